@@ -1,0 +1,157 @@
+//! Axis-aligned boxes: what every builder, search and cost sees of an object.
+
+use glam::{DVec3, Vec3};
+
+/// An axis-aligned bounding box in world units. Zero extents are legal; see [`Aabb::EMPTY`] for 'no box at all'.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Aabb {
+    /// Lower corner.
+    pub min: Vec3,
+    /// Upper corner, not below `min` in any component unless the box is empty.
+    pub max: Vec3,
+}
+
+impl Aabb {
+    /// The neutral element of [`union`](Aabb::union): contains nothing, area 0 by definition.
+    pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+
+    /// The smallest box around `points`, [`Aabb::EMPTY`] when there are none.
+    pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
+        points.into_iter().fold(Self::EMPTY, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
+    }
+
+    /// The smallest box around both.
+    #[inline]
+    #[must_use]
+    pub fn union(&self, other: &Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Half of the surface area, xy + yz + zx, in world units squared; 0 for an empty box.
+    ///
+    /// Coordinates are promoted to f64 *before* they are subtracted, so any two finite f32 coordinates give a
+    /// finite area, and scaling by a power of two scales the area exactly. Monotone: a box inside another never
+    /// has the larger area, rounding included.
+    #[inline]
+    pub fn half_area(&self) -> f64 {
+        let d = self.extent();
+        if d.cmplt(DVec3::ZERO).any() { 0.0 } else { d.x * d.y + d.y * d.z + d.z * d.x }
+    }
+
+    /// Side lengths in world units; negative infinity for an empty box.
+    #[inline]
+    pub fn extent(&self) -> DVec3 {
+        self.max.as_dvec3() - self.min.as_dvec3()
+    }
+
+    /// *Twice* the centre of the box. Exact for coordinates of similar magnitude and never out of range, which
+    /// is why sort keys use it in place of the centre; `+0` is added so that −0 and +0 are one key.
+    #[inline]
+    pub fn doubled_centroid(&self) -> DVec3 {
+        self.min.as_dvec3() + self.max.as_dvec3() + DVec3::ZERO
+    }
+
+    /// Whether `other` lies inside this box, borders included, compared bit by bit without tolerance.
+    /// Everything contains an empty box.
+    #[inline]
+    pub fn contains(&self, other: &Self) -> bool {
+        self.min.cmple(other.min).all() && self.max.cmpge(other.max).all()
+    }
+
+    /// The axis (0, 1 or 2) of the largest extent; the lowest such axis on ties.
+    pub fn longest_axis(&self) -> usize {
+        let d = self.extent();
+        let mut axis = 0;
+        for candidate in 1..3 {
+            if d[candidate] > d[axis] {
+                axis = candidate;
+            }
+        }
+        axis
+    }
+
+    /// Whether the box is one an object may have: finite, and `min` not above `max`.
+    pub fn check(&self) -> Result<(), InvalidBoxReason> {
+        if !(self.min.is_finite() && self.max.is_finite()) {
+            Err(InvalidBoxReason::NotFinite)
+        } else if self.min.cmpgt(self.max).any() {
+            Err(InvalidBoxReason::Inverted)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+impl From<([f32; 3], [f32; 3])> for Aabb {
+    fn from((min, max): ([f32; 3], [f32; 3])) -> Self {
+        Self { min: min.into(), max: max.into() }
+    }
+}
+
+/// Why a box cannot be an object's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InvalidBoxReason {
+    /// A coordinate is NaN or infinite.
+    #[error("has a coordinate that is not finite")]
+    NotFinite,
+    /// Some component of `min` exceeds that of `max`.
+    #[error("has min above max")]
+    Inverted,
+}
+
+/// An object's box that was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the box of object {index} {reason}")]
+pub struct InvalidBox {
+    /// Index of the object.
+    pub index: usize,
+    /// What is wrong with its box.
+    pub reason: InvalidBoxReason,
+}
+
+/// Checks every object's box, in O(n); names the first offender.
+pub fn check_boxes(boxes: &[Aabb]) -> Result<(), InvalidBox> {
+    for (index, b) in boxes.iter().enumerate() {
+        b.check().map_err(|reason| InvalidBox { index, reason })?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_empty_box_is_neutral_and_has_no_area() {
+        let b = Aabb::from(([-1.0, 0.0, 2.0], [3.0, 0.5, 2.0]));
+        assert_eq!(Aabb::EMPTY.union(&b), b);
+        assert_eq!(Aabb::EMPTY.half_area(), 0.0);
+        assert!(b.contains(&Aabb::EMPTY));
+    }
+
+    #[test]
+    fn the_area_of_the_largest_finite_box_is_finite() {
+        let b = Aabb { min: Vec3::splat(f32::MIN), max: Vec3::splat(f32::MAX) };
+        assert!(b.half_area().is_finite() && b.doubled_centroid().is_finite());
+    }
+
+    #[test]
+    fn refused_boxes_are_named_by_index() {
+        let good = Aabb::from(([0.0; 3], [1.0; 3]));
+        for (bad, reason) in [
+            (Aabb::from(([0.0, f32::NAN, 0.0], [1.0; 3])), InvalidBoxReason::NotFinite),
+            (Aabb::from(([0.0; 3], [1.0, f32::INFINITY, 1.0])), InvalidBoxReason::NotFinite),
+            (Aabb::from(([0.0, 2.0, 0.0], [1.0; 3])), InvalidBoxReason::Inverted),
+            (Aabb::EMPTY, InvalidBoxReason::NotFinite),
+        ] {
+            assert_eq!(check_boxes(&[good, bad, bad]), Err(InvalidBox { index: 1, reason }));
+        }
+    }
+
+    #[test]
+    fn the_longest_axis_is_the_lowest_on_ties() {
+        assert_eq!(Aabb::from(([0.0; 3], [1.0, 2.0, 2.0])).longest_axis(), 1);
+        assert_eq!(Aabb::from(([0.0; 3], [1.0; 3])).longest_axis(), 0);
+    }
+}

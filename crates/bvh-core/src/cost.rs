@@ -1,0 +1,178 @@
+//! Every cost the workspace reports, each a documented formula, in f64.
+//!
+//! Areas are *half* surface areas in world units squared, from coordinates promoted to f64 before subtraction.
+//! Sums are compensated, so that a cost does not depend on the order of the nodes beyond its last bit or two.
+//! Costs that are divided by the root's area are 0 by definition when that area is 0.
+
+use crate::{Bvh, NodeKind};
+
+/// Which cost a search minimises and a row of results reports as `cost`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum Objective {
+    /// [`internal_area`], the paper's objective.
+    #[default]
+    InternalArea,
+    /// [`goldsmith_salmon`].
+    GoldsmithSalmon,
+    /// [`sah`] with the given constants.
+    Sah(SahConstants),
+}
+
+impl Objective {
+    /// The cost of `tree` under this objective, in O(nodes).
+    pub fn cost(&self, tree: &Bvh) -> f64 {
+        match self {
+            Self::InternalArea => internal_area(tree),
+            Self::GoldsmithSalmon => goldsmith_salmon(tree),
+            Self::Sah(constants) => sah(tree, constants),
+        }
+    }
+}
+
+/// The constants of the surface area heuristic, in any common unit of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields, default)
+)]
+pub struct SahConstants {
+    /// Cost of visiting an inner node. Default 1.
+    pub traversal: f64,
+    /// Cost of testing one object. Default 1.
+    pub intersection: f64,
+}
+
+impl Default for SahConstants {
+    fn default() -> Self {
+        Self { traversal: 1.0, intersection: 1.0 }
+    }
+}
+
+/// The paper's objective: the total half area of all inner nodes' boxes, root included, leaves excluded, in
+/// world units squared. Compare it only within a scene. O(nodes).
+///
+/// Source: Ng & Trifonov 2003, section 3.3. Differs from the paper: half areas in place of whole ones, as
+/// its own implementation does (section 3.2).
+pub fn internal_area(tree: &Bvh) -> f64 {
+    tree.nodes.iter().filter(|node| !node.is_leaf()).map(|node| node.aabb.half_area()).collect::<Sum>().value()
+}
+
+/// The Goldsmith–Salmon cost: Σ over inner nodes of S(node) / S(root) · number of children. Dimensionless: the
+/// expected number of boxes below the root that a random line through the root's box is tested against. O(nodes).
+///
+/// Source: Goldsmith & Salmon 1987; Ng & Trifonov 2003, section 1.
+pub fn goldsmith_salmon(tree: &Bvh) -> f64 {
+    let total: Sum =
+        tree.nodes.iter().map(|node| node.aabb.half_area() * node.children().len() as f64).collect();
+    over_root_area(tree, total.value())
+}
+
+/// The surface area heuristic: traversal · Σ inner S/S(root) + intersection · Σ leaves S/S(root) · objects.
+/// Dimensionless multiple of the constants' unit: expected time per random line through the root's box. O(nodes).
+///
+/// Source: MacDonald & Booth 1990.
+pub fn sah(tree: &Bvh, constants: &SahConstants) -> f64 {
+    let total: Sum = tree
+        .nodes
+        .iter()
+        .map(|node| {
+            node.aabb.half_area()
+                * match node.kind() {
+                    NodeKind::Inner { .. } => constants.traversal,
+                    NodeKind::Leaf { count, .. } => constants.intersection * f64::from(count),
+                }
+        })
+        .collect();
+    over_root_area(tree, total.value())
+}
+
+/// `area` divided by the half area of the root's box; 0 when that area is 0 or the tree is empty.
+pub fn over_root_area(tree: &Bvh, area: f64) -> f64 {
+    let root = tree.root_aabb().map_or(0.0, |aabb| aabb.half_area());
+    if root > 0.0 { area / root } else { 0.0 }
+}
+
+/// A compensated sum (Neumaier 1974): as accurate as if added in twice the precision.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sum {
+    total: f64,
+    lost: f64,
+}
+
+impl Sum {
+    /// Adds one term.
+    #[inline]
+    pub fn add(&mut self, term: f64) {
+        let total = self.total + term;
+        self.lost += if self.total.abs() >= term.abs() {
+            (self.total - total) + term
+        } else {
+            (term - total) + self.total
+        };
+        self.total = total;
+    }
+
+    /// The sum so far.
+    #[inline]
+    pub fn value(&self) -> f64 {
+        self.total + self.lost
+    }
+}
+
+impl FromIterator<f64> for Sum {
+    fn from_iter<I: IntoIterator<Item = f64>>(terms: I) -> Self {
+        let mut sum = Self::default();
+        terms.into_iter().for_each(|term| sum.add(term));
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Aabb, Node};
+    use alloc::{vec, vec::Vec};
+
+    /// Unit cubes at x = 0 and x = 2 under one root of half area 7.
+    fn two_cubes() -> Bvh {
+        let boxes = [Aabb::from(([0.0; 3], [1.0; 3])), Aabb::from(([2.0, 0.0, 0.0], [3.0, 1.0, 1.0]))];
+        let root = Node::inner(boxes[0].union(&boxes[1]), 1, 2);
+        Bvh { nodes: vec![root, Node::leaf(boxes[0], 0, 1), Node::leaf(boxes[1], 1, 1)], prim_ids: vec![0, 1] }
+    }
+
+    #[test]
+    fn two_cubes_cost_what_the_hand_computes() {
+        let tree = two_cubes();
+        assert_eq!(sah(&tree, &SahConstants::default()), 1.0 + 6.0 / 7.0);
+        assert_eq!(sah(&tree, &SahConstants { traversal: 2.0, intersection: 0.0 }), 2.0);
+        assert_eq!(internal_area(&tree), 7.0);
+        assert_eq!(goldsmith_salmon(&tree), 2.0);
+    }
+
+    #[test]
+    fn trees_without_inner_nodes_or_area_cost_nothing() {
+        let point = Aabb::from(([1.0; 3], [1.0; 3]));
+        let flat = Bvh {
+            nodes: vec![Node::inner(point, 1, 2), Node::leaf(point, 0, 1), Node::leaf(point, 1, 1)],
+            prim_ids: vec![0, 1],
+        };
+        let single = Bvh { nodes: vec![Node::leaf(point, 0, 1)], prim_ids: vec![0] };
+        for tree in [Bvh::default(), single, flat] {
+            for objective in
+                [Objective::InternalArea, Objective::GoldsmithSalmon, Objective::Sah(SahConstants::default())]
+            {
+                assert_eq!(objective.cost(&tree), 0.0, "{objective:?} of {tree:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_sum_does_not_depend_on_the_order_of_its_terms() {
+        let terms: Vec<f64> = (0..1000).map(|i| f64::from(i * i % 997) * 10f64.powi(i % 30)).collect();
+        let forwards: Sum = terms.iter().copied().collect();
+        let backwards: Sum = terms.iter().rev().copied().collect();
+        assert_eq!(forwards.value(), backwards.value());
+    }
+}

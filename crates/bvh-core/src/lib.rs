@@ -1,0 +1,36 @@
+//! Bounding volume hierarchies: the one tree type, its boxes, its costs and its validity.
+//!
+//! Everything in the workspace builds, searches, traces and saves the one [`Bvh`] of this crate, and every
+//! reported number comes from its [`cost`] module. The crate does no input or output, reads no clock, draws no
+//! random numbers and needs only `alloc`.
+//!
+//! ```
+//! use bvh_core::{Aabb, Bvh, Node, cost};
+//! // Two unit cubes, two apart, under one root.
+//! let boxes = [Aabb::from(([0.0; 3], [1.0; 3])), Aabb::from(([2.0, 0.0, 0.0], [3.0, 1.0, 1.0]))];
+//! let tree = Bvh {
+//!     nodes: vec![
+//!         Node::inner(boxes[0].union(&boxes[1]), 1, 2),
+//!         Node::leaf(boxes[0], 0, 1),
+//!         Node::leaf(boxes[1], 1, 1),
+//!     ],
+//!     prim_ids: vec![0, 1],
+//! };
+//! bvh_core::validate(&tree, &boxes)?;
+//! assert_eq!(cost::internal_area(&tree), 7.0);
+//! # Ok::<(), bvh_core::InvalidBvh>(())
+//! ```
+#![cfg_attr(not(feature = "std"), no_std)]
+
+extern crate alloc;
+
+mod aabb;
+mod bvh;
+pub mod cost;
+mod packed;
+mod validate;
+
+pub use aabb::{Aabb, InvalidBox, InvalidBoxReason, check_boxes};
+pub use bvh::{Bvh, MAX_OBJECTS, Node, NodeKind};
+pub use packed::PackedAabb;
+pub use validate::{InvalidBvh, validate};

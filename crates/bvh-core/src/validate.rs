@@ -1,0 +1,159 @@
+//! The one validator: says whether a tree is one, and over the objects it claims.
+
+use crate::{Aabb, Bvh, MAX_OBJECTS, NodeKind};
+
+/// Why a tree was refused. Nodes and objects are named by index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs)] // the fields are the indices that the messages name
+pub enum InvalidBvh {
+    /// The tree was built for another number of objects.
+    #[error("the tree names {named} objects but the scene has {objects}")]
+    ObjectCount { named: usize, objects: usize },
+    /// Counts and indices are 31 bits wide.
+    #[error("{objects} objects are more than the {MAX_OBJECTS} a tree can hold")]
+    TooManyObjects { objects: usize },
+    /// Objects without nodes, or nodes without objects.
+    #[error("the tree has {nodes} nodes over {objects} objects")]
+    NodeCount { nodes: usize, objects: usize },
+    /// Children must follow their parent and lie inside the array, two at least.
+    #[error("inner node {node} names children {first}..{first}+{count}, of {nodes} nodes")]
+    BadChildren { node: usize, first: u32, count: u32, nodes: usize },
+    /// A leaf's range must be non-empty and inside `prim_ids`.
+    #[error("leaf {node} names objects {first}..{first}+{count}, of {objects}")]
+    BadLeaf { node: usize, first: u32, count: u32, objects: usize },
+    /// A node that no parent or more than one parent names.
+    #[error("node {node} has {parents} parents")]
+    Parents { node: usize, parents: u32 },
+    /// An object id outside the scene.
+    #[error("leaf {node} names object {object}, of {objects}")]
+    BadObject { node: usize, object: u32, objects: usize },
+    /// An object in no leaf or in several.
+    #[error("object {object} is in {leaves} leaves")]
+    Leaves { object: usize, leaves: u32 },
+    /// A child's box that is not inside its parent's.
+    #[error("node {child} is not inside its parent {node}")]
+    ChildOutside { node: usize, child: usize },
+    /// An object's box that is not inside its leaf's.
+    #[error("object {object} is not inside its leaf {node}")]
+    ObjectOutside { node: usize, object: usize },
+}
+
+/// Checks that `tree` is a tree over exactly the objects of `boxes`: every node reached once, every object in
+/// exactly one leaf, every box inside its parent's bit by bit. O(nodes + objects), no recursion; safe on any bits.
+pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
+    let (nodes, objects) = (tree.nodes.len(), boxes.len());
+    if objects > MAX_OBJECTS {
+        return Err(InvalidBvh::TooManyObjects { objects });
+    }
+    if tree.prim_ids.len() != objects {
+        return Err(InvalidBvh::ObjectCount { named: tree.prim_ids.len(), objects });
+    }
+    if (nodes == 0) != (objects == 0) || nodes > 2 * objects {
+        return Err(InvalidBvh::NodeCount { nodes, objects });
+    }
+    let mut parents = alloc::vec![0u32; nodes];
+    let mut leaves = alloc::vec![0u32; objects];
+    for (index, node) in tree.nodes.iter().enumerate() {
+        match node.kind() {
+            NodeKind::Inner { first, count } => {
+                let range = node.children();
+                // Children after parents: together with one parent each this excludes cycles.
+                if count < 2 || range.start <= index || range.end > nodes {
+                    return Err(InvalidBvh::BadChildren { node: index, first, count, nodes });
+                }
+                for child in range {
+                    parents[child] += 1;
+                    if !node.aabb.contains(&tree.nodes[child].aabb) {
+                        return Err(InvalidBvh::ChildOutside { node: index, child });
+                    }
+                }
+            }
+            NodeKind::Leaf { first, count } => {
+                let range = node.prims();
+                if count < 1 || range.end > objects {
+                    return Err(InvalidBvh::BadLeaf { node: index, first, count, objects });
+                }
+                for &object in &tree.prim_ids[range] {
+                    let Some(aabb) = boxes.get(object as usize) else {
+                        return Err(InvalidBvh::BadObject { node: index, object, objects });
+                    };
+                    leaves[object as usize] += 1;
+                    if !node.aabb.contains(aabb) {
+                        return Err(InvalidBvh::ObjectOutside { node: index, object: object as usize });
+                    }
+                }
+            }
+        }
+    }
+    for (node, &parents) in parents.iter().enumerate() {
+        if parents != u32::from(node != 0) {
+            return Err(InvalidBvh::Parents { node, parents });
+        }
+    }
+    match leaves.iter().position(|&leaves| leaves != 1) {
+        Some(object) => Err(InvalidBvh::Leaves { object, leaves: leaves[object] }),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Node;
+    use alloc::{vec, vec::Vec};
+
+    fn cube(x: f32) -> Aabb {
+        Aabb::from(([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]))
+    }
+
+    fn valid() -> (Bvh, Vec<Aabb>) {
+        let boxes = vec![cube(0.0), cube(2.0), cube(4.0)];
+        let right = boxes[1].union(&boxes[2]);
+        let nodes = vec![
+            Node::inner(boxes[0].union(&right), 1, 2),
+            Node::leaf(boxes[0], 0, 1),
+            Node::inner(right, 3, 2),
+            Node::leaf(boxes[1], 1, 1),
+            Node::leaf(boxes[2], 2, 1),
+        ];
+        (Bvh { nodes, prim_ids: vec![0, 1, 2] }, boxes)
+    }
+
+    #[test]
+    fn a_valid_tree_and_the_empty_tree_pass() {
+        let (tree, boxes) = valid();
+        assert_eq!(validate(&tree, &boxes), Ok(()));
+        assert_eq!(validate(&Bvh::default(), &[]), Ok(()));
+    }
+
+    #[test]
+    fn every_kind_of_damage_is_named() {
+        type Damage = fn(&mut Bvh);
+        let cases: [(Damage, InvalidBvh); 10] = [
+            (|t| t.prim_ids.truncate(2), InvalidBvh::ObjectCount { named: 2, objects: 3 }),
+            (|t| t.nodes.clear(), InvalidBvh::NodeCount { nodes: 0, objects: 3 }),
+            (
+                |t| t.nodes[2] = Node::inner(t.nodes[2].aabb, 2, 2),
+                InvalidBvh::BadChildren { node: 2, first: 2, count: 2, nodes: 5 },
+            ),
+            (
+                |t| t.nodes[2] = Node::inner(t.nodes[2].aabb, 4, 2),
+                InvalidBvh::BadChildren { node: 2, first: 4, count: 2, nodes: 5 },
+            ),
+            (
+                |t| t.nodes[4] = Node::leaf(t.nodes[4].aabb, 2, 2),
+                InvalidBvh::BadLeaf { node: 4, first: 2, count: 2, objects: 3 },
+            ),
+            (|t| t.nodes[0] = Node::leaf(t.nodes[0].aabb, 0, 1), InvalidBvh::Parents { node: 1, parents: 0 }),
+            (|t| t.prim_ids[1] = 3, InvalidBvh::BadObject { node: 3, object: 3, objects: 3 }),
+            (|t| t.nodes[4] = Node::leaf(cube(2.0), 1, 1), InvalidBvh::Leaves { object: 1, leaves: 2 }),
+            (|t| t.nodes[0].aabb.max.x = 4.5, InvalidBvh::ChildOutside { node: 0, child: 2 }),
+            (|t| t.nodes[4].aabb.min.y = 0.5, InvalidBvh::ObjectOutside { node: 4, object: 2 }),
+        ];
+        for (damage, expected) in cases {
+            let (mut tree, boxes) = valid();
+            damage(&mut tree);
+            assert_eq!(validate(&tree, &boxes), Err(expected));
+        }
+    }
+}

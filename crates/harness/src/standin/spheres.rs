@@ -1,0 +1,74 @@
+//! Spheres for the ray tracing rows: the document's 75, and the same picture with more and smaller ones.
+//!
+//! Centres follow Roberts' (2018) additive recurrence on the plastic-number generalization of the golden ratio,
+//! which keeps any number of points evenly apart without a grid. Differs from the document: it gives no positions.
+
+use super::patch::jitter;
+use glam::{DVec3, Vec3};
+
+/// A sphere in world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// Centre.
+    pub center: Vec3,
+    /// Radius, above 0.
+    pub radius: f32,
+}
+
+/// Half the size of the box that holds the centres: about 16:9 seen along the z axis, centred at the origin.
+const HALF_SIZE: DVec3 = DVec3::new(8.0, 4.5, 5.0);
+
+/// `count` spheres whose centres fill the box |x| <= 8, |y| <= 4.5, |z| <= 5 at every count. Radii vary by a factor
+/// of 4 and shrink with the cube root of `count`, so that the volume taken is the same; spheres hardly touch.
+/// The same bytes at every call and on every machine. O(count).
+pub fn spheres(count: usize) -> Vec<Sphere> {
+    // 1/g, 1/g², 1/g³ for the real root g of g⁴ = g + 1.
+    let steps = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_2);
+    let volume = 8.0 * HALF_SIZE.x * HALF_SIZE.y * HALF_SIZE.z;
+    let spacing = libm::cbrt(volume / count as f64);
+    (0..count)
+        .map(|i| {
+            let unit = (steps * i as f64 + DVec3::splat(0.5)).map(|x| x - x.floor());
+            // Many small, few large: the square of an even draw.
+            let draw = 0.5 + 0.5 * jitter(11, i);
+            let radius = spacing * (0.12 + 0.36 * draw * draw);
+            Sphere { center: ((unit * 2.0 - DVec3::ONE) * HALF_SIZE).as_vec3(), radius: radius as f32 }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUNTS: [usize; 4] = [1, 75, 750, 7500];
+
+    #[test]
+    fn every_count_gives_that_many_finite_spheres_inside_the_region() {
+        assert!(spheres(0).is_empty());
+        for count in COUNTS {
+            let spheres = spheres(count);
+            assert_eq!(spheres.len(), count);
+            for sphere in spheres {
+                assert!(sphere.radius > 0.0 && sphere.radius.is_finite(), "{count}: {sphere:?}");
+                assert!(sphere.center.abs().cmple(HALF_SIZE.as_vec3()).all(), "{count}: {sphere:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_sphere_holds_the_centre_of_another_and_few_touch() {
+        for count in [75, 750] {
+            let spheres = spheres(count);
+            let mut touching = 0;
+            for (i, a) in spheres.iter().enumerate() {
+                for b in &spheres[..i] {
+                    let distance = a.center.distance(b.center);
+                    assert!(distance > a.radius.max(b.radius), "{count}: {a:?} {b:?}");
+                    touching += usize::from(distance < a.radius + b.radius);
+                }
+            }
+            assert!(touching * 5 < count, "{touching} of {count}");
+        }
+    }
+}
