@@ -7,7 +7,7 @@
 
 use crate::Presorted;
 use crate::evaluation::Evaluation;
-use crate::sweep::{Split, SplitRule, Sweep};
+use crate::sweep::{Block, SplitRule, Sweep, union_of};
 use bvh_core::{Aabb, Bvh, Node, PackedAabb};
 use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
 
@@ -19,11 +19,17 @@ pub const PARALLEL_OBJECTS: usize = 4096;
 #[derive(Debug, Default)]
 pub struct Workspace {
     orders: [Vec<u32>; 2],
-    scratch: Vec<u32>,
-    right: Vec<f64>,
     /// Per object: 1 while it goes to the left. Atomic because parallel subtrees share the array, if no entry;
     /// relaxed accesses compile to plain ones.
     goes_left: Vec<AtomicU8>,
+    scratch: Scratch,
+}
+
+/// Buffers of one task.
+#[derive(Debug, Default)]
+struct Scratch {
+    goes_right: Vec<u32>,
+    blocks: [Vec<Block>; 3],
     stack: Vec<Frame>,
 }
 
@@ -34,24 +40,27 @@ struct Frame {
     start: u32,
     /// Number of objects, at least 2.
     len: u32,
-    /// The node's own index in the task's block.
-    node: u32,
-    /// First node of the descendants' block, relative to the task's.
+    /// First of the two children's nodes, relative to the task's block.
     below: u32,
+    known: Known,
+}
+
+/// What is known of a node before it is divided.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    aabb: PackedAabb,
+    /// Per axis, the lowest axis known to order the objects identically, usually itself.
     same_as: [u8; 3],
 }
 
-/// A subtree that can be built on its own: exclusive parts of all arrays.
+/// A subtree that can be built on its own, below a node already written: exclusive parts of all arrays.
 struct Task<'a> {
-    node: &'a mut Node,
     /// The descendants' block, 2·objects − 2 nodes, and its place in the whole tree.
     below: &'a mut [Node],
     below_at: u32,
     objects_at: u32,
     orders: [&'a mut [u32]; 3],
-    scratch: &'a mut [u32],
-    right: &'a mut [f64],
-    same_as: [u8; 3],
+    known: Known,
 }
 
 /// What all tasks of a build share.
@@ -73,12 +82,9 @@ pub fn divide<E: Evaluation, R: SplitRule>(
     workspace: &mut Workspace,
     tree: &mut Bvh,
 ) {
-    let Workspace { stack, .. } = workspace;
-    let mut stack = std::mem::take(stack);
-    if let Some((shared, task)) = prepare(scene, evaluation, skip_same_order, workspace, tree) {
-        build(&shared, task, rule, &mut stack);
+    if let Some((shared, task, scratch)) = prepare(scene, evaluation, skip_same_order, workspace, tree) {
+        build(&shared, task, rule, scratch);
     }
-    workspace.stack = stack;
 }
 
 /// As [`divide`], on the threads of the current rayon pool, into the same bytes: `rule` must have no memory.
@@ -97,104 +103,103 @@ pub fn divide_parallel<E: Evaluation, R: SplitRule + Copy + Send + Sync>(
         mut task: Task<'s>,
         mut rule: R,
     ) {
+        let mut scratch = Scratch::default();
         // A loop, not a recursion: one side goes to the pool, the other stays, however unbalanced the splits.
-        while task.orders[0].len() >= PARALLEL_OBJECTS {
-            let (left, right) = split_task(shared, task, &mut rule);
+        while task.objects() >= PARALLEL_OBJECTS {
+            let (left, right) = split_task(shared, task, &mut rule, &mut scratch);
             let (larger, smaller) =
-                if left.orders[0].len() > right.orders[0].len() { (left, right) } else { (right, left) };
-            if smaller.orders[0].len() >= PARALLEL_OBJECTS {
+                if left.objects() > right.objects() { (left, right) } else { (right, left) };
+            if smaller.objects() >= PARALLEL_OBJECTS {
                 scope.spawn(move |scope| spawn(scope, shared, smaller, rule));
             } else {
-                build(shared, smaller, &mut rule, &mut Vec::new());
+                build(shared, smaller, &mut rule, &mut scratch);
             }
             task = larger;
         }
-        build(shared, task, &mut rule, &mut Vec::new());
+        build(shared, task, &mut rule, &mut scratch);
     }
-    if let Some((shared, task)) = prepare(scene, evaluation, skip_same_order, workspace, tree) {
+    if let Some((shared, task, _)) = prepare(scene, evaluation, skip_same_order, workspace, tree) {
         let shared = &shared;
         rayon::scope(|scope| spawn(scope, shared, task, rule));
     }
 }
 
-/// Sizes all arrays and cuts them into the root's task; `None` for the scene without objects.
+/// Sizes all arrays, writes the root, and cuts the arrays into its task; `None` for the scene without objects.
 fn prepare<'a, E>(
     scene: &'a Presorted,
     evaluation: &'a E,
     skip_same_order: bool,
     workspace: &'a mut Workspace,
     tree: &'a mut Bvh,
-) -> Option<(Shared<'a, E>, Task<'a>)> {
+) -> Option<(Shared<'a, E>, Task<'a>, &'a mut Scratch)> {
     let n = scene.len();
+    let Workspace { orders: [y, z], goes_left, scratch } = workspace;
     tree.prim_ids.clone_from(&scene.orders[0]);
-    tree.nodes.resize((2 * n).saturating_sub(1), Node::leaf(Aabb::EMPTY, 0, 0));
-    let [y, z] = &mut workspace.orders;
     y.clone_from(&scene.orders[1]);
     z.clone_from(&scene.orders[2]);
-    workspace.scratch.resize(n, 0);
-    workspace.right.resize(n, 0.0);
-    workspace.goes_left.resize_with(n, AtomicU8::default);
-    let (node, below) = tree.nodes.split_first_mut()?;
-    let shared =
-        Shared { boxes: &scene.boxes, evaluation, goes_left: &workspace.goes_left[..n], skip_same_order };
-    let task = Task {
-        node,
-        below,
-        below_at: 1,
-        objects_at: 0,
-        orders: [&mut tree.prim_ids, y, z],
-        scratch: &mut workspace.scratch[..n],
-        right: &mut workspace.right[..n],
-        same_as: [0, 1, 2],
-    };
-    Some((shared, task))
+    goes_left.resize_with(n, AtomicU8::default);
+    tree.nodes.resize((2 * n).saturating_sub(1), Node::leaf(Aabb::EMPTY, 0, 0));
+    let (root, below) = tree.nodes.split_first_mut()?;
+    let aabb = union_of(&scene.boxes, &tree.prim_ids);
+    *root = if n == 1 { Node::leaf((&aabb).into(), 0, 1) } else { Node::inner((&aabb).into(), 1, 2) };
+    let shared = Shared { boxes: &scene.boxes, evaluation, goes_left, skip_same_order };
+    let known = Known { aabb, same_as: [0, 1, 2] };
+    Some((
+        shared,
+        Task { below, below_at: 1, objects_at: 0, orders: [&mut tree.prim_ids, y, z], known },
+        scratch,
+    ))
 }
 
-/// Divides the task's root and returns both sides as tasks.
+impl Task<'_> {
+    fn objects(&self) -> usize {
+        self.orders[0].len()
+    }
+}
+
+/// Divides the task's node, of two or more objects, writes its children and returns them as tasks.
 #[cfg(feature = "rayon")]
 fn split_task<'a, E: Evaluation, R: SplitRule>(
     shared: &Shared<'_, E>,
-    mut task: Task<'a>,
+    task: Task<'a>,
     rule: &mut R,
+    scratch: &mut Scratch,
 ) -> (Task<'a>, Task<'a>) {
-    let [x, y, z] = &mut task.orders;
-    let (aabb, left, same_as) =
-        split_node_fast(shared, [x, y, z], task.same_as, task.scratch, task.right, rule);
-    *task.node = Node::inner((&aabb).into(), task.below_at, 2);
-    let (children, below) = task.below.split_at_mut(2);
-    let (first, second) = children.split_at_mut(1);
+    let Task { below, below_at, objects_at, orders: [x, y, z], known } = task;
+    let (left, [known_left, known_right]) = split_node_fast(shared, [x, y, z], known, rule, scratch);
+    let (children, below) = below.split_at_mut(2);
     let (below_left, below_right) = below.split_at_mut(2 * left - 2);
-    let [x, y, z] = task.orders.map(|order| order.split_at_mut(left));
-    let (scratch_left, scratch_right) = task.scratch.split_at_mut(left);
-    let (right_left, right_right) = task.right.split_at_mut(left);
-    (
+    let [x, y, z] = [x, y, z].map(|order| order.split_at_mut(left));
+    let sides = [
         Task {
-            node: &mut first[0],
             below: below_left,
-            below_at: task.below_at + 2,
-            objects_at: task.objects_at,
+            below_at: below_at + 2,
+            objects_at,
             orders: [x.0, y.0, z.0],
-            scratch: scratch_left,
-            right: right_left,
-            same_as,
+            known: known_left,
         },
         Task {
-            node: &mut second[0],
             below: below_right,
-            below_at: task.below_at + 2 * left as u32,
-            objects_at: task.objects_at + left as u32,
+            below_at: below_at + 2 * left as u32,
+            objects_at: objects_at + left as u32,
             orders: [x.1, y.1, z.1],
-            scratch: scratch_right,
-            right: right_right,
-            same_as,
+            known: known_right,
         },
-    )
+    ];
+    for (child, side) in children.iter_mut().zip(&sides) {
+        let aabb = (&side.known.aabb).into();
+        *child = match side.objects() {
+            1 => Node::leaf(aabb, side.objects_at, 1),
+            _ => Node::inner(aabb, side.below_at, 2),
+        };
+    }
+    sides.into()
 }
 
 macro_rules! with_vector_instructions {
-    ($(#[$doc:meta])* $fast:ident = $plain:ident <$($generic:ident: $bound:ident),*>
+    ($(#[$attribute:meta])* $fast:ident = $plain:ident <$($generic:ident: $bound:ident),*>
         ($($name:ident: $type:ty),* $(,)?) $(-> $result:ty)?) => {
-        $(#[$doc])*
+        $(#[$attribute])*
         fn $fast<$($generic: $bound),*>($($name: $type),*) $(-> $result)? {
             #[cfg(target_arch = "x86_64")]
             {
@@ -216,76 +221,69 @@ with_vector_instructions! {
     /// [`build_plain`], compiled a second time for processors with AVX2, where a box is one register: about a third
     /// off the time of a build. Same operations in the same order, none fused, hence the same bits.
     build = build_plain<E: Evaluation, R: SplitRule>(
-        shared: &Shared<'_, E>, task: Task<'_>, rule: &mut R, stack: &mut Vec<Frame>)
+        shared: &Shared<'_, E>, task: Task<'_>, rule: &mut R, scratch: &mut Scratch)
 }
 
-#[cfg(feature = "rayon")]
 with_vector_instructions! {
     /// [`split_node`], likewise.
+    #[cfg(feature = "rayon")]
     split_node_fast = split_node<E: Evaluation, R: SplitRule>(
-        shared: &Shared<'_, E>, orders: [&mut [u32]; 3], same_as: [u8; 3], scratch: &mut [u32], right: &mut [f64],
-        rule: &mut R) -> (PackedAabb, usize, [u8; 3])
+        shared: &Shared<'_, E>, orders: [&mut [u32]; 3], known: Known, rule: &mut R, scratch: &mut Scratch)
+        -> (usize, [Known; 2])
 }
 
-/// Builds a task's whole subtree with an explicit stack, the left child first.
+/// Builds everything below a task's node with an explicit stack, the left child first.
 #[inline(always)]
 fn build_plain<E: Evaluation, R: SplitRule>(
     shared: &Shared<'_, E>,
     task: Task<'_>,
     rule: &mut R,
-    stack: &mut Vec<Frame>,
+    scratch: &mut Scratch,
 ) {
-    let Task { node: root, below, below_at, objects_at, orders: [x, y, z], scratch, right, same_as } = task;
-    let leaf =
-        |x: &[u32], at: u32| Node::leaf((&shared.boxes[x[at as usize] as usize]).into(), objects_at + at, 1);
-    if x.len() == 1 {
-        *root = leaf(x, 0);
-        return;
+    let Task { below: nodes, below_at, objects_at, orders: [x, y, z], known } = task;
+    let mut stack = std::mem::take(&mut scratch.stack);
+    if x.len() > 1 {
+        stack.push(Frame { start: 0, len: x.len() as u32, below: 0, known });
     }
-    const ROOT: u32 = u32::MAX;
-    stack.clear();
-    stack.push(Frame { start: 0, len: x.len() as u32, node: ROOT, below: 0, same_as });
-    while let Some(Frame { start, len, node, below: block, same_as }) = stack.pop() {
+    while let Some(Frame { start, len, below, known }) = stack.pop() {
         let range = start as usize..(start + len) as usize;
-        let (aabb, left, same_as) = if len == 2 {
-            let pair = &x[range];
-            (shared.boxes[pair[0] as usize].union(&shared.boxes[pair[1] as usize]), 1, same_as)
-        } else {
-            let orders = [&mut x[range.clone()], &mut y[range.clone()], &mut z[range.clone()]];
-            split_node(shared, orders, same_as, &mut scratch[range.clone()], &mut right[range], rule)
-        };
-        let inner = Node::inner((&aabb).into(), below_at + block, 2);
-        if node == ROOT {
-            *root = inner
-        } else {
-            below[node as usize] = inner
+        if len == 2 {
+            for (at, &object) in x[range].iter().enumerate() {
+                let aabb = (&shared.boxes[object as usize]).into();
+                nodes[below as usize + at] = Node::leaf(aabb, objects_at + start + at as u32, 1);
+            }
+            continue;
         }
+        let orders = [&mut x[range.clone()], &mut y[range.clone()], &mut z[range]];
+        let (left, known) = split_node(shared, orders, known, rule, scratch);
         let left = left as u32;
         let sides = [
-            Frame { start, len: left, node: block, below: block + 2, same_as },
-            Frame { start: start + left, len: len - left, node: block + 1, below: block + 2 * left, same_as },
+            Frame { start, len: left, below: below + 2, known: known[0] },
+            Frame { start: start + left, len: len - left, below: below + 2 * left, known: known[1] },
         ];
-        for side in sides.into_iter().rev() {
-            if side.len == 1 {
-                below[side.node as usize] = leaf(x, side.start);
+        for (at, side) in sides.into_iter().enumerate().rev() {
+            let aabb = (&side.known.aabb).into();
+            nodes[below as usize + at] = if side.len == 1 {
+                Node::leaf(aabb, objects_at + side.start, 1)
             } else {
                 stack.push(side);
-            }
+                Node::inner(aabb, below_at + side.below, 2)
+            };
         }
     }
+    scratch.stack = stack;
 }
 
-/// Lets the rule split a node of two or more objects and partitions its lists. Returns the node's box, the number
-/// of objects on the left, and what is known of identical orders.
+/// Lets the rule split a node of two or more objects and partitions its lists. Returns the number of objects on
+/// the left and what is known of both sides.
 #[inline(always)]
 fn split_node<E: Evaluation, R: SplitRule>(
     shared: &Shared<'_, E>,
     orders: [&mut [u32]; 3],
-    mut same_as: [u8; 3],
-    scratch: &mut [u32],
-    right: &mut [f64],
+    Known { aabb, mut same_as }: Known,
     rule: &mut R,
-) -> (PackedAabb, usize, [u8; 3]) {
+    scratch: &mut Scratch,
+) -> (usize, [Known; 2]) {
     if shared.skip_same_order {
         note_same_orders(&orders, &mut same_as);
     }
@@ -295,25 +293,24 @@ fn split_node<E: Evaluation, R: SplitRule>(
         evaluation: shared.evaluation,
         orders: [&*x, &*y, &*z],
         same_as,
-        right,
-        aabb: None,
+        aabb,
+        blocks: &mut scratch.blocks,
     };
-    let Split { axis, left, .. } = rule.choose(&mut sweep);
-    let left = left as usize;
-    let aabb = sweep.aabb.unwrap_or(PackedAabb::EMPTY);
+    let split = rule.choose(&mut sweep);
+    let known = sweep.side_boxes(&split).map(|aabb| Known { aabb, same_as });
+    let (axis, left) = (split.axis as usize, split.left as usize);
     let orders = [x, y, z];
-    let others = [1, 2, 3].map(|step| (axis as usize + step) % 3);
-    if others[..2].iter().any(|&other| same_as[other] as usize == other) {
-        for (at, &object) in orders[axis as usize].iter().enumerate() {
-            shared.goes_left[object as usize].store(u8::from(at < left), Relaxed);
-        }
+    if (0..3).any(|other| other != axis && same_as[other] as usize == other) {
+        let (to_left, to_right) = orders[axis].split_at(left);
+        to_left.iter().for_each(|&object| shared.goes_left[object as usize].store(1, Relaxed));
+        to_right.iter().for_each(|&object| shared.goes_left[object as usize].store(0, Relaxed));
     }
     for (other, order) in orders.into_iter().enumerate() {
-        if other != axis as usize && same_as[other] as usize == other {
-            partition(order, scratch, shared.goes_left);
+        if other != axis && same_as[other] as usize == other {
+            partition(order, &mut scratch.goes_right, shared.goes_left);
         }
     }
-    (aabb, left, same_as)
+    (left, known)
 }
 
 /// Finds axes whose orders have become identical. Once they are, they are in the whole subtree.
@@ -334,15 +331,18 @@ fn note_same_orders(orders: &[&mut [u32]; 3], same_as: &mut [u8; 3]) {
 
 /// Moves the objects that go left to the front, keeping the order on both sides. Without branches.
 #[inline(always)]
-fn partition(order: &mut [u32], scratch: &mut [u32], goes_left: &[AtomicU8]) {
+fn partition(order: &mut [u32], goes_right: &mut Vec<u32>, goes_left: &[AtomicU8]) {
+    if goes_right.len() < order.len() {
+        goes_right.resize(order.len(), 0);
+    }
     let (mut left, mut right) = (0, 0);
     for at in 0..order.len() {
         let object = order[at];
         let side = usize::from(goes_left[object as usize].load(Relaxed));
         order[left] = object;
-        scratch[right] = object;
+        goes_right[right] = object;
         left += side;
         right += 1 - side;
     }
-    order[left..].copy_from_slice(&scratch[..right]);
+    order[left..].copy_from_slice(&goes_right[..right]);
 }

@@ -3,24 +3,33 @@
 //! A split is judged by its two sides alone. The division by the parent's area and the factor 2 of a surface
 //! drop out (Ng & Trifonov 2003, section 3.2).
 
-/// Judges the splits of a node. A side's value must not shrink as objects are added to it, and
-/// [`at_least`](Self::at_least) must not exceed the cost of any split with that side: scans prune by it, exactly.
+/// Judges the splits of a node by the box and the *load* of either side, where the load of a side is a sum over
+/// its objects: their number, or their weight.
+///
+/// A side's value must not shrink as objects are added to it, nor [`join`](Self::join) or
+/// [`bound`](Self::bound) as values grow: scans prune by that, exactly.
 pub trait Evaluation: Sync {
-    /// What is gathered of a side besides its box.
-    type Side: Copy + Default;
-    /// Adds an object to a side.
-    fn add(&self, side: &mut Self::Side, object: u32);
-    /// The value of a side with this half area.
-    fn side(&self, area: f64, side: &Self::Side) -> f64;
+    /// The load of one object. Default 1.
+    #[inline(always)]
+    fn load(&self, _object: u32) -> f64 {
+        1.0
+    }
+    /// The load of several objects. Default: their number.
+    #[inline(always)]
+    fn total_load(&self, objects: &[u32]) -> f64 {
+        objects.len() as f64
+    }
+    /// The value of a side with this half area and load, finite and not negative.
+    fn side(&self, area: f64, load: f64) -> f64;
     /// The cost of a split, from the values of its sides; symmetric.
     #[inline(always)]
     fn join(&self, left: f64, right: f64) -> f64 {
         left + right
     }
-    /// A lower bound of the cost of every split that has a side of this value.
+    /// A lower bound of the cost of all splits whose sides have at least these values. Default: [`join`](Self::join).
     #[inline(always)]
-    fn at_least(&self, side: f64) -> f64 {
-        side
+    fn bound(&self, left: f64, right: f64) -> f64 {
+        self.join(left, right)
     }
 }
 
@@ -31,14 +40,9 @@ pub trait Evaluation: Sync {
 pub struct AreaTimesCount;
 
 impl Evaluation for AreaTimesCount {
-    type Side = f64;
     #[inline(always)]
-    fn add(&self, side: &mut f64, _object: u32) {
-        *side += 1.0;
-    }
-    #[inline(always)]
-    fn side(&self, area: f64, side: &f64) -> f64 {
-        area * side
+    fn side(&self, area: f64, load: f64) -> f64 {
+        area * load
     }
 }
 
@@ -49,14 +53,17 @@ impl Evaluation for AreaTimesCount {
 pub struct AreaTimesWeight<'a>(pub &'a [f32]);
 
 impl Evaluation for AreaTimesWeight<'_> {
-    type Side = f64;
     #[inline(always)]
-    fn add(&self, side: &mut f64, object: u32) {
-        *side += f64::from(self.0[object as usize]);
+    fn load(&self, object: u32) -> f64 {
+        f64::from(self.0[object as usize])
     }
     #[inline(always)]
-    fn side(&self, area: f64, side: &f64) -> f64 {
-        area * side
+    fn total_load(&self, objects: &[u32]) -> f64 {
+        objects.iter().map(|&object| self.load(object)).sum()
+    }
+    #[inline(always)]
+    fn side(&self, area: f64, load: f64) -> f64 {
+        area * load
     }
 }
 
@@ -76,14 +83,9 @@ impl AreaTimesPower {
 }
 
 impl Evaluation for AreaTimesPower {
-    type Side = u32;
     #[inline(always)]
-    fn add(&self, side: &mut u32, _object: u32) {
-        *side += 1;
-    }
-    #[inline(always)]
-    fn side(&self, area: f64, side: &u32) -> f64 {
-        area * self.0[*side as usize]
+    fn side(&self, area: f64, load: f64) -> f64 {
+        area * self.0[load as usize]
     }
 }
 
@@ -108,16 +110,11 @@ pub enum AreaOnly {
 }
 
 impl Evaluation for AreaOnly {
-    type Side = u32;
     #[inline(always)]
-    fn add(&self, side: &mut u32, _object: u32) {
-        *side += 1;
-    }
-    #[inline(always)]
-    fn side(&self, area: f64, side: &u32) -> f64 {
+    fn side(&self, area: f64, load: f64) -> f64 {
         match self {
             Self::SumOfSquares => area * area,
-            Self::InnerSum if *side == 1 => 0.0,
+            Self::InnerSum if load == 1.0 => 0.0,
             _ => area,
         }
     }
@@ -131,10 +128,8 @@ impl Evaluation for AreaOnly {
         }
     }
     #[inline(always)]
-    fn at_least(&self, side: f64) -> f64 {
-        match self {
-            Self::Difference | Self::Product => 0.0,
-            _ => side,
-        }
+    fn bound(&self, left: f64, right: f64) -> f64 {
+        // The difference alone may shrink as a side grows.
+        if *self == Self::Difference { 0.0 } else { self.join(left, right) }
     }
 }

@@ -68,7 +68,7 @@ pub enum ObjError {
     NoFaces { path: PathBuf, vertices: usize },
     /// A `v` statement of a wrong length.
     #[error(
-        "{place}: vertex of {found} numbers; expected 3 (x y z), 4 (x y z and a weight), or 6 or 7 \
+        "{place}: vertex of length {found}; expected 3 (x y z), 4 (x y z and a weight), or 6 or 7 \
          (x y z and a colour)"
     )]
     VertexLength { place: Place, found: usize },
@@ -417,8 +417,8 @@ mod tests {
             ("f 1 2 3\n\nv 0 -inf 0", [":8: ", "`-inf`", "finite"]),
             ("v 0 0 1e39", [":6: ", "`1e39`", "3.4e38"]),
             ("v 0 0 0,5", [":6: ", "`0,5`", "finite number"]),
-            ("v 0 0", [":6: ", "of 2 numbers", "3 (x y z)"]),
-            ("v 0 0 0 1 1", [":6: ", "of 5 numbers", "3 (x y z)"]),
+            ("v 0 0", [":6: ", "length 2", "3 (x y z)"]),
+            ("v 0 0 0 1 1", [":6: ", "length 5", "3 (x y z)"]),
             ("v 0 0 0 0", [":6: ", "weight `0`", "other than 0"]),
             ("v 1e30 0 0 1e-30", [":6: ", "weight `1e-30`", "3.4e38"]),
             ("v 1 1 1 inf", [":6: ", "weight `inf`", "finite"]),

@@ -8,7 +8,7 @@ use super::patch::{Mesh, about_x, about_y, about_z, circle, cos_sin, fraction, o
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 /// World units per inner radius of the shank.
-const UNIT: f64 = 700.0;
+const UNIT: f64 = 118.0;
 
 /// Half the side of the cushion, in inner radii of the shank.
 const CUSHION: f64 = 2.6;
@@ -90,7 +90,7 @@ fn ring() -> Mesh {
             let away = half * (0.082 + 0.0105 * i as f64 + 0.002 * row);
             let size = 0.042 - 0.0009 * i as f64;
             let seat = |away: f64, across: f64| {
-                placed(about_y(away), DVec3::ZERO) * placed(DMat3::IDENTITY, DVec3::new(0.0, across, surface(away)))
+                placed(about_y(away), DVec3::ZERO) * placed(DMat3::IDENTITY, DVec3::new(0.0, across, surface(away, across)))
             };
             let lean = placed(about_x(-0.035 * row), DVec3::ZERO);
             ring.place(&stone, &(seat(away, 0.105 * row) * lean * small(size)));
@@ -102,9 +102,15 @@ fn ring() -> Mesh {
     ring
 }
 
-/// Distance of the shank's outer surface from the centre, `away` turns from the head.
-fn surface(away: f64) -> f64 {
-    1.19 - 0.14 * away.abs()
+/// Half the width of the shank, `away` turns from the head.
+fn half_width(away: f64) -> f64 {
+    0.21 - 0.22 * away.abs()
+}
+
+/// Radius of the shank's domed outer surface, `away` turns from the head and `across` from its middle.
+fn surface(away: f64, across: f64) -> f64 {
+    let x = across / half_width(away);
+    1.19 - 0.14 * away.abs() - 0.08 * x * x * x * x
 }
 
 /// The shank: flat inside, domed outside, wider at the head; finer towards the head than at the back.
@@ -115,12 +121,12 @@ fn shank(mesh: &mut Mesh) {
         // A cubic spacing of the steps: most of them near the head, where the shoulders are.
         let s = 2.0 * fraction(j, steps) - 1.0;
         let away = 0.5 * s * (0.45 + 0.55 * s * s);
-        let width = 0.21 - 0.22 * away.abs();
+        let width = half_width(away);
         let (across, radius) = match i % (dome + 2) {
             0 => (-width, 1.0),
             k if k <= dome => {
-                let x = 2.0 * fraction(k - 1, dome - 1) - 1.0;
-                (width * x, surface(away) - 0.08 * x * x * x * x)
+                let across = width * (2.0 * fraction(k - 1, dome - 1) - 1.0);
+                (across, surface(away, across))
             }
             _ => (width, 1.0),
         };

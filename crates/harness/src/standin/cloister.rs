@@ -3,13 +3,13 @@
 //! Twin columns with base, leaved capital and abacus carry moulded round arches; behind them groin vaults with ribs;
 //! outside, walls of a few large polygons. Shafts, ribs and tiles are long and thin. Nothing is irregular, but the
 //! walks differ in length, columns stand turned, and the gate, the well and the garden lie oblique. World units
-//! (centimetres) are chosen so that the greedy MF tree costs about 1.8e9, as the original's did.
+//! are chosen so that the greedy MF tree costs about 1.8e9, as the original's did.
 
 use super::patch::{Mesh, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright};
 use glam::{DMat3, DVec3, Vec3};
 
 /// World units per metre.
-const UNIT: f64 = 100.0;
+const UNIT: f64 = 134.0;
 /// Width of a bay and depth of the walk, metres.
 const BAY: f64 = 3.6;
 /// Height of the parapet on which the columns stand, metres.
@@ -32,7 +32,7 @@ pub fn triangles() -> Vec<[Vec3; 3]> {
     }
     court(&mut cloister, half);
     cloister.place(&well(), &upright(0.037, 2.1, -1.4, 0.0));
-    cloister.finish(UNIT, DVec3::new(1250.0, -430.0, 0.0))
+    cloister.finish(UNIT, DVec3::new(1250.0, -430.0, 75.0))
 }
 
 /// The pieces that are repeated in every bay.
@@ -142,7 +142,7 @@ fn walk(parts: &Parts, bays: usize) -> Mesh {
     let mut walk = Mesh::default();
     let start = -0.5 * BAY * bays as f64;
     let end = -start;
-    let back = -BAY - 0.1;
+    let back = -BAY - 0.25;
     walk.cuboid(DVec3::new(start, -0.3, 0.0), DVec3::new(end, 0.3, PARAPET));
     walk.sweep(
         &[DVec3::new(start, 0.0, PARAPET), DVec3::new(end, 0.0, PARAPET)],
@@ -156,7 +156,7 @@ fn walk(parts: &Parts, bays: usize) -> Mesh {
         let middle = x + 0.5 * BAY;
         walk.place(&parts.vault, &upright(0.0, middle, -0.5 * BAY - 0.1, SPRING));
         if bay < bays {
-            for (turns, y) in [(0.003 * bay as f64, -0.22), (0.002 * bay as f64 - 0.01, 0.22)] {
+            for (turns, y) in [(0.003 * bay as f64, -0.18), (0.002 * bay as f64 - 0.01, 0.18)] {
                 walk.place(&parts.column, &upright(turns, x, y, PARAPET));
             }
             walk.place(&parts.arch, &upright(0.0, middle, 0.0, SPRING));
@@ -164,9 +164,11 @@ fn walk(parts: &Parts, bays: usize) -> Mesh {
         }
         paving(&mut walk, x, bay);
     }
+    let bed = |x: f64, y: f64| DVec3::new(x, y, -0.02);
+    let outer = end - back;
+    walk.quad(bed(start, 0.0), bed(end, 0.0), bed(outer, back), bed(-outer, back));
     // The back wall: three polygons with a doorway between them, closed above by its arch.
     let door = start + BAY * (0.5 + (bays / 2) as f64);
-    let outer = end - back;
     let upright_quad = |mesh: &mut Mesh, from: f64, to: f64, low: f64, high: f64| {
         let at = |x: f64, z: f64| DVec3::new(x, back, z);
         mesh.quad(at(from, low), at(to, low), at(to, high), at(from, high));
@@ -220,13 +222,16 @@ fn paving(mesh: &mut Mesh, x: f64, bay: usize) {
 /// The lean-to roof over a walk, `half` its arcade's half length: rafters below, boarding in two triangles, rows of
 /// barrel tiles above; mitred at both corners.
 fn roof(mesh: &mut Mesh, parts: &Parts, half: f64) {
-    let (eaves, ridge) = (DVec3::new(0.0, 0.7, EAVES), DVec3::new(0.0, -BAY - 0.1, EAVES + 1.5));
+    let (eaves, ridge) = (DVec3::new(0.0, 0.7, EAVES), DVec3::new(0.0, -BAY - 0.25, EAVES + 1.5));
     let slope = (ridge - eaves).length();
     let up = (ridge - eaves) / slope;
-    let normal = up.cross(DVec3::NEG_X);
+    let normal = up.cross(DVec3::X);
     let along = |x: f64| DVec3::X * x;
     let (low, high) = (half - eaves.y, half - ridge.y);
-    mesh.quad(eaves + along(-low), eaves + along(low), ridge + along(high), ridge + along(-high));
+    mesh.grid(5, 1, |i, j| {
+        let side = 2.0 * fraction(i, 5) - 1.0;
+        if j == 0 { eaves + along(side * low) } else { ridge + along(side * high) }
+    });
     let rafters = (2.0 * low / 0.9) as usize;
     let beam = [(0.05, -0.12), (0.05, -0.02), (-0.05, -0.02), (-0.05, -0.12)];
     for k in 0..rafters {
@@ -252,7 +257,7 @@ fn roof(mesh: &mut Mesh, parts: &Parts, half: f64) {
 fn court(mesh: &mut Mesh, half: DVec3) {
     let inner = half - DVec3::new(0.25, 0.25, 0.0);
     let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
-    mesh.quad(at(-inner.x, -inner.y, -0.1), at(inner.x, -inner.y, -0.1), at(inner.x, inner.y, -0.1), at(-inner.x, inner.y, -0.1));
+    mesh.grid(3, 2, |i, j| at(inner.x * (2.0 * fraction(i, 3) - 1.0), inner.y * (j as f64 - 1.0), -0.1));
     for (turns, length) in [(0.037, 14.0), (0.287, 11.0)] {
         let mut path = Mesh::default();
         let stones = 18;

@@ -8,13 +8,13 @@ use super::patch::{Mesh, about_z, circle, cos_sin, fraction, on_circle, placed, 
 use glam::{DMat3, DVec3, Vec3};
 
 /// World units per tread depth.
-const UNIT: f64 = 4.0;
+const UNIT: f64 = 2.17;
 /// Height of a step, in tread depths.
 const RISE: f64 = 0.62;
 /// Height of a handrail, in tread depths.
 const RAIL: f64 = 2.6;
 /// Side of the room, in tread depths.
-const ROOM: f64 = 32.0;
+const ROOM: f64 = 30.0;
 
 /// The triangles of the scene; the same bytes at every call and on every machine.
 pub fn triangles() -> Vec<[Vec3; 3]> {
@@ -52,8 +52,7 @@ struct Plan {
 /// One gravity's floor, flights, landings and arcade; up is z.
 fn storey(plan: &Plan) -> Mesh {
     let mut storey = Mesh::default();
-    let corner = |x, y| DVec3::new(x, y, 0.0);
-    storey.quad(corner(0.0, 0.0), corner(ROOM, 0.0), corner(ROOM, ROOM), corner(0.0, ROOM));
+    storey.grid(3, 2, |i, j| DVec3::new(fraction(i, 3), fraction(j, 2), 0.0) * ROOM);
 
     // First flight along x to a landing, second along y to a gallery, third down at an angle of its own.
     let (width, deep) = (plan.width, plan.width + 1.0);
@@ -77,7 +76,7 @@ fn storey(plan: &Plan) -> Mesh {
         let x = turn + deep - 2.2 - 4.4 * bay as f64;
         storey.place(&gate(1.7, 2.2, high - 3.3, 9), &upright(0.0, x, gallery + deep, 0.0));
     }
-    storey.place(&gate(1.9, 4.0, 4.2, 14), &upright(0.25, ROOM - 0.5, plan.y + 12.0, 0.0));
+    storey.place(&gate(1.9, 4.0, 4.2, 14), &upright(0.25, ROOM - 0.5, plan.y + 11.0, 0.0));
     storey.place(&gate(1.4, 2.0, 3.1, 10), &upright(2.6 * plan.oblique, plan.x + 6.0, plan.y + 9.0, 0.0));
     storey
 }

@@ -8,7 +8,7 @@ use super::patch::{Mesh, about_x, about_y, about_z, circle, cos_sin, fraction, j
 use glam::{DMat3, DVec3, Vec3};
 
 /// World units per cone height.
-const UNIT: f64 = 300.0;
+const UNIT: f64 = 104.0;
 /// Golden angle in turns: (3 − √5) / 2.
 const GOLDEN: f64 = 0.381_966_011_250_105_1;
 const SCALES: usize = 122;
@@ -18,7 +18,7 @@ const SUB_SCALES: usize = 6;
 pub fn triangles() -> Vec<[Vec3; 3]> {
     let mut cone = Mesh::default();
     let core = [0.0, 0.0, 0.25, 0.5, 0.75, 1.0].map(|t| (0.6 * belly(t), 0.97 * t));
-    let closed: Vec<_> = [(0.0, -0.04)].into_iter().chain(core).chain([(0.0, 1.06)]).collect();
+    let closed: Vec<_> = [(0.0, -0.04)].into_iter().chain(core).chain([(0.0, 1.0)]).collect();
     cone.revolve(&closed, 14);
     let stem: Vec<DVec3> =
         (0..=6).map(|k| fraction(k, 6)).map(|t| DVec3::new(0.07 * t * t, 0.02 * t, -0.25 * t)).collect();
@@ -31,7 +31,7 @@ pub fn triangles() -> Vec<[Vec3; 3]> {
         let opening = 0.13 - 0.09 * t + 0.012 * jitter(2, i);
         let azimuth = i as f64 * GOLDEN + 0.004 * jitter(3, i);
         let rotation = about_z(azimuth) * about_y(opening) * about_x(0.01 * jitter(4, i));
-        let root = about_z(azimuth) * DVec3::new(0.5 * belly(t), 0.0, t * 0.93);
+        let root = about_z(azimuth) * DVec3::new(0.5 * belly(t), 0.0, 0.98 * t - 0.05);
         cone.place(&scale(i), &placed(rotation * DMat3::from_diagonal(DVec3::splat(size)), root));
     }
     cone.finish(UNIT, DVec3::ZERO)
