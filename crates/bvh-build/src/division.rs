@@ -335,6 +335,7 @@ fn partition(order: &mut [u32], goes_right: &mut Vec<u32>, goes_left: &[AtomicU8
     if goes_right.len() < order.len() {
         goes_right.resize(order.len(), 0);
     }
+    let goes_right = &mut goes_right[..order.len()];
     let (mut left, mut right) = (0, 0);
     for at in 0..order.len() {
         let object = order[at];

@@ -1,27 +1,28 @@
 //! A box as one vector register, for the inner loops of builders and searches.
 
 use crate::Aabb;
-use glam::Vec3;
+use glam::{DVec4, Vec4};
 
-/// A box stored as `(-min, 0, max, 0)`, so that a union is one maximum over eight lanes and an extent is one
-/// addition of the two halves. Plain safe code; compilers turn it into one AVX or two SSE instructions.
+/// A box stored as `-min` and `max`, so that a union is a maximum and an extent is an addition, four lanes at a
+/// time. Plain safe code over glam's vector types, one or two instructions each where the processor has them.
 ///
 /// Holds the same numbers as an [`Aabb`] (negation is exact) and has the same half area, bit by bit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(32))]
-pub struct PackedAabb([f32; 8]);
+pub struct PackedAabb {
+    negated_min: Vec4,
+    max: Vec4,
+}
 
 impl PackedAabb {
     /// The neutral element of [`grow`](Self::grow). Has no meaningful area.
-    pub const EMPTY: Self = Self([f32::NEG_INFINITY; 8]);
+    pub const EMPTY: Self = Self { negated_min: Vec4::NEG_INFINITY, max: Vec4::NEG_INFINITY };
 
     /// Extends the box to contain `other`.
     #[inline(always)]
     pub fn grow(&mut self, other: &Self) {
-        for (a, b) in self.0.iter_mut().zip(other.0) {
-            // Written so that it is `maxps`: f32::max would add instructions for NaN, which input checks exclude.
-            *a = if b > *a { b } else { *a };
-        }
+        self.negated_min = self.negated_min.max(other.negated_min);
+        self.max = self.max.max(other.max);
     }
 
     /// The smallest box around both.
@@ -35,18 +36,21 @@ impl PackedAabb {
     /// Half of the surface area in f64, equal to [`Aabb::half_area`] for every non-empty box.
     #[inline(always)]
     pub fn half_area(&self) -> f64 {
-        let b = &self.0;
-        let x = f64::from(b[4]) + f64::from(b[0]);
-        let y = f64::from(b[5]) + f64::from(b[1]);
-        let z = f64::from(b[6]) + f64::from(b[2]);
+        let DVec4 { x, y, z, .. } = self.extent();
         x * y + y * z + z * x
+    }
+
+    /// Side lengths in world units, the fourth lane 0.
+    #[inline(always)]
+    pub fn extent(&self) -> DVec4 {
+        self.max.as_dvec4() + self.negated_min.as_dvec4()
     }
 }
 
 impl From<&Aabb> for PackedAabb {
     #[inline]
     fn from(b: &Aabb) -> Self {
-        Self([-b.min.x, -b.min.y, -b.min.z, 0.0, b.max.x, b.max.y, b.max.z, 0.0])
+        Self { negated_min: (-b.min).extend(0.0), max: b.max.extend(0.0) }
     }
 }
 
@@ -55,17 +59,14 @@ impl From<&PackedAabb> for Aabb {
     /// depend on the order in which −0 and +0 were met.
     #[inline]
     fn from(b: &PackedAabb) -> Self {
-        let b = &b.0;
-        Self {
-            min: Vec3::new(0.0 - b[0], 0.0 - b[1], 0.0 - b[2]),
-            max: Vec3::new(b[4] + 0.0, b[5] + 0.0, b[6] + 0.0),
-        }
+        Self { min: (Vec4::ZERO - b.negated_min).truncate(), max: (b.max + Vec4::ZERO).truncate() }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
     use proptest::prelude::*;
 
     fn any_box() -> impl Strategy<Value = Aabb> {

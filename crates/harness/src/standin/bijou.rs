@@ -1,8 +1,9 @@
-//! Stand-in for bijou: a ring with a brilliant-cut stone, a halo and shoulders of small stones, and a chain.
+//! Stand-in for bijou: a ring with a brilliant-cut stone, shoulders of small stones, and a chain.
 //!
-//! Every stone is a whole standard brilliant (table, stars, bezels, girdle, pavilion), whatever its size, beside a
-//! smooth shank, prongs and beads, on a cushion of a few large polygons; the ring leans against the axes. World
-//! units are chosen so that the greedy MF tree costs about 1.7e7, as the original's did.
+//! Every stone is a whole standard brilliant (table, stars, bezels, girdle, pavilion), whatever its
+//! size, beside a smooth shank, prongs and beads, on a cushion of a few large polygons; the ring
+//! leans against the axes. World units are chosen so that the greedy MF tree costs about 1.7e7, as
+//! the original's did.
 
 use super::patch::{Mesh, about_x, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
@@ -67,7 +68,8 @@ fn ring() -> Mesh {
     let halo: Vec<_> = [(0.56, 1.5), (0.56, 1.54), (0.74, 1.54), (0.74, 1.48), (0.56, 1.5)].into();
     ring.revolve(&halo, 56);
     for k in 0..6 {
-        let bent = [(0.2, 1.05), (0.34, 1.25), (0.48, 1.48), (0.545, 1.62), (0.54, 1.68), (0.5, 1.71), (0.43, 1.73)];
+        let bent =
+            [(0.2, 1.05), (0.34, 1.25), (0.48, 1.48), (0.545, 1.62), (0.54, 1.68), (0.5, 1.71), (0.43, 1.73)];
         let path: Vec<_> = bent.map(|(r, z)| on_circle(r, fraction(k, 6) + 0.02, z)).into();
         let side = on_circle(1.0, fraction(k, 6) + 0.27, 0.0);
         ring.sweep(&path, side, &circle(0.045, 9), |i| 1.0 - 0.06 * i as f64);
@@ -90,7 +92,8 @@ fn ring() -> Mesh {
             let away = half * (0.082 + 0.0105 * i as f64 + 0.002 * row);
             let size = 0.042 - 0.0009 * i as f64;
             let seat = |away: f64, across: f64| {
-                placed(about_y(away), DVec3::ZERO) * placed(DMat3::IDENTITY, DVec3::new(0.0, across, surface(away, across)))
+                placed(about_y(away), DVec3::ZERO)
+                    * placed(DMat3::IDENTITY, DVec3::new(0.0, across, surface(away, across)))
             };
             let lean = placed(about_x(-0.035 * row), DVec3::ZERO);
             ring.place(&stone, &(seat(away, 0.105 * row) * lean * small(size)));
@@ -107,13 +110,15 @@ fn half_width(away: f64) -> f64 {
     0.21 - 0.22 * away.abs()
 }
 
-/// Radius of the shank's domed outer surface, `away` turns from the head and `across` from its middle.
+/// Radius of the shank's domed outer surface, `away` turns from the head and `across` from its
+/// middle.
 fn surface(away: f64, across: f64) -> f64 {
     let x = across / half_width(away);
     1.19 - 0.14 * away.abs() - 0.08 * x * x * x * x
 }
 
-/// The shank: flat inside, domed outside, wider at the head; finer towards the head than at the back.
+/// The shank: flat inside, domed outside, wider at the head; finer towards the head than at the
+/// back.
 fn shank(mesh: &mut Mesh) {
     let dome = 9;
     let steps = 72;
@@ -166,7 +171,8 @@ fn chain(links: usize) -> Mesh {
         spot.with_z(padding(spot.x, spot.y) + 0.05)
     };
     for k in 0..links {
-        let (before, here, after) = (at(fraction(k, links)), at(fraction(2 * k + 1, 2 * links)), at(fraction(k + 1, links)));
+        let (before, here, after) =
+            (at(fraction(k, links)), at(fraction(2 * k + 1, 2 * links)), at(fraction(k + 1, links)));
         let along = (after - before).normalize();
         let across = DVec3::Z.cross(along).normalize();
         let heading = DMat3::from_cols(along, across, along.cross(across));

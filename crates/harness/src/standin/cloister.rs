@@ -1,15 +1,17 @@
-//! Stand-in for Cloister: an arcaded courtyard with vaulted walks, tiled roofs, a well and a paved floor.
+//! Stand-in for Cloister: an arcaded courtyard with vaulted walks, tiled roofs and a well.
 //!
-//! Twin columns with base, leaved capital and abacus carry moulded round arches; behind them groin vaults with ribs;
-//! outside, walls of a few large polygons. Shafts, ribs and tiles are long and thin. Nothing is irregular, but the
-//! walks differ in length, columns stand turned, and the gate, the well and the garden lie oblique. World units
-//! are chosen so that the greedy MF tree costs about 1.8e9, as the original's did.
+//! Twin columns with base, leaved capital and abacus carry moulded round arches; behind them groin
+//! vaults with ribs; outside, walls of a few large polygons. Shafts, ribs and tiles are long and
+//! thin. Nothing is irregular, but the walks differ in length, columns stand turned, and the gate,
+//! the well and the garden lie oblique. World units are chosen so that the greedy MF tree costs
+//! about 1.8e9, as the original's did.
 
 use super::patch::{Mesh, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright};
 use glam::{DMat3, DVec3, Vec3};
+use std::f64::consts::SQRT_2;
 
 /// World units per metre.
-const UNIT: f64 = 134.0;
+const UNIT: f64 = 138.0;
 /// Width of a bay and depth of the walk, metres.
 const BAY: f64 = 3.6;
 /// Height of the parapet on which the columns stand, metres.
@@ -26,8 +28,11 @@ pub fn triangles() -> Vec<[Vec3; 3]> {
     let (long, short) = (9, 7);
     let half = DVec3::new(long as f64, short as f64, 0.0) * (0.5 * BAY);
     let parts = Parts::new();
-    for (turns, bays, offset) in [(0.0, long, half.y), (0.25, short, half.x), (0.5, long, half.y), (0.75, short, half.x)] {
-        // Each walk is built along +x with the court on its +y side, its corner vault at its far end.
+    for (turns, bays, offset) in
+        [(0.0, long, half.y), (0.25, short, half.x), (0.5, long, half.y), (0.75, short, half.x)]
+    {
+        // Each walk is built along +x with the court on its +y side, its corner vault at its far
+        // end.
         cloister.place(&walk(&parts, bays), &(upright(turns, 0.0, 0.0, 0.0) * upright(0.0, 0.0, -offset, 0.0)));
     }
     court(&mut cloister, half);
@@ -63,8 +68,10 @@ fn column() -> Mesh {
         mesh.cuboid(DVec3::new(-half, -half, low), DVec3::new(half, half, high));
     };
     square(&mut column, 0.17, 0.0, 0.12);
-    // Attic base: torus, scotia, torus; then one long quad per side of the shaft, a necking, and the bell.
-    let base = [(0.17, 0.12), (0.175, 0.15), (0.165, 0.18), (0.135, 0.2), (0.13, 0.22), (0.145, 0.25), (0.12, 0.28)];
+    // Attic base: torus, scotia, torus; then one long quad per side of the shaft, a necking, and
+    // the bell.
+    let base =
+        [(0.17, 0.12), (0.175, 0.15), (0.165, 0.18), (0.135, 0.2), (0.13, 0.22), (0.145, 0.25), (0.12, 0.28)];
     let bell = [(0.1, 1.8), (0.115, 1.83), (0.1, 1.86), (0.105, 2.0), (0.13, 2.1), (0.18, 2.18)];
     let profile: Vec<_> = base.into_iter().chain(bell).collect();
     column.revolve(&profile, 12);
@@ -77,7 +84,11 @@ fn column() -> Mesh {
         leaf.grid(2, 4, |i, j| {
             let (u, v) = (fraction(i, 2) - 0.5, fraction(j, 4));
             let width = 0.085 * (1.0 - v * v * v) + 0.012;
-            DVec3::new(0.108 + 0.085 * v * v * v + 0.01 * (1.0 - 4.0 * u * u), u * width, low + tall * (v - 0.35 * v * v * v))
+            DVec3::new(
+                0.108 + 0.085 * v * v * v + 0.01 * (1.0 - 4.0 * u * u),
+                u * width,
+                low + tall * (v - 0.35 * v * v * v),
+            )
         });
         column.place(&leaf, &upright(fraction(k, 8) + 0.021, 0.0, 0.0, 0.0));
     }
@@ -101,8 +112,8 @@ fn arcade_arch() -> Mesh {
     arch
 }
 
-/// A groin vault over one square bay, centred on the z axis, springing at z = 0: the lower envelope of two barrels
-/// is left open, so four webs meet in the groins; diagonal ribs run below these.
+/// A groin vault over one square bay, centred on the z axis, springing at z = 0: the lower envelope
+/// of two barrels is left open, so four webs meet in the groins; diagonal ribs run below these.
 fn vault() -> Mesh {
     let mut vault = Mesh::default();
     let half = 0.5 * BAY;
@@ -121,7 +132,7 @@ fn vault() -> Mesh {
     for turns in [0.125, 0.375] {
         let path: Vec<_> = (0..=14)
             .map(|k| cos_sin(0.5 * fraction(k, 14)))
-            .map(|(c, s)| about_z(turns) * DVec3::new(half * 2.0_f64.sqrt() * c, 0.0, half * s - 0.02))
+            .map(|(c, s)| about_z(turns) * DVec3::new(half * SQRT_2 * c, 0.0, half * s - 0.02))
             .collect();
         let rib = [(0.05, -0.07), (0.09, 0.0), (0.05, 0.07), (-0.03, 0.07), (-0.03, -0.07)];
         vault.sweep(&path, about_z(turns) * DVec3::Y, &rib, |_| 1.0);
@@ -137,7 +148,8 @@ fn boss() -> Mesh {
     boss
 }
 
-/// A walk of `bays` bays along x, centred, its arcade in the plane y = 0 and its back wall at y = −`BAY`.
+/// A walk of `bays` bays along x, centred, its arcade in the plane y = 0 and its back wall at y =
+/// −`BAY`.
 fn walk(parts: &Parts, bays: usize) -> Mesh {
     let mut walk = Mesh::default();
     let start = -0.5 * BAY * bays as f64;
@@ -202,12 +214,13 @@ fn buttress(mesh: &mut Mesh, x: f64) {
     mesh.quad(at(-0.14, 0.42, 4.9), at(0.14, 0.42, 4.9), at(0.14, 0.25, 5.2), at(-0.14, 0.25, 5.2));
 }
 
-/// The floor of one bay: a border of long slabs around a lozenge of square tiles, whose size changes from bay to bay.
+/// The floor of one bay: a border of long slabs around a lozenge of square tiles, whose size
+/// changes from bay to bay.
 fn paving(mesh: &mut Mesh, x: f64, bay: usize) {
     let tiles = 3 + bay % 3;
     let (middle, half) = (DVec3::new(x + 0.5 * BAY, -0.5 * BAY - 0.1, 0.0), 0.5 * BAY - 0.3);
     for k in 0..4 {
-        let corner = |i: usize, reach: f64| middle + on_circle(reach * 2.0_f64.sqrt(), fraction(2 * i + 1, 8), 0.0);
+        let corner = |i: usize, reach: f64| middle + on_circle(reach * SQRT_2, fraction(2 * i + 1, 8), 0.0);
         mesh.quad(corner(k, half), corner(k, half + 0.3), corner(k + 1, half + 0.3), corner(k + 1, half));
         let tip = middle + on_circle(half, fraction(k, 4), 0.0);
         let next = middle + on_circle(half, fraction(k + 1, 4), 0.0);
@@ -219,8 +232,8 @@ fn paving(mesh: &mut Mesh, x: f64, bay: usize) {
     });
 }
 
-/// The lean-to roof over a walk, `half` its arcade's half length: rafters below, boarding in two triangles, rows of
-/// barrel tiles above; mitred at both corners.
+/// The lean-to roof over a walk, `half` its arcade's half length: rafters below, boarding in five
+/// panels, rows of barrel tiles above; mitred at both corners.
 fn roof(mesh: &mut Mesh, parts: &Parts, half: f64) {
     let (eaves, ridge) = (DVec3::new(0.0, 0.7, EAVES), DVec3::new(0.0, -BAY - 0.25, EAVES + 1.5));
     let slope = (ridge - eaves).length();
@@ -247,7 +260,10 @@ fn roof(mesh: &mut Mesh, parts: &Parts, half: f64) {
         for j in 0..rows {
             let limit = low + (high - low) * fraction(2 * j + 1, 2 * rows);
             if x.abs() < limit {
-                mesh.place(&parts.tile, &placed(frame, eaves + along(x) + up * (length * j as f64) + normal * 0.02));
+                mesh.place(
+                    &parts.tile,
+                    &placed(frame, eaves + along(x) + up * (length * j as f64) + normal * 0.02),
+                );
             }
         }
     }
@@ -261,7 +277,9 @@ fn court(mesh: &mut Mesh, half: DVec3) {
     for (turns, length) in [(0.037, 14.0), (0.287, 11.0)] {
         let mut path = Mesh::default();
         let stones = 18;
-        path.grid(stones, 2, |i, j| at((2.0 * fraction(i, stones) - 1.0) * length, 0.7 * (j as f64 - 1.0), -0.06));
+        path.grid(stones, 2, |i, j| {
+            at((2.0 * fraction(i, stones) - 1.0) * length, 0.7 * (j as f64 - 1.0), -0.06)
+        });
         mesh.place(&path, &upright(turns, 2.1, -1.4, 0.0));
         for (x, y) in [(3.0, 1.0), (3.0, -1.6), (-9.0, 1.0), (-9.0, -1.6)] {
             let mut hedge = Mesh::default();
@@ -275,7 +293,17 @@ fn court(mesh: &mut Mesh, half: DVec3) {
 fn well() -> Mesh {
     let mut well = Mesh::default();
     well.revolve(&[(2.0, -0.1), (2.0, 0.1), (1.65, 0.1), (1.65, 0.3), (1.3, 0.3), (1.3, 0.5), (0.7, 0.5)], 8);
-    let kerb = [(0.95, 0.5), (0.98, 0.6), (0.88, 0.68), (0.84, 1.1), (0.92, 1.2), (0.98, 1.28), (0.95, 1.36), (0.7, 1.36), (0.7, -2.5)];
+    let kerb = [
+        (0.95, 0.5),
+        (0.98, 0.6),
+        (0.88, 0.68),
+        (0.84, 1.1),
+        (0.92, 1.2),
+        (0.98, 1.28),
+        (0.95, 1.36),
+        (0.7, 1.36),
+        (0.7, -2.5),
+    ];
     well.revolve(&kerb, 36);
     for k in 0..12 {
         // Blind arches around the kerb.
@@ -289,7 +317,8 @@ fn well() -> Mesh {
         .collect();
     well.sweep(&yoke, DVec3::Y, &circle(0.035, 7), |_| 1.0);
     let mut link = Mesh::default();
-    let ring: Vec<_> = (0..=6).map(|i| on_circle(0.012, fraction(i, 6), 0.0)).map(|p| (0.03 + p.x, p.y)).collect();
+    let ring: Vec<_> =
+        (0..=6).map(|i| on_circle(0.012, fraction(i, 6), 0.0)).map(|p| (0.03 + p.x, p.y)).collect();
     link.revolve(&ring, 9);
     for k in 0..18 {
         let turned = about_z(if k % 2 == 0 { 0.02 } else { 0.27 }) * about_y(0.25);
@@ -302,6 +331,19 @@ fn well() -> Mesh {
 /// A wooden bucket, hoops included.
 fn bucket() -> Mesh {
     let mut bucket = Mesh::default();
-    bucket.revolve(&[(0.0, 0.0), (0.16, 0.0), (0.165, 0.08), (0.175, 0.08), (0.175, 0.12), (0.19, 0.36), (0.175, 0.36), (0.15, 0.03), (0.0, 0.03)], 14);
+    bucket.revolve(
+        &[
+            (0.0, 0.0),
+            (0.16, 0.0),
+            (0.165, 0.08),
+            (0.175, 0.08),
+            (0.175, 0.12),
+            (0.19, 0.36),
+            (0.175, 0.36),
+            (0.15, 0.03),
+            (0.0, 0.03),
+        ],
+        14,
+    );
     bucket
 }

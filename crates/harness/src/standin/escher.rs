@@ -1,8 +1,9 @@
-//! Stand-in for escher: staircases that interlock under three directions of gravity, after the print 'Relativity'.
+//! Stand-in for escher: staircases that interlock under three directions of gravity.
 //!
-//! Each gravity has its own flights, landings, arcade and balustrades in one room; the flights differ in length,
-//! place and bearing, so that no symmetry of the axes decides a split. Walls and floors are a few large polygons.
-//! World units are chosen so that the greedy MF tree costs about 4.8e5, as the original's did.
+//! After the print 'Relativity'. Each gravity has its own flights, landings, arcade and balustrades in one room; the flights
+//! differ in length, place and bearing, so that no symmetry of the axes decides a split. Walls and
+//! floors are a few large polygons. World units are chosen so that the greedy MF tree costs about
+//! 4.8e5, as the original's did.
 
 use super::patch::{Mesh, about_z, circle, cos_sin, fraction, on_circle, placed, upright};
 use glam::{DMat3, DVec3, Vec3};
@@ -26,9 +27,36 @@ pub fn triangles() -> Vec<[Vec3; 3]> {
         DMat3::from_cols(DVec3::Z, DVec3::X, DVec3::Y),
     ];
     let plans = [
-        Plan { first: 13, second: 9, width: 3.6, x: 3.0, y: 4.5, oblique: 0.038, bays: 3, climbs_beneath: true },
-        Plan { first: 10, second: 11, width: 3.0, x: 7.0, y: 9.0, oblique: -0.061, bays: 2, climbs_beneath: false },
-        Plan { first: 15, second: 7, width: 2.6, x: 2.0, y: 14.0, oblique: 0.094, bays: 4, climbs_beneath: true },
+        Plan {
+            first: 13,
+            second: 9,
+            width: 3.6,
+            x: 3.0,
+            y: 4.5,
+            oblique: 0.038,
+            bays: 3,
+            climbs_beneath: true,
+        },
+        Plan {
+            first: 10,
+            second: 11,
+            width: 3.0,
+            x: 7.0,
+            y: 9.0,
+            oblique: -0.061,
+            bays: 2,
+            climbs_beneath: false,
+        },
+        Plan {
+            first: 15,
+            second: 7,
+            width: 2.6,
+            x: 2.0,
+            y: 14.0,
+            oblique: 0.094,
+            bays: 4,
+            climbs_beneath: true,
+        },
     ];
     for (gravity, plan) in gravities.into_iter().zip(&plans) {
         room.place(&storey(plan), &placed(gravity, DVec3::ZERO));
@@ -54,7 +82,8 @@ fn storey(plan: &Plan) -> Mesh {
     let mut storey = Mesh::default();
     storey.grid(3, 2, |i, j| DVec3::new(fraction(i, 3), fraction(j, 2), 0.0) * ROOM);
 
-    // First flight along x to a landing, second along y to a gallery, third down at an angle of its own.
+    // First flight along x to a landing, second along y to a gallery, third down at an angle of its
+    // own.
     let (width, deep) = (plan.width, plan.width + 1.0);
     let (low, high) = (plan.first as f64 * RISE, (plan.first + plan.second) as f64 * RISE);
     let turn = plan.x + plan.first as f64;
@@ -68,10 +97,12 @@ fn storey(plan: &Plan) -> Mesh {
     let (c, s) = cos_sin(bearing);
     // The descending flight is an ascending one seen from its foot.
     let foot = DVec3::new(turn + 8.0 * c, gallery + 8.0 * s + width, down);
-    storey.place(&flight(8, width, plan.climbs_beneath), &upright(plan.oblique, foot.x, foot.y - width, foot.z));
+    storey
+        .place(&flight(8, width, plan.climbs_beneath), &upright(plan.oblique, foot.x, foot.y - width, foot.z));
     landing(&mut storey, foot + DVec3::new(-3.0, -width, 0.0), 3.0, width);
 
-    // The arcade that carries the gallery, a doorway in the back wall, and a free-standing oblique gate.
+    // The arcade that carries the gallery, a doorway in the back wall, and a free-standing oblique
+    // gate.
     for bay in 0..plan.bays {
         let x = turn + deep - 2.2 - 4.4 * bay as f64;
         storey.place(&gate(1.7, 2.2, high - 3.3, 9), &upright(0.0, x, gallery + deep, 0.0));
@@ -81,7 +112,8 @@ fn storey(plan: &Plan) -> Mesh {
     storey
 }
 
-/// A flight of `steps` along x with balustrades on both sides; its underside is a slope or, upside down, stairs too.
+/// A flight of `steps` along x with balustrades on both sides; its underside is a slope or, upside
+/// down, stairs too.
 fn flight(steps: usize, width: f64, climbs_beneath: bool) -> Mesh {
     let mut flight = Mesh::default();
     let run = steps as f64;
@@ -95,12 +127,21 @@ fn flight(steps: usize, width: f64, climbs_beneath: bool) -> Mesh {
         if climbs_beneath {
             let z = x - depth;
             flight.quad(at(x, y0, z), at(x, y1, z), at(x + 1.0, y1, z), at(x + 1.0, y0, z));
-            flight.quad(at(x + 1.0, y0, z), at(x + 1.0, y1, z), at(x + 1.0, y1, z + 1.0), at(x + 1.0, y0, z + 1.0));
+            flight.quad(
+                at(x + 1.0, y0, z),
+                at(x + 1.0, y1, z),
+                at(x + 1.0, y1, z + 1.0),
+                at(x + 1.0, y0, z + 1.0),
+            );
         }
         for y in [y0, y1] {
             flight.triangle(at(x, y, x), at(x + 1.0, y, x + 1.0), at(x, y, x + 1.0));
             if climbs_beneath {
-                flight.triangle(at(x, y, x - depth), at(x + 1.0, y, x - depth), at(x + 1.0, y, x + 1.0 - depth));
+                flight.triangle(
+                    at(x, y, x - depth),
+                    at(x + 1.0, y, x - depth),
+                    at(x + 1.0, y, x + 1.0 - depth),
+                );
             }
         }
     }
@@ -108,7 +149,12 @@ fn flight(steps: usize, width: f64, climbs_beneath: bool) -> Mesh {
         flight.quad(at(0.0, y, 0.0), at(run, y, run), at(run, y, run - depth), at(0.0, y, -depth));
     }
     if !climbs_beneath {
-        flight.quad(at(0.0, 0.0, -depth), at(0.0, width, -depth), at(run, width, run - depth), at(run, 0.0, run - depth));
+        flight.quad(
+            at(0.0, 0.0, -depth),
+            at(0.0, width, -depth),
+            at(run, width, run - depth),
+            at(run, 0.0, run - depth),
+        );
     }
     for y in [0.15, width - 0.15] {
         let feet: Vec<_> = (0..steps).map(|k| at(k as f64 + 0.5, y, k as f64 + 1.0)).collect();
@@ -117,17 +163,18 @@ fn flight(steps: usize, width: f64, climbs_beneath: bool) -> Mesh {
     flight
 }
 
-/// A slab with its near corner at `corner`, its top at that height, and a balustrade along its far side.
+/// A slab with its near corner at `corner`, its top at that height, and a balustrade along its far
+/// side.
 fn landing(mesh: &mut Mesh, corner: DVec3, length: f64, width: f64) {
     mesh.cuboid(corner - DVec3::Z * 0.8, corner + DVec3::new(length, width, 0.0));
     let posts = (length / 0.9) as usize;
-    let feet: Vec<_> = (0..=posts)
-        .map(|k| corner + DVec3::new(0.2 + fraction(k, posts) * (length - 0.4), 0.2, 0.0))
-        .collect();
+    let feet: Vec<_> =
+        (0..=posts).map(|k| corner + DVec3::new(0.2 + fraction(k, posts) * (length - 0.4), 0.2, 0.0)).collect();
     balustrade(mesh, &feet);
 }
 
-/// Square balusters set on the diagonal at `feet`, a handrail over them, and a turned newel at either end.
+/// Square balusters set on the diagonal at `feet`, a handrail over them, and a turned newel at
+/// either end.
 fn balustrade(mesh: &mut Mesh, feet: &[DVec3]) {
     let up = DVec3::Z * RAIL;
     for &foot in feet {
@@ -147,7 +194,8 @@ fn balustrade(mesh: &mut Mesh, feet: &[DVec3]) {
     }
 }
 
-/// An arch on two square piers of height `pier`, with a moulding around it; stands on z = 0, passes along y.
+/// An arch on two square piers of height `pier`, with a moulding around it; stands on z = 0, passes
+/// along y.
 fn gate(radius: f64, half_width: f64, pier: f64, segments: usize) -> Mesh {
     let mut gate = Mesh::default();
     let mut arch = Mesh::default();
@@ -170,7 +218,10 @@ fn spiral(steps: usize) -> Mesh {
     let mut spiral = Mesh::default();
     let (per_step, rise, radius) = (0.062, 0.9, 3.4);
     let height = steps as f64 * rise;
-    spiral.revolve(&[(0.7, 0.0), (0.7, 0.3), (0.45, 0.6), (0.45, height), (0.6, height + 0.3), (0.0, height + 1.2)], 12);
+    spiral.revolve(
+        &[(0.7, 0.0), (0.7, 0.3), (0.45, 0.6), (0.45, height), (0.6, height + 0.3), (0.0, height + 1.2)],
+        12,
+    );
     for k in 0..steps {
         let z = (k + 1) as f64 * rise;
         let mut wedge = |drop: f64| {

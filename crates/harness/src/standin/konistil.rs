@@ -1,8 +1,8 @@
-//! Stand-in for konistil: a valley with a town, a station, a viaduct and power lines, in millimetres on a map grid.
+//! Stand-in for konistil: a valley with town and railway, in millimetres on a map grid.
 //!
-//! Coordinates run into the millions, costs to 1e14, beside parts a few hundred units thick: rails, wires and
-//! lattice masts are long and thin; the terrain is one coarse sheet, fine only where the town stands. Ground,
-//! houses and trees are irregular by a small seeded jitter.
+//! Coordinates run into the millions, costs to 1e14, beside parts a few hundred units thick: rails,
+//! wires and lattice masts are long and thin; the terrain is one coarse sheet, fine only where the
+//! town stands. Ground, houses and trees are irregular by a small seeded jitter.
 
 use super::patch::{Mesh, about_z, circle, cos_sin, fraction, jitter, placed, upright};
 use glam::{DMat3, DVec3, Vec3};
@@ -56,7 +56,8 @@ fn value_noise(stream: u32, x: f64, y: f64) -> f64 {
     low * (1.0 - v) + high * v
 }
 
-/// The line that valley and railway follow: y in metres at x, oblique to the map and slightly curved.
+/// The line that valley and railway follow: y in metres at x, oblique to the map and slightly
+/// curved.
 fn course(x: f64) -> f64 {
     760.0 + 0.17 * x + 110.0 * cos_sin(x / 5200.0).1
 }
@@ -144,7 +145,8 @@ fn viaduct(mesh: &mut Mesh) {
     }
 }
 
-/// The station: a glazed barrel roof on ribs, platforms, a hall with a row of arches, a clock tower.
+/// The station: a glazed barrel roof on ribs, platforms, a hall with a row of arches, a clock
+/// tower.
 fn station(mesh: &mut Mesh) {
     let mut station = Mesh::default();
     let (length, half, ribs) = (140.0, 19.0, 15);
@@ -170,7 +172,10 @@ fn station(mesh: &mut Mesh) {
     bay.arch(2.6, 3.5, 4.2, 0.8, 12);
     for k in 0..14 {
         station.place(&bay, &upright(0.0, 7.0 * (k as f64 - 6.5), 23.0, 4.0));
-        station.cuboid(DVec3::new(7.0 * (k as f64 - 7.0) - 0.9, 22.6, 0.0), DVec3::new(7.0 * (k as f64 - 7.0) + 0.9, 23.4, 4.0));
+        station.cuboid(
+            DVec3::new(7.0 * (k as f64 - 7.0) - 0.9, 22.6, 0.0),
+            DVec3::new(7.0 * (k as f64 - 7.0) + 0.9, 23.4, 4.0),
+        );
     }
     station.place(&house(98.0, 14.0, 9.0, 5.0), &upright(0.0, 0.0, 31.0, 0.0));
     station.cuboid(DVec3::new(50.0, 24.0, 0.0), DVec3::new(58.0, 32.0, 27.0));
@@ -180,15 +185,27 @@ fn station(mesh: &mut Mesh) {
     mesh.place(&station, &placed(aligned(1500.0), beside(1500.0, 0.0, TRACK)));
 }
 
-/// A gabled house, `length` along x, with eaves, windows, a door and a chimney; stands on z = 0, sunk a little.
+/// A gabled house, `length` along x, with eaves, windows, a door and a chimney; stands on z = 0,
+/// sunk a little.
 fn house(length: f64, width: f64, wall: f64, gable: f64) -> Mesh {
     let mut house = Mesh::default();
     let (x, y) = (0.5 * length, 0.5 * width);
     let at = |i: f64, j: f64, z: f64| DVec3::new(i, j, z);
     for side in [-1.0, 1.0] {
-        house.quad(at(-x, side * y, -4.0), at(x, side * y, -4.0), at(x, side * y, wall), at(-x, side * y, wall));
+        house.quad(
+            at(-x, side * y, -4.0),
+            at(x, side * y, -4.0),
+            at(x, side * y, wall),
+            at(-x, side * y, wall),
+        );
         let end = side * x;
-        house.polygon(&[at(end, -y, -4.0), at(end, y, -4.0), at(end, y, wall), at(end, 0.0, wall + gable), at(end, -y, wall)]);
+        house.polygon(&[
+            at(end, -y, -4.0),
+            at(end, y, -4.0),
+            at(end, y, wall),
+            at(end, 0.0, wall + gable),
+            at(end, -y, wall),
+        ]);
         // The roof overhangs on all sides.
         let eaves = wall - 0.7 * gable / y;
         house.quad(
@@ -201,7 +218,12 @@ fn house(length: f64, width: f64, wall: f64, gable: f64) -> Mesh {
         for k in 0..windows {
             let middle = length * (fraction(2 * k + 1, 2 * windows) - 0.5);
             let face = side * (y + 0.05);
-            house.quad(at(middle - 0.6, face, 1.2), at(middle + 0.6, face, 1.2), at(middle + 0.6, face, 2.9), at(middle - 0.6, face, 2.9));
+            house.quad(
+                at(middle - 0.6, face, 1.2),
+                at(middle + 0.6, face, 1.2),
+                at(middle + 0.6, face, 2.9),
+                at(middle - 0.6, face, 2.9),
+            );
         }
     }
     house.cuboid(at(0.22 * x, 0.3 * y, wall), at(0.22 * x + 0.9, 0.3 * y + 0.9, wall + gable + 0.8));
@@ -220,7 +242,8 @@ fn town(mesh: &mut Mesh) {
             if yard.length() < 52.0 {
                 continue; // the churchyard
             }
-            let size = (11.0 + 3.0 * jitter(22, index), 8.5 + 1.5 * jitter(23, index), 6.0 + 2.0 * jitter(24, index));
+            let size =
+                (11.0 + 3.0 * jitter(22, index), 8.5 + 1.5 * jitter(23, index), 6.0 + 2.0 * jitter(24, index));
             let turn = about_z(0.018 * jitter(25, index) + if index % 5 == 0 { 0.25 } else { 0.0 });
             let part = house(size.0, size.1, size.2, 0.42 * size.1);
             mesh.place(&part, &placed(aligned(x) * turn, spot + DVec3::Z * ground(spot.x, spot.y)));

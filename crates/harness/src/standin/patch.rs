@@ -1,7 +1,8 @@
-//! Turns curved surfaces, swept profiles and placed copies into triangles: the shared vocabulary of the mesh stand-ins.
+//! Turns surfaces, swept profiles and placed copies into triangles, for the mesh stand-ins.
 //!
-//! All coordinates are f64 until [`Mesh::finish`] rounds each of them to f32 once. Angles are in turns, so that
-//! quarter turns are exact; sine and cosine come from `libm`, so that every machine gets the same bytes.
+//! All coordinates are f64 until [`Mesh::finish`] rounds each of them to f32 once. Angles are in
+//! turns, so that quarter turns are exact; sine and cosine come from `libm`, so that every machine
+//! gets the same bytes.
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
@@ -23,14 +24,16 @@ impl Mesh {
         self.triangle(a, c, d);
     }
 
-    /// Adds a convex polygon as a fan around its first corner; fewer than three corners add nothing.
+    /// Adds a convex polygon as a fan around its first corner; fewer than three corners add
+    /// nothing.
     pub fn polygon(&mut self, corners: &[DVec3]) {
         for pair in corners.windows(2).skip(1) {
             self.triangle(corners[0], pair[0], pair[1]);
         }
     }
 
-    /// Adds a surface of `columns` × `rows` quadrilaterals with the corners `point(i, j)`, `i <= columns`, `j <= rows`.
+    /// Adds a surface of `columns` × `rows` quadrilaterals with the corners `point(i, j)`, `i <=
+    /// columns`, `j <= rows`.
     pub fn grid(&mut self, columns: usize, rows: usize, point: impl Fn(usize, usize) -> DVec3) {
         for j in 0..rows {
             for i in 0..columns {
@@ -39,7 +42,8 @@ impl Mesh {
         }
     }
 
-    /// Adds the surface of revolution of a `(radius, z)` profile about the z axis, with `segments` sides.
+    /// Adds the surface of revolution of a `(radius, z)` profile about the z axis, with `segments`
+    /// sides.
     pub fn revolve(&mut self, profile: &[(f64, f64)], segments: usize) {
         self.grid(segments, profile.len().saturating_sub(1), |i, j| {
             let (radius, z) = profile[j];
@@ -47,16 +51,10 @@ impl Mesh {
         });
     }
 
-    /// Sweeps a closed polygon along a path and closes both ends. The profile's first coordinate points along
-    /// `side` × path, its second completes the frame; `side` must not be parallel to the path. The profile is
-    /// multiplied by `scale(k)` at path point `k`.
-    pub fn sweep(
-        &mut self,
-        path: &[DVec3],
-        side: DVec3,
-        profile: &[(f64, f64)],
-        scale: impl Fn(usize) -> f64,
-    ) {
+    /// Sweeps a closed polygon along a path and closes both ends. The profile's first coordinate
+    /// points along `side` × path, its second completes the frame; `side` must not be parallel to
+    /// the path. The profile is multiplied by `scale(k)` at path point `k`.
+    pub fn sweep(&mut self, path: &[DVec3], side: DVec3, profile: &[(f64, f64)], scale: impl Fn(usize) -> f64) {
         let Some(last) = path.len().checked_sub(1) else {
             return;
         };
@@ -90,8 +88,9 @@ impl Mesh {
         }
     }
 
-    /// Adds a wall of the given thickness, pierced by a round arch that springs from z = 0 at x = ±`radius`: the
-    /// two faces |x| <= `half_width`, z <= `top`, and the soffit between them, with `segments` steps around the arch.
+    /// Adds a wall of the given thickness, pierced by a round arch that springs from z = 0 at x =
+    /// ±`radius`: the two faces |x| <= `half_width`, z <= `top`, and the soffit between them, with
+    /// `segments` steps around the arch.
     pub fn arch(&mut self, radius: f64, half_width: f64, top: f64, thickness: f64, segments: usize) {
         let front = |i: usize, y: f64| {
             let (c, s) = cos_sin(fraction(i, segments) * 0.5);
@@ -117,8 +116,8 @@ impl Mesh {
         self.triangles.extend(part.triangles.iter().map(|triangle| triangle.map(moved)));
     }
 
-    /// Multiplies by `unit`, adds `origin`, rounds to f32 and leaves out the triangles that have no area (the
-    /// quadrilaterals at a pole have one each).
+    /// Multiplies by `unit`, adds `origin`, rounds to f32 and leaves out the triangles that have no
+    /// area (the quadrilaterals at a pole have one each).
     pub fn finish(self, unit: f64, origin: DVec3) -> Vec<[Vec3; 3]> {
         let rounded = |corner: DVec3| (corner * unit + origin).as_vec3();
         let has_area = |[a, b, c]: &[Vec3; 3]| {
@@ -143,7 +142,8 @@ pub fn cos_sin(turns: f64) -> (f64, f64) {
     }
 }
 
-/// The point at height `z` and distance `radius` from the z axis, `turns` around it from the x axis.
+/// The point at height `z` and distance `radius` from the z axis, `turns` around it from the x
+/// axis.
 pub fn on_circle(radius: f64, turns: f64, z: f64) -> DVec3 {
     let (c, s) = cos_sin(turns);
     DVec3::new(radius * c, radius * s, z)
@@ -187,8 +187,9 @@ pub fn upright(turns: f64, x: f64, y: f64, z: f64) -> DAffine3 {
     placed(about_z(turns), DVec3::new(x, y, z))
 }
 
-/// A number in [-1, 1) that depends on its two arguments only: the finalizer of MurmurHash3 over both, top 24 bits.
-/// Stand-ins use it where nature is irregular (scales, terrain, trees), nowhere else.
+/// A number in [-1, 1) that depends on its two arguments only: the finalizer of MurmurHash3 over
+/// both, top 24 bits. Stand-ins use it where nature is irregular (scales, terrain, trees), nowhere
+/// else.
 pub fn jitter(stream: u32, index: usize) -> f64 {
     let mut bits = (index as u32).wrapping_mul(0x9e37_79b9) ^ stream.wrapping_mul(0x27d4_eb2f);
     bits = (bits ^ (bits >> 16)).wrapping_mul(0x85eb_ca6b);

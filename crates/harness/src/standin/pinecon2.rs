@@ -1,8 +1,9 @@
 //! Stand-in for pinecon2: a fractal pine cone whose scales carry smaller scales.
 //!
-//! Scales follow the golden-angle spiral of Vogel (1979) up a bellied cone; each is a bent blade that carries
-//! blades of its own, and each of those a thorn. Scales are irregular by a small seeded jitter. World units are
-//! chosen so that the greedy MF tree costs about 1.4e6, as the original's did.
+//! Scales follow the golden-angle spiral of Vogel (1979) up a bellied cone; each is a bent blade
+//! that carries blades of its own, and each of those a thorn. Scales are irregular by a small
+//! seeded jitter. World units are chosen so that the greedy MF tree costs about 1.4e6, as the
+//! original's did.
 
 use super::patch::{Mesh, about_x, about_y, about_z, circle, cos_sin, fraction, jitter, placed};
 use glam::{DMat3, DVec3, Vec3};
@@ -69,7 +70,8 @@ fn blade(mesh: &mut Mesh, columns: usize, rows: usize, lift: f64) {
     mesh.grid(columns, rows, |i, j| face(fraction(i, columns), fraction(j, rows), lift));
 }
 
-/// The blade's surface: `u` across in 0..=1, `v` from root to tip; widest two thirds up, cupped and bent outwards.
+/// The blade's surface: `u` across in 0..=1, `v` from root to tip; widest two thirds up, cupped and
+/// bent outwards.
 fn face(u: f64, v: f64, lift: f64) -> DVec3 {
     let across = 2.0 * u - 1.0;
     let width = 0.16 + 0.36 * cos_sin(0.25 * (1.0 - v) * (1.0 - v) * 1.6).0 - 0.22 * v * v * v;

@@ -1,7 +1,8 @@
-//! Spheres for the ray tracing rows: the document's 75, and the same picture with more and smaller ones.
+//! Spheres for the ray tracing rows: the document's 75, and the same picture with more of them.
 //!
-//! Centres follow Roberts' (2018) additive recurrence on the plastic-number generalization of the golden ratio,
-//! which keeps any number of points evenly apart without a grid. Differs from the document: it gives no positions.
+//! Centres follow Roberts' (2018) additive recurrence on the plastic-number generalization of the
+//! golden ratio, which keeps any number of points evenly apart without a grid. Differs from the
+//! document: it gives no positions.
 
 use super::patch::jitter;
 use glam::{DVec3, Vec3};
@@ -15,12 +16,13 @@ pub struct Sphere {
     pub radius: f32,
 }
 
-/// Half the size of the box that holds the centres: about 16:9 seen along the z axis, centred at the origin.
+/// Half the size of the box that holds the centres: about 16:9 seen along the z axis, centred at
+/// the origin.
 const HALF_SIZE: DVec3 = DVec3::new(8.0, 4.5, 5.0);
 
-/// `count` spheres whose centres fill the box |x| <= 8, |y| <= 4.5, |z| <= 5 at every count. Radii vary by a factor
-/// of 4 and shrink with the cube root of `count`, so that the volume taken is the same; spheres hardly touch.
-/// The same bytes at every call and on every machine. O(count).
+/// `count` spheres whose centres fill the box |x| <= 8, |y| <= 4.5, |z| <= 5 at every count. Radii
+/// vary by a factor of 4 and shrink with the cube root of `count`, so that the volume taken is the
+/// same; spheres hardly touch. The same bytes at every call and on every machine. O(count).
 pub fn spheres(count: usize) -> Vec<Sphere> {
     // 1/g, 1/g², 1/g³ for the real root g of g⁴ = g + 1.
     let steps = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_2);
