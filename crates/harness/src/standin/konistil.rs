@@ -1,6 +1,6 @@
 //! Stand-in for konistil: a valley with town and railway, in millimetres on a map grid.
 //!
-//! Coordinates run into the millions, costs to 1e14, beside parts a few hundred units thick: rails,
+//! Coordinates run into the millions, costs to 1e14, beside parts a few tens of units thick: rails,
 //! wires and lattice masts are long and thin; the terrain is one coarse sheet, fine only where the
 //! town stands. Ground, houses and trees are irregular by a small seeded jitter.
 

@@ -22,7 +22,7 @@ const HALF_SIZE: DVec3 = DVec3::new(8.0, 4.5, 5.0);
 
 /// `count` spheres whose centres fill the box |x| <= 8, |y| <= 4.5, |z| <= 5 at every count. Radii
 /// vary by a factor of 4 and shrink with the cube root of `count`, so that the volume taken is the
-/// same; spheres hardly touch. The same bytes at every call and on every machine. O(count).
+/// same; few spheres touch. The same bytes at every call and on every machine. O(count).
 pub fn spheres(count: usize) -> Vec<Sphere> {
     // 1/g, 1/g², 1/g³ for the real root g of g⁴ = g + 1.
     let steps = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_2);
@@ -31,10 +31,14 @@ pub fn spheres(count: usize) -> Vec<Sphere> {
     (0..count)
         .map(|i| {
             let unit = (steps * i as f64 + DVec3::splat(0.5)).map(|x| x - x.floor());
+            // A small jitter hides the planes in which the recurrence lies.
+            let loose = DVec3::splat(0.12 * spacing);
+            let shift = DVec3::new(jitter(12, i), jitter(13, i), jitter(14, i)) * loose;
+            let center = (unit * 2.0 - DVec3::ONE) * (HALF_SIZE - loose) + shift;
             // Many small, few large: the square of an even draw.
             let draw = 0.5 + 0.5 * jitter(11, i);
-            let radius = spacing * (0.12 + 0.36 * draw * draw);
-            Sphere { center: ((unit * 2.0 - DVec3::ONE) * HALF_SIZE).as_vec3(), radius: radius as f32 }
+            let radius = spacing * (0.10 + 0.30 * draw * draw);
+            Sphere { center: center.as_vec3(), radius: radius as f32 }
         })
         .collect()
 }

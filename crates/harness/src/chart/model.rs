@@ -1,0 +1,269 @@
+//! What a figure is: panels, axes and layers of data series, in data units and without any layout.
+
+use thiserror::Error;
+
+/// Panels in a grid under one title, with one legend for all of them.
+///
+/// A series name means the same colour, dash, marker and legend entry wherever it occurs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Figure {
+    /// Printed bold at the top; wrapped. Also the title of the SVG for readers who cannot see it.
+    pub title: String,
+    /// Printed under the title; wrapped. Says what is shown, of what, how often.
+    pub caption: String,
+    /// Panels per row, 1 to 4 (other values are brought into this range); rows are filled in order.
+    pub columns: usize,
+    /// The panels, row by row.
+    pub panels: Vec<Panel>,
+    /// Looks given to series in advance, so that a method looks the same in every figure. Names not
+    /// listed take the free slots in order of appearance.
+    pub looks: Vec<(String, Look)>,
+}
+
+/// How the marks of a series are told from those of the others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// The n-th combination of colour (Okabe and Ito's colour-blind-safe ones), dash and marker, from 0.
+    Slot(usize),
+    /// Black and dashed: what the others are compared with, such as the paper's values.
+    Reference,
+}
+
+/// One pair of axes with the layers drawn over each other, the first at the bottom of its kind:
+/// bands, then bars, lines, error bars and points, and at last all text.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Panel {
+    /// Printed bold above the panel; may be empty.
+    pub title: String,
+    /// The horizontal axis.
+    pub x: Axis,
+    /// The vertical axis.
+    pub y: Axis,
+    /// The data. Without any that can be drawn the panel says 'no data'.
+    pub layers: Vec<Layer>,
+}
+
+/// What is measured along one side of a panel, and which part of it is shown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// Name and unit, such as `time (s)`. A power of ten common to all ticks is appended to it.
+    pub label: String,
+    /// How values become positions.
+    pub scale: Scale,
+    /// Lower end, in data units. `None`, or a value the scale cannot show: just below the data.
+    pub low: Option<f64>,
+    /// Upper end, in data units, above `low`. `None`, or a value the scale cannot show: just above
+    /// the data.
+    pub high: Option<f64>,
+}
+
+/// How values become positions along an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Scale {
+    /// Equal differences are equal distances.
+    Linear,
+    /// Equal ratios are equal distances; values of 0 and below have no position.
+    Log,
+    /// Value i, from 0, is the middle of the i-th name's place; places are 1 wide.
+    Category(Vec<String>),
+}
+
+impl Axis {
+    /// A linear axis around the data.
+    pub fn linear(label: impl Into<String>) -> Self {
+        Self { label: label.into(), scale: Scale::Linear, low: None, high: None }
+    }
+
+    /// A logarithmic axis around the data.
+    pub fn log(label: impl Into<String>) -> Self {
+        Self { scale: Scale::Log, ..Self::linear(label) }
+    }
+
+    /// An axis with one place for each name.
+    pub fn categories(label: impl Into<String>, names: Vec<String>) -> Self {
+        Self { scale: Scale::Category(names), ..Self::linear(label) }
+    }
+
+    /// The same axis from `low` to `high`, whatever the data.
+    #[must_use]
+    pub fn range(self, low: f64, high: f64) -> Self {
+        Self { low: Some(low), high: Some(high), ..self }
+    }
+
+    /// The same axis beginning at `low`.
+    #[must_use]
+    pub fn starting_at(self, low: f64) -> Self {
+        Self { low: Some(low), ..self }
+    }
+}
+
+/// Marks of one kind. Coordinates are data units; points an axis cannot show (non-finite, or not
+/// positive on a logarithmic axis) are skipped and interrupt a line. An empty name has no legend
+/// entry.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Layer {
+    /// Straight lines from point to point.
+    Line {
+        /// The series.
+        name: String,
+        /// `(x, y)`, in drawing order.
+        points: Vec<(f64, f64)>,
+    },
+    /// A staircase: y holds until the next x. On a logarithmic axis it falls through the floor at the
+    /// first y that is 0 or below.
+    Steps {
+        /// The series.
+        name: String,
+        /// `(x, y)`, x ascending; the last point ends the last step.
+        points: Vec<(f64, f64)>,
+    },
+    /// Markers.
+    Points {
+        /// The series.
+        name: String,
+        /// `(x, y)`.
+        points: Vec<(f64, f64)>,
+    },
+    /// A translucent area between two lines.
+    Band {
+        /// The series.
+        name: String,
+        /// `(x, lower, upper)`, x ascending; a lower value of 0 or below reaches the floor of a
+        /// logarithmic axis.
+        points: Vec<(f64, f64, f64)>,
+    },
+    /// A translucent area between two staircases.
+    StepBand {
+        /// The series.
+        name: String,
+        /// As for [`Layer::Band`]; both values hold until the next x.
+        points: Vec<(f64, f64, f64)>,
+    },
+    /// Markers with a vertical bar. On a category axis, offsets of x by less than a half keep several
+    /// series beside each other.
+    ErrorBars {
+        /// The series.
+        name: String,
+        /// `(x, lower, middle, upper)`; the marker is at `middle`.
+        points: Vec<(f64, f64, f64, f64)>,
+    },
+    /// One bar per category of a category x axis; several such layers stand beside each other.
+    Bars {
+        /// The series.
+        name: String,
+        /// Height of each category's bar; skipped if not finite.
+        values: Vec<f64>,
+        /// Lower and upper end of the whisker on each bar; may be shorter than `values`, or empty.
+        spread: Vec<(f64, f64)>,
+        /// Where bars begin: 0, or 1 for ratios. A logarithmic axis's floor if it cannot show this.
+        base: f64,
+    },
+    /// A horizontal reference line over the whole panel.
+    HLine {
+        /// Its height.
+        y: f64,
+        /// Printed along the line; may be empty.
+        label: String,
+    },
+    /// A vertical reference line over the whole panel.
+    VLine {
+        /// Its place.
+        x: f64,
+        /// Printed beside the line; may be empty.
+        label: String,
+    },
+    /// Text beside a point, put where it covers as little as possible.
+    Note {
+        /// The point's x.
+        x: f64,
+        /// The point's y.
+        y: f64,
+        /// The text, on one line.
+        text: String,
+    },
+}
+
+impl Layer {
+    /// The series, of layers that belong to one.
+    pub fn name(&self) -> Option<&str> {
+        match self {
+            Self::Line { name, .. }
+            | Self::Steps { name, .. }
+            | Self::Points { name, .. }
+            | Self::Band { name, .. }
+            | Self::StepBand { name, .. }
+            | Self::ErrorBars { name, .. }
+            | Self::Bars { name, .. } => Some(name),
+            Self::HLine { .. } | Self::VLine { .. } | Self::Note { .. } => None,
+        }
+    }
+}
+
+/// A table of coloured cells with its key.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeatMap {
+    /// Printed bold at the top; wrapped.
+    pub title: String,
+    /// Printed under the title; wrapped.
+    pub caption: String,
+    /// What the rows are, such as `case`; may be empty.
+    pub row_label: String,
+    /// What the columns are; may be empty.
+    pub column_label: String,
+    /// One name per row, from the top.
+    pub rows: Vec<String>,
+    /// One name per column, from the left.
+    pub columns: Vec<String>,
+    /// `rows.len() * columns.len()` cells, row by row.
+    pub cells: Vec<Cell>,
+    /// What the colours mean.
+    pub key: Key,
+}
+
+/// One cell of a heat map.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cell {
+    /// What the colour shows. Grey where the key has no colour for it, such as NaN for 'not run'.
+    pub value: f64,
+    /// Printed in the cell; may be empty.
+    pub text: String,
+}
+
+/// What the colours of a heat map mean.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Key {
+    /// Value i, from 0, is the i-th of these classes, given from best to worst.
+    Classes(Vec<String>),
+    /// Numbers. Values outside a range that was set take its end's colour.
+    Numbers {
+        /// Label, scale (linear or logarithmic) and range.
+        axis: Axis,
+        /// The value that is neither good nor bad, such as a ratio of 1, drawn in white with blue
+        /// below and red above it. `None`: light to dark.
+        middle: Option<f64>,
+    },
+}
+
+/// Why there is no picture.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "each message says what its fields are")]
+pub enum ChartError {
+    /// A heat map whose cells do not fill its table.
+    #[error("heat map '{title}' has {rows} rows of {columns} cells, and {cells} cells instead of their product")]
+    CellCount { title: String, rows: usize, columns: usize, cells: usize },
+    /// The drawing library refused something.
+    #[error("figure '{title}' could not be drawn: {reason}")]
+    Draw { title: String, reason: String },
+    /// One of the fonts in the program could not be read.
+    #[error("the embedded font could not be read: {reason}")]
+    Font { reason: String },
+    /// Not an SVG.
+    #[error("the SVG to rasterise could not be read: {reason}")]
+    Svg { reason: String },
+    /// More pixels than a PNG should have.
+    #[error("a picture of {width} × {height} pixels is too large for a PNG; show fewer panels or rows")]
+    TooLarge { width: u32, height: u32 },
+    /// The PNG encoder failed.
+    #[error("the PNG could not be encoded: {reason}")]
+    Png { reason: String },
+}
