@@ -106,6 +106,19 @@ impl<E: Evaluation> Sweep<'_, E> {
         self.improve(self.same_as[axis as usize], Split::NONE)
     }
 
+    /// The best candidates of the three axes into `list`, the best of all first. O(n).
+    #[inline(always)]
+    pub fn axis_bests(&mut self, list: &mut Vec<Split>) {
+        list.clear();
+        for axis in 0..3 {
+            let same = self.same_as[axis as usize];
+            // An axis with the order of a lower one has the same best.
+            let best = if same == axis { self.axis_best(axis) } else { list[same as usize] };
+            list.push(best);
+        }
+        list.sort_unstable_by(Split::rank);
+    }
+
     /// Replaces `best` by the best candidate of `axis` if that ranks before it.
     #[inline(always)]
     fn improve(&mut self, axis: u8, mut best: Split) -> Split {
@@ -181,7 +194,8 @@ impl<E: Evaluation> Sweep<'_, E> {
     }
 
     /// Shows `visit` every candidate of `axis` that costs at most `bound`, and some others, each once, in no
-    /// particular order. `visit` returns the bound from there on.
+    /// particular order. `visit` returns the bound from there on. With `BEST`, candidates dearer than another one
+    /// shown later may be left out.
     ///
     /// Objects are taken in blocks. One pass gathers each block's box; scans over the blocks from either end
     /// value the candidates between them; and since a side's value only grows as it gains objects, the left
@@ -204,52 +218,29 @@ impl<E: Evaluation> Sweep<'_, E> {
             visit(candidate(evaluation.join(left, right), n / 2));
             return;
         }
+        // A small node is one block with nothing around it.
+        let (size, blocks) = if n <= 2 * BLOCK {
+            (n, &[Block::NONE][..])
+        } else {
+            let blocks = &mut self.blocks[axis as usize];
+            gather_blocks(boxes, *evaluation, order, blocks);
+            for (index, pair) in blocks.windows(2).enumerate() {
+                let cost = evaluation.join(pair[1].left_value, pair[0].right_value);
+                bound = visit(candidate(cost, (index + 1) * BLOCK));
+            }
+            (BLOCK, &blocks[..])
+        };
         let mut costs = [0.0; 2 * BLOCK];
-        if n <= 2 * BLOCK {
-            let lowest = value_block(boxes, *evaluation, order, &Block::NONE, &mut costs);
+        for (index, (block, objects)) in blocks.iter().zip(order.chunks(size)).enumerate() {
+            if evaluation.bound(block.left_value, block.right_value) > bound {
+                continue;
+            }
+            let lowest = value_block(boxes, *evaluation, objects, block, &mut costs);
             bound = if BEST { bound.min(lowest) } else { bound };
             if lowest <= bound {
-                for left in (1..n).filter(|&left| costs[left] <= bound) {
-                    visit(candidate(costs[left], left));
-                }
-            }
-            return;
-        }
-
-        let blocks = &mut self.blocks[axis as usize];
-        blocks.clear();
-        blocks
-            .extend(order.chunks(BLOCK).map(|objects| Block { left: union_of(boxes, objects), ..Block::NONE }));
-        let (mut aabb, mut load) = (PackedAabb::EMPTY, 0.0);
-        for (block, objects) in blocks.iter_mut().zip(order.chunks(BLOCK)).rev() {
-            if load > 0.0 {
-                block.right_value = evaluation.side(aabb.half_area(), load);
-            }
-            (block.right, block.right_load) = (aabb, load);
-            aabb.grow(&block.left);
-            load += evaluation.total_load(objects);
-        }
-        let (mut aabb, mut load, mut right_value) = (PackedAabb::EMPTY, 0.0, 0.0);
-        for (index, (block, objects)) in blocks.iter_mut().zip(order.chunks(BLOCK)).enumerate() {
-            let own = block.left;
-            if index > 0 {
-                block.left_value = evaluation.side(aabb.half_area(), load);
-                bound = visit(candidate(evaluation.join(block.left_value, right_value), index * BLOCK));
-            }
-            (block.left, block.left_load) = (aabb, load);
-            aabb.grow(&own);
-            load += evaluation.total_load(objects);
-            right_value = block.right_value;
-        }
-        for (index, (block, objects)) in blocks.iter().zip(order.chunks(BLOCK)).enumerate() {
-            if evaluation.bound(block.left_value, block.right_value) <= bound {
-                let lowest = value_block(boxes, *evaluation, objects, block, &mut costs);
-                bound = if BEST { bound.min(lowest) } else { bound };
-                if lowest <= bound {
-                    for left in 1..objects.len() {
-                        if costs[left] <= bound {
-                            bound = visit(candidate(costs[left], index * BLOCK + left));
-                        }
+                for (left, &cost) in costs.iter().enumerate().take(objects.len()).skip(1) {
+                    if cost <= bound {
+                        bound = visit(candidate(cost, index * size + left));
                     }
                 }
             }
@@ -272,6 +263,33 @@ impl<E: Evaluation> Sweep<'_, E> {
             block.left.union(&union_of(self.boxes, &order[start..left])),
             block.right.union(&union_of(self.boxes, &order[left..end])),
         ]
+    }
+}
+
+/// The surroundings of every block of `order`.
+#[inline(always)]
+fn gather_blocks<E: Evaluation>(boxes: &[PackedAabb], evaluation: &E, order: &[u32], blocks: &mut Vec<Block>) {
+    blocks.clear();
+    // Each block's own box, for now in the place of the box before it.
+    blocks.extend(order.chunks(BLOCK).map(|objects| Block { left: union_of(boxes, objects), ..Block::NONE }));
+    let (mut aabb, mut load) = (PackedAabb::EMPTY, 0.0);
+    for (block, objects) in blocks.iter_mut().zip(order.chunks(BLOCK)).rev() {
+        if aabb != PackedAabb::EMPTY {
+            block.right_value = evaluation.side(aabb.half_area(), load);
+        }
+        (block.right, block.right_load) = (aabb, load);
+        aabb.grow(&block.left);
+        load += evaluation.total_load(objects);
+    }
+    let (mut aabb, mut load) = (PackedAabb::EMPTY, 0.0);
+    for (block, objects) in blocks.iter_mut().zip(order.chunks(BLOCK)) {
+        if aabb != PackedAabb::EMPTY {
+            block.left_value = evaluation.side(aabb.half_area(), load);
+        }
+        let own = std::mem::replace(&mut block.left, aabb);
+        block.left_load = load;
+        aabb.grow(&own);
+        load += evaluation.total_load(objects);
     }
 }
 

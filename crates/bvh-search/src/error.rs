@@ -1,0 +1,31 @@
+//! What a search can refuse.
+
+use bvh_build::BuildError;
+
+/// Why a search did not start. Once started, a search always returns a tree.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SearchError {
+    /// The scene cannot be built.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// A parameter of the search is outside its range.
+    #[error("{parameter} is {found}; accepted: {accepted}")]
+    Parameter {
+        /// The parameter's name in the configuration.
+        parameter: &'static str,
+        /// The value found.
+        found: f64,
+        /// The range that would be accepted.
+        accepted: &'static str,
+    },
+}
+
+/// `Ok` if `holds`, else an error that names the parameter, what was found and what would be accepted.
+pub(crate) fn require(
+    holds: bool,
+    parameter: &'static str,
+    found: f64,
+    accepted: &'static str,
+) -> Result<(), SearchError> {
+    if holds { Ok(()) } else { Err(SearchError::Parameter { parameter, found, accepted }) }
+}

@@ -1,0 +1,35 @@
+//! Stochastic search for better bounding volume hierarchies.
+//!
+//! A search is one file with a `Config` that implements [`Search`]. It proposes trees; the [`Run`] it is handed
+//! counts evaluations, keeps the incumbent's cost and the history, and says when to stop, so that no search can
+//! forget to. [`solve`] starts a search and returns its [`Outcome`]. Searches read no clock and hold no global
+//! state; the same seed gives the same outcome on any number of threads.
+//!
+//! ```
+//! use bvh_core::Aabb;
+//! use bvh_search::{Problem, Budget, grasp, solve};
+//! let boxes: Vec<Aabb> = (0..100u8).map(f32::from).map(|i| {
+//!     let at = [i, (i * 7.3) % 11.0, (i * 3.1) % 5.0];
+//!     Aabb::from((at, at.map(|c| c + 1.5)))
+//! }).collect();
+//! let config = grasp::Config { trials: 20, noise: Some(0.1), ..Default::default() };
+//! let outcome = solve(&config, &Problem::new(&boxes), 1, Budget::default(), &())?;
+//! assert_eq!(outcome.history.len(), 20);
+//! assert_eq!(outcome.cost, outcome.history.iter().map(|event| event.cost).fold(f64::INFINITY, f64::min));
+//! # Ok::<(), bvh_search::SearchError>(())
+//! ```
+
+mod budget;
+mod error;
+pub mod grasp;
+#[cfg(feature = "serde")]
+mod registry;
+mod run;
+mod stream;
+
+pub use budget::{Budget, StopReason};
+pub use error::SearchError;
+#[cfg(feature = "serde")]
+pub use registry::Method;
+pub use run::{Event, Observer, Outcome, Problem, Run, Search, solve};
+pub use stream::Stream;

@@ -1,0 +1,48 @@
+//! The one registry of methods: the only place that knows them all by name.
+
+use crate::{Problem, Run, Search, SearchError};
+use bvh_core::Bvh;
+use serde::{Deserialize, Serialize};
+
+/// One line per method: its name in specs and tables, and the configuration that runs it.
+macro_rules! methods {
+    ($($(#[$doc:meta])* $name:literal => $variant:ident($config:ty),)*) => {
+        /// A builder or a search with its parameters, as a spec names it: a table whose `method` is the name and
+        /// whose other keys are the configuration's fields. Unknown names and keys are refused.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(tag = "method")]
+        pub enum Method {
+            $($(#[$doc])* #[serde(rename = $name)] $variant($config),)*
+        }
+
+        impl Method {
+            /// The names of all methods.
+            pub const NAMES: &[&str] = &[$($name),*];
+
+            /// Every method with its default parameters.
+            pub fn all() -> Vec<Self> {
+                vec![$(Self::$variant(Default::default())),*]
+            }
+
+            /// The method's name.
+            pub fn name(&self) -> &'static str {
+                match self { $(Self::$variant(_) => $name),* }
+            }
+        }
+
+        impl Search for Method {
+            fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+                match self { $(Self::$variant(config) => config.search(problem, seed, run)),* }
+            }
+        }
+    };
+}
+
+methods! {
+    /// Greedy top-down division.
+    "muller_fellner" => MullerFellner(bvh_build::muller_fellner::Config),
+    /// Division at the median.
+    "median_cut" => MedianCut(bvh_build::median_cut::Config),
+    /// Randomised Müller–Fellner.
+    "grasp" => Grasp(crate::grasp::Config),
+}

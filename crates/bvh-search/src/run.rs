@@ -1,0 +1,146 @@
+//! One search at work: the only place that counts evaluations and work, keeps the incumbent's cost and the history,
+//! and decides when to stop.
+
+use crate::{Budget, SearchError, StopReason};
+use bvh_build::Builder;
+use bvh_core::{Aabb, Bvh, cost::Objective};
+
+/// What is searched for: the tree over `boxes` of least cost.
+#[derive(Clone, Copy, Debug)]
+pub struct Problem<'a> {
+    /// One box per object.
+    pub boxes: &'a [Aabb],
+    /// The cost to minimise.
+    pub objective: Objective,
+}
+
+impl<'a> Problem<'a> {
+    /// The paper's problem: least total area of inner nodes.
+    pub fn new(boxes: &'a [Aabb]) -> Self {
+        Self { boxes, objective: Objective::default() }
+    }
+}
+
+/// A search, or a builder seen as a search of one evaluation.
+pub trait Search {
+    /// Looks for a good tree, reports every evaluation to `run`, and returns the incumbent. Stops as soon as
+    /// [`Run::stopped`] says so, but never before one tree has been evaluated.
+    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError>;
+}
+
+impl<B: Builder> Search for B {
+    fn search(&self, problem: &Problem, _seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+        let tree = self.build(problem.boxes)?;
+        run.record(problem.objective.cost(&tree), tree.nodes.len() as u64);
+        Ok(tree)
+    }
+}
+
+/// Follows a search from outside, from any thread. `()` watches nothing.
+pub trait Observer: Sync {
+    /// Called after every event of the history, in order.
+    fn event(&self, _event: &Event) {}
+    /// Asked often; the search returns its incumbent soon after this is true.
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+impl Observer for () {}
+
+/// One point of a search's history: a trial, a generation, or an improvement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// Trees or moves evaluated so far, this one included.
+    pub evaluations: u64,
+    /// Nodes made or visited so far.
+    pub work: u64,
+    /// The cost found now.
+    pub cost: f64,
+    /// The lowest cost so far.
+    pub incumbent: f64,
+}
+
+/// The state that is common to all searches.
+pub struct Run<'a> {
+    budget: Budget,
+    observer: &'a dyn Observer,
+    evaluations: u64,
+    work: u64,
+    incumbent: f64,
+    history: Vec<Event>,
+}
+
+impl Run<'_> {
+    /// Counts one evaluation that took `work` nodes and found `cost`. Returns whether it is the new incumbent:
+    /// strictly cheaper than all before, so that of equal trees the first is kept.
+    pub fn record(&mut self, cost: f64, work: u64) -> bool {
+        self.evaluations += 1;
+        self.work += work;
+        let improved = cost < self.incumbent;
+        if improved {
+            self.incumbent = cost;
+        }
+        let Self { evaluations, work, incumbent, .. } = *self;
+        let event = Event { evaluations, work, cost, incumbent };
+        self.history.push(event);
+        self.observer.event(&event);
+        improved
+    }
+
+    /// Why the search must return now, if it must.
+    pub fn stopped(&self) -> Option<StopReason> {
+        let reached = |limit: Option<u64>, count| limit.is_some_and(|limit| count >= limit);
+        if self.evaluations == 0 {
+            None
+        } else if self.observer.cancelled() {
+            Some(StopReason::Cancelled)
+        } else if reached(self.budget.max_evaluations, self.evaluations) {
+            Some(StopReason::Evaluations)
+        } else if reached(self.budget.max_work, self.work) {
+            Some(StopReason::Work)
+        } else {
+            None
+        }
+    }
+
+    /// How many evaluations of `work` nodes each the budget still has, at least one while not stopped.
+    pub fn evaluations_left(&self, work: u64) -> u64 {
+        let left = |limit: Option<u64>, count: u64| limit.map_or(u64::MAX, |limit| limit.saturating_sub(count));
+        let by_work = left(self.budget.max_work, self.work).div_ceil(work.max(1));
+        left(self.budget.max_evaluations, self.evaluations).min(by_work).max(u64::from(self.evaluations == 0))
+    }
+}
+
+/// What a search found.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The incumbent.
+    pub tree: Bvh,
+    /// Its cost by the problem's objective.
+    pub cost: f64,
+    /// Trees or moves evaluated.
+    pub evaluations: u64,
+    /// Nodes made or visited.
+    pub work: u64,
+    /// Why the search returned.
+    pub stop: StopReason,
+    /// Every event, in order.
+    pub history: Vec<Event>,
+}
+
+/// Runs one search within `budget`; randomness comes from `seed` alone.
+pub fn solve(
+    search: &dyn Search,
+    problem: &Problem,
+    seed: u64,
+    budget: Budget,
+    observer: &dyn Observer,
+) -> Result<Outcome, SearchError> {
+    let incumbent = f64::INFINITY;
+    let mut run = Run { budget, observer, evaluations: 0, work: 0, incumbent, history: Vec::new() };
+    let tree = search.search(problem, seed, &mut run)?;
+    let stop = run.stopped().unwrap_or(StopReason::Completed);
+    let Run { evaluations, work, incumbent: cost, history, .. } = run;
+    Ok(Outcome { tree, cost, evaluations, work, stop, history })
+}
