@@ -1,6 +1,6 @@
 //! Draws shapes and text given in pixels, through plotters, into one SVG.
 //!
-//! plotters' SVG backend has whole-number coordinates and no dashes or clipping. So it draws tenths
+//! plotters' SVG backend has whole-number coordinates and no dashes or clipping. So it draws twelfths
 //! of a pixel, and a figure is several of its pictures nested in one SVG: a nested picture clips what
 //! leaves it and inherits the dash of the group around it.
 
@@ -8,14 +8,16 @@ use std::fmt::Write as _;
 
 use plotters::coord::Shift;
 use plotters::element::{PathElement, Polygon, Rectangle, Text};
-use plotters::prelude::{Color, DrawingArea, IntoDrawingArea, IntoTextStyle, RGBColor, SVGBackend, ShapeStyle};
+use plotters::prelude::{Color, DrawingArea, IntoDrawingArea, RGBColor, SVGBackend, ShapeStyle};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{FontDesc, FontFamily, FontStyle, FontTransform, TextStyle};
 
+use super::style::WHITE;
 use super::text::{FAMILY, Type};
 
-/// Steps of plotters' coordinates per pixel.
-const STEPS: f64 = 10.0;
+/// Steps of plotters' coordinates per pixel. Of tens, twelfths and the like, twelfths let all font
+/// sizes be written exactly: see [`nominal`].
+const STEPS: f64 = 12.0;
 
 /// Where a text lies with respect to its point; always centred across the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -167,17 +169,33 @@ impl Pen<'_> {
         Ok(self.0.draw(&Rectangle::new(corners, colour.mix(opacity).filled()))?)
     }
 
-    /// A marker of this radius with a white edge, so that crowded ones can be told apart.
-    pub fn marker(&self, (x, y): (f64, f64), shape: &[(f64, f64)], colour: RGBColor, radius: f64) -> Result<(), Fault> {
+    /// A marker of this radius with a white edge of this width.
+    pub fn marker(
+        &self,
+        (x, y): (f64, f64),
+        shape: &[(f64, f64)],
+        colour: RGBColor,
+        radius: f64,
+        edge: f64,
+    ) -> Result<(), Fault> {
         let scaled = |radius: f64| -> Vec<(i32, i32)> {
             shape.iter().map(|&(dx, dy)| point((x + dx * radius, y + dy * radius))).collect()
         };
-        self.0.draw(&Polygon::new(scaled(radius + 1.2), RGBColor(255, 255, 255)))?;
+        if edge > 0.0 {
+            self.0.draw(&Polygon::new(scaled(radius + edge), WHITE))?;
+        }
         Ok(self.0.draw(&Polygon::new(scaled(radius), colour))?)
     }
 
     /// A line of text.
-    pub fn text(&self, at: (f64, f64), text: &str, style: Type, colour: RGBColor, anchor: Anchor) -> Result<(), Fault> {
+    pub fn text(
+        &self,
+        at: (f64, f64),
+        text: &str,
+        style: Type,
+        colour: RGBColor,
+        anchor: Anchor,
+    ) -> Result<(), Fault> {
         let (turned, side) = match anchor {
             Anchor::Start => (false, HPos::Left),
             Anchor::Middle => (false, HPos::Center),
@@ -186,6 +204,9 @@ impl Pen<'_> {
             Anchor::UpMiddle => (true, HPos::Center),
             Anchor::UpEnd => (true, HPos::Right),
         };
+        if text.is_empty() {
+            return Ok(());
+        }
         // plotters centres the lower-case letters; a little lower, digits and capitals look centred.
         let lower = 0.09 * style.size;
         let (x, y) = if turned { (at.0 + lower, at.1) } else { (at.0, at.1 + lower) };
@@ -231,6 +252,7 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(i32, i32)> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::text::{BODY, HEADING, SMALL, TITLE};
     use super::*;
 
     #[test]
@@ -238,21 +260,22 @@ mod tests {
         let wave = |i: i32| (f64::from(i) * 1e-4, f64::from(i % 97));
         let dense: Vec<(f64, f64)> = (0..1_000_000).map(wave).collect();
         let thin = thinned(&dense);
-        assert!(thin.len() <= 4 * 1001, "{} points", thin.len());
+        assert!(thin.len() as f64 <= 4.0 * (100.0 * STEPS + 1.0), "{} points", thin.len());
         assert_eq!((thin.first(), thin.last()), (Some(&point(dense[0])), Some(&point(dense[999_999]))));
-        assert_eq!(thin.iter().map(|point| point.1).max(), Some(960));
+        assert_eq!(thin.iter().map(|point| point.1).max(), Some(steps(96.0)));
     }
 
     #[test]
     fn level_points_are_left_out_and_reversals_kept() {
-        assert_eq!(thinned(&[(0.0, 1.0), (1.0, 1.0), (2.0, 1.0)]), [(0, 10), (20, 10)]);
-        assert_eq!(thinned(&[(0.0, 1.0), (2.0, 1.0), (1.0, 1.0)]), [(0, 10), (20, 10), (10, 10)]);
+        let (a, b, c) = ((0.0, 1.0), (1.0, 1.0), (2.0, 1.0));
+        assert_eq!(thinned(&[a, b, c]), [point(a), point(c)]);
+        assert_eq!(thinned(&[a, c, b]), [point(a), point(c), point(b)]);
     }
 
     #[test]
     fn font_sizes_are_written_without_rounding_errors() {
-        for size in [12.0, 13.0, 14.0, 17.0] {
-            assert_eq!(nominal(size * STEPS) / 1.24, size * STEPS);
+        for style in [SMALL, BODY, HEADING, TITLE] {
+            assert_eq!(nominal(style.size * STEPS) / 1.24, style.size * STEPS);
         }
     }
 
@@ -260,7 +283,9 @@ mod tests {
     fn names_cannot_break_the_svg() {
         let mut canvas = Canvas::new("a < b & \u{0}c", 10.0, 10.0);
         let style = Type { size: 12.0, bold: false };
-        canvas.over(|pen| pen.text((5.0, 5.0), "<\u{1}>&\"", style, RGBColor(0, 0, 0), Anchor::Middle)).unwrap();
+        canvas
+            .over(|pen| pen.text((5.0, 5.0), "<\u{1}>&\"", style, RGBColor(0, 0, 0), Anchor::Middle))
+            .unwrap();
         let svg = canvas.finish();
         assert!(svg.contains("<title>a &lt; b &amp;  c</title>") && svg.contains("&lt; &gt;&amp;&quot;"));
     }

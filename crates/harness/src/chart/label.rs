@@ -37,13 +37,24 @@ impl Labels {
             let parts = ((to.0 - from.0).abs().max((to.1 - from.1).abs()) / GRAIN).ceil().max(1.0);
             for part in 0..=parts as i32 {
                 let along = f64::from(part) / parts;
-                self.obstacles.insert(cell((from.0 + (to.0 - from.0) * along, from.1 + (to.1 - from.1) * along)));
+                self.obstacles
+                    .insert(cell((from.0 + (to.0 - from.0) * along, from.1 + (to.1 - from.1) * along)));
             }
         }
     }
 
-    /// The index and place of the candidate that covers least, the first among equals; O(area).
-    pub fn best(&mut self, candidates: &[Frame]) -> Option<(usize, Frame)> {
+    /// Keeps labels off an area, as far as it is inside the panel.
+    pub fn avoid_area(&mut self, area: Frame) {
+        let mut y = area.top.max(self.frame.top);
+        while y < area.bottom().min(self.frame.bottom()) {
+            self.avoid(&[(area.left, y), (area.right(), y)]);
+            y += GRAIN;
+        }
+        self.avoid(&[(area.left, area.bottom()), (area.right(), area.bottom())]);
+    }
+
+    /// The candidate that covers least, the first among equals.
+    pub fn best(&mut self, candidates: &[Frame]) -> Option<Frame> {
         let cost = |place: &Frame| {
             let (from, to) = (cell((place.left, place.top)), cell((place.right(), place.bottom())));
             let rows = (from.0..=to.0).flat_map(|x| (from.1..=to.1).map(move |y| (x, y)));
@@ -53,9 +64,9 @@ impl Labels {
                 || !self.frame.contains((place.right(), place.bottom()));
             covered + 1_000 * clashes + 100_000 * usize::from(outside)
         };
-        let (index, place) = candidates.iter().copied().enumerate().min_by_key(|(_, place)| cost(place))?;
+        let place = candidates.iter().copied().min_by_key(cost)?;
         self.taken.push(place);
-        Some((index, place))
+        Some(place)
     }
 }
 
@@ -93,15 +104,15 @@ mod tests {
         let mut labels = Labels::new(PANEL);
         labels.avoid(&[(100.0, 50.0), (200.0, 50.0)]);
         let places = around((100.0, 50.0), 40.0, 14.0);
-        let (_, first) = labels.best(&places).unwrap();
+        let first = labels.best(&places).unwrap();
         assert!(first.right() < 100.0, "{first:?} lies on the line");
-        let (_, second) = labels.best(&places).unwrap();
+        let second = labels.best(&places).unwrap();
         assert!(!second.overlaps(first));
     }
 
     #[test]
     fn a_label_at_the_edge_is_put_inside() {
-        let (_, place) = Labels::new(PANEL).best(&around((199.0, 1.0), 40.0, 14.0)).unwrap();
+        let place = Labels::new(PANEL).best(&around((199.0, 1.0), 40.0, 14.0)).unwrap();
         assert!(PANEL.contains((place.left, place.top)) && PANEL.contains((place.right(), place.bottom())));
     }
 }

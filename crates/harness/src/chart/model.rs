@@ -43,6 +43,13 @@ pub struct Panel {
     pub layers: Vec<Layer>,
 }
 
+impl Panel {
+    /// Whether bars are likely to cover labels of reference lines.
+    pub(super) fn has_bars(&self) -> bool {
+        self.layers.iter().any(|layer| matches!(layer, Layer::Bars { .. }))
+    }
+}
+
 /// What is measured along one side of a panel, and which part of it is shown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
@@ -50,7 +57,8 @@ pub struct Axis {
     pub label: String,
     /// How values become positions.
     pub scale: Scale,
-    /// Lower end, in data units. `None`, or a value the scale cannot show: just below the data.
+    /// Lower end, in data units; categories have none. `None`, or a value the scale cannot show: just
+    /// below the data.
     pub low: Option<f64>,
     /// Upper end, in data units, above `low`. `None`, or a value the scale cannot show: just above
     /// the data.
@@ -60,11 +68,12 @@ pub struct Axis {
 /// How values become positions along an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Scale {
-    /// Equal differences are equal distances.
+    /// Equal differences are equal distances. Values beyond ±10³⁰⁰ have no position.
     Linear,
     /// Equal ratios are equal distances; values of 0 and below have no position.
     Log,
-    /// Value i, from 0, is the middle of the i-th name's place; places are 1 wide.
+    /// Value i, from 0, is the middle of the i-th name's place, from the left or bottom; places are 1
+    /// wide.
     Category(Vec<String>),
 }
 
@@ -162,7 +171,7 @@ pub enum Layer {
     HLine {
         /// Its height.
         y: f64,
-        /// Printed along the line; may be empty.
+        /// Printed along the line or, in a panel with bars, in the legend; may be empty.
         label: String,
     },
     /// A vertical reference line over the whole panel.
@@ -249,7 +258,9 @@ pub enum Key {
 #[allow(missing_docs, reason = "each message says what its fields are")]
 pub enum ChartError {
     /// A heat map whose cells do not fill its table.
-    #[error("heat map '{title}' has {rows} rows of {columns} cells, and {cells} cells instead of their product")]
+    #[error(
+        "heat map '{title}' has {rows} rows of {columns} cells, and {cells} cells instead of their product"
+    )]
     CellCount { title: String, rows: usize, columns: usize, cells: usize },
     /// The drawing library refused something.
     #[error("figure '{title}' could not be drawn: {reason}")]

@@ -4,8 +4,9 @@ use super::model::{Axis, Scale};
 
 /// Values above this size, in either direction, count as non-finite, so that no difference overflows.
 const LARGEST: f64 = 1e300;
-/// Positions are kept within this many axis lengths of the axis; beyond that a line's slope is lost.
-const FARTHEST: f64 = 1000.0;
+/// Positions are kept within this many axis lengths of the axis; a line to a point beyond that is
+/// nearly upright or level anyway.
+const FARTHEST: f64 = 100.0;
 
 /// The shown part of an axis: `low < high`, in units of the value or of its decimal logarithm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,14 +35,8 @@ pub(super) struct Ticks {
 
 /// The value's coordinate on a linear or logarithmic line, if it has one there.
 fn coordinate(log: bool, value: f64) -> Option<f64> {
-    if !(value.abs() <= LARGEST) {
-        return None;
-    }
-    match (log, value > 0.0) {
-        (false, _) => Some(value),
-        (true, true) => Some(libm::log10(value)),
-        (true, false) => None,
-    }
+    let shown = if log { value > 0.0 && value <= LARGEST } else { value.abs() <= LARGEST };
+    shown.then(|| if log { libm::log10(value) } else { value })
 }
 
 impl Span {
@@ -82,11 +77,7 @@ impl Span {
     fn widened(self) -> Self {
         let narrowest = (1e-9 * self.low.abs().max(self.high.abs())).max(1e-200);
         let missing = narrowest - (self.high - self.low);
-        if missing > 0.0 {
-            Self { low: self.low - missing, high: self.high + missing, ..self }
-        } else {
-            self
-        }
+        if missing > 0.0 { Self { low: self.low - missing, high: self.high + missing, ..self } } else { self }
     }
 
     fn fraction(self, coordinate: f64) -> f64 {
@@ -100,7 +91,7 @@ impl Span {
 
     /// As [`Self::place`], but finite values without a logarithm are far below the axis.
     pub fn place_or_below(self, value: f64) -> Option<f64> {
-        self.place(value).or_else(|| (value <= 0.0 && value >= -LARGEST).then_some(-FARTHEST))
+        self.place(value).or_else(|| (-LARGEST..=0.0).contains(&value).then_some(-FARTHEST))
     }
 
     /// The densest ticks whose labels `fit`, of at most `most` (at least 2).
@@ -141,7 +132,7 @@ impl Span {
             if count < 2.0 && !ticks.is_empty() {
                 break;
             }
-            let digits = (factor - power).clamp(0, 9) as usize;
+            let digits = (factor - power).clamp(0, 11) as usize;
             ticks = (0..count.max(0.0) as i64)
                 .map(|i| (from as i64 + i) * i64::from(mantissa))
                 .filter_map(|units| {
@@ -151,7 +142,14 @@ impl Span {
                 })
                 .collect();
             if fit(&ticks) {
-                break;
+                return ticks;
+            }
+        }
+        // None fit: the ends, or if these do not either, one.
+        if let [first, .., last] = &ticks[..] {
+            ticks = vec![first.clone(), last.clone()];
+            if !fit(&ticks) {
+                ticks.pop();
             }
         }
         ticks
@@ -159,9 +157,7 @@ impl Span {
 
     fn log_ticks(self, most: usize, fit: &dyn Fn(&[Tick]) -> bool) -> Ticks {
         let (first, last) = ((self.low - 1e-9).ceil() as i32, (self.high + 1e-9).floor() as i32);
-        let at = |power: i32, mantissa: i32| {
-            self.fraction(f64::from(power) + libm::log10(f64::from(mantissa)))
-        };
+        let at = |power: i32, mantissa: i32| self.fraction(f64::from(power) + libm::log10(f64::from(mantissa)));
         let inside = |at: &f64| (-1e-9..=1.0 + 1e-9).contains(at);
         let between: Vec<(i32, i32)> =
             (first - 1..=last).flat_map(|power| (2..10).map(move |mantissa| (power, mantissa))).collect();

@@ -4,6 +4,8 @@ use plotters::style::RGBColor;
 
 use super::model::{Figure, Look};
 
+/// The background.
+pub(super) const WHITE: RGBColor = RGBColor(255, 255, 255);
 /// Text and axes.
 pub(super) const INK: RGBColor = RGBColor(34, 34, 34);
 /// Captions and reference lines.
@@ -13,24 +15,27 @@ pub(super) const GRID: RGBColor = RGBColor(221, 221, 221);
 /// Grid lines between them.
 pub(super) const FAINT: RGBColor = RGBColor(240, 240, 240);
 
-/// Okabe and Ito's colours without yellow, which is lost on white, and black, which is the
-/// reference's.
-const COLOURS: [RGBColor; 6] = [
+/// Okabe and Ito's colours, with grey for yellow, which is lost on white; black is the reference's.
+/// There is one more than dashes and markers, so that combinations repeat only after 42 series.
+const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
+    RGBColor(120, 120, 120),
 ];
 
-/// On and off lengths in pixels, each telling the colour of the same index apart in greyscale.
+/// On and off lengths in pixels.
 const DASHES: [&[f64]; 6] = [&[], &[8.0, 3.0], &[2.5, 2.0], &[9.0, 3.0, 2.5, 3.0], &[14.0, 3.0], &[5.0, 2.5]];
 
+/// The dash of reference lines.
+const RULE: &[f64] = &[4.0, 3.0];
 /// The dash of reference series.
 const REFERENCE_DASH: &[f64] = &[6.0, 4.0];
 
-/// Unit markers: polygons of radius about 1 around the origin, y downwards.
+/// Unit markers: polygons of radius about 1 around the origin, y downwards. The last is the reference's.
 const MARKERS: [&[(f64, f64)]; 7] = [
     &[
         (0.95, 0.0),
@@ -93,16 +98,20 @@ pub(super) struct Stroke {
 impl Stroke {
     fn of(look: Look) -> Self {
         match look {
-            Look::Reference => Self { colour: RGBColor(0, 0, 0), dash: REFERENCE_DASH, marker: MARKERS[6] },
-            // Each round through the colours shifts dashes and markers by one.
+            Look::Reference => {
+                Self { colour: RGBColor(0, 0, 0), dash: REFERENCE_DASH, marker: MARKERS[MARKERS.len() - 1] }
+            }
             Look::Slot(slot) => Self {
                 colour: COLOURS[slot % COLOURS.len()],
-                dash: DASHES[(slot + slot / COLOURS.len()) % DASHES.len()],
-                marker: MARKERS[(slot + slot / COLOURS.len()) % 6],
+                dash: DASHES[slot % DASHES.len()],
+                marker: MARKERS[slot % (MARKERS.len() - 1)],
             },
         }
     }
 }
+
+/// Reference lines.
+pub(super) const REFERENCE_LINE: Stroke = Stroke { colour: GREY, dash: RULE, marker: MARKERS[0] };
 
 /// The strokes of all series of a figure, in order of their first appearance.
 pub(super) struct Strokes(Vec<(String, Stroke)>);
@@ -115,10 +124,12 @@ impl Strokes {
                 names.push(name);
             }
         }
-        let set = |name| figure.looks.iter().find(|(known, _)| known == name).map(|&(_, look)| look);
+        let set = |name: &str| figure.looks.iter().find(|(known, _)| known == name).map(|&(_, look)| look);
         let taken = |slot| figure.looks.iter().any(|&(_, look)| look == Look::Slot(slot));
         let mut free = (0..).filter(|&slot| !taken(slot));
-        let stroke = |name: &str| Stroke::of(set(name).or_else(|| free.next().map(Look::Slot)).unwrap_or(Look::Reference));
+        let stroke = |name: &str| {
+            Stroke::of(set(name).or_else(|| free.next().map(Look::Slot)).unwrap_or(Look::Reference))
+        };
         let strokes: Vec<Stroke> = names.iter().copied().map(stroke).collect();
         Self(names.into_iter().map(str::to_owned).zip(strokes).collect())
     }

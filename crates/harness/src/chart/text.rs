@@ -104,8 +104,13 @@ impl Ruler {
         if self.width(text, style) <= width {
             return text.to_owned();
         }
-        let mut kept: String = text.to_owned();
-        while kept.pop().is_some() && self.width(&kept, style) + self.width("…", style) > width {}
+        let room = width - self.width("…", style);
+        let mut taken = 0.0;
+        let fits = |character: &char| {
+            taken += self.width(character.encode_utf8(&mut [0; 4]), style);
+            taken <= room
+        };
+        let kept: String = text.chars().take_while(fits).collect();
         format!("{}…", kept.trim_end())
     }
 }
@@ -138,7 +143,8 @@ mod tests {
     #[test]
     fn the_font_has_the_characters_of_figures() {
         let ruler = Ruler::new().unwrap();
-        for character in "aZ09 äéñß αΩπσ ×÷±−≤≥≈∞√∑ ⁰¹²³⁴⁵⁶⁷⁸⁹⁻ ₀₁₉ ←→↑↓ …–—’“” °µ½ ✓✗ ●■▲".chars() {
+        for character in "aZ09 äéñß αΩπσ ×÷±−≤≥≈∞√∑ ⁰¹²³⁴⁵⁶⁷⁸⁹⁻ ₀₁₉ ←→↑↓ …–—’“” °µ½ ✓✗ ●■▲".chars()
+        {
             assert!(ruler.regular.0.map(character).is_some(), "no {character}");
         }
     }

@@ -1,0 +1,66 @@
+//! What can go wrong in the harness, and the exit code that says so.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A failure, with the file or object it concerns.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each message says what its fields are")]
+pub enum Error {
+    /// A spec that cannot be run: file, key, what was found, what would be accepted.
+    #[error("{}: {message}", .file.display())]
+    Spec { file: PathBuf, message: String },
+    /// A scene that is neither built in, nor fetched, nor a readable OBJ file.
+    #[error("scene {name}: {message}")]
+    Scene { name: String, message: String },
+    /// A command line that asks for something contradictory.
+    #[error("{0}")]
+    Usage(String),
+    /// A file or folder that could not be read or written.
+    #[error("{}: cannot {action}: {source}", .path.display())]
+    Io { path: PathBuf, action: &'static str, source: io::Error },
+    /// A CSV file whose content is not what the harness writes.
+    #[error("{}: {source}", .path.display())]
+    Csv { path: PathBuf, source: csv::Error },
+    /// Another harness is writing to the same folder.
+    #[error("{} is in use by another harness; wait for it or choose another --out", .0.display())]
+    Busy(PathBuf),
+    /// A run failed.
+    #[error("scene {scene}, method {method}: {source}")]
+    Search { scene: String, method: String, source: bvh_search::SearchError },
+    /// A method returned something that is not a tree over the scene: a defect of the method.
+    #[error("scene {scene}, method {method} returned an invalid tree: {source}; please report this")]
+    InvalidTree { scene: String, method: String, source: bvh_core::InvalidBvh },
+    /// A figure could not be drawn.
+    #[error(transparent)]
+    Chart(#[from] crate::chart::ChartError),
+    /// `--check` found other numbers than the committed ones.
+    #[error(
+        "{differences} difference(s) from the committed results; if they are meant, run again without --check"
+    )]
+    Differs { differences: usize },
+    /// Ctrl-C.
+    #[error("interrupted; {finished} of {runs} runs are kept, `--resume` does the rest")]
+    Interrupted { finished: usize, runs: usize },
+}
+
+impl Error {
+    /// 2 for what the user can mend in a spec or a command line, 130 after Ctrl-C, otherwise 1.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Spec { .. } | Self::Scene { .. } | Self::Usage(_) => 2,
+            Self::Interrupted { .. } => 130,
+            _ => 1,
+        }
+    }
+
+    /// For `map_err` on file operations: names the path and what was tried.
+    pub fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::Io { path: path.to_owned(), action, source }
+    }
+
+    /// For `map_err` on CSV operations: names the path.
+    pub fn csv(path: &Path) -> impl FnOnce(csv::Error) -> Self {
+        move |source| Self::Csv { path: path.to_owned(), source }
+    }
+}

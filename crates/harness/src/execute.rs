@@ -1,0 +1,214 @@
+//! Carries out the runs of an experiment: in parallel or one by one, with progress, until done or interrupted.
+
+use crate::provenance::Provenance;
+use crate::record::{HistoryRow, RunRow, TimingRow};
+use crate::scene::Scene;
+use crate::spec::{Experiment, Labelled};
+use crate::store::{FinishedRun, Store};
+use crate::{Error, report};
+use bvh_build::{Builder, muller_fellner};
+use bvh_core::cost::{self, Objective, SahConstants};
+use bvh_search::{Event, Observer, Problem, solve};
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+use std::time::Instant;
+
+/// One run of an experiment.
+struct Job<'a> {
+    scene: &'a Scene,
+    /// The cost of the scene's greedy Müller–Fellner tree.
+    base: f64,
+    labelled: &'a Labelled,
+    repetition: u32,
+}
+
+/// What a finished experiment leaves to say.
+#[derive(Clone, Debug, Default)]
+pub struct Summary {
+    /// Tables for the terminal.
+    pub text: String,
+    /// Optional scenes that were not there.
+    pub left_out: Vec<String>,
+}
+
+/// Runs `experiment` into `out/NAME/`. `interrupted` is watched: when it becomes true, finished runs are kept and the
+/// rest is given up.
+pub fn execute(
+    experiment: &Experiment,
+    out: &Path,
+    resume: bool,
+    interrupted: &AtomicBool,
+) -> Result<Summary, Error> {
+    let (scenes, left_out) = experiment.load_scenes()?;
+    let resolved = resolve(experiment, &scenes)?;
+    let store = Store::open(out, &experiment.name, &resolved, resume)?;
+    let bases = scenes
+        .par_iter()
+        .map(|scene| base_cost(scene, &experiment.objective))
+        .collect::<Result<Vec<_>, _>>()?;
+    let jobs: Vec<Job> = scenes
+        .iter()
+        .zip(bases)
+        .flat_map(|(scene, base)| experiment.methods.iter().map(move |labelled| (scene, base, labelled)))
+        .flat_map(|(scene, base, labelled)| {
+            (0..experiment.repetitions).map(move |repetition| Job { scene, base, labelled, repetition })
+        })
+        .collect();
+
+    let todo: Vec<usize> = (0..jobs.len()).filter(|&index| !store.has(index)).collect();
+    let finished = AtomicUsize::new(jobs.len() - todo.len());
+    let watch = Watch { bar: progress(jobs.len() as u64, finished.load(Relaxed) as u64), interrupted };
+    watch.bar.set_message(experiment.name.clone());
+    let work = |&index: &usize| -> Result<(), Error> {
+        if let Some(run) = perform(experiment, &jobs[index], &watch)? {
+            store.keep(index, &run)?;
+            finished.fetch_add(1, Relaxed);
+            watch.bar.inc(1);
+        }
+        Ok(())
+    };
+    let result =
+        if experiment.sequential { todo.iter().try_for_each(work) } else { todo.par_iter().try_for_each(work) };
+    watch.bar.finish_and_clear();
+    result?;
+    let finished = finished.load(Relaxed);
+    if finished < jobs.len() {
+        return Err(Error::Interrupted { finished, runs: jobs.len() });
+    }
+    store.join(jobs.len())?;
+    store.write("resolved.toml", resolved.as_bytes())?;
+    let text = report::write_all(experiment, &store)?;
+    store.write("provenance.toml", to_toml(&Provenance::gather())?.as_bytes())?;
+    store.finish()?;
+    Ok(Summary { text, left_out })
+}
+
+/// The cost of the scene's greedy Müller–Fellner tree, the base of all ratios.
+fn base_cost(scene: &Scene, objective: &Objective) -> Result<f64, Error> {
+    let refused = |source| Error::Search {
+        scene: scene.name.clone(),
+        method: "muller_fellner, the base".into(),
+        source: bvh_search::SearchError::Build(source),
+    };
+    Ok(objective.cost(&muller_fellner::Config::default().build(&scene.boxes).map_err(refused)?))
+}
+
+/// One run; `None` if it was interrupted.
+fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<FinishedRun>, Error> {
+    let Job { scene, base, labelled: Labelled { label, method }, repetition } = *job;
+    if watch.cancelled() {
+        return Ok(None);
+    }
+    let seed = experiment.seed_of(&scene.name, label, repetition);
+    let problem = Problem { boxes: &scene.boxes, objective: experiment.objective };
+    let start = Instant::now();
+    let outcome = solve(method, &problem, seed, experiment.budget, watch);
+    let seconds = start.elapsed().as_secs_f64();
+    if watch.cancelled() {
+        return Ok(None);
+    }
+    let names = || (scene.name.clone(), label.clone());
+    let outcome = outcome.map_err(|source| {
+        let (scene, method) = names();
+        Error::Search { scene, method, source }
+    })?;
+    let tree = &outcome.tree;
+    bvh_core::validate(tree, &scene.boxes).map_err(|source| {
+        let (scene, method) = names();
+        Error::InvalidTree { scene, method, source }
+    })?;
+    let (scene_name, method) = names();
+    let internal_area = cost::internal_area(tree);
+    let run = RunRow {
+        scene: scene_name.clone(),
+        scene_kind: scene.kind.into(),
+        method: method.clone(),
+        seed,
+        repetition,
+        objects: scene.boxes.len(),
+        evaluations: outcome.evaluations,
+        work: outcome.work,
+        stop: outcome.stop,
+        cost: outcome.cost,
+        base_cost: base,
+        cost_over_base: if base > 0.0 { outcome.cost / base } else { 1.0 },
+        cost_over_root_area: cost::over_root_area(tree, internal_area),
+        internal_area,
+        goldsmith_salmon: cost::goldsmith_salmon(tree),
+        sah: cost::sah(tree, &SahConstants::default()),
+        nodes: tree.nodes.len(),
+        depth: tree.depth(),
+    };
+    let row = |event: &Event| HistoryRow {
+        scene: scene_name.clone(),
+        method: method.clone(),
+        seed,
+        repetition,
+        evaluations: event.evaluations,
+        work: event.work,
+        cost: event.cost,
+        incumbent: event.incumbent,
+    };
+    let history = outcome.history.iter().map(row).collect();
+    let threads = rayon::current_num_threads();
+    let timing = TimingRow { scene: scene_name, method, seed, repetition, threads, seconds };
+    Ok(Some(FinishedRun { run, history, timing }))
+}
+
+/// The spec with every default spelled out, and which scenes it ran on.
+fn resolve(experiment: &Experiment, scenes: &[Scene]) -> Result<String, Error> {
+    #[derive(Serialize)]
+    struct LoadedScene<'a> {
+        name: &'a str,
+        kind: &'a str,
+        objects: usize,
+        checksum: String,
+    }
+    #[derive(Serialize)]
+    struct Resolved<'a> {
+        experiment: &'a Experiment,
+        scenes: Vec<LoadedScene<'a>>,
+    }
+    let scenes = scenes
+        .iter()
+        .map(|scene| LoadedScene {
+            name: &scene.name,
+            kind: scene.kind,
+            objects: scene.boxes.len(),
+            checksum: format!("{:016x}", scene.checksum()),
+        })
+        .collect();
+    to_toml(&Resolved { experiment, scenes })
+}
+
+fn to_toml(value: &impl Serialize) -> Result<String, Error> {
+    toml::to_string(value).map_err(|error| Error::Usage(format!("cannot be written as TOML: {error}")))
+}
+
+/// A bar with the time left; hidden unless standard error is a terminal.
+fn progress(runs: u64, finished: u64) -> ProgressBar {
+    let bar = ProgressBar::new(runs).with_position(finished);
+    let template = "{msg} {wide_bar} {pos}/{len} runs, {eta} left";
+    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.reset_eta();
+    bar
+}
+
+/// Follows all runs: moves the bar, passes an interruption on.
+struct Watch<'a> {
+    bar: ProgressBar,
+    interrupted: &'a AtomicBool,
+}
+
+impl Observer for Watch<'_> {
+    fn event(&self, _event: &Event) {
+        self.bar.tick();
+    }
+
+    fn cancelled(&self) -> bool {
+        self.interrupted.load(Relaxed)
+    }
+}

@@ -1,0 +1,152 @@
+//! The command line: reads arguments, calls the library, prints what it returns, sets the exit code.
+
+use clap::{Args, Parser, Subcommand};
+use harness::scene::{FETCHED, SPHERES, Scene, fetched_path};
+use harness::spec::{Experiment, Overrides};
+use harness::standin::STAND_INS;
+use harness::{Error, check, execute};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+/// Experiments on bounding volume hierarchies: TOML specs in, CSV files and figures out.
+#[derive(Parser)]
+#[command(name = "harness", version, args_conflicts_with_subcommands = true, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// List the built-in scenes, their sizes, and what each stands in for.
+    Scenes,
+}
+
+#[derive(Args)]
+struct RunArgs {
+    /// Experiment specs, run one after the other.
+    #[arg(value_name = "SPEC.toml", required = true)]
+    specs: Vec<PathBuf>,
+    /// Folder for the results; each experiment has one of its own in it.
+    #[arg(long, value_name = "DIR", default_value = "results")]
+    out: PathBuf,
+    /// Scene to run on in place of the spec's, by name or path of an OBJ file; may be repeated.
+    #[arg(long = "scene", value_name = "NAME|PATH")]
+    scenes: Vec<String>,
+    /// Number of threads; as many as processors if not given. Changes no result but the times.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// Seed in place of the spec's.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Run the spec's smaller variant, into a folder of its own.
+    #[arg(long)]
+    quick: bool,
+    /// Compare with the committed results instead of writing any; exit code 1 on a difference.
+    #[arg(long, conflicts_with = "resume")]
+    check: bool,
+    /// Keep the finished runs of an interrupted experiment and do the rest.
+    #[arg(long)]
+    resume: bool,
+}
+
+/// Set by Ctrl-C. A second one ends the program at once; finished runs are kept either way.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let handler = ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Relaxed) {
+            std::process::exit(130);
+        }
+    });
+    if let Err(error) = handler {
+        eprintln!("warning: Ctrl-C will end the program at once: {error}");
+    }
+    let result = match cli.command {
+        Some(Command::Scenes) => list_scenes(),
+        None => run(&cli.run),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn run(args: &RunArgs) -> Result<(), Error> {
+    if let Some(jobs) = args.jobs {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(jobs.into())
+            .build_global()
+            .map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))?;
+    }
+    let overrides = Overrides { scenes: args.scenes.clone(), seed: args.seed, quick: args.quick };
+    // All specs are checked before the first one is run.
+    let experiments =
+        args.specs.iter().map(|path| Experiment::read(path, &overrides)).collect::<Result<Vec<_>, _>>()?;
+    let mut differences = 0;
+    for experiment in &experiments {
+        if args.check {
+            differences += check(args, experiment)?;
+        } else {
+            let summary = execute::execute(experiment, &args.out, args.resume, &INTERRUPTED)?;
+            println!("{}", experiment.question);
+            for name in &summary.left_out {
+                println!("(without {name}: scripts/fetch-scenes brings it)");
+            }
+            println!("\n{}Results: {}", summary.text, args.out.join(&experiment.name).display());
+        }
+    }
+    if differences > 0 { Err(Error::Differs { differences }) } else { Ok(()) }
+}
+
+/// Runs into a folder that is removed again. Returns the number of differences.
+fn check(args: &RunArgs, experiment: &Experiment) -> Result<usize, Error> {
+    let temporary = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
+    let summary = execute::execute(experiment, temporary.path(), false, &INTERRUPTED)?;
+    let (fresh, committed) = (temporary.path().join(&experiment.name), args.out.join(&experiment.name));
+    let found = check::compare(&fresh, &committed, &summary.left_out)?;
+    for name in &summary.left_out {
+        println!("{}: scene {name} is not fetched; its rows are not compared", experiment.name);
+    }
+    for difference in &found {
+        println!("{}: {difference}", experiment.name);
+    }
+    if found.is_empty() {
+        println!("{}: as committed", experiment.name);
+    }
+    Ok(found.len())
+}
+
+fn list_scenes() -> Result<(), Error> {
+    let mut table = comfy_table::Table::new();
+    table.load_preset(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(["name", "objects", "kind", "what it is"]);
+    for scene in STAND_INS {
+        let kind = format!("stand-in for {}", scene.original);
+        table.add_row([scene.name, &scene.triangle_count.to_string(), &kind, scene.character]);
+    }
+    for (name, count) in SPHERES {
+        table.add_row([name, &count.to_string(), "procedural", "Spheres, as in the second source document."]);
+    }
+    for (name, package) in FETCHED {
+        let objects = match fetched_path(name) {
+            Some(_) => Scene::load(name)?.boxes.len().to_string(),
+            None => "not fetched".into(),
+        };
+        table.add_row([
+            name,
+            &objects,
+            "file",
+            &format!("From the Rust package {package}, by scripts/fetch-scenes."),
+        ]);
+    }
+    println!("{table}\nAny OBJ file can be named by its path.");
+    Ok(())
+}

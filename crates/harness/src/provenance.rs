@@ -1,0 +1,59 @@
+//! Where results come from: revision, compiler, processor, threads, date. Kept apart from what can be reproduced.
+
+use serde::Serialize;
+use std::process::Command;
+use std::time::SystemTime;
+
+/// Contents of `provenance.toml`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Provenance {
+    /// The command line, the program's own path left out.
+    pub command: String,
+    /// Git revision of the working folder, `+` when it has uncommitted changes, or `unknown`.
+    pub revision: String,
+    /// Version of this program.
+    pub version: &'static str,
+    /// The compiler that built it.
+    pub rustc: &'static str,
+    /// Processor model and architecture.
+    pub cpu: String,
+    /// Threads used.
+    pub threads: usize,
+    /// When the results were completed, UTC.
+    pub date: String,
+}
+
+impl Provenance {
+    /// Gathers everything now.
+    pub fn gather() -> Self {
+        Self {
+            command: std::iter::once("harness".into())
+                .chain(std::env::args().skip(1))
+                .collect::<Vec<_>>()
+                .join(" "),
+            revision: revision().unwrap_or_else(|| "unknown".into()),
+            version: env!("CARGO_PKG_VERSION"),
+            rustc: env!("HARNESS_RUSTC"),
+            cpu: cpu(),
+            threads: rayon::current_num_threads(),
+            date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
+        }
+    }
+}
+
+fn revision() -> Option<String> {
+    let git = |args: &[&str]| {
+        let output = Command::new("git").args(args).output().ok().filter(|output| output.status.success())?;
+        Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    let dirty = git(&["status", "--porcelain", "--untracked-files=no"])?;
+    Some(git(&["rev-parse", "HEAD"])? + if dirty.is_empty() { "" } else { "+" })
+}
+
+/// The model as Linux names it; elsewhere the architecture alone.
+fn cpu() -> String {
+    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model =
+        info.lines().find_map(|line| line.strip_prefix("model name")).and_then(|rest| rest.split(':').nth(1));
+    model.map_or_else(String::new, |model| format!("{}, ", model.trim())) + std::env::consts::ARCH
+}

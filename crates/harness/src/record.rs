@@ -1,0 +1,126 @@
+//! The rows of the CSV files: flat, units in the names, full precision.
+
+use crate::Error;
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use std::path::Path;
+
+/// One row of `runs.csv`: what one run of one method on one scene found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// `stand-in`, `procedural` or `file`.
+    pub scene_kind: String,
+    /// Label of the method in the spec.
+    pub method: String,
+    /// Seed of this run, derived from the spec's.
+    pub seed: u64,
+    /// From 0.
+    pub repetition: u32,
+    /// Number of objects in the scene.
+    pub objects: usize,
+    /// Trees or moves evaluated.
+    pub evaluations: u64,
+    /// Nodes made or visited.
+    pub work: u64,
+    /// Why the run ended.
+    pub stop: bvh_search::StopReason,
+    /// The objective's value for the best tree found.
+    pub cost: f64,
+    /// The objective's value for the greedy Müller–Fellner tree of the scene, the base of ratios.
+    pub base_cost: f64,
+    /// `cost` divided by `base_cost`; 1 when that is 0.
+    pub cost_over_base: f64,
+    /// `internal_area` divided by the root's half area.
+    pub cost_over_root_area: f64,
+    /// The paper's objective: total half area of inner nodes, world units squared.
+    pub internal_area: f64,
+    /// The Goldsmith–Salmon cost.
+    pub goldsmith_salmon: f64,
+    /// The surface area heuristic with both constants 1.
+    pub sah: f64,
+    /// Number of nodes of the tree.
+    pub nodes: usize,
+    /// Edges from the root to the deepest leaf.
+    pub depth: usize,
+}
+
+/// One row of `history.csv`: one trial, generation or improvement of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HistoryRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Label of the method in the spec.
+    pub method: String,
+    /// Seed of the run.
+    pub seed: u64,
+    /// From 0.
+    pub repetition: u32,
+    /// Trees or moves evaluated so far.
+    pub evaluations: u64,
+    /// Nodes made or visited so far.
+    pub work: u64,
+    /// The objective's value found now.
+    pub cost: f64,
+    /// The lowest value so far.
+    pub incumbent: f64,
+}
+
+/// One row of `timing.csv`, the only CSV file with seconds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TimingRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Label of the method in the spec.
+    pub method: String,
+    /// Seed of the run.
+    pub seed: u64,
+    /// From 0.
+    pub repetition: u32,
+    /// Threads at its disposal.
+    pub threads: usize,
+    /// Wall time of the whole run.
+    pub seconds: f64,
+}
+
+/// One row of `paper.csv`: a number of the paper beside ours.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PaperRow {
+    /// Where the paper has it.
+    pub source: String,
+    /// Scene, ours a stand-in.
+    pub scene: String,
+    /// What is compared.
+    pub quantity: String,
+    /// The paper's value.
+    pub paper: String,
+    /// Ours.
+    pub ours: String,
+    /// The paper's value as a ratio to its base; empty where that has no meaning.
+    pub paper_over_base: Option<f64>,
+    /// Ours likewise.
+    pub ours_over_base: Option<f64>,
+    /// `agrees`, or how it differs.
+    pub verdict: String,
+    /// Why, where known.
+    pub reason: String,
+}
+
+/// Reads all rows of a CSV file.
+pub fn read<R: DeserializeOwned>(path: &Path) -> Result<Vec<R>, Error> {
+    let mut reader = csv::Reader::from_path(path).map_err(Error::csv(path))?;
+    reader.deserialize().collect::<Result<_, _>>().map_err(Error::csv(path))
+}
+
+/// The bytes of a CSV file with a header and these rows; the header alone needs at least one row.
+pub fn to_bytes<R: Serialize>(rows: &[R], path: &Path) -> Result<Vec<u8>, Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.serialize(row).map_err(Error::csv(path))?;
+    }
+    writer.into_inner().map_err(|error| Error::Io {
+        path: path.to_owned(),
+        action: "write",
+        source: std::io::Error::other(error.to_string()),
+    })
+}

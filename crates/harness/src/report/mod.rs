@@ -1,0 +1,173 @@
+//! What is made from an experiment's CSV files: tables, figures, and the paper's numbers beside ours.
+//!
+//! A kind of report is one file with a `Config` and one line in [`Report`]. Reports read CSV files only.
+
+pub mod statistics;
+pub mod table;
+pub mod times;
+pub mod trials;
+
+use crate::record::{self, HistoryRow, PaperRow, RunRow, TimingRow};
+use crate::spec::Experiment;
+use crate::store::Store;
+use crate::{Error, chart};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// One report of a spec.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Report {
+    /// Ratios to base, scenes by columns, beside the paper's.
+    Table(table::Config),
+    /// Cost against number of trials.
+    Trials(trials::Config),
+    /// Times of runs against each other.
+    Times(times::Config),
+}
+
+impl Report {
+    /// The labels of the methods the report speaks of.
+    pub fn labels(&self) -> Vec<&String> {
+        match self {
+            Self::Table(config) => config.columns.iter().map(|column| &column.method).collect(),
+            Self::Trials(config) => config.methods.iter().collect(),
+            Self::Times(config) => config.methods.iter().collect(),
+        }
+    }
+
+    fn write(&self, rows: &Rows) -> Result<Output, Error> {
+        match self {
+            Self::Table(config) => config.write(rows),
+            Self::Trials(config) => config.write(rows),
+            Self::Times(config) => config.write(rows),
+        }
+    }
+}
+
+/// An experiment's rows, as read from its CSV files.
+#[derive(Clone, Debug)]
+pub struct Rows {
+    /// Of `runs.csv`.
+    pub runs: Vec<RunRow>,
+    /// Of `history.csv`.
+    pub history: Vec<HistoryRow>,
+    /// Of `timing.csv`.
+    pub timing: Vec<TimingRow>,
+}
+
+impl Rows {
+    /// The scenes in the order of the rows, with their kinds.
+    pub fn scenes(&self) -> Vec<(&str, &str)> {
+        let mut scenes: Vec<_> =
+            self.runs.iter().map(|run| (run.scene.as_str(), run.scene_kind.as_str())).collect();
+        scenes.dedup();
+        scenes
+    }
+
+    /// The costs of one method's trials on one scene over base, one list per repetition, in order.
+    pub fn trials_over_base(&self, scene: &str, method: &str) -> Vec<Vec<f64>> {
+        self.runs
+            .iter()
+            .filter(|run| run.scene == scene && run.method == method)
+            .map(|run| {
+                self.history
+                    .iter()
+                    .filter(|row| {
+                        row.scene == scene && row.method == method && row.repetition == run.repetition
+                    })
+                    .map(|row| over(row.cost, run.base_cost))
+                    .collect()
+            })
+            .collect()
+    }
+}
+
+/// A ratio of costs; 1 when the base is 0, as in `runs.csv`.
+fn over(cost: f64, base: f64) -> f64 {
+    if base > 0.0 { cost / base } else { 1.0 }
+}
+
+/// What a report makes.
+#[derive(Clone, Debug, Default)]
+pub struct Output {
+    /// Further CSV files: name without extension, and bytes. Names that begin with `timing` hold seconds.
+    pub csv: Vec<(String, Vec<u8>)>,
+    /// Figures: name without extension, and what they show.
+    pub figures: Vec<(String, chart::Figure)>,
+    /// Comparisons with the paper.
+    pub paper: Vec<PaperRow>,
+    /// For the terminal.
+    pub text: String,
+}
+
+/// A scene's name with its kind, as every table shows it.
+fn display_name(scene: &str, kind: &str) -> String {
+    if kind == "file" { scene.into() } else { format!("{scene} ({kind})") }
+}
+
+/// Makes all reports of `experiment` from the CSV files in its folder. Returns the text for the terminal.
+pub fn write_all(experiment: &Experiment, store: &Store) -> Result<String, Error> {
+    let folder = store.folder();
+    let rows = Rows {
+        runs: record::read(&folder.join("runs.csv"))?,
+        history: record::read(&folder.join("history.csv"))?,
+        timing: record::read(&folder.join("timing.csv"))?,
+    };
+    let mut text = String::new();
+    let mut paper = Vec::new();
+    for report in &experiment.reports {
+        let output = report.write(&rows)?;
+        for (name, bytes) in &output.csv {
+            store.write(&format!("{name}.csv"), bytes)?;
+        }
+        for (name, figure) in &output.figures {
+            let svg = chart::svg(figure)?;
+            store.write(&format!("{name}.svg"), svg.as_bytes())?;
+            store.write(&format!("{name}.png"), &chart::png(&svg)?)?;
+        }
+        paper.extend(output.paper);
+        text += &output.text;
+    }
+    if !paper.is_empty() {
+        store.write("paper.csv", &record::to_bytes(&paper, Path::new("paper.csv"))?)?;
+    }
+    Ok(text)
+}
+
+/// How our ratio to base compares with the paper's: whether it is within `tolerance` of it, and on the same side of
+/// the base.
+pub fn verdict(paper: f64, ours: f64, tolerance: f64) -> String {
+    // The paper prints four digits: closer to the base than this is on neither side.
+    let side = |ratio: f64| if (ratio - 1.0).abs() < 5e-4 { 0.0 } else { (ratio - 1.0).signum() };
+    let close = (ours / paper - 1.0).abs() <= tolerance;
+    let contradicts = side(paper) * side(ours) < 0.0;
+    let relation = if ours > paper { "higher" } else { "lower" };
+    match (close, contradicts) {
+        (true, false) => "agrees".into(),
+        (true, true) => format!("close, but {relation}, across the base"),
+        (false, false) => format!("same direction, {relation}"),
+        (false, true) => format!("differs, {relation}"),
+    }
+}
+
+/// An empty table for the terminal.
+fn text_table<'a>(header: impl IntoIterator<Item = &'a str>) -> comfy_table::Table {
+    let mut table = comfy_table::Table::new();
+    table.load_preset(comfy_table::presets::UTF8_FULL_CONDENSED).set_header(header);
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::verdict;
+
+    #[test]
+    fn verdicts_tell_agreement_direction_and_contradiction_apart() {
+        assert_eq!(verdict(1.0018, 1.003, 0.02), "agrees");
+        assert_eq!(verdict(1.1, 1.2, 0.02), "same direction, higher");
+        assert_eq!(verdict(2.0, 1.1, 0.02), "same direction, lower");
+        assert_eq!(verdict(0.996, 1.01, 0.02), "close, but higher, across the base");
+        assert_eq!(verdict(0.95, 1.2, 0.02), "differs, higher");
+    }
+}

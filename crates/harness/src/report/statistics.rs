@@ -1,0 +1,67 @@
+//! The statistics of reports: quantiles, and the expected best of several trials.
+
+/// The `q`-quantile of finite values, 0 ≤ q ≤ 1, interpolated linearly between order statistics; `None` of none.
+pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let position = q * (sorted.len().checked_sub(1)? as f64);
+    let (below, above) = (sorted[position.floor() as usize], sorted[position.ceil() as usize]);
+    Some(below + (above - below) * position.fract())
+}
+
+/// The median of finite values.
+pub fn median(values: &[f64]) -> Option<f64> {
+    quantile(values, 0.5)
+}
+
+/// The lowest value.
+pub fn minimum(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    values.into_iter().min_by(f64::total_cmp)
+}
+
+/// The expected lowest of `m` values drawn without replacement from a pool of N, exactly:
+/// E\[min of m\] = Σᵢ c₍ᵢ₎ · C(N − i, m − 1) / C(N, m), values ascending. `None` unless 1 ≤ m ≤ N. O(N log N).
+pub fn expected_best_of(pool: &[f64], m: usize) -> Option<f64> {
+    let n = pool.len();
+    if m == 0 || m > n {
+        return None;
+    }
+    let mut sorted = pool.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    // The weight of the i-th value, from that of the one before, so that no binomial is ever formed.
+    let mut weight = m as f64 / n as f64;
+    let mut expected = 0.0;
+    for (i, value) in (1..=n - m + 1).zip(sorted) {
+        expected += weight * value;
+        if i < n {
+            weight *= (n - i + 1 - m) as f64 / (n - i) as f64;
+        }
+    }
+    Some(expected)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_interpolate_between_order_statistics() {
+        let values = [4.0, 1.0, 3.0, 2.0];
+        assert_eq!([0.0, 0.5, 1.0].map(|q| quantile(&values, q).unwrap()), [1.0, 2.5, 4.0]);
+        assert_eq!(median(&[]), None);
+    }
+
+    #[test]
+    fn the_expected_best_equals_the_mean_over_all_subsets() {
+        let pool = [5.0, 1.0, 4.0, 4.0, 9.0, 2.5, 7.0];
+        for m in 1..=pool.len() {
+            let minima: Vec<f64> = (0u32..1 << pool.len())
+                .filter(|set| set.count_ones() as usize == m)
+                .map(|set| minimum((0..pool.len()).filter(|i| set & (1 << i) != 0).map(|i| pool[i])).unwrap())
+                .collect();
+            let mean = minima.iter().sum::<f64>() / minima.len() as f64;
+            assert!((expected_best_of(&pool, m).unwrap() - mean).abs() < 1e-12, "m = {m}");
+        }
+        assert_eq!(expected_best_of(&pool, 8), None);
+    }
+}

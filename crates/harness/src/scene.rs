@@ -1,0 +1,138 @@
+//! Scenes by name or path: built-in stand-ins, the spheres, fetched meshes, and any OBJ file.
+
+use crate::{Error, obj, standin};
+use bvh_core::Aabb;
+use glam::Vec3;
+use std::path::{Path, PathBuf};
+
+/// The objects of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Primitives {
+    /// Three corners each, in world units.
+    Triangles(Vec<[Vec3; 3]>),
+    /// Centre and radius each, in world units.
+    Spheres(Vec<standin::spheres::Sphere>),
+}
+
+impl Primitives {
+    /// The objects' boxes, one each.
+    pub fn boxes(&self) -> Vec<Aabb> {
+        match self {
+            Self::Triangles(triangles) => triangles.iter().map(|&corners| Aabb::around(corners)).collect(),
+            Self::Spheres(spheres) => spheres
+                .iter()
+                .map(|s| Aabb { min: s.center - Vec3::splat(s.radius), max: s.center + Vec3::splat(s.radius) })
+                .collect(),
+        }
+    }
+}
+
+/// A scene, loaded.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Its name in tables: a built-in name, or the file's name without extension.
+    pub name: String,
+    /// `stand-in`, `procedural` or `file`. Stand-ins are called that in every table.
+    pub kind: &'static str,
+    /// What it is made of.
+    pub primitives: Primitives,
+    /// One box per object.
+    pub boxes: Vec<Aabb>,
+}
+
+/// Meshes that `scripts/fetch-scenes` puts under `scenes/`: name, and the Rust package that ships it.
+pub const FETCHED: [(&str, &str); 2] = [("sponza", "bvh"), ("kitchen", "obvhs")];
+
+/// The second document's sphere scenes: name and number of spheres.
+pub const SPHERES: [(&str, usize); 3] = [("spheres75", 75), ("spheres750", 750), ("spheres7500", 7500)];
+
+impl Scene {
+    /// Loads a scene by the name or path that a spec or `--scene` gives.
+    pub fn load(name: &str) -> Result<Self, Error> {
+        if let Some(built_in) = standin::STAND_INS.iter().find(|scene| scene.name == name) {
+            return Ok(Self::new(name, "stand-in", Primitives::Triangles((built_in.triangles)())));
+        }
+        if let Some(&(_, count)) = SPHERES.iter().find(|(spheres, _)| *spheres == name) {
+            return Ok(Self::new(name, "procedural", Primitives::Spheres(standin::spheres::spheres(count))));
+        }
+        let path = match FETCHED.iter().find(|(fetched, _)| *fetched == name) {
+            Some((_, package)) => fetched_path(name).ok_or_else(|| Error::Scene {
+                name: name.into(),
+                message: format!(
+                    "not fetched yet; run scripts/fetch-scenes, which copies it from the Rust package `{package}` \
+                     to scenes/{name}.obj"
+                ),
+            })?,
+            None => PathBuf::from(name),
+        };
+        if !name.ends_with(".obj") && !path.exists() {
+            return Err(Error::Scene {
+                name: name.into(),
+                message: format!("no such scene; {}", known_scenes()),
+            });
+        }
+        let message = |error: obj::ObjError| Error::Scene { name: name.into(), message: error.to_string() };
+        let triangles = obj::load(&path).map_err(message)?.triangles;
+        let stem = path.file_stem().map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
+        Ok(Self::new(&stem, "file", Primitives::Triangles(triangles)))
+    }
+
+    fn new(name: &str, kind: &'static str, primitives: Primitives) -> Self {
+        Self { name: name.into(), kind, boxes: primitives.boxes(), primitives }
+    }
+
+    /// 64-bit FNV-1a of the boxes' bits: tells whether results belong to this very scene.
+    pub fn checksum(&self) -> u64 {
+        let coordinates = self.boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
+        fnv1a(coordinates.flat_map(f32::to_le_bytes))
+    }
+}
+
+/// The 64-bit FNV-1a hash of some bytes: stable across machines and versions.
+pub fn fnv1a(bytes: impl IntoIterator<Item = u8>) -> u64 {
+    bytes
+        .into_iter()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// Where a fetched scene lies: under the current folder's `scenes/`, else under the repository's.
+pub fn fetched_path(name: &str) -> Option<PathBuf> {
+    let file = format!("{name}.obj");
+    let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    [PathBuf::new(), repository].iter().map(|top| top.join("scenes").join(&file)).find(|path| path.is_file())
+}
+
+/// What would be accepted as a scene.
+fn known_scenes() -> String {
+    let names = standin::STAND_INS.iter().map(|scene| scene.name);
+    let names = names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name));
+    format!("accepted: {}, or the path of an OBJ file", names.collect::<Vec<_>>().join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stand_ins_are_labelled_and_have_one_box_per_triangle() {
+        let scene = Scene::load("escher").unwrap();
+        assert_eq!((scene.kind, scene.boxes.len()), ("stand-in", standin::STAND_INS[2].triangle_count));
+    }
+
+    #[test]
+    fn an_unknown_scene_is_answered_with_the_known_ones() {
+        let message = Scene::load("eschre").unwrap_err().to_string();
+        assert!(message.contains("eschre") && message.contains("escher, konistil"), "{message}");
+        let message = Scene::load("nowhere/x.obj").unwrap_err().to_string();
+        assert!(message.contains("nowhere/x.obj: no such file"), "{message}");
+    }
+
+    #[test]
+    fn a_file_is_named_by_its_stem() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("one.obj");
+        std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        let scene = Scene::load(path.to_str().unwrap()).unwrap();
+        assert_eq!((scene.name.as_str(), scene.kind, scene.boxes.len()), ("one", "file", 1));
+    }
+}

@@ -1,0 +1,296 @@
+//! Experiment specs: TOML in, a checked [`Experiment`] out, or an error with file, key, found and accepted.
+
+use crate::Error;
+use crate::report::Report;
+use crate::scene::{Scene, fnv1a};
+use bvh_core::cost::Objective;
+use bvh_search::{Budget, Method, Problem, solve};
+use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
+use std::path::Path;
+
+/// A checked experiment: every method on every scene, so many times, and how to report it.
+///
+/// These are also the keys of a spec, except that `quick` may hold a table of keys that replace others under
+/// `--quick`. Serialised, with every default spelled out, it is `resolved.toml`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    /// Name of the results folder: the spec file's stem, `-quick` appended under `--quick`.
+    #[serde(default)]
+    pub name: String,
+    /// What the experiment asks, for its readers.
+    pub question: String,
+    /// Names or paths of the scenes.
+    pub scenes: Vec<String>,
+    /// Scenes that are left out, with a note, where they have not been fetched. Default none.
+    #[serde(default)]
+    pub optional_scenes: Vec<String>,
+    /// Every run's seed is derived from this one, the experiment, the scene, the method and the repetition. Default 1.
+    #[serde(default = "one")]
+    pub seed: u64,
+    /// Runs of every method on every scene, at least 1. Default 1.
+    #[serde(default = "one")]
+    pub repetitions: u32,
+    /// One run at a time, because their times are the result. Default false.
+    #[serde(default)]
+    pub sequential: bool,
+    /// What `cost` means. Default the paper's objective.
+    #[serde(default)]
+    pub objective: Objective,
+    /// Limits of every run. Default none.
+    #[serde(default)]
+    pub budget: Budget,
+    /// What is run, at least one.
+    pub methods: Vec<Labelled>,
+    /// Tables and figures made from the rows. Default none.
+    #[serde(default)]
+    pub reports: Vec<Report>,
+}
+
+/// A method with the label that tables and figures show; by default its name.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "toml::Table", into = "toml::Table")]
+pub struct Labelled {
+    /// Unique within the experiment.
+    pub label: String,
+    /// What is run.
+    pub method: Method,
+}
+
+impl TryFrom<toml::Table> for Labelled {
+    type Error = String;
+
+    fn try_from(mut table: toml::Table) -> Result<Self, String> {
+        let label = match table.remove("label") {
+            Some(toml::Value::String(label)) => Some(label),
+            Some(found) => return Err(format!("label is {found}; accepted: a text")),
+            None => None,
+        };
+        let name = match table.get("method") {
+            Some(toml::Value::String(name)) if Method::NAMES.contains(&name.as_str()) => name.clone(),
+            found => {
+                let found = found.map_or_else(|| "is missing".to_owned(), |found| format!("is {found}"));
+                return Err(format!("method {found}; accepted: {}", Method::NAMES.join(", ")));
+            }
+        };
+        let method = Method::deserialize(table).map_err(|error| format!("{name}: {}", error.message()))?;
+        Ok(Self { label: label.unwrap_or(name), method })
+    }
+}
+
+impl From<Labelled> for toml::Table {
+    fn from(labelled: Labelled) -> Self {
+        let mut table = Self::try_from(&labelled.method).unwrap_or_default();
+        table.insert("label".into(), labelled.label.into());
+        table
+    }
+}
+
+fn one<T: From<u8>>() -> T {
+    1.into()
+}
+
+/// What the command line changes in every spec.
+#[derive(Clone, Debug, Default)]
+pub struct Overrides {
+    /// Replaces the scenes, if any are given.
+    pub scenes: Vec<String>,
+    /// Replaces the seed.
+    pub seed: Option<u64>,
+    /// Applies the spec's `quick` table.
+    pub quick: bool,
+}
+
+impl Experiment {
+    /// Reads and checks the spec at `path`. Does not load its scenes.
+    pub fn read(path: &Path, overrides: &Overrides) -> Result<Self, Error> {
+        let fail = |message: String| Error::Spec { file: path.to_owned(), message };
+        let text = std::fs::read_to_string(path).map_err(|error| fail(error.to_string()))?;
+        let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| fail(error.to_string()))?;
+        let quick = table.remove("quick");
+        let mut name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        // Parsed from the text where possible, so that errors show its line.
+        let mut experiment: Self = if overrides.quick || quick.is_some() {
+            if overrides.quick {
+                name += "-quick";
+                match quick {
+                    Some(toml::Value::Table(quick)) => replace(&mut table, quick),
+                    Some(found) => {
+                        return Err(fail(format!("quick is {found}; accepted: a table of keys to replace")));
+                    }
+                    None => {}
+                }
+            }
+            Self::deserialize(table).map_err(|error| fail(error.to_string().trim().to_owned()))?
+        } else {
+            toml::from_str(&text).map_err(|error| fail(error.to_string().trim().to_owned()))?
+        };
+        if !experiment.name.is_empty() {
+            return Err(fail(format!(
+                "name is {:?}; accepted: none, the file's name is used",
+                experiment.name
+            )));
+        }
+        experiment.name = name;
+        if let Some(seed) = overrides.seed {
+            experiment.seed = seed;
+        }
+        if !overrides.scenes.is_empty() {
+            experiment.scenes.clone_from(&overrides.scenes);
+            experiment.optional_scenes.clear();
+        }
+        experiment.check().map_err(fail)?;
+        Ok(experiment)
+    }
+
+    /// Everything that types alone do not say.
+    fn check(&self) -> Result<(), String> {
+        if self.scenes.is_empty() {
+            return Err("scenes is empty; accepted: at least one name or path".into());
+        }
+        if self.methods.is_empty() {
+            return Err("methods is empty; accepted: at least one table with a `method`".into());
+        }
+        if self.repetitions == 0 {
+            return Err("repetitions is 0; accepted: 1 or more".into());
+        }
+        if i64::try_from(self.seed).is_err() {
+            return Err(format!("seed is {}; accepted: 0 to {}", self.seed, i64::MAX));
+        }
+        let mut labels = HashSet::new();
+        for (index, Labelled { label, method }) in self.methods.iter().enumerate() {
+            if !labels.insert(label) {
+                return Err(format!(
+                    "methods[{index}].label is {label:?} for the second time; accepted: unique labels"
+                ));
+            }
+            // A search checks its own parameters before it looks at the scene: let it, on the scene of nothing.
+            let budget = Budget { max_evaluations: Some(1), max_work: None };
+            let nothing = Problem { boxes: &[], objective: self.objective };
+            solve(method, &nothing, 0, budget, &())
+                .map_err(|error| format!("methods[{index}] ({label}): {error}"))?;
+        }
+        for (index, report) in self.reports.iter().enumerate() {
+            for label in report.labels() {
+                if !labels.contains(label) {
+                    let known: Vec<_> = self.methods.iter().map(|method| method.label.as_str()).collect();
+                    let known = known.join(", ");
+                    return Err(format!("reports[{index}] names method {label:?}; accepted: {known}"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Loads the scenes, those optional ones that are there included. Returns them and the names of those left out.
+    pub fn load_scenes(&self) -> Result<(Vec<Scene>, Vec<String>), Error> {
+        let mut scenes = self.scenes.iter().map(|name| Scene::load(name)).collect::<Result<Vec<_>, _>>()?;
+        let mut left_out = Vec::new();
+        for name in &self.optional_scenes {
+            match Scene::load(name) {
+                Ok(scene) => scenes.push(scene),
+                Err(_) => left_out.push(name.clone()),
+            }
+        }
+        let mut names = HashSet::new();
+        match scenes.iter().find(|scene| !names.insert(&scene.name)) {
+            Some(twice) => Err(Error::Usage(format!("two scenes are called {}; name each once", twice.name))),
+            None => Ok((scenes, left_out)),
+        }
+    }
+
+    /// The seed of one run, within 32 bits so that every spreadsheet keeps it exactly.
+    pub fn seed_of(&self, scene: &str, label: &str, repetition: u32) -> u64 {
+        let identity = format!("{}\0{}\0{scene}\0{label}\0{repetition}", self.seed, self.name);
+        let hash = fnv1a(identity.into_bytes());
+        (hash ^ (hash >> 32)) & 0xffff_ffff
+    }
+}
+
+/// Replaces keys of `table` by those of `by`, tables key by key.
+fn replace(table: &mut toml::Table, by: toml::Table) {
+    for (key, value) in by {
+        match (table.get_mut(&key), value) {
+            (Some(toml::Value::Table(old)), toml::Value::Table(new)) => replace(old, new),
+            (_, value) => {
+                table.insert(key, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str = "question = 'q'\nscenes = ['escher']\nmethods = [{ method = 'grasp', noise = 0.1 }]\n";
+
+    fn read(text: &str, overrides: &Overrides) -> Result<Experiment, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("spec.toml");
+        std::fs::write(&path, text).unwrap();
+        Experiment::read(&path, overrides).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn wrong_keys_and_values_are_named_with_what_would_be_accepted() {
+        for (wrong, parts) in [
+            ("alpa = 1\n", &["spec.toml", "alpa", "expected one of", "repetitions"][..]),
+            ("repetitions = 0\n", &["repetitions is 0", "1 or more"]),
+            ("repetitions = 'x'\n", &["repetitions", "x", "line"]),
+            ("seed = -1\n", &["seed", "-1"]),
+            ("name = 'x'\n", &["name", "the file's name is used"]),
+            ("objective = 'volume'\n", &["volume", "internal_area"]),
+            ("budget = { seconds = 1 }\n", &["seconds", "max_evaluations"]),
+            ("[[reports]]\nkind = 'pie'\n", &["pie", "table"]),
+        ] {
+            let message = read(&format!("{GOOD}{wrong}"), &Overrides::default()).unwrap_err();
+            assert!(parts.iter().all(|part| message.contains(part)), "{wrong}: {message}");
+        }
+    }
+
+    #[test]
+    fn wrong_methods_are_named_with_what_would_be_accepted() {
+        for (methods, parts) in [
+            ("[]", &["methods is empty"][..]),
+            ("[{ noise = 0.1 }]", &["method is missing", "grasp"]),
+            ("[{ method = 'grep' }]", &["\"grep\"", "muller_fellner"]),
+            ("[{ method = 'grasp', alpa = 1 }]", &["grasp", "alpa", "noise"]),
+            ("[{ method = 'grasp', noise = 1.5 }]", &["methods[0]", "noise is 1.5", "0 to 1"]),
+            ("[{ method = 'grasp', label = 3 }]", &["label is 3"]),
+            ("[{ method = 'grasp' }, { method = 'grasp' }]", &["methods[1].label", "second time"]),
+        ] {
+            let text = format!("question = 'q'\nscenes = ['escher']\nmethods = {methods}\n");
+            let message = read(&text, &Overrides::default()).unwrap_err();
+            assert!(parts.iter().all(|part| message.contains(part)), "{methods}: {message}");
+        }
+    }
+
+    #[test]
+    fn quick_replaces_keys_and_names_its_results_apart() {
+        let text = format!("{GOOD}repetitions = 5\n[quick]\nrepetitions = 2\n");
+        let quick = read(&text, &Overrides { quick: true, ..Default::default() }).unwrap();
+        assert_eq!((quick.repetitions, quick.name.as_str()), (2, "spec-quick"));
+        assert_eq!(read(&text, &Overrides::default()).unwrap().repetitions, 5);
+    }
+
+    #[test]
+    fn a_resolved_spec_spells_out_every_default_and_reads_back_as_itself() {
+        let experiment = read(GOOD, &Overrides::default()).unwrap();
+        let text = toml::to_string(&experiment).unwrap();
+        assert!(text.contains("trials = 100") && text.contains("skip_same_order = true"), "{text}");
+        assert_eq!(toml::from_str::<Experiment>(&text).unwrap(), experiment);
+    }
+
+    #[test]
+    fn seeds_differ_between_runs_and_follow_the_spec_alone() {
+        let experiment = read(GOOD, &Overrides::default()).unwrap();
+        let mut seeds: Vec<u64> =
+            (0..100).map(|repetition| experiment.seed_of("escher", "grasp", repetition)).collect();
+        seeds.push(experiment.seed_of("bijou", "grasp", 0));
+        let distinct: HashSet<_> = seeds.iter().collect();
+        assert_eq!(distinct.len(), seeds.len());
+        assert_eq!(seeds[0], read(GOOD, &Overrides::default()).unwrap().seed_of("escher", "grasp", 0));
+    }
+}
