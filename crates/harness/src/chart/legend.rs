@@ -5,8 +5,9 @@ use super::model::{Figure, Layer};
 use super::style::{INK, REFERENCE_LINE, Stroke, Strokes};
 use super::text::{BODY, Ruler};
 
-/// Widths of samples of lines and of other marks.
+/// Widths of samples of lines, of reference lines among bars, and of other marks.
 const LINE: f64 = 30.0;
+const RULE: f64 = 20.0;
 const MARK: f64 = 14.0;
 /// From a sample to its name, and from a name to the next sample.
 const GAPS: (f64, f64) = (7.0, 22.0);
@@ -65,15 +66,16 @@ impl<'a> Legend<'a> {
             }
         };
         let mut entries: Vec<Entry> = strokes.names().map(entry).collect();
+        let mut sample = if entries.iter().any(|entry| entry.line || entry.band) { LINE } else { MARK };
         for panel in figure.panels.iter().filter(|panel| panel.has_bars()) {
             for layer in &panel.layers {
                 let Layer::HLine { label, .. } = layer else { continue };
                 if !label.trim().is_empty() && entries.iter().all(|entry| entry.name != *label) {
+                    sample = sample.max(RULE);
                     entries.push(Entry { line: true, ..Entry::new(label, REFERENCE_LINE) });
                 }
             }
         }
-        let sample = if entries.iter().any(|entry| entry.line || entry.band) { LINE } else { MARK };
         Self { entries, ruler, sample }
     }
 

@@ -117,7 +117,7 @@ mod tests {
         data.extend(NASTY.iter().map(|&value| vec![(value, value)]));
         data.push(NASTY.iter().flat_map(|&x| NASTY.iter().map(move |&y| (x, y))).collect());
         for points in data {
-            for x in axes() {
+            for (kind, x) in axes().into_iter().enumerate() {
                 let panel = |(index, layer): (usize, Layer)| Panel {
                     title: "title ".repeat(index),
                     x: x.clone(),
@@ -128,7 +128,7 @@ mod tests {
                 let figure = Figure { columns: points.len() % 6, panels, ..Figure::default() };
                 let picture = svg(&figure).unwrap();
                 assert!(!picture.contains("NaN") && !picture.contains("inf"), "{points:?} on {x:?}");
-                if points.len() > 1 {
+                if points.len() > 1 && kind == 0 {
                     png(&picture).unwrap();
                 }
             }

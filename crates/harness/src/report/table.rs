@@ -171,30 +171,27 @@ impl Config {
 
     fn panel(&self, scenes: &[(&str, &str)], cells: &[Cell]) -> Panel {
         let names = scenes.iter().map(|&(scene, kind)| display_name(scene, kind)).collect();
-        let mut layers = Vec::new();
-        let mut extremes: Vec<f64> = Vec::new();
-        for column in self.columns.iter().skip(1) {
+        let columns = || self.columns.iter().skip(1);
+        let values = |column: &Column, value: &dyn Fn(&Cell) -> Option<f64>| -> Vec<f64> {
             let of = |scene: &str| cells.iter().find(|cell| cell.scene == scene && cell.column == column.name);
-            let ours: Vec<f64> = scenes
-                .iter()
-                .map(|&(scene, _)| of(scene).map_or(f64::NAN, |cell| cell.cost_over_base))
-                .collect();
-            let paper: Vec<f64> =
-                scenes.iter().map(|&(scene, _)| self.paper_ratio(column, scene).unwrap_or(f64::NAN)).collect();
-            extremes.extend(ours.iter().chain(&paper).filter(|value| value.is_finite()));
-            let bars = |who: &str, values| Layer::Bars {
-                name: format!("{}, {who}", column.name),
-                values,
-                spread: vec![],
-                base: 1.0,
-            };
-            if paper.iter().any(|value| value.is_finite()) {
-                layers.push(bars("paper", paper));
+            scenes.iter().map(|&(scene, _)| of(scene).and_then(value).unwrap_or(f64::NAN)).collect()
+        };
+        let bars = |name: String, values| Layer::Bars { name, values, spread: vec![], base: 1.0 };
+        // Columns that are readings of one column of the paper share its bars.
+        let readings = columns().all(|column| column.paper == self.columns[1].paper);
+        let mut layers = Vec::new();
+        for (index, column) in columns().enumerate() {
+            if !column.paper.is_empty() && (index == 0 || !readings) {
+                let name = if readings { "paper".into() } else { format!("{}, paper", column.name) };
+                layers.push(bars(name, values(column, &|cell| cell.paper_over_base)));
             }
-            layers.push(bars("ours", ours));
+            layers.push(bars(
+                format!("{}, ours", column.name),
+                values(column, &|cell| Some(cell.cost_over_base)),
+            ));
         }
         let label = "cost / base";
-        let wide = minimum(extremes.iter().map(|value| -value)).is_some_and(|lowest| lowest < -10.0);
+        let wide = cells.iter().any(|cell| cell.cost_over_base > 10.0);
         let y = if wide { Axis::log(label) } else { Axis::linear(label) };
         layers.push(Layer::HLine { y: 1.0, label: "greedy".into() });
         Panel { title: String::new(), x: Axis::categories("", names), y, layers }

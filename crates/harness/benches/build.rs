@@ -1,0 +1,95 @@
+//! Times of builders: against each other, against more threads, and against other libraries.
+//!
+//! `cargo bench -p harness --bench build --features peers`
+
+mod paired;
+
+use bvh_build::division::Workspace;
+use bvh_build::{Builder, Presorted, muller_fellner};
+use bvh_core::{Aabb, Bvh};
+use bvh_search::grasp::{self, Candidates};
+use bvh_search::{Budget, Problem, solve};
+use glam::Vec3;
+use harness::scene::Scene;
+use paired::{Contender, compare};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+fn pool(threads: usize) -> ThreadPool {
+    ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads")
+}
+
+fn main() {
+    let one = pool(1);
+    for name in ["cloister", "sponza", "escher"] {
+        match Scene::load(name) {
+            Ok(scene) => one.install(|| one_thread(&scene)),
+            Err(error) => println!("\n{error}"),
+        }
+    }
+    let cloister = Scene::load("cloister").expect("a built-in scene").boxes;
+    let away = Vec3::new(1e4, 0.0, 0.0);
+    let twice: Vec<Aabb> = cloister
+        .iter()
+        .copied()
+        .chain(cloister.iter().map(|b| Aabb { min: b.min + away, max: b.max + away }))
+        .collect();
+    two_threads(&twice);
+}
+
+fn one_thread(scene: &Scene) {
+    let boxes = &scene.boxes;
+    let config = muller_fellner::Config::default();
+    let mut contenders: Vec<Contender> =
+        vec![("Müller–Fellner, one object per leaf", Box::new(|| drop(config.build(boxes))))];
+    #[cfg(feature = "peers")]
+    for (name, preset) in [
+        ("obvhs fast", obvhs::BvhBuildParams::fast_build as fn() -> _),
+        ("obvhs medium", obvhs::BvhBuildParams::medium_build),
+    ] {
+        use obvhs::{aabb, bvh2};
+        let theirs: Vec<aabb::Aabb> =
+            boxes.iter().map(|b| aabb::Aabb::new(b.min.to_array().into(), b.max.to_array().into())).collect();
+        contenders.push((
+            name,
+            Box::new(move || {
+                let mut preprocessing = std::time::Duration::default();
+                drop(bvh2::builder::build_bvh2(&theirs, preset(), &mut preprocessing));
+            }),
+        ));
+    }
+    compare(&format!("{}, {} objects, one thread", scene.name, boxes.len()), 25, contenders);
+
+    // Trials start from sorted objects, so many are measured together, the sort once.
+    const TRIALS: u64 = 20;
+    let greedy = || {
+        let scene = Presorted::new(boxes).expect("finite boxes");
+        let (mut workspace, mut tree) = (Workspace::default(), Bvh::default());
+        for _ in 0..TRIALS {
+            config.construct(&scene, &mut bvh_build::sweep::TakeBest, &mut workspace, &mut tree);
+            std::hint::black_box(bvh_core::cost::internal_area(&tree));
+        }
+    };
+    let trials = |candidates, noise| {
+        let config = grasp::Config { trials: TRIALS, candidates, noise, ..Default::default() };
+        move || drop(solve(&config, &Problem::new(boxes), 1, Budget::default(), &()))
+    };
+    let contenders: Vec<Contender> = vec![
+        ("greedy", Box::new(greedy)),
+        ("axis best, noise 0.1", Box::new(trials(Candidates::AxisBest, Some(0.1)))),
+        ("axis best, any", Box::new(trials(Candidates::AxisBest, None))),
+        ("k = 5, noise 0.1", Box::new(trials(Candidates::KBest(5), Some(0.1)))),
+        ("k = 5, any", Box::new(trials(Candidates::KBest(5), None))),
+        ("within 5 %, any", Box::new(trials(Candidates::Within(0.05), None))),
+    ];
+    compare(&format!("{}, {TRIALS} constructions with their costs, one thread", scene.name), 9, contenders);
+}
+
+fn two_threads(boxes: &[Aabb]) {
+    let (one, two) = (pool(1), pool(2));
+    let config = muller_fellner::Config::default();
+    let contenders: Vec<Contender> = vec![
+        ("one thread", Box::new(|| one.install(|| drop(config.build(boxes))))),
+        ("two threads", Box::new(|| two.install(|| drop(config.build(boxes))))),
+    ];
+    compare(&format!("cloister twice, {} objects, Müller–Fellner", boxes.len()), 25, contenders);
+}

@@ -1,0 +1,30 @@
+//! Ratios of times measured in turns, so that a machine whose speed drifts does not favour either side.
+
+use harness::report::statistics::quantile;
+use std::hint::black_box;
+use std::time::Instant;
+
+/// A named piece of work.
+pub type Contender<'a> = (&'a str, Box<dyn FnMut() + 'a>);
+
+/// Runs all contenders in turns, `rounds` times after one warm-up, and prints each one's median time and the
+/// quartiles of its ratios to the first, round by round.
+pub fn compare(title: &str, rounds: usize, mut contenders: Vec<Contender<'_>>) {
+    let mut seconds = vec![Vec::with_capacity(rounds); contenders.len()];
+    for round in 0..=rounds {
+        for ((_, work), times) in contenders.iter_mut().zip(&mut seconds) {
+            let start = Instant::now();
+            black_box(work());
+            if round > 0 {
+                times.push(start.elapsed().as_secs_f64());
+            }
+        }
+    }
+    println!("\n{title}");
+    for ((name, _), times) in contenders.iter().zip(&seconds) {
+        let ratios: Vec<f64> = times.iter().zip(&seconds[0]).map(|(own, first)| own / first).collect();
+        let [low, middle, high] = [0.25, 0.5, 0.75].map(|q| quantile(&ratios, q).unwrap_or(f64::NAN));
+        let median = quantile(times, 0.5).unwrap_or(f64::NAN) * 1e3;
+        println!("  {name:<44} {median:9.3} ms   ratio {middle:.3}  ({low:.3} to {high:.3})");
+    }
+}

@@ -1,0 +1,200 @@
+//! The program as its users meet it: what it writes, what it refuses, and what survives a kill.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
+
+const SPEC: &str = "
+question = 'Do results survive?'
+scenes = ['escher', 'pinecon2']
+repetitions = 3
+methods = [
+    { label = 'greedy', method = 'muller_fellner' },
+    { label = 'noise', method = 'grasp', trials = 12, noise = 0.1 },
+    { label = 'k', method = 'grasp', trials = 6, candidates = { k_best = 5 } },
+]
+
+[[reports]]
+kind = 'table'
+source = 'Test'
+title = 'a table'
+[[reports.columns]]
+name = 'base'
+method = 'greedy'
+paper = { escher = 1.0, pinecon2 = 1.0 }
+[[reports.columns]]
+name = 'best of 5'
+method = 'noise'
+best_of = 5
+paper = { escher = 1.0, pinecon2 = 0.9 }
+
+[quick]
+scenes = ['escher']
+repetitions = 1
+";
+
+fn harness(folder: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+    command.current_dir(folder).args(args).stdin(Stdio::null());
+    command
+}
+
+fn run(folder: &Path, args: &[&str]) -> Output {
+    harness(folder, args).output().unwrap()
+}
+
+/// A folder with the spec in it.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("spec.toml"), SPEC).unwrap();
+    folder
+}
+
+/// The CSV files without seconds, by name, and the resolved spec.
+fn reproducible(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut files: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| (name.ends_with(".csv") && !name.starts_with("timing")) || name == "resolved.toml")
+        .map(|name| (name.clone(), fs::read(folder.join(name)).unwrap()))
+        .collect();
+    files.sort();
+    files
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+#[test]
+fn a_run_writes_rows_figures_and_provenance_and_prints_the_table() {
+    let folder = folder();
+    let output = run(folder.path(), &["spec.toml"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("escher (stand-in)"), "{}", text(&output.stdout));
+    let results = folder.path().join("results/spec");
+    for name in [
+        "runs.csv",
+        "history.csv",
+        "timing.csv",
+        "paper.csv",
+        "table.csv",
+        "table.svg",
+        "table.png",
+        "provenance.toml",
+    ] {
+        assert!(results.join(name).is_file(), "{name}");
+    }
+    assert!(!results.join(".partial").exists());
+    let runs = fs::read_to_string(results.join("runs.csv")).unwrap();
+    assert_eq!(runs.lines().count(), 1 + 2 * 3 * 3);
+    assert!(!reproducible(&results).iter().any(|(_, bytes)| text(bytes).contains("seconds")));
+}
+
+#[test]
+fn any_number_of_threads_writes_the_same_bytes() {
+    let folder = folder();
+    let results: Vec<_> = ["1", "2", "3"]
+        .map(|jobs| {
+            assert!(run(folder.path(), &["spec.toml", "--jobs", jobs, "--out", jobs]).status.success());
+            reproducible(&folder.path().join(jobs).join("spec"))
+        })
+        .into();
+    assert!(results[0] == results[1] && results[0] == results[2]);
+}
+
+#[test]
+fn a_killed_run_resumes_to_the_same_bytes() {
+    let folder = folder();
+    assert!(run(folder.path(), &["spec.toml", "--out", "whole"]).status.success());
+    let whole = reproducible(&folder.path().join("whole/spec"));
+    for milliseconds in [2, 5, 10, 20, 40, 80, 120, 200] {
+        let out = format!("killed{milliseconds}");
+        let mut child = harness(folder.path(), &["spec.toml", "--jobs", "1", "--out", &out])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let output = run(folder.path(), &["spec.toml", "--resume", "--out", &out]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert!(reproducible(&folder.path().join(out).join("spec")) == whole, "killed after {milliseconds} ms");
+    }
+}
+
+#[test]
+fn check_passes_on_equal_results_and_names_an_altered_number() {
+    let folder = folder();
+    assert!(run(folder.path(), &["spec.toml"]).status.success());
+    let output = run(folder.path(), &["spec.toml", "--check"]);
+    assert!(output.status.success(), "{}", text(&output.stdout));
+    let path = folder.path().join("results/spec/runs.csv");
+    let runs = fs::read_to_string(&path).unwrap();
+    let line = runs.lines().find(|line| line.contains("pinecon2,stand-in,noise")).unwrap();
+    let cost = line.split(',').nth(9).unwrap();
+    fs::write(&path, runs.replace(cost, "12345.5")).unwrap();
+    let output = run(folder.path(), &["spec.toml", "--check"]);
+    let said = text(&output.stdout);
+    assert_eq!(output.status.code(), Some(1));
+    for part in ["scene pinecon2", "method noise", &format!("cost is {cost}, committed 12345.5")] {
+        assert!(said.contains(part), "{part} in {said}");
+    }
+    assert!(fs::read_to_string(&path).unwrap().contains("12345.5"), "a check writes nothing");
+}
+
+#[test]
+fn quick_seed_and_scene_change_what_is_run() {
+    let folder = folder();
+    assert!(run(folder.path(), &["spec.toml", "--quick"]).status.success());
+    let quick = fs::read_to_string(folder.path().join("results/spec-quick/runs.csv")).unwrap();
+    assert_eq!(quick.lines().count(), 1 + 3);
+    fs::write(folder.path().join("two.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nf 1 2 3\nf 2 3 4\n").unwrap();
+    let args = ["spec.toml", "--quick", "--scene", "two.obj", "--seed", "9", "--out", "other"];
+    assert!(run(folder.path(), &args).status.success());
+    let other = fs::read_to_string(folder.path().join("other/spec-quick/runs.csv")).unwrap();
+    assert!(other.contains("\ntwo,file,greedy,") && !other.contains("escher"), "{other}");
+}
+
+#[test]
+fn what_is_wrong_is_named_and_costs_nothing_but_a_message() {
+    let folder = folder();
+    let spec = |name: &str, text: String| fs::write(folder.path().join(name), text).unwrap();
+    spec("key.toml", SPEC.replace("repetitions = 3", "repetition = 3"));
+    spec("parameter.toml", SPEC.replace("noise = 0.1", "noise = 2.0"));
+    spec("scene.toml", SPEC.replace("'pinecon2'", "'sofa'"));
+    spec("label.toml", SPEC.replace("method = 'noise'", "method = 'nose'"));
+    fs::write(folder.path().join("nan.obj"), "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    fs::write(folder.path().join("empty.obj"), "").unwrap();
+    fs::write(folder.path().join("file"), "").unwrap();
+    for (args, code, parts) in [
+        (&["missing.toml"][..], 2, &["missing.toml"][..]),
+        (&["key.toml"], 2, &["key.toml", "repetition", "repetitions"]),
+        (&["parameter.toml"], 2, &["methods[1] (noise)", "noise is 2", "0 to 1"]),
+        (&["scene.toml"], 2, &["sofa", "accepted: bijou"]),
+        (&["label.toml"], 2, &["reports[0]", "nose", "accepted: greedy, noise, k"]),
+        (&["spec.toml", "--scene", "nan.obj"], 2, &["nan.obj:2", "nan"]),
+        (&["spec.toml", "--scene", "empty.obj"], 2, &["empty.obj is empty"]),
+        (&["spec.toml", "--scene", "none.obj"], 2, &["none.obj", "no such file"]),
+        (&["spec.toml", "--jobs", "0"], 2, &["--jobs", "1..=1024"]),
+        (&["spec.toml", "--sed", "1"], 2, &["--sed", "--seed"]),
+        (&["spec.toml", "--out", "file"], 1, &["file", "cannot create the folder"]),
+        (&["spec.toml", "--check", "--resume"], 2, &["--check", "--resume"]),
+        (&[], 2, &["Usage"]),
+    ] {
+        let output = run(folder.path(), args);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{args:?}: {said}");
+        assert!(parts.iter().all(|part| said.contains(part)), "{args:?}: {said}");
+    }
+    assert!(!folder.path().join("results").exists(), "nothing was written");
+}
+
+#[test]
+fn scenes_are_listed_with_what_they_stand_in_for() {
+    let output = run(Path::new("."), &["scenes"]);
+    assert!(output.status.success());
+    assert!(text(&output.stdout).contains("stand-in for Cloister"));
+}
