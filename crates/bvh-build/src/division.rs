@@ -9,7 +9,8 @@ use crate::Presorted;
 use crate::evaluation::Evaluation;
 use crate::sweep::{Block, SplitRule, Sweep, union_of};
 use bvh_core::{Aabb, Bvh, Node, PackedAabb};
-use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
+#[cfg(feature = "rayon")]
+use std::sync::Mutex;
 
 /// Subtrees of at least this many objects are built by parallel tasks: large enough that a task's start is lost
 /// in its work.
@@ -19,15 +20,15 @@ pub const PARALLEL_OBJECTS: usize = 4096;
 #[derive(Debug, Default)]
 pub struct Workspace {
     orders: [Vec<u32>; 2],
-    /// Per object: 1 while it goes to the left. Atomic because parallel subtrees share the array, if no entry;
-    /// relaxed accesses compile to plain ones.
-    goes_left: Vec<AtomicU8>,
     scratch: Scratch,
 }
 
-/// Buffers of one task.
+/// Buffers of one thread.
 #[derive(Debug, Default)]
 struct Scratch {
+    /// Per object of the scene: 1 while it goes to the left. Not shared between threads, though their objects are
+    /// disjoint: neighbouring objects in different subtrees would fight for cache lines.
+    goes_left: Vec<u8>,
     goes_right: Vec<u32>,
     blocks: [Vec<Block>; 3],
     stack: Vec<Frame>,
@@ -67,7 +68,6 @@ struct Task<'a> {
 struct Shared<'a, E> {
     boxes: &'a [PackedAabb],
     evaluation: &'a E,
-    goes_left: &'a [AtomicU8],
     /// Whether to look for axes that order a node's objects identically.
     skip_same_order: bool,
 }
@@ -100,27 +100,33 @@ pub fn divide_parallel<E: Evaluation, R: SplitRule + Copy + Send + Sync>(
     fn spawn<'s, E: Evaluation, R: SplitRule + Copy + Send + Sync + 's>(
         scope: &rayon::Scope<'s>,
         shared: &'s Shared<'s, E>,
+        scratches: &'s Mutex<Vec<Scratch>>,
         mut task: Task<'s>,
         mut rule: R,
     ) {
-        let mut scratch = Scratch::default();
+        // At most one per thread is ever made. A poisoned lock is taken all the same: buffers have no invariant.
+        let pooled = || scratches.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut scratch = pooled().pop().unwrap_or_default();
+        scratch.goes_left.resize(shared.boxes.len(), 0);
         // A loop, not a recursion: one side goes to the pool, the other stays, however unbalanced the splits.
         while task.objects() >= PARALLEL_OBJECTS {
             let (left, right) = split_task(shared, task, &mut rule, &mut scratch);
             let (larger, smaller) =
                 if left.objects() > right.objects() { (left, right) } else { (right, left) };
             if smaller.objects() >= PARALLEL_OBJECTS {
-                scope.spawn(move |scope| spawn(scope, shared, smaller, rule));
+                scope.spawn(move |scope| spawn(scope, shared, scratches, smaller, rule));
             } else {
                 build(shared, smaller, &mut rule, &mut scratch);
             }
             task = larger;
         }
         build(shared, task, &mut rule, &mut scratch);
+        pooled().push(scratch);
     }
-    if let Some((shared, task, _)) = prepare(scene, evaluation, skip_same_order, workspace, tree) {
+    if let Some((shared, task, scratch)) = prepare(scene, evaluation, skip_same_order, workspace, tree) {
         let shared = &shared;
-        rayon::scope(|scope| spawn(scope, shared, task, rule));
+        let scratches = &Mutex::new(vec![std::mem::take(scratch)]);
+        rayon::scope(|scope| spawn(scope, shared, scratches, task, rule));
     }
 }
 
@@ -133,16 +139,16 @@ fn prepare<'a, E>(
     tree: &'a mut Bvh,
 ) -> Option<(Shared<'a, E>, Task<'a>, &'a mut Scratch)> {
     let n = scene.len();
-    let Workspace { orders: [y, z], goes_left, scratch } = workspace;
+    let Workspace { orders: [y, z], scratch } = workspace;
     tree.prim_ids.clone_from(&scene.orders[0]);
     y.clone_from(&scene.orders[1]);
     z.clone_from(&scene.orders[2]);
-    goes_left.resize_with(n, AtomicU8::default);
+    scratch.goes_left.resize(n, 0);
     tree.nodes.resize((2 * n).saturating_sub(1), Node::leaf(Aabb::EMPTY, 0, 0));
     let (root, below) = tree.nodes.split_first_mut()?;
     let aabb = union_of(&scene.boxes, &tree.prim_ids);
     *root = if n == 1 { Node::leaf((&aabb).into(), 0, 1) } else { Node::inner((&aabb).into(), 1, 2) };
-    let shared = Shared { boxes: &scene.boxes, evaluation, goes_left, skip_same_order };
+    let shared = Shared { boxes: &scene.boxes, evaluation, skip_same_order };
     let known = Known { aabb, same_as: [0, 1, 2] };
     Some((
         shared,
@@ -302,12 +308,12 @@ fn split_node<E: Evaluation, R: SplitRule>(
     let orders = [x, y, z];
     if (0..3).any(|other| other != axis && same_as[other] as usize == other) {
         let (to_left, to_right) = orders[axis].split_at(left);
-        to_left.iter().for_each(|&object| shared.goes_left[object as usize].store(1, Relaxed));
-        to_right.iter().for_each(|&object| shared.goes_left[object as usize].store(0, Relaxed));
+        to_left.iter().for_each(|&object| scratch.goes_left[object as usize] = 1);
+        to_right.iter().for_each(|&object| scratch.goes_left[object as usize] = 0);
     }
     for (other, order) in orders.into_iter().enumerate() {
         if other != axis && same_as[other] as usize == other {
-            partition(order, &mut scratch.goes_right, shared.goes_left);
+            partition(order, &mut scratch.goes_right, &scratch.goes_left);
         }
     }
     (left, known)
@@ -331,7 +337,7 @@ fn note_same_orders(orders: &[&mut [u32]; 3], same_as: &mut [u8; 3]) {
 
 /// Moves the objects that go left to the front, keeping the order on both sides. Without branches.
 #[inline(always)]
-fn partition(order: &mut [u32], goes_right: &mut Vec<u32>, goes_left: &[AtomicU8]) {
+fn partition(order: &mut [u32], goes_right: &mut Vec<u32>, goes_left: &[u8]) {
     if goes_right.len() < order.len() {
         goes_right.resize(order.len(), 0);
     }
@@ -339,7 +345,7 @@ fn partition(order: &mut [u32], goes_right: &mut Vec<u32>, goes_left: &[AtomicU8
     let (mut left, mut right) = (0, 0);
     for at in 0..order.len() {
         let object = order[at];
-        let side = usize::from(goes_left[object as usize].load(Relaxed));
+        let side = usize::from(goes_left[object as usize]);
         order[left] = object;
         goes_right[right] = object;
         left += side;

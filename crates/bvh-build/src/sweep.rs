@@ -136,26 +136,20 @@ impl<E: Evaluation> Sweep<'_, E> {
     #[inline(always)]
     pub fn k_best(&mut self, k: usize, list: &mut Vec<Split>) {
         list.clear();
+        let bound = |list: &[Split]| if list.len() < k { f64::INFINITY } else { list[k - 1].cost };
         for axis in self.distinct_axes() {
-            // `list` is unordered while scanning; `worst` is its last-ranked entry once it is full.
-            let mut worst = last_ranked(list, k);
-            let bound = worst.map_or(f64::INFINITY, |at| list[at].cost);
-            self.scan::<false>(axis, bound, |candidate| {
-                match worst {
-                    None => {
-                        list.push(candidate);
-                        worst = last_ranked(list, k);
+            self.scan::<false>(axis, bound(list), |candidate| {
+                if candidate.cost <= bound(list) {
+                    let mut at = list.len();
+                    while at > 0 && candidate.rank(&list[at - 1]).is_lt() {
+                        at -= 1;
                     }
-                    Some(at) if candidate.cost <= list[at].cost && candidate.rank(&list[at]).is_lt() => {
-                        list[at] = candidate;
-                        worst = last_ranked(list, k);
-                    }
-                    Some(_) => {}
+                    list.insert(at, candidate);
+                    list.truncate(k);
                 }
-                worst.map_or(f64::INFINITY, |at| list[at].cost)
+                bound(list)
             });
         }
-        list.sort_unstable_by(Split::rank);
     }
 
     /// The best candidate and all others of cost below (1 + `alpha`) times the best into `list`, best first.
@@ -328,10 +322,4 @@ pub(crate) fn union_of(boxes: &[PackedAabb], objects: &[u32]) -> PackedAabb {
         aabb.grow(&boxes[object as usize]);
     }
     aabb
-}
-
-/// The position of the entry that ranks last, once `list` holds `k`.
-#[inline(always)]
-fn last_ranked(list: &[Split], k: usize) -> Option<usize> {
-    if list.len() < k { None } else { (0..list.len()).max_by(|&a, &b| list[a].rank(&list[b])) }
 }
