@@ -41,22 +41,7 @@ fn one_thread(scene: &Scene) {
     let config = muller_fellner::Config::default();
     let mut contenders: Vec<Contender> =
         vec![("Müller–Fellner, one object per leaf", Box::new(|| drop(config.build(boxes))))];
-    #[cfg(feature = "peers")]
-    for (name, preset) in [
-        ("obvhs fast", obvhs::BvhBuildParams::fast_build as fn() -> _),
-        ("obvhs medium", obvhs::BvhBuildParams::medium_build),
-    ] {
-        use obvhs::{aabb, bvh2};
-        let theirs: Vec<aabb::Aabb> =
-            boxes.iter().map(|b| aabb::Aabb::new(b.min.to_array().into(), b.max.to_array().into())).collect();
-        contenders.push((
-            name,
-            Box::new(move || {
-                let mut preprocessing = std::time::Duration::default();
-                drop(bvh2::builder::build_bvh2(&theirs, preset(), &mut preprocessing));
-            }),
-        ));
-    }
+    contenders.extend(peers(boxes));
     compare(&format!("{}, {} objects, one thread", scene.name, boxes.len()), 25, contenders);
 
     // Trials start from sorted objects, so many are measured together, the sort once.
@@ -82,6 +67,28 @@ fn one_thread(scene: &Scene) {
         ("within 5 %, any", Box::new(trials(Candidates::Within(0.05), None))),
     ];
     compare(&format!("{}, {TRIALS} constructions with their costs, one thread", scene.name), 9, contenders);
+}
+
+/// Builds by other libraries, without the feature none.
+#[cfg(not(feature = "peers"))]
+fn peers(_boxes: &[Aabb]) -> Vec<Contender<'_>> {
+    Vec::new()
+}
+
+/// Builds by other libraries, with their own leaves.
+#[cfg(feature = "peers")]
+fn peers(boxes: &[Aabb]) -> Vec<Contender<'_>> {
+    use obvhs::{BvhBuildParams, aabb, bvh2::builder::build_bvh2};
+    let theirs: Vec<aabb::Aabb> =
+        boxes.iter().map(|b| aabb::Aabb::new(b.min.to_array().into(), b.max.to_array().into())).collect();
+    let build = |preset: fn() -> BvhBuildParams| {
+        let theirs = theirs.clone();
+        Box::new(move || drop(build_bvh2(&theirs, preset(), &mut Default::default())))
+    };
+    vec![
+        ("obvhs fast", build(BvhBuildParams::fast_build)),
+        ("obvhs medium", build(BvhBuildParams::medium_build)),
+    ]
 }
 
 fn two_threads(boxes: &[Aabb]) {

@@ -1,7 +1,6 @@
 //! Ratios of times measured in turns, so that a machine whose speed drifts does not favour either side.
 
 use harness::report::statistics::quantile;
-use std::hint::black_box;
 use std::time::Instant;
 
 /// A named piece of work.
@@ -14,7 +13,7 @@ pub fn compare(title: &str, rounds: usize, mut contenders: Vec<Contender<'_>>) {
     for round in 0..=rounds {
         for ((_, work), times) in contenders.iter_mut().zip(&mut seconds) {
             let start = Instant::now();
-            black_box(work());
+            work();
             if round > 0 {
                 times.push(start.elapsed().as_secs_f64());
             }

@@ -2,6 +2,7 @@
 //!
 //! A kind of report is one file with a `Config` and one line in [`Report`]. Reports read CSV files only.
 
+pub mod generations;
 pub mod statistics;
 pub mod table;
 pub mod times;
@@ -24,6 +25,8 @@ pub enum Report {
     Trials(trials::Config),
     /// Times of runs against each other.
     Times(times::Config),
+    /// Cost against generation.
+    Generations(generations::Config),
 }
 
 impl Report {
@@ -33,6 +36,7 @@ impl Report {
             Self::Table(config) => config.columns.iter().map(|column| &column.method).collect(),
             Self::Trials(config) => config.methods.iter().collect(),
             Self::Times(config) => config.methods.iter().collect(),
+            Self::Generations(config) => vec![&config.method, &config.baseline],
         }
     }
 
@@ -41,6 +45,7 @@ impl Report {
             Self::Table(config) => config.write(rows),
             Self::Trials(config) => config.write(rows),
             Self::Times(config) => config.write(rows),
+            Self::Generations(config) => config.write(rows),
         }
     }
 }
@@ -65,21 +70,23 @@ impl Rows {
         scenes
     }
 
+    /// The histories of one method on one scene, one per repetition.
+    pub fn histories(&self, scene: &str, method: &str) -> Vec<Vec<&HistoryRow>> {
+        let own = |row: &&HistoryRow| row.scene == scene && row.method == method;
+        let rows: Vec<&HistoryRow> = self.history.iter().filter(own).collect();
+        rows.chunk_by(|a, b| a.repetition == b.repetition).map(<[_]>::to_vec).collect()
+    }
+
+    /// The cost of the scene's greedy tree.
+    pub fn base_cost(&self, scene: &str) -> f64 {
+        self.runs.iter().find(|run| run.scene == scene).map_or(f64::NAN, |run| run.base_cost)
+    }
+
     /// The costs of one method's trials on one scene over base, one list per repetition, in order.
     pub fn trials_over_base(&self, scene: &str, method: &str) -> Vec<Vec<f64>> {
-        self.runs
-            .iter()
-            .filter(|run| run.scene == scene && run.method == method)
-            .map(|run| {
-                self.history
-                    .iter()
-                    .filter(|row| {
-                        row.scene == scene && row.method == method && row.repetition == run.repetition
-                    })
-                    .map(|row| over(row.cost, run.base_cost))
-                    .collect()
-            })
-            .collect()
+        let base = self.base_cost(scene);
+        let over_base = |history: Vec<&HistoryRow>| history.iter().map(|row| over(row.cost, base)).collect();
+        self.histories(scene, method).into_iter().map(over_base).collect()
     }
 }
 
