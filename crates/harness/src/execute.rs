@@ -80,7 +80,7 @@ pub fn execute(
     }
     store.join(jobs.len())?;
     store.write("resolved.toml", resolved.as_bytes())?;
-    let text = report::write_all(experiment, &store)?;
+    let text = report::write_all(&experiment.reports, &store)?;
     store.write("provenance.toml", to_toml(&Provenance::gather())?.as_bytes())?;
     store.finish()?;
     Ok(Summary { text, left_out })

@@ -9,7 +9,6 @@ pub mod times;
 pub mod trials;
 
 use crate::record::{self, HistoryRow, PaperRow, RunRow, TimingRow};
-use crate::spec::Experiment;
 use crate::store::Store;
 use crate::{Error, chart};
 use serde::{Deserialize, Serialize};
@@ -113,8 +112,8 @@ fn display_name(scene: &str, kind: &str) -> String {
     if kind == "file" { scene.into() } else { format!("{scene} ({kind})") }
 }
 
-/// Makes all reports of `experiment` from the CSV files in its folder. Returns the text for the terminal.
-pub fn write_all(experiment: &Experiment, store: &Store) -> Result<String, Error> {
+/// Makes all reports from the CSV files in the store's folder. Returns the text for the terminal.
+pub fn write_all(reports: &[Report], store: &Store) -> Result<String, Error> {
     let folder = store.folder();
     let rows = Rows {
         runs: record::read(&folder.join("runs.csv"))?,
@@ -123,7 +122,7 @@ pub fn write_all(experiment: &Experiment, store: &Store) -> Result<String, Error
     };
     let mut text = String::new();
     let mut paper = Vec::new();
-    for report in &experiment.reports {
+    for report in reports {
         let output = report.write(&rows)?;
         for (name, bytes) in &output.csv {
             store.write(&format!("{name}.csv"), bytes)?;
