@@ -47,8 +47,16 @@ pub const FETCHED: [(&str, &str); 2] = [("sponza", "bvh"), ("kitchen", "obvhs")]
 pub const SPHERES: [(&str, usize); 3] = [("spheres75", 75), ("spheres750", 750), ("spheres7500", 7500)];
 
 impl Scene {
-    /// Loads a scene by the name or path that a spec or `--scene` gives.
+    /// Loads a scene by the name or path that a spec or `--scene` gives. `NAME:1000` is a subset of so many of its
+    /// objects, evenly spaced in their order.
     pub fn load(name: &str) -> Result<Self, Error> {
+        match name.rsplit_once(':').and_then(|(whole, count)| Some((whole, count.parse::<usize>().ok()?))) {
+            Some((whole, count)) => Self::load_whole(whole)?.subset(count),
+            None => Self::load_whole(name),
+        }
+    }
+
+    fn load_whole(name: &str) -> Result<Self, Error> {
         if let Some(built_in) = standin::STAND_INS.iter().find(|scene| scene.name == name) {
             return Ok(Self::new(name, "stand-in", Primitives::Triangles((built_in.triangles)())));
         }
@@ -81,6 +89,26 @@ impl Scene {
         Self { name: name.into(), kind, boxes: primitives.boxes(), primitives }
     }
 
+    /// `count` of the scene's objects, evenly spaced in their order.
+    fn subset(self, count: usize) -> Result<Self, Error> {
+        let name = format!("{}:{count}", self.name);
+        let all = self.boxes.len();
+        if count == 0 || count > all {
+            return Err(Error::Scene {
+                name,
+                message: format!("a subset has 1 to {all} of this scene's objects"),
+            });
+        }
+        fn pick<T: Copy>(items: &[T], count: usize) -> Vec<T> {
+            (0..count).map(|index| items[index * items.len() / count]).collect()
+        }
+        let primitives = match &self.primitives {
+            Primitives::Triangles(triangles) => Primitives::Triangles(pick(triangles, count)),
+            Primitives::Spheres(spheres) => Primitives::Spheres(pick(spheres, count)),
+        };
+        Ok(Self::new(&name, self.kind, primitives))
+    }
+
     /// 64-bit FNV-1a of the boxes' bits: tells whether results belong to this very scene.
     pub fn checksum(&self) -> u64 {
         let coordinates = self.boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
@@ -106,7 +134,10 @@ pub fn fetched_path(name: &str) -> Option<PathBuf> {
 fn known_scenes() -> String {
     let names = standin::STAND_INS.iter().map(|scene| scene.name);
     let names = names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name));
-    format!("accepted: {}, or the path of an OBJ file", names.collect::<Vec<_>>().join(", "))
+    format!(
+        "accepted: {}, the path of an OBJ file, or either with `:COUNT` for a subset",
+        names.collect::<Vec<_>>().join(", ")
+    )
 }
 
 #[cfg(test)]
@@ -125,6 +156,16 @@ mod tests {
         assert!(message.contains("eschre") && message.contains("escher, konistil"), "{message}");
         let message = Scene::load("nowhere/x.obj").unwrap_err().to_string();
         assert!(message.contains("nowhere/x.obj: no such file"), "{message}");
+    }
+
+    #[test]
+    fn a_subset_has_as_many_distinct_objects_as_asked_for() {
+        let scene = Scene::load("spheres75:30").unwrap();
+        assert_eq!((scene.name.as_str(), scene.boxes.len()), ("spheres75:30", 30));
+        assert!((1..30).all(|i| scene.boxes[i] != scene.boxes[i - 1]));
+        for wrong in ["spheres75:0", "spheres75:76"] {
+            assert!(Scene::load(wrong).unwrap_err().to_string().contains("1 to 75"), "{wrong}");
+        }
     }
 
     #[test]
