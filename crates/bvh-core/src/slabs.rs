@@ -1,0 +1,137 @@
+//! The conservative ray–box test: it never misses a box that holds a hit.
+
+use crate::{Aabb, Ray};
+use glam::Vec3;
+
+/// A ray prepared for tests against the boxes of one scene.
+///
+/// Three promises make the answer of a traversal independent of its tree:
+///
+/// 1. *Conservative.* The interval of a box contains the exact one: the exit is enlarged by [`Slabs::FAR`], which
+///    covers the rounding of entry and exit (the bound 1 + 2γ(3) of Pharr, Jakob & Humphreys, Physically Based
+///    Rendering, 3.9.2, and the multiplication itself), and the box by [`Slabs::MARGIN`] of the scene's distance
+///    from the origin, which covers what the rounding of [`Triangle::intersect`](crate::Triangle::intersect) moves
+///    a vertex (Woop, Benthin & Wald 2013, section 4, who enlarge each box by its own distance).
+/// 2. *Monotone.* A box inside another one, bit by bit, has its interval inside the other's: each operation rounds
+///    monotonically.
+/// 3. *Defined.* Reciprocals are finite and the margin is never zero, hence no 0 · ∞, and a ray in a face plane is
+///    strictly inside the enlarged box.
+#[derive(Clone, Copy, Debug)]
+pub struct Slabs {
+    /// origin + margin, subtracted from lower corners.
+    pub(crate) lower: Vec3,
+    /// origin − margin, subtracted from upper corners.
+    pub(crate) upper: Vec3,
+    pub(crate) inverse: Vec3,
+    pub(crate) t_min: f32,
+}
+
+impl Slabs {
+    /// What an exit is multiplied by: with u = 2^-24 an entry is too far by (1 + u)^3 and an exit too near by
+    /// (1 − u)^4 at most.
+    pub const FAR: f32 = 1.0 + 8.0 * (f32::EPSILON / 2.0);
+
+    /// By how much boxes grow, in multiples of the largest coordinate of the scene relative to the ray's origin.
+    /// The rounding of a sheared vertex is below 6u of it.
+    pub const MARGIN: f32 = 8.0 * (f32::EPSILON / 2.0);
+
+    /// Prepares `ray` for boxes inside `bounds`, which may be a scene's root box or one object's.
+    #[inline]
+    pub fn new(ray: &Ray, bounds: &Aabb) -> Self {
+        let origin = ray.origin();
+        let reach = (bounds.min - origin).abs().max((bounds.max - origin).abs());
+        let margin = Vec3::splat(reach.max_element() * Self::MARGIN);
+        Self {
+            // One step further: the sum may have been rounded, or not have changed at all.
+            lower: (origin + margin).map(f32::next_up),
+            upper: (origin - margin).map(f32::next_down),
+            inverse: ray.inverse_direction(),
+            t_min: ray.t_min(),
+        }
+    }
+
+    /// The distances between which the ray may be inside the box, `t_min` at least; none when the first exceeds the
+    /// second.
+    #[inline(always)]
+    pub fn interval(&self, aabb: &Aabb) -> (f32, f32) {
+        let (low, high) = ((aabb.min - self.lower) * self.inverse, (aabb.max - self.upper) * self.inverse);
+        let (near, far) = (low.min(high), low.max(high));
+        (near.x.max(near.y).max(near.z).max(self.t_min), far.x.min(far.y).min(far.z) * Self::FAR)
+    }
+}
+
+/// Moves the distance of a hit into its object's own box: from wherever rounding put it to where a traversal looks.
+/// `None` when `t` is before `ray.t_min()` or NaN, the ray misses the box in its range, or the moved distance is behind
+/// `t_max`.
+///
+/// A traversal skips a box whose entry is behind the nearest hit so far. Whether an object with nearly the same
+/// distance is in that box or in another one would otherwise decide which of them is found.
+///
+/// `bounds` must be the object's box, or one inside it.
+#[inline]
+pub fn clip_to_box(ray: &Ray, bounds: &Aabb, t: f32, t_max: f32) -> Option<f32> {
+    let (entry, exit) = Slabs::new(ray, bounds).interval(bounds);
+    let moved = t.min(exit).max(entry);
+    (ray.t_min() <= t && entry <= exit && moved <= t_max).then_some(moved)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn meets(ray: &Ray, b: &Aabb) -> bool {
+        let (entry, exit) = Slabs::new(ray, b).interval(b);
+        entry <= exit && entry <= ray.t_max()
+    }
+
+    #[test]
+    fn rays_in_faces_along_edges_and_through_corners_meet_the_box() {
+        let b = Aabb::from(([1.0, 2.0, 3.0], [2.0, 4.0, 6.0]));
+        for zero in [0.0, -0.0] {
+            for axis in 0..3 {
+                for sign in [-1.0, 1.0] {
+                    let mut direction = Vec3::splat(zero);
+                    direction[axis] = sign;
+                    for corner in [b.min, b.max, Vec3::new(b.min.x, b.max.y, b.min.z)] {
+                        for start in [corner - 10.0 * direction, corner - 0.5 * direction, corner] {
+                            let ray = Ray::half_line(start, direction).unwrap();
+                            assert!(meets(&ray, &b), "{ray:?}");
+                        }
+                        let away = Ray::half_line(corner + 7.0 * direction, direction).unwrap();
+                        assert!(!meets(&away, &b), "{away:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn boxes_without_extent_are_met_at_every_scale() {
+        for k in [-120, -60, 0, 60, 120] {
+            let scale = libm::exp2f(k as f32);
+            let point = Vec3::new(0.3, -0.7, 1.9) * scale;
+            for origin in [Vec3::new(-1.0, 0.4, 0.1) * scale, Vec3::ZERO, point] {
+                let towards = (point - origin) / scale;
+                let ray =
+                    Ray::half_line(origin, if towards == Vec3::ZERO { Vec3::X } else { towards }).unwrap();
+                assert!(meets(&ray, &Aabb { min: point, max: point }), "2^{k}: {ray:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn intervals_of_boxes_inside_others_are_inside_theirs() {
+        let inner = Aabb::from(([0.1, 0.2, 0.3], [0.4, 0.2, 0.9]));
+        let outer = Aabb::from(([0.1, -3.0, 0.3], [0.5, 0.2, 1e6]));
+        for direction in [Vec3::new(0.3, 0.1, 0.7), Vec3::new(-1e-40, 0.0, 1.0), Vec3::new(-0.0, 1.0, 0.0)] {
+            for origin in [Vec3::ZERO, Vec3::splat(0.2), Vec3::new(0.25, 0.2, -9.0), Vec3::splat(-3e38)] {
+                let ray = Ray::half_line(origin, direction).unwrap();
+                let own = Slabs::new(&ray, &inner).interval(&inner);
+                let scene = Slabs::new(&ray, &outer).interval(&inner);
+                let around = Slabs::new(&ray, &outer).interval(&outer);
+                assert!(own.0 >= scene.0 && own.1 <= scene.1, "{ray:?}");
+                assert!(scene.0 >= around.0 && scene.1 <= around.1, "{ray:?}");
+            }
+        }
+    }
+}

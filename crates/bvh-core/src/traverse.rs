@@ -1,0 +1,232 @@
+//! Which object a ray meets first, and whether it meets any: traversal of the one tree type.
+//!
+//! The objects may be anything: the caller passes a closure that tests one of them. Boxes are visited front to back,
+//! skipped when they begin behind the nearest hit, and tested conservatively ([`Slabs`](crate::Slabs)). With tests
+//! whose distances lie inside their objects' boxes, as [`Triangle::intersect`](crate::Triangle::intersect),
+//! [`Sphere::intersect`](crate::Sphere::intersect) and [`clip_to_box`](crate::clip_to_box) give them, the answer is
+//! that of testing every object, bit by bit, whatever the tree.
+//!
+//! ```
+//! use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Shear, TestCounts, Triangle, nearest_hit};
+//! use glam::Vec3;
+//! let triangles = [0.0, 1.0].map(|z| Triangle([Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 0.0, z), Vec3::new(0.0, 1.0, z)]));
+//! let [a, b] = triangles.map(|t| t.aabb());
+//! let tree = Bvh {
+//!     nodes: vec![Node::inner(a.union(&b), 1, 2), Node::leaf(a, 0, 1), Node::leaf(b, 1, 1)],
+//!     prim_ids: vec![0, 1],
+//! };
+//! let ray = Ray::half_line(Vec3::new(0.2, 0.2, 3.0), -Vec3::Z)?;
+//! let shear = Shear::new(&ray);
+//! let mut counts = TestCounts::default();
+//! let hit = nearest_hit(&tree, &ray, |id, t_max| triangles[id as usize].intersect(&shear, t_max), &mut counts);
+//! assert_eq!(hit, Some(Hit { t: 2.0, object: 1 }));
+//! assert_eq!(counts, TestCounts { boxes: 3, objects: 1 });
+//! # Ok::<(), bvh_core::InvalidRay>(())
+//! ```
+
+use crate::stack::Stack;
+use crate::{Bvh, Hit, Node, NodeKind, Ray, Slabs};
+use alloc::vec::Vec;
+use core::ops::ControlFlow;
+
+/// What counts the tests of a traversal. `()` counts nothing and costs nothing.
+pub trait Counter {
+    /// `boxes` more boxes are tested. The root's box counts too.
+    #[inline(always)]
+    fn boxes(&mut self, boxes: usize) {
+        let _ = boxes;
+    }
+
+    /// One more object is tested.
+    #[inline(always)]
+    fn object(&mut self) {}
+}
+
+impl Counter for () {}
+
+/// Numbers of tests, of one ray or of many.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TestCounts {
+    /// Tests against boxes of nodes, the root's and the leaves' included.
+    pub boxes: u64,
+    /// Tests against objects.
+    pub objects: u64,
+}
+
+impl Counter for TestCounts {
+    #[inline(always)]
+    fn boxes(&mut self, boxes: usize) {
+        self.boxes += boxes as u64;
+    }
+
+    #[inline(always)]
+    fn object(&mut self) {
+        self.objects += 1;
+    }
+}
+
+/// The nearest object that `ray` meets in its range; of several at the same distance the one of the lowest id.
+///
+/// `test(object, t_max)` gives the distance at which the ray meets the object, if that is in `ray.t_min()..=t_max`.
+///
+/// # Panics
+/// May panic, or not return, for a tree that [`validate`](crate::validate()) refuses.
+#[inline]
+pub fn nearest_hit(
+    tree: &Bvh,
+    ray: &Ray,
+    mut test: impl FnMut(u32, f32) -> Option<f32>,
+    counter: &mut impl Counter,
+) -> Option<Hit> {
+    let mut nearest = None;
+    walk(tree, ray, counter, |objects, t_max, counter| {
+        nearest_of(objects.iter().copied(), t_max, &mut nearest, &mut test, counter);
+        ControlFlow::Continue(())
+    });
+    nearest
+}
+
+/// Whether `ray` meets any object in its range: the question of a shadow ray.
+///
+/// `test(object)` says whether the ray meets the object. Boxes are visited front to back all the same: a hit ends the
+/// search, and near objects fill more of the view.
+///
+/// # Panics
+/// As [`nearest_hit`].
+#[inline]
+pub fn any_hit(tree: &Bvh, ray: &Ray, mut test: impl FnMut(u32) -> bool, counter: &mut impl Counter) -> bool {
+    let mut found = false;
+    walk(tree, ray, counter, |objects, _, counter| {
+        for &object in objects {
+            counter.object();
+            if test(object) {
+                found = true;
+                return ControlFlow::Break(());
+            }
+        }
+        ControlFlow::Continue(())
+    });
+    found
+}
+
+/// [`nearest_hit`] without a tree: tests the objects `0..objects` one after the other.
+pub fn nearest_hit_of_all(
+    objects: u32,
+    ray: &Ray,
+    mut test: impl FnMut(u32, f32) -> Option<f32>,
+    counter: &mut impl Counter,
+) -> Option<Hit> {
+    let mut nearest = None;
+    nearest_of(0..objects, &mut ray.t_max(), &mut nearest, &mut test, counter);
+    nearest
+}
+
+/// [`any_hit`] without a tree: tests the objects `0..objects` one after the other.
+pub fn any_hit_of_all(objects: u32, mut test: impl FnMut(u32) -> bool, counter: &mut impl Counter) -> bool {
+    (0..objects).any(|object| {
+        counter.object();
+        test(object)
+    })
+}
+
+#[inline(always)]
+fn nearest_of(
+    objects: impl Iterator<Item = u32>,
+    t_max: &mut f32,
+    nearest: &mut Option<Hit>,
+    test: &mut impl FnMut(u32, f32) -> Option<f32>,
+    counter: &mut impl Counter,
+) {
+    for object in objects {
+        counter.object();
+        if let Some(t) = test(object, *t_max)
+            && t <= *t_max
+        {
+            let hit = Hit { t, object };
+            if nearest.is_none_or(|nearest| hit.precedes(&nearest)) {
+                *nearest = Some(hit);
+                *t_max = t;
+            }
+        }
+    }
+}
+
+/// A box that the ray enters at `entry`, to be visited later.
+#[derive(Clone, Copy)]
+struct Pending {
+    entry: f32,
+    node: u32,
+}
+
+/// Hands the objects of leaves that the ray may meet to `leaf`, the nearest first, until it breaks. `leaf` may lower
+/// the distance from which on boxes are skipped.
+#[inline(always)]
+fn walk<C: Counter>(
+    tree: &Bvh,
+    ray: &Ray,
+    counter: &mut C,
+    mut leaf: impl FnMut(&[u32], &mut f32, &mut C) -> ControlFlow<()>,
+) {
+    let Some(mut node) = tree.nodes.first() else { return };
+    let slabs = Slabs::new(ray, &node.aabb);
+    let mut t_max = ray.t_max();
+    counter.boxes(1);
+    if enter(&slabs, node, t_max).is_none() {
+        return;
+    }
+    let mut stack = Stack::<Pending, 64>::new(Pending { entry: 0.0, node: 0 });
+    let mut entered = Vec::new();
+    loop {
+        match node.kind() {
+            NodeKind::Leaf { .. } => {
+                if leaf(&tree.prim_ids[node.prims()], &mut t_max, counter).is_break() {
+                    return;
+                }
+            }
+            NodeKind::Inner { first, count: 2 } => {
+                counter.boxes(2);
+                let pair = &tree.nodes[first as usize..first as usize + 2];
+                match (enter(&slabs, &pair[0], t_max), enter(&slabs, &pair[1], t_max)) {
+                    (Some(a), Some(b)) => {
+                        let swap = b < a;
+                        stack.push(Pending { entry: if swap { a } else { b }, node: first + u32::from(!swap) });
+                        node = &pair[usize::from(swap)];
+                        continue;
+                    }
+                    (Some(_), None) => {
+                        node = &pair[0];
+                        continue;
+                    }
+                    (None, Some(_)) => {
+                        node = &pair[1];
+                        continue;
+                    }
+                    (None, None) => {}
+                }
+            }
+            NodeKind::Inner { first, count } => {
+                counter.boxes(count as usize);
+                let children = (first..).zip(&tree.nodes[node.children()]);
+                entered.extend(children.filter_map(|(node, child)| {
+                    enter(&slabs, child, t_max).map(|entry| Pending { entry, node })
+                }));
+                // The nearest last, so that it is popped first; the lower index first on ties.
+                entered.sort_unstable_by(|a, b| b.entry.total_cmp(&a.entry).then(b.node.cmp(&a.node)));
+                entered.drain(..).for_each(|pending| stack.push(pending));
+            }
+        }
+        node = loop {
+            let Some(pending) = stack.pop() else { return };
+            if pending.entry <= t_max {
+                break &tree.nodes[pending.node as usize];
+            }
+        };
+    }
+}
+
+/// Where the ray enters the node's box, if it does so in its range.
+#[inline(always)]
+fn enter(slabs: &Slabs, node: &Node, t_max: f32) -> Option<f32> {
+    let (entry, exit) = slabs.interval(&node.aabb);
+    (entry <= exit.min(t_max)).then_some(entry)
+}

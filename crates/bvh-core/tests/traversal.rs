@@ -1,0 +1,146 @@
+//! Every traversal gives the answer of testing every object, bit by bit.
+
+mod support;
+
+use bvh_core::{
+    Aabb, Bvh, Hit, Ray, Shear, Sphere, TestCounts, Triangle, any_hit, any_hit_of_all, clip_to_box,
+    nearest_hit, nearest_hit_of_all, validate,
+};
+use glam::Vec3;
+use support::{Random, SHAPES, ball, boxes, chain, grid_box, rays, scaled, soup, tree};
+
+/// The answer of testing every triangle, and whether any was hit.
+fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
+    let shear = Shear::new(ray);
+    let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
+    let n = triangles.len() as u32;
+    let nearest = nearest_hit_of_all(n, ray, test, &mut ());
+    assert_eq!(any_hit_of_all(n, |id| test(id, ray.t_max()).is_some(), &mut ()), nearest.is_some());
+    nearest
+}
+
+fn check(name: &str, tree: &Bvh, triangles: &[Triangle], ray: &Ray, expected: Option<Hit>) {
+    let shear = Shear::new(ray);
+    let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
+    let hit = nearest_hit(tree, ray, test, &mut ());
+    let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
+    assert_eq!(bits(hit), bits(expected), "{name}: {ray:?}");
+    let any = any_hit(tree, ray, |id| test(id, ray.t_max()).is_some(), &mut ());
+    assert_eq!(any, expected.is_some(), "{name}: {ray:?}");
+}
+
+#[test]
+fn every_tree_answers_as_brute_force_at_every_scale() {
+    let mut random = Random(1);
+    let scenes = [("soup", soup(150, &mut random)), ("grid", grid_box(4)), ("ball", ball(2))];
+    let mut hits = 0;
+    for (name, scene) in scenes {
+        for exponent in [-60, 0, 60] {
+            let triangles = scaled(&scene, libm::exp2f(exponent as f32));
+            let boxes = boxes(&triangles);
+            let mut trees: Vec<Bvh> = SHAPES.iter().map(|&shape| tree(&boxes, shape, &mut random)).collect();
+            trees.push(chain(&boxes));
+            trees.iter().for_each(|tree| validate(tree, &boxes).unwrap());
+            for ray in rays(&triangles, 3000, &mut random) {
+                let expected = brute_force(&triangles, &ray);
+                hits += usize::from(expected.is_some());
+                for (i, tree) in trees.iter().enumerate() {
+                    check(&format!("{name} * 2^{exponent}, tree {i}"), tree, &triangles, &ray, expected);
+                }
+            }
+        }
+    }
+    assert!(hits > 5000, "the rays should hit something: {hits}");
+}
+
+#[test]
+fn spheres_and_boxes_are_traced_by_the_same_functions() {
+    let mut random = Random(2);
+    let spheres: Vec<Sphere> =
+        (0..75).map(|_| Sphere { center: random.point(), radius: 0.01 + 0.2 * random.unit() }).collect();
+    let boxes: Vec<Aabb> = spheres.iter().map(Sphere::aabb).collect();
+    let trees = SHAPES.map(|shape| tree(&boxes, shape, &mut random));
+    for _ in 0..5000 {
+        let (origin, target) = (random.point() * random.of(&[1.0, 100.0]), random.point());
+        let ray = Ray::half_line(origin, target - origin).unwrap();
+        let sphere = |id: u32, t_max| spheres[id as usize].intersect(&ray, t_max);
+        // A box is met where its interval begins.
+        let solid = |id: u32, t_max| clip_to_box(&ray, &boxes[id as usize], ray.t_min(), t_max);
+        let n = spheres.len() as u32;
+        let expected =
+            (nearest_hit_of_all(n, &ray, sphere, &mut ()), nearest_hit_of_all(n, &ray, solid, &mut ()));
+        for tree in &trees {
+            let found = (nearest_hit(tree, &ray, sphere, &mut ()), nearest_hit(tree, &ray, solid, &mut ()));
+            assert_eq!(found, expected, "{ray:?}");
+        }
+    }
+}
+
+#[test]
+fn a_chain_of_twenty_thousand_is_traced_from_both_ends() {
+    let triangles: Vec<Triangle> = (0..20_000)
+        .map(|i| Triangle([Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p + Vec3::Z * (i as f32))))
+        .collect();
+    let tree = chain(&boxes(&triangles));
+    assert_eq!(tree.depth(), triangles.len() - 1);
+    for (z, direction, object) in [(-1.0, 1.0, 0), (30_000.0, -1.0, 19_999)] {
+        let ray = Ray::half_line(Vec3::new(0.1, 0.1, z), Vec3::Z * direction).unwrap();
+        let hit = nearest_hit(
+            &tree,
+            &ray,
+            |id, t_max| triangles[id as usize].intersect(&Shear::new(&ray), t_max),
+            &mut (),
+        );
+        assert_eq!(hit.map(|hit| hit.object), Some(object));
+        // No object is hit: every node is visited.
+        let mut counts = TestCounts::default();
+        assert!(!any_hit(&tree, &ray, |_| false, &mut counts));
+        assert_eq!(counts, TestCounts { boxes: tree.nodes.len() as u64, objects: tree.prim_ids.len() as u64 });
+    }
+}
+
+#[test]
+fn no_ray_leaves_a_closed_mesh_through_an_edge_or_a_vertex() {
+    let mut random = Random(3);
+    for (name, triangles) in [("ball", ball(3)), ("box", grid_box(7))] {
+        let tree = tree(&boxes(&triangles), SHAPES[0], &mut random);
+        for _ in 0..40_000 {
+            let Triangle([a, b, _]) = random.of(&triangles);
+            let target = a + (b - a) * random.of(&[0.0, 0.5, 1.0, 1.0 / 3.0]);
+            let origin = random.point() * 0.5;
+            for (origin, direction) in [(origin, target - origin), (Vec3::ZERO, target)] {
+                let ray = Ray::half_line(origin, direction).unwrap();
+                let shear = Shear::new(&ray);
+                let test = |id: u32| triangles[id as usize].intersect(&shear, ray.t_max()).is_some();
+                assert!(any_hit(&tree, &ray, test, &mut ()), "{name} leaks {ray:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn counts_include_the_root_and_stop_at_the_first_hit() {
+    let boxes: Vec<Aabb> =
+        (0..4).map(|i| Aabb { min: Vec3::X * (2 * i) as f32, max: Vec3::X * (2 * i) as f32 + 1.0 }).collect();
+    let tree = chain(&boxes);
+    let count = |ray: &Ray, any: bool| {
+        let mut counts = TestCounts::default();
+        if any {
+            any_hit(&tree, ray, |_| true, &mut counts);
+        } else {
+            nearest_hit(&tree, ray, |id, t_max| clip_to_box(ray, &boxes[id as usize], 0.0, t_max), &mut counts);
+        }
+        (counts.boxes, counts.objects)
+    };
+    let middle = Vec3::splat(0.5);
+    let forwards = Ray::half_line(middle - Vec3::X, Vec3::X).unwrap();
+    assert_eq!(count(&forwards, true), (3, 1));
+    assert_eq!(count(&forwards, false), (3, 1));
+    let backwards = Ray::half_line(middle + Vec3::X * 9.0, -Vec3::X).unwrap();
+    assert_eq!(count(&backwards, true), (7, 1));
+    let past = Ray::half_line(middle + Vec3::X * 9.0, Vec3::X).unwrap();
+    assert_eq!(count(&past, false), (1, 0));
+    assert_eq!(nearest_hit(&Bvh::default(), &past, |_, _| Some(0.0), &mut ()), None);
+    let empty = Ray::new(middle - Vec3::X, Vec3::X, 2.0, 1.0).unwrap();
+    assert_eq!(count(&empty, false), (1, 0));
+}
