@@ -6,6 +6,7 @@
 pub mod division;
 mod error;
 pub mod evaluation;
+pub mod goldsmith_salmon;
 pub mod median_cut;
 pub mod muller_fellner;
 mod presort;

@@ -1,7 +1,8 @@
 //! Carries out the runs of an experiment: in parallel or one by one, with progress, until done or interrupted.
 
 use crate::provenance::Provenance;
-use crate::record::{HistoryRow, RunRow, TimingRow};
+use crate::rays;
+use crate::record::{HistoryRow, RayRow, RunRow, TimingRow};
 use crate::scene::Scene;
 use crate::spec::{Experiment, Labelled};
 use crate::store::{FinishedRun, Store};
@@ -153,9 +154,26 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<F
         incumbent: event.incumbent,
     };
     let history = outcome.history.iter().map(row).collect();
+    let ray_row = |config: &rays::Config| {
+        let (family, query) = (format!("{:?}", config.family), format!("{:?}", config.query));
+        // The same rays for all methods: their differences are then the trees'.
+        let ray_seed = experiment.seed_of(&scene_name, &format!("rays {family}"), 0);
+        let [family, query] = [family, query].map(|name| name.to_lowercase());
+        let named = RayRow {
+            scene: scene_name.clone(),
+            method: method.clone(),
+            seed,
+            repetition,
+            family,
+            query,
+            ..Default::default()
+        };
+        rays::measure(config, scene, tree, ray_seed, named)
+    };
+    let rays = experiment.rays.iter().map(ray_row).collect();
     let threads = rayon::current_num_threads();
     let timing = TimingRow { scene: scene_name, method, seed, repetition, threads, seconds };
-    Ok(Some(FinishedRun { run, history, timing }))
+    Ok(Some(FinishedRun { run, history, timing, rays }))
 }
 
 /// The spec with every default spelled out, and which scenes it ran on.

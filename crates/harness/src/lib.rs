@@ -9,6 +9,7 @@ pub mod error;
 pub mod execute;
 pub mod obj;
 pub mod provenance;
+pub mod rays;
 pub mod record;
 pub mod report;
 pub mod scene;

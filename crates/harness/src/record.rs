@@ -83,6 +83,39 @@ pub struct TimingRow {
     pub seconds: f64,
 }
 
+/// One row of `rays.csv`: the tests that random rays took in a run's tree.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RayRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Label of the method in the spec.
+    pub method: String,
+    /// Seed of the run; the rays are the same for all runs on a scene.
+    pub seed: u64,
+    /// From 0.
+    pub repetition: u32,
+    /// Where the rays come from.
+    pub family: String,
+    /// What they ask.
+    pub query: String,
+    /// Number of rays.
+    pub rays: u64,
+    /// Fraction of them that hit something.
+    pub hit_fraction: f64,
+    /// Mean number of tests against boxes, the root's and the leaves' included.
+    pub boxes_per_ray: f64,
+    /// Its standard error.
+    pub boxes_standard_error: f64,
+    /// Lower end of its 95 % interval.
+    pub boxes_low: f64,
+    /// Upper end.
+    pub boxes_high: f64,
+    /// Mean number of tests against objects.
+    pub objects_per_ray: f64,
+    /// Its standard error.
+    pub objects_standard_error: f64,
+}
+
 /// One row of `paper.csv`: a number of the paper beside ours.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PaperRow {

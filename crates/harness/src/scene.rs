@@ -1,7 +1,7 @@
 //! Scenes by name or path: built-in stand-ins, the spheres, fetched meshes, and any OBJ file.
 
 use crate::{Error, obj, standin};
-use bvh_core::Aabb;
+use bvh_core::{Aabb, Sphere, Triangle};
 use glam::Vec3;
 use std::path::{Path, PathBuf};
 
@@ -11,18 +11,15 @@ pub enum Primitives {
     /// Three corners each, in world units.
     Triangles(Vec<[Vec3; 3]>),
     /// Centre and radius each, in world units.
-    Spheres(Vec<standin::spheres::Sphere>),
+    Spheres(Vec<Sphere>),
 }
 
 impl Primitives {
     /// The objects' boxes, one each.
     pub fn boxes(&self) -> Vec<Aabb> {
         match self {
-            Self::Triangles(triangles) => triangles.iter().map(|&corners| Aabb::around(corners)).collect(),
-            Self::Spheres(spheres) => spheres
-                .iter()
-                .map(|s| Aabb { min: s.center - Vec3::splat(s.radius), max: s.center + Vec3::splat(s.radius) })
-                .collect(),
+            Self::Triangles(triangles) => triangles.iter().map(|&corners| Triangle(corners).aabb()).collect(),
+            Self::Spheres(spheres) => spheres.iter().map(Sphere::aabb).collect(),
         }
     }
 }

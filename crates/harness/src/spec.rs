@@ -1,8 +1,8 @@
 //! Experiment specs: TOML in, a checked [`Experiment`] out, or an error with file, key, found and accepted.
 
-use crate::Error;
 use crate::report::Report;
 use crate::scene::{Scene, fnv1a};
+use crate::{Error, rays};
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, Method, Problem, solve};
 use serde::{Deserialize, Serialize};
@@ -43,6 +43,9 @@ pub struct Experiment {
     pub budget: Budget,
     /// What is run, at least one.
     pub methods: Vec<Labelled>,
+    /// Measurements of every run's tree with random rays. Default none.
+    #[serde(default)]
+    pub rays: Vec<rays::Config>,
     /// Tables and figures made from the rows. Default none.
     #[serde(default)]
     pub reports: Vec<Report>,
@@ -158,6 +161,9 @@ impl Experiment {
         if i64::try_from(self.seed).is_err() {
             return Err(format!("seed is {}; accepted: 0 to {}", self.seed, i64::MAX));
         }
+        if let Some(index) = self.rays.iter().position(|rays| rays.count == 0) {
+            return Err(format!("rays[{index}].count is 0; accepted: 1 or more"));
+        }
         let mut labels = HashSet::new();
         for (index, Labelled { label, method }) in self.methods.iter().enumerate() {
             if !labels.insert(label) {
@@ -244,6 +250,8 @@ mod tests {
             ("objective = 'volume'\n", &["volume", "internal_area"]),
             ("budget = { seconds = 1 }\n", &["seconds", "max_evaluations"]),
             ("[[reports]]\nkind = 'pie'\n", &["pie", "table"]),
+            ("rays = [{ family = 'lines', query = 'any', count = 0 }]\n", &["rays[0].count is 0"]),
+            ("rays = [{ family = 'curves', query = 'any', count = 1 }]\n", &["curves", "inside"]),
         ] {
             let message = read(&format!("{GOOD}{wrong}"), &Overrides::default()).unwrap_err();
             assert!(parts.iter().all(|part| message.contains(part)), "{wrong}: {message}");

@@ -5,7 +5,7 @@
 //! their rows are joined in the order of the spec, so the bytes do not depend on the order of finishing.
 
 use crate::Error;
-use crate::record::{HistoryRow, RunRow, TimingRow, to_bytes};
+use crate::record::{HistoryRow, RayRow, RunRow, TimingRow, to_bytes};
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -19,10 +19,12 @@ pub struct FinishedRun {
     pub history: Vec<HistoryRow>,
     /// For `timing.csv`.
     pub timing: TimingRow,
+    /// For `rays.csv`, which is written if there are any.
+    pub rays: Vec<RayRow>,
 }
 
 /// The files that are joined from those of the runs.
-const JOINED: [&str; 3] = ["runs.csv", "history.csv", "timing.csv"];
+const JOINED: [&str; 4] = ["runs.csv", "history.csv", "timing.csv", "rays.csv"];
 
 /// An experiment's folder, locked until dropped.
 #[derive(Debug)]
@@ -92,6 +94,7 @@ impl Store {
             to_bytes(std::slice::from_ref(&run.run), &part)?,
             to_bytes(&run.history, &part)?,
             to_bytes(std::slice::from_ref(&run.timing), &part)?,
+            to_bytes(&run.rays, &part)?,
         ];
         for (name, bytes) in JOINED.iter().zip(contents) {
             write_synced(&unfinished.join(name), &bytes)?;
@@ -110,7 +113,9 @@ impl Store {
                 let header = bytes.iter().position(|&byte| byte == b'\n').map_or(bytes.len(), |end| end + 1);
                 joined.extend_from_slice(if joined.is_empty() { &bytes } else { &bytes[header..] });
             }
-            write_whole(&self.folder.join(name), &joined)?;
+            if !joined.is_empty() {
+                write_whole(&self.folder.join(name), &joined)?;
+            }
         }
         Ok(())
     }

@@ -2,13 +2,17 @@
 //!
 //! A kind of report is one file with a `Config` and one line in [`Report`]. Reports read CSV files only.
 
+pub mod correlation;
+pub mod distribution;
+pub mod estimator;
 pub mod generations;
+pub mod ray_tests;
 pub mod statistics;
 pub mod table;
 pub mod times;
 pub mod trials;
 
-use crate::record::{self, HistoryRow, PaperRow, RunRow, TimingRow};
+use crate::record::{self, HistoryRow, PaperRow, RayRow, RunRow, TimingRow};
 use crate::store::Store;
 use crate::{Error, chart};
 use serde::{Deserialize, Serialize};
@@ -26,6 +30,14 @@ pub enum Report {
     Times(times::Config),
     /// Cost against generation.
     Generations(generations::Config),
+    /// The distribution of costs over trials.
+    Distribution(distribution::Config),
+    /// Tests per random ray, methods by scenes.
+    RayTests(ray_tests::Config),
+    /// The error of the ray estimator against the number of rays.
+    Estimator(estimator::Config),
+    /// Costs against tests per ray over many trees.
+    Correlation(correlation::Config),
 }
 
 impl Report {
@@ -36,6 +48,10 @@ impl Report {
             Self::Trials(config) => config.methods.iter().collect(),
             Self::Times(config) => config.methods.iter().collect(),
             Self::Generations(config) => vec![&config.method, &config.baseline],
+            Self::Distribution(config) => config.methods.iter().collect(),
+            Self::RayTests(config) => config.methods.iter().collect(),
+            Self::Estimator(config) => config.methods.iter().collect(),
+            Self::Correlation(config) => config.methods.iter().collect(),
         }
     }
 
@@ -45,6 +61,10 @@ impl Report {
             Self::Trials(config) => config.write(rows),
             Self::Times(config) => config.write(rows),
             Self::Generations(config) => config.write(rows),
+            Self::Distribution(config) => config.write(rows),
+            Self::RayTests(config) => config.write(rows),
+            Self::Estimator(config) => config.write(rows),
+            Self::Correlation(config) => config.write(rows),
         }
     }
 }
@@ -58,6 +78,8 @@ pub struct Rows {
     pub history: Vec<HistoryRow>,
     /// Of `timing.csv`.
     pub timing: Vec<TimingRow>,
+    /// Of `rays.csv`; none if rays were not asked for.
+    pub rays: Vec<RayRow>,
 }
 
 impl Rows {
@@ -119,6 +141,7 @@ pub fn write_all(reports: &[Report], store: &Store) -> Result<String, Error> {
         runs: record::read(&folder.join("runs.csv"))?,
         history: record::read(&folder.join("history.csv"))?,
         timing: record::read(&folder.join("timing.csv"))?,
+        rays: if folder.join("rays.csv").is_file() { record::read(&folder.join("rays.csv"))? } else { vec![] },
     };
     let mut text = String::new();
     let mut paper = Vec::new();

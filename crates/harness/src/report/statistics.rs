@@ -40,6 +40,37 @@ pub fn expected_best_of(pool: &[f64], m: usize) -> Option<f64> {
     Some(expected)
 }
 
+/// Pearson's correlation of pairs; `None` of fewer than two, or if either side is constant.
+pub fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
+    let n = pairs.len() as f64;
+    let (mean_x, mean_y) =
+        (pairs.iter().map(|p| p.0).sum::<f64>() / n, pairs.iter().map(|p| p.1).sum::<f64>() / n);
+    let product = |f: fn(f64, f64) -> f64| pairs.iter().map(|&(x, y)| f(x - mean_x, y - mean_y)).sum::<f64>();
+    let (xx, yy) = (product(|x, _| x * x), product(|_, y| y * y));
+    (pairs.len() > 1 && xx > 0.0 && yy > 0.0).then(|| product(|x, y| x * y) / (xx.sqrt() * yy.sqrt()))
+}
+
+/// Spearman's rank correlation of pairs: Pearson's of the ranks, equal values sharing their mean rank.
+pub fn spearman(pairs: &[(f64, f64)]) -> Option<f64> {
+    let of = |side: fn(&(f64, f64)) -> f64| ranks(&pairs.iter().map(side).collect::<Vec<_>>());
+    pearson(&of(|p| p.0).into_iter().zip(of(|p| p.1)).collect::<Vec<_>>())
+}
+
+/// The rank of every value, from 1, equal values sharing their mean rank.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let mut ranks = vec![0.0; values.len()];
+    let mut before = 0;
+    for ties in order.chunk_by(|&a, &b| values[a] == values[b]) {
+        for &at in ties {
+            ranks[at] = before as f64 + (ties.len() as f64 + 1.0) / 2.0;
+        }
+        before += ties.len();
+    }
+    ranks
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -63,5 +94,15 @@ mod tests {
             assert!((expected_best_of(&pool, m).unwrap() - mean).abs() < 1e-12, "m = {m}");
         }
         assert_eq!(expected_best_of(&pool, 8), None);
+    }
+
+    #[test]
+    fn correlations_are_one_for_what_rises_together() {
+        let line: Vec<_> = (0..9).map(|i| (f64::from(i), 3.0 - 2.0 * f64::from(i))).collect();
+        assert!((pearson(&line).unwrap() + 1.0).abs() < 1e-12);
+        let cubes: Vec<_> = (0..9).map(|i| (f64::from(i), f64::from(i * i * i))).collect();
+        assert!((spearman(&cubes).unwrap() - 1.0).abs() < 1e-12 && pearson(&cubes).unwrap() < 0.95);
+        assert_eq!(ranks(&[2.0, 1.0, 2.0, 5.0]), [2.5, 1.0, 2.5, 4.0]);
+        assert_eq!(pearson(&[(1.0, 2.0), (1.0, 3.0)]), None);
     }
 }

@@ -5,16 +5,8 @@
 //! document: it gives no positions.
 
 use super::patch::jitter;
-use glam::{DVec3, Vec3};
-
-/// A sphere in world units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sphere {
-    /// Centre.
-    pub center: Vec3,
-    /// Radius, above 0.
-    pub radius: f32,
-}
+use bvh_core::Sphere;
+use glam::DVec3;
 
 /// Half the size of the box that holds the centres: about 16:9 seen along the z axis, centred at
 /// the origin.

@@ -1,0 +1,163 @@
+//! The working form of the tree: children in blocks of four, side by side, so that one look at memory and one vector
+//! comparison serve four boxes.
+
+use super::Object;
+
+/// Children per block.
+pub(super) const LANES: usize = 4;
+/// Marks a leaf in a link.
+pub(super) const LEAF: u32 = 1 << 31;
+/// No node: above the root.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Four children of one node, side by side. A node with more has several blocks in a row, their number a power of
+/// two: full ones move to twice the room. A node has no record of its own, only its lane in its parent's block,
+/// and is named by `block · LANES + lane`.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Block {
+    /// −min.xyz, max.xyz of each.
+    pub(super) bounds: [[f32; LANES]; 6],
+    /// An inner child's first block; a leaf's object, marked [`LEAF`].
+    pub(super) link: [u32; LANES],
+    /// An inner child's number of children; 2, those of the pair, for a leaf.
+    pub(super) count: [u32; LANES],
+    /// An inner child's half area. For a leaf what its growth is counted from: nothing, or its half area if children
+    /// are chosen by area.
+    pub(super) area: [f64; LANES],
+}
+
+impl Block {
+    /// Lanes without a child: leaves that contain nothing and would grow without bound.
+    pub(super) const EMPTY: Self = Self {
+        bounds: [[f32::INFINITY; LANES]; 6],
+        link: [LEAF; LANES],
+        count: [2; LANES],
+        area: [0.0; LANES],
+    };
+
+    /// The first inner child that contains `b`.
+    #[inline(always)]
+    pub(super) fn first_containing(&self, b: &[f32; 6]) -> Option<usize> {
+        let lanes = self.containing(b);
+        (lanes != 0).then(|| lanes.trailing_zeros() as usize % LANES)
+    }
+
+    /// One bit per inner child that contains `b`. The compiler makes nothing good of the plain version below.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn containing(&self, b: &[f32; 6]) -> u32 {
+        use std::arch::x86_64::*;
+        // SAFETY: every x86-64 processor has SSE2, and nothing here goes through a pointer.
+        unsafe {
+            let lanes = |x: [f32; LANES]| _mm_setr_ps(x[0], x[1], x[2], x[3]);
+            let side = |i: usize| _mm_cmple_ps(_mm_set1_ps(b[i]), lanes(self.bounds[i]));
+            let sides = |i: usize| _mm_and_ps(side(i), side(i + 1));
+            let contains = _mm_and_ps(_mm_and_ps(sides(0), sides(2)), sides(4));
+            // LEAF is a float's sign bit, and the mask takes the sign bits.
+            let [a, b, c, d] = self.link;
+            let leaves = _mm_castsi128_ps(_mm_setr_epi32(a as i32, b as i32, c as i32, d as i32));
+            _mm_movemask_ps(_mm_andnot_ps(leaves, contains)) as u32
+        }
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    #[inline(always)]
+    fn containing(&self, b: &[f32; 6]) -> u32 {
+        self.containing_plain(b)
+    }
+
+    #[cfg(any(test, not(target_arch = "x86_64")))]
+    #[inline(always)]
+    fn containing_plain(&self, b: &[f32; 6]) -> u32 {
+        let contains = |lane: usize| !self.is_leaf(lane) && (0..6).all(|i| b[i] <= self.bounds[i][lane]);
+        (0..LANES).map(|lane| u32::from(contains(lane)) << lane).sum()
+    }
+
+    /// The half area of the union of a child and `b`, the operations as in [`bvh_core::PackedAabb::half_area`].
+    #[inline(always)]
+    pub(super) fn union_area(&self, lane: usize, b: &[f32; 6]) -> f64 {
+        let bound = |i: usize| f64::from(larger(self.bounds[i][lane], b[i]));
+        let [x, y, z] = [bound(0) + bound(3), bound(1) + bound(4), bound(2) + bound(5)];
+        x * y + y * z + z * x
+    }
+
+    /// The first block of an inner child's children, and their number.
+    #[inline(always)]
+    pub(super) fn family(&self, lane: usize) -> (usize, usize) {
+        (self.link[lane] as usize, self.count[lane] as usize)
+    }
+
+    #[inline(always)]
+    pub(super) fn is_leaf(&self, lane: usize) -> bool {
+        self.link[lane] & LEAF != 0
+    }
+
+    #[inline(always)]
+    pub(super) fn grow(&mut self, lane: usize, b: &[f32; 6], area: f64) {
+        for (bounds, &b) in self.bounds.iter_mut().zip(b) {
+            bounds[lane] = larger(bounds[lane], b);
+        }
+        self.area[lane] = area;
+    }
+
+    #[inline(always)]
+    pub(super) fn put_leaf(&mut self, lane: usize, object: &Object, id: u32, area: f64) {
+        for (bounds, b) in self.bounds.iter_mut().zip(object.bounds) {
+            bounds[lane] = b;
+        }
+        self.link[lane] = id | LEAF;
+        self.count[lane] = 2;
+        self.area[lane] = area;
+    }
+
+    #[inline(always)]
+    pub(super) fn copy(&mut self, lane: usize, from: &Block, from_lane: usize) {
+        for (to, from) in self.bounds.iter_mut().zip(&from.bounds) {
+            to[lane] = from[from_lane];
+        }
+        self.link[lane] = from.link[from_lane];
+        self.count[lane] = from.count[from_lane];
+        self.area[lane] = from.area[from_lane];
+    }
+}
+
+/// One instruction, unlike `f32::max`, which minds NaN.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The block and the lane of a node.
+#[inline(always)]
+pub(super) fn place(node: u32) -> (usize, usize) {
+    (node as usize / LANES, node as usize % LANES)
+}
+
+/// The first block of an inner node's children, and their number.
+#[inline(always)]
+pub(super) fn family(blocks: &[Block], node: u32) -> (usize, usize) {
+    let (block, lane) = place(node);
+    if node == NONE { (0, 1) } else { blocks[block].family(lane) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_vector_comparison_finds_what_the_plain_one_finds(
+            bounds in prop::array::uniform6(prop::array::uniform4(-6i8..2)),
+            leaf in prop::array::uniform4(any::<bool>()),
+            b in prop::array::uniform6(-2i8..2),
+        ) {
+            // Zeros of both signs meet.
+            let mut block = Block { bounds: bounds.map(|side| side.map(|c| f32::from(c) * -0.5)), ..Block::EMPTY };
+            block.link = leaf.map(|leaf| if leaf { LEAF } else { 7 });
+            let b = b.map(|c| f32::from(c) * 0.5);
+            prop_assert_eq!(block.containing(&b), block.containing_plain(&b));
+        }
+    }
+}
