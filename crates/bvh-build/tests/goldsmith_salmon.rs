@@ -57,11 +57,16 @@ impl Plain {
         tree
     }
 
-    /// Tries every stop of the path and keeps the cheapest tree.
+    /// Tries every stop of the path and keeps the cheapest tree; of equals the first, from the last inner node that
+    /// contains the object downwards.
     fn insert(&self, config: &Config, boxes: &[Aabb], id: u32) -> Self {
         let added = boxes[id as usize];
-        let (mut node, mut path, mut stops) = (self, vec![], vec![]);
+        let (mut node, mut path, mut stops, mut last_containing) = (self, vec![], vec![], 0);
+        let contains = |node: &Self| node.object.is_none() && node.aabb(boxes).contains(&added);
         loop {
+            if contains(node) {
+                last_containing = stops.len();
+            }
             if node.object.is_none() {
                 stops.push((path.clone(), false));
             }
@@ -80,8 +85,7 @@ impl Plain {
                     (Descent::Cost, Some(_)) => 2.0 * after,
                 }
             };
-            let contains = |child: &Self| child.object.is_none() && child.aabb(boxes).contains(&added);
-            let next = node.children.iter().position(contains).unwrap_or_else(|| {
+            let next = node.children.iter().position(&contains).unwrap_or_else(|| {
                 let growths: Vec<f64> = node.children.iter().map(growth).collect();
                 (0..growths.len()).min_by(|&a, &b| growths[a].total_cmp(&growths[b])).unwrap()
             });
@@ -89,7 +93,11 @@ impl Plain {
             path.push(next);
         }
         let trees: Vec<Self> = stops.iter().map(|(path, pair)| self.with(path, id, *pair)).collect();
-        trees.into_iter().min_by(|a, b| a.cost(boxes).total_cmp(&b.cost(boxes))).unwrap()
+        let cheapest =
+            |trees: &[Self]| trees.iter().min_by(|a, b| a.cost(boxes).total_cmp(&b.cost(boxes))).cloned();
+        let best = cheapest(&trees[last_containing..]).unwrap();
+        assert_eq!(best.cost(boxes), cheapest(&trees).unwrap().cost(boxes), "no node above is cheaper");
+        best
     }
 
     /// As [`topology`].

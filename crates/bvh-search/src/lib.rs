@@ -21,7 +21,10 @@
 
 mod budget;
 mod error;
+pub mod genetic;
 pub mod grasp;
+mod insertion_orders;
+pub mod random_orders;
 #[cfg(feature = "serde")]
 mod registry;
 mod run;

@@ -43,6 +43,12 @@ methods! {
     "muller_fellner" => MullerFellner(bvh_build::muller_fellner::Config),
     /// Division at the median.
     "median_cut" => MedianCut(bvh_build::median_cut::Config),
+    /// Incremental insertion, in index order.
+    "goldsmith_salmon" => GoldsmithSalmon(bvh_build::goldsmith_salmon::Config),
     /// Randomised Müller–Fellner.
     "grasp" => Grasp(crate::grasp::Config),
+    /// Goldsmith–Salmon insertion in random orders.
+    "random_orders" => RandomOrders(crate::random_orders::Config),
+    /// A genetic algorithm over insertion orders.
+    "genetic" => Genetic(crate::genetic::Config),
 }

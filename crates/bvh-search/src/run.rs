@@ -75,7 +75,13 @@ impl Run<'_> {
     /// Counts one evaluation that took `work` nodes and found `cost`. Returns whether it is the new incumbent:
     /// strictly cheaper than all before, so that of equal trees the first is kept.
     pub fn record(&mut self, cost: f64, work: u64) -> bool {
-        self.evaluations += 1;
+        self.record_generation(1, cost, work)
+    }
+
+    /// Counts several evaluations that took `work` nodes together and whose best found `cost`, as one event.
+    /// Returns whether it is the new incumbent.
+    pub fn record_generation(&mut self, evaluations: u64, cost: f64, work: u64) -> bool {
+        self.evaluations += evaluations;
         self.work += work;
         let improved = cost < self.incumbent;
         if improved {
