@@ -5,13 +5,15 @@
 mod paired;
 
 use bvh_build::division::Workspace;
-use bvh_build::{Builder, Presorted, muller_fellner};
+use bvh_build::{Builder, Presorted, goldsmith_salmon, muller_fellner};
 use bvh_core::{Aabb, Bvh};
 use bvh_search::grasp::{self, Candidates};
-use bvh_search::{Budget, Problem, solve};
+use bvh_search::{Budget, Problem, Stream, solve};
 use glam::Vec3;
 use harness::scene::Scene;
 use paired::{Contender, compare};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 fn pool(threads: usize) -> ThreadPool {
@@ -41,6 +43,17 @@ fn one_thread(scene: &Scene) {
     let config = muller_fellner::Config::default();
     let mut contenders: Vec<Contender> =
         vec![("Müller–Fellner, one object per leaf", Box::new(|| drop(config.build(boxes))))];
+    let insertion = goldsmith_salmon::Config::default();
+    let (objects, order) =
+        (goldsmith_salmon::Scene::new(boxes).expect("finite boxes"), shuffled(boxes.len() as u32));
+    let (mut workspace, mut tree) = (goldsmith_salmon::Workspace::default(), Bvh::default());
+    contenders.push((
+        "Goldsmith–Salmon, a random order",
+        Box::new(move || {
+            insertion.insert_all(&objects, &order, &mut workspace).expect("a permutation");
+            workspace.write(&mut tree);
+        }),
+    ));
     contenders.extend(peers(boxes));
     compare(&format!("{}, {} objects, one thread", scene.name, boxes.len()), 25, contenders);
 
@@ -67,6 +80,12 @@ fn one_thread(scene: &Scene) {
         ("within 5 %, any", Box::new(trials(Candidates::Within(0.05), None))),
     ];
     compare(&format!("{}, {TRIALS} constructions with their costs, one thread", scene.name), 9, contenders);
+}
+
+fn shuffled(n: u32) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..n).collect();
+    order.shuffle(&mut Stream::seed_from_u64(1));
+    order
 }
 
 /// Builds by other libraries, without the feature none.

@@ -79,7 +79,14 @@ impl Config {
                             |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.4}"));
                         if method == "all" {
                             let rays = format!("{family}, {query}");
-                            text.add_row([scene, method, cost, &rays, &show(pearson), &show(spearman)]);
+                            text.add_row([
+                                &rows.shown(scene),
+                                method,
+                                cost,
+                                &rays,
+                                &show(pearson),
+                                &show(spearman),
+                            ]);
                         }
                         let trees = pairs.len();
                         correlations.push(Correlation {

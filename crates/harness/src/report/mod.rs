@@ -91,6 +91,12 @@ impl Rows {
         scenes
     }
 
+    /// The scene's name with its kind.
+    pub fn shown(&self, scene: &str) -> String {
+        let kind = self.runs.iter().find(|run| run.scene == scene).map_or("", |run| run.scene_kind.as_str());
+        display_name(scene, kind)
+    }
+
     /// The histories of one method on one scene, one per repetition.
     pub fn histories(&self, scene: &str, method: &str) -> Vec<Vec<&HistoryRow>> {
         let own = |row: &&HistoryRow| row.scene == scene && row.method == method;

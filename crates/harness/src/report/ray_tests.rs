@@ -64,7 +64,7 @@ impl Config {
             }
             self.compare(&display_name(scene, kind), &table[start..], &mut output);
         }
-        output.text = self.text(&table);
+        output.text = self.text(rows, &table);
         output.figures.push(("ray_tests".into(), self.figure(rows, &table)));
         output.csv.push(("ray_tests".into(), to_bytes(&table, Path::new("ray_tests.csv"))?));
         Ok(output)
@@ -146,11 +146,11 @@ impl Config {
         }
     }
 
-    fn text(&self, table: &[Row]) -> String {
+    fn text(&self, rows: &Rows, table: &[Row]) -> String {
         let mut text = text_table(["scene", "method", "rays", "boxes per ray (95 %)", "over first", "paper"]);
         for row in table {
             text.add_row([
-                row.scene.into(),
+                rows.shown(row.scene),
                 row.method.into(),
                 format!("{}, {}", row.family, row.query),
                 format!("{:.2}  ({:.2} to {:.2})", row.boxes_per_ray, row.boxes_low, row.boxes_high),
