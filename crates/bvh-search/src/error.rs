@@ -8,6 +8,22 @@ pub enum SearchError {
     /// The scene cannot be built.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// Local search works on binary trees.
+    #[error("inner node {node} has {children} children; local search takes binary trees only")]
+    NotBinary {
+        /// Index of the node.
+        node: usize,
+        /// Its number of children.
+        children: u32,
+    },
+    /// Local search works on trees with one object in every leaf.
+    #[error("leaf {node} has {objects} objects; local search takes one per leaf")]
+    LeafOfSeveral {
+        /// Index of the node.
+        node: usize,
+        /// Its number of objects.
+        objects: u32,
+    },
     /// A parameter of the search is outside its range.
     #[error("{parameter} is {found}; accepted: {accepted}")]
     Parameter {

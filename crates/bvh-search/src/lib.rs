@@ -22,10 +22,16 @@
 mod budget;
 mod error;
 pub mod grasp;
+mod incumbent;
+mod place;
+pub mod reinsertion;
+pub mod ruin_recreate;
 #[cfg(feature = "serde")]
 mod registry;
 mod run;
 mod stream;
+mod vector;
+mod working;
 
 pub use budget::{Budget, StopReason};
 pub use error::SearchError;

@@ -45,4 +45,8 @@ methods! {
     "median_cut" => MedianCut(bvh_build::median_cut::Config),
     /// Randomised Müller–Fellner.
     "grasp" => Grasp(crate::grasp::Config),
+    /// Reinsertion to a local optimum.
+    "reinsertion" => Reinsertion(crate::reinsertion::Config),
+    /// Annealed ruin and recreate.
+    "ruin_recreate" => RuinRecreate(crate::ruin_recreate::Config),
 }

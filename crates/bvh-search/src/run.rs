@@ -71,21 +71,56 @@ pub struct Run<'a> {
     history: Vec<Event>,
 }
 
-impl Run<'_> {
+impl<'a> Run<'a> {
     /// Counts one evaluation that took `work` nodes and found `cost`. Returns whether it is the new incumbent:
     /// strictly cheaper than all before, so that of equal trees the first is kept.
     pub fn record(&mut self, cost: f64, work: u64) -> bool {
-        self.evaluations += 1;
-        self.work += work;
+        self.count(1, work);
         let improved = cost < self.incumbent;
         if improved {
             self.incumbent = cost;
         }
+        self.report(cost);
+        improved
+    }
+
+    /// Counts moves that took `work` nodes together, without an event each: searches that make millions of moves report
+    /// what comes of them by [`improve`](Self::improve).
+    pub fn count(&mut self, evaluations: u64, work: u64) {
+        self.evaluations = self.evaluations.saturating_add(evaluations);
+        self.work = self.work.saturating_add(work);
+    }
+
+    /// An event if moves already counted have led to a new incumbent of this cost. Returns whether they have.
+    pub fn improve(&mut self, cost: f64) -> bool {
+        let improved = cost < self.incumbent;
+        if improved {
+            self.incumbent = cost;
+            self.report(cost);
+        }
+        improved
+    }
+
+    fn report(&mut self, cost: f64) {
         let Self { evaluations, work, incumbent, .. } = *self;
         let event = Event { evaluations, work, cost, incumbent };
         self.history.push(event);
         self.observer.event(&event);
-        improved
+    }
+
+    /// The work the budget still has; `None` if it has no limit.
+    pub fn work_left(&self) -> Option<u64> {
+        self.budget.max_work.map(|limit| limit.saturating_sub(self.work))
+    }
+
+    /// The evaluations the budget still has; `None` if it has no limit.
+    pub fn moves_left(&self) -> Option<u64> {
+        self.budget.max_evaluations.map(|limit| limit.saturating_sub(self.evaluations))
+    }
+
+    /// The one who watches, to be asked from other threads.
+    pub fn observer(&self) -> &'a dyn Observer {
+        self.observer
     }
 
     /// Why the search must return now, if it must.

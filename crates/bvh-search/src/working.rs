@@ -1,0 +1,327 @@
+//! The one working form of a tree that local search changes: parents, packed boxes, cached areas, and a journal.
+//!
+//! Node 0 is no node but the *anchor* whose first child is the root, so that the root needs no special case. Detaching
+//! a subtree keeps its parent node with it; attaching uses that node again, so that nothing is ever allocated.
+
+use crate::SearchError;
+use bvh_core::cost::Sum;
+use bvh_core::{Aabb, Bvh, Node as BvhNode, NodeKind, PackedAabb};
+
+/// No node.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// The index above the root.
+pub(crate) const ANCHOR: u32 = 0;
+
+/// One cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Node {
+    /// Exact union of everything below.
+    pub aabb: PackedAabb,
+    /// Half area of `aabb`.
+    pub area: f64,
+    /// The change during which the node was last written to the journal.
+    stamp: u64,
+    /// `NONE` for a detached subtree's spare parent.
+    pub parent: u32,
+    /// Both children, or `[NONE, object]`.
+    pub children: [u32; 2],
+    /// In the journal only: where the node belongs.
+    index: u32,
+}
+
+impl Node {
+    const ANCHOR: Self = Self {
+        aabb: PackedAabb::EMPTY,
+        area: 0.0,
+        stamp: 0,
+        parent: NONE,
+        children: [NONE; 2],
+        index: NONE,
+    };
+
+    #[inline(always)]
+    pub fn is_leaf(&self) -> bool {
+        self.children[0] == NONE
+    }
+
+    /// The child that is not `child`.
+    #[inline(always)]
+    pub fn other(&self, child: u32) -> u32 {
+        self.children[usize::from(self.children[0] == child)]
+    }
+}
+
+/// A binary tree under change. Leaves hold one object each.
+#[derive(Clone, Debug)]
+pub(crate) struct Working {
+    pub nodes: Vec<Node>,
+    journal: Vec<Node>,
+    change: u64,
+}
+
+impl Default for Working {
+    fn default() -> Self {
+        Self { nodes: vec![Node::ANCHOR], journal: Vec::new(), change: 0 }
+    }
+}
+
+impl Working {
+    /// The working form of a valid tree, in O(n); boxes are made tight. Refuses inner nodes with more than two children,
+    /// and leaves with more than one object.
+    pub fn from_bvh(tree: &Bvh, boxes: &[Aabb]) -> Result<Self, SearchError> {
+        let mut nodes = Vec::with_capacity(tree.nodes.len() + 1);
+        nodes.push(Node::ANCHOR);
+        for (index, node) in tree.nodes.iter().enumerate() {
+            let children = match node.kind() {
+                NodeKind::Inner { first, count: 2 } => [first + 1, first + 2],
+                NodeKind::Leaf { first, count: 1 } => [NONE, tree.prim_ids[first as usize]],
+                NodeKind::Inner { count, .. } => {
+                    return Err(SearchError::NotBinary { node: index, children: count });
+                }
+                NodeKind::Leaf { count, .. } => {
+                    return Err(SearchError::LeafOfSeveral { node: index, objects: count });
+                }
+            };
+            nodes.push(Node { children, ..Node::ANCHOR });
+        }
+        if nodes.len() > 1 {
+            nodes[0].children[0] = 1;
+            nodes[1].parent = ANCHOR;
+        }
+        for at in (1..nodes.len()).rev() {
+            let [left, right] = nodes[at].children;
+            let aabb = if left == NONE {
+                PackedAabb::from(&boxes[right as usize])
+            } else {
+                nodes[left as usize].parent = at as u32;
+                nodes[right as usize].parent = at as u32;
+                nodes[left as usize].aabb.union(&nodes[right as usize].aabb)
+            };
+            nodes[at].aabb = aabb;
+            nodes[at].area = aabb.half_area();
+        }
+        Ok(Self { nodes, ..Self::default() })
+    }
+
+    /// The tree, children adjacent and left before right, objects in leaf order.
+    pub fn to_bvh(&self) -> Bvh {
+        let mut tree = Bvh::default();
+        let Some(root) = self.root() else { return tree };
+        let count = self.nodes.len() - 1;
+        let placeholder = BvhNode::leaf(Aabb::EMPTY, 0, 0);
+        tree.nodes = Vec::with_capacity(count);
+        tree.nodes.push(placeholder);
+        let mut stack = vec![(root, 0)];
+        while let Some((at, to)) = stack.pop() {
+            let node = &self.nodes[at as usize];
+            let aabb = Aabb::from(&node.aabb);
+            tree.nodes[to as usize] = if node.is_leaf() {
+                tree.prim_ids.push(node.children[1]);
+                BvhNode::leaf(aabb, tree.prim_ids.len() as u32 - 1, 1)
+            } else {
+                let first = tree.nodes.len() as u32;
+                tree.nodes.extend([placeholder; 2]);
+                stack.extend([(node.children[1], first + 1), (node.children[0], first)]);
+                BvhNode::inner(aabb, first, 2)
+            };
+        }
+        tree
+    }
+
+    /// The root, unless there are no objects.
+    pub fn root(&self) -> Option<u32> {
+        Some(self.nodes[0].children[0]).filter(|&root| root != NONE)
+    }
+
+    /// Number of objects.
+    pub fn objects(&self) -> usize {
+        self.nodes.len() / 2
+    }
+
+    /// The total area of all inner nodes, recomputed. O(n).
+    pub fn internal_area(&self) -> f64 {
+        self.nodes.iter().filter(|node| !node.is_leaf()).map(|node| node.area).collect::<Sum>().value()
+    }
+
+    /// Begins a change: what follows can be undone back to here.
+    #[inline(always)]
+    pub fn begin(&mut self) {
+        self.change += 1;
+        self.journal.clear();
+    }
+
+    /// Takes the change back, bit by bit.
+    #[inline(always)]
+    pub fn undo(&mut self) {
+        for node in self.journal.drain(..) {
+            self.nodes[node.index as usize] = node;
+        }
+    }
+
+    /// The node, about to be written.
+    #[inline(always)]
+    fn write(&mut self, at: u32) -> &mut Node {
+        let node = &mut self.nodes[at as usize];
+        if node.stamp != self.change {
+            self.journal.push(Node { index: at, ..*node });
+            node.stamp = self.change;
+        }
+        node
+    }
+
+    /// Lets `new` take the place of `old` below `parent`.
+    #[inline(always)]
+    fn replace_child(&mut self, parent: u32, old: u32, new: u32) {
+        let children = &mut self.write(parent).children;
+        children[usize::from(children[0] != old)] = new;
+        self.write(new).parent = parent;
+    }
+
+    /// Takes `node` and what is below it out of the tree, its parent node with it. Boxes are made tight up to, and
+    /// without, `anchor`. Returns the area saved, the sibling that took the parent's place, and the nodes visited.
+    #[inline(always)]
+    pub fn detach(&mut self, node: u32, anchor: u32) -> (f64, u32, u64) {
+        let parent = self.nodes[node as usize].parent;
+        let Node { parent: above, area, .. } = self.nodes[parent as usize];
+        let sibling = self.nodes[parent as usize].other(node);
+        self.write(parent).parent = NONE;
+        self.replace_child(above, parent, sibling);
+        let (mut saved, mut at, mut visits) = (area, above, 2);
+        while at != anchor {
+            let [left, right] = self.nodes[at as usize].children;
+            let aabb = self.nodes[left as usize].aabb.union(&self.nodes[right as usize].aabb);
+            visits += 1;
+            if aabb == self.nodes[at as usize].aabb {
+                break;
+            }
+            let area = aabb.half_area();
+            let node = self.write(at);
+            saved += node.area - area;
+            (node.aabb, node.area) = (aabb, area);
+            at = node.parent;
+        }
+        (saved, sibling, visits)
+    }
+
+    /// Puts a detached `node` beside `place`, its parent node above both. Returns the area added and the nodes visited.
+    #[inline(always)]
+    pub fn attach(&mut self, node: u32, place: u32, anchor: u32) -> (f64, u64) {
+        let Node { aabb: added_box, parent, .. } = self.nodes[node as usize];
+        let Node { aabb, parent: above, .. } = self.nodes[place as usize];
+        self.replace_child(above, place, parent);
+        self.write(place).parent = parent;
+        let aabb = aabb.union(&added_box);
+        let area = aabb.half_area();
+        let joint = self.write(parent);
+        (joint.children, joint.aabb, joint.area) = ([place, node], aabb, area);
+        let (mut added, mut at, mut visits) = (area, above, 2);
+        while at != anchor {
+            let grown = self.nodes[at as usize].aabb.union(&added_box);
+            visits += 1;
+            if grown == self.nodes[at as usize].aabb {
+                break;
+            }
+            let area = grown.half_area();
+            let node = self.write(at);
+            added += area - node.area;
+            (node.aabb, node.area) = (grown, area);
+            at = node.parent;
+        }
+        (added, visits)
+    }
+
+    /// All nodes but the anchor, parents before children, left before right. O(n).
+    pub fn preorder(&self) -> Vec<u32> {
+        let mut order = Vec::with_capacity(self.nodes.len());
+        let mut stack: Vec<u32> = self.root().into_iter().collect();
+        while let Some(at) = stack.pop() {
+            order.push(at);
+            let node = &self.nodes[at as usize];
+            if !node.is_leaf() {
+                stack.extend([node.children[1], node.children[0]]);
+            }
+        }
+        order
+    }
+
+    /// Cuts the tree into its largest subtrees of at most `limit` leaves, each a tree of its own, and the rest above
+    /// them, a tree whose 'objects' are the pieces' indices. O(n).
+    pub fn split(&self, limit: usize) -> (Self, Vec<Self>) {
+        let order = self.preorder();
+        let mut leaves = vec![1u32; self.nodes.len()];
+        for &at in order.iter().rev() {
+            let node = &self.nodes[at as usize];
+            if !node.is_leaf() {
+                leaves[at as usize] = node.children.iter().map(|&child| leaves[child as usize]).sum();
+            }
+        }
+        let mut new = vec![NONE; self.nodes.len()];
+        new[0] = 0;
+        let mut top = vec![self.nodes[0]];
+        let mut pieces = Vec::new();
+        let mut next = 0;
+        while next < order.len() {
+            let at = order[next] as usize;
+            new[at] = top.len() as u32;
+            if leaves[at] as usize > limit {
+                top.push(self.nodes[at]);
+                next += 1;
+                continue;
+            }
+            top.push(Node { children: [NONE, pieces.len() as u32], ..self.nodes[at] });
+            let range = &order[next..next + 2 * leaves[at] as usize - 1];
+            let entry = new[at];
+            for (&old, to) in range.iter().zip(1..) {
+                new[old as usize] = to;
+            }
+            let mut nodes = Vec::with_capacity(range.len() + 1);
+            nodes.push(Node { children: [1, NONE], ..Node::ANCHOR });
+            nodes.extend(range.iter().map(|&old| renumbered(&self.nodes[old as usize], &new)));
+            nodes[1].parent = ANCHOR;
+            pieces.push(Self { nodes, ..Self::default() });
+            new[at] = entry;
+            next += range.len();
+        }
+        // The piece's own leaves are told by their parents, which are below the cut.
+        let mut below_cut = top.iter_mut();
+        if let Some(anchor) = below_cut.next() {
+            anchor.children[0] = if order.is_empty() { NONE } else { 1 };
+        }
+        for node in below_cut {
+            *node = renumbered(node, &new);
+        }
+        (Self { nodes: top, ..Self::default() }, pieces)
+    }
+
+    /// Undoes [`split`](Self::split), whatever became of the parts: nodes come to lie in preorder. O(n).
+    pub fn join(top: &Self, pieces: &[Self]) -> Self {
+        const TOP: u32 = NONE;
+        let mut nodes = Vec::with_capacity(pieces.iter().map(|piece| 2 * piece.objects()).sum());
+        nodes.push(Node::ANCHOR);
+        let mut stack: Vec<(u32, u32, u32, u8)> = top.root().map(|root| (TOP, root, ANCHOR, 0)).into_iter().collect();
+        while let Some((part, at, parent, side)) = stack.pop() {
+            let source = if part == TOP { top } else { &pieces[part as usize] };
+            let node = &source.nodes[at as usize];
+            if part == TOP && node.is_leaf() {
+                let piece = node.children[1];
+                stack.push((piece, pieces[piece as usize].nodes[0].children[0], parent, side));
+                continue;
+            }
+            let to = nodes.len() as u32;
+            nodes[parent as usize].children[usize::from(side)] = to;
+            nodes.push(Node { parent, stamp: 0, ..*node });
+            if !node.is_leaf() {
+                stack.extend([(part, node.children[1], to, 1), (part, node.children[0], to, 0)]);
+            }
+        }
+        Self { nodes, ..Self::default() }
+    }
+}
+
+/// The node with its links looked up in `new`; a leaf keeps its object.
+fn renumbered(node: &Node, new: &[u32]) -> Node {
+    let children = if node.is_leaf() { node.children } else { node.children.map(|child| new[child as usize]) };
+    Node { parent: new[node.parent as usize], children, stamp: 0, ..*node }
+}
