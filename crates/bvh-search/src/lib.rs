@@ -21,9 +21,11 @@
 
 mod budget;
 mod error;
+mod fusing;
 pub mod grasp;
 mod incumbent;
 mod place;
+pub mod portfolio;
 pub mod reinsertion;
 pub mod ruin_recreate;
 #[cfg(feature = "serde")]
@@ -37,5 +39,5 @@ pub use budget::{Budget, StopReason};
 pub use error::SearchError;
 #[cfg(feature = "serde")]
 pub use registry::Method;
-pub use run::{Event, Observer, Outcome, Problem, Run, Search, solve};
+pub use run::{Event, Observer, Outcome, Problem, Run, Search, Tally, solve};
 pub use stream::Stream;

@@ -1,16 +1,16 @@
-//! The best place for a subtree: branch and bound over all nodes below an anchor, exact.
+//! The best place for a subtree: branch and bound over all nodes of the tree, exact.
 //!
 //! Placing a box B beside a node X costs the area of the node around both, and what the ancestors of X grow. No place
 //! below X costs less than what X and its ancestors grow plus the area of B, which bounds the search. It begins at a
 //! place that is likely good and looks near it first (Meister & Bittner 2018), so that the bound is low from the start.
 
-use crate::working::{NONE, Node, Working};
+use crate::working::{ANCHOR, NONE, Node, Working};
 use bvh_core::PackedAabb;
 
 /// Buffers of a search, and how many nodes it visited.
 #[derive(Debug, Default)]
 pub(crate) struct PlaceSearch {
-    /// From the first place up to below the anchor.
+    /// From the first place up to the root.
     path: Vec<Step>,
     /// Inner nodes whose children are to be looked at, with the growth of everything down to and with them.
     stack: Vec<(u32, f64)>,
@@ -41,23 +41,22 @@ pub(crate) struct Place {
 type Item<'a> = (&'a PackedAabb, f64);
 
 impl PlaceSearch {
-    /// The cheapest place for a *detached* item below `anchor`, if one costs less than `limit`. Begins at `first`, or at
-    /// `top`, the node below the anchor, if `first` is itself detached.
+    /// The cheapest place for a *detached* item, if one costs less than `limit`. Begins at `first`, or at the root if
+    /// `first` is itself detached.
     #[inline(always)]
     pub fn detached(
         &mut self,
         tree: &Working,
         item: Item,
         first: u32,
-        (anchor, top): (u32, u32),
         limit: f64,
     ) -> Option<Place> {
         self.path.clear();
         let (mut at, mut below) = (first, NONE);
-        while at != anchor {
+        while at != ANCHOR {
             if at == NONE {
                 self.path.clear();
-                (at, below) = (top, NONE);
+                (at, below) = (tree.nodes[ANCHOR as usize].children[0], NONE);
             }
             let node = &tree.nodes[at as usize];
             let joint = node.aabb.union(item.0).half_area();
@@ -73,7 +72,7 @@ impl PlaceSearch {
     /// The cheapest place for `node`, which stays where it is while the search pretends that it is gone. `None` if no
     /// place costs less than its own by more than `tolerance` times that. Also returns what its own costs.
     #[inline(always)]
-    pub fn attached(&mut self, tree: &Working, node: u32, anchor: u32, tolerance: f64) -> (Option<Place>, f64) {
+    pub fn attached(&mut self, tree: &Working, node: u32, tolerance: f64) -> (Option<Place>, f64) {
         let Node { aabb, area, parent, .. } = tree.nodes[node as usize];
         self.path.clear();
         let sibling = tree.nodes[parent as usize].other(node);
@@ -81,7 +80,7 @@ impl PlaceSearch {
         let Node { area: joint, parent: mut at, .. } = tree.nodes[parent as usize];
         self.path.push(Step { node: sibling, below: NONE, joint, growth: joint - rest_area });
         let mut below = parent;
-        while at != anchor {
+        while at != ANCHOR {
             let ancestor = &tree.nodes[at as usize];
             rest.grow(&tree.nodes[ancestor.other(below) as usize].aabb);
             let growth = ancestor.area - rest.half_area();

@@ -49,4 +49,6 @@ methods! {
     "reinsertion" => Reinsertion(crate::reinsertion::Config),
     /// Annealed ruin and recreate.
     "ruin_recreate" => RuinRecreate(crate::ruin_recreate::Config),
+    /// All that pays, in the order that pays.
+    "best" => Best(crate::portfolio::Config),
 }

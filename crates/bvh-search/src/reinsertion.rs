@@ -7,6 +7,7 @@
 
 use crate::error::require;
 use crate::incumbent::Incumbent;
+use crate::run::Tally;
 use crate::place::PlaceSearch;
 use crate::stream::stream;
 use crate::vector::with_vector_instructions;
@@ -67,10 +68,10 @@ impl Search for Config {
                 Order::ByArea => sort_by_area(&tree, &mut order),
                 Order::Random => order.shuffle(&mut stream(seed, number.into())),
             }
-            let swept = sweep(&mut tree, &order, run.work_left().unwrap_or(u64::MAX), run.observer());
-            run.count(swept.tried, swept.work);
+            let swept = sweep(&mut tree, &order, run.work_left(), run.observer());
+            run.count(swept);
             best.offer(&tree, run);
-            if swept.moved == 0 {
+            if swept.kept == 0 {
                 break;
             }
         }
@@ -83,27 +84,15 @@ fn sort_by_area(tree: &Working, order: &mut [u32]) {
     order.sort_by(|&a, &b| tree.nodes[b as usize].area.total_cmp(&tree.nodes[a as usize].area));
 }
 
-/// What a sweep did.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Swept {
-    pub tried: u64,
-    pub moved: u64,
-    pub work: u64,
-}
-
 /// Sweeps by area until nothing moves.
-pub(crate) fn to_local_optimum(tree: &mut Working, most_work: u64, observer: &dyn Observer) -> Swept {
-    let mut total = Swept::default();
+pub(crate) fn to_local_optimum(tree: &mut Working, most_work: u64, observer: &dyn Observer) -> Tally {
+    let mut total = Tally::default();
     loop {
         let mut order = tree.preorder();
         sort_by_area(tree, &mut order);
         let swept = sweep(tree, &order, most_work.saturating_sub(total.work), observer);
-        total = Swept {
-            tried: total.tried + swept.tried,
-            moved: total.moved + swept.moved,
-            work: total.work + swept.work,
-        };
-        if swept.moved == 0 || total.work >= most_work || observer.cancelled() {
+        total += swept;
+        if swept.kept == 0 || total.work >= most_work || observer.cancelled() {
             return total;
         }
     }
@@ -113,30 +102,29 @@ with_vector_instructions! {
     /// Tries to improve the place of every node of `order` once. Stops early, at any node, when the work is done or the
     /// observer says so.
     pub(crate) sweep = sweep_plain(
-        tree: &mut Working, order: &[u32], most_work: u64, observer: &dyn Observer) -> Swept
+        tree: &mut Working, order: &[u32], most_work: u64, observer: &dyn Observer) -> Tally
 }
 
 /// A place must be better by this part of its cost: above rounding, so that no two places take turns.
 const TOLERANCE: f64 = 1e-12;
 
 #[inline(always)]
-fn sweep_plain(tree: &mut Working, order: &[u32], most_work: u64, observer: &dyn Observer) -> Swept {
-    let mut swept = Swept::default();
+fn sweep_plain(tree: &mut Working, order: &[u32], most_work: u64, observer: &dyn Observer) -> Tally {
+    let mut swept = Tally::default();
     let mut search = PlaceSearch::default();
     for &node in order {
-        if swept.tried % 256 == 255 && (swept.work + search.visits >= most_work || observer.cancelled()) {
+        if swept.moves % 256 == 255 && (swept.work + search.visits >= most_work || observer.cancelled()) {
             break;
         }
         if tree.nodes[node as usize].parent == ANCHOR {
             continue;
         }
-        swept.tried += 1;
-        if let (Some(place), _) = search.attached(tree, node, ANCHOR, TOLERANCE) {
+        swept.moves += 1;
+        if let (Some(place), _) = search.attached(tree, node, TOLERANCE) {
             tree.begin();
-            // The node's parent goes with it, so a place beside the parent is one beside the sibling's.
-            let (_, _, visits) = tree.detach(node, ANCHOR);
-            swept.work += visits + tree.attach(node, place.beside, ANCHOR).1;
-            swept.moved += 1;
+            let (_, _, visits) = tree.detach(node);
+            swept.work += visits + tree.attach(node, place.beside).1;
+            swept.kept += 1;
         }
     }
     swept.work += search.visits;

@@ -10,14 +10,14 @@ use crate::place::PlaceSearch;
 use crate::reinsertion;
 use crate::stream::{Stream, stream};
 use crate::vector::with_vector_instructions;
-use crate::working::{ANCHOR, NONE, Working};
-use crate::{Observer, Problem, Run, Search, SearchError};
+use crate::working::{ANCHOR, Working};
+use crate::{Observer, Problem, Run, Search, SearchError, Tally};
 use bvh_build::muller_fellner;
 use bvh_core::Bvh;
 use rand::RngExt;
 use rand::seq::SliceRandom;
 
-/// What to ruin and how to cool.
+/// What to ruin, how to cool, and for how long.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -25,15 +25,14 @@ use rand::seq::SliceRandom;
     serde(deny_unknown_fields, default)
 )]
 pub struct Config {
-    /// Most levels from a random node up to the top of the ruined part, at least 1. Default 8.
-    pub climb: u32,
-    /// Most subtrees taken out at once, at least 1. Default 11.
-    pub removed: u32,
-    /// First temperature, relative to the area of the ruined part; 0 or more. Default 0.2.
+    /// The move.
+    pub ruin: Ruin,
+    /// First temperature, relative to the area of the ruined part, above 0. Default 0.1, which suits some 10 000 nodes
+    /// of work per object; more work wants a higher one, about as its square root.
     pub hot: f64,
     /// Last temperature, above 0 and not above `hot`. Default 0.003.
     pub cold: f64,
-    /// Work per object, unless the budget has less. Default 20 000.
+    /// Work per object, unless the budget has less. Default 10 000.
     pub work_per_object: u64,
     /// The builder of the start. Default as for reinsertion.
     pub start: muller_fellner::Config,
@@ -41,16 +40,48 @@ pub struct Config {
 
 impl Default for Config {
     fn default() -> Self {
-        Self { climb: 8, removed: 11, hot: 0.2, cold: 0.003, work_per_object: 20_000, start: reinsertion::start() }
+        Self {
+            ruin: Ruin::default(),
+            hot: 0.1,
+            cold: 0.003,
+            work_per_object: 10_000,
+            start: reinsertion::start(),
+        }
     }
 }
 
 impl Config {
-    pub(crate) fn check(&self) -> Result<(), SearchError> {
-        require(self.climb >= 1, "climb", self.climb.into(), "1 or more")?;
-        require(self.removed >= 1, "removed", self.removed.into(), "1 or more")?;
+    fn check(&self) -> Result<(), SearchError> {
+        self.ruin.check()?;
         require(self.hot.is_finite() && self.hot > 0.0, "hot", self.hot, "above 0")?;
         require(self.cold > 0.0 && self.cold <= self.hot, "cold", self.cold, "above 0, not above hot")
+    }
+}
+
+/// A move: from a random node some levels up, and from there several random descents, each to a subtree taken out.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields, default)
+)]
+pub struct Ruin {
+    /// Most levels from the random node up to the top of the ruined part, at least 1. Default 8.
+    pub climb: u32,
+    /// Most subtrees taken out at once, at least 1. Default 14.
+    pub removed: u32,
+}
+
+impl Default for Ruin {
+    fn default() -> Self {
+        Self { climb: 8, removed: 14 }
+    }
+}
+
+impl Ruin {
+    pub(crate) fn check(&self) -> Result<(), SearchError> {
+        require(self.climb >= 1 && self.climb < u32::MAX, "climb", self.climb.into(), "1 to 4294967294")?;
+        require(self.removed >= 1, "removed", self.removed.into(), "1 or more")
     }
 }
 
@@ -58,118 +89,109 @@ impl Search for Config {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         self.check()?;
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
-        let own = self.work_per_object.saturating_mul(problem.boxes.len() as u64);
-        let work = run.work_left().map_or(own, |left| left.min(own));
-        anneal(self, &mut tree, work, &mut |round| (seed, round), &mut best, run);
+        let work = self.work_per_object.saturating_mul(problem.boxes.len() as u64).min(run.work_left());
+        let cooling = Cooling { hot: self.hot, cold: self.cold, work, moves: run.moves_left() };
+        let observer = run.observer();
+        anneal(&self.ruin, &cooling, &mut tree, &mut stream(seed, 0), observer, &mut |tree, tally| {
+            run.count(tally);
+            best.offer(tree, run);
+        });
         Ok(best.tree)
     }
 }
 
-fn env(name: &str, default: f64) -> f64 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+/// One descent of the temperature.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cooling {
+    /// First temperature.
+    pub hot: f64,
+    /// Last temperature.
+    pub cold: f64,
+    /// The work to be done meanwhile.
+    pub work: u64,
+    /// The most moves.
+    pub moves: u64,
 }
 
-/// Cools `tree` from hot to cold over `work`, offering it to `best` along the way.
+/// Cools `tree` geometrically, by the part of the work done, then sweeps it to a local optimum in the last eighth.
+/// Shows the tree to `round` along the way, with what was done since the last time.
 pub(crate) fn anneal(
-    config: &Config,
+    ruin: &Ruin,
+    cooling: &Cooling,
     tree: &mut Working,
-    work: u64,
-    streams: &mut dyn FnMut(u64) -> (u64, u64),
-    best: &mut Incumbent,
-    run: &mut Run,
+    rng: &mut Stream,
+    observer: &dyn Observer,
+    round: &mut dyn FnMut(&Working, Tally),
 ) {
-    let n = tree.objects();
-    if n < 3 {
+    let n = tree.objects() as u64;
+    if n < 3 || cooling.moves == 0 {
         return;
     }
-    let rounds = (work / (env("RPO", 64.0) as u64 * n as u64)).clamp(4, 100);
-    let factor = config.cold / config.hot;
-    let at = |fraction: f64| config.hot * libm::pow(factor, fraction);
-    for round in 0..rounds {
-        let (seed, index) = streams(round);
-        let mut rng = stream(seed, index << 32);
-        let share = work / rounds;
-        let size = env("PIECE", 2000.0) * libm::exp2(rng.random_range(-1.0..1.0));
-        let limit = (size as usize).min(n.div_ceil(env("MINP", 1.0) as usize));
-        let (mut top, mut pieces) = tree.split(limit);
-        let heat = [at(round as f64 / rounds as f64), at((round + 1) as f64 / rounds as f64)];
-        let top_weight = env("TOPW", 4.0) * top.objects() as f64;
-        let total = n as f64 + top_weight;
-        let observer = run.observer();
-        let one = |tree: &mut Working, weight: f64, index: u64| {
-            let mut rng = stream(seed, index);
-            let quota = (share as f64 * (weight / total)) as u64;
-            cool(config, tree, heat, quota, &mut rng, observer)
-        };
-        let mut tally = Tally::default();
-        if top.objects() > 2 {
-            tally.add(one(&mut top, top_weight, (index << 32) + 1));
+    let work = cooling.work - cooling.work / 8;
+    let rounds = (work / (WORK_PER_ROUND * n)).clamp(1, 100);
+    let at = |round: u64| cooling.hot * libm::pow(cooling.cold / cooling.hot, round as f64 / rounds as f64);
+    let mut done = Tally::default();
+    for number in 0..rounds {
+        *tree = tree.in_preorder();
+        let end = (work as f64 * ((number + 1) as f64 / rounds as f64)) as u64;
+        let left = Quota { work: end.saturating_sub(done.work), moves: cooling.moves - done.moves };
+        let tally = cool(ruin, tree, [at(number), at(number + 1)], left, rng, observer);
+        done += tally;
+        if number + 1 < rounds {
+            round(tree, tally);
         }
-        #[cfg(feature = "rayon")]
-        let done: Vec<Tally> = {
-            use rayon::prelude::*;
-            pieces.par_iter_mut().enumerate().map(|(i, piece)| one(piece, piece.objects() as f64, (index << 32) + 2 + i as u64)).collect()
-        };
-        #[cfg(not(feature = "rayon"))]
-        let done: Vec<Tally> = pieces.iter_mut().enumerate().map(|(i, piece)| one(piece, piece.objects() as f64, (index << 32) + 2 + i as u64)).collect();
-        done.into_iter().for_each(|done| tally.add(done));
-        *tree = Working::join(&top, &pieces);
-        run.count(tally.moves, tally.work);
-        best.offer(tree, run);
-        if std::env::var("TRACE").is_ok() {
-            eprintln!("round {round} heat {:.4} area {:.6e} moves {} accepted {} work {}", heat[0], tree.internal_area(), tally.moves, tally.accepted, tally.work);
+        if observer.cancelled() || done.moves >= cooling.moves {
+            return round(tree, tally);
         }
-        if run.stopped().is_some() {
-            break;
+        if number + 1 == rounds {
+            *tree = tree.in_preorder();
+            let left = cooling.work.saturating_sub(done.work);
+            let mut last = tally;
+            last += reinsertion::to_local_optimum(tree, left, observer);
+            round(tree, last);
         }
     }
-    let swept = reinsertion::to_local_optimum(tree, u64::MAX, run.observer());
-    run.count(swept.tried, swept.work);
-    best.offer(tree, run);
 }
 
-/// What was done.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Tally {
-    pub moves: u64,
-    pub accepted: u64,
-    pub work: u64,
-}
+/// Work per object after which nodes are laid out anew.
+const WORK_PER_ROUND: u64 = 64;
 
-impl Tally {
-    fn add(&mut self, other: Self) {
-        self.moves += other.moves;
-        self.accepted += other.accepted;
-        self.work += other.work;
-    }
+/// When a round must end.
+#[derive(Clone, Copy, Debug)]
+struct Quota {
+    work: u64,
+    moves: u64,
 }
 
 with_vector_instructions! {
     /// Moves until `quota` work is done, while the temperature falls geometrically from the first to the second.
-    cool = cool_plain(config: &Config, tree: &mut Working, heat: [f64; 2], quota: u64, rng: &mut Stream,
+    cool = cool_plain(ruin: &Ruin, tree: &mut Working, heat: [f64; 2], quota: Quota, rng: &mut Stream,
         observer: &dyn Observer) -> Tally
 }
 
 #[inline(always)]
-fn cool_plain(config: &Config, tree: &mut Working, heat: [f64; 2], quota: u64, rng: &mut Stream, observer: &dyn Observer) -> Tally {
+fn cool_plain(
+    ruin: &Ruin,
+    tree: &mut Working,
+    [hot, cold]: [f64; 2],
+    quota: Quota,
+    rng: &mut Stream,
+    observer: &dyn Observer,
+) -> Tally {
     let mut tally = Tally::default();
-    if tree.objects() < 3 {
-        return tally;
-    }
     let mut mover = Mover::default();
-    let mut temperature = heat[0];
+    let mut temperature = hot;
     loop {
         if tally.moves % 64 == 0 {
             tally.work = mover.work + mover.search.visits;
-            if tally.work >= quota || observer.cancelled() {
-                break;
+            if tally.work >= quota.work || tally.moves >= quota.moves || observer.cancelled() {
+                return tally;
             }
-            temperature = heat[0] * libm::pow(heat[1] / heat[0], tally.work as f64 / quota as f64);
+            temperature = hot * libm::pow(cold / hot, tally.work as f64 / quota.work as f64);
         }
-        tally.accepted += u64::from(mover.step(config, tree, temperature, rng));
+        tally.kept += u64::from(mover.step(ruin, tree, temperature, rng));
         tally.moves += 1;
     }
-    tally
 }
 
 /// Buffers of moves.
@@ -178,69 +200,61 @@ struct Mover {
     search: PlaceSearch,
     /// Roots of the subtrees taken out, each with the sibling it had.
     out: Vec<(u32, u32)>,
+    /// Nodes visited outside of the search.
     work: u64,
 }
 
 impl Mover {
     /// One move: ruins, recreates, and takes it back unless accepted. Returns whether it was.
     #[inline(always)]
-    fn step(&mut self, config: &Config, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
+    fn step(&mut self, ruin: &Ruin, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
         let mut top = rng.random_range(1..tree.nodes.len() as u32);
-        let levels = rng.random_range(1..=config.climb);
+        let levels = rng.random_range(1..=ruin.climb);
+        let mut above = tree.nodes[top as usize].parent;
         for _ in 0..levels {
-            let parent = tree.nodes[top as usize].parent;
-            if parent == ANCHOR {
+            if above == ANCHOR {
                 break;
             }
-            top = parent;
+            top = above;
+            above = tree.nodes[top as usize].parent;
         }
-        if tree.nodes[top as usize].is_leaf() {
+        let Some(side) = tree.nodes[above as usize].children.iter().position(|&child| child == top) else {
             return false;
-        }
-        let anchor = tree.nodes[top as usize].parent;
-        let side = usize::from(tree.nodes[anchor as usize].children[0] != top);
-        let scale = tree.nodes[top as usize].area;
-        let threshold = -temperature * scale * libm::log(1.0 - rng.random::<f64>());
+        };
+        // The dice of Metropolis are cast first: what would lead above the limit need not be finished.
+        let chance = 1.0 - rng.random::<f64>();
+        let mut limit = -temperature * tree.nodes[top as usize].area * libm::log(chance);
         tree.begin();
         self.out.clear();
-        let mut saved = 0.0;
-        let mut least = 0.0;
-        for _ in 0..rng.random_range(1..=config.removed) {
-            let top = tree.nodes[anchor as usize].children[side];
-            if tree.nodes[top as usize].is_leaf() {
+        for _ in 0..rng.random_range(1..=ruin.removed) {
+            let mut node = tree.nodes[above as usize].children[side];
+            if tree.nodes[node as usize].is_leaf() {
                 break;
             }
-            let mut node = top;
             for _ in 0..rng.random_range(1..=levels + 1) {
-                let Some(children) = inner(tree, node) else { break };
-                node = children[rng.random_range(0..2usize)];
+                if tree.nodes[node as usize].is_leaf() {
+                    break;
+                }
+                node = tree.nodes[node as usize].children[usize::from(rng.random::<bool>())];
             }
-            let (less, sibling, visits) = tree.detach(node, anchor);
+            let (saved, sibling, visits) = tree.detach(node);
             self.work += visits;
-            saved += less;
-            least += tree.nodes[node as usize].area;
+            // Every subtree out will cost its own area at least.
+            limit += saved - tree.nodes[node as usize].area;
             self.out.push((node, sibling));
         }
         self.out.shuffle(rng);
-        let mut limit = saved + threshold - least;
         for &(node, first) in &self.out {
             let item = &tree.nodes[node as usize];
             let (aabb, area) = (item.aabb, item.area);
             limit += area;
-            let top = tree.nodes[anchor as usize].children[side];
-            let place = self.search.detached(tree, (&aabb, area), first, (anchor, top), limit);
-            let Some(place) = place else {
+            let Some(place) = self.search.detached(tree, (&aabb, area), first, limit) else {
                 tree.undo();
                 return false;
             };
-            self.work += tree.attach(node, place.beside, anchor).1;
+            self.work += tree.attach(node, place.beside).1;
             limit -= place.cost;
         }
         true
     }
-}
-
-#[inline(always)]
-fn inner(tree: &Working, node: u32) -> Option<[u32; 2]> {
-    Some(tree.nodes[node as usize].children).filter(|children| children[0] != NONE)
 }

@@ -4,6 +4,7 @@
 use crate::{Budget, SearchError, StopReason};
 use bvh_build::Builder;
 use bvh_core::{Aabb, Bvh, cost::Objective};
+use std::ops::AddAssign;
 
 /// What is searched for: the tree over `boxes` of least cost.
 #[derive(Clone, Copy, Debug)]
@@ -61,6 +62,25 @@ pub struct Event {
     pub incumbent: f64,
 }
 
+/// What was done to a tree, for [`Run::count`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Moves evaluated.
+    pub moves: u64,
+    /// Those of them that were kept.
+    pub kept: u64,
+    /// Nodes made or visited.
+    pub work: u64,
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.moves += other.moves;
+        self.kept += other.kept;
+        self.work += other.work;
+    }
+}
+
 /// The state that is common to all searches.
 pub struct Run<'a> {
     budget: Budget,
@@ -75,7 +95,7 @@ impl<'a> Run<'a> {
     /// Counts one evaluation that took `work` nodes and found `cost`. Returns whether it is the new incumbent:
     /// strictly cheaper than all before, so that of equal trees the first is kept.
     pub fn record(&mut self, cost: f64, work: u64) -> bool {
-        self.count(1, work);
+        self.count(Tally { moves: 1, work, kept: 0 });
         let improved = cost < self.incumbent;
         if improved {
             self.incumbent = cost;
@@ -84,11 +104,11 @@ impl<'a> Run<'a> {
         improved
     }
 
-    /// Counts moves that took `work` nodes together, without an event each: searches that make millions of moves report
-    /// what comes of them by [`improve`](Self::improve).
-    pub fn count(&mut self, evaluations: u64, work: u64) {
-        self.evaluations = self.evaluations.saturating_add(evaluations);
-        self.work = self.work.saturating_add(work);
+    /// Counts moves without an event each: searches that make millions of moves report what comes of them by
+    /// [`improve`](Self::improve).
+    pub fn count(&mut self, tally: Tally) {
+        self.evaluations = self.evaluations.saturating_add(tally.moves);
+        self.work = self.work.saturating_add(tally.work);
     }
 
     /// An event if moves already counted have led to a new incumbent of this cost. Returns whether they have.
@@ -108,14 +128,14 @@ impl<'a> Run<'a> {
         self.observer.event(&event);
     }
 
-    /// The work the budget still has; `None` if it has no limit.
-    pub fn work_left(&self) -> Option<u64> {
-        self.budget.max_work.map(|limit| limit.saturating_sub(self.work))
+    /// The work the budget still has; `u64::MAX` if it has no limit.
+    pub fn work_left(&self) -> u64 {
+        self.budget.max_work.map_or(u64::MAX, |limit| limit.saturating_sub(self.work))
     }
 
-    /// The evaluations the budget still has; `None` if it has no limit.
-    pub fn moves_left(&self) -> Option<u64> {
-        self.budget.max_evaluations.map(|limit| limit.saturating_sub(self.evaluations))
+    /// The evaluations the budget still has; `u64::MAX` if it has no limit.
+    pub fn moves_left(&self) -> u64 {
+        self.budget.max_evaluations.map_or(u64::MAX, |limit| limit.saturating_sub(self.evaluations))
     }
 
     /// The one who watches, to be asked from other threads.

@@ -22,13 +22,13 @@ pub(crate) struct Node {
     /// Half area of `aabb`.
     pub area: f64,
     /// The change during which the node was last written to the journal.
-    stamp: u64,
+    pub stamp: u64,
     /// `NONE` for a detached subtree's spare parent.
     pub parent: u32,
     /// Both children, or `[NONE, object]`.
     pub children: [u32; 2],
     /// In the journal only: where the node belongs.
-    index: u32,
+    pub index: u32,
 }
 
 impl Node {
@@ -105,6 +105,13 @@ impl Working {
         Ok(Self { nodes, ..Self::default() })
     }
 
+    /// A tree of nodes written elsewhere, linked, the anchor first.
+    pub fn from_nodes(nodes: Vec<Node>) -> Self {
+        let mut tree = Self { nodes, ..Self::default() };
+        tree.nodes.iter_mut().for_each(|node| node.stamp = 0);
+        tree
+    }
+
     /// The tree, children adjacent and left before right, objects in leaf order.
     pub fn to_bvh(&self) -> Bvh {
         let mut tree = Bvh::default();
@@ -179,17 +186,17 @@ impl Working {
         self.write(new).parent = parent;
     }
 
-    /// Takes `node` and what is below it out of the tree, its parent node with it. Boxes are made tight up to, and
-    /// without, `anchor`. Returns the area saved, the sibling that took the parent's place, and the nodes visited.
+    /// Takes `node`, not the root, and what is below it out of the tree, its parent node with it. Boxes are made tight.
+    /// Returns the area saved, the sibling that took the parent's place, and the nodes visited.
     #[inline(always)]
-    pub fn detach(&mut self, node: u32, anchor: u32) -> (f64, u32, u64) {
+    pub fn detach(&mut self, node: u32) -> (f64, u32, u64) {
         let parent = self.nodes[node as usize].parent;
         let Node { parent: above, area, .. } = self.nodes[parent as usize];
         let sibling = self.nodes[parent as usize].other(node);
         self.write(parent).parent = NONE;
         self.replace_child(above, parent, sibling);
         let (mut saved, mut at, mut visits) = (area, above, 2);
-        while at != anchor {
+        while at != ANCHOR {
             let [left, right] = self.nodes[at as usize].children;
             let aabb = self.nodes[left as usize].aabb.union(&self.nodes[right as usize].aabb);
             visits += 1;
@@ -207,7 +214,7 @@ impl Working {
 
     /// Puts a detached `node` beside `place`, its parent node above both. Returns the area added and the nodes visited.
     #[inline(always)]
-    pub fn attach(&mut self, node: u32, place: u32, anchor: u32) -> (f64, u64) {
+    pub fn attach(&mut self, node: u32, place: u32) -> (f64, u64) {
         let Node { aabb: added_box, parent, .. } = self.nodes[node as usize];
         let Node { aabb, parent: above, .. } = self.nodes[place as usize];
         self.replace_child(above, place, parent);
@@ -217,7 +224,7 @@ impl Working {
         let joint = self.write(parent);
         (joint.children, joint.aabb, joint.area) = ([place, node], aabb, area);
         let (mut added, mut at, mut visits) = (area, above, 2);
-        while at != anchor {
+        while at != ANCHOR {
             let grown = self.nodes[at as usize].aabb.union(&added_box);
             visits += 1;
             if grown == self.nodes[at as usize].aabb {
@@ -246,82 +253,21 @@ impl Working {
         order
     }
 
-    /// Cuts the tree into its largest subtrees of at most `limit` leaves, each a tree of its own, and the rest above
-    /// them, a tree whose 'objects' are the pieces' indices. O(n).
-    pub fn split(&self, limit: usize) -> (Self, Vec<Self>) {
+    /// The same tree with its nodes in preorder, so that neighbours in the tree are neighbours in memory. O(n).
+    pub fn in_preorder(&self) -> Self {
         let order = self.preorder();
-        let mut leaves = vec![1u32; self.nodes.len()];
-        for &at in order.iter().rev() {
-            let node = &self.nodes[at as usize];
+        let mut new = vec![ANCHOR; self.nodes.len()];
+        order.iter().zip(1..).for_each(|(&old, at)| new[old as usize] = at);
+        let mut nodes = vec![self.nodes[0]];
+        nodes.extend(order.iter().map(|&old| self.nodes[old as usize]));
+        for node in &mut nodes {
             if !node.is_leaf() {
-                leaves[at as usize] = node.children.iter().map(|&child| leaves[child as usize]).sum();
+                node.children = node.children.map(|child| if child == NONE { NONE } else { new[child as usize] });
+            }
+            if node.parent != NONE {
+                node.parent = new[node.parent as usize];
             }
         }
-        let mut new = vec![NONE; self.nodes.len()];
-        new[0] = 0;
-        let mut top = vec![self.nodes[0]];
-        let mut pieces = Vec::new();
-        let mut next = 0;
-        while next < order.len() {
-            let at = order[next] as usize;
-            new[at] = top.len() as u32;
-            if leaves[at] as usize > limit {
-                top.push(self.nodes[at]);
-                next += 1;
-                continue;
-            }
-            top.push(Node { children: [NONE, pieces.len() as u32], ..self.nodes[at] });
-            let range = &order[next..next + 2 * leaves[at] as usize - 1];
-            let entry = new[at];
-            for (&old, to) in range.iter().zip(1..) {
-                new[old as usize] = to;
-            }
-            let mut nodes = Vec::with_capacity(range.len() + 1);
-            nodes.push(Node { children: [1, NONE], ..Node::ANCHOR });
-            nodes.extend(range.iter().map(|&old| renumbered(&self.nodes[old as usize], &new)));
-            nodes[1].parent = ANCHOR;
-            pieces.push(Self { nodes, ..Self::default() });
-            new[at] = entry;
-            next += range.len();
-        }
-        // The piece's own leaves are told by their parents, which are below the cut.
-        let mut below_cut = top.iter_mut();
-        if let Some(anchor) = below_cut.next() {
-            anchor.children[0] = if order.is_empty() { NONE } else { 1 };
-        }
-        for node in below_cut {
-            *node = renumbered(node, &new);
-        }
-        (Self { nodes: top, ..Self::default() }, pieces)
+        Self::from_nodes(nodes)
     }
-
-    /// Undoes [`split`](Self::split), whatever became of the parts: nodes come to lie in preorder. O(n).
-    pub fn join(top: &Self, pieces: &[Self]) -> Self {
-        const TOP: u32 = NONE;
-        let mut nodes = Vec::with_capacity(pieces.iter().map(|piece| 2 * piece.objects()).sum());
-        nodes.push(Node::ANCHOR);
-        let mut stack: Vec<(u32, u32, u32, u8)> = top.root().map(|root| (TOP, root, ANCHOR, 0)).into_iter().collect();
-        while let Some((part, at, parent, side)) = stack.pop() {
-            let source = if part == TOP { top } else { &pieces[part as usize] };
-            let node = &source.nodes[at as usize];
-            if part == TOP && node.is_leaf() {
-                let piece = node.children[1];
-                stack.push((piece, pieces[piece as usize].nodes[0].children[0], parent, side));
-                continue;
-            }
-            let to = nodes.len() as u32;
-            nodes[parent as usize].children[usize::from(side)] = to;
-            nodes.push(Node { parent, stamp: 0, ..*node });
-            if !node.is_leaf() {
-                stack.extend([(part, node.children[1], to, 1), (part, node.children[0], to, 0)]);
-            }
-        }
-        Self { nodes, ..Self::default() }
-    }
-}
-
-/// The node with its links looked up in `new`; a leaf keeps its object.
-fn renumbered(node: &Node, new: &[u32]) -> Node {
-    let children = if node.is_leaf() { node.children } else { node.children.map(|child| new[child as usize]) };
-    Node { parent: new[node.parent as usize], children, stamp: 0, ..*node }
 }
