@@ -32,7 +32,7 @@ impl<'p> Incumbent<'p> {
 
     /// Keeps `tree` if it is better than all before. O(n).
     pub fn offer(&mut self, tree: &Working, run: &mut Run) -> bool {
-        if tree.internal_area() >= self.area {
+        if tree.area() >= self.area {
             return false;
         }
         let candidate = tree.to_bvh();

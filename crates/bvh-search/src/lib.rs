@@ -24,6 +24,7 @@ mod error;
 mod fusing;
 pub mod grasp;
 mod incumbent;
+mod optimize;
 mod place;
 pub mod portfolio;
 pub mod reinsertion;
@@ -37,7 +38,8 @@ mod working;
 
 pub use budget::{Budget, StopReason};
 pub use error::SearchError;
+pub use optimize::optimize;
 #[cfg(feature = "serde")]
 pub use registry::Method;
-pub use run::{Event, Observer, Outcome, Problem, Run, Search, Tally, solve};
+pub use run::{Event, Observer, Outcome, Problem, Quota, Run, Search, Tally, solve};
 pub use stream::Stream;

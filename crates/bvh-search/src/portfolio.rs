@@ -11,7 +11,7 @@ use crate::incumbent::Incumbent;
 use crate::ruin_recreate::{Cooling, Ruin, anneal};
 use crate::stream::stream;
 use crate::working::Working;
-use crate::{Problem, Run, Search, SearchError, Tally, reinsertion};
+use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally, reinsertion};
 use bvh_build::muller_fellner;
 use bvh_core::Bvh;
 
@@ -34,6 +34,8 @@ pub struct Config {
     pub chains: u32,
     /// First temperature of a chain, per square root of its work per object, above 0. Default 0.0015.
     pub heat: f64,
+    /// Highest first temperature of every generation but the first, above 0. Default 0.05.
+    pub reheat: f64,
     /// Highest temperature, above 0. Default 0.2.
     pub hottest: f64,
     /// Last temperature, above 0. Default 0.003.
@@ -52,6 +54,7 @@ impl Default for Config {
             work_per_object: 200_000,
             chains: 2,
             heat: 0.0015,
+            reheat: 0.05,
             hottest: 0.2,
             cold: 0.003,
             ruin: Ruin::default(),
@@ -61,11 +64,11 @@ impl Default for Config {
 }
 
 impl Config {
-    fn check(&self) -> Result<(), SearchError> {
+    pub(crate) fn check(&self) -> Result<(), SearchError> {
         require(self.first >= 1.0 && self.first.is_finite(), "first", self.first, "1 or more")?;
         require(self.growth >= 1.0 && self.growth.is_finite(), "growth", self.growth, "1 or more")?;
         require((1..=64).contains(&self.chains), "chains", self.chains.into(), "1 to 64")?;
-        for (name, found) in [("heat", self.heat), ("hottest", self.hottest), ("cold", self.cold)] {
+        for (name, found) in [("heat", self.heat), ("reheat", self.reheat), ("hottest", self.hottest), ("cold", self.cold)] {
             require(found > 0.0 && found.is_finite(), name, found, "above 0")?;
         }
         self.ruin.check()
@@ -77,17 +80,18 @@ impl Config {
         if n < 3 {
             return;
         }
-        run.count(reinsertion::to_local_optimum(tree, run.work_left(), run.observer()));
+        run.count(reinsertion::to_local_optimum(tree, run.left(), run.observer()));
         best.offer(tree, run);
-        let all = self.work_per_object.saturating_mul(n).min(run.work_left());
-        let lengths = self.lengths(all as f64 / n as f64);
-        let mut left = all;
-        for (generation, length) in (0u64..).zip(lengths) {
-            if run.stopped().is_some() || left == 0 {
+        let mut left = self.work_per_object.saturating_mul(n).min(run.left().work);
+        let lengths = self.lengths(left as f64 / n as f64);
+        let last = lengths.len() - 1;
+        for (generation, length) in lengths.into_iter().enumerate() {
+            if run.stopped().is_some() {
                 break;
             }
-            let work = ((length * n as f64) as u64).min(left);
-            let tally = self.generation(tree, generation, work, seed, run);
+            let work = if generation == last { left } else { left.min((length * n as f64) as u64) };
+            let quota = Quota { work, moves: run.left().moves };
+            let tally = self.generation(tree, generation as u64, quota, seed, run.observer());
             left = left.saturating_sub(tally.work);
             run.count(tally);
             best.offer(tree, run);
@@ -98,26 +102,33 @@ impl Config {
     fn lengths(&self, work: f64) -> Vec<f64> {
         let mut lengths = vec![];
         let (mut next, mut sum) = (self.first, 0.0);
-        while sum + next <= work && lengths.len() < 10_000 {
+        while sum + next <= work && lengths.len() < MOST_GENERATIONS {
             lengths.push(next);
             sum += next;
             next *= self.growth;
         }
         if lengths.is_empty() {
-            return vec![work];
+            (lengths, sum) = (vec![work], work);
         }
         lengths.iter().map(|length| length * (work / sum)).collect()
     }
 
-    /// Anneals in chains, fuses, and sweeps what was fused to a local optimum.
-    fn generation(&self, tree: &mut Working, generation: u64, work: u64, seed: u64, run: &Run) -> Tally {
-        let observer = run.observer();
+    /// Anneals in chains and fuses.
+    fn generation(
+        &self,
+        tree: &mut Working,
+        generation: u64,
+        Quota { work, moves }: Quota,
+        seed: u64,
+        observer: &dyn Observer,
+    ) -> Tally {
         let chains = u64::from(self.chains);
         let share = work / chains;
         let hot = self.heat * libm::sqrt(share as f64 / tree.objects() as f64);
+        let hot = if generation == 0 { hot } else { hot.min(self.reheat) };
         let hot = hot.min(self.hottest).max(self.cold);
-        let moves = run.moves_left() / chains;
-        let cooling = Cooling { hot, cold: self.cold, work: share, moves };
+        let quota = Quota { work: share, moves: moves.div_ceil(chains) };
+        let cooling = Cooling { hot, cold: self.cold, quota };
         let chain = |number: u64| {
             let mut rng = stream(seed, generation * chains + number);
             let (mut tree, mut done) = (tree.clone(), Tally::default());
@@ -139,6 +150,9 @@ impl Config {
         tally
     }
 }
+
+/// Ends the schedule when generations do not grow.
+const MOST_GENERATIONS: usize = 10_000;
 
 impl Search for Config {
     /// Chains run in parallel, each with a stream of its own.

@@ -12,7 +12,7 @@ use crate::place::PlaceSearch;
 use crate::stream::stream;
 use crate::vector::with_vector_instructions;
 use crate::working::{ANCHOR, Working};
-use crate::{Observer, Problem, Run, Search, SearchError};
+use crate::{Observer, Problem, Quota, Run, Search, SearchError};
 use bvh_build::muller_fellner;
 use bvh_core::Bvh;
 use rand::seq::SliceRandom;
@@ -68,7 +68,7 @@ impl Search for Config {
                 Order::ByArea => sort_by_area(&tree, &mut order),
                 Order::Random => order.shuffle(&mut stream(seed, number.into())),
             }
-            let swept = sweep(&mut tree, &order, run.work_left(), run.observer());
+            let swept = sweep(&mut tree, &order, run.left(), run.observer());
             run.count(swept);
             best.offer(&tree, run);
             if swept.kept == 0 {
@@ -85,35 +85,36 @@ fn sort_by_area(tree: &Working, order: &mut [u32]) {
 }
 
 /// Sweeps by area until nothing moves.
-pub(crate) fn to_local_optimum(tree: &mut Working, most_work: u64, observer: &dyn Observer) -> Tally {
+pub(crate) fn to_local_optimum(tree: &mut Working, quota: Quota, observer: &dyn Observer) -> Tally {
     let mut total = Tally::default();
     loop {
         let mut order = tree.preorder();
         sort_by_area(tree, &mut order);
-        let swept = sweep(tree, &order, most_work.saturating_sub(total.work), observer);
+        let swept = sweep(tree, &order, quota.less(&total), observer);
         total += swept;
-        if swept.kept == 0 || total.work >= most_work || observer.cancelled() {
+        if swept.kept == 0 || quota.is_reached(&total) || observer.cancelled() {
             return total;
         }
     }
 }
 
 with_vector_instructions! {
-    /// Tries to improve the place of every node of `order` once. Stops early, at any node, when the work is done or the
-    /// observer says so.
+    /// Tries to improve the place of every node of `order` once. Stops early when the quota is reached or
+    /// the observer says so.
     pub(crate) sweep = sweep_plain(
-        tree: &mut Working, order: &[u32], most_work: u64, observer: &dyn Observer) -> Tally
+        tree: &mut Working, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally
 }
 
 /// A place must be better by this part of its cost: above rounding, so that no two places take turns.
 const TOLERANCE: f64 = 1e-12;
 
 #[inline(always)]
-fn sweep_plain(tree: &mut Working, order: &[u32], most_work: u64, observer: &dyn Observer) -> Tally {
+fn sweep_plain(tree: &mut Working, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally {
     let mut swept = Tally::default();
     let mut search = PlaceSearch::default();
     for &node in order {
-        if swept.moves % 256 == 255 && (swept.work + search.visits >= most_work || observer.cancelled()) {
+        let done = Tally { work: swept.work + search.visits, ..swept };
+        if quota.is_reached(&done) || swept.moves % 256 == 255 && observer.cancelled() {
             break;
         }
         if tree.nodes[node as usize].parent == ANCHOR {

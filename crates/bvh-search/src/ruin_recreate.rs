@@ -11,7 +11,7 @@ use crate::reinsertion;
 use crate::stream::{Stream, stream};
 use crate::vector::with_vector_instructions;
 use crate::working::{ANCHOR, Working};
-use crate::{Observer, Problem, Run, Search, SearchError, Tally};
+use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally};
 use bvh_build::muller_fellner;
 use bvh_core::Bvh;
 use rand::RngExt;
@@ -89,8 +89,9 @@ impl Search for Config {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         self.check()?;
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
-        let work = self.work_per_object.saturating_mul(problem.boxes.len() as u64).min(run.work_left());
-        let cooling = Cooling { hot: self.hot, cold: self.cold, work, moves: run.moves_left() };
+        let mut quota = run.left();
+        quota.work = quota.work.min(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
+        let cooling = Cooling { hot: self.hot, cold: self.cold, quota };
         let observer = run.observer();
         anneal(&self.ruin, &cooling, &mut tree, &mut stream(seed, 0), observer, &mut |tree, tally| {
             run.count(tally);
@@ -107,14 +108,18 @@ pub(crate) struct Cooling {
     pub hot: f64,
     /// Last temperature.
     pub cold: f64,
-    /// The work to be done meanwhile.
-    pub work: u64,
-    /// The most moves.
-    pub moves: u64,
+    /// The work to be done meanwhile, and the most moves.
+    pub quota: Quota,
 }
 
-/// Cools `tree` geometrically, by the part of the work done, then sweeps it to a local optimum in the last eighth.
-/// Shows the tree to `round` along the way, with what was done since the last time.
+/// Work per object after which nodes are laid out anew.
+const WORK_PER_ROUND: u64 = 64;
+
+/// Work per object that is kept for the sweeps, an eighth of all at most.
+const WORK_OF_SWEEPS: u64 = 300;
+
+/// Cools `tree` geometrically, by the part of the work done, then sweeps it to a local optimum. Shows the tree to
+/// `round` along the way, with what was done since the last time.
 pub(crate) fn anneal(
     ruin: &Ruin,
     cooling: &Cooling,
@@ -123,48 +128,33 @@ pub(crate) fn anneal(
     observer: &dyn Observer,
     round: &mut dyn FnMut(&Working, Tally),
 ) {
-    let n = tree.objects() as u64;
-    if n < 3 || cooling.moves == 0 {
+    let (n, Quota { work, moves }) = (tree.objects() as u64, cooling.quota);
+    if n < 3 {
         return;
     }
-    let work = cooling.work - cooling.work / 8;
+    let work = work - (work / 8).min(WORK_OF_SWEEPS.saturating_mul(n));
     let rounds = (work / (WORK_PER_ROUND * n)).clamp(1, 100);
-    let at = |round: u64| cooling.hot * libm::pow(cooling.cold / cooling.hot, round as f64 / rounds as f64);
+    let factor = cooling.cold / cooling.hot;
     let mut done = Tally::default();
-    for number in 0..rounds {
+    for number in 1..=rounds {
         *tree = tree.in_preorder();
-        let end = (work as f64 * ((number + 1) as f64 / rounds as f64)) as u64;
-        let left = Quota { work: end.saturating_sub(done.work), moves: cooling.moves - done.moves };
-        let tally = cool(ruin, tree, [at(number), at(number + 1)], left, rng, observer);
+        let part = |number: u64| number as f64 / rounds as f64;
+        let heat = [number - 1, number].map(|number| cooling.hot * libm::pow(factor, part(number)));
+        let end = Quota { work: (work as f64 * part(number)) as u64, moves };
+        let tally = cool(ruin, tree, heat, end.less(&done), rng, observer);
         done += tally;
-        if number + 1 < rounds {
-            round(tree, tally);
-        }
-        if observer.cancelled() || done.moves >= cooling.moves {
-            return round(tree, tally);
-        }
-        if number + 1 == rounds {
-            *tree = tree.in_preorder();
-            let left = cooling.work.saturating_sub(done.work);
-            let mut last = tally;
-            last += reinsertion::to_local_optimum(tree, left, observer);
-            round(tree, last);
+        round(tree, tally);
+        if observer.cancelled() {
+            return;
         }
     }
-}
-
-/// Work per object after which nodes are laid out anew.
-const WORK_PER_ROUND: u64 = 64;
-
-/// When a round must end.
-#[derive(Clone, Copy, Debug)]
-struct Quota {
-    work: u64,
-    moves: u64,
+    *tree = tree.in_preorder();
+    let tally = reinsertion::to_local_optimum(tree, cooling.quota.less(&done), observer);
+    round(tree, tally);
 }
 
 with_vector_instructions! {
-    /// Moves until `quota` work is done, while the temperature falls geometrically from the first to the second.
+    /// Moves until the quota is reached, while the temperature falls geometrically from the first to the second.
     cool = cool_plain(ruin: &Ruin, tree: &mut Working, heat: [f64; 2], quota: Quota, rng: &mut Stream,
         observer: &dyn Observer) -> Tally
 }
@@ -182,9 +172,12 @@ fn cool_plain(
     let mut mover = Mover::default();
     let mut temperature = hot;
     loop {
+        tally.work = mover.work + mover.search.visits;
+        if quota.is_reached(&tally) {
+            return tally;
+        }
         if tally.moves % 64 == 0 {
-            tally.work = mover.work + mover.search.visits;
-            if tally.work >= quota.work || tally.moves >= quota.moves || observer.cancelled() {
+            if observer.cancelled() {
                 return tally;
             }
             temperature = hot * libm::pow(cold / hot, tally.work as f64 / quota.work as f64);

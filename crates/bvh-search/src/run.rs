@@ -81,6 +81,29 @@ impl AddAssign for Tally {
     }
 }
 
+/// How much may still be done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Quota {
+    /// Moves to evaluate.
+    pub moves: u64,
+    /// Nodes to make or visit.
+    pub work: u64,
+}
+
+impl Quota {
+    /// Whether what was done is at least that.
+    #[inline(always)]
+    pub fn is_reached(&self, done: &Tally) -> bool {
+        done.moves >= self.moves || done.work >= self.work
+    }
+
+    /// What is left after something was done.
+    #[must_use]
+    pub fn less(&self, done: &Tally) -> Self {
+        Self { moves: self.moves.saturating_sub(done.moves), work: self.work.saturating_sub(done.work) }
+    }
+}
+
 /// The state that is common to all searches.
 pub struct Run<'a> {
     budget: Budget,
@@ -128,14 +151,13 @@ impl<'a> Run<'a> {
         self.observer.event(&event);
     }
 
-    /// The work the budget still has; `u64::MAX` if it has no limit.
-    pub fn work_left(&self) -> u64 {
-        self.budget.max_work.map_or(u64::MAX, |limit| limit.saturating_sub(self.work))
-    }
-
-    /// The evaluations the budget still has; `u64::MAX` if it has no limit.
-    pub fn moves_left(&self) -> u64 {
-        self.budget.max_evaluations.map_or(u64::MAX, |limit| limit.saturating_sub(self.evaluations))
+    /// What the budget still has, without end where it has no limit.
+    pub fn left(&self) -> Quota {
+        let left = |limit: Option<u64>, count| limit.map_or(u64::MAX, |limit| limit.saturating_sub(count));
+        Quota {
+            work: left(self.budget.max_work, self.work),
+            moves: left(self.budget.max_evaluations, self.evaluations),
+        }
     }
 
     /// The one who watches, to be asked from other threads.
@@ -161,9 +183,8 @@ impl<'a> Run<'a> {
 
     /// How many evaluations of `work` nodes each the budget still has, at least one while not stopped.
     pub fn evaluations_left(&self, work: u64) -> u64 {
-        let left = |limit: Option<u64>, count: u64| limit.map_or(u64::MAX, |limit| limit.saturating_sub(count));
-        let by_work = left(self.budget.max_work, self.work).div_ceil(work.max(1));
-        left(self.budget.max_evaluations, self.evaluations).min(by_work).max(u64::from(self.evaluations == 0))
+        let left = self.left();
+        left.moves.min(left.work.div_ceil(work.max(1))).max(u64::from(self.evaluations == 0))
     }
 }
 

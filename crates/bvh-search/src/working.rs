@@ -57,31 +57,31 @@ impl Node {
 #[derive(Clone, Debug)]
 pub(crate) struct Working {
     pub nodes: Vec<Node>,
+    /// Total area of the inner nodes when the change began, and what the change has added since.
+    area: Sum,
+    added: f64,
     journal: Vec<Node>,
     change: u64,
 }
 
 impl Default for Working {
     fn default() -> Self {
-        Self { nodes: vec![Node::ANCHOR], journal: Vec::new(), change: 0 }
+        Self { nodes: vec![Node::ANCHOR], area: Sum::default(), added: 0.0, journal: Vec::new(), change: 0 }
     }
 }
 
 impl Working {
-    /// The working form of a valid tree, in O(n); boxes are made tight. Refuses inner nodes with more than two children,
-    /// and leaves with more than one object.
+    /// The working form of a valid tree with one object per leaf, in O(n); boxes are made tight. Refuses inner nodes with
+    /// more than two children.
     pub fn from_bvh(tree: &Bvh, boxes: &[Aabb]) -> Result<Self, SearchError> {
         let mut nodes = Vec::with_capacity(tree.nodes.len() + 1);
         nodes.push(Node::ANCHOR);
         for (index, node) in tree.nodes.iter().enumerate() {
             let children = match node.kind() {
                 NodeKind::Inner { first, count: 2 } => [first + 1, first + 2],
-                NodeKind::Leaf { first, count: 1 } => [NONE, tree.prim_ids[first as usize]],
+                NodeKind::Leaf { first, .. } => [NONE, tree.prim_ids[first as usize]],
                 NodeKind::Inner { count, .. } => {
                     return Err(SearchError::NotBinary { node: index, children: count });
-                }
-                NodeKind::Leaf { count, .. } => {
-                    return Err(SearchError::LeafOfSeveral { node: index, objects: count });
                 }
             };
             nodes.push(Node { children, ..Node::ANCHOR });
@@ -102,13 +102,14 @@ impl Working {
             nodes[at].aabb = aabb;
             nodes[at].area = aabb.half_area();
         }
-        Ok(Self { nodes, ..Self::default() })
+        Ok(Self::from_nodes(nodes))
     }
 
     /// A tree of nodes written elsewhere, linked, the anchor first.
-    pub fn from_nodes(nodes: Vec<Node>) -> Self {
+    pub fn from_nodes(mut nodes: Vec<Node>) -> Self {
+        nodes.iter_mut().for_each(|node| node.stamp = 0);
         let mut tree = Self { nodes, ..Self::default() };
-        tree.nodes.iter_mut().for_each(|node| node.stamp = 0);
+        tree.area.add(tree.internal_area());
         tree
     }
 
@@ -147,6 +148,12 @@ impl Working {
         self.nodes.len() / 2
     }
 
+    /// The total area of all inner nodes, kept incrementally: its error does not grow with the number of changes beyond
+    /// that of one rounding each.
+    pub fn area(&self) -> f64 {
+        self.area.value() + self.added
+    }
+
     /// The total area of all inner nodes, recomputed. O(n).
     pub fn internal_area(&self) -> f64 {
         self.nodes.iter().filter(|node| !node.is_leaf()).map(|node| node.area).collect::<Sum>().value()
@@ -157,11 +164,14 @@ impl Working {
     pub fn begin(&mut self) {
         self.change += 1;
         self.journal.clear();
+        self.area.add(self.added);
+        self.added = 0.0;
     }
 
     /// Takes the change back, bit by bit.
     #[inline(always)]
     pub fn undo(&mut self) {
+        self.added = 0.0;
         for node in self.journal.drain(..) {
             self.nodes[node.index as usize] = node;
         }
@@ -209,6 +219,7 @@ impl Working {
             (node.aabb, node.area) = (aabb, area);
             at = node.parent;
         }
+        self.added -= saved;
         (saved, sibling, visits)
     }
 
@@ -236,6 +247,7 @@ impl Working {
             (node.aabb, node.area) = (grown, area);
             at = node.parent;
         }
+        self.added += added;
         (added, visits)
     }
 
