@@ -82,3 +82,50 @@ fn key(object: u32) -> u128 {
     let (low, high) = (scatter(at.wrapping_mul(GAMMA)), scatter((at + 1).wrapping_mul(GAMMA)));
     u128::from(high) << 64 | u128::from(low)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::stream;
+    use bvh_build::{Builder, muller_fellner};
+    use bvh_core::{Aabb, validate};
+    use rand::RngExt;
+
+    #[test]
+    fn the_fused_tree_has_the_best_part_of_every_parent() {
+        let boxes: Vec<Aabb> = (0..200u16)
+            .map(|i| {
+                let at = [f32::from(i) * 1.7 % 9.0, f32::from(i) * 2.3 % 7.0, f32::from(i / 3)];
+                Aabb::from((at, at.map(|c| c + 1.0)))
+            })
+            .collect();
+        let good = muller_fellner::Config::default().build(&boxes).unwrap();
+        let good = Working::from_bvh(&good, &boxes).unwrap();
+        let [left, right] = good.nodes[good.root().unwrap() as usize].children;
+        // Two parents, each spoilt on one side of the root.
+        let spoilt = |side: u32| {
+            let mut tree = good.clone();
+            let mut rng = stream(u64::from(side), 0);
+            tree.begin();
+            for _ in 0..20 {
+                let mut node = side;
+                while !tree.nodes[node as usize].is_leaf() {
+                    node = tree.nodes[node as usize].children[usize::from(rng.random::<bool>())];
+                }
+                if node != side && tree.nodes[node as usize].parent != side {
+                    tree.detach(node);
+                    let place = tree.nodes[side as usize].children[0];
+                    tree.attach(node, place);
+                }
+            }
+            tree
+        };
+        let (a, b) = (spoilt(left), spoilt(right));
+        let fused = fuse(&[&a, &b]);
+        validate(&fused.to_bvh(), &boxes).unwrap();
+        assert!(a.area() > good.area() && b.area() > good.area());
+        assert!(fused.area() <= good.area() * (1.0 + 1e-12), "{} {}", fused.area(), good.area());
+        assert_eq!(fuse(&[&good]).to_bvh(), good.to_bvh());
+        assert_eq!(fuse(&[&Working::default()]).objects(), 0);
+    }
+}

@@ -27,10 +27,10 @@ mod incumbent;
 mod optimize;
 mod place;
 pub mod portfolio;
-pub mod reinsertion;
-pub mod ruin_recreate;
 #[cfg(feature = "serde")]
 mod registry;
+pub mod reinsertion;
+pub mod ruin_recreate;
 mod run;
 mod stream;
 mod vector;

@@ -44,13 +44,7 @@ impl PlaceSearch {
     /// The cheapest place for a *detached* item, if one costs less than `limit`. Begins at `first`, or at the root if
     /// `first` is itself detached.
     #[inline(always)]
-    pub fn detached(
-        &mut self,
-        tree: &Working,
-        item: Item,
-        first: u32,
-        limit: f64,
-    ) -> Option<Place> {
+    pub fn detached(&mut self, tree: &Working, item: Item, first: u32, limit: f64) -> Option<Place> {
         self.path.clear();
         let (mut at, mut below) = (first, NONE);
         while at != ANCHOR {

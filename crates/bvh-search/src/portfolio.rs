@@ -68,7 +68,9 @@ impl Config {
         require(self.first >= 1.0 && self.first.is_finite(), "first", self.first, "1 or more")?;
         require(self.growth >= 1.0 && self.growth.is_finite(), "growth", self.growth, "1 or more")?;
         require((1..=64).contains(&self.chains), "chains", self.chains.into(), "1 to 64")?;
-        for (name, found) in [("heat", self.heat), ("reheat", self.reheat), ("hottest", self.hottest), ("cold", self.cold)] {
+        for (name, found) in
+            [("heat", self.heat), ("reheat", self.reheat), ("hottest", self.hottest), ("cold", self.cold)]
+        {
             require(found > 0.0 && found.is_finite(), name, found, "above 0")?;
         }
         self.ruin.check()

@@ -7,8 +7,8 @@
 
 use crate::error::require;
 use crate::incumbent::Incumbent;
-use crate::run::Tally;
 use crate::place::PlaceSearch;
+use crate::run::Tally;
 use crate::stream::stream;
 use crate::vector::with_vector_instructions;
 use crate::working::{ANCHOR, Working};
