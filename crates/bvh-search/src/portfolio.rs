@@ -32,11 +32,9 @@ pub struct Config {
     pub work_per_object: u64,
     /// Independent chains per generation, which is also how many threads can help, 1 to 64. Default 2.
     pub chains: u32,
-    /// First temperature of a chain, per square root of its work per object, above 0. Default 0.0015.
+    /// First temperature of a chain per 1000 nodes of its work per object, above 0. Default 0.013.
     pub heat: f64,
-    /// Highest first temperature of every generation but the first, above 0. Default 0.05.
-    pub reheat: f64,
-    /// Highest temperature, above 0. Default 0.2.
+    /// Highest temperature, above 0. Default 0.1.
     pub hottest: f64,
     /// Last temperature, above 0. Default 0.003.
     pub cold: f64,
@@ -53,9 +51,8 @@ impl Default for Config {
             growth: 1.5,
             work_per_object: 200_000,
             chains: 2,
-            heat: 0.0015,
-            reheat: 0.05,
-            hottest: 0.2,
+            heat: 0.013,
+            hottest: 0.1,
             cold: 0.003,
             ruin: Ruin::default(),
             start: reinsertion::start(),
@@ -68,9 +65,7 @@ impl Config {
         require(self.first >= 1.0 && self.first.is_finite(), "first", self.first, "1 or more")?;
         require(self.growth >= 1.0 && self.growth.is_finite(), "growth", self.growth, "1 or more")?;
         require((1..=64).contains(&self.chains), "chains", self.chains.into(), "1 to 64")?;
-        for (name, found) in
-            [("heat", self.heat), ("reheat", self.reheat), ("hottest", self.hottest), ("cold", self.cold)]
-        {
+        for (name, found) in [("heat", self.heat), ("hottest", self.hottest), ("cold", self.cold)] {
             require(found > 0.0 && found.is_finite(), name, found, "above 0")?;
         }
         self.ruin.check()
@@ -126,8 +121,7 @@ impl Config {
     ) -> Tally {
         let chains = u64::from(self.chains);
         let share = work / chains;
-        let hot = self.heat * libm::sqrt(share as f64 / tree.objects() as f64);
-        let hot = if generation == 0 { hot } else { hot.min(self.reheat) };
+        let hot = self.heat * (share as f64 / tree.objects() as f64 / 1000.0);
         let hot = hot.min(self.hottest).max(self.cold);
         let quota = Quota { work: share, moves: moves.div_ceil(chains) };
         let cooling = Cooling { hot, cold: self.cold, quota };

@@ -2,7 +2,7 @@
 //! result as in simulated annealing.
 //!
 //! Schrimpf et al. 2000 (ruin and recreate); Kirkpatrick, Gelatt & Vecchi 1983; Shaw 1998 (related removal).
-//! Temperatures are relative to the area of the ruined part, so that one schedule suits nodes of all sizes.
+//! Temperatures are relative to the area that the removal saves, so that one schedule suits nodes of all sizes.
 
 use crate::error::require;
 use crate::incumbent::Incumbent;
@@ -27,8 +27,8 @@ use rand::seq::SliceRandom;
 pub struct Config {
     /// The move.
     pub ruin: Ruin,
-    /// First temperature, relative to the area of the ruined part, above 0. Default 0.1, which suits some 10 000 nodes
-    /// of work per object; more work wants a higher one, about as its square root.
+    /// First temperature, relative to the area that a removal saves, above 0. Default 0.1, which suits 8000 nodes of
+    /// work per object or more; less work wants a lower one, in proportion.
     pub hot: f64,
     /// Last temperature, above 0 and not above `hot`. Default 0.003.
     pub cold: f64,
@@ -58,7 +58,7 @@ impl Config {
     }
 }
 
-/// A move: from a random node some levels up, and from there several random descents, each to a subtree taken out.
+/// A move: from a random node, the larger of two, some levels up, and from there several random descents, each to a subtree taken out.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -201,7 +201,9 @@ impl Mover {
     /// One move: ruins, recreates, and takes it back unless accepted. Returns whether it was.
     #[inline(always)]
     fn step(&mut self, ruin: &Ruin, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
-        let mut top = rng.random_range(1..tree.nodes.len() as u32);
+        // The larger of two: large nodes are few, and what they can gain is large.
+        let [a, b] = [(); 2].map(|()| rng.random_range(1..tree.nodes.len() as u32));
+        let mut top = if tree.nodes[b as usize].area > tree.nodes[a as usize].area { b } else { a };
         let levels = rng.random_range(1..=ruin.climb);
         let mut above = tree.nodes[top as usize].parent;
         for _ in 0..levels {
@@ -214,9 +216,7 @@ impl Mover {
         let Some(side) = tree.nodes[above as usize].children.iter().position(|&child| child == top) else {
             return false;
         };
-        // The dice of Metropolis are cast first: what would lead above the limit need not be finished.
-        let chance = 1.0 - rng.random::<f64>();
-        let mut limit = -temperature * tree.nodes[top as usize].area * libm::log(chance);
+        let (mut total, mut least) = (0.0, 0.0);
         tree.begin();
         self.out.clear();
         for _ in 0..rng.random_range(1..=ruin.removed) {
@@ -232,11 +232,15 @@ impl Mover {
             }
             let (saved, sibling, visits) = tree.detach(node);
             self.work += visits;
+            total += saved;
             // Every subtree out will cost its own area at least.
-            limit += saved - tree.nodes[node as usize].area;
+            least += tree.nodes[node as usize].area;
             self.out.push((node, sibling));
         }
         self.out.shuffle(rng);
+        // The dice of Metropolis are cast first: what would lead above the limit need not be finished.
+        let chance = 1.0 - rng.random::<f64>();
+        let mut limit = total * (1.0 - temperature * libm::log(chance)) - least;
         for &(node, first) in &self.out {
             let item = &tree.nodes[node as usize];
             let (aabb, area) = (item.aabb, item.area);
