@@ -209,6 +209,8 @@ impl<E: Evaluation> Sweep<'_, E> {
             let area = self.aabb.half_area();
             let (left, right) = order.split_at(n / 2);
             let [left, right] = [left, right].map(|side| evaluation.side(area, evaluation.total_load(side)));
+            // What another node left here must not be taken for this one's, see `side_boxes`.
+            self.blocks[axis as usize].clear();
             visit(candidate(evaluation.join(left, right), n / 2));
             return;
         }

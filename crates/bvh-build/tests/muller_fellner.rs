@@ -217,3 +217,23 @@ fn what_cannot_be_built_is_refused_by_name() {
     let config = Config { heuristic: Heuristic::AreaTimesPower(1.5), ..Config::default() };
     assert_eq!(config.build(&boxes).unwrap_err().to_string(), "area_times_power is 1.5; accepted: 0 to 1");
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+    #[test]
+    fn scenes_of_few_distinct_boxes_have_exact_boxes_too(corners in prop::collection::vec(any::<[bool; 6]>(), 1..300)) {
+        let boxes: Vec<Aabb> = corners
+            .iter()
+            .map(|c| {
+                let at = c.map(|bit| f32::from(u8::from(bit)));
+                let min = [at[0] * at[3], at[1] * at[4], at[2] * at[5]];
+                Aabb::from((min, std::array::from_fn(|k| at[k].max(at[k + 3] * at[0] * at[1]))))
+            })
+            .collect();
+        let tree = Config::default().build(&boxes).unwrap();
+        validate(&tree, &boxes).unwrap();
+        let mut tight = tree.clone();
+        tight.refit(&boxes);
+        prop_assert_eq!(tree, tight);
+    }
+}

@@ -1,6 +1,7 @@
 //! What a search can refuse.
 
 use bvh_build::BuildError;
+use bvh_core::InvalidBvh;
 
 /// Why a search did not start. Once started, a search always returns a tree.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -8,6 +9,17 @@ pub enum SearchError {
     /// The scene cannot be built.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// The tree to be optimised is none over these boxes.
+    #[error(transparent)]
+    Invalid(#[from] InvalidBvh),
+    /// Local search works on binary trees.
+    #[error("inner node {node} has {children} children; local search takes binary trees only")]
+    NotBinary {
+        /// Index of the node.
+        node: usize,
+        /// Its number of children.
+        children: u32,
+    },
     /// A parameter of the search is outside its range.
     #[error("{parameter} is {found}; accepted: {accepted}")]
     Parameter {

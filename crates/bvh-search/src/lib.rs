@@ -21,18 +21,28 @@
 
 mod budget;
 mod error;
+mod fusing;
 pub mod genetic;
 pub mod grasp;
+mod incumbent;
 mod insertion_orders;
+mod optimize;
+mod place;
+pub mod portfolio;
 pub mod random_orders;
 #[cfg(feature = "serde")]
 mod registry;
+pub mod reinsertion;
+pub mod ruin_recreate;
 mod run;
 mod stream;
+mod vector;
+mod working;
 
 pub use budget::{Budget, StopReason};
 pub use error::SearchError;
+pub use optimize::optimize;
 #[cfg(feature = "serde")]
 pub use registry::Method;
-pub use run::{Event, Observer, Outcome, Problem, Run, Search, solve};
+pub use run::{Event, Observer, Outcome, Problem, Quota, Run, Search, Tally, solve};
 pub use stream::Stream;

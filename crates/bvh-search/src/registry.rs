@@ -51,4 +51,10 @@ methods! {
     "random_orders" => RandomOrders(crate::random_orders::Config),
     /// A genetic algorithm over insertion orders.
     "genetic" => Genetic(crate::genetic::Config),
+    /// Reinsertion to a local optimum.
+    "reinsertion" => Reinsertion(crate::reinsertion::Config),
+    /// Annealed ruin and recreate.
+    "ruin_recreate" => RuinRecreate(crate::ruin_recreate::Config),
+    /// All that pays, in the order that pays.
+    "best" => Best(crate::portfolio::Config),
 }

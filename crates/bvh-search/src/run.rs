@@ -4,6 +4,7 @@
 use crate::{Budget, SearchError, StopReason};
 use bvh_build::Builder;
 use bvh_core::{Aabb, Bvh, cost::Objective};
+use std::ops::AddAssign;
 
 /// What is searched for: the tree over `boxes` of least cost.
 #[derive(Clone, Copy, Debug)]
@@ -61,6 +62,48 @@ pub struct Event {
     pub incumbent: f64,
 }
 
+/// What was done to a tree, for [`Run::count`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Moves evaluated.
+    pub moves: u64,
+    /// Those of them that were kept.
+    pub kept: u64,
+    /// Nodes made or visited.
+    pub work: u64,
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.moves += other.moves;
+        self.kept += other.kept;
+        self.work += other.work;
+    }
+}
+
+/// How much may still be done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Quota {
+    /// Moves to evaluate.
+    pub moves: u64,
+    /// Nodes to make or visit.
+    pub work: u64,
+}
+
+impl Quota {
+    /// Whether what was done is at least that.
+    #[inline(always)]
+    pub fn is_reached(&self, done: &Tally) -> bool {
+        done.moves >= self.moves || done.work >= self.work
+    }
+
+    /// What is left after something was done.
+    #[must_use]
+    pub fn less(&self, done: &Tally) -> Self {
+        Self { moves: self.moves.saturating_sub(done.moves), work: self.work.saturating_sub(done.work) }
+    }
+}
+
 /// The state that is common to all searches.
 pub struct Run<'a> {
     budget: Budget,
@@ -71,7 +114,7 @@ pub struct Run<'a> {
     history: Vec<Event>,
 }
 
-impl Run<'_> {
+impl<'a> Run<'a> {
     /// Counts one evaluation that took `work` nodes and found `cost`. Returns whether it is the new incumbent:
     /// strictly cheaper than all before, so that of equal trees the first is kept.
     pub fn record(&mut self, cost: f64, work: u64) -> bool {
@@ -81,17 +124,51 @@ impl Run<'_> {
     /// Counts several evaluations that took `work` nodes together and whose best found `cost`, as one event.
     /// Returns whether it is the new incumbent.
     pub fn record_generation(&mut self, evaluations: u64, cost: f64, work: u64) -> bool {
-        self.evaluations += evaluations;
-        self.work += work;
+        self.count(Tally { moves: evaluations, work, kept: 0 });
         let improved = cost < self.incumbent;
         if improved {
             self.incumbent = cost;
         }
+        self.report(cost);
+        improved
+    }
+
+    /// Counts moves without an event each: searches that make millions of moves report what comes of them by
+    /// [`improve`](Self::improve).
+    pub fn count(&mut self, tally: Tally) {
+        self.evaluations = self.evaluations.saturating_add(tally.moves);
+        self.work = self.work.saturating_add(tally.work);
+    }
+
+    /// An event if moves already counted have led to a new incumbent of this cost. Returns whether they have.
+    pub fn improve(&mut self, cost: f64) -> bool {
+        let improved = cost < self.incumbent;
+        if improved {
+            self.incumbent = cost;
+            self.report(cost);
+        }
+        improved
+    }
+
+    fn report(&mut self, cost: f64) {
         let Self { evaluations, work, incumbent, .. } = *self;
         let event = Event { evaluations, work, cost, incumbent };
         self.history.push(event);
         self.observer.event(&event);
-        improved
+    }
+
+    /// What the budget still has, without end where it has no limit.
+    pub fn left(&self) -> Quota {
+        let left = |limit: Option<u64>, count| limit.map_or(u64::MAX, |limit| limit.saturating_sub(count));
+        Quota {
+            work: left(self.budget.max_work, self.work),
+            moves: left(self.budget.max_evaluations, self.evaluations),
+        }
+    }
+
+    /// The one who watches, to be asked from other threads.
+    pub fn observer(&self) -> &'a dyn Observer {
+        self.observer
     }
 
     /// Why the search must return now, if it must.
@@ -112,9 +189,8 @@ impl Run<'_> {
 
     /// How many evaluations of `work` nodes each the budget still has, at least one while not stopped.
     pub fn evaluations_left(&self, work: u64) -> u64 {
-        let left = |limit: Option<u64>, count: u64| limit.map_or(u64::MAX, |limit| limit.saturating_sub(count));
-        let by_work = left(self.budget.max_work, self.work).div_ceil(work.max(1));
-        left(self.budget.max_evaluations, self.evaluations).min(by_work).max(u64::from(self.evaluations == 0))
+        let left = self.left();
+        left.moves.min(left.work.div_ceil(work.max(1))).max(u64::from(self.evaluations == 0))
     }
 }
 

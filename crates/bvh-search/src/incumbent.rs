@@ -1,0 +1,46 @@
+//! The best tree of a local search, kept cheaply: converted only when one is really better.
+
+use crate::working::Working;
+use crate::{Problem, Run, SearchError};
+use bvh_build::Builder;
+use bvh_core::{Bvh, cost};
+
+/// The best tree so far. Local search lowers the internal area; for binary trees with one object per leaf every
+/// objective of a [`Problem`] grows with it, so that lowering it lowers them all.
+pub(crate) struct Incumbent<'p> {
+    problem: Problem<'p>,
+    pub tree: Bvh,
+    area: f64,
+}
+
+impl<'p> Incumbent<'p> {
+    /// Builds the start, the first evaluation of the run; also in its working form.
+    pub fn build(
+        builder: &dyn Builder,
+        problem: &Problem<'p>,
+        run: &mut Run,
+    ) -> Result<(Self, Working), SearchError> {
+        Self::begin(builder.build(problem.boxes)?, problem, run)
+    }
+
+    /// Begins with a valid tree.
+    pub fn begin(tree: Bvh, problem: &Problem<'p>, run: &mut Run) -> Result<(Self, Working), SearchError> {
+        let working = Working::from_bvh(&tree, problem.boxes)?;
+        run.record(problem.objective.cost(&tree), tree.nodes.len() as u64);
+        Ok((Self { problem: *problem, area: cost::internal_area(&tree), tree }, working))
+    }
+
+    /// Keeps `tree` if it is better than all before. O(n).
+    pub fn offer(&mut self, tree: &Working, run: &mut Run) -> bool {
+        if tree.area() >= self.area {
+            return false;
+        }
+        let candidate = tree.to_bvh();
+        let improved = run.improve(self.problem.objective.cost(&candidate));
+        if improved {
+            self.area = cost::internal_area(&candidate);
+            self.tree = candidate;
+        }
+        improved
+    }
+}

@@ -1,0 +1,60 @@
+//! Any binary tree in, a better one out: for those who have a builder of their own.
+
+use crate::incumbent::Incumbent;
+use crate::{Budget, Observer, Outcome, Problem, Run, Search, SearchError, portfolio, solve};
+use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate};
+
+/// Improves `tree`, over the objects of `boxes`, by the [portfolio](crate::portfolio) but for its builder, until the
+/// budget is spent or the observer cancels. The result has the same leaves, with as many objects in each; leaves of
+/// several objects are moved as a whole. The cost is the [internal area](bvh_core::cost::internal_area), with boxes made
+/// tight, and never above that of `tree`.
+///
+/// Refuses trees that are not [valid](validate), and inner nodes with more than two children.
+pub fn optimize(
+    tree: &Bvh,
+    boxes: &[Aabb],
+    config: &portfolio::Config,
+    seed: u64,
+    budget: Budget,
+    observer: &dyn Observer,
+) -> Result<Outcome, SearchError> {
+    check_boxes(boxes).map_err(bvh_build::BuildError::from)?;
+    validate(tree, boxes)?;
+    // Every leaf is one object, whose box is the leaf's; so to speak.
+    let (mut tight, mut leaves) = (tree.clone(), Vec::new());
+    tight.refit(boxes);
+    for node in &mut tight.nodes {
+        if let NodeKind::Leaf { .. } = node.kind() {
+            leaves.push((node.aabb, node.prims()));
+            *node = Node::leaf(node.aabb, leaves.len() as u32 - 1, 1);
+        }
+    }
+    tight.prim_ids = (0..leaves.len() as u32).collect();
+    let leaf_boxes: Vec<Aabb> = leaves.iter().map(|(aabb, _)| *aabb).collect();
+    let mut outcome = solve(&From { tree: tight, config }, &Problem::new(&leaf_boxes), seed, budget, observer)?;
+    let mut prim_ids = Vec::with_capacity(boxes.len());
+    for node in &mut outcome.tree.nodes {
+        if let NodeKind::Leaf { first, .. } = node.kind() {
+            let (aabb, prims) = &leaves[outcome.tree.prim_ids[first as usize] as usize];
+            *node = Node::leaf(*aabb, prim_ids.len() as u32, prims.len() as u32);
+            prim_ids.extend_from_slice(&tree.prim_ids[prims.clone()]);
+        }
+    }
+    outcome.tree.prim_ids = prim_ids;
+    Ok(outcome)
+}
+
+/// The portfolio, from a given tree.
+struct From<'a> {
+    tree: Bvh,
+    config: &'a portfolio::Config,
+}
+
+impl Search for From<'_> {
+    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+        self.config.check()?;
+        let (mut best, mut tree) = Incumbent::begin(self.tree.clone(), problem, run)?;
+        self.config.improve(&mut tree, seed, &mut best, run);
+        Ok(best.tree)
+    }
+}

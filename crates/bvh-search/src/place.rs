@@ -1,0 +1,160 @@
+//! The best place for a subtree: branch and bound over all nodes of the tree, exact.
+//!
+//! Placing a box B beside a node X costs the area of the node around both, and what the ancestors of X grow. No place
+//! below X costs less than what X and its ancestors grow plus the area of B, which bounds the search. It begins at a
+//! place that is likely good and looks near it first (Meister & Bittner 2018), so that the bound is low from the start.
+
+use crate::working::{ANCHOR, NONE, Node, Working};
+use bvh_core::PackedAabb;
+
+/// Buffers of a search, and how many nodes it visited.
+#[derive(Debug, Default)]
+pub(crate) struct PlaceSearch {
+    /// From the first place up to the root.
+    path: Vec<Step>,
+    /// Inner nodes whose children are to be looked at, with the growth of everything down to and with them.
+    stack: Vec<(u32, f64)>,
+    /// Nodes visited by all searches so far.
+    pub visits: u64,
+}
+
+/// A node of the path.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    node: u32,
+    /// The child the path came from, `NONE` for the first.
+    below: u32,
+    /// Area of the node's box and B's.
+    joint: f64,
+    /// That, less the node's own area; later with that of all nodes above.
+    growth: f64,
+}
+
+/// A place and what it costs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Place {
+    pub beside: u32,
+    pub cost: f64,
+}
+
+/// What is to be placed: its box and that box's half area.
+type Item<'a> = (&'a PackedAabb, f64);
+
+impl PlaceSearch {
+    /// The cheapest place for a *detached* item, if one costs less than `limit`. Begins at `first`, or at the root if
+    /// `first` is itself detached.
+    #[inline(always)]
+    pub fn detached(&mut self, tree: &Working, item: Item, first: u32, limit: f64) -> Option<Place> {
+        self.path.clear();
+        let (mut at, mut below) = (first, NONE);
+        while at != ANCHOR {
+            if at == NONE {
+                self.path.clear();
+                (at, below) = (tree.nodes[ANCHOR as usize].children[0], NONE);
+            }
+            let node = &tree.nodes[at as usize];
+            let joint = node.aabb.union(item.0).half_area();
+            self.path.push(Step { node: at, below, joint, growth: joint - node.area });
+            (below, at) = (at, node.parent);
+        }
+        let mut best = Place { beside: NONE, cost: limit };
+        self.climb(&mut best);
+        self.search(tree, item, &mut best);
+        (best.beside != NONE).then_some(best)
+    }
+
+    /// The cheapest place for `node`, which stays where it is while the search pretends that it is gone. `None` if no
+    /// place costs less than its own by more than `tolerance` times that. Also returns what its own costs.
+    #[inline(always)]
+    pub fn attached(&mut self, tree: &Working, node: u32, tolerance: f64) -> (Option<Place>, f64) {
+        let Node { aabb, area, parent, .. } = tree.nodes[node as usize];
+        self.path.clear();
+        let sibling = tree.nodes[parent as usize].other(node);
+        let Node { aabb: mut rest, area: rest_area, .. } = tree.nodes[sibling as usize];
+        let Node { area: joint, parent: mut at, .. } = tree.nodes[parent as usize];
+        self.path.push(Step { node: sibling, below: NONE, joint, growth: joint - rest_area });
+        let mut below = parent;
+        while at != ANCHOR {
+            let ancestor = &tree.nodes[at as usize];
+            rest.grow(&tree.nodes[ancestor.other(below) as usize].aabb);
+            let growth = ancestor.area - rest.half_area();
+            self.path.push(Step { node: at, below, joint: ancestor.area, growth });
+            (below, at) = (at, ancestor.parent);
+        }
+        let mut best = Place { beside: NONE, cost: f64::INFINITY };
+        self.climb(&mut best);
+        let own = self.path[0].growth + rest_area;
+        if best.cost >= own * (1.0 - tolerance) || best.beside == sibling {
+            best = Place { beside: NONE, cost: own * (1.0 - tolerance) };
+        }
+        self.search(tree, (&aabb, area), &mut best);
+        ((best.beside != NONE).then_some(best), own)
+    }
+
+    /// Tries the places beside the path's nodes, and sums up their growth.
+    #[inline(always)]
+    fn climb(&mut self, best: &mut Place) {
+        let mut growth = 0.0;
+        for step in self.path.iter_mut().rev() {
+            let cost = growth + step.joint;
+            if cost < best.cost {
+                *best = Place { beside: step.node, cost };
+            }
+            growth += step.growth;
+            step.growth = growth;
+        }
+        self.visits += self.path.len() as u64;
+    }
+
+    /// Looks at everything beside and below the path, from its first node up.
+    #[inline(always)]
+    fn search(&mut self, tree: &Working, item: Item, best: &mut Place) {
+        for &Step { node: at, below, growth, .. } in &self.path {
+            if growth + item.1 >= best.cost {
+                continue;
+            }
+            let node = &tree.nodes[at as usize];
+            if below == NONE {
+                if !node.is_leaf() {
+                    self.stack.push((at, growth));
+                }
+            } else {
+                let other = node.other(below);
+                self.visits += 1;
+                let open = try_place(&tree.nodes[other as usize], other, item.0, growth, best);
+                if open + item.1 < best.cost {
+                    self.stack.push((other, open));
+                }
+            }
+            // Everything below, the more promising child first.
+            while let Some((at, growth)) = self.stack.pop() {
+                if growth + item.1 >= best.cost {
+                    continue;
+                }
+                let [left, right] = tree.nodes[at as usize].children;
+                self.visits += 2;
+                let mut first = (left, try_place(&tree.nodes[left as usize], left, item.0, growth, best));
+                let mut second = (right, try_place(&tree.nodes[right as usize], right, item.0, growth, best));
+                if second.1 < first.1 {
+                    std::mem::swap(&mut first, &mut second);
+                }
+                if second.1 + item.1 < best.cost {
+                    self.stack.push(second);
+                }
+                if first.1 + item.1 < best.cost {
+                    self.stack.push(first);
+                }
+            }
+        }
+    }
+}
+
+/// Tries the place beside a node. Returns the growth down to and with the node, infinite for a leaf.
+#[inline(always)]
+fn try_place(node: &Node, at: u32, aabb: &PackedAabb, growth: f64, best: &mut Place) -> f64 {
+    let cost = growth + node.aabb.union(aabb).half_area();
+    if cost < best.cost {
+        *best = Place { beside: at, cost };
+    }
+    if node.is_leaf() { f64::INFINITY } else { cost - node.area }
+}

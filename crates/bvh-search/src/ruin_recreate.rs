@@ -1,0 +1,257 @@
+//! Annealed ruin and recreate: take several related subtrees out, put each back where it costs least, and accept the
+//! result as in simulated annealing.
+//!
+//! Schrimpf et al. 2000 (ruin and recreate); Kirkpatrick, Gelatt & Vecchi 1983; Shaw 1998 (related removal).
+//! Temperatures are relative to the area that the removal saves, so that one schedule suits nodes of all sizes.
+
+use crate::error::require;
+use crate::incumbent::Incumbent;
+use crate::place::PlaceSearch;
+use crate::reinsertion;
+use crate::stream::{Stream, stream};
+use crate::vector::with_vector_instructions;
+use crate::working::{ANCHOR, Working};
+use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally};
+use bvh_build::muller_fellner;
+use bvh_core::Bvh;
+use rand::RngExt;
+use rand::seq::SliceRandom;
+
+/// What to ruin, how to cool, and for how long.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields, default)
+)]
+pub struct Config {
+    /// The move.
+    pub ruin: Ruin,
+    /// First temperature, relative to the area that a removal saves, above 0. Default 0.1, which suits 8000 nodes of
+    /// work per object or more; less work wants a lower one, in proportion.
+    pub hot: f64,
+    /// Last temperature, above 0 and not above `hot`. Default 0.003.
+    pub cold: f64,
+    /// Work per object, unless the budget has less. Default 10 000.
+    pub work_per_object: u64,
+    /// The builder of the start. Default as for reinsertion.
+    pub start: muller_fellner::Config,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            ruin: Ruin::default(),
+            hot: 0.1,
+            cold: 0.003,
+            work_per_object: 10_000,
+            start: reinsertion::start(),
+        }
+    }
+}
+
+impl Config {
+    fn check(&self) -> Result<(), SearchError> {
+        self.ruin.check()?;
+        require(self.hot.is_finite() && self.hot > 0.0, "hot", self.hot, "above 0")?;
+        require(self.cold > 0.0 && self.cold <= self.hot, "cold", self.cold, "above 0, not above hot")
+    }
+}
+
+/// A move: from a random node, the larger of two, some levels up, and from there several random descents, each to a subtree taken out.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields, default)
+)]
+pub struct Ruin {
+    /// Most levels from the random node up to the top of the ruined part, at least 1. Default 8.
+    pub climb: u32,
+    /// Most subtrees taken out at once, at least 1. Default 14.
+    pub removed: u32,
+}
+
+impl Default for Ruin {
+    fn default() -> Self {
+        Self { climb: 8, removed: 14 }
+    }
+}
+
+impl Ruin {
+    pub(crate) fn check(&self) -> Result<(), SearchError> {
+        require(self.climb >= 1 && self.climb < u32::MAX, "climb", self.climb.into(), "1 to 4294967294")?;
+        require(self.removed >= 1, "removed", self.removed.into(), "1 or more")
+    }
+}
+
+impl Search for Config {
+    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+        self.check()?;
+        let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
+        let mut quota = run.left();
+        quota.work = quota.work.min(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
+        let cooling = Cooling { hot: self.hot, cold: self.cold, quota };
+        let observer = run.observer();
+        anneal(&self.ruin, &cooling, &mut tree, &mut stream(seed, 0), observer, &mut |tree, tally| {
+            run.count(tally);
+            best.offer(tree, run);
+        });
+        Ok(best.tree)
+    }
+}
+
+/// One descent of the temperature.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cooling {
+    /// First temperature.
+    pub hot: f64,
+    /// Last temperature.
+    pub cold: f64,
+    /// The work to be done meanwhile, and the most moves.
+    pub quota: Quota,
+}
+
+/// Work per object after which nodes are laid out anew.
+const WORK_PER_ROUND: u64 = 64;
+
+/// Work per object that is kept for the sweeps, an eighth of all at most.
+const WORK_OF_SWEEPS: u64 = 300;
+
+/// Cools `tree` geometrically, by the part of the work done, then sweeps it to a local optimum. Shows the tree to
+/// `round` along the way, with what was done since the last time.
+pub(crate) fn anneal(
+    ruin: &Ruin,
+    cooling: &Cooling,
+    tree: &mut Working,
+    rng: &mut Stream,
+    observer: &dyn Observer,
+    round: &mut dyn FnMut(&Working, Tally),
+) {
+    let (n, Quota { work, moves }) = (tree.objects() as u64, cooling.quota);
+    if n < 3 {
+        return;
+    }
+    let work = work - (work / 8).min(WORK_OF_SWEEPS.saturating_mul(n));
+    let rounds = (work / (WORK_PER_ROUND * n)).clamp(1, 100);
+    let factor = cooling.cold / cooling.hot;
+    let mut done = Tally::default();
+    for number in 1..=rounds {
+        *tree = tree.in_preorder();
+        let part = |number: u64| number as f64 / rounds as f64;
+        let heat = [number - 1, number].map(|number| cooling.hot * libm::pow(factor, part(number)));
+        let end = Quota { work: (work as f64 * part(number)) as u64, moves };
+        let tally = cool(ruin, tree, heat, end.less(&done), rng, observer);
+        done += tally;
+        round(tree, tally);
+        if observer.cancelled() {
+            return;
+        }
+    }
+    *tree = tree.in_preorder();
+    let tally = reinsertion::to_local_optimum(tree, cooling.quota.less(&done), observer);
+    round(tree, tally);
+}
+
+with_vector_instructions! {
+    /// Moves until the quota is reached, while the temperature falls geometrically from the first to the second.
+    cool = cool_plain(ruin: &Ruin, tree: &mut Working, heat: [f64; 2], quota: Quota, rng: &mut Stream,
+        observer: &dyn Observer) -> Tally
+}
+
+#[inline(always)]
+fn cool_plain(
+    ruin: &Ruin,
+    tree: &mut Working,
+    [hot, cold]: [f64; 2],
+    quota: Quota,
+    rng: &mut Stream,
+    observer: &dyn Observer,
+) -> Tally {
+    let mut tally = Tally::default();
+    let mut mover = Mover::default();
+    let mut temperature = hot;
+    loop {
+        tally.work = mover.work + mover.search.visits;
+        if quota.is_reached(&tally) {
+            return tally;
+        }
+        if tally.moves % 64 == 0 {
+            if observer.cancelled() {
+                return tally;
+            }
+            temperature = hot * libm::pow(cold / hot, tally.work as f64 / quota.work as f64);
+        }
+        tally.kept += u64::from(mover.step(ruin, tree, temperature, rng));
+        tally.moves += 1;
+    }
+}
+
+/// Buffers of moves.
+#[derive(Debug, Default)]
+struct Mover {
+    search: PlaceSearch,
+    /// Roots of the subtrees taken out, each with the sibling it had.
+    out: Vec<(u32, u32)>,
+    /// Nodes visited outside of the search.
+    work: u64,
+}
+
+impl Mover {
+    /// One move: ruins, recreates, and takes it back unless accepted. Returns whether it was.
+    #[inline(always)]
+    fn step(&mut self, ruin: &Ruin, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
+        // The larger of two: large nodes are few, and what they can gain is large.
+        let [a, b] = [(); 2].map(|()| rng.random_range(1..tree.nodes.len() as u32));
+        let mut top = if tree.nodes[b as usize].area > tree.nodes[a as usize].area { b } else { a };
+        let levels = rng.random_range(1..=ruin.climb);
+        let mut above = tree.nodes[top as usize].parent;
+        for _ in 0..levels {
+            if above == ANCHOR {
+                break;
+            }
+            top = above;
+            above = tree.nodes[top as usize].parent;
+        }
+        let Some(side) = tree.nodes[above as usize].children.iter().position(|&child| child == top) else {
+            return false;
+        };
+        let (mut total, mut least) = (0.0, 0.0);
+        tree.begin();
+        self.out.clear();
+        for _ in 0..rng.random_range(1..=ruin.removed) {
+            let mut node = tree.nodes[above as usize].children[side];
+            if tree.nodes[node as usize].is_leaf() {
+                break;
+            }
+            for _ in 0..rng.random_range(1..=levels + 1) {
+                if tree.nodes[node as usize].is_leaf() {
+                    break;
+                }
+                node = tree.nodes[node as usize].children[usize::from(rng.random::<bool>())];
+            }
+            let (saved, sibling, visits) = tree.detach(node);
+            self.work += visits;
+            total += saved;
+            // Every subtree out will cost its own area at least.
+            least += tree.nodes[node as usize].area;
+            self.out.push((node, sibling));
+        }
+        self.out.shuffle(rng);
+        // The dice of Metropolis are cast first: what would lead above the limit need not be finished.
+        let chance = 1.0 - rng.random::<f64>();
+        let mut limit = total * (1.0 - temperature * libm::log(chance)) - least;
+        for &(node, first) in &self.out {
+            let item = &tree.nodes[node as usize];
+            let (aabb, area) = (item.aabb, item.area);
+            limit += area;
+            let Some(place) = self.search.detached(tree, (&aabb, area), first, limit) else {
+                tree.undo();
+                return false;
+            };
+            self.work += tree.attach(node, place.beside).1;
+            limit -= place.cost;
+        }
+        true
+    }
+}

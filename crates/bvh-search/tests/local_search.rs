@@ -1,0 +1,267 @@
+//! Local search against the exact optimum, and the laws that every method of it must obey.
+
+use bvh_build::Builder;
+use bvh_core::{Aabb, Bvh, Node, cost, validate};
+use bvh_search::{
+    Budget, Event, Method, Observer, Outcome, Problem, SearchError, StopReason, optimize, portfolio,
+    reinsertion, ruin_recreate, solve,
+};
+use proptest::prelude::*;
+
+const METHODS: [&str; 3] = ["reinsertion", "ruin_recreate", "best"];
+
+/// The methods under test with their default parameters.
+fn methods() -> impl Iterator<Item = Method> {
+    Method::all().into_iter().filter(|method| METHODS.contains(&method.name()))
+}
+
+/// Boxes of very different sizes in a unit cube.
+fn scatter(n: u32, salt: u32) -> Vec<Aabb> {
+    let hash = |i: u32, k: u32| {
+        let h = (i ^ salt.wrapping_mul(0x9e37_79b9))
+            .wrapping_mul(2_654_435_761)
+            .rotate_left(k)
+            .wrapping_mul(0x85eb_ca6b);
+        (h >> 8) as f32 / (1 << 24) as f32
+    };
+    (0..n)
+        .map(|i| {
+            let low = [hash(i, 3), hash(i, 11), hash(i, 19)];
+            let size = hash(i, 27) * hash(i, 5) * 0.5;
+            Aabb::from((low, std::array::from_fn(|k| low[k] + size * hash(i, 7 + k as u32))))
+        })
+        .collect()
+}
+
+fn work(max_work: u64) -> Budget {
+    Budget { max_work: Some(max_work), ..Budget::default() }
+}
+
+fn run(method: &Method, boxes: &[Aabb], max_work: u64) -> Outcome {
+    let outcome = solve(method, &Problem::new(boxes), 5, work(max_work), &()).unwrap();
+    validate(&outcome.tree, boxes).unwrap();
+    let mut tight = outcome.tree.clone();
+    tight.refit(boxes);
+    assert_eq!(outcome.tree, tight, "{}", method.name());
+    assert_eq!(outcome.cost, cost::internal_area(&outcome.tree), "{}", method.name());
+    outcome
+}
+
+/// The least internal area of all binary trees over `boxes`, by dynamic programming over subsets. O(3^n).
+fn optimum(boxes: &[Aabb]) -> f64 {
+    let mut best = vec![0.0; 1 << boxes.len()];
+    for set in 1usize..1 << boxes.len() {
+        if set.count_ones() > 1 {
+            let members = boxes.iter().enumerate().filter(|(i, _)| set & 1 << i != 0).map(|(_, b)| b);
+            let aabb = members.fold(Aabb::EMPTY, |union, b| union.union(b));
+            let (mut part, mut least) = ((set - 1) & set, f64::INFINITY);
+            while part > 0 {
+                least = f64::min(least, best[part] + best[set ^ part]);
+                part = (part - 1) & set;
+            }
+            best[set] = aabb.half_area() + least;
+        }
+    }
+    best.last().copied().unwrap_or(0.0)
+}
+
+#[test]
+fn no_method_goes_below_the_optimum_and_the_portfolio_reaches_it() {
+    for instance in 0..60 {
+        let boxes = scatter(3 + instance % 6, instance);
+        let optimum = optimum(&boxes);
+        for method in methods() {
+            let cost = run(&method, &boxes, 100_000).cost;
+            assert!(cost >= optimum * (1.0 - 1e-12), "{} {cost} {optimum}", method.name());
+            if method.name() == "best" {
+                assert!(cost <= optimum * (1.0 + 1e-12), "instance {instance}: {cost} {optimum}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_method_improves_on_its_start_and_the_portfolio_most() {
+    let boxes = scatter(2000, 1);
+    let start = cost::internal_area(&reinsertion::Config::default().start.build(&boxes).unwrap());
+    let [reinsertion, annealed, best] = METHODS.map(|name| {
+        let method = methods().find(|method| method.name() == name).unwrap();
+        let outcome = run(&method, &boxes, 8_000_000);
+        assert_eq!(outcome.history[0].cost, start);
+        outcome.cost
+    });
+    assert!(reinsertion < start && annealed < reinsertion && best < reinsertion);
+}
+
+#[test]
+fn the_result_does_not_depend_on_the_number_of_threads() {
+    let boxes = scatter(1500, 2);
+    for method in methods() {
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| run(&method, &boxes, 2_000_000))
+        };
+        let one = on(1);
+        for threads in [2, 3] {
+            let other = on(threads);
+            assert_eq!((&one.tree, &one.history), (&other.tree, &other.history), "{}", method.name());
+        }
+    }
+}
+
+#[test]
+fn scaling_by_powers_of_two_changes_no_topology() {
+    let boxes = scatter(300, 3);
+    for method in methods() {
+        let plain = run(&method, &boxes, 300_000);
+        for k in [-60, 60] {
+            let factor = 2f32.powi(k);
+            let scaled: Vec<Aabb> =
+                boxes.iter().map(|b| Aabb { min: b.min * factor, max: b.max * factor }).collect();
+            let outcome = run(&method, &scaled, 300_000);
+            assert_eq!(outcome.tree.prim_ids, plain.tree.prim_ids, "{} {k}", method.name());
+            assert_eq!(outcome.cost, plain.cost * f64::from(factor).powi(2), "{} {k}", method.name());
+        }
+    }
+}
+
+#[test]
+fn degenerate_scenes_give_valid_trees_of_finite_cost() {
+    let point = |x: f32| Aabb::from(([x, 0.0, 0.0], [x, 0.0, 0.0]));
+    let cube = |x: f32, size: f32| Aabb::from(([x; 3], [x + size; 3]));
+    let scenes: [Vec<Aabb>; 10] = [
+        vec![],
+        scatter(1, 1),
+        scatter(2, 1),
+        scatter(3, 1),
+        vec![cube(0.0, 1.0); 500],
+        vec![point(0.0); 500],
+        (0..500u16).map(|i| point(i.into())).collect(),
+        (1..120).map(|k| cube(0.0, 2f32.powi(k))).collect(),
+        (1..500u16).map(|i| cube(f32::from(i) * 1e-40, 1e-41)).collect(),
+        vec![Aabb { min: [f32::MIN; 3].into(), max: [f32::MAX; 3].into() }; 50],
+    ];
+    for (number, boxes) in scenes.iter().enumerate() {
+        for method in methods() {
+            let outcome = run(&method, boxes, 200_000);
+            assert!(outcome.cost.is_finite() && outcome.cost >= 0.0, "scene {number} {}", method.name());
+        }
+    }
+}
+
+#[test]
+fn budgets_end_a_search_where_they_say() {
+    let boxes = scatter(1000, 4);
+    for method in methods() {
+        for max_work in [0, 1, 5_000, 100_000] {
+            let outcome = run(&method, &boxes, max_work);
+            // One move more at most, or the start alone.
+            assert!(outcome.work <= max_work.max(1999) + 2000, "{} {max_work} {}", method.name(), outcome.work);
+        }
+        let budget = Budget { max_evaluations: Some(777), ..Budget::default() };
+        let outcome = solve(&method, &Problem::new(&boxes), 1, budget, &()).unwrap();
+        assert!((777..=778).contains(&outcome.evaluations), "{} {}", method.name(), outcome.evaluations);
+        assert_eq!(outcome.stop, StopReason::Evaluations);
+    }
+}
+
+#[test]
+fn a_cancelled_search_returns_what_it_has() {
+    struct AfterTheStart(std::sync::atomic::AtomicBool);
+    impl Observer for AfterTheStart {
+        fn event(&self, _: &Event) {
+            self.0.store(true, std::sync::atomic::Ordering::Relaxed);
+        }
+        fn cancelled(&self) -> bool {
+            self.0.load(std::sync::atomic::Ordering::Relaxed)
+        }
+    }
+    let boxes = scatter(1000, 4);
+    for method in methods() {
+        let observer = AfterTheStart(false.into());
+        let outcome = solve(&method, &Problem::new(&boxes), 1, Budget::default(), &observer).unwrap();
+        assert_eq!(outcome.stop, StopReason::Cancelled, "{}", method.name());
+        validate(&outcome.tree, &boxes).unwrap();
+    }
+}
+
+/// Every inner node has a leaf on its left: as deep as a tree can be.
+fn chain(boxes: &[Aabb]) -> Bvh {
+    let n = boxes.len() as u32;
+    let mut nodes = vec![Node::inner(Aabb::EMPTY, 1, 2)];
+    for i in 0..n - 1 {
+        nodes.push(Node::leaf(Aabb::EMPTY, i, 1));
+        nodes.push(if i + 2 < n {
+            Node::inner(Aabb::EMPTY, 2 * i + 3, 2)
+        } else {
+            Node::leaf(Aabb::EMPTY, i + 1, 1)
+        });
+    }
+    let mut tree = Bvh { nodes, prim_ids: (0..n).collect() };
+    tree.refit(boxes);
+    tree
+}
+
+#[test]
+fn the_deepest_tree_can_be_optimised() {
+    let boxes = scatter(3000, 5);
+    let tree = chain(&boxes);
+    let outcome = optimize(&tree, &boxes, &portfolio::Config::default(), 1, work(20_000_000), &()).unwrap();
+    validate(&outcome.tree, &boxes).unwrap();
+    assert!(outcome.cost < cost::internal_area(&tree) / 4.0);
+}
+
+#[test]
+fn leaves_of_several_objects_are_kept_and_other_trees_refused_by_name() {
+    let boxes = scatter(400, 6);
+    let pairs: Vec<Aabb> = boxes.chunks(2).map(|pair| pair[0].union(&pair[1])).collect();
+    let mut tree = reinsertion::Config::default().start.build(&pairs).unwrap();
+    for node in &mut tree.nodes {
+        if node.is_leaf() {
+            *node = Node::leaf(node.aabb, 2 * node.prims().start as u32, 2);
+        }
+    }
+    tree.prim_ids = tree.prim_ids.iter().flat_map(|&pair| [2 * pair, 2 * pair + 1]).collect();
+    let config = portfolio::Config::default();
+    let outcome = optimize(&tree, &boxes, &config, 1, work(1_000_000), &()).unwrap();
+    validate(&outcome.tree, &boxes).unwrap();
+    assert_eq!(outcome.tree.inner_count(), tree.inner_count());
+    assert_eq!(outcome.cost, cost::internal_area(&outcome.tree));
+    assert!(outcome.cost < cost::internal_area(&tree));
+
+    let refused = |tree: &Bvh, boxes: &[Aabb]| optimize(tree, boxes, &config, 1, work(0), &()).unwrap_err();
+    let mut flat = Bvh { nodes: vec![Node::inner(Aabb::EMPTY, 1, 3)], prim_ids: vec![0, 1, 2] };
+    flat.nodes.extend((0..3).map(|i| Node::leaf(Aabb::EMPTY, i, 1)));
+    flat.refit(&boxes[..3]);
+    assert_eq!(refused(&flat, &boxes[..3]), SearchError::NotBinary { node: 0, children: 3 });
+    assert!(matches!(refused(&flat, &boxes[..2]), SearchError::Invalid(_)));
+}
+
+#[test]
+fn parameters_outside_their_range_are_named() {
+    let problem = Problem::new(&[]);
+    let refused = |method: Method| solve(&method, &problem, 1, Budget::default(), &()).unwrap_err().to_string();
+    let cold = ruin_recreate::Config { cold: 1.0, ..Default::default() };
+    assert_eq!(refused(Method::RuinRecreate(cold)), "cold is 1; accepted: above 0, not above hot");
+    let sweeps = reinsertion::Config { sweeps: 0, ..Default::default() };
+    assert_eq!(refused(Method::Reinsertion(sweeps)), "sweeps is 0; accepted: 1 or more");
+    let chains = portfolio::Config { chains: 0, ..Default::default() };
+    assert_eq!(refused(Method::Best(chains)), "chains is 0; accepted: 1 to 64");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+    #[test]
+    fn no_scene_ends_above_its_start(n in 0u32..200, salt: u32, quantum in 1u32..20) {
+        // Coarse coordinates: many ties, coincident boxes and zero extents.
+        let round = |c: f32| (c * quantum as f32).floor();
+        let boxes: Vec<Aabb> = scatter(n, salt)
+            .iter()
+            .map(|b| Aabb { min: b.min.to_array().map(round).into(), max: b.max.to_array().map(round).into() })
+            .collect();
+        for method in methods() {
+            let outcome = run(&method, &boxes, 50_000);
+            prop_assert!(outcome.cost <= outcome.history[0].cost);
+        }
+    }
+}
