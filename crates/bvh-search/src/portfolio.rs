@@ -8,7 +8,7 @@
 use crate::error::require;
 use crate::fusing::fuse;
 use crate::incumbent::Incumbent;
-use crate::ruin_recreate::{Cooling, Ruin, anneal};
+use crate::ruin_recreate::{Cooling, Ruin, Scale, anneal};
 use crate::stream::stream;
 use crate::working::Working;
 use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally, reinsertion};
@@ -41,7 +41,7 @@ pub struct Config {
     pub hottest: f64,
     /// Last temperature, above 0. Default 0.003.
     pub cold: f64,
-    /// The move.
+    /// The move; its `scale` is the chain's, in turns `saved` and `top`.
     pub ruin: Ruin,
     /// The builder of the start. Default as for reinsertion.
     pub start: muller_fellner::Config,
@@ -141,7 +141,10 @@ impl Config {
         let chain = |number: u64| {
             let mut rng = stream(seed, generation * chains + number);
             let (mut tree, mut done) = (tree.clone(), Tally::default());
-            anneal(&self.ruin, &cooling, &mut tree, &mut rng, observer, &mut |_, tally| done += tally);
+            // Which scale of temperatures is the better one depends on the scene: every other chain takes the other.
+            let scale = if number % 2 == 0 { Scale::Saved } else { Scale::Top };
+            let ruin = Ruin { scale, ..self.ruin.clone() };
+            anneal(&ruin, &cooling, &mut tree, &mut rng, observer, &mut |_, tally| done += tally);
             (tree, done)
         };
         #[cfg(feature = "rayon")]
