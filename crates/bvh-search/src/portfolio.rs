@@ -142,7 +142,7 @@ impl Config {
             let mut rng = stream(seed, generation * chains + number);
             let (mut tree, mut done) = (tree.clone(), Tally::default());
             // Which scale of temperatures is the better one depends on the scene: every other chain takes the other.
-            let scale = if number % 2 == 0 { Scale::Saved } else { Scale::Top };
+            let scale = if number.is_multiple_of(2) { Scale::Saved } else { Scale::Top };
             let ruin = Ruin { scale, ..self.ruin.clone() };
             anneal(&ruin, &cooling, &mut tree, &mut rng, observer, &mut |_, tally| done += tally);
             (tree, done)
