@@ -5,6 +5,10 @@
 //! forget to. [`solve`] starts a search and returns its [`Outcome`]. Searches read no clock and hold no global
 //! state; the same seed gives the same outcome on any number of threads.
 //!
+//! [`portfolio`], called `best`, is the one to take; [`optimize()`] applies it to a tree made elsewhere. Local search
+//! minimises the internal area of binary trees with one object per leaf. For these every objective of a [`Problem`] is
+//! a constant plus a multiple of it, so all of them fall together.
+//!
 //! ```
 //! use bvh_core::Aabb;
 //! use bvh_search::{Problem, Budget, grasp, solve};

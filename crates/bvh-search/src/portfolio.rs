@@ -8,7 +8,7 @@
 use crate::error::require;
 use crate::fusing::fuse;
 use crate::incumbent::Incumbent;
-use crate::ruin_recreate::{Cooling, Ruin, anneal};
+use crate::ruin_recreate::{Cooling, Ruin, Scale, anneal};
 use crate::stream::stream;
 use crate::working::Working;
 use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally, reinsertion};
@@ -23,12 +23,15 @@ use bvh_core::Bvh;
     serde(deny_unknown_fields, default)
 )]
 pub struct Config {
-    /// Work per object of the first generation, at least 1. Default 1500. Without a budget of work that is how it
-    /// is; with one, all generations are stretched so that they fill it.
+    /// Work per object of the first generation, at least 1. Default 1500. When the budget limits the work, all
+    /// generations are stretched so that they fill it.
     pub first: f64,
-    /// How many times longer every generation is than the one before, at least 1. Default 1.5.
+    /// How many times longer every generation is than the one before, at least 1, when the budget does not limit the
+    /// work, so that the search may be cancelled at any time. Default 2.
     pub growth: f64,
-    /// Work per object of all generations together, unless the budget has less. Default 200 000.
+    /// The same when it does: few long generations are better if the end is known. Default 4.
+    pub growth_to_end: f64,
+    /// Work per object of all generations together, unless the budget has less. Default 1 000 000.
     pub work_per_object: u64,
     /// Independent chains per generation, which is also how many threads can help, 1 to 64. Default 2.
     pub chains: u32,
@@ -38,7 +41,7 @@ pub struct Config {
     pub hottest: f64,
     /// Last temperature, above 0. Default 0.003.
     pub cold: f64,
-    /// The move.
+    /// The move; its `scale` is the chain's, in turns `saved` and `top`.
     pub ruin: Ruin,
     /// The builder of the start. Default as for reinsertion.
     pub start: muller_fellner::Config,
@@ -48,8 +51,9 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             first: 1500.0,
-            growth: 1.5,
-            work_per_object: 200_000,
+            growth: 2.0,
+            growth_to_end: 4.0,
+            work_per_object: 1_000_000,
             chains: 2,
             heat: 0.013,
             hottest: 0.1,
@@ -63,7 +67,9 @@ impl Default for Config {
 impl Config {
     pub(crate) fn check(&self) -> Result<(), SearchError> {
         require(self.first >= 1.0 && self.first.is_finite(), "first", self.first, "1 or more")?;
-        require(self.growth >= 1.0 && self.growth.is_finite(), "growth", self.growth, "1 or more")?;
+        for (name, found) in [("growth", self.growth), ("growth_to_end", self.growth_to_end)] {
+            require(found >= 1.0 && found.is_finite(), name, found, "1 or more")?;
+        }
         require((1..=64).contains(&self.chains), "chains", self.chains.into(), "1 to 64")?;
         for (name, found) in [("heat", self.heat), ("hottest", self.hottest), ("cold", self.cold)] {
             require(found > 0.0 && found.is_finite(), name, found, "above 0")?;
@@ -79,14 +85,17 @@ impl Config {
         }
         run.count(reinsertion::to_local_optimum(tree, run.left(), run.observer()));
         best.offer(tree, run);
-        let mut left = self.work_per_object.saturating_mul(n).min(run.left().work);
-        let lengths = self.lengths(left as f64 / n as f64);
+        let own = self.work_per_object.saturating_mul(n);
+        let budget = run.left().work;
+        let mut left = own.min(budget);
+        let lengths = self.lengths(left as f64 / n as f64, budget <= own);
         let last = lengths.len() - 1;
         for (generation, length) in lengths.into_iter().enumerate() {
             if run.stopped().is_some() {
                 break;
             }
-            let work = if generation == last { left } else { left.min((length * n as f64) as u64) };
+            let work =
+                if generation == last && budget <= own { left } else { left.min((length * n as f64) as u64) };
             let quota = Quota { work, moves: run.left().moves };
             let tally = self.generation(tree, generation as u64, quota, seed, run.observer());
             left = left.saturating_sub(tally.work);
@@ -95,19 +104,23 @@ impl Config {
         }
     }
 
-    /// The generations' lengths, stretched to fill `work`, all per object.
-    fn lengths(&self, work: f64) -> Vec<f64> {
+    /// The generations' lengths, per object, of `work` together, which they fill if it is limited.
+    fn lengths(&self, work: f64, limited: bool) -> Vec<f64> {
+        let growth = if limited { self.growth_to_end } else { self.growth };
         let mut lengths = vec![];
         let (mut next, mut sum) = (self.first, 0.0);
         while sum + next <= work && lengths.len() < MOST_GENERATIONS {
             lengths.push(next);
             sum += next;
-            next *= self.growth;
+            next *= growth;
         }
         if lengths.is_empty() {
             (lengths, sum) = (vec![work], work);
         }
-        lengths.iter().map(|length| length * (work / sum)).collect()
+        if limited && sum > 0.0 {
+            lengths.iter_mut().for_each(|length| *length *= work / sum);
+        }
+        lengths
     }
 
     /// Anneals in chains and fuses.
@@ -128,7 +141,10 @@ impl Config {
         let chain = |number: u64| {
             let mut rng = stream(seed, generation * chains + number);
             let (mut tree, mut done) = (tree.clone(), Tally::default());
-            anneal(&self.ruin, &cooling, &mut tree, &mut rng, observer, &mut |_, tally| done += tally);
+            // Which scale of temperatures is the better one depends on the scene: every other chain takes the other.
+            let scale = if number.is_multiple_of(2) { Scale::Saved } else { Scale::Top };
+            let ruin = Ruin { scale, ..self.ruin.clone() };
+            anneal(&ruin, &cooling, &mut tree, &mut rng, observer, &mut |_, tally| done += tally);
             (tree, done)
         };
         #[cfg(feature = "rayon")]

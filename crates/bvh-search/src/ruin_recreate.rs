@@ -2,7 +2,7 @@
 //! result as in simulated annealing.
 //!
 //! Schrimpf et al. 2000 (ruin and recreate); Kirkpatrick, Gelatt & Vecchi 1983; Shaw 1998 (related removal).
-//! Temperatures are relative to the area that the removal saves, so that one schedule suits nodes of all sizes.
+//! Temperatures are relative to an area of the move, so that one schedule suits nodes of all sizes.
 
 use crate::error::require;
 use crate::incumbent::Incumbent;
@@ -27,7 +27,7 @@ use rand::seq::SliceRandom;
 pub struct Config {
     /// The move.
     pub ruin: Ruin,
-    /// First temperature, relative to the area that a removal saves, above 0. Default 0.1, which suits 8000 nodes of
+    /// First temperature, relative to the move's `scale`, above 0. Default 0.1, which suits 8000 nodes of
     /// work per object or more; less work wants a lower one, in proportion.
     pub hot: f64,
     /// Last temperature, above 0 and not above `hot`. Default 0.003.
@@ -70,11 +70,24 @@ pub struct Ruin {
     pub climb: u32,
     /// Most subtrees taken out at once, at least 1. Default 14.
     pub removed: u32,
+    /// What temperatures are relative to. Default `saved`.
+    pub scale: Scale,
+}
+
+/// What the temperature of a move is relative to, so that one schedule suits nodes of all sizes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum Scale {
+    /// The area that the removal saves.
+    #[default]
+    Saved,
+    /// The area of the top of the ruined part.
+    Top,
 }
 
 impl Default for Ruin {
     fn default() -> Self {
-        Self { climb: 8, removed: 14 }
+        Self { climb: 8, removed: 14, scale: Scale::Saved }
     }
 }
 
@@ -216,6 +229,7 @@ impl Mover {
         let Some(side) = tree.nodes[above as usize].children.iter().position(|&child| child == top) else {
             return false;
         };
+        let top_area = tree.nodes[top as usize].area;
         let (mut total, mut least) = (0.0, 0.0);
         tree.begin();
         self.out.clear();
@@ -240,7 +254,11 @@ impl Mover {
         self.out.shuffle(rng);
         // The dice of Metropolis are cast first: what would lead above the limit need not be finished.
         let chance = 1.0 - rng.random::<f64>();
-        let mut limit = total * (1.0 - temperature * libm::log(chance)) - least;
+        let scale = match ruin.scale {
+            Scale::Saved => total,
+            Scale::Top => top_area,
+        };
+        let mut limit = total - temperature * scale * libm::log(chance) - least;
         for &(node, first) in &self.out {
             let item = &tree.nodes[node as usize];
             let (aabb, area) = (item.aabb, item.area);
