@@ -35,6 +35,7 @@ mod stack;
 mod traverse;
 mod triangle;
 mod validate;
+mod vector;
 
 pub use aabb::{Aabb, InvalidBox, InvalidBoxReason, check_boxes};
 pub use bvh::{Bvh, MAX_OBJECTS, Node, NodeKind};

@@ -177,8 +177,9 @@ fn mutate(individual: &mut Individual, mean: f64, rng: &mut Stream) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scatter::scatter;
     use crate::{Budget, solve};
-    use bvh_core::{Aabb, cost::Objective};
+    use bvh_core::cost::Objective;
     use proptest::prelude::*;
 
     fn is_permutation(order: &[u32], n: usize) -> bool {
@@ -212,16 +213,6 @@ mod tests {
             prop_assert!(is_permutation(&individual.order, n));
             prop_assert!(individual.order == before || !individual.evaluated, "a change asks for an evaluation");
         }
-    }
-
-    fn scatter(n: u32) -> Vec<Aabb> {
-        let hash = |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 65_521) as f32;
-        (0..n)
-            .map(|i| {
-                let low = [hash(i, 3), hash(i, 11), hash(i, 19)];
-                Aabb::from((low, low.map(|c| c + hash(i, 27) / 32.0)))
-            })
-            .collect()
     }
 
     #[test]

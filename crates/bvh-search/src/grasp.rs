@@ -161,19 +161,10 @@ impl SplitRule for Randomised {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scatter::scatter;
     use crate::{Budget, solve};
     use bvh_build::Builder;
-    use bvh_core::{Aabb, validate};
-
-    fn scatter(n: u32) -> Vec<Aabb> {
-        let hash = |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 65_521) as f32;
-        (0..n)
-            .map(|i| {
-                let low = [hash(i, 3), hash(i, 11), hash(i, 19)];
-                Aabb::from((low, low.map(|c| c + hash(i, 27) / 32.0)))
-            })
-            .collect()
-    }
+    use bvh_core::validate;
 
     fn configs() -> [Config; 5] {
         let config = |candidates, noise| Config { trials: 12, candidates, noise, ..Config::default() };

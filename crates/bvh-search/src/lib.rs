@@ -39,8 +39,9 @@ mod registry;
 pub mod reinsertion;
 pub mod ruin_recreate;
 mod run;
+#[cfg(test)]
+mod scatter;
 mod stream;
-mod vector;
 mod working;
 
 pub use budget::{Budget, StopReason};

@@ -10,11 +10,11 @@ use crate::incumbent::Incumbent;
 use crate::place::PlaceSearch;
 use crate::run::Tally;
 use crate::stream::stream;
-use crate::vector::with_vector_instructions;
 use crate::working::{ANCHOR, Working};
 use crate::{Observer, Problem, Quota, Run, Search, SearchError};
 use bvh_build::muller_fellner;
 use bvh_core::Bvh;
+use bvh_core::with_vector_instructions;
 use rand::seq::SliceRandom;
 
 /// In which order to try the nodes, how often, and from where.

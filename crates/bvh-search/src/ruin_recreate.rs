@@ -9,11 +9,11 @@ use crate::incumbent::Incumbent;
 use crate::place::PlaceSearch;
 use crate::reinsertion;
 use crate::stream::{Stream, stream};
-use crate::vector::with_vector_instructions;
 use crate::working::{ANCHOR, Working};
 use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally};
 use bvh_build::muller_fellner;
 use bvh_core::Bvh;
+use bvh_core::with_vector_instructions;
 use rand::RngExt;
 use rand::seq::SliceRandom;
 

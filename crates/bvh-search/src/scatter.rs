@@ -1,0 +1,14 @@
+//! A scene for the unit tests of searches.
+
+use bvh_core::Aabb;
+
+/// A reproducible scatter of `n` small boxes.
+pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
+    let hash = |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 65_521) as f32;
+    (0..n)
+        .map(|i| {
+            let low = [hash(i, 3), hash(i, 11), hash(i, 19)];
+            Aabb::from((low, low.map(|c| c + hash(i, 27) / 32.0)))
+        })
+        .collect()
+}
