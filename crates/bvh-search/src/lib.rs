@@ -31,6 +31,7 @@ pub mod genetic;
 pub mod grasp;
 mod incumbent;
 mod insertion_orders;
+pub mod lower_bound;
 mod optimize;
 mod place;
 pub mod portfolio;

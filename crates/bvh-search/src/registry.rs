@@ -55,6 +55,8 @@ methods! {
     "reinsertion" => Reinsertion(crate::reinsertion::Config),
     /// Annealed ruin and recreate.
     "ruin_recreate" => RuinRecreate(crate::ruin_recreate::Config),
+    /// The exact optimum of small scenes.
+    "exact" => Exact(crate::exact::Config),
     /// All that pays, in the order that pays.
     "best" => Best(crate::portfolio::Config),
 }

@@ -1,0 +1,327 @@
+//! The smallest box around an object and enough others: branch and bound over its six faces, stopped at any time.
+
+use bvh_build::median_cut::{Config, CutAxis};
+use bvh_build::{BuildError, Builder};
+use bvh_core::{Aabb, Bvh, NodeKind, with_vector_instructions};
+use std::ops::Range;
+
+/// How far a box reaches in six directions, as −min and max, each padded to four lanes. A box contains an object if it
+/// reaches as far in all; the union of boxes is the maximum, and the minimum over several objects is how far a box with
+/// any of them reaches at least.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(32))]
+struct Reach([f32; 8]);
+
+impl Reach {
+    #[inline(always)]
+    fn union(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(
+            |face| if other.0[face] > self.0[face] { other.0[face] } else { self.0[face] },
+        ))
+    }
+
+    #[inline(always)]
+    fn common(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(
+            |face| if other.0[face] < self.0[face] { other.0[face] } else { self.0[face] },
+        ))
+    }
+
+    /// The least half area of a box that reaches so far; rounded as [`Aabb::half_area`], hence just as monotone.
+    #[inline(always)]
+    fn half_area(&self) -> f64 {
+        let extent = |axis: usize| f64::max(f64::from(self.0[axis + 4]) + f64::from(self.0[axis]), 0.0);
+        let [x, y, z] = [extent(0), extent(1), extent(2)];
+        x * y + y * z + z * x
+    }
+}
+
+impl From<&Aabb> for Reach {
+    fn from(b: &Aabb) -> Self {
+        let ([a, b, c], [d, e, f]) = (b.min.to_array(), b.max.to_array());
+        Self([-a, -b, -c, 0.0, d, e, f, 0.0])
+    }
+}
+
+/// A node of the tree in which neighbours are looked up.
+#[derive(Clone, Debug)]
+struct Part {
+    /// Its objects, in tree order.
+    objects: Range<usize>,
+    /// The root is its own.
+    parent: usize,
+    /// The first of two; 0 for leaves.
+    children: usize,
+    /// Common to all its objects.
+    reach: Reach,
+    /// Of the box around all its objects.
+    half_area: f64,
+}
+
+/// The objects in the order of a balanced tree over them, with weights.
+pub(super) struct Scene {
+    parts: Vec<Part>,
+    leaves: Vec<usize>,
+    /// Of all objects before each, and of all.
+    weight_before: Vec<u64>,
+}
+
+/// Parts of at most this part of the size that is asked for are in a box as soon as one of their objects is.
+const PARTS_PER_SIZE: u64 = 128;
+
+/// Areas of smallest boxes with at least a certain weight, for groups of objects.
+pub(super) struct Grouped {
+    pub from: u64,
+    /// One past the last object, and the area.
+    groups: Vec<(usize, f64)>,
+}
+
+impl Grouped {
+    /// The area for one object.
+    pub fn area(&self, at: usize) -> f64 {
+        self.groups.get(self.groups.partition_point(|group| group.0 <= at)).map_or(0.0, |group| group.1)
+    }
+}
+
+impl Scene {
+    /// Every object weighs 1. Refuses what no builder accepts. O(n log n).
+    pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
+        let tree = Config { axis: CutAxis::Longest, ..Config::default() }.build(boxes)?;
+        let reaches: Vec<Reach> = tree.prim_ids.iter().map(|&id| Reach::from(&boxes[id as usize])).collect();
+        let parts = parts(&tree, &reaches);
+        let mut leaves = vec![0; boxes.len()];
+        for (index, part) in parts.iter().enumerate().filter(|(_, part)| part.children == 0) {
+            leaves[part.objects.start] = index;
+        }
+        let mut scene = Self { parts, leaves, weight_before: vec![] };
+        scene.set_weights(&vec![1; boxes.len()]);
+        Ok(scene)
+    }
+
+    /// In tree order.
+    pub fn set_weights(&mut self, weights: &[u64]) {
+        let mut total = 0;
+        let before = weights.iter().map(|weight| {
+            total += weight;
+            total
+        });
+        self.weight_before = std::iter::once(0).chain(before).collect();
+    }
+
+    /// Of all objects.
+    pub fn weight(&self) -> u64 {
+        self.weight_before.last().copied().unwrap_or(0)
+    }
+
+    /// Half area of the box around all.
+    pub fn area(&self) -> f64 {
+        self.parts.first().map_or(0.0, |root| root.half_area)
+    }
+
+    /// The part of a single object.
+    pub fn leaf(&self, at: usize) -> usize {
+        self.leaves[at]
+    }
+
+    fn weight_of(&self, objects: &Range<usize>) -> u64 {
+        self.weight_before[objects.end] - self.weight_before[objects.start]
+    }
+
+    /// The largest parts that weigh at most so much or are single objects, in tree order.
+    pub fn groups(&self, most: u64) -> Vec<usize> {
+        let (mut groups, mut stack) = (vec![], vec![0]);
+        while let Some(index) = stack.pop() {
+            let part = &self.parts[index];
+            if part.children == 0 || self.weight_of(&part.objects) <= most {
+                groups.push(index);
+            } else {
+                stack.extend([part.children + 1, part.children]);
+            }
+        }
+        groups
+    }
+
+    /// Areas of groups, to be looked up by object.
+    pub fn grouped(&self, from: u64, groups: &[usize], areas: &[f64]) -> Grouped {
+        let end = |&group: &usize| self.parts[group].objects.end;
+        Grouped { from, groups: groups.iter().map(end).zip(areas.iter().copied()).collect() }
+    }
+
+    /// At most the half area of every box that contains an object of the part `seed` and weighs at least `weight`, which must
+    /// not be more than all objects do; exactly the least such area for a single object and enough effort.
+    pub fn smallest_box(&self, seed: usize, weight: u64, effort: u32) -> f64 {
+        search(self, seed, weight, effort)
+    }
+}
+
+/// The nodes with what is known of their objects. Parents come before children.
+fn parts(tree: &Bvh, reaches: &[Reach]) -> Vec<Part> {
+    let mut parts: Vec<Part> = Vec::with_capacity(tree.nodes.len());
+    for node in &tree.nodes {
+        let (children, objects) = match node.kind() {
+            NodeKind::Inner { first, .. } => (first as usize, 0..0),
+            NodeKind::Leaf { .. } => (0, node.prims()),
+        };
+        let reach = reaches[objects.start];
+        parts.push(Part { objects, parent: 0, children, reach, half_area: node.aabb.half_area() });
+    }
+    for index in (0..parts.len()).rev() {
+        let first = parts[index].children;
+        if first != 0 {
+            let (left, right) = (&parts[first], &parts[first + 1]);
+            let objects = left.objects.start..right.objects.end;
+            let reach = left.reach.common(&right.reach);
+            parts[first].parent = index;
+            parts[first + 1].parent = index;
+            parts[index] = Part { objects, reach, ..parts[index].clone() };
+        }
+    }
+    parts
+}
+
+/// A part that a box may contain.
+#[derive(Clone, Copy)]
+struct Member {
+    /// The half area of the box around it and what must be inside.
+    area: f64,
+    part: u32,
+    weight: u32,
+}
+
+/// All boxes that contain `must`, have nothing but `members`, weigh enough, and are smaller than one that is known.
+struct Region {
+    must: Reach,
+    members: Vec<Member>,
+    /// As many of the members, those that need the least area, weigh enough.
+    enough: usize,
+    /// The area that the last of these needs: no box of the region is smaller.
+    bound: f64,
+}
+
+impl Region {
+    /// `None` if it has no box smaller than `known`, which becomes the area of the best box found.
+    #[inline(always)]
+    fn new(
+        scene: &Scene,
+        must: Reach,
+        members: impl Iterator<Item = Member>,
+        weight: u64,
+        known: &mut f64,
+    ) -> Option<Self> {
+        let with = |member: Member| {
+            let area = must.union(&scene.parts[member.part as usize].reach).half_area();
+            Member { area, ..member }
+        };
+        let mut members: Vec<Member> = members.map(with).filter(|member| member.area < *known).collect();
+        let weigh = |members: &[Member]| members.iter().map(|member| u64::from(member.weight)).sum::<u64>();
+        if weigh(&members) < weight {
+            return None;
+        }
+        // The fewest that weigh enough end within `low..high`; all before `low` are among them.
+        let (mut low, mut high, mut missing) = (0, members.len(), weight);
+        while high - low > 1 {
+            let half = (high - low) / 2;
+            let by_area = |a: &Member, b: &Member| a.area.total_cmp(&b.area).then(a.part.cmp(&b.part));
+            members[low..high].select_nth_unstable_by(half, by_area);
+            let lower = weigh(&members[low..low + half]);
+            if lower >= missing {
+                high = low + half;
+            } else {
+                missing -= lower;
+                low += half;
+            }
+        }
+        let bound = members[low].area;
+        let region = Self { must, members, enough: low + 1, bound };
+        *known = known.min(region.around(scene).half_area());
+        Some(region)
+    }
+
+    /// How far the members reach that need the least area and weigh enough.
+    #[inline(always)]
+    fn nearest<'a>(&'a self, scene: &'a Scene) -> impl Iterator<Item = &'a Reach> {
+        self.members[..self.enough].iter().map(|member| &scene.parts[member.part as usize].reach)
+    }
+
+    /// The box around them, a good one of the region.
+    #[inline(always)]
+    fn around(&self, scene: &Scene) -> Reach {
+        self.nearest(scene).fold(self.must, |union, reach| union.union(reach))
+    }
+
+    /// Where to divide: the face whose move from `must` to the best box of the region costs most area, at the middle
+    /// of the reaches that it passes.
+    fn division(&self, scene: &Scene) -> Option<(usize, f32)> {
+        let around = self.around(scene);
+        let mut best = None;
+        for face in [0, 1, 2, 4, 5, 6] {
+            let mut moved = self.must;
+            moved.0[face] = around.0[face];
+            let gain = (moved.half_area(), around.0[face] - self.must.0[face]);
+            if gain.1 > 0.0 && best.is_none_or(|(least, _)| gain > least) {
+                best = Some((gain, face));
+            }
+        }
+        let (_, face) = best?;
+        let mut passed: Vec<f32> =
+            self.nearest(scene).map(|reach| reach.0[face]).filter(|&reach| reach > self.must.0[face]).collect();
+        let middle = passed.len() / 2;
+        passed.select_nth_unstable_by(middle, f32::total_cmp);
+        Some((face, passed[middle]))
+    }
+}
+
+with_vector_instructions! {
+    search = search_plain(scene: &Scene, seed: usize, weight: u64, effort: u32) -> f64
+}
+
+#[inline(always)]
+fn search_plain(scene: &Scene, seed: usize, weight: u64, effort: u32) -> f64 {
+    let mut around = seed;
+    while around != 0 && scene.weight_of(&scene.parts[around].objects) < weight {
+        around = scene.parts[around].parent;
+    }
+    let mut known = scene.parts[around].half_area;
+    let must = scene.parts[seed].reach;
+    let members = neighbours(scene, &must, weight / PARTS_PER_SIZE, known);
+    // Regions without smaller boxes are gone; the others together hold all of them.
+    let mut regions: Vec<Region> =
+        Region::new(scene, must, members.into_iter(), weight, &mut known).into_iter().collect();
+    let mut left = regions.iter().map(|region| region.members.len() as u64).sum::<u64>() * u64::from(effort);
+    loop {
+        let least = (0..regions.len()).min_by(|&a, &b| regions[a].bound.total_cmp(&regions[b].bound));
+        let Some(least) = least.filter(|&least| regions[least].bound < known) else { return known };
+        if left == 0 {
+            return regions[least].bound;
+        }
+        let region = regions.swap_remove(least);
+        left = left.saturating_sub(2 * region.members.len() as u64);
+        let Some((face, at)) = region.division(scene) else { return region.bound };
+        let members = || region.members.iter().copied();
+        let short = members().filter(|member| scene.parts[member.part as usize].reach.0[face] < at);
+        let mut far = region.must;
+        far.0[face] = at;
+        regions.extend(Region::new(scene, region.must, short, weight, &mut known));
+        regions.extend(Region::new(scene, far, members(), weight, &mut known));
+    }
+}
+
+/// The parts that need less area than `known` together with `must`: single objects, or as large as `most`.
+#[inline(always)]
+fn neighbours(scene: &Scene, must: &Reach, most: u64, known: f64) -> Vec<Member> {
+    let (mut found, mut stack) = (vec![], vec![0]);
+    while let Some(index) = stack.pop() {
+        let part = &scene.parts[index];
+        let area = must.union(&part.reach).half_area();
+        if area >= known {
+            continue;
+        }
+        let weight = scene.weight_of(&part.objects);
+        if part.children == 0 || weight <= most {
+            found.push(Member { area, part: index as u32, weight: weight as u32 });
+        } else {
+            stack.extend([part.children + 1, part.children]);
+        }
+    }
+    found
+}
