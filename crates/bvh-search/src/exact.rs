@@ -13,7 +13,7 @@ use crate::{Problem, Run, Search, SearchError};
 use bvh_build::BuildError;
 use bvh_core::{Aabb, Bvh, Node, check_boxes};
 
-/// The most objects a scene may have: 3¹⁶ / 2 divisions take about a tenth of a second and 2¹⁶ sets 2.5 MB.
+/// The most objects a scene may have: 3¹⁶ / 2 divisions take a few hundredths of a second and 2¹⁶ sets 2.5 MB.
 pub const MOST_OBJECTS: usize = 16;
 
 /// Nothing to choose.
