@@ -83,8 +83,9 @@ impl Config {
         if n < 3 {
             return;
         }
-        run.count(reinsertion::to_local_optimum(tree, run.left(), run.observer()));
-        best.offer(tree, run);
+        reinsertion::descend(tree, best, run, u32::MAX, |tree, _, order| {
+            reinsertion::sort_by_area(tree, order)
+        });
         let own = self.work_per_object.saturating_mul(n);
         let budget = run.left().work;
         let mut left = own.min(budget);

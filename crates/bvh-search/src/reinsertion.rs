@@ -59,28 +59,39 @@ impl Search for Config {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         require(self.sweeps >= 1, "sweeps", self.sweeps.into(), "1 or more")?;
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
-        for number in 0..self.sweeps {
-            if run.stopped().is_some() {
-                break;
-            }
-            let mut order = tree.preorder();
-            match self.order {
-                Order::ByArea => sort_by_area(&tree, &mut order),
-                Order::Random => order.shuffle(&mut stream(seed, number.into())),
-            }
-            let swept = sweep(&mut tree, &order, run.left(), run.observer());
-            run.count(swept);
-            best.offer(&tree, run);
-            if swept.kept == 0 {
-                break;
-            }
-        }
+        descend(&mut tree, &mut best, run, self.sweeps, |tree, number, order| match self.order {
+            Order::ByArea => sort_by_area(tree, order),
+            Order::Random => order.shuffle(&mut stream(seed, number.into())),
+        });
         Ok(best.tree)
     }
 }
 
+/// Sweeps in the order that `arrange` makes of the nodes, offering the tree after each sweep, until nothing moves.
+pub(crate) fn descend(
+    tree: &mut Working,
+    best: &mut Incumbent,
+    run: &mut Run,
+    sweeps: u32,
+    arrange: impl Fn(&Working, u32, &mut [u32]),
+) {
+    for number in 0..sweeps {
+        if run.stopped().is_some() {
+            break;
+        }
+        let mut order = tree.preorder();
+        arrange(tree, number, &mut order);
+        let swept = sweep(tree, &order, run.left(), run.observer());
+        run.count(swept);
+        best.offer(tree, run);
+        if swept.kept == 0 {
+            break;
+        }
+    }
+}
+
 /// The largest first, equal ones in the order given.
-fn sort_by_area(tree: &Working, order: &mut [u32]) {
+pub(crate) fn sort_by_area(tree: &Working, order: &mut [u32]) {
     order.sort_by(|&a, &b| tree.nodes[b as usize].area.total_cmp(&tree.nodes[a as usize].area));
 }
 
