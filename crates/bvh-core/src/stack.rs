@@ -17,14 +17,15 @@ impl<T: Copy, const N: usize> Stack<T, N> {
         Self { inline: [filler; N], len: 0, spilled: Vec::new() }
     }
 
+    /// Pushes `value` if `condition` holds, without a branch on it.
     #[inline(always)]
-    pub(crate) fn push(&mut self, value: T) {
+    pub(crate) fn push_if(&mut self, condition: bool, value: T) {
         match self.inline.get_mut(self.len) {
             Some(slot) => {
                 *slot = value;
-                self.len += 1;
+                self.len += usize::from(condition);
             }
-            None => self.spill(value),
+            None => self.spill(condition, value),
         }
     }
 
@@ -41,8 +42,8 @@ impl<T: Copy, const N: usize> Stack<T, N> {
 
     #[cold]
     #[inline(never)]
-    fn spill(&mut self, value: T) {
-        self.spilled.push(value);
+    fn spill(&mut self, condition: bool, value: T) {
+        self.spilled.extend(condition.then_some(value));
     }
 }
 
@@ -54,7 +55,7 @@ mod tests {
     fn the_last_in_is_the_first_out_on_both_sides_of_the_spill() {
         let mut stack = Stack::<u32, 4>::new(0);
         for round in 0..3 {
-            (0..10).for_each(|i| stack.push(round + i));
+            (0..20).for_each(|i| stack.push_if(i % 2 == 0, round + i / 2));
             assert_eq!(
                 (0..10).map_while(|_| stack.pop()).collect::<Vec<_>>(),
                 Vec::from_iter((0..10).rev().map(|i| round + i))

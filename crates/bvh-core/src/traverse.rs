@@ -25,7 +25,7 @@
 //! ```
 
 use crate::stack::Stack;
-use crate::{Bvh, Hit, Node, NodeKind, Ray, Slabs};
+use crate::{Bvh, Hit, NodeKind, Ray, Slabs};
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
@@ -171,10 +171,10 @@ fn walk<C: Counter>(
     let slabs = Slabs::new(ray, &node.aabb);
     let mut t_max = ray.t_max();
     counter.boxes(1);
-    if enter(&slabs, node, t_max).is_none() {
+    if slabs.entry(&node.aabb) > t_max {
         return;
     }
-    let mut stack = Stack::<Pending, 64>::new(Pending { entry: 0.0, node: 0 });
+    let mut stack = Stack::<Pending, 48>::new(Pending { entry: 0.0, node: 0 });
     let mut entered = Vec::new();
     loop {
         match node.kind() {
@@ -186,33 +186,24 @@ fn walk<C: Counter>(
             NodeKind::Inner { first, count: 2 } => {
                 counter.boxes(2);
                 let pair = &tree.nodes[first as usize..first as usize + 2];
-                match (enter(&slabs, &pair[0], t_max), enter(&slabs, &pair[1], t_max)) {
-                    (Some(a), Some(b)) => {
-                        let swap = b < a;
-                        stack.push(Pending { entry: if swap { a } else { b }, node: first + u32::from(!swap) });
-                        node = &pair[usize::from(swap)];
-                        continue;
-                    }
-                    (Some(_), None) => {
-                        node = &pair[0];
-                        continue;
-                    }
-                    (None, Some(_)) => {
-                        node = &pair[1];
-                        continue;
-                    }
-                    (None, None) => {}
+                let (a, b) = (slabs.entry(&pair[0].aabb), slabs.entry(&pair[1].aabb));
+                // Without a branch up to here: which child is nearer cannot be predicted.
+                let swap = b < a;
+                let (near, far) = if swap { (b, a) } else { (a, b) };
+                stack.push_if(far <= t_max, Pending { entry: far, node: first + u32::from(!swap) });
+                if near <= t_max {
+                    node = &pair[usize::from(swap)];
+                    continue;
                 }
             }
             NodeKind::Inner { first, count } => {
                 counter.boxes(count as usize);
                 let children = (first..).zip(&tree.nodes[node.children()]);
-                entered.extend(children.filter_map(|(node, child)| {
-                    enter(&slabs, child, t_max).map(|entry| Pending { entry, node })
-                }));
+                entered.extend(children.map(|(node, child)| Pending { entry: slabs.entry(&child.aabb), node }));
+                entered.retain(|pending| pending.entry <= t_max);
                 // The nearest last, so that it is popped first; the lower index first on ties.
                 entered.sort_unstable_by(|a, b| b.entry.total_cmp(&a.entry).then(b.node.cmp(&a.node)));
-                entered.drain(..).for_each(|pending| stack.push(pending));
+                entered.drain(..).for_each(|pending| stack.push_if(true, pending));
             }
         }
         node = loop {
@@ -222,11 +213,4 @@ fn walk<C: Counter>(
             }
         };
     }
-}
-
-/// Where the ray enters the node's box, if it does so in its range.
-#[inline(always)]
-fn enter(slabs: &Slabs, node: &Node, t_max: f32) -> Option<f32> {
-    let (entry, exit) = slabs.interval(&node.aabb);
-    (entry <= exit.min(t_max)).then_some(entry)
 }

@@ -14,6 +14,8 @@ pub struct Shear {
     pub(crate) ray: Ray,
     /// The axes that become x, y and z; z is the direction's largest component.
     pub(crate) axes: [usize; 3],
+    /// The ray's origin along these axes.
+    pub(crate) origin: [f32; 3],
     /// How far a step along z moves in x and in y; both at most 1.
     pub(crate) slope: [f32; 2],
 }
@@ -33,15 +35,16 @@ impl Shear {
         };
         // Three different axes below 3, written so that the compiler sees it too.
         let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][z];
-        Self { ray: *ray, axes, slope: [d[axes[0]] / d[z], d[axes[1]] / d[z]] }
+        let origin = axes.map(|axis| ray.origin()[axis]);
+        Self { ray: *ray, axes, origin, slope: [d[axes[0]] / d[z], d[axes[1]] / d[z]] }
     }
 
     /// A point relative to the ray: 0, 0 and any z when it is on it. The same operations in the same order as the
     /// vector form of the wide layout.
     #[inline(always)]
-    fn apply(&self, p: Vec3) -> [f32; 3] {
-        let p = (p - self.ray.origin()).to_array();
-        let [x, y, z] = self.axes.map(|axis| p[axis]);
+    fn apply(&self, p: &Vec3) -> [f32; 3] {
+        let p: &[f32; 3] = p.as_ref();
+        let [x, y, z] = core::array::from_fn(|i| p[self.axes[i]] - self.origin[i]);
         [x - self.slope[0] * z, y - self.slope[1] * z, z]
     }
 }
@@ -72,7 +75,7 @@ impl Triangle {
     /// triangles are rejected in f32, exactly) and makes the distance as precise as the sheared vertices are.
     #[inline]
     pub fn intersect(&self, shear: &Shear, t_max: f32) -> Option<f32> {
-        let corners = self.0.map(|p| shear.apply(p));
+        let corners = self.0.each_ref().map(|p| shear.apply(p));
         let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = corners;
         // Rounding is monotone: the sign of a difference of rounded products is right, or the difference is 0.
         let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
