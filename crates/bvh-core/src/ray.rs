@@ -56,7 +56,8 @@ impl Ray {
             let inverse = 1.0 / d;
             if inverse.is_finite() { inverse } else { f32::MAX.copysign(d) }
         });
-        Ok(Self { origin, direction, inverse, t_min, t_max: t_max.min(f32::MAX) })
+        // A zero is +0.
+        Ok(Self { origin, direction, inverse, t_min: t_min + 0.0, t_max: t_max.min(f32::MAX) })
     }
 
     /// The whole half line: `t` from 0 to the largest finite distance.

@@ -1,7 +1,7 @@
 //! The conservative ray–box test: it never misses a box that holds a hit.
 
 use crate::{Aabb, Ray};
-use glam::{Vec3, Vec4, Vec4Swizzles};
+use glam::{Vec4, Vec4Swizzles};
 
 /// A ray prepared for tests against the boxes of one scene.
 ///
@@ -19,11 +19,11 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 #[derive(Clone, Copy, Debug)]
 pub struct Slabs {
     /// origin + margin, subtracted from lower corners.
-    lower: Vec4,
+    pub(crate) lower: Vec4,
     /// origin − margin, subtracted from upper corners.
-    upper: Vec4,
-    inverse: Vec4,
-    t_min: f32,
+    pub(crate) upper: Vec4,
+    pub(crate) inverse: Vec4,
+    pub(crate) t_min: f32,
 }
 
 impl Slabs {
@@ -106,6 +106,7 @@ pub fn clip_to_box(ray: &Ray, bounds: &Aabb, t: f32, t_max: f32) -> Option<f32> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
 
     fn meets(ray: &Ray, b: &Aabb) -> bool {
         let (entry, exit) = Slabs::new(ray, b).interval(b);

@@ -82,12 +82,14 @@ impl Triangle {
         if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
             return None;
         }
-        self.decide(shear, corners, t_max)
+        self.decide(shear, t_max)
     }
 
     /// The rest of the test, for the few triangles that the sides of their edges in f32 do not exclude.
-    fn decide(&self, shear: &Shear, corners: [[f32; 3]; 3], t_max: f32) -> Option<f32> {
-        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners.map(|p| p.map(f64::from));
+    #[inline(never)]
+    pub(crate) fn decide(&self, shear: &Shear, t_max: f32) -> Option<f32> {
+        let corners = self.0.each_ref().map(|p| shear.apply(p).map(f64::from));
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners;
         // Products of two f32 are exact in f64.
         let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
         if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {

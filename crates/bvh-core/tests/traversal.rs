@@ -3,8 +3,8 @@
 mod support;
 
 use bvh_core::{
-    Aabb, Bvh, Hit, Ray, Shear, Sphere, TestCounts, Triangle, any_hit, any_hit_of_all, clip_to_box,
-    nearest_hit, nearest_hit_of_all, validate,
+    Aabb, Bvh, Hit, Ray, Shear, Sphere, TestCounts, Triangle, WideBvh, any_hit, any_hit_of_all, clip_to_box,
+    collapse_leaves, cost::SahConstants, nearest_hit, nearest_hit_of_all, validate,
 };
 use glam::Vec3;
 use support::{Random, SHAPES, ball, boxes, chain, grid_box, rays, scaled, soup, tree};
@@ -29,6 +29,16 @@ fn check(name: &str, tree: &Bvh, triangles: &[Triangle], ray: &Ray, expected: Op
     assert_eq!(any, expected.is_some(), "{name}: {ray:?}");
 }
 
+fn check_wide(name: &str, wide: &WideBvh, ray: &Ray, expected: Option<Hit>) {
+    let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
+    for hit in [wide.nearest_hit(ray), wide.nearest_hit_portable(ray)] {
+        assert_eq!(bits(hit), bits(expected), "{name}: {ray:?}");
+    }
+    for any in [wide.any_hit(ray), wide.any_hit_portable(ray)] {
+        assert_eq!(any, expected.is_some(), "{name}: {ray:?}");
+    }
+}
+
 #[test]
 fn every_tree_answers_as_brute_force_at_every_scale() {
     let mut random = Random(1);
@@ -40,12 +50,19 @@ fn every_tree_answers_as_brute_force_at_every_scale() {
             let boxes = boxes(&triangles);
             let mut trees: Vec<Bvh> = SHAPES.iter().map(|&shape| tree(&boxes, shape, &mut random)).collect();
             trees.push(chain(&boxes));
+            let collapsed: Vec<Bvh> =
+                trees.iter().map(|tree| collapse_leaves(tree, &SahConstants::default())).collect();
+            trees.extend(collapsed);
             trees.iter().for_each(|tree| validate(tree, &boxes).unwrap());
+            let wides: Vec<WideBvh> =
+                trees.iter().map(|tree| WideBvh::new(tree, &triangles).unwrap()).collect();
             for ray in rays(&triangles, 3000, &mut random) {
                 let expected = brute_force(&triangles, &ray);
                 hits += usize::from(expected.is_some());
-                for (i, tree) in trees.iter().enumerate() {
-                    check(&format!("{name} * 2^{exponent}, tree {i}"), tree, &triangles, &ray, expected);
+                for (i, (tree, wide)) in trees.iter().zip(&wides).enumerate() {
+                    let name = format!("{name} * 2^{exponent}, tree {i}");
+                    check(&name, tree, &triangles, &ray, expected);
+                    check_wide(&name, wide, &ray, expected);
                 }
             }
         }
