@@ -1,7 +1,7 @@
 //! Four triangles side by side, for tests of one ray against all of them.
 
 use crate::{MAX_OBJECTS, Shear, Triangle};
-use glam::Vec4;
+use glam::{Vec3, Vec4};
 
 /// Up to four triangles: `corners[corner][axis][lane]`.
 #[derive(Clone, Copy, Debug)]
@@ -42,28 +42,32 @@ impl Block {
         self.ids[0] & Self::LAST != 0
     }
 
-    /// Calls `found` with every triangle the ray may meet, and its id. All others are missed for sure: the operations
-    /// are those of [`Triangle::intersect`] in the same order, so that their signs are the same, bit by bit.
+    /// A bit per triangle that the ray may meet. All others are missed for sure: the operations are those of
+    /// [`Triangle::intersect`] in the same order, so that their signs are the same, bit by bit.
     #[inline(always)]
-    pub(crate) fn candidates(&self, shear: &Shear, mut found: impl FnMut(u32, Triangle)) {
-        let [a, b, c] = self.corners.each_ref().map(|corner| {
-            let [x, y, z] = core::array::from_fn(|i| corner[shear.axes[i]] - shear.origin[i]);
-            [x - shear.slope[0] * z, y - shear.slope[1] * z]
-        });
-        let edge = |p: [Vec4; 2], q: [Vec4; 2]| p[0] * q[1] - p[1] * q[0];
-        let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
-        let negative = u.cmplt(Vec4::ZERO) | v.cmplt(Vec4::ZERO) | w.cmplt(Vec4::ZERO);
-        let positive = u.cmpgt(Vec4::ZERO) | v.cmpgt(Vec4::ZERO) | w.cmpgt(Vec4::ZERO);
-        let mut lanes = !(negative & positive).bitmask() & 0b1111;
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            if self.ids[lane] != Self::UNUSED {
-                found(
-                    self.ids[lane] & !Self::LAST,
-                    Triangle(self.corners.map(|corner| corner.map(|axis| axis.to_array()[lane]).into())),
-                );
-            }
-        }
+    pub(crate) fn candidates(&self, shear: &Shear) -> u32 {
+        let [kx, ky, kz] = shear.axes;
+        let sheared = |corner: &[Vec4; 3]| {
+            let z = corner[kz] - shear.origin[2];
+            [
+                corner[kx] - shear.origin[0] - shear.slope[0] * z,
+                corner[ky] - shear.origin[1] - shear.slope[1] * z,
+            ]
+        };
+        let [a, b, c] = &self.corners;
+        let ([ax, ay], [bx, by], [cx, cy]) = (sheared(a), sheared(b), sheared(c));
+        let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
+        let zero = Vec4::ZERO;
+        let negative = u.cmplt(zero) | v.cmplt(zero) | w.cmplt(zero);
+        let positive = u.cmpgt(zero) | v.cmpgt(zero) | w.cmpgt(zero);
+        !(negative & positive).bitmask() & 0b1111
+    }
+
+    /// The triangle in a lane below 4, and its id; `None` in an unused lane.
+    #[inline(always)]
+    pub(crate) fn triangle(&self, lane: usize) -> Option<(u32, Triangle)> {
+        let id = self.ids[lane];
+        let corner = |corner: &[Vec4; 3]| Vec3::from(corner.each_ref().map(|axis| axis.as_ref()[lane]));
+        (id != Self::UNUSED).then(|| (id & !Self::LAST, Triangle(self.corners.each_ref().map(corner))))
     }
 }

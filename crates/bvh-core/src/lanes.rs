@@ -118,44 +118,49 @@ mod avx2 {
     }
 
     impl Expand for Avx2 {
+        // Inlined into the two functions above, in which alone the intrinsics are compiled as what they are.
         #[inline(always)]
         fn expand(node: &WideNode, ray: &WideRay, t_max: f32, entered: &mut [Pending; 8]) -> usize {
-            // SAFETY: called only from the two functions above, which have the features.
-            unsafe { expand(node, ray, t_max, entered) }
-        }
-    }
+            // SAFETY: called only from those functions, which have the features.
+            unsafe {
+                let load = |a: &[f32; 8]| _mm256_loadu_ps(a.as_ptr());
+                let plane = |plane: usize, origin: f32, inverse: f32| {
+                    let distance = _mm256_sub_ps(load(&node.planes[plane]), _mm256_set1_ps(origin));
+                    _mm256_mul_ps(distance, _mm256_set1_ps(inverse))
+                };
+                let near = |axis: usize| plane(ray.near[axis], ray.near_origin[axis], ray.inverse[axis]);
+                let far = |axis: usize| plane(ray.far[axis], ray.far_origin[axis], ray.inverse[axis]);
+                let entry = _mm256_max_ps(
+                    _mm256_max_ps(near(0), near(1)),
+                    _mm256_max_ps(near(2), _mm256_set1_ps(ray.t_min)),
+                );
+                let exit = _mm256_min_ps(_mm256_min_ps(far(0), far(1)), far(2));
+                let last =
+                    _mm256_min_ps(_mm256_mul_ps(exit, _mm256_set1_ps(Slabs::FAR)), _mm256_set1_ps(t_max));
+                let hits = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(entry, last)) as u32 & node.lanes;
 
-    #[inline]
-    #[target_feature(enable = "avx2,bmi1,popcnt")]
-    fn expand(node: &WideNode, ray: &WideRay, t_max: f32, entered: &mut [Pending; 8]) -> usize {
-        let load = |a: &[f32; 8]| _mm256_setr_ps(a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7]);
-        let plane = |plane: usize, origin: f32, inverse: f32| {
-            let distance = _mm256_sub_ps(load(&node.planes[plane]), _mm256_set1_ps(origin));
-            _mm256_mul_ps(distance, _mm256_set1_ps(inverse))
-        };
-        let near = |axis: usize| plane(ray.near[axis], ray.near_origin[axis], ray.inverse[axis]);
-        let far = |axis: usize| plane(ray.far[axis], ray.far_origin[axis], ray.inverse[axis]);
-        let entry =
-            _mm256_max_ps(_mm256_max_ps(near(0), near(1)), _mm256_max_ps(near(2), _mm256_set1_ps(ray.t_min)));
-        let exit = _mm256_min_ps(_mm256_min_ps(far(0), far(1)), far(2));
-        let last = _mm256_min_ps(_mm256_mul_ps(exit, _mm256_set1_ps(Slabs::FAR)), _mm256_set1_ps(t_max));
-        let hits = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(entry, last)) as u32 & node.lanes;
-
-        // Entries are not negative: their bits are ordered as they are. The lane in the last bits makes them distinct.
-        let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-        let keys =
-            _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(entry)), lanes);
-        let mut rest = hits;
-        while rest != 0 {
-            let lane = rest.trailing_zeros();
-            rest &= rest - 1;
-            // A child's place is the number of those behind it: sorted without a comparison to be predicted.
-            let key = _mm256_permutevar8x32_epi32(keys, _mm256_set1_epi32(lane as i32));
-            let behind = _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpgt_epi32(keys, key))) as u32 & hits;
-            let t = _mm256_cvtss_f32(_mm256_permutevar8x32_ps(entry, _mm256_set1_epi32(lane as i32)));
-            entered[(behind.count_ones() & 7) as usize] =
-                Pending { entry: t, child: node.children[(lane & 7) as usize] };
+                // Entries are not negative: their bits are ordered as they are. The lane in the last bits makes them
+                // distinct.
+                let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+                let keys = _mm256_or_si256(
+                    _mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(entry)),
+                    lanes,
+                );
+                let mut rest = hits;
+                while rest != 0 {
+                    let lane = rest.trailing_zeros();
+                    rest &= rest - 1;
+                    // A child's place is the number of those behind it: sorted without a comparison to be predicted.
+                    let index = _mm256_set1_epi32(lane as i32);
+                    let key = _mm256_permutevar8x32_epi32(keys, index);
+                    let behind =
+                        _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpgt_epi32(keys, key))) as u32 & hits;
+                    let t = _mm256_cvtss_f32(_mm256_permutevar8x32_ps(entry, index));
+                    entered[(behind.count_ones() & 7) as usize] =
+                        Pending { entry: t, child: node.children[(lane & 7) as usize] };
+                }
+                hits.count_ones() as usize
+            }
         }
-        hits.count_ones() as usize
     }
 }

@@ -18,25 +18,31 @@ pub struct Shear {
     pub(crate) origin: [f32; 3],
     /// How far a step along z moves in x and in y; both at most 1.
     pub(crate) slope: [f32; 2],
+    /// The direction along z.
+    depth: f64,
 }
 
 impl Shear {
     /// Prepares a ray.
-    #[inline]
+    #[inline(always)]
     pub fn new(ray: &Ray) -> Self {
-        let d = ray.direction();
-        let size = d.abs();
-        let z = if size.x >= size.y && size.x >= size.z {
+        let (origin, direction) = (ray.origin().to_array(), ray.direction().to_array());
+        let size = direction.map(f32::abs);
+        let z = if size[0] >= size[1] && size[0] >= size[2] {
             0
-        } else if size.y >= size.z {
+        } else if size[1] >= size[2] {
             1
         } else {
             2
         };
-        // Three different axes below 3, written so that the compiler sees it too.
-        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][z];
-        let origin = axes.map(|axis| ray.origin()[axis]);
-        Self { ray: *ray, axes, origin, slope: [d[axes[0]] / d[z], d[axes[1]] / d[z]] }
+        let axes @ [kx, ky, kz] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][z];
+        Self {
+            ray: *ray,
+            axes,
+            origin: [origin[kx], origin[ky], origin[kz]],
+            slope: [direction[kx] / direction[kz], direction[ky] / direction[kz]],
+            depth: f64::from(direction[kz]),
+        }
     }
 
     /// A point relative to the ray: 0, 0 and any z when it is on it. The same operations in the same order as the
@@ -99,8 +105,10 @@ impl Triangle {
         if determinant == 0.0 {
             return None;
         }
-        let z = (u * az + v * bz + w * cz) / determinant;
-        let t = z / f64::from(shear.ray.direction()[shear.axes[2]]);
+        let t = (u * az + v * bz + w * cz) / (determinant * shear.depth);
+        if t < f64::from(shear.ray.t_min()) {
+            return None;
+        }
         // Collinear corners can get an area from the rounding of the shear.
         clip_to_box(&shear.ray, &self.aabb(), t as f32, t_max).filter(|_| !self.is_degenerate())
     }

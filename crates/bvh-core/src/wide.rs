@@ -5,7 +5,6 @@ use crate::lanes::{Expand, Portable, WideRay};
 use crate::stack::Stack;
 use crate::{Aabb, Bvh, Hit, InvalidBvh, Ray, Shear, Triangle, collapse, validate};
 use alloc::vec::Vec;
-use core::ops::ControlFlow;
 
 /// An immutable copy of a [`Bvh`] and its triangles, for tracing only.
 ///
@@ -135,40 +134,21 @@ impl WideBvh {
 
     #[inline(always)]
     pub(crate) fn nearest_with<E: Expand>(&self, ray: &Ray) -> Option<Hit> {
-        let shear = Shear::new(ray);
-        let mut nearest: Option<Hit> = None;
-        self.walk::<E>(ray, |block, t_max| {
-            block.candidates(&shear, |object, triangle| {
-                if let Some(t) = triangle.decide(&shear, *t_max) {
-                    let hit = Hit { t, object };
-                    if nearest.is_none_or(|nearest| hit.precedes(&nearest)) {
-                        nearest = Some(hit);
-                        *t_max = t;
-                    }
-                }
-            });
-            ControlFlow::Continue(())
-        });
-        nearest
+        self.walk::<E, false>(ray)
     }
 
     #[inline(always)]
     pub(crate) fn any_with<E: Expand>(&self, ray: &Ray) -> bool {
-        let shear = Shear::new(ray);
-        let mut found = false;
-        self.walk::<E>(ray, |block, t_max| {
-            block.candidates(&shear, |_, triangle| found = found || triangle.decide(&shear, *t_max).is_some());
-            if found { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        });
-        found
+        self.walk::<E, true>(ray).is_some()
     }
 
-    /// Hands the blocks that the ray may meet to `test`, the nearest first, until it breaks. `test` may lower the
-    /// distance from which on boxes are skipped.
+    /// The nearest hit, or the first one found. One function without closures, so that all of it is compiled with the
+    /// instructions that its caller may use.
     #[inline(always)]
-    fn walk<E: Expand>(&self, ray: &Ray, mut test: impl FnMut(&Block, &mut f32) -> ControlFlow<()>) {
-        let Some(mut child) = self.root else { return };
-        let wide_ray = WideRay::new(ray, &self.bounds);
+    fn walk<E: Expand, const ANY: bool>(&self, ray: &Ray) -> Option<Hit> {
+        let mut child = self.root?;
+        let (shear, wide_ray) = (Shear::new(ray), WideRay::new(ray, &self.bounds));
+        let mut nearest: Option<Hit> = None;
         let mut t_max = ray.t_max();
         let mut stack = Stack::<Pending, 64>::new(Pending { entry: 0.0, child });
         loop {
@@ -178,8 +158,22 @@ impl WideBvh {
                 stack.grow(entered);
             } else {
                 for block in &self.blocks[(child.0 & !Child::LEAF) as usize..] {
-                    if test(block, &mut t_max).is_break() {
-                        return;
+                    let mut lanes = block.candidates(&shear);
+                    while lanes != 0 {
+                        let lane = lanes.trailing_zeros() as usize;
+                        lanes &= lanes - 1;
+                        if let Some((object, triangle)) = block.triangle(lane)
+                            && let Some(t) = triangle.decide(&shear, t_max)
+                        {
+                            let hit = Hit { t, object };
+                            if ANY {
+                                return Some(hit);
+                            }
+                            if nearest.is_none_or(|nearest| hit.precedes(&nearest)) {
+                                nearest = Some(hit);
+                                t_max = t;
+                            }
+                        }
                     }
                     if block.is_last() {
                         break;
@@ -187,7 +181,7 @@ impl WideBvh {
                 }
             }
             child = loop {
-                let Some(pending) = stack.pop() else { return };
+                let Some(pending) = stack.pop() else { return nearest };
                 if pending.entry <= t_max {
                     break pending.child;
                 }
