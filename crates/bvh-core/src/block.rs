@@ -42,25 +42,26 @@ impl Block {
         self.ids[0] & Self::LAST != 0
     }
 
-    /// A bit per triangle that the ray may meet. All others are missed for sure: the operations are those of
-    /// [`Triangle::intersect`] in the same order, so that their signs are the same, bit by bit.
+    /// A bit per triangle that the ray may meet before `t_max`. [`Triangle::intersect`] would reject all others: by the
+    /// sides of their edges, which are computed here as there, bit by bit, or because all three corners, with a margin
+    /// for rounding, are behind the ray's origin or after `t_max`.
     #[inline(always)]
-    pub(crate) fn candidates(&self, shear: &Shear) -> u32 {
+    pub(crate) fn candidates(&self, shear: &Shear, t_max: f32) -> u32 {
         let [kx, ky, kz] = shear.axes;
         let sheared = |corner: &[Vec4; 3]| {
             let z = corner[kz] - shear.origin[2];
-            [
-                corner[kx] - shear.origin[0] - shear.slope[0] * z,
-                corner[ky] - shear.origin[1] - shear.slope[1] * z,
-            ]
+            let (x, y) = (corner[kx] - shear.origin[0], corner[ky] - shear.origin[1]);
+            [x - shear.slope[0] * z, y - shear.slope[1] * z, z * shear.forwards]
         };
         let [a, b, c] = &self.corners;
-        let ([ax, ay], [bx, by], [cx, cy]) = (sheared(a), sheared(b), sheared(c));
+        let ([ax, ay, az], [bx, by, bz], [cx, cy, cz]) = (sheared(a), sheared(b), sheared(c));
         let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
         let zero = Vec4::ZERO;
         let negative = u.cmplt(zero) | v.cmplt(zero) | w.cmplt(zero);
         let positive = u.cmpgt(zero) | v.cmpgt(zero) | w.cmpgt(zero);
-        !(negative & positive).bitmask() & 0b1111
+        let behind = az.max(bz).max(cz).cmplt(zero);
+        let after = az.min(bz).min(cz).cmpgt(Vec4::splat(t_max * shear.farther));
+        !(negative & positive | behind | after).bitmask() & 0b1111
     }
 
     /// The triangle in a lane below 4, and its id; `None` in an unused lane.

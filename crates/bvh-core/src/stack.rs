@@ -10,7 +10,7 @@ pub(crate) struct Stack<T, const N: usize> {
 }
 
 impl<T: Copy, const N: usize> Stack<T, N> {
-    /// The empty stack; `filler` is any value.
+    /// The empty stack; `filler` is any value, quickest if all its bits are zero.
     #[inline(always)]
     pub(crate) fn new(filler: T) -> Self {
         Self { inline: [filler; N], len: 0, spilled: Vec::new() }
@@ -21,7 +21,8 @@ impl<T: Copy, const N: usize> Stack<T, N> {
     pub(crate) fn room<const K: usize>(&mut self) -> &mut [T; K] {
         const { assert!(K <= N) };
         if self.len > N - K {
-            self.spill();
+            spill(&self.inline[..self.len], &mut self.spilled);
+            self.len = 0;
         }
         match self.inline[self.len..].first_chunk_mut() {
             Some(room) => room,
@@ -50,13 +51,13 @@ impl<T: Copy, const N: usize> Stack<T, N> {
         self.len -= 1;
         self.inline.get(self.len).copied()
     }
+}
 
-    #[cold]
-    #[inline(never)]
-    fn spill(&mut self) {
-        self.spilled.extend_from_slice(&self.inline[..self.len]);
-        self.len = 0;
-    }
+/// Not a method: so that the stack's length stays in a register.
+#[cold]
+#[inline(never)]
+fn spill<T: Copy>(inline: &[T], spilled: &mut Vec<T>) {
+    spilled.extend_from_slice(inline);
 }
 
 #[cfg(test)]

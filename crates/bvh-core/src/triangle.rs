@@ -20,6 +20,10 @@ pub struct Shear {
     pub(crate) slope: [f32; 2],
     /// The direction along z.
     depth: f64,
+    /// Its sign, ±1.
+    pub(crate) forwards: f32,
+    /// Its size and a little more: z beyond `t` times this is beyond `t`, rounding included.
+    pub(crate) farther: f32,
 }
 
 impl Shear {
@@ -35,13 +39,16 @@ impl Shear {
         } else {
             2
         };
-        let axes @ [kx, ky, kz] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][z];
+        const AXES: &[[usize; 3]; 3] = &[[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+        let axes @ [kx, ky, kz] = AXES[z];
         Self {
             ray: *ray,
             axes,
             origin: [origin[kx], origin[ky], origin[kz]],
             slope: [direction[kx] / direction[kz], direction[ky] / direction[kz]],
             depth: f64::from(direction[kz]),
+            forwards: 1.0f32.copysign(direction[kz]),
+            farther: size[z] * (1.0 + 1e-6),
         }
     }
 

@@ -150,7 +150,7 @@ impl WideBvh {
         let (shear, wide_ray) = (Shear::new(ray), WideRay::new(ray, &self.bounds));
         let mut nearest: Option<Hit> = None;
         let mut t_max = ray.t_max();
-        let mut stack = Stack::<Pending, 64>::new(Pending { entry: 0.0, child });
+        let mut stack = Stack::<Pending, 48>::new(Pending { entry: 0.0, child: Child::node(0) });
         loop {
             if child.0 & Child::LEAF == 0 {
                 let node = &self.nodes[child.0 as usize];
@@ -158,7 +158,7 @@ impl WideBvh {
                 stack.grow(entered);
             } else {
                 for block in &self.blocks[(child.0 & !Child::LEAF) as usize..] {
-                    let mut lanes = block.candidates(&shear);
+                    let mut lanes = block.candidates(&shear, t_max);
                     while lanes != 0 {
                         let lane = lanes.trailing_zeros() as usize;
                         lanes &= lanes - 1;
