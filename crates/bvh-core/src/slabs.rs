@@ -1,7 +1,7 @@
 //! The conservative ray–box test: it never misses a box that holds a hit.
 
 use crate::{Aabb, Ray};
-use glam::{Vec4, Vec4Swizzles};
+use glam::{Vec3, Vec4, Vec4Swizzles};
 
 /// A ray prepared for tests against the boxes of one scene.
 ///
@@ -19,11 +19,11 @@ use glam::{Vec4, Vec4Swizzles};
 #[derive(Clone, Copy, Debug)]
 pub struct Slabs {
     /// origin + margin, subtracted from lower corners.
-    pub(crate) lower: Vec4,
+    lower: Vec4,
     /// origin − margin, subtracted from upper corners.
-    pub(crate) upper: Vec4,
-    pub(crate) inverse: Vec4,
-    pub(crate) t_min: f32,
+    upper: Vec4,
+    inverse: Vec4,
+    t_min: f32,
 }
 
 impl Slabs {
@@ -38,10 +38,7 @@ impl Slabs {
     /// Prepares `ray` for boxes inside `bounds`, which may be a scene's root box or one object's.
     #[inline]
     pub fn new(ray: &Ray, bounds: &Aabb) -> Self {
-        let origin = ray.origin();
-        let reach = (bounds.min - origin).abs().max((bounds.max - origin).abs());
-        // The second term covers the rounding of the sums below, the third keeps the margin above zero.
-        let margin = reach.max_element() * Self::MARGIN + origin.abs() * f32::EPSILON + f32::MIN_POSITIVE;
+        let (origin, margin) = (ray.origin(), margin(ray, bounds));
         Self {
             lower: (origin + margin).extend(0.0),
             upper: (origin - margin).extend(0.0),
@@ -70,6 +67,16 @@ impl Slabs {
         let (entry, exit) = self.interval(aabb);
         if entry <= exit { entry } else { f32::INFINITY }
     }
+}
+
+/// By how much boxes grow along each axis for a ray that meets boxes inside `bounds`; never too little to change the
+/// origin it is added to.
+#[inline(always)]
+pub(crate) fn margin(ray: &Ray, bounds: &Aabb) -> Vec3 {
+    let origin = ray.origin();
+    let reach = (bounds.min - origin).abs().max((bounds.max - origin).abs());
+    // The second term covers the rounding of the sum with the origin, the third is for an origin and a reach of zero.
+    reach.max_element() * Slabs::MARGIN + origin.abs() * f32::EPSILON + f32::MIN_POSITIVE
 }
 
 /// The larger of two numbers; unlike `f32::max` one instruction, since neither is NaN.
@@ -106,7 +113,6 @@ pub fn clip_to_box(ray: &Ray, bounds: &Aabb, t: f32, t_max: f32) -> Option<f32> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
 
     fn meets(ray: &Ray, b: &Aabb) -> bool {
         let (entry, exit) = Slabs::new(ray, b).interval(b);

@@ -154,8 +154,12 @@ impl WideBvh {
         loop {
             if child.0 & Child::LEAF == 0 {
                 let node = &self.nodes[child.0 as usize];
-                let entered = E::expand(node, &wide_ray, t_max, stack.room());
-                stack.grow(entered);
+                let room = stack.room();
+                if let Some(others) = E::expand(node, &wide_ray, t_max, room).checked_sub(1) {
+                    child = room[others & 7].child;
+                    stack.grow(others);
+                    continue;
+                }
             } else {
                 for block in &self.blocks[(child.0 & !Child::LEAF) as usize..] {
                     let mut lanes = block.candidates(&shear, t_max);
