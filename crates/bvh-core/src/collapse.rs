@@ -85,7 +85,7 @@ fn binary(tree: &Bvh) -> Cow<'_, Bvh> {
 /// Expected time of visiting a wide node, in any unit. With a block's, measured; the layout depends little on them.
 const NODE_COST: f32 = 1.0;
 /// Expected time of testing a block.
-const BLOCK_COST: f32 = 0.6;
+const BLOCK_COST: f32 = 1.0;
 
 /// How a subtree becomes children of a wide node.
 #[derive(Clone, Copy)]

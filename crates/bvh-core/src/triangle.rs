@@ -57,7 +57,8 @@ impl Shear {
     #[inline(always)]
     fn apply(&self, p: &Vec3) -> [f32; 3] {
         let p: &[f32; 3] = p.as_ref();
-        let [x, y, z] = core::array::from_fn(|i| p[self.axes[i]] - self.origin[i]);
+        let ([kx, ky, kz], [ox, oy, oz]) = (self.axes, self.origin);
+        let (x, y, z) = (p[kx] - ox, p[ky] - oy, p[kz] - oz);
         [x - self.slope[0] * z, y - self.slope[1] * z, z]
     }
 }
