@@ -39,15 +39,13 @@ pub struct WideBvh {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct WideNode {
-    /// Lower x, y, z, then upper x, y, z, of all children.
+    /// Lower x, y, z, then upper x, y, z, of all children; NaN in unused lanes, so that no ray enters them.
     pub(crate) planes: [[f32; 8]; 6],
     pub(crate) children: [Child; 8],
-    /// A bit per lane that holds a child.
-    pub(crate) lanes: u32,
 }
 
 impl WideNode {
-    pub(crate) const EMPTY: Self = Self { planes: [[0.0; 8]; 6], children: [Child::node(0); 8], lanes: 0 };
+    pub(crate) const EMPTY: Self = Self { planes: [[f32::NAN; 8]; 6], children: [Child::node(0); 8] };
 
     /// Gives a lane a child with this box.
     pub(crate) fn set_box(&mut self, lane: usize, aabb: &Aabb) {
@@ -55,12 +53,12 @@ impl WideNode {
             self.planes[axis][lane] = aabb.min[axis];
             self.planes[axis + 3][lane] = aabb.max[axis];
         }
-        self.lanes |= 1 << lane;
     }
 }
 
 /// A node's index, or the index of a leaf's first block; the leaf's last block is marked as such.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(transparent)]
 pub(crate) struct Child(u32);
 
 impl Child {
@@ -78,6 +76,7 @@ impl Child {
 
 /// A child that the ray enters at `entry`, to be visited later.
 #[derive(Clone, Copy)]
+#[repr(C)]
 pub(crate) struct Pending {
     pub(crate) entry: f32,
     pub(crate) child: Child,
@@ -154,10 +153,9 @@ impl WideBvh {
         loop {
             if child.0 & Child::LEAF == 0 {
                 let node = &self.nodes[child.0 as usize];
-                let room = stack.room();
-                if let Some(others) = E::expand(node, &wide_ray, t_max, room).checked_sub(1) {
-                    child = room[others & 7].child;
+                if let Some((nearest, others)) = E::expand(node, &wide_ray, t_max, stack.room()) {
                     stack.grow(others);
+                    child = nearest;
                     continue;
                 }
             } else {
