@@ -193,3 +193,138 @@ pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle]) -> WideBvh {
     }
     wide
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{cost, validate};
+    use glam::Vec3;
+
+    /// Triangles along a curve, and a lopsided binary tree over them with leaves of one.
+    fn scene(n: u32, seed: u32) -> (Vec<Triangle>, Bvh) {
+        let point = |i: u32| {
+            let bits = (i + 1).wrapping_mul(2_654_435_761 ^ seed.wrapping_mul(0x9e37_79b9));
+            Vec3::new((bits >> 24) as f32, (bits >> 16 & 255) as f32, (bits >> 8 & 255) as f32) / 32.0
+        };
+        let triangle = |i| Triangle([point(i), point(i) + Vec3::X, point(i) + Vec3::Y * (1 + i % 3) as f32]);
+        let triangles: Vec<Triangle> = (0..n).map(triangle).collect();
+        let mut tree = Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, n)], prim_ids: (0..n).collect() };
+        let mut node = 0;
+        while node < tree.nodes.len() {
+            let range = tree.nodes[node].prims();
+            if range.len() > 1 {
+                let (first, end) = (tree.nodes.len() as u32, range.end as u32);
+                let middle = range.start as u32 + 1 + (seed + node as u32) % (range.len() as u32 - 1);
+                tree.nodes[node] = Node::inner(Aabb::EMPTY, first, 2);
+                tree.nodes.push(Node::leaf(Aabb::EMPTY, range.start as u32, middle - range.start as u32));
+                tree.nodes.push(Node::leaf(Aabb::EMPTY, middle, end - middle));
+            }
+            node += 1;
+        }
+        tree.refit(&triangles.iter().map(Triangle::aabb).collect::<Vec<_>>());
+        (triangles, tree)
+    }
+
+    /// The least of `cost` over all ways to give every inner node one of `states` states.
+    fn exhaustive(tree: &Bvh, states: usize, cost: impl Fn(&[usize]) -> f64) -> f64 {
+        let mut choice = vec![0; tree.nodes.len()];
+        let inner: Vec<usize> = (0..tree.nodes.len()).filter(|&i| !tree.nodes[i].is_leaf()).collect();
+        let mut least = f64::INFINITY;
+        for mut code in 0..states.pow(inner.len() as u32) {
+            for &node in &inner {
+                choice[node] = code % states;
+                code /= states;
+            }
+            least = least.min(cost(&choice));
+        }
+        least
+    }
+
+    fn objects(tree: &Bvh, node: usize) -> f64 {
+        let mut ids = Vec::new();
+        collect(tree, node, &mut ids);
+        ids.len() as f64
+    }
+
+    #[test]
+    fn no_choice_of_leaves_costs_less_than_the_collapsed_tree() {
+        for seed in 0..20 {
+            let (triangles, tree) = scene(10, seed);
+            let constants = SahConstants { traversal: f64::from(seed % 4), intersection: 1.0 };
+            let collapsed = collapse_leaves(&tree, &constants);
+            let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+            validate(&collapsed, &boxes).unwrap();
+            // States: inner node or leaf.
+            let least = exhaustive(&tree, 2, |choice| {
+                let (mut total, mut open) = (0.0, vec![0]);
+                while let Some(node) = open.pop() {
+                    let area = tree.nodes[node].aabb.half_area();
+                    if tree.nodes[node].is_leaf() || choice[node] == 1 {
+                        total += area * constants.intersection * objects(&tree, node);
+                    } else {
+                        total += area * constants.traversal;
+                        open.extend(tree.nodes[node].children());
+                    }
+                }
+                cost::over_root_area(&tree, total)
+            });
+            let found = cost::sah(&collapsed, &constants);
+            assert!((found - least).abs() < 1e-12 * least, "seed {seed}: {found} is not {least}");
+        }
+    }
+
+    #[test]
+    fn no_choice_of_nodes_costs_less_than_the_wide_layout() {
+        for seed in 0..6 {
+            let (triangles, tree) = scene(11, seed);
+            let cost_of_leaf = |aabb: &Aabb, objects: f64| {
+                aabb.half_area() * f64::from(BLOCK_COST) * (objects / Block::LANES as f64).ceil()
+            };
+            // States: wide node, left out, or leaf; the root is not left out.
+            let least = exhaustive(&tree, 3, |choice| {
+                let (mut total, mut open) = (0.0, vec![0]);
+                while let Some(node) = open.pop() {
+                    let aabb = &tree.nodes[node].aabb;
+                    if tree.nodes[node].is_leaf() || choice[node] == 2 {
+                        total += cost_of_leaf(aabb, objects(&tree, node));
+                        continue;
+                    }
+                    total += aabb.half_area() * f64::from(NODE_COST);
+                    let (mut children, mut parts) = (0, Vec::from_iter(tree.nodes[node].children()));
+                    while let Some(part) = parts.pop() {
+                        if choice[part] == 1 && !tree.nodes[part].is_leaf() {
+                            parts.extend(tree.nodes[part].children());
+                        } else {
+                            children += 1;
+                            open.push(part);
+                        }
+                    }
+                    if children > 8 {
+                        return f64::INFINITY;
+                    }
+                }
+                total
+            });
+            let wide = WideBvh::new(&tree, &triangles).unwrap();
+            let found: f64 = wide
+                .boxes()
+                .map(|(aabb, blocks)| match blocks {
+                    0 => aabb.half_area() * f64::from(NODE_COST),
+                    _ => cost_of_leaf(&aabb, (blocks * Block::LANES) as f64),
+                })
+                .sum();
+            assert!((found - least).abs() < 1e-5 * least, "seed {seed}: {found} is not {least}");
+        }
+    }
+
+    #[test]
+    fn trees_of_one_leaf_and_of_none_have_layouts() {
+        let (triangles, _) = scene(9, 1);
+        let mut tree = Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, 9)], prim_ids: (0..9).rev().collect() };
+        tree.refit(&triangles.iter().map(Triangle::aabb).collect::<Vec<_>>());
+        let wide = WideBvh::new(&tree, &triangles).unwrap();
+        assert_eq!((wide.nodes.len(), wide.blocks.len()), (0, 3));
+        assert_eq!(WideBvh::new(&Bvh::default(), &[]).unwrap().bytes(), 0);
+        assert!(WideBvh::new(&tree, &triangles[1..]).is_err());
+    }
+}

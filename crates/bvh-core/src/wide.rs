@@ -191,3 +191,25 @@ impl WideBvh {
         }
     }
 }
+
+#[cfg(test)]
+impl WideBvh {
+    /// The box of every node, with 0, and of every leaf, with its number of blocks.
+    pub(crate) fn boxes(&self) -> impl Iterator<Item = (Aabb, usize)> {
+        let lane_box = |node: &WideNode, lane: usize| Aabb {
+            min: [0, 1, 2].map(|axis| node.planes[axis][lane]).into(),
+            max: [3, 4, 5].map(|axis| node.planes[axis][lane]).into(),
+        };
+        let blocks = |child: Child| match child.0 & Child::LEAF {
+            0 => 0,
+            leaf => {
+                1 + self.blocks[(child.0 ^ leaf) as usize..].iter().take_while(|block| !block.is_last()).count()
+            }
+        };
+        let root = self.root.map(|root| (self.bounds, blocks(root)));
+        root.into_iter().chain(self.nodes.iter().flat_map(move |node| {
+            let used = (0..8).filter(|&lane| !node.planes[0][lane].is_nan());
+            used.map(move |lane| (lane_box(node, lane), blocks(node.children[lane])))
+        }))
+    }
+}

@@ -109,6 +109,7 @@ fn a_chain_of_twenty_thousand_is_traced_from_both_ends() {
             &mut (),
         );
         assert_eq!(hit.map(|hit| hit.object), Some(object));
+        assert_eq!(WideBvh::new(&tree, &triangles).unwrap().nearest_hit(&ray), hit);
         // No object is hit: every node is visited.
         let mut counts = TestCounts::default();
         assert!(!any_hit(&tree, &ray, |_| false, &mut counts));
