@@ -89,8 +89,8 @@ impl Triangle {
     /// triangles are rejected in f32, exactly) and makes the distance as precise as the sheared vertices are.
     #[inline]
     pub fn intersect(&self, shear: &Shear, t_max: f32) -> Option<f32> {
-        let corners = self.0.each_ref().map(|p| shear.apply(p));
-        let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = corners;
+        let [a, b, c] = &self.0;
+        let ([ax, ay, _], [bx, by, _], [cx, cy, _]) = (shear.apply(a), shear.apply(b), shear.apply(c));
         // Rounding is monotone: the sign of a difference of rounded products is right, or the difference is 0.
         let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
         if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
@@ -102,8 +102,10 @@ impl Triangle {
     /// The rest of the test, for the few triangles that the sides of their edges in f32 do not exclude.
     #[inline(never)]
     pub(crate) fn decide(&self, shear: &Shear, t_max: f32) -> Option<f32> {
-        let corners = self.0.each_ref().map(|p| shear.apply(p).map(f64::from));
-        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners;
+        let [a, b, c] = &self.0;
+        let double = |[x, y, z]: [f32; 3]| (f64::from(x), f64::from(y), f64::from(z));
+        let ((ax, ay, az), (bx, by, bz)) = (double(shear.apply(a)), double(shear.apply(b)));
+        let (cx, cy, cz) = double(shear.apply(c));
         // Products of two f32 are exact in f64.
         let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
         if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
