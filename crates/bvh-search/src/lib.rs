@@ -25,6 +25,7 @@
 
 mod budget;
 mod error;
+pub mod exact;
 mod fusing;
 pub mod genetic;
 pub mod grasp;
