@@ -23,7 +23,9 @@
 //! # Ok::<(), bvh_search::SearchError>(())
 //! ```
 
+pub mod annealing;
 mod budget;
+mod cooling;
 mod error;
 mod fusing;
 pub mod genetic;
@@ -37,11 +39,13 @@ pub mod random_orders;
 #[cfg(feature = "serde")]
 mod registry;
 pub mod reinsertion;
+pub mod rotation;
 pub mod ruin_recreate;
 mod run;
 #[cfg(test)]
 mod scatter;
 mod stream;
+pub mod treelet;
 mod working;
 
 pub use budget::{Budget, StopReason};

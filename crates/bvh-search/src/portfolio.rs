@@ -5,10 +5,11 @@
 //!    the incumbent, and all that they end with is fused with it. Fusing keeps every part that became better and drops
 //!    every part that became worse, so that nothing is ever lost to the heat.
 
+use crate::cooling::{Cooling, anneal};
 use crate::error::require;
 use crate::fusing::fuse;
 use crate::incumbent::Incumbent;
-use crate::ruin_recreate::{Cooling, Ruin, Scale, anneal};
+use crate::ruin_recreate::{Mover, Ruin, Scale};
 use crate::stream::stream;
 use crate::working::Working;
 use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally, reinsertion};
@@ -144,7 +145,8 @@ impl Config {
             // Which scale of temperatures is the better one depends on the scene: every other chain takes the other.
             let scale = if number.is_multiple_of(2) { Scale::Saved } else { Scale::Top };
             let ruin = Ruin { scale, ..self.ruin.clone() };
-            anneal(&ruin, &cooling, &mut tree, &mut rng, observer, &mut |_, tally| done += tally);
+            let mover = &mut Mover::new(&ruin);
+            anneal(mover, &cooling, &mut tree, &mut rng, observer, &mut |_, tally| done += tally);
             (tree, done)
         };
         #[cfg(feature = "rayon")]

@@ -53,6 +53,12 @@ methods! {
     "genetic" => Genetic(crate::genetic::Config),
     /// Reinsertion to a local optimum.
     "reinsertion" => Reinsertion(crate::reinsertion::Config),
+    /// Tree rotations to a local optimum.
+    "rotation" => Rotation(crate::rotation::Config),
+    /// Treelet restructuring to a local optimum.
+    "treelet" => Treelet(crate::treelet::Config),
+    /// Annealing on single reinsertions.
+    "annealing" => Annealing(crate::annealing::Config),
     /// Annealed ruin and recreate.
     "ruin_recreate" => RuinRecreate(crate::ruin_recreate::Config),
     /// All that pays, in the order that pays.
