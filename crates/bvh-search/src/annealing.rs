@@ -23,10 +23,10 @@ use rand::RngExt;
     serde(deny_unknown_fields, default)
 )]
 pub struct Config {
-    /// The move. TOML name `move`.
+    /// The move; `move` in specs.
     #[cfg_attr(feature = "serde", serde(rename = "move"))]
     pub step: Move,
-    /// First temperature, relative to the area saved by the removal, above 0. Default 0.1.
+    /// First temperature, relative to the area saved by the removal, above 0. Default 0.3.
     pub hot: f64,
     /// Last temperature, above 0 and not above `hot`. Default 0.003.
     pub cold: f64,
@@ -39,7 +39,7 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         let start = reinsertion::start();
-        Self { step: Move::default(), hot: 0.1, cold: 0.003, work_per_object: 10_000, start }
+        Self { step: Move::default(), hot: 0.3, cold: 0.003, work_per_object: 10_000, start }
     }
 }
 
@@ -52,7 +52,7 @@ impl Default for Config {
     serde(deny_unknown_fields, default)
 )]
 pub struct Move {
-    /// Most levels up, at least 1. Default 8.
+    /// Most levels up, at least 1. Default 12.
     pub climb: u32,
     /// Which place below the top. Default `best`.
     pub target: Target,
@@ -60,7 +60,7 @@ pub struct Move {
 
 impl Default for Move {
     fn default() -> Self {
-        Self { climb: 8, target: Target::Best }
+        Self { climb: 12, target: Target::Best }
     }
 }
 

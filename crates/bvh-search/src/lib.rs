@@ -32,6 +32,7 @@ pub mod genetic;
 pub mod grasp;
 mod incumbent;
 mod insertion_orders;
+mod local_search;
 mod optimize;
 mod place;
 pub mod portfolio;
@@ -50,6 +51,7 @@ mod working;
 
 pub use budget::{Budget, StopReason};
 pub use error::SearchError;
+pub use local_search::LocalSearch;
 pub use optimize::optimize;
 #[cfg(feature = "serde")]
 pub use registry::Method;

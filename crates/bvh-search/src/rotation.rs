@@ -202,8 +202,7 @@ mod tests {
         {
             let boxes = scatter(n);
             let mut tree = balanced(&boxes);
-            let quota = Quota { moves: u64::MAX, work: u64::MAX };
-            until_still(quota, &(), |quota| {
+            until_still(Quota::ENDLESS, &(), |quota| {
                 let nodes = order.of(&tree);
                 let swept = sweep(&mut tree, &nodes, quota, &());
                 let area = tree.internal_area();

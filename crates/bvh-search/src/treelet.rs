@@ -223,15 +223,13 @@ mod tests {
         Working::from_bvh(&start, boxes).unwrap()
     }
 
-    const ENDLESS: Quota = Quota { moves: u64::MAX, work: u64::MAX };
-
     #[test]
     fn boxes_and_areas_stay_exact_and_a_local_optimum_is_one() {
         for size in [3, 5, 7, 12] {
             let boxes = scatter(150);
             let mut tree = balanced(&boxes);
             let (mut solver, start) = (Solver::new(size, &tree), tree.area());
-            until_still(ENDLESS, &(), |quota| {
+            until_still(Quota::ENDLESS, &(), |quota| {
                 let swept = sweep(&mut tree, &mut solver, quota, &());
                 let area = tree.internal_area();
                 assert!((tree.area() - area).abs() <= 1e-12 * area);
@@ -244,7 +242,7 @@ mod tests {
             tight.refit(&boxes);
             assert_eq!(found, tight);
             // Nothing was skipped that would have paid.
-            let again = sweep(&mut tree.clone(), &mut Solver::new(size, &tree), ENDLESS, &());
+            let again = sweep(&mut tree.clone(), &mut Solver::new(size, &tree), Quota::ENDLESS, &());
             assert_eq!(again.kept, 0);
         }
     }
@@ -256,7 +254,7 @@ mod tests {
             let boxes = scatter(n);
             let mut tree = balanced(&boxes);
             let mut solver = Solver::new(n, &tree);
-            until_still(ENDLESS, &(), |quota| sweep(&mut tree, &mut solver, quota, &()));
+            until_still(Quota::ENDLESS, &(), |quota| sweep(&mut tree, &mut solver, quota, &()));
             let outcome = solve(
                 &Method::Best(crate::portfolio::Config { work_per_object: 20_000, ..Default::default() }),
                 &Problem::new(&boxes),
