@@ -37,6 +37,7 @@ mod optimize;
 mod place;
 pub mod portfolio;
 pub mod random_orders;
+pub mod rebuild;
 #[cfg(feature = "serde")]
 mod registry;
 pub mod reinsertion;
