@@ -128,10 +128,11 @@ fn nearest_of_plain(clusters: &[Cluster], radius: usize, start: usize, found: &m
     for (at, found) in (start..).zip(found) {
         let aabb = clusters[at].aabb;
         let mut best = (f64::INFINITY, usize::MAX, at);
-        for other in at.saturating_sub(radius)..(at + radius + 1).min(clusters.len()) {
+        let first = at.saturating_sub(radius);
+        for (other, cluster) in (first..).zip(&clusters[first..(at + radius + 1).min(clusters.len())]) {
             if other != at {
                 // The same for both of a pair, and different for all pairs of one cluster.
-                let area = aabb.union(&clusters[other].aabb).half_area();
+                let area = aabb.union(&cluster.aabb).half_area();
                 if (area, at ^ other) < (best.0, best.1) {
                     best = (area, at ^ other, other);
                 }

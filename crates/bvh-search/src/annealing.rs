@@ -7,11 +7,10 @@
 use crate::cooling::{self, Cooling, anneal};
 use crate::error::require;
 use crate::incumbent::Incumbent;
-use crate::reinsertion;
+use crate::start::Start;
 use crate::stream::{Stream, stream};
 use crate::working::{ANCHOR, Working};
 use crate::{Problem, Run, Search, SearchError};
-use bvh_build::muller_fellner;
 use bvh_core::{Bvh, PackedAabb};
 use rand::RngExt;
 
@@ -32,13 +31,13 @@ pub struct Config {
     pub cold: f64,
     /// Work per object, unless the budget has less. Default 10 000.
     pub work_per_object: u64,
-    /// The builder of the start. Default as for reinsertion.
-    pub start: muller_fellner::Config,
+    /// The builder of the start.
+    pub start: Start,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        let start = reinsertion::start();
+        let start = Start::default();
         Self { step: Move::default(), hot: 0.3, cold: 0.003, work_per_object: 10_000, start }
     }
 }
@@ -77,7 +76,7 @@ pub enum Target {
 impl Search for Config {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         let climb = self.step.climb;
-        require(climb >= 1 && climb < u32::MAX, "climb", climb.into(), "1 to 4294967294")?;
+        require((1..u32::MAX).contains(&climb), "climb", climb.into(), "1 to 4294967294")?;
         require(self.hot.is_finite() && self.hot > 0.0, "hot", self.hot, "above 0")?;
         require(self.cold > 0.0 && self.cold <= self.hot, "cold", self.cold, "above 0, not above hot")?;
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;

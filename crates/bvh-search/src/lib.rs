@@ -46,6 +46,7 @@ pub mod ruin_recreate;
 mod run;
 #[cfg(test)]
 mod scatter;
+mod start;
 mod stream;
 pub mod treelet;
 mod working;
@@ -57,4 +58,5 @@ pub use optimize::optimize;
 #[cfg(feature = "serde")]
 pub use registry::Method;
 pub use run::{Event, Observer, Outcome, Problem, Quota, Run, Search, Tally, solve};
+pub use start::Start;
 pub use stream::Stream;

@@ -10,10 +10,10 @@ use crate::error::require;
 use crate::fusing::fuse;
 use crate::incumbent::Incumbent;
 use crate::ruin_recreate::{Mover, Ruin, Scale};
+use crate::start::Start;
 use crate::stream::stream;
 use crate::working::Working;
 use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally, reinsertion};
-use bvh_build::muller_fellner;
 use bvh_core::Bvh;
 
 /// How long the generations are and how hot.
@@ -44,8 +44,8 @@ pub struct Config {
     pub cold: f64,
     /// The move; its `scale` is the chain's, in turns `saved` and `top`.
     pub ruin: Ruin,
-    /// The builder of the start. Default as for reinsertion.
-    pub start: muller_fellner::Config,
+    /// The builder of the start.
+    pub start: Start,
 }
 
 impl Default for Config {
@@ -60,7 +60,7 @@ impl Default for Config {
             hottest: 0.1,
             cold: 0.003,
             ruin: Ruin::default(),
-            start: reinsertion::start(),
+            start: Start::default(),
         }
     }
 }

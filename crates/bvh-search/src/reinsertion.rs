@@ -9,10 +9,10 @@ use crate::error::require;
 use crate::incumbent::{Incumbent, until_still};
 use crate::place::PlaceSearch;
 use crate::run::Tally;
+use crate::start::Start;
 use crate::stream::stream;
 use crate::working::{ANCHOR, Working};
 use crate::{Observer, Problem, Quota, Run, Search, SearchError};
-use bvh_build::muller_fellner;
 use bvh_core::Bvh;
 use bvh_core::with_vector_instructions;
 use rand::seq::SliceRandom;
@@ -29,20 +29,14 @@ pub struct Config {
     pub order: Order,
     /// The most sweeps over all nodes, at least 1; ends earlier at a local optimum. Default 1000.
     pub sweeps: u32,
-    /// The builder of the start. Default `area_times_power` 0.9, which leaves it less to do than the original.
-    pub start: muller_fellner::Config,
+    /// The builder of the start.
+    pub start: Start,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { order: Order::ByArea, sweeps: 1000, start: start() }
+        Self { order: Order::ByArea, sweeps: 1000, start: Start::default() }
     }
-}
-
-/// The start of all local searches.
-pub(crate) fn start() -> muller_fellner::Config {
-    let heuristic = muller_fellner::Heuristic::AreaTimesPower(0.9);
-    muller_fellner::Config { heuristic, ..Default::default() }
 }
 
 /// The order of a sweep.

@@ -8,10 +8,10 @@
 
 use crate::error::require;
 use crate::incumbent::{Incumbent, until_still};
-use crate::reinsertion::{TOLERANCE, sort_by_area, start};
+use crate::reinsertion::{TOLERANCE, sort_by_area};
+use crate::start::Start;
 use crate::working::Working;
 use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally};
-use bvh_build::muller_fellner;
 use bvh_core::{Bvh, with_vector_instructions};
 
 /// In which order to try the nodes, how often, and from where.
@@ -26,13 +26,13 @@ pub struct Config {
     pub order: Order,
     /// The most sweeps over all nodes, at least 1; ends earlier at a local optimum. Default 1000.
     pub sweeps: u32,
-    /// The builder of the start. Default as for reinsertion.
-    pub start: muller_fellner::Config,
+    /// The builder of the start.
+    pub start: Start,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { order: Order::BottomUp, sweeps: 1000, start: start() }
+        Self { order: Order::BottomUp, sweeps: 1000, start: Start::default() }
     }
 }
 

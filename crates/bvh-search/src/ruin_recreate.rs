@@ -8,11 +8,10 @@ use crate::cooling::{Cooling, Move, anneal};
 use crate::error::require;
 use crate::incumbent::Incumbent;
 use crate::place::PlaceSearch;
-use crate::reinsertion;
+use crate::start::Start;
 use crate::stream::{Stream, stream};
 use crate::working::{ANCHOR, Working};
 use crate::{Problem, Run, Search, SearchError};
-use bvh_build::muller_fellner;
 use bvh_core::Bvh;
 use rand::RngExt;
 use rand::seq::SliceRandom;
@@ -34,19 +33,13 @@ pub struct Config {
     pub cold: f64,
     /// Work per object, unless the budget has less. Default 10 000.
     pub work_per_object: u64,
-    /// The builder of the start. Default as for reinsertion.
-    pub start: muller_fellner::Config,
+    /// The builder of the start.
+    pub start: Start,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self {
-            ruin: Ruin::default(),
-            hot: 0.1,
-            cold: 0.003,
-            work_per_object: 10_000,
-            start: reinsertion::start(),
-        }
+        Self { ruin: Ruin::default(), hot: 0.1, cold: 0.003, work_per_object: 10_000, start: Start::default() }
     }
 }
 

@@ -9,10 +9,10 @@
 
 use crate::error::require;
 use crate::incumbent::{Incumbent, until_still};
-use crate::reinsertion::{TOLERANCE, start};
+use crate::reinsertion::TOLERANCE;
+use crate::start::Start;
 use crate::working::{NONE, Working};
 use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally};
-use bvh_build::muller_fellner;
 use bvh_core::{Bvh, PackedAabb, with_vector_instructions};
 
 /// How large treelets are, how often all are tried, and from where.
@@ -27,13 +27,13 @@ pub struct Config {
     pub size: u32,
     /// The most sweeps over all nodes, at least 1; ends earlier at a local optimum. Default 1000.
     pub sweeps: u32,
-    /// The builder of the start. Default as for reinsertion.
-    pub start: muller_fellner::Config,
+    /// The builder of the start.
+    pub start: Start,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { size: 7, sweeps: 1000, start: start() }
+        Self { size: 7, sweeps: 1000, start: Start::default() }
     }
 }
 
