@@ -96,7 +96,8 @@ mod tests {
     use bvh_core::validate;
 
     fn scatter(n: usize, salt: usize) -> Vec<Aabb> {
-        let at = |i: usize, k: usize| ((i * 7 + salt * 13 + 1) * (k * 31 + 17) * 2_654_435 % 1009) as f32 / 100.0;
+        let at =
+            |i: usize, k: usize| ((i * 7 + salt * 13 + 1) * (k * 31 + 17) * 2_654_435 % 1009) as f32 / 100.0;
         let point = |i: usize| [at(i, 0), at(i, 1), at(i, 2)];
         (0..n).map(|i| Aabb::from((point(i), point(i).map(|c| c + at(i, 3) / 5.0)))).collect()
     }
@@ -145,7 +146,7 @@ mod tests {
         for n in 2..10u32 {
             let work = divisions(&scatter(n as usize, 1)).1;
             // Pairs of disjoint sets that are not empty.
-            assert_eq!(work, (3u64.pow(n) - 2u64.pow(n + 1) + 1) / 2);
+            assert_eq!(work, 3u64.pow(n).div_ceil(2) - 2u64.pow(n));
         }
     }
 }

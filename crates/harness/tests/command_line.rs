@@ -131,7 +131,8 @@ fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
     let folder = folder();
     let spec = SPEC.replace("repetitions = 3", "repetitions = 40").replace("trials = 12", "trials = 100");
     fs::write(folder.path().join("spec.toml"), spec).unwrap();
-    let child = harness(folder.path(), &["spec.toml"]).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let child =
+        harness(folder.path(), &["spec.toml"]).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     // The lock and the first finished runs exist by then; all of them take seconds.
     std::thread::sleep(Duration::from_millis(400));
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
