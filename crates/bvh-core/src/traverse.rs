@@ -180,9 +180,8 @@ fn walk<C: Counter>(
         Stack::<Pending, 48>::new(Pending { entry: 0.0, kind: NodeKind::Inner { first: 0, count: 0 } });
     loop {
         match kind {
-            NodeKind::Leaf { first, count } => {
-                let objects = first as usize..first as usize + count as usize;
-                if leaf(&tree.prim_ids[objects], &mut t_max, counter).is_break() {
+            NodeKind::Leaf { .. } => {
+                if leaf(objects(tree, kind), &mut t_max, counter).is_break() {
                     return;
                 }
             }
@@ -192,11 +191,22 @@ fn walk<C: Counter>(
                 let (a, b) = (slabs.entry(&pair[0].aabb), slabs.entry(&pair[1].aabb));
                 // Without a branch up to here: which child is nearer cannot be predicted.
                 let swap = b < a;
-                let (near, far) = if swap { (b, a) } else { (a, b) };
-                stack.push_if(far <= t_max, Pending { entry: far, kind: pair[usize::from(!swap)].kind() });
-                if near <= t_max {
-                    kind = pair[usize::from(swap)].kind();
-                    continue;
+                let (near_entry, far_entry) = if swap { (b, a) } else { (a, b) };
+                let (near, far) = (pair[usize::from(swap)].kind(), pair[usize::from(!swap)].kind());
+                if near_entry <= t_max {
+                    if let NodeKind::Leaf { .. } = near {
+                        if leaf(objects(tree, near), &mut t_max, counter).is_break() {
+                            return;
+                        }
+                        if far_entry <= t_max {
+                            kind = far;
+                            continue;
+                        }
+                    } else {
+                        stack.push_if(far_entry <= t_max, Pending { entry: far_entry, kind: far });
+                        kind = near;
+                        continue;
+                    }
                 }
             }
             NodeKind::Inner { first, count } => {
@@ -211,6 +221,15 @@ fn walk<C: Counter>(
                 break pending.kind;
             }
         };
+    }
+}
+
+/// The objects of a leaf.
+#[inline(always)]
+fn objects(tree: &Bvh, leaf: NodeKind) -> &[u32] {
+    match leaf {
+        NodeKind::Leaf { first, count } => &tree.prim_ids[first as usize..first as usize + count as usize],
+        NodeKind::Inner { .. } => &[],
     }
 }
 
