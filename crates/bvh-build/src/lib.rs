@@ -3,6 +3,7 @@
 //! Every builder is one file with a `Config` and sees the objects' boxes only. All are deterministic, use no
 //! recursion on data, and refuse boxes that are not finite by naming the object.
 
+pub mod agglomerative;
 pub mod division;
 mod error;
 pub mod evaluation;

@@ -25,8 +25,11 @@
 extern crate alloc;
 
 mod aabb;
+mod block;
 mod bvh;
+mod collapse;
 pub mod cost;
+mod lanes;
 mod packed;
 mod ray;
 mod slabs;
@@ -36,9 +39,11 @@ mod traverse;
 mod triangle;
 mod validate;
 mod vector;
+mod wide;
 
 pub use aabb::{Aabb, InvalidBox, InvalidBoxReason, check_boxes};
 pub use bvh::{Bvh, MAX_OBJECTS, Node, NodeKind};
+pub use collapse::collapse_leaves;
 pub use packed::PackedAabb;
 pub use ray::{Hit, InvalidRay, Ray};
 pub use slabs::{Slabs, clip_to_box};
@@ -46,3 +51,4 @@ pub use sphere::Sphere;
 pub use traverse::{Counter, TestCounts, any_hit, any_hit_of_all, nearest_hit, nearest_hit_of_all};
 pub use triangle::{Shear, Triangle};
 pub use validate::{InvalidBvh, validate};
+pub use wide::WideBvh;

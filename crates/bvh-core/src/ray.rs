@@ -42,6 +42,7 @@ impl Ray {
 
     /// The ray from `origin` in `direction` over `t_min..=t_max`. Distances `t` are in multiples of the direction's
     /// length, which need not be 1. An infinite `t_max` stands for the largest finite distance.
+    #[inline]
     pub fn new(origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Result<Self, InvalidRay> {
         if !origin.is_finite() {
             return Err(InvalidRay::Origin(origin));
@@ -56,10 +57,12 @@ impl Ray {
             let inverse = 1.0 / d;
             if inverse.is_finite() { inverse } else { f32::MAX.copysign(d) }
         });
-        Ok(Self { origin, direction, inverse, t_min, t_max: t_max.min(f32::MAX) })
+        // A zero is +0.
+        Ok(Self { origin, direction, inverse, t_min: t_min + 0.0, t_max: t_max.min(f32::MAX) })
     }
 
     /// The whole half line: `t` from 0 to the largest finite distance.
+    #[inline]
     pub fn half_line(origin: Vec3, direction: Vec3) -> Result<Self, InvalidRay> {
         Self::new(origin, direction, 0.0, f32::MAX)
     }

@@ -1,7 +1,7 @@
 //! The conservative ray–box test: it never misses a box that holds a hit.
 
 use crate::{Aabb, Ray};
-use glam::Vec3;
+use glam::{Vec3, Vec4, Vec4Swizzles};
 
 /// A ray prepared for tests against the boxes of one scene.
 ///
@@ -19,11 +19,11 @@ use glam::Vec3;
 #[derive(Clone, Copy, Debug)]
 pub struct Slabs {
     /// origin + margin, subtracted from lower corners.
-    pub(crate) lower: Vec3,
+    lower: Vec4,
     /// origin − margin, subtracted from upper corners.
-    pub(crate) upper: Vec3,
-    pub(crate) inverse: Vec3,
-    pub(crate) t_min: f32,
+    upper: Vec4,
+    inverse: Vec4,
+    t_min: f32,
 }
 
 impl Slabs {
@@ -38,14 +38,11 @@ impl Slabs {
     /// Prepares `ray` for boxes inside `bounds`, which may be a scene's root box or one object's.
     #[inline]
     pub fn new(ray: &Ray, bounds: &Aabb) -> Self {
-        let origin = ray.origin();
-        let reach = (bounds.min - origin).abs().max((bounds.max - origin).abs());
-        let margin = Vec3::splat(reach.max_element() * Self::MARGIN);
+        let (origin, margin) = (ray.origin(), margin(ray, bounds));
         Self {
-            // One step further: the sum may have been rounded, or not have changed at all.
-            lower: (origin + margin).map(f32::next_up),
-            upper: (origin - margin).map(f32::next_down),
-            inverse: ray.inverse_direction(),
+            lower: (origin + margin).extend(0.0),
+            upper: (origin - margin).extend(0.0),
+            inverse: ray.inverse_direction().extend(0.0),
             t_min: ray.t_min(),
         }
     }
@@ -54,10 +51,44 @@ impl Slabs {
     /// second.
     #[inline(always)]
     pub fn interval(&self, aabb: &Aabb) -> (f32, f32) {
-        let (low, high) = ((aabb.min - self.lower) * self.inverse, (aabb.max - self.upper) * self.inverse);
+        let Aabb { min, max } = *aabb;
+        // Two overlapping loads and a rotation; the fourth lane is not used.
+        let min = Vec4::new(min.x, min.y, min.z, max.x);
+        let max = Vec4::new(aabb.min.z, max.x, max.y, max.z).yzwx();
+        let (low, high) = ((min - self.lower) * self.inverse, (max - self.upper) * self.inverse);
         let (near, far) = (low.min(high), low.max(high));
-        (near.x.max(near.y).max(near.z).max(self.t_min), far.x.min(far.y).min(far.z) * Self::FAR)
+        let entry = larger(larger(near.x, near.y), larger(near.z, self.t_min));
+        (entry, smaller(smaller(far.x, far.y), far.z) * Self::FAR)
     }
+
+    /// Where the ray enters the box; infinite when it misses it, which is behind every `t_max`.
+    #[inline(always)]
+    pub fn entry(&self, aabb: &Aabb) -> f32 {
+        let (entry, exit) = self.interval(aabb);
+        if entry <= exit { entry } else { f32::INFINITY }
+    }
+}
+
+/// By how much boxes grow along each axis for a ray that meets boxes inside `bounds`; never too little to change the
+/// origin it is added to.
+#[inline(always)]
+pub(crate) fn margin(ray: &Ray, bounds: &Aabb) -> Vec3 {
+    let origin = ray.origin();
+    let reach = (bounds.min - origin).abs().max((bounds.max - origin).abs());
+    // The second term covers the rounding of the sum with the origin, the third is for an origin and a reach of zero.
+    reach.max_element() * Slabs::MARGIN + origin.abs() * f32::EPSILON + f32::MIN_POSITIVE
+}
+
+/// The larger of two numbers; unlike `f32::max` one instruction, since neither is NaN.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The smaller of two numbers, as [`larger`].
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 /// Moves the distance of a hit into its object's own box: from wherever rounding put it to where a traversal looks.
@@ -70,9 +101,13 @@ impl Slabs {
 /// `bounds` must be the object's box, or one inside it.
 #[inline]
 pub fn clip_to_box(ray: &Ray, bounds: &Aabb, t: f32, t_max: f32) -> Option<f32> {
+    if t.is_nan() || t < ray.t_min() {
+        return None;
+    }
     let (entry, exit) = Slabs::new(ray, bounds).interval(bounds);
-    let moved = t.min(exit).max(entry);
-    (ray.t_min() <= t && entry <= exit && moved <= t_max).then_some(moved)
+    // A zero is +0, however it came about.
+    let moved = larger(smaller(t, exit), entry) + 0.0;
+    (entry <= exit && moved <= t_max).then_some(moved)
 }
 
 #[cfg(test)]

@@ -2,48 +2,62 @@
 
 use alloc::vec::Vec;
 
-/// A stack whose first `N` entries need no allocation. Chains of any depth fit.
+/// A stack whose upper `N` entries live inline and whose lower ones, if it gets that deep, on the heap.
 pub(crate) struct Stack<T, const N: usize> {
     inline: [T; N],
     len: usize,
-    /// Non-empty only while `inline` is full.
     spilled: Vec<T>,
 }
 
 impl<T: Copy, const N: usize> Stack<T, N> {
-    /// The empty stack; `filler` is any value.
+    /// The empty stack; `filler` is any value, quickest if all its bits are zero.
     #[inline(always)]
     pub(crate) fn new(filler: T) -> Self {
         Self { inline: [filler; N], len: 0, spilled: Vec::new() }
     }
 
+    /// Room for `K` more entries above the topmost, in any order; [`grow`](Self::grow) by as many as were written.
     #[inline(always)]
-    pub(crate) fn push(&mut self, value: T) {
-        match self.inline.get_mut(self.len) {
-            Some(slot) => {
-                *slot = value;
-                self.len += 1;
-            }
-            None => self.spill(value),
+    pub(crate) fn room<const K: usize>(&mut self) -> &mut [T; K] {
+        const { assert!(K <= N) };
+        if self.len > N - K {
+            spill(&self.inline[..self.len], &mut self.spilled);
+            self.len = 0;
         }
+        match self.inline[self.len..].first_chunk_mut() {
+            Some(room) => room,
+            None => unreachable!("at most N - K entries are inline"),
+        }
+    }
+
+    /// Adds the first `entries` of the [`room`](Self::room) to the stack.
+    #[inline(always)]
+    pub(crate) fn grow(&mut self, entries: usize) {
+        self.len += entries;
+    }
+
+    /// Pushes `value` if `condition` holds, without a branch on it.
+    #[inline(always)]
+    pub(crate) fn push_if(&mut self, condition: bool, value: T) {
+        *self.room::<1>() = [value];
+        self.grow(usize::from(condition));
     }
 
     #[inline(always)]
     pub(crate) fn pop(&mut self) -> Option<T> {
-        if self.len == N
-            && let Some(value) = self.spilled.pop()
-        {
-            return Some(value);
+        if self.len == 0 {
+            return self.spilled.pop();
         }
-        self.len = self.len.checked_sub(1)?;
+        self.len -= 1;
         self.inline.get(self.len).copied()
     }
+}
 
-    #[cold]
-    #[inline(never)]
-    fn spill(&mut self, value: T) {
-        self.spilled.push(value);
-    }
+/// Not a method: so that the stack's length stays in a register.
+#[cold]
+#[inline(never)]
+fn spill<T: Copy>(inline: &[T], spilled: &mut Vec<T>) {
+    spilled.extend_from_slice(inline);
 }
 
 #[cfg(test)]
@@ -54,12 +68,11 @@ mod tests {
     fn the_last_in_is_the_first_out_on_both_sides_of_the_spill() {
         let mut stack = Stack::<u32, 4>::new(0);
         for round in 0..3 {
-            (0..10).for_each(|i| stack.push(round + i));
-            assert_eq!(
-                (0..10).map_while(|_| stack.pop()).collect::<Vec<_>>(),
-                Vec::from_iter((0..10).rev().map(|i| round + i))
-            );
-            assert_eq!(stack.pop(), None);
+            (0..20).for_each(|i| stack.push_if(i % 2 == 0, round + i / 2));
+            *stack.room() = [round + 10, round + 11, 99];
+            stack.grow(2);
+            let popped: Vec<u32> = core::iter::from_fn(|| stack.pop()).collect();
+            assert_eq!(popped, Vec::from_iter((0..12).rev().map(|i| round + i)));
         }
     }
 }

@@ -151,11 +151,12 @@ fn nearest_of(
     }
 }
 
-/// A box that the ray enters at `entry`, to be visited later.
+/// A node whose box the ray enters at `entry`, to be visited later. By what it names, not by its index: the node itself
+/// may have left the cache by then.
 #[derive(Clone, Copy)]
 struct Pending {
     entry: f32,
-    node: u32,
+    kind: NodeKind,
 }
 
 /// Hands the objects of leaves that the ray may meet to `leaf`, the nearest first, until it breaks. `leaf` may lower
@@ -167,66 +168,90 @@ fn walk<C: Counter>(
     counter: &mut C,
     mut leaf: impl FnMut(&[u32], &mut f32, &mut C) -> ControlFlow<()>,
 ) {
-    let Some(mut node) = tree.nodes.first() else { return };
-    let slabs = Slabs::new(ray, &node.aabb);
+    let Some(root) = tree.nodes.first() else { return };
+    let slabs = Slabs::new(ray, &root.aabb);
     let mut t_max = ray.t_max();
     counter.boxes(1);
-    if enter(&slabs, node, t_max).is_none() {
+    if slabs.entry(&root.aabb) > t_max {
         return;
     }
-    let mut stack = Stack::<Pending, 64>::new(Pending { entry: 0.0, node: 0 });
-    let mut entered = Vec::new();
+    let mut kind = root.kind();
+    let mut stack =
+        Stack::<Pending, 48>::new(Pending { entry: 0.0, kind: NodeKind::Inner { first: 0, count: 0 } });
     loop {
-        match node.kind() {
+        match kind {
             NodeKind::Leaf { .. } => {
-                if leaf(&tree.prim_ids[node.prims()], &mut t_max, counter).is_break() {
+                if leaf(objects(tree, kind), &mut t_max, counter).is_break() {
                     return;
                 }
             }
             NodeKind::Inner { first, count: 2 } => {
                 counter.boxes(2);
                 let pair = &tree.nodes[first as usize..first as usize + 2];
-                match (enter(&slabs, &pair[0], t_max), enter(&slabs, &pair[1], t_max)) {
-                    (Some(a), Some(b)) => {
-                        let swap = b < a;
-                        stack.push(Pending { entry: if swap { a } else { b }, node: first + u32::from(!swap) });
-                        node = &pair[usize::from(swap)];
+                let (a, b) = (slabs.entry(&pair[0].aabb), slabs.entry(&pair[1].aabb));
+                // Without a branch up to here: which child is nearer cannot be predicted.
+                let swap = b < a;
+                let (near_entry, far_entry) = if swap { (b, a) } else { (a, b) };
+                let (near, far) = (pair[usize::from(swap)].kind(), pair[usize::from(!swap)].kind());
+                if near_entry <= t_max {
+                    if let NodeKind::Leaf { .. } = near {
+                        if leaf(objects(tree, near), &mut t_max, counter).is_break() {
+                            return;
+                        }
+                        if far_entry <= t_max {
+                            kind = far;
+                            continue;
+                        }
+                    } else {
+                        stack.push_if(far_entry <= t_max, Pending { entry: far_entry, kind: far });
+                        kind = near;
                         continue;
                     }
-                    (Some(_), None) => {
-                        node = &pair[0];
-                        continue;
-                    }
-                    (None, Some(_)) => {
-                        node = &pair[1];
-                        continue;
-                    }
-                    (None, None) => {}
                 }
             }
             NodeKind::Inner { first, count } => {
                 counter.boxes(count as usize);
-                let children = (first..).zip(&tree.nodes[node.children()]);
-                entered.extend(children.filter_map(|(node, child)| {
-                    enter(&slabs, child, t_max).map(|entry| Pending { entry, node })
-                }));
-                // The nearest last, so that it is popped first; the lower index first on ties.
-                entered.sort_unstable_by(|a, b| b.entry.total_cmp(&a.entry).then(b.node.cmp(&a.node)));
-                entered.drain(..).for_each(|pending| stack.push(pending));
+                let children = &tree.nodes[first as usize..first as usize + count as usize];
+                push_sorted(children, &slabs, t_max, &mut stack);
             }
         }
-        node = loop {
+        kind = loop {
             let Some(pending) = stack.pop() else { return };
             if pending.entry <= t_max {
-                break &tree.nodes[pending.node as usize];
+                break pending.kind;
             }
         };
     }
 }
 
-/// Where the ray enters the node's box, if it does so in its range.
+/// The objects of a leaf.
 #[inline(always)]
-fn enter(slabs: &Slabs, node: &Node, t_max: f32) -> Option<f32> {
-    let (entry, exit) = slabs.interval(&node.aabb);
-    (entry <= exit.min(t_max)).then_some(entry)
+fn objects(tree: &Bvh, leaf: NodeKind) -> &[u32] {
+    match leaf {
+        NodeKind::Leaf { first, count } => &tree.prim_ids[first as usize..first as usize + count as usize],
+        NodeKind::Inner { .. } => &[],
+    }
+}
+
+/// Pushes the children that the ray enters, the nearest last; of two at the same distance the first one.
+fn push_sorted<const N: usize>(children: &[Node], slabs: &Slabs, t_max: f32, stack: &mut Stack<Pending, N>) {
+    let mut few = [(0.0, 0); 16];
+    let mut many = Vec::new();
+    let entered = match few.get_mut(..children.len()) {
+        Some(few) => few,
+        None => {
+            many.resize(children.len(), (0.0, 0));
+            &mut many[..]
+        }
+    };
+    let mut count = 0;
+    for (index, child) in children.iter().enumerate() {
+        let entry = slabs.entry(&child.aabb);
+        entered[count] = (entry, index);
+        count += usize::from(entry <= t_max);
+    }
+    entered[..count].sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
+    for &(entry, index) in &entered[..count] {
+        stack.push_if(true, Pending { entry, kind: children[index].kind() });
+    }
 }

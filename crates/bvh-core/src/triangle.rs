@@ -14,34 +14,51 @@ pub struct Shear {
     pub(crate) ray: Ray,
     /// The axes that become x, y and z; z is the direction's largest component.
     pub(crate) axes: [usize; 3],
+    /// The ray's origin along these axes.
+    pub(crate) origin: [f32; 3],
     /// How far a step along z moves in x and in y; both at most 1.
     pub(crate) slope: [f32; 2],
+    /// The direction along z.
+    depth: f64,
+    /// Its sign, ±1.
+    pub(crate) forwards: f32,
+    /// Its size and a little more: z beyond `t` times this is beyond `t`, rounding included.
+    pub(crate) farther: f32,
 }
 
 impl Shear {
     /// Prepares a ray.
-    #[inline]
+    #[inline(always)]
     pub fn new(ray: &Ray) -> Self {
-        let d = ray.direction();
-        let size = d.abs();
-        let z = if size.x >= size.y && size.x >= size.z {
+        let (origin, direction) = (ray.origin().to_array(), ray.direction().to_array());
+        let size = direction.map(f32::abs);
+        let z = if size[0] >= size[1] && size[0] >= size[2] {
             0
-        } else if size.y >= size.z {
+        } else if size[1] >= size[2] {
             1
         } else {
             2
         };
-        // Three different axes below 3, written so that the compiler sees it too.
-        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][z];
-        Self { ray: *ray, axes, slope: [d[axes[0]] / d[z], d[axes[1]] / d[z]] }
+        const AXES: &[[usize; 3]; 3] = &[[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+        let axes @ [kx, ky, kz] = AXES[z];
+        Self {
+            ray: *ray,
+            axes,
+            origin: [origin[kx], origin[ky], origin[kz]],
+            slope: [direction[kx] / direction[kz], direction[ky] / direction[kz]],
+            depth: f64::from(direction[kz]),
+            forwards: 1.0f32.copysign(direction[kz]),
+            farther: size[z] * (1.0 + 1e-6),
+        }
     }
 
     /// A point relative to the ray: 0, 0 and any z when it is on it. The same operations in the same order as the
     /// vector form of the wide layout.
     #[inline(always)]
-    fn apply(&self, p: Vec3) -> [f32; 3] {
-        let p = (p - self.ray.origin()).to_array();
-        let [x, y, z] = self.axes.map(|axis| p[axis]);
+    fn apply(&self, p: &Vec3) -> [f32; 3] {
+        let p: &[f32; 3] = p.as_ref();
+        let ([kx, ky, kz], [ox, oy, oz]) = (self.axes, self.origin);
+        let (x, y, z) = (p[kx] - ox, p[ky] - oy, p[kz] - oz);
         [x - self.slope[0] * z, y - self.slope[1] * z, z]
     }
 }
@@ -72,19 +89,23 @@ impl Triangle {
     /// triangles are rejected in f32, exactly) and makes the distance as precise as the sheared vertices are.
     #[inline]
     pub fn intersect(&self, shear: &Shear, t_max: f32) -> Option<f32> {
-        let corners = self.0.map(|p| shear.apply(p));
-        let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = corners;
+        let [a, b, c] = &self.0;
+        let ([ax, ay, _], [bx, by, _], [cx, cy, _]) = (shear.apply(a), shear.apply(b), shear.apply(c));
         // Rounding is monotone: the sign of a difference of rounded products is right, or the difference is 0.
         let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
         if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
             return None;
         }
-        self.decide(shear, corners, t_max)
+        self.decide(shear, t_max)
     }
 
     /// The rest of the test, for the few triangles that the sides of their edges in f32 do not exclude.
-    fn decide(&self, shear: &Shear, corners: [[f32; 3]; 3], t_max: f32) -> Option<f32> {
-        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners.map(|p| p.map(f64::from));
+    #[inline(never)]
+    pub(crate) fn decide(&self, shear: &Shear, t_max: f32) -> Option<f32> {
+        let [a, b, c] = &self.0;
+        let double = |[x, y, z]: [f32; 3]| (f64::from(x), f64::from(y), f64::from(z));
+        let ((ax, ay, az), (bx, by, bz)) = (double(shear.apply(a)), double(shear.apply(b)));
+        let (cx, cy, cz) = double(shear.apply(c));
         // Products of two f32 are exact in f64.
         let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
         if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
@@ -94,8 +115,10 @@ impl Triangle {
         if determinant == 0.0 {
             return None;
         }
-        let z = (u * az + v * bz + w * cz) / determinant;
-        let t = z / f64::from(shear.ray.direction()[shear.axes[2]]);
+        let t = (u * az + v * bz + w * cz) / (determinant * shear.depth);
+        if t < f64::from(shear.ray.t_min()) {
+            return None;
+        }
         // Collinear corners can get an area from the rounding of the shear.
         clip_to_box(&shear.ray, &self.aabb(), t as f32, t_max).filter(|_| !self.is_degenerate())
     }

@@ -146,7 +146,7 @@ mod tests {
         for n in 2..10u32 {
             let work = divisions(&scatter(n as usize, 1)).1;
             // Pairs of disjoint sets that are not empty.
-            assert_eq!(work, (3u64.pow(n) - 2u64.pow(n + 1) + 1) / 2);
+            assert_eq!(work, 3u64.pow(n).div_ceil(2) - 2u64.pow(n));
         }
     }
 }

@@ -9,17 +9,21 @@
 //! | Figure 1 | `k_best`, restricted by cardinality | 0.1 |
 //! | section 3.4 | `within`, restricted by value | any |
 //!
+//! GRASP's second phase, which the paper leaves to future work (sections 3.4 and 5), is `local_search`: every constructed
+//! tree is led to a local optimum of its own.
+//!
 //! Differs from the paper: nothing in the first two rules; for the others it does not say how noise acts, and here
 //! it is the probability of taking one of the candidates other than the best, all alike.
 
 use crate::error::require;
 use crate::stream::{Stream, stream};
-use crate::{Problem, Run, Search, SearchError};
+use crate::working::Working;
+use crate::{LocalSearch, Observer, Problem, Quota, Run, Search, SearchError, Tally};
 use bvh_build::division::Workspace;
 use bvh_build::evaluation::Evaluation;
 use bvh_build::sweep::{Split, SplitRule, Sweep};
 use bvh_build::{Presorted, muller_fellner};
-use bvh_core::Bvh;
+use bvh_core::{Aabb, Bvh};
 use rand::RngExt;
 
 /// How to construct, and how often.
@@ -38,13 +42,22 @@ pub struct Config {
     /// as likely as any other. Default none.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub noise: Option<f64>,
+    /// What is done to every constructed tree. Default none, as in the paper.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "LocalSearch::is_none"))]
+    pub local_search: LocalSearch,
     /// The heuristic that ranks splits, and the rest of the greedy builder's configuration.
     pub construction: muller_fellner::Config,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { trials: 100, candidates: Candidates::AxisBest, noise: None, construction: Default::default() }
+        Self {
+            trials: 100,
+            candidates: Candidates::AxisBest,
+            noise: None,
+            local_search: LocalSearch::None,
+            construction: Default::default(),
+        }
     }
 }
 
@@ -60,28 +73,60 @@ pub enum Candidates {
     Within(f64),
 }
 
+impl Candidates {
+    pub(crate) fn check(self) -> Result<(), SearchError> {
+        match self {
+            Self::AxisBest => Ok(()),
+            Self::KBest(k) => require(k >= 1, "k_best", k.into(), "1 or more"),
+            Self::Within(alpha) => require(alpha >= 0.0 && alpha.is_finite(), "within", alpha, "0 or more"),
+        }
+    }
+}
+
 impl Config {
     fn check(&self) -> Result<(), SearchError> {
         require(self.trials >= 1, "trials", self.trials as f64, "1 or more")?;
         if let Some(noise) = self.noise {
             require((0.0..=1.0).contains(&noise), "noise", noise, "0 to 1")?;
         }
-        match self.candidates {
-            Candidates::AxisBest => {}
-            Candidates::KBest(k) => require(k >= 1, "k_best", k.into(), "1 or more")?,
-            Candidates::Within(alpha) => {
-                require(alpha >= 0.0 && alpha.is_finite(), "within", alpha, "0 or more")?;
-            }
-        }
+        self.candidates.check()?;
         Ok(self.construction.heuristic.check()?)
     }
 
     /// Construction number `trial`, into `tree`.
     fn construct(&self, scene: &Presorted, seed: u64, trial: u64, workspace: &mut Workspace, tree: &mut Bvh) {
         let Self { candidates, noise, .. } = *self;
-        let mut rule = Randomised { candidates, noise, rng: stream(seed, trial), list: Vec::new() };
+        let mut rule = Randomised::new(candidates, noise, stream(seed, trial));
         self.construction.construct(scene, &mut rule, workspace, tree);
     }
+
+    /// Leads a tree to a local optimum, unless cancelled, which leaves it as it was.
+    fn improve(
+        &self,
+        tree: &mut Bvh,
+        boxes: &[Aabb],
+        observer: &dyn Observer,
+    ) -> Result<Improved, SearchError> {
+        if self.local_search.is_none() {
+            return Ok(Improved { finished: true, work: 0 });
+        }
+        let mut working = Working::from_bvh(tree, boxes)?;
+        let Tally { work, .. } = self.local_search.descend(&mut working, Quota::ENDLESS, observer);
+        let finished = !observer.cancelled();
+        if finished {
+            *tree = working.to_bvh();
+        }
+        Ok(Improved { finished, work })
+    }
+}
+
+/// What became of a constructed tree.
+#[derive(Clone, Copy, Debug)]
+struct Improved {
+    /// Whether the local optimum was reached and kept.
+    finished: bool,
+    /// Nodes visited.
+    work: u64,
 }
 
 impl Search for Config {
@@ -89,24 +134,35 @@ impl Search for Config {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         self.check()?;
         let scene = Presorted::new(problem.boxes)?;
-        let work = (2 * scene.len() as u64).saturating_sub(1);
-        let cost_of = |(workspace, tree): &mut (Workspace, Bvh), trial: u64| {
+        let construction = (2 * scene.len() as u64).saturating_sub(1);
+        let observer = run.observer();
+        let attempt = |(workspace, tree): &mut (Workspace, Bvh), trial: u64| {
             self.construct(&scene, seed, trial, workspace, tree);
-            problem.objective.cost(tree)
+            let improved = self.improve(tree, problem.boxes, observer)?;
+            Ok::<_, SearchError>((problem.objective.cost(tree), improved))
         };
-        let (mut next, mut best) = (0, 0);
+        // Trials whose work is not known before are done in smaller batches, to waste less at the end of a budget.
+        let most = if self.local_search.is_none() { BATCH } else { SMALL_BATCH };
+        let (mut next, mut best) = (0, (0, true));
         while next < self.trials && run.stopped().is_none() {
-            let end = self.trials.min(next.saturating_add(run.evaluations_left(work).min(BATCH)));
-            for (trial, cost) in (next..end).zip(map_trials(next..end, cost_of)) {
-                if run.record(cost, work) {
-                    best = trial;
+            let end = self.trials.min(next.saturating_add(run.evaluations_left(construction).min(most)));
+            for (trial, result) in (next..end).zip(map_trials(next..end, attempt)) {
+                let (cost, Improved { finished, work }) = result?;
+                if run.record(cost, construction + work) {
+                    best = (trial, finished);
+                }
+                if run.stopped().is_some() {
+                    break;
                 }
             }
             next = end;
         }
-        // Only costs were kept; the incumbent is constructed once more.
-        let mut tree = Bvh::default();
-        self.construct(&scene, seed, best, &mut Workspace::default(), &mut tree);
+        // Only costs were kept; the incumbent is made once more, to the end this time.
+        let (mut tree, (trial, finished)) = (Bvh::default(), best);
+        self.construct(&scene, seed, trial, &mut Workspace::default(), &mut tree);
+        if finished {
+            self.improve(&mut tree, problem.boxes, &())?;
+        }
         Ok(tree)
     }
 }
@@ -114,29 +170,38 @@ impl Search for Config {
 /// Trials between two looks at the budget.
 const BATCH: u64 = 32;
 
-/// `cost_of` every trial, in order, each thread with buffers of its own.
-fn map_trials(
+/// The same with local search.
+const SMALL_BATCH: u64 = 4;
+
+/// Every trial's result, in order, each thread with buffers of its own.
+fn map_trials<T: Send>(
     trials: std::ops::Range<u64>,
-    cost_of: impl Fn(&mut (Workspace, Bvh), u64) -> f64 + Send + Sync,
-) -> Vec<f64> {
+    attempt: impl Fn(&mut (Workspace, Bvh), u64) -> T + Send + Sync,
+) -> Vec<T> {
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        trials.into_par_iter().map_init(Default::default, cost_of).collect()
+        trials.into_par_iter().map_init(Default::default, attempt).collect()
     }
     #[cfg(not(feature = "rayon"))]
     {
         let mut buffers = Default::default();
-        trials.map(|trial| cost_of(&mut buffers, trial)).collect()
+        trials.map(|trial| attempt(&mut buffers, trial)).collect()
     }
 }
 
 /// Draws a split from a node's restricted candidate list.
-struct Randomised {
+pub(crate) struct Randomised {
     candidates: Candidates,
     noise: Option<f64>,
     rng: Stream,
     list: Vec<Split>,
+}
+
+impl Randomised {
+    pub fn new(candidates: Candidates, noise: Option<f64>, rng: Stream) -> Self {
+        Self { candidates, noise, rng, list: Vec::new() }
+    }
 }
 
 impl SplitRule for Randomised {
@@ -166,7 +231,7 @@ mod tests {
     use bvh_build::Builder;
     use bvh_core::validate;
 
-    fn configs() -> [Config; 5] {
+    fn configs() -> [Config; 6] {
         let config = |candidates, noise| Config { trials: 12, candidates, noise, ..Config::default() };
         [
             config(Candidates::AxisBest, None),
@@ -174,6 +239,7 @@ mod tests {
             config(Candidates::KBest(5), Some(0.1)),
             config(Candidates::KBest(5), None),
             config(Candidates::Within(0.05), Some(0.5)),
+            Config { local_search: LocalSearch::Treelet, ..config(Candidates::AxisBest, Some(0.1)) },
         ]
     }
 
@@ -220,6 +286,45 @@ mod tests {
             assert_eq!(one.tree, on(2, 50).tree, "{config:?}");
             assert_eq!(one.history[..20], on(2, 20).history, "{config:?}");
         }
+    }
+
+    #[test]
+    fn local_search_improves_every_trial_and_its_work_is_counted_on_any_number_of_threads() {
+        let boxes = scatter(500);
+        let run = |local_search, threads: usize, max_work| {
+            let config = Config { trials: 20, local_search, ..Config::default() };
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let budget = Budget { max_work, ..Budget::default() };
+            pool.install(|| solve(&config, &Problem::new(&boxes), 3, budget, &()).unwrap())
+        };
+        let plain = run(LocalSearch::None, 1, None);
+        for local_search in [LocalSearch::Rotation, LocalSearch::Treelet, LocalSearch::Reinsertion] {
+            let improved = run(local_search, 1, None);
+            let pairs = plain.history.iter().zip(&improved.history);
+            assert!(pairs.clone().all(|(before, after)| after.cost < before.cost && after.work > before.work));
+            let cut = |threads| run(local_search, threads, Some(improved.work / 3));
+            let (one, three) = (cut(1), cut(3));
+            assert_eq!((&one.tree, &one.history), (&three.tree, &three.history));
+            // The budget ends the search with the first trial that exceeds it.
+            let within = improved.history.iter().take_while(|event| event.work < improved.work / 3).count();
+            assert_eq!(one.history, improved.history[..=within]);
+        }
+    }
+
+    #[test]
+    fn a_trial_cut_off_by_the_observer_is_recorded_as_constructed() {
+        struct Cancelled;
+        impl Observer for Cancelled {
+            fn cancelled(&self) -> bool {
+                true
+            }
+        }
+        let boxes = scatter(500);
+        let config = Config { local_search: LocalSearch::Reinsertion, ..Config::default() };
+        let outcome = solve(&config, &Problem::new(&boxes), 3, Budget::default(), &Cancelled).unwrap();
+        let plain = Config { trials: 1, ..Config::default() };
+        let plain = solve(&plain, &Problem::new(&boxes), 3, Budget::default(), &()).unwrap();
+        assert_eq!((outcome.tree, outcome.cost), (plain.tree, plain.cost));
     }
 
     #[test]

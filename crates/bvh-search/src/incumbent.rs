@@ -1,7 +1,7 @@
 //! The best tree of a local search, kept cheaply: converted only when one is really better.
 
 use crate::working::Working;
-use crate::{Problem, Run, SearchError};
+use crate::{Observer, Problem, Quota, Run, SearchError, Tally};
 use bvh_build::Builder;
 use bvh_core::{Bvh, cost};
 
@@ -42,5 +42,42 @@ impl<'p> Incumbent<'p> {
             self.tree = candidate;
         }
         improved
+    }
+
+    /// Sweeps `tree` until a sweep keeps nothing, `sweeps` times at most; `sweep` is told how many were before.
+    pub fn descend(
+        &mut self,
+        tree: &mut Working,
+        sweeps: u32,
+        run: &mut Run,
+        mut sweep: impl FnMut(&mut Working, u32, Quota, &dyn Observer) -> Tally,
+    ) {
+        for number in 0..sweeps {
+            if run.stopped().is_some() {
+                break;
+            }
+            let swept = sweep(tree, number, run.left(), run.observer());
+            run.count(swept);
+            self.offer(tree, run);
+            if swept.kept == 0 {
+                break;
+            }
+        }
+    }
+}
+
+/// Sweeps until a sweep keeps nothing, the quota is reached, or the observer says so.
+pub(crate) fn until_still(
+    quota: Quota,
+    observer: &dyn Observer,
+    mut sweep: impl FnMut(Quota) -> Tally,
+) -> Tally {
+    let mut total = Tally::default();
+    loop {
+        let swept = sweep(quota.less(&total));
+        total += swept;
+        if swept.kept == 0 || quota.is_reached(&total) || observer.cancelled() {
+            return total;
+        }
     }
 }

@@ -23,7 +23,9 @@
 //! # Ok::<(), bvh_search::SearchError>(())
 //! ```
 
+pub mod annealing;
 mod budget;
+mod cooling;
 mod error;
 pub mod exact;
 mod fusing;
@@ -31,25 +33,32 @@ pub mod genetic;
 pub mod grasp;
 mod incumbent;
 mod insertion_orders;
+mod local_search;
 pub mod lower_bound;
 mod optimize;
 mod place;
 pub mod portfolio;
 pub mod random_orders;
+pub mod rebuild;
 #[cfg(feature = "serde")]
 mod registry;
 pub mod reinsertion;
+pub mod rotation;
 pub mod ruin_recreate;
 mod run;
 #[cfg(test)]
 mod scatter;
+mod start;
 mod stream;
+pub mod treelet;
 mod working;
 
 pub use budget::{Budget, StopReason};
 pub use error::SearchError;
+pub use local_search::LocalSearch;
 pub use optimize::optimize;
 #[cfg(feature = "serde")]
 pub use registry::Method;
 pub use run::{Event, Observer, Outcome, Problem, Quota, Run, Search, Tally, solve};
+pub use start::Start;
 pub use stream::Stream;

@@ -5,14 +5,15 @@
 //!    the incumbent, and all that they end with is fused with it. Fusing keeps every part that became better and drops
 //!    every part that became worse, so that nothing is ever lost to the heat.
 
+use crate::cooling::{Cooling, anneal};
 use crate::error::require;
 use crate::fusing::fuse;
 use crate::incumbent::Incumbent;
-use crate::ruin_recreate::{Cooling, Ruin, Scale, anneal};
+use crate::ruin_recreate::{Mover, Ruin, Scale};
+use crate::start::Start;
 use crate::stream::stream;
 use crate::working::Working;
 use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally, reinsertion};
-use bvh_build::muller_fellner;
 use bvh_core::Bvh;
 
 /// How long the generations are and how hot.
@@ -43,8 +44,8 @@ pub struct Config {
     pub cold: f64,
     /// The move; its `scale` is the chain's, in turns `saved` and `top`.
     pub ruin: Ruin,
-    /// The builder of the start. Default as for reinsertion.
-    pub start: muller_fellner::Config,
+    /// The builder of the start.
+    pub start: Start,
 }
 
 impl Default for Config {
@@ -59,7 +60,7 @@ impl Default for Config {
             hottest: 0.1,
             cold: 0.003,
             ruin: Ruin::default(),
-            start: reinsertion::start(),
+            start: Start::default(),
         }
     }
 }
@@ -83,8 +84,9 @@ impl Config {
         if n < 3 {
             return;
         }
-        run.count(reinsertion::to_local_optimum(tree, run.left(), run.observer()));
-        best.offer(tree, run);
+        best.descend(tree, u32::MAX, run, |tree, _, quota, observer| {
+            reinsertion::sweep_by_area(tree, quota, observer)
+        });
         let own = self.work_per_object.saturating_mul(n);
         let budget = run.left().work;
         let mut left = own.min(budget);
@@ -144,7 +146,8 @@ impl Config {
             // Which scale of temperatures is the better one depends on the scene: every other chain takes the other.
             let scale = if number.is_multiple_of(2) { Scale::Saved } else { Scale::Top };
             let ruin = Ruin { scale, ..self.ruin.clone() };
-            anneal(&ruin, &cooling, &mut tree, &mut rng, observer, &mut |_, tally| done += tally);
+            let mover = &mut Mover::new(&ruin);
+            anneal(mover, &cooling, &mut tree, &mut rng, observer, &mut |_, tally| done += tally);
             (tree, done)
         };
         #[cfg(feature = "rayon")]

@@ -45,6 +45,8 @@ methods! {
     "median_cut" => MedianCut(bvh_build::median_cut::Config),
     /// Incremental insertion, in index order.
     "goldsmith_salmon" => GoldsmithSalmon(bvh_build::goldsmith_salmon::Config),
+    /// Bottom-up clustering.
+    "agglomerative" => Agglomerative(bvh_build::agglomerative::Config),
     /// Randomised Müller–Fellner.
     "grasp" => Grasp(crate::grasp::Config),
     /// Goldsmith–Salmon insertion in random orders.
@@ -53,6 +55,14 @@ methods! {
     "genetic" => Genetic(crate::genetic::Config),
     /// Reinsertion to a local optimum.
     "reinsertion" => Reinsertion(crate::reinsertion::Config),
+    /// Tree rotations to a local optimum.
+    "rotation" => Rotation(crate::rotation::Config),
+    /// Treelet restructuring to a local optimum.
+    "treelet" => Treelet(crate::treelet::Config),
+    /// Annealing on single reinsertions.
+    "annealing" => Annealing(crate::annealing::Config),
+    /// Rebuilding what looks badly split.
+    "rebuild" => Rebuild(crate::rebuild::Config),
     /// Annealed ruin and recreate.
     "ruin_recreate" => RuinRecreate(crate::ruin_recreate::Config),
     /// The exact optimum of small scenes.

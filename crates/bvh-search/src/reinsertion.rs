@@ -6,13 +6,13 @@
 //! finds nothing.
 
 use crate::error::require;
-use crate::incumbent::Incumbent;
+use crate::incumbent::{Incumbent, until_still};
 use crate::place::PlaceSearch;
 use crate::run::Tally;
+use crate::start::Start;
 use crate::stream::stream;
 use crate::working::{ANCHOR, Working};
 use crate::{Observer, Problem, Quota, Run, Search, SearchError};
-use bvh_build::muller_fellner;
 use bvh_core::Bvh;
 use bvh_core::with_vector_instructions;
 use rand::seq::SliceRandom;
@@ -29,20 +29,14 @@ pub struct Config {
     pub order: Order,
     /// The most sweeps over all nodes, at least 1; ends earlier at a local optimum. Default 1000.
     pub sweeps: u32,
-    /// The builder of the start. Default `area_times_power` 0.9, which leaves it less to do than the original.
-    pub start: muller_fellner::Config,
+    /// The builder of the start.
+    pub start: Start,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { order: Order::ByArea, sweeps: 1000, start: start() }
+        Self { order: Order::ByArea, sweeps: 1000, start: Start::default() }
     }
-}
-
-/// The start of all local searches.
-pub(crate) fn start() -> muller_fellner::Config {
-    let heuristic = muller_fellner::Heuristic::AreaTimesPower(0.9);
-    muller_fellner::Config { heuristic, ..Default::default() }
 }
 
 /// The order of a sweep.
@@ -59,43 +53,33 @@ impl Search for Config {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         require(self.sweeps >= 1, "sweeps", self.sweeps.into(), "1 or more")?;
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
-        for number in 0..self.sweeps {
-            if run.stopped().is_some() {
-                break;
-            }
+        best.descend(&mut tree, self.sweeps, run, |tree, number, quota, observer| {
             let mut order = tree.preorder();
             match self.order {
-                Order::ByArea => sort_by_area(&tree, &mut order),
+                Order::ByArea => sort_by_area(tree, &mut order),
                 Order::Random => order.shuffle(&mut stream(seed, number.into())),
             }
-            let swept = sweep(&mut tree, &order, run.left(), run.observer());
-            run.count(swept);
-            best.offer(&tree, run);
-            if swept.kept == 0 {
-                break;
-            }
-        }
+            sweep(tree, &order, quota, observer)
+        });
         Ok(best.tree)
     }
 }
 
 /// The largest first, equal ones in the order given.
-fn sort_by_area(tree: &Working, order: &mut [u32]) {
+pub(crate) fn sort_by_area(tree: &Working, order: &mut [u32]) {
     order.sort_by(|&a, &b| tree.nodes[b as usize].area.total_cmp(&tree.nodes[a as usize].area));
+}
+
+/// Tries every node once, the largest first.
+pub(crate) fn sweep_by_area(tree: &mut Working, quota: Quota, observer: &dyn Observer) -> Tally {
+    let mut order = tree.preorder();
+    sort_by_area(tree, &mut order);
+    sweep(tree, &order, quota, observer)
 }
 
 /// Sweeps by area until nothing moves.
 pub(crate) fn to_local_optimum(tree: &mut Working, quota: Quota, observer: &dyn Observer) -> Tally {
-    let mut total = Tally::default();
-    loop {
-        let mut order = tree.preorder();
-        sort_by_area(tree, &mut order);
-        let swept = sweep(tree, &order, quota.less(&total), observer);
-        total += swept;
-        if swept.kept == 0 || quota.is_reached(&total) || observer.cancelled() {
-            return total;
-        }
-    }
+    until_still(quota, observer, |quota| sweep_by_area(tree, quota, observer))
 }
 
 with_vector_instructions! {
@@ -106,7 +90,7 @@ with_vector_instructions! {
 }
 
 /// A place must be better by this part of its cost: above rounding, so that no two places take turns.
-const TOLERANCE: f64 = 1e-12;
+pub(crate) const TOLERANCE: f64 = 1e-12;
 
 #[inline(always)]
 fn sweep_plain(tree: &mut Working, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally {

@@ -4,16 +4,15 @@
 //! Schrimpf et al. 2000 (ruin and recreate); Kirkpatrick, Gelatt & Vecchi 1983; Shaw 1998 (related removal).
 //! Temperatures are relative to an area of the move, so that one schedule suits nodes of all sizes.
 
+use crate::cooling::{Cooling, Move, anneal};
 use crate::error::require;
 use crate::incumbent::Incumbent;
 use crate::place::PlaceSearch;
-use crate::reinsertion;
+use crate::start::Start;
 use crate::stream::{Stream, stream};
 use crate::working::{ANCHOR, Working};
-use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally};
-use bvh_build::muller_fellner;
+use crate::{Problem, Run, Search, SearchError};
 use bvh_core::Bvh;
-use bvh_core::with_vector_instructions;
 use rand::RngExt;
 use rand::seq::SliceRandom;
 
@@ -34,19 +33,13 @@ pub struct Config {
     pub cold: f64,
     /// Work per object, unless the budget has less. Default 10 000.
     pub work_per_object: u64,
-    /// The builder of the start. Default as for reinsertion.
-    pub start: muller_fellner::Config,
+    /// The builder of the start.
+    pub start: Start,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self {
-            ruin: Ruin::default(),
-            hot: 0.1,
-            cold: 0.003,
-            work_per_object: 10_000,
-            start: reinsertion::start(),
-        }
+        Self { ruin: Ruin::default(), hot: 0.1, cold: 0.003, work_per_object: 10_000, start: Start::default() }
     }
 }
 
@@ -106,7 +99,8 @@ impl Search for Config {
         quota.work = quota.work.min(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
         let cooling = Cooling { hot: self.hot, cold: self.cold, quota };
         let observer = run.observer();
-        anneal(&self.ruin, &cooling, &mut tree, &mut stream(seed, 0), observer, &mut |tree, tally| {
+        let mover = &mut Mover::new(&self.ruin);
+        anneal(mover, &cooling, &mut tree, &mut stream(seed, 0), observer, &mut |tree, tally| {
             run.count(tally);
             best.offer(tree, run);
         });
@@ -114,95 +108,10 @@ impl Search for Config {
     }
 }
 
-/// One descent of the temperature.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Cooling {
-    /// First temperature.
-    pub hot: f64,
-    /// Last temperature.
-    pub cold: f64,
-    /// The work to be done meanwhile, and the most moves.
-    pub quota: Quota,
-}
-
-/// Work per object after which nodes are laid out anew.
-const WORK_PER_ROUND: u64 = 64;
-
-/// Work per object that is kept for the sweeps, an eighth of all at most.
-const WORK_OF_SWEEPS: u64 = 300;
-
-/// Cools `tree` geometrically, by the part of the work done, then sweeps it to a local optimum. Shows the tree to
-/// `round` along the way, with what was done since the last time.
-pub(crate) fn anneal(
-    ruin: &Ruin,
-    cooling: &Cooling,
-    tree: &mut Working,
-    rng: &mut Stream,
-    observer: &dyn Observer,
-    round: &mut dyn FnMut(&Working, Tally),
-) {
-    let (n, Quota { work, moves }) = (tree.objects() as u64, cooling.quota);
-    if n < 3 {
-        return;
-    }
-    let work = work - (work / 8).min(WORK_OF_SWEEPS.saturating_mul(n));
-    let rounds = (work / (WORK_PER_ROUND * n)).clamp(1, 100);
-    let factor = cooling.cold / cooling.hot;
-    let mut done = Tally::default();
-    for number in 1..=rounds {
-        *tree = tree.in_preorder();
-        let part = |number: u64| number as f64 / rounds as f64;
-        let heat = [number - 1, number].map(|number| cooling.hot * libm::pow(factor, part(number)));
-        let end = Quota { work: (work as f64 * part(number)) as u64, moves };
-        let tally = cool(ruin, tree, heat, end.less(&done), rng, observer);
-        done += tally;
-        round(tree, tally);
-        if observer.cancelled() {
-            return;
-        }
-    }
-    *tree = tree.in_preorder();
-    let tally = reinsertion::to_local_optimum(tree, cooling.quota.less(&done), observer);
-    round(tree, tally);
-}
-
-with_vector_instructions! {
-    /// Moves until the quota is reached, while the temperature falls geometrically from the first to the second.
-    cool = cool_plain(ruin: &Ruin, tree: &mut Working, heat: [f64; 2], quota: Quota, rng: &mut Stream,
-        observer: &dyn Observer) -> Tally
-}
-
-#[inline(always)]
-fn cool_plain(
-    ruin: &Ruin,
-    tree: &mut Working,
-    [hot, cold]: [f64; 2],
-    quota: Quota,
-    rng: &mut Stream,
-    observer: &dyn Observer,
-) -> Tally {
-    let mut tally = Tally::default();
-    let mut mover = Mover::default();
-    let mut temperature = hot;
-    loop {
-        tally.work = mover.work + mover.search.visits;
-        if quota.is_reached(&tally) {
-            return tally;
-        }
-        if tally.moves % 64 == 0 {
-            if observer.cancelled() {
-                return tally;
-            }
-            temperature = hot * libm::pow(cold / hot, tally.work as f64 / quota.work as f64);
-        }
-        tally.kept += u64::from(mover.step(ruin, tree, temperature, rng));
-        tally.moves += 1;
-    }
-}
-
-/// Buffers of moves.
-#[derive(Debug, Default)]
-struct Mover {
+/// Ruins, recreates, accepts or not.
+#[derive(Debug)]
+pub(crate) struct Mover<'a> {
+    ruin: &'a Ruin,
     search: PlaceSearch,
     /// Roots of the subtrees taken out, each with the sibling it had.
     out: Vec<(u32, u32)>,
@@ -210,10 +119,20 @@ struct Mover {
     work: u64,
 }
 
-impl Mover {
-    /// One move: ruins, recreates, and takes it back unless accepted. Returns whether it was.
+impl<'a> Mover<'a> {
+    pub fn new(ruin: &'a Ruin) -> Self {
+        Self { ruin, search: PlaceSearch::default(), out: Vec::new(), work: 0 }
+    }
+}
+
+impl Move for Mover<'_> {
+    fn work(&self) -> u64 {
+        self.work + self.search.visits
+    }
+
     #[inline(always)]
-    fn step(&mut self, ruin: &Ruin, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
+    fn step(&mut self, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
+        let ruin = self.ruin;
         // The larger of two: large nodes are few, and what they can gain is large.
         let [a, b] = [(); 2].map(|()| rng.random_range(1..tree.nodes.len() as u32));
         let mut top = if tree.nodes[b as usize].area > tree.nodes[a as usize].area { b } else { a };

@@ -91,6 +91,9 @@ pub struct Quota {
 }
 
 impl Quota {
+    /// No limit.
+    pub const ENDLESS: Self = Self { moves: u64::MAX, work: u64::MAX };
+
     /// Whether what was done is at least that.
     #[inline(always)]
     pub fn is_reached(&self, done: &Tally) -> bool {

@@ -201,8 +201,7 @@ impl Working {
         self.replace_child(above, parent, sibling);
         let (mut saved, mut at, mut visits) = (area, above, 2);
         while at != ANCHOR {
-            let [left, right] = self.nodes[at as usize].children;
-            let aabb = self.nodes[left as usize].aabb.union(&self.nodes[right as usize].aabb);
+            let aabb = self.union_of(self.nodes[at as usize].children);
             visits += 1;
             if aabb == self.nodes[at as usize].aabb {
                 break;
@@ -243,6 +242,30 @@ impl Working {
         }
         self.added += added;
         (added, visits)
+    }
+
+    /// The box around two nodes.
+    #[inline(always)]
+    pub fn union_of(&self, [left, right]: [u32; 2]) -> PackedAabb {
+        self.nodes[left as usize].aabb.union(&self.nodes[right as usize].aabb)
+    }
+
+    /// Gives the inner node `at` these children and makes its box tight. What is above stays as it is: when several nodes
+    /// are joined anew, the lowest come first, and the highest must have the objects it had.
+    #[inline(always)]
+    pub fn join(&mut self, at: u32, children: [u32; 2]) {
+        let aabb = self.union_of(children);
+        let area = aabb.half_area();
+        children.into_iter().for_each(|child| self.write(child).parent = at);
+        let node = self.write(at);
+        let before = node.area;
+        (node.children, node.aabb, node.area) = (children, aabb, area);
+        self.added += area - before;
+    }
+
+    /// How many changes have begun: what a node's `stamp` is compared with.
+    pub fn changes(&self) -> u64 {
+        self.change
     }
 
     /// All nodes but the anchor, parents before children, left before right. O(n).

@@ -8,7 +8,8 @@ use bvh_search::{
 };
 use proptest::prelude::*;
 
-const METHODS: [&str; 3] = ["reinsertion", "ruin_recreate", "best"];
+const METHODS: [&str; 7] =
+    ["reinsertion", "rotation", "treelet", "annealing", "rebuild", "ruin_recreate", "best"];
 
 /// The methods under test with their default parameters.
 fn methods() -> impl Iterator<Item = Method> {
@@ -84,13 +85,14 @@ fn no_method_goes_below_the_optimum_and_the_portfolio_reaches_it() {
 fn every_method_improves_on_its_start_and_the_portfolio_most() {
     let boxes = scatter(2000, 1);
     let start = cost::internal_area(&reinsertion::Config::default().start.build(&boxes).unwrap());
-    let [reinsertion, annealed, best] = METHODS.map(|name| {
+    let [reinsertion, rotated, treelets, single, rebuilt, annealed, best] = METHODS.map(|name| {
         let method = methods().find(|method| method.name() == name).unwrap();
         let outcome = run(&method, &boxes, 8_000_000);
         assert_eq!(outcome.history[0].cost, start);
         outcome.cost
     });
-    assert!(reinsertion < start && annealed < reinsertion && best < reinsertion);
+    assert!(rotated < start && treelets < start && reinsertion < start);
+    assert!(single < reinsertion && rebuilt < reinsertion && annealed < reinsertion && best < reinsertion);
 }
 
 #[test]

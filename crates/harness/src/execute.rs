@@ -1,12 +1,13 @@
 //! Carries out the runs of an experiment: in parallel or one by one, with progress, until done or interrupted.
 
+use crate::Error;
 use crate::provenance::Provenance;
 use crate::rays;
-use crate::record::{HistoryRow, RayRow, RunRow, TimingRow};
+use crate::record::{ClockRow, HistoryRow, RayRow, RunRow, TimingRow};
+use crate::report::{self, Report};
 use crate::scene::Scene;
 use crate::spec::{Experiment, Labelled};
 use crate::store::{FinishedRun, Store};
-use crate::{Error, report};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_search::{Event, Observer, Problem, solve};
@@ -14,6 +15,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::time::Instant;
 
@@ -105,9 +107,9 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<F
     }
     let seed = experiment.seed_of(&scene.name, label, repetition);
     let problem = Problem { boxes: &scene.boxes, objective: experiment.objective };
-    let start = Instant::now();
-    let outcome = solve(method, &problem, seed, experiment.budget, watch);
-    let seconds = start.elapsed().as_secs_f64();
+    let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
+    let outcome = solve(method, &problem, seed, experiment.budget, &stopwatch);
+    let seconds = stopwatch.start.elapsed().as_secs_f64();
     if watch.cancelled() {
         return Ok(None);
     }
@@ -171,9 +173,18 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<F
         rays::measure(config, scene, tree, ray_seed, named)
     };
     let rays = experiment.rays.iter().map(ray_row).collect();
+    let clock = if experiment.reports.iter().any(Report::needs_clock) { stopwatch.seconds() } else { vec![] };
+    let clock_row = |(event, seconds)| ClockRow {
+        scene: scene_name.clone(),
+        method: method.clone(),
+        repetition,
+        event,
+        seconds,
+    };
+    let clock = clock.into_iter().enumerate().map(clock_row).collect();
     let threads = rayon::current_num_threads();
     let timing = TimingRow { scene: scene_name, method, seed, repetition, threads, seconds };
-    Ok(Some(FinishedRun { run, history, timing, rays }))
+    Ok(Some(FinishedRun { run, history, timing, rays, clock }))
 }
 
 /// The spec with every default spelled out, and which scenes it ran on.
@@ -228,5 +239,31 @@ impl Observer for Watch<'_> {
 
     fn cancelled(&self) -> bool {
         self.interrupted.load(Relaxed)
+    }
+}
+
+/// Notes when the events of one run happen.
+struct Stopwatch<'a> {
+    watch: &'a Watch<'a>,
+    start: Instant,
+    events: Mutex<Vec<f64>>,
+}
+
+impl Stopwatch<'_> {
+    /// The seconds of all events so far.
+    fn seconds(&self) -> Vec<f64> {
+        self.events.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
+    }
+}
+
+impl Observer for Stopwatch<'_> {
+    fn event(&self, event: &Event) {
+        let seconds = self.start.elapsed().as_secs_f64();
+        self.events.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(seconds);
+        self.watch.event(event);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.watch.cancelled()
     }
 }

@@ -5,6 +5,8 @@ use harness::scene::{FETCHED, SPHERES, Scene, fetched_path};
 use harness::spec::{Experiment, Overrides};
 use harness::standin::STAND_INS;
 use harness::{Error, check, execute};
+use std::fmt::Arguments;
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -64,7 +66,7 @@ fn main() -> ExitCode {
         }
     });
     if let Err(error) = handler {
-        eprintln!("warning: Ctrl-C will end the program at once: {error}");
+        complain(format_args!("warning: Ctrl-C will end the program at once: {error}"));
     }
     let result = match cli.command {
         Some(Command::Scenes) => list_scenes(),
@@ -73,10 +75,20 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            complain(format_args!("error: {error}"));
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// Prints a line. A reader that has gone, as `head` does, is no error: the results are in files.
+fn say(line: Arguments) {
+    let _ = writeln!(std::io::stdout(), "{line}");
+}
+
+/// Prints a line to standard error.
+fn complain(line: Arguments) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 fn run(args: &RunArgs) -> Result<(), Error> {
@@ -96,11 +108,11 @@ fn run(args: &RunArgs) -> Result<(), Error> {
             differences += check(args, experiment)?;
         } else {
             let summary = execute::execute(experiment, &args.out, args.resume, &INTERRUPTED)?;
-            println!("{}", experiment.question);
+            say(format_args!("{}", experiment.question));
             for name in &summary.left_out {
-                println!("(without {name}: scripts/fetch-scenes brings it)");
+                say(format_args!("(without {name}: scripts/fetch-scenes brings it)"));
             }
-            println!("\n{}Results: {}", summary.text, args.out.join(&experiment.name).display());
+            say(format_args!("\n{}Results: {}", summary.text, args.out.join(&experiment.name).display()));
         }
     }
     if differences > 0 { Err(Error::Differs { differences }) } else { Ok(()) }
@@ -113,13 +125,13 @@ fn check(args: &RunArgs, experiment: &Experiment) -> Result<usize, Error> {
     let (fresh, committed) = (temporary.path().join(&experiment.name), args.out.join(&experiment.name));
     let found = check::compare(&fresh, &committed, &summary.left_out)?;
     for name in &summary.left_out {
-        println!("{}: scene {name} is not fetched; its rows are not compared", experiment.name);
+        say(format_args!("{}: scene {name} is not fetched; its rows are not compared", experiment.name));
     }
     for difference in &found {
-        println!("{}: {difference}", experiment.name);
+        say(format_args!("{}: {difference}", experiment.name));
     }
     if found.is_empty() {
-        println!("{}: as committed", experiment.name);
+        say(format_args!("{}: as committed", experiment.name));
     }
     Ok(found.len())
 }
@@ -147,6 +159,6 @@ fn list_scenes() -> Result<(), Error> {
             &format!("From the Rust package {package}, by scripts/fetch-scenes."),
         ]);
     }
-    println!("{table}\nAny OBJ file can be named by its path.");
+    say(format_args!("{table}\nAny OBJ file can be named by its path."));
     Ok(())
 }

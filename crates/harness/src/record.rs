@@ -83,6 +83,21 @@ pub struct TimingRow {
     pub seconds: f64,
 }
 
+/// One row of `timing_history.csv`: when the event of the same row of `history.csv` happened.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ClockRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Label of the method in the spec.
+    pub method: String,
+    /// From 0.
+    pub repetition: u32,
+    /// Number of the event within its run, from 0.
+    pub event: usize,
+    /// Wall time since the run began.
+    pub seconds: f64,
+}
+
 /// One row of `rays.csv`: the tests that random rays took in a run's tree.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RayRow {

@@ -5,7 +5,7 @@
 //! their rows are joined in the order of the spec, so the bytes do not depend on the order of finishing.
 
 use crate::Error;
-use crate::record::{HistoryRow, RayRow, RunRow, TimingRow, to_bytes};
+use crate::record::{ClockRow, HistoryRow, RayRow, RunRow, TimingRow, to_bytes};
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -21,10 +21,12 @@ pub struct FinishedRun {
     pub timing: TimingRow,
     /// For `rays.csv`, which is written if there are any.
     pub rays: Vec<RayRow>,
+    /// For `timing_history.csv`, likewise.
+    pub clock: Vec<ClockRow>,
 }
 
 /// The files that are joined from those of the runs.
-const JOINED: [&str; 4] = ["runs.csv", "history.csv", "timing.csv", "rays.csv"];
+const JOINED: [&str; 5] = ["runs.csv", "history.csv", "timing.csv", "rays.csv", "timing_history.csv"];
 
 /// An experiment's folder, locked until dropped.
 #[derive(Debug)]
@@ -95,6 +97,7 @@ impl Store {
             to_bytes(&run.history, &part)?,
             to_bytes(std::slice::from_ref(&run.timing), &part)?,
             to_bytes(&run.rays, &part)?,
+            to_bytes(&run.clock, &part)?,
         ];
         for (name, bytes) in JOINED.iter().zip(contents) {
             write_synced(&unfinished.join(name), &bytes)?;

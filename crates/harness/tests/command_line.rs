@@ -125,6 +125,23 @@ fn a_killed_run_resumes_to_the_same_bytes() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
+    let folder = folder();
+    let spec = SPEC.replace("repetitions = 3", "repetitions = 40").replace("trials = 12", "trials = 100");
+    fs::write(folder.path().join("spec.toml"), spec).unwrap();
+    let child =
+        harness(folder.path(), &["spec.toml"]).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    // The lock and the first finished runs exist by then; all of them take seconds.
+    std::thread::sleep(Duration::from_millis(400));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("of 240 runs are kept, `--resume` does the rest"));
+    assert!(folder.path().join("results/spec/.partial/000000").is_dir());
+}
+
 #[test]
 fn check_passes_on_equal_results_and_names_an_altered_number() {
     let folder = folder();

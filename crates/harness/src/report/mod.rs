@@ -2,6 +2,7 @@
 //!
 //! A kind of report is one file with a `Config` and one line in [`Report`]. Reports read CSV files only.
 
+pub mod anytime;
 pub mod correlation;
 pub mod distribution;
 pub mod estimator;
@@ -12,7 +13,7 @@ pub mod table;
 pub mod times;
 pub mod trials;
 
-use crate::record::{self, HistoryRow, PaperRow, RayRow, RunRow, TimingRow};
+use crate::record::{self, ClockRow, HistoryRow, PaperRow, RayRow, RunRow, TimingRow};
 use crate::store::Store;
 use crate::{Error, chart};
 use serde::{Deserialize, Serialize};
@@ -38,6 +39,8 @@ pub enum Report {
     Estimator(estimator::Config),
     /// Costs against tests per ray over many trees.
     Correlation(correlation::Config),
+    /// Error against run time and against work.
+    Anytime(anytime::Config),
 }
 
 impl Report {
@@ -52,7 +55,13 @@ impl Report {
             Self::RayTests(config) => config.methods.iter().collect(),
             Self::Estimator(config) => config.methods.iter().collect(),
             Self::Correlation(config) => config.methods.iter().collect(),
+            Self::Anytime(config) => config.methods.iter().collect(),
         }
+    }
+
+    /// Whether the report asks when events happened.
+    pub fn needs_clock(&self) -> bool {
+        matches!(self, Self::Anytime(_))
     }
 
     fn write(&self, rows: &Rows) -> Result<Output, Error> {
@@ -65,6 +74,7 @@ impl Report {
             Self::RayTests(config) => config.write(rows),
             Self::Estimator(config) => config.write(rows),
             Self::Correlation(config) => config.write(rows),
+            Self::Anytime(config) => config.write(rows),
         }
     }
 }
@@ -80,6 +90,8 @@ pub struct Rows {
     pub timing: Vec<TimingRow>,
     /// Of `rays.csv`; none if rays were not asked for.
     pub rays: Vec<RayRow>,
+    /// Of `timing_history.csv`; none if no report needs them, otherwise one for every row of `history`, in its order.
+    pub clock: Vec<ClockRow>,
 }
 
 impl Rows {
@@ -143,11 +155,13 @@ fn display_name(scene: &str, kind: &str) -> String {
 /// Makes all reports from the CSV files in the store's folder. Returns the text for the terminal.
 pub fn write_all(reports: &[Report], store: &Store) -> Result<String, Error> {
     let folder = store.folder();
+    let if_any = |name: &str| Some(folder.join(name)).filter(|path| path.is_file());
     let rows = Rows {
         runs: record::read(&folder.join("runs.csv"))?,
         history: record::read(&folder.join("history.csv"))?,
         timing: record::read(&folder.join("timing.csv"))?,
-        rays: if folder.join("rays.csv").is_file() { record::read(&folder.join("rays.csv"))? } else { vec![] },
+        rays: if_any("rays.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
+        clock: if_any("timing_history.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
     };
     let mut text = String::new();
     let mut paper = Vec::new();

@@ -1,0 +1,215 @@
+//! A tree of triangles laid out for speed: eight children per node and four triangles per leaf block, tested at once.
+
+use crate::block::Block;
+use crate::lanes::{Expand, Portable, WideRay};
+use crate::stack::Stack;
+use crate::{Aabb, Bvh, Hit, InvalidBvh, Ray, Shear, Triangle, collapse, validate};
+use alloc::vec::Vec;
+
+/// An immutable copy of a [`Bvh`] and its triangles, for tracing only.
+///
+/// Gives the answers of [`nearest_hit`](crate::nearest_hit) with [`Triangle::intersect`] over the same triangles, bit
+/// by bit, on every machine: with AVX2 where the processor has it and the feature `std` is on, else with portable code.
+///
+/// ```
+/// use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};
+/// use glam::Vec3;
+/// let triangles = [0.0, 1.0].map(|z| Triangle([Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 0.0, z), Vec3::new(0.0, 1.0, z)]));
+/// let [a, b] = triangles.map(|t| t.aabb());
+/// let tree = Bvh {
+///     nodes: vec![Node::inner(a.union(&b), 1, 2), Node::leaf(a, 0, 1), Node::leaf(b, 1, 1)],
+///     prim_ids: vec![0, 1],
+/// };
+/// let wide = WideBvh::new(&tree, &triangles)?;
+/// let ray = Ray::half_line(Vec3::new(0.2, 0.2, 3.0), -Vec3::Z).unwrap();
+/// assert_eq!(wide.nearest_hit(&ray), Some(Hit { t: 2.0, object: 1 }));
+/// assert!(wide.any_hit(&ray));
+/// # Ok::<(), bvh_core::InvalidBvh>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct WideBvh {
+    pub(crate) bounds: Aabb,
+    /// `None` for the tree over no triangles.
+    pub(crate) root: Option<Child>,
+    pub(crate) nodes: Vec<WideNode>,
+    pub(crate) blocks: Vec<Block>,
+}
+
+/// A node's eight children, or fewer in the lower lanes: four cache lines.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct WideNode {
+    /// Lower x, y, z, then upper x, y, z, of all children; NaN in unused lanes, so that no ray enters them.
+    pub(crate) planes: [[f32; 8]; 6],
+    pub(crate) children: [Child; 8],
+}
+
+impl WideNode {
+    pub(crate) const EMPTY: Self = Self { planes: [[f32::NAN; 8]; 6], children: [Child::node(0); 8] };
+
+    /// Gives a lane a child with this box.
+    pub(crate) fn set_box(&mut self, lane: usize, aabb: &Aabb) {
+        for axis in 0..3 {
+            self.planes[axis][lane] = aabb.min[axis];
+            self.planes[axis + 3][lane] = aabb.max[axis];
+        }
+    }
+}
+
+/// A node's index, or the index of a leaf's first block; the leaf's last block is marked as such.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(transparent)]
+pub(crate) struct Child(u32);
+
+impl Child {
+    const LEAF: u32 = 1 << 31;
+
+    pub(crate) const fn node(index: u32) -> Self {
+        Self(index)
+    }
+
+    /// The leaf that begins with this block.
+    pub(crate) const fn leaf(first_block: u32) -> Self {
+        Self(first_block | Self::LEAF)
+    }
+}
+
+/// A child that the ray enters at `entry`, to be visited later.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub(crate) struct Pending {
+    pub(crate) entry: f32,
+    pub(crate) child: Child,
+}
+
+impl WideBvh {
+    /// Lays out `tree`, valid over the boxes of `triangles`, with any number of children per node. O(n) time and memory.
+    ///
+    /// Which nodes of the tree survive, and which subtrees become one leaf, is decided exactly by dynamic programming:
+    /// the result has the least expected time for a random line among all that can be made by leaving nodes out.
+    ///
+    /// Source: Ylitie, Karras & Laine 2017, 'Efficient incoherent ray traversal on GPUs through compressed wide BVHs',
+    /// section 4.1. Differs from the paper: boxes in full precision; leaves of any size, paid per block of four.
+    pub fn new(tree: &Bvh, triangles: &[Triangle]) -> Result<Self, InvalidBvh> {
+        let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+        validate(tree, &boxes)?;
+        Ok(collapse::widen(tree, triangles))
+    }
+
+    /// The nearest triangle that `ray` meets in its range; of several at the same distance the one of the lowest id.
+    #[inline]
+    pub fn nearest_hit(&self, ray: &Ray) -> Option<Hit> {
+        #[cfg(all(feature = "std", target_arch = "x86_64"))]
+        if let Some(avx2) = crate::lanes::Avx2::detect() {
+            return avx2.nearest_hit(self, ray);
+        }
+        self.nearest_hit_portable(ray)
+    }
+
+    /// Whether `ray` meets any triangle in its range.
+    #[inline]
+    pub fn any_hit(&self, ray: &Ray) -> bool {
+        #[cfg(all(feature = "std", target_arch = "x86_64"))]
+        if let Some(avx2) = crate::lanes::Avx2::detect() {
+            return avx2.any_hit(self, ray);
+        }
+        self.any_hit_portable(ray)
+    }
+
+    /// [`nearest_hit`](Self::nearest_hit) without instructions that the processor may lack.
+    pub fn nearest_hit_portable(&self, ray: &Ray) -> Option<Hit> {
+        self.nearest_with::<Portable>(ray)
+    }
+
+    /// [`any_hit`](Self::any_hit) without instructions that the processor may lack.
+    pub fn any_hit_portable(&self, ray: &Ray) -> bool {
+        self.any_with::<Portable>(ray)
+    }
+
+    /// Bytes of memory that nodes and triangles take.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..])
+    }
+
+    #[inline(always)]
+    pub(crate) fn nearest_with<E: Expand>(&self, ray: &Ray) -> Option<Hit> {
+        self.walk::<E, false>(ray)
+    }
+
+    #[inline(always)]
+    pub(crate) fn any_with<E: Expand>(&self, ray: &Ray) -> bool {
+        self.walk::<E, true>(ray).is_some()
+    }
+
+    /// The nearest hit, or the first one found. One function without closures, so that all of it is compiled with the
+    /// instructions that its caller may use.
+    #[inline(always)]
+    fn walk<E: Expand, const ANY: bool>(&self, ray: &Ray) -> Option<Hit> {
+        let mut child = self.root?;
+        let (shear, wide_ray) = (Shear::new(ray), WideRay::new(ray, &self.bounds));
+        let mut nearest: Option<Hit> = None;
+        let mut t_max = ray.t_max();
+        let mut stack = Stack::<Pending, 48>::new(Pending { entry: 0.0, child: Child::node(0) });
+        loop {
+            if child.0 & Child::LEAF == 0 {
+                let node = &self.nodes[child.0 as usize];
+                if let Some((nearest, others)) = E::expand(node, &wide_ray, t_max, stack.room()) {
+                    stack.grow(others);
+                    child = nearest;
+                    continue;
+                }
+            } else {
+                for block in &self.blocks[(child.0 & !Child::LEAF) as usize..] {
+                    let mut lanes = block.candidates(&shear, t_max);
+                    while lanes != 0 {
+                        let lane = lanes.trailing_zeros() as usize;
+                        lanes &= lanes - 1;
+                        if let Some((object, triangle)) = block.triangle(lane)
+                            && let Some(t) = triangle.decide(&shear, t_max)
+                        {
+                            let hit = Hit { t, object };
+                            if ANY {
+                                return Some(hit);
+                            }
+                            if nearest.is_none_or(|nearest| hit.precedes(&nearest)) {
+                                nearest = Some(hit);
+                                t_max = t;
+                            }
+                        }
+                    }
+                    if block.is_last() {
+                        break;
+                    }
+                }
+            }
+            child = loop {
+                let Some(pending) = stack.pop() else { return nearest };
+                if pending.entry <= t_max {
+                    break pending.child;
+                }
+            };
+        }
+    }
+}
+
+#[cfg(test)]
+impl WideBvh {
+    /// The box of every node, with 0, and of every leaf, with its number of blocks.
+    pub(crate) fn boxes(&self) -> impl Iterator<Item = (Aabb, usize)> {
+        let lane_box = |node: &WideNode, lane: usize| Aabb {
+            min: [0, 1, 2].map(|axis| node.planes[axis][lane]).into(),
+            max: [3, 4, 5].map(|axis| node.planes[axis][lane]).into(),
+        };
+        let blocks = |child: Child| match child.0 & Child::LEAF {
+            0 => 0,
+            leaf => {
+                1 + self.blocks[(child.0 ^ leaf) as usize..].iter().take_while(|block| !block.is_last()).count()
+            }
+        };
+        let root = self.root.map(|root| (self.bounds, blocks(root)));
+        root.into_iter().chain(self.nodes.iter().flat_map(move |node| {
+            let used = (0..8).filter(|&lane| !node.planes[0][lane].is_nan());
+            used.map(move |lane| (lane_box(node, lane), blocks(node.children[lane])))
+        }))
+    }
+}
