@@ -43,7 +43,7 @@ use bvh_core::{Aabb, cost::Sum};
 use smallest_box::{Grouped, Scene};
 
 /// The effort that is worth its time.
-pub const DEFAULT_EFFORT: u32 = 32;
+pub const DEFAULT_EFFORT: u32 = 16;
 
 /// A lower bound of [`bvh_core::cost::internal_area`] of every binary tree over `boxes` with one object per leaf, in
 /// world units squared; 0 for fewer than two objects. See the [module](self) for the proof.

@@ -3,14 +3,14 @@
 use crate::Error;
 use crate::provenance::Provenance;
 use crate::rays;
-use crate::record::{ClockRow, HistoryRow, RayRow, RunRow, TimingRow};
+use crate::record::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, to_bytes};
 use crate::report::{self, Report};
 use crate::scene::Scene;
 use crate::spec::{Experiment, Labelled};
 use crate::store::{FinishedRun, Store};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
-use bvh_search::{Event, Observer, Problem, solve};
+use bvh_search::{Event, Observer, Problem, lower_bound, solve};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -83,6 +83,10 @@ pub fn execute(
     }
     store.join(jobs.len())?;
     store.write("resolved.toml", resolved.as_bytes())?;
+    if let Some(effort) = experiment.lower_bound {
+        let bounds = scenes.iter().map(|scene| bound(scene, effort)).collect::<Result<Vec<_>, _>>()?;
+        store.write("bounds.csv", &to_bytes(&bounds, Path::new("bounds.csv"))?)?;
+    }
     let text = report::write_all(&experiment.reports, &store)?;
     store.write("provenance.toml", to_toml(&Provenance::gather())?.as_bytes())?;
     store.finish()?;
@@ -97,6 +101,17 @@ fn base_cost(scene: &Scene, objective: &Objective) -> Result<f64, Error> {
         source: bvh_search::SearchError::Build(source),
     };
     Ok(objective.cost(&muller_fellner::Config::default().build(&scene.boxes).map_err(refused)?))
+}
+
+/// A lower bound of the scene's internal area.
+fn bound(scene: &Scene, effort: u32) -> Result<BoundRow, Error> {
+    let refused = |source| Error::Search {
+        scene: scene.name.clone(),
+        method: "the lower bound".into(),
+        source: bvh_search::SearchError::Build(source),
+    };
+    let lower_bound = lower_bound::internal_area(&scene.boxes, effort).map_err(refused)?;
+    Ok(BoundRow { scene: scene.name.clone(), objects: scene.boxes.len(), lower_bound })
 }
 
 /// One run; `None` if it was interrupted.

@@ -8,6 +8,7 @@ pub mod check;
 pub mod error;
 pub mod execute;
 pub mod obj;
+pub mod part;
 pub mod provenance;
 pub mod rays;
 pub mod record;

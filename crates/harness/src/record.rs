@@ -131,6 +131,17 @@ pub struct RayRow {
     pub objects_standard_error: f64,
 }
 
+/// One row of `bounds.csv`: a proven lower bound of a scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BoundRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Number of objects in the scene.
+    pub objects: usize,
+    /// No binary tree with one object per leaf has less `internal_area`.
+    pub lower_bound: f64,
+}
+
 /// One row of `paper.csv`: a number of the paper beside ours.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PaperRow {

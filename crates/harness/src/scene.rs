@@ -1,5 +1,6 @@
 //! Scenes by name or path: built-in stand-ins, the spheres, fetched meshes, and any OBJ file.
 
+use crate::part::Part;
 use crate::{Error, obj, standin};
 use bvh_core::{Aabb, Sphere, Triangle};
 use glam::Vec3;
@@ -44,11 +45,10 @@ pub const FETCHED: [(&str, &str); 2] = [("sponza", "bvh"), ("kitchen", "obvhs")]
 pub const SPHERES: [(&str, usize); 3] = [("spheres75", 75), ("spheres750", 750), ("spheres7500", 7500)];
 
 impl Scene {
-    /// Loads a scene by the name or path that a spec or `--scene` gives. `NAME:1000` is a subset of so many of its
-    /// objects, evenly spaced in their order.
+    /// Loads a scene by the name or path that a spec or `--scene` gives, or the [`Part`] of it that the name ends with.
     pub fn load(name: &str) -> Result<Self, Error> {
-        match name.rsplit_once(':').and_then(|(whole, count)| Some((whole, count.parse::<usize>().ok()?))) {
-            Some((whole, count)) => Self::load_whole(whole)?.subset(count),
+        match Part::parse(name) {
+            Some((whole, part)) => Self::load_whole(whole)?.part(part, &name[whole.len()..]),
             None => Self::load_whole(name),
         }
     }
@@ -86,22 +86,20 @@ impl Scene {
         Self { name: name.into(), kind, boxes: primitives.boxes(), primitives }
     }
 
-    /// `count` of the scene's objects, evenly spaced in their order.
-    fn subset(self, count: usize) -> Result<Self, Error> {
-        let name = format!("{}:{count}", self.name);
+    /// A part of the scene's objects, called by the scene's name and `suffix`.
+    fn part(self, part: Part, suffix: &str) -> Result<Self, Error> {
+        let name = self.name + suffix;
         let all = self.boxes.len();
-        if count == 0 || count > all {
+        if part.count() == 0 || part.count() > all {
             return Err(Error::Scene {
                 name,
                 message: format!("a subset has 1 to {all} of this scene's objects"),
             });
         }
-        fn pick<T: Copy>(items: &[T], count: usize) -> Vec<T> {
-            (0..count).map(|index| items[index * items.len() / count]).collect()
-        }
+        let chosen = part.choose(&self.boxes);
         let primitives = match &self.primitives {
-            Primitives::Triangles(triangles) => Primitives::Triangles(pick(triangles, count)),
-            Primitives::Spheres(spheres) => Primitives::Spheres(pick(spheres, count)),
+            Primitives::Triangles(all) => Primitives::Triangles(chosen.iter().map(|&at| all[at]).collect()),
+            Primitives::Spheres(all) => Primitives::Spheres(chosen.iter().map(|&at| all[at]).collect()),
         };
         Ok(Self::new(&name, self.kind, primitives))
     }
@@ -132,7 +130,8 @@ fn known_scenes() -> String {
     let names = standin::STAND_INS.iter().map(|scene| scene.name);
     let names = names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name));
     format!(
-        "accepted: {}, the path of an OBJ file, or either with `:COUNT` for a subset",
+        "accepted: {}, the path of an OBJ file, or either with `:COUNT`, `:random:COUNT:SEED` or \
+         `:cluster:COUNT:SEED` for a subset",
         names.collect::<Vec<_>>().join(", ")
     )
 }

@@ -2,7 +2,7 @@
 
 use crate::report::Report;
 use crate::scene::{Scene, fnv1a};
-use crate::{Error, rays};
+use crate::{Error, part, rays};
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, Method, Problem, solve};
 use serde::{Deserialize, Serialize};
@@ -21,7 +21,7 @@ pub struct Experiment {
     pub name: String,
     /// What the experiment asks, for its readers.
     pub question: String,
-    /// Names or paths of the scenes.
+    /// Names or paths of the scenes; `A..B` after a colon stands for all numbers from A to B.
     pub scenes: Vec<String>,
     /// Scenes that are left out, with a note, where they have not been fetched. Default none.
     #[serde(default)]
@@ -41,6 +41,9 @@ pub struct Experiment {
     /// Limits of every run. Default none.
     #[serde(default)]
     pub budget: Budget,
+    /// Effort of a lower bound of every scene's internal area. Default none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lower_bound: Option<u32>,
     /// What is run, at least one.
     pub methods: Vec<Labelled>,
     /// Measurements of every run's tree with random rays. Default none.
@@ -191,7 +194,8 @@ impl Experiment {
 
     /// Loads the scenes, those optional ones that are there included. Returns them and the names of those left out.
     pub fn load_scenes(&self) -> Result<(Vec<Scene>, Vec<String>), Error> {
-        let mut scenes = self.scenes.iter().map(|name| Scene::load(name)).collect::<Result<Vec<_>, _>>()?;
+        let names = self.scenes.iter().flat_map(|name| part::expand(name));
+        let mut scenes = names.map(|name| Scene::load(&name)).collect::<Result<Vec<_>, _>>()?;
         let mut left_out = Vec::new();
         for name in &self.optional_scenes {
             match Scene::load(name) {

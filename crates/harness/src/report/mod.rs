@@ -6,6 +6,7 @@ pub mod anytime;
 pub mod correlation;
 pub mod distribution;
 pub mod estimator;
+pub mod gaps;
 pub mod generations;
 pub mod ray_tests;
 pub mod statistics;
@@ -13,7 +14,7 @@ pub mod table;
 pub mod times;
 pub mod trials;
 
-use crate::record::{self, ClockRow, HistoryRow, PaperRow, RayRow, RunRow, TimingRow};
+use crate::record::{self, BoundRow, ClockRow, HistoryRow, PaperRow, RayRow, RunRow, TimingRow};
 use crate::store::Store;
 use crate::{Error, chart};
 use serde::{Deserialize, Serialize};
@@ -41,6 +42,8 @@ pub enum Report {
     Correlation(correlation::Config),
     /// Error against run time and against work.
     Anytime(anytime::Config),
+    /// Gaps to the exact optimum of small scenes.
+    Gaps(gaps::Config),
 }
 
 impl Report {
@@ -55,6 +58,7 @@ impl Report {
             Self::RayTests(config) => config.methods.iter().collect(),
             Self::Estimator(config) => config.methods.iter().collect(),
             Self::Correlation(config) => config.methods.iter().collect(),
+            Self::Gaps(config) => config.methods.iter().chain([&config.optimum]).collect(),
             Self::Anytime(config) => config.methods.iter().collect(),
         }
     }
@@ -74,6 +78,7 @@ impl Report {
             Self::RayTests(config) => config.write(rows),
             Self::Estimator(config) => config.write(rows),
             Self::Correlation(config) => config.write(rows),
+            Self::Gaps(config) => config.write(rows),
             Self::Anytime(config) => config.write(rows),
         }
     }
@@ -90,6 +95,8 @@ pub struct Rows {
     pub timing: Vec<TimingRow>,
     /// Of `rays.csv`; none if rays were not asked for.
     pub rays: Vec<RayRow>,
+    /// Of `bounds.csv`; none if bounds were not asked for.
+    pub bounds: Vec<BoundRow>,
     /// Of `timing_history.csv`; none if no report needs them, otherwise one for every row of `history`, in its order.
     pub clock: Vec<ClockRow>,
 }
@@ -161,6 +168,7 @@ pub fn write_all(reports: &[Report], store: &Store) -> Result<String, Error> {
         history: record::read(&folder.join("history.csv"))?,
         timing: record::read(&folder.join("timing.csv"))?,
         rays: if_any("rays.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
+        bounds: if_any("bounds.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
         clock: if_any("timing_history.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
     };
     let mut text = String::new();
