@@ -22,7 +22,7 @@ fn instances(count: usize) -> Vec<Vec<Aabb>> {
     let draw = |k: usize| (k * 7919 + 104_729) * (k % 97 + 31) % all.len();
     let instance = |number: usize| {
         let n = 6 + number % 7;
-        if number % 2 == 0 {
+        if number.is_multiple_of(2) {
             let center = all[draw(number)].doubled_centroid();
             let distance = |b: &Aabb| (b.doubled_centroid() - center).length_squared();
             let mut nearest = all.clone();
