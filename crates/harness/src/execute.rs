@@ -3,17 +3,18 @@
 use crate::Error;
 use crate::provenance::Provenance;
 use crate::rays;
-use crate::record::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, to_bytes};
+use crate::record::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow};
 use crate::report::{self, Report};
 use crate::scene::Scene;
 use crate::spec::{Experiment, Labelled};
 use crate::store::{FinishedRun, Store};
+use crate::sweep::Shard;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_search::{Event, Observer, Problem, lower_bound, solve};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
@@ -26,6 +27,8 @@ struct Job<'a> {
     base: f64,
     labelled: &'a Labelled,
     repetition: u32,
+    /// Whether what is known of the scene alone is this run's to say.
+    first_of_scene: bool,
 }
 
 /// What a finished experiment leaves to say.
@@ -37,17 +40,26 @@ pub struct Summary {
     pub left_out: Vec<String>,
 }
 
+/// How much of an experiment is to be done.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Extent {
+    /// Keep the finished runs of an interrupted experiment.
+    pub resume: bool,
+    /// Do these runs only, and leave them to be [merged](crate::sweep::merge).
+    pub shard: Option<Shard>,
+}
+
 /// Runs `experiment` into `out/NAME/`. `interrupted` is watched: when it becomes true, finished runs are kept and the
 /// rest is given up.
 pub fn execute(
     experiment: &Experiment,
     out: &Path,
-    resume: bool,
+    extent: Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
     let (scenes, left_out) = experiment.load_scenes()?;
     let resolved = resolve(experiment, &scenes)?;
-    let store = Store::open(out, &experiment.name, &resolved, resume)?;
+    let store = Store::open(out, &experiment.name, &resolved, extent.resume)?;
     let bases = scenes
         .par_iter()
         .map(|scene| base_cost(scene, &experiment.objective))
@@ -55,15 +67,22 @@ pub fn execute(
     let jobs: Vec<Job> = scenes
         .iter()
         .zip(bases)
-        .flat_map(|(scene, base)| experiment.methods.iter().map(move |labelled| (scene, base, labelled)))
-        .flat_map(|(scene, base, labelled)| {
-            (0..experiment.repetitions).map(move |repetition| Job { scene, base, labelled, repetition })
+        .flat_map(|(scene, base)| {
+            experiment.runs().map(move |(labelled, repetition, first_of_scene)| Job {
+                scene,
+                base,
+                labelled,
+                repetition,
+                first_of_scene,
+            })
         })
         .collect();
 
-    let todo: Vec<usize> = (0..jobs.len()).filter(|&index| !store.has(index)).collect();
-    let finished = AtomicUsize::new(jobs.len() - todo.len());
-    let watch = Watch { bar: progress(jobs.len() as u64, finished.load(Relaxed) as u64), interrupted };
+    let own: Vec<usize> =
+        (0..jobs.len()).filter(|&index| extent.shard.is_none_or(|shard| shard.has(index))).collect();
+    let todo: Vec<usize> = own.iter().copied().filter(|&index| !store.has(index)).collect();
+    let finished = AtomicUsize::new(own.len() - todo.len());
+    let watch = Watch { bar: progress(own.len() as u64, finished.load(Relaxed) as u64), interrupted };
     watch.bar.set_message(experiment.name.clone());
     let work = |&index: &usize| -> Result<(), Error> {
         if let Some(run) = perform(experiment, &jobs[index], &watch)? {
@@ -78,19 +97,33 @@ pub fn execute(
     watch.bar.finish_and_clear();
     result?;
     let finished = finished.load(Relaxed);
-    if finished < jobs.len() {
-        return Err(Error::Interrupted { finished, runs: jobs.len() });
+    if finished < own.len() {
+        return Err(Error::Interrupted { finished, runs: own.len() });
     }
-    store.join(jobs.len())?;
-    store.write("resolved.toml", resolved.as_bytes())?;
-    if let Some(effort) = experiment.lower_bound {
-        let bounds = scenes.iter().map(|scene| bound(scene, effort)).collect::<Result<Vec<_>, _>>()?;
-        store.write("bounds.csv", &to_bytes(&bounds, Path::new("bounds.csv"))?)?;
+    let provenance = Provenance::gather();
+    if let Some(shard) = extent.shard {
+        store.keep_shard(&to_toml(&provenance)?)?;
+        let text = format!("{finished} runs, part {shard}; `harness merge` joins the parts.\n");
+        return Ok(Summary { text, left_out });
     }
-    let text = report::write_all(&experiment.reports, &store)?;
-    store.write("provenance.toml", to_toml(&Provenance::gather())?.as_bytes())?;
-    store.finish()?;
+    let text = conclude(&experiment.reports, jobs.len(), &resolved, &provenance, store)?;
     Ok(Summary { text, left_out })
+}
+
+/// Joins the kept runs and makes the reports. Returns the text for the terminal.
+pub(crate) fn conclude(
+    reports: &[Report],
+    runs: usize,
+    resolved: &str,
+    provenance: &Provenance,
+    store: Store,
+) -> Result<String, Error> {
+    store.join(runs)?;
+    store.write("resolved.toml", resolved.as_bytes())?;
+    let text = report::write_all(reports, &store)?;
+    store.write("provenance.toml", to_toml(provenance)?.as_bytes())?;
+    store.finish()?;
+    Ok(text)
 }
 
 /// The cost of the scene's greedy Müller–Fellner tree, the base of all ratios.
@@ -116,7 +149,7 @@ fn bound(scene: &Scene, effort: u32) -> Result<BoundRow, Error> {
 
 /// One run; `None` if it was interrupted.
 fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<FinishedRun>, Error> {
-    let Job { scene, base, labelled: Labelled { label, method }, repetition } = *job;
+    let Job { scene, base, labelled: Labelled { label, method }, repetition, .. } = *job;
     if watch.cancelled() {
         return Ok(None);
     }
@@ -197,35 +230,38 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<F
         seconds,
     };
     let clock = clock.into_iter().enumerate().map(clock_row).collect();
+    let bounds = match experiment.lower_bound {
+        Some(effort) if job.first_of_scene => vec![bound(scene, effort)?],
+        _ => vec![],
+    };
     let threads = rayon::current_num_threads();
     let timing = TimingRow { scene: scene_name, method, seed, repetition, threads, seconds };
-    Ok(Some(FinishedRun { run, history, timing, rays, clock }))
+    Ok(Some(FinishedRun { run, history, timing, rays, clock, bounds }))
 }
 
-/// The spec with every default spelled out, and which scenes it ran on.
+/// Contents of `resolved.toml`: the spec with every default spelled out, and which scenes it ran on.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct Resolved {
+    pub experiment: Experiment,
+    pub scenes: Vec<LoadedScene>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct LoadedScene {
+    pub name: String,
+    pub kind: String,
+    pub objects: usize,
+    pub checksum: String,
+}
+
 fn resolve(experiment: &Experiment, scenes: &[Scene]) -> Result<String, Error> {
-    #[derive(Serialize)]
-    struct LoadedScene<'a> {
-        name: &'a str,
-        kind: &'a str,
-        objects: usize,
-        checksum: String,
-    }
-    #[derive(Serialize)]
-    struct Resolved<'a> {
-        experiment: &'a Experiment,
-        scenes: Vec<LoadedScene<'a>>,
-    }
-    let scenes = scenes
-        .iter()
-        .map(|scene| LoadedScene {
-            name: &scene.name,
-            kind: scene.kind,
-            objects: scene.boxes.len(),
-            checksum: format!("{:016x}", scene.checksum()),
-        })
-        .collect();
-    to_toml(&Resolved { experiment, scenes })
+    let loaded = |scene: &Scene| LoadedScene {
+        name: scene.name.clone(),
+        kind: scene.kind.into(),
+        objects: scene.boxes.len(),
+        checksum: format!("{:016x}", scene.checksum()),
+    };
+    to_toml(&Resolved { experiment: experiment.clone(), scenes: scenes.iter().map(loaded).collect() })
 }
 
 fn to_toml(value: &impl Serialize) -> Result<String, Error> {

@@ -210,6 +210,16 @@ impl Experiment {
         }
     }
 
+    /// The runs on one scene in order: method, repetition, and whether it is the first.
+    pub fn runs(&self) -> impl Iterator<Item = (&Labelled, u32, bool)> {
+        let of = |labelled| (0..self.repetitions).map(move |repetition| (labelled, repetition));
+        self.methods
+            .iter()
+            .flat_map(of)
+            .enumerate()
+            .map(|(index, (labelled, repetition))| (labelled, repetition, index == 0))
+    }
+
     /// The seed of one run, within 32 bits so that every spreadsheet keeps it exactly.
     pub fn seed_of(&self, scene: &str, label: &str, repetition: u32) -> u64 {
         let identity = format!("{}\0{}\0{scene}\0{label}\0{repetition}", self.seed, self.name);
