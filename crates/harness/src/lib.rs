@@ -7,6 +7,7 @@ pub mod chart;
 pub mod check;
 pub mod error;
 pub mod execute;
+pub mod html;
 pub mod obj;
 pub mod part;
 pub mod provenance;

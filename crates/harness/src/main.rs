@@ -6,7 +6,7 @@ use harness::scene::{FETCHED, SPHERES, Scene, fetched_path};
 use harness::spec::{Experiment, Overrides};
 use harness::standin::STAND_INS;
 use harness::sweep::{self, Shard};
-use harness::{Error, check, execute};
+use harness::{Error, check, execute, html};
 use std::fmt::Arguments;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -27,6 +27,15 @@ struct Cli {
 enum Command {
     /// List the built-in scenes, their sizes, and what each stands in for.
     Scenes,
+    /// Write all results on one HTML page.
+    Report {
+        /// Folder with the results of experiments.
+        #[arg(long, value_name = "DIR", default_value = "results")]
+        results: PathBuf,
+        /// The page.
+        #[arg(long, value_name = "FILE.html", default_value = "results/report.html")]
+        out: PathBuf,
+    },
     /// Join the parts of experiments made with --shard into what one run would have written.
     Merge {
         /// Folders that were given as --out to runs with --shard.
@@ -85,6 +94,7 @@ fn main() -> ExitCode {
     }
     let result = match cli.command {
         Some(Command::Scenes) => list_scenes(),
+        Some(Command::Report { results, out }) => write_page(&results, &out),
         Some(Command::Merge { folders, out }) => merge(&folders, &out),
         None => run(&cli.run),
     };
@@ -151,6 +161,12 @@ fn check(args: &RunArgs, experiment: &Experiment) -> Result<usize, Error> {
         say(format_args!("{}: as committed", experiment.name));
     }
     Ok(found.len())
+}
+
+fn write_page(results: &Path, out: &Path) -> Result<(), Error> {
+    let experiments = html::write(results, out)?;
+    say(format_args!("{experiments} experiments: {}", out.display()));
+    Ok(())
 }
 
 fn merge(folders: &[PathBuf], out: &Path) -> Result<(), Error> {

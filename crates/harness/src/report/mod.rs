@@ -68,7 +68,7 @@ impl Report {
         matches!(self, Self::Anytime(_))
     }
 
-    fn write(&self, rows: &Rows) -> Result<Output, Error> {
+    pub(crate) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         match self {
             Self::Table(config) => config.write(rows),
             Self::Trials(config) => config.write(rows),
@@ -102,6 +102,19 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// Reads the CSV files in an experiment's folder.
+    pub fn read(folder: &Path) -> Result<Self, Error> {
+        let if_any = |name: &str| Some(folder.join(name)).filter(|path| path.is_file());
+        Ok(Self {
+            runs: record::read(&folder.join("runs.csv"))?,
+            history: record::read(&folder.join("history.csv"))?,
+            timing: record::read(&folder.join("timing.csv"))?,
+            rays: if_any("rays.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
+            bounds: if_any("bounds.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
+            clock: if_any("timing_history.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
+        })
+    }
+
     /// The scenes in the order of the rows, with their kinds.
     pub fn scenes(&self) -> Vec<(&str, &str)> {
         let mut scenes: Vec<_> =
@@ -152,6 +165,8 @@ pub struct Output {
     pub paper: Vec<PaperRow>,
     /// For the terminal.
     pub text: String,
+    /// The sentence that reads the result, from its numbers; empty if the table says it all.
+    pub reading: String,
 }
 
 /// A scene's name with its kind, as every table shows it.
@@ -161,16 +176,7 @@ fn display_name(scene: &str, kind: &str) -> String {
 
 /// Makes all reports from the CSV files in the store's folder. Returns the text for the terminal.
 pub fn write_all(reports: &[Report], store: &Store) -> Result<String, Error> {
-    let folder = store.folder();
-    let if_any = |name: &str| Some(folder.join(name)).filter(|path| path.is_file());
-    let rows = Rows {
-        runs: record::read(&folder.join("runs.csv"))?,
-        history: record::read(&folder.join("history.csv"))?,
-        timing: record::read(&folder.join("timing.csv"))?,
-        rays: if_any("rays.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
-        bounds: if_any("bounds.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
-        clock: if_any("timing_history.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
-    };
+    let rows = Rows::read(store.folder())?;
     let mut text = String::new();
     let mut paper = Vec::new();
     for report in reports {
