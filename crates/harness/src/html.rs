@@ -150,14 +150,13 @@ fn experiment(section: &Section) -> Markup {
 
 /// How many of the paper's numbers ours agree with.
 fn of_the_paper(rows: &[PaperRow]) -> String {
-    let count = |begins: &str| rows.iter().filter(|row| row.verdict.starts_with(begins)).count();
-    let others = rows.len() - count("agrees") - count("same direction");
+    let theirs: Vec<&PaperRow> = rows.iter().filter(|row| !row.paper.is_empty()).collect();
+    let count = |begins: &str| theirs.iter().filter(|row| row.verdict.starts_with(begins)).count();
+    let (agree, direction) = (count("agrees"), count("same direction"));
     format!(
-        "Of {} numbers of the paper, ours agree with {}, are in the same direction from the base but further or less far \
-         for {}, and are otherwise for {others}.",
-        rows.len(),
-        count("agrees"),
-        count("same direction"),
+        "Numbers of the paper: {}. Ours agree with {agree}; {direction} more are on the same side of the base; {} differ.",
+        theirs.len(),
+        theirs.len() - agree - direction,
     )
 }
 
