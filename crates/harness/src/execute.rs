@@ -1,13 +1,12 @@
 //! Carries out the runs of an experiment: in parallel or one by one, with progress, until done or interrupted.
 
-use crate::Error;
-use crate::provenance::Provenance;
-use crate::rays;
+use crate::provenance::{Provenance, revision_or_unknown};
 use crate::record::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, to_bytes};
 use crate::report::{self, Report};
 use crate::scene::Scene;
 use crate::spec::{Experiment, Labelled};
 use crate::store::{FinishedRun, Store};
+use crate::{Error, rays, record, reference, store};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_search::{Event, Observer, Problem, lower_bound, solve};
@@ -87,10 +86,58 @@ pub fn execute(
         let bounds = scenes.iter().map(|scene| bound(scene, effort)).collect::<Result<Vec<_>, _>>()?;
         store.write("bounds.csv", &to_bytes(&bounds, Path::new("bounds.csv"))?)?;
     }
+    write_references(experiment, &scenes, out, &store)?;
     let text = report::write_all(&experiment.reports, &store)?;
     store.write("provenance.toml", to_toml(&Provenance::gather())?.as_bytes())?;
     store.finish()?;
     Ok(Summary { text, left_out })
+}
+
+/// Makes the reports of finished runs again, with the references of now. Nothing is run: the spec must be the one that
+/// the rows in `out/NAME/` come from, but for its reports.
+pub fn report_again(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
+    let (scenes, left_out) = experiment.load_scenes()?;
+    let resolved = resolve(experiment, &scenes)?;
+    let folder = out.join(&experiment.name);
+    if store::is_unfinished(&folder) {
+        let folder = folder.display();
+        return Err(Error::Usage(format!(
+            "{folder}: the experiment was interrupted; finish it with --resume first"
+        )));
+    }
+    let path = folder.join("resolved.toml");
+    let found = std::fs::read_to_string(&path).map_err(Error::io(&path, "read the file"))?;
+    let runs = |text: &str| -> Option<toml::Table> {
+        let mut table: toml::Table = text.parse().ok()?;
+        table.get_mut("experiment")?.as_table_mut()?.remove("reports");
+        Some(table)
+    };
+    if runs(&found) != runs(&resolved) {
+        return Err(Error::Usage(format!(
+            "{}: the rows come from another spec, scene or seed; run it again without --reports",
+            path.display()
+        )));
+    }
+    let store = Store::open(out, &experiment.name, &resolved, false)?;
+    store.write("resolved.toml", resolved.as_bytes())?;
+    write_references(experiment, &scenes, out, &store)?;
+    let text = report::write_all(&experiment.reports, &store)?;
+    store.finish()?;
+    Ok(Summary { text, left_out })
+}
+
+/// Improves the best known costs by the rows in the store's folder, and records the references if a report needs them.
+fn write_references(experiment: &Experiment, scenes: &[Scene], out: &Path, store: &Store) -> Result<(), Error> {
+    let runs: Vec<RunRow> = record::read(&store.folder().join("runs.csv"))?;
+    let bounds = record::read_if_any(&store.folder().join("bounds.csv"))?;
+    let revision = revision_or_unknown();
+    let known = reference::improve(out, scenes, &experiment.objective, &runs, &bounds, &revision)?;
+    if experiment.reports.iter().any(Report::needs_references) {
+        let references = reference::select(&known, scenes, &experiment.objective)?;
+        let name = reference::REFERENCES;
+        store.write(name, &to_bytes(&references, Path::new(name))?)?;
+    }
+    Ok(())
 }
 
 /// The cost of the scene's greedy Müller–Fellner tree, the base of all ratios.
@@ -116,14 +163,15 @@ fn bound(scene: &Scene, effort: u32) -> Result<BoundRow, Error> {
 
 /// One run; `None` if it was interrupted.
 fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<FinishedRun>, Error> {
-    let Job { scene, base, labelled: Labelled { label, method }, repetition } = *job;
+    let Job { scene, base, labelled, repetition } = *job;
+    let Labelled { label, method, .. } = labelled;
     if watch.cancelled() {
         return Ok(None);
     }
     let seed = experiment.seed_of(&scene.name, label, repetition);
     let problem = Problem { boxes: &scene.boxes, objective: experiment.objective };
     let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
-    let outcome = solve(method, &problem, seed, experiment.budget, &stopwatch);
+    let outcome = solve(method, &problem, seed, experiment.budget_of(labelled), &stopwatch);
     let seconds = stopwatch.start.elapsed().as_secs_f64();
     if watch.cancelled() {
         return Ok(None);
@@ -222,7 +270,7 @@ fn resolve(experiment: &Experiment, scenes: &[Scene]) -> Result<String, Error> {
             name: &scene.name,
             kind: scene.kind,
             objects: scene.boxes.len(),
-            checksum: format!("{:016x}", scene.checksum()),
+            checksum: scene.checksum_text(),
         })
         .collect();
     to_toml(&Resolved { experiment, scenes })

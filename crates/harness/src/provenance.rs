@@ -31,7 +31,7 @@ impl Provenance {
                 .chain(std::env::args().skip(1))
                 .collect::<Vec<_>>()
                 .join(" "),
-            revision: revision().unwrap_or_else(|| "unknown".into()),
+            revision: revision_or_unknown(),
             version: env!("CARGO_PKG_VERSION"),
             rustc: env!("HARNESS_RUSTC"),
             cpu: cpu(),
@@ -39,6 +39,11 @@ impl Provenance {
             date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
         }
     }
+}
+
+/// As in [`Provenance::revision`].
+pub fn revision_or_unknown() -> String {
+    revision().unwrap_or_else(|| "unknown".into())
 }
 
 fn revision() -> Option<String> {

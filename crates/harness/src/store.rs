@@ -28,6 +28,9 @@ pub struct FinishedRun {
 /// The files that are joined from those of the runs.
 const JOINED: [&str; 5] = ["runs.csv", "history.csv", "timing.csv", "rays.csv", "timing_history.csv"];
 
+/// The folder of the runs while the experiment goes on.
+const PARTIAL: &str = ".partial";
+
 /// An experiment's folder, locked until dropped.
 #[derive(Debug)]
 pub struct Store {
@@ -41,7 +44,7 @@ impl Store {
     /// have had the same resolved spec; without, discards them.
     pub fn open(out: &Path, name: &str, resolved: &str, resume: bool) -> Result<Self, Error> {
         let folder = out.join(name);
-        let partial = folder.join(".partial");
+        let partial = folder.join(PARTIAL);
         fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
         let lock_path = folder.join(".lock");
         let lock = File::create(&lock_path).map_err(Error::io(&lock_path, "create the file"))?;
@@ -132,6 +135,11 @@ impl Store {
     pub fn finish(self) -> Result<(), Error> {
         fs::remove_dir_all(&self.partial).map_err(Error::io(&self.partial, "remove the folder"))
     }
+}
+
+/// Whether an interrupted experiment has left finished runs in its folder.
+pub fn is_unfinished(folder: &Path) -> bool {
+    folder.join(PARTIAL).exists()
 }
 
 /// Replaces the file at `path` by `bytes`: at any moment it is the old file or the whole new one.
