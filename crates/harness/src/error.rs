@@ -39,6 +39,9 @@ pub enum Error {
         "{differences} difference(s) from the committed results; if they are meant, run again without --check"
     )]
     Differs { differences: usize },
+    /// Parts of an experiment that cannot be joined.
+    #[error("{experiment}: {message}")]
+    Merge { experiment: String, message: String },
     /// Ctrl-C.
     #[error("interrupted; {finished} of {runs} runs are kept, `--resume` does the rest")]
     Interrupted { finished: usize, runs: usize },

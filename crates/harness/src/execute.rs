@@ -1,18 +1,19 @@
 //! Carries out the runs of an experiment: in parallel or one by one, with progress, until done or interrupted.
 
-use crate::provenance::{Provenance, revision_or_unknown};
-use crate::record::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, to_bytes};
+use crate::provenance::Provenance;
+use crate::record::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow};
 use crate::report::{self, Report};
 use crate::scene::Scene;
 use crate::spec::{Experiment, Labelled};
 use crate::store::{FinishedRun, Store};
-use crate::{Error, rays, record, reference, store};
+use crate::sweep::Shard;
+use crate::{Error, rays, reference, store};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
-use bvh_search::{Event, Observer, Problem, lower_bound, solve};
+use bvh_search::{Budget, Event, Observer, Problem, exact, lower_bound, solve};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
@@ -25,6 +26,8 @@ struct Job<'a> {
     base: f64,
     labelled: &'a Labelled,
     repetition: u32,
+    /// Whether what is known of the scene alone is this run's to say.
+    first_of_scene: bool,
 }
 
 /// What a finished experiment leaves to say.
@@ -36,17 +39,26 @@ pub struct Summary {
     pub left_out: Vec<String>,
 }
 
+/// How much of an experiment is to be done.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Extent {
+    /// Keep the finished runs of an interrupted experiment.
+    pub resume: bool,
+    /// Do these runs only, and leave them to be [merged](crate::sweep::merge).
+    pub shard: Option<Shard>,
+}
+
 /// Runs `experiment` into `out/NAME/`. `interrupted` is watched: when it becomes true, finished runs are kept and the
 /// rest is given up.
 pub fn execute(
     experiment: &Experiment,
     out: &Path,
-    resume: bool,
+    extent: Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
     let (scenes, left_out) = experiment.load_scenes()?;
-    let resolved = resolve(experiment, &scenes)?;
-    let store = Store::open(out, &experiment.name, &resolved, resume)?;
+    let resolved = resolve(experiment, &scenes);
+    let store = Store::open(out, &experiment.name, &to_toml(&resolved)?, extent.resume)?;
     let bases = scenes
         .par_iter()
         .map(|scene| base_cost(scene, &experiment.objective))
@@ -54,15 +66,22 @@ pub fn execute(
     let jobs: Vec<Job> = scenes
         .iter()
         .zip(bases)
-        .flat_map(|(scene, base)| experiment.methods.iter().map(move |labelled| (scene, base, labelled)))
-        .flat_map(|(scene, base, labelled)| {
-            (0..experiment.repetitions).map(move |repetition| Job { scene, base, labelled, repetition })
+        .flat_map(|(scene, base)| {
+            experiment.runs().map(move |(labelled, repetition, first_of_scene)| Job {
+                scene,
+                base,
+                labelled,
+                repetition,
+                first_of_scene,
+            })
         })
         .collect();
 
-    let todo: Vec<usize> = (0..jobs.len()).filter(|&index| !store.has(index)).collect();
-    let finished = AtomicUsize::new(jobs.len() - todo.len());
-    let watch = Watch { bar: progress(jobs.len() as u64, finished.load(Relaxed) as u64), interrupted };
+    let own: Vec<usize> =
+        (0..jobs.len()).filter(|&index| extent.shard.is_none_or(|shard| shard.has(index))).collect();
+    let todo: Vec<usize> = own.iter().copied().filter(|&index| !store.has(index)).collect();
+    let finished = AtomicUsize::new(own.len() - todo.len());
+    let watch = Watch { bar: progress(own.len() as u64, finished.load(Relaxed) as u64), interrupted };
     watch.bar.set_message(experiment.name.clone());
     let work = |&index: &usize| -> Result<(), Error> {
         if let Some(run) = perform(experiment, &jobs[index], &watch)? {
@@ -77,67 +96,63 @@ pub fn execute(
     watch.bar.finish_and_clear();
     result?;
     let finished = finished.load(Relaxed);
-    if finished < jobs.len() {
-        return Err(Error::Interrupted { finished, runs: jobs.len() });
+    if finished < own.len() {
+        return Err(Error::Interrupted { finished, runs: own.len() });
     }
-    store.join(jobs.len())?;
-    store.write("resolved.toml", resolved.as_bytes())?;
-    if let Some(effort) = experiment.lower_bound {
-        let bounds = scenes.iter().map(|scene| bound(scene, effort)).collect::<Result<Vec<_>, _>>()?;
-        store.write("bounds.csv", &to_bytes(&bounds, Path::new("bounds.csv"))?)?;
+    let provenance = Provenance::gather();
+    if let Some(shard) = extent.shard {
+        store.keep_shard(&to_toml(&provenance)?)?;
+        let text = format!("{finished} runs, part {shard}; `harness merge` joins the parts.\n");
+        return Ok(Summary { text, left_out });
     }
-    write_references(experiment, &scenes, out, &store)?;
-    let text = report::write_all(&experiment.reports, &store)?;
-    store.write("provenance.toml", to_toml(&Provenance::gather())?.as_bytes())?;
-    store.finish()?;
+    let text = conclude(&resolved, out, &provenance, store)?;
     Ok(Summary { text, left_out })
+}
+
+/// Joins the kept runs and makes the reports. Returns the text for the terminal.
+pub(crate) fn conclude(
+    resolved: &Resolved,
+    out: &Path,
+    provenance: &Provenance,
+    store: Store,
+) -> Result<String, Error> {
+    store.join(resolved.experiment.runs().count() * resolved.scenes.len())?;
+    let text = report(resolved, out, provenance, &store)?;
+    store.write("provenance.toml", to_toml(provenance)?.as_bytes())?;
+    store.finish()?;
+    Ok(text)
+}
+
+/// Improves the best known costs and makes the reports of joined rows. Returns the text for the terminal.
+fn report(resolved: &Resolved, out: &Path, provenance: &Provenance, store: &Store) -> Result<String, Error> {
+    store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
+    reference::update(resolved, out, &provenance.revision, store)?;
+    report::write_all(&resolved.experiment.reports, store)
 }
 
 /// Makes the reports of finished runs again, with the references of now. Nothing is run: the spec must be the one that
 /// the rows in `out/NAME/` come from, but for its reports.
 pub fn report_again(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     let (scenes, left_out) = experiment.load_scenes()?;
-    let resolved = resolve(experiment, &scenes)?;
+    let resolved = resolve(experiment, &scenes);
     let folder = out.join(&experiment.name);
+    let refuse = |message: &str| Error::Usage(format!("{}: {message}", folder.display()));
     if store::is_unfinished(&folder) {
-        let folder = folder.display();
-        return Err(Error::Usage(format!(
-            "{folder}: the experiment was interrupted; finish it with --resume first"
-        )));
+        return Err(refuse("the experiment was interrupted; finish it with --resume first"));
     }
     let path = folder.join("resolved.toml");
     let found = std::fs::read_to_string(&path).map_err(Error::io(&path, "read the file"))?;
-    let runs = |text: &str| -> Option<toml::Table> {
-        let mut table: toml::Table = text.parse().ok()?;
-        table.get_mut("experiment")?.as_table_mut()?.remove("reports");
-        Some(table)
-    };
-    if runs(&found) != runs(&resolved) {
-        return Err(Error::Usage(format!(
-            "{}: the rows come from another spec, scene or seed; run it again without --reports",
-            path.display()
-        )));
+    let same_runs = toml::from_str(&found).is_ok_and(|found: Resolved| {
+        let experiment = Experiment { reports: experiment.reports.clone(), ..found.experiment };
+        Resolved { experiment, ..found } == resolved
+    });
+    if !same_runs {
+        return Err(refuse("the rows come from another spec, scene or seed; run it again without --reports"));
     }
-    let store = Store::open(out, &experiment.name, &resolved, false)?;
-    store.write("resolved.toml", resolved.as_bytes())?;
-    write_references(experiment, &scenes, out, &store)?;
-    let text = report::write_all(&experiment.reports, &store)?;
+    let store = Store::open(out, &experiment.name, &found, false)?;
+    let text = report(&resolved, out, &Provenance::gather(), &store)?;
     store.finish()?;
     Ok(Summary { text, left_out })
-}
-
-/// Improves the best known costs by the rows in the store's folder, and records the references if a report needs them.
-fn write_references(experiment: &Experiment, scenes: &[Scene], out: &Path, store: &Store) -> Result<(), Error> {
-    let runs: Vec<RunRow> = record::read(&store.folder().join("runs.csv"))?;
-    let bounds = record::read_if_any(&store.folder().join("bounds.csv"))?;
-    let revision = revision_or_unknown();
-    let known = reference::improve(out, scenes, &experiment.objective, &runs, &bounds, &revision)?;
-    if experiment.reports.iter().any(Report::needs_references) {
-        let references = reference::select(&known, scenes, &experiment.objective)?;
-        let name = reference::REFERENCES;
-        store.write(name, &to_bytes(&references, Path::new(name))?)?;
-    }
-    Ok(())
 }
 
 /// The cost of the scene's greedy Müller–Fellner tree, the base of all ratios.
@@ -150,20 +165,25 @@ fn base_cost(scene: &Scene, objective: &Objective) -> Result<f64, Error> {
     Ok(objective.cost(&muller_fellner::Config::default().build(&scene.boxes).map_err(refused)?))
 }
 
-/// A lower bound of the scene's internal area.
-fn bound(scene: &Scene, effort: u32) -> Result<BoundRow, Error> {
-    let refused = |source| Error::Search {
-        scene: scene.name.clone(),
-        method: "the lower bound".into(),
-        source: bvh_search::SearchError::Build(source),
+/// What is proven of the scene's internal area: the exact optimum where gaps are measured from it, else a lower bound if
+/// the experiment asks for one.
+fn bound(experiment: &Experiment, scene: &Scene) -> Result<Option<BoundRow>, Error> {
+    let refused =
+        |source| Error::Search { scene: scene.name.clone(), method: "the lower bound".into(), source };
+    let lower_bound = if experiment.needs_optimum(scene.boxes.len()) {
+        solve(&exact::Config {}, &Problem::new(&scene.boxes), 0, Budget::default(), &()).map_err(refused)?.cost
+    } else if let Some(effort) = experiment.lower_bound {
+        let bound = lower_bound::internal_area(&scene.boxes, effort);
+        bound.map_err(bvh_search::SearchError::Build).map_err(refused)?
+    } else {
+        return Ok(None);
     };
-    let lower_bound = lower_bound::internal_area(&scene.boxes, effort).map_err(refused)?;
-    Ok(BoundRow { scene: scene.name.clone(), objects: scene.boxes.len(), lower_bound })
+    Ok(Some(BoundRow { scene: scene.name.clone(), objects: scene.boxes.len(), lower_bound }))
 }
 
 /// One run; `None` if it was interrupted.
 fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<FinishedRun>, Error> {
-    let Job { scene, base, labelled, repetition } = *job;
+    let Job { scene, base, labelled, repetition, .. } = *job;
     let Labelled { label, method, .. } = labelled;
     if watch.cancelled() {
         return Ok(None);
@@ -245,35 +265,36 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<F
         seconds,
     };
     let clock = clock.into_iter().enumerate().map(clock_row).collect();
+    let bounds = if job.first_of_scene { bound(experiment, scene)? } else { None };
+    let bounds = bounds.into_iter().collect();
     let threads = rayon::current_num_threads();
     let timing = TimingRow { scene: scene_name, method, seed, repetition, threads, seconds };
-    Ok(Some(FinishedRun { run, history, timing, rays, clock }))
+    Ok(Some(FinishedRun { run, history, timing, rays, clock, bounds }))
 }
 
-/// The spec with every default spelled out, and which scenes it ran on.
-fn resolve(experiment: &Experiment, scenes: &[Scene]) -> Result<String, Error> {
-    #[derive(Serialize)]
-    struct LoadedScene<'a> {
-        name: &'a str,
-        kind: &'a str,
-        objects: usize,
-        checksum: String,
-    }
-    #[derive(Serialize)]
-    struct Resolved<'a> {
-        experiment: &'a Experiment,
-        scenes: Vec<LoadedScene<'a>>,
-    }
-    let scenes = scenes
-        .iter()
-        .map(|scene| LoadedScene {
-            name: &scene.name,
-            kind: scene.kind,
-            objects: scene.boxes.len(),
-            checksum: scene.checksum_text(),
-        })
-        .collect();
-    to_toml(&Resolved { experiment, scenes })
+/// Contents of `resolved.toml`: the spec with every default spelled out, and which scenes it ran on.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Resolved {
+    pub experiment: Experiment,
+    pub scenes: Vec<LoadedScene>,
+}
+
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct LoadedScene {
+    pub name: String,
+    pub kind: String,
+    pub objects: usize,
+    pub checksum: String,
+}
+
+fn resolve(experiment: &Experiment, scenes: &[Scene]) -> Resolved {
+    let loaded = |scene: &Scene| LoadedScene {
+        name: scene.name.clone(),
+        kind: scene.kind.into(),
+        objects: scene.boxes.len(),
+        checksum: format!("{:016x}", scene.checksum()),
+    };
+    Resolved { experiment: experiment.clone(), scenes: scenes.iter().map(loaded).collect() }
 }
 
 fn to_toml(value: &impl Serialize) -> Result<String, Error> {

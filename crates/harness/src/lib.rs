@@ -7,6 +7,7 @@ pub mod chart;
 pub mod check;
 pub mod error;
 pub mod execute;
+pub mod html;
 pub mod obj;
 pub mod part;
 pub mod provenance;
@@ -18,5 +19,6 @@ pub mod scene;
 pub mod spec;
 pub mod standin;
 pub mod store;
+pub mod sweep;
 
 pub use error::Error;

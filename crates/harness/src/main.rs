@@ -1,13 +1,15 @@
 //! The command line: reads arguments, calls the library, prints what it returns, sets the exit code.
 
 use clap::{Args, Parser, Subcommand};
+use harness::execute::Extent;
 use harness::scene::{FETCHED, SPHERES, Scene, fetched_path};
 use harness::spec::{Experiment, Overrides};
 use harness::standin::STAND_INS;
-use harness::{Error, check, execute, reference};
+use harness::sweep::{self, Shard};
+use harness::{Error, check, execute, html, reference};
 use std::fmt::Arguments;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -25,6 +27,24 @@ struct Cli {
 enum Command {
     /// List the built-in scenes, their sizes, and what each stands in for.
     Scenes,
+    /// Write all results on one HTML page.
+    Report {
+        /// Folder with the results of experiments.
+        #[arg(long, value_name = "DIR", default_value = "results")]
+        results: PathBuf,
+        /// The page.
+        #[arg(long, value_name = "FILE.html", default_value = "results/report.html")]
+        out: PathBuf,
+    },
+    /// Join the parts of experiments made with --shard into what one run would have written.
+    Merge {
+        /// Folders that were given as --out to runs with --shard.
+        #[arg(value_name = "DIR", required = true)]
+        folders: Vec<PathBuf>,
+        /// Folder for the results.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
 }
 
 #[derive(Args)]
@@ -51,11 +71,15 @@ struct RunArgs {
     #[arg(long, conflicts_with = "resume")]
     check: bool,
     /// Make the tables and figures again from the rows there are, with the best known costs of now; run nothing.
-    #[arg(long, conflicts_with_all = ["check", "resume"])]
+    #[arg(long, conflicts_with_all = ["check", "resume", "shard"])]
     reports: bool,
     /// Keep the finished runs of an interrupted experiment and do the rest.
     #[arg(long)]
     resume: bool,
+    /// Do only the I-th of N parts of the runs, from 1, and leave them for `harness merge`. Every part needs an --out
+    /// of its own.
+    #[arg(long, value_name = "I/N", conflicts_with = "check")]
+    shard: Option<Shard>,
 }
 
 /// Set by Ctrl-C. A second one ends the program at once; finished runs are kept either way.
@@ -73,6 +97,8 @@ fn main() -> ExitCode {
     }
     let result = match cli.command {
         Some(Command::Scenes) => list_scenes(),
+        Some(Command::Report { results, out }) => write_page(&results, &out),
+        Some(Command::Merge { folders, out }) => merge(&folders, &out),
         None => run(&cli.run),
     };
     match result {
@@ -105,6 +131,7 @@ fn run(args: &RunArgs) -> Result<(), Error> {
     // All specs are checked before the first one is run.
     let experiments =
         args.specs.iter().map(|path| Experiment::read(path, &overrides)).collect::<Result<Vec<_>, _>>()?;
+    let extent = Extent { resume: args.resume, shard: args.shard };
     let mut differences = 0;
     for experiment in &experiments {
         if args.check {
@@ -113,7 +140,7 @@ fn run(args: &RunArgs) -> Result<(), Error> {
             let summary = if args.reports {
                 execute::report_again(experiment, &args.out)?
             } else {
-                execute::execute(experiment, &args.out, args.resume, &INTERRUPTED)?
+                execute::execute(experiment, &args.out, extent, &INTERRUPTED)?
             };
             say(format_args!("{}", experiment.question));
             for name in &summary.left_out {
@@ -130,7 +157,7 @@ fn check(args: &RunArgs, experiment: &Experiment) -> Result<usize, Error> {
     let temporary = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
     let (fresh, committed) = (temporary.path().join(&experiment.name), args.out.join(&experiment.name));
     reference::adopt(&committed, temporary.path())?;
-    let summary = execute::execute(experiment, temporary.path(), false, &INTERRUPTED)?;
+    let summary = execute::execute(experiment, temporary.path(), Extent::default(), &INTERRUPTED)?;
     let found = check::compare(&fresh, &committed, &summary.left_out)?;
     for name in &summary.left_out {
         say(format_args!("{}: scene {name} is not fetched; its rows are not compared", experiment.name));
@@ -142,6 +169,19 @@ fn check(args: &RunArgs, experiment: &Experiment) -> Result<usize, Error> {
         say(format_args!("{}: as committed", experiment.name));
     }
     Ok(found.len())
+}
+
+fn write_page(results: &Path, out: &Path) -> Result<(), Error> {
+    let experiments = html::write(results, out)?;
+    say(format_args!("{experiments} experiments: {}", out.display()));
+    Ok(())
+}
+
+fn merge(folders: &[PathBuf], out: &Path) -> Result<(), Error> {
+    for (name, text) in sweep::merge(folders, out)? {
+        say(format_args!("{text}Results: {}", out.join(name).display()));
+    }
+    Ok(())
 }
 
 fn list_scenes() -> Result<(), Error> {

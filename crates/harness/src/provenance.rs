@@ -1,26 +1,29 @@
 //! Where results come from: revision, compiler, processor, threads, date. Kept apart from what can be reproduced.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::process::Command;
 use std::time::SystemTime;
 
 /// Contents of `provenance.toml`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Provenance {
     /// The command line, the program's own path left out.
     pub command: String,
     /// Git revision of the working folder, `+` when it has uncommitted changes, or `unknown`.
     pub revision: String,
     /// Version of this program.
-    pub version: &'static str,
+    pub version: String,
     /// The compiler that built it.
-    pub rustc: &'static str,
+    pub rustc: String,
     /// Processor model and architecture.
     pub cpu: String,
     /// Threads used.
     pub threads: usize,
     /// When the results were completed, UTC.
     pub date: String,
+    /// Of every part, if the results are merged.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<Provenance>,
 }
 
 impl Provenance {
@@ -31,19 +34,15 @@ impl Provenance {
                 .chain(std::env::args().skip(1))
                 .collect::<Vec<_>>()
                 .join(" "),
-            revision: revision_or_unknown(),
-            version: env!("CARGO_PKG_VERSION"),
-            rustc: env!("HARNESS_RUSTC"),
+            revision: revision().unwrap_or_else(|| "unknown".into()),
+            version: env!("CARGO_PKG_VERSION").into(),
+            rustc: env!("HARNESS_RUSTC").into(),
             cpu: cpu(),
             threads: rayon::current_num_threads(),
             date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
+            parts: vec![],
         }
     }
-}
-
-/// As in [`Provenance::revision`].
-pub fn revision_or_unknown() -> String {
-    revision().unwrap_or_else(|| "unknown".into())
 }
 
 fn revision() -> Option<String> {

@@ -4,7 +4,7 @@ use crate::report::Report;
 use crate::scene::{Scene, fnv1a};
 use crate::{Error, part, rays};
 use bvh_core::cost::Objective;
-use bvh_search::{Budget, Method, Problem, solve};
+use bvh_search::{Budget, Method, Problem, exact, solve};
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::path::Path;
@@ -215,6 +215,21 @@ impl Experiment {
             Some(twice) => Err(Error::Usage(format!("two scenes are called {}; name each once", twice.name))),
             None => Ok((scenes, left_out)),
         }
+    }
+
+    /// The runs on one scene in order: method, repetition, and whether it is the first.
+    pub fn runs(&self) -> impl Iterator<Item = (&Labelled, u32, bool)> {
+        let of = |labelled| (0..self.repetitions).map(move |repetition| (labelled, repetition));
+        self.methods
+            .iter()
+            .flat_map(of)
+            .enumerate()
+            .map(|(index, (labelled, repetition))| (labelled, repetition, index == 0))
+    }
+
+    /// Whether gaps are measured on scenes of so many objects from their exact optimum.
+    pub fn needs_optimum(&self, objects: usize) -> bool {
+        objects <= exact::MOST_OBJECTS && self.reports.iter().any(Report::needs_references)
     }
 
     /// The limits of a method's runs.

@@ -5,7 +5,7 @@
 //! their rows are joined in the order of the spec, so the bytes do not depend on the order of finishing.
 
 use crate::Error;
-use crate::record::{ClockRow, HistoryRow, RayRow, RunRow, TimingRow, to_bytes};
+use crate::record::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, to_bytes};
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -23,13 +23,13 @@ pub struct FinishedRun {
     pub rays: Vec<RayRow>,
     /// For `timing_history.csv`, likewise.
     pub clock: Vec<ClockRow>,
+    /// For `bounds.csv`, likewise.
+    pub bounds: Vec<BoundRow>,
 }
 
 /// The files that are joined from those of the runs.
-const JOINED: [&str; 5] = ["runs.csv", "history.csv", "timing.csv", "rays.csv", "timing_history.csv"];
-
-/// The folder of the runs while the experiment goes on.
-const PARTIAL: &str = ".partial";
+pub const JOINED: [&str; 6] =
+    ["runs.csv", "history.csv", "timing.csv", "rays.csv", "timing_history.csv", "bounds.csv"];
 
 /// An experiment's folder, locked until dropped.
 #[derive(Debug)]
@@ -44,14 +44,9 @@ impl Store {
     /// have had the same resolved spec; without, discards them.
     pub fn open(out: &Path, name: &str, resolved: &str, resume: bool) -> Result<Self, Error> {
         let folder = out.join(name);
-        let partial = folder.join(PARTIAL);
+        let partial = folder.join(".partial");
         fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
-        let lock_path = folder.join(".lock");
-        let lock = File::create(&lock_path).map_err(Error::io(&lock_path, "create the file"))?;
-        lock.try_lock().map_err(|error| match error {
-            fs::TryLockError::WouldBlock => Error::Busy(folder.clone()),
-            fs::TryLockError::Error(source) => Error::Io { path: lock_path, action: "lock the file", source },
-        })?;
+        let lock = lock(&folder)?;
         let spec = partial.join("resolved.toml");
         let found = fs::read_to_string(&spec).ok();
         match found {
@@ -79,7 +74,7 @@ impl Store {
     }
 
     fn part(&self, index: usize) -> PathBuf {
-        self.partial.join(format!("{index:06}"))
+        self.partial.join(part_name(index))
     }
 
     /// Whether run `index` has been kept.
@@ -90,18 +85,27 @@ impl Store {
     /// Keeps run `index`.
     pub fn keep(&self, index: usize, run: &FinishedRun) -> Result<(), Error> {
         let part = self.part(index);
+        self.keep_bytes(
+            index,
+            [
+                to_bytes(std::slice::from_ref(&run.run), &part)?,
+                to_bytes(&run.history, &part)?,
+                to_bytes(std::slice::from_ref(&run.timing), &part)?,
+                to_bytes(&run.rays, &part)?,
+                to_bytes(&run.clock, &part)?,
+                to_bytes(&run.bounds, &part)?,
+            ],
+        )
+    }
+
+    /// Keeps run `index`, given the contents of its [`JOINED`] files.
+    pub fn keep_bytes(&self, index: usize, contents: [Vec<u8>; JOINED.len()]) -> Result<(), Error> {
+        let part = self.part(index);
         let unfinished = part.with_extension("unfinished");
         if unfinished.exists() {
             fs::remove_dir_all(&unfinished).map_err(Error::io(&unfinished, "remove the folder"))?;
         }
         fs::create_dir(&unfinished).map_err(Error::io(&unfinished, "create the folder"))?;
-        let contents = [
-            to_bytes(std::slice::from_ref(&run.run), &part)?,
-            to_bytes(&run.history, &part)?,
-            to_bytes(std::slice::from_ref(&run.timing), &part)?,
-            to_bytes(&run.rays, &part)?,
-            to_bytes(&run.clock, &part)?,
-        ];
         for (name, bytes) in JOINED.iter().zip(contents) {
             write_synced(&unfinished.join(name), &bytes)?;
         }
@@ -131,15 +135,36 @@ impl Store {
         write_whole(&self.folder.join(name), bytes)
     }
 
+    /// Leaves the finished runs of a shard for merging, with where they come from.
+    pub fn keep_shard(self, provenance: &str) -> Result<(), Error> {
+        write_whole(&self.partial.join("provenance.toml"), provenance.as_bytes())
+    }
+
     /// Removes what only an interrupted experiment needs. The lock file stays: removing it would race.
     pub fn finish(self) -> Result<(), Error> {
         fs::remove_dir_all(&self.partial).map_err(Error::io(&self.partial, "remove the folder"))
     }
 }
 
-/// Whether an interrupted experiment has left finished runs in its folder.
+/// Locks an experiment's folder against other harnesses until the file is dropped.
+pub fn lock(folder: &Path) -> Result<File, Error> {
+    let path = folder.join(".lock");
+    let lock = File::create(&path).map_err(Error::io(&path, "create the file"))?;
+    match lock.try_lock() {
+        Ok(()) => Ok(lock),
+        Err(fs::TryLockError::WouldBlock) => Err(Error::Busy(folder.to_owned())),
+        Err(fs::TryLockError::Error(source)) => Err(Error::Io { path, action: "lock the file", source }),
+    }
+}
+
+/// The name of the folder in which run `index` is kept.
+pub fn part_name(index: usize) -> String {
+    format!("{index:06}")
+}
+
+/// Whether an interrupted experiment, or a part of one, has left finished runs in its folder.
 pub fn is_unfinished(folder: &Path) -> bool {
-    folder.join(PARTIAL).exists()
+    folder.join(".partial").exists()
 }
 
 /// Replaces the file at `path` by `bytes`: at any moment it is the old file or the whole new one.

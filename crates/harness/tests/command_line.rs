@@ -215,3 +215,73 @@ fn scenes_are_listed_with_what_they_stand_in_for() {
     assert!(output.status.success());
     assert!(text(&output.stdout).contains("stand-in for Cloister"));
 }
+
+#[test]
+fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_differs_is_named() {
+    let folder = folder();
+    let part = |number: &str, out: &str| {
+        let output = run(folder.path(), &["spec.toml", "--shard", number, "--out", out]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+    };
+    let refused = |args: &[&str], code: i32, parts: &[&str]| {
+        let output = run(folder.path(), args);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{message}");
+        assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+        assert!(!folder.path().join("merged").exists());
+    };
+    assert!(run(folder.path(), &["spec.toml", "--out", "whole"]).status.success());
+    part("1/3", "one");
+    part("3/3", "three");
+    let missing = ["spec: 6 of 18 runs are missing", "scene escher, method greedy, repetition 1"];
+    refused(&["merge", "one", "three", "--out", "merged"], 1, &missing);
+    refused(&["merge", "one", "whole", "--out", "merged"], 2, &["whole", "--shard"]);
+    refused(&["merge", "one", "nowhere", "--out", "merged"], 1, &["nowhere"]);
+    refused(&["spec.toml", "--shard", "4/3", "--out", "merged"], 2, &["--shard", "4/3", "from 1 to N"]);
+
+    // The same runs twice are welcome, as long as they agree.
+    part("2/3", "two");
+    part("2/3", "again");
+    let folders = ["merge", "one", "two", "three", "again", "--out"];
+    let output = run(folder.path(), &[&folders[..], &["merged"]].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let whole = reproducible(&folder.path().join("whole/spec"));
+    assert!(whole == reproducible(&folder.path().join("merged/spec")));
+    let figure = |out: &str| fs::read(folder.path().join(out).join("spec/table.svg")).unwrap();
+    assert!(figure("whole") == figure("merged"));
+    let provenance = fs::read_to_string(folder.path().join("merged/spec/provenance.toml")).unwrap();
+    assert_eq!(provenance.matches("[[parts]]").count(), 4);
+    fs::remove_dir_all(folder.path().join("merged")).unwrap();
+
+    let kept = folder.path().join("again/spec/.partial/000001/runs.csv");
+    fs::write(&kept, fs::read_to_string(&kept).unwrap().replace("escher", "esther")).unwrap();
+    let differs = ["different runs.csv", "scene escher, method greedy, repetition 1"];
+    refused(&[&folders[..], &["merged"]].concat(), 1, &differs);
+    assert!(
+        run(folder.path(), &["spec.toml", "--seed", "9", "--shard", "2/3", "--out", "two"]).status.success()
+    );
+    refused(&["merge", "one", "two", "three", "--out", "merged"], 1, &["different specs"]);
+    refused(&["merge", "one", "--out", "one"], 2, &["--out one"]);
+}
+
+#[test]
+fn the_page_of_all_results_has_each_experiment_with_table_and_figure_and_needs_no_other_file() {
+    let folder = folder();
+    assert!(run(folder.path(), &["spec.toml"]).status.success());
+    assert!(run(folder.path(), &["spec.toml", "--quick"]).status.success());
+    let output = run(folder.path(), &["report"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("1 experiments"), "{}", text(&output.stdout));
+    let page = fs::read_to_string(folder.path().join("results/report.html")).unwrap();
+    for part in
+        ["Do results survive?", "numbers of the paper, ours agree with", "<svg", "best of 5: ", "provenance"]
+    {
+        assert!(page.contains(part), "{part}");
+    }
+    for other in ["<script", "<img", "<link", "src=", "url(http"] {
+        assert!(!page.contains(other), "{other}");
+    }
+    let nothing = run(folder.path(), &["report", "--results", "."]);
+    assert_eq!(nothing.status.code(), Some(2));
+    assert!(text(&nothing.stderr).contains("no finished experiment"), "{}", text(&nothing.stderr));
+}

@@ -1,6 +1,6 @@
 //! How well costs predict the tests that rays take, over many trees of one scene.
 
-use super::statistics::{pearson, spearman};
+use super::statistics::{pearson, range, spearman};
 use super::{Output, Rows, display_name, text_table};
 use crate::Error;
 use crate::chart::{Axis, Figure, Layer, Panel};
@@ -42,6 +42,17 @@ const COSTS: [Cost; 3] = [
     ("cost_over_root_area", |run| run.cost_over_root_area),
     ("sah", |run| run.sah),
 ];
+
+/// How well every cost ranks the trees, over scenes and kinds of rays.
+fn reading(correlations: &[Correlation]) -> String {
+    let of = |(cost, _): Cost| {
+        let own = correlations.iter().filter(|row| row.method == "all" && row.cost == cost);
+        let (low, high) = range(own.filter_map(|row| row.spearman))?;
+        Some(format!("{cost} {low:.3} to {high:.3}"))
+    };
+    let costs: Vec<String> = COSTS.into_iter().filter_map(of).collect();
+    format!("Rank correlation of box tests per ray over all trees of a scene with {}.", costs.join(", with "))
+}
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
@@ -120,6 +131,7 @@ impl Config {
             figures: vec![("correlation".into(), Figure { title, caption, columns: 2, panels, looks: vec![] })],
             paper: vec![],
             text: format!("{}: {}\n{text}\n", self.source, self.title),
+            reading: reading(&correlations),
         })
     }
 }

@@ -38,6 +38,16 @@ struct Summary<'a> {
     base_cost: f64,
 }
 
+/// How far the trials reach.
+fn reading(summaries: &[Summary]) -> String {
+    let of = |row: &Summary| {
+        let Summary { scene, method, lowest_cost, median_cost, base_cost, .. } = row;
+        let (lowest, median) = (lowest_cost / base_cost, median_cost / base_cost);
+        format!("{scene}, {method}: the median is {median:.3} of Müller–Fellner's cost, the lowest {lowest:.3}")
+    };
+    summaries.iter().map(of).collect::<Vec<_>>().join("; ") + "."
+}
+
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let (mut summaries, mut panels) = (Vec::new(), Vec::new());
@@ -93,6 +103,7 @@ impl Config {
             )],
             paper: vec![],
             text: format!("{}: {}\n{text}\n", self.source, self.title),
+            reading: reading(&summaries),
         })
     }
 }

@@ -101,7 +101,8 @@ fn staircase(solved: &[f64], all: usize, end: f64) -> Vec<(f64, f64)> {
         count += together.len();
         steps.push((together[0], count as f64 / all as f64));
     }
-    if let Some(&(_, last)) = steps.last() {
+    if let (Some(&(first, _)), Some(&(_, last))) = (steps.first(), steps.last()) {
+        steps.insert(0, (first, 0.0));
         steps.push((end, last));
     }
     steps
@@ -113,7 +114,7 @@ mod tests {
 
     #[test]
     fn runs_solved_together_are_one_step() {
-        assert_eq!(staircase(&[1.0, 1.0, 4.0], 6, 5.0), [(1.0, 2.0 / 6.0), (4.0, 0.5), (5.0, 0.5)]);
+        assert_eq!(staircase(&[1.0, 1.0, 4.0], 6, 5.0), [(1.0, 0.0), (1.0, 2.0 / 6.0), (4.0, 0.5), (5.0, 0.5)]);
         assert_eq!(staircase(&[], 6, 5.0), []);
     }
 }

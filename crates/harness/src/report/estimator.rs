@@ -1,5 +1,6 @@
 //! The error of the ray estimator against the number of rays, beside the slope −1/2 that it must have.
 
+use super::statistics::range;
 use super::{Output, Rows, display_name};
 use crate::Error;
 use crate::chart::{Axis, Figure, Layer, Panel};
@@ -29,6 +30,18 @@ struct Point<'a> {
     rays: u64,
     /// Standard error of the tests per ray over their mean.
     relative_error: f64,
+}
+
+/// How the error falls with the number of rays, by the slope between the least and the greatest number.
+fn reading(points: &[Point]) -> String {
+    let slope = |line: &[Point]| {
+        let (first, last) = (line.first()?, line.last().filter(|last| last.rays > line[0].rays)?);
+        Some((last.relative_error / first.relative_error).ln() / (last.rays as f64 / first.rays as f64).ln())
+    };
+    let lines = points.chunk_by(|a, b| (a.scene, a.method) == (b.scene, b.method));
+    range(lines.filter_map(slope)).map_or_else(String::new, |(low, high)| {
+        format!("The error falls with the number of rays to the power {low:.2} to {high:.2}; theory: −1/2.")
+    })
 }
 
 impl Config {
@@ -62,6 +75,7 @@ impl Config {
         Ok(Output {
             csv: vec![("estimator".into(), to_bytes(&points, Path::new("estimator.csv"))?)],
             figures: vec![("estimator".into(), Figure { title, caption, columns: 2, panels, looks: vec![] })],
+            reading: reading(&points),
             ..Output::default()
         })
     }

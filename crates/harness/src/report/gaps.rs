@@ -108,7 +108,26 @@ impl Config {
             csv.push(("tightness".into(), to_bytes(&tightness, Path::new("tightness.csv"))?));
         }
         let text = self.text(&gaps, &ratios);
-        Ok(Output { csv, figures: vec![("gaps".into(), figure)], paper: vec![], text })
+        let reading = self.reading(&gaps, &ratios);
+        Ok(Output { csv, figures: vec![("gaps".into(), figure)], paper: vec![], text, reading })
+    }
+
+    fn reading(
+        &self,
+        gaps: &BTreeMap<(&str, &str, usize), Vec<f64>>,
+        ratios: &BTreeMap<(&str, usize), Vec<f64>>,
+    ) -> String {
+        let solves = |method: &String| {
+            let own = gaps.iter().filter(|((of, ..), _)| of == method);
+            let all: Vec<f64> = own.flat_map(|(_, gaps)| gaps.iter().copied()).collect();
+            format!("{method} {:.1} %", 100.0 * solved(&all))
+        };
+        let methods: Vec<String> = self.methods.iter().map(solves).collect();
+        let bounds: Vec<f64> = ratios.values().flatten().copied().collect();
+        let bound = quantile(&bounds, 0.5).map_or_else(String::new, |median| {
+            format!(" The lower bound is {median:.3} of the optimum (median).")
+        });
+        format!("Runs that end at the exact optimum: {}.{bound}", methods.join(", "))
     }
 
     /// Fraction solved and worst gap against size, for every kind of part.

@@ -123,6 +123,12 @@ impl Config {
             middle / average,
             middle / base,
         );
+        output.reading += &format!(
+            "{shown}: {:.3} of the average order's cost, {:.3} of Müller–Fellner's, over {} runs. ",
+            middle / average,
+            middle / base,
+            finals.len()
+        );
         let row = |quantity: &str, paper: String, ours: String, verdict: &str| PaperRow {
             source: self.source.clone(),
             scene: shown.into(),

@@ -96,7 +96,7 @@ impl Report {
         matches!(self, Anytime(_) | RunTimes(_) | Ecdf(_) | Profile(_) | Numbers(_))
     }
 
-    fn write(&self, rows: &Rows) -> Result<Output, Error> {
+    pub(crate) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         match self {
             Self::Table(config) => config.write(rows),
             Self::Trials(config) => config.write(rows),
@@ -137,6 +137,19 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// Reads the CSV files in an experiment's folder.
+    pub fn read(folder: &Path) -> Result<Self, Error> {
+        Ok(Self {
+            runs: record::read(&folder.join("runs.csv"))?,
+            history: record::read(&folder.join("history.csv"))?,
+            timing: record::read(&folder.join("timing.csv"))?,
+            rays: record::read_if_any(&folder.join("rays.csv"))?,
+            bounds: record::read_if_any(&folder.join("bounds.csv"))?,
+            clock: record::read_if_any(&folder.join("timing_history.csv"))?,
+            references: record::read_if_any(&folder.join(reference::REFERENCES))?,
+        })
+    }
+
     /// The scenes in the order of the rows, with their kinds.
     pub fn scenes(&self) -> Vec<(&str, &str)> {
         let mut scenes: Vec<_> =
@@ -197,6 +210,8 @@ pub struct Output {
     pub paper: Vec<PaperRow>,
     /// For the terminal.
     pub text: String,
+    /// The sentence that reads the result, from its numbers; empty if the table says it all.
+    pub reading: String,
 }
 
 /// A scene's name with its kind, as every table shows it.
@@ -206,16 +221,7 @@ fn display_name(scene: &str, kind: &str) -> String {
 
 /// Makes all reports from the CSV files in the store's folder. Returns the text for the terminal.
 pub fn write_all(reports: &[Report], store: &Store) -> Result<String, Error> {
-    let folder = store.folder();
-    let rows = Rows {
-        runs: record::read(&folder.join("runs.csv"))?,
-        history: record::read(&folder.join("history.csv"))?,
-        timing: record::read(&folder.join("timing.csv"))?,
-        rays: record::read_if_any(&folder.join("rays.csv"))?,
-        bounds: record::read_if_any(&folder.join("bounds.csv"))?,
-        clock: record::read_if_any(&folder.join("timing_history.csv"))?,
-        references: record::read_if_any(&folder.join(reference::REFERENCES))?,
-    };
+    let rows = Rows::read(store.folder())?;
     let mut text = String::new();
     let mut paper = Vec::new();
     for report in reports {

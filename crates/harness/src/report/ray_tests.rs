@@ -1,6 +1,6 @@
 //! Tests per random ray: what the paper calls the number of intersections, methods by scenes.
 
-use super::statistics::median;
+use super::statistics::{median, range};
 use super::{Output, Rows, display_name, text_table};
 use crate::Error;
 use crate::chart::{Axis, Figure, Layer, Look, Panel};
@@ -65,6 +65,7 @@ impl Config {
             self.compare(&display_name(scene, kind), &table[start..], &mut output);
         }
         output.text = self.text(rows, &table);
+        output.reading = self.reading(&table);
         output.figures.push(("ray_tests".into(), self.figure(rows, &table)));
         output.csv.push(("ray_tests".into(), to_bytes(&table, Path::new("ray_tests.csv"))?));
         Ok(output)
@@ -144,6 +145,17 @@ impl Config {
             panels: rows.scenes().into_iter().map(panel).collect(),
             looks: vec![(PAPER.into(), Look::Reference)],
         }
+    }
+
+    fn reading(&self, table: &[Row]) -> String {
+        let first = self.methods.first().map_or("", String::as_str);
+        let of = |method: &String| {
+            let own = table.iter().filter(|row| row.method == method).map(|row| row.boxes_over_first);
+            let (low, high) = range(own)?;
+            Some(format!("{method} {low:.2} to {high:.2}"))
+        };
+        let ratios: Vec<String> = self.methods.iter().skip(1).filter_map(of).collect();
+        format!("Box tests per ray over those of {first}: {}.", ratios.join(", "))
     }
 
     fn text(&self, rows: &Rows, table: &[Row]) -> String {

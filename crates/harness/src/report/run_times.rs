@@ -62,7 +62,7 @@ impl Config {
             for (scene, _) in rows.scenes() {
                 for target in &self.targets {
                     let Some(cost) = target.cost(rows, scene) else { continue };
-                    let mut layers = Vec::new();
+                    let (mut layers, mut laws) = (Vec::new(), Vec::new());
                     for method in &self.methods {
                         let runs = series(rows, scene, method, along);
                         let mut solved: Vec<f64> = runs.iter().filter_map(|run| reached(run, cost)).collect();
@@ -77,8 +77,10 @@ impl Config {
                             solved_fraction,
                         }));
                         let law = ShiftedExponential::fit(&solved, runs.len());
-                        layers.push(Layer::Steps { name: method.clone(), points: curve });
-                        layers.extend(law.map(|law| drawn(&law, &solved)));
+                        // What never happens has no curve.
+                        let points = if solved.is_empty() { vec![] } else { curve };
+                        layers.push(Layer::Steps { name: method.clone(), points });
+                        laws.extend(law.map(|law| drawn(&law, &solved)));
                         fits.push(Fit {
                             scene,
                             target: target.name(),
@@ -91,6 +93,7 @@ impl Config {
                             kolmogorov_smirnov_distance: law.map(|law| law.distance(&solved, runs.len())),
                         });
                     }
+                    layers.extend(laws);
                     let title = format!("{}: {}", rows.shown(scene), target.name());
                     let y = Axis::linear("P(solved)").range(0.0, 1.02);
                     panels.push(Panel { title, x: Axis::log(along.label()), y, layers });
@@ -109,8 +112,8 @@ impl Config {
     fn figure(&self, panels: Vec<Panel>) -> Figure {
         let mut looks: Vec<_> = self.methods.iter().cloned().zip((0..).map(Look::Slot)).collect();
         looks.push((FIT.into(), Look::Reference));
-        let caption = "Fraction of runs with an incumbent at or below the target, against run time; a curve ends where the \
-                       longest run did."
+        let caption = "Fraction of runs with an incumbent at or below the target. A curve ends where the longest run did; a \
+                       method without one never got there. Dashed black: time-to-target fits."
             .into();
         Figure { title: format!("{}: {}", self.source, self.title), caption, columns: 2, panels, looks }
     }

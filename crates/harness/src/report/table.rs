@@ -1,6 +1,6 @@
 //! The paper's tables: ratios to base, scenes by columns, ours beside the paper's.
 
-use super::statistics::{expected_best_of, median, minimum};
+use super::statistics::{expected_best_of, median, minimum, range};
 use super::{Output, Rows, display_name, over, text_table, verdict};
 use crate::Error;
 use crate::chart::{Axis, Figure, Layer, Panel};
@@ -83,7 +83,22 @@ impl Config {
             figures: vec![("table".into(), figure)],
             paper: self.comparisons(&cells, rows),
             text: self.text(&scenes, &cells),
+            reading: self.reading(&cells),
         })
+    }
+
+    fn reading(&self, cells: &[Cell]) -> String {
+        let of = |column: &Column| {
+            let own = || cells.iter().filter(|cell| cell.column == column.name).map(|cell| cell.cost_over_base);
+            let (low, high) = range(own())?;
+            let below = own().filter(|&ratio| ratio < 1.0).count();
+            let scenes = own().count();
+            Some(format!(
+                "{}: {low:.3} to {high:.3} of base, below it on {below} of {scenes} scenes",
+                column.name
+            ))
+        };
+        self.columns.iter().filter_map(of).collect::<Vec<_>>().join("; ") + "."
     }
 
     fn cell<'a>(&'a self, rows: &Rows, scene: &'a str, kind: &'a str, column: &'a Column) -> Option<Cell<'a>> {

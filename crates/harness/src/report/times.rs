@@ -1,6 +1,6 @@
 //! Times of methods against each other, pair by pair, in the same run.
 
-use super::statistics::{median, quantile};
+use super::statistics::{median, quantile, range};
 use super::{Output, Rows, display_name, text_table};
 use crate::Error;
 use crate::chart::{Axis, Figure, Layer, Panel};
@@ -73,7 +73,18 @@ impl Config {
             figures: vec![("times".into(), self.figure(&scenes, &ratios))],
             paper: vec![],
             text: self.text(&scenes, &ratios),
+            reading: self.reading(&ratios),
         })
+    }
+
+    fn reading(&self, ratios: &[Ratio]) -> String {
+        let first = self.methods.first().map_or("", String::as_str);
+        let of = |method: &String| {
+            let own = ratios.iter().filter(|ratio| ratio.method == method).map(|ratio| ratio.ratio_median);
+            let (low, high) = range(own)?;
+            Some(format!("'{method}' takes {low:.3} to {high:.3} times as long as '{first}', median by scene"))
+        };
+        self.methods.iter().skip(1).filter_map(of).collect::<Vec<_>>().join("; ") + "."
     }
 
     fn figure(&self, scenes: &[(&str, &str)], ratios: &[Ratio]) -> Figure {

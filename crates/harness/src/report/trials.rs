@@ -93,6 +93,12 @@ impl Config {
     }
 
     fn compare(&self, scene: &str, ranking: &[(f64, &String)], output: &mut Output) {
+        if let (Some((low, best)), Some((high, worst))) = (ranking.first(), ranking.last()) {
+            let m = self.best_of;
+            output.reading += &format!(
+                "{scene}, expected best of {m}: {best} lowest with {low:.4} of base, {worst} highest with {high:.4}. "
+            );
+        }
         let order = ranking.iter().map(|(ratio, method)| format!("{method}: {ratio:.4}")).collect::<Vec<_>>();
         output.text += &format!(
             "{}: {}\n{scene}, expected best of {}: {}\n\n",

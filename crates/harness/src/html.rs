@@ -1,0 +1,226 @@
+//! All results on one page: a self-contained HTML file that needs neither scripts nor other files.
+
+use crate::Error;
+use crate::chart;
+use crate::execute::Resolved;
+use crate::provenance::Provenance;
+use crate::record::PaperRow;
+use crate::report::{Output, Rows};
+use crate::store::write_whole;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use std::fs;
+use std::path::Path;
+
+const STYLE: &str = "
+:root { color-scheme: light; }
+body { font: 16px/1.5 system-ui, sans-serif; color: #1b1f24; background: #fff; max-width: 62rem; margin: 0 auto; padding: 1rem; }
+h1 { font-size: 1.7rem; } h2 { font-size: 1.3rem; margin-top: 3rem; border-top: 1px solid #d0d7de; padding-top: 1rem; }
+nav ul { columns: 3; padding-left: 1.2rem; }
+.reading { border-left: 4px solid #0969da; padding-left: .8rem; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .85rem; } th, td { padding: .2rem .6rem; text-align: left; vertical-align: top; }
+th { border-bottom: 2px solid #57606a; } tr + tr td { border-top: 1px solid #d8dee4; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
+pre { font-size: .75rem; line-height: 1.25; overflow-x: auto; background: #f6f8fa; padding: .6rem; }
+figure { margin: 1rem 0; } figure svg { max-width: 100%; height: auto; }
+footer, .provenance { color: #57606a; font-size: .8rem; }
+";
+
+/// One experiment's folder, as read.
+struct Section {
+    name: String,
+    question: String,
+    stand_ins: bool,
+    reading: String,
+    tables: String,
+    paper: Vec<PaperRow>,
+    /// Name and SVG text.
+    figures: Vec<(String, String)>,
+    provenance: Provenance,
+}
+
+/// Writes a page of all experiments in `results` to `out`. Quick variants are left out where the whole one is there, and
+/// folders without a finished experiment always. Returns the number of experiments.
+pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(results).map_err(Error::io(results, "read the folder"))? {
+        let entry = entry.map_err(Error::io(results, "read the folder"))?;
+        if entry.path().join("resolved.toml").is_file() {
+            names.push(entry.file_name().to_string_lossy().into_owned());
+        }
+    }
+    let whole =
+        |name: &String| name.strip_suffix("-quick").is_none_or(|whole| !names.iter().any(|n| n == whole));
+    let mut sections = names
+        .iter()
+        .filter(|name| whole(name))
+        .map(|name| section(results, name))
+        .collect::<Result<Vec<_>, _>>()?;
+    if sections.is_empty() {
+        return Err(Error::Usage(format!(
+            "{} holds no finished experiment; accepted: the --out of one",
+            results.display()
+        )));
+    }
+    // What the paper has comes first.
+    sections.sort_by(|a, b| (a.paper.is_empty(), &a.name).cmp(&(b.paper.is_empty(), &b.name)));
+    write_whole(out, page(&sections).into_string().as_bytes())?;
+    Ok(sections.len())
+}
+
+fn section(results: &Path, name: &str) -> Result<Section, Error> {
+    let folder = results.join(name);
+    let read = |path: &Path| fs::read_to_string(path).map_err(Error::io(path, "read the file"));
+    let bad =
+        |path: &Path, error: toml::de::Error| Error::Spec { file: path.to_owned(), message: error.to_string() };
+    let path = folder.join("resolved.toml");
+    let resolved: Resolved = toml::from_str(&read(&path)?).map_err(|error| bad(&path, error))?;
+    let path = folder.join("provenance.toml");
+    let provenance = toml::from_str(&read(&path)?).map_err(|error| bad(&path, error))?;
+    // From the CSV files, as the figures beside them were.
+    let rows = Rows::read(&folder)?;
+    let (mut all, mut figures) = (Output::default(), Vec::new());
+    for report in &resolved.experiment.reports {
+        let output = report.write(&rows)?;
+        all.text += &output.text;
+        all.paper.extend(output.paper);
+        all.reading += &(output.reading + "\n");
+        for (name, figure) in &output.figures {
+            figures.push((name.clone(), chart::svg(figure)?));
+        }
+    }
+    Ok(Section {
+        name: name.into(),
+        question: resolved.experiment.question,
+        stand_ins: resolved.scenes.iter().any(|scene| scene.kind == "stand-in"),
+        reading: all.reading,
+        tables: all.text,
+        paper: all.paper,
+        figures,
+        provenance,
+    })
+}
+
+fn page(sections: &[Section]) -> Markup {
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { "BVH by stochastic search: results" }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                h1 { "BVH by stochastic search: results" }
+                p {
+                    "Costs are ratios to the greedy Müller–Fellner tree of the same scene unless a table says otherwise. The \
+                     paper is Ng & Trifonov, Automatic Bounding Volume Hierarchy Generation Using Stochastic Search Methods \
+                     (2003); its scenes are gone, and stand-ins are called stand-ins."
+                }
+                nav { ul { @for section in sections { li { a href={ "#" (section.name) } { (section.name) } } } } }
+                @for section in sections { (experiment(section)) }
+                footer { p { "Made by harness " (env!("CARGO_PKG_VERSION")) " from the CSV files beside it." } }
+            }
+        }
+    }
+}
+
+fn experiment(section: &Section) -> Markup {
+    let Section { name, question, provenance, .. } = section;
+    html! {
+        section id=(name) {
+            h2 { (name) }
+            p { strong { (question) } }
+            @if section.stand_ins { p { "Scenes named as stand-ins are procedural stand-ins for the paper's." } }
+            @if !section.paper.is_empty() { p.reading { (of_the_paper(&section.paper)) } }
+            @for line in section.reading.lines().filter(|line| !line.is_empty()) { p.reading { (line) } }
+            @if !section.paper.is_empty() { (paper_table(&section.paper)) }
+            @for (stem, svg) in &section.figures {
+                figure id={ (name) "-" (stem) } { (PreEscaped(drawing(svg))) }
+            }
+            @if !section.tables.is_empty() { pre { (section.tables) } }
+            p.provenance {
+                code { (provenance.command) } ", revision " (provenance.revision) ", " (provenance.rustc) ", "
+                (provenance.cpu) ", " (provenance.threads) " thread(s), " (provenance.date)
+                @if !provenance.parts.is_empty() { ", merged from " (provenance.parts.len()) " parts" }
+            }
+        }
+    }
+}
+
+/// How many of the paper's numbers ours agree with.
+fn of_the_paper(rows: &[PaperRow]) -> String {
+    let count = |begins: &str| rows.iter().filter(|row| row.verdict.starts_with(begins)).count();
+    let others = rows.len() - count("agrees") - count("same direction");
+    format!(
+        "Of {} numbers of the paper, ours agree with {}, are in the same direction from the base but further or less far \
+         for {}, and are otherwise for {others}.",
+        rows.len(),
+        count("agrees"),
+        count("same direction"),
+    )
+}
+
+fn paper_table(rows: &[PaperRow]) -> Markup {
+    let ratio = |ratio: Option<f64>| ratio.map_or_else(String::new, |ratio| format!("{ratio:.3}"));
+    html! {
+        div.scroll {
+            table {
+                thead {
+                    tr {
+                        th { "source" } th { "scene" } th { "quantity" } th { "paper" } th { "ours" }
+                        th { "paper / base" } th { "ours / base" } th { "verdict" }
+                    }
+                }
+                tbody {
+                    @for row in rows {
+                        tr title=(row.reason) {
+                            td { (row.source) } td { (row.scene) } td { (row.quantity) }
+                            td.number { (row.paper) } td.number { (row.ours) }
+                            td.number { (ratio(row.paper_over_base)) } td.number { (ratio(row.ours_over_base)) }
+                            td { (row.verdict) }
+                        }
+                    }
+                }
+            }
+        }
+        @let reasons: std::collections::BTreeSet<&str> = rows.iter().map(|row| row.reason.as_str()).collect();
+        @for reason in reasons.into_iter().filter(|reason| !reason.is_empty()) { p { (reason) } }
+    }
+}
+
+/// The drawing without what may stand before it in a file of its own.
+fn drawing(svg: &str) -> &str {
+    svg.find("<svg").map_or("", |start| &svg[start..])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_escaped_and_drawings_are_not() {
+        let provenance = Provenance { command: "harness a<b".into(), ..Provenance::gather() };
+        let section = Section {
+            name: "x".into(),
+            question: "Is 1 < 2 & so on?".into(),
+            stand_ins: true,
+            reading: "first\nsecond".into(),
+            tables: "<pre>".into(),
+            paper: vec![],
+            figures: vec![("f".into(), "<?xml version=\"1.0\"?><svg width=\"1\"></svg>".into())],
+            provenance,
+        };
+        let page = page(&[section]).into_string();
+        for part in [
+            "1 &lt; 2 &amp; so",
+            "&lt;pre&gt;",
+            "a&lt;b",
+            "<svg width=\"1\">",
+            "<p class=\"reading\">second</p>",
+        ] {
+            assert!(page.contains(part), "{part}");
+        }
+        assert!(!page.contains("<?xml") && !page.contains("<script"));
+    }
+}
