@@ -147,7 +147,7 @@ pub fn report_again(experiment: &Experiment, out: &Path) -> Result<Summary, Erro
         Resolved { experiment, ..found } == resolved
     });
     if !same_runs {
-        return Err(refuse("the rows come from another spec, scene or seed; run it again without --reports"));
+        return Err(refuse("the rows come from another spec, scene or seed; run it again without --redraw"));
     }
     let store = Store::open(out, &experiment.name, &found, false)?;
     let text = report(&resolved, out, &Provenance::gather(), &store)?;

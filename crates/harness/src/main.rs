@@ -72,7 +72,7 @@ struct RunArgs {
     check: bool,
     /// Make the tables and figures again from the rows there are, with the best known costs of now; run nothing.
     #[arg(long, conflicts_with_all = ["check", "resume", "shard"])]
-    reports: bool,
+    redraw: bool,
     /// Keep the finished runs of an interrupted experiment and do the rest.
     #[arg(long)]
     resume: bool,
@@ -137,7 +137,7 @@ fn run(args: &RunArgs) -> Result<(), Error> {
         if args.check {
             differences += check(args, experiment)?;
         } else {
-            let summary = if args.reports {
+            let summary = if args.redraw {
                 execute::report_again(experiment, &args.out)?
             } else {
                 execute::execute(experiment, &args.out, extent, &INTERRUPTED)?

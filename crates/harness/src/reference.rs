@@ -3,7 +3,7 @@
 //! `best_known.csv` in the results folder has one row per scene and objective, improved at the end of every experiment
 //! that beats it. Reports that measure gaps read `references.csv` in the experiment's own folder: the rows as they were
 //! then. So later finds change no gap that was written; `--check` begins with the recorded references in place of the best
-//! known ones, and `--reports` brings them, and the gaps, up to date.
+//! known ones, and `--redraw` brings them, and the gaps, up to date.
 //!
 //! Only binary trees with one object per leaf count: wider nodes and leaves would make every cost beatable.
 

@@ -69,6 +69,7 @@ impl Config {
             output.csv.push((along.file(&self.file), along.csv(&points)?));
         }
         output.text = self.text(rows);
+        output.reading = self.reading(rows);
         Ok(output)
     }
 
@@ -82,6 +83,24 @@ impl Config {
             panels,
             looks: self.methods.iter().cloned().zip((0..).map(Look::Slot)).collect(),
         }
+    }
+
+    /// Which method ends lowest where, and how far below the greedy tree.
+    fn reading(&self, rows: &Rows) -> String {
+        let lowest = |(scene, _): (&str, _)| {
+            let base = rows.base_cost(scene);
+            let median = |method: &String| {
+                let costs: Vec<f64> = rows.runs_of(scene, method).map(|run| run.cost).collect();
+                Some((quantile(&costs, 0.5)?, method.clone()))
+            };
+            let (cost, method) = self.methods.iter().filter_map(median).min_by(|a, b| a.0.total_cmp(&b.0))?;
+            Some(format!("{scene}: {method}, {:+.2} %", 100.0 * (cost / base - 1.0)))
+        };
+        let lowest: Vec<String> = rows.scenes().into_iter().filter_map(lowest).collect();
+        format!(
+            "The lowest median cost against the greedy tree's at the end of the runs, {}.",
+            lowest.join("; ")
+        )
     }
 
     fn text(&self, rows: &Rows) -> String {

@@ -36,7 +36,7 @@ struct Step<'a> {
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let mut output = Output::default();
-        let mut text = text_table(["method", "solved at the end"]);
+        let (mut text, mut reached_by) = (text_table(["method", "solved at the end"]), Vec::new());
         for along in Along::ALL {
             let (mut steps, mut layers) = (Vec::new(), Vec::new());
             let ends = |method: &String| {
@@ -50,6 +50,7 @@ impl Config {
                 steps.extend(curve.iter().map(|&(x, solved_fraction)| Step { method, x, solved_fraction }));
                 layers.push(Layer::Steps { name: method.clone(), points: curve });
                 if along == Along::Work {
+                    reached_by.push(format!("{method} {:.0} %", 100.0 * solved.len() as f64 / all as f64));
                     text.add_row([method.clone(), format!("{} of {all}", solved.len())]);
                 }
             }
@@ -59,6 +60,7 @@ impl Config {
             output.csv.push((along.file("ecdf"), along.csv(&steps)?));
         }
         output.text = format!("{}: {}\n{text}\n", self.source, self.title);
+        output.reading = format!("Of all runs and targets, reached at the end: {}.", reached_by.join(", "));
         Ok(output)
     }
 

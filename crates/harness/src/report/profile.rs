@@ -60,8 +60,21 @@ impl Config {
             }
             output.figures.push((along.file("profile"), self.figure(&table, problems, along)));
             output.csv.push((along.file("profile"), along.csv(&table)?));
+            if along == Along::Work {
+                output.reading = self.reading(&table, problems);
+            }
         }
         Ok(output)
+    }
+
+    fn reading(&self, table: &[Row], problems: usize) -> String {
+        let of = |method: &String| {
+            let own = || table.iter().filter(|row| row.method == method).filter_map(|row| row.ratio_to_fastest);
+            let fastest = own().filter(|ratio| *ratio <= 1.0).count();
+            format!("{method} {} ({fastest} as the fastest)", own().count())
+        };
+        let all: Vec<String> = self.methods.iter().map(of).collect();
+        format!("Of {problems} problems, a scene with a target each, solved by work: {}.", all.join(", "))
     }
 
     fn figure(&self, table: &[Row], problems: usize, along: Along) -> Figure {

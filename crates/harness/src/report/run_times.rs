@@ -105,6 +105,9 @@ impl Config {
             if along == Along::Seconds {
                 output.text = self.text(rows, &fits);
             }
+            if along == Along::Work {
+                output.reading = self.reading(&fits);
+            }
         }
         Ok(output)
     }
@@ -116,6 +119,19 @@ impl Config {
                        method without one never got there. Dashed black: time-to-target fits."
             .into();
         Figure { title: format!("{}: {}", self.source, self.title), caption, columns: 2, panels, looks }
+    }
+
+    /// How often each method reached the last target, which is the hardest in most specs.
+    fn reading(&self, fits: &[Fit]) -> String {
+        let Some(last) = self.targets.last().map(Target::name) else { return String::new() };
+        let of = |method: &String| {
+            let own = || fits.iter().filter(|fit| fit.method == method && fit.target == last);
+            let (solved, runs) =
+                own().fold((0, 0), |(solved, runs), fit| (solved + fit.solved, runs + fit.runs));
+            format!("{method} in {solved} of {runs} runs")
+        };
+        let all: Vec<String> = self.methods.iter().map(of).collect();
+        format!("{last} was reached by {}.", all.join(", "))
     }
 
     fn text(&self, rows: &Rows, fits: &[Fit]) -> String {

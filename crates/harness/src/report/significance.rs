@@ -49,6 +49,9 @@ struct Row<'a> {
     verdict: &'static str,
 }
 
+const WILCOXON: &str = "Wilcoxon signed-rank";
+const MANN_WHITNEY: &str = "Mann–Whitney";
+
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let across = self.against.iter().filter_map(|against| self.across(rows, against)).collect();
@@ -61,6 +64,7 @@ impl Config {
         Ok(Output {
             csv: vec![("significance".into(), to_bytes(&table, Path::new("significance.csv"))?)],
             text: self.text(rows, &table),
+            reading: self.reading(&table),
             ..Output::default()
         })
     }
@@ -78,8 +82,7 @@ impl Config {
         let effect = sizes.iter().sum::<f64>() / samples as f64;
         let others = differences.iter().filter(|difference| **difference != 0.0).count() as f64;
         let lower = test.statistic < others * (others + 1.0) / 4.0;
-        let name = "Wilcoxon signed-rank";
-        (samples > 0).then(|| self.row(["all", against, name], [samples, samples], test, effect, lower))
+        (samples > 0).then(|| self.row(["all", against, WILCOXON], [samples, samples], test, effect, lower))
     }
 
     fn within<'a>(&'a self, rows: &'a Rows, scene: &'a str, against: &'a str) -> Option<Row<'a>> {
@@ -88,7 +91,7 @@ impl Config {
         let samples = [own.len(), other.len()];
         // One run says nothing about the others.
         let some = samples.into_iter().all(|samples| samples > 1);
-        some.then(|| self.row([scene, against, "Mann–Whitney"], samples, test, effect, effect > 0.5))
+        some.then(|| self.row([scene, against, MANN_WHITNEY], samples, test, effect, effect > 0.5))
     }
 
     fn row<'a>(
@@ -124,6 +127,30 @@ impl Config {
             }
         }
         table
+    }
+
+    fn reading(&self, table: &[Row]) -> String {
+        let of = |against: &String| {
+            let own = |verdict: Option<&str>| {
+                let within = table.iter().filter(|row| row.against == against && row.test == MANN_WHITNEY);
+                within.filter(|row| verdict.is_none_or(|verdict| row.verdict == verdict)).count()
+            };
+            let across = table.iter().find(|row| row.against == against && row.test == WILCOXON);
+            let across = across.map_or_else(String::new, |row| format!(", across all {}", row.verdict));
+            format!(
+                "{against}: lower on {}, higher on {} of {} scenes{across}",
+                own(Some("lower")),
+                own(Some("higher")),
+                own(None)
+            )
+        };
+        let all: Vec<String> = self.against.iter().map(of).collect();
+        format!(
+            "Costs of {} after Holm's correction at {}, against {}.",
+            self.method,
+            self.level,
+            all.join("; against ")
+        )
     }
 
     fn text(&self, rows: &Rows, table: &[Row]) -> String {

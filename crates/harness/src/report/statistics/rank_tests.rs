@@ -128,6 +128,7 @@ mod tests {
     use super::*;
 
     #[test]
+    #[allow(clippy::approx_constant, reason = "3.14 is a measurement here")]
     fn the_worked_examples_of_hollander_and_wolfe_come_out() {
         // Hollander & Wolfe 1973, depression scale before and after (p. 29) and permeability of membranes (p. 69), as in
         // the manual of R's wilcox.test: one-sided p-values 0.01953 and 0.1272.
