@@ -1,17 +1,16 @@
 //! Carries out the runs of an experiment: in parallel or one by one, with progress, until done or interrupted.
 
-use crate::Error;
 use crate::provenance::Provenance;
-use crate::rays;
 use crate::record::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow};
 use crate::report::{self, Report};
 use crate::scene::Scene;
 use crate::spec::{Experiment, Labelled};
 use crate::store::{FinishedRun, Store};
 use crate::sweep::Shard;
+use crate::{Error, rays, reference, store};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
-use bvh_search::{Event, Observer, Problem, lower_bound, solve};
+use bvh_search::{Budget, Event, Observer, Problem, exact, lower_bound, solve};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -58,8 +57,8 @@ pub fn execute(
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
     let (scenes, left_out) = experiment.load_scenes()?;
-    let resolved = resolve(experiment, &scenes)?;
-    let store = Store::open(out, &experiment.name, &resolved, extent.resume)?;
+    let resolved = resolve(experiment, &scenes);
+    let store = Store::open(out, &experiment.name, &to_toml(&resolved)?, extent.resume)?;
     let bases = scenes
         .par_iter()
         .map(|scene| base_cost(scene, &experiment.objective))
@@ -106,24 +105,54 @@ pub fn execute(
         let text = format!("{finished} runs, part {shard}; `harness merge` joins the parts.\n");
         return Ok(Summary { text, left_out });
     }
-    let text = conclude(&experiment.reports, jobs.len(), &resolved, &provenance, store)?;
+    let text = conclude(&resolved, out, &provenance, store)?;
     Ok(Summary { text, left_out })
 }
 
 /// Joins the kept runs and makes the reports. Returns the text for the terminal.
 pub(crate) fn conclude(
-    reports: &[Report],
-    runs: usize,
-    resolved: &str,
+    resolved: &Resolved,
+    out: &Path,
     provenance: &Provenance,
     store: Store,
 ) -> Result<String, Error> {
-    store.join(runs)?;
-    store.write("resolved.toml", resolved.as_bytes())?;
-    let text = report::write_all(reports, &store)?;
+    store.join(resolved.experiment.runs().count() * resolved.scenes.len())?;
+    let text = report(resolved, out, provenance, &store)?;
     store.write("provenance.toml", to_toml(provenance)?.as_bytes())?;
     store.finish()?;
     Ok(text)
+}
+
+/// Improves the best known costs and makes the reports of joined rows. Returns the text for the terminal.
+fn report(resolved: &Resolved, out: &Path, provenance: &Provenance, store: &Store) -> Result<String, Error> {
+    store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
+    reference::update(resolved, out, &provenance.revision, store)?;
+    report::write_all(&resolved.experiment.reports, store)
+}
+
+/// Makes the reports of finished runs again, with the references of now. Nothing is run: the spec must be the one that
+/// the rows in `out/NAME/` come from, but for its reports.
+pub fn report_again(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
+    let (scenes, left_out) = experiment.load_scenes()?;
+    let resolved = resolve(experiment, &scenes);
+    let folder = out.join(&experiment.name);
+    let refuse = |message: &str| Error::Usage(format!("{}: {message}", folder.display()));
+    if store::is_unfinished(&folder) {
+        return Err(refuse("the experiment was interrupted; finish it with --resume first"));
+    }
+    let path = folder.join("resolved.toml");
+    let found = std::fs::read_to_string(&path).map_err(Error::io(&path, "read the file"))?;
+    let same_runs = toml::from_str(&found).is_ok_and(|found: Resolved| {
+        let experiment = Experiment { reports: experiment.reports.clone(), ..found.experiment };
+        Resolved { experiment, ..found } == resolved
+    });
+    if !same_runs {
+        return Err(refuse("the rows come from another spec, scene or seed; run it again without --redraw"));
+    }
+    let store = Store::open(out, &experiment.name, &found, false)?;
+    let text = report(&resolved, out, &Provenance::gather(), &store)?;
+    store.finish()?;
+    Ok(Summary { text, left_out })
 }
 
 /// The cost of the scene's greedy Müller–Fellner tree, the base of all ratios.
@@ -136,27 +165,33 @@ fn base_cost(scene: &Scene, objective: &Objective) -> Result<f64, Error> {
     Ok(objective.cost(&muller_fellner::Config::default().build(&scene.boxes).map_err(refused)?))
 }
 
-/// A lower bound of the scene's internal area.
-fn bound(scene: &Scene, effort: u32) -> Result<BoundRow, Error> {
-    let refused = |source| Error::Search {
-        scene: scene.name.clone(),
-        method: "the lower bound".into(),
-        source: bvh_search::SearchError::Build(source),
+/// What is proven of the scene's internal area: the exact optimum where gaps are measured from it, else a lower bound if
+/// the experiment asks for one.
+fn bound(experiment: &Experiment, scene: &Scene) -> Result<Option<BoundRow>, Error> {
+    let refused =
+        |source| Error::Search { scene: scene.name.clone(), method: "the lower bound".into(), source };
+    let lower_bound = if experiment.needs_optimum(scene.boxes.len()) {
+        solve(&exact::Config {}, &Problem::new(&scene.boxes), 0, Budget::default(), &()).map_err(refused)?.cost
+    } else if let Some(effort) = experiment.lower_bound {
+        let bound = lower_bound::internal_area(&scene.boxes, effort);
+        bound.map_err(bvh_search::SearchError::Build).map_err(refused)?
+    } else {
+        return Ok(None);
     };
-    let lower_bound = lower_bound::internal_area(&scene.boxes, effort).map_err(refused)?;
-    Ok(BoundRow { scene: scene.name.clone(), objects: scene.boxes.len(), lower_bound })
+    Ok(Some(BoundRow { scene: scene.name.clone(), objects: scene.boxes.len(), lower_bound }))
 }
 
 /// One run; `None` if it was interrupted.
 fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<FinishedRun>, Error> {
-    let Job { scene, base, labelled: Labelled { label, method }, repetition, .. } = *job;
+    let Job { scene, base, labelled, repetition, .. } = *job;
+    let Labelled { label, method, .. } = labelled;
     if watch.cancelled() {
         return Ok(None);
     }
     let seed = experiment.seed_of(&scene.name, label, repetition);
     let problem = Problem { boxes: &scene.boxes, objective: experiment.objective };
     let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
-    let outcome = solve(method, &problem, seed, experiment.budget, &stopwatch);
+    let outcome = solve(method, &problem, seed, experiment.budget_of(labelled), &stopwatch);
     let seconds = stopwatch.start.elapsed().as_secs_f64();
     if watch.cancelled() {
         return Ok(None);
@@ -230,23 +265,21 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<F
         seconds,
     };
     let clock = clock.into_iter().enumerate().map(clock_row).collect();
-    let bounds = match experiment.lower_bound {
-        Some(effort) if job.first_of_scene => vec![bound(scene, effort)?],
-        _ => vec![],
-    };
+    let bounds = if job.first_of_scene { bound(experiment, scene)? } else { None };
+    let bounds = bounds.into_iter().collect();
     let threads = rayon::current_num_threads();
     let timing = TimingRow { scene: scene_name, method, seed, repetition, threads, seconds };
     Ok(Some(FinishedRun { run, history, timing, rays, clock, bounds }))
 }
 
 /// Contents of `resolved.toml`: the spec with every default spelled out, and which scenes it ran on.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Resolved {
     pub experiment: Experiment,
     pub scenes: Vec<LoadedScene>,
 }
 
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LoadedScene {
     pub name: String,
     pub kind: String,
@@ -254,14 +287,14 @@ pub(crate) struct LoadedScene {
     pub checksum: String,
 }
 
-fn resolve(experiment: &Experiment, scenes: &[Scene]) -> Result<String, Error> {
+fn resolve(experiment: &Experiment, scenes: &[Scene]) -> Resolved {
     let loaded = |scene: &Scene| LoadedScene {
         name: scene.name.clone(),
         kind: scene.kind.into(),
         objects: scene.boxes.len(),
         checksum: format!("{:016x}", scene.checksum()),
     };
-    to_toml(&Resolved { experiment: experiment.clone(), scenes: scenes.iter().map(loaded).collect() })
+    Resolved { experiment: experiment.clone(), scenes: scenes.iter().map(loaded).collect() }
 }
 
 fn to_toml(value: &impl Serialize) -> Result<String, Error> {

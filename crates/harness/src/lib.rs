@@ -13,6 +13,7 @@ pub mod part;
 pub mod provenance;
 pub mod rays;
 pub mod record;
+pub mod reference;
 pub mod report;
 pub mod scene;
 pub mod spec;

@@ -6,7 +6,7 @@ use harness::scene::{FETCHED, SPHERES, Scene, fetched_path};
 use harness::spec::{Experiment, Overrides};
 use harness::standin::STAND_INS;
 use harness::sweep::{self, Shard};
-use harness::{Error, check, execute, html};
+use harness::{Error, check, execute, html, reference};
 use std::fmt::Arguments;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -70,6 +70,9 @@ struct RunArgs {
     /// Compare with the committed results instead of writing any; exit code 1 on a difference.
     #[arg(long, conflicts_with = "resume")]
     check: bool,
+    /// Make the tables and figures again from the rows there are, with the best known costs of now; run nothing.
+    #[arg(long, conflicts_with_all = ["check", "resume", "shard"])]
+    redraw: bool,
     /// Keep the finished runs of an interrupted experiment and do the rest.
     #[arg(long)]
     resume: bool,
@@ -134,7 +137,11 @@ fn run(args: &RunArgs) -> Result<(), Error> {
         if args.check {
             differences += check(args, experiment)?;
         } else {
-            let summary = execute::execute(experiment, &args.out, extent, &INTERRUPTED)?;
+            let summary = if args.redraw {
+                execute::report_again(experiment, &args.out)?
+            } else {
+                execute::execute(experiment, &args.out, extent, &INTERRUPTED)?
+            };
             say(format_args!("{}", experiment.question));
             for name in &summary.left_out {
                 say(format_args!("(without {name}: scripts/fetch-scenes brings it)"));
@@ -148,8 +155,9 @@ fn run(args: &RunArgs) -> Result<(), Error> {
 /// Runs into a folder that is removed again. Returns the number of differences.
 fn check(args: &RunArgs, experiment: &Experiment) -> Result<usize, Error> {
     let temporary = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
-    let summary = execute::execute(experiment, temporary.path(), Extent::default(), &INTERRUPTED)?;
     let (fresh, committed) = (temporary.path().join(&experiment.name), args.out.join(&experiment.name));
+    reference::adopt(&committed, temporary.path())?;
+    let summary = execute::execute(experiment, temporary.path(), Extent::default(), &INTERRUPTED)?;
     let found = check::compare(&fresh, &committed, &summary.left_out)?;
     for name in &summary.left_out {
         say(format_args!("{}: scene {name} is not fetched; its rows are not compared", experiment.name));

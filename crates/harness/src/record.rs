@@ -142,6 +142,30 @@ pub struct BoundRow {
     pub lower_bound: f64,
 }
 
+/// One row of `best_known.csv` and `references.csv`: what gaps are measured from, for one scene and objective. Only binary
+/// trees with one object per leaf count.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReferenceRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Number of objects in the scene.
+    pub objects: usize,
+    /// Of the boxes, hexadecimal: scenes of the same name are told apart by it.
+    pub checksum: String,
+    /// Which cost.
+    pub objective: String,
+    /// The least known, or the exact optimum.
+    pub cost: f64,
+    /// Label of the method that found it; `exact` for the optimum.
+    pub method: String,
+    /// Seed of the run that found it.
+    pub seed: u64,
+    /// Git revision of the program that found it.
+    pub revision: String,
+    /// The greatest proven lower bound known, in the unit of `cost`.
+    pub lower_bound: Option<f64>,
+}
+
 /// One row of `paper.csv`: a number of the paper beside ours.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PaperRow {
@@ -169,6 +193,11 @@ pub struct PaperRow {
 pub fn read<R: DeserializeOwned>(path: &Path) -> Result<Vec<R>, Error> {
     let mut reader = csv::Reader::from_path(path).map_err(Error::csv(path))?;
     reader.deserialize().collect::<Result<_, _>>().map_err(Error::csv(path))
+}
+
+/// As [`read`]; no rows if there is no such file.
+pub fn read_if_any<R: DeserializeOwned>(path: &Path) -> Result<Vec<R>, Error> {
+    if path.is_file() { read(path) } else { Ok(vec![]) }
 }
 
 /// The bytes of a CSV file with a header and these rows; the header alone needs at least one row.

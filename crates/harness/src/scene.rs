@@ -104,6 +104,11 @@ impl Scene {
         Ok(Self::new(&name, self.kind, primitives))
     }
 
+    /// The checksum as files show it.
+    pub fn checksum_text(&self) -> String {
+        format!("{:016x}", self.checksum())
+    }
+
     /// 64-bit FNV-1a of the boxes' bits: tells whether results belong to this very scene.
     pub fn checksum(&self) -> u64 {
         let coordinates = self.boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));

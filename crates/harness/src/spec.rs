@@ -4,7 +4,7 @@ use crate::report::Report;
 use crate::scene::{Scene, fnv1a};
 use crate::{Error, part, rays};
 use bvh_core::cost::Objective;
-use bvh_search::{Budget, Method, Problem, solve};
+use bvh_search::{Budget, Method, Problem, exact, solve};
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::path::Path;
@@ -54,7 +54,7 @@ pub struct Experiment {
     pub reports: Vec<Report>,
 }
 
-/// A method with the label that tables and figures show; by default its name.
+/// A method with the label that tables and figures show, by default its name, and limits of its own, if it has any.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "toml::Table", into = "toml::Table")]
 pub struct Labelled {
@@ -62,6 +62,8 @@ pub struct Labelled {
     pub label: String,
     /// What is run.
     pub method: Method,
+    /// Limits of its runs besides the experiment's: the lower of both counts. Default none.
+    pub budget: Option<Budget>,
 }
 
 impl TryFrom<toml::Table> for Labelled {
@@ -73,6 +75,8 @@ impl TryFrom<toml::Table> for Labelled {
             Some(found) => return Err(format!("label is {found}; accepted: a text")),
             None => None,
         };
+        let budget = table.remove("budget").map(Budget::deserialize).transpose();
+        let budget = budget.map_err(|error| format!("budget: {}", error.message()))?;
         let name = match table.get("method") {
             Some(toml::Value::String(name)) if Method::NAMES.contains(&name.as_str()) => name.clone(),
             found => {
@@ -81,7 +85,7 @@ impl TryFrom<toml::Table> for Labelled {
             }
         };
         let method = Method::deserialize(table).map_err(|error| format!("{name}: {}", error.message()))?;
-        Ok(Self { label: label.unwrap_or(name), method })
+        Ok(Self { label: label.unwrap_or(name), method, budget })
     }
 }
 
@@ -89,6 +93,9 @@ impl From<Labelled> for toml::Table {
     fn from(labelled: Labelled) -> Self {
         let mut table = Self::try_from(&labelled.method).unwrap_or_default();
         table.insert("label".into(), labelled.label.into());
+        if let Some(budget) = labelled.budget.and_then(|budget| toml::Value::try_from(budget).ok()) {
+            table.insert("budget".into(), budget);
+        }
         table
     }
 }
@@ -168,7 +175,7 @@ impl Experiment {
             return Err(format!("rays[{index}].count is 0; accepted: 1 or more"));
         }
         let mut labels = HashSet::new();
-        for (index, Labelled { label, method }) in self.methods.iter().enumerate() {
+        for (index, Labelled { label, method, .. }) in self.methods.iter().enumerate() {
             if !labels.insert(label) {
                 return Err(format!(
                     "methods[{index}].label is {label:?} for the second time; accepted: unique labels"
@@ -218,6 +225,21 @@ impl Experiment {
             .flat_map(of)
             .enumerate()
             .map(|(index, (labelled, repetition))| (labelled, repetition, index == 0))
+    }
+
+    /// Whether gaps are measured on scenes of so many objects from their exact optimum.
+    pub fn needs_optimum(&self, objects: usize) -> bool {
+        objects <= exact::MOST_OBJECTS && self.reports.iter().any(Report::needs_references)
+    }
+
+    /// The limits of a method's runs.
+    pub fn budget_of(&self, labelled: &Labelled) -> Budget {
+        let own = labelled.budget.unwrap_or_default();
+        let lower = |a: Option<u64>, b: Option<u64>| a.into_iter().chain(b).min();
+        Budget {
+            max_evaluations: lower(self.budget.max_evaluations, own.max_evaluations),
+            max_work: lower(self.budget.max_work, own.max_work),
+        }
     }
 
     /// The seed of one run, within 32 bits so that every spreadsheet keeps it exactly.
@@ -281,6 +303,7 @@ mod tests {
             ("[{ method = 'grasp', alpa = 1 }]", &["grasp", "alpa", "noise"]),
             ("[{ method = 'grasp', noise = 1.5 }]", &["methods[0]", "noise is 1.5", "0 to 1"]),
             ("[{ method = 'grasp', label = 3 }]", &["label is 3"]),
+            ("[{ method = 'grasp', budget = { max_seconds = 3 } }]", &["max_seconds", "max_work"]),
             ("[{ method = 'grasp' }, { method = 'grasp' }]", &["methods[1].label", "second time"]),
         ] {
             let text = format!("question = 'q'\nscenes = ['escher']\nmethods = {methods}\n");
@@ -299,10 +322,23 @@ mod tests {
 
     #[test]
     fn a_resolved_spec_spells_out_every_default_and_reads_back_as_itself() {
-        let experiment = read(GOOD, &Overrides::default()).unwrap();
+        let good = GOOD.replace("0.1 }", "0.1, budget = { max_work = 9 } }");
+        let experiment = read(&good, &Overrides::default()).unwrap();
         let text = toml::to_string(&experiment).unwrap();
         assert!(text.contains("trials = 100") && text.contains("skip_same_order = true"), "{text}");
         assert_eq!(toml::from_str::<Experiment>(&text).unwrap(), experiment);
+    }
+
+    #[test]
+    fn of_two_limits_the_lower_one_counts() {
+        let good = GOOD.replace("0.1 }", "0.1, budget = { max_work = 9 } }");
+        let budget = |of_all: &str| {
+            let experiment = read(&format!("{good}budget = {of_all}\n"), &Overrides::default()).unwrap();
+            experiment.budget_of(&experiment.methods[0])
+        };
+        let (max_evaluations, max_work) = (Some(3), Some(5));
+        assert_eq!(budget("{ max_work = 5 }"), Budget { max_work, max_evaluations: None });
+        assert_eq!(budget("{ max_evaluations = 3 }"), Budget { max_evaluations, max_work: Some(9) });
     }
 
     #[test]

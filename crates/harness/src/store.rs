@@ -162,6 +162,11 @@ pub fn part_name(index: usize) -> String {
     format!("{index:06}")
 }
 
+/// Whether an interrupted experiment, or a part of one, has left finished runs in its folder.
+pub fn is_unfinished(folder: &Path) -> bool {
+    folder.join(".partial").exists()
+}
+
 /// Replaces the file at `path` by `bytes`: at any moment it is the old file or the whole new one.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let mut unfinished = path.as_os_str().to_owned();

@@ -145,7 +145,7 @@ fn join(name: &str, parts: &[Part], out: &Path) -> Result<String, Error> {
             provenance.parts.push(own);
         }
     }
-    conclude(&resolved.experiment.reports, runs, &first.resolved, &provenance, store)
+    conclude(&resolved, out, &provenance, store)
 }
 
 /// The files of a kept run.

@@ -283,3 +283,60 @@ fn the_page_of_all_results_has_each_experiment_with_table_and_figure_and_needs_n
     assert_eq!(nothing.status.code(), Some(2));
     assert!(text(&nothing.stderr).contains("no finished experiment"), "{}", text(&nothing.stderr));
 }
+
+const GAPS: &str = "
+question = 'What are gaps measured from?'
+scenes = ['escher:300', 'spheres75:12']
+methods = [
+    { label = 'greedy', method = 'muller_fellner' },
+    { label = 'search', method = 'reinsertion', budget = { max_work = 2000 } },
+]
+[[reports]]
+kind = 'numbers'
+title = 'gaps'
+methods = ['greedy', 'search']
+";
+
+/// The column of the first row of the scene and method.
+fn cell(path: &Path, scene: &str, method: &str, column: &str) -> f64 {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let rows = reader.deserialize::<std::collections::BTreeMap<String, String>>().map(Result::unwrap);
+    let of =
+        |row: &std::collections::BTreeMap<String, String>| row["scene"] == scene && row["method"] == method;
+    rows.into_iter().find(of).unwrap()[column].parse().unwrap()
+}
+
+#[test]
+fn gaps_are_to_the_best_known_cost_and_stay_until_they_are_redrawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, work: &str| {
+        fs::write(folder.path().join(name), GAPS.replace("max_work = 2000", work)).unwrap();
+    };
+    let succeeds = |args: &[&str]| {
+        let output = run(folder.path(), args);
+        assert!(output.status.success(), "{args:?}: {}{}", text(&output.stdout), text(&output.stderr));
+    };
+    write("short.toml", "max_work = 2000");
+    write("long.toml", "max_work = 10000000");
+    succeeds(&["short.toml"]);
+    let numbers = folder.path().join("results/short/numbers.csv");
+    let gap = || cell(&numbers, "escher:300", "search", "gap_median");
+    assert_eq!(gap(), 0.0, "its own best is the best known");
+    // Small scenes have an exact optimum, whoever finds it.
+    assert!(cell(&numbers, "spheres75:12", "greedy", "lower_bound_over_reference") >= 1.0 - 1e-12);
+    let best_known = || fs::read(folder.path().join("results/best_known.csv")).unwrap();
+    let before = best_known();
+    succeeds(&["long.toml"]);
+    let after = best_known();
+    assert!(before != after && gap() == 0.0);
+    succeeds(&["short.toml", "--check"]);
+    assert!(best_known() == after, "a check writes nothing");
+    succeeds(&["short.toml", "--redraw"]);
+    assert!(gap() > 0.0);
+    succeeds(&["short.toml", "--check"]);
+    // Rows of another spec cannot be redrawn.
+    write("short.toml", "max_work = 3000");
+    let refused = run(folder.path(), &["short.toml", "--redraw"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("another spec"), "{}", text(&refused.stderr));
+}

@@ -1,12 +1,11 @@
-//! Error against run time, and against work: the gap of the incumbent, over seconds and over nodes visited.
+//! Error against run time: the gap of the incumbent to the exact optimum or the best known cost, along all three axes.
 
+use super::progress::{Along, Series, series};
 use super::statistics::quantile;
-use super::{Output, Rows, display_name, text_table};
+use super::{Output, Rows, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Panel};
-use crate::record::to_bytes;
+use crate::chart::{Axis, Figure, Layer, Look, Panel};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
 /// Error against run time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,32 +15,35 @@ pub struct Config {
     pub source: String,
     /// Heading.
     pub title: String,
+    /// Name of the files; several such reports of one experiment need different ones. Default `anytime`.
+    #[serde(default = "anytime")]
+    pub file: String,
     /// Labels of the methods. One event per run, as a builder has, is shown as a point.
     pub methods: Vec<String>,
-    /// Seconds at which the table for the terminal reads the curves. Default 0.1, 1 and 10.
+    /// Seconds at which the table for the terminal reads the curves. Default 0.1, 1, 10 and 60.
     #[serde(default = "decades")]
     pub at_seconds: Vec<f64>,
 }
 
-fn decades() -> Vec<f64> {
-    vec![0.1, 1.0, 10.0]
+fn anytime() -> String {
+    "anytime".into()
 }
 
-/// One point of a curve, as written to `timing_anytime.csv` and `anytime_work.csv`.
+fn decades() -> Vec<f64> {
+    vec![0.1, 1.0, 10.0, 60.0]
+}
+
+/// One point of a curve, as written to `timing_anytime.csv`, `anytime_evaluations.csv` and `anytime_work.csv`.
 #[derive(Serialize)]
 struct Point<'a> {
     scene: &'a str,
     method: &'a str,
-    /// Seconds, or nodes made or visited, as the file's name says.
     x: f64,
-    /// The gap to the lowest cost of this experiment on this scene, over repetitions.
+    /// The gap to the reference, over repetitions.
     gap_quartile_1: f64,
     gap_median: f64,
     gap_quartile_3: f64,
 }
-
-/// A run's incumbents: when, or after how much work, and how costly.
-type Series = Vec<(f64, f64)>;
 
 /// Points per factor of ten along a curve.
 const PER_DECADE: f64 = 20.0;
@@ -49,72 +51,79 @@ const PER_DECADE: f64 = 20.0;
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let mut output = Output::default();
-        let mut text = text_table(
-            ["scene", "method"]
-                .into_iter()
-                .map(str::to_owned)
-                .chain(self.at_seconds.iter().map(|s| format!("{s} s")))
-                .collect::<Vec<_>>()
-                .iter()
-                .map(String::as_str),
-        );
-        for (name, label, by_seconds) in
-            [("timing_anytime", "time (s)", true), ("anytime_work", "nodes made or visited", false)]
-        {
+        for along in Along::ALL {
             let (mut points, mut panels) = (Vec::new(), Vec::new());
-            for (scene, kind) in rows.scenes() {
-                let lowest = rows.history.iter().filter(|row| row.scene == scene).map(|row| row.incumbent);
-                let reference = lowest.fold(f64::INFINITY, f64::min);
+            for (scene, _) in rows.scenes() {
+                let Some(reference) = rows.reference(scene) else { continue };
                 let mut layers = Vec::new();
                 for method in &self.methods {
-                    let runs = series(rows, scene, method, by_seconds);
+                    let runs = series(rows, scene, method, along);
                     let start = points.len();
-                    points.extend(curve(scene, method, &runs, reference));
+                    points.extend(curve(scene, method, &runs, reference.cost));
                     layers.extend(draw(method, &points[start..]));
-                    if by_seconds {
-                        let base = rows.base_cost(scene);
-                        let cell = |&at: &f64| {
-                            quantile(&incumbents(&runs, at), 0.5).map_or_else(String::new, |cost| {
-                                format!("{:+.2} %", 100.0 * (cost / base - 1.0))
-                            })
-                        };
-                        let name = [display_name(scene, kind), method.clone()];
-                        text.add_row(
-                            name.into_iter().chain(self.at_seconds.iter().map(cell)).collect::<Vec<_>>(),
-                        );
-                    }
                 }
-                let y = Axis::log("gap to the best found");
-                panels.push(Panel { title: display_name(scene, kind), x: Axis::log(label), y, layers });
+                let (x, y) = (Axis::log(along.label()), Axis::log("gap to the best known"));
+                panels.push(Panel { title: rows.shown(scene), x, y, layers });
             }
-            let title = format!("{}: {}", self.source, self.title);
-            let caption = "Cost of the incumbent over the lowest cost of this experiment, minus 1: median and quartiles over \
-                           repetitions. A curve ends where it is the best found."
-                .into();
-            output.figures.push((name.into(), Figure { title, caption, columns: 2, panels, looks: vec![] }));
-            output.csv.push((name.into(), to_bytes(&points, Path::new(name))?));
+            output.figures.push((along.file(&self.file), self.figure(panels)));
+            output.csv.push((along.file(&self.file), along.csv(&points)?));
         }
-        output.text = format!(
-            "{}: {}\nMedian cost against the greedy tree's, after so many seconds:\n{text}\n",
-            self.source, self.title
-        );
+        output.text = self.text(rows);
+        output.reading = self.reading(rows);
         Ok(output)
     }
-}
 
-/// The incumbents of every run of a method on a scene.
-fn series(rows: &Rows, scene: &str, method: &str, by_seconds: bool) -> Vec<Series> {
-    let own: Vec<(u32, (f64, f64))> = rows
-        .history
-        .iter()
-        .enumerate()
-        .filter(|(_, row)| row.scene == scene && row.method == method)
-        .map(|(at, row)| {
-            let seconds = rows.clock.get(at).map_or(f64::NAN, |clock| clock.seconds);
-            (row.repetition, (if by_seconds { seconds } else { row.work as f64 }, row.incumbent))
-        })
-        .collect();
-    own.chunk_by(|a, b| a.0 == b.0).map(|run| run.iter().map(|(_, point)| *point).collect()).collect()
+    fn figure(&self, panels: Vec<Panel>) -> Figure {
+        Figure {
+            title: format!("{}: {}", self.source, self.title),
+            caption: "Cost of the incumbent over the best known cost of the scene, minus 1: median and quartiles over repetitions. \
+                      Points are builders. A curve falls through the floor where it is the best known."
+                .into(),
+            columns: 2,
+            panels,
+            looks: self.methods.iter().cloned().zip((0..).map(Look::Slot)).collect(),
+        }
+    }
+
+    /// Which method ends lowest where, and how far below the greedy tree.
+    fn reading(&self, rows: &Rows) -> String {
+        let lowest = |(scene, _): (&str, _)| {
+            let base = rows.base_cost(scene);
+            let median = |method: &String| {
+                let costs: Vec<f64> = rows.runs_of(scene, method).map(|run| run.cost).collect();
+                Some((quantile(&costs, 0.5)?, method.clone()))
+            };
+            let (cost, method) = self.methods.iter().filter_map(median).min_by(|a, b| a.0.total_cmp(&b.0))?;
+            Some(format!("{scene}: {method}, {:+.2} %", 100.0 * (cost / base - 1.0)))
+        };
+        let lowest: Vec<String> = rows.scenes().into_iter().filter_map(lowest).collect();
+        format!(
+            "The lowest median cost against the greedy tree's at the end of the runs, {}.",
+            lowest.join("; ")
+        )
+    }
+
+    fn text(&self, rows: &Rows) -> String {
+        let seconds = self.at_seconds.iter().map(|seconds| format!("{seconds} s"));
+        let header: Vec<String> = ["scene".into(), "method".into()].into_iter().chain(seconds).collect();
+        let mut table = text_table(header.iter().map(String::as_str));
+        for (scene, _) in rows.scenes() {
+            let base = rows.base_cost(scene);
+            for method in &self.methods {
+                let runs = series(rows, scene, method, Along::Seconds);
+                let cell = |&at: &f64| {
+                    let cost = quantile(&incumbents(&runs, at), 0.5);
+                    cost.map_or_else(String::new, |cost| format!("{:+.2} %", 100.0 * (cost / base - 1.0)))
+                };
+                let name = [rows.shown(scene), method.clone()];
+                table.add_row(name.into_iter().chain(self.at_seconds.iter().map(cell)).collect::<Vec<_>>());
+            }
+        }
+        format!(
+            "{}: {}\nMedian cost against the greedy tree's, after so many seconds:\n{table}\n",
+            self.source, self.title
+        )
+    }
 }
 
 /// What the runs that have an incumbent by then have it cost.

@@ -81,6 +81,7 @@ impl Config {
                     self.methods.iter().map(|method| (method.as_str(), trees(method))).collect();
                 let all: Vec<_> = by_method.iter().flat_map(|(_, trees)| trees.iter().copied()).collect();
                 let sets = std::iter::once(("all", all)).chain(by_method.iter().cloned());
+                let mut rank = String::new();
                 for (method, trees) in sets {
                     for (cost, value) in COSTS {
                         let pairs: Vec<_> =
@@ -89,6 +90,9 @@ impl Config {
                         let show =
                             |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.4}"));
                         if method == "all" {
+                            if let Some(spearman) = spearman.filter(|_| cost == COSTS[0].0) {
+                                rank = format!(", ρ = {spearman:.3}");
+                            }
                             let rays = format!("{family}, {query}");
                             text.add_row([
                                 &rows.shown(scene),
@@ -117,14 +121,14 @@ impl Config {
                     points: trees.iter().map(|(run, row)| (run.goldsmith_salmon, row.boxes_per_ray)).collect(),
                 });
                 panels.push(Panel {
-                    title: format!("{}: {family}, {query}", display_name(scene, kind)),
+                    title: format!("{}: {family}, {query}{rank}", display_name(scene, kind)),
                     x: Axis::linear("Goldsmith–Salmon cost"),
                     y: Axis::linear("box tests per ray"),
                     layers: layers.collect(),
                 });
             }
         }
-        let caption = "One point per tree, the same rays for all.".into();
+        let caption = "One point per tree, the same rays for all. ρ is Spearman's rank correlation.".into();
         let title = format!("{}: {}", self.source, self.title);
         Ok(Output {
             csv: vec![("correlation".into(), to_bytes(&correlations, Path::new("correlation.csv"))?)],

@@ -27,6 +27,9 @@ pub struct Config {
     /// The paper's final cost over that of the average order.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub paper_gain: Option<f64>,
+    /// The generation after which the paper still sees some improvement.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub paper_improves_after: Option<usize>,
     /// Why ours differs, where it does.
     #[serde(default)]
     pub reason: String,
@@ -161,6 +164,20 @@ impl Config {
                     format!("{gain:.3}"),
                     format!("{ours:.3}"),
                     &super::verdict(gain, ours, 0.05),
+                )
+            });
+        }
+        if let Some(after) = self.paper_improves_after
+            && let Some(before) = middle_run(runs).and_then(|run| runs[run].get(after))
+        {
+            let ratio = middle / before.incumbent;
+            output.paper.push(PaperRow {
+                ours_over_base: Some(ratio),
+                ..row(
+                    &format!("final cost over that of generation {after}"),
+                    "some improvement".into(),
+                    format!("{ratio:.4}"),
+                    if ratio < 1.0 { "agrees" } else { "differs" },
                 )
             });
         }

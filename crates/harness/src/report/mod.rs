@@ -5,18 +5,25 @@
 pub mod anytime;
 pub mod correlation;
 pub mod distribution;
+pub mod ecdf;
 pub mod estimator;
 pub mod gaps;
 pub mod generations;
+pub mod numbers;
+pub mod profile;
+pub mod progress;
 pub mod ray_tests;
+pub mod run_times;
+pub mod significance;
 pub mod statistics;
 pub mod table;
+pub mod target;
 pub mod times;
 pub mod trials;
 
-use crate::record::{self, BoundRow, ClockRow, HistoryRow, PaperRow, RayRow, RunRow, TimingRow};
+use crate::record::{self, BoundRow, ClockRow, HistoryRow, PaperRow, RayRow, ReferenceRow, RunRow, TimingRow};
 use crate::store::Store;
-use crate::{Error, chart};
+use crate::{Error, chart, reference};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -44,6 +51,16 @@ pub enum Report {
     Anytime(anytime::Config),
     /// Gaps to the exact optimum of small scenes.
     Gaps(gaps::Config),
+    /// Run-time distributions.
+    RunTimes(run_times::Config),
+    /// The aggregate distribution of run times over scenes and targets.
+    Ecdf(ecdf::Config),
+    /// Performance profiles.
+    Profile(profile::Config),
+    /// Medians, quartiles and primal integrals.
+    Numbers(numbers::Config),
+    /// Whether methods really differ.
+    Significance(significance::Config),
 }
 
 impl Report {
@@ -60,12 +77,23 @@ impl Report {
             Self::Correlation(config) => config.methods.iter().collect(),
             Self::Gaps(config) => config.methods.iter().chain([&config.optimum]).collect(),
             Self::Anytime(config) => config.methods.iter().collect(),
+            Self::RunTimes(config) => config.methods.iter().collect(),
+            Self::Ecdf(config) => config.methods.iter().collect(),
+            Self::Profile(config) => config.methods.iter().collect(),
+            Self::Numbers(config) => config.methods.iter().collect(),
+            Self::Significance(config) => config.against.iter().chain([&config.method]).collect(),
         }
     }
 
     /// Whether the report asks when events happened.
     pub fn needs_clock(&self) -> bool {
-        matches!(self, Self::Anytime(_))
+        self.needs_references()
+    }
+
+    /// Whether the report measures gaps.
+    pub fn needs_references(&self) -> bool {
+        use Report::{Anytime, Ecdf, Numbers, Profile, RunTimes};
+        matches!(self, Anytime(_) | RunTimes(_) | Ecdf(_) | Profile(_) | Numbers(_))
     }
 
     pub(crate) fn write(&self, rows: &Rows) -> Result<Output, Error> {
@@ -80,6 +108,11 @@ impl Report {
             Self::Correlation(config) => config.write(rows),
             Self::Gaps(config) => config.write(rows),
             Self::Anytime(config) => config.write(rows),
+            Self::RunTimes(config) => config.write(rows),
+            Self::Ecdf(config) => config.write(rows),
+            Self::Profile(config) => config.write(rows),
+            Self::Numbers(config) => config.write(rows),
+            Self::Significance(config) => config.write(rows),
         }
     }
 }
@@ -99,19 +132,21 @@ pub struct Rows {
     pub bounds: Vec<BoundRow>,
     /// Of `timing_history.csv`; none if no report needs them, otherwise one for every row of `history`, in its order.
     pub clock: Vec<ClockRow>,
+    /// Of `references.csv`, under the experiment's objective; none if no report needs them.
+    pub references: Vec<ReferenceRow>,
 }
 
 impl Rows {
     /// Reads the CSV files in an experiment's folder.
     pub fn read(folder: &Path) -> Result<Self, Error> {
-        let if_any = |name: &str| Some(folder.join(name)).filter(|path| path.is_file());
         Ok(Self {
             runs: record::read(&folder.join("runs.csv"))?,
             history: record::read(&folder.join("history.csv"))?,
             timing: record::read(&folder.join("timing.csv"))?,
-            rays: if_any("rays.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
-            bounds: if_any("bounds.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
-            clock: if_any("timing_history.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
+            rays: record::read_if_any(&folder.join("rays.csv"))?,
+            bounds: record::read_if_any(&folder.join("bounds.csv"))?,
+            clock: record::read_if_any(&folder.join("timing_history.csv"))?,
+            references: record::read_if_any(&folder.join(reference::REFERENCES))?,
         })
     }
 
@@ -139,6 +174,16 @@ impl Rows {
     /// The cost of the scene's greedy tree.
     pub fn base_cost(&self, scene: &str) -> f64 {
         self.runs.iter().find(|run| run.scene == scene).map_or(f64::NAN, |run| run.base_cost)
+    }
+
+    /// What gaps on the scene are measured from.
+    pub fn reference(&self, scene: &str) -> Option<&ReferenceRow> {
+        self.references.iter().find(|row| row.scene == scene)
+    }
+
+    /// The runs of one method on one scene.
+    pub fn runs_of<'a>(&'a self, scene: &'a str, method: &'a str) -> impl Iterator<Item = &'a RunRow> {
+        self.runs.iter().filter(move |run| run.scene == scene && run.method == method)
     }
 
     /// The costs of one method's trials on one scene over base, one list per repetition, in order.

@@ -1,4 +1,7 @@
-//! The statistics of reports: quantiles, and the expected best of several trials.
+//! The statistics of reports: quantiles, the expected best of several trials, the primal integral, correlations, tests.
+
+pub mod rank_tests;
+pub mod time_to_target;
 
 /// The `q`-quantile of finite values, 0 ≤ q ≤ 1, interpolated linearly between order statistics; `None` of none.
 pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
@@ -46,6 +49,22 @@ pub fn expected_best_of(pool: &[f64], m: usize) -> Option<f64> {
         }
     }
     Some(expected)
+}
+
+/// The primal integral (Berthold 2013) up to `horizon`, divided by it: the mean over that time of the primal gap
+/// |cost − reference| / max(cost, reference), which is 1 before the first incumbent. `incumbents` are times and costs, both
+/// ascending in time. 0 is the reference at once, 1 is nothing at all. `None` unless the horizon is above 0.
+pub fn primal_integral(incumbents: &[(f64, f64)], reference: f64, horizon: f64) -> Option<f64> {
+    let gap = |cost: f64| {
+        let greater = cost.max(reference);
+        if greater > 0.0 { (cost - reference).abs() / greater } else { 0.0 }
+    };
+    let (mut since, mut current, mut integral) = (0.0, 1.0, 0.0);
+    for &(time, cost) in incumbents.iter().take_while(|(time, _)| *time < horizon) {
+        integral += current * (time - since);
+        (since, current) = (time, gap(cost));
+    }
+    (horizon > 0.0).then(|| (integral + current * (horizon - since)) / horizon)
 }
 
 /// Pearson's correlation of pairs; `None` of fewer than two, or if either side is constant.
@@ -102,6 +121,16 @@ mod tests {
             assert!((expected_best_of(&pool, m).unwrap() - mean).abs() < 1e-12, "m = {m}");
         }
         assert_eq!(expected_best_of(&pool, 8), None);
+    }
+
+    #[test]
+    fn the_primal_integral_is_the_area_under_the_gap() {
+        // Gap 1 until 2, then 1/2 until 6, then 0.
+        let incumbents = [(2.0, 20.0), (6.0, 10.0)];
+        assert_eq!(primal_integral(&incumbents, 10.0, 8.0), Some((2.0 + 0.5 * 4.0) / 8.0));
+        assert_eq!(primal_integral(&incumbents, 10.0, 4.0), Some((2.0 + 0.5 * 2.0) / 4.0));
+        assert_eq!(primal_integral(&[], 10.0, 4.0), Some(1.0));
+        assert_eq!(primal_integral(&incumbents, 10.0, 0.0), None);
     }
 
     #[test]

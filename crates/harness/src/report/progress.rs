@@ -1,0 +1,140 @@
+//! How far runs have come along the three axes of run time: wall seconds, evaluations, and work units.
+
+use super::Rows;
+use super::statistics::median;
+use crate::Error;
+use crate::record::to_bytes;
+use serde::Serialize;
+use std::path::Path;
+
+/// What run time is measured by. Seconds belong to a machine and go into timing files only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Along {
+    /// Wall time.
+    Seconds,
+    /// Trees or moves.
+    Evaluations,
+    /// Nodes made or visited.
+    Work,
+}
+
+impl Along {
+    /// Every axis.
+    pub const ALL: [Self; 3] = [Self::Seconds, Self::Evaluations, Self::Work];
+
+    /// Of an axis of a figure.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Seconds => "time (s)",
+            Self::Evaluations => "evaluations (trees or moves)",
+            Self::Work => "work (nodes made or visited)",
+        }
+    }
+
+    /// Of a column of a CSV file.
+    pub fn column(self) -> &'static str {
+        match self {
+            Self::Seconds => "seconds",
+            Self::Evaluations => "evaluations",
+            Self::Work => "work",
+        }
+    }
+
+    /// The name, without extension, of a file of this kind.
+    pub fn file(self, kind: &str) -> String {
+        match self {
+            Self::Seconds => format!("timing_{kind}"),
+            Self::Evaluations | Self::Work => format!("{kind}_{}", self.column()),
+        }
+    }
+
+    /// The bytes of a CSV file of rows whose column `x` is measured along this axis, and is called after it.
+    pub fn csv(self, rows: &[impl Serialize]) -> Result<Vec<u8>, Error> {
+        let bytes = to_bytes(rows, Path::new(self.column()))?;
+        let end = bytes.iter().position(|&byte| byte == b'\n').unwrap_or(bytes.len());
+        let (header, body) = bytes.split_at(end);
+        let header = String::from_utf8_lossy(header);
+        let columns: Vec<&str> =
+            header.split(',').map(|column| if column == "x" { self.column() } else { column }).collect();
+        Ok([columns.join(",").as_bytes(), body].concat())
+    }
+}
+
+/// A run's incumbents: when, or after how much work, and how costly.
+pub type Series = Vec<(f64, f64)>;
+
+/// The incumbents of every run of a method on a scene.
+pub fn series(rows: &Rows, scene: &str, method: &str, along: Along) -> Vec<Series> {
+    let own: Vec<(u32, (f64, f64))> = rows
+        .history
+        .iter()
+        .enumerate()
+        .filter(|(_, row)| row.scene == scene && row.method == method)
+        .map(|(at, row)| {
+            let x = match along {
+                Along::Seconds => rows.clock.get(at).map_or(f64::NAN, |clock| clock.seconds),
+                Along::Evaluations => row.evaluations as f64,
+                Along::Work => row.work as f64,
+            };
+            (row.repetition, (x, row.incumbent))
+        })
+        .collect();
+    own.chunk_by(|a, b| a.0 == b.0).map(|run| run.iter().map(|(_, point)| *point).collect()).collect()
+}
+
+/// Where the longest run of a method on a scene ended; 0 if there is none.
+pub fn longest(rows: &Rows, scene: &str, method: &str, along: Along) -> f64 {
+    let timing = || rows.timing.iter().filter(|row| row.scene == scene && row.method == method);
+    match along {
+        Along::Seconds => timing().map(|row| row.seconds).fold(0.0, f64::max),
+        Along::Evaluations => rows.runs_of(scene, method).map(|run| run.evaluations as f64).fold(0.0, f64::max),
+        Along::Work => rows.runs_of(scene, method).map(|run| run.work as f64).fold(0.0, f64::max),
+    }
+}
+
+/// When a run first had an incumbent of at most this cost; `None` if it never had.
+pub fn reached(run: &Series, cost: f64) -> Option<f64> {
+    run.iter().find(|(_, incumbent)| *incumbent <= cost).map(|(x, _)| *x)
+}
+
+/// When the median run had an incumbent of at most this cost, unsolved runs last; `None` if it never had.
+pub fn median_reached(runs: &[Series], cost: f64) -> Option<f64> {
+    let times: Vec<f64> = runs.iter().map(|run| reached(run, cost).unwrap_or(f64::INFINITY)).collect();
+    // Between a number and infinity there is only infinity, and between two of them nothing.
+    median(&times).filter(|time| time.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_method_reaches_what_its_median_run_does() {
+        let runs = |times: &[f64]| times.iter().map(|&time| vec![(time, 1.0)]).collect::<Vec<_>>();
+        assert_eq!(median_reached(&runs(&[3.0, 1.0, 2.0]), 1.0), Some(2.0));
+        let one_of_two = vec![vec![(1.0, 1.0)], vec![(1.0, 5.0)]];
+        assert_eq!([median_reached(&one_of_two, 1.0), median_reached(&[], 1.0)], [None, None]);
+    }
+
+    #[test]
+    fn a_column_is_called_after_the_axis_and_only_seconds_go_into_timing_files() {
+        #[derive(Serialize)]
+        struct Row {
+            scene: &'static str,
+            x: f64,
+        }
+        let bytes = Along::Work.csv(&[Row { scene: "x", x: 2.0 }]).unwrap();
+        assert_eq!(String::from_utf8(bytes).unwrap(), "scene,work\nx,2.0\n");
+        let files = Along::ALL.map(|along| along.file("a"));
+        assert_eq!(files, ["timing_a", "a_evaluations", "a_work"]);
+    }
+
+    #[test]
+    fn a_target_is_reached_by_the_first_incumbent_at_or_below_it() {
+        let run = vec![(1.0, 9.0), (2.0, 7.0), (5.0, 6.0)];
+        assert_eq!(
+            [9.5, 7.0, 6.5, 1.0].map(|cost| reached(&run, cost)),
+            [Some(1.0), Some(2.0), Some(5.0), None]
+        );
+    }
+}

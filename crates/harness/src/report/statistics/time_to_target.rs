@@ -1,0 +1,98 @@
+//! The shifted exponential distribution of the time that a randomised search takes to reach a target.
+//!
+//! Aiex, Resende & Ribeiro 2007, 'TTT plots: a perl program to create time-to-target plots'; Hoos & Stützle 1998 for runs
+//! that never reach it.
+
+/// P(solved within t) = 1 − exp(−(t − shift) / mean) from `shift` on, both in the unit of the times.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShiftedExponential {
+    /// The time before which no run is done. May come out below 0.
+    pub shift: f64,
+    /// The mean time after that.
+    pub mean: f64,
+}
+
+impl ShiftedExponential {
+    /// Fitted, as in the source, to the quartiles of the times of `runs` runs of which some were `solved`, in any order:
+    /// robust against outliers, and possible as long as three quarters were solved. `None` otherwise, or if the
+    /// quartiles are equal.
+    pub fn fit(solved: &[f64], runs: usize) -> Option<Self> {
+        let mut sorted = solved.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let (lower, upper) = (at(&sorted, runs, 0.25)?, at(&sorted, runs, 0.75)?);
+        let mean = (upper - lower) / (standard_quantile(0.75) - standard_quantile(0.25));
+        (mean > 0.0).then(|| Self { shift: lower - mean * standard_quantile(0.25), mean })
+    }
+
+    /// P(solved within `time`).
+    pub fn probability(&self, time: f64) -> f64 {
+        -libm::expm1(-((time - self.shift) / self.mean).max(0.0))
+    }
+
+    /// The time within which a run is solved with this probability, 0 to 1.
+    pub fn quantile(&self, probability: f64) -> f64 {
+        self.shift + self.mean * standard_quantile(probability)
+    }
+
+    /// The greatest difference between the fit and the distribution of these times (Kolmogorov–Smirnov).
+    pub fn distance(&self, solved: &[f64], runs: usize) -> f64 {
+        let mut sorted = solved.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let steps = sorted.iter().zip(0u32..).flat_map(|(&time, before)| {
+            [before, before + 1].map(|count| (f64::from(count) / runs as f64 - self.probability(time)).abs())
+        });
+        steps.fold(0.0, f64::max)
+    }
+}
+
+/// The quantile of the exponential distribution of mean 1.
+fn standard_quantile(probability: f64) -> f64 {
+    -libm::log1p(-probability)
+}
+
+/// The time of this probability, the i-th of n runs standing at (i − ½) / n, linear in between.
+fn at(sorted: &[f64], runs: usize, probability: f64) -> Option<f64> {
+    let position = (runs as f64 * probability - 0.5).max(0.0);
+    let (below, above) = (sorted.get(position.floor() as usize)?, sorted.get(position.ceil() as usize)?);
+    Some(below + (above - below) * position.fract())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Times that stand exactly where the distribution has its i-th of n.
+    fn times(law: ShiftedExponential, runs: u32) -> Vec<f64> {
+        (0..runs).map(|i| law.quantile((f64::from(i) + 0.5) / f64::from(runs))).collect()
+    }
+
+    #[test]
+    fn a_shifted_exponential_is_found_again() {
+        let law = ShiftedExponential { shift: 3.0, mean: 0.7 };
+        for runs in [26, 102] {
+            let mut times = times(law, runs);
+            times.reverse();
+            let fit = ShiftedExponential::fit(&times, times.len()).unwrap();
+            assert!((fit.shift - 3.0).abs() < 1e-12 && (fit.mean - 0.7).abs() < 1e-12, "{fit:?}");
+            assert!(fit.distance(&times, times.len()) <= 0.5 / f64::from(runs) + 1e-12);
+        }
+    }
+
+    #[test]
+    fn unsolved_runs_count_and_too_many_prevent_the_fit() {
+        let law = ShiftedExponential { shift: 1.0, mean: 2.0 };
+        let times = times(law, 26);
+        let fit = ShiftedExponential::fit(&times[..20], 26).unwrap();
+        assert!((fit.mean - 2.0).abs() < 1e-12, "{fit:?}");
+        assert_eq!(ShiftedExponential::fit(&times[..18], 26), None);
+        assert_eq!(ShiftedExponential::fit(&[1.0; 5], 5), None);
+        assert_eq!(ShiftedExponential::fit(&[], 0), None);
+    }
+
+    #[test]
+    fn probabilities_and_quantiles_are_inverse() {
+        let law = ShiftedExponential { shift: 1.0, mean: 2.0 };
+        assert_eq!((law.probability(0.5), law.quantile(0.0)), (0.0, 1.0));
+        assert!((law.probability(law.quantile(0.9)) - 0.9).abs() < 1e-15);
+    }
+}
