@@ -1,6 +1,7 @@
 //! The command line: reads arguments, calls the library, prints what it returns, sets the exit code.
 
 use clap::{Args, Parser, Subcommand};
+use harness::render::command as render;
 use harness::scene::{FETCHED, SPHERES, Scene, fetched_path};
 use harness::spec::{Experiment, Overrides};
 use harness::standin::STAND_INS;
@@ -25,6 +26,8 @@ struct Cli {
 enum Command {
     /// List the built-in scenes, their sizes, and what each stands in for.
     Scenes,
+    /// Draw a scene: a small Whitted ray tracer, the same picture with any structure.
+    Render(render::Args),
 }
 
 #[derive(Args)]
@@ -70,6 +73,7 @@ fn main() -> ExitCode {
     }
     let result = match cli.command {
         Some(Command::Scenes) => list_scenes(),
+        Some(Command::Render(args)) => draw(&args),
         None => run(&cli.run),
     };
     match result {
@@ -92,12 +96,7 @@ fn complain(line: Arguments) {
 }
 
 fn run(args: &RunArgs) -> Result<(), Error> {
-    if let Some(jobs) = args.jobs {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(jobs.into())
-            .build_global()
-            .map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))?;
-    }
+    use_threads(args.jobs)?;
     let overrides = Overrides { scenes: args.scenes.clone(), seed: args.seed, quick: args.quick };
     // All specs are checked before the first one is run.
     let experiments =
@@ -134,6 +133,18 @@ fn check(args: &RunArgs, experiment: &Experiment) -> Result<usize, Error> {
         say(format_args!("{}: as committed", experiment.name));
     }
     Ok(found.len())
+}
+
+fn use_threads(jobs: Option<u16>) -> Result<(), Error> {
+    let Some(jobs) = jobs else { return Ok(()) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.into());
+    pool.build_global().map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))
+}
+
+fn draw(args: &render::Args) -> Result<(), Error> {
+    use_threads(args.jobs)?;
+    say(format_args!("{}", render::run(args, &INTERRUPTED)?));
+    Ok(())
 }
 
 fn list_scenes() -> Result<(), Error> {

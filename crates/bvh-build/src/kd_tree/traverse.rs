@@ -43,12 +43,7 @@ impl KdTree {
 
     /// Whether `ray` meets any object in its range; see [`bvh_core::any_hit`] and [`nearest_hit`](Self::nearest_hit).
     #[inline]
-    pub fn any_hit(
-        &self,
-        ray: &Ray,
-        mut test: impl FnMut(u32) -> bool,
-        counter: &mut impl Counter,
-    ) -> bool {
+    pub fn any_hit(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool, counter: &mut impl Counter) -> bool {
         let mut found = false;
         self.walk(ray, counter, |objects, _, counter| {
             for &object in objects {
@@ -170,7 +165,10 @@ mod tests {
             ("flat", boxes(300, Vec3::new(0.1, 0.1, 0.0))),
             ("needles", boxes(300, Vec3::new(3.0, 0.0, 1e-3))),
             ("nested", (0..200).map(nested).collect()),
-            ("line", (0..200).map(|i| Aabb { min: Vec3::X * i as f32, max: Vec3::X * (i + 1) as f32 }).collect()),
+            (
+                "line",
+                (0..200).map(|i| Aabb { min: Vec3::X * i as f32, max: Vec3::X * (i + 1) as f32 }).collect(),
+            ),
         ]
     }
 
