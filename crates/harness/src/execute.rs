@@ -197,9 +197,14 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<F
         seconds,
     };
     let clock = clock.into_iter().enumerate().map(clock_row).collect();
+    let first = repetition == 0 && experiment.methods.first().is_some_and(|first| first.label == *label);
+    let (renders, render_times) = match &experiment.render {
+        Some(config) => config.measure(scene, tree, &run, seconds, first)?,
+        None => Default::default(),
+    };
     let threads = rayon::current_num_threads();
     let timing = TimingRow { scene: scene_name, method, seed, repetition, threads, seconds };
-    Ok(Some(FinishedRun { run, history, timing, rays, clock }))
+    Ok(Some(FinishedRun { run, history, timing, rays, clock, renders, render_times }))
 }
 
 /// The spec with every default spelled out, and which scenes it ran on.

@@ -131,6 +131,44 @@ pub struct RayRow {
     pub objects_standard_error: f64,
 }
 
+/// One row of `renders.csv`: the tests that one picture took.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RenderRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Label of the method in the spec, or what is not a tree.
+    pub method: String,
+    /// From 0.
+    pub repetition: u32,
+    /// Number of objects in the scene.
+    pub objects: usize,
+    /// Number of rays: through pixels, to lights, and mirrored.
+    pub rays: u64,
+    /// Mean number of tests against boxes, or of cells of a KD-tree.
+    pub boxes_per_ray: f64,
+    /// Mean number of tests against objects.
+    pub objects_per_ray: f64,
+    /// 64-bit FNV-1a of the pixels: the same for all structures.
+    pub picture: String,
+}
+
+/// One row of `timing_renders.csv`: the seconds of the same row of `renders.csv`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RenderTimeRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Label of the method in the spec, or what is not a tree.
+    pub method: String,
+    /// From 0.
+    pub repetition: u32,
+    /// How often the picture was drawn.
+    pub repeats: usize,
+    /// Wall time of making the structure.
+    pub build_seconds: f64,
+    /// Wall time of drawing on one thread, the least of all repeats.
+    pub render_seconds: f64,
+}
+
 /// One row of `bounds.csv`: a proven lower bound of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BoundRow {

@@ -5,7 +5,7 @@
 //! their rows are joined in the order of the spec, so the bytes do not depend on the order of finishing.
 
 use crate::Error;
-use crate::record::{ClockRow, HistoryRow, RayRow, RunRow, TimingRow, to_bytes};
+use crate::record::{ClockRow, HistoryRow, RayRow, RenderRow, RenderTimeRow, RunRow, TimingRow, to_bytes};
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -23,10 +23,22 @@ pub struct FinishedRun {
     pub rays: Vec<RayRow>,
     /// For `timing_history.csv`, likewise.
     pub clock: Vec<ClockRow>,
+    /// For `renders.csv`, likewise.
+    pub renders: Vec<RenderRow>,
+    /// For `timing_renders.csv`, likewise.
+    pub render_times: Vec<RenderTimeRow>,
 }
 
 /// The files that are joined from those of the runs.
-const JOINED: [&str; 5] = ["runs.csv", "history.csv", "timing.csv", "rays.csv", "timing_history.csv"];
+const JOINED: [&str; 7] = [
+    "runs.csv",
+    "history.csv",
+    "timing.csv",
+    "rays.csv",
+    "timing_history.csv",
+    "renders.csv",
+    "timing_renders.csv",
+];
 
 /// An experiment's folder, locked until dropped.
 #[derive(Debug)]
@@ -98,6 +110,8 @@ impl Store {
             to_bytes(std::slice::from_ref(&run.timing), &part)?,
             to_bytes(&run.rays, &part)?,
             to_bytes(&run.clock, &part)?,
+            to_bytes(&run.renders, &part)?,
+            to_bytes(&run.render_times, &part)?,
         ];
         for (name, bytes) in JOINED.iter().zip(contents) {
             write_synced(&unfinished.join(name), &bytes)?;

@@ -38,7 +38,7 @@ pub fn automatic(scene: &Scene, bounds: &Aabb, aspect: f64) -> View {
     // From further above for meshes, whose floor would otherwise be seen edge on.
     let (side, height) = match scene.primitives {
         Primitives::Triangles(_) => (0.62, 0.58),
-        Primitives::Spheres(_) => (0.34, 0.24),
+        Primitives::Spheres(_) => (0.20, 0.17),
     };
     let front = if up == DVec3::Y { DVec3::Z } else { -DVec3::Y };
     framing(bounds, up.cross(front) * side + up * height + front, up, aspect, View::FOV)

@@ -1,6 +1,6 @@
 //! From light to the bytes of a PNG file.
 
-use crate::Error;
+use crate::{Error, store};
 use glam::DVec3;
 use std::path::Path;
 
@@ -31,7 +31,7 @@ pub fn write_png(path: &Path, width: u32, pixels: &[[u8; 3]]) -> Result<(), Erro
         writer.finish()
     });
     encoded.map_err(|error| Error::io(path, "encode the picture")(std::io::Error::other(error)))?;
-    std::fs::write(path, bytes).map_err(Error::io(path, "write the picture"))
+    store::write_whole(path, &bytes)
 }
 
 #[cfg(test)]

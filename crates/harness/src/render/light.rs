@@ -80,10 +80,10 @@ struct Tally {
     rays: u64,
 }
 
-const HORIZON: DVec3 = DVec3::new(0.80, 0.84, 0.88);
-const ZENITH: DVec3 = DVec3::new(0.20, 0.36, 0.62);
+const HORIZON: DVec3 = DVec3::new(0.58, 0.66, 0.76);
+const ZENITH: DVec3 = DVec3::new(0.11, 0.24, 0.50);
 /// Light from below, reflected by everything around.
-const BELOW: DVec3 = DVec3::new(0.30, 0.27, 0.24);
+const BELOW: DVec3 = DVec3::new(0.22, 0.20, 0.18);
 /// How much of the surrounding light reaches a surface.
 const AMBIENT: f64 = 0.42;
 

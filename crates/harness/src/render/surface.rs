@@ -96,7 +96,7 @@ impl Ground {
         let tile = |x: f64| (x * 3.0).floor() as i64 & 1;
         let flat = [0, 1, 2].map(|axis| if self.up[axis] == 0.0 { tile(aside[axis]) } else { 0 });
         let dark = self.checkered && (flat[0] + flat[1] + flat[2]) & 1 == 1;
-        let colour = if dark { DVec3::new(0.34, 0.36, 0.40) } else { DVec3::new(0.62, 0.63, 0.65) };
+        let colour = if dark { DVec3::new(0.15, 0.17, 0.21) } else { DVec3::new(0.44, 0.45, 0.47) };
         Surface { point, normal: self.up, colour, mirror: if self.checkered { 0.06 } else { 0.0 }, haze }
     }
 }

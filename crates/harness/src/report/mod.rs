@@ -8,13 +8,14 @@ pub mod distribution;
 pub mod estimator;
 pub mod gaps;
 pub mod generations;
+pub mod pictures;
 pub mod ray_tests;
 pub mod statistics;
 pub mod table;
 pub mod times;
 pub mod trials;
 
-use crate::record::{self, BoundRow, ClockRow, HistoryRow, PaperRow, RayRow, RunRow, TimingRow};
+use crate::record::{self, BoundRow, ClockRow, HistoryRow, PaperRow, RayRow, RenderRow, RenderTimeRow, RunRow, TimingRow};
 use crate::store::Store;
 use crate::{Error, chart};
 use serde::{Deserialize, Serialize};
@@ -44,6 +45,8 @@ pub enum Report {
     Anytime(anytime::Config),
     /// Gaps to the exact optimum of small scenes.
     Gaps(gaps::Config),
+    /// One picture by brute force, KD-tree and trees.
+    Pictures(pictures::Config),
 }
 
 impl Report {
@@ -60,6 +63,7 @@ impl Report {
             Self::Correlation(config) => config.methods.iter().collect(),
             Self::Gaps(config) => config.methods.iter().chain([&config.optimum]).collect(),
             Self::Anytime(config) => config.methods.iter().collect(),
+            Self::Pictures(config) => config.methods.iter().collect(),
         }
     }
 
@@ -80,6 +84,7 @@ impl Report {
             Self::Correlation(config) => config.write(rows),
             Self::Gaps(config) => config.write(rows),
             Self::Anytime(config) => config.write(rows),
+            Self::Pictures(config) => config.write(rows),
         }
     }
 }
@@ -99,6 +104,10 @@ pub struct Rows {
     pub bounds: Vec<BoundRow>,
     /// Of `timing_history.csv`; none if no report needs them, otherwise one for every row of `history`, in its order.
     pub clock: Vec<ClockRow>,
+    /// Of `renders.csv`; none if pictures were not asked for.
+    pub renders: Vec<RenderRow>,
+    /// Of `timing_renders.csv`, likewise.
+    pub render_times: Vec<RenderTimeRow>,
 }
 
 impl Rows {
@@ -170,6 +179,8 @@ pub fn write_all(reports: &[Report], store: &Store) -> Result<String, Error> {
         rays: if_any("rays.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
         bounds: if_any("bounds.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
         clock: if_any("timing_history.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
+        renders: if_any("renders.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
+        render_times: if_any("timing_renders.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
     };
     let mut text = String::new();
     let mut paper = Vec::new();
