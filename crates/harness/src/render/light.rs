@@ -4,7 +4,6 @@ use super::camera::{Camera, View};
 use super::surface::{Ground, Surface};
 use super::tracer::Tracer;
 use super::{Options, Tile, image};
-use crate::scene::Scene;
 use bvh_core::{Aabb, Ray, TestCounts};
 use glam::DVec3;
 use std::ops::Range;
@@ -38,8 +37,8 @@ impl Light {
 }
 
 /// Lights for a view: from outside a warm one from the upper left and a weak cool one from the right; from inside a sun
-/// overhead and a lamp near the eye.
-pub fn automatic(_scene: &Scene, view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
+/// overhead, its light from the floor, and a weak lamp near the eye.
+pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     if bounds.check().is_err() {
         return vec![];
     }
@@ -49,9 +48,15 @@ pub fn automatic(_scene: &Scene, view: &View, up: DVec3, bounds: &Aabb) -> Vec<L
     let right = forward.cross(up).normalize_or_zero();
     let light = |position, colour: [f64; 3], reach| Light { position, colour: colour.into(), reach };
     if is_inside(view, bounds) {
-        let sun = center + up * (4.0 * radius) + right * (0.55 * radius) + forward * (1.1 * radius);
-        let lamp = view.from + up * (0.06 * radius) - right * (0.03 * radius);
-        return vec![light(sun, [2.6, 2.3, 1.8], f64::INFINITY), light(lamp, [0.9, 0.62, 0.36], 0.35 * radius)];
+        let sun = center + up * (4.0 * radius) + right * (0.85 * radius) + forward * (0.6 * radius);
+        let lamp = view.from + up * (0.05 * radius) - right * (0.04 * radius);
+        // Where the sun's light falls: what walls and vaults get from there.
+        let floor = view.at - up * (0.15 * radius) + right * (0.05 * radius);
+        return vec![
+            light(sun, [2.0, 1.72, 1.3], f64::INFINITY),
+            light(lamp, [0.50, 0.34, 0.19], 0.3 * radius),
+            light(floor, [0.95, 0.74, 0.48], 0.3 * radius),
+        ];
     }
     let key = center + up * (2.2 * radius) - right * (1.5 * radius) - forward * (1.4 * radius);
     let fill = center + up * (1.2 * radius) + right * (2.2 * radius) - forward * (1.2 * radius);

@@ -100,7 +100,7 @@ pub fn render(
     let camera = Camera::new(&view, up, width, height);
     let lights = match &options.lights {
         Some(positions) => Light::white(positions),
-        None => light::automatic(scene, &view, up, &bounds),
+        None => light::automatic(&view, up, &bounds),
     };
     let world = World::new(tracer, &view, up, &bounds, lights, options);
     let columns = width.div_ceil(TILE);

@@ -49,7 +49,7 @@ impl Surface {
                 let center = spheres[id].center.as_dvec3();
                 let normal = (met - center).normalize_or(-direction);
                 let point = center + normal * f64::from(spheres[id].radius);
-                (point, normal, COLOURS[id % COLOURS.len()], 0.12)
+                (point, normal, COLOURS[id % COLOURS.len()], 0.05)
             }
         };
         let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
@@ -96,7 +96,7 @@ impl Ground {
         let tile = |x: f64| (x * 3.0).floor() as i64 & 1;
         let flat = [0, 1, 2].map(|axis| if self.up[axis] == 0.0 { tile(aside[axis]) } else { 0 });
         let dark = self.checkered && (flat[0] + flat[1] + flat[2]) & 1 == 1;
-        let colour = if dark { DVec3::new(0.15, 0.17, 0.21) } else { DVec3::new(0.44, 0.45, 0.47) };
-        Surface { point, normal: self.up, colour, mirror: if self.checkered { 0.06 } else { 0.0 }, haze }
+        let colour = if dark { DVec3::new(0.045, 0.05, 0.065) } else { DVec3::new(0.24, 0.25, 0.27) };
+        Surface { point, normal: self.up, colour, mirror: if self.checkered { 0.1 } else { 0.0 }, haze }
     }
 }

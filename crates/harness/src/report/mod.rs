@@ -15,7 +15,9 @@ pub mod table;
 pub mod times;
 pub mod trials;
 
-use crate::record::{self, BoundRow, ClockRow, HistoryRow, PaperRow, RayRow, RenderRow, RenderTimeRow, RunRow, TimingRow};
+use crate::record::{
+    self, BoundRow, ClockRow, HistoryRow, PaperRow, RayRow, RenderRow, RenderTimeRow, RunRow, TimingRow,
+};
 use crate::store::Store;
 use crate::{Error, chart};
 use serde::{Deserialize, Serialize};

@@ -140,7 +140,7 @@ impl Config {
             caption: "Mean number of tests over all rays of one picture: through pixels, to lights, and mirrored. The \
                       picture is the same, bit by bit, whatever it is made with."
                 .into(),
-            columns: 1,
+            columns: 3,
             panels: rows.scenes().into_iter().map(panel).collect(),
             looks: vec![],
         }
@@ -149,7 +149,8 @@ impl Config {
     fn time_figure(&self, rows: &Rows, times: &[TimeRow]) -> Figure {
         let panel = |(scene, _): (&str, &str)| {
             let own: Vec<&TimeRow> = times.iter().filter(|row| row.scene == scene).collect();
-            let theirs = own.iter().enumerate().filter_map(|(at, row)| Some((at as f64, row.document_speed_up?)));
+            let theirs =
+                own.iter().enumerate().filter_map(|(at, row)| Some((at as f64, row.document_speed_up?)));
             let layers = vec![
                 Layer::Bars {
                     name: "ours".into(),
@@ -165,7 +166,7 @@ impl Config {
         Figure {
             title: format!("{}: {}, time", self.source, self.title),
             caption: "Seconds of brute force over seconds, one thread, each the least of several.".into(),
-            columns: 1,
+            columns: 3,
             panels: rows.scenes().into_iter().map(panel).collect(),
             looks: vec![(DOCUMENT.into(), Look::Reference)],
         }
