@@ -18,6 +18,12 @@ pub struct View {
 impl View {
     /// Degrees, unless something else is asked for: a moderate wide angle.
     pub const FOV: f64 = 40.0;
+
+    /// Whether the eye is in this box.
+    pub fn is_inside(&self, bounds: &Aabb) -> bool {
+        let eye = self.from.as_vec3();
+        bounds.contains(&Aabb { min: eye, max: eye })
+    }
 }
 
 /// Views of scenes that are to be seen from inside: name, eye, middle of the picture, angle.
@@ -32,7 +38,11 @@ pub fn up(scene: &Scene) -> DVec3 {
 /// distance at which the whole box just fits.
 pub fn automatic(scene: &Scene, bounds: &Aabb, aspect: f64) -> View {
     if let Some((_, from, at, fov)) = INSIDE.iter().find(|view| view.0 == scene.name) {
-        return View { from: (*from).into(), at: (*at).into(), fov: *fov };
+        let view = View { from: (*from).into(), at: (*at).into(), fov: *fov };
+        // Another scene may have the same name.
+        if view.is_inside(bounds) {
+            return view;
+        }
     }
     let up = up(scene);
     // From further above for meshes, whose floor would otherwise be seen edge on.

@@ -29,9 +29,9 @@ fn one() -> u32 {
 pub const BASELINES: [(&str, &str); 2] = [("brute force", "brute"), ("KD-tree", "kdtree")];
 
 /// Seconds after which a picture is not drawn once more.
-const REPEAT_WITHIN: f64 = 1.0;
+const REPEAT_WITHIN: f64 = 2.0;
 /// How often a picture is drawn at most.
-const MOST_REPEATS: usize = 9;
+const MOST_REPEATS: usize = 25;
 
 impl Config {
     /// Checks the ranges of the parameters.

@@ -47,7 +47,7 @@ pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     let forward = (view.at - view.from).normalize_or(DVec3::NEG_Z);
     let right = forward.cross(up).normalize_or_zero();
     let light = |position, colour: [f64; 3], reach| Light { position, colour: colour.into(), reach };
-    if is_inside(view, bounds) {
+    if view.is_inside(bounds) {
         let sun = center + up * (4.0 * radius) + right * (0.85 * radius) + forward * (0.6 * radius);
         let lamp = view.from + up * (0.05 * radius) - right * (0.04 * radius);
         // Where the sun's light falls: what walls and vaults get from there.
@@ -61,12 +61,6 @@ pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     let key = center + up * (2.2 * radius) - right * (1.5 * radius) - forward * (1.4 * radius);
     let fill = center + up * (1.2 * radius) + right * (2.2 * radius) - forward * (1.2 * radius);
     vec![light(key, [1.25, 1.16, 1.02], f64::INFINITY), light(fill, [0.20, 0.24, 0.32], f64::INFINITY)]
-}
-
-/// Whether the eye is inside the scene's box: then there is no ground but the scene's own.
-fn is_inside(view: &View, bounds: &Aabb) -> bool {
-    let eye = view.from.as_vec3();
-    bounds.contains(&Aabb { min: eye, max: eye })
 }
 
 /// All that a ray can meet.
@@ -101,7 +95,8 @@ impl<'a> World<'a> {
         lights: Vec<Light>,
         options: &Options,
     ) -> Self {
-        let ground = (options.ground && !is_inside(view, bounds)).then(|| Ground::below(tracer, bounds, up));
+        // From inside, a scene is its own ground.
+        let ground = (options.ground && !view.is_inside(bounds)).then(|| Ground::below(tracer, bounds, up));
         Self { tracer, up, lights, ground: ground.flatten(), depth: options.depth }
     }
 
@@ -197,7 +192,8 @@ impl<'a> World<'a> {
             let distance = to_light.length();
             let towards = to_light / distance;
             let cosine = surface.normal.dot(towards);
-            if cosine <= 0.0 || self.is_shadowed(start, towards, distance, tally) {
+            // NaN where the light is in the surface.
+            if cosine.is_nan() || cosine <= 0.0 || self.is_shadowed(start, towards, distance, tally) {
                 continue;
             }
             let arriving = light.at(distance);

@@ -70,12 +70,15 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// Under the bounds of the tracer's objects; `None` under none.
+    /// Under the bounds of the tracer's objects; `None` under nothing or a single point.
     pub fn below(tracer: &Tracer, bounds: &Aabb, up: DVec3) -> Option<Self> {
         bounds.check().ok()?;
         let checkered = matches!(tracer.objects, Primitives::Spheres(_));
         let gap = if checkered { 0.05 } else { 1e-3 };
         let radius = bounds.extent().length() / 2.0;
+        if radius == 0.0 {
+            return None;
+        }
         let height = bounds.min.as_dvec3().dot(up) - gap * radius;
         Some(Self { up, height, center: bounds.doubled_centroid() / 2.0, radius, checkered })
     }
