@@ -138,7 +138,7 @@ impl Config {
         let mut sides = vec![Side::Both; n];
         let placeholder = Cell::Leaf { first: 0, count: 0 };
         tree.cells.push(placeholder);
-        let budget = n.saturating_mul(Self::MAX_REFERENCES);
+        let budget = n.saturating_mul(Self::MAX_REFERENCES).min(u32::MAX as usize);
         let events = [0, 1, 2].map(|axis| events(boxes, axis));
         let mut stack = vec![Frame { cell: 0, bounds, events, count: n, depth: 0, budget }];
         while let Some(frame) = stack.pop() {
@@ -168,9 +168,13 @@ impl Config {
             let depth = frame.depth + 1;
             let all = split.below + split.above;
             let share = |count: usize| (frame.budget as u128 * count as u128 / all as u128) as usize;
-            let child = |cell, bounds, side, count| {
-                let (events, budget) = (part(side), share(count).max(count));
-                Frame { cell, bounds, events, count, depth, budget }
+            let child = |cell, bounds, side, count| Frame {
+                cell,
+                bounds,
+                events: part(side),
+                count,
+                depth,
+                budget: share(count),
             };
             stack.push(child(below + 1, upper, Side::Above, split.above));
             stack.push(child(below, lower, Side::Below, split.below));

@@ -1,7 +1,10 @@
 //! `harness render`: arguments in, a PNG file and a line of numbers out.
 
+use super::camera::{self, View};
+use super::draw::{Options, render, tiles};
+use super::film::Film;
 use super::tracer::{Structure, Tracer};
-use super::{Film, Options, View, camera, heat, image, render, tiles};
+use super::{heat, image};
 use crate::Error;
 use crate::scene::Scene;
 use bvh_core::Aabb;

@@ -1,6 +1,8 @@
 //! Pictures as measurements: the tests and the seconds that a run's tree takes, beside brute force and a KD-tree.
 
-use super::{Film, Options, Structure, Tracer, render};
+use super::draw::{Options, render};
+use super::film::Film;
+use super::tracer::{Structure, Tracer};
 use crate::record::{RenderRow, RenderTimeRow};
 use crate::scene::{Scene, fnv1a};
 use crate::{Error, record::RunRow};

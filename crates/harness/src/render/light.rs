@@ -1,9 +1,10 @@
 //! How bright a pixel is: rays through it, to the lights, and mirrored.
 
 use super::camera::{Camera, View};
+use super::film::Tile;
+use super::image;
 use super::surface::{Ground, Surface};
 use super::tracer::Tracer;
-use super::{Options, Tile, image};
 use bvh_core::{Aabb, Ray, TestCounts};
 use glam::DVec3;
 use std::ops::Range;
@@ -93,11 +94,12 @@ impl<'a> World<'a> {
         up: DVec3,
         bounds: &Aabb,
         lights: Vec<Light>,
-        options: &Options,
+        ground: bool,
+        depth: u32,
     ) -> Self {
         // From inside, a scene is its own ground.
-        let ground = (options.ground && !view.is_inside(bounds)).then(|| Ground::below(tracer, bounds, up));
-        Self { tracer, up, lights, ground: ground.flatten(), depth: options.depth }
+        let ground = (ground && !view.is_inside(bounds)).then(|| Ground::below(tracer, bounds, up));
+        Self { tracer, up, lights, ground: ground.flatten(), depth }
     }
 
     /// A tile of the picture, `samples`² rays per pixel.
