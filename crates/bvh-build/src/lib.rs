@@ -8,6 +8,7 @@ pub mod division;
 mod error;
 pub mod evaluation;
 pub mod goldsmith_salmon;
+pub mod kd_tree;
 pub mod median_cut;
 pub mod muller_fellner;
 mod presort;

@@ -61,6 +61,16 @@ impl Slabs {
         (entry, smaller(smaller(far.x, far.y), far.z) * Self::FAR)
     }
 
+    /// The distances between which the ray may cross the plane across `axis` at `position`, a plane that meets the
+    /// bounds: up to the second it may be in front of the plane, from the first on behind it. The interval of any box
+    /// in front of the plane ends, and that of any box behind it begins, on that side, bit by bit.
+    #[inline(always)]
+    pub fn crossing(&self, axis: usize, position: f32) -> (f32, f32) {
+        let a = (position - self.lower[axis]) * self.inverse[axis];
+        let b = (position - self.upper[axis]) * self.inverse[axis];
+        (smaller(a, b), larger(a, b) * Self::FAR)
+    }
+
     /// Where the ray enters the box; infinite when it misses it, which is behind every `t_max`.
     #[inline(always)]
     pub fn entry(&self, aabb: &Aabb) -> f32 {

@@ -45,6 +45,9 @@ pub enum Error {
     /// Ctrl-C.
     #[error("interrupted; {finished} of {runs} runs are kept, `--resume` does the rest")]
     Interrupted { finished: usize, runs: usize },
+    /// Ctrl-C during a picture.
+    #[error("interrupted; no picture was written")]
+    Abandoned,
 }
 
 impl Error {
@@ -52,7 +55,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Spec { .. } | Self::Scene { .. } | Self::Usage(_) => 2,
-            Self::Interrupted { .. } => 130,
+            Self::Interrupted { .. } | Self::Abandoned => 130,
             _ => 1,
         }
     }

@@ -238,7 +238,7 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<F
         cost: event.cost,
         incumbent: event.incumbent,
     };
-    let history = outcome.history.iter().map(row).collect();
+    let history: Vec<HistoryRow> = outcome.history.iter().map(row).collect();
     let ray_row = |config: &rays::Config| {
         let (family, query) = (format!("{:?}", config.family), format!("{:?}", config.query));
         // The same rays for all methods: their differences are then the trees'.
@@ -255,7 +255,7 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<F
         };
         rays::measure(config, scene, tree, ray_seed, named)
     };
-    let rays = experiment.rays.iter().map(ray_row).collect();
+    let rays: Vec<RayRow> = experiment.rays.iter().map(ray_row).collect();
     let clock = if experiment.reports.iter().any(Report::needs_clock) { stopwatch.seconds() } else { vec![] };
     let clock_row = |(event, seconds)| ClockRow {
         scene: scene_name.clone(),
@@ -264,12 +264,24 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<F
         event,
         seconds,
     };
-    let clock = clock.into_iter().enumerate().map(clock_row).collect();
+    let clock: Vec<ClockRow> = clock.into_iter().enumerate().map(clock_row).collect();
     let bounds = if job.first_of_scene { bound(experiment, scene)? } else { None };
-    let bounds = bounds.into_iter().collect();
+    let (renders, render_times) = match &experiment.render {
+        Some(config) => config.measure(scene, tree, &run, seconds, job.first_of_scene)?,
+        None => Default::default(),
+    };
     let threads = rayon::current_num_threads();
     let timing = TimingRow { scene: scene_name, method, seed, repetition, threads, seconds };
-    Ok(Some(FinishedRun { run, history, timing, rays, clock, bounds }))
+    let mut finished = FinishedRun::default();
+    finished.add(&[run])?;
+    finished.add(&history)?;
+    finished.add(&[timing])?;
+    finished.add(&rays)?;
+    finished.add(&clock)?;
+    finished.add(bounds.as_slice())?;
+    finished.add(&renders)?;
+    finished.add(&render_times)?;
+    Ok(Some(finished))
 }
 
 /// Contents of `resolved.toml`: the spec with every default spelled out, and which scenes it ran on.

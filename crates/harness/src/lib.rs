@@ -1,7 +1,7 @@
 //! Experiments on bounding volume hierarchies: TOML specs in, CSV files and figures out.
 //!
 //! Data flows one way: [`spec`] → [`scene`] → [`execute`] → [`store`] (rows of [`record`]) → [`report`], which reads
-//! the CSV files only. Everything that touches files, clocks, threads or the terminal lives in this crate.
+//! the CSV files only. Pictures are [`render`]'s. Everything that touches files, clocks, threads or the terminal lives in this crate.
 
 pub mod chart;
 pub mod check;
@@ -14,6 +14,7 @@ pub mod provenance;
 pub mod rays;
 pub mod record;
 pub mod reference;
+pub mod render;
 pub mod report;
 pub mod scene;
 pub mod spec;

@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand};
 use harness::execute::Extent;
+use harness::render::command as render;
 use harness::scene::{FETCHED, SPHERES, Scene, fetched_path};
 use harness::spec::{Experiment, Overrides};
 use harness::standin::STAND_INS;
@@ -45,6 +46,8 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
+    /// Draw a scene: a small Whitted ray tracer, the same picture with any structure.
+    Render(render::Args),
 }
 
 #[derive(Args)]
@@ -99,6 +102,7 @@ fn main() -> ExitCode {
         Some(Command::Scenes) => list_scenes(),
         Some(Command::Report { results, out }) => write_page(&results, &out),
         Some(Command::Merge { folders, out }) => merge(&folders, &out),
+        Some(Command::Render(args)) => draw(&args),
         None => run(&cli.run),
     };
     match result {
@@ -121,12 +125,7 @@ fn complain(line: Arguments) {
 }
 
 fn run(args: &RunArgs) -> Result<(), Error> {
-    if let Some(jobs) = args.jobs {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(jobs.into())
-            .build_global()
-            .map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))?;
-    }
+    use_threads(args.jobs)?;
     let overrides = Overrides { scenes: args.scenes.clone(), seed: args.seed, quick: args.quick };
     // All specs are checked before the first one is run.
     let experiments =
@@ -181,6 +180,18 @@ fn merge(folders: &[PathBuf], out: &Path) -> Result<(), Error> {
     for (name, text) in sweep::merge(folders, out)? {
         say(format_args!("{text}Results: {}", out.join(name).display()));
     }
+    Ok(())
+}
+
+fn use_threads(jobs: Option<u16>) -> Result<(), Error> {
+    let Some(jobs) = jobs else { return Ok(()) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.into());
+    pool.build_global().map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))
+}
+
+fn draw(args: &render::Args) -> Result<(), Error> {
+    use_threads(args.jobs)?;
+    say(format_args!("{}", render::run(args, &INTERRUPTED)?));
     Ok(())
 }
 

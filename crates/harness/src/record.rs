@@ -131,6 +131,44 @@ pub struct RayRow {
     pub objects_standard_error: f64,
 }
 
+/// One row of `renders.csv`: the tests that one picture took.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RenderRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Label of the method in the spec, or what is not a tree.
+    pub method: String,
+    /// From 0.
+    pub repetition: u32,
+    /// Number of objects in the scene.
+    pub objects: usize,
+    /// Number of rays: through pixels, to lights, and mirrored.
+    pub rays: u64,
+    /// Mean number of tests against boxes, or of cells of a KD-tree.
+    pub boxes_per_ray: f64,
+    /// Mean number of tests against objects.
+    pub objects_per_ray: f64,
+    /// 64-bit FNV-1a of the pixels: the same for all structures.
+    pub picture: String,
+}
+
+/// One row of `timing_renders.csv`: the seconds of the same row of `renders.csv`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RenderTimeRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Label of the method in the spec, or what is not a tree.
+    pub method: String,
+    /// From 0.
+    pub repetition: u32,
+    /// How often the picture was drawn.
+    pub repeats: usize,
+    /// Wall time of making the structure.
+    pub build_seconds: f64,
+    /// Wall time of drawing on one thread, the least of all repeats.
+    pub render_seconds: f64,
+}
+
 /// One row of `bounds.csv`: a proven lower bound of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BoundRow {
@@ -189,15 +227,42 @@ pub struct PaperRow {
     pub reason: String,
 }
 
+/// A kind of rows in a file of its own.
+pub trait Row: Serialize + DeserializeOwned {
+    /// The CSV file that holds them; its name begins with `timing` if they hold seconds.
+    const FILE: &'static str;
+}
+
+macro_rules! rows {
+    ($($kind:ident => $file:literal,)*) => {
+        $(impl Row for $kind {
+            const FILE: &'static str = $file;
+        })*
+    };
+}
+
+rows! {
+    RunRow => "runs.csv",
+    HistoryRow => "history.csv",
+    TimingRow => "timing.csv",
+    ClockRow => "timing_history.csv",
+    RayRow => "rays.csv",
+    BoundRow => "bounds.csv",
+    RenderRow => "renders.csv",
+    ReferenceRow => "references.csv",
+    RenderTimeRow => "timing_renders.csv",
+}
+
+/// Reads all rows of a kind from an experiment's folder; none if no run left any.
+pub fn read_if_any<R: Row>(folder: &Path) -> Result<Vec<R>, Error> {
+    let path = folder.join(R::FILE);
+    if path.is_file() { read(&path) } else { Ok(vec![]) }
+}
+
 /// Reads all rows of a CSV file.
 pub fn read<R: DeserializeOwned>(path: &Path) -> Result<Vec<R>, Error> {
     let mut reader = csv::Reader::from_path(path).map_err(Error::csv(path))?;
     reader.deserialize().collect::<Result<_, _>>().map_err(Error::csv(path))
-}
-
-/// As [`read`]; no rows if there is no such file.
-pub fn read_if_any<R: DeserializeOwned>(path: &Path) -> Result<Vec<R>, Error> {
-    if path.is_file() { read(path) } else { Ok(vec![]) }
 }
 
 /// The bytes of a CSV file with a header and these rows; the header alone needs at least one row.

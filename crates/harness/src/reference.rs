@@ -9,7 +9,7 @@
 
 use crate::Error;
 use crate::execute::{LoadedScene, Resolved};
-use crate::record::{BoundRow, ReferenceRow, RunRow, read, read_if_any, to_bytes};
+use crate::record::{BoundRow, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
 use crate::report::Report;
 use crate::store::{Store, write_whole};
 use bvh_core::cost::Objective;
@@ -20,7 +20,7 @@ use std::path::Path;
 /// The file in the results folder.
 pub const BEST_KNOWN: &str = "best_known.csv";
 /// The file in the folder of an experiment.
-pub const REFERENCES: &str = "references.csv";
+pub const REFERENCES: &str = ReferenceRow::FILE;
 
 /// Costs less apart than this, relatively, are equal: the rest is rounding.
 const ROUNDING: f64 = 1e-12;
@@ -34,12 +34,12 @@ pub fn is_optimum(reference: &ReferenceRow) -> bool {
 /// them. One harness at a time does so; at any moment the file is the old one or the whole new one.
 pub(crate) fn update(resolved: &Resolved, out: &Path, revision: &str, store: &Store) -> Result<(), Error> {
     let runs: Vec<RunRow> = read(&store.folder().join("runs.csv"))?;
-    let bounds: Vec<BoundRow> = read_if_any(&store.folder().join("bounds.csv"))?;
+    let bounds: Vec<BoundRow> = read_if_any(store.folder())?;
     let lock_path = out.join(".lock");
     let lock = File::create(&lock_path).map_err(Error::io(&lock_path, "create the file"))?;
     lock.lock().map_err(Error::io(&lock_path, "lock the file"))?;
     let path = out.join(BEST_KNOWN);
-    let before: Vec<ReferenceRow> = read_if_any(&path)?;
+    let before: Vec<ReferenceRow> = if path.is_file() { read(&path)? } else { vec![] };
     let mut known = before.clone();
     let experiment = &resolved.experiment;
     let mut references = Vec::new();

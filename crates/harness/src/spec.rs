@@ -2,7 +2,7 @@
 
 use crate::report::Report;
 use crate::scene::{Scene, fnv1a};
-use crate::{Error, part, rays};
+use crate::{Error, part, rays, render};
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, Method, Problem, exact, solve};
 use serde::{Deserialize, Serialize};
@@ -49,6 +49,9 @@ pub struct Experiment {
     /// Measurements of every run's tree with random rays. Default none.
     #[serde(default)]
     pub rays: Vec<rays::Config>,
+    /// A picture drawn with every run's tree, and with brute force and a KD-tree. Default none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub render: Option<render::experiment::Config>,
     /// Tables and figures made from the rows. Default none.
     #[serde(default)]
     pub reports: Vec<Report>,
@@ -174,6 +177,7 @@ impl Experiment {
         if let Some(index) = self.rays.iter().position(|rays| rays.count == 0) {
             return Err(format!("rays[{index}].count is 0; accepted: 1 or more"));
         }
+        self.render.map_or(Ok(()), |render| render.check())?;
         let mut labels = HashSet::new();
         for (index, Labelled { label, method, .. }) in self.methods.iter().enumerate() {
             if !labels.insert(label) {

@@ -5,31 +5,45 @@
 //! their rows are joined in the order of the spec, so the bytes do not depend on the order of finishing.
 
 use crate::Error;
-use crate::record::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, to_bytes};
+use crate::record::{Row, to_bytes};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// The rows of one finished run.
-#[derive(Clone, Debug)]
+/// The rows of one finished run: for every kind that it has, the CSV file of its own.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FinishedRun {
-    /// For `runs.csv`.
-    pub run: RunRow,
-    /// For `history.csv`.
-    pub history: Vec<HistoryRow>,
-    /// For `timing.csv`.
-    pub timing: TimingRow,
-    /// For `rays.csv`, which is written if there are any.
-    pub rays: Vec<RayRow>,
-    /// For `timing_history.csv`, likewise.
-    pub clock: Vec<ClockRow>,
-    /// For `bounds.csv`, likewise.
-    pub bounds: Vec<BoundRow>,
+    files: BTreeMap<String, Vec<u8>>,
 }
 
-/// The files that are joined from those of the runs.
-pub const JOINED: [&str; 6] =
-    ["runs.csv", "history.csv", "timing.csv", "rays.csv", "timing_history.csv", "bounds.csv"];
+impl FinishedRun {
+    /// Adds rows of one kind, once per kind; none leave no file.
+    pub fn add<R: Row>(&mut self, rows: &[R]) -> Result<(), Error> {
+        if !rows.is_empty() {
+            self.files.insert(R::FILE.into(), to_bytes(rows, Path::new(R::FILE))?);
+        }
+        Ok(())
+    }
+
+    /// Reads a kept run back.
+    pub fn read(part: &Path) -> Result<Self, Error> {
+        let mut files = BTreeMap::new();
+        for name in file_names(part)? {
+            let path = part.join(&name);
+            files.insert(name, fs::read(&path).map_err(Error::io(&path, "read the file"))?);
+        }
+        Ok(Self { files })
+    }
+
+    /// The first file, other than those with seconds, in which two runs differ.
+    pub fn difference<'a>(&'a self, other: &'a Self) -> Option<&'a str> {
+        let names = self.files.keys().chain(other.files.keys()).map(String::as_str);
+        names
+            .filter(|name| !name.starts_with("timing"))
+            .find(|&name| self.files.get(name) != other.files.get(name))
+    }
+}
 
 /// An experiment's folder, locked until dropped.
 #[derive(Debug)]
@@ -85,47 +99,34 @@ impl Store {
     /// Keeps run `index`.
     pub fn keep(&self, index: usize, run: &FinishedRun) -> Result<(), Error> {
         let part = self.part(index);
-        self.keep_bytes(
-            index,
-            [
-                to_bytes(std::slice::from_ref(&run.run), &part)?,
-                to_bytes(&run.history, &part)?,
-                to_bytes(std::slice::from_ref(&run.timing), &part)?,
-                to_bytes(&run.rays, &part)?,
-                to_bytes(&run.clock, &part)?,
-                to_bytes(&run.bounds, &part)?,
-            ],
-        )
-    }
-
-    /// Keeps run `index`, given the contents of its [`JOINED`] files.
-    pub fn keep_bytes(&self, index: usize, contents: [Vec<u8>; JOINED.len()]) -> Result<(), Error> {
-        let part = self.part(index);
         let unfinished = part.with_extension("unfinished");
         if unfinished.exists() {
             fs::remove_dir_all(&unfinished).map_err(Error::io(&unfinished, "remove the folder"))?;
         }
         fs::create_dir(&unfinished).map_err(Error::io(&unfinished, "create the folder"))?;
-        for (name, bytes) in JOINED.iter().zip(contents) {
-            write_synced(&unfinished.join(name), &bytes)?;
+        for (name, bytes) in &run.files {
+            write_synced(&unfinished.join(name), bytes)?;
         }
         fs::rename(&unfinished, &part).map_err(Error::io(&part, "rename the folder"))
     }
 
     /// Joins all `runs` kept runs into the CSV files.
     pub fn join(&self, runs: usize) -> Result<(), Error> {
-        for name in JOINED {
+        let parts: Vec<(PathBuf, BTreeSet<String>)> = (0..runs)
+            .map(|index| self.part(index))
+            .map(|part| Ok((part.clone(), file_names(&part)?)))
+            .collect::<Result<_, Error>>()?;
+        let names: BTreeSet<&String> = parts.iter().flat_map(|(_, names)| names).collect();
+        for name in names {
             let mut joined = Vec::new();
-            for index in 0..runs {
-                let path = self.part(index).join(name);
+            for (part, _) in parts.iter().filter(|(_, names)| names.contains(name)) {
+                let path = part.join(name);
                 let bytes = fs::read(&path).map_err(Error::io(&path, "read the file"))?;
                 // Every part begins with the same header line.
                 let header = bytes.iter().position(|&byte| byte == b'\n').map_or(bytes.len(), |end| end + 1);
                 joined.extend_from_slice(if joined.is_empty() { &bytes } else { &bytes[header..] });
             }
-            if !joined.is_empty() {
-                write_whole(&self.folder.join(name), &joined)?;
-            }
+            write_whole(&self.folder.join(name), &joined)?;
         }
         Ok(())
     }
@@ -165,6 +166,12 @@ pub fn part_name(index: usize) -> String {
 /// Whether an interrupted experiment, or a part of one, has left finished runs in its folder.
 pub fn is_unfinished(folder: &Path) -> bool {
     folder.join(".partial").exists()
+}
+
+fn file_names(folder: &Path) -> Result<BTreeSet<String>, Error> {
+    let entries = fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))?;
+    let name = |entry: std::io::Result<fs::DirEntry>| Ok(entry?.file_name().to_string_lossy().into_owned());
+    entries.map(name).collect::<std::io::Result<_>>().map_err(Error::io(folder, "read the folder"))
 }
 
 /// Replaces the file at `path` by `bytes`: at any moment it is the old file or the whole new one.

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::execute::{Resolved, conclude};
 use crate::provenance::Provenance;
-use crate::store::{self, JOINED, Store};
+use crate::store::{self, FinishedRun, Store};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs;
@@ -120,7 +120,7 @@ fn join(name: &str, parts: &[Part], out: &Path) -> Result<String, Error> {
             continue;
         };
         for other in others {
-            if let Some(file) = difference(owner, other)? {
+            if let Some(file) = FinishedRun::read(owner)?.difference(&FinishedRun::read(other)?) {
                 let (owner, other) = (owner.display(), other.display());
                 return Err(fail(format!("{owner} and {other} have different {file} of {}", named(index))));
             }
@@ -135,7 +135,7 @@ fn join(name: &str, parts: &[Part], out: &Path) -> Result<String, Error> {
 
     let store = Store::open(out, name, &first.resolved, false)?;
     for (index, owner) in owners.iter().enumerate() {
-        store.keep_bytes(index, contents(owner)?)?;
+        store.keep(index, &FinishedRun::read(owner)?)?;
     }
     let mut provenance = Provenance::gather();
     for part in parts {
@@ -146,23 +146,6 @@ fn join(name: &str, parts: &[Part], out: &Path) -> Result<String, Error> {
         }
     }
     conclude(&resolved, out, &provenance, store)
-}
-
-/// The files of a kept run.
-fn contents(kept: &Path) -> Result<[Vec<u8>; JOINED.len()], Error> {
-    let mut contents: [Vec<u8>; JOINED.len()] = Default::default();
-    for (content, name) in contents.iter_mut().zip(JOINED) {
-        let path = kept.join(name);
-        *content = fs::read(&path).map_err(Error::io(&path, "read the file"))?;
-    }
-    Ok(contents)
-}
-
-/// The first file, other than those with seconds, in which the same run of two parts differs.
-fn difference(a: &Path, b: &Path) -> Result<Option<&'static str>, Error> {
-    let (a, b) = (contents(a)?, contents(b)?);
-    let differs = |&at: &usize| !JOINED[at].starts_with("timing") && a[at] != b[at];
-    Ok((0..JOINED.len()).find(differs).map(|at| JOINED[at]))
 }
 
 /// Whether both paths are one existing folder.

@@ -10,6 +10,7 @@ pub mod estimator;
 pub mod gaps;
 pub mod generations;
 pub mod numbers;
+pub mod pictures;
 pub mod profile;
 pub mod progress;
 pub mod ray_tests;
@@ -21,9 +22,12 @@ pub mod target;
 pub mod times;
 pub mod trials;
 
-use crate::record::{self, BoundRow, ClockRow, HistoryRow, PaperRow, RayRow, ReferenceRow, RunRow, TimingRow};
+use crate::record::{
+    self, BoundRow, ClockRow, HistoryRow, PaperRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row,
+    RunRow, TimingRow,
+};
 use crate::store::Store;
-use crate::{Error, chart, reference};
+use crate::{Error, chart};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -61,6 +65,8 @@ pub enum Report {
     Numbers(numbers::Config),
     /// Whether methods really differ.
     Significance(significance::Config),
+    /// One picture by brute force, KD-tree and trees.
+    Pictures(pictures::Config),
 }
 
 impl Report {
@@ -82,6 +88,7 @@ impl Report {
             Self::Profile(config) => config.methods.iter().collect(),
             Self::Numbers(config) => config.methods.iter().collect(),
             Self::Significance(config) => config.against.iter().chain([&config.method]).collect(),
+            Self::Pictures(config) => config.methods.iter().collect(),
         }
     }
 
@@ -113,6 +120,7 @@ impl Report {
             Self::Profile(config) => config.write(rows),
             Self::Numbers(config) => config.write(rows),
             Self::Significance(config) => config.write(rows),
+            Self::Pictures(config) => config.write(rows),
         }
     }
 }
@@ -134,19 +142,25 @@ pub struct Rows {
     pub clock: Vec<ClockRow>,
     /// Of `references.csv`, under the experiment's objective; none if no report needs them.
     pub references: Vec<ReferenceRow>,
+    /// Of `renders.csv`; none if pictures were not asked for.
+    pub renders: Vec<RenderRow>,
+    /// Of `timing_renders.csv`, likewise.
+    pub render_times: Vec<RenderTimeRow>,
 }
 
 impl Rows {
     /// Reads the CSV files in an experiment's folder.
     pub fn read(folder: &Path) -> Result<Self, Error> {
         Ok(Self {
-            runs: record::read(&folder.join("runs.csv"))?,
-            history: record::read(&folder.join("history.csv"))?,
-            timing: record::read(&folder.join("timing.csv"))?,
-            rays: record::read_if_any(&folder.join("rays.csv"))?,
-            bounds: record::read_if_any(&folder.join("bounds.csv"))?,
-            clock: record::read_if_any(&folder.join("timing_history.csv"))?,
-            references: record::read_if_any(&folder.join(reference::REFERENCES))?,
+            runs: record::read(&folder.join(RunRow::FILE))?,
+            history: record::read_if_any(folder)?,
+            timing: record::read_if_any(folder)?,
+            rays: record::read_if_any(folder)?,
+            bounds: record::read_if_any(folder)?,
+            clock: record::read_if_any(folder)?,
+            references: record::read_if_any(folder)?,
+            renders: record::read_if_any(folder)?,
+            render_times: record::read_if_any(folder)?,
         })
     }
 

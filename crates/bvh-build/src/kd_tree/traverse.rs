@@ -1,0 +1,221 @@
+//! Traversal of a KD-tree, with the answers of testing every object.
+//!
+//! A ray's interval in a cell is computed as a [`Slabs`] interval is, by the same operations, and only ever cut by split
+//! planes. So if an object's box lies on one side of a plane, its interval lies in that side's; if it reaches into both,
+//! so does the object's name, and the two intervals overlap: the cell in which a hit is found is never skipped. A hit
+//! outside the cell at hand is a hit all the same; cells that begin behind it are skipped.
+
+use super::{Cell, KdTree};
+use bvh_core::{Counter, Hit, Ray, Slabs};
+use std::ops::ControlFlow;
+
+impl KdTree {
+    /// The nearest object that `ray` meets in its range; of several at the same distance the one of the lowest id.
+    /// `test` and the answer are those of [`bvh_core::nearest_hit`], bit by bit.
+    ///
+    /// `counter` counts the root's box and every split plane that is met as one box, and an object as often as it is
+    /// tested: one that reaches into several cells may be tested in each.
+    #[inline]
+    pub fn nearest_hit(
+        &self,
+        ray: &Ray,
+        mut test: impl FnMut(u32, f32) -> Option<f32>,
+        counter: &mut impl Counter,
+    ) -> Option<Hit> {
+        let mut nearest: Option<Hit> = None;
+        self.walk(ray, counter, |objects, t_max, counter| {
+            for &object in objects {
+                counter.object();
+                if let Some(t) = test(object, *t_max)
+                    && t <= *t_max
+                {
+                    let hit = Hit { t, object };
+                    if nearest.is_none_or(|nearest| hit.precedes(&nearest)) {
+                        nearest = Some(hit);
+                        *t_max = t;
+                    }
+                }
+            }
+            ControlFlow::Continue(())
+        });
+        nearest
+    }
+
+    /// Whether `ray` meets any object in its range; see [`bvh_core::any_hit`] and [`nearest_hit`](Self::nearest_hit).
+    #[inline]
+    pub fn any_hit(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool, counter: &mut impl Counter) -> bool {
+        let mut found = false;
+        self.walk(ray, counter, |objects, _, counter| {
+            for &object in objects {
+                counter.object();
+                if test(object) {
+                    found = true;
+                    return ControlFlow::Break(());
+                }
+            }
+            ControlFlow::Continue(())
+        });
+        found
+    }
+
+    /// Hands the objects of leaves that the ray may meet to `leaf`, the nearest first, until it breaks. `leaf` may lower
+    /// the distance from which on cells are skipped.
+    #[inline(always)]
+    fn walk<C: Counter>(
+        &self,
+        ray: &Ray,
+        counter: &mut C,
+        mut leaf: impl FnMut(&[u32], &mut f32, &mut C) -> ControlFlow<()>,
+    ) {
+        if self.cells.is_empty() {
+            return;
+        }
+        let slabs = Slabs::new(ray, &self.bounds);
+        let backwards = ray.inverse_direction().to_array().map(|inverse| inverse < 0.0);
+        let mut t_max = ray.t_max();
+        counter.boxes(1);
+        let (mut entry, mut exit) = slabs.interval(&self.bounds);
+        if entry > exit || entry > t_max {
+            return;
+        }
+        // A level leaves at most one cell for later: this cannot overflow.
+        let mut stack = [(0, 0.0, 0.0); Self::MAX_DEPTH];
+        let mut pending = 0;
+        let mut cell = 0;
+        loop {
+            match self.cells[cell] {
+                Cell::Leaf { first, count } => {
+                    let objects = &self.objects[first as usize..first as usize + count as usize];
+                    if leaf(objects, &mut t_max, counter).is_break() {
+                        return;
+                    }
+                }
+                Cell::Inner { axis, position, below } => {
+                    counter.boxes(1);
+                    let (far_entry, near_exit) = slabs.crossing(axis.into(), position);
+                    let near = below as usize + usize::from(backwards[usize::from(axis)]);
+                    let far = below as usize + usize::from(!backwards[usize::from(axis)]);
+                    let (far_entry, near_exit) = (far_entry.max(entry), near_exit.min(exit));
+                    let (near_met, far_met) = (entry <= near_exit, far_entry <= exit && far_entry <= t_max);
+                    if near_met {
+                        if far_met {
+                            stack[pending] = (far, far_entry, exit);
+                            pending += 1;
+                        }
+                        (cell, exit) = (near, near_exit);
+                        continue;
+                    }
+                    if far_met {
+                        (cell, entry) = (far, far_entry);
+                        continue;
+                    }
+                }
+            }
+            loop {
+                if pending == 0 {
+                    return;
+                }
+                pending -= 1;
+                (cell, entry, exit) = stack[pending];
+                if entry <= t_max {
+                    break;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Config;
+    use super::*;
+    use bvh_core::{Aabb, TestCounts, clip_to_box, nearest_hit_of_all};
+    use glam::Vec3;
+
+    /// SplitMix64 (Steele, Lea & Flood 2014), in -1..1.
+    fn random(state: &mut u64) -> f32 {
+        *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (((z ^ (z >> 31)) >> 39) as f32 - (1 << 24) as f32) / (1 << 24) as f32
+    }
+
+    fn point(state: &mut u64) -> Vec3 {
+        Vec3::new(random(state), random(state), random(state))
+    }
+
+    fn cases() -> Vec<(&'static str, Vec<Aabb>)> {
+        let mut s = 7;
+        let mut boxes = |n: usize, size: Vec3| -> Vec<Aabb> {
+            (0..n)
+                .map(|_| {
+                    let (a, b) = (point(&mut s), size * point(&mut s));
+                    Aabb { min: a.min(a + b), max: a.max(a + b) }
+                })
+                .collect()
+        };
+        let nested = |i: i32| Aabb { min: Vec3::splat(-i as f32), max: Vec3::splat(i as f32) };
+        vec![
+            ("none", vec![]),
+            ("one", boxes(1, Vec3::ONE)),
+            ("identical", vec![nested(1); 100]),
+            ("points", vec![nested(0); 100]),
+            ("small", boxes(1000, Vec3::splat(0.05))),
+            ("large", boxes(200, Vec3::ONE)),
+            ("flat", boxes(300, Vec3::new(0.1, 0.1, 0.0))),
+            ("needles", boxes(300, Vec3::new(3.0, 0.0, 1e-3))),
+            ("nested", (0..200).map(nested).collect()),
+            (
+                "line",
+                (0..200).map(|i| Aabb { min: Vec3::X * i as f32, max: Vec3::X * (i + 1) as f32 }).collect(),
+            ),
+        ]
+    }
+
+    #[test]
+    fn trees_are_bounded_and_answer_as_brute_force_on_awkward_boxes() {
+        let mut s = 1;
+        for (name, boxes) in cases() {
+            let tree = Config::default().build(&boxes).unwrap();
+            assert!(tree.references() >= boxes.len() && tree.references() <= 16 * boxes.len(), "{name}");
+            assert!(tree.depth() as f64 <= 8.0 + 1.3 * libm::log2(boxes.len().max(1) as f64), "{name}");
+            for i in 0..2000 {
+                let mut direction = point(&mut s);
+                if i % 3 == 0 {
+                    direction[i % 2] = if i % 4 == 0 { 0.0 } else { -0.0 };
+                }
+                let corner = boxes.get(i % boxes.len().max(1)).map_or(Vec3::ZERO, |b| b.min);
+                let origin = [corner - direction, point(&mut s) * 300.0, point(&mut s), corner][i % 4];
+                let towards = if i % 4 == 1 { corner - origin } else { direction };
+                let Ok(ray) = Ray::half_line(origin, towards) else { continue };
+                let solid = |id: u32, t_max| clip_to_box(&ray, &boxes[id as usize], ray.t_min(), t_max);
+                let expected = nearest_hit_of_all(boxes.len() as u32, &ray, solid, &mut ());
+                assert_eq!(tree.nearest_hit(&ray, solid, &mut ()), expected, "{name}: {ray:?}");
+                let any = tree.any_hit(&ray, |id| solid(id, f32::MAX).is_some(), &mut ());
+                assert_eq!(any, expected.is_some(), "{name}: {ray:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn apart_objects_are_told_apart_by_few_tests() {
+        let row = |i: i32| Aabb { min: Vec3::X * i as f32 * 2.0, max: Vec3::X * (i as f32 * 2.0) + 1.0 };
+        let boxes: Vec<Aabb> = (0..64).map(row).collect();
+        let tree = Config::default().build(&boxes).unwrap();
+        assert_eq!(tree.references(), boxes.len());
+        let mut counts = TestCounts::default();
+        let ray = Ray::half_line(Vec3::new(60.5, 0.5, -5.0), Vec3::Z).unwrap();
+        let solid = |id: u32, t_max| clip_to_box(&ray, &boxes[id as usize], 0.0, t_max);
+        assert_eq!(tree.nearest_hit(&ray, solid, &mut counts).map(|hit| hit.object), Some(30));
+        assert_eq!(counts.objects, 1);
+        assert!(counts.boxes <= 1 + tree.depth() as u64, "{counts:?}");
+    }
+
+    #[test]
+    fn parameters_out_of_range_are_refused_by_name() {
+        let refused = |config: Config| config.build(&[]).unwrap_err().to_string();
+        assert!(refused(Config { traversal: 0.0, ..Config::default() }).contains("traversal is 0"));
+        assert!(refused(Config { intersection: f64::NAN, ..Config::default() }).contains("intersection"));
+        assert!(refused(Config { empty_factor: 1.5, ..Config::default() }).contains("0 to 1"));
+    }
+}

@@ -1,0 +1,154 @@
+//! From a scene and a view to a picture: tiles in parallel, the same bytes on any number of threads.
+
+use super::camera::{self, Camera, View};
+use super::film::{Film, Tile};
+use super::light::{self, Light, World};
+use super::tracer::Tracer;
+use crate::scene::Scene;
+use bvh_core::Aabb;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// What is drawn, and how finely.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Of the picture, in pixels.
+    pub width: u32,
+    /// Of the picture, in pixels.
+    pub height: u32,
+    /// Rays per pixel and direction, 1 or more: `samples`² rays per pixel, on a grid.
+    pub samples: u32,
+    /// Mirror reflections that are followed one after the other.
+    pub depth: u32,
+    /// Where the camera is; where it frames the scene best if not given.
+    pub view: Option<View>,
+    /// Replace the lights that fit the view, if given. None at all: no shadow ray is sent, and light comes from the eye.
+    pub lights: Option<Vec<DVec3>>,
+    /// Whether there is a ground below the scene, where it is seen from outside.
+    pub ground: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { width: 960, height: 540, samples: 2, depth: 4, view: None, lights: None, ground: true }
+    }
+}
+
+/// Pixels of a tile's side. A tile is what a thread does between two looks at the progress.
+const TILE: u32 = 16;
+
+/// Number of tiles that [`render`] reports.
+pub fn tiles(options: &Options) -> u64 {
+    u64::from(options.width.div_ceil(TILE)) * u64::from(options.height.div_ceil(TILE))
+}
+
+/// Draws the scene on all threads of the current rayon pool. `tile_done` is called after every tile; once it returns
+/// false, the picture is given up and `None` returned.
+pub fn render(
+    scene: &Scene,
+    tracer: &Tracer,
+    options: &Options,
+    tile_done: &(dyn Fn() -> bool + Sync),
+) -> Option<Film> {
+    let bounds = scene.boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
+    let (width, height) = (options.width, options.height);
+    let up = camera::up(scene);
+    let aspect = f64::from(width) / f64::from(height);
+    let automatic = || camera::automatic(scene, &bounds, aspect);
+    let view = options.view.clone().unwrap_or_else(automatic);
+    let camera = Camera::new(&view, up, width, height);
+    let lights = match &options.lights {
+        Some(positions) => Light::white(positions),
+        None => light::automatic(&view, up, &bounds),
+    };
+    let world = World::new(tracer, &view, up, &bounds, lights, options.ground, options.depth);
+    let columns = width.div_ceil(TILE);
+    let finished: Option<Vec<Tile>> = (0..tiles(options) as u32)
+        .into_par_iter()
+        .map(|index| {
+            let (x, y) = (index % columns * TILE, index / columns * TILE);
+            let tile =
+                world.tile(&camera, x..(x + TILE).min(width), y..(y + TILE).min(height), options.samples);
+            tile_done().then_some(tile)
+        })
+        .collect();
+    finished.map(|tiles| Film::of_tiles(width, &tiles, columns as usize))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tracer::{self, Structure};
+    use super::*;
+    use bvh_build::{Builder, goldsmith_salmon, kd_tree, muller_fellner};
+    use bvh_core::WideBvh;
+
+    fn structures(scene: &Scene) -> Vec<Structure> {
+        let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+        let mut structures = vec![
+            Structure::Brute,
+            Structure::KdTree(kd_tree::Config::default().build(&scene.boxes).unwrap()),
+            Structure::Tree(goldsmith_salmon::Config::default().build(&scene.boxes).unwrap()),
+        ];
+        structures
+            .extend(tracer::triangles(scene).map(|own| Structure::Wide(WideBvh::new(&greedy, &own).unwrap())));
+        structures.push(Structure::Tree(greedy));
+        structures
+    }
+
+    fn picture(scene: &Scene, structure: Structure, options: &Options) -> Film {
+        render(scene, &Tracer::new(scene, structure), options, &|| true).unwrap()
+    }
+
+    #[test]
+    fn every_structure_gives_the_same_picture() {
+        let options = Options { width: 41, height: 23, samples: 1, ..Options::default() };
+        for name in ["spheres75", "escher:cluster:600:1", "bijou:random:300:1", "cloister:cluster:500:2"] {
+            let scene = Scene::load(name).unwrap();
+            let films: Vec<Film> =
+                structures(&scene).into_iter().map(|structure| picture(&scene, structure, &options)).collect();
+            let distinct: std::collections::HashSet<_> = films[0].pixels.iter().collect();
+            assert!(distinct.len() > 100, "{name}: {} colours", distinct.len());
+            for film in &films {
+                assert_eq!(film.pixels.len(), 41 * 23);
+                assert!(film.pixels == films[0].pixels && film.rays == films[0].rays, "{name}");
+            }
+            assert_eq!(
+                films[0].counts.objects,
+                films[0].tests.iter().sum::<u64>(),
+                "brute force tests no boxes"
+            );
+            assert!(films[1].counts.objects < films[0].counts.objects, "a KD-tree saves tests");
+        }
+    }
+
+    #[test]
+    fn any_number_of_threads_and_any_size_give_the_same_pixels() {
+        let scene = Scene::load("spheres75").unwrap();
+        for (width, height) in [(1, 1), (16, 16), (17, 33), (5, 40)] {
+            let options = Options { width, height, samples: 1, ..Options::default() };
+            let films = [1, 3].map(|threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| picture(&scene, structures(&scene).remove(1), &options))
+            });
+            assert_eq!(films[0].pixels.len(), (width * height) as usize);
+            assert_eq!(films[0], films[1]);
+        }
+    }
+
+    #[test]
+    fn without_lights_no_shadow_ray_is_sent() {
+        let scene = Scene::load("escher:cluster:600:1").unwrap();
+        let options = Options { width: 32, height: 18, samples: 1, ground: false, ..Options::default() };
+        let dark = Options { lights: Some(vec![]), ..options.clone() };
+        let rays = |options: &Options| picture(&scene, Structure::Brute, options).rays;
+        assert_eq!(rays(&dark), 32 * 18, "triangles mirror nothing");
+        assert!(rays(&options) > rays(&dark));
+    }
+
+    #[test]
+    fn a_picture_is_given_up_when_asked_to() {
+        let scene = Scene::load("spheres75").unwrap();
+        let tracer = Tracer::new(&scene, Structure::Brute);
+        assert_eq!(render(&scene, &tracer, &Options::default(), &|| false), None);
+    }
+}

@@ -1,0 +1,111 @@
+//! Pictures as measurements: the tests and the seconds that a run's tree takes, beside brute force and a KD-tree.
+
+use super::draw::{Options, render};
+use super::film::Film;
+use super::tracer::{Structure, Tracer};
+use crate::record::{RenderRow, RenderTimeRow};
+use crate::scene::{Scene, fnv1a};
+use crate::{Error, record::RunRow};
+use bvh_core::Bvh;
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// The picture that is drawn of every run's tree, from where the scene is framed best.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// In pixels, 1 to 10 000.
+    pub width: u32,
+    /// In pixels, 1 to 10 000.
+    pub height: u32,
+    /// `samples`² rays go through each pixel, 1 to 16. Default 1.
+    #[serde(default = "one")]
+    pub samples: u32,
+}
+
+fn one() -> u32 {
+    1
+}
+
+/// What is not a tree of ours, by the names it has in tables.
+pub const BASELINES: [(&str, &str); 2] = [("brute force", "brute"), ("KD-tree", "kdtree")];
+
+/// Seconds after which a picture is not drawn once more.
+const REPEAT_WITHIN: f64 = 2.0;
+/// How often a picture is drawn at most.
+const MOST_REPEATS: usize = 25;
+
+impl Config {
+    /// Checks the ranges of the parameters.
+    pub fn check(&self) -> Result<(), String> {
+        let keys =
+            [("width", self.width, 10_000), ("height", self.height, 10_000), ("samples", self.samples, 16)];
+        match keys.iter().find(|(_, found, most)| !(1..=*most).contains(found)) {
+            Some((key, found, most)) => Err(format!("render.{key} is {found}; accepted: 1 to {most}")),
+            None => Ok(()),
+        }
+    }
+
+    /// Draws the scene with the tree of `run`, which took `build_seconds`, on one thread; before that, if `first`,
+    /// with each of the [`BASELINES`].
+    pub fn measure(
+        &self,
+        scene: &Scene,
+        tree: &Bvh,
+        run: &RunRow,
+        build_seconds: f64,
+        first: bool,
+    ) -> Result<(Vec<RenderRow>, Vec<RenderTimeRow>), Error> {
+        let mut structures = Vec::new();
+        for (label, name) in BASELINES.into_iter().filter(|_| first) {
+            let start = Instant::now();
+            let structure = Structure::by_name(name, scene)?;
+            structures.push((label, structure, 0, start.elapsed().as_secs_f64()));
+        }
+        structures.push((&run.method, Structure::Tree(tree.clone()), run.repetition, build_seconds));
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        let pool = pool.map_err(|error| Error::Usage(format!("cannot start a thread: {error}")))?;
+        let (mut rows, mut times) = (Vec::new(), Vec::new());
+        for (method, structure, repetition, build_seconds) in structures {
+            let tracer = Tracer::new(scene, structure);
+            let (film, seconds) = pool.install(|| self.draw(scene, &tracer));
+            let per_ray = |tests: u64| tests as f64 / film.rays as f64;
+            let (boxes, objects) = (film.counts.boxes, film.counts.objects);
+            rows.push(RenderRow {
+                scene: scene.name.clone(),
+                method: method.into(),
+                repetition,
+                objects: scene.boxes.len(),
+                rays: film.rays,
+                boxes_per_ray: per_ray(boxes),
+                objects_per_ray: per_ray(objects),
+                picture: format!("{:016x}", fnv1a(film.pixels.as_flattened().iter().copied())),
+            });
+            times.push(RenderTimeRow {
+                scene: scene.name.clone(),
+                method: method.into(),
+                repetition,
+                repeats: seconds.len(),
+                build_seconds,
+                render_seconds: seconds.into_iter().fold(f64::INFINITY, f64::min),
+            });
+        }
+        Ok((rows, times))
+    }
+
+    /// The picture, and how long it took each time.
+    fn draw(&self, scene: &Scene, tracer: &Tracer) -> (Film, Vec<f64>) {
+        let Self { width, height, samples } = *self;
+        let options = Options { width, height, samples, ..Options::default() };
+        let mut seconds = Vec::new();
+        loop {
+            let start = Instant::now();
+            let film = render(scene, tracer, &options, &|| true);
+            seconds.push(start.elapsed().as_secs_f64());
+            let done = seconds.iter().sum::<f64>() >= REPEAT_WITHIN || seconds.len() == MOST_REPEATS;
+            if let Some(film) = film.filter(|_| done) {
+                return (film, seconds);
+            }
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! `harness render` and experiments with pictures, as their users meet them.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn run(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_harness")).current_dir(folder).args(args).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+#[test]
+fn every_structure_and_any_number_of_threads_write_the_same_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut files = BTreeSet::new();
+    let structures = ["brute", "kdtree", "bvh", "wide"];
+    for (accel, jobs) in structures.into_iter().zip(["1", "2", "3", "1"]) {
+        let args = ["render", "escher:cluster:300:1", "--out", "p.png", "--size", "50x31", "--accel", accel];
+        let output = run(folder.path(), &[&args[..], &["--jobs", jobs]].concat());
+        assert!(output.status.success(), "{accel}: {}", text(&output.stderr));
+        assert_eq!(text(&output.stdout).contains("per ray"), accel != "wide", "{}", text(&output.stdout));
+        files.insert(fs::read(folder.path().join("p.png")).unwrap());
+    }
+    assert_eq!(files.len(), 1);
+}
+
+#[test]
+fn the_eye_may_be_anywhere_and_the_scene_a_single_point() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("point.obj"), "v 1 2 3\nv 1 2 3\nv 1 2 3\nf 1 2 3\n").unwrap();
+    fs::write(folder.path().join("flat.obj"), "v 0 0 0\nv 1e30 0 0\nv 0 0 1e30\nf 1 2 3\n").unwrap();
+    for scene in ["point.obj", "flat.obj"] {
+        for eye in [&[][..], &["--from", "-1,2,3", "--at", "-1,2,3"], &["--from", "1,2,3", "--no-lights"]] {
+            let args = [&["render", scene, "--out", "p.png", "--size", "20x10", "--heatmap"], eye].concat();
+            let output = run(folder.path(), &args);
+            assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_with_what_would_be_accepted() {
+    let folder = tempfile::tempdir().unwrap();
+    for (args, code, parts) in [
+        (&["sofa"][..], 2, &["no such scene", "spheres75"][..]),
+        (&["spheres75", "--accel", "octree"], 2, &["octree", "brute, kdtree, bvh, wide"]),
+        (&["spheres75", "--accel", "none.bvh"], 2, &["none.bvh"]),
+        (&["spheres75", "--accel", "wide"], 2, &["spheres75 has spheres", "accepted: brute"]),
+        (&["escher", "--accel", "wide", "--heatmap"], 2, &["counts no tests"]),
+        (&["spheres75", "--size", "0x10"], 2, &["--size", "960x540"]),
+        (&["spheres75", "--from", "1,2"], 2, &["--from", "three numbers"]),
+        (&["spheres75", "--fov", "180"], 2, &["--fov", "1 to 170"]),
+        (&["spheres75", "--samples", "0"], 2, &["--samples", "1..=16"]),
+        (&["spheres75", "--light", "0,0,0", "--no-lights"], 2, &["--light", "--no-lights"]),
+        (&["spheres75", "--size", "8x8", "--out", "no/p.png"], 1, &["no/p.png", "cannot"]),
+    ] {
+        let out: &[&str] = if args.contains(&"--out") { &[] } else { &["--out", "p.png"] };
+        let output = run(folder.path(), &[&["render"], args, out].concat());
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{args:?}: {said}");
+        assert!(parts.iter().all(|part| said.contains(part)), "{args:?}: {said}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing was written");
+}
+
+#[test]
+fn an_experiment_draws_with_every_tree_and_the_baselines_and_keeps_seconds_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = "
+question = 'Is it faster?'
+scenes = ['spheres75', 'escher:cluster:90:1']
+render = { width = 24, height = 16 }
+repetitions = 2
+methods = [{ method = 'median_cut' }, { method = 'random_orders', trials = 1 }]
+[[reports]]
+kind = 'pictures'
+source = 'Test'
+title = 'a picture'
+methods = ['median_cut', 'random_orders']
+scene = 'spheres75'
+document = { 'brute force' = 32.77, 'KD-tree' = 1.8 }
+";
+    fs::write(folder.path().join("spec.toml"), spec).unwrap();
+    let output = run(folder.path(), &["spec.toml"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("18.2 (1.8 s)"), "{}", text(&output.stdout));
+    assert!(text(&output.stdout).contains("same picture"), "{}", text(&output.stdout));
+    let results = folder.path().join("results/spec");
+    let mut reader = csv::Reader::from_path(results.join("renders.csv")).unwrap();
+    let rows: Vec<harness::record::RenderRow> = reader.deserialize().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), 2 * (2 + 2 * 2));
+    for scene in rows.chunks(6) {
+        assert!(scene.iter().all(|row| row.picture == scene[0].picture && row.rays == scene[0].rays));
+        assert_eq!((scene[0].method.as_str(), scene[0].boxes_per_ray), ("brute force", 0.0));
+        assert!(scene[1..].iter().all(|row| row.objects_per_ray < scene[0].objects_per_ray));
+    }
+    assert!(!fs::read_to_string(results.join("pictures.csv")).unwrap().contains("seconds"));
+    assert!(fs::read_to_string(results.join("timing_pictures.csv")).unwrap().contains("seconds"));
+    let output = run(folder.path(), &["spec.toml", "--check", "--jobs", "1"]);
+    assert!(output.status.success(), "{}", text(&output.stdout));
+    fs::write(folder.path().join("wrong.toml"), spec.replace("width = 24", "width = 0")).unwrap();
+    let output = run(folder.path(), &["wrong.toml"]);
+    assert!(
+        text(&output.stderr).contains("render.width is 0; accepted: 1 to 10000"),
+        "{}",
+        text(&output.stderr)
+    );
+}
