@@ -8,6 +8,7 @@ use crate::report::{self, Report};
 use crate::scene::Scene;
 use crate::spec::{Experiment, Labelled};
 use crate::store::{FinishedRun, Store};
+use crate::suite::Measure;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_search::{Event, Observer, Problem, lower_bound, solve};
@@ -45,6 +46,9 @@ pub fn execute(
     resume: bool,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
+    if let Some(measure) = &experiment.suite {
+        return over_suite(experiment, measure, out, interrupted);
+    }
     let (scenes, left_out) = experiment.load_scenes()?;
     let resolved = resolve(experiment, &scenes)?;
     let store = Store::open(out, &experiment.name, &resolved, resume)?;
@@ -91,6 +95,28 @@ pub fn execute(
     store.write("provenance.toml", to_toml(&Provenance::gather())?.as_bytes())?;
     store.finish()?;
     Ok(Summary { text, left_out })
+}
+
+/// Measures over the suite of stiff cases; always from the start.
+fn over_suite(
+    experiment: &Experiment,
+    measure: &Measure,
+    out: &Path,
+    interrupted: &AtomicBool,
+) -> Result<Summary, Error> {
+    let resolved = to_toml(experiment)?;
+    let store = Store::open(out, &experiment.name, &resolved, false)?;
+    let text = match measure {
+        Measure::Stability(config) => {
+            let interrupted = || interrupted.load(Relaxed);
+            config.execute(&experiment.scenes, &experiment.methods, &store, &interrupted)?
+        }
+        Measure::Precision(config) => config.execute(&store)?,
+    };
+    store.write("resolved.toml", resolved.as_bytes())?;
+    store.write("provenance.toml", to_toml(&Provenance::gather())?.as_bytes())?;
+    store.finish()?;
+    Ok(Summary { text, left_out: vec![] })
 }
 
 /// The cost of the scene's greedy Müller–Fellner tree, the base of all ratios.

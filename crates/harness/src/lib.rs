@@ -17,5 +17,6 @@ pub mod scene;
 pub mod spec;
 pub mod standin;
 pub mod store;
+pub mod suite;
 
 pub use error::Error;

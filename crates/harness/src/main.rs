@@ -4,6 +4,7 @@ use clap::{Args, Parser, Subcommand};
 use harness::scene::{FETCHED, SPHERES, Scene, fetched_path};
 use harness::spec::{Experiment, Overrides};
 use harness::standin::STAND_INS;
+use harness::suite::child;
 use harness::{Error, check, execute};
 use std::fmt::Arguments;
 use std::io::Write;
@@ -25,6 +26,9 @@ struct Cli {
 enum Command {
     /// List the built-in scenes, their sizes, and what each stands in for.
     Scenes,
+    /// One case of the suite, in a process of its own.
+    #[command(name = child::COMMAND, hide = true)]
+    SuiteChild { subject: String, case: String, objects: usize },
 }
 
 #[derive(Args)]
@@ -70,6 +74,9 @@ fn main() -> ExitCode {
     }
     let result = match cli.command {
         Some(Command::Scenes) => list_scenes(),
+        Some(Command::SuiteChild { subject, case, objects }) => child::main(&subject, &case, objects)
+            .map(|answer| say(format_args!("{answer}")))
+            .map_err(Error::Usage),
         None => run(&cli.run),
     };
     match result {
