@@ -15,11 +15,16 @@ verify:
     cargo run -p harness -- --check experiments/table3.toml experiments/table4.toml experiments/figure1.toml
     cargo run -p harness -- --check --quick experiments/table2.toml experiments/figure2.toml experiments/figure3.toml \
         experiments/figure4.toml experiments/subsets.toml experiments/random_orders.toml experiments/rays.toml \
-        experiments/correlation.toml experiments/local_search.toml experiments/anytime.toml
+        experiments/correlation.toml experiments/local_search.toml experiments/anytime.toml \
+        experiments/stability.toml experiments/precision.toml
 
 # The paper's Table 4.
 table4:
     cargo run -p harness -- experiments/table4.toml
+
+# Stiff and extreme cases, other libraries included.
+stability:
+    cargo run -p harness --features peers -- experiments/stability.toml experiments/precision.toml
 
 # Times of builders against other libraries.
 bench:

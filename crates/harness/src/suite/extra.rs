@@ -91,8 +91,7 @@ pub fn about_one_cover_per_level(method: &Method, boxes: &[Aabb], outcome: &Outc
 
 /// S27: some node near the root has the teapot, and nothing else, below it.
 pub fn teapot_is_isolated(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
-    if !matches!(method, Method::MullerFellner(_) | Method::Best(_) | Method::Reinsertion(_) | Method::Exact(_))
-    {
+    if !(is_greedy(method) || matches!(method, Method::Best(_) | Method::Reinsertion(_) | Method::Exact(_))) {
         return Ok(String::new());
     }
     let tree = &outcome.tree;
