@@ -63,7 +63,7 @@ fn any_boxes() -> impl Strategy<Value = Vec<Aabb>> {
             if bits.is_multiple_of(16) { 0.0 * random } else { random }
         });
         let corner = || prop::array::uniform3(coordinate.clone());
-        prop::collection::vec([corner(), corner()].prop_map(box_of), 0..16)
+        prop::collection::vec([corner(), corner()].prop_map(box_of), 0..40)
     })
 }
 
@@ -74,7 +74,7 @@ fn boxes_on_a_grid(bits: u32) -> impl Strategy<Value = (Vec<Aabb>, f32)> {
         let most = (1 << bits) - 1;
         let coordinate = (-most..=most).prop_map(move |whole: i32| whole as f32 * unit);
         let corner = || prop::array::uniform3(coordinate.clone());
-        (prop::collection::vec([corner(), corner()].prop_map(box_of), 0..14), Just(unit))
+        (prop::collection::vec([corner(), corner()].prop_map(box_of), 0..40), Just(unit))
     })
 }
 
@@ -84,7 +84,7 @@ fn close(a: f64, b: f64) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig::with_cases(400))]
 
     #[test]
     fn every_method_builds_a_tight_tree_of_exact_cost_over_any_finite_bits(boxes in any_boxes()) {

@@ -84,7 +84,7 @@ mod tests {
         assert_eq!(exact, BigUint::from(3u8));
         let exact = internal_area(&pair(Aabb::from(([f32::MIN; 3], [f32::MAX; 3]))));
         let side = (BigUint::from((1u32 << 24) - 1) << 104u32) * 2u8;
-        assert_eq!(exact, &side * &side * 3u8 << UNIT);
+        assert_eq!(exact, (&side * &side * 3u8) << UNIT);
     }
 
     #[test]

@@ -189,7 +189,8 @@ fn obvhs_0_4(triangles: &[Triangle], params: obvhs::BvhBuildParams) -> Built {
             let triangle = &triangles[ids[at] as usize];
             triangle.intersect(&shear, ray.t_max()).unwrap_or(f32::INFINITY)
         });
-        Some(hit.t).filter(|&t| t < f32::INFINITY)
+        // The distance is overwritten at the end, whether there was a hit or not.
+        (hit.primitive_id != u32::MAX).then_some(hit.t)
     };
     Built { tree, nearest: Box::new(nearest) }
 }

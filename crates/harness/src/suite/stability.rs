@@ -173,7 +173,7 @@ impl Config {
         if !peers.is_empty() {
             store.write("timing_peers.csv", &to_bytes(&peers, Path::new("timing_peers.csv"))?)?;
         }
-        report(store, !peers.is_empty())
+        report(store)
     }
 
     /// Another library on a case: few objects with all checks, then many.
@@ -201,12 +201,14 @@ impl Config {
     }
 }
 
-/// The heat map and the summary, from the CSV files.
-fn report(store: &Store, with_peers: bool) -> Result<String, Error> {
+/// The heat map and the summary, from the CSV files. The other libraries' rows may be those of an earlier run: without
+/// the feature `peers` none are written.
+fn report(store: &Store) -> Result<String, Error> {
     let own: Vec<Row> = read(&store.folder().join("cells.csv"))?;
     let mut rows = own.clone();
-    if with_peers {
-        rows.extend(read::<Row>(&store.folder().join("timing_peers.csv"))?);
+    let peers = store.folder().join("timing_peers.csv");
+    if peers.is_file() {
+        rows.extend(read::<Row>(&peers)?);
     }
     let names = |name: fn(&Row) -> &String| {
         let mut names: Vec<String> = Vec::new();
@@ -228,8 +230,8 @@ fn report(store: &Store, with_peers: bool) -> Result<String, Error> {
     let cells = scenes.iter().flat_map(|scene| columns.iter().map(move |column| cell(scene, column))).collect();
     let map = HeatMap {
         title: "Stiff and extreme cases".into(),
-        caption: "Every case with all that can be asked of: methods, traversals, readers, and other libraries where they \
-                  were compiled in. Numbers are depths of trees; where a promise was broken, which. Grey: not asked."
+        caption: "Every case with all that can be asked: methods, traversals, readers, and other libraries. Numbers are \
+                  depths of trees; where a promise was broken, which. Grey: not asked."
             .into(),
         row_label: "case".into(),
         column_label: String::new(),
