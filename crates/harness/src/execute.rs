@@ -6,6 +6,7 @@ use crate::report::{self, Report};
 use crate::scene::Scene;
 use crate::spec::{Experiment, Labelled};
 use crate::store::{FinishedRun, Store};
+use crate::suite::Measure;
 use crate::sweep::Shard;
 use crate::{Error, rays, reference, store};
 use bvh_build::{Builder, muller_fellner};
@@ -56,6 +57,12 @@ pub fn execute(
     extent: Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
+    if let Some(measure) = &experiment.suite {
+        if extent.shard.is_some() {
+            return Err(Error::Usage(format!("{}: the suite of cases is not done in parts", experiment.name)));
+        }
+        return over_suite(experiment, measure, out, interrupted);
+    }
     let (scenes, left_out) = experiment.load_scenes()?;
     let resolved = resolve(experiment, &scenes);
     let store = Store::open(out, &experiment.name, &to_toml(&resolved)?, extent.resume)?;
@@ -153,6 +160,28 @@ pub fn report_again(experiment: &Experiment, out: &Path) -> Result<Summary, Erro
     let text = report(&resolved, out, &Provenance::gather(), &store)?;
     store.finish()?;
     Ok(Summary { text, left_out })
+}
+
+/// Measures over the suite of stiff cases; always from the start.
+fn over_suite(
+    experiment: &Experiment,
+    measure: &Measure,
+    out: &Path,
+    interrupted: &AtomicBool,
+) -> Result<Summary, Error> {
+    let resolved = to_toml(&resolve(experiment, &[]))?;
+    let store = Store::open(out, &experiment.name, &resolved, false)?;
+    let text = match measure {
+        Measure::Stability(config) => {
+            let interrupted = || interrupted.load(Relaxed);
+            config.execute(&experiment.scenes, &experiment.methods, &store, &interrupted)?
+        }
+        Measure::Precision(config) => config.execute(&store)?,
+    };
+    store.write("resolved.toml", resolved.as_bytes())?;
+    store.write("provenance.toml", to_toml(&Provenance::gather())?.as_bytes())?;
+    store.finish()?;
+    Ok(Summary { text, left_out: vec![] })
 }
 
 /// The cost of the scene's greedy Müller–Fellner tree, the base of all ratios.

@@ -76,9 +76,18 @@ fn section(results: &Path, name: &str) -> Result<Section, Error> {
     let resolved: Resolved = toml::from_str(&read(&path)?).map_err(|error| bad(&path, error))?;
     let path = folder.join("provenance.toml");
     let provenance = toml::from_str(&read(&path)?).map_err(|error| bad(&path, error))?;
-    // From the CSV files, as the figures beside them were.
-    let rows = Rows::read(&folder)?;
     let (mut all, mut figures) = (Output::default(), Vec::new());
+    // From the CSV files, as the figures beside them were; those of the suite are shown as they are.
+    if resolved.experiment.suite.is_some() {
+        for entry in fs::read_dir(&folder).map_err(Error::io(&folder, "read the folder"))?.flatten() {
+            let path = entry.path();
+            if path.extension().is_some_and(|extension| extension == "svg") {
+                figures.push((entry.file_name().to_string_lossy().into_owned(), read(&path)?));
+            }
+        }
+        figures.sort();
+    }
+    let rows = if resolved.experiment.reports.is_empty() { Rows::default() } else { Rows::read(&folder)? };
     for report in &resolved.experiment.reports {
         let output = report.write(&rows)?;
         all.text += &output.text;

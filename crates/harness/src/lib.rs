@@ -20,6 +20,7 @@ pub mod scene;
 pub mod spec;
 pub mod standin;
 pub mod store;
+pub mod suite;
 pub mod sweep;
 
 pub use error::Error;

@@ -6,6 +6,7 @@ use harness::render::command as render;
 use harness::scene::{FETCHED, SPHERES, Scene, fetched_path};
 use harness::spec::{Experiment, Overrides};
 use harness::standin::STAND_INS;
+use harness::suite::child;
 use harness::sweep::{self, Shard};
 use harness::{Error, check, execute, html, reference};
 use std::fmt::Arguments;
@@ -48,6 +49,9 @@ enum Command {
     },
     /// Draw a scene: a small Whitted ray tracer, the same picture with any structure.
     Render(render::Args),
+    /// One case of the suite, in a process of its own.
+    #[command(name = child::COMMAND, hide = true)]
+    SuiteChild { subject: String, case: String, objects: usize },
 }
 
 #[derive(Args)]
@@ -103,6 +107,9 @@ fn main() -> ExitCode {
         Some(Command::Report { results, out }) => write_page(&results, &out),
         Some(Command::Merge { folders, out }) => merge(&folders, &out),
         Some(Command::Render(args)) => draw(&args),
+        Some(Command::SuiteChild { subject, case, objects }) => child::main(&subject, &case, objects)
+            .map(|answer| say(format_args!("{answer}")))
+            .map_err(Error::Usage),
         None => run(&cli.run),
     };
     match result {

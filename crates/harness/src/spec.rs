@@ -2,7 +2,7 @@
 
 use crate::report::Report;
 use crate::scene::{Scene, fnv1a};
-use crate::{Error, part, rays, render};
+use crate::{Error, part, rays, render, suite};
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, Method, Problem, exact, solve};
 use serde::{Deserialize, Serialize};
@@ -21,7 +21,12 @@ pub struct Experiment {
     pub name: String,
     /// What the experiment asks, for its readers.
     pub question: String,
-    /// Names or paths of the scenes; `A..B` after a colon stands for all numbers from A to B.
+    /// A measurement over the suite of stiff cases, in place of runs on scenes. Default none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub suite: Option<suite::Measure>,
+    /// Names or paths of the scenes; `A..B` after a colon stands for all numbers from A to B. With `suite`, names of
+    /// cases, none for all.
+    #[serde(default)]
     pub scenes: Vec<String>,
     /// Scenes that are left out, with a note, where they have not been fetched. Default none.
     #[serde(default)]
@@ -44,7 +49,8 @@ pub struct Experiment {
     /// Effort of a lower bound of every scene's internal area. Default none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lower_bound: Option<u32>,
-    /// What is run, at least one.
+    /// What is run, at least one; with `suite`, none for every method of the registry.
+    #[serde(default)]
     pub methods: Vec<Labelled>,
     /// Measurements of every run's tree with random rays. Default none.
     #[serde(default)]
@@ -156,13 +162,21 @@ impl Experiment {
             experiment.scenes.clone_from(&overrides.scenes);
             experiment.optional_scenes.clear();
         }
+        if experiment.suite.is_some() && experiment.methods.is_empty() {
+            let labelled = |method: Method| Labelled { label: method.name().into(), method, budget: None };
+            experiment.methods = Method::all().into_iter().map(labelled).collect();
+        }
         experiment.check().map_err(fail)?;
         Ok(experiment)
     }
 
     /// Everything that types alone do not say.
     fn check(&self) -> Result<(), String> {
-        if self.scenes.is_empty() {
+        if self.suite.is_some() {
+            if let Some(unknown) = self.scenes.iter().find(|id| suite::examine::case(id).is_none()) {
+                return Err(format!("scene {unknown} is no case of the suite; accepted: S01 to S45"));
+            }
+        } else if self.scenes.is_empty() {
             return Err("scenes is empty; accepted: at least one name or path".into());
         }
         if self.methods.is_empty() {

@@ -126,7 +126,7 @@ impl Report {
 }
 
 /// An experiment's rows, as read from its CSV files.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Rows {
     /// Of `runs.csv`.
     pub runs: Vec<RunRow>,

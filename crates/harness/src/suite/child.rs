@@ -1,0 +1,105 @@
+//! What runs in a process of its own: other libraries, whose crash or hang must not end the run, and builds whose peak
+//! memory is to be known.
+
+use super::examine::case;
+use super::scenes;
+use bvh_search::{Budget, Method, Problem, solve};
+use serde::{Deserialize, Serialize};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// The hidden command of the harness that [`main`] carries out.
+pub const COMMAND: &str = "suite-child";
+
+/// The other libraries, by name; none without the feature `peers`.
+#[cfg(feature = "peers")]
+pub use super::peers::NAMES as PEERS;
+/// The other libraries, by name; none without the feature `peers`.
+#[cfg(not(feature = "peers"))]
+pub const PEERS: &[&str] = &[];
+
+/// What a child says of another library's tree.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Found {
+    /// Edges from the root to the deepest leaf.
+    pub depth: usize,
+    /// The internal area.
+    pub cost: f64,
+    /// The promises that it broke; empty if none.
+    pub broken: String,
+}
+
+/// Runs this very program again and returns what it prints; an error if it fails or takes longer than `limit`.
+fn ask(arguments: [&str; 3], limit: Duration) -> Result<String, String> {
+    let program = std::env::current_exe().map_err(|error| error.to_string())?;
+    let start = Instant::now();
+    let mut child = Command::new(program)
+        .arg(COMMAND)
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .map_err(|error| error.to_string())?;
+    // What is printed fits into the pipe.
+    loop {
+        match child.try_wait().map_err(|error| error.to_string())? {
+            Some(_) => break,
+            None if start.elapsed() > limit => {
+                // Gone already, or going.
+                let _ = child.kill();
+                let _ = child.wait();
+                return Err(format!("no end within {} s", limit.as_secs()));
+            }
+            None => std::thread::sleep(Duration::from_millis(5)),
+        }
+    }
+    let output = child.wait_with_output().map_err(|error| error.to_string())?;
+    match output.status.success() {
+        true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
+        false if output.status.code() == Some(101) => Err("panic".into()),
+        false => Err(format!("crash, {}", output.status)),
+    }
+}
+
+/// Another library on the scene of a case, in a child; or how that ended.
+pub fn examine(peer: &str, case: &str, objects: usize, limit: Duration) -> Result<Found, String> {
+    let answer = ask([peer, case, &objects.to_string()], limit)?;
+    toml::from_str(&answer).map_err(|error| error.to_string())
+}
+
+/// The most memory that a build takes beyond its boxes, in a child; `None` where the system does not tell.
+pub fn peak_bytes(method: &Method, case: &str, objects: usize) -> Option<u64> {
+    let method = toml::to_string(method).ok()?;
+    let answer = ask([&method, case, &objects.to_string()], Duration::from_secs(3600)).ok()?;
+    answer.trim().parse().ok()
+}
+
+/// What the child does: `subject` is a library's name or a method as a spec writes it. Returns what to print.
+pub fn main(subject: &str, id: &str, objects: usize) -> Result<String, String> {
+    let scene = case(id).and_then(super::Case::scene).ok_or_else(|| format!("{id} is no case with a scene"))?;
+    let triangles = (scene.scene)(objects);
+    #[cfg(feature = "peers")]
+    if let Some(found) = super::peers::examine(subject, &triangles) {
+        return toml::to_string(&found).map_err(|error| error.to_string());
+    }
+    let method: Method = toml::from_str(subject).map_err(|error| error.to_string())?;
+    let boxes = scenes::boxes(&triangles);
+    drop(triangles);
+    let before = status("VmRSS");
+    let outcome =
+        solve(&method, &Problem::new(&boxes), 1, Budget::default(), &()).map_err(|e| e.to_string())?;
+    let peak = status("VmHWM");
+    drop(outcome);
+    match (before, peak) {
+        (Some(before), Some(peak)) => Ok(peak.saturating_sub(before).to_string()),
+        _ => Err("the system does not tell".into()),
+    }
+}
+
+/// A size in bytes as Linux tells it.
+fn status(key: &str) -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(':'))?;
+    Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
+}

@@ -1,0 +1,98 @@
+//! The internal area of a tree without any rounding: what the reported cost is measured against.
+
+use bvh_core::Bvh;
+use num_bigint::{BigInt, BigUint};
+use num_traits::{ToPrimitive, Zero};
+
+/// An f32 is a whole multiple of 2^-149; a product of two differences of them one of 2^-298.
+const UNIT: u32 = 298;
+/// An f64 is a whole multiple of 2^-1074.
+const UNIT_F64: u32 = 1074;
+
+/// A finite number in units of 2^-149.
+fn whole(x: f32) -> BigInt {
+    let bits = x.to_bits();
+    let (exponent, fraction) = (bits >> 23 & 0xff, bits & 0x7f_ffff);
+    let size = if exponent == 0 { fraction } else { fraction | 1 << 23 };
+    let size = BigInt::from(size) << (exponent.max(1) - 1);
+    if x.is_sign_negative() { -size } else { size }
+}
+
+/// [`bvh_core::cost::internal_area`] of a valid tree, exact, in units of 2^-298. O(nodes).
+pub fn internal_area(tree: &Bvh) -> BigUint {
+    let mut total = BigInt::zero();
+    for node in tree.nodes.iter().filter(|node| !node.is_leaf()) {
+        total += half_area(&node.aabb);
+    }
+    total.magnitude().clone()
+}
+
+/// The half area of a box that is not empty, exact, in units of 2^-298.
+pub fn half_area(aabb: &bvh_core::Aabb) -> BigInt {
+    let [x, y, z] = [0, 1, 2].map(|axis| whole(aabb.max[axis]) - whole(aabb.min[axis]));
+    &x * &y + &y * &z + &z * &x
+}
+
+/// |cost − exact| / exact, with `exact` in units of 2^-298; 0 if both are 0, infinite if only one is or the cost is not
+/// a finite number from 0 up.
+pub fn relative_error(cost: f64, exact: &BigUint) -> f64 {
+    if !(cost.is_finite() && cost >= 0.0) {
+        return f64::INFINITY;
+    }
+    let (bits, exact) = (cost.to_bits(), exact << (UNIT_F64 - UNIT));
+    let (exponent, fraction) = (bits >> 52, bits & ((1 << 52) - 1));
+    let size = if exponent == 0 { fraction } else { fraction | 1 << 52 };
+    let cost = BigUint::from(size) << (exponent.max(1) - 1);
+    let difference = if cost > exact { &cost - &exact } else { &exact - &cost };
+    if difference.is_zero() {
+        return 0.0;
+    }
+    if exact.is_zero() {
+        return f64::INFINITY;
+    }
+    ratio(&difference, &exact)
+}
+
+/// a / b for b above 0.
+pub fn ratio(a: &BigUint, b: &BigUint) -> f64 {
+    // In units of 2^-200: far below any rounding of a ratio that is not tiny.
+    ((a << 200u32) / b).to_f64().unwrap_or(f64::INFINITY) / 2f64.powi(200)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_core::{Aabb, Node};
+
+    fn pair(a: Aabb) -> Bvh {
+        Bvh {
+            nodes: vec![Node::inner(a, 1, 2), Node::leaf(a, 0, 1), Node::leaf(a, 1, 1)],
+            prim_ids: vec![0, 1],
+        }
+    }
+
+    #[test]
+    fn small_whole_areas_are_those_of_f64() {
+        let tree = pair(Aabb::from(([-1.0, 2.0, 0.5], [3.0, 2.25, 8.0])));
+        assert_eq!(relative_error(bvh_core::cost::internal_area(&tree), &internal_area(&tree)), 0.0);
+    }
+
+    #[test]
+    fn the_smallest_and_the_largest_box_are_exact() {
+        let tiny = f32::from_bits(1);
+        let exact = internal_area(&pair(Aabb::from(([0.0; 3], [tiny; 3]))));
+        assert_eq!(exact, BigUint::from(3u8));
+        let exact = internal_area(&pair(Aabb::from(([f32::MIN; 3], [f32::MAX; 3]))));
+        let side = (BigUint::from((1u32 << 24) - 1) << 104u32) * 2u8;
+        assert_eq!(exact, (&side * &side * 3u8) << UNIT);
+    }
+
+    #[test]
+    fn an_error_of_one_bit_is_seen() {
+        let tree = pair(Aabb::from(([0.0; 3], [1.0; 3])));
+        let error = relative_error(3f64.next_up(), &internal_area(&tree));
+        assert_eq!(error, (3f64.next_up() - 3.0) / 3.0);
+        assert_eq!(relative_error(f64::NAN, &internal_area(&tree)), f64::INFINITY);
+        assert_eq!(relative_error(0.0, &BigUint::zero()), 0.0);
+    }
+}

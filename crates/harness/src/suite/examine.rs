@@ -1,0 +1,161 @@
+//! One method on one scene: whether the promises P1, P2 and P4 to P7 are kept, and the numbers to report.
+
+use super::exact_area::{internal_area, relative_error};
+use super::transform::{same_topology, scale_range, scaled, scaled_area};
+use super::{Case, SceneCase, Size, Verdict, is_builder, scenes};
+use bvh_core::cost;
+use bvh_core::{Aabb, validate};
+use bvh_search::{Budget, Method, Outcome, Problem, SearchError, solve};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
+
+/// A cost may differ from the exact one by this much, relative to it.
+pub const ROUNDING: f64 = 1e-12;
+
+/// Scenes of more objects are not built for every number of threads and every scale.
+const REPEATED: usize = 20_000;
+
+/// What there is to say of one method on one scene.
+#[derive(Clone, Debug, Default)]
+pub struct Examined {
+    /// Numbers of objects.
+    pub objects: usize,
+    /// Edges from the root to the deepest leaf.
+    pub depth: usize,
+    /// The internal area.
+    pub cost: f64,
+    /// Of the cost, against exact arithmetic.
+    pub relative_error: f64,
+    /// Of the method alone.
+    pub seconds: f64,
+    /// Further findings.
+    pub note: String,
+}
+
+/// The budget of a method on so many objects. Builders have none.
+pub fn budget(method: &Method, objects: usize, work_per_object: u64) -> Budget {
+    let work = work_per_object.saturating_mul(objects as u64 + 1);
+    Budget { max_evaluations: None, max_work: (!is_builder(method)).then_some(work) }
+}
+
+/// Runs a method with seed 1; a panic is a broken promise.
+pub fn run(method: &Method, boxes: &[Aabb], work_per_object: u64) -> Result<Outcome, String> {
+    let budget = budget(method, boxes.len(), work_per_object);
+    let solved = catch_unwind(AssertUnwindSafe(|| solve(method, &Problem::new(boxes), 1, budget, &())));
+    match solved {
+        Ok(Ok(outcome)) => Ok(outcome),
+        Ok(Err(error)) => Err(format!("P1: refused: {error}")),
+        Err(panic) => Err(format!("P1: panicked: {}", message(&*panic))),
+    }
+}
+
+fn message(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().cloned();
+    text.or_else(|| panic.downcast_ref::<&str>().map(|&text| text.into())).unwrap_or_default()
+}
+
+/// Checks a method on the scene of a case at a size.
+pub fn examine(
+    case: &SceneCase,
+    method: &Method,
+    size: Size,
+    work_per_object: u64,
+) -> Result<Examined, String> {
+    let objects = case.objects(method, size);
+    let boxes = scenes::boxes(&(case.scene)(objects));
+    let start = Instant::now();
+    let outcome = run(method, &boxes, work_per_object)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let relative_error = check_outcome(&boxes, &outcome)?;
+    if boxes.len() <= REPEATED {
+        check_threads(method, &boxes, work_per_object, &outcome)?;
+        let range = scale_range(&boxes);
+        let (low, high) = (*range.start().max(&-120), *range.end().min(&120));
+        for k in [low, low / 7, high / 7, high] {
+            check_scale(method, &boxes, work_per_object, &outcome, k)?;
+        }
+    }
+    let note = case.also.map_or(Ok(String::new()), |also| also(method, &boxes, &outcome))?;
+    let (depth, cost) = (outcome.tree.depth(), outcome.cost);
+    Ok(Examined { objects: boxes.len(), depth, cost, relative_error, seconds, note })
+}
+
+/// P2 and P7: the tree is valid and tight, its cost finite, exact but for rounding, the best of the history and no
+/// higher than the start's. Returns the relative error of the cost.
+pub fn check_outcome(boxes: &[Aabb], outcome: &Outcome) -> Result<f64, String> {
+    let Outcome { tree, cost, history, .. } = outcome;
+    validate(tree, boxes).map_err(|error| format!("P2: {error}"))?;
+    let mut tight = tree.clone();
+    tight.refit(boxes);
+    if tight != *tree {
+        return Err("P2: boxes are not tight".into());
+    }
+    let costs = [*cost, cost::internal_area(tree), cost::goldsmith_salmon(tree)];
+    if !costs.iter().all(|cost| cost.is_finite() && *cost >= 0.0) {
+        return Err(format!("P7: costs {costs:?}"));
+    }
+    let error = relative_error(*cost, &internal_area(tree));
+    if error > ROUNDING {
+        return Err(format!("P7: the cost {cost} is off by {error:e} of the exact one"));
+    }
+    let best = history.iter().map(|event| event.cost).fold(f64::INFINITY, f64::min);
+    if best != *cost {
+        return Err(format!("P7: the cost is {cost}, the best of the history {best}"));
+    }
+    Ok(error)
+}
+
+/// P4: the same tree and history on one thread and on three.
+pub fn check_threads(
+    method: &Method,
+    boxes: &[Aabb],
+    work_per_object: u64,
+    outcome: &Outcome,
+) -> Result<(), String> {
+    for threads in [1, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| e.to_string())?;
+        let other = pool.install(|| run(method, boxes, work_per_object))?;
+        if (&other.tree, &other.history) != (&outcome.tree, &outcome.history) {
+            return Err(format!("P4: another outcome on {threads} threads"));
+        }
+    }
+    Ok(())
+}
+
+/// P5: the scene scaled by 2^k gives the same tree, and 4^k times the cost, bit by bit.
+pub fn check_scale(
+    method: &Method,
+    boxes: &[Aabb],
+    work_per_object: u64,
+    outcome: &Outcome,
+    k: i32,
+) -> Result<(), String> {
+    let other = run(method, &scaled(boxes, k), work_per_object)?;
+    if !same_topology(&other.tree, &outcome.tree) {
+        return Err(format!("P5: another tree at scale 2^{k}"));
+    }
+    let (expected, found) = (scaled_area(outcome.cost, k), other.cost);
+    if found != expected {
+        return Err(format!("P5: the cost at scale 2^{k} is {found}, not {expected}"));
+    }
+    Ok(())
+}
+
+/// The method refuses the boxes and names the object.
+pub fn refuses(method: &Method, boxes: &[Aabb], object: usize) -> Verdict {
+    let solved =
+        catch_unwind(AssertUnwindSafe(|| solve(method, &Problem::new(boxes), 1, Budget::default(), &())));
+    match solved {
+        Ok(Err(error @ SearchError::Build(_))) if error.to_string().contains(&format!("object {object} ")) => {
+            Ok(error.to_string())
+        }
+        Ok(Err(error)) => Err(format!("P1: the error names no object {object}: {error}")),
+        Ok(Ok(_)) => Err(format!("P1: built a tree over object {object}")),
+        Err(panic) => Err(format!("P1: panicked: {}", message(&*panic))),
+    }
+}
+
+/// The case of this identifier.
+pub fn case(id: &str) -> Option<&'static Case> {
+    super::CASES.iter().find(|case| case.id == id)
+}

@@ -1,0 +1,357 @@
+//! What the precision of areas costs and buys: the Müller–Fellner sweep in f32 and in f64 against exact arithmetic.
+//!
+//! One plain sweep, the same code for every kind of number, stands in for the builder's, which has f64 areas only.
+
+use super::exact_area::{half_area, internal_area, ratio};
+use super::scenes;
+use super::transform::scaled;
+use crate::Error;
+use crate::chart::{self, Axis, Figure, Layer, Panel};
+use crate::record::to_bytes;
+use crate::store::Store;
+use bvh_core::{Aabb, Bvh, Node};
+use num_bigint::{BigInt, BigUint};
+use num_traits::Zero;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::time::Instant;
+
+/// What is measured.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Objects per scene, at least 3.
+    pub objects: usize,
+    /// Builds per time; the shortest counts. At least 1.
+    pub repetitions: u32,
+}
+
+/// One kind of number on one scene, as written to `precision.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Row {
+    scene: String,
+    /// `f32` or `f64`.
+    method: String,
+    objects: usize,
+    /// Nodes of the exact tree with a choice.
+    decisions: usize,
+    /// Where the split chosen there costs more than the best one, exactly.
+    wrong: usize,
+    wrong_fraction: f64,
+    /// Where no candidate has a finite cost.
+    undecided: usize,
+    /// The internal area of the whole tree over that of the exact one; 1 if both are 0.
+    cost_over_exact: f64,
+}
+
+/// As written to `timing_precision.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Timing {
+    scene: String,
+    method: String,
+    nanoseconds_per_object: f64,
+}
+
+/// What sides of a split are valued in: half area times number of objects.
+trait Number: Clone {
+    fn side(aabb: &Aabb, count: usize) -> Self;
+    fn join(&self, other: &Self) -> Self;
+    /// Whether this is a cost, and the lower one.
+    fn precedes(&self, other: &Self) -> bool;
+    fn is_cost(&self) -> bool;
+}
+
+impl Number for f32 {
+    fn side(aabb: &Aabb, count: usize) -> Self {
+        let d = aabb.max - aabb.min;
+        (d.x * d.y + d.y * d.z + d.z * d.x) * count as f32
+    }
+    fn join(&self, other: &Self) -> Self {
+        self + other
+    }
+    fn precedes(&self, other: &Self) -> bool {
+        self < other
+    }
+    fn is_cost(&self) -> bool {
+        self.is_finite()
+    }
+}
+
+impl Number for f64 {
+    fn side(aabb: &Aabb, count: usize) -> Self {
+        aabb.half_area() * count as f64
+    }
+    fn join(&self, other: &Self) -> Self {
+        self + other
+    }
+    fn precedes(&self, other: &Self) -> bool {
+        self < other
+    }
+    fn is_cost(&self) -> bool {
+        self.is_finite()
+    }
+}
+
+impl Number for BigInt {
+    fn side(aabb: &Aabb, count: usize) -> Self {
+        half_area(aabb) * count
+    }
+    fn join(&self, other: &Self) -> Self {
+        self + other
+    }
+    fn precedes(&self, other: &Self) -> bool {
+        self < other
+    }
+    fn is_cost(&self) -> bool {
+        true
+    }
+}
+
+/// The first `left` objects in the order of `axis` against the rest.
+type Split = (usize, usize);
+
+/// The best of all splits by the rules of the builder: of equal cost the more balanced, then the lower axis and
+/// position. `None` if no cost is finite.
+fn best<N: Number>(boxes: &[Aabb], orders: &[Vec<u32>; 3]) -> Option<(N, Split)> {
+    let n = orders[0].len();
+    let mut best: Option<(N, usize, Split)> = None;
+    for (axis, order) in orders.iter().enumerate() {
+        let mut right = Vec::with_capacity(n);
+        let mut aabb = Aabb::EMPTY;
+        for (i, &object) in order.iter().enumerate().skip(1).rev() {
+            aabb = aabb.union(&boxes[object as usize]);
+            right.push(N::side(&aabb, n - i));
+        }
+        let mut aabb = Aabb::EMPTY;
+        for (left, right) in (1..n).zip(right.iter().rev()) {
+            aabb = aabb.union(&boxes[order[left - 1] as usize]);
+            let cost = N::side(&aabb, left).join(right);
+            let imbalance = n.abs_diff(2 * left);
+            let better = best.as_ref().is_none_or(|(least, balance, _)| {
+                cost.precedes(least) || (!least.precedes(&cost) && imbalance < *balance)
+            });
+            if cost.is_cost() && better {
+                best = Some((cost, imbalance, (axis, left)));
+            }
+        }
+    }
+    best.map(|(cost, _, split)| (cost, split))
+}
+
+/// What a split costs, exactly.
+fn exact_cost(boxes: &[Aabb], orders: &[Vec<u32>; 3], (axis, left): Split) -> BigInt {
+    let (l, r) = orders[axis].split_at(left);
+    let [l, r] = [l, r].map(|side| {
+        let aabb = side.iter().fold(Aabb::EMPTY, |b, &object| b.union(&boxes[object as usize]));
+        BigInt::side(&aabb, side.len())
+    });
+    l + r
+}
+
+/// The objects of both sides in the orders of all axes.
+fn divide(orders: &[Vec<u32>; 3], (axis, left): Split, goes_left: &mut [bool]) -> [[Vec<u32>; 3]; 2] {
+    for (at, &object) in orders[axis].iter().enumerate() {
+        goes_left[object as usize] = at < left;
+    }
+    [true, false].map(|side| {
+        [0, 1, 2].map(|axis: usize| {
+            orders[axis].iter().copied().filter(|&o| goes_left[o as usize] == side).collect()
+        })
+    })
+}
+
+/// Divides greedily down to single objects. `choose` is asked for the split of every node of three or more.
+fn build(boxes: &[Aabb], mut choose: impl FnMut(&[Vec<u32>; 3]) -> Split) -> Bvh {
+    let sorted = |axis: usize| {
+        let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+        order.sort_by(|&a, &b| {
+            let key = |object: u32| boxes[object as usize].doubled_centroid()[axis];
+            key(a).total_cmp(&key(b))
+        });
+        order
+    };
+    let placeholder = Node::leaf(Aabb::EMPTY, 0, 1);
+    let mut tree = Bvh { nodes: vec![placeholder], prim_ids: Vec::with_capacity(boxes.len()) };
+    let mut goes_left = vec![false; boxes.len()];
+    let mut open = vec![(0, [0, 1, 2].map(sorted))];
+    while let Some((node, orders)) = open.pop() {
+        if let [object] = orders[0][..] {
+            tree.nodes[node] = Node::leaf(Aabb::EMPTY, tree.prim_ids.len() as u32, 1);
+            tree.prim_ids.push(object);
+            continue;
+        }
+        let split = if orders[0].len() == 2 { (0, 1) } else { choose(&orders) };
+        let [left, right] = divide(&orders, split, &mut goes_left);
+        let first = tree.nodes.len();
+        tree.nodes[node] = Node::inner(Aabb::EMPTY, first as u32, 2);
+        tree.nodes.extend([placeholder; 2]);
+        open.extend([(first + 1, right), (first, left)]);
+    }
+    tree.refit(boxes);
+    tree
+}
+
+/// Halves what cannot be decided.
+fn chosen<N: Number>(boxes: &[Aabb], orders: &[Vec<u32>; 3]) -> Split {
+    best::<N>(boxes, orders).map_or((0, orders[0].len() / 2), |(_, split)| split)
+}
+
+/// The internal area of the exact tree, and its number of decisions, wrong ones by f32 and f64, undecided ones.
+#[derive(Default)]
+struct Decisions {
+    area: BigUint,
+    all: usize,
+    wrong: [usize; 2],
+    undecided: [usize; 2],
+}
+
+fn decisions(boxes: &[Aabb]) -> Decisions {
+    let mut found = Decisions::default();
+    let tree = build(boxes, |orders| {
+        let (least, split) =
+            best::<BigInt>(boxes, orders).unwrap_or_else(|| (BigInt::zero(), (0, orders[0].len() / 2)));
+        found.all += 1;
+        let choices = [
+            best::<f32>(boxes, orders).map(|(_, split)| split),
+            best::<f64>(boxes, orders).map(|(_, split)| split),
+        ];
+        for (kind, choice) in choices.into_iter().enumerate() {
+            found.undecided[kind] += usize::from(choice.is_none());
+            let choice = choice.unwrap_or((0, orders[0].len() / 2));
+            found.wrong[kind] += usize::from(choice != split && exact_cost(boxes, orders, choice) > least);
+        }
+        split
+    });
+    found.area = internal_area(&tree);
+    found
+}
+
+/// The stiff scenes on which precision could matter, by case.
+fn stiff(n: usize) -> Vec<(String, Vec<Aabb>)> {
+    let mut found: Vec<(String, Vec<Aabb>)> = Vec::new();
+    let uniform = scenes::boxes(&scenes::uniform(n));
+    for k in [-120, -72, -68, 0, 56, 60, 120] {
+        found.push((format!("S21 2^{k}"), scaled(&uniform, k)));
+    }
+    for id in ["S06", "S09", "S22", "S23", "S24", "S25", "S27", "S28", "S29", "S30", "S31"] {
+        if let Some(scene) = super::examine::case(id).and_then(super::Case::scene) {
+            let objects = n.min(scene.sizes[2]);
+            found.push((id.into(), scenes::boxes(&(scene.scene)(objects))));
+        }
+    }
+    found
+}
+
+impl Config {
+    /// Measures everything and writes the CSV files and the figure.
+    pub fn execute(&self, store: &Store) -> Result<String, Error> {
+        let (mut rows, mut timing) = (Vec::new(), Vec::new());
+        for (scene, boxes) in stiff(self.objects) {
+            let Decisions { area, all, wrong, undecided } = decisions(&boxes);
+            let measured = [self.timed::<f32>(&boxes), self.timed::<f64>(&boxes)];
+            for (kind, (tree, seconds)) in measured.into_iter().enumerate() {
+                let (scene, method) = (scene.clone(), ["f32", "f64"][kind].to_owned());
+                let nanoseconds_per_object = seconds * 1e9 / boxes.len() as f64;
+                timing.push(Timing { scene: scene.clone(), method: method.clone(), nanoseconds_per_object });
+                let cost_over_exact = if area.is_zero() { 1.0 } else { ratio(&internal_area(&tree), &area) };
+                rows.push(Row {
+                    scene,
+                    method,
+                    objects: boxes.len(),
+                    decisions: all,
+                    wrong: wrong[kind],
+                    wrong_fraction: wrong[kind] as f64 / all.max(1) as f64,
+                    undecided: undecided[kind],
+                    cost_over_exact,
+                });
+            }
+        }
+        store.write("precision.csv", &to_bytes(&rows, Path::new("precision.csv"))?)?;
+        store.write("timing_precision.csv", &to_bytes(&timing, Path::new("timing_precision.csv"))?)?;
+        let svg = chart::svg(&figure(&rows, &timing))?;
+        store.write("precision.svg", svg.as_bytes())?;
+        store.write("precision.png", &chart::png(&svg)?)?;
+        Ok(text(&rows))
+    }
+
+    /// The tree by one kind of number, and the seconds of the fastest build.
+    fn timed<N: Number>(&self, boxes: &[Aabb]) -> (Bvh, f64) {
+        let once = |_| {
+            let start = Instant::now();
+            let tree = build(boxes, |orders| chosen::<N>(boxes, orders));
+            (tree, start.elapsed().as_secs_f64())
+        };
+        let builds = (0..self.repetitions.max(1)).map(once);
+        builds.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
+    }
+}
+
+fn figure(rows: &[Row], timing: &[Timing]) -> Figure {
+    let of = |kind: &'static str| rows.iter().filter(move |row| row.method == kind);
+    let scenes: Vec<String> = of("f32").map(|row| row.scene.clone()).collect();
+    let bars =
+        |kind: &str, values: Vec<f64>| Layer::Bars { name: kind.into(), values, spread: vec![], base: 0.0 };
+    let panel = |title: &str, label: &str, value: &dyn Fn(&'static str) -> Vec<f64>| Panel {
+        title: title.into(),
+        x: Axis::categories("", scenes.clone()),
+        y: Axis::linear(label),
+        layers: ["f32", "f64"].map(|kind| bars(kind, value(kind))).into(),
+    };
+    let wrong = |kind| of(kind).map(|row| 100.0 * row.wrong_fraction).collect();
+    let cost = |kind| of(kind).map(|row| 100.0 * (row.cost_over_exact - 1.0)).collect();
+    let own_time = |kind: &'static str| timing.iter().filter(move |row| row.method == kind);
+    let time = |kind| own_time(kind).map(|row| row.nanoseconds_per_object / 1000.0).collect();
+    Figure {
+        title: "What f32 areas cost: Müller–Fellner's choices against exact arithmetic".into(),
+        caption: "Stiff scenes of the suite. Above, how often the chosen split is not the best one, at the nodes of the \
+                  exact tree; then the cost of the whole tree over the exact one's; below, the time of one plain sweep, \
+                  the same code for both."
+            .into(),
+        columns: 1,
+        panels: vec![
+            panel("wrong decisions", "% of nodes", &wrong),
+            panel("cost above the exact tree's", "%", &cost),
+            panel("time", "µs per object", &time),
+        ],
+        looks: vec![],
+    }
+}
+
+fn text(rows: &[Row]) -> String {
+    let mut table = comfy_table::Table::new();
+    table.load_preset(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(["scene", "areas", "wrong", "undecided", "cost over exact"]);
+    for row in rows {
+        let wrong = format!("{} of {}", row.wrong, row.decisions);
+        let cost = format!("{:.6}", row.cost_over_exact);
+        table.add_row([&row.scene, &row.method, &wrong, &row.undecided.to_string(), &cost]);
+    }
+    format!("{table}\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_build::{Builder, muller_fellner};
+
+    #[test]
+    fn the_plain_sweep_in_f64_builds_the_trees_of_the_builder() {
+        for make in [scenes::uniform, scenes::overlapping, scenes::planar_grid, scenes::two_densities] {
+            let boxes = scenes::boxes(&make(200));
+            let plain = build(&boxes, |orders| chosen::<f64>(&boxes, orders));
+            let built = muller_fellner::Config::default().build(&boxes).unwrap();
+            assert_eq!(internal_area(&plain), internal_area(&built));
+        }
+    }
+
+    #[test]
+    fn f32_is_lost_where_its_areas_vanish_or_overflow_and_f64_is_not() {
+        let uniform = scenes::boxes(&scenes::uniform(60));
+        for k in [-100, 100] {
+            let Decisions { all, wrong, undecided, .. } = decisions(&scaled(&uniform, k));
+            assert!(wrong[0] > all / 2, "{wrong:?} of {all}");
+            assert_eq!((wrong[1], undecided[1]), (0, 0));
+        }
+        assert_eq!(decisions(&uniform).wrong[1], 0);
+    }
+}

@@ -1,0 +1,261 @@
+//! The experiment `stability`: every case with every method, traversal and part, as rows and a heat map.
+
+use super::examine::Examined;
+use super::{CASES, Case, Cell, PARTS, SceneCase, Size, child, is_builder, tracing};
+use crate::Error;
+use crate::chart::{self, HeatMap, Key};
+use crate::record::{read, to_bytes};
+use crate::spec::Labelled;
+use crate::store::Store;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::time::Duration;
+
+/// What is run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// How large the scenes of builders are.
+    pub builders: Size,
+    /// Nodes per object that a search may make or visit.
+    pub work_per_object: u64,
+    /// Rays per scene and traversal.
+    pub rays: usize,
+    /// Seconds after which another library's build of a case, where any are compiled in, counts as hanging.
+    #[serde(default = "twenty")]
+    pub seconds_per_peer: u64,
+}
+
+fn twenty() -> u64 {
+    20
+}
+
+/// How a cell ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+enum Class {
+    #[serde(rename = "as promised")]
+    Kept,
+    #[serde(rename = "error, as promised")]
+    Refused,
+    #[serde(rename = "not there yet")]
+    Pending,
+    #[serde(rename = "promise broken")]
+    Broken,
+    #[serde(rename = "crash or hang")]
+    Dead,
+}
+
+const CLASSES: [&str; 5] =
+    ["as promised", "typed error, as promised", "not there yet", "promise broken", "crash or hang"];
+
+/// One cell, as written to `cells.csv`, and for other libraries to `timing_peers.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Row {
+    /// The case.
+    scene: String,
+    /// The method, traversal, part or library.
+    method: String,
+    outcome: Class,
+    /// 0 where nothing is built.
+    objects: usize,
+    depth: Option<usize>,
+    /// Internal area, world units squared.
+    cost: Option<f64>,
+    /// Of the cost against exact arithmetic.
+    relative_error: Option<f64>,
+    note: String,
+}
+
+/// The time of a method on a case's scene, as written to `timing_cells.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Timing {
+    scene: String,
+    method: String,
+    objects: usize,
+    seconds: f64,
+    nanoseconds_per_object: f64,
+    /// Of builders on S36, beyond the boxes, where the system tells.
+    peak_bytes_per_object: Option<f64>,
+}
+
+/// The case whose memory is measured.
+const MEMORY: &str = "S36";
+
+impl Row {
+    fn new(case: &Case, method: &str, cell: Cell) -> (Self, Option<Examined>) {
+        let row = |outcome, note| Self {
+            scene: format!("{} {}", case.id, case.name),
+            method: method.into(),
+            outcome,
+            objects: 0,
+            depth: None,
+            cost: None,
+            relative_error: None,
+            note,
+        };
+        match cell {
+            Cell::Refused(error) => (row(Class::Refused, error), None),
+            Cell::Broken(promise) => (row(Class::Broken, promise), None),
+            Cell::Pending => (row(Class::Pending, String::new()), None),
+            Cell::Kept(examined) if case.scene().is_some() && examined.seconds > 0.0 => {
+                let Examined { objects, depth, cost, relative_error, .. } = examined;
+                let (depth, cost, relative_error) = (Some(depth), Some(cost), Some(relative_error));
+                let kept = row(Class::Kept, examined.note.clone());
+                (Self { objects, depth, cost, relative_error, ..kept }, Some(examined))
+            }
+            Cell::Kept(examined) => (row(Class::Kept, examined.note), None),
+        }
+    }
+
+    /// The promises named in a broken cell, or the depth.
+    fn text(&self) -> String {
+        match self.outcome {
+            Class::Broken | Class::Dead => {
+                let promises = self.note.split([' ', ':', ';']).filter(|word| {
+                    word.len() == 2
+                        && word.starts_with('P')
+                        && word.ends_with(|digit: char| digit.is_ascii_digit())
+                });
+                let mut promises: Vec<&str> = promises.collect();
+                promises.dedup();
+                if promises.is_empty() { "!".into() } else { promises.join(" ") }
+            }
+            _ => self.depth.map_or_else(String::new, |depth| depth.to_string()),
+        }
+    }
+}
+
+impl Config {
+    /// Runs the cases (all if none are named) and writes rows, times and the heat map.
+    pub fn execute(
+        &self,
+        cases: &[String],
+        methods: &[Labelled],
+        store: &Store,
+        interrupted: &dyn Fn() -> bool,
+    ) -> Result<String, Error> {
+        let chosen = |case: &&Case| cases.is_empty() || cases.iter().any(|id| id == case.id);
+        let cases: Vec<&Case> = CASES.iter().filter(chosen).collect();
+        let (mut rows, mut times, mut peers) = (Vec::new(), Vec::new(), Vec::<Row>::new());
+        for (done, case) in cases.iter().enumerate() {
+            if interrupted() {
+                return Err(Error::Interrupted { finished: done, runs: cases.len() });
+            }
+            for Labelled { label, method, .. } in methods {
+                let cell = case.of_method(method, self.builders, self.work_per_object);
+                let Some((row, examined)) = cell.map(|cell| Row::new(case, label, cell)) else { continue };
+                times.extend(examined.map(|Examined { objects, seconds, .. }| {
+                    Timing {
+                        scene: row.scene.clone(),
+                        method: label.clone(),
+                        objects,
+                        seconds,
+                        nanoseconds_per_object: seconds * 1e9 / objects.max(1) as f64,
+                        peak_bytes_per_object: (case.id == MEMORY && is_builder(method))
+                            .then(|| child::peak_bytes(method, case.id, objects))
+                            .flatten()
+                            .map(|bytes| bytes as f64 / objects.max(1) as f64),
+                    }
+                }));
+                rows.push(row);
+            }
+            let traversals = tracing::TRAVERSALS.iter().filter_map(|(name, traversal)| {
+                Some(Row::new(case, name, case.of_traversal(*traversal, self.rays)?).0)
+            });
+            rows.extend(traversals);
+            rows.extend(PARTS.iter().filter_map(|part| Some(Row::new(case, part, case.of_part(part)?).0)));
+            for peer in child::PEERS {
+                peers.extend(case.scene().map(|scene| self.peer(case, scene, peer)));
+            }
+        }
+        store.write("cells.csv", &to_bytes(&rows, Path::new("cells.csv"))?)?;
+        store.write("timing_cells.csv", &to_bytes(&times, Path::new("timing_cells.csv"))?)?;
+        if !peers.is_empty() {
+            store.write("timing_peers.csv", &to_bytes(&peers, Path::new("timing_peers.csv"))?)?;
+        }
+        report(store)
+    }
+
+    /// Another library on a case: few objects with all checks, then many.
+    fn peer(&self, case: &Case, scene: &SceneCase, peer: &str) -> Row {
+        let limit = Duration::from_secs(self.seconds_per_peer.max(1));
+        let mut last = Row::new(case, peer, Cell::Pending).0;
+        let mut broken = Vec::new();
+        for objects in [scene.sizes[0], scene.sizes[1]] {
+            last.objects = objects;
+            match child::examine(peer, case.id, objects, limit) {
+                Ok(found) => {
+                    (last.depth, last.cost) = (Some(found.depth), found.cost.is_finite().then_some(found.cost));
+                    if !found.broken.is_empty() {
+                        broken.push(found.broken);
+                    }
+                }
+                Err(end) => {
+                    broken.push(format!("P1: {end} on {objects} objects"));
+                    return Row { outcome: Class::Dead, note: broken.join("; "), ..last };
+                }
+            }
+        }
+        let outcome = if broken.is_empty() { Class::Kept } else { Class::Broken };
+        Row { outcome, note: broken.join("; "), ..last }
+    }
+}
+
+/// The heat map and the summary, from the CSV files. The other libraries' rows may be those of an earlier run: without
+/// the feature `peers` none are written.
+fn report(store: &Store) -> Result<String, Error> {
+    let own: Vec<Row> = read(&store.folder().join("cells.csv"))?;
+    let mut rows = own.clone();
+    let peers = store.folder().join("timing_peers.csv");
+    if peers.is_file() {
+        rows.extend(read::<Row>(&peers)?);
+    }
+    let names = |name: fn(&Row) -> &String| {
+        let mut names: Vec<String> = Vec::new();
+        for row in &rows {
+            if !names.contains(name(row)) {
+                names.push(name(row).clone());
+            }
+        }
+        names
+    };
+    let (scenes, columns) = (names(|row| &row.scene), names(|row| &row.method));
+    let cell = |scene: &String, column: &String| {
+        let row = rows.iter().find(|row| (&row.scene, &row.method) == (scene, column));
+        row.map_or(chart::Cell { value: f64::NAN, text: String::new() }, |row| chart::Cell {
+            value: f64::from(row.outcome as u8),
+            text: row.text(),
+        })
+    };
+    let cells = scenes.iter().flat_map(|scene| columns.iter().map(move |column| cell(scene, column))).collect();
+    let map = HeatMap {
+        title: "Stiff and extreme cases".into(),
+        caption: "Every case with all that can be asked: methods, traversals, readers, and other libraries. Numbers are \
+                  depths of trees; where a promise was broken, which. Grey: not asked."
+            .into(),
+        row_label: "case".into(),
+        column_label: String::new(),
+        rows: scenes,
+        columns,
+        cells,
+        key: Key::Classes(CLASSES.map(String::from).into()),
+    };
+    let svg = chart::heatmap_svg(&map)?;
+    store.write("stability.svg", svg.as_bytes())?;
+    store.write("stability.png", &chart::png(&svg)?)?;
+    let count = |class| own.iter().filter(|row| row.outcome == class).count();
+    let worst = own.iter().filter_map(|row| row.relative_error).fold(0.0, f64::max);
+    let mut text = format!(
+        "{} cells: {} as promised, {} with the error promised, {} not there yet, {} broken. Largest error of a cost: \
+         {worst:.1e}.\n",
+        own.len(),
+        count(Class::Kept),
+        count(Class::Refused),
+        count(Class::Pending),
+        count(Class::Broken),
+    );
+    for row in rows.iter().filter(|row| matches!(row.outcome, Class::Broken | Class::Dead)) {
+        text += &format!("{}, {}: {}\n", row.scene, row.method, row.note);
+    }
+    Ok(text)
+}

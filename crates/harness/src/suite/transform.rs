@@ -1,0 +1,116 @@
+//! Exact changes of a scene that a method should not, or should, notice: scale, translation, reflection, axes, order.
+
+use bvh_core::{Aabb, Bvh};
+use bvh_search::Stream;
+use glam::{DVec3, Vec3};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use std::ops::RangeInclusive;
+
+/// 2^k for the k of normal numbers.
+fn power(k: i32) -> f64 {
+    f64::from_bits(((k.clamp(-1022, 1023) + 1023) as u64) << 52)
+}
+
+/// All coordinates times 2^k; exact for the k of [`scale_range`].
+pub fn scaled(boxes: &[Aabb], k: i32) -> Vec<Aabb> {
+    let scale = |p: Vec3| (p.as_dvec3() * power(k)).as_vec3();
+    boxes.iter().map(|b| Aabb { min: scale(b.min), max: scale(b.max) }).collect()
+}
+
+/// A cost in units of area after the scene was scaled by 2^k.
+pub fn scaled_area(area: f64, k: i32) -> f64 {
+    area * power(k) * power(k)
+}
+
+/// The k by which all coordinates can be scaled so that none overflows or becomes denormal; 0 is always among them.
+pub fn scale_range(boxes: &[Aabb]) -> RangeInclusive<i32> {
+    let coordinates = boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
+    let exponents = coordinates.filter(|&x| x != 0.0).map(|x| (x.to_bits() >> 23 & 0xff).max(1) as i32 - 127);
+    let (low, high) = exponents.fold((127, -126), |(low, high), e| (low.min(e), high.max(e)));
+    (-126 - low).min(0)..=(127 - high).max(0)
+}
+
+/// All coordinates along an axis negated.
+pub fn mirrored(boxes: &[Aabb], axis: usize) -> Vec<Aabb> {
+    let mut sign = Vec3::ONE;
+    sign[axis] = -1.0;
+    let mirror =
+        |b: &Aabb| Aabb { min: (b.min * sign).min(b.max * sign), max: (b.min * sign).max(b.max * sign) };
+    boxes.iter().map(mirror).collect()
+}
+
+/// Axis i becomes axis `to[i]`.
+pub fn with_axes(boxes: &[Aabb], to: [usize; 3]) -> Vec<Aabb> {
+    let turn = |p: Vec3| {
+        let mut turned = Vec3::ZERO;
+        (0..3).for_each(|axis| turned[to[axis]] = p[axis]);
+        turned
+    };
+    boxes.iter().map(|b| Aabb { min: turn(b.min), max: turn(b.max) }).collect()
+}
+
+/// All boxes moved; `None` unless every coordinate is exact afterwards.
+pub fn translated(boxes: &[Aabb], by: Vec3) -> Option<Vec<Aabb>> {
+    let exact = |p: Vec3| {
+        let sum = p.as_dvec3() + by.as_dvec3();
+        // The sum of two f32 may not even be an f64: back again it must be the same.
+        (sum.as_vec3().as_dvec3() == sum && sum - by.as_dvec3() == p.as_dvec3()).then(|| sum.as_vec3())
+    };
+    boxes.iter().map(|b| Some(Aabb { min: exact(b.min)?, max: exact(b.max)? })).collect()
+}
+
+/// The boxes in another order, and for every place in it the object's index before.
+pub fn shuffled(boxes: &[Aabb], seed: u64) -> (Vec<Aabb>, Vec<u32>) {
+    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+    order.shuffle(&mut Stream::seed_from_u64(seed));
+    (order.iter().map(|&i| boxes[i as usize]).collect(), order)
+}
+
+/// Whether no two boxes have the same centre along any axis: then no order depends on indices.
+pub fn distinct_centres(boxes: &[Aabb]) -> bool {
+    (0..3).all(|axis| {
+        let mut keys: Vec<f64> = boxes.iter().map(Aabb::doubled_centroid).map(|c: DVec3| c[axis]).collect();
+        keys.sort_by(f64::total_cmp);
+        keys.windows(2).all(|pair| pair[0] < pair[1])
+    })
+}
+
+/// The same tree, but for the boxes: the same nodes over the same objects.
+pub fn same_topology(a: &Bvh, b: &Bvh) -> bool {
+    let kinds = |tree: &Bvh| tree.nodes.iter().map(|node| node.kind()).collect::<Vec<_>>();
+    a.prim_ids == b.prim_ids && kinds(a) == kinds(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::suite::scenes;
+
+    #[test]
+    fn scaling_within_the_range_is_exact_and_beyond_it_is_not() {
+        let boxes = scenes::boxes(&scenes::uniform(50));
+        let range = scale_range(&boxes);
+        assert!(*range.start() <= -120 && *range.end() >= 120);
+        for k in [*range.start(), *range.end()] {
+            assert_eq!(scaled(&scaled(&boxes, k), -k), boxes);
+        }
+        assert_ne!(scaled(&scaled(&boxes, range.end() + 1), -range.end() - 1), boxes);
+    }
+
+    #[test]
+    fn two_reflections_and_three_turns_change_nothing() {
+        let boxes = scenes::boxes(&scenes::symmetric(50));
+        assert_eq!(mirrored(&mirrored(&boxes, 1), 1), boxes);
+        assert_ne!(mirrored(&boxes, 1), boxes);
+        let turn = |boxes: Vec<Aabb>| with_axes(&boxes, [1, 2, 0]);
+        assert_eq!(turn(turn(turn(boxes.clone()))), boxes);
+    }
+
+    #[test]
+    fn a_translation_that_rounds_is_none() {
+        let boxes = [Aabb::from(([0.0; 3], [1.0; 3]))];
+        assert!(translated(&boxes, Vec3::splat(8.0)).is_some());
+        assert_eq!(translated(&boxes, Vec3::splat(1e8)), None);
+    }
+}

@@ -1,0 +1,217 @@
+//! Laws that hold for all finite coordinates, as exact as each method can promise them.
+//!
+//! | law | who | claim |
+//! |---|---|---|
+//! | scale by 2^k | every method | same tree, cost times 4^k, bit by bit; `suite::behaviour::scales` has every k |
+//! | translation, exact in f32, on a grid of 24 bits | every method | same tree and cost, bit by bit. Off such a grid the sum of two corners, which orders objects, may round differently |
+//! | reflection | insertion in any order, exact | same tree and cost, bit by bit: these see areas and indices only |
+//! | | Müller–Fellner | same cost where neither centres nor costs of splits tie: ties go to the lower side |
+//! | | median cut | same cost for 2^k objects: an odd one goes to the lower half |
+//! | | agglomerative, searches from sorted orders | none: the Morton curve has a first corner; random draws name positions |
+//! | permutation of axes | insertion, exact | same cost where areas are exact: otherwise xy + yz + zx rounds by its order |
+//! | | Müller–Fellner | the same, and where nothing ties: ties go to the lower axis |
+//! | | median cut, agglomerative | none: axes alternate from x; curves interleave x first |
+//! | permutation of objects | Müller–Fellner, median cut | same tree, bit by bit, where no two centres tie along an axis |
+//! | | exact | same cost but for rounding |
+//! | | insertion | none: the order is what it is about |
+//! | every object twice | exact | the optimum grows by the objects' areas at most, and never falls |
+//! | one more object inside another | exact | the optimum grows by the other's area at most, and never falls |
+//! | | insertion, last | the Goldsmith–Salmon cost grows by 1 at most, a place at the root, and never falls |
+//! | | every method | the root's box stays |
+
+use bvh_core::{Aabb, cost};
+use bvh_search::{Method, Outcome, exact};
+use glam::Vec3;
+use harness::suite::examine::{ROUNDING, check_outcome, check_scale, run};
+use harness::suite::transform::{
+    distinct_centres, mirrored, same_topology, scale_range, shuffled, translated, with_axes,
+};
+use harness::suite::{EXACT_OBJECTS, methods};
+use proptest::prelude::*;
+
+/// Nodes per object that a search may make or visit.
+const WORK: u64 = 40;
+
+fn solved(method: &Method, boxes: &[Aabb]) -> Outcome {
+    run(method, boxes, WORK).unwrap_or_else(|broken| panic!("{}: {broken}", method.name()))
+}
+
+/// As many boxes as the method takes.
+fn taken<'a>(method: &Method, boxes: &'a [Aabb]) -> &'a [Aabb] {
+    if let Method::Exact(_) = method { &boxes[..boxes.len().min(EXACT_OBJECTS - 4)] } else { boxes }
+}
+
+fn named(name: &str) -> Method {
+    Method::all().into_iter().find(|method| method.name() == name).expect("a method of the registry")
+}
+
+/// The methods that look at areas and indices only.
+fn insertion_and_exact() -> Vec<Method> {
+    ["goldsmith_salmon", "random_orders", "genetic", "exact"].map(named).into()
+}
+
+fn box_of([a, b]: [[f32; 3]; 2]) -> Aabb {
+    let (a, b) = (Vec3::from(a), Vec3::from(b));
+    Aabb { min: a.min(b), max: a.max(b) }
+}
+
+/// Boxes of any finite bits; of several exponents in a row, from one to all of them; zeros, repetitions.
+fn any_boxes() -> impl Strategy<Value = Vec<Aabb>> {
+    (0u32..=254, 0u32..=254).prop_flat_map(|(low, width)| {
+        let coordinate = (any::<u32>(), low..=(low + width).min(254)).prop_map(move |(bits, exponent)| {
+            let random = f32::from_bits(bits & 0x807f_ffff | exponent << 23);
+            if bits.is_multiple_of(16) { 0.0 * random } else { random }
+        });
+        let corner = || prop::array::uniform3(coordinate.clone());
+        prop::collection::vec([corner(), corner()].prop_map(box_of), 0..40)
+    })
+}
+
+/// Boxes whose coordinates are whole multiples, of at most 22 bits, of one power of two, and that power.
+fn boxes_on_a_grid(bits: u32) -> impl Strategy<Value = (Vec<Aabb>, f32)> {
+    (-149i32..=104).prop_flat_map(move |exponent| {
+        let unit = libm::exp2(exponent.into()) as f32;
+        let most = (1 << bits) - 1;
+        let coordinate = (-most..=most).prop_map(move |whole: i32| whole as f32 * unit);
+        let corner = || prop::array::uniform3(coordinate.clone());
+        (prop::collection::vec([corner(), corner()].prop_map(box_of), 0..40), Just(unit))
+    })
+}
+
+/// Whether both costs are the same but for the rounding of sums.
+fn close(a: f64, b: f64) -> bool {
+    (a - b).abs() <= ROUNDING * a.max(b)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn every_method_builds_a_tight_tree_of_exact_cost_over_any_finite_bits(boxes in any_boxes()) {
+        for (label, method) in methods() {
+            let boxes = taken(&method, &boxes);
+            let found = check_outcome(boxes, &solved(&method, boxes));
+            prop_assert!(found.is_ok(), "{}: {:?}", label, found);
+        }
+    }
+
+    #[test]
+    fn a_scale_of_two_to_the_k_changes_no_tree(boxes in any_boxes(), at in 0.0..1.0) {
+        for (label, method) in methods() {
+            let boxes = taken(&method, &boxes);
+            let range = scale_range(boxes);
+            let k = range.start() + (f64::from(range.end() - range.start()) * at) as i32;
+            let found = check_scale(&method, boxes, WORK, &solved(&method, boxes), k);
+            prop_assert!(found.is_ok(), "{}: {:?}", label, found);
+        }
+    }
+
+    #[test]
+    fn an_exact_translation_changes_no_tree(
+        (boxes, unit) in boxes_on_a_grid(22), by in prop::array::uniform3(-(1i32 << 22)..1 << 22),
+    ) {
+        let by = Vec3::from(by.map(|whole| whole as f32 * unit));
+        let Some(moved) = translated(&boxes, by) else { return Err(TestCaseError::reject("rounds")) };
+        for (label, method) in methods() {
+            let (here, there) = (solved(&method, taken(&method, &boxes)), solved(&method, taken(&method, &moved)));
+            prop_assert!(same_topology(&here.tree, &there.tree) && here.cost == there.cost, "{}", label);
+        }
+    }
+
+    #[test]
+    fn a_reflection_changes_nothing_for_those_that_see_areas_only(boxes in any_boxes(), axis in 0usize..3) {
+        let other = mirrored(&boxes, axis);
+        for method in insertion_and_exact() {
+            let (one, other) = (solved(&method, taken(&method, &boxes)), solved(&method, taken(&method, &other)));
+            prop_assert!(same_topology(&one.tree, &other.tree) && one.cost == other.cost, "{}", method.name());
+        }
+    }
+
+    #[test]
+    fn a_reflection_keeps_the_cost_of_sorted_division(
+        // Within a few exponents, so that no large box hides the differences of small ones.
+        corners in prop::collection::vec([0.5f32..8.0, 0.5f32..8.0, 0.5f32..8.0, 0.01f32..1.0, 0.01f32..1.0, 0.01f32..1.0], 16),
+        axis in 0usize..3, k in -100i32..100,
+    ) {
+        let scale = libm::exp2(k.into()) as f32;
+        let of = |c: &[f32; 6]| Aabb::from(([c[0], c[1], c[2]], [c[0] + c[3], c[1] + c[4], c[2] + c[5]]));
+        let boxes: Vec<Aabb> =
+            corners.iter().map(of).map(|b| Aabb { min: b.min * scale, max: b.max * scale }).collect();
+        prop_assume!(distinct_centres(&boxes));
+        let other = mirrored(&boxes, axis);
+        for method in ["muller_fellner", "median_cut"].map(named) {
+            let costs = [&boxes, &other].map(|boxes| solved(&method, boxes).cost);
+            prop_assert!(close(costs[0], costs[1]), "{}: {:?}", method.name(), costs);
+        }
+    }
+
+    #[test]
+    fn a_permutation_of_axes_keeps_the_cost_where_areas_are_exact(
+        (boxes, _) in boxes_on_a_grid(15),
+        to in prop::sample::select(vec![[1, 2, 0], [2, 0, 1], [1, 0, 2], [0, 2, 1], [2, 1, 0]]),
+    ) {
+        let other = with_axes(&boxes, to);
+        for method in insertion_and_exact() {
+            let (one, other) = (solved(&method, taken(&method, &boxes)), solved(&method, taken(&method, &other)));
+            prop_assert!(same_topology(&one.tree, &other.tree) && one.cost == other.cost, "{}", method.name());
+        }
+    }
+
+    #[test]
+    fn the_order_of_objects_with_distinct_centres_changes_no_divided_tree(boxes in any_boxes(), seed in any::<u64>()) {
+        prop_assume!(distinct_centres(&boxes));
+        let (permuted, order) = shuffled(&boxes, seed);
+        for (label, method) in methods() {
+            if !matches!(method, Method::MullerFellner(_) | Method::MedianCut(_)) {
+                continue;
+            }
+            let (one, mut other) = (solved(&method, &boxes), solved(&method, &permuted));
+            other.tree.prim_ids.iter_mut().for_each(|id| *id = order[*id as usize]);
+            prop_assert!(one.tree == other.tree && one.cost == other.cost, "{}", label);
+        }
+    }
+
+    #[test]
+    fn the_order_of_objects_keeps_the_optimum(boxes in any_boxes(), seed in any::<u64>()) {
+        let exact = Method::Exact(exact::Config::default());
+        let boxes = taken(&exact, &boxes);
+        let costs = [solved(&exact, boxes).cost, solved(&exact, &shuffled(boxes, seed).0).cost];
+        prop_assert!(close(costs[0], costs[1]), "{:?}", costs);
+    }
+
+    #[test]
+    fn every_object_twice_costs_its_area_more_at_most(boxes in any_boxes()) {
+        let boxes = &boxes[..boxes.len().min(6)];
+        let twice: Vec<Aabb> = boxes.iter().flat_map(|b| [*b; 2]).collect();
+        let exact = Method::Exact(exact::Config::default());
+        let (once, both) = (solved(&exact, boxes).cost, solved(&exact, &twice).cost);
+        let most: f64 = once + boxes.iter().map(Aabb::half_area).sum::<f64>();
+        prop_assert!(once <= both * (1.0 + ROUNDING) && both <= most * (1.0 + ROUNDING), "{once} {both} {most}");
+        for (label, method) in methods() {
+            let outcome = solved(&method, &twice);
+            let wide = outcome.tree.nodes.iter().any(|node| node.children().len() > 2);
+            prop_assert!(wide || both <= outcome.cost * (1.0 + ROUNDING), "{} is below the optimum", label);
+        }
+    }
+
+    #[test]
+    fn an_enclosed_object_costs_its_encloser_more_at_most(boxes in any_boxes(), which in any::<prop::sample::Index>()) {
+        prop_assume!(!boxes.is_empty());
+        let boxes = &boxes[..boxes.len().min(EXACT_OBJECTS - 4)];
+        let around = boxes[which.index(boxes.len())];
+        let inside = Aabb { min: around.min, max: around.min };
+        let more = [boxes, &[inside]].concat();
+        let exact = Method::Exact(exact::Config::default());
+        let (before, after) = (solved(&exact, boxes).cost, solved(&exact, &more).cost);
+        let most = before + around.half_area();
+        prop_assert!(before <= after * (1.0 + ROUNDING) && after <= most * (1.0 + ROUNDING), "{before} {after}");
+        let insertion = named("goldsmith_salmon");
+        let [before, after] = [boxes, &more].map(|boxes| cost::goldsmith_salmon(&solved(&insertion, boxes).tree));
+        let first = if boxes.len() == 1 { 2.0 } else { 1.0 };
+        prop_assert!(before <= after * (1.0 + ROUNDING) && after <= (before + first) * (1.0 + ROUNDING));
+        for (label, method) in methods() {
+            let roots = [boxes, &more].map(|boxes| solved(&method, boxes).tree.root_aabb());
+            prop_assert_eq!(roots[0], roots[1], "{}", label);
+        }
+    }
+}

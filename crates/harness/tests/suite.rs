@@ -1,0 +1,171 @@
+//! Every case of the suite holds for every method, every traversal and every other part.
+
+use bvh_core::{cost::Objective, validate};
+use bvh_search::{Budget, Method, Problem, StopReason, solve};
+use harness::suite::{
+    self, CASES, Case, Cell, Check, EXACT_OBJECTS, PARTS, Size, examine, is_builder, scenes, tracing,
+};
+use std::collections::BTreeSet;
+
+/// Nodes per object that a search may make or visit here.
+const WORK: u64 = 150;
+
+/// Panics with all broken promises at once.
+fn assert_kept(broken: Vec<String>) {
+    assert!(broken.is_empty(), "\n{}", broken.join("\n"));
+}
+
+fn broken(case: &Case, subject: &str, cell: Option<Cell>) -> Option<String> {
+    match cell {
+        Some(Cell::Broken(promise)) => Some(format!("{} ({}), {subject}: {promise}", case.id, case.name)),
+        _ => None,
+    }
+}
+
+#[test]
+fn every_case_from_s01_to_s45_is_there_and_checked() {
+    let ids: Vec<String> = CASES.iter().map(|case| case.id.to_owned()).collect();
+    assert_eq!(ids, (1..=45).map(|i| format!("S{i:02}")).collect::<Vec<_>>());
+    for case in &CASES {
+        assert!(!case.checks.is_empty(), "{} has no check", case.id);
+        // A check of a method or a part that does not exist would never be made.
+        for check in case.checks {
+            match check {
+                Check::Method(Some(name), _) => assert!(Method::NAMES.contains(name), "{}: {name}", case.id),
+                Check::Part(part, _) | Check::Pending(part) => {
+                    assert!(PARTS.contains(part), "{}: {part}", case.id)
+                }
+                _ => {}
+            }
+        }
+    }
+    let pending = |case: &&Case| case.checks.iter().any(|check| matches!(check, Check::Pending(_)));
+    let pending: Vec<&str> = CASES.iter().filter(pending).map(|case| case.id).collect();
+    assert_eq!(pending, ["S38"], "all other cases can be checked");
+}
+
+#[test]
+fn every_scene_has_the_size_it_is_asked_for() {
+    for case in &CASES {
+        if let Some(scene) = case.scene() {
+            let few = scene.sizes[0];
+            assert_eq!((scene.scene)(few).len(), few, "{}", case.id);
+            assert!(scene.sizes.is_sorted(), "{}", case.id);
+        }
+    }
+}
+
+/// The methods of one half, so that two threads share them.
+fn check_methods(half: usize) {
+    let mut found = Vec::new();
+    for (label, method) in suite::methods().into_iter().skip(half).step_by(2) {
+        for case in &CASES {
+            found.extend(broken(case, &label, case.of_method(&method, Size::Few, WORK)));
+        }
+    }
+    assert_kept(found);
+}
+
+#[test]
+fn every_case_holds_for_every_method() {
+    check_methods(0);
+}
+
+#[test]
+fn every_case_holds_for_every_other_method() {
+    check_methods(1);
+}
+
+#[test]
+fn every_scene_holds_for_every_builder_at_a_larger_size() {
+    let mut found = Vec::new();
+    for (method, case) in
+        Method::all().iter().filter(|m| is_builder(m)).flat_map(|m| CASES.iter().map(move |c| (m, c)))
+    {
+        if let Some(scene) = case.scene() {
+            let examined = examine::examine(scene, method, Size::Many, WORK);
+            found.extend(broken(case, method.name(), examined.err().map(Cell::Broken)));
+        }
+    }
+    assert_kept(found);
+}
+
+#[test]
+#[ignore = "minutes and gigabytes: S36 has ten million triangles"]
+fn every_scene_holds_for_every_builder_at_its_full_size() {
+    let mut found = Vec::new();
+    for (method, case) in
+        Method::all().iter().filter(|m| is_builder(m)).flat_map(|m| CASES.iter().map(move |c| (m, c)))
+    {
+        if let Some(scene) = case.scene() {
+            let examined = examine::examine(scene, method, Size::All, WORK);
+            found.extend(broken(case, method.name(), examined.err().map(Cell::Broken)));
+        }
+    }
+    assert_kept(found);
+}
+
+#[test]
+fn every_traversal_answers_as_brute_force_on_every_scene() {
+    let mut found = Vec::new();
+    for case in &CASES {
+        for (name, traversal) in tracing::TRAVERSALS {
+            found.extend(broken(case, name, case.of_traversal(*traversal, 1500)));
+        }
+    }
+    assert_kept(found);
+}
+
+#[test]
+fn every_other_part_keeps_its_promises() {
+    let parts = CASES.iter().flat_map(|case| PARTS.map(|part| broken(case, part, case.of_part(part))));
+    assert_kept(parts.flatten().collect());
+}
+
+#[test]
+fn the_rays_of_the_suite_hit_miss_and_cover_every_kind() {
+    let triangles = scenes::closed_box(192);
+    let rays = tracing::rays(&triangles, 1500, 1);
+    assert_eq!(rays.len(), 1500);
+    let hits = rays.iter().filter(|ray| tracing::brute_force(&triangles, ray).is_some()).count();
+    assert!((300..1200).contains(&hits), "{hits}");
+    let zeros = rays.iter().flat_map(|ray| ray.direction().to_array()).filter(|&d| d == 0.0);
+    let signs: BTreeSet<u32> = zeros.map(f32::to_bits).collect();
+    assert_eq!(signs.len(), 2, "zeros of both signs");
+    assert!(
+        rays.iter().any(|ray| ray.t_min() > ray.t_max()) && rays.iter().any(|ray| ray.t_min() == ray.t_max())
+    );
+}
+
+#[test]
+fn every_objective_is_what_its_method_reports() {
+    for (label, method) in suite::methods() {
+        let n = if let Method::Exact(_) = method { EXACT_OBJECTS } else { 60 };
+        for make in [scenes::uniform, scenes::identical_points, scenes::giant_over_small] {
+            let boxes = scenes::boxes(&make(n));
+            for objective in [Objective::GoldsmithSalmon, Objective::Sah(Default::default())] {
+                let budget = examine::budget(&method, n, WORK);
+                let outcome = solve(&method, &Problem { boxes: &boxes, objective }, 1, budget, &()).unwrap();
+                validate(&outcome.tree, &boxes).unwrap();
+                let cost = objective.cost(&outcome.tree);
+                let close = (outcome.cost - cost).abs() <= examine::ROUNDING * cost;
+                assert!(close, "{label}, {objective:?}: {} reported, {cost}", outcome.cost);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_cancelled_method_says_so() {
+    struct Impatient;
+    impl bvh_search::Observer for Impatient {
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+    let boxes = scenes::boxes(&scenes::uniform(EXACT_OBJECTS));
+    for (label, method) in suite::methods() {
+        let cancelled = solve(&method, &Problem::new(&boxes), 1, Budget::default(), &Impatient).unwrap();
+        assert_eq!(cancelled.stop, StopReason::Cancelled, "{label}");
+    }
+}
