@@ -1,9 +1,10 @@
 //! Axis-aligned boxes: what every builder, search and cost sees of an object.
 
+use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
 /// An axis-aligned bounding box in world units. Zero extents are legal; see [`Aabb::EMPTY`] for 'no box at all'.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Aabb {
     /// Lower corner.
@@ -85,6 +86,13 @@ impl Aabb {
 
 impl From<([f32; 3], [f32; 3])> for Aabb {
     fn from((min, max): ([f32; 3], [f32; 3])) -> Self {
+        Self { min: min.into(), max: max.into() }
+    }
+}
+
+impl From<[[f32; 3]; 2]> for Aabb {
+    /// From the lower and the upper corner.
+    fn from([min, max]: [[f32; 3]; 2]) -> Self {
         Self { min: min.into(), max: max.into() }
     }
 }
