@@ -1,12 +1,14 @@
 //! Experiments on bounding volume hierarchies: TOML specs in, CSV files and figures out.
 //!
 //! Data flows one way: [`spec`] → [`scene`] → [`execute`] → [`store`] (rows of [`record`]) → [`report`], which reads
-//! the CSV files only. Everything that touches files, clocks, threads or the terminal lives in this crate.
+//! the CSV files only. Beside it, [`bake`] makes tree files and [`inspect`] reads them. Everything that touches files, clocks, threads or the terminal lives in this crate.
 
+pub mod bake;
 pub mod chart;
 pub mod check;
 pub mod error;
 pub mod execute;
+pub mod inspect;
 pub mod obj;
 pub mod part;
 pub mod provenance;
@@ -17,5 +19,6 @@ pub mod scene;
 pub mod spec;
 pub mod standin;
 pub mod store;
+pub mod tree_file;
 
 pub use error::Error;

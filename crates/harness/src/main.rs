@@ -1,6 +1,8 @@
 //! The command line: reads arguments, calls the library, prints what it returns, sets the exit code.
 
 use clap::{Args, Parser, Subcommand};
+use harness::bake::{BakeArgs, bake};
+use harness::inspect::{InspectArgs, inspect};
 use harness::scene::{FETCHED, SPHERES, Scene, fetched_path};
 use harness::spec::{Experiment, Overrides};
 use harness::standin::STAND_INS;
@@ -25,6 +27,8 @@ struct Cli {
 enum Command {
     /// List the built-in scenes, their sizes, and what each stands in for.
     Scenes,
+    Bake(BakeArgs),
+    Inspect(InspectArgs),
 }
 
 #[derive(Args)]
@@ -70,6 +74,8 @@ fn main() -> ExitCode {
     }
     let result = match cli.command {
         Some(Command::Scenes) => list_scenes(),
+        Some(Command::Bake(args)) => use_threads(args.jobs).and_then(|()| bake(&args, &INTERRUPTED)).map(print),
+        Some(Command::Inspect(args)) => inspect(&args).map(print),
         None => run(&cli.run),
     };
     match result {
@@ -91,13 +97,22 @@ fn complain(line: Arguments) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
+/// Prints a text that may be several lines.
+fn print(text: String) {
+    say(format_args!("{}", text.trim_end()));
+}
+
+/// Makes all threads of this program that many.
+fn use_threads(jobs: Option<u16>) -> Result<(), Error> {
+    let Some(jobs) = jobs else { return Ok(()) };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(jobs.into())
+        .build_global()
+        .map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))
+}
+
 fn run(args: &RunArgs) -> Result<(), Error> {
-    if let Some(jobs) = args.jobs {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(jobs.into())
-            .build_global()
-            .map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))?;
-    }
+    use_threads(args.jobs)?;
     let overrides = Overrides { scenes: args.scenes.clone(), seed: args.seed, quick: args.quick };
     // All specs are checked before the first one is run.
     let experiments =
