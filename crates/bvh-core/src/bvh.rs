@@ -61,6 +61,12 @@ impl Node {
         if self.is_leaf() { NodeKind::Leaf { first, count } } else { NodeKind::Inner { first, count } }
     }
 
+    /// `first`, `count`, and whether the node is a leaf, without a branch.
+    #[inline(always)]
+    pub(crate) fn parts(&self) -> (u32, u32, bool) {
+        (self.first, self.tagged_count & !LEAF, self.is_leaf())
+    }
+
     /// Whether the node is a leaf.
     #[inline]
     pub fn is_leaf(&self) -> bool {

@@ -43,17 +43,60 @@ pub enum InvalidBvh {
 /// exactly one leaf, every box inside its parent's bit by bit. O(nodes + objects), no recursion; safe on any bits.
 pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
     check_structure(tree.into(), boxes.len())?;
-    for (node, leaf) in tree.nodes.iter().enumerate() {
-        let mut objects = tree.prim_ids[leaf.prims()].iter().map(|&object| object as usize);
-        if let Some(object) = objects.find(|&object| !leaf.aabb.contains(&boxes[object])) {
+    for (node, at) in tree.nodes.iter().enumerate() {
+        if let Some(child) = at.children().find(|&child| !at.aabb.contains(&tree.nodes[child].aabb)) {
+            return Err(InvalidBvh::ChildOutside { node, child });
+        }
+        let mut objects = tree.prim_ids[at.prims()].iter().map(|&object| object as usize);
+        if let Some(object) = objects.find(|&object| !at.aabb.contains(&boxes[object])) {
             return Err(InvalidBvh::ObjectOutside { node, object });
         }
     }
     Ok(())
 }
 
-/// [`validate`] without the objects' boxes.
+/// [`validate`] without the boxes: what makes a traversal end and stay in bounds.
 pub(crate) fn check_structure(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
+    if is_plain(tree, objects) { Ok(()) } else { name_damage(tree, objects) }
+}
+
+/// Whether this is a sound tree of the common kind: two children per inner node, one object per leaf. Loading is to take no
+/// time, so nothing branches on where leaves are, and marks are only written: as many places as there are to name
+/// are named, and all are, hence each once.
+fn is_plain(tree: BvhView, objects: usize) -> bool {
+    let nodes = tree.nodes.len();
+    if objects == 0 || objects > MAX_OBJECTS || nodes != 2 * objects - 1 || tree.prim_ids.len() != objects {
+        return false;
+    }
+    // A mark per pair of siblings, then one per place in a leaf.
+    let pairs = objects - 1;
+    let mut marks = alloc::vec![0u8; pairs + objects];
+    let (mut inner, mut sound) = (0, true);
+    for (index, node) in tree.nodes.iter().enumerate() {
+        let (first, count, is_leaf) = node.parts();
+        let (slot, end) =
+            if is_leaf { (pairs + first as usize, pairs + objects) } else { (first as usize / 2, pairs) };
+        // Pairs fill the nodes from 1 on.
+        let follows = is_leaf | ((first as usize > index) & (first % 2 == 1));
+        sound &= follows & (count == 2 - u32::from(is_leaf)) & (slot < end);
+        if let Some(mark) = marks.get_mut(slot) {
+            *mark = 1;
+        }
+        inner += usize::from(!is_leaf);
+    }
+    let mut ids = alloc::vec![0u8; objects];
+    for &id in tree.prim_ids {
+        match ids.get_mut(id as usize) {
+            Some(mark) => *mark = 1,
+            None => return false,
+        }
+    }
+    let all = |marks: &[u8]| marks.iter().map(|&mark| usize::from(mark)).sum::<usize>() == marks.len();
+    sound && inner == pairs && all(&marks) && all(&ids)
+}
+
+/// The first thing that is wrong with a tree's structure, if anything is.
+fn name_damage(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
     let nodes = tree.nodes.len();
     if objects > MAX_OBJECTS {
         return Err(InvalidBvh::TooManyObjects { objects });
@@ -80,9 +123,6 @@ pub(crate) fn check_structure(tree: BvhView, objects: usize) -> Result<(), Inval
                 for child in range {
                     if !reached.set(child) {
                         return Err(InvalidBvh::Parents { node: child, parents: 2 });
-                    }
-                    if !node.aabb.contains(&tree.nodes[child].aabb) {
-                        return Err(InvalidBvh::ChildOutside { node: index, child });
                     }
                 }
             }

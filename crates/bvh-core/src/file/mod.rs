@@ -281,7 +281,8 @@ impl<'a> TreeFile<'a> {
         }
     }
 
-    /// The tree, copied, its structure and the nesting of its boxes checked. O(nodes + objects).
+    /// The tree, copied, its structure checked: what makes traversals end and stay in bounds. What the boxes contain is
+    /// left to the checksum, or to [`validate`](validate()). O(nodes + objects).
     pub fn tree(&self) -> Result<Bvh, FileError> {
         self.expect(Layout::Tree)?;
         let tree = Bvh { nodes: copied(self.sections[0]), prim_ids: copied(self.sections[1]) };
