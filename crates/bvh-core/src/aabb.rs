@@ -1,9 +1,10 @@
 //! Axis-aligned boxes: what every builder, search and cost sees of an object.
 
-use glam::{DVec3, Vec3};
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3, Vec4};
 
 /// An axis-aligned bounding box in world units. Zero extents are legal; see [`Aabb::EMPTY`] for 'no box at all'.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Aabb {
     /// Lower corner.
@@ -56,7 +57,14 @@ impl Aabb {
     /// Everything contains an empty box.
     #[inline]
     pub fn contains(&self, other: &Self) -> bool {
-        self.min.cmple(other.min).all() && self.max.cmpge(other.max).all()
+        // Four lanes at a time: min x, y, z, max x, then min z, max x, y, z.
+        let lanes = |aabb: &Self| {
+            let [min_x, min_y, min_z, max_x, max_y, max_z] = bytemuck::cast(*aabb);
+            (Vec4::new(min_x, min_y, min_z, max_x), Vec4::new(min_z, max_x, max_y, max_z))
+        };
+        let ((min, max), (other_min, other_max)) = (lanes(self), lanes(other));
+        let (above, below) = (min.cmple(other_min).bitmask(), max.cmpge(other_max).bitmask());
+        (above & 0b0111 == 0b0111) & (below & 0b1110 == 0b1110)
     }
 
     /// The axis (0, 1 or 2) of the largest extent; the lowest such axis on ties.
@@ -85,6 +93,13 @@ impl Aabb {
 
 impl From<([f32; 3], [f32; 3])> for Aabb {
     fn from((min, max): ([f32; 3], [f32; 3])) -> Self {
+        Self { min: min.into(), max: max.into() }
+    }
+}
+
+impl From<[[f32; 3]; 2]> for Aabb {
+    /// From the lower and the upper corner.
+    fn from([min, max]: [[f32; 3]; 2]) -> Self {
         Self { min: min.into(), max: max.into() }
     }
 }
@@ -128,6 +143,21 @@ mod tests {
         assert_eq!(Aabb::EMPTY.union(&b), b);
         assert_eq!(Aabb::EMPTY.half_area(), 0.0);
         assert!(b.contains(&Aabb::EMPTY));
+    }
+
+    #[test]
+    fn a_box_contains_another_if_all_six_planes_do() {
+        let unit = Aabb::from([[0.0; 3], [1.0; 3]]);
+        assert!(unit.contains(&unit));
+        for plane in 0..6 {
+            for (inside, shifted) in [(true, 0.5), (false, -0.5), (false, 1.5), (false, f32::NAN)] {
+                let mut corners = [[0.0f32; 3], [1.0; 3]];
+                corners[plane / 3][plane % 3] = shifted;
+                let other = Aabb::from(corners);
+                let inside = inside || (plane < 3 && shifted == 1.5) || (plane >= 3 && shifted == -0.5);
+                assert_eq!(unit.contains(&other), inside, "{other:?}");
+            }
+        }
     }
 
     #[test]

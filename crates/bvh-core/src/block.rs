@@ -1,10 +1,11 @@
 //! Four triangles side by side, for tests of one ray against all of them.
 
 use crate::{MAX_OBJECTS, Shear, Triangle};
+use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4};
 
 /// Up to four triangles: `corners[corner][axis][lane]`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub(crate) struct Block {
     corners: [[Vec4; 3]; 3],
@@ -34,6 +35,13 @@ impl Block {
             block.ids[0] |= if number == blocks { Self::LAST } else { 0 };
             block
         })
+    }
+
+    /// The ids in the lanes, the first one used, without what marks a last block; `None` in unused lanes.
+    pub(crate) fn ids(&self) -> [Option<u32>; 4] {
+        let [first, others @ ..] = self.ids;
+        let id = |id| (id != Self::UNUSED).then_some(id);
+        [Some(first & !Self::LAST), id(others[0]), id(others[1]), id(others[2])]
     }
 
     /// Whether this is a leaf's last block.

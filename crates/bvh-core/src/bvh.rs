@@ -2,6 +2,7 @@
 
 use crate::Aabb;
 use alloc::vec::Vec;
+use bytemuck::{Pod, Zeroable};
 
 /// The most objects one tree may hold: node indices and counts stay within 31 bits.
 pub const MAX_OBJECTS: usize = 1 << 30;
@@ -9,7 +10,7 @@ pub const MAX_OBJECTS: usize = 1 << 30;
 const LEAF: u32 = 1 << 31;
 
 /// A node of a [`Bvh`]: 32 bytes, plain data.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Node {
     /// Contains everything below the node; the exact union when built by this workspace.
@@ -60,6 +61,12 @@ impl Node {
         if self.is_leaf() { NodeKind::Leaf { first, count } } else { NodeKind::Inner { first, count } }
     }
 
+    /// `first`, `count`, and whether the node is a leaf, without a branch.
+    #[inline(always)]
+    pub(crate) fn parts(&self) -> (u32, u32, bool) {
+        (self.first, self.tagged_count & !LEAF, self.is_leaf())
+    }
+
     /// Whether the node is a leaf.
     #[inline]
     pub fn is_leaf(&self) -> bool {
@@ -96,6 +103,22 @@ pub struct Bvh {
     pub nodes: Vec<Node>,
     /// Object ids, in leaf order; one entry per object.
     pub prim_ids: Vec<u32>,
+}
+
+/// A [`Bvh`] that lies elsewhere, in a mapped file for example: what traversal takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BvhView<'a> {
+    /// As [`Bvh::nodes`].
+    pub nodes: &'a [Node],
+    /// As [`Bvh::prim_ids`].
+    pub prim_ids: &'a [u32],
+}
+
+impl<'a> From<&'a Bvh> for BvhView<'a> {
+    #[inline(always)]
+    fn from(tree: &'a Bvh) -> Self {
+        Self { nodes: &tree.nodes, prim_ids: &tree.prim_ids }
+    }
 }
 
 impl Bvh {

@@ -58,7 +58,7 @@ fn collect(tree: &Bvh, subtree: usize, ids: &mut Vec<u32>) {
 }
 
 /// The same tree with two children per inner node: further ones are halved, in their order.
-fn binary(tree: &Bvh) -> Cow<'_, Bvh> {
+pub(crate) fn binary(tree: &Bvh) -> Cow<'_, Bvh> {
     if tree.nodes.iter().all(|node| node.is_leaf() || node.children().len() == 2) {
         return Cow::Borrowed(tree);
     }

@@ -6,6 +6,8 @@
 
 use crate::{Bvh, NodeKind};
 
+pub use crate::overlap::end_point_overlap;
+
 /// Which cost a search minimises and a row of results reports as `cost`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]

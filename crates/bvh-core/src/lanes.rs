@@ -84,7 +84,7 @@ pub(crate) use avx2::Avx2;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod avx2 {
     use super::{Child, Expand, Pending, WideNode, WideRay};
-    use crate::{Hit, Ray, Slabs, WideBvh};
+    use crate::{Hit, Ray, Slabs, WideView};
     use core::arch::x86_64::*;
 
     /// Proof that the processor has AVX2 and what came with it.
@@ -101,9 +101,9 @@ mod avx2 {
         }
 
         #[inline(always)]
-        pub(crate) fn nearest_hit(self, wide: &WideBvh, ray: &Ray) -> Option<Hit> {
+        pub(crate) fn nearest_hit(self, wide: WideView, ray: &Ray) -> Option<Hit> {
             #[target_feature(enable = "avx2,bmi1,popcnt")]
-            fn inner(wide: &WideBvh, ray: &Ray) -> Option<Hit> {
+            fn inner(wide: WideView, ray: &Ray) -> Option<Hit> {
                 wide.nearest_with::<Avx2>(ray)
             }
             // SAFETY: a value of `Self` exists only where `detect` has found these features.
@@ -111,9 +111,9 @@ mod avx2 {
         }
 
         #[inline(always)]
-        pub(crate) fn any_hit(self, wide: &WideBvh, ray: &Ray) -> bool {
+        pub(crate) fn any_hit(self, wide: WideView, ray: &Ray) -> bool {
             #[target_feature(enable = "avx2,bmi1,popcnt")]
-            fn inner(wide: &WideBvh, ray: &Ray) -> bool {
+            fn inner(wide: WideView, ray: &Ray) -> bool {
                 wide.any_with::<Avx2>(ray)
             }
             // SAFETY: a value of `Self` exists only where `detect` has found these features.

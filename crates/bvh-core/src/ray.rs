@@ -41,9 +41,15 @@ impl Ray {
     const DIRECTION_RANGE: core::ops::RangeInclusive<f32> = pow2(-100)..=pow2(100);
 
     /// The ray from `origin` in `direction` over `t_min..=t_max`. Distances `t` are in multiples of the direction's
-    /// length, which need not be 1. An infinite `t_max` stands for the largest finite distance.
+    /// length, which need not be 1. An infinite `t_max` stands for the largest finite distance. Arrays `[f32; 3]` will do.
     #[inline]
-    pub fn new(origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Result<Self, InvalidRay> {
+    pub fn new(
+        origin: impl Into<Vec3>,
+        direction: impl Into<Vec3>,
+        t_min: f32,
+        t_max: f32,
+    ) -> Result<Self, InvalidRay> {
+        let (origin, direction) = (origin.into(), direction.into());
         if !origin.is_finite() {
             return Err(InvalidRay::Origin(origin));
         }
@@ -63,7 +69,7 @@ impl Ray {
 
     /// The whole half line: `t` from 0 to the largest finite distance.
     #[inline]
-    pub fn half_line(origin: Vec3, direction: Vec3) -> Result<Self, InvalidRay> {
+    pub fn half_line(origin: impl Into<Vec3>, direction: impl Into<Vec3>) -> Result<Self, InvalidRay> {
         Self::new(origin, direction, 0.0, f32::MAX)
     }
 

@@ -14,6 +14,11 @@ pub struct Sphere {
 }
 
 impl Sphere {
+    /// From a centre, as an array or as a vector, and a radius.
+    pub fn new(center: impl Into<Vec3>, radius: f32) -> Self {
+        Self { center: center.into(), radius }
+    }
+
     /// A box around the sphere, its corners rounded outwards and kept finite.
     pub fn aabb(&self) -> Aabb {
         let (center, radius) = (self.center.as_dvec3(), f64::from(self.radius));

@@ -25,7 +25,7 @@
 //! ```
 
 use crate::stack::Stack;
-use crate::{Bvh, Hit, Node, NodeKind, Ray, Slabs};
+use crate::{BvhView, Hit, Node, NodeKind, Ray, Slabs};
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
@@ -67,19 +67,19 @@ impl Counter for TestCounts {
 
 /// The nearest object that `ray` meets in its range; of several at the same distance the one of the lowest id.
 ///
-/// `test(object, t_max)` gives the distance at which the ray meets the object, if that is in `ray.t_min()..=t_max`.
+/// `tree` is a [`&Bvh`](crate::Bvh) or a view of one. `test(object, t_max)` gives the distance at which the ray meets the object, if that is in `ray.t_min()..=t_max`.
 ///
 /// # Panics
 /// May panic, or not return, for a tree that [`validate`](crate::validate()) refuses.
 #[inline]
-pub fn nearest_hit(
-    tree: &Bvh,
+pub fn nearest_hit<'t>(
+    tree: impl Into<BvhView<'t>>,
     ray: &Ray,
     mut test: impl FnMut(u32, f32) -> Option<f32>,
     counter: &mut impl Counter,
 ) -> Option<Hit> {
     let mut nearest = None;
-    walk(tree, ray, counter, |objects, t_max, counter| {
+    walk(tree.into(), ray, counter, |objects, t_max, counter| {
         nearest_of(objects.iter().copied(), t_max, &mut nearest, &mut test, counter);
         ControlFlow::Continue(())
     });
@@ -94,9 +94,14 @@ pub fn nearest_hit(
 /// # Panics
 /// As [`nearest_hit`].
 #[inline]
-pub fn any_hit(tree: &Bvh, ray: &Ray, mut test: impl FnMut(u32) -> bool, counter: &mut impl Counter) -> bool {
+pub fn any_hit<'t>(
+    tree: impl Into<BvhView<'t>>,
+    ray: &Ray,
+    mut test: impl FnMut(u32) -> bool,
+    counter: &mut impl Counter,
+) -> bool {
     let mut found = false;
-    walk(tree, ray, counter, |objects, _, counter| {
+    walk(tree.into(), ray, counter, |objects, _, counter| {
         for &object in objects {
             counter.object();
             if test(object) {
@@ -163,7 +168,7 @@ struct Pending {
 /// the distance from which on boxes are skipped.
 #[inline(always)]
 fn walk<C: Counter>(
-    tree: &Bvh,
+    tree: BvhView,
     ray: &Ray,
     counter: &mut C,
     mut leaf: impl FnMut(&[u32], &mut f32, &mut C) -> ControlFlow<()>,
@@ -226,7 +231,7 @@ fn walk<C: Counter>(
 
 /// The objects of a leaf.
 #[inline(always)]
-fn objects(tree: &Bvh, leaf: NodeKind) -> &[u32] {
+fn objects(tree: BvhView<'_>, leaf: NodeKind) -> &[u32] {
     match leaf {
         NodeKind::Leaf { first, count } => &tree.prim_ids[first as usize..first as usize + count as usize],
         NodeKind::Inner { .. } => &[],

@@ -1,12 +1,20 @@
 //! Triangles, and a ray test that lets no ray through the edge between two of them.
 
 use crate::{Aabb, Ray, clip_to_box};
+use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
 /// A triangle in world units; either side can be hit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Triangle(pub [Vec3; 3]);
+
+impl From<[[f32; 3]; 3]> for Triangle {
+    /// From three corners.
+    fn from(corners: [[f32; 3]; 3]) -> Self {
+        Self(corners.map(Vec3::from))
+    }
+}
 
 /// A ray prepared for tests against triangles: the shear that turns its direction into the axis `z`.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,7 @@
 //! The one validator: says whether a tree is one, and over the objects it claims.
 
-use crate::{Aabb, Bvh, MAX_OBJECTS, NodeKind};
+use crate::{Aabb, Bvh, BvhView, MAX_OBJECTS, NodeKind};
+use alloc::vec::Vec;
 
 /// Why a tree was refused. Nodes and objects are named by index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -21,7 +22,7 @@ pub enum InvalidBvh {
     /// A leaf's range must be non-empty and inside `prim_ids`.
     #[error("leaf {node} names objects {first}..{first}+{count}, of {objects}")]
     BadLeaf { node: usize, first: u32, count: u32, objects: usize },
-    /// A node that no parent or more than one parent names.
+    /// A node that no parent or more than one parent names; only two are counted.
     #[error("node {node} has {parents} parents")]
     Parents { node: usize, parents: u32 },
     /// An object id outside the scene.
@@ -41,7 +42,62 @@ pub enum InvalidBvh {
 /// Checks that `tree` is a tree over exactly the objects of `boxes`: every node reached once, every object in
 /// exactly one leaf, every box inside its parent's bit by bit. O(nodes + objects), no recursion; safe on any bits.
 pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
-    let (nodes, objects) = (tree.nodes.len(), boxes.len());
+    check_structure(tree.into(), boxes.len())?;
+    for (node, at) in tree.nodes.iter().enumerate() {
+        if let Some(child) = at.children().find(|&child| !at.aabb.contains(&tree.nodes[child].aabb)) {
+            return Err(InvalidBvh::ChildOutside { node, child });
+        }
+        let mut objects = tree.prim_ids[at.prims()].iter().map(|&object| object as usize);
+        if let Some(object) = objects.find(|&object| !at.aabb.contains(&boxes[object])) {
+            return Err(InvalidBvh::ObjectOutside { node, object });
+        }
+    }
+    Ok(())
+}
+
+/// [`validate`] without the boxes: what makes a traversal end and stay in bounds.
+pub(crate) fn check_structure(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
+    if is_plain(tree, objects) { Ok(()) } else { name_damage(tree, objects) }
+}
+
+/// Whether this is a sound tree of the common kind: two children per inner node, one object per leaf. Loading is to take no
+/// time, so nothing branches on where leaves are, and marks are only written: as many places as there are to name
+/// are named, and all are, hence each once.
+fn is_plain(tree: BvhView, objects: usize) -> bool {
+    let nodes = tree.nodes.len();
+    if objects == 0 || objects > MAX_OBJECTS || nodes != 2 * objects - 1 || tree.prim_ids.len() != objects {
+        return false;
+    }
+    // A mark per pair of siblings, then one per place in a leaf.
+    let pairs = objects - 1;
+    let mut marks = alloc::vec![0u8; pairs + objects];
+    let (mut inner, mut sound) = (0, true);
+    for (index, node) in tree.nodes.iter().enumerate() {
+        let (first, count, is_leaf) = node.parts();
+        let (slot, end) =
+            if is_leaf { (pairs + first as usize, pairs + objects) } else { (first as usize / 2, pairs) };
+        // Pairs fill the nodes from 1 on.
+        let follows = is_leaf | ((first as usize > index) & (first % 2 == 1));
+        sound &= follows & (count == 2 - u32::from(is_leaf)) & (slot < end);
+        if let Some(mark) = marks.get_mut(slot) {
+            *mark = 1;
+        }
+        inner += usize::from(!is_leaf);
+    }
+    let mut ids = alloc::vec![0u8; objects];
+    for &id in tree.prim_ids {
+        match ids.get_mut(id as usize) {
+            Some(mark) => *mark = 1,
+            None => return false,
+        }
+    }
+    let all = |marks: &[u8]| marks.iter().map(|&mark| usize::from(mark)).sum::<usize>() == marks.len();
+    sound && inner == pairs && all(&marks) && all(&ids)
+}
+
+/// The first thing that is wrong with a tree's structure, if anything is.
+fn name_damage(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
+    let nodes = tree.nodes.len();
     if objects > MAX_OBJECTS {
         return Err(InvalidBvh::TooManyObjects { objects });
     }
@@ -51,8 +107,10 @@ pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
     if (nodes == 0) != (objects == 0) || nodes > 2 * objects {
         return Err(InvalidBvh::NodeCount { nodes, objects });
     }
-    let mut parents = alloc::vec![0u32; nodes];
-    let mut leaves = alloc::vec![0u32; objects];
+    let (mut reached, mut placed) = (Marks::new(nodes), Marks::new(objects));
+    // Of every node but the root, and of every object, if each is marked once.
+    let (mut children, mut prims) = (0, 0);
+    let mut repeated = None;
     for (index, node) in tree.nodes.iter().enumerate() {
         match node.kind() {
             NodeKind::Inner { first, count } => {
@@ -61,10 +119,10 @@ pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
                 if count < 2 || range.start <= index || range.end > nodes {
                     return Err(InvalidBvh::BadChildren { node: index, first, count, nodes });
                 }
+                children += range.len();
                 for child in range {
-                    parents[child] += 1;
-                    if !node.aabb.contains(&tree.nodes[child].aabb) {
-                        return Err(InvalidBvh::ChildOutside { node: index, child });
+                    if !reached.set(child) {
+                        return Err(InvalidBvh::Parents { node: child, parents: 2 });
                     }
                 }
             }
@@ -73,26 +131,53 @@ pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
                 if count < 1 || range.end > objects {
                     return Err(InvalidBvh::BadLeaf { node: index, first, count, objects });
                 }
+                prims += range.len();
                 for &object in &tree.prim_ids[range] {
-                    let Some(aabb) = boxes.get(object as usize) else {
+                    if object as usize >= objects {
                         return Err(InvalidBvh::BadObject { node: index, object, objects });
-                    };
-                    leaves[object as usize] += 1;
-                    if !node.aabb.contains(aabb) {
-                        return Err(InvalidBvh::ObjectOutside { node: index, object: object as usize });
+                    }
+                    if !placed.set(object as usize) {
+                        repeated = Some(object as usize);
                     }
                 }
             }
         }
     }
-    for (node, &parents) in parents.iter().enumerate() {
-        if parents != u32::from(node != 0) {
-            return Err(InvalidBvh::Parents { node, parents });
-        }
+    if children + 1 < nodes
+        && let Some(node) = (1..nodes).find(|&node| !reached.get(node))
+    {
+        return Err(InvalidBvh::Parents { node, parents: 0 });
     }
-    match leaves.iter().position(|&leaves| leaves != 1) {
-        Some(object) => Err(InvalidBvh::Leaves { object, leaves: leaves[object] }),
-        None => Ok(()),
+    if let Some(object) = repeated {
+        return Err(InvalidBvh::Leaves { object, leaves: 2 });
+    }
+    if prims < objects
+        && let Some(object) = (0..objects).find(|&object| !placed.get(object))
+    {
+        return Err(InvalidBvh::Leaves { object, leaves: 0 });
+    }
+    Ok(())
+}
+
+/// A bit per index.
+pub(crate) struct Marks(Vec<u64>);
+
+impl Marks {
+    pub(crate) fn new(len: usize) -> Self {
+        Self(alloc::vec![0; len.div_ceil(64)])
+    }
+
+    /// Marks an index. Returns whether it was not marked before.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, index: usize) -> bool {
+        let (word, bit) = (&mut self.0[index / 64], 1 << (index % 64));
+        let is_new = *word & bit == 0;
+        *word |= bit;
+        is_new
+    }
+
+    pub(crate) fn get(&self, index: usize) -> bool {
+        self.0[index / 64] & 1 << (index % 64) != 0
     }
 }
 
@@ -100,7 +185,7 @@ pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
 mod tests {
     use super::*;
     use crate::Node;
-    use alloc::{vec, vec::Vec};
+    use alloc::vec;
 
     fn cube(x: f32) -> Aabb {
         Aabb::from(([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]))

@@ -5,6 +5,7 @@ use crate::lanes::{Expand, Portable, WideRay};
 use crate::stack::Stack;
 use crate::{Aabb, Bvh, Hit, InvalidBvh, Ray, Shear, Triangle, collapse, validate};
 use alloc::vec::Vec;
+use bytemuck::{Pod, Zeroable};
 
 /// An immutable copy of a [`Bvh`] and its triangles, for tracing only.
 ///
@@ -35,17 +36,28 @@ pub struct WideBvh {
     pub(crate) blocks: Vec<Block>,
 }
 
-/// A node's eight children, or fewer in the lower lanes: four cache lines.
+/// A [`WideBvh`] that lies elsewhere, in a mapped file for example.
 #[derive(Clone, Copy, Debug)]
+pub struct WideView<'a> {
+    pub(crate) bounds: Aabb,
+    pub(crate) root: Option<Child>,
+    pub(crate) nodes: &'a [WideNode],
+    pub(crate) blocks: &'a [Block],
+}
+
+/// A node's eight children, or fewer in the lower lanes: four cache lines.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(crate) struct WideNode {
     /// Lower x, y, z, then upper x, y, z, of all children; NaN in unused lanes, so that no ray enters them.
     pub(crate) planes: [[f32; 8]; 6],
     pub(crate) children: [Child; 8],
+    pub(crate) padding: [u32; 8],
 }
 
 impl WideNode {
-    pub(crate) const EMPTY: Self = Self { planes: [[f32::NAN; 8]; 6], children: [Child::node(0); 8] };
+    pub(crate) const EMPTY: Self =
+        Self { planes: [[f32::NAN; 8]; 6], children: [Child::node(0); 8], padding: [0; 8] };
 
     /// Gives a lane a child with this box.
     pub(crate) fn set_box(&mut self, lane: usize, aabb: &Aabb) {
@@ -57,7 +69,7 @@ impl WideNode {
 }
 
 /// A node's index, or the index of a leaf's first block; the leaf's last block is marked as such.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(transparent)]
 pub(crate) struct Child(u32);
 
@@ -72,6 +84,19 @@ impl Child {
     pub(crate) const fn leaf(first_block: u32) -> Self {
         Self(first_block | Self::LEAF)
     }
+
+    /// The index of the node, or of the leaf's first block.
+    pub(crate) fn target(self) -> WideTarget {
+        let index = (self.0 & !Self::LEAF) as usize;
+        if self.0 & Self::LEAF == 0 { WideTarget::Node(index) } else { WideTarget::Block(index) }
+    }
+}
+
+/// What a [`Child`] refers to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum WideTarget {
+    Node(usize),
+    Block(usize),
 }
 
 /// A child that the ray enters at `entry`, to be visited later.
@@ -96,9 +121,41 @@ impl WideBvh {
         Ok(collapse::widen(tree, triangles))
     }
 
+    /// The layout where it lies.
+    #[inline(always)]
+    pub fn view(&self) -> WideView<'_> {
+        WideView { bounds: self.bounds, root: self.root, nodes: &self.nodes, blocks: &self.blocks }
+    }
+
     /// The nearest triangle that `ray` meets in its range; of several at the same distance the one of the lowest id.
     #[inline]
     pub fn nearest_hit(&self, ray: &Ray) -> Option<Hit> {
+        self.view().nearest_hit(ray)
+    }
+
+    /// Whether `ray` meets any triangle in its range.
+    #[inline]
+    pub fn any_hit(&self, ray: &Ray) -> bool {
+        self.view().any_hit(ray)
+    }
+
+    /// Bytes of memory that nodes and triangles take.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..])
+    }
+}
+
+impl<'a> WideView<'a> {
+    /// A layout whose root is the first node, else the leaf of all blocks.
+    pub(crate) fn over(bounds: Aabb, nodes: &'a [WideNode], blocks: &'a [Block]) -> Self {
+        let leaf = (!blocks.is_empty()).then_some(Child::leaf(0));
+        let root = if nodes.is_empty() { leaf } else { Some(Child::node(0)) };
+        Self { bounds, root, nodes, blocks }
+    }
+
+    /// As [`WideBvh::nearest_hit`].
+    #[inline]
+    pub fn nearest_hit(self, ray: &Ray) -> Option<Hit> {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
         if let Some(avx2) = crate::lanes::Avx2::detect() {
             return avx2.nearest_hit(self, ray);
@@ -106,9 +163,9 @@ impl WideBvh {
         self.nearest_hit_portable(ray)
     }
 
-    /// Whether `ray` meets any triangle in its range.
+    /// As [`WideBvh::any_hit`].
     #[inline]
-    pub fn any_hit(&self, ray: &Ray) -> bool {
+    pub fn any_hit(self, ray: &Ray) -> bool {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
         if let Some(avx2) = crate::lanes::Avx2::detect() {
             return avx2.any_hit(self, ray);
@@ -117,34 +174,29 @@ impl WideBvh {
     }
 
     /// [`nearest_hit`](Self::nearest_hit) without instructions that the processor may lack.
-    pub fn nearest_hit_portable(&self, ray: &Ray) -> Option<Hit> {
+    pub fn nearest_hit_portable(self, ray: &Ray) -> Option<Hit> {
         self.nearest_with::<Portable>(ray)
     }
 
     /// [`any_hit`](Self::any_hit) without instructions that the processor may lack.
-    pub fn any_hit_portable(&self, ray: &Ray) -> bool {
+    pub fn any_hit_portable(self, ray: &Ray) -> bool {
         self.any_with::<Portable>(ray)
     }
 
-    /// Bytes of memory that nodes and triangles take.
-    pub fn bytes(&self) -> usize {
-        size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..])
-    }
-
     #[inline(always)]
-    pub(crate) fn nearest_with<E: Expand>(&self, ray: &Ray) -> Option<Hit> {
+    pub(crate) fn nearest_with<E: Expand>(self, ray: &Ray) -> Option<Hit> {
         self.walk::<E, false>(ray)
     }
 
     #[inline(always)]
-    pub(crate) fn any_with<E: Expand>(&self, ray: &Ray) -> bool {
+    pub(crate) fn any_with<E: Expand>(self, ray: &Ray) -> bool {
         self.walk::<E, true>(ray).is_some()
     }
 
     /// The nearest hit, or the first one found. One function without closures, so that all of it is compiled with the
     /// instructions that its caller may use.
     #[inline(always)]
-    fn walk<E: Expand, const ANY: bool>(&self, ray: &Ray) -> Option<Hit> {
+    fn walk<E: Expand, const ANY: bool>(self, ray: &Ray) -> Option<Hit> {
         let mut child = self.root?;
         let (shear, wide_ray) = (Shear::new(ray), WideRay::new(ray, &self.bounds));
         let mut nearest: Option<Hit> = None;

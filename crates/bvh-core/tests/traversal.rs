@@ -31,10 +31,10 @@ fn check(name: &str, tree: &Bvh, triangles: &[Triangle], ray: &Ray, expected: Op
 
 fn check_wide(name: &str, wide: &WideBvh, ray: &Ray, expected: Option<Hit>) {
     let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
-    for hit in [wide.nearest_hit(ray), wide.nearest_hit_portable(ray)] {
+    for hit in [wide.nearest_hit(ray), wide.view().nearest_hit_portable(ray)] {
         assert_eq!(bits(hit), bits(expected), "{name}: {ray:?}");
     }
-    for any in [wide.any_hit(ray), wide.any_hit_portable(ray)] {
+    for any in [wide.any_hit(ray), wide.view().any_hit_portable(ray)] {
         assert_eq!(any, expected.is_some(), "{name}: {ray:?}");
     }
 }
@@ -165,7 +165,7 @@ fn no_ray_slips_between_the_boxes_beside_a_long_edge() {
             let shear = Shear::new(&ray);
             let test = |id: u32| triangles[id as usize].intersect(&shear, ray.t_max()).is_some();
             assert!(any_hit(&tree, &ray, test, &mut ()), "axis {axis}: {ray:?}");
-            assert!(wide.any_hit(&ray) && wide.any_hit_portable(&ray), "axis {axis}: {ray:?}");
+            assert!(wide.any_hit(&ray) && wide.view().any_hit_portable(&ray), "axis {axis}: {ray:?}");
         }
     }
 }

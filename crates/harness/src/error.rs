@@ -31,6 +31,9 @@ pub enum Error {
     /// A method returned something that is not a tree over the scene: a defect of the method.
     #[error("scene {scene}, method {method} returned an invalid tree: {source}; please report this")]
     InvalidTree { scene: String, method: String, source: bvh_core::InvalidBvh },
+    /// A tree file that is damaged, or for another scene.
+    #[error("{}: {source}", .path.display())]
+    TreeFile { path: PathBuf, source: bvh_core::file::FileError },
     /// A figure could not be drawn.
     #[error(transparent)]
     Chart(#[from] crate::chart::ChartError),
@@ -48,14 +51,17 @@ pub enum Error {
     /// Ctrl-C during a picture.
     #[error("interrupted; no picture was written")]
     Abandoned,
+    /// Ctrl-C during a bake.
+    #[error("interrupted; the best tree so far, of cost {cost}, is in {0}; `--from {0}` goes on", .path.display())]
+    Stopped { path: PathBuf, cost: f64 },
 }
 
 impl Error {
     /// 2 for what the user can mend in a spec or a command line, 130 after Ctrl-C, otherwise 1.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Spec { .. } | Self::Scene { .. } | Self::Usage(_) => 2,
-            Self::Interrupted { .. } | Self::Abandoned => 130,
+            Self::Spec { .. } | Self::Scene { .. } | Self::Usage(_) | Self::TreeFile { .. } => 2,
+            Self::Interrupted { .. } | Self::Stopped { .. } | Self::Abandoned => 130,
             _ => 1,
         }
     }

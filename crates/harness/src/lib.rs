@@ -1,13 +1,16 @@
 //! Experiments on bounding volume hierarchies: TOML specs in, CSV files and figures out.
 //!
 //! Data flows one way: [`spec`] → [`scene`] → [`execute`] → [`store`] (rows of [`record`]) → [`report`], which reads
-//! the CSV files only. Pictures are [`render`]'s. Everything that touches files, clocks, threads or the terminal lives in this crate.
+//! the CSV files only. Beside it, [`bake`] makes tree files, [`inspect`] reads them, [`mod@render`] makes pictures.
+//! Everything that touches files, clocks, threads or the terminal lives in this crate.
 
+pub mod bake;
 pub mod chart;
 pub mod check;
 pub mod error;
 pub mod execute;
 pub mod html;
+pub mod inspect;
 pub mod obj;
 pub mod part;
 pub mod provenance;
@@ -22,5 +25,6 @@ pub mod standin;
 pub mod store;
 pub mod suite;
 pub mod sweep;
+pub mod tree_file;
 
 pub use error::Error;

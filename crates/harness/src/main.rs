@@ -1,7 +1,9 @@
 //! The command line: reads arguments, calls the library, prints what it returns, sets the exit code.
 
 use clap::{Args, Parser, Subcommand};
+use harness::bake::{BakeArgs, bake};
 use harness::execute::Extent;
+use harness::inspect::{InspectArgs, inspect};
 use harness::render::command as render;
 use harness::scene::{FETCHED, SPHERES, Scene, fetched_path};
 use harness::spec::{Experiment, Overrides};
@@ -51,7 +53,13 @@ enum Command {
     Render(render::Args),
     /// One case of the suite, in a process of its own.
     #[command(name = child::COMMAND, hide = true)]
-    SuiteChild { subject: String, case: String, objects: usize },
+    SuiteChild {
+        subject: String,
+        case: String,
+        objects: usize,
+    },
+    Bake(BakeArgs),
+    Inspect(InspectArgs),
 }
 
 #[derive(Args)]
@@ -110,6 +118,8 @@ fn main() -> ExitCode {
         Some(Command::SuiteChild { subject, case, objects }) => child::main(&subject, &case, objects)
             .map(|answer| say(format_args!("{answer}")))
             .map_err(Error::Usage),
+        Some(Command::Bake(args)) => use_threads(args.jobs).and_then(|()| bake(&args, &INTERRUPTED)).map(print),
+        Some(Command::Inspect(args)) => inspect(&args).map(print),
         None => run(&cli.run),
     };
     match result {
@@ -129,6 +139,20 @@ fn say(line: Arguments) {
 /// Prints a line to standard error.
 fn complain(line: Arguments) {
     let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// Prints a text that may be several lines.
+fn print(text: String) {
+    say(format_args!("{}", text.trim_end()));
+}
+
+/// Makes all threads of this program that many.
+fn use_threads(jobs: Option<u16>) -> Result<(), Error> {
+    let Some(jobs) = jobs else { return Ok(()) };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(jobs.into())
+        .build_global()
+        .map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))
 }
 
 fn run(args: &RunArgs) -> Result<(), Error> {
@@ -188,12 +212,6 @@ fn merge(folders: &[PathBuf], out: &Path) -> Result<(), Error> {
         say(format_args!("{text}Results: {}", out.join(name).display()));
     }
     Ok(())
-}
-
-fn use_threads(jobs: Option<u16>) -> Result<(), Error> {
-    let Some(jobs) = jobs else { return Ok(()) };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.into());
-    pool.build_global().map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))
 }
 
 fn draw(args: &render::Args) -> Result<(), Error> {

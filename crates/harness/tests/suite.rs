@@ -41,7 +41,7 @@ fn every_case_from_s01_to_s45_is_there_and_checked() {
     }
     let pending = |case: &&Case| case.checks.iter().any(|check| matches!(check, Check::Pending(_)));
     let pending: Vec<&str> = CASES.iter().filter(pending).map(|case| case.id).collect();
-    assert_eq!(pending, ["S38"], "all other cases can be checked");
+    assert!(pending.is_empty(), "{pending:?} cannot be checked");
 }
 
 #[test]

@@ -72,9 +72,9 @@ impl Mesh {
         let expected = self.structures.answer(ray, self.triangles.len(), test);
         for wide in &self.wide {
             assert_eq!(bits(wide.nearest_hit(ray)), bits(expected), "wide: {ray:?}");
-            assert_eq!(bits(wide.nearest_hit_portable(ray)), bits(expected), "wide, portable: {ray:?}");
+            assert_eq!(bits(wide.view().nearest_hit_portable(ray)), bits(expected), "wide, portable: {ray:?}");
             assert_eq!(wide.any_hit(ray), expected.is_some(), "wide: {ray:?}");
-            assert_eq!(wide.any_hit_portable(ray), expected.is_some(), "wide, portable: {ray:?}");
+            assert_eq!(wide.view().any_hit_portable(ray), expected.is_some(), "wide, portable: {ray:?}");
         }
         expected
     }

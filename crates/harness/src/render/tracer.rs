@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::scene::{Primitives, Scene};
+use crate::tree_file::load_tree;
 use bvh_build::kd_tree::KdTree;
 use bvh_build::{BuildError, Builder, kd_tree, muller_fellner};
 use bvh_core::{
@@ -51,18 +52,10 @@ impl Structure {
                 })?;
                 Ok(Self::Wide(wide))
             }
-            _ if name.ends_with(".bvh") => load(Path::new(name), scene).map(Self::Tree),
+            _ if name.ends_with(".bvh") => load_tree(Path::new(name), &scene.boxes).map(Self::Tree),
             _ => Err(Error::Usage(format!("--accel is {name:?}; accepted: {}", Self::ACCEPTED))),
         }
     }
-}
-
-/// Reads a saved tree over the scene's boxes.
-fn load(path: &Path, _scene: &Scene) -> Result<Bvh, Error> {
-    Err(Error::Usage(format!(
-        "--accel {}: this version cannot read tree files yet; accepted: brute, kdtree, bvh, wide",
-        path.display()
-    )))
 }
 
 /// The scene's triangles, if it is made of them.

@@ -7,7 +7,7 @@ use crate::rays::{self, Family, Query};
 use crate::record::RayRow;
 use crate::scene::{Primitives, Scene};
 use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
-use bvh_core::{Aabb, Ray, Shear, Triangle, cost, validate};
+use bvh_core::{Aabb, Ray, Shear, Triangle, cost, file, validate};
 use bvh_search::grasp::{self, Candidates};
 use bvh_search::{Budget, Event, Method, Observer, Problem, annealing, genetic, solve};
 use glam::Vec3;
@@ -337,4 +337,30 @@ pub fn estimates_converge() -> Verdict {
     // Fewer than 51 of 60 would happen once in a thousand times.
     require(covered >= 51, || format!("{covered} of {SEEDS} intervals cover {truth}"))?;
     Ok(format!("{covered} of {SEEDS} intervals cover"))
+}
+
+/// S38: a tree file with any bit flipped, cut at any length, of another version or endianness, or of another scene is
+/// refused.
+pub fn damaged_tree_files() -> Verdict {
+    let boxes = boxes(12);
+    let say = |error: &dyn std::error::Error| error.to_string();
+    let tree = muller_fellner::Config::default().build(&boxes).map_err(|error| say(&error))?;
+    let whole = file::save(&tree, &boxes, &file::Origin::default()).map_err(|error| say(&error))?;
+    require(file::load(&whole, &boxes).ok() == Some(tree), || {
+        "an undamaged file is not the tree saved".into()
+    })?;
+    for bit in 0..8 * whole.len() {
+        let mut damaged = whole.clone();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        require(file::load(&damaged, &boxes).is_err(), || format!("bit {bit} can be flipped"))?;
+    }
+    for length in 0..whole.len() {
+        require(file::load(&whole[..length], &boxes).is_err(), || format!("{length} bytes are enough"))?;
+    }
+    let reversed: Vec<u8> = whole.chunks(4).flat_map(|word| word.iter().rev()).copied().collect();
+    require(file::load(&reversed, &boxes).is_err(), || "another endianness is accepted".into())?;
+    let mut others = boxes.clone();
+    others[3].max.x = others[3].max.x.next_up();
+    require(file::load(&whole, &others).is_err(), || "the tree of another scene is accepted".into())?;
+    Ok(format!("{} damages refused", 9 * whole.len() + 2))
 }

@@ -1,6 +1,6 @@
 //! The table of cases.
 
-use super::Check::{Method, Part, Pending, Refused, Scene};
+use super::Check::{Method, Part, Refused, Scene};
 use super::{Also, Case, Check, SceneCase, behaviour, extra, scenes};
 use bvh_core::{Aabb, Triangle};
 use glam::Vec3;
@@ -139,7 +139,7 @@ pub static CASES: [Case; 45] = [
     case("S35", "OBJ files as they come", &[Part("OBJ files", behaviour::files_as_people_write_them)]),
     case("S36", "ten million triangles", &[plain(scenes::uniform, [300, 50_000, 10_000_000])]),
     case("S37", "threads and seeds", &[Method(None, behaviour::threads_and_seeds)]),
-    case("S38", "damaged tree files", &[Pending("tree files")]),
+    case("S38", "damaged tree files", &[Part("tree files", behaviour::damaged_tree_files)]),
     case("S39", "budgets 0, 1 ms, cancelled", &[Method(None, behaviour::budgets_end)]),
     case("S40", "genetic edge cases", &[Method(Some("genetic"), behaviour::genetic_edges)]),
     case("S41", "GRASP edge cases", &[Method(Some("grasp"), behaviour::grasp_edges)]),

@@ -1,7 +1,7 @@
 //! Every traversal against testing every triangle, and the rays that make it hard.
 
 use super::Verdict;
-use bvh_build::{BuildError, Builder, goldsmith_salmon, muller_fellner};
+use bvh_build::{BuildError, Builder, goldsmith_salmon, kd_tree, muller_fellner};
 use bvh_core::{Aabb, Bvh, Hit, Ray, Shear, Triangle, WideBvh, any_hit, nearest_hit, nearest_hit_of_all};
 use bvh_search::Stream;
 use glam::Vec3;
@@ -20,8 +20,9 @@ pub const TRAVERSALS: &[(&str, Traversal)] = &[
     ("n-ary tree", |scene| over_tree(scene, &goldsmith_salmon::Config::default())),
     ("wide, SIMD", |scene| wide(scene, |wide, ray| (wide.nearest_hit(ray), wide.any_hit(ray)))),
     ("wide, portable", |scene| {
-        wide(scene, |wide, ray| (wide.nearest_hit_portable(ray), wide.any_hit_portable(ray)))
+        wide(scene, |wide, ray| (wide.view().nearest_hit_portable(ray), wide.view().any_hit_portable(ray)))
     }),
+    ("KD-tree", over_cells),
 ];
 
 fn build(scene: &[Triangle], builder: &dyn Builder) -> Result<Bvh, String> {
@@ -35,6 +36,18 @@ fn over_tree(scene: &[Triangle], builder: &dyn Builder) -> Result<Tracer, String
         let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
         let any = any_hit(&tree, ray, |id| test(id, ray.t_max()).is_some(), &mut ());
         (nearest_hit(&tree, ray, test, &mut ()), any)
+    }))
+}
+
+fn over_cells(scene: &[Triangle]) -> Result<Tracer, String> {
+    let cells =
+        kd_tree::Config::default().build(&super::scenes::boxes(scene)).map_err(|error| error.to_string())?;
+    let triangles = scene.to_vec();
+    Ok(Box::new(move |ray| {
+        let shear = Shear::new(ray);
+        let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
+        let any = cells.any_hit(ray, |id| test(id, ray.t_max()).is_some(), &mut ());
+        (cells.nearest_hit(ray, test, &mut ()), any)
     }))
 }
 

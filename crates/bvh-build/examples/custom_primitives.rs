@@ -1,0 +1,70 @@
+//! Traces primitives of one's own beside spheres: a tree needs a box of each, a ray a test of each.
+//!
+//! `cargo run -p bvh-build --example custom_primitives`
+
+use bvh_build::{Builder, muller_fellner};
+use bvh_core::{Aabb, Ray, Sphere, clip_to_box, nearest_hit};
+use std::error::Error;
+
+/// A horizontal disc, which no library knows.
+struct Disc {
+    center: [f32; 3],
+    radius: f32,
+}
+
+enum Primitive {
+    Disc(Disc),
+    Sphere(Sphere),
+}
+
+impl Primitive {
+    fn aabb(&self) -> Aabb {
+        match self {
+            Self::Sphere(sphere) => sphere.aabb(),
+            Self::Disc(Disc { center: [x, y, z], radius: r }) => {
+                Aabb::from([[x - r, *y, z - r], [x + r, *y, z + r]])
+            }
+        }
+    }
+
+    fn intersect(&self, ray: &Ray, t_max: f32) -> Option<f32> {
+        match self {
+            Self::Sphere(sphere) => sphere.intersect(ray, t_max),
+            Self::Disc(disc) => {
+                let (origin, direction) = (ray.origin().to_array(), ray.direction().to_array());
+                let t = (disc.center[1] - origin[1]) / direction[1];
+                let [dx, dz] = [0, 2].map(|axis| origin[axis] + t * direction[axis] - disc.center[axis]);
+                let inside = dx * dx + dz * dz <= disc.radius * disc.radius;
+                // Keeps the distance within that of the box, so that the answer does not depend on the tree.
+                if inside { clip_to_box(ray, &self.aabb(), t, t_max) } else { None }
+            }
+        }
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let primitives: Vec<Primitive> = (0..1000u16)
+        .map(|i| {
+            let center = [f32::from(i % 10) * 3.0, f32::from(i / 10 % 10) * 3.0, f32::from(i / 100) * 3.0];
+            match i % 3 {
+                0 => Primitive::Sphere(Sphere::new(center, 1.0)),
+                _ => Primitive::Disc(Disc { center, radius: 1.25 }),
+            }
+        })
+        .collect();
+    let boxes: Vec<Aabb> = primitives.iter().map(Primitive::aabb).collect();
+    let tree = muller_fellner::Config::default().build(&boxes)?;
+    let (mut spheres, mut discs) = (0, 0);
+    for i in 0..100u8 {
+        let across = [f32::from(i % 10) - 4.5, -10.0, f32::from(i / 10) - 4.5];
+        let ray = Ray::half_line([15.0, 40.0, 15.0], across)?;
+        match nearest_hit(&tree, &ray, |id, t_max| primitives[id as usize].intersect(&ray, t_max), &mut ()) {
+            Some(hit) if hit.object % 3 == 0 => spheres += 1,
+            Some(_) => discs += 1,
+            None => {}
+        }
+    }
+    println!("of 100 rays {spheres} meet a sphere first, {discs} a disc");
+    assert!(spheres > 0 && discs > 0);
+    Ok(())
+}

@@ -1,0 +1,173 @@
+//! Trees as the plain arrays of other libraries: two children per node, `first` and `count`.
+
+use crate::collapse::binary;
+use crate::validate::Marks;
+use crate::{Aabb, Bvh, InvalidBvh, MAX_OBJECTS, Node, NodeKind};
+use alloc::vec::Vec;
+use bytemuck::{Pod, Zeroable};
+
+/// A node as most libraries have it, 32 bytes in the order of `tinybvh`'s `BVHNode` and of many GPU tracers; `obvhs` has
+/// the same fields in another order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct FirstCountNode {
+    /// Lower corner of the box.
+    pub min: [f32; 3],
+    /// Index of the first of two adjacent children, or position of the leaf's first object id.
+    pub first: u32,
+    /// Upper corner of the box.
+    pub max: [f32; 3],
+    /// Number of object ids of a leaf; 0 for an inner node.
+    pub count: u32,
+}
+
+impl Bvh {
+    /// The tree's nodes with two children each, root first, children after parents; object ids are those of
+    /// [`prim_ids`](Bvh::prim_ids). Nodes with more children are halved, in their order. O(nodes).
+    ///
+    /// # Panics
+    /// May panic on a tree that [`validate`](crate::validate()) refuses.
+    pub fn to_first_count(&self) -> Vec<FirstCountNode> {
+        first_count(&binary(self), 0)
+    }
+
+    /// As [`to_first_count`](Self::to_first_count), with an unused node at index 1, so that all pairs of siblings begin
+    /// at even indices and share a cache line, as `tinybvh` has them.
+    ///
+    /// # Panics
+    /// May panic on a tree that [`validate`](crate::validate()) refuses.
+    pub fn to_first_count_aligned(&self) -> Vec<FirstCountNode> {
+        first_count(&binary(self), 1)
+    }
+
+    /// The tree of such arrays, in depth-first order. Nodes and ids that the root does not lead to are left out, and
+    /// children may come before their parents. Refuses what leads out of bounds or to a node a second time. O(nodes).
+    ///
+    /// What the boxes contain is left to [`validate`](crate::validate()); [`refit`](Bvh::refit) makes padded ones tight.
+    pub fn from_first_count(nodes: &[FirstCountNode], prim_ids: &[u32]) -> Result<Self, InvalidBvh> {
+        if nodes.len() > 2 * MAX_OBJECTS || prim_ids.len() > MAX_OBJECTS {
+            return Err(InvalidBvh::TooManyObjects { objects: prim_ids.len().max(nodes.len() / 2) });
+        }
+        let mut tree = Self::default();
+        let mut reached = Marks::new(nodes.len());
+        let mut open: Vec<(usize, usize)> = Vec::new();
+        if !nodes.is_empty() {
+            tree.nodes.push(Node::leaf(Aabb::EMPTY, 0, 0));
+            open.push((0, 0));
+        }
+        while let Some((from, to)) = open.pop() {
+            if !reached.set(from) {
+                return Err(InvalidBvh::Parents { node: from, parents: 2 });
+            }
+            let FirstCountNode { min, first, max, count } = nodes[from];
+            let aabb = Aabb::from([min, max]);
+            // No overflow: usize has 32 bits or more, and `first` is compared before it is added to.
+            let fits = |count: u32, len: usize| count as usize <= len && first as usize <= len - count as usize;
+            if count == 0 {
+                if !fits(2, nodes.len()) {
+                    return Err(InvalidBvh::BadChildren { node: from, first, count: 2, nodes: nodes.len() });
+                }
+                let below = tree.nodes.len();
+                tree.nodes[to] = Node::inner(aabb, below as u32, 2);
+                tree.nodes.extend([Node::leaf(aabb, 0, 0); 2]);
+                open.extend([(first as usize + 1, below + 1), (first as usize, below)]);
+            } else {
+                let (named, objects) = (tree.prim_ids.len() + count as usize, prim_ids.len());
+                if !fits(count, objects) {
+                    return Err(InvalidBvh::BadLeaf { node: from, first, count, objects });
+                }
+                if named > objects {
+                    return Err(InvalidBvh::ObjectCount { named, objects });
+                }
+                tree.nodes[to] = Node::leaf(aabb, tree.prim_ids.len() as u32, count);
+                tree.prim_ids.extend_from_slice(&prim_ids[first as usize..][..count as usize]);
+            }
+        }
+        Ok(tree)
+    }
+}
+
+/// The nodes of a binary tree, `spare` unused ones after the root. Pairs of siblings fill the tree's nodes from 1 on, and so
+/// begin at odd indices there.
+fn first_count(tree: &Bvh, spare: usize) -> Vec<FirstCountNode> {
+    let mut nodes = alloc::vec![FirstCountNode::default(); tree.nodes.len()];
+    if nodes.len() > 1 {
+        nodes.resize(nodes.len() + spare, FirstCountNode::default());
+    }
+    let place = |index: usize| if index == 0 { 0 } else { index + spare };
+    for (index, node) in tree.nodes.iter().enumerate() {
+        let (first, count) = match node.kind() {
+            NodeKind::Inner { first, .. } => (place(first as usize) as u32, 0),
+            NodeKind::Leaf { first, count } => (first, count),
+        };
+        let (min, max) = (node.aabb.min.to_array(), node.aabb.max.to_array());
+        nodes[place(index)] = FirstCountNode { min, first, max, count };
+    }
+    nodes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::validate;
+    use alloc::vec;
+
+    /// A node of three children over seven boxes, with leaves of up to three.
+    fn scene() -> (Bvh, Vec<Aabb>) {
+        let boxes: Vec<Aabb> =
+            (0..7u8).map(f32::from).map(|x| Aabb::from([[x, 0.0, 0.0], [x + 2.0, 1.0, x]])).collect();
+        let leaf = |first, count| Node::leaf(Aabb::EMPTY, first, count);
+        let inner = |first, count| Node::inner(Aabb::EMPTY, first, count);
+        let nodes = vec![inner(1, 3), leaf(0, 1), inner(4, 2), leaf(6, 1), leaf(1, 3), leaf(4, 2)];
+        let mut tree = Bvh { nodes, prim_ids: vec![6, 5, 4, 3, 2, 1, 0] };
+        tree.refit(&boxes);
+        (tree, boxes)
+    }
+
+    #[test]
+    fn a_binary_tree_survives_the_way_there_and_back() {
+        let (tree, boxes) = scene();
+        let binary = Bvh::from_first_count(&tree.to_first_count(), &tree.prim_ids).unwrap();
+        validate(&binary, &boxes).unwrap();
+        assert_eq!((binary.nodes.len(), &binary.prim_ids), (7, &tree.prim_ids));
+        for nodes in [binary.to_first_count(), binary.to_first_count_aligned()] {
+            assert_eq!(Bvh::from_first_count(&nodes, &binary.prim_ids), Ok(binary.clone()));
+        }
+        let aligned = binary.to_first_count_aligned();
+        assert!(aligned.iter().enumerate().all(|(at, node)| at == 1 || node.count > 0 || node.first % 2 == 0));
+    }
+
+    #[test]
+    fn trees_of_no_node_and_of_one_have_arrays() {
+        let aabb = Aabb::from([[0.0; 3], [1.0; 3]]);
+        for tree in [Bvh::default(), Bvh { nodes: vec![Node::leaf(aabb, 0, 1)], prim_ids: vec![0] }] {
+            for nodes in [tree.to_first_count(), tree.to_first_count_aligned()] {
+                assert_eq!(Bvh::from_first_count(&nodes, &tree.prim_ids), Ok(tree.clone()));
+                assert_eq!(nodes.len(), tree.nodes.len());
+            }
+        }
+    }
+
+    #[test]
+    fn arrays_that_lead_astray_are_refused() {
+        let (tree, _) = scene();
+        let nodes = tree.to_first_count();
+        let refusal = |at: usize, first, count| {
+            let mut nodes = nodes.clone();
+            (nodes[at].first, nodes[at].count) = (first, count);
+            Bvh::from_first_count(&nodes, &tree.prim_ids).unwrap_err()
+        };
+        assert_eq!(refusal(0, 6, 0), InvalidBvh::BadChildren { node: 0, first: 6, count: 2, nodes: 7 });
+        assert_eq!(
+            refusal(0, u32::MAX, 0),
+            InvalidBvh::BadChildren { node: 0, first: u32::MAX, count: 2, nodes: 7 }
+        );
+        assert!(matches!(refusal(0, 0, 0), InvalidBvh::Parents { parents: 2, .. }));
+        assert_eq!(refusal(1, 7, 1), InvalidBvh::BadLeaf { node: 1, first: 7, count: 1, objects: 7 });
+        assert_eq!(
+            refusal(1, 1, u32::MAX),
+            InvalidBvh::BadLeaf { node: 1, first: 1, count: u32::MAX, objects: 7 }
+        );
+        assert!(matches!(refusal(1, 0, 7), InvalidBvh::ObjectCount { objects: 7, .. }));
+    }
+}

@@ -1,0 +1,305 @@
+//! `harness bake`: the best tree for a scene that a budget buys, kept in a file.
+
+use crate::Error;
+use crate::scene::Scene;
+use crate::tree_file::{self, Reserved, load_tree};
+use bvh_build::{Builder, muller_fellner};
+use bvh_core::cost;
+use bvh_core::file::{self, Header, Origin};
+use bvh_search::{
+    Budget, Event, Method, Observer, Outcome, Problem, SearchError, StopReason, optimize, portfolio, solve,
+};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+/// Search for the best tree of a scene within a budget, and save it.
+#[derive(Args, Clone, Debug)]
+pub struct BakeArgs {
+    /// Name of a scene, or path of an OBJ file.
+    pub scene: String,
+    /// How long to search: a time (`10s`, `1m 30s`), or work (`50Mwork`: 50 million nodes visited), which gives the
+    /// same bytes everywhere.
+    #[arg(long, value_name = "TIME|WORK")]
+    pub budget: Effort,
+    /// The file to write; an old one is replaced when the new one is complete.
+    #[arg(long, value_name = "FILE.bvh")]
+    pub out: PathBuf,
+    /// Seed of the random numbers.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// The method, with its default parameters.
+    #[arg(long, value_name = "NAME", default_value = BEST)]
+    pub method: String,
+    /// Go on from the tree of an earlier bake of the same scene; the result is never worse.
+    #[arg(long, value_name = "FILE.bvh")]
+    pub from: Option<PathBuf>,
+    /// Number of threads; as many as processors if not given. Changes no result of a budget of work.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+}
+
+/// The method that goes on from a given tree.
+const BEST: &str = "best";
+
+/// A budget: of time, or of work in nodes made or visited.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// Elapsed, from the search's beginning.
+    Time(Duration),
+    /// As [`Budget::max_work`].
+    Work(u64),
+}
+
+impl FromStr for Effort {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let effort = match text.strip_suffix("work") {
+            Some(amount) => {
+                let digits = amount.trim_end_matches(['k', 'M', 'G']);
+                let unit = match &amount[digits.len()..] {
+                    "" => Some(1),
+                    "k" => Some(1_000),
+                    "M" => Some(1_000_000),
+                    "G" => Some(1_000_000_000),
+                    _ => None,
+                };
+                unit.and_then(|unit| digits.trim_end().parse::<u64>().ok()?.checked_mul(unit)).map(Self::Work)
+            }
+            None => humantime::parse_duration(text).ok().map(Self::Time),
+        };
+        effort.ok_or_else(|| {
+            "expected a time such as 10s, 500ms or 1h30m, or work such as 50Mwork (units k, M, G)".into()
+        })
+    }
+}
+
+/// Searches until the budget is spent or `interrupted` becomes true, and writes the best tree found. Returns what there is
+/// to say. An interruption is an error that says that the file was written all the same.
+pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<String, Error> {
+    let scene = Scene::load(&args.scene)?;
+    let method = method(args)?;
+    let start = args.from.as_deref().map(|path| start(path, &scene)).transpose()?;
+    let reserved = Reserved::new(&args.out, most_bytes(scene.boxes.len()))?;
+
+    let refused = |source| Error::Search { scene: scene.name.clone(), method: args.method.clone(), source };
+    let greedy = muller_fellner::Config::default().build(&scene.boxes);
+    let base = cost::internal_area(&greedy.map_err(|source| refused(SearchError::Build(source)))?);
+    let watch = Watch::new(args.budget, base, interrupted);
+    let budget = match args.budget {
+        Effort::Time(_) => Budget::default(),
+        Effort::Work(work) => Budget { max_work: Some(work), ..Budget::default() },
+    };
+    let search = || match (&start, &method) {
+        (Some((tree, _)), Method::Best(config)) => {
+            optimize(tree, &scene.boxes, config, args.seed, budget, &watch)
+        }
+        _ => solve(&method, &Problem::new(&scene.boxes), args.seed, budget, &watch),
+    };
+    let outcome = watch.during(search).map_err(refused)?;
+    let seconds = watch.start.elapsed().as_secs_f64();
+
+    let spent = start.as_ref().map_or(0, |(_, header)| header.work);
+    let work = spent.saturating_add(outcome.work);
+    let origin = Origin { method: &args.method, seed: args.seed, work, ..Default::default() };
+    let bytes = file::save(&outcome.tree, &scene.boxes, &origin)
+        .map_err(|source| Error::TreeFile { path: args.out.clone(), source })?;
+    reserved.write(&bytes)?;
+    if interrupted.load(Relaxed) {
+        return Err(Error::Stopped { path: args.out.clone(), cost: outcome.cost });
+    }
+    let before = start.map(|(_, header)| header.cost);
+    Ok(summary(args, &scene, &outcome, base, before, seconds) + &format!("{} bytes", bytes.len()))
+}
+
+/// The method by name, unless it could not do what is asked.
+fn method(args: &BakeArgs) -> Result<Method, Error> {
+    let found = Method::all().into_iter().find(|method| method.name() == args.method);
+    match found {
+        None => {
+            let accepted = Method::NAMES.join(", ");
+            Err(Error::Usage(format!("--method {}: no such method; accepted: {accepted}", args.method)))
+        }
+        Some(Method::Best(config)) if matches!(args.budget, Effort::Time(_)) => {
+            // The budget says when to end; generations grow until then.
+            Ok(Method::Best(portfolio::Config { work_per_object: u64::from(u32::MAX), ..config }))
+        }
+        Some(Method::Best(config)) => {
+            Ok(Method::Best(portfolio::Config { work_per_object: u64::MAX, ..config }))
+        }
+        Some(_) if args.from.is_some() => {
+            Err(Error::Usage(format!("--method {} cannot go on --from a tree; accepted: {BEST}", args.method)))
+        }
+        Some(method) => Ok(method),
+    }
+}
+
+/// The tree to go on from, and its header.
+fn start(path: &Path, scene: &Scene) -> Result<(bvh_core::Bvh, Header), Error> {
+    let tree = load_tree(path, &scene.boxes)?;
+    let header = tree_file::open(path, &tree_file::read(path)?)?.header().clone();
+    Ok((tree, header))
+}
+
+/// The size of the largest tree file over so many objects.
+fn most_bytes(objects: usize) -> usize {
+    Header::BYTES + objects * (2 * size_of::<bvh_core::Node>() + size_of::<u32>())
+}
+
+fn summary(
+    args: &BakeArgs,
+    scene: &Scene,
+    outcome: &Outcome,
+    base: f64,
+    before: Option<f64>,
+    seconds: f64,
+) -> String {
+    let mut lines = vec![
+        format!(
+            "{} ({}), {} objects, {}, seed {}",
+            scene.name,
+            scene.kind,
+            scene.boxes.len(),
+            args.method,
+            args.seed
+        ),
+        format!("internal area {}, {} Müller–Fellner's {base}", outcome.cost, gain(outcome.cost, base)),
+    ];
+    if let Some(before) = before {
+        lines.push(format!("{} the tree it went on from, {before}", gain(outcome.cost, before)));
+    }
+    let why = match outcome.stop {
+        StopReason::Completed => ", and nothing more that this method does",
+        _ => "",
+    };
+    lines.push(format!("{} moves, {} nodes visited, {seconds:.1} s{why}", outcome.evaluations, outcome.work));
+    lines.push(format!("{}: ", args.out.display()));
+    lines.join("\n")
+}
+
+/// `cost` in relation to `base`, in words.
+fn gain(cost: f64, base: f64) -> String {
+    let percent = if base > 0.0 { 100.0 * (1.0 - cost / base) } else { 0.0 };
+    if percent >= 0.0 { format!("{percent:.2} % below") } else { format!("{:.2} % above", -percent) }
+}
+
+/// The clock of a bake: shows how it goes and says when it is over.
+struct Watch<'a> {
+    bar: ProgressBar,
+    start: Instant,
+    effort: Effort,
+    base: f64,
+    last: Mutex<Option<(Event, Duration)>>,
+    over: AtomicBool,
+    interrupted: &'a AtomicBool,
+}
+
+impl<'a> Watch<'a> {
+    fn new(effort: Effort, base: f64, interrupted: &'a AtomicBool) -> Self {
+        // Hidden unless standard error is a terminal. In thousandths of the budget.
+        let bar = ProgressBar::new(1000);
+        let style = ProgressStyle::with_template("{wide_bar} {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let (last, over) = (Mutex::default(), AtomicBool::new(false));
+        Self { bar, start: Instant::now(), effort, base, last, over, interrupted }
+    }
+
+    /// Runs `search` while another thread keeps the time.
+    fn during<T>(&self, search: impl FnOnce() -> T) -> T {
+        let found = std::thread::scope(|scope| {
+            let (running, ended) = channel();
+            scope.spawn(move || self.keep_time(&ended));
+            let found = search();
+            drop(running);
+            found
+        });
+        self.bar.finish_and_clear();
+        found
+    }
+
+    fn keep_time(&self, ended: &Receiver<()>) {
+        const REFRESH: Duration = Duration::from_millis(100);
+        loop {
+            let elapsed = self.start.elapsed();
+            let wait = match self.effort {
+                Effort::Time(budget) if elapsed >= budget => {
+                    self.over.store(true, Relaxed);
+                    REFRESH
+                }
+                Effort::Time(budget) => REFRESH.min(budget - elapsed),
+                Effort::Work(_) => REFRESH,
+            };
+            if ended.recv_timeout(wait) != Err(RecvTimeoutError::Timeout) {
+                return;
+            }
+            self.show(self.start.elapsed());
+        }
+    }
+
+    /// Incumbent, gain, rate and time left.
+    fn show(&self, elapsed: Duration) {
+        let last = *self.last.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let Some((event, at)) = last else { return };
+        let seconds = at.as_secs_f64().max(1e-9);
+        let (done, left) = match self.effort {
+            Effort::Time(budget) => (
+                elapsed.as_secs_f64() / budget.as_secs_f64().max(1e-9),
+                budget.saturating_sub(elapsed).as_secs_f64(),
+            ),
+            Effort::Work(work) => {
+                let done = event.work as f64 / work.max(1) as f64;
+                (done, seconds / done.max(1e-9) - elapsed.as_secs_f64())
+            }
+        };
+        self.bar.set_position((1000.0 * done.min(1.0)) as u64);
+        self.bar.set_message(format!(
+            "{:.6e}, {} MF, {:.2} M moves/s, {:.0} s left",
+            event.incumbent,
+            gain(event.incumbent, self.base),
+            event.evaluations as f64 / seconds / 1e6,
+            left.max(0.0)
+        ));
+    }
+}
+
+impl Observer for Watch<'_> {
+    fn event(&self, event: &Event) {
+        let now = Some((*event, self.start.elapsed()));
+        *self.last.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = now;
+    }
+
+    fn cancelled(&self) -> bool {
+        self.over.load(Relaxed) || self.interrupted.load(Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn budgets_are_times_or_work() {
+        for (text, expected) in [
+            ("10s", Some(Effort::Time(Duration::from_secs(10)))),
+            ("1m 30s", Some(Effort::Time(Duration::from_secs(90)))),
+            ("0s", Some(Effort::Time(Duration::ZERO))),
+            ("50000000work", Some(Effort::Work(50_000_000))),
+            ("50Mwork", Some(Effort::Work(50_000_000))),
+            ("2 Gwork", Some(Effort::Work(2_000_000_000))),
+            ("10", None),
+            ("work", None),
+            ("-5work", None),
+            ("5kMwork", None),
+            ("99999999999Gwork", None),
+            ("soon", None),
+        ] {
+            assert_eq!(text.parse().ok(), expected, "{text}");
+        }
+    }
+}

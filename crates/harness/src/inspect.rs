@@ -1,0 +1,192 @@
+//! `harness inspect`: what a tree file is, what its tree costs, and what it looks like.
+
+use crate::scene::{Primitives, Scene};
+use crate::store::write_whole;
+use crate::{Error, record, tree_file};
+use bvh_build::{Builder, muller_fellner};
+use bvh_core::cost::{self, Objective, SahConstants};
+use bvh_core::file::{FileError, Header, Layout, TreeFile};
+use bvh_core::{Bvh, NodeKind, Triangle, validate};
+use clap::Args;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Say what a tree file holds: its origin, costs, depth, arity, validity.
+#[derive(Args, Clone, Debug)]
+pub struct InspectArgs {
+    /// The tree file.
+    #[arg(value_name = "FILE.bvh")]
+    pub file: PathBuf,
+    /// The scene it is for, by name or path of an OBJ file: checks the tree against its objects, compares it with
+    /// Müller–Fellner's, and measures the end-point overlap.
+    pub scene: Option<String>,
+    /// Write the nodes to a CSV file, one row each, in full precision.
+    #[arg(long, value_name = "NODES.csv")]
+    pub nodes: Option<PathBuf>,
+}
+
+/// One row of the nodes' CSV file.
+#[derive(Serialize)]
+struct NodeRow {
+    node: usize,
+    /// Empty for the root.
+    parent: Option<usize>,
+    kind: &'static str,
+    first: u32,
+    count: u32,
+    min_x: f32,
+    min_y: f32,
+    min_z: f32,
+    max_x: f32,
+    max_y: f32,
+    max_z: f32,
+}
+
+/// Lines of `what: value`.
+#[derive(Default)]
+struct Lines(String);
+
+impl Lines {
+    fn say(&mut self, what: &str, value: impl std::fmt::Display) {
+        self.0 += &format!("{what}: {value}\n");
+    }
+}
+
+/// Inspects a file. Returns what there is to say, a line per fact, `what: value`. Refuses a file that is damaged, or for
+/// another scene than the one named.
+pub fn inspect(args: &InspectArgs) -> Result<String, Error> {
+    let bytes = tree_file::read(&args.file)?;
+    let file = tree_file::open(&args.file, &bytes)?;
+    let scene = args.scene.as_deref().map(Scene::load).transpose()?;
+    let mut lines = Lines::default();
+    describe(file.header(), bytes.len(), &mut lines);
+    let refused = |source| Error::TreeFile { path: args.file.clone(), source };
+    match file.header().layout {
+        Layout::Tree => {
+            let tree = file.tree().map_err(refused)?;
+            measure(&tree, &mut lines);
+            if let Some(path) = &args.nodes {
+                write_nodes(&tree, path)?;
+            }
+            match &scene {
+                Some(scene) => against(&tree, file, scene, &mut lines).map_err(refused)?,
+                None => lines.say("valid", "as a tree; with a scene its objects are checked too"),
+            }
+        }
+        Layout::Wide => {
+            if args.nodes.is_some() {
+                let path = args.file.display();
+                return Err(Error::Usage(format!("{path} is a wide layout; --nodes is for trees")));
+            }
+            file.wide().map_err(refused)?;
+            if let Some(scene) = &scene {
+                file.for_triangles(&triangles(scene).unwrap_or_default()).map_err(refused)?;
+                lines.say("scene", &scene.name);
+            }
+            lines.say("valid", "yes");
+        }
+    }
+    Ok(lines.0)
+}
+
+/// What the header says.
+fn describe(header: &Header, bytes: usize, lines: &mut Lines) {
+    let objective = match header.objective {
+        Objective::InternalArea => "internal area".into(),
+        Objective::GoldsmithSalmon => "Goldsmith–Salmon".into(),
+        Objective::Sah(SahConstants { traversal, intersection }) => {
+            format!("surface area heuristic, traversal {traversal}, intersection {intersection}")
+        }
+    };
+    lines.say("layout", header.layout);
+    lines.say("version", Header::VERSION);
+    lines.say("bytes", bytes);
+    lines.say("method", &header.method);
+    lines.say("seed", header.seed);
+    lines.say("work", header.work);
+    lines.say("objective", objective);
+    lines.say("cost when saved", header.cost);
+    lines.say("checksum of the scene", format_args!("{:016x}", header.scene));
+    lines.say("objects", header.objects);
+    lines.say("nodes", header.nodes);
+    if header.layout == Layout::Wide {
+        lines.say("blocks", header.blocks);
+    }
+}
+
+/// What can be computed from the tree alone.
+fn measure(tree: &Bvh, lines: &mut Lines) {
+    let area = cost::internal_area(tree);
+    lines.say("inner nodes", tree.inner_count());
+    lines.say("leaves", tree.nodes.len() - tree.inner_count());
+    lines.say("depth", tree.depth());
+    lines.say("internal area", area);
+    lines.say("internal area over root area", cost::over_root_area(tree, area));
+    lines.say("Goldsmith–Salmon cost", cost::goldsmith_salmon(tree));
+    lines.say("surface area heuristic", cost::sah(tree, &SahConstants::default()));
+    let (mut arities, mut leaves) = (BTreeMap::new(), BTreeMap::new());
+    for node in &tree.nodes {
+        let (histogram, count) = match node.kind() {
+            NodeKind::Inner { count, .. } => (&mut arities, count),
+            NodeKind::Leaf { count, .. } => (&mut leaves, count),
+        };
+        *histogram.entry(count).or_insert(0usize) += 1;
+    }
+    lines.say("inner nodes by children", histogram(&arities));
+    lines.say("leaves by objects", histogram(&leaves));
+}
+
+/// `2 × 100, 3 × 7`: sizes and how many have them.
+fn histogram(counts: &BTreeMap<u32, usize>) -> String {
+    let bins: Vec<String> = counts.iter().map(|(size, count)| format!("{size} × {count}")).collect();
+    if bins.is_empty() { "none".into() } else { bins.join(", ") }
+}
+
+/// What takes the scene to say.
+fn against(tree: &Bvh, file: TreeFile, scene: &Scene, lines: &mut Lines) -> Result<(), FileError> {
+    file.for_boxes(&scene.boxes)?;
+    validate(tree, &scene.boxes)?;
+    lines.say("scene", &scene.name);
+    lines.say("valid", "yes, over this scene's objects");
+    // Boxes that the file's checksum has accepted are finite: a valid tree lies around them.
+    if let Ok(greedy) = muller_fellner::Config::default().build(&scene.boxes) {
+        let base = cost::internal_area(&greedy);
+        if base > 0.0 {
+            lines.say("internal area over Müller–Fellner's", cost::internal_area(tree) / base);
+        }
+    }
+    match triangles(scene) {
+        Some(triangles) => {
+            let overlap = cost::end_point_overlap(tree, &triangles, &SahConstants::default());
+            lines.say("end-point overlap", overlap);
+        }
+        None => lines.say("end-point overlap", "of triangles only"),
+    }
+    Ok(())
+}
+
+fn triangles(scene: &Scene) -> Option<Vec<Triangle>> {
+    match &scene.primitives {
+        Primitives::Triangles(corners) => Some(corners.iter().copied().map(Triangle).collect()),
+        Primitives::Spheres(_) => None,
+    }
+}
+
+fn write_nodes(tree: &Bvh, path: &Path) -> Result<(), Error> {
+    let mut parents = vec![None; tree.nodes.len()];
+    for (index, node) in tree.nodes.iter().enumerate() {
+        parents[node.children()].fill(Some(index));
+    }
+    let row = |(node, parent): (usize, Option<usize>)| {
+        let of = &tree.nodes[node];
+        let (kind, first, count) = match of.kind() {
+            NodeKind::Inner { first, count } => ("inner", first, count),
+            NodeKind::Leaf { first, count } => ("leaf", first, count),
+        };
+        let ([min_x, min_y, min_z], [max_x, max_y, max_z]) = (of.aabb.min.to_array(), of.aabb.max.to_array());
+        NodeRow { node, parent, kind, first, count, min_x, min_y, min_z, max_x, max_y, max_z }
+    };
+    let rows: Vec<NodeRow> = parents.into_iter().enumerate().map(row).collect();
+    write_whole(path, &record::to_bytes(&rows, path)?)
+}
