@@ -165,6 +165,30 @@ mod tests {
     }
 
     #[test]
+    fn what_lies_on_one_side_of_a_plane_is_met_on_that_side() {
+        let b = Aabb::from(([0.1, -0.2, 0.3], [0.4, -0.2, 0.9]));
+        for direction in [Vec3::new(0.3, -0.1, 0.7), Vec3::new(-1e-40, 0.0, 1.0), Vec3::new(-0.0, 1.0, 0.0)] {
+            for origin in [Vec3::ZERO, b.min, b.max, Vec3::new(0.25, -0.2, -9.0), Vec3::splat(-3e38)] {
+                let ray = Ray::half_line(origin, direction).unwrap();
+                let slabs = Slabs::new(&ray, &b);
+                let (entry, exit) = slabs.interval(&b);
+                for axis in 0..3 {
+                    let (mut near, mut far) = (b.min[axis], b.max[axis]);
+                    if ray.inverse_direction()[axis] < 0.0 {
+                        (near, far) = (far, near);
+                    }
+                    assert!(slabs.crossing(axis, near).0 <= entry, "{ray:?}");
+                    assert!(slabs.crossing(axis, far).1 >= exit, "{ray:?}");
+                    assert!(
+                        slabs.crossing(axis, near).0 <= slabs.crossing(axis, near).1.max(ray.t_min()),
+                        "{ray:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
     fn intervals_of_boxes_inside_others_are_inside_theirs() {
         let inner = Aabb::from(([0.1, 0.2, 0.3], [0.4, 0.2, 0.9]));
         let outer = Aabb::from(([0.1, -3.0, 0.3], [0.5, 0.2, 1e6]));

@@ -1,7 +1,7 @@
 //! The chart engine: data series in, an SVG and the PNG made from it out; no files, no clock.
 //!
 //! A [`Figure`] says what is shown, in data units. [`svg`] lays it out and draws it with plotters;
-//! [`png`] rasterises the very same SVG with fonts that are part of the program. The same figure gives
+//! [`png()`] rasterises the very same SVG with fonts that are part of the program. The same figure gives
 //! the same bytes of SVG on every machine, and the same bytes of PNG on machines of the same
 //! processor architecture.
 //!
