@@ -147,8 +147,11 @@ pub fn report_again(experiment: &Experiment, out: &Path) -> Result<Summary, Erro
     if store::is_unfinished(&folder) {
         return Err(refuse("the experiment was interrupted; finish it with --resume first"));
     }
-    let path = folder.join("resolved.toml");
-    let found = std::fs::read_to_string(&path).map_err(Error::io(&path, "read the file"))?;
+    let read = |name: &str| {
+        let path = folder.join(name);
+        std::fs::read_to_string(&path).map_err(Error::io(&path, "read the file"))
+    };
+    let found = read("resolved.toml")?;
     let same_runs = toml::from_str(&found).is_ok_and(|found: Resolved| {
         let experiment = Experiment { reports: experiment.reports.clone(), ..found.experiment };
         Resolved { experiment, ..found } == resolved
@@ -157,7 +160,10 @@ pub fn report_again(experiment: &Experiment, out: &Path) -> Result<Summary, Erro
         return Err(refuse("the rows come from another spec, scene or seed; run it again without --redraw"));
     }
     let store = Store::open(out, &experiment.name, &found, false)?;
-    let text = report(&resolved, out, &Provenance::gather(), &store)?;
+    // What the rows have found, their program has found.
+    let provenance: Provenance = toml::from_str(&read("provenance.toml")?)
+        .map_err(|error| refuse(&format!("provenance.toml: {}", error.message())))?;
+    let text = report(&resolved, out, &provenance, &store)?;
     store.finish()?;
     Ok(Summary { text, left_out })
 }

@@ -80,7 +80,7 @@ impl Config {
 
     fn figure(&self, rows: &Rows, panel: Panel) -> Figure {
         let targets: Vec<String> = self.targets.iter().map(Target::name).collect();
-        let scenes: Vec<&str> = rows.scenes().into_iter().map(|(scene, _)| scene).collect();
+        let scenes: Vec<String> = rows.scenes().into_iter().map(|(scene, _)| rows.shown(scene)).collect();
         Figure {
             title: format!("{}: {}", self.source, self.title),
             caption: format!(

@@ -94,12 +94,12 @@ impl Config {
                         });
                     }
                     layers.extend(laws);
-                    let title = format!("{}: {}", rows.shown(scene), target.name());
+                    let title = format!("{scene}: {}", target.name());
                     let y = Axis::linear("P(solved)").range(0.0, 1.02);
                     panels.push(Panel { title, x: Axis::log(along.label()), y, layers });
                 }
             }
-            output.figures.push((along.file("run_times"), self.figure(panels)));
+            output.figures.push((along.file("run_times"), self.figure(rows, panels)));
             output.csv.push((along.file("run_times"), along.csv(&steps)?));
             output.csv.push((along.file("run_times_fit"), along.csv(&fits)?));
             if along == Along::Seconds {
@@ -112,12 +112,15 @@ impl Config {
         Ok(output)
     }
 
-    fn figure(&self, panels: Vec<Panel>) -> Figure {
+    fn figure(&self, rows: &Rows, panels: Vec<Panel>) -> Figure {
         let mut looks: Vec<_> = self.methods.iter().cloned().zip((0..).map(Look::Slot)).collect();
         looks.push((FIT.into(), Look::Reference));
-        let caption = "Fraction of runs with an incumbent at or below the target. A curve ends where the longest run did; a \
-                       method without one never got there. Dashed black: time-to-target fits."
-            .into();
+        let scenes: Vec<String> = rows.scenes().into_iter().map(|(scene, _)| rows.shown(scene)).collect();
+        let caption = format!(
+            "{}. Fraction of runs with an incumbent at or below the target. A curve ends where the longest run did; a method \
+             without one never got there. Dashed black: time-to-target fits.",
+            scenes.join(", ")
+        );
         Figure { title: format!("{}: {}", self.source, self.title), caption, columns: 2, panels, looks }
     }
 
