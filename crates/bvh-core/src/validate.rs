@@ -205,6 +205,28 @@ mod tests {
     }
 
     #[test]
+    fn what_passes_as_plain_is_sound() {
+        let (tree, _) = valid();
+        let view = |tree: &Bvh| is_plain(tree.into(), 3);
+        assert!(view(&tree));
+        let mut damaged = 0;
+        for node in 0..5 {
+            for first in 0..6 {
+                for count in 0..4 {
+                    for node_of in [Node::inner, Node::leaf] {
+                        let mut tree = tree.clone();
+                        tree.nodes[node] = node_of(tree.nodes[node].aabb, first, count);
+                        let sound = name_damage((&tree).into(), 3).is_ok();
+                        assert_eq!(view(&tree), sound, "{:?}", tree.nodes);
+                        damaged += usize::from(!sound);
+                    }
+                }
+            }
+        }
+        assert_eq!(damaged, 5 * 6 * 4 * 2 - 5, "all but the five that change nothing");
+    }
+
+    #[test]
     fn a_valid_tree_and_the_empty_tree_pass() {
         let (tree, boxes) = valid();
         assert_eq!(validate(&tree, &boxes), Ok(()));

@@ -13,8 +13,13 @@ const ORIGIN: Origin = Origin {
     objective: Objective::Sah(SahConstants { traversal: 1.5, intersection: 0.25 }),
 };
 
-/// Triangles along a line and a tree over them with a node of three children and a leaf of two objects.
+/// Triangles along a line and a tree over them with a node of three children and leaves of up to two objects.
 fn scene(n: u32) -> (Vec<Triangle>, Vec<Aabb>, Bvh) {
+    scene_of(n, 3, 2)
+}
+
+/// The same with so many children of the root, two of all other nodes, and leaves of up to `leaf` objects.
+fn scene_of(n: u32, children: usize, leaf: usize) -> (Vec<Triangle>, Vec<Aabb>, Bvh) {
     let triangle = |i: u32| {
         let at = Vec3::new(i as f32, (i % 3) as f32, (i % 5) as f32 * 0.5);
         Triangle([at, at + Vec3::X * 1.5, at + Vec3::new(0.25, 1.0, 0.5)])
@@ -23,10 +28,10 @@ fn scene(n: u32) -> (Vec<Triangle>, Vec<Aabb>, Bvh) {
     let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
     let mut tree = Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, n)], prim_ids: (0..n).rev().collect() };
     let mut at = 0;
-    while at < tree.nodes.len() && n > 2 {
+    while at < tree.nodes.len() && n as usize > leaf {
         let range = tree.nodes[at].prims();
-        let parts = if at == 0 { 3 } else { 2 };
-        if range.len() > 2 {
+        let parts = if at == 0 { children } else { 2 };
+        if range.len() > leaf {
             let first = tree.nodes.len() as u32;
             let cut = |part: usize| (range.start + range.len() * part / parts) as u32;
             tree.nodes
@@ -173,6 +178,7 @@ fn seal(bytes: &mut [u8]) {
 #[test]
 fn a_forged_file_is_refused_or_can_be_traced_to_the_end() {
     let (triangles, boxes, tree) = scene(11);
+    let (.., plain) = scene_of(11, 2, 1);
     let floats = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MIN, f32::MAX, 0.0].map(f32::to_bits);
     let words = (0..24)
         .chain([1 << 30, 1 << 31, u32::MAX, u32::MAX - 1])
@@ -180,7 +186,11 @@ fn a_forged_file_is_refused_or_can_be_traced_to_the_end() {
         .chain(floats);
     let words: Vec<u32> = words.collect();
     let mut accepted = 0;
-    for whole in [save(&tree, &boxes, &ORIGIN).unwrap(), save_wide(&tree, &triangles, &ORIGIN).unwrap()] {
+    for whole in [
+        save(&tree, &boxes, &ORIGIN).unwrap(),
+        save(&plain, &boxes, &ORIGIN).unwrap(),
+        save_wide(&tree, &triangles, &ORIGIN).unwrap(),
+    ] {
         for at in (16..whole.len()).step_by(4).filter(|at| !Header::CHECKSUM.contains(at)) {
             for word in &words {
                 let mut bytes = whole.clone();
