@@ -9,6 +9,7 @@ pub mod error;
 pub mod execute;
 pub mod obj;
 pub mod part;
+pub mod peers;
 pub mod provenance;
 pub mod rays;
 pub mod record;
@@ -17,5 +18,6 @@ pub mod scene;
 pub mod spec;
 pub mod standin;
 pub mod store;
+pub mod tracing;
 
 pub use error::Error;

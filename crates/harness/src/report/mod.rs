@@ -8,13 +8,18 @@ pub mod distribution;
 pub mod estimator;
 pub mod gaps;
 pub mod generations;
+pub mod pareto;
+pub mod peers;
 pub mod ray_tests;
 pub mod statistics;
 pub mod table;
 pub mod times;
+pub mod traversal;
 pub mod trials;
 
-use crate::record::{self, BoundRow, ClockRow, HistoryRow, PaperRow, RayRow, RunRow, TimingRow};
+use crate::record::{
+    self, BoundRow, ClockRow, HistoryRow, PaperRow, RayRow, RunRow, TimingRow, TraceRow, TraceTimeRow,
+};
 use crate::store::Store;
 use crate::{Error, chart};
 use serde::{Deserialize, Serialize};
@@ -44,6 +49,12 @@ pub enum Report {
     Anytime(anytime::Config),
     /// Gaps to the exact optimum of small scenes.
     Gaps(gaps::Config),
+    /// Cost against build time and against time per ray.
+    Pareto(pareto::Config),
+    /// Other libraries beside ours.
+    Peers(peers::Config),
+    /// Speed of rays by tree, layout and kind of rays, and how well the cost predicts it.
+    Traversal(traversal::Config),
 }
 
 impl Report {
@@ -60,6 +71,9 @@ impl Report {
             Self::Correlation(config) => config.methods.iter().collect(),
             Self::Gaps(config) => config.methods.iter().chain([&config.optimum]).collect(),
             Self::Anytime(config) => config.methods.iter().collect(),
+            Self::Pareto(config) => config.methods.iter().collect(),
+            Self::Peers(config) => config.methods.iter().chain([&config.ours]).collect(),
+            Self::Traversal(config) => config.methods.iter().collect(),
         }
     }
 
@@ -80,6 +94,9 @@ impl Report {
             Self::Correlation(config) => config.write(rows),
             Self::Gaps(config) => config.write(rows),
             Self::Anytime(config) => config.write(rows),
+            Self::Pareto(config) => config.write(rows),
+            Self::Peers(config) => config.write(rows),
+            Self::Traversal(config) => config.write(rows),
         }
     }
 }
@@ -99,6 +116,10 @@ pub struct Rows {
     pub bounds: Vec<BoundRow>,
     /// Of `timing_history.csv`; none if no report needs them, otherwise one for every row of `history`, in its order.
     pub clock: Vec<ClockRow>,
+    /// Of `traversal.csv`; none if rays were not traced.
+    pub traces: Vec<TraceRow>,
+    /// Of `timing_traversal.csv`, likewise.
+    pub trace_times: Vec<TraceTimeRow>,
 }
 
 impl Rows {
@@ -170,6 +191,8 @@ pub fn write_all(reports: &[Report], store: &Store) -> Result<String, Error> {
         rays: if_any("rays.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
         bounds: if_any("bounds.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
         clock: if_any("timing_history.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
+        traces: if_any("traversal.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
+        trace_times: if_any("timing_traversal.csv").map_or(Ok(vec![]), |path| record::read(&path))?,
     };
     let mut text = String::new();
     let mut paper = Vec::new();
