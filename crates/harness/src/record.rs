@@ -158,7 +158,7 @@ pub struct TraceRow {
     pub objects_per_ray: Option<f64>,
 }
 
-/// One row of `timing_traversal.csv`: one turn of one layout.
+/// One row of `timing_traversal.csv`: the time of rays of one kind in one layout of a run's tree, on one thread.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TraceTimeRow {
     /// Name of the scene.
@@ -171,12 +171,14 @@ pub struct TraceTimeRow {
     pub rays: String,
     /// Number of rays.
     pub count: u64,
-    /// Number of the turn, from 1.
-    pub round: u32,
+    /// Turns that were timed.
+    pub rounds: u32,
     /// What it took to make the layout from the tree; for other libraries with the tree.
     pub preparation_seconds: f64,
-    /// What all rays took, on one thread.
+    /// What all rays took: the sum over small parts of them of each part's fastest turn.
     pub seconds: f64,
+    /// The same with each part's median turn.
+    pub median_seconds: f64,
 }
 
 /// One row of `bounds.csv`: a proven lower bound of a scene.

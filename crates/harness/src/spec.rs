@@ -193,8 +193,12 @@ impl Experiment {
         if self.threads == Some(0) {
             return Err("threads is 0; accepted: 1 or more".into());
         }
-        if self.tracing.as_ref().is_some_and(|tracing| tracing.count == 0) {
-            return Err("tracing.count is 0; accepted: 1 or more".into());
+        if let Some(tracing) = &self.tracing {
+            for (key, value) in [("count", tracing.count), ("rounds", tracing.rounds)] {
+                if value == 0 {
+                    return Err(format!("tracing.{key} is 0; accepted: 1 or more"));
+                }
+            }
         }
         let mut labels = HashSet::new();
         for (index, Labelled { label, method }) in self.methods.iter().enumerate() {
@@ -297,6 +301,8 @@ mod tests {
             ("budget = { seconds = 1 }\n", &["seconds", "max_evaluations"]),
             ("[[reports]]\nkind = 'pie'\n", &["pie", "table"]),
             ("rays = [{ family = 'lines', query = 'any', count = 0 }]\n", &["rays[0].count is 0"]),
+            ("tracing = { rounds = 0 }\n", &["tracing.rounds is 0", "1 or more"]),
+            ("threads = 0\n", &["threads is 0", "1 or more"]),
             ("rays = [{ family = 'curves', query = 'any', count = 1 }]\n", &["curves", "inside"]),
         ] {
             let message = read(&format!("{GOOD}{wrong}"), &Overrides::default()).unwrap_err();

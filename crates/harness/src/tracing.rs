@@ -3,6 +3,7 @@
 use crate::peers::Peer;
 use crate::rays::{Family, Query, random_ray};
 use crate::record::{TraceRow, TraceTimeRow};
+use crate::report::statistics::{median, minimum};
 use crate::scene::{Primitives, Scene};
 use bvh_core::{Bvh, Hit, Ray, Shear, TestCounts, Triangle, WideBvh, any_hit, nearest_hit};
 use bvh_search::Stream;
@@ -105,8 +106,8 @@ impl Default for Camera {
 }
 
 /// Answers rays, the distance and the object of a hit for each (any of both for an any-hit query), and returns the
-/// seconds that took.
-pub type Trace<'a> = Box<dyn Fn(Query, &[Ray], &mut [Option<Hit>]) -> f64 + 'a>;
+/// seconds that took, part by part.
+pub type Trace<'a> = Box<dyn Fn(Query, &[Ray], &mut [Option<Hit>]) -> Vec<f64> + 'a>;
 
 /// Counts the tests of one ray.
 pub type Count<'a> = Box<dyn Fn(Query, &Ray, &mut TestCounts) + 'a>;
@@ -125,14 +126,20 @@ pub struct Contender<'a> {
     pub count: Option<Count<'a>>,
 }
 
-/// Answers every ray and returns the seconds that took.
+/// Rays whose time is taken together: few enough that some part of every turn is not interrupted by other programs.
+const PART: usize = 4096;
+
+/// Answers every ray and returns the seconds that took, part by part.
 #[inline(always)]
-pub fn timed<R>(rays: &[R], hits: &mut [Option<Hit>], mut answer: impl FnMut(&R) -> Option<Hit>) -> f64 {
-    let start = Instant::now();
-    for (ray, hit) in rays.iter().zip(hits) {
-        *hit = answer(ray);
-    }
-    start.elapsed().as_secs_f64()
+pub fn timed<R>(rays: &[R], hits: &mut [Option<Hit>], mut answer: impl FnMut(&R) -> Option<Hit>) -> Vec<f64> {
+    let part = |(rays, hits): (&[R], &mut [Option<Hit>])| {
+        let start = Instant::now();
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = answer(ray);
+        }
+        start.elapsed().as_secs_f64()
+    };
+    rays.chunks(PART).zip(hits.chunks_mut(PART)).map(part).collect()
 }
 
 /// A method's tree on a scene.
@@ -172,8 +179,10 @@ pub fn measure(
         let rays = rays(kind, config.count, scene, tree, &camera, seed);
         let right = reference(kind, &rays, scene, tree);
         let mut hits = vec![None; rays.len()];
+        // By contender, and by part of the rays, the seconds of each turn.
+        let mut turns = vec![vec![Vec::new(); rays.len().div_ceil(PART)]; contenders.len()];
         for round in 0..=config.rounds {
-            for (method, contender) in &contenders {
+            for ((method, contender), turns) in contenders.iter().zip(&mut turns) {
                 if cancelled() {
                     return Ok(None);
                 }
@@ -181,19 +190,24 @@ pub fn measure(
                 let seconds = (contender.trace)(kind.query(), &rays, &mut hits);
                 if round == 0 {
                     rows.push(row(scene, method, contender, kind, &rays, &right, &hits, tree));
-                    continue;
+                } else {
+                    turns.iter_mut().zip(seconds).for_each(|(turns, seconds)| turns.push(seconds));
                 }
-                times.push(TraceTimeRow {
-                    scene: scene.name.clone(),
-                    method: (*method).into(),
-                    layout: contender.layout.clone(),
-                    rays: kind.name().into(),
-                    count: rays.len() as u64,
-                    round,
-                    preparation_seconds: contender.preparation_seconds,
-                    seconds,
-                });
             }
+        }
+        for ((method, contender), parts) in contenders.iter().zip(&turns) {
+            let sum = |of: fn(&[f64]) -> Option<f64>| parts.iter().filter_map(|turns| of(turns)).sum();
+            times.push(TraceTimeRow {
+                scene: scene.name.clone(),
+                method: (*method).into(),
+                layout: contender.layout.clone(),
+                rays: kind.name().into(),
+                count: rays.len() as u64,
+                rounds: config.rounds,
+                preparation_seconds: contender.preparation_seconds,
+                seconds: sum(|turns| minimum(turns.iter().copied())),
+                median_seconds: sum(median),
+            });
         }
     }
     Ok(Some((rows, times)))
@@ -428,11 +442,12 @@ mod tests {
         let good = muller_fellner::Config::default().build(&scene.boxes).unwrap();
         let bad = median_cut::Config::default().build(&scene.boxes).unwrap();
         let entry = |method, tree| Entry { method, tree, peer: None };
-        let config: Config = toml::from_str("count = 3000\nrounds = 1").unwrap();
+        let config: Config = toml::from_str("count = 5000\nrounds = 2").unwrap();
         let (rows, times) = measure(&config, &scene, &[entry("good", &good), entry("bad", &bad)], 1, || false)
             .unwrap()
             .unwrap();
         assert_eq!((rows.len(), times.len()), (18, 18));
+        assert!(times.iter().all(|row| 0.0 < row.seconds && row.seconds <= row.median_seconds));
         for row in &rows {
             assert!(row.hits > 100 && row.hits < row.count, "{row:?}");
             assert_eq!((row.missed_hits, row.false_hits, row.other_hits), (0, 0, 0), "{row:?}");

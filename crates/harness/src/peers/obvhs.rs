@@ -107,7 +107,7 @@ fn trace(
     hits: &mut [Option<Hit>],
     traverse: impl Fn(bool, TheirRay, &mut RayHit) -> bool,
     ids: &[u32],
-) -> f64 {
+) -> Vec<f64> {
     let theirs =
         |ray: &Ray| TheirRay::new(ray.origin().into(), ray.direction().into(), ray.t_min(), ray.t_max());
     let rays: Vec<TheirRay> = rays.iter().map(theirs).collect();

@@ -44,7 +44,7 @@ pub(super) fn contenders(triangles: &[[Vec3; 3]]) -> Result<Vec<Contender<'_>>, 
         let vertices = vertices(triangles);
         match binary(&vertices) {
             Ok(tree) => trace(&tree, rays, hits),
-            Err(_) => f64::NAN,
+            Err(_) => Vec::new(),
         }
     };
     let contender = |layout: &str, preparation_seconds, trace| Contender {
@@ -76,7 +76,7 @@ fn binary(vertices: &[[f32; 4]]) -> Result<bvh::BVH<'_>, String> {
 }
 
 /// The wrapper has no any-hit traversal: shadow rays look for the nearest hit too.
-fn trace(tree: &impl Intersector, rays: &[Ray], hits: &mut [Option<Hit>]) -> f64 {
+fn trace(tree: &impl Intersector, rays: &[Ray], hits: &mut [Option<Hit>]) -> Vec<f64> {
     let theirs = |ray: &Ray| {
         let mut theirs = TheirRay::new(ray.origin().into(), ray.direction().into());
         theirs.hit.t = ray.t_max().min(tinybvh_rs::INFINITE);

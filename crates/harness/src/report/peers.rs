@@ -1,10 +1,10 @@
 //! Other libraries beside ours: build time, cost by our module, speed by their fastest layout, disagreements.
 
-use super::statistics::{median, minimum};
+use super::statistics::minimum;
 use super::traversal::distinct;
 use super::{Output, Rows, display_name, over, text_table};
 use crate::Error;
-use crate::record::{TraceRow, TraceTimeRow, to_bytes};
+use crate::record::{TraceRow, to_bytes};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -34,7 +34,7 @@ struct Comparison<'a> {
     /// The method's fastest layout for these rays.
     layout: &'a str,
     mrays_per_second: f64,
-    /// Our speed over this method's, turn by turn: the median.
+    /// Our speed over this method's.
     ours_over_this: f64,
     rays_traced: u64,
     missed_hits: u64,
@@ -66,15 +66,7 @@ impl Config {
         kind: &'a str,
     ) -> Option<Comparison<'a>> {
         let (layout, ns) = fastest(rows, scene, method, kind)?;
-        let (our_layout, _) = fastest(rows, scene, &self.ours, kind)?;
-        let turns = |method: &str, layout: &str| -> Vec<f64> {
-            let own = |row: &&TraceTimeRow| {
-                row.scene == scene && row.method == method && row.layout == layout && row.rays == kind
-            };
-            rows.trace_times.iter().filter(own).map(|row| row.seconds).collect()
-        };
-        let (theirs, ours) = (turns(method, layout), turns(&self.ours, our_layout));
-        let ratios: Vec<f64> = theirs.iter().zip(&ours).map(|(theirs, ours)| theirs / ours).collect();
+        let (_, our_ns) = fastest(rows, scene, &self.ours, kind)?;
         let run = rows.first_run(scene, method)?;
         let own = |row: &&TraceRow| {
             row.scene == scene && row.method == method && row.layout == layout && row.rays == kind
@@ -88,7 +80,7 @@ impl Config {
             cost_over_base: over(run.cost, run.base_cost),
             layout,
             mrays_per_second: 1e3 / ns,
-            ours_over_this: median(&ratios)?,
+            ours_over_this: ns / our_ns,
             rays_traced: trace.count,
             missed_hits: trace.missed_hits,
             false_hits: trace.false_hits,

@@ -1,6 +1,6 @@
 //! Speed of rays by tree, layout and kind of rays, and how well the trees' cost predicts it.
 
-use super::statistics::{minimum, pearson, spearman};
+use super::statistics::{pearson, spearman};
 use super::{Output, Rows, display_name, over, text_table};
 use crate::Error;
 use crate::chart::{Axis, Figure, Layer, Panel};
@@ -46,12 +46,13 @@ struct Speed<'a> {
 }
 
 impl Rows {
-    /// Nanoseconds per ray of the fastest turn.
+    /// Nanoseconds per ray.
     pub(super) fn ns_per_ray(&self, scene: &str, method: &str, layout: &str, rays: &str) -> Option<f64> {
-        let own = self.trace_times.iter().filter(|row| {
-            row.scene == scene && row.method == method && row.layout == layout && row.rays == rays
-        });
-        minimum(own.map(|row| 1e9 * row.seconds / row.count as f64))
+        let own = self
+            .trace_times
+            .iter()
+            .find(|row| row.scene == scene && row.method == method && row.layout == layout && row.rays == rays);
+        own.filter(|row| row.count > 0).map(|row| 1e9 * row.seconds / row.count as f64)
     }
 
     /// The first run of a method on a scene.
@@ -124,7 +125,7 @@ impl Config {
         let figure = Figure {
             title: format!("{}: {}", self.source, self.title),
             caption:
-                "One point per tree: the fastest turn, one thread. Cost is the total area of inner nodes over \
+                "One point per tree; one thread, the fastest of several turns. Cost is the total area of inner nodes over \
                       that of the greedy tree."
                     .into(),
             columns: 2,
