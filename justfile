@@ -15,7 +15,7 @@ verify:
     cargo run -p harness -- --check experiments/table3.toml experiments/table4.toml experiments/figure1.toml
     cargo run -p harness -- --check --quick experiments/table2.toml experiments/figure2.toml experiments/figure3.toml \
         experiments/figure4.toml experiments/subsets.toml experiments/random_orders.toml experiments/rays.toml \
-        experiments/correlation.toml experiments/local_search.toml experiments/anytime.toml
+        experiments/correlation.toml experiments/local_search.toml experiments/anytime.toml experiments/traversal.toml
 
 # The paper's Table 4.
 table4:
