@@ -161,7 +161,7 @@ impl WideBvh {
         let (shear, wide_ray) = (Shear::new(ray), WideRay::new(ray, &self.bounds));
         let mut nearest: Option<Hit> = None;
         let mut t_max = ray.t_max();
-        let mut stack = Stack::<Pending, 48>::new(Pending { entry: 0.0, child: Child::node(0) });
+        let mut stack = Stack::<Pending, 32>::new(Pending { entry: 0.0, child: Child::node(0) });
         loop {
             if child.0 & Child::LEAF == 0 {
                 counter.boxes(WideNode::LANES);

@@ -17,6 +17,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
@@ -149,8 +150,8 @@ fn trace(
 ) -> Result<(), Error> {
     let interrupted = || Error::Interrupted { finished: jobs.len(), runs: jobs.len() };
     for (index, job) in jobs.iter().enumerate().filter(|(_, job)| job.repetition == 0) {
-        if !trees.contains_key(&index) {
-            trees.insert(index, perform(experiment, job, watch)?.ok_or_else(interrupted)?.1);
+        if let Entry::Vacant(missing) = trees.entry(index) {
+            missing.insert(perform(experiment, job, watch)?.ok_or_else(interrupted)?.1);
         }
     }
     let (mut rows, mut times) = (Vec::new(), Vec::new());
