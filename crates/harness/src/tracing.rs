@@ -5,11 +5,13 @@ use crate::rays::{Family, Query, random_ray};
 use crate::record::{TraceRow, TraceTimeRow};
 use crate::report::statistics::{median, minimum};
 use crate::scene::{Primitives, Scene};
-use bvh_core::{Bvh, Hit, Ray, Shear, TestCounts, Triangle, WideBvh, any_hit, nearest_hit};
+use bvh_core::cost::SahConstants;
+use bvh_core::{Bvh, Hit, Ray, Shear, TestCounts, Triangle, WideBvh, any_hit, collapse_leaves, nearest_hit};
 use bvh_search::Stream;
 use glam::{DVec3, Vec3};
 use rand::SeedableRng;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -47,7 +49,7 @@ fn every_kind() -> Vec<Kind> {
 }
 
 fn every_layout() -> Vec<Layout> {
-    vec![Layout::Binary, Layout::Wide, Layout::WidePortable]
+    vec![Layout::Binary, Layout::BinaryLeaves, Layout::Wide, Layout::WidePortable]
 }
 
 /// A kind of rays. All directions are unit vectors and all rays begin at distance 0.
@@ -83,6 +85,8 @@ impl Kind {
 pub enum Layout {
     /// The tree as it is.
     Binary,
+    /// The tree with its leaves merged where the surface area heuristic, both constants 1, says so.
+    BinaryLeaves,
     /// [`WideBvh`] with the best instructions of this machine.
     Wide,
     /// [`WideBvh`] with portable code.
@@ -265,7 +269,12 @@ fn own_contenders<'a>(layouts: &[Layout], scene: &Scene, tree: &'a Bvh) -> Resul
         let triangles = triangles(scene)?;
         let start = Instant::now();
         contenders.push(match layout {
-            Layout::Binary => binary(tree, triangles),
+            Layout::Binary => binary("binary", Cow::Borrowed(tree), triangles, 0.0),
+            Layout::BinaryLeaves => {
+                let merged = collapse_leaves(tree, &SahConstants::default());
+                let seconds = start.elapsed().as_secs_f64();
+                binary("binary, merged leaves", Cow::Owned(merged), triangles, seconds)
+            }
             Layout::Wide | Layout::WidePortable => {
                 let wide = WideBvh::new(tree, &triangles).map_err(|error| error.to_string())?;
                 self::wide(wide, layout, start.elapsed().as_secs_f64())
@@ -275,30 +284,35 @@ fn own_contenders<'a>(layouts: &[Layout], scene: &Scene, tree: &'a Bvh) -> Resul
     Ok(contenders)
 }
 
-fn binary(tree: &Bvh, triangles: Vec<Triangle>) -> Contender<'_> {
-    let counted = triangles.clone();
+fn binary<'a>(
+    layout: &str,
+    tree: Cow<'a, Bvh>,
+    triangles: Vec<Triangle>,
+    preparation_seconds: f64,
+) -> Contender<'a> {
+    let (counted_tree, counted) = (tree.clone(), triangles.clone());
     Contender {
-        layout: "binary".into(),
+        layout: layout.into(),
         exact: true,
-        preparation_seconds: 0.0,
+        preparation_seconds,
         trace: Box::new(move |query, rays, hits| match query {
             Query::Any => timed(rays, hits, |ray| {
                 let shear = Shear::new(ray);
                 let test = |id: u32| triangles[id as usize].intersect(&shear, ray.t_max()).is_some();
-                any_hit(tree, ray, test, &mut ()).then_some(SOME_HIT)
+                any_hit(&tree, ray, test, &mut ()).then_some(SOME_HIT)
             }),
             _ => timed(rays, hits, |ray| {
                 let shear = Shear::new(ray);
-                nearest_hit(tree, ray, |id, t_max| triangles[id as usize].intersect(&shear, t_max), &mut ())
+                nearest_hit(&tree, ray, |id, t_max| triangles[id as usize].intersect(&shear, t_max), &mut ())
             }),
         }),
         count: Some(Box::new(move |query, ray, counts| {
             let shear = Shear::new(ray);
             let test = |id: u32, t_max| counted[id as usize].intersect(&shear, t_max);
             if query == Query::Any {
-                any_hit(tree, ray, |id| test(id, ray.t_max()).is_some(), counts);
+                any_hit(&counted_tree, ray, |id| test(id, ray.t_max()).is_some(), counts);
             } else {
-                nearest_hit(tree, ray, test, counts);
+                nearest_hit(&counted_tree, ray, test, counts);
             }
         })),
     }
@@ -379,7 +393,7 @@ impl Camera {
 pub fn reference(kind: Kind, rays: &[Ray], scene: &Scene, tree: &Bvh) -> Vec<Option<Hit>> {
     let mut hits = vec![None; rays.len()];
     if let Ok(triangles) = triangles(scene) {
-        (binary(tree, triangles).trace)(kind.query(), rays, &mut hits);
+        (binary("binary", Cow::Borrowed(tree), triangles, 0.0).trace)(kind.query(), rays, &mut hits);
     }
     hits
 }
@@ -446,7 +460,7 @@ mod tests {
         let (rows, times) = measure(&config, &scene, &[entry("good", &good), entry("bad", &bad)], 1, || false)
             .unwrap()
             .unwrap();
-        assert_eq!((rows.len(), times.len()), (18, 18));
+        assert_eq!((rows.len(), times.len()), (24, 24));
         assert!(times.iter().all(|row| 0.0 < row.seconds && row.seconds <= row.median_seconds));
         for row in &rows {
             assert!(row.hits > 100 && row.hits < row.count, "{row:?}");
