@@ -23,7 +23,8 @@ impl Block {
     pub(crate) fn chain(ids: &[u32], triangles: &[Triangle]) -> impl Iterator<Item = Self> {
         let blocks = ids.len().div_ceil(Self::LANES);
         (1..).zip(ids.chunks(Self::LANES)).map(move |(number, ids)| {
-            let mut block = Self { corners: [[Vec4::ZERO; 3]; 3], ids: [Self::UNUSED; 4] };
+            // Unused lanes at infinity: behind the ray, or after all that it can hit.
+            let mut block = Self { corners: [[Vec4::INFINITY; 3]; 3], ids: [Self::UNUSED; 4] };
             for (lane, &id) in ids.iter().enumerate() {
                 block.ids[lane] = id;
                 for (lanes, corner) in block.corners.iter_mut().zip(&triangles[id as usize].0) {

@@ -104,7 +104,7 @@ mod avx2 {
         pub(crate) fn nearest_hit(self, wide: WideView, ray: &Ray) -> Option<Hit> {
             #[target_feature(enable = "avx2,bmi1,popcnt")]
             fn inner(wide: WideView, ray: &Ray) -> Option<Hit> {
-                wide.nearest_with::<Avx2>(ray)
+                wide.nearest_with::<Avx2>(ray, &mut ())
             }
             // SAFETY: a value of `Self` exists only where `detect` has found these features.
             unsafe { inner(wide, ray) }
@@ -114,7 +114,7 @@ mod avx2 {
         pub(crate) fn any_hit(self, wide: WideView, ray: &Ray) -> bool {
             #[target_feature(enable = "avx2,bmi1,popcnt")]
             fn inner(wide: WideView, ray: &Ray) -> bool {
-                wide.any_with::<Avx2>(ray)
+                wide.any_with::<Avx2>(ray, &mut ())
             }
             // SAFETY: a value of `Self` exists only where `detect` has found these features.
             unsafe { inner(wide, ray) }

@@ -194,24 +194,20 @@ fn walk<C: Counter>(
                 counter.boxes(2);
                 let pair = &tree.nodes[first as usize..first as usize + 2];
                 let (a, b) = (slabs.entry(&pair[0].aabb), slabs.entry(&pair[1].aabb));
-                // Without a branch up to here: which child is nearer cannot be predicted.
-                let swap = b < a;
-                let (near_entry, far_entry) = if swap { (b, a) } else { (a, b) };
-                let (near, far) = (pair[usize::from(swap)].kind(), pair[usize::from(!swap)].kind());
-                if near_entry <= t_max {
-                    if let NodeKind::Leaf { .. } = near {
-                        if leaf(objects(tree, near), &mut t_max, counter).is_break() {
-                            return;
-                        }
-                        if far_entry <= t_max {
-                            kind = far;
-                            continue;
-                        }
-                    } else {
-                        stack.push_if(far_entry <= t_max, Pending { entry: far_entry, kind: far });
-                        kind = near;
+                // A branch, though often mispredicted: the processor goes on with the child it expects to be nearer
+                // while the distances are still computed.
+                let next = if b < a {
+                    descend(tree, &pair[1], &pair[0], [b, a], &mut t_max, &mut stack, &mut leaf, counter)
+                } else {
+                    descend(tree, &pair[0], &pair[1], [a, b], &mut t_max, &mut stack, &mut leaf, counter)
+                };
+                match next {
+                    ControlFlow::Continue(Some(next)) => {
+                        kind = next;
                         continue;
                     }
+                    ControlFlow::Continue(None) => {}
+                    ControlFlow::Break(()) => return,
                 }
             }
             NodeKind::Inner { first, count } => {
@@ -227,6 +223,33 @@ fn walk<C: Counter>(
             }
         };
     }
+}
+
+/// Visits the nearer one of two children if it is a leaf. Returns what to visit next, if it is one of the two, and pushes
+/// the farther one if that comes later.
+#[inline(always)]
+#[allow(clippy::too_many_arguments, reason = "the state of a walk, in registers")]
+fn descend<C: Counter, const N: usize>(
+    tree: BvhView,
+    near: &Node,
+    far: &Node,
+    [near_entry, far_entry]: [f32; 2],
+    t_max: &mut f32,
+    stack: &mut Stack<Pending, N>,
+    leaf: &mut impl FnMut(&[u32], &mut f32, &mut C) -> ControlFlow<()>,
+    counter: &mut C,
+) -> ControlFlow<(), Option<NodeKind>> {
+    if near_entry > *t_max {
+        return ControlFlow::Continue(None);
+    }
+    if let NodeKind::Leaf { .. } = near.kind() {
+        leaf(objects(tree, near.kind()), t_max, counter)?;
+        return ControlFlow::Continue((far_entry <= *t_max).then(|| far.kind()));
+    }
+    if far_entry <= *t_max {
+        stack.push_if(true, Pending { entry: far_entry, kind: far.kind() });
+    }
+    ControlFlow::Continue(Some(near.kind()))
 }
 
 /// The objects of a leaf.

@@ -3,7 +3,7 @@
 use crate::block::Block;
 use crate::lanes::{Expand, Portable, WideRay};
 use crate::stack::Stack;
-use crate::{Aabb, Bvh, Hit, InvalidBvh, Ray, Shear, Triangle, collapse, validate};
+use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Shear, Triangle, collapse, validate};
 use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 
@@ -56,6 +56,7 @@ pub(crate) struct WideNode {
 }
 
 impl WideNode {
+    pub(crate) const LANES: usize = 8;
     pub(crate) const EMPTY: Self =
         Self { planes: [[f32::NAN; 8]; 6], children: [Child::node(0); 8], padding: [0; 8] };
 
@@ -175,35 +176,47 @@ impl<'a> WideView<'a> {
 
     /// [`nearest_hit`](Self::nearest_hit) without instructions that the processor may lack.
     pub fn nearest_hit_portable(self, ray: &Ray) -> Option<Hit> {
-        self.nearest_with::<Portable>(ray)
+        self.nearest_hit_counted(ray, &mut ())
     }
 
     /// [`any_hit`](Self::any_hit) without instructions that the processor may lack.
     pub fn any_hit_portable(self, ray: &Ray) -> bool {
-        self.any_with::<Portable>(ray)
+        self.any_hit_counted(ray, &mut ())
+    }
+
+    /// [`nearest_hit_portable`](Self::nearest_hit_portable) with its tests counted: eight boxes for every node and four
+    /// objects for every block of triangles, whether these have so many or not. The same counts on every machine.
+    pub fn nearest_hit_counted(self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
+        self.nearest_with::<Portable>(ray, counter)
+    }
+
+    /// [`any_hit_portable`](Self::any_hit_portable) with its tests counted likewise.
+    pub fn any_hit_counted(self, ray: &Ray, counter: &mut impl Counter) -> bool {
+        self.any_with::<Portable>(ray, counter)
     }
 
     #[inline(always)]
-    pub(crate) fn nearest_with<E: Expand>(self, ray: &Ray) -> Option<Hit> {
-        self.walk::<E, false>(ray)
+    pub(crate) fn nearest_with<E: Expand>(self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
+        self.walk::<E, false>(ray, counter)
     }
 
     #[inline(always)]
-    pub(crate) fn any_with<E: Expand>(self, ray: &Ray) -> bool {
-        self.walk::<E, true>(ray).is_some()
+    pub(crate) fn any_with<E: Expand>(self, ray: &Ray, counter: &mut impl Counter) -> bool {
+        self.walk::<E, true>(ray, counter).is_some()
     }
 
     /// The nearest hit, or the first one found. One function without closures, so that all of it is compiled with the
     /// instructions that its caller may use.
     #[inline(always)]
-    fn walk<E: Expand, const ANY: bool>(self, ray: &Ray) -> Option<Hit> {
+    fn walk<E: Expand, const ANY: bool>(self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
         let mut child = self.root?;
         let (shear, wide_ray) = (Shear::new(ray), WideRay::new(ray, &self.bounds));
         let mut nearest: Option<Hit> = None;
         let mut t_max = ray.t_max();
-        let mut stack = Stack::<Pending, 48>::new(Pending { entry: 0.0, child: Child::node(0) });
+        let mut stack = Stack::<Pending, 32>::new(Pending { entry: 0.0, child: Child::node(0) });
         loop {
             if child.0 & Child::LEAF == 0 {
+                counter.boxes(WideNode::LANES);
                 let node = &self.nodes[child.0 as usize];
                 if let Some((nearest, others)) = E::expand(node, &wide_ray, t_max, stack.room()) {
                     stack.grow(others);
@@ -212,6 +225,7 @@ impl<'a> WideView<'a> {
                 }
             } else {
                 for block in &self.blocks[(child.0 & !Child::LEAF) as usize..] {
+                    (0..Block::LANES).for_each(|_| counter.object());
                     let mut lanes = block.candidates(&shear, t_max);
                     while lanes != 0 {
                         let lane = lanes.trailing_zeros() as usize;

@@ -1,20 +1,24 @@
 //! Carries out the runs of an experiment: in parallel or one by one, with progress, until done or interrupted.
 
+use crate::peers::{Built, Peer};
 use crate::provenance::Provenance;
-use crate::record::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow};
+use crate::record::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, to_bytes};
 use crate::report::{self, Report};
 use crate::scene::Scene;
-use crate::spec::{Experiment, Labelled};
+use crate::spec::{Contestant, Experiment, Labelled};
 use crate::store::{FinishedRun, Store};
 use crate::suite::Measure;
 use crate::sweep::Shard;
-use crate::{Error, rays, reference, store};
+use crate::{Error, rays, reference, store, tracing};
 use bvh_build::{Builder, muller_fellner};
+use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective, SahConstants};
-use bvh_search::{Budget, Event, Observer, Problem, exact, lower_bound, solve};
+use bvh_search::{Budget, Event, Observer, Outcome, Problem, StopReason, exact, lower_bound, solve};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
@@ -63,6 +67,24 @@ pub fn execute(
         }
         return over_suite(experiment, measure, out, interrupted);
     }
+    let Some(threads) = experiment.threads else { return run(experiment, out, extent, interrupted) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build();
+    let pool = pool.map_err(|error| Error::Usage(format!("threads = {threads}: {error}")))?;
+    pool.install(|| run(experiment, out, extent, interrupted))
+}
+
+fn run(
+    experiment: &Experiment,
+    out: &Path,
+    extent: Extent,
+    interrupted: &AtomicBool,
+) -> Result<Summary, Error> {
+    if extent.shard.is_some() && experiment.tracing.is_some() {
+        return Err(Error::Usage(format!(
+            "{}: rays are timed against each other, not in parts",
+            experiment.name
+        )));
+    }
     let (scenes, left_out) = experiment.load_scenes()?;
     let resolved = resolve(experiment, &scenes);
     let store = Store::open(out, &experiment.name, &to_toml(&resolved)?, extent.resume)?;
@@ -86,13 +108,22 @@ pub fn execute(
 
     let own: Vec<usize> =
         (0..jobs.len()).filter(|&index| extent.shard.is_none_or(|shard| shard.has(index))).collect();
-    let todo: Vec<usize> = own.iter().copied().filter(|&index| !store.has(index)).collect();
+    let mut todo: Vec<usize> = own.iter().copied().filter(|&index| !store.has(index)).collect();
+    if experiment.sequential {
+        let scene = |index: usize| index / (experiment.methods.len() * experiment.repetitions as usize);
+        todo.sort_by_key(|&index| (scene(index), jobs[index].repetition));
+    }
+    // The trees that rays are traced through, by the number of their run.
+    let trees = Mutex::new(BTreeMap::new());
     let finished = AtomicUsize::new(own.len() - todo.len());
     let watch = Watch { bar: progress(own.len() as u64, finished.load(Relaxed) as u64), interrupted };
     watch.bar.set_message(experiment.name.clone());
     let work = |&index: &usize| -> Result<(), Error> {
-        if let Some(run) = perform(experiment, &jobs[index], &watch)? {
+        if let Some((run, tree)) = perform(experiment, &jobs[index], &watch)? {
             store.keep(index, &run)?;
+            if experiment.tracing.is_some() && jobs[index].repetition == 0 {
+                trees.lock().unwrap_or_else(std::sync::PoisonError::into_inner).insert(index, tree);
+            }
             finished.fetch_add(1, Relaxed);
             watch.bar.inc(1);
         }
@@ -111,6 +142,10 @@ pub fn execute(
         store.keep_shard(&to_toml(&provenance)?)?;
         let text = format!("{finished} runs, part {shard}; `harness merge` joins the parts.\n");
         return Ok(Summary { text, left_out });
+    }
+    if let Some(config) = &experiment.tracing {
+        let trees = trees.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        trace(experiment, config, &jobs, trees, &watch, &store)?;
     }
     let text = conclude(&resolved, out, &provenance, store)?;
     Ok(Summary { text, left_out })
@@ -216,8 +251,47 @@ fn bound(experiment: &Experiment, scene: &Scene) -> Result<Option<BoundRow>, Err
     Ok(Some(BoundRow { scene: scene.name.clone(), objects: scene.boxes.len(), lower_bound }))
 }
 
-/// One run; `None` if it was interrupted.
-fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<FinishedRun>, Error> {
+/// Traces rays through the trees of all first runs, scene by scene. Trees of runs that were kept from an interrupted
+/// experiment are made again.
+fn trace(
+    experiment: &Experiment,
+    config: &tracing::Config,
+    jobs: &[Job],
+    mut trees: BTreeMap<usize, Bvh>,
+    watch: &Watch,
+    store: &Store,
+) -> Result<(), Error> {
+    let interrupted = || Error::Interrupted { finished: jobs.len(), runs: jobs.len() };
+    for (index, job) in jobs.iter().enumerate().filter(|(_, job)| job.repetition == 0) {
+        if let Entry::Vacant(missing) = trees.entry(index) {
+            missing.insert(perform(experiment, job, watch)?.ok_or_else(interrupted)?.1);
+        }
+    }
+    let (mut rows, mut times) = (Vec::new(), Vec::new());
+    let first_runs: Vec<(&Job, &Bvh)> = trees.iter().map(|(&index, tree)| (&jobs[index], tree)).collect();
+    for of_scene in first_runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
+        let scene = of_scene[0].0.scene;
+        let entries: Vec<tracing::Entry> = of_scene
+            .iter()
+            .map(|&(job, tree)| {
+                let Labelled { label, method, .. } = job.labelled;
+                let peer = if let Contestant::Peer(peer) = method { Some(peer) } else { None };
+                tracing::Entry { method: label, tree, peer }
+            })
+            .collect();
+        let seed = experiment.seed_of(&scene.name, "tracing", 0);
+        let measured = tracing::measure(config, scene, &entries, seed, || watch.cancelled())
+            .map_err(|message| Error::Scene { name: scene.name.clone(), message })?;
+        let (scene_rows, scene_times) = measured.ok_or_else(interrupted)?;
+        rows.extend(scene_rows);
+        times.extend(scene_times);
+    }
+    store.write("traversal.csv", &to_bytes(&rows, Path::new("traversal.csv"))?)?;
+    store.write("timing_traversal.csv", &to_bytes(&times, Path::new("timing_traversal.csv"))?)
+}
+
+/// One run and its tree; `None` if it was interrupted.
+fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<(FinishedRun, Bvh)>, Error> {
     let Job { scene, base, labelled, repetition, .. } = *job;
     let Labelled { label, method, .. } = labelled;
     if watch.cancelled() {
@@ -226,16 +300,22 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<F
     let seed = experiment.seed_of(&scene.name, label, repetition);
     let problem = Problem { boxes: &scene.boxes, objective: experiment.objective };
     let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
-    let outcome = solve(method, &problem, seed, experiment.budget_of(labelled), &stopwatch);
-    let seconds = stopwatch.start.elapsed().as_secs_f64();
+    let names = || (scene.name.clone(), label.clone());
+    let (outcome, seconds) = match method {
+        Contestant::Ours(method) => {
+            let outcome = solve(method, &problem, seed, experiment.budget_of(labelled), &stopwatch);
+            let seconds = stopwatch.start.elapsed().as_secs_f64();
+            let outcome = outcome.map_err(|source| {
+                let (scene, method) = names();
+                Error::Search { scene, method, source }
+            })?;
+            (outcome, seconds)
+        }
+        Contestant::Peer(peer) => build_by(peer, scene, &experiment.objective, &stopwatch)?,
+    };
     if watch.cancelled() {
         return Ok(None);
     }
-    let names = || (scene.name.clone(), label.clone());
-    let outcome = outcome.map_err(|source| {
-        let (scene, method) = names();
-        Error::Search { scene, method, source }
-    })?;
     let tree = &outcome.tree;
     bvh_core::validate(tree, &scene.boxes).map_err(|source| {
         let (scene, method) = names();
@@ -316,7 +396,23 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<F
     finished.add(bounds.as_slice())?;
     finished.add(&renders)?;
     finished.add(&render_times)?;
-    Ok(Some(finished))
+    Ok(Some((finished, outcome.tree)))
+}
+
+/// A tree by another library, as a search of one evaluation, and the seconds of the building alone.
+fn build_by(
+    peer: &Peer,
+    scene: &Scene,
+    objective: &Objective,
+    stopwatch: &Stopwatch,
+) -> Result<(Outcome, f64), Error> {
+    let refused = |message| Error::Scene { name: scene.name.clone(), message };
+    let Built { tree, seconds } = peer.build(scene).map_err(refused)?;
+    let (cost, work) = (objective.cost(&tree), tree.nodes.len() as u64);
+    let event = Event { evaluations: 1, work, cost, incumbent: cost };
+    stopwatch.note(seconds);
+    let stop = StopReason::Completed;
+    Ok((Outcome { tree, cost, evaluations: 1, work, stop, history: vec![event] }, seconds))
 }
 
 /// Contents of `resolved.toml`: the spec with every default spelled out, and which scenes it ran on.
@@ -381,6 +477,10 @@ struct Stopwatch<'a> {
 }
 
 impl Stopwatch<'_> {
+    fn note(&self, seconds: f64) {
+        self.events.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(seconds);
+    }
+
     /// The seconds of all events so far.
     fn seconds(&self) -> Vec<f64> {
         self.events.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
@@ -389,8 +489,7 @@ impl Stopwatch<'_> {
 
 impl Observer for Stopwatch<'_> {
     fn event(&self, event: &Event) {
-        let seconds = self.start.elapsed().as_secs_f64();
-        self.events.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(seconds);
+        self.note(self.start.elapsed().as_secs_f64());
         self.watch.event(event);
     }
 

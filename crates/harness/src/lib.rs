@@ -13,6 +13,7 @@ pub mod html;
 pub mod inspect;
 pub mod obj;
 pub mod part;
+pub mod peers;
 pub mod provenance;
 pub mod rays;
 pub mod record;
@@ -25,6 +26,7 @@ pub mod standin;
 pub mod store;
 pub mod suite;
 pub mod sweep;
+pub mod tracing;
 pub mod tree_file;
 
 pub use error::Error;

@@ -162,7 +162,7 @@ fn ask(
 }
 
 /// A random ray; `None` if the box is so small or so large that none can be made.
-fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> {
+pub(crate) fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> {
     let (low, size) = (root.min.as_dvec3(), root.extent());
     let mut unit = || rng.random::<f64>();
     let inside = DVec3::new(unit(), unit(), unit());

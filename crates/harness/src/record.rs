@@ -169,6 +169,56 @@ pub struct RenderTimeRow {
     pub render_seconds: f64,
 }
 
+/// One row of `traversal.csv`: what rays of one kind found and took in one layout of a run's tree.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TraceRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Label of the method in the spec.
+    pub method: String,
+    /// How the tree is laid out.
+    pub layout: String,
+    /// Kind of the rays, the same ones for all methods and layouts.
+    pub rays: String,
+    /// Number of rays.
+    pub count: u64,
+    /// How many hit something.
+    pub hits: u64,
+    /// Rays that should hit and do not.
+    pub missed_hits: u64,
+    /// Rays that should not hit and do.
+    pub false_hits: u64,
+    /// Rays that hit elsewhere than they should.
+    pub other_hits: u64,
+    /// Mean number of tests against boxes, the root's included where it is tested; 8 for every wide node.
+    pub boxes_per_ray: Option<f64>,
+    /// Mean number of tests against objects; 4 for every block of triangles.
+    pub objects_per_ray: Option<f64>,
+}
+
+/// One row of `timing_traversal.csv`: the time of rays of one kind in one layout of a run's tree, on one thread.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TraceTimeRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Label of the method in the spec.
+    pub method: String,
+    /// How the tree is laid out.
+    pub layout: String,
+    /// Kind of the rays.
+    pub rays: String,
+    /// Number of rays.
+    pub count: u64,
+    /// Turns that were timed.
+    pub rounds: u32,
+    /// What it took to make the layout from the tree; for other libraries with the tree.
+    pub preparation_seconds: f64,
+    /// What all rays took: the sum over small parts of them of each part's fastest turn.
+    pub seconds: f64,
+    /// The same with each part's median turn.
+    pub median_seconds: f64,
+}
+
 /// One row of `bounds.csv`: a proven lower bound of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BoundRow {
@@ -250,6 +300,8 @@ rows! {
     BoundRow => "bounds.csv",
     RenderRow => "renders.csv",
     ReferenceRow => "references.csv",
+    TraceRow => "traversal.csv",
+    TraceTimeRow => "timing_traversal.csv",
     RenderTimeRow => "timing_renders.csv",
 }
 

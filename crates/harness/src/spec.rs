@@ -1,8 +1,9 @@
 //! Experiment specs: TOML in, a checked [`Experiment`] out, or an error with file, key, found and accepted.
 
+use crate::peers::Peer;
 use crate::report::Report;
 use crate::scene::{Scene, fnv1a};
-use crate::{Error, part, rays, render, suite};
+use crate::{Error, part, rays, render, suite, tracing};
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, Method, Problem, exact, solve};
 use serde::{Deserialize, Serialize};
@@ -37,9 +38,12 @@ pub struct Experiment {
     /// Runs of every method on every scene, at least 1. Default 1.
     #[serde(default = "one")]
     pub repetitions: u32,
-    /// One run at a time, because their times are the result. Default false.
+    /// One run at a time, methods in turns, because their times are the result. Default false.
     #[serde(default)]
     pub sequential: bool,
+    /// Threads that every run has in place of all, at least 1. Default none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub threads: Option<u16>,
     /// What `cost` means. Default the paper's objective.
     #[serde(default)]
     pub objective: Objective,
@@ -58,6 +62,9 @@ pub struct Experiment {
     /// A picture drawn with every run's tree, and with brute force and a KD-tree. Default none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub render: Option<render::experiment::Config>,
+    /// Rays traced through the tree of every method's first run, in all layouts, in turns. Default none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tracing: Option<tracing::Config>,
     /// Tables and figures made from the rows. Default none.
     #[serde(default)]
     pub reports: Vec<Report>,
@@ -70,15 +77,25 @@ pub struct Labelled {
     /// Unique within the experiment.
     pub label: String,
     /// What is run.
-    pub method: Method,
+    pub method: Contestant,
     /// Limits of its runs besides the experiment's: the lower of both counts. Default none.
     pub budget: Option<Budget>,
+}
+
+/// A method of ours, or another library.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+#[allow(missing_docs, reason = "said above")]
+pub enum Contestant {
+    Ours(Method),
+    Peer(Peer),
 }
 
 impl TryFrom<toml::Table> for Labelled {
     type Error = String;
 
     fn try_from(mut table: toml::Table) -> Result<Self, String> {
+        let known = |name: &String| Method::NAMES.iter().chain(Peer::NAMES).any(|known| known == name);
         let label = match table.remove("label") {
             Some(toml::Value::String(label)) => Some(label),
             Some(found) => return Err(format!("label is {found}; accepted: a text")),
@@ -87,13 +104,19 @@ impl TryFrom<toml::Table> for Labelled {
         let budget = table.remove("budget").map(Budget::deserialize).transpose();
         let budget = budget.map_err(|error| format!("budget: {}", error.message()))?;
         let name = match table.get("method") {
-            Some(toml::Value::String(name)) if Method::NAMES.contains(&name.as_str()) => name.clone(),
+            Some(toml::Value::String(name)) if known(name) => name.clone(),
             found => {
                 let found = found.map_or_else(|| "is missing".to_owned(), |found| format!("is {found}"));
-                return Err(format!("method {found}; accepted: {}", Method::NAMES.join(", ")));
+                let (ours, peers) = (Method::NAMES.join(", "), Peer::NAMES.join(", "));
+                return Err(format!("method {found}; accepted: {ours}, or the libraries {peers}"));
             }
         };
-        let method = Method::deserialize(table).map_err(|error| format!("{name}: {}", error.message()))?;
+        let method = if Method::NAMES.contains(&name.as_str()) {
+            Method::deserialize(table).map(Contestant::Ours)
+        } else {
+            Peer::deserialize(table).map(Contestant::Peer)
+        };
+        let method = method.map_err(|error| format!("{name}: {}", error.message()))?;
         Ok(Self { label: label.unwrap_or(name), method, budget })
     }
 }
@@ -163,7 +186,11 @@ impl Experiment {
             experiment.optional_scenes.clear();
         }
         if experiment.suite.is_some() && experiment.methods.is_empty() {
-            let labelled = |method: Method| Labelled { label: method.name().into(), method, budget: None };
+            let labelled = |method: Method| Labelled {
+                label: method.name().into(),
+                method: Contestant::Ours(method),
+                budget: None,
+            };
             experiment.methods = Method::all().into_iter().map(labelled).collect();
         }
         experiment.check().map_err(fail)?;
@@ -175,6 +202,11 @@ impl Experiment {
         if self.suite.is_some() {
             if let Some(unknown) = self.scenes.iter().find(|id| suite::examine::case(id).is_none()) {
                 return Err(format!("scene {unknown} is no case of the suite; accepted: S01 to S45"));
+            }
+            if let Some(Labelled { label, .. }) =
+                self.methods.iter().find(|labelled| matches!(labelled.method, Contestant::Peer(_)))
+            {
+                return Err(format!("{label} is another library; accepted in the suite: its key `peers`"));
             }
         } else if self.scenes.is_empty() {
             return Err("scenes is empty; accepted: at least one name or path".into());
@@ -192,6 +224,16 @@ impl Experiment {
             return Err(format!("rays[{index}].count is 0; accepted: 1 or more"));
         }
         self.render.map_or(Ok(()), |render| render.check())?;
+        if self.threads == Some(0) {
+            return Err("threads is 0; accepted: 1 or more".into());
+        }
+        if let Some(tracing) = &self.tracing {
+            for (key, value) in [("count", tracing.count), ("rounds", tracing.rounds)] {
+                if value == 0 {
+                    return Err(format!("tracing.{key} is 0; accepted: 1 or more"));
+                }
+            }
+        }
         let mut labels = HashSet::new();
         for (index, Labelled { label, method, .. }) in self.methods.iter().enumerate() {
             if !labels.insert(label) {
@@ -199,6 +241,19 @@ impl Experiment {
                     "methods[{index}].label is {label:?} for the second time; accepted: unique labels"
                 ));
             }
+            let method = match method {
+                Contestant::Ours(method) => method,
+                Contestant::Peer(peer) => match peer.missing_feature() {
+                    Some(feature) => {
+                        let (name, ours) = (peer.name(), Method::NAMES.join(", "));
+                        return Err(format!(
+                            "methods[{index}].method is {name:?}, another library, which needs `cargo run --release -p \
+                             harness --features {feature}`; accepted without: {ours}"
+                        ));
+                    }
+                    None => continue,
+                },
+            };
             // A search checks its own parameters before it looks at the scene: let it, on the scene of nothing.
             let budget = Budget { max_evaluations: Some(1), max_work: None };
             let nothing = Problem { boxes: &[], objective: self.objective };
@@ -305,6 +360,8 @@ mod tests {
             ("budget = { seconds = 1 }\n", &["seconds", "max_evaluations"]),
             ("[[reports]]\nkind = 'pie'\n", &["pie", "table"]),
             ("rays = [{ family = 'lines', query = 'any', count = 0 }]\n", &["rays[0].count is 0"]),
+            ("tracing = { rounds = 0 }\n", &["tracing.rounds is 0", "1 or more"]),
+            ("threads = 0\n", &["threads is 0", "1 or more"]),
             ("rays = [{ family = 'curves', query = 'any', count = 1 }]\n", &["curves", "inside"]),
         ] {
             let message = read(&format!("{GOOD}{wrong}"), &Overrides::default()).unwrap_err();
@@ -318,6 +375,7 @@ mod tests {
             ("[]", &["methods is empty"][..]),
             ("[{ noise = 0.1 }]", &["method is missing", "grasp"]),
             ("[{ method = 'grep' }]", &["\"grep\"", "muller_fellner"]),
+            ("[{ method = 'obvhs', preset = 'best' }]", &["obvhs", "best", "very_slow"]),
             ("[{ method = 'grasp', alpa = 1 }]", &["grasp", "alpa", "noise"]),
             ("[{ method = 'grasp', noise = 1.5 }]", &["methods[0]", "noise is 1.5", "0 to 1"]),
             ("[{ method = 'grasp', label = 3 }]", &["label is 3"]),
@@ -327,6 +385,26 @@ mod tests {
             let text = format!("question = 'q'\nscenes = ['escher']\nmethods = {methods}\n");
             let message = read(&text, &Overrides::default()).unwrap_err();
             assert!(parts.iter().all(|part| message.contains(part)), "{methods}: {message}");
+        }
+    }
+
+    #[test]
+    fn another_library_is_accepted_exactly_with_its_feature() {
+        for name in Peer::NAMES {
+            let text = format!("question = 'q'\nscenes = ['escher']\nmethods = [{{ method = '{name}' }}]\n");
+            let Contestant::Peer(peer) = toml::from_str::<Experiment>(&text).unwrap().methods.remove(0).method
+            else {
+                panic!("{name} is no library");
+            };
+            let read = read(&text, &Overrides::default());
+            match peer.missing_feature() {
+                Some(feature) => {
+                    let message = read.unwrap_err();
+                    let parts = ["methods[0].method", name, "--features", feature, "muller_fellner"];
+                    assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+                }
+                None => assert!(read.is_ok(), "{read:?}"),
+            }
         }
     }
 

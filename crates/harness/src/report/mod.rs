@@ -10,6 +10,8 @@ pub mod estimator;
 pub mod gaps;
 pub mod generations;
 pub mod numbers;
+pub mod pareto;
+pub mod peers;
 pub mod pictures;
 pub mod profile;
 pub mod progress;
@@ -20,11 +22,12 @@ pub mod statistics;
 pub mod table;
 pub mod target;
 pub mod times;
+pub mod traversal;
 pub mod trials;
 
 use crate::record::{
     self, BoundRow, ClockRow, HistoryRow, PaperRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row,
-    RunRow, TimingRow,
+    RunRow, TimingRow, TraceRow, TraceTimeRow,
 };
 use crate::store::Store;
 use crate::{Error, chart};
@@ -67,6 +70,12 @@ pub enum Report {
     Significance(significance::Config),
     /// One picture by brute force, KD-tree and trees.
     Pictures(pictures::Config),
+    /// Cost against build time and against time per ray.
+    Pareto(pareto::Config),
+    /// Other libraries beside ours.
+    Peers(peers::Config),
+    /// Speed of rays by tree, layout and kind of rays, and how well the cost predicts it.
+    Traversal(traversal::Config),
 }
 
 impl Report {
@@ -89,6 +98,9 @@ impl Report {
             Self::Numbers(config) => config.methods.iter().collect(),
             Self::Significance(config) => config.against.iter().chain([&config.method]).collect(),
             Self::Pictures(config) => config.methods.iter().collect(),
+            Self::Pareto(config) => config.methods.iter().collect(),
+            Self::Peers(config) => config.methods.iter().chain([&config.ours]).collect(),
+            Self::Traversal(config) => config.methods.iter().collect(),
         }
     }
 
@@ -121,6 +133,9 @@ impl Report {
             Self::Numbers(config) => config.write(rows),
             Self::Significance(config) => config.write(rows),
             Self::Pictures(config) => config.write(rows),
+            Self::Pareto(config) => config.write(rows),
+            Self::Peers(config) => config.write(rows),
+            Self::Traversal(config) => config.write(rows),
         }
     }
 }
@@ -146,6 +161,10 @@ pub struct Rows {
     pub renders: Vec<RenderRow>,
     /// Of `timing_renders.csv`, likewise.
     pub render_times: Vec<RenderTimeRow>,
+    /// Of `traversal.csv`; none if rays were not traced.
+    pub traces: Vec<TraceRow>,
+    /// Of `timing_traversal.csv`, likewise.
+    pub trace_times: Vec<TraceTimeRow>,
 }
 
 impl Rows {
@@ -161,6 +180,8 @@ impl Rows {
             references: record::read_if_any(folder)?,
             renders: record::read_if_any(folder)?,
             render_times: record::read_if_any(folder)?,
+            traces: record::read_if_any(folder)?,
+            trace_times: record::read_if_any(folder)?,
         })
     }
 

@@ -5,7 +5,7 @@ use super::{CASES, Case, Cell, PARTS, SceneCase, Size, child, is_builder, tracin
 use crate::Error;
 use crate::chart::{self, HeatMap, Key};
 use crate::record::{read, to_bytes};
-use crate::spec::Labelled;
+use crate::spec::{Contestant, Labelled};
 use crate::store::Store;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -142,6 +142,7 @@ impl Config {
                 return Err(Error::Interrupted { finished: done, runs: cases.len() });
             }
             for Labelled { label, method, .. } in methods {
+                let Contestant::Ours(method) = method else { continue };
                 let cell = case.of_method(method, self.builders, self.work_per_object);
                 let Some((row, examined)) = cell.map(|cell| Row::new(case, label, cell)) else { continue };
                 times.extend(examined.map(|Examined { objects, seconds, .. }| {

@@ -1,0 +1,111 @@
+//! The crate `bvh`.
+
+use super::{Built, Theirs, convert};
+use crate::rays::Query;
+use crate::tracing::{Contender, timed};
+use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
+use ::bvh::bounding_hierarchy::BHShape;
+use ::bvh::bvh::{Bvh as TheirBvh, BvhNode};
+use ::bvh::ray::Ray as TheirRay;
+use bvh_core::{Aabb, Hit, Ray};
+use glam::Vec3;
+use nalgebra::{Point3, Vector3};
+use std::time::Instant;
+
+/// A box that may know its triangle.
+#[derive(Clone)]
+struct Shape {
+    aabb: TheirAabb<f32, 3>,
+    corners: [Point3<f32>; 3],
+    object: u32,
+    node: usize,
+}
+
+impl Bounded<f32, 3> for Shape {
+    fn aabb(&self) -> TheirAabb<f32, 3> {
+        self.aabb
+    }
+}
+
+impl BHShape<f32, 3> for Shape {
+    fn set_bh_node_index(&mut self, node: usize) {
+        self.node = node;
+    }
+
+    fn bh_node_index(&self) -> usize {
+        self.node
+    }
+}
+
+fn point(p: Vec3) -> Point3<f32> {
+    Point3::new(p.x, p.y, p.z)
+}
+
+fn shapes<'a>(boxes: impl Iterator<Item = (Aabb, [Vec3; 3])> + 'a) -> Vec<Shape> {
+    let shape = |(object, (aabb, corners)): (u32, (Aabb, [Vec3; 3]))| Shape {
+        aabb: TheirAabb { min: point(aabb.min), max: point(aabb.max) },
+        corners: corners.map(point),
+        object,
+        node: 0,
+    };
+    (0..).zip(boxes).map(shape).collect()
+}
+
+/// Builds on one thread; the library's leaves have one object.
+pub(super) fn build(boxes: &[Aabb]) -> Built {
+    let mut shapes = shapes(boxes.iter().map(|&aabb| (aabb, [aabb.min; 3])));
+    let start = Instant::now();
+    let theirs = TheirBvh::build(&mut shapes);
+    let seconds = start.elapsed().as_secs_f64();
+    let tree = convert(0, boxes, |index| match theirs.nodes[index] {
+        BvhNode::Leaf { shape_index, .. } => Theirs::Leaf(vec![shape_index as u32]),
+        BvhNode::Node { child_l_index, child_r_index, .. } => Theirs::Inner([child_l_index, child_r_index]),
+    });
+    Built { tree, seconds }
+}
+
+/// The iterator by distance, ended at the first box that begins behind the nearest hit: of the library's traversals the
+/// only one that is ordered and has no limit of depth. Its triangle test sees front sides only and is asked for both.
+pub(super) fn contender(triangles: &[[Vec3; 3]]) -> Contender<'_> {
+    let mut shapes = shapes(triangles.iter().map(|&corners| (Aabb::around(corners), corners)));
+    let start = Instant::now();
+    let tree = TheirBvh::build(&mut shapes);
+    let preparation_seconds = start.elapsed().as_secs_f64();
+    let meets = |shape: &Shape, ray: &TheirRay<f32, 3>| {
+        let [a, b, c] = &shape.corners;
+        let front = ray.intersects_triangle(a, b, c).distance;
+        if front.is_finite() { front } else { ray.intersects_triangle(a, c, b).distance }
+    };
+    let trace = move |query: Query, rays: &[Ray], hits: &mut [Option<Hit>]| {
+        let theirs = |ray: &Ray| {
+            let (o, d) = (ray.origin(), ray.direction());
+            // It makes directions unit vectors; distances are converted.
+            (TheirRay::new(point(o), Vector3::new(d.x, d.y, d.z)), d.length(), ray.t_min(), ray.t_max())
+        };
+        let rays: Vec<_> = rays.iter().map(theirs).collect();
+        timed(&rays, hits, |(ray, length, t_min, t_max)| {
+            let mut nearest: Option<Hit> = None;
+            let (low, mut high) = (t_min * length, t_max * length);
+            for shape in tree.nearest_traverse_iterator(ray, &shapes) {
+                let distance = meets(shape, ray);
+                if distance >= low && distance <= high {
+                    nearest = Some(Hit { t: distance / length, object: shape.object });
+                    high = distance;
+                    if query == Query::Any {
+                        break;
+                    }
+                } else if ray.intersection_slice_for_aabb(&shape.aabb).is_some_and(|(entry, _)| entry > high) {
+                    break;
+                }
+            }
+            nearest
+        })
+    };
+    Contender {
+        layout: "binary, their own".into(),
+        exact: false,
+        preparation_seconds,
+        trace: Box::new(trace),
+        count: None,
+    }
+}

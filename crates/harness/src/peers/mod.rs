@@ -1,0 +1,214 @@
+//! Other libraries as methods of experiments: their trees by our cost, their traversals beside ours.
+//!
+//! A library is one file and one line in [`Peer`]. Specs that name one are understood without the cargo feature
+//! `peers`, so that the message can say what is missing.
+
+#[cfg(feature = "peers")]
+mod bvh;
+#[cfg(feature = "peers")]
+mod obvhs;
+#[cfg(feature = "peer-tinybvh")]
+mod tinybvh;
+
+#[cfg(feature = "peers")]
+use crate::scene::Primitives;
+use crate::scene::Scene;
+use crate::tracing::Contender;
+use bvh_core::Bvh;
+#[cfg(feature = "peers")]
+use bvh_core::{Aabb, Node};
+use serde::{Deserialize, Serialize};
+
+/// A library with its settings, as a spec names it.
+///
+/// Its tree, for the costs and the build time, has one object per leaf, as ours do. Its rays go through what the
+/// library makes for rays by the same settings: with its own leaves, and with split triangles where it splits them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "method", rename_all = "snake_case")]
+pub enum Peer {
+    /// The crate `bvh`: binned surface area heuristic. It has no settings.
+    Bvh(NoSettings),
+    /// The crate `obvhs`: parallel locally ordered clustering, then reinsertion.
+    Obvhs(Obvhs),
+    /// The crate `tinybvh-rs`, for the C++ library tinybvh: binned surface area heuristic. It has no settings.
+    Tinybvh(NoSettings),
+}
+
+/// The settings of a library that has none.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoSettings {}
+
+/// Settings of `obvhs`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Obvhs {
+    /// The library's preset. Default medium.
+    pub preset: Preset,
+    /// In place of the preset's `reinsertion_batch_ratio`: the fraction of nodes that are reinserted; above 1 several
+    /// times. Default the preset's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reinsertion: Option<f32>,
+}
+
+/// The presets of `obvhs`, by the names of its functions without `_build`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[allow(missing_docs, reason = "the library's names")]
+pub enum Preset {
+    Fastest,
+    VeryFast,
+    Fast,
+    #[default]
+    Medium,
+    Slow,
+    VerySlow,
+}
+
+/// A library's tree.
+#[derive(Clone, Debug)]
+pub struct Built {
+    /// As our type, boxes made tight.
+    pub tree: Bvh,
+    /// What the library took to build it, conversions left out.
+    pub seconds: f64,
+}
+
+impl Peer {
+    /// The names of all libraries.
+    pub const NAMES: &[&str] = &["bvh", "obvhs", "tinybvh"];
+
+    /// The library's name.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Bvh(_) => "bvh",
+            Self::Obvhs(_) => "obvhs",
+            Self::Tinybvh(_) => "tinybvh",
+        }
+    }
+
+    /// The cargo feature that the program lacks to use this library, if it does.
+    pub fn missing_feature(&self) -> Option<&'static str> {
+        match self {
+            Self::Bvh(_) | Self::Obvhs(_) => (!cfg!(feature = "peers")).then_some("peers"),
+            Self::Tinybvh(_) => (!cfg!(feature = "peer-tinybvh")).then_some("peer-tinybvh"),
+        }
+    }
+
+    /// Builds the tree over the scene's objects. An error says what the library cannot do.
+    #[cfg_attr(not(feature = "peers"), allow(unused_variables, reason = "there is nothing to build"))]
+    pub fn build(&self, scene: &Scene) -> Result<Built, String> {
+        match self {
+            #[cfg(feature = "peers")]
+            Self::Bvh(_) => Ok(bvh::build(&scene.boxes)),
+            #[cfg(feature = "peers")]
+            Self::Obvhs(config) => Ok(obvhs::build(config, &scene.boxes)),
+            #[cfg(feature = "peer-tinybvh")]
+            Self::Tinybvh(_) => tinybvh::build(triangles(scene)?, &scene.boxes),
+            #[allow(unreachable_patterns, reason = "not without the features")]
+            _ => Err(format!("this program was built without the library {}", self.name())),
+        }
+    }
+
+    /// The library's ways to trace rays through the scene's triangles.
+    #[cfg_attr(not(feature = "peers"), allow(unused_variables, reason = "there is nothing to trace"))]
+    pub fn contenders<'a>(&self, scene: &'a Scene) -> Result<Vec<Contender<'a>>, String> {
+        match self {
+            #[cfg(feature = "peers")]
+            Self::Bvh(_) => Ok(vec![bvh::contender(triangles(scene)?)]),
+            #[cfg(feature = "peers")]
+            Self::Obvhs(config) => Ok(obvhs::contenders(config, triangles(scene)?)),
+            #[cfg(feature = "peer-tinybvh")]
+            Self::Tinybvh(_) => tinybvh::contenders(triangles(scene)?),
+            #[allow(unreachable_patterns, reason = "not without the features")]
+            _ => Err(format!("this program was built without the library {}", self.name())),
+        }
+    }
+}
+
+/// What a library traces.
+#[cfg(feature = "peers")]
+fn triangles(scene: &Scene) -> Result<&[[glam::Vec3; 3]], String> {
+    match &scene.primitives {
+        Primitives::Triangles(triangles) => Ok(triangles),
+        Primitives::Spheres(_) => Err(format!("{}: this library takes triangles, not spheres", scene.name)),
+    }
+}
+
+/// A node of a library's tree.
+#[cfg(feature = "peers")]
+enum Theirs {
+    Inner([usize; 2]),
+    Leaf(Vec<u32>),
+}
+
+/// The tree below `root` as our type, with tight boxes in place of the library's.
+#[cfg(feature = "peers")]
+fn convert(root: usize, boxes: &[Aabb], node: impl Fn(usize) -> Theirs) -> Bvh {
+    let mut tree = Bvh::default();
+    if boxes.is_empty() {
+        return tree;
+    }
+    tree.nodes.push(Node::leaf(Aabb::EMPTY, 0, 0));
+    let mut open = vec![(root, 0)];
+    while let Some((theirs, ours)) = open.pop() {
+        tree.nodes[ours] = match node(theirs) {
+            Theirs::Leaf(objects) => {
+                let first = tree.prim_ids.len() as u32;
+                tree.prim_ids.extend_from_slice(&objects);
+                Node::leaf(Aabb::EMPTY, first, objects.len() as u32)
+            }
+            Theirs::Inner(children) => {
+                let first = tree.nodes.len();
+                tree.nodes.extend([Node::leaf(Aabb::EMPTY, 0, 0); 2]);
+                open.extend(children.into_iter().zip(first..first + 2).rev());
+                Node::inner(Aabb::EMPTY, first as u32, 2)
+            }
+        };
+    }
+    tree.refit(boxes);
+    tree
+}
+
+#[cfg(all(test, feature = "peers"))]
+mod tests {
+    use super::*;
+    use crate::tracing::{self, Kind};
+    use bvh_core::validate;
+
+    fn all() -> Vec<Peer> {
+        let mut peers = vec![Peer::Bvh(NoSettings {})];
+        let presets = [Preset::Fastest, Preset::Medium, Preset::VerySlow];
+        peers.extend(presets.map(|preset| Peer::Obvhs(Obvhs { preset, reinsertion: None })));
+        if cfg!(feature = "peer-tinybvh") {
+            peers.push(Peer::Tinybvh(NoSettings {}));
+        }
+        peers
+    }
+
+    #[test]
+    fn trees_of_other_libraries_are_valid_and_have_one_object_per_leaf() {
+        let scene = Scene::load("escher:500").unwrap();
+        for peer in all() {
+            let built = peer.build(&scene).unwrap();
+            validate(&built.tree, &scene.boxes).unwrap();
+            assert_eq!(built.tree.nodes.len(), 2 * 500 - 1, "{peer:?}");
+        }
+    }
+
+    #[test]
+    fn other_libraries_find_nearly_all_hits_and_nothing_else() {
+        let scene = Scene::load("escher:2000").unwrap();
+        let tree = Peer::Bvh(NoSettings {}).build(&scene).unwrap().tree;
+        let rays = tracing::rays(Kind::Incoherent, 4000, &scene, &tree, &Default::default(), 1);
+        let reference = tracing::reference(Kind::Incoherent, &rays, &scene, &tree);
+        for peer in all() {
+            for contender in peer.contenders(&scene).unwrap() {
+                let mut hits = vec![None; rays.len()];
+                (contender.trace)(Kind::Incoherent.query(), &rays, &mut hits);
+                let found = tracing::disagreements(&reference, &hits, &tree, &rays);
+                assert!(found.missed + found.false_hits + found.other < 20, "{peer:?}: {found:?}");
+            }
+        }
+    }
+}

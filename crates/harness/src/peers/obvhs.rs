@@ -1,0 +1,123 @@
+//! The crate `obvhs`.
+
+use super::{Built, Obvhs, Preset, Theirs, convert};
+use crate::rays::Query;
+use crate::tracing::{Contender, timed};
+use ::obvhs::ray::{Ray as TheirRay, RayHit};
+use ::obvhs::rt_triangle::RtTriangle;
+use ::obvhs::triangle::Triangle as TheirTriangle;
+use ::obvhs::{BvhBuildParams, aabb};
+use ::obvhs::{bvh2::builder as binary, cwbvh::builder as wide};
+use bvh_core::{Aabb, Hit, Ray};
+use glam::{Vec3, Vec3A};
+use std::time::Duration;
+
+fn parameters(config: &Obvhs) -> BvhBuildParams {
+    let mut parameters = match config.preset {
+        Preset::Fastest => BvhBuildParams::fastest_build(),
+        Preset::VeryFast => BvhBuildParams::very_fast_build(),
+        Preset::Fast => BvhBuildParams::fast_build(),
+        Preset::Medium => BvhBuildParams::medium_build(),
+        Preset::Slow => BvhBuildParams::slow_build(),
+        Preset::VerySlow => BvhBuildParams::very_slow_build(),
+    };
+    if let Some(ratio) = config.reinsertion {
+        parameters.reinsertion_batch_ratio = ratio;
+    }
+    parameters
+}
+
+/// Builds over boxes: one object per leaf, and no split triangles. Its own stopwatch leaves out conversions and checks.
+pub(super) fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
+    let theirs: Vec<aabb::Aabb> = boxes.iter().map(|b| aabb::Aabb::new(b.min.into(), b.max.into())).collect();
+    let parameters = BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..parameters(config) };
+    let mut time = Duration::ZERO;
+    let built = binary::build_bvh2(&theirs, parameters, &mut time);
+    let tree = convert(0, boxes, |index| {
+        let node = &built.nodes[index];
+        let first = node.first_index as usize;
+        match node.prim_count as usize {
+            0 => Theirs::Inner([first, first + 1]),
+            count => Theirs::Leaf(built.primitive_indices[first..first + count].to_vec()),
+        }
+    });
+    Built { tree, seconds: time.as_secs_f64() }
+}
+
+/// The binary tree and the eight-wide compressed one of the preset, with triangles in the order of leaves, as the
+/// library recommends. Its directions are unit vectors; ours are too, but for rounding.
+pub(super) fn contenders(config: &Obvhs, triangles: &[[Vec3; 3]]) -> Vec<Contender<'static>> {
+    let corner = |p: Vec3| Vec3A::from(p);
+    let theirs: Vec<TheirTriangle> = triangles
+        .iter()
+        .map(|&[a, b, c]| TheirTriangle { v0: corner(a), v1: corner(b), v2: corner(c) })
+        .collect();
+    let in_order =
+        |ids: &[u32]| -> Vec<RtTriangle> { ids.iter().map(|&id| (&theirs[id as usize]).into()).collect() };
+    let (mut binary_time, mut wide_time) = (Duration::ZERO, Duration::ZERO);
+    let tree = binary::build_bvh2_from_tris(&theirs, parameters(config), &mut binary_time);
+    let in_leaves = in_order(&tree.primitive_indices);
+    let trace_binary = move |query: Query, rays: &[Ray], hits: &mut [Option<Hit>]| {
+        trace(
+            query,
+            rays,
+            hits,
+            |any, ray, hit| {
+                let test = |ray: &TheirRay, id: usize| in_leaves[id].intersect(ray);
+                if any { !tree.ray_traverse_miss(ray, test) } else { tree.ray_traverse(ray, hit, test) }
+            },
+            &tree.primitive_indices,
+        )
+    };
+    let compressed = wide::build_cwbvh_from_tris(&theirs, parameters(config), &mut wide_time);
+    let in_leaves = in_order(&compressed.primitive_indices);
+    let trace_wide = move |query: Query, rays: &[Ray], hits: &mut [Option<Hit>]| {
+        trace(
+            query,
+            rays,
+            hits,
+            |any, ray, hit| {
+                let test = |ray: &TheirRay, id: usize| in_leaves[id].intersect(ray);
+                if any {
+                    !compressed.ray_traverse_miss(ray, test)
+                } else {
+                    compressed.ray_traverse(ray, hit, test)
+                }
+            },
+            &compressed.primitive_indices,
+        )
+    };
+    let contender = |layout: &str, time: Duration, trace| Contender {
+        layout: layout.into(),
+        exact: false,
+        preparation_seconds: time.as_secs_f64(),
+        trace,
+        count: None,
+    };
+    vec![
+        contender("binary, their own", binary_time, Box::new(trace_binary) as _),
+        contender("wide, their own", wide_time, Box::new(trace_wide) as _),
+    ]
+}
+
+#[inline(always)]
+fn trace(
+    query: Query,
+    rays: &[Ray],
+    hits: &mut [Option<Hit>],
+    traverse: impl Fn(bool, TheirRay, &mut RayHit) -> bool,
+    ids: &[u32],
+) -> Vec<f64> {
+    let theirs =
+        |ray: &Ray| TheirRay::new(ray.origin().into(), ray.direction().into(), ray.t_min(), ray.t_max());
+    let rays: Vec<TheirRay> = rays.iter().map(theirs).collect();
+    if query == Query::Any {
+        return timed(&rays, hits, |&ray| {
+            traverse(true, ray, &mut RayHit::none()).then_some(Hit { t: 0.0, object: 0 })
+        });
+    }
+    timed(&rays, hits, |&ray| {
+        let mut hit = RayHit::none();
+        traverse(false, ray, &mut hit).then(|| Hit { t: hit.t, object: ids[hit.primitive_id as usize] })
+    })
+}
