@@ -117,6 +117,7 @@ impl Row {
                         && word.ends_with(|digit: char| digit.is_ascii_digit())
                 });
                 let mut promises: Vec<&str> = promises.collect();
+                promises.sort_unstable();
                 promises.dedup();
                 if promises.is_empty() { "!".into() } else { promises.join(" ") }
             }
