@@ -68,8 +68,6 @@ pub enum Check {
     Method(Option<&'static str>, fn(&Method) -> Verdict),
     /// Asked of another part of the program, one of [`PARTS`].
     Part(&'static str, fn() -> Verdict),
-    /// What is to be asked of this part does not exist yet.
-    Pending(&'static str),
 }
 
 /// Parts of the program that are neither methods nor traversals.
@@ -141,8 +139,6 @@ pub enum Cell {
     Refused(String),
     /// The promise that was broken.
     Broken(String),
-    /// Asked of something that does not exist yet.
-    Pending,
 }
 
 impl From<Verdict> for Cell {
@@ -204,7 +200,6 @@ impl Case {
     pub fn of_part(&self, part: &str) -> Option<Cell> {
         self.checks.iter().find_map(|check| match check {
             Check::Part(name, check) if *name == part => Some(check().into()),
-            Check::Pending(name) if *name == part => Some(Cell::Pending),
             _ => None,
         })
     }

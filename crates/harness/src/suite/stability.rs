@@ -37,16 +37,13 @@ enum Class {
     Kept,
     #[serde(rename = "error, as promised")]
     Refused,
-    #[serde(rename = "not there yet")]
-    Pending,
     #[serde(rename = "promise broken")]
     Broken,
     #[serde(rename = "crash or hang")]
     Dead,
 }
 
-const CLASSES: [&str; 5] =
-    ["as promised", "typed error, as promised", "not there yet", "promise broken", "crash or hang"];
+const CLASSES: [&str; 4] = ["as promised", "typed error, as promised", "promise broken", "crash or hang"];
 
 /// One cell, as written to `cells.csv`, and for other libraries to `timing_peers.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -96,7 +93,6 @@ impl Row {
         match cell {
             Cell::Refused(error) => (row(Class::Refused, error), None),
             Cell::Broken(promise) => (row(Class::Broken, promise), None),
-            Cell::Pending => (row(Class::Pending, String::new()), None),
             Cell::Kept(examined) if case.scene().is_some() && examined.seconds > 0.0 => {
                 let Examined { objects, depth, cost, relative_error, .. } = examined;
                 let (depth, cost, relative_error) = (Some(depth), Some(cost), Some(relative_error));
@@ -181,7 +177,7 @@ impl Config {
     /// Another library on a case: few objects with all checks, then many.
     fn peer(&self, case: &Case, scene: &SceneCase, peer: &str) -> Row {
         let limit = Duration::from_secs(self.seconds_per_peer.max(1));
-        let mut last = Row::new(case, peer, Cell::Pending).0;
+        let mut last = Row::new(case, peer, Cell::Broken(String::new())).0;
         let mut broken = Vec::new();
         for objects in [scene.sizes[0], scene.sizes[1]] {
             last.objects = objects;
@@ -248,12 +244,11 @@ fn report(store: &Store) -> Result<String, Error> {
     let count = |class| own.iter().filter(|row| row.outcome == class).count();
     let worst = own.iter().filter_map(|row| row.relative_error).fold(0.0, f64::max);
     let mut text = format!(
-        "{} cells: {} as promised, {} with the error promised, {} not there yet, {} broken. Largest error of a cost: \
+        "{} cells: {} as promised, {} with the error promised, {} broken. Largest error of a cost: \
          {worst:.1e}.\n",
         own.len(),
         count(Class::Kept),
         count(Class::Refused),
-        count(Class::Pending),
         count(Class::Broken),
     );
     for row in rows.iter().filter(|row| matches!(row.outcome, Class::Broken | Class::Dead)) {
