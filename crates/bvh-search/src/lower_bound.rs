@@ -213,7 +213,7 @@ mod tests {
             let boxes: Vec<Aabb> =
                 (0..12).map(|i| Aabb::from((corner(i), corner(i).map(|c| c + at(i, 4) / 10.0)))).collect();
             let tightness = internal_area(&boxes, DEFAULT_EFFORT).unwrap() / optimum(&boxes);
-            assert!(tightness > 0.85, "{tightness}");
+            assert!(tightness > 0.8, "{tightness}");
         }
     }
 
