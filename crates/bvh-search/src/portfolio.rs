@@ -127,18 +127,21 @@ impl Config {
             let end = observer.progress().map_or(1.0, |now| now + (1.0 - now) / rest as f64);
             let quota = Quota { work, ..run.left() };
             let cooling = Cooling { hot, cold: self.cold, quota, end, pieces: self.pieces(timed) };
-            let mut tally = Tally::default();
             let mut annealed = tree.clone();
             let mover = || Mover::new(&self.ruin);
             let streams = [seed, 1 + (number << 40)];
-            anneal(mover, &cooling, &mut annealed, streams, observer, &mut |_, done| tally += done);
+            anneal(mover, &cooling, &mut annealed, streams, observer, &mut |tree, tally| {
+                left = left.saturating_sub(tally.work);
+                run.count(tally);
+                if tree.area() < best.area() * (1.0 - WORTH_AN_EVENT) {
+                    best.offer(tree, run);
+                }
+            });
             *tree = if known && number == 0 && annealed.area() < tree.area() {
                 annealed
             } else {
                 fuse(&[tree, &annealed])
             };
-            left = left.saturating_sub(tally.work);
-            run.count(tally);
             best.offer(tree, run);
             if !known {
                 length *= self.growth;
@@ -173,6 +176,9 @@ impl Config {
         self.pieces.max(1)
     }
 }
+
+/// What the incumbent must gain in a round to be converted and reported before the end of a generation.
+const WORTH_AN_EVENT: f64 = 1e-3;
 
 /// Work per pair of objects above which two descents end lower than one: so for the smallest scenes.
 const WORK_PER_PAIR: f64 = 200.0;
