@@ -4,11 +4,11 @@
 //! Temperatures are relative to the area that taking the subtree out saves, so that one schedule suits nodes of all
 //! sizes.
 
-use crate::cooling::{self, Cooling, anneal};
+use crate::cooling::{self, Cooling, Starts, anneal};
 use crate::error::require;
 use crate::incumbent::Incumbent;
 use crate::start::Start;
-use crate::stream::{Stream, stream};
+use crate::stream::Stream;
 use crate::working::{ANCHOR, Working};
 use crate::{Problem, Run, Search, SearchError};
 use bvh_core::{Bvh, PackedAabb};
@@ -82,9 +82,9 @@ impl Search for Config {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
         let mut quota = run.left();
         quota.work = quota.work.min(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
-        let cooling = Cooling { hot: self.hot, cold: self.cold, quota };
-        let (observer, mover) = (run.observer(), &mut Mover::new(&self.step));
-        anneal(mover, &cooling, &mut tree, &mut stream(seed, 0), observer, &mut |tree, tally| {
+        let cooling = Cooling { hot: self.hot, cold: self.cold, quota, end: 1.0, pieces: 1 };
+        let observer = run.observer();
+        anneal(|| Mover::new(&self.step), &cooling, &mut tree, [seed, 0], observer, &mut |tree, tally| {
             run.count(tally);
             best.offer(tree, run);
         });
@@ -96,6 +96,7 @@ impl Search for Config {
 #[derive(Debug)]
 pub(crate) struct Mover<'a> {
     config: &'a Move,
+    starts: Starts,
     /// Inner nodes whose children are to be looked at, with the growth of everything from the top down to and with them.
     stack: Vec<(u32, f64)>,
     work: u64,
@@ -103,7 +104,7 @@ pub(crate) struct Mover<'a> {
 
 impl<'a> Mover<'a> {
     pub fn new(config: &'a Move) -> Self {
-        Self { config, stack: Vec::new(), work: 0 }
+        Self { config, starts: Starts::default(), stack: Vec::new(), work: 0 }
     }
 
     /// The cheapest place below `top`, itself included, for a detached item, but for that beside `sibling`; if any costs
@@ -149,11 +150,14 @@ impl cooling::Move for Mover<'_> {
         self.work
     }
 
+    fn starts(&mut self) -> &mut Starts {
+        &mut self.starts
+    }
+
     #[inline(always)]
     fn step(&mut self, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
         self.work += 1;
-        let [a, b] = [(); 2].map(|()| rng.random_range(1..tree.nodes.len() as u32));
-        let node = if tree.nodes[b as usize].area > tree.nodes[a as usize].area { b } else { a };
+        let node = self.starts.draw(tree, rng);
         if tree.nodes[node as usize].parent == ANCHOR {
             return false;
         }

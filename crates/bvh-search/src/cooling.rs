@@ -4,8 +4,10 @@
 
 use crate::stream::Stream;
 use crate::working::Working;
-use crate::{Observer, Quota, Tally, reinsertion};
+use crate::{Observer, Quota, Tally, pieces};
 use bvh_core::with_vector_instructions;
+use rand::RngExt;
+use std::ops::Range;
 
 /// A kind of move.
 pub(crate) trait Move {
@@ -13,6 +15,50 @@ pub(crate) trait Move {
     fn step(&mut self, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool;
     /// Nodes visited by all steps so far.
     fn work(&self) -> u64;
+    /// Where moves begin.
+    fn starts(&mut self) -> &mut Starts;
+}
+
+/// Where moves begin. In a large tree, at any node of a part of the memory, where neighbours in the tree are neighbours,
+/// for some moves, and then in another part: so that they find nodes in a cache.
+#[derive(Debug, Default)]
+pub(crate) struct Starts {
+    /// Only at these nodes, unless there are none.
+    pub only: Vec<u32>,
+    middle: u32,
+    draws: u32,
+}
+
+/// Nodes from the middle of the part to its ends.
+const REACH: u32 = 4096;
+
+/// Moves in one part: a pass over everything takes few of all moves even of a short search.
+const DRAWS: u32 = 256;
+
+impl Starts {
+    /// The larger of two random nodes: large ones are few, and what they can gain is large.
+    #[inline(always)]
+    pub fn draw(&mut self, tree: &Working, rng: &mut Stream) -> u32 {
+        let [a, b] = if self.only.is_empty() {
+            let range = self.part(tree.nodes.len() as u32, rng);
+            [(); 2].map(|()| rng.random_range(range.clone()))
+        } else {
+            [(); 2].map(|()| self.only[rng.random_range(0..self.only.len())])
+        };
+        if tree.nodes[b as usize].area > tree.nodes[a as usize].area { b } else { a }
+    }
+
+    #[inline(always)]
+    fn part(&mut self, len: u32, rng: &mut Stream) -> Range<u32> {
+        if len < 16 * REACH {
+            return 1..len;
+        }
+        if self.draws == 0 {
+            (self.middle, self.draws) = (rng.random_range(1..len), DRAWS);
+        }
+        self.draws -= 1;
+        self.middle.saturating_sub(REACH).max(1)..(self.middle + REACH).min(len)
+    }
 }
 
 /// One descent of the temperature.
@@ -24,21 +70,27 @@ pub(crate) struct Cooling {
     pub cold: f64,
     /// The work to be done meanwhile, and the most moves.
     pub quota: Quota,
+    /// The observer's progress at which to be done, if it knows any; above the one at the beginning.
+    pub end: f64,
+    /// Pieces that are annealed at once, at least 1.
+    pub pieces: u32,
 }
 
-/// Work per object after which nodes are laid out anew.
-const WORK_PER_ROUND: u64 = 64;
+/// Work per object after which nodes are laid out anew, a hundredth of all but within these bounds.
+const WORK_PER_ROUND: [u64; 2] = [64, 256];
 
 /// Work per object that is kept for the sweeps, an eighth of all at most.
 const WORK_OF_SWEEPS: u64 = 300;
 
 /// Cools `tree`, then sweeps it to a local optimum of reinsertion. Shows the tree to `round` along the way, with what
-/// was done since the last time.
+/// was done since the last time. Every round has its own stream of `seed`, and every piece of it, from number `first` on.
+///
+/// If the observer knows the time, temperatures follow whichever is nearer to its end, the time or the work.
 pub(crate) fn anneal<M: Move>(
-    mover: &mut M,
+    mover: impl Fn() -> M + Sync,
     cooling: &Cooling,
     tree: &mut Working,
-    rng: &mut Stream,
+    [seed, first]: [u64; 2],
     observer: &dyn Observer,
     round: &mut dyn FnMut(&Working, Tally),
 ) {
@@ -46,30 +98,51 @@ pub(crate) fn anneal<M: Move>(
     if n < 3 {
         return;
     }
-    let work = work - (work / 8).min(WORK_OF_SWEEPS.saturating_mul(n));
-    let rounds = (work / (WORK_PER_ROUND * n)).clamp(1, 100);
+    let sweeps = WORK_OF_SWEEPS.saturating_mul(n);
+    let work = work - (work / 8).min(sweeps);
+    let (mut done, mut streams) = (Tally::default(), first);
     let factor = cooling.cold / cooling.hot;
-    let mut done = Tally::default();
-    for number in 1..=rounds {
-        *tree = tree.in_preorder();
-        let part = |number: u64| number as f64 / rounds as f64;
-        let heat = [number - 1, number].map(|number| cooling.hot * libm::pow(factor, part(number)));
-        let end = Quota { work: (work as f64 * part(number)) as u64, moves };
-        let tally = cool(mover, tree, heat, end.less(&done), rng, observer);
+    let temperature = |part: f64| cooling.hot * libm::pow(factor, part.min(1.0));
+    let began = observer.progress();
+    let [short, long] = WORK_PER_ROUND.map(|work| work * n);
+    let mut next = (work / 100).clamp(short, long).min(work);
+    if began.is_some() {
+        next = next.min(short);
+    }
+    // Parts of the work or time: done, and for one node of work.
+    let (mut part, mut rate) = (0.0, 1.0 / work as f64);
+    *tree = tree.in_preorder();
+    while part < 1.0 {
+        let step = rate * next as f64;
+        let heat = [part, part + step].map(temperature);
+        let end = if began.is_none() && part + 1.5 * step >= 1.0 { work } else { work.min(done.work + next) };
+        let quota = Quota { work: end, moves }.less(&done);
+        let tally =
+            pieces::cool_in_pieces(&mover, tree, heat, quota, cooling.pieces, [seed, streams], observer);
+        streams += pieces::STREAMS;
         done += tally;
         round(tree, tally);
-        if observer.cancelled() {
+        if observer.cancelled() || cooling.quota.is_reached(&done) {
             return;
         }
+        part = done.work as f64 / work as f64;
+        if let (Some(began), Some(now)) = (began, observer.progress()) {
+            let passed = (now - began) / (cooling.end - began);
+            let per_node = passed / done.work as f64;
+            let timed = passed / (1.0 - (per_node * sweeps as f64).min(0.125));
+            if timed > part {
+                (part, rate) = (timed, timed / done.work as f64);
+                next = ((0.01 / rate) as u64).clamp(short, long);
+            }
+        }
     }
-    *tree = tree.in_preorder();
-    let tally = reinsertion::to_local_optimum(tree, cooling.quota.less(&done), observer);
+    let tally = pieces::descend_in_pieces(tree, cooling.pieces, cooling.quota.less(&done), observer);
     round(tree, tally);
 }
 
 with_vector_instructions! {
     /// Moves until the quota is reached, while the temperature falls geometrically from the first to the second.
-    cool = cool_plain<M: Move>(mover: &mut M, tree: &mut Working, heat: [f64; 2], quota: Quota, rng: &mut Stream,
+    pub(crate) cool = cool_plain<M: Move>(mover: &mut M, tree: &mut Working, heat: [f64; 2], quota: Quota, rng: &mut Stream,
         observer: &dyn Observer) -> Tally
 }
 
@@ -104,48 +177,54 @@ fn cool_plain<M: Move>(
 mod tests {
     use super::*;
     use crate::scatter::scatter;
-    use crate::stream::stream;
     use crate::{annealing, ruin_recreate};
     use bvh_build::{Builder, muller_fellner};
+    use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
     /// Counts the moves of another kind, and checks the tree after every one.
-    struct Checked<M> {
+    struct Checked<'a, M> {
         inner: M,
-        moves: u64,
+        moves: &'a AtomicU64,
     }
 
-    impl<M: Move> Move for Checked<M> {
+    impl<M: Move> Move for Checked<'_, M> {
         fn step(&mut self, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
             let before = tree.area();
             let kept = self.inner.step(tree, temperature, rng);
             let area = tree.internal_area();
-            assert!((tree.area() - area).abs() <= 1e-12 * area, "move {}", self.moves);
+            let number = self.moves.fetch_add(1, Relaxed);
+            assert!((tree.area() - area).abs() <= 1e-12 * area, "move {number}");
             assert!(kept || (tree.area() - before).abs() <= 1e-12 * before);
-            self.moves += 1;
             kept
         }
         fn work(&self) -> u64 {
             self.inner.work()
         }
+        fn starts(&mut self) -> &mut Starts {
+            self.inner.starts()
+        }
     }
 
-    fn check(inner: impl Move) {
+    fn check<M: Move>(inner: impl Fn() -> M + Sync) {
         let boxes = scatter(60);
         let start = muller_fellner::Config::default().build(&boxes).unwrap();
         let mut tree = Working::from_bvh(&start, &boxes).unwrap();
         let quota = Quota { moves: 300_000, work: u64::MAX / 1024 };
-        let cooling = Cooling { hot: 0.5, cold: 0.4, quota };
-        let mut mover = Checked { inner, moves: 0 };
-        anneal(&mut mover, &cooling, &mut tree, &mut stream(1, 0), &(), &mut |_, _| ());
-        assert!(mover.moves > 250_000);
+        let cooling = Cooling { hot: 0.5, cold: 0.4, quota, end: 1.0, pieces: 1 };
+        let moves = AtomicU64::new(0);
+        let mover = || Checked { inner: inner(), moves: &moves };
+        anneal(mover, &cooling, &mut tree, [1, 0], &(), &mut |_, _| ());
+        assert_eq!(moves.into_inner(), 300_000);
         bvh_core::validate(&tree.to_bvh(), &boxes).unwrap();
     }
 
     #[test]
     fn areas_stay_exact_after_each_of_a_million_annealed_moves() {
-        check(ruin_recreate::Mover::new(&ruin_recreate::Ruin::default()));
+        let ruin = ruin_recreate::Ruin::default();
+        check(|| ruin_recreate::Mover::new(&ruin));
         for target in [annealing::Target::Random, annealing::Target::Best] {
-            check(annealing::Mover::new(&annealing::Move { target, ..Default::default() }));
+            let step = annealing::Move { target, ..Default::default() };
+            check(|| annealing::Mover::new(&step));
         }
     }
 }

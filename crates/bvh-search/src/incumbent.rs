@@ -30,6 +30,11 @@ impl<'p> Incumbent<'p> {
         Ok((Self { problem: *problem, area: cost::internal_area(&tree), tree }, working))
     }
 
+    /// The internal area of the best tree.
+    pub fn area(&self) -> f64 {
+        self.area
+    }
+
     /// Keeps `tree` if it is better than all before. O(n).
     pub fn offer(&mut self, tree: &Working, run: &mut Run) -> bool {
         if tree.area() >= self.area {

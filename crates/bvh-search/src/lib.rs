@@ -36,6 +36,7 @@ mod insertion_orders;
 mod local_search;
 pub mod lower_bound;
 mod optimize;
+mod pieces;
 mod place;
 pub mod portfolio;
 pub mod random_orders;

@@ -1,17 +1,22 @@
 //! `best`: the methods that pay, in the order that pays, for any budget.
 //!
-//! 1. Greedy division with |L|^0.9, then reinsertion to a local optimum: most of the gain in the least time.
-//! 2. Generations, each longer than the one before: several independent chains of annealed ruin and recreate start at
-//!    the incumbent, and all that they end with is fused with it. Fusing keeps every part that became better and drops
-//!    every part that became worse, so that nothing is ever lost to the heat.
+//! 1. Greedy division with |L|^0.9.
+//! 2. If the end is known, from the budget's work or the observer's [progress](crate::Observer::progress): one long descent
+//!    of the temperature of annealed ruin and recreate that ends there. It starts at once, since what a local search had
+//!    found would be forgotten; and at equal work it ends lower than several, one after another or side by side and fused.
+//! 3. If it is not: reinsertion to a local optimum, then generations, each annealed from the incumbent and longer than the
+//!    one before.
+//!
+//! What a generation ends with is fused with the incumbent, unless it is the first: that keeps every part that became
+//! better and drops every part that became worse.
 
-use crate::cooling::{Cooling, anneal};
+use crate::cooling::{Cooling, anneal, cool};
 use crate::error::require;
 use crate::fusing::fuse;
 use crate::incumbent::Incumbent;
 use crate::ruin_recreate::{Mover, Ruin, Scale};
 use crate::start::Start;
-use crate::stream::stream;
+use crate::stream::{Stream, stream};
 use crate::working::Working;
 use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally, reinsertion};
 use bvh_core::Bvh;
@@ -24,25 +29,26 @@ use bvh_core::Bvh;
     serde(deny_unknown_fields, default)
 )]
 pub struct Config {
-    /// Work per object of the first generation, at least 1. Default 1500. When the budget limits the work, all
-    /// generations are stretched so that they fill it.
+    /// Work per object of the first generation if the end is not known, at least 1. Default 1500.
     pub first: f64,
-    /// How many times longer every generation is than the one before, at least 1, when the budget does not limit the
-    /// work, so that the search may be cancelled at any time. Default 2.
+    /// How many times longer every generation is than the one before, at least 1, if the end is not known. Default 2.
     pub growth: f64,
-    /// The same when it does: few long generations are better if the end is known. Default 4.
-    pub growth_to_end: f64,
+    /// Most work per object of a generation if the end is known, at least 1, but at most 200 per object for each other
+    /// object; more is divided equally. Default 100 000.
+    pub longest: f64,
     /// Work per object of all generations together, unless the budget has less. Default 1 000 000.
     pub work_per_object: u64,
-    /// Independent chains per generation, which is also how many threads can help, 1 to 64. Default 2.
-    pub chains: u32,
-    /// First temperature of a chain per 1000 nodes of its work per object, above 0. Default 0.013.
+    /// First temperature per 1000 nodes of a generation's work per object, above 0. Default 0.02.
     pub heat: f64,
-    /// Highest temperature, above 0. Default 0.1.
+    /// Highest temperature, above 0. Default 0.2.
     pub hottest: f64,
     /// Last temperature, above 0. Default 0.003.
     pub cold: f64,
-    /// The move; its `scale` is the chain's, in turns `saved` and `top`.
+    /// Disjoint pieces of the tree that are annealed at once, 0 to 4096; so many threads can help. The default, 0, is
+    /// the whole tree, which is a little better at equal work; but four per thread if the time is known and there are
+    /// several threads.
+    pub pieces: u32,
+    /// The move.
     pub ruin: Ruin,
     /// The builder of the start.
     pub start: Start,
@@ -53,13 +59,13 @@ impl Default for Config {
         Self {
             first: 1500.0,
             growth: 2.0,
-            growth_to_end: 4.0,
+            longest: 100_000.0,
             work_per_object: 1_000_000,
-            chains: 2,
-            heat: 0.013,
-            hottest: 0.1,
+            heat: 0.02,
+            hottest: 0.2,
             cold: 0.003,
-            ruin: Ruin::default(),
+            pieces: 0,
+            ruin: Ruin { scale: Scale::Top, ..Ruin::default() },
             start: Start::default(),
         }
     }
@@ -67,107 +73,121 @@ impl Default for Config {
 
 impl Config {
     pub(crate) fn check(&self) -> Result<(), SearchError> {
-        require(self.first >= 1.0 && self.first.is_finite(), "first", self.first, "1 or more")?;
-        for (name, found) in [("growth", self.growth), ("growth_to_end", self.growth_to_end)] {
+        for (name, found) in [("first", self.first), ("growth", self.growth), ("longest", self.longest)] {
             require(found >= 1.0 && found.is_finite(), name, found, "1 or more")?;
         }
-        require((1..=64).contains(&self.chains), "chains", self.chains.into(), "1 to 64")?;
         for (name, found) in [("heat", self.heat), ("hottest", self.hottest), ("cold", self.cold)] {
             require(found > 0.0 && found.is_finite(), name, found, "above 0")?;
         }
+        require(self.pieces <= 4096, "pieces", self.pieces.into(), "0 to 4096")?;
         self.ruin.check()
     }
 
-    /// Improves the incumbent until the work is done.
+    /// Improves the incumbent until the work is done or the time is over.
     pub(crate) fn improve(&self, tree: &mut Working, seed: u64, best: &mut Incumbent, run: &mut Run) {
         let n = tree.objects() as u64;
         if n < 3 {
             return;
         }
-        best.descend(tree, u32::MAX, run, |tree, _, quota, observer| {
-            reinsertion::sweep_by_area(tree, quota, observer)
-        });
-        let own = self.work_per_object.saturating_mul(n);
-        let budget = run.left().work;
-        let mut left = own.min(budget);
-        let lengths = self.lengths(left as f64 / n as f64, budget <= own);
-        let last = lengths.len() - 1;
-        for (generation, length) in lengths.into_iter().enumerate() {
-            if run.stopped().is_some() {
+        let (own, observer) = (self.work_per_object.saturating_mul(n), run.observer());
+        let timed = observer.progress().is_some();
+        let known = timed || run.left().work <= own;
+        let mut left = own.min(run.left().work);
+        let (mut length, mut generations) = (self.first, MOST_GENERATIONS);
+        if known {
+            length = left as f64 / n as f64;
+            if timed {
+                let quota = Quota { work: left.min(PROBE * n), ..run.left() };
+                let (tally, in_time) = self.probe(tree, stream(seed, 0), quota, observer);
+                left = left.saturating_sub(tally.work);
+                run.count(tally);
+                length = length.min(in_time / n as f64);
+            }
+            let longest = self.longest.min(WORK_PER_PAIR * n as f64);
+            generations = (length / longest).ceil().clamp(1.0, MOST_GENERATIONS as f64) as u64;
+            length /= generations as f64;
+        } else {
+            best.descend(tree, u32::MAX, run, |tree, _, quota, observer| {
+                reinsertion::sweep_by_area(tree, quota, observer)
+            });
+        }
+        for number in 0..generations {
+            if run.stopped().is_some() || left == 0 {
                 break;
             }
-            let work =
-                if generation == last && budget <= own { left } else { left.min((length * n as f64) as u64) };
-            let quota = Quota { work, moves: run.left().moves };
-            let tally = self.generation(tree, generation as u64, quota, seed, run.observer());
-            left = left.saturating_sub(tally.work);
-            run.count(tally);
+            let rest = generations - number;
+            let hot = (self.heat * length / 1000.0).min(self.hottest).max(self.cold);
+            let work = if timed {
+                left
+            } else if known {
+                left / rest
+            } else {
+                left.min((length * n as f64) as u64)
+            };
+            let end = observer.progress().map_or(1.0, |now| now + (1.0 - now) / rest as f64);
+            let quota = Quota { work, ..run.left() };
+            let cooling = Cooling { hot, cold: self.cold, quota, end, pieces: self.pieces(timed) };
+            let mut annealed = tree.clone();
+            let mover = || Mover::new(&self.ruin);
+            let streams = [seed, 1 + (number << 40)];
+            anneal(mover, &cooling, &mut annealed, streams, observer, &mut |tree, tally| {
+                left = left.saturating_sub(tally.work);
+                run.count(tally);
+                if tree.area() < best.area() * (1.0 - WORTH_AN_EVENT) {
+                    best.offer(tree, run);
+                }
+            });
+            *tree = if known && number == 0 && annealed.area() < tree.area() {
+                annealed
+            } else {
+                fuse(&[tree, &annealed])
+            };
             best.offer(tree, run);
+            if !known {
+                length *= self.growth;
+            }
         }
     }
 
-    /// The generations' lengths, per object, of `work` together, which they fill if it is limited.
-    fn lengths(&self, work: f64, limited: bool) -> Vec<f64> {
-        let growth = if limited { self.growth_to_end } else { self.growth };
-        let mut lengths = vec![];
-        let (mut next, mut sum) = (self.first, 0.0);
-        while sum + next <= work && lengths.len() < MOST_GENERATIONS {
-            lengths.push(next);
-            sum += next;
-            next *= growth;
-        }
-        if lengths.is_empty() {
-            (lengths, sum) = (vec![work], work);
-        }
-        if limited && sum > 0.0 {
-            lengths.iter_mut().for_each(|length| *length *= work / sum);
-        }
-        lengths
-    }
-
-    /// Anneals in chains and fuses.
-    fn generation(
+    /// Moves at the lowest temperature. Also returns the work for which the rest of the time is enough at this rate.
+    fn probe(
         &self,
         tree: &mut Working,
-        generation: u64,
-        Quota { work, moves }: Quota,
-        seed: u64,
+        mut rng: Stream,
+        quota: Quota,
         observer: &dyn Observer,
-    ) -> Tally {
-        let chains = u64::from(self.chains);
-        let share = work / chains;
-        let hot = self.heat * (share as f64 / tree.objects() as f64 / 1000.0);
-        let hot = hot.min(self.hottest).max(self.cold);
-        let quota = Quota { work: share, moves: moves.div_ceil(chains) };
-        let cooling = Cooling { hot, cold: self.cold, quota };
-        let chain = |number: u64| {
-            let mut rng = stream(seed, generation * chains + number);
-            let (mut tree, mut done) = (tree.clone(), Tally::default());
-            // Which scale of temperatures is the better one depends on the scene: every other chain takes the other.
-            let scale = if number.is_multiple_of(2) { Scale::Saved } else { Scale::Top };
-            let ruin = Ruin { scale, ..self.ruin.clone() };
-            let mover = &mut Mover::new(&ruin);
-            anneal(mover, &cooling, &mut tree, &mut rng, observer, &mut |_, tally| done += tally);
-            (tree, done)
+    ) -> (Tally, f64) {
+        let began = observer.progress();
+        let tally = cool(&mut Mover::new(&self.ruin), tree, [self.cold; 2], quota, &mut rng, observer);
+        let in_time = match (began, observer.progress()) {
+            (Some(began), Some(now)) => tally.work as f64 * (1.0 - now).max(0.0) / (now - began).max(1e-9),
+            _ => f64::INFINITY,
         };
+        (tally, in_time)
+    }
+
+    /// How many pieces to anneal at once.
+    fn pieces(&self, timed: bool) -> u32 {
         #[cfg(feature = "rayon")]
-        let found: Vec<(Working, Tally)> = {
-            use rayon::prelude::*;
-            (0..chains).into_par_iter().map(chain).collect()
-        };
-        #[cfg(not(feature = "rayon"))]
-        let found: Vec<(Working, Tally)> = (0..chains).map(chain).collect();
-        let mut tally = Tally::default();
-        found.iter().for_each(|(_, done)| tally += *done);
-        let mut trees = vec![&*tree];
-        trees.extend(found.iter().map(|(tree, _)| tree));
-        *tree = fuse(&trees);
-        tally
+        if self.pieces == 0 && timed && rayon::current_num_threads() > 1 {
+            return 4 * rayon::current_num_threads().min(1024) as u32;
+        }
+        let _ = timed;
+        self.pieces.max(1)
     }
 }
 
+/// What the incumbent must gain in a round to be converted and reported before the end of a generation.
+const WORTH_AN_EVENT: f64 = 1e-3;
+
+/// Work per pair of objects above which two descents end lower than one: so for the smallest scenes.
+const WORK_PER_PAIR: f64 = 200.0;
+
+/// Work per object after which the rate of work is known.
+const PROBE: u64 = 16;
+
 /// Ends the schedule when generations do not grow.
-const MOST_GENERATIONS: usize = 10_000;
+const MOST_GENERATIONS: u64 = 10_000;
 
 impl Search for Config {
     /// Chains run in parallel, each with a stream of its own.

@@ -4,12 +4,12 @@
 //! Schrimpf et al. 2000 (ruin and recreate); Kirkpatrick, Gelatt & Vecchi 1983; Shaw 1998 (related removal).
 //! Temperatures are relative to an area of the move, so that one schedule suits nodes of all sizes.
 
-use crate::cooling::{Cooling, Move, anneal};
+use crate::cooling::{Cooling, Move, Starts, anneal};
 use crate::error::require;
 use crate::incumbent::Incumbent;
 use crate::place::PlaceSearch;
 use crate::start::Start;
-use crate::stream::{Stream, stream};
+use crate::stream::Stream;
 use crate::working::{ANCHOR, Working};
 use crate::{Problem, Run, Search, SearchError};
 use bvh_core::Bvh;
@@ -97,10 +97,9 @@ impl Search for Config {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
         let mut quota = run.left();
         quota.work = quota.work.min(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
-        let cooling = Cooling { hot: self.hot, cold: self.cold, quota };
+        let cooling = Cooling { hot: self.hot, cold: self.cold, quota, end: 1.0, pieces: 1 };
         let observer = run.observer();
-        let mover = &mut Mover::new(&self.ruin);
-        anneal(mover, &cooling, &mut tree, &mut stream(seed, 0), observer, &mut |tree, tally| {
+        anneal(|| Mover::new(&self.ruin), &cooling, &mut tree, [seed, 0], observer, &mut |tree, tally| {
             run.count(tally);
             best.offer(tree, run);
         });
@@ -112,6 +111,7 @@ impl Search for Config {
 #[derive(Debug)]
 pub(crate) struct Mover<'a> {
     ruin: &'a Ruin,
+    starts: Starts,
     search: PlaceSearch,
     /// Roots of the subtrees taken out, each with the sibling it had.
     out: Vec<(u32, u32)>,
@@ -121,7 +121,7 @@ pub(crate) struct Mover<'a> {
 
 impl<'a> Mover<'a> {
     pub fn new(ruin: &'a Ruin) -> Self {
-        Self { ruin, search: PlaceSearch::default(), out: Vec::new(), work: 0 }
+        Self { ruin, starts: Starts::default(), search: PlaceSearch::default(), out: Vec::new(), work: 0 }
     }
 }
 
@@ -130,12 +130,14 @@ impl Move for Mover<'_> {
         self.work + self.search.visits
     }
 
+    fn starts(&mut self) -> &mut Starts {
+        &mut self.starts
+    }
+
     #[inline(always)]
     fn step(&mut self, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
         let ruin = self.ruin;
-        // The larger of two: large nodes are few, and what they can gain is large.
-        let [a, b] = [(); 2].map(|()| rng.random_range(1..tree.nodes.len() as u32));
-        let mut top = if tree.nodes[b as usize].area > tree.nodes[a as usize].area { b } else { a };
+        let mut top = self.starts.draw(tree, rng);
         let levels = rng.random_range(1..=ruin.climb);
         let mut above = tree.nodes[top as usize].parent;
         for _ in 0..levels {

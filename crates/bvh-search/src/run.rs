@@ -45,6 +45,11 @@ pub trait Observer: Sync {
     fn cancelled(&self) -> bool {
         false
     }
+    /// The part of the time that has passed, 0 to 1, if the search will be cancelled at a time that is known: the
+    /// search then plans to be done when it is 1. Such runs cannot be repeated exactly.
+    fn progress(&self) -> Option<f64> {
+        None
+    }
 }
 
 impl Observer for () {}

@@ -7,6 +7,7 @@ use bvh_search::{
     reinsertion, ruin_recreate, solve,
 };
 use proptest::prelude::*;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
 const METHODS: [&str; 7] =
     ["reinsertion", "rotation", "treelet", "annealing", "rebuild", "ruin_recreate", "best"];
@@ -98,7 +99,8 @@ fn every_method_improves_on_its_start_and_the_portfolio_most() {
 #[test]
 fn the_result_does_not_depend_on_the_number_of_threads() {
     let boxes = scatter(1500, 2);
-    for method in methods() {
+    let pieces = portfolio::Config { pieces: 8, ..Default::default() };
+    for method in methods().chain([Method::Best(pieces)]) {
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| run(&method, &boxes, 2_000_000))
@@ -169,13 +171,13 @@ fn budgets_end_a_search_where_they_say() {
 
 #[test]
 fn a_cancelled_search_returns_what_it_has() {
-    struct AfterTheStart(std::sync::atomic::AtomicBool);
+    struct AfterTheStart(AtomicBool);
     impl Observer for AfterTheStart {
         fn event(&self, _: &Event) {
-            self.0.store(true, std::sync::atomic::Ordering::Relaxed);
+            self.0.store(true, Relaxed);
         }
         fn cancelled(&self) -> bool {
-            self.0.load(std::sync::atomic::Ordering::Relaxed)
+            self.0.load(Relaxed)
         }
     }
     let boxes = scatter(1000, 4);
@@ -184,6 +186,29 @@ fn a_cancelled_search_returns_what_it_has() {
         let outcome = solve(&method, &Problem::new(&boxes), 1, Budget::default(), &observer).unwrap();
         assert_eq!(outcome.stop, StopReason::Cancelled, "{}", method.name());
         validate(&outcome.tree, &boxes).unwrap();
+    }
+}
+
+#[test]
+fn the_portfolio_ends_when_the_time_does_and_its_pieces_are_a_valid_tree() {
+    /// Time passes by the question.
+    struct Clock(AtomicU32);
+    impl Observer for Clock {
+        fn progress(&self) -> Option<f64> {
+            Some(f64::from(self.0.fetch_add(1, Relaxed)) / 5000.0)
+        }
+        fn cancelled(&self) -> bool {
+            self.progress() > Some(1.0)
+        }
+    }
+    let boxes = scatter(3000, 7);
+    for pieces in [1, 8] {
+        let config = Method::Best(portfolio::Config { pieces, ..Default::default() });
+        let clock = Clock(0.into());
+        let outcome = solve(&config, &Problem::new(&boxes), 1, Budget::default(), &clock).unwrap();
+        validate(&outcome.tree, &boxes).unwrap();
+        assert!((4000..5100).contains(&clock.0.into_inner()), "{pieces}");
+        assert!(outcome.cost < run(&config, &boxes, 1_000_000).cost);
     }
 }
 
@@ -247,8 +272,8 @@ fn parameters_outside_their_range_are_named() {
     assert_eq!(refused(Method::RuinRecreate(cold)), "cold is 1; accepted: above 0, not above hot");
     let sweeps = reinsertion::Config { sweeps: 0, ..Default::default() };
     assert_eq!(refused(Method::Reinsertion(sweeps)), "sweeps is 0; accepted: 1 or more");
-    let chains = portfolio::Config { chains: 0, ..Default::default() };
-    assert_eq!(refused(Method::Best(chains)), "chains is 0; accepted: 1 to 64");
+    let pieces = portfolio::Config { pieces: 5000, ..Default::default() };
+    assert_eq!(refused(Method::Best(pieces)), "pieces is 5000; accepted: 0 to 4096");
 }
 
 proptest! {

@@ -277,6 +277,13 @@ impl Observer for Watch<'_> {
     fn cancelled(&self) -> bool {
         self.over.load(Relaxed) || self.interrupted.load(Relaxed)
     }
+
+    fn progress(&self) -> Option<f64> {
+        match self.effort {
+            Effort::Time(budget) => Some(self.start.elapsed().div_duration_f64(budget).min(1.0)),
+            Effort::Work(_) => None,
+        }
+    }
 }
 
 #[cfg(test)]
