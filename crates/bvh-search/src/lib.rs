@@ -33,6 +33,7 @@ pub mod genetic;
 pub mod grasp;
 mod incumbent;
 mod insertion_orders;
+pub mod iterated;
 mod local_search;
 pub mod lower_bound;
 mod optimize;

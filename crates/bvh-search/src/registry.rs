@@ -61,6 +61,8 @@ methods! {
     "treelet" => Treelet(crate::treelet::Config),
     /// Annealing on single reinsertions.
     "annealing" => Annealing(crate::annealing::Config),
+    /// Kicks and descents.
+    "iterated_local_search" => IteratedLocalSearch(crate::iterated::Config),
     /// Rebuilding what looks badly split.
     "rebuild" => Rebuild(crate::rebuild::Config),
     /// Annealed ruin and recreate.
