@@ -131,7 +131,7 @@ pub fn measure(
     let Some(Entry { tree, .. }) = entries.first() else { return Ok(Some((rows, times))) };
     let camera = config.cameras.get(&scene.name).copied().unwrap_or_default();
     for &kind in &config.rays {
-        let rays = cameras::rays(kind, config.count, scene, tree, &camera, seed);
+        let rays = rays(kind, config.count, scene, tree, &camera, seed);
         let right = reference(kind, &rays, scene, tree);
         let mut hits = vec![None; rays.len()];
         // By contender, and by part of the rays, the seconds of each turn.
