@@ -35,6 +35,7 @@ mod incumbent;
 mod insertion_orders;
 mod local_search;
 pub mod lower_bound;
+pub mod omission;
 mod optimize;
 mod place;
 pub mod portfolio;
@@ -56,6 +57,7 @@ mod working;
 pub use budget::{Budget, StopReason};
 pub use error::SearchError;
 pub use local_search::LocalSearch;
+pub use omission::Omission;
 pub use optimize::optimize;
 #[cfg(feature = "serde")]
 pub use registry::Method;

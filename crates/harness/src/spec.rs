@@ -256,7 +256,7 @@ impl Experiment {
             };
             // A search checks its own parameters before it looks at the scene: let it, on the scene of nothing.
             let budget = Budget { max_evaluations: Some(1), max_work: None };
-            let nothing = Problem { boxes: &[], objective: self.objective };
+            let nothing = Problem { objective: self.objective, ..Problem::new(&[]) };
             solve(method, &nothing, 0, budget, &())
                 .map_err(|error| format!("methods[{index}] ({label}): {error}"))?;
         }
