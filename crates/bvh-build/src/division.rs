@@ -306,7 +306,11 @@ pub(crate) fn note_same_orders(orders: [&[u32]; 3], same_as: &mut [u8; 3]) {
     for (low, high) in [(0u8, 1u8), (0, 2), (1, 2)] {
         let (a, b) = (low as usize, high as usize);
         // The first elements usually differ, which saves the call that compares the rest.
-        if same_as[a] == low && same_as[b] == high && orders[a].first() == orders[b].first() && orders[a] == orders[b] {
+        if same_as[a] == low
+            && same_as[b] == high
+            && orders[a].first() == orders[b].first()
+            && orders[a] == orders[b]
+        {
             for axis in same_as.iter_mut().filter(|axis| **axis == high) {
                 *axis = low;
             }

@@ -70,7 +70,10 @@ impl Facts {
             }
             if same != axis && !flat {
                 let same = AXES[same];
-                found.push((Omission::SameOrder, format!("splits along {name}: the order is that along {same}")));
+                found.push((
+                    Omission::SameOrder,
+                    format!("splits along {name}: the order is that along {same}"),
+                ));
             }
         }
         if flat {
@@ -81,7 +84,8 @@ impl Facts {
             let why = format!("the search `best`, given {work} nodes of work: the optimum takes no more");
             found.push((Omission::Tiny, why));
         }
-        let why = format!("what is left of a local search at an internal area of {}: no tree has less", self.floor);
+        let why =
+            format!("what is left of a local search at an internal area of {}: no tree has less", self.floor);
         found.push((Omission::BoundMet, why));
         found
     }

@@ -241,7 +241,8 @@ pub fn solve(
     observer: &dyn Observer,
 ) -> Result<Outcome, SearchError> {
     let incumbent = f64::INFINITY;
-    let mut run = Run { budget, observer, evaluations: 0, work: 0, incumbent, optimal: false, history: Vec::new() };
+    let mut run =
+        Run { budget, observer, evaluations: 0, work: 0, incumbent, optimal: false, history: Vec::new() };
     let tree = search.search(problem, seed, &mut run)?;
     let stop = run.stopped().unwrap_or(StopReason::Completed);
     let Run { evaluations, work, incumbent: cost, history, .. } = run;

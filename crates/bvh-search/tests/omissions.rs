@@ -11,7 +11,7 @@ fn cube(min: [f32; 3], size: f32) -> Aabb {
 
 /// Scattered numbers below 100.
 fn number(i: usize, salt: usize) -> f32 {
-    ((i * 7919 + salt * 104_729 + 13) * 2_654_435 % 1009) as f32 / 10.0
+    ((i * i * (salt + 1) + i * 7919 + salt * 31 + 13) * 2_654_435 % 1009) as f32 / 10.0
 }
 
 fn scattered(n: usize) -> Vec<Aabb> {

@@ -298,7 +298,8 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<(
         return Ok(None);
     }
     let seed = experiment.seed_of(&scene.name, labelled.seed_as.as_ref().unwrap_or(label), repetition);
-    let problem = Problem { objective: experiment.objective, keep: &labelled.keep, ..Problem::new(&scene.boxes) };
+    let problem =
+        Problem { objective: experiment.objective, keep: &labelled.keep, ..Problem::new(&scene.boxes) };
     let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
     let names = || (scene.name.clone(), label.clone());
     let (outcome, seconds) = match method {

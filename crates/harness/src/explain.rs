@@ -18,7 +18,10 @@ pub fn experiment(experiment: &Experiment) -> Result<String, Error> {
         (experiment.render.is_some(), "pictures and their shadow rays"),
         (experiment.tracing.is_some(), "wide layouts and timed rays"),
         (experiment.lower_bound.is_some(), "lower bounds"),
-        (experiment.reports.iter().any(|report| report.needs_references()), "references and the clock of every event"),
+        (
+            experiment.reports.iter().any(|report| report.needs_references()),
+            "references and the clock of every event",
+        ),
         (!experiment.reports.is_empty(), "tables and figures"),
     ];
     let not_asked: Vec<_> = asked.iter().filter(|(asked, _)| !asked).map(|&(_, what)| what).collect();

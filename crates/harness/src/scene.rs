@@ -49,7 +49,9 @@ impl Scene {
     /// Loads a scene by the name or path that a spec or `--scene` gives, or the [`Part`] of it that the name ends with.
     pub fn load(name: &str) -> Result<Self, Error> {
         match Part::parse(name) {
-            Some((case, Part::Spaced(objects))) if examine::case(case).is_some_and(|case| case.scene().is_some()) => {
+            Some((case, Part::Spaced(objects)))
+                if examine::case(case).is_some_and(|case| case.scene().is_some()) =>
+            {
                 Self::of_suite(case, name, objects)
             }
             Some((whole, part)) => Self::load_whole(whole)?.part(part, &name[whole.len()..]),

@@ -135,7 +135,9 @@ impl From<Labelled> for toml::Table {
         if let Some(budget) = labelled.budget.and_then(|budget| toml::Value::try_from(budget).ok()) {
             table.insert("budget".into(), budget);
         }
-        if !labelled.keep.is_empty() && let Ok(keep) = toml::Value::try_from(labelled.keep) {
+        if !labelled.keep.is_empty()
+            && let Ok(keep) = toml::Value::try_from(labelled.keep)
+        {
             table.insert("keep".into(), keep);
         }
         if let Some(label) = labelled.seed_as {

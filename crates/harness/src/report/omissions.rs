@@ -154,17 +154,14 @@ impl Pair {
 
     fn times<'a>(&'a self, rows: &Rows, scene: &'a str) -> Times<'a> {
         let seconds = |label: &'a str| {
-            rows.timing.iter().filter(move |row| row.scene == scene && row.method == label).map(|row| row.seconds)
+            rows.timing
+                .iter()
+                .filter(move |row| row.scene == scene && row.method == label)
+                .map(|row| row.seconds)
         };
         let ratios: Vec<f64> =
             seconds(&self.out).zip(seconds(&self.kept)).map(|(out, kept)| out / kept).collect();
         let at = |q| quantile(&ratios, q).unwrap_or(f64::NAN);
-        Times {
-            scene,
-            omission: &self.name,
-            ratio_low: at(0.25),
-            ratio_median: at(0.5),
-            ratio_high: at(0.75),
-        }
+        Times { scene, omission: &self.name, ratio_low: at(0.25), ratio_median: at(0.5), ratio_high: at(0.75) }
     }
 }
