@@ -63,8 +63,8 @@ impl Facts {
             return found;
         }
         let flat = self.bounds.half_area() == 0.0;
-        for axis in 0..3 {
-            let (name, same) = (AXES[axis], self.same_orders[axis] as usize);
+        for (axis, name) in AXES.into_iter().enumerate() {
+            let same = self.same_orders[axis] as usize;
             if self.in_order[axis] && !(flat && axis > 0) {
                 found.push((Omission::Sorted, format!("sorting along {name}: the objects come in that order")));
             }
