@@ -99,7 +99,7 @@ fn a_scene_says_what_it_does_not_need() {
     };
     assert_eq!(of(&scattered(1)), []);
     assert_eq!(of(&scattered(500)), [Omission::BoundMet]);
-    assert_eq!(of(&scattered(5)), [Omission::Tiny, Omission::BoundMet]);
+    assert_eq!(of(&scattered(12)), [Omission::Tiny, Omission::BoundMet]);
     let line = &stiff(50)[3];
     assert_eq!(of(line), [Omission::Flat, Omission::BoundMet]);
     let repeated: Vec<Aabb> = scattered(5).into_iter().flat_map(|b| [b; 10]).collect();
