@@ -270,7 +270,7 @@ fn split_node<E: Evaluation, R: SplitRule>(
     scratch: &mut Scratch,
 ) -> (usize, [Known; 2]) {
     if shared.skip_same_order {
-        note_same_orders(&orders, &mut same_as);
+        note_same_orders(orders.each_ref().map(|order| &**order), &mut same_as);
     }
     let [x, y, z] = orders;
     let mut sweep = Sweep {
@@ -302,11 +302,15 @@ fn split_node<E: Evaluation, R: SplitRule>(
 ///
 /// Source: Ng & Trifonov 2003, section 3.2.
 #[inline(always)]
-fn note_same_orders(orders: &[&mut [u32]; 3], same_as: &mut [u8; 3]) {
+pub(crate) fn note_same_orders(orders: [&[u32]; 3], same_as: &mut [u8; 3]) {
     for (low, high) in [(0u8, 1u8), (0, 2), (1, 2)] {
         let (a, b) = (low as usize, high as usize);
         // The first elements usually differ, which saves the call that compares the rest.
-        if same_as[a] == low && same_as[b] == high && orders[a][0] == orders[b][0] && orders[a] == orders[b] {
+        if same_as[a] == low
+            && same_as[b] == high
+            && orders[a].first() == orders[b].first()
+            && orders[a] == orders[b]
+        {
             for axis in same_as.iter_mut().filter(|axis| **axis == high) {
                 *axis = low;
             }

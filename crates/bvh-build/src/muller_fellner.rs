@@ -24,11 +24,16 @@ pub struct Config {
     pub heuristic: Heuristic,
     /// Whether axes that order a node's objects identically are scanned once. Changes no tree. Default true.
     pub skip_same_order: bool,
+    /// Whether an axis along which the objects came in order is not sorted again. Changes no tree. Default true.
+    pub skip_sorted: bool,
+    /// Whether a scene without area, all on one line along an axis, is divided along x alone. Changes no tree. Default
+    /// true.
+    pub skip_flat: bool,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { heuristic: Heuristic::default(), skip_same_order: true }
+        Self { heuristic: Heuristic::default(), skip_same_order: true, skip_sorted: true, skip_flat: true }
     }
 }
 
@@ -59,7 +64,7 @@ impl Heuristic {
 
 impl Builder for Config {
     fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
-        let scene = Presorted::new(boxes)?;
+        let scene = Presorted::sort(boxes, self.skip_sorted, self.skip_flat)?;
         self.heuristic.check()?;
         let mut tree = Bvh::default();
         match self.heuristic {
@@ -77,7 +82,7 @@ impl Config {
     /// Builds with `weights[i]` the expected cost C_obj of intersecting object `i`: any unit, finite, not negative.
     /// Replaces the configured heuristic.
     pub fn build_weighted(&self, boxes: &[Aabb], weights: &[f32]) -> Result<Bvh, BuildError> {
-        let scene = Presorted::new(boxes)?;
+        let scene = Presorted::sort(boxes, self.skip_sorted, self.skip_flat)?;
         if weights.len() != boxes.len() {
             return Err(BuildError::WeightCount { weights: weights.len(), objects: boxes.len() });
         }

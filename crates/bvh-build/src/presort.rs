@@ -10,6 +10,8 @@ pub struct Presorted {
     pub(crate) boxes: Vec<PackedAabb>,
     /// Per axis, the objects by increasing box centre, equal centres by index.
     pub(crate) orders: [Vec<u32>; 3],
+    /// Per axis, whether the objects came in order.
+    in_order: [bool; 3],
 }
 
 impl Presorted {
@@ -17,23 +19,53 @@ impl Presorted {
     ///
     /// Source: Ng & Trifonov 2003, Table 1, step 1: 'sort boxes along all three axes', by *box* centre.
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
+        Self::sort(boxes, true, false)
+    }
+
+    /// As [`new`](Self::new), unless `skip_sorted`, sorting also what is in order. With `x_without_area` a scene without
+    /// area is sorted along x alone, and the other axes have that order: every candidate split of its nodes costs
+    /// nothing, so that the halves along x are as good as any and, x being the lowest axis, what a greedy build takes.
+    pub(crate) fn sort(boxes: &[Aabb], skip_sorted: bool, x_without_area: bool) -> Result<Self, BuildError> {
         check_scene(boxes)?;
         let sorted = |axis: usize| {
             let mut keyed: Vec<(f64, u32)> =
                 boxes.iter().zip(0..).map(|(b, index)| (b.doubled_centroid()[axis], index)).collect();
-            radsort::sort_by_key(&mut keyed, |&(key, _)| key);
-            keyed.into_iter().map(|(_, index)| index).collect()
+            // Seldom true, and then seldom found out late.
+            let in_order = keyed.is_sorted_by_key(|&(key, _)| key);
+            if !(in_order && skip_sorted) {
+                radsort::sort_by_key(&mut keyed, |&(key, _)| key);
+            }
+            (keyed.into_iter().map(|(_, index)| index).collect::<Vec<u32>>(), in_order)
         };
-        #[cfg(feature = "rayon")]
-        let orders = if boxes.len() >= crate::division::PARALLEL_OBJECTS {
-            let (x, (y, z)) = rayon::join(|| sorted(0), || rayon::join(|| sorted(1), || sorted(2)));
-            [x, y, z]
-        } else {
+        let sorted = || {
+            if x_without_area && bounds(boxes).half_area() == 0.0 {
+                let x = sorted(0);
+                return [x.clone(), x.clone(), x];
+            }
+            #[cfg(feature = "rayon")]
+            if boxes.len() >= crate::division::PARALLEL_OBJECTS {
+                let (x, (y, z)) = rayon::join(|| sorted(0), || rayon::join(|| sorted(1), || sorted(2)));
+                return [x, y, z];
+            }
             [sorted(0), sorted(1), sorted(2)]
         };
-        #[cfg(not(feature = "rayon"))]
-        let orders = [sorted(0), sorted(1), sorted(2)];
-        Ok(Self { boxes: boxes.iter().map(PackedAabb::from).collect(), orders })
+        let [x, y, z] = sorted();
+        let (orders, in_order) = ([x.0, y.0, z.0], [x.1, y.1, z.1]);
+        Ok(Self { boxes: boxes.iter().map(PackedAabb::from).collect(), orders, in_order })
+    }
+
+    /// Per axis, whether the objects came in order, so that they needed no sorting. So they do along an axis on which
+    /// all box centres coincide.
+    pub fn in_order(&self) -> [bool; 3] {
+        self.in_order
+    }
+
+    /// Per axis, the lowest axis that orders all objects identically, usually itself. O(n).
+    pub fn same_orders(&self) -> [u8; 3] {
+        let orders = self.orders.each_ref().map(Vec::as_slice);
+        let mut same_as = [0, 1, 2];
+        crate::division::note_same_orders(orders, &mut same_as);
+        same_as
     }
 
     /// Number of objects.
@@ -45,6 +77,11 @@ impl Presorted {
     pub fn is_empty(&self) -> bool {
         self.boxes.is_empty()
     }
+}
+
+/// The box around all.
+fn bounds(boxes: &[Aabb]) -> Aabb {
+    boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b))
 }
 
 /// Refuses what no builder can take: too many objects, or a box that is not finite or is inverted.

@@ -23,6 +23,8 @@ pub struct Budget {
 pub enum StopReason {
     /// It did all that its configuration asks for.
     Completed,
+    /// No tree costs less than its incumbent.
+    Optimal,
     /// [`Budget::max_evaluations`] was reached.
     Evaluations,
     /// [`Budget::max_work`] was reached.

@@ -9,7 +9,7 @@
 //! objects: the recurrence of Karras & Aila 2013 for treelets, here for the whole tree.
 
 use crate::error::require;
-use crate::{Problem, Run, Search, SearchError};
+use crate::{Omission, Problem, Run, Search, SearchError};
 use bvh_build::BuildError;
 use bvh_core::{Aabb, Bvh, Node, check_boxes};
 
@@ -35,6 +35,24 @@ impl Search for Config {
         run.record(problem.objective.cost(&tree), work);
         Ok(tree)
     }
+}
+
+/// The optimum in place of a search, if it takes no more than `work` and what the run has left, and the scene is one of
+/// three objects or more; fewer leave no choice. Ends the run.
+pub(crate) fn instead(problem: &Problem, work: u64, run: &mut Run) -> Result<Option<Bvh>, SearchError> {
+    let n = problem.boxes.len();
+    let worth = (3..=MOST_OBJECTS).contains(&n) && most_work(n) <= work.min(run.left().work);
+    if !worth || !problem.leaves_out(Omission::Tiny) {
+        return Ok(None);
+    }
+    let tree = Config {}.search(problem, 0, run)?;
+    run.settle();
+    Ok(Some(tree))
+}
+
+/// Divisions of a scene of so many objects, at most [`MOST_OBJECTS`], but for the 2ⁿ with an empty part.
+pub(crate) fn most_work(objects: usize) -> u64 {
+    3u64.pow(objects as u32) / 2
 }
 
 /// For every set of two objects or more, its part with the lowest object in the best division; and how many divisions

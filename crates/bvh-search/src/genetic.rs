@@ -221,7 +221,7 @@ mod tests {
     #[test]
     fn the_best_is_never_lost_whatever_the_population_and_the_rates() {
         let boxes = scatter(80);
-        let problem = Problem { boxes: &boxes, objective: Objective::GoldsmithSalmon };
+        let problem = Problem { objective: Objective::GoldsmithSalmon, ..Problem::new(&boxes) };
         for population in [1, 2, 3, 20] {
             for (crossover, mutation) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.7, 0.05), (1.0, 1.0)] {
                 let config = Config { population, generations: 15, crossover, mutation, ..Config::default() };
@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn generations_improve_on_random_orders() {
         let boxes = scatter(300);
-        let problem = Problem { boxes: &boxes, objective: Objective::GoldsmithSalmon };
+        let problem = Problem { objective: Objective::GoldsmithSalmon, ..Problem::new(&boxes) };
         let config = Config { population: 20, generations: 40, ..Config::default() };
         let history = solve(&config, &problem, 3, Budget::default(), &()).unwrap().history;
         assert!(history.last().unwrap().incumbent < history[0].incumbent);

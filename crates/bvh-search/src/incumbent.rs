@@ -1,7 +1,8 @@
 //! The best tree of a local search, kept cheaply: converted only when one is really better.
 
+use crate::reinsertion::TOLERANCE;
 use crate::working::Working;
-use crate::{Observer, Problem, Quota, Run, SearchError, Tally};
+use crate::{Observer, Omission, Problem, Quota, Run, SearchError, Tally, lower_bound};
 use bvh_build::Builder;
 use bvh_core::{Bvh, cost};
 
@@ -11,6 +12,8 @@ pub(crate) struct Incumbent<'p> {
     problem: Problem<'p>,
     pub tree: Bvh,
     area: f64,
+    /// An area that no tree is below.
+    floor: f64,
 }
 
 impl<'p> Incumbent<'p> {
@@ -27,7 +30,18 @@ impl<'p> Incumbent<'p> {
     pub fn begin(tree: Bvh, problem: &Problem<'p>, run: &mut Run) -> Result<(Self, Working), SearchError> {
         let working = Working::from_bvh(&tree, problem.boxes)?;
         run.record(problem.objective.cost(&tree), tree.nodes.len() as u64);
-        Ok((Self { problem: *problem, area: cost::internal_area(&tree), tree }, working))
+        let met = problem.leaves_out(Omission::BoundMet);
+        let floor = if met { lower_bound::of_largest(problem.boxes) } else { f64::NEG_INFINITY };
+        let incumbent = Self { problem: *problem, area: cost::internal_area(&tree), tree, floor };
+        incumbent.settle(run);
+        Ok((incumbent, working))
+    }
+
+    /// Ends the run if nothing can be better but for rounding.
+    fn settle(&self, run: &mut Run) {
+        if self.area <= self.floor * (1.0 + TOLERANCE) {
+            run.settle();
+        }
     }
 
     /// The internal area of the best tree.
@@ -45,6 +59,7 @@ impl<'p> Incumbent<'p> {
         if improved {
             self.area = cost::internal_area(&candidate);
             self.tree = candidate;
+            self.settle(run);
         }
         improved
     }

@@ -36,6 +36,7 @@ mod insertion_orders;
 pub mod iterated;
 mod local_search;
 pub mod lower_bound;
+pub mod omission;
 mod optimize;
 mod pieces;
 mod place;
@@ -58,6 +59,7 @@ mod working;
 pub use budget::{Budget, StopReason};
 pub use error::SearchError;
 pub use local_search::LocalSearch;
+pub use omission::Omission;
 pub use optimize::optimize;
 #[cfg(feature = "serde")]
 pub use registry::Method;

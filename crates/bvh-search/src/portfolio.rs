@@ -18,7 +18,7 @@ use crate::ruin_recreate::{Mover, Ruin, Scale};
 use crate::start::Start;
 use crate::stream::{Stream, stream};
 use crate::working::Working;
-use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally, reinsertion};
+use crate::{Observer, Problem, Quota, Run, Search, SearchError, Tally, exact, reinsertion};
 use bvh_core::Bvh;
 
 /// How long the generations are and how hot.
@@ -193,6 +193,10 @@ impl Search for Config {
     /// Chains run in parallel, each with a stream of its own.
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         self.check()?;
+        let own = self.work_per_object.saturating_mul(problem.boxes.len() as u64);
+        if let Some(optimum) = exact::instead(problem, own, run)? {
+            return Ok(optimum);
+        }
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
         self.improve(&mut tree, seed, &mut best, run);
         Ok(best.tree)

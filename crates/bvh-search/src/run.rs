@@ -1,7 +1,7 @@
 //! One search at work: the only place that counts evaluations and work, keeps the incumbent's cost and the history,
 //! and decides when to stop.
 
-use crate::{Budget, SearchError, StopReason};
+use crate::{Budget, Omission, SearchError, StopReason};
 use bvh_build::Builder;
 use bvh_core::{Aabb, Bvh, cost::Objective};
 use std::ops::AddAssign;
@@ -13,12 +13,19 @@ pub struct Problem<'a> {
     pub boxes: &'a [Aabb],
     /// The cost to minimise.
     pub objective: Objective,
+    /// What is done although it changes no cost, to measure what leaving it out saves. Nothing if empty.
+    pub keep: &'a [Omission],
 }
 
 impl<'a> Problem<'a> {
     /// The paper's problem: least total area of inner nodes.
     pub fn new(boxes: &'a [Aabb]) -> Self {
-        Self { boxes, objective: Objective::default() }
+        Self { boxes, objective: Objective::default(), keep: &[] }
+    }
+
+    /// Whether to leave this out where the scene does not need it.
+    pub fn leaves_out(&self, omission: Omission) -> bool {
+        !self.keep.contains(&omission)
     }
 }
 
@@ -119,6 +126,7 @@ pub struct Run<'a> {
     evaluations: u64,
     work: u64,
     incumbent: f64,
+    optimal: bool,
     history: Vec<Event>,
 }
 
@@ -165,8 +173,16 @@ impl<'a> Run<'a> {
         self.observer.event(&event);
     }
 
-    /// What the budget still has, without end where it has no limit.
+    /// Ends the search: no tree costs less than the incumbent.
+    pub fn settle(&mut self) {
+        self.optimal = true;
+    }
+
+    /// What the budget still has, without end where it has no limit; nothing if the incumbent is optimal.
     pub fn left(&self) -> Quota {
+        if self.optimal {
+            return Quota { work: 0, moves: 0 };
+        }
         let left = |limit: Option<u64>, count| limit.map_or(u64::MAX, |limit| limit.saturating_sub(count));
         Quota {
             work: left(self.budget.max_work, self.work),
@@ -186,6 +202,8 @@ impl<'a> Run<'a> {
             None
         } else if self.observer.cancelled() {
             Some(StopReason::Cancelled)
+        } else if self.optimal {
+            Some(StopReason::Optimal)
         } else if reached(self.budget.max_evaluations, self.evaluations) {
             Some(StopReason::Evaluations)
         } else if reached(self.budget.max_work, self.work) {
@@ -228,7 +246,8 @@ pub fn solve(
     observer: &dyn Observer,
 ) -> Result<Outcome, SearchError> {
     let incumbent = f64::INFINITY;
-    let mut run = Run { budget, observer, evaluations: 0, work: 0, incumbent, history: Vec::new() };
+    let mut run =
+        Run { budget, observer, evaluations: 0, work: 0, incumbent, optimal: false, history: Vec::new() };
     let tree = search.search(problem, seed, &mut run)?;
     let stop = run.stopped().unwrap_or(StopReason::Completed);
     let Run { evaluations, work, incumbent: cost, history, .. } = run;

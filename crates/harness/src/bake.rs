@@ -42,6 +42,9 @@ pub struct BakeArgs {
     /// Number of threads; as many as processors if not given. Changes no result of a budget of work.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
+    /// Say first what the scene does not need and is left out, and why.
+    #[arg(long)]
+    pub explain: bool,
 }
 
 /// The method that goes on from a given tree.
@@ -176,6 +179,7 @@ fn summary(
     }
     let why = match outcome.stop {
         StopReason::Completed => ", and nothing more that this method does",
+        StopReason::Optimal => ", and no tree is better",
         _ => "",
     };
     lines.push(format!("{} moves, {} nodes visited, {seconds:.1} s{why}", outcome.evaluations, outcome.work));

@@ -297,8 +297,9 @@ fn perform(experiment: &Experiment, job: &Job, watch: &Watch) -> Result<Option<(
     if watch.cancelled() {
         return Ok(None);
     }
-    let seed = experiment.seed_of(&scene.name, label, repetition);
-    let problem = Problem { boxes: &scene.boxes, objective: experiment.objective };
+    let seed = experiment.seed_of(&scene.name, labelled.seed_as.as_ref().unwrap_or(label), repetition);
+    let problem =
+        Problem { objective: experiment.objective, keep: &labelled.keep, ..Problem::new(&scene.boxes) };
     let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
     let names = || (scene.name.clone(), label.clone());
     let (outcome, seconds) = match method {

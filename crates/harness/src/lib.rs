@@ -9,6 +9,7 @@ pub mod chart;
 pub mod check;
 pub mod error;
 pub mod execute;
+pub mod explain;
 pub mod html;
 pub mod inspect;
 pub mod obj;

@@ -10,7 +10,7 @@ use harness::spec::{Experiment, Overrides};
 use harness::standin::STAND_INS;
 use harness::suite::child;
 use harness::sweep::{self, Shard};
-use harness::{Error, check, execute, html, reference};
+use harness::{Error, check, execute, explain, html, reference};
 use std::fmt::Arguments;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -95,6 +95,9 @@ struct RunArgs {
     /// of its own.
     #[arg(long, value_name = "I/N", conflicts_with = "check")]
     shard: Option<Shard>,
+    /// Say first what each scene does not need and is left out, and why.
+    #[arg(long)]
+    explain: bool,
 }
 
 /// Set by Ctrl-C. A second one ends the program at once; finished runs are kept either way.
@@ -118,7 +121,7 @@ fn main() -> ExitCode {
         Some(Command::SuiteChild { subject, case, objects }) => child::main(&subject, &case, objects)
             .map(|answer| say(format_args!("{answer}")))
             .map_err(Error::Usage),
-        Some(Command::Bake(args)) => use_threads(args.jobs).and_then(|()| bake(&args, &INTERRUPTED)).map(print),
+        Some(Command::Bake(args)) => use_threads(args.jobs).and_then(|()| explain_and_bake(&args)),
         Some(Command::Inspect(args)) => inspect(&args).map(print),
         None => run(&cli.run),
     };
@@ -155,6 +158,13 @@ fn use_threads(jobs: Option<u16>) -> Result<(), Error> {
         .map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))
 }
 
+fn explain_and_bake(args: &BakeArgs) -> Result<(), Error> {
+    if args.explain {
+        print(explain::scene(&Scene::load(&args.scene)?)?);
+    }
+    bake(args, &INTERRUPTED).map(print)
+}
+
 fn run(args: &RunArgs) -> Result<(), Error> {
     use_threads(args.jobs)?;
     let overrides = Overrides { scenes: args.scenes.clone(), seed: args.seed, quick: args.quick };
@@ -164,6 +174,9 @@ fn run(args: &RunArgs) -> Result<(), Error> {
     let extent = Extent { resume: args.resume, shard: args.shard };
     let mut differences = 0;
     for experiment in &experiments {
+        if args.explain {
+            print(explain::experiment(experiment)?);
+        }
         if args.check {
             differences += check(args, experiment)?;
         } else {

@@ -1,6 +1,7 @@
 //! Scenes by name or path: built-in stand-ins, the spheres, fetched meshes, and any OBJ file.
 
 use crate::part::Part;
+use crate::suite::{self, examine};
 use crate::{Error, obj, standin};
 use bvh_core::{Aabb, Sphere, Triangle};
 use glam::Vec3;
@@ -48,6 +49,11 @@ impl Scene {
     /// Loads a scene by the name or path that a spec or `--scene` gives, or the [`Part`] of it that the name ends with.
     pub fn load(name: &str) -> Result<Self, Error> {
         match Part::parse(name) {
+            Some((case, Part::Spaced(objects)))
+                if examine::case(case).is_some_and(|case| case.scene().is_some()) =>
+            {
+                Self::of_suite(case, name, objects)
+            }
             Some((whole, part)) => Self::load_whole(whole)?.part(part, &name[whole.len()..]),
             None => Self::load_whole(name),
         }
@@ -80,6 +86,20 @@ impl Scene {
         let triangles = obj::load(&path).map_err(message)?.triangles;
         let stem = path.file_stem().map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
         Ok(Self::new(&stem, "file", Primitives::Triangles(triangles)))
+    }
+
+    /// The scene of a case of the suite, made of so many objects, or about so many where others make no such scene.
+    fn of_suite(case: &str, name: &str, objects: usize) -> Result<Self, Error> {
+        let scene = examine::case(case).and_then(suite::Case::scene);
+        match scene.map_or(vec![], |case| (case.scene)(objects)) {
+            none if none.is_empty() => {
+                Err(Error::Scene { name: name.into(), message: "a scene has 1 object or more".into() })
+            }
+            some => {
+                let corners = some.iter().map(|triangle| triangle.0).collect();
+                Ok(Self::new(name, "procedural", Primitives::Triangles(corners)))
+            }
+        }
     }
 
     fn new(name: &str, kind: &'static str, primitives: Primitives) -> Self {
@@ -135,7 +155,7 @@ fn known_scenes() -> String {
     let names = standin::STAND_INS.iter().map(|scene| scene.name);
     let names = names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name));
     format!(
-        "accepted: {}, the path of an OBJ file, or either with `:COUNT`, `:random:COUNT:SEED` or \
+        "accepted: {}, the path of an OBJ file, a case of the suite with a number of objects such as S34:20000, or either of the others with `:COUNT`, `:random:COUNT:SEED` or \
          `:cluster:COUNT:SEED` for a subset",
         names.collect::<Vec<_>>().join(", ")
     )

@@ -5,7 +5,7 @@ use crate::report::Report;
 use crate::scene::{Scene, fnv1a};
 use crate::{Error, part, rays, render, suite, tracing};
 use bvh_core::cost::Objective;
-use bvh_search::{Budget, Method, Problem, exact, solve};
+use bvh_search::{Budget, Method, Omission, Problem, exact, solve};
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::path::Path;
@@ -80,6 +80,10 @@ pub struct Labelled {
     pub method: Contestant,
     /// Limits of its runs besides the experiment's: the lower of both counts. Default none.
     pub budget: Option<Budget>,
+    /// What its runs do although the scene does not need it, to measure what leaving it out saves. Default nothing.
+    pub keep: Vec<Omission>,
+    /// Label whose seeds its runs have, for methods that are to differ in nothing else. Default its own.
+    pub seed_as: Option<String>,
 }
 
 /// A method of ours, or another library.
@@ -96,13 +100,16 @@ impl TryFrom<toml::Table> for Labelled {
 
     fn try_from(mut table: toml::Table) -> Result<Self, String> {
         let known = |name: &String| Method::NAMES.iter().chain(Peer::NAMES).any(|known| known == name);
-        let label = match table.remove("label") {
-            Some(toml::Value::String(label)) => Some(label),
-            Some(found) => return Err(format!("label is {found}; accepted: a text")),
-            None => None,
+        let mut text = |key: &str| match table.remove(key) {
+            Some(toml::Value::String(text)) => Ok(Some(text)),
+            Some(found) => Err(format!("{key} is {found}; accepted: a text")),
+            None => Ok(None),
         };
+        let (label, seed_as) = (text("label")?, text("seed_as")?);
         let budget = table.remove("budget").map(Budget::deserialize).transpose();
         let budget = budget.map_err(|error| format!("budget: {}", error.message()))?;
+        let keep = table.remove("keep").map_or(Ok(vec![]), Vec::deserialize);
+        let keep = keep.map_err(|error| format!("keep: {}", error.message()))?;
         let name = match table.get("method") {
             Some(toml::Value::String(name)) if known(name) => name.clone(),
             found => {
@@ -117,7 +124,7 @@ impl TryFrom<toml::Table> for Labelled {
             Peer::deserialize(table).map(Contestant::Peer)
         };
         let method = method.map_err(|error| format!("{name}: {}", error.message()))?;
-        Ok(Self { label: label.unwrap_or(name), method, budget })
+        Ok(Self { label: label.unwrap_or(name), method, budget, keep, seed_as })
     }
 }
 
@@ -127,6 +134,14 @@ impl From<Labelled> for toml::Table {
         table.insert("label".into(), labelled.label.into());
         if let Some(budget) = labelled.budget.and_then(|budget| toml::Value::try_from(budget).ok()) {
             table.insert("budget".into(), budget);
+        }
+        if !labelled.keep.is_empty()
+            && let Ok(keep) = toml::Value::try_from(labelled.keep)
+        {
+            table.insert("keep".into(), keep);
+        }
+        if let Some(label) = labelled.seed_as {
+            table.insert("seed_as".into(), label.into());
         }
         table
     }
@@ -190,6 +205,8 @@ impl Experiment {
                 label: method.name().into(),
                 method: Contestant::Ours(method),
                 budget: None,
+                keep: vec![],
+                seed_as: None,
             };
             experiment.methods = Method::all().into_iter().map(labelled).collect();
         }
@@ -256,7 +273,7 @@ impl Experiment {
             };
             // A search checks its own parameters before it looks at the scene: let it, on the scene of nothing.
             let budget = Budget { max_evaluations: Some(1), max_work: None };
-            let nothing = Problem { boxes: &[], objective: self.objective };
+            let nothing = Problem { objective: self.objective, ..Problem::new(&[]) };
             solve(method, &nothing, 0, budget, &())
                 .map_err(|error| format!("methods[{index}] ({label}): {error}"))?;
         }

@@ -142,7 +142,8 @@ fn every_objective_is_what_its_method_reports() {
             let boxes = scenes::boxes(&make(n));
             for objective in [Objective::GoldsmithSalmon, Objective::Sah(Default::default())] {
                 let budget = examine::budget(&method, n, WORK);
-                let outcome = solve(&method, &Problem { boxes: &boxes, objective }, 1, budget, &()).unwrap();
+                let outcome =
+                    solve(&method, &Problem { objective, ..Problem::new(&boxes) }, 1, budget, &()).unwrap();
                 validate(&outcome.tree, &boxes).unwrap();
                 let cost = objective.cost(&outcome.tree);
                 let close = (outcome.cost - cost).abs() <= examine::ROUNDING * cost;

@@ -10,6 +10,7 @@ pub mod estimator;
 pub mod gaps;
 pub mod generations;
 pub mod numbers;
+pub mod omissions;
 pub mod pareto;
 pub mod peers;
 pub mod pictures;
@@ -76,6 +77,8 @@ pub enum Report {
     Peers(peers::Config),
     /// Speed of rays by tree, layout and kind of rays, and how well the cost predicts it.
     Traversal(traversal::Config),
+    /// What leaving something out saves.
+    Omissions(omissions::Config),
 }
 
 impl Report {
@@ -101,6 +104,7 @@ impl Report {
             Self::Pareto(config) => config.methods.iter().collect(),
             Self::Peers(config) => config.methods.iter().chain([&config.ours]).collect(),
             Self::Traversal(config) => config.methods.iter().collect(),
+            Self::Omissions(config) => config.labels().collect(),
         }
     }
 
@@ -136,6 +140,7 @@ impl Report {
             Self::Pareto(config) => config.write(rows),
             Self::Peers(config) => config.write(rows),
             Self::Traversal(config) => config.write(rows),
+            Self::Omissions(config) => config.write(rows),
         }
     }
 }
