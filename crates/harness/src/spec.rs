@@ -150,8 +150,13 @@ pub struct Overrides {
 impl Experiment {
     /// Reads and checks the spec at `path`. Does not load its scenes.
     pub fn read(path: &Path, overrides: &Overrides) -> Result<Self, Error> {
+        let fail = |error: std::io::Error| Error::Spec { file: path.to_owned(), message: error.to_string() };
+        Self::parse(path, &std::fs::read_to_string(path).map_err(fail)?, overrides)
+    }
+
+    /// Reads and checks a spec's text; `path` gives it its name.
+    pub fn parse(path: &Path, text: &str, overrides: &Overrides) -> Result<Self, Error> {
         let fail = |message: String| Error::Spec { file: path.to_owned(), message };
-        let text = std::fs::read_to_string(path).map_err(|error| fail(error.to_string()))?;
         let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| fail(error.to_string()))?;
         let quick = table.remove("quick");
         let mut name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -169,7 +174,7 @@ impl Experiment {
             }
             Self::deserialize(table).map_err(|error| fail(error.to_string().trim().to_owned()))?
         } else {
-            toml::from_str(&text).map_err(|error| fail(error.to_string().trim().to_owned()))?
+            toml::from_str(text).map_err(|error| fail(error.to_string().trim().to_owned()))?
         };
         if !experiment.name.is_empty() {
             return Err(fail(format!(
