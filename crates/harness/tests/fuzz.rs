@@ -6,7 +6,6 @@
 #[path = "../fuzz/src/lib.rs"]
 mod targets;
 
-
 use bvh_search::Stream;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
