@@ -141,8 +141,8 @@ fn check_paths(cli: &Cli) -> Result<(), Error> {
     match &cli.command {
         None => output_folder("--out", &cli.run.out),
         Some(Command::Report { results, out }) => {
-            input_folder("--results", results)?;
-            output_file("--out", out)
+            output_file("--out", out)?;
+            input_folder("--results", results)
         }
         Some(Command::Merge { out, .. }) => output_folder("--out", out),
         Some(Command::Render(args)) => {

@@ -159,8 +159,8 @@ impl Experiment {
         let fail = |message: String| Error::Spec { file: path.to_owned(), message };
         let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| fail(error.to_string()))?;
         let quick = table.remove("quick");
-        if let Some((key, number)) = not_finite(&table) {
-            return Err(fail(format!("{key} is {number}; accepted: a finite number")));
+        if let Some((key, value)) = never_right(&table) {
+            return Err(fail(format!("{key} is {value}; accepted under any key: finite numbers, no dates")));
         }
         let mut name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         // Parsed from the text where possible, so that errors show its line.
@@ -376,13 +376,14 @@ fn key_of(report: &Report, label: &str) -> Option<String> {
     Some(format!(" under {key}"))
 }
 
-/// The first number that is none, or infinite, with its key.
-fn not_finite(table: &toml::Table) -> Option<(String, f64)> {
-    fn within(key: String, value: &toml::Value) -> Option<(String, f64)> {
+/// The first value that no key takes, with its key: a number that is none or infinite, or a date.
+fn never_right(table: &toml::Table) -> Option<(String, &toml::Value)> {
+    fn within(key: String, value: &toml::Value) -> Option<(String, &toml::Value)> {
         match value {
-            toml::Value::Float(number) if !number.is_finite() => Some((key, *number)),
+            toml::Value::Float(number) if !number.is_finite() => Some((key, value)),
+            toml::Value::Datetime(_) => Some((key, value)),
             toml::Value::Table(table) => {
-                not_finite(table).map(|(inner, number)| (format!("{key}.{inner}"), number))
+                never_right(table).map(|(inner, value)| (format!("{key}.{inner}"), value))
             }
             toml::Value::Array(array) => {
                 array.iter().enumerate().find_map(|(index, value)| within(format!("{key}[{index}]"), value))
@@ -450,7 +451,7 @@ mod tests {
             ("scenes = ['a:5..4']\n", &["scenes", "a:5..4", "A up to B"]),
             ("tracing = { count = 4294967295 }\n", &["tracing.count", "1 to 100000000"]),
             ("objective = { sah = { traversal = -1.0 } }\n", &["objective.sah.traversal is -1"]),
-            ("rays = [{ count = nan }]\n", &["rays[0].count is NaN", "finite"]),
+            ("rays = [{ count = nan }]\n", &["rays[0].count is nan", "finite"]),
             ("rays = [{ family = 'curves', query = 'any', count = 1 }]\n", &["curves", "inside"]),
         ] {
             let good = if wrong.contains("scenes = ['a") {
