@@ -29,7 +29,12 @@ pub fn find(spec: Table, read: impl Fn(Table) -> Option<String>) -> Option<Strin
                 .position(|(step, found)| (Some(step) == tag.as_ref()) == tags && *found != Some(error.clone()))
         };
         let Some(next) = cured.or_else(|| changed(false)).or_else(|| changed(true)) else { break };
-        path.extend(steps.into_iter().nth(next));
+        let Some(step) = steps.into_iter().nth(next) else { break };
+        if let Step::Index(index) = step {
+            // What follows may have the same error.
+            remove(&mut spec, &path, &Step::Index(index + 1));
+        }
+        path.push(step);
     }
     let shown = |text: String, step: &Step| match step {
         Step::Key(key) if text.is_empty() => key.clone(),
