@@ -67,7 +67,7 @@ fn place(spec: &Value, path: &[Step]) -> String {
     let mut place = String::new();
     for step in path {
         at = follow(&mut at, step).clone();
-        let tag = ["method", "kind"].iter().find_map(|tag| at.get(tag)?.as_str()).unwrap_or_default();
+        let tag = ["kind", "method"].iter().find_map(|tag| at.get(tag)?.as_str()).unwrap_or_default();
         match step {
             Step::Key(key) => place += &format!(".{key}"),
             Step::Index(_) => place += &format!("[{tag}]"),
