@@ -16,6 +16,9 @@ pub use rays::rays;
 pub use spec::spec;
 pub use tree_file::tree_file;
 
+/// What takes any bytes.
+pub type Target = fn(&[u8]);
+
 /// Every target by name.
-pub const TARGETS: [(&str, fn(&[u8])); 5] =
+pub const TARGETS: [(&str, Target); 5] =
     [("boxes", boxes), ("obj", obj), ("spec", spec), ("tree_file", tree_file), ("rays", rays)];
