@@ -4,9 +4,11 @@
 //! the CSV files only. Beside it, [`bake`] makes tree files, [`inspect`] reads them, [`mod@render`] makes pictures.
 //! Everything that touches files, clocks, threads or the terminal lives in this crate.
 
+pub mod arguments;
 pub mod bake;
 pub mod chart;
 pub mod check;
+mod culprit;
 pub mod error;
 pub mod execute;
 pub mod explain;

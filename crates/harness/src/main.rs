@@ -1,6 +1,7 @@
 //! The command line: reads arguments, calls the library, prints what it returns, sets the exit code.
 
 use clap::{Args, Parser, Subcommand};
+use harness::arguments::{input_file, input_folder, output_file, output_folder};
 use harness::bake::{BakeArgs, bake};
 use harness::execute::Extent;
 use harness::inspect::{InspectArgs, inspect};
@@ -113,7 +114,7 @@ fn main() -> ExitCode {
     if let Err(error) = handler {
         complain(format_args!("warning: Ctrl-C will end the program at once: {error}"));
     }
-    let result = match cli.command {
+    let result = check_paths(&cli).and_then(|()| match cli.command {
         Some(Command::Scenes) => list_scenes(),
         Some(Command::Report { results, out }) => write_page(&results, &out),
         Some(Command::Merge { folders, out }) => merge(&folders, &out),
@@ -124,8 +125,12 @@ fn main() -> ExitCode {
         Some(Command::Bake(args)) => use_threads(args.jobs).and_then(|()| explain_and_bake(&args)),
         Some(Command::Inspect(args)) => inspect(&args).map(print),
         None => run(&cli.run),
-    };
+    });
     match result {
+        Ok(()) if UNHEARD.load(Relaxed) => {
+            complain(format_args!("error: not all that was to be said could be written to standard output"));
+            ExitCode::FAILURE
+        }
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             complain(format_args!("error: {error}"));
@@ -134,9 +139,43 @@ fn main() -> ExitCode {
     }
 }
 
+/// Refuses paths of the wrong kind before any work.
+fn check_paths(cli: &Cli) -> Result<(), Error> {
+    match &cli.command {
+        None => output_folder("--out", &cli.run.out),
+        Some(Command::Report { results, out }) => {
+            output_file("--out", out)?;
+            input_folder("--results", results)
+        }
+        Some(Command::Merge { out, .. }) => output_folder("--out", out),
+        Some(Command::Render(args)) => {
+            if args.accel.ends_with(".bvh") {
+                input_file("--accel", Path::new(&args.accel))?;
+            }
+            output_file("--out", &args.out)
+        }
+        Some(Command::Bake(args)) => {
+            args.from.as_deref().map_or(Ok(()), |from| input_file("--from", from))?;
+            output_file("--out", &args.out)
+        }
+        Some(Command::Inspect(args)) => {
+            args.nodes.as_deref().map_or(Ok(()), |nodes| output_file("--nodes", nodes))
+        }
+        Some(Command::Scenes | Command::SuiteChild { .. }) => Ok(()),
+    }
+}
+
+/// Set when something could not be said.
+static UNHEARD: AtomicBool = AtomicBool::new(false);
+
 /// Prints a line. A reader that has gone, as `head` does, is no error: the results are in files.
 fn say(line: Arguments) {
-    let _ = writeln!(std::io::stdout(), "{line}");
+    let mut out = std::io::stdout();
+    if let Err(error) = writeln!(out, "{line}").and_then(|()| out.flush())
+        && error.kind() != std::io::ErrorKind::BrokenPipe
+    {
+        UNHEARD.store(true, Relaxed);
+    }
 }
 
 /// Prints a line to standard error.

@@ -63,16 +63,24 @@ impl Part {
     }
 }
 
+/// How many names [`expand`] makes of this one.
+pub fn names(name: &str) -> u64 {
+    let ranges = name.split(':').skip(1).filter_map(range);
+    ranges.map(|(low, high)| (u64::from(high) + 1).saturating_sub(low.into())).fold(1, u64::saturating_mul)
+}
+
+/// The numbers of `A..B`.
+fn range(word: &str) -> Option<(u32, u32)> {
+    let (low, high) = word.split_once("..")?;
+    Some((low.parse().ok()?, high.parse().ok()?))
+}
+
 /// `name` with every `A..B` after a colon replaced by A, A + 1, … B: many parts of a scene on one line of a spec.
 pub fn expand(name: &str) -> Vec<String> {
     let mut names = vec![String::new()];
     for (index, word) in name.split(':').enumerate() {
-        let range = || {
-            let (low, high) = word.split_once("..")?;
-            Some(low.parse::<u32>().ok()?..=high.parse().ok()?)
-        };
-        let words: Vec<String> = match range().filter(|_| index > 0) {
-            Some(range) => range.map(|number| number.to_string()).collect(),
+        let words: Vec<String> = match range(word).filter(|_| index > 0) {
+            Some((low, high)) => (low..=high).map(|number| number.to_string()).collect(),
             None => vec![word.to_owned()],
         };
         let colon = if index > 0 { ":" } else { "" };
@@ -102,6 +110,9 @@ mod tests {
         let expected = ["a:random:6:0", "a:random:6:1", "a:random:7:0", "a:random:7:1"];
         assert_eq!(expand("a:random:6..7:0..1"), expected);
         assert_eq!(expand("../x..y.obj"), ["../x..y.obj"]);
+        for name in ["a", "a:1..3", "a:random:6..7:0..1", "../x..y.obj", "a:3..1"] {
+            assert_eq!(names(name), expand(name).len() as u64, "{name}");
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::peers::Peer;
 use crate::report::Report;
 use crate::scene::{Scene, fnv1a};
-use crate::{Error, part, rays, render, suite, tracing};
+use crate::{Error, culprit, part, rays, render, suite, tracing};
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, Method, Omission, Problem, exact, solve};
 use serde::{Deserialize, Serialize};
@@ -165,10 +165,18 @@ pub struct Overrides {
 impl Experiment {
     /// Reads and checks the spec at `path`. Does not load its scenes.
     pub fn read(path: &Path, overrides: &Overrides) -> Result<Self, Error> {
+        let fail = |error: std::io::Error| Error::Spec { file: path.to_owned(), message: error.to_string() };
+        Self::parse(path, &std::fs::read_to_string(path).map_err(fail)?, overrides)
+    }
+
+    /// Reads and checks a spec's text; `path` gives it its name.
+    pub fn parse(path: &Path, text: &str, overrides: &Overrides) -> Result<Self, Error> {
         let fail = |message: String| Error::Spec { file: path.to_owned(), message };
-        let text = std::fs::read_to_string(path).map_err(|error| fail(error.to_string()))?;
         let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| fail(error.to_string()))?;
         let quick = table.remove("quick");
+        if let Some((key, value)) = never_right(&table) {
+            return Err(fail(format!("{key} is {value}; accepted under any key: finite numbers, no dates")));
+        }
         let mut name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         // Parsed from the text where possible, so that errors show its line.
         let mut experiment: Self = if overrides.quick || quick.is_some() {
@@ -182,10 +190,11 @@ impl Experiment {
                     None => {}
                 }
             }
-            Self::deserialize(table).map_err(|error| fail(error.to_string().trim().to_owned()))?
+            Self::deserialize(table.clone())
         } else {
-            toml::from_str(&text).map_err(|error| fail(error.to_string().trim().to_owned()))?
-        };
+            toml::from_str(text)
+        }
+        .map_err(|error| fail(explain(&error, table)))?;
         if !experiment.name.is_empty() {
             return Err(fail(format!(
                 "name is {:?}; accepted: none, the file's name is used",
@@ -228,6 +237,24 @@ impl Experiment {
         } else if self.scenes.is_empty() {
             return Err("scenes is empty; accepted: at least one name or path".into());
         }
+        let scenes = self.scenes.iter().map(|name| part::names(name)).fold(0, u64::saturating_add);
+        if let Some(none) = self.scenes.iter().find(|name| part::names(name) == 0) {
+            return Err(format!("scenes: {none:?} ends before it begins; accepted: A..B with A up to B"));
+        }
+        let runs =
+            [self.methods.len() as u64, self.repetitions.into()].into_iter().fold(scenes, u64::saturating_mul);
+        if runs > MOST_RUNS {
+            return Err(format!(
+                "scenes, methods and repetitions make {runs} runs; accepted: up to {MOST_RUNS}"
+            ));
+        }
+        if let Objective::Sah(constants) = self.objective {
+            for (key, value) in [("traversal", constants.traversal), ("intersection", constants.intersection)] {
+                if value < 0.0 {
+                    return Err(format!("objective.sah.{key} is {value}; accepted: 0 or more"));
+                }
+            }
+        }
         if self.methods.is_empty() {
             return Err("methods is empty; accepted: at least one table with a `method`".into());
         }
@@ -248,6 +275,9 @@ impl Experiment {
             for (key, value) in [("count", tracing.count), ("rounds", tracing.rounds)] {
                 if value == 0 {
                     return Err(format!("tracing.{key} is 0; accepted: 1 or more"));
+                }
+                if value > MOST_RAYS {
+                    return Err(format!("tracing.{key} is {value}; accepted: 1 to {MOST_RAYS}"));
                 }
             }
         }
@@ -282,7 +312,8 @@ impl Experiment {
                 if !labels.contains(label) {
                     let known: Vec<_> = self.methods.iter().map(|method| method.label.as_str()).collect();
                     let known = known.join(", ");
-                    return Err(format!("reports[{index}] names method {label:?}; accepted: {known}"));
+                    let key = key_of(report, label).unwrap_or_default();
+                    return Err(format!("reports[{index}] names method {label:?}{key}; accepted: {known}"));
                 }
             }
         }
@@ -340,6 +371,58 @@ impl Experiment {
     }
 }
 
+/// Most runs of an experiment.
+const MOST_RUNS: u64 = 10_000_000;
+
+/// Most rays of a kind, all in memory at once.
+const MOST_RAYS: u32 = 100_000_000;
+
+/// Under which key a report names a method, for the message.
+fn key_of(report: &Report, label: &str) -> Option<String> {
+    fn names(value: &toml::Value, label: &str) -> bool {
+        match value {
+            toml::Value::String(text) => text == label,
+            toml::Value::Array(array) => array.iter().any(|value| names(value, label)),
+            toml::Value::Table(table) => table.iter().any(|(key, value)| key != "name" && names(value, label)),
+            _ => false,
+        }
+    }
+    let texts = ["kind", "source", "title", "reason", "file"];
+    let table = toml::Table::try_from(report).ok()?;
+    let (key, _) = table.iter().find(|(key, value)| !texts.contains(&key.as_str()) && names(value, label))?;
+    Some(format!(" under {key}"))
+}
+
+/// The first value that no key takes, with its key: a number that is none or infinite, or a date.
+fn never_right(table: &toml::Table) -> Option<(String, &toml::Value)> {
+    fn within(key: String, value: &toml::Value) -> Option<(String, &toml::Value)> {
+        match value {
+            toml::Value::Float(number) if !number.is_finite() => Some((key, value)),
+            toml::Value::Datetime(_) => Some((key, value)),
+            toml::Value::Table(table) => {
+                never_right(table).map(|(inner, value)| (format!("{key}.{inner}"), value))
+            }
+            toml::Value::Array(array) => {
+                array.iter().enumerate().find_map(|(index, value)| within(format!("{key}[{index}]"), value))
+            }
+            _ => None,
+        }
+    }
+    table.iter().find_map(|(key, value)| within(key.clone(), value))
+}
+
+/// What the parser says, and the key that it is about.
+fn explain(error: &toml::de::Error, table: toml::Table) -> String {
+    let read =
+        |table| Experiment::deserialize(table).err().map(|error: toml::de::Error| error.message().to_owned());
+    let said = error.to_string();
+    let shown = if error.span().is_some() { &said } else { error.message() };
+    match culprit::find(table, read) {
+        Some(key) => format!("{} (key {key})", shown.trim()),
+        None => said.trim().to_owned(),
+    }
+}
+
 /// Replaces keys of `table` by those of `by`, tables key by key.
 fn replace(table: &mut toml::Table, by: toml::Table) {
     for (key, value) in by {
@@ -379,9 +462,21 @@ mod tests {
             ("rays = [{ family = 'lines', query = 'any', count = 0 }]\n", &["rays[0].count is 0"]),
             ("tracing = { rounds = 0 }\n", &["tracing.rounds is 0", "1 or more"]),
             ("threads = 0\n", &["threads is 0", "1 or more"]),
+            ("repetitions = 4294967295\n", &["repetitions", "4294967295 runs"]),
+            ("optional_scenes = []\nscenes = ['a:0..4294967295']\n", &["scenes", "4294967296 runs"]),
+            ("scenes = ['a:0..9999:0..99999:0..4294967295']\n", &["scenes", "4294967296000000000 runs"]),
+            ("scenes = ['a:5..4']\n", &["scenes", "a:5..4", "A up to B"]),
+            ("tracing = { count = 4294967295 }\n", &["tracing.count", "1 to 100000000"]),
+            ("objective = { sah = { traversal = -1.0 } }\n", &["objective.sah.traversal is -1"]),
+            ("rays = [{ count = nan }]\n", &["rays[0].count is nan", "finite"]),
             ("rays = [{ family = 'curves', query = 'any', count = 1 }]\n", &["curves", "inside"]),
         ] {
-            let message = read(&format!("{GOOD}{wrong}"), &Overrides::default()).unwrap_err();
+            let good = if wrong.contains("scenes = ['a") {
+                GOOD.replace("scenes = ['escher']\n", "")
+            } else {
+                GOOD.into()
+            };
+            let message = read(&format!("{good}{wrong}"), &Overrides::default()).unwrap_err();
             assert!(parts.iter().all(|part| message.contains(part)), "{wrong}: {message}");
         }
     }

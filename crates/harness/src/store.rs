@@ -179,8 +179,13 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let mut unfinished = path.as_os_str().to_owned();
     unfinished.push(".unfinished");
     let unfinished = PathBuf::from(unfinished);
-    write_synced(&unfinished, bytes)?;
-    fs::rename(&unfinished, path).map_err(Error::io(path, "replace the file"))
+    let written = write_synced(&unfinished, bytes)
+        .and_then(|()| fs::rename(&unfinished, path).map_err(Error::io(path, "replace the file")));
+    if written.is_err() {
+        // On a full disk what is left of it would be in the way.
+        let _ = fs::remove_file(&unfinished);
+    }
+    written
 }
 
 fn write_synced(path: &Path, bytes: &[u8]) -> Result<(), Error> {

@@ -197,7 +197,7 @@ fn what_is_wrong_is_named_and_costs_nothing_but_a_message() {
         (&["spec.toml", "--scene", "none.obj"], 2, &["none.obj", "no such file"]),
         (&["spec.toml", "--jobs", "0"], 2, &["--jobs", "1..=1024"]),
         (&["spec.toml", "--sed", "1"], 2, &["--sed", "--seed"]),
-        (&["spec.toml", "--out", "file"], 1, &["file", "cannot create the folder"]),
+        (&["spec.toml", "--out", "file"], 2, &["--out", "file is a file", "a folder"]),
         (&["spec.toml", "--check", "--resume"], 2, &["--check", "--resume"]),
         (&[], 2, &["Usage"]),
     ] {

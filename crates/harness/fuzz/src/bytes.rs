@@ -1,0 +1,33 @@
+//! Numbers out of bytes, zeros when these have run out.
+
+use glam::Vec3;
+
+/// Bytes that have not been read yet.
+pub struct Bytes<'a>(pub &'a [u8]);
+
+impl Bytes<'_> {
+    /// The next `N` bytes.
+    pub fn take<const N: usize>(&mut self) -> [u8; N] {
+        let mut taken = [0; N];
+        let (head, rest) = self.0.split_at(self.0.len().min(N));
+        taken[..head.len()].copy_from_slice(head);
+        self.0 = rest;
+        taken
+    }
+
+    /// The next byte.
+    pub fn byte(&mut self) -> u8 {
+        let [byte] = self.take();
+        byte
+    }
+
+    /// The next number: any bits, or one of a few that meet each other often.
+    pub fn number(&mut self, few: bool) -> f32 {
+        if few { f32::from(self.byte() as i8) / 16.0 } else { f32::from_le_bytes(self.take()) }
+    }
+
+    /// The next point.
+    pub fn point(&mut self, few: bool) -> Vec3 {
+        Vec3::from([(); 3].map(|()| self.number(few)))
+    }
+}

@@ -1,0 +1,66 @@
+//! Rays and triangles of any bits: every traversal against testing every object.
+
+use super::bytes::Bytes;
+use bvh_build::{Builder, goldsmith_salmon, kd_tree, muller_fellner};
+use bvh_core::{Aabb, Hit, Ray, Sphere, Triangle, any_hit, clip_to_box, nearest_hit, nearest_hit_of_all};
+use glam::Vec3;
+use harness::suite::tracing::{TRAVERSALS, check};
+
+/// The bytes: how to read the rest, the number of triangles, an exponent, then triangles, then rays.
+pub fn rays(bytes: &[u8]) {
+    let mut bytes = Bytes(bytes);
+    let [mode, count, exponent] = bytes.take();
+    let (few, few_in_rays) = (mode & 1 == 0, mode & 2 == 0);
+    let scale = f32::from_bits(u32::from(exponent.clamp(1, 254)) << 23);
+    let scale = if mode & 4 == 0 { 1.0 } else { scale };
+    // A scene is finite.
+    let finite = |at: Vec3| (at * scale).map(|c| if c.is_finite() { c } else { 0.0 });
+    let mut corner = || finite(bytes.point(few));
+    let triangles: Vec<Triangle> = (0..count % 12).map(|_| Triangle([corner(), corner(), corner()])).collect();
+    let mut rays = Vec::new();
+    while !bytes.0.is_empty() && rays.len() < 8 {
+        let origin = bytes.point(few_in_rays) * if few_in_rays { scale } else { 1.0 };
+        let (direction, t_min, t_max) =
+            (bytes.point(few_in_rays), bytes.number(few_in_rays), bytes.number(few_in_rays));
+        let range = if mode & 8 == 0 { (0.0, f32::INFINITY) } else { (t_min, t_max) };
+        match Ray::new(origin, direction, range.0, range.1) {
+            Ok(ray) => rays.push(ray),
+            // Every refusal has one of three reasons.
+            Err(error) => assert!(
+                !(origin + direction).is_finite()
+                    || direction.abs().max_element() < 1e-30
+                    || direction.abs().max_element() > 1e30
+                    || range.1.is_nan()
+                    || range.0.is_nan()
+                    || range.0 < 0.0,
+                "{error}"
+            ),
+        }
+    }
+    for (name, traversal) in TRAVERSALS {
+        check(*traversal, &triangles, &rays).unwrap_or_else(|broken| panic!("{name}: {broken}"));
+    }
+    let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+    let spheres: Vec<Sphere> =
+        triangles.iter().map(|t| Sphere::new(t.0[0] / 4.0, t.0[1].x.abs() / 4.0)).collect();
+    let around: Vec<Aabb> = spheres.iter().map(Sphere::aabb).collect();
+    for ray in &rays {
+        over(&boxes, ray, |id, t_max| clip_to_box(ray, &boxes[id as usize], ray.t_min(), t_max));
+        over(&around, ray, |id, t_max| spheres[id as usize].intersect(ray, t_max));
+    }
+}
+
+/// Trees and a KD-tree over the boxes answer as testing every object does.
+fn over(boxes: &[Aabb], ray: &Ray, test: impl Fn(u32, f32) -> Option<f32>) {
+    let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
+    let expected = nearest_hit_of_all(boxes.len() as u32, ray, &test, &mut ());
+    let any = |id: u32| test(id, ray.t_max()).is_some();
+    for builder in [&muller_fellner::Config::default() as &dyn Builder, &goldsmith_salmon::Config::default()] {
+        let tree = builder.build(boxes).unwrap();
+        assert_eq!(bits(nearest_hit(&tree, ray, &test, &mut ())), bits(expected), "{ray:?}");
+        assert_eq!(any_hit(&tree, ray, any, &mut ()), expected.is_some(), "{ray:?}");
+    }
+    let cells = kd_tree::Config::default().build(boxes).unwrap();
+    assert_eq!(bits(cells.nearest_hit(ray, &test, &mut ())), bits(expected), "KD-tree: {ray:?}");
+    assert_eq!(cells.any_hit(ray, any, &mut ()), expected.is_some(), "KD-tree: {ray:?}");
+}

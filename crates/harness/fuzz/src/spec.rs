@@ -1,0 +1,26 @@
+//! Specs of any bytes.
+
+use harness::spec::{Experiment, Overrides};
+use std::path::Path;
+
+/// The bytes: a spec. It is refused with its file named, or read, and then its resolved form is read as itself.
+pub fn spec(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let path = Path::new("spec.toml");
+    for quick in [false, true] {
+        let overrides = Overrides { quick, ..Default::default() };
+        match Experiment::parse(path, text, &overrides) {
+            Ok(experiment) => {
+                let mut expected = Experiment { name: String::new(), ..experiment };
+                let resolved = toml::to_string(&expected).unwrap();
+                let read = Experiment::parse(path, &resolved, &Overrides::default());
+                expected.name = "spec".into();
+                assert_eq!(read.unwrap(), expected, "{resolved}");
+            }
+            Err(error) => {
+                assert_eq!(error.exit_code(), 2);
+                assert!(error.to_string().starts_with("spec.toml: "), "{error}");
+            }
+        }
+    }
+}

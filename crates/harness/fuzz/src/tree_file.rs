@@ -1,0 +1,133 @@
+//! Tree files of any bytes, as they are and with a right checksum.
+
+use bvh_core::cost::{self, SahConstants};
+use bvh_core::file::{Header, Layout, TreeFile, load, load_wide};
+use bvh_core::{Aabb, Bvh, Ray, TestCounts, Triangle, any_hit, collapse_leaves, nearest_hit, validate};
+use glam::Vec3;
+
+/// The first byte says what is mended; the rest is a file.
+pub fn tree_file(bytes: &[u8]) {
+    let Some((&mode, bytes)) = bytes.split_first() else { return };
+    // As a mapped file lies, so that views are tried.
+    let mut held = vec![Line([0; 64]); bytes.len().div_ceil(64)];
+    for (line, part) in held.iter_mut().zip(bytes.chunks(64)) {
+        line.0[..part.len()].copy_from_slice(part);
+    }
+    let mut flat: Vec<u8> = held.iter().flat_map(|line| line.0).take(bytes.len()).collect();
+    if mode & 1 == 1 && flat.len() >= Header::BYTES {
+        mend_start(&mut flat, mode & 2 == 2);
+        seal(&mut flat);
+        for (line, part) in held.iter_mut().zip(flat.chunks(64)) {
+            line.0[..part.len()].copy_from_slice(part);
+        }
+    }
+    let (lines, len) = (held.len(), flat.len());
+    // SAFETY: `Line` is an array of bytes, so `lines` of them are 64 times as many initialised bytes, and `len` is no more.
+    let aligned = unsafe { std::slice::from_raw_parts(held.as_ptr().cast::<u8>(), lines * 64) };
+    opened(&aligned[..len]);
+    let _ = TreeFile::open(&flat).map(|file| (file.view().is_ok(), file.wide_view().is_ok()));
+}
+
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Line([u8; 64]);
+
+/// Gives a file the right first bytes and, if asked for, as many objects as its length has room for.
+fn mend_start(bytes: &mut [u8], counts: bool) {
+    bytes[..8].copy_from_slice(&Header::MAGIC);
+    bytes[8..12].copy_from_slice(&Header::VERSION.to_le_bytes());
+    bytes[12..16].copy_from_slice(&[4, 3, 2, 1]);
+    if counts && bytes[16] == 0 {
+        let nodes = u64::from(bytes[24]);
+        let rest = (bytes.len() - Header::BYTES) as u64;
+        let objects = rest.saturating_sub(nodes * 32) / 4;
+        for (at, count) in [(24, nodes), (32, objects), (40, 0)] {
+            bytes[at..at + 8].copy_from_slice(&count.to_le_bytes());
+        }
+    }
+}
+
+/// Writes the checksum, from its description in `bvh_core::file`.
+fn seal(bytes: &mut [u8]) {
+    bytes[184..192].fill(0);
+    let mix = |state: u64, word: u64| (state ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
+    let mut lanes = [1, 2, 3, 4];
+    for part in bytes.chunks(32) {
+        let mut words = [0; 32];
+        words[..part.len()].copy_from_slice(part);
+        for (lane, word) in lanes.iter_mut().zip(words.as_chunks::<8>().0) {
+            *lane = mix(*lane, u64::from_le_bytes(*word));
+        }
+    }
+    let sum = lanes.into_iter().fold(bytes.len() as u64, mix);
+    bytes[184..192].copy_from_slice(&sum.to_le_bytes());
+}
+
+fn opened(bytes: &[u8]) {
+    let file = match TreeFile::open(bytes) {
+        Ok(file) => file,
+        Err(error) => {
+            assert!(load(bytes, &[]).is_err() && load_wide(bytes, &[]).is_err(), "{error}");
+            return;
+        }
+    };
+    let objects = file.header().objects;
+    assert_eq!([file.tree().is_ok(), file.view().is_ok()], [file.tree().is_ok(); 2]);
+    assert_eq!(file.wide().is_ok(), file.wide_view().is_ok());
+    let is_tree = file.header().layout == Layout::Tree;
+    assert!(!(file.tree().is_ok() && !is_tree || file.wide().is_ok() && is_tree));
+    if let (Ok(tree), Ok(view)) = (file.tree(), file.view()) {
+        assert!(bits(&tree.nodes) == bits(view.nodes) && tree.prim_ids == view.prim_ids);
+        traced(&tree, objects);
+        measured(tree, objects);
+    }
+    if let (Ok(wide), Ok(view)) = (file.wide(), file.wide_view()) {
+        for ray in rays() {
+            let hits = [wide.nearest_hit(&ray), view.nearest_hit(&ray), view.nearest_hit_portable(&ray)];
+            assert!(hits.iter().flatten().all(|hit| (hit.object as usize) < objects));
+            assert!(hits[1] == hits[0] && hits[2] == hits[0], "{hits:?}");
+            let any = [wide.any_hit(&ray), view.any_hit(&ray), view.any_hit_portable(&ray)];
+            assert_eq!(any, [hits[0].is_some(); 3]);
+        }
+    }
+}
+
+fn bits(nodes: &[bvh_core::Node]) -> Vec<[u32; 6]> {
+    let corners = |node: &bvh_core::Node| [node.aabb.min.to_array(), node.aabb.max.to_array()];
+    nodes.iter().map(|node| corners(node).as_flattened().as_chunks::<6>().0[0].map(f32::to_bits)).collect()
+}
+
+fn rays() -> impl Iterator<Item = Ray> {
+    let origins = [Vec3::ZERO, Vec3::new(0.5, 5.0, -3.0), Vec3::splat(-1e30)];
+    let directions = [Vec3::X, Vec3::new(0.0, -1.0, 0.5), Vec3::ONE];
+    origins.into_iter().flat_map(move |from| directions.map(|to| Ray::half_line(from, to))).flatten()
+}
+
+/// Every traversal ends, tests only objects that there are, and none twice.
+fn traced(tree: &Bvh, objects: usize) {
+    for ray in rays() {
+        let mut counts = TestCounts::default();
+        let seen = |id: u32, _: f32| -> Option<f32> {
+            assert!((id as usize) < objects);
+            None
+        };
+        assert_eq!(nearest_hit(tree, &ray, seen, &mut counts), None);
+        assert!(!any_hit(tree, &ray, |id| seen(id, 0.0).is_some(), &mut ()));
+        assert!(counts.objects <= objects as u64 && counts.boxes <= tree.nodes.len() as u64);
+    }
+}
+
+/// Whatever the boxes are, costs, refitting and conversions do not fail.
+fn measured(mut tree: Bvh, objects: usize) {
+    let constants = SahConstants::default();
+    let costs = [cost::internal_area(&tree), cost::goldsmith_salmon(&tree), cost::sah(&tree, &constants)];
+    assert!(cost::over_root_area(&tree, costs[0]).is_nan() || tree.depth() <= tree.nodes.len());
+    let merged = collapse_leaves(&tree, &constants);
+    assert_eq!(merged.prim_ids.len(), objects);
+    let boxes: Vec<Aabb> = (0..objects).map(|at| Aabb::around([Vec3::splat(at as f32)])).collect();
+    let _ = validate(&tree, &boxes);
+    tree.refit(&boxes);
+    assert_eq!(validate(&tree, &boxes), Ok(()));
+    let triangles: Vec<Triangle> = boxes.iter().map(|b| Triangle([b.min; 3])).collect();
+    assert!(bvh_core::WideBvh::new(&tree, &triangles).is_ok());
+}

@@ -1,0 +1,256 @@
+//! What the world does to a running harness: full disks, folders that cannot be written, kills, a second harness.
+//!
+//! `KILLS=100 cargo test -p harness --test faults` kills that often.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+const SPEC: &str = "
+question = 'What survives?'
+scenes = ['spheres75', 'escher:300', 'spheres750']
+repetitions = 12
+methods = [
+    { label = 'greedy', method = 'muller_fellner' },
+    { label = 'noise', method = 'grasp', trials = 60, noise = 0.1 },
+    { label = 'orders', method = 'random_orders', trials = 10 },
+]
+";
+
+/// A folder with the spec in it.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("spec.toml"), SPEC).unwrap();
+    folder
+}
+
+fn command(folder: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+    command.current_dir(folder).args(args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command
+}
+
+fn output(folder: &Path, args: &[&str]) -> Output {
+    command(folder, args).stdout(Stdio::piped()).stderr(Stdio::piped()).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Runs what must succeed.
+fn succeed(folder: &Path, args: &[&str]) {
+    let output = output(folder, args);
+    assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
+}
+
+/// Runs what must fail, with parts of what is said.
+fn fail(folder: &Path, args: &[&str], code: i32, parts: &[&str]) {
+    let output = output(folder, args);
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{args:?}: {said}");
+    assert!(parts.iter().all(|part| said.contains(part)), "{args:?}: {said}");
+}
+
+/// The CSV files without seconds, by name, and the resolved spec.
+fn results(out: &Path) -> Vec<(String, Vec<u8>)> {
+    let folder = out.join("spec");
+    let names = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let wanted =
+        |name: &String| (name.ends_with(".csv") && !name.starts_with("timing")) || name == "resolved.toml";
+    let mut files: Vec<_> =
+        names.filter(wanted).map(|name| (name.clone(), fs::read(folder.join(name)).unwrap())).collect();
+    files.sort();
+    assert!(files.len() >= 3, "{files:?}");
+    files
+}
+
+/// What one uninterrupted run writes.
+fn whole(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    succeed(folder, &["spec.toml", "--out", "whole"]);
+    results(&folder.join("whole"))
+}
+
+/// Waits until a file is there.
+fn wait_for(path: &Path) {
+    let start = Instant::now();
+    while !path.exists() {
+        assert!(start.elapsed() < Duration::from_secs(60), "{} never came", path.display());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
+    let folder = folder();
+    let whole = whole(folder.path());
+    let kills: u32 = std::env::var("KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(20);
+    let (mut killed, mut finished, mut state) = (0, 0, 1u32);
+    let mut out = "out0".to_owned();
+    while killed < kills {
+        let mut child =
+            command(folder.path(), &["spec.toml", "--resume", "--jobs=2", "--out", &out]).spawn().unwrap();
+        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        std::thread::sleep(Duration::from_micros(u64::from(state >> 8) % 60_000));
+        if child.try_wait().unwrap().is_none() {
+            child.kill().unwrap();
+            killed += 1;
+            child.wait().unwrap();
+        } else if child.wait().unwrap().success() {
+            assert!(results(&folder.path().join(&out)) == whole, "after {killed} kills");
+            finished += 1;
+            out = format!("out{finished}");
+        } else {
+            panic!("after {killed} kills --resume fails");
+        }
+    }
+    succeed(folder.path(), &["spec.toml", "--resume", "--out", &out]);
+    assert!(results(&folder.path().join(&out)) == whole);
+    eprintln!("{killed} kills, {} experiments finished", finished + 1);
+}
+
+#[test]
+fn a_second_harness_on_the_same_folder_is_refused_and_disturbs_nothing() {
+    struct Killed(Child);
+    impl Drop for Killed {
+        fn drop(&mut self) {
+            let _ = self.0.kill();
+            let _ = self.0.wait();
+        }
+    }
+    let folder = folder();
+    let long = SPEC.replace("trials = 60", "trials = 1000000");
+    fs::write(folder.path().join("long.toml"), long).unwrap();
+    let first = Killed(command(folder.path(), &["long.toml"]).spawn().unwrap());
+    wait_for(&folder.path().join("results/long/.partial/000000"));
+    for more in [&[][..], &["--resume"], &["--seed=3"], &["--shard=1/2"]] {
+        let args = [&["long.toml"], more].concat();
+        fail(folder.path(), &args, 1, &["results/long is in use by another harness", "--out"]);
+    }
+    // Other folders are free, and the kept run is still there.
+    succeed(folder.path(), &["spec.toml"]);
+    assert!(folder.path().join("results/long/.partial/000000/runs.csv").is_file());
+    drop(first);
+    // The lock died with its owner.
+    fail(folder.path(), &["long.toml", "--resume", "--seed=3"], 2, &["results/long", "another spec"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_is_reported_and_what_was_finished_is_kept() {
+    let folder = folder();
+    let whole = whole(folder.path());
+    // No file may grow beyond so many blocks of 512 bytes; past the limit a write fails as on a full disk.
+    for blocks in [0, 1, 2, 8] {
+        let out = format!("full{blocks}");
+        let script = format!(
+            "trap '' XFSZ; ulimit -f {blocks}; exec '{}' spec.toml --jobs 2 --out {out}",
+            env!("CARGO_BIN_EXE_harness")
+        );
+        let output = Command::new("sh").args(["-c", &script]).current_dir(folder.path()).output().unwrap();
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.contains(&format!("{out}/spec")) && said.contains("cannot write the file"), "{said}");
+        assert!(!folder.path().join(&out).join("spec/runs.csv").exists());
+        succeed(folder.path(), &["spec.toml", "--resume", "--out", &out]);
+        assert!(results(&folder.path().join(&out)) == whole);
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_cannot_be_said_is_an_error_and_a_reader_that_left_is_none() {
+    let folder = folder();
+    let full = || Stdio::from(fs::File::options().write(true).open("/dev/full").unwrap());
+    let output = command(folder.path(), &["scenes"]).stdout(full()).stderr(Stdio::piped()).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("standard output"));
+    let mut child = command(folder.path(), &["scenes"]).stdout(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    assert!(child.wait().unwrap().success());
+    // A file is put in the place of what has its name: never of a device.
+    fail(folder.path(), &["render", "spheres75", "--out", "/dev/full"], 2, &["--out", "/dev/full"]);
+}
+
+/// Makes a folder unwritable, for root too where the file system can; undone when dropped.
+#[cfg(unix)]
+struct ReadOnly<'a>(&'a Path);
+
+#[cfg(unix)]
+impl<'a> ReadOnly<'a> {
+    /// `None` if this user can write there all the same.
+    fn new(folder: &'a Path) -> Option<Self> {
+        let this = Self(folder);
+        this.set("555", "+i");
+        let probe = folder.join("probe");
+        let refused = fs::write(&probe, "").is_err();
+        let _ = fs::remove_file(probe);
+        refused.then_some(this)
+    }
+
+    fn set(&self, mode: &str, attribute: &str) {
+        for (program, argument) in [("chattr", "-i"), ("chmod", mode), ("chattr", attribute)] {
+            let _ = Command::new(program).arg(argument).arg(self.0).stderr(Stdio::null()).status();
+        }
+    }
+}
+
+#[cfg(unix)]
+impl Drop for ReadOnly<'_> {
+    fn drop(&mut self) {
+        self.set("755", "-i");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_that_cannot_be_written_is_named() {
+    let folder = folder();
+    let locked = folder.path().join("locked");
+    fs::create_dir(&locked).unwrap();
+    succeed(folder.path(), &["bake", "spheres75", "--budget=0s", "--out=good.bvh"]);
+    let Some(_guard) = ReadOnly::new(&locked) else {
+        eprintln!("not tried: this user can write into any folder here");
+        return;
+    };
+    fail(folder.path(), &["spec.toml", "--out=locked"], 1, &["locked/spec", "cannot create the folder"]);
+    fail(
+        folder.path(),
+        &["bake", "spheres75", "--budget=1h", "--out=locked/x.bvh"],
+        1,
+        &["locked", "cannot create"],
+    );
+    fail(folder.path(), &["inspect", "good.bvh", "--nodes=locked/x.csv"], 1, &["locked/x.csv", "cannot write"]);
+    let render = ["render", "spheres75", "--size=8x8", "--out=locked/x.png"];
+    fail(folder.path(), &render, 1, &["locked/x.png", "cannot"]);
+    assert_eq!(fs::read_dir(&locked).unwrap().count(), 0);
+}
+
+#[test]
+fn a_folder_where_a_file_should_be_is_named_and_so_is_the_reverse() {
+    let folder = folder();
+    let at = folder.path();
+    fs::create_dir(at.join("folder.obj")).unwrap();
+    fs::create_dir(at.join("folder.toml")).unwrap();
+    fs::create_dir(at.join("folder.bvh")).unwrap();
+    fail(at, &["folder.toml"], 2, &["folder.toml"]);
+    fail(at, &["spec.toml", "--scene=folder.obj"], 2, &["folder.obj", "directory"]);
+    fail(at, &["inspect", "folder.bvh"], 2, &["folder.bvh", "a folder"]);
+    fail(at, &["render", "spheres75", "--accel=folder.bvh", "--out=x.png"], 2, &["--accel", "folder.bvh"]);
+    let made = |path: &str| fs::create_dir_all(at.join(path)).unwrap();
+    made("a/spec/runs.csv");
+    fail(at, &["spec.toml", "--out=a"], 1, &["a/spec/runs.csv", "cannot replace the file"]);
+    assert!(!at.join("a/spec/runs.csv.unfinished").exists());
+    fs::remove_dir(at.join("a/spec/runs.csv")).unwrap();
+    // The runs were not lost.
+    succeed(at, &["spec.toml", "--out=a", "--resume"]);
+    made("b/spec/.lock");
+    fail(at, &["spec.toml", "--out=b"], 1, &["b/spec/.lock", "cannot create the file"]);
+    made("c/spec");
+    fs::write(at.join("c/spec/.partial"), "").unwrap();
+    fail(at, &["spec.toml", "--out=c"], 1, &["c/spec/.partial", "cannot"]);
+    made("d");
+    fs::write(at.join("d/spec"), "").unwrap();
+    fail(at, &["spec.toml", "--out=d"], 1, &["d/spec", "cannot create the folder"]);
+}

@@ -1,0 +1,296 @@
+//! A wrong value under any key of a spec or any flag of the program is refused with exit code 2 and its name.
+//!
+//! No key and no flag is listed here: keys are asked of the parser, flags of `--help`, so that new ones are tried too.
+
+use bvh_search::Method;
+use harness::peers::Peer;
+use harness::spec::{Experiment, Overrides};
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use toml::{Table, Value};
+
+/// A step from a table to a value in it.
+#[derive(Clone, Debug)]
+enum Step {
+    Key(String),
+    Index(usize),
+}
+
+fn follow<'a>(value: &'a mut Value, step: &Step) -> &'a mut Value {
+    match step {
+        Step::Key(key) => &mut value[key.as_str()],
+        Step::Index(index) => &mut value[*index],
+    }
+}
+
+/// The paths of all tables in a value.
+fn tables(value: &Value, path: &[Step], found: &mut Vec<Vec<Step>>) {
+    let on = |step: Step| [path, &[step]].concat();
+    match value {
+        Value::Table(table) => {
+            found.push(path.to_vec());
+            table.iter().for_each(|(key, value)| tables(value, &on(Step::Key(key.clone())), found));
+        }
+        Value::Array(array) => {
+            array.iter().enumerate().for_each(|(index, value)| tables(value, &on(Step::Index(index)), found));
+        }
+        _ => {}
+    }
+}
+
+/// A spec with the value at a key of the table at `path`.
+fn with(spec: &Value, path: &[Step], key: &str, value: Value) -> Value {
+    let mut spec = spec.clone();
+    path.iter().fold(&mut spec, follow).as_table_mut().unwrap().insert(key.into(), value);
+    spec
+}
+
+/// The error's exit code and message.
+fn read(spec: &Value) -> Result<Experiment, (u8, String)> {
+    let text = toml::to_string(spec).unwrap();
+    Experiment::parse(Path::new("folder/some.toml"), &text, &Overrides::default())
+        .map_err(|error| (error.exit_code(), error.to_string()))
+}
+
+/// The names that a message gives as accepted.
+fn accepted(message: &str) -> Vec<String> {
+    let Some((_, names)) = message.split_once("expected ") else { return Vec::new() };
+    names.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+/// Where a table is, whatever its number: arrays' elements are told by their method or kind.
+fn place(spec: &Value, path: &[Step]) -> String {
+    let mut at = spec.clone();
+    let mut place = String::new();
+    for step in path {
+        at = follow(&mut at, step).clone();
+        let tag = ["kind", "method"].iter().find_map(|tag| at.get(tag)?.as_str()).unwrap_or_default();
+        match step {
+            Step::Key(key) => place += &format!(".{key}"),
+            Step::Index(_) => place += &format!("[{tag}]"),
+        }
+    }
+    place
+}
+
+/// The committed experiments with every default spelled out, and one with every method.
+fn specs() -> Vec<Value> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments");
+    let mut paths: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    let mut specs = Vec::new();
+    for path in paths {
+        let mut spec: Table = fs::read_to_string(&path).unwrap().parse().unwrap();
+        spec.remove("quick");
+        // Other libraries may not be compiled in; any method may stand for them.
+        for method in spec.get_mut("methods").and_then(Value::as_array_mut).into_iter().flatten() {
+            if Peer::NAMES.contains(&method["method"].as_str().unwrap()) {
+                let label = method.get("label").unwrap_or(&method["method"]).clone();
+                *method = Value::Table(Table::from_iter([
+                    ("label".into(), label),
+                    ("method".into(), "median_cut".into()),
+                ]));
+            }
+        }
+        let experiment: Experiment = Value::Table(spec).try_into().unwrap();
+        specs.push(Value::try_from(&experiment).unwrap());
+    }
+    let methods: Vec<Table> = Method::all().iter().map(|method| Table::try_from(method).unwrap()).collect();
+    let question = Value::from("Which keys has every method?");
+    let all = [("question", question), ("scenes", vec!["escher"].into()), ("methods", methods.into())];
+    let mut all: Table = all.map(|(key, value)| (key.to_owned(), value)).into_iter().collect();
+    let text = "
+budget = { max_work = 5 }
+objective = { sah = { traversal = 1.0, intersection = 2.0 } }
+rays = [{ family = 'lines', query = 'any', count = 7 }]
+render = { width = 8, height = 8, samples = 2 }
+reports = [{ kind = 'generations', source = 's', title = 't', method = 'genetic', baseline = 'grasp', reason = 'r' }]
+tracing = { cameras = { escher = { eye = [1.0, 2.0, 3.0], target = [0.5, 0.5, 0.5] } } }
+";
+    all.extend(text.parse::<Table>().unwrap());
+    specs.push(Value::Table(all));
+    specs
+}
+
+#[test]
+fn a_wrong_value_under_any_key_of_a_spec_is_refused_by_name() {
+    let wrong = Value::Datetime("1979-05-27".parse().unwrap());
+    let [nan, infinite] = [f64::NAN, f64::NEG_INFINITY].map(Value::from);
+    let doubtful = [
+        Value::from(-1),
+        Value::from(0),
+        Value::from(i64::MAX),
+        Value::from(-0.5),
+        Value::from(1e300),
+        Value::from(true),
+        Value::from("no such thing"),
+        Value::Array(vec![]),
+        Value::Array(vec![Value::from(-1)]),
+        Value::Array(vec![Value::from("no such thing")]),
+        Value::Table(Table::new()),
+        Value::Table(Table::from_iter([("unheard_of".into(), Value::from(1))])),
+    ];
+    let mut seen = BTreeMap::new();
+    let found = RefCell::new(BTreeSet::new());
+    let complain = |what: String| found.borrow_mut().insert(what);
+    for spec in specs() {
+        assert!(read(&spec).is_ok(), "{:?}", read(&spec));
+        let mut paths = Vec::new();
+        tables(&spec, &[], &mut paths);
+        for path in paths {
+            let place = place(&spec, &path);
+            let mut table = spec.clone();
+            let table = path.iter().fold(&mut table, follow).as_table().unwrap().clone();
+            // A key that no table has makes the parser list those that it would accept.
+            let unknown = read(&with(&spec, &path, "unheard_of", 1.into()));
+            let listed = unknown.map_or_else(|(_, message)| accepted(&message), |_| Vec::new());
+            for key in table.keys().cloned().chain(listed) {
+                if key == "unheard_of" || seen.insert(format!("{place}.{key}"), ()).is_some() {
+                    continue;
+                }
+                let try_value = |value: &Value| match read(&with(&spec, &path, &key, value.clone())) {
+                    Ok(_) => true,
+                    Err((code, message)) => {
+                        // What is refused is the key, or one within it.
+                        // Nothing is wrong with a label but that a report names another. What a table may hold
+                        // can be for the key above to say.
+                        let other = key == "label" && message.contains("names method");
+                        let above = path.iter().rev().filter(|_| value.is_table()).any(|step| match step {
+                            Step::Key(above) => message.contains(above),
+                            Step::Index(_) => false,
+                        });
+                        let named = message.starts_with("folder/some.toml: ")
+                            && (message.contains(&key) || above || other)
+                            && code == 2;
+                        if !named {
+                            complain(format!("{place}.{key} = {value}: code {code}, {message}"));
+                        }
+                        false
+                    }
+                };
+                for value in [&wrong, &nan, &infinite] {
+                    if try_value(value) {
+                        complain(format!("{place}.{key} = {value} is accepted"));
+                    }
+                }
+                let taken: Vec<bool> = doubtful.iter().map(try_value).collect();
+                // Whole numbers count something.
+                if taken[0] && !taken[3] {
+                    complain(format!("{place}.{key} = -1 is accepted"));
+                }
+            }
+        }
+    }
+    eprintln!("{} keys", seen.len());
+    for method in Method::NAMES {
+        assert!(seen.contains_key(&format!(".methods[{method}].label")), "{method}");
+    }
+    let kinds = with(
+        &specs()[0],
+        &[],
+        "reports",
+        vec![Table::from_iter([("kind".into(), "unheard_of".into())])].into(),
+    );
+    let kinds = accepted(&read(&kinds).unwrap_err().1);
+    assert!(kinds.len() > 10);
+    for kind in kinds {
+        if !seen.contains_key(&format!(".reports[{kind}].kind")) {
+            complain(format!("no report of kind {kind} was tried"));
+        }
+    }
+    let found = found.take();
+    assert!(found.is_empty(), "\n{}", found.into_iter().collect::<Vec<_>>().join("\n"));
+}
+
+fn harness(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_harness"))
+        .current_dir(folder)
+        .args(args)
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    (output.status.code(), String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned())
+}
+
+/// The flags of a command with the name of their value, as its help lists them.
+fn flags(folder: &Path, command: &str) -> Vec<(String, Option<String>)> {
+    let args: Vec<&str> = [command, "--help"].into_iter().filter(|arg| !arg.is_empty()).collect();
+    let (_, help) = harness(folder, &args);
+    let flag = |line: &str| {
+        let mut words = line.trim_start().split_whitespace().skip_while(|word| !word.starts_with("--"));
+        let name = words.next()?.trim_end_matches(',').to_owned();
+        Some((name, words.next().filter(|word| word.starts_with('<')).map(str::to_owned)))
+    };
+    let lines = help.lines().filter(|line| line.trim_start().starts_with('-'));
+    lines.filter_map(flag).filter(|(name, _)| !["--help", "--version"].contains(&name.as_str())).collect()
+}
+
+#[test]
+fn a_wrong_value_of_any_flag_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::create_dir(at.join("folder")).unwrap();
+    fs::write(at.join("file"), "").unwrap();
+    let spec = "question = 'q'\nscenes = ['spheres75']\nmethods = [{ method = 'median_cut' }]\n";
+    fs::write(at.join("spec.toml"), spec).unwrap();
+    let (code, said) = harness(at, &["bake", "spheres75", "--budget=0s", "--out=good.bvh"]);
+    assert_eq!(code, Some(0), "{said}");
+    let entries = || fs::read_dir(at).unwrap().count();
+    let before = entries();
+    // Every command with what it cannot do without.
+    let commands: [(&str, &[&str]); 7] = [
+        ("", &["spec.toml"]),
+        ("bake", &["spheres75", "--budget=0s", "--out=x.bvh"]),
+        ("inspect", &["good.bvh", "spheres75"]),
+        ("render", &["spheres75", "--out=x.png", "--size=8x8"]),
+        ("report", &[]),
+        ("merge", &["folder", "--out=x"]),
+        ("scenes", &[]),
+    ];
+    let (_, help) = harness(at, &["--help"]);
+    let listed =
+        help.split_once("Commands:").unwrap().1.lines().skip(1).take_while(|line| !line.trim().is_empty());
+    let listed: BTreeSet<&str> = listed.filter_map(|line| line.split_whitespace().next()).collect();
+    let tried: BTreeSet<&str> =
+        commands.map(|(name, _)| name).into_iter().chain(["help"]).filter(|n| !n.is_empty()).collect();
+    assert_eq!(listed, tried);
+    let (mut count, mut found) = (0, Vec::new());
+    for (command, needed) in commands {
+        for (flag, value) in flags(at, command) {
+            count += 1;
+            let wrong: &[&str] = match value.as_deref() {
+                None => &["3"],
+                Some("<DIR>") => &["file", "file/below", ""],
+                Some(file) if file.starts_with("<FILE") || file.ends_with(".csv>") => &["folder", ""],
+                Some(_) => &["no such thing", "-1", "nan", "99999999999999999999999", ""],
+            };
+            for wrong in wrong {
+                // A seed may be any number, and work may be much.
+                let given = format!("{flag}={wrong}");
+                let others = needed.iter().filter(|arg| !arg.starts_with(&format!("{flag}=")));
+                let args: Vec<&str> = [command]
+                    .into_iter()
+                    .filter(|c| !c.is_empty())
+                    .chain(others.copied())
+                    .chain([given.as_str()])
+                    .collect();
+                let (code, said) = harness(at, &args);
+                let named =
+                    said.contains(&flag) || (flag == "--scene" && said.contains(&format!("scene {wrong}")));
+                if code != Some(2) || !named {
+                    found.push(format!("{args:?}: code {code:?}: {said}"));
+                }
+            }
+        }
+        let unknown: Vec<&str> =
+            [command].into_iter().filter(|c| !c.is_empty()).chain(["--unheard-of"]).collect();
+        let (code, said) = harness(at, &unknown);
+        assert!(code == Some(2) && said.contains("--unheard-of"), "{unknown:?}: {said}");
+    }
+    assert!(count > 30, "{count} flags");
+    assert!(found.is_empty(), "\n{}", found.join("\n"));
+    assert_eq!(entries(), before, "nothing was written");
+}
