@@ -220,7 +220,7 @@ fn flags(folder: &Path, command: &str) -> Vec<(String, Option<String>)> {
     let args: Vec<&str> = [command, "--help"].into_iter().filter(|arg| !arg.is_empty()).collect();
     let (_, help) = harness(folder, &args);
     let flag = |line: &str| {
-        let mut words = line.trim_start().split_whitespace().skip_while(|word| !word.starts_with("--"));
+        let mut words = line.split_whitespace().skip_while(|word| !word.starts_with("--"));
         let name = words.next()?.trim_end_matches(',').to_owned();
         Some((name, words.next().filter(|word| word.starts_with('<')).map(str::to_owned)))
     };
