@@ -389,8 +389,15 @@ fn key_of(report: &Report, label: &str) -> Option<String> {
     }
     let texts = ["kind", "source", "title", "reason", "file"];
     let table = toml::Table::try_from(report).ok()?;
-    let (key, _) = table.iter().find(|(key, value)| !texts.contains(&key.as_str()) && names(value, label))?;
-    Some(format!(" under {key}"))
+    let (key, value) =
+        table.iter().find(|(key, value)| !texts.contains(&key.as_str()) && names(value, label))?;
+    // One of several tables: the key in it, too.
+    let of_table = |table: &toml::Value| {
+        let found = table.as_table()?.iter().find(|(key, value)| *key != "name" && names(value, label));
+        Some(found?.0.clone())
+    };
+    let inner = value.as_array().and_then(|tables| tables.iter().find_map(of_table));
+    Some(inner.map_or_else(|| format!(" under {key}"), |inner| format!(" under {inner} of {key}")))
 }
 
 /// The first value that no key takes, with its key: a number that is none or infinite, or a date.

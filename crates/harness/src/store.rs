@@ -45,6 +45,9 @@ impl FinishedRun {
     }
 }
 
+/// What `.partial/` is called while it is removed.
+const REMOVED: &str = ".removed";
+
 /// An experiment's folder, locked until dropped.
 #[derive(Debug)]
 pub struct Store {
@@ -61,6 +64,10 @@ impl Store {
         let partial = folder.join(".partial");
         fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
         let lock = lock(&folder)?;
+        let removed = folder.join(REMOVED);
+        if removed.exists() {
+            fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))?;
+        }
         let spec = partial.join("resolved.toml");
         let found = fs::read_to_string(&spec).ok();
         match found {
@@ -72,8 +79,9 @@ impl Store {
             }
             Some(_) if resume => {}
             _ => {
-                if partial.exists() {
-                    fs::remove_dir_all(&partial).map_err(Error::io(&partial, "remove the folder"))?;
+                if partial.is_dir() {
+                    fs::rename(&partial, &removed).map_err(Error::io(&partial, "rename the folder"))?;
+                    fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))?;
                 }
                 fs::create_dir_all(&partial).map_err(Error::io(&partial, "create the folder"))?;
                 write_whole(&spec, resolved.as_bytes())?;
@@ -143,7 +151,10 @@ impl Store {
 
     /// Removes what only an interrupted experiment needs. The lock file stays: removing it would race.
     pub fn finish(self) -> Result<(), Error> {
-        fs::remove_dir_all(&self.partial).map_err(Error::io(&self.partial, "remove the folder"))
+        // Renamed first: what is removed bit by bit must not look like finished runs if that is interrupted.
+        let removed = self.folder.join(REMOVED);
+        fs::rename(&self.partial, &removed).map_err(Error::io(&self.partial, "rename the folder"))?;
+        fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))
     }
 }
 

@@ -106,7 +106,10 @@ fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
         }
     }
     succeed(folder.path(), &["spec.toml", "--resume", "--out", &out]);
-    assert!(results(&folder.path().join(&out)) == whole);
+    let found = results(&folder.path().join(&out));
+    let names = |files: &[(String, Vec<u8>)]| files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    let differ: Vec<&String> = found.iter().zip(&whole).filter(|(a, b)| a != b).map(|(a, _)| &a.0).collect();
+    assert!(found == whole, "{differ:?}, {:?} and {:?}", names(&found), names(&whole));
     eprintln!("{killed} kills, {} experiments finished", finished + 1);
 }
 
