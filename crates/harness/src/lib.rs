@@ -14,6 +14,7 @@ pub mod execute;
 pub mod explain;
 pub mod html;
 pub mod inspect;
+mod job;
 pub mod obj;
 pub mod part;
 pub mod peers;

@@ -91,9 +91,9 @@ pub enum Layout {
     Binary,
     /// The tree with its leaves merged where the surface area heuristic, both constants 1, says so.
     BinaryLeaves,
-    /// [`WideBvh`] with the best instructions of this machine.
+    /// [`WideBvh`](bvh_core::WideBvh) with the best instructions of this machine.
     Wide,
-    /// [`WideBvh`] with portable code.
+    /// [`WideBvh`](bvh_core::WideBvh) with portable code.
     WidePortable,
 }
 
