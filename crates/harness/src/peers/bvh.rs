@@ -1,13 +1,13 @@
 //! The crate `bvh`.
 
-use super::{Built, Theirs, convert};
+use super::{Built, Raw, Theirs, convert};
 use crate::rays::Query;
 use crate::tracing::{Contender, timed};
 use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
 use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh as TheirBvh, BvhNode};
 use ::bvh::ray::Ray as TheirRay;
-use bvh_core::{Aabb, Hit, Ray};
+use bvh_core::{Aabb, Bvh, Hit, Ray};
 use glam::Vec3;
 use nalgebra::{Point3, Vector3};
 use std::time::Instant;
@@ -51,17 +51,47 @@ fn shapes<'a>(boxes: impl Iterator<Item = (Aabb, [Vec3; 3])> + 'a) -> Vec<Shape>
     (0..).zip(boxes).map(shape).collect()
 }
 
+/// A ray with the library's unit direction.
+fn ray(ray: &Ray) -> TheirRay<f32, 3> {
+    let direction = ray.direction();
+    TheirRay::new(point(ray.origin()), Vector3::new(direction.x, direction.y, direction.z))
+}
+
+fn shapes_of_boxes(boxes: &[Aabb]) -> Vec<Shape> {
+    shapes(boxes.iter().map(|&aabb| (aabb, [aabb.min; 3])))
+}
+
+/// A leaf has the object's box and no other; an inner node what its two boxes contain.
+fn to_ours(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
+    let corner = |p: Point3<f32>| Vec3::new(p.x, p.y, p.z);
+    let aabb = |b: TheirAabb<f32, 3>| Aabb { min: corner(b.min), max: corner(b.max) };
+    convert(boxes, |index| match theirs.nodes[index] {
+        BvhNode::Leaf { shape_index, .. } => (boxes[shape_index], Theirs::Leaf(vec![shape_index as u32])),
+        BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } => {
+            (aabb(child_l_aabb).union(&aabb(child_r_aabb)), Theirs::Inner([child_l_index, child_r_index]))
+        }
+    })
+}
+
 /// Builds on one thread; the library's leaves have one object.
 pub(super) fn build(boxes: &[Aabb]) -> Built {
-    let mut shapes = shapes(boxes.iter().map(|&aabb| (aabb, [aabb.min; 3])));
+    let mut shapes = shapes_of_boxes(boxes);
     let start = Instant::now();
     let theirs = TheirBvh::build(&mut shapes);
     let seconds = start.elapsed().as_secs_f64();
-    let tree = convert(0, boxes, |index| match theirs.nodes[index] {
-        BvhNode::Leaf { shape_index, .. } => Theirs::Leaf(vec![shape_index as u32]),
-        BvhNode::Node { child_l_index, child_r_index, .. } => Theirs::Inner([child_l_index, child_r_index]),
-    });
-    Built { tree, seconds }
+    Built::tight(to_ours(&theirs, boxes), seconds, boxes)
+}
+
+/// Its recursive traversal, which collects all objects whose boxes the ray meets.
+pub(super) fn raw(boxes: &[Aabb]) -> Raw {
+    let mut shapes = shapes_of_boxes(boxes);
+    let theirs = TheirBvh::build(&mut shapes);
+    let tree = to_ours(&theirs, boxes);
+    let nearest = move |ray: &Ray, test: &dyn Fn(u32) -> Option<f32>| {
+        let found = theirs.traverse(&self::ray(ray), &shapes);
+        found.iter().filter_map(|shape| test(shape.object)).min_by(f32::total_cmp)
+    };
+    Raw { tree, nearest: Box::new(nearest) }
 }
 
 /// The iterator by distance, ended at the first box that begins behind the nearest hit: of the library's traversals the
@@ -77,11 +107,8 @@ pub(super) fn contender(triangles: &[[Vec3; 3]]) -> Contender<'_> {
         if front.is_finite() { front } else { ray.intersects_triangle(a, c, b).distance }
     };
     let trace = move |query: Query, rays: &[Ray], hits: &mut [Option<Hit>]| {
-        let theirs = |ray: &Ray| {
-            let (o, d) = (ray.origin(), ray.direction());
-            // It makes directions unit vectors; distances are converted.
-            (TheirRay::new(point(o), Vector3::new(d.x, d.y, d.z)), d.length(), ray.t_min(), ray.t_max())
-        };
+        // Distances along unit vectors are converted.
+        let theirs = |ray: &Ray| (self::ray(ray), ray.direction().length(), ray.t_min(), ray.t_max());
         let rays: Vec<_> = rays.iter().map(theirs).collect();
         timed(&rays, hits, |(ray, length, t_min, t_max)| {
             let mut nearest: Option<Hit> = None;

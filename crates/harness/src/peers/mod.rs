@@ -16,7 +16,7 @@ use crate::scene::Scene;
 use crate::tracing::Contender;
 use bvh_core::Bvh;
 #[cfg(feature = "peers")]
-use bvh_core::{Aabb, Node};
+use bvh_core::{Aabb, Node, Ray};
 use serde::{Deserialize, Serialize};
 
 /// A library with its settings, as a spec names it.
@@ -74,6 +74,26 @@ pub struct Built {
     pub seconds: f64,
 }
 
+impl Built {
+    #[cfg(feature = "peers")]
+    fn tight(mut tree: Bvh, seconds: f64, boxes: &[Aabb]) -> Self {
+        tree.refit(boxes);
+        Self { tree, seconds }
+    }
+}
+
+/// What a library makes of boxes, for the suite: nothing of it mended.
+#[cfg(feature = "peers")]
+pub(crate) struct Raw {
+    /// As our type, with the library's boxes.
+    pub(crate) tree: Bvh,
+    /// The nearest distance at which a ray meets an object, by the library's own traversal and the caller's test.
+    pub(crate) nearest: Nearest,
+}
+
+#[cfg(feature = "peers")]
+pub(crate) type Nearest = Box<dyn Fn(&Ray, &dyn Fn(u32) -> Option<f32>) -> Option<f32>>;
+
 impl Peer {
     /// The names of all libraries.
     pub const NAMES: &[&str] = &["bvh", "obvhs", "tinybvh"];
@@ -110,6 +130,16 @@ impl Peer {
         }
     }
 
+    /// The tree over boxes by the settings as they are; `None` for a library whose traversal takes no other's test.
+    #[cfg(feature = "peers")]
+    pub(crate) fn raw(&self, boxes: &[Aabb]) -> Option<Raw> {
+        match self {
+            Self::Bvh(_) => Some(bvh::raw(boxes)),
+            Self::Obvhs(config) => Some(obvhs::raw(config, boxes)),
+            Self::Tinybvh(_) => None,
+        }
+    }
+
     /// The library's ways to trace rays through the scene's triangles.
     #[cfg_attr(not(feature = "peers"), allow(unused_variables, reason = "there is nothing to trace"))]
     pub fn contenders<'a>(&self, scene: &'a Scene) -> Result<Vec<Contender<'a>>, String> {
@@ -135,38 +165,38 @@ fn triangles(scene: &Scene) -> Result<&[[glam::Vec3; 3]], String> {
     }
 }
 
-/// A node of a library's tree.
+/// What is below a node of a library's tree.
 #[cfg(feature = "peers")]
 enum Theirs {
     Inner([usize; 2]),
     Leaf(Vec<u32>),
 }
 
-/// The tree below `root` as our type, with tight boxes in place of the library's.
+/// The tree below node 0 as our type, with the boxes that `node` gives.
 #[cfg(feature = "peers")]
-fn convert(root: usize, boxes: &[Aabb], node: impl Fn(usize) -> Theirs) -> Bvh {
+fn convert(boxes: &[Aabb], node: impl Fn(usize) -> (Aabb, Theirs)) -> Bvh {
     let mut tree = Bvh::default();
     if boxes.is_empty() {
         return tree;
     }
     tree.nodes.push(Node::leaf(Aabb::EMPTY, 0, 0));
-    let mut open = vec![(root, 0)];
+    let mut open = vec![(0, 0)];
     while let Some((theirs, ours)) = open.pop() {
-        tree.nodes[ours] = match node(theirs) {
+        let (aabb, content) = node(theirs);
+        tree.nodes[ours] = match content {
             Theirs::Leaf(objects) => {
                 let first = tree.prim_ids.len() as u32;
                 tree.prim_ids.extend_from_slice(&objects);
-                Node::leaf(Aabb::EMPTY, first, objects.len() as u32)
+                Node::leaf(aabb, first, objects.len() as u32)
             }
             Theirs::Inner(children) => {
                 let first = tree.nodes.len();
                 tree.nodes.extend([Node::leaf(Aabb::EMPTY, 0, 0); 2]);
                 open.extend(children.into_iter().zip(first..first + 2).rev());
-                Node::inner(Aabb::EMPTY, first as u32, 2)
+                Node::inner(aabb, first as u32, 2)
             }
         };
     }
-    tree.refit(boxes);
     tree
 }
 

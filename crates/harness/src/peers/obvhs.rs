@@ -1,14 +1,15 @@
 //! The crate `obvhs`.
 
-use super::{Built, Obvhs, Preset, Theirs, convert};
+use super::{Built, Obvhs, Preset, Raw, Theirs, convert};
 use crate::rays::Query;
 use crate::tracing::{Contender, timed};
+use ::obvhs::bvh2::{Bvh2, builder as binary};
+use ::obvhs::cwbvh::builder as wide;
 use ::obvhs::ray::{Ray as TheirRay, RayHit};
 use ::obvhs::rt_triangle::RtTriangle;
 use ::obvhs::triangle::Triangle as TheirTriangle;
 use ::obvhs::{BvhBuildParams, aabb};
-use ::obvhs::{bvh2::builder as binary, cwbvh::builder as wide};
-use bvh_core::{Aabb, Hit, Ray};
+use bvh_core::{Aabb, Bvh, Hit, Ray};
 use glam::{Vec3, Vec3A};
 use std::time::Duration;
 
@@ -27,21 +28,49 @@ fn parameters(config: &Obvhs) -> BvhBuildParams {
     parameters
 }
 
-/// Builds over boxes: one object per leaf, and no split triangles. Its own stopwatch leaves out conversions and checks.
-pub(super) fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
+fn build_over(boxes: &[Aabb], parameters: BvhBuildParams) -> (Bvh2, Duration) {
     let theirs: Vec<aabb::Aabb> = boxes.iter().map(|b| aabb::Aabb::new(b.min.into(), b.max.into())).collect();
-    let parameters = BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..parameters(config) };
     let mut time = Duration::ZERO;
-    let built = binary::build_bvh2(&theirs, parameters, &mut time);
-    let tree = convert(0, boxes, |index| {
-        let node = &built.nodes[index];
+    (binary::build_bvh2(&theirs, parameters, &mut time), time)
+}
+
+fn to_ours(theirs: &Bvh2, boxes: &[Aabb]) -> Bvh {
+    convert(boxes, |index| {
+        let node = &theirs.nodes[index];
+        let aabb = Aabb { min: node.aabb().min.into(), max: node.aabb().max.into() };
         let first = node.first_index as usize;
         match node.prim_count as usize {
-            0 => Theirs::Inner([first, first + 1]),
-            count => Theirs::Leaf(built.primitive_indices[first..first + count].to_vec()),
+            0 => (aabb, Theirs::Inner([first, first + 1])),
+            count => (aabb, Theirs::Leaf(theirs.primitive_indices[first..first + count].to_vec())),
         }
-    });
-    Built { tree, seconds: time.as_secs_f64() }
+    })
+}
+
+fn ray(ray: &Ray, t_max: f32) -> TheirRay {
+    TheirRay::new(ray.origin().into(), ray.direction().into(), ray.t_min(), t_max)
+}
+
+/// Builds over boxes: one object per leaf, and no split triangles. Its own stopwatch leaves out conversions and checks.
+pub(super) fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
+    let parameters = BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..parameters(config) };
+    let (theirs, time) = build_over(boxes, parameters);
+    Built::tight(to_ours(&theirs, boxes), time.as_secs_f64(), boxes)
+}
+
+/// The preset as it is: leaves of several objects.
+pub(super) fn raw(config: &Obvhs, boxes: &[Aabb]) -> Raw {
+    let (theirs, _) = build_over(boxes, parameters(config));
+    let tree = to_ours(&theirs, boxes);
+    let nearest = move |ray: &Ray, test: &dyn Fn(u32) -> Option<f32>| {
+        let mut hit = RayHit::none();
+        // Theirs takes hits below the end of the range only.
+        theirs.ray_traverse(self::ray(ray, ray.t_max().next_up()), &mut hit, |_, at| {
+            test(theirs.primitive_indices[at]).unwrap_or(f32::INFINITY)
+        });
+        // The distance is overwritten at the end, whether there was a hit or not.
+        (hit.primitive_id != u32::MAX).then_some(hit.t)
+    };
+    Raw { tree, nearest: Box::new(nearest) }
 }
 
 /// The binary tree and the eight-wide compressed one of the preset, with triangles in the order of leaves, as the
@@ -108,9 +137,7 @@ fn trace(
     traverse: impl Fn(bool, TheirRay, &mut RayHit) -> bool,
     ids: &[u32],
 ) -> Vec<f64> {
-    let theirs =
-        |ray: &Ray| TheirRay::new(ray.origin().into(), ray.direction().into(), ray.t_min(), ray.t_max());
-    let rays: Vec<TheirRay> = rays.iter().map(theirs).collect();
+    let rays: Vec<TheirRay> = rays.iter().map(|ray| self::ray(ray, ray.t_max())).collect();
     if query == Query::Any {
         return timed(&rays, hits, |&ray| {
             traverse(true, ray, &mut RayHit::none()).then_some(Hit { t: 0.0, object: 0 })

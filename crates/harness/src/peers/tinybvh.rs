@@ -22,15 +22,15 @@ pub(super) fn build(triangles: &[[Vec3; 3]], boxes: &[Aabb]) -> Result<Built, St
     built.split_leaves(1);
     let seconds = start.elapsed().as_secs_f64();
     let (nodes, ids) = (built.nodes(), built.indices());
-    let tree = convert(0, boxes, |index| {
+    let tree = convert(boxes, |index| {
         let (first, count) = (nodes[index].left_first as usize, nodes[index].tri_count as usize);
-        if count == 0 {
-            Theirs::Inner([first, first + 1])
-        } else {
-            Theirs::Leaf(ids[first..first + count].to_vec())
-        }
+        let content = match count {
+            0 => Theirs::Inner([first, first + 1]),
+            _ => Theirs::Leaf(ids[first..first + count].to_vec()),
+        };
+        (Aabb::EMPTY, content)
     });
-    Ok(Built { tree, seconds })
+    Ok(Built::tight(tree, seconds, boxes))
 }
 
 /// The binary tree with its own leaves and, in a program compiled for a processor with AVX2, its eight-wide layout: of
