@@ -1,12 +1,12 @@
 //! `harness inspect`: what a tree file is, what its tree costs, and what it looks like.
 
-use crate::scene::{Primitives, Scene};
+use crate::scene::Scene;
 use crate::store::write_whole;
 use crate::{Error, record, tree_file};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_core::file::{FileError, Header, Layout, TreeFile};
-use bvh_core::{Bvh, NodeKind, Triangle, validate};
+use bvh_core::{Bvh, NodeKind, validate};
 use clap::Args;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -81,7 +81,7 @@ pub fn inspect(args: &InspectArgs) -> Result<String, Error> {
             }
             file.wide().map_err(refused)?;
             if let Some(scene) = &scene {
-                file.for_triangles(&triangles(scene).unwrap_or_default()).map_err(refused)?;
+                file.for_triangles(&scene.triangles().unwrap_or_default()).map_err(refused)?;
                 lines.say("scene", &scene.name);
             }
             lines.say("valid", "yes");
@@ -156,21 +156,14 @@ fn against(tree: &Bvh, file: TreeFile, scene: &Scene, lines: &mut Lines) -> Resu
             lines.say("internal area over Müller–Fellner's", cost::internal_area(tree) / base);
         }
     }
-    match triangles(scene) {
-        Some(triangles) => {
+    match scene.triangles() {
+        Ok(triangles) => {
             let overlap = cost::end_point_overlap(tree, &triangles, &SahConstants::default());
             lines.say("end-point overlap", overlap);
         }
-        None => lines.say("end-point overlap", "of triangles only"),
+        Err(_) => lines.say("end-point overlap", "of triangles only"),
     }
     Ok(())
-}
-
-fn triangles(scene: &Scene) -> Option<Vec<Triangle>> {
-    match &scene.primitives {
-        Primitives::Triangles(corners) => Some(corners.iter().copied().map(Triangle).collect()),
-        Primitives::Spheres(_) => None,
-    }
 }
 
 fn write_nodes(tree: &Bvh, path: &Path) -> Result<(), Error> {

@@ -39,6 +39,11 @@ pub struct Scene {
     pub boxes: Vec<Aabb>,
 }
 
+/// Triangles are needed, and the scene of this name has none.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0} has spheres; accepted: scenes of triangles")]
+pub struct NoTriangles(pub String);
+
 /// Meshes that `scripts/fetch-scenes` puts under `scenes/`: name, and the Rust package that ships it.
 pub const FETCHED: [(&str, &str); 2] = [("sponza", "bvh"), ("kitchen", "obvhs")];
 
@@ -122,6 +127,19 @@ impl Scene {
             Primitives::Spheres(all) => Primitives::Spheres(chosen.iter().map(|&at| all[at]).collect()),
         };
         Ok(Self::new(&name, self.kind, primitives))
+    }
+
+    /// The corners of its triangles, three each, in world units.
+    pub fn corners(&self) -> Result<&[[Vec3; 3]], NoTriangles> {
+        match &self.primitives {
+            Primitives::Triangles(corners) => Ok(corners),
+            Primitives::Spheres(_) => Err(NoTriangles(self.name.clone())),
+        }
+    }
+
+    /// Its triangles as the core knows them, in O(n).
+    pub fn triangles(&self) -> Result<Vec<Triangle>, NoTriangles> {
+        Ok(self.corners()?.iter().copied().map(Triangle).collect())
     }
 
     /// The checksum as files show it.

@@ -49,7 +49,7 @@ fn what_cannot_be_drawn_is_refused_with_what_would_be_accepted() {
         (&["sofa"][..], 2, &["no such scene", "spheres75"][..]),
         (&["spheres75", "--accel", "octree"], 2, &["octree", "brute, kdtree, bvh, wide"]),
         (&["spheres75", "--accel", "none.bvh"], 2, &["none.bvh"]),
-        (&["spheres75", "--accel", "wide"], 2, &["spheres75 has spheres", "accepted: brute"]),
+        (&["spheres75", "--accel", "wide"], 2, &["spheres75 has spheres", "--accel brute"]),
         (&["escher", "--accel", "wide", "--heatmap"], 2, &["counts no tests"]),
         (&["spheres75", "--size", "0x10"], 2, &["--size", "960x540"]),
         (&["spheres75", "--from", "1,2"], 2, &["--from", "three numbers"]),

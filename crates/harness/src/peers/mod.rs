@@ -10,8 +10,6 @@ mod obvhs;
 #[cfg(feature = "peer-tinybvh")]
 mod tinybvh;
 
-#[cfg(feature = "peers")]
-use crate::scene::Primitives;
 use crate::scene::Scene;
 use crate::tracing::Contender;
 use bvh_core::Bvh;
@@ -124,7 +122,7 @@ impl Peer {
             #[cfg(feature = "peers")]
             Self::Obvhs(config) => Ok(obvhs::build(config, &scene.boxes)),
             #[cfg(feature = "peer-tinybvh")]
-            Self::Tinybvh(_) => tinybvh::build(triangles(scene)?, &scene.boxes),
+            Self::Tinybvh(_) => tinybvh::build(corners(scene)?, &scene.boxes),
             #[allow(unreachable_patterns, reason = "not without the features")]
             _ => Err(format!("this program was built without the library {}", self.name())),
         }
@@ -145,24 +143,20 @@ impl Peer {
     pub fn contenders<'a>(&self, scene: &'a Scene) -> Result<Vec<Contender<'a>>, String> {
         match self {
             #[cfg(feature = "peers")]
-            Self::Bvh(_) => Ok(vec![bvh::contender(triangles(scene)?)]),
+            Self::Bvh(_) => Ok(vec![bvh::contender(corners(scene)?)]),
             #[cfg(feature = "peers")]
-            Self::Obvhs(config) => Ok(obvhs::contenders(config, triangles(scene)?)),
+            Self::Obvhs(config) => Ok(obvhs::contenders(config, corners(scene)?)),
             #[cfg(feature = "peer-tinybvh")]
-            Self::Tinybvh(_) => tinybvh::contenders(triangles(scene)?),
+            Self::Tinybvh(_) => tinybvh::contenders(corners(scene)?),
             #[allow(unreachable_patterns, reason = "not without the features")]
             _ => Err(format!("this program was built without the library {}", self.name())),
         }
     }
 }
 
-/// What a library traces.
 #[cfg(feature = "peers")]
-fn triangles(scene: &Scene) -> Result<&[[glam::Vec3; 3]], String> {
-    match &scene.primitives {
-        Primitives::Triangles(triangles) => Ok(triangles),
-        Primitives::Spheres(_) => Err(format!("{}: this library takes triangles, not spheres", scene.name)),
-    }
+fn corners(scene: &Scene) -> Result<&[[glam::Vec3; 3]], String> {
+    scene.corners().map_err(|error| error.to_string())
 }
 
 /// What is below a node of a library's tree.

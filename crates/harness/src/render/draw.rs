@@ -77,7 +77,7 @@ pub fn render(
 
 #[cfg(test)]
 mod tests {
-    use super::super::tracer::{self, Structure};
+    use super::super::tracer::Structure;
     use super::*;
     use bvh_build::{Builder, goldsmith_salmon, kd_tree, muller_fellner};
     use bvh_core::WideBvh;
@@ -89,8 +89,7 @@ mod tests {
             Structure::KdTree(kd_tree::Config::default().build(&scene.boxes).unwrap()),
             Structure::Tree(goldsmith_salmon::Config::default().build(&scene.boxes).unwrap()),
         ];
-        structures
-            .extend(tracer::triangles(scene).map(|own| Structure::Wide(WideBvh::new(&greedy, &own).unwrap())));
+        structures.extend(scene.triangles().map(|own| Structure::Wide(WideBvh::new(&greedy, &own).unwrap())));
         structures.push(Structure::Tree(greedy));
         structures
     }

@@ -41,10 +41,9 @@ impl Structure {
             "kdtree" => Ok(Self::KdTree(kd_tree::Config::default().build(&scene.boxes).map_err(refused)?)),
             "bvh" => Ok(Self::Tree(greedy()?)),
             "wide" => {
-                let triangles = triangles(scene).ok_or_else(|| Error::Usage(format!(
-                    "--accel wide: the wide layout holds triangles, {} has spheres; accepted: brute, kdtree, bvh",
-                    scene.name
-                )))?;
+                let triangles = scene.triangles().map_err(|error| {
+                    Error::Usage(format!("--accel wide: {error}, or --accel brute, kdtree, bvh"))
+                })?;
                 let wide = WideBvh::new(&greedy()?, &triangles).map_err(|source| Error::InvalidTree {
                     scene: scene.name.clone(),
                     method: name.into(),
@@ -55,14 +54,6 @@ impl Structure {
             _ if name.ends_with(".bvh") => load_tree(Path::new(name), &scene.boxes).map(Self::Tree),
             _ => Err(Error::Usage(format!("--accel is {name:?}; accepted: {}", Self::ACCEPTED))),
         }
-    }
-}
-
-/// The scene's triangles, if it is made of them.
-pub fn triangles(scene: &Scene) -> Option<Vec<Triangle>> {
-    match &scene.primitives {
-        Primitives::Triangles(triangles) => Some(triangles.iter().copied().map(Triangle).collect()),
-        Primitives::Spheres(_) => None,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::Layout;
 use crate::rays::Query;
-use crate::scene::{Primitives, Scene};
+use crate::scene::Scene;
 use bvh_core::cost::SahConstants;
 use bvh_core::{Bvh, Hit, Ray, Shear, TestCounts, Triangle, WideBvh, any_hit, collapse_leaves, nearest_hit};
 use std::borrow::Cow;
@@ -45,14 +45,6 @@ pub fn timed<R>(rays: &[R], hits: &mut [Option<Hit>], mut answer: impl FnMut(&R)
     rays.chunks(PART).zip(hits.chunks_mut(PART)).map(part).collect()
 }
 
-/// The scene's triangles as the core knows them.
-pub(super) fn triangles(scene: &Scene) -> Result<Vec<Triangle>, String> {
-    match &scene.primitives {
-        Primitives::Triangles(triangles) => Ok(triangles.iter().map(|&corners| Triangle(corners)).collect()),
-        Primitives::Spheres(_) => Err(format!("{} is made of spheres; accepted: triangles", scene.name)),
-    }
-}
-
 /// One of our trees in its layouts.
 pub(super) fn own_contenders<'a>(
     layouts: &[Layout],
@@ -61,7 +53,7 @@ pub(super) fn own_contenders<'a>(
 ) -> Result<Vec<Contender<'a>>, String> {
     let mut contenders = Vec::new();
     for &layout in layouts {
-        let triangles = triangles(scene)?;
+        let triangles = scene.triangles().map_err(|error| error.to_string())?;
         let start = Instant::now();
         contenders.push(match layout {
             Layout::Binary => binary("binary", Cow::Borrowed(tree), triangles, 0.0),

@@ -14,7 +14,7 @@ use answers::exact_disagreements;
 use bvh_core::{Bvh, Hit, Ray, TestCounts};
 pub use cameras::{Camera, rays};
 pub use contenders::{Contender, timed};
-use contenders::{PART, binary, own_contenders, triangles};
+use contenders::{PART, binary, own_contenders};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -208,7 +208,7 @@ fn row(
 /// The right answers: those of our binary traversal, which are those of testing every triangle.
 pub fn reference(kind: Kind, rays: &[Ray], scene: &Scene, tree: &Bvh) -> Vec<Option<Hit>> {
     let mut hits = vec![None; rays.len()];
-    if let Ok(triangles) = triangles(scene) {
+    if let Ok(triangles) = scene.triangles() {
         (binary("binary", Cow::Borrowed(tree), triangles, 0.0).trace)(kind.query(), rays, &mut hits);
     }
     hits
