@@ -1,0 +1,125 @@
+//! Of whole specs: what is refused and how, and what is read.
+
+use super::*;
+use crate::peers::Peer;
+
+const GOOD: &str = "question = 'q'\nscenes = ['escher']\nmethods = [{ method = 'grasp', noise = 0.1 }]\n";
+
+fn read(text: &str, overrides: &Overrides) -> Result<Experiment, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("spec.toml");
+    std::fs::write(&path, text).unwrap();
+    Experiment::read(&path, overrides).map_err(|error| error.to_string())
+}
+
+#[test]
+fn wrong_keys_and_values_are_named_with_what_would_be_accepted() {
+    for (wrong, parts) in [
+        ("alpa = 1\n", &["spec.toml", "alpa", "expected one of", "repetitions"][..]),
+        ("repetitions = 0\n", &["repetitions is 0", "1 or more"]),
+        ("repetitions = 'x'\n", &["repetitions", "x", "line"]),
+        ("seed = -1\n", &["seed", "-1"]),
+        ("name = 'x'\n", &["name", "the file's name is used"]),
+        ("objective = 'volume'\n", &["volume", "internal_area"]),
+        ("budget = { seconds = 1 }\n", &["seconds", "max_evaluations"]),
+        ("[[reports]]\nkind = 'pie'\n", &["pie", "table"]),
+        ("rays = [{ family = 'lines', query = 'any', count = 0 }]\n", &["rays[0].count is 0"]),
+        ("tracing = { rounds = 0 }\n", &["tracing.rounds is 0", "1 or more"]),
+        ("threads = 0\n", &["threads is 0", "1 or more"]),
+        ("repetitions = 4294967295\n", &["repetitions", "4294967295 runs"]),
+        ("optional_scenes = []\nscenes = ['a:0..4294967295']\n", &["scenes", "4294967296 runs"]),
+        ("scenes = ['a:0..9999:0..99999:0..4294967295']\n", &["scenes", "4294967296000000000 runs"]),
+        ("scenes = ['a:5..4']\n", &["scenes", "a:5..4", "A up to B"]),
+        ("tracing = { count = 4294967295 }\n", &["tracing.count", "1 to 100000000"]),
+        ("objective = { sah = { traversal = -1.0 } }\n", &["objective.sah.traversal is -1"]),
+        ("rays = [{ count = nan }]\n", &["rays[0].count is nan", "finite"]),
+        ("rays = [{ family = 'curves', query = 'any', count = 1 }]\n", &["curves", "inside"]),
+    ] {
+        let good = if wrong.contains("scenes = ['a") {
+            GOOD.replace("scenes = ['escher']\n", "")
+        } else {
+            GOOD.into()
+        };
+        let message = read(&format!("{good}{wrong}"), &Overrides::default()).unwrap_err();
+        assert!(parts.iter().all(|part| message.contains(part)), "{wrong}: {message}");
+    }
+}
+
+#[test]
+fn wrong_methods_are_named_with_what_would_be_accepted() {
+    for (methods, parts) in [
+        ("[]", &["methods is empty"][..]),
+        ("[{ noise = 0.1 }]", &["method is missing", "grasp"]),
+        ("[{ method = 'grep' }]", &["\"grep\"", "muller_fellner"]),
+        ("[{ method = 'obvhs', preset = 'best' }]", &["obvhs", "best", "very_slow"]),
+        ("[{ method = 'grasp', alpa = 1 }]", &["grasp", "alpa", "noise"]),
+        ("[{ method = 'grasp', noise = 1.5 }]", &["methods[0]", "noise is 1.5", "0 to 1"]),
+        ("[{ method = 'grasp', label = 3 }]", &["label is 3"]),
+        ("[{ method = 'grasp', budget = { max_seconds = 3 } }]", &["max_seconds", "max_work"]),
+        ("[{ method = 'grasp' }, { method = 'grasp' }]", &["methods[1].label", "second time"]),
+    ] {
+        let text = format!("question = 'q'\nscenes = ['escher']\nmethods = {methods}\n");
+        let message = read(&text, &Overrides::default()).unwrap_err();
+        assert!(parts.iter().all(|part| message.contains(part)), "{methods}: {message}");
+    }
+}
+
+#[test]
+fn another_library_is_accepted_exactly_with_its_feature() {
+    for name in Peer::NAMES {
+        let text = format!("question = 'q'\nscenes = ['escher']\nmethods = [{{ method = '{name}' }}]\n");
+        let Contestant::Peer(peer) = toml::from_str::<Experiment>(&text).unwrap().methods.remove(0).method
+        else {
+            panic!("{name} is no library");
+        };
+        let read = read(&text, &Overrides::default());
+        match peer.missing_feature() {
+            Some(feature) => {
+                let message = read.unwrap_err();
+                let parts = ["methods[0].method", name, "--features", feature, "muller_fellner"];
+                assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+            }
+            None => assert!(read.is_ok(), "{read:?}"),
+        }
+    }
+}
+
+#[test]
+fn quick_replaces_keys_and_names_its_results_apart() {
+    let text = format!("{GOOD}repetitions = 5\n[quick]\nrepetitions = 2\n");
+    let quick = read(&text, &Overrides { quick: true, ..Default::default() }).unwrap();
+    assert_eq!((quick.repetitions, quick.name.as_str()), (2, "spec-quick"));
+    assert_eq!(read(&text, &Overrides::default()).unwrap().repetitions, 5);
+}
+
+#[test]
+fn a_resolved_spec_spells_out_every_default_and_reads_back_as_itself() {
+    let good = GOOD.replace("0.1 }", "0.1, budget = { max_work = 9 } }");
+    let experiment = read(&good, &Overrides::default()).unwrap();
+    let text = toml::to_string(&experiment).unwrap();
+    assert!(text.contains("trials = 100") && text.contains("skip_same_order = true"), "{text}");
+    assert_eq!(toml::from_str::<Experiment>(&text).unwrap(), experiment);
+}
+
+#[test]
+fn of_two_limits_the_lower_one_counts() {
+    let good = GOOD.replace("0.1 }", "0.1, budget = { max_work = 9 } }");
+    let budget = |of_all: &str| {
+        let experiment = read(&format!("{good}budget = {of_all}\n"), &Overrides::default()).unwrap();
+        experiment.budget_of(&experiment.methods[0])
+    };
+    let (max_evaluations, max_work) = (Some(3), Some(5));
+    assert_eq!(budget("{ max_work = 5 }"), Budget { max_work, max_evaluations: None });
+    assert_eq!(budget("{ max_evaluations = 3 }"), Budget { max_evaluations, max_work: Some(9) });
+}
+
+#[test]
+fn seeds_differ_between_runs_and_follow_the_spec_alone() {
+    let experiment = read(GOOD, &Overrides::default()).unwrap();
+    let mut seeds: Vec<u64> =
+        (0..100).map(|repetition| experiment.seed_of("escher", "grasp", repetition)).collect();
+    seeds.push(experiment.seed_of("bijou", "grasp", 0));
+    let distinct: HashSet<_> = seeds.iter().collect();
+    assert_eq!(distinct.len(), seeds.len());
+    assert_eq!(seeds[0], read(GOOD, &Overrides::default()).unwrap().seed_of("escher", "grasp", 0));
+}
