@@ -177,9 +177,9 @@ fn a_wrong_value_under_any_key_of_a_spec_is_refused_by_name() {
                     }
                 }
                 let taken: Vec<bool> = doubtful.iter().map(try_value).collect();
-                // Whole numbers count something.
-                if taken[0] && !taken[3] {
-                    complain(format!("{place}.{key} = -1 is accepted"));
+                // Numbers count or measure something, but for what is so much above or below.
+                if (taken[0] || taken[3] || taken[8]) && key != "percent" {
+                    complain(format!("{place}.{key}: -1, -0.5 or [-1] is accepted"));
                 }
             }
         }

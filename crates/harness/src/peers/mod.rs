@@ -113,6 +113,16 @@ impl Peer {
         }
     }
 
+    /// Checks the ranges of the settings.
+    pub fn check(&self) -> Result<(), String> {
+        match self {
+            Self::Obvhs(Obvhs { reinsertion: Some(ratio), .. }) if !(0.0..=100.0).contains(ratio) => {
+                Err(format!("reinsertion is {ratio}; accepted: 0 to 100"))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Builds the tree over the scene's objects. An error says what the library cannot do.
     #[cfg_attr(not(feature = "peers"), allow(unused_variables, reason = "there is nothing to build"))]
     pub fn build(&self, scene: &Scene) -> Result<Built, String> {

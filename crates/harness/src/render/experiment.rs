@@ -36,16 +36,6 @@ const REPEAT_WITHIN: f64 = 2.0;
 const MOST_REPEATS: usize = 25;
 
 impl Config {
-    /// Checks the ranges of the parameters.
-    pub fn check(&self) -> Result<(), String> {
-        let keys =
-            [("width", self.width, 10_000), ("height", self.height, 10_000), ("samples", self.samples, 16)];
-        match keys.iter().find(|(_, found, most)| !(1..=*most).contains(found)) {
-            Some((key, found, most)) => Err(format!("render.{key} is {found}; accepted: 1 to {most}")),
-            None => Ok(()),
-        }
-    }
-
     /// Draws the scene with the tree of `run`, which took `build_seconds`, on one thread; before that, if `first`,
     /// with each of the [`BASELINES`].
     pub fn measure(

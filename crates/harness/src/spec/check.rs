@@ -1,24 +1,20 @@
 //! What types alone do not say of a spec, part by part. Messages name the key, what was found, what would be accepted.
 
-use super::{Contestant, Experiment, Labelled};
+use super::{Contestant, Experiment, Labelled, ranges};
 use crate::report::Report;
 use crate::{part, suite};
-use bvh_core::cost::Objective;
 use bvh_search::{Budget, Method, Problem, solve};
 use std::collections::HashSet;
 
 /// Most runs of an experiment.
 const MOST_RUNS: u64 = 10_000_000;
 
-/// Most rays of a kind, all in memory at once.
-const MOST_RAYS: u32 = 100_000_000;
-
 impl Experiment {
     /// Everything that types alone do not say.
     pub(super) fn check(&self) -> Result<(), String> {
         self.check_scenes()?;
         self.check_runs()?;
-        self.check_measurements()?;
+        ranges::check(self)?;
         self.check_labels()?;
         self.methods.iter().enumerate().try_for_each(|(index, method)| self.check_method(index, method))?;
         self.reports.iter().enumerate().try_for_each(|(index, report)| self.check_report(index, report))
@@ -39,7 +35,7 @@ impl Experiment {
         }
     }
 
-    /// How many there are, and what is common to all.
+    /// That there are some, and not too many.
     fn check_runs(&self) -> Result<(), String> {
         let scenes = self.scenes.iter().map(|name| part::names(name)).fold(0, u64::saturating_add);
         let runs =
@@ -51,41 +47,6 @@ impl Experiment {
         }
         if self.methods.is_empty() {
             return Err("methods is empty; accepted: at least one table with a `method`".into());
-        }
-        if let Objective::Sah(constants) = self.objective {
-            for (key, value) in [("traversal", constants.traversal), ("intersection", constants.intersection)] {
-                if value < 0.0 {
-                    return Err(format!("objective.sah.{key} is {value}; accepted: 0 or more"));
-                }
-            }
-        }
-        if self.repetitions == 0 {
-            return Err("repetitions is 0; accepted: 1 or more".into());
-        }
-        if i64::try_from(self.seed).is_err() {
-            return Err(format!("seed is {}; accepted: 0 to {}", self.seed, i64::MAX));
-        }
-        if self.threads == Some(0) {
-            return Err("threads is 0; accepted: 1 or more".into());
-        }
-        Ok(())
-    }
-
-    /// Of every run's tree: random rays, a picture, timed rays.
-    fn check_measurements(&self) -> Result<(), String> {
-        if let Some(index) = self.rays.iter().position(|rays| rays.count == 0) {
-            return Err(format!("rays[{index}].count is 0; accepted: 1 or more"));
-        }
-        self.render.map_or(Ok(()), |render| render.check())?;
-        if let Some(tracing) = &self.tracing {
-            for (key, value) in [("count", tracing.count), ("rounds", tracing.rounds)] {
-                if value == 0 {
-                    return Err(format!("tracing.{key} is 0; accepted: 1 or more"));
-                }
-                if value > MOST_RAYS {
-                    return Err(format!("tracing.{key} is {value}; accepted: 1 to {MOST_RAYS}"));
-                }
-            }
         }
         Ok(())
     }
@@ -116,7 +77,7 @@ impl Experiment {
                          harness --features {feature}`; accepted without: {ours}"
                     ))
                 }
-                None => Ok(()),
+                None => peer.check().map_err(|error| format!("methods[{index}] ({label}): {error}")),
             },
             Contestant::Ours(method) => {
                 // A search checks its own parameters before it looks at the scene: let it, on the scene of nothing.

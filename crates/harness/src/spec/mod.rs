@@ -1,9 +1,11 @@
 //! Experiment specs: TOML in, a checked [`Experiment`] out, or an error with file, key, found and accepted.
 //!
-//! `read` is the way from text to values, `check` what types alone do not say, `method` one entry of `methods`.
+//! `read` is the way from text to values, `check` what types alone do not say, `ranges`
+//! that of numbers, `method` one entry of `methods`.
 
 mod check;
 mod method;
+mod ranges;
 mod read;
 
 use crate::report::Report;

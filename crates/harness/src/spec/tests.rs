@@ -24,7 +24,7 @@ fn wrong_keys_and_values_are_named_with_what_would_be_accepted() {
         ("budget = { seconds = 1 }\n", &["seconds", "max_evaluations"]),
         ("[[reports]]\nkind = 'pie'\n", &["pie", "table"]),
         ("rays = [{ family = 'lines', query = 'any', count = 0 }]\n", &["rays[0].count is 0"]),
-        ("tracing = { rounds = 0 }\n", &["tracing.rounds is 0", "1 or more"]),
+        ("tracing = { rounds = 0 }\n", &["tracing.rounds is 0", "1 to 100000000"]),
         ("threads = 0\n", &["threads is 0", "1 or more"]),
         ("repetitions = 4294967295\n", &["repetitions", "4294967295 runs"]),
         ("optional_scenes = []\nscenes = ['a:0..4294967295']\n", &["scenes", "4294967296 runs"]),
@@ -42,6 +42,58 @@ fn wrong_keys_and_values_are_named_with_what_would_be_accepted() {
         };
         let message = read(&format!("{good}{wrong}"), &Overrides::default()).unwrap_err();
         assert!(parts.iter().all(|part| message.contains(part)), "{wrong}: {message}");
+    }
+}
+
+#[test]
+fn finite_nonsense_in_reports_is_named_with_what_would_be_accepted() {
+    let common = "source = 's'\ntitle = 't'\n";
+    for (kind, wrong, parts) in [
+        ("significance", "level = -0.5", &["reports[0].level is -0.5", "above 0 and below 1"][..]),
+        ("significance", "level = 1", &["reports[0].level is 1", "above 0 and below 1"]),
+        ("trials", "best_of = 0", &["reports[0].best_of is 0", "1 or more"]),
+        ("ray_tests", "tolerance = -0.1", &["reports[0].tolerance is -0.1", "0 to 1"]),
+        ("ray_tests", "paper = { escher = [1, 2] }", &["reports[0].paper.escher is a list of 2", "up to 1"]),
+        ("times", "paper = { escher = [0.0] }", &["reports[0].paper.escher[0] is 0", "above 0"]),
+        ("ecdf", "targets = []", &["reports[0].targets is empty", "one or more"]),
+        ("ecdf", "targets = [{ of = 'base', percent = -100 }]", &["targets[0].percent is -100", "above -100"]),
+        ("anytime", "at_seconds = [1, 10, 2]", &["reports[0].at_seconds is [1.0, 10.0, 2.0]", "ascending"]),
+        ("anytime", "at_seconds = [0]", &["reports[0].at_seconds[0] is 0", "above 0"]),
+        ("anytime", "file = '../../x'", &["reports[0].file is \"../../x\"", "letters, digits"]),
+        ("generations", "paper_gain = 0", &["reports[0].paper_gain is 0", "above 0"]),
+        (
+            "generations",
+            "paper_final = { e = [3, 2] }",
+            &["paper_final.e is [3.0, 2.0]", "the lower number first"],
+        ),
+        ("pictures", "document = { 'brute force' = -1 }", &["document.brute force is -1", "above 0"]),
+        ("pareto", "methods = []", &["reports[0].methods is empty", "one or more"]),
+    ] {
+        let keys = match kind {
+            "significance" => "title = 't'\nmethod = 'grasp'\nagainst = ['grasp']\n".to_owned(),
+            "generations" => format!("{common}method = 'grasp'\nbaseline = 'grasp'\n"),
+            "pictures" => format!("{common}methods = ['grasp']\nscene = 'escher'\n"),
+            _ if wrong.starts_with("methods") => common.to_owned(),
+            _ => format!("{common}methods = ['grasp']\n"),
+        };
+        let text = format!("{GOOD}[[reports]]\nkind = '{kind}'\n{keys}{wrong}\n");
+        let message = read(&text, &Overrides::default()).unwrap_err();
+        assert!(parts.iter().all(|part| message.contains(part)), "{kind}, {wrong}: {message}");
+    }
+}
+
+#[test]
+fn nonsense_beside_reports_is_named_with_what_would_be_accepted() {
+    let suite = |measure: &str| format!("question = 'q'\n[suite]\n{measure}\n");
+    for (text, parts) in [
+        (
+            suite("stability = { builders = 'few', work_per_object = 1, rays = 9223372036854775807 }"),
+            &["suite.stability.rays", "1 to 100000000"][..],
+        ),
+        (suite("precision = { objects = 2, repetitions = 1 }"), &["suite.precision.objects is 2", "3 to"]),
+    ] {
+        let message = read(&text, &Overrides::default()).unwrap_err();
+        assert!(parts.iter().all(|part| message.contains(part)), "{text}: {message}");
     }
 }
 
