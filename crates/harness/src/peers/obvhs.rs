@@ -73,6 +73,20 @@ pub(super) fn raw(config: &Obvhs, boxes: &[Aabb]) -> Raw {
     Raw { tree, nearest: Box::new(nearest) }
 }
 
+/// What traces by a tree over `triangles` in the order of its leaves: its types have the same functions, but no trait.
+macro_rules! traced_by {
+    ($tree:ident, $triangles:expr) => {{
+        let triangles: Vec<RtTriangle> = $triangles;
+        move |query: Query, rays: &[Ray], hits: &mut [Option<Hit>]| {
+            let traverse = |any, ray, hit: &mut RayHit| {
+                let test = |ray: &TheirRay, id: usize| triangles[id].intersect(ray);
+                if any { !$tree.ray_traverse_miss(ray, test) } else { $tree.ray_traverse(ray, hit, test) }
+            };
+            trace(query, rays, hits, traverse, &$tree.primitive_indices)
+        }
+    }};
+}
+
 /// The binary tree and the eight-wide compressed one of the preset, with triangles in the order of leaves, as the
 /// library recommends. Its directions are unit vectors; ours are too, but for rounding.
 pub(super) fn contenders(config: &Obvhs, triangles: &[[Vec3; 3]]) -> Vec<Contender<'static>> {
@@ -85,37 +99,9 @@ pub(super) fn contenders(config: &Obvhs, triangles: &[[Vec3; 3]]) -> Vec<Contend
         |ids: &[u32]| -> Vec<RtTriangle> { ids.iter().map(|&id| (&theirs[id as usize]).into()).collect() };
     let (mut binary_time, mut wide_time) = (Duration::ZERO, Duration::ZERO);
     let tree = binary::build_bvh2_from_tris(&theirs, parameters(config), &mut binary_time);
-    let in_leaves = in_order(&tree.primitive_indices);
-    let trace_binary = move |query: Query, rays: &[Ray], hits: &mut [Option<Hit>]| {
-        trace(
-            query,
-            rays,
-            hits,
-            |any, ray, hit| {
-                let test = |ray: &TheirRay, id: usize| in_leaves[id].intersect(ray);
-                if any { !tree.ray_traverse_miss(ray, test) } else { tree.ray_traverse(ray, hit, test) }
-            },
-            &tree.primitive_indices,
-        )
-    };
+    let trace_binary = traced_by!(tree, in_order(&tree.primitive_indices));
     let compressed = wide::build_cwbvh_from_tris(&theirs, parameters(config), &mut wide_time);
-    let in_leaves = in_order(&compressed.primitive_indices);
-    let trace_wide = move |query: Query, rays: &[Ray], hits: &mut [Option<Hit>]| {
-        trace(
-            query,
-            rays,
-            hits,
-            |any, ray, hit| {
-                let test = |ray: &TheirRay, id: usize| in_leaves[id].intersect(ray);
-                if any {
-                    !compressed.ray_traverse_miss(ray, test)
-                } else {
-                    compressed.ray_traverse(ray, hit, test)
-                }
-            },
-            &compressed.primitive_indices,
-        )
-    };
+    let trace_wide = traced_by!(compressed, in_order(&compressed.primitive_indices));
     let contender = |layout: &str, time: Duration, trace| Contender {
         layout: layout.into(),
         exact: false,

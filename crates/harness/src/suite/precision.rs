@@ -13,6 +13,7 @@ use bvh_core::{Aabb, Bvh, Node};
 use num_bigint::{BigInt, BigUint};
 use num_traits::Zero;
 use serde::{Deserialize, Serialize};
+use std::ops::Add;
 use std::path::Path;
 use std::time::Instant;
 
@@ -52,13 +53,10 @@ struct Timing {
     nanoseconds_per_object: f64,
 }
 
-/// What sides of a split are valued in: half area times number of objects.
-trait Number: Clone {
+/// What sides of a split are valued in: half area times number of objects. Both sides together are a cost.
+trait Number: Clone + PartialOrd + for<'a> Add<&'a Self, Output = Self> {
     fn side(aabb: &Aabb, count: usize) -> Self;
-    fn join(&self, other: &Self) -> Self;
-    /// Whether this is a cost, and the lower one.
-    fn precedes(&self, other: &Self) -> bool;
-    fn is_cost(&self) -> bool;
+    fn is_finite(&self) -> bool;
 }
 
 impl Number for f32 {
@@ -66,14 +64,8 @@ impl Number for f32 {
         let d = aabb.max - aabb.min;
         (d.x * d.y + d.y * d.z + d.z * d.x) * count as f32
     }
-    fn join(&self, other: &Self) -> Self {
-        self + other
-    }
-    fn precedes(&self, other: &Self) -> bool {
-        self < other
-    }
-    fn is_cost(&self) -> bool {
-        self.is_finite()
+    fn is_finite(&self) -> bool {
+        Self::is_finite(*self)
     }
 }
 
@@ -81,14 +73,8 @@ impl Number for f64 {
     fn side(aabb: &Aabb, count: usize) -> Self {
         aabb.half_area() * count as f64
     }
-    fn join(&self, other: &Self) -> Self {
-        self + other
-    }
-    fn precedes(&self, other: &Self) -> bool {
-        self < other
-    }
-    fn is_cost(&self) -> bool {
-        self.is_finite()
+    fn is_finite(&self) -> bool {
+        Self::is_finite(*self)
     }
 }
 
@@ -96,13 +82,7 @@ impl Number for BigInt {
     fn side(aabb: &Aabb, count: usize) -> Self {
         half_area(aabb) * count
     }
-    fn join(&self, other: &Self) -> Self {
-        self + other
-    }
-    fn precedes(&self, other: &Self) -> bool {
-        self < other
-    }
-    fn is_cost(&self) -> bool {
+    fn is_finite(&self) -> bool {
         true
     }
 }
@@ -125,12 +105,12 @@ fn best<N: Number>(boxes: &[Aabb], orders: &[Vec<u32>; 3]) -> Option<(N, Split)>
         let mut aabb = Aabb::EMPTY;
         for (left, right) in (1..n).zip(right.iter().rev()) {
             aabb = aabb.union(&boxes[order[left - 1] as usize]);
-            let cost = N::side(&aabb, left).join(right);
+            let cost = N::side(&aabb, left) + right;
             let imbalance = n.abs_diff(2 * left);
-            let better = best.as_ref().is_none_or(|(least, balance, _)| {
-                cost.precedes(least) || (!least.precedes(&cost) && imbalance < *balance)
-            });
-            if cost.is_cost() && better {
+            let better = best
+                .as_ref()
+                .is_none_or(|(least, balance, _)| cost < *least || (*least >= cost && imbalance < *balance));
+            if cost.is_finite() && better {
                 best = Some((cost, imbalance, (axis, left)));
             }
         }
