@@ -153,16 +153,28 @@ impl Bvh {
     /// [`validate`](crate::validate()) refuses.
     pub fn refit(&mut self, boxes: &[Aabb]) {
         for index in (0..self.nodes.len()).rev() {
-            let node = &self.nodes[index];
-            let aabb = match node.kind() {
-                NodeKind::Inner { .. } => {
-                    self.nodes[node.children()].iter().fold(Aabb::EMPTY, |b, child| b.union(&child.aabb))
-                }
-                NodeKind::Leaf { .. } => {
-                    self.prim_ids[node.prims()].iter().fold(Aabb::EMPTY, |b, &id| b.union(&boxes[id as usize]))
-                }
-            };
-            self.nodes[index].aabb = aabb;
+            self.nodes[index].aabb = self.around(&self.nodes[index], boxes);
+        }
+    }
+
+    /// Whether every box is the smallest around what is below it, so that [`refit`](Self::refit) would change nothing:
+    /// in O(nodes + objects).
+    ///
+    /// # Panics
+    /// As [`refit`](Self::refit).
+    pub fn is_tight(&self, boxes: &[Aabb]) -> bool {
+        self.nodes.iter().all(|node| node.aabb == self.around(node, boxes))
+    }
+
+    /// The box around a node's children or objects.
+    fn around(&self, node: &Node, boxes: &[Aabb]) -> Aabb {
+        match node.kind() {
+            NodeKind::Inner { .. } => {
+                self.nodes[node.children()].iter().fold(Aabb::EMPTY, |b, child| b.union(&child.aabb))
+            }
+            NodeKind::Leaf { .. } => {
+                self.prim_ids[node.prims()].iter().fold(Aabb::EMPTY, |b, &id| b.union(&boxes[id as usize]))
+            }
         }
     }
 }
@@ -176,6 +188,27 @@ mod tests {
     fn a_node_is_plain_data_of_32_bytes() {
         assert_eq!(size_of::<Node>(), 32);
         assert!(!core::mem::needs_drop::<Node>());
+    }
+
+    #[test]
+    fn a_tree_is_tight_until_a_box_has_room_to_spare_and_again_when_refitted() {
+        let boxes = [0.0, 2.0].map(|x| Aabb::from(([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0])));
+        let padded = Aabb::from(([0.0; 3], [4.0; 3]));
+        for loose in 0..3 {
+            let mut tree = Bvh {
+                nodes: vec![
+                    Node::inner(boxes[0].union(&boxes[1]), 1, 2),
+                    Node::leaf(boxes[0], 0, 1),
+                    Node::leaf(boxes[1], 1, 1),
+                ],
+                prim_ids: vec![0, 1],
+            };
+            assert!(tree.is_tight(&boxes));
+            tree.nodes[loose].aabb = padded;
+            assert!(!tree.is_tight(&boxes), "{loose}");
+            tree.refit(&boxes);
+            assert!(tree.is_tight(&boxes));
+        }
     }
 
     #[test]

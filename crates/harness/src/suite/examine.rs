@@ -85,9 +85,7 @@ pub fn examine(
 pub fn check_outcome(boxes: &[Aabb], outcome: &Outcome) -> Result<f64, String> {
     let Outcome { tree, cost, history, .. } = outcome;
     validate(tree, boxes).map_err(|error| format!("P2: {error}"))?;
-    let mut tight = tree.clone();
-    tight.refit(boxes);
-    if tight != *tree {
+    if !tree.is_tight(boxes) {
         return Err("P2: boxes are not tight".into());
     }
     let costs = [*cost, cost::internal_area(tree), cost::goldsmith_salmon(tree)];
