@@ -1,5 +1,7 @@
 //! Baking and inspecting as their users meet them: what is written, kept, refused, and read by other languages.
 
+mod support;
+
 use harness::scene::Scene;
 use harness::tree_file::load_tree;
 use std::collections::BTreeMap;
@@ -7,20 +9,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
-
-fn harness(folder: &Path, args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
-    command.current_dir(folder).args(args).stdin(Stdio::null());
-    command
-}
-
-fn run(folder: &Path, args: &[&str]) -> Output {
-    harness(folder, args).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
+use support::{harness, run, run_on_a_small_disk, text};
 
 /// Standard output of a command that must succeed.
 fn said(folder: &Path, args: &[&str]) -> String {
@@ -187,12 +176,7 @@ fn what_cannot_be_baked_or_inspected_is_said_and_nothing_is_lost() {
 fn a_disk_without_room_is_noticed_before_the_search_and_the_old_file_stays() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("a.bvh"), "old").unwrap();
-    // No file of this shell's children may grow beyond 4 blocks of 512 bytes.
-    let script = format!(
-        "trap '' XFSZ; ulimit -f 4; exec '{}' bake spheres75 --budget 1h --out a.bvh",
-        env!("CARGO_BIN_EXE_harness")
-    );
-    let output = Command::new("sh").args(["-c", &script]).current_dir(folder.path()).output().unwrap();
+    let output = run_on_a_small_disk(folder.path(), "bake spheres75 --budget 1h --out a.bvh", 4);
     let said = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("a.bvh: cannot reserve the file's space"), "{said}");

@@ -1,9 +1,12 @@
 //! The program as its users meet it: what it writes, what it refuses, and what survives a kill.
 
+mod support;
+
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::Duration;
+use support::{harness, reproducible, run, text};
 
 const SPEC: &str = "
 question = 'Do results survive?'
@@ -34,37 +37,11 @@ scenes = ['escher']
 repetitions = 1
 ";
 
-fn harness(folder: &Path, args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
-    command.current_dir(folder).args(args).stdin(Stdio::null());
-    command
-}
-
-fn run(folder: &Path, args: &[&str]) -> Output {
-    harness(folder, args).output().unwrap()
-}
-
 /// A folder with the spec in it.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("spec.toml"), SPEC).unwrap();
     folder
-}
-
-/// The CSV files without seconds, by name, and the resolved spec.
-fn reproducible(folder: &Path) -> Vec<(String, Vec<u8>)> {
-    let mut files: Vec<_> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .filter(|name| (name.ends_with(".csv") && !name.starts_with("timing")) || name == "resolved.toml")
-        .map(|name| (name.clone(), fs::read(folder.join(name)).unwrap()))
-        .collect();
-    files.sort();
-    files
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
 }
 
 #[test]

@@ -2,10 +2,13 @@
 //!
 //! `KILLS=100 cargo test -p harness --test faults` kills that often.
 
+mod support;
+
 use std::fs;
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
+use support::{harness, reproducible, run, run_on_a_small_disk, text};
 
 const SPEC: &str = "
 question = 'What survives?'
@@ -25,43 +28,30 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
+/// What is killed or goes on in the background: nobody reads what it says.
 fn command(folder: &Path, args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
-    command.current_dir(folder).args(args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    let mut command = harness(folder, args);
+    command.stdout(Stdio::null()).stderr(Stdio::null());
     command
-}
-
-fn output(folder: &Path, args: &[&str]) -> Output {
-    command(folder, args).stdout(Stdio::piped()).stderr(Stdio::piped()).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
 }
 
 /// Runs what must succeed.
 fn succeed(folder: &Path, args: &[&str]) {
-    let output = output(folder, args);
+    let output = run(folder, args);
     assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
 }
 
 /// Runs what must fail, with parts of what is said.
 fn fail(folder: &Path, args: &[&str], code: i32, parts: &[&str]) {
-    let output = output(folder, args);
+    let output = run(folder, args);
     let said = text(&output.stderr);
     assert_eq!(output.status.code(), Some(code), "{args:?}: {said}");
     assert!(parts.iter().all(|part| said.contains(part)), "{args:?}: {said}");
 }
 
-/// The CSV files without seconds, by name, and the resolved spec.
+/// What a run leaves that every run must leave.
 fn results(out: &Path) -> Vec<(String, Vec<u8>)> {
-    let folder = out.join("spec");
-    let names = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let wanted =
-        |name: &String| (name.ends_with(".csv") && !name.starts_with("timing")) || name == "resolved.toml";
-    let mut files: Vec<_> =
-        names.filter(wanted).map(|name| (name.clone(), fs::read(folder.join(name)).unwrap())).collect();
-    files.sort();
+    let files = reproducible(&out.join("spec"));
     assert!(files.len() >= 3, "{files:?}");
     files
 }
@@ -144,14 +134,10 @@ fn a_second_harness_on_the_same_folder_is_refused_and_disturbs_nothing() {
 fn a_full_disk_is_reported_and_what_was_finished_is_kept() {
     let folder = folder();
     let whole = whole(folder.path());
-    // No file may grow beyond so many blocks of 512 bytes; past the limit a write fails as on a full disk.
     for blocks in [0, 1, 2, 8] {
         let out = format!("full{blocks}");
-        let script = format!(
-            "trap '' XFSZ; ulimit -f {blocks}; exec '{}' spec.toml --jobs 2 --out {out}",
-            env!("CARGO_BIN_EXE_harness")
-        );
-        let output = Command::new("sh").args(["-c", &script]).current_dir(folder.path()).output().unwrap();
+        let args = format!("spec.toml --jobs 2 --out {out}");
+        let output = run_on_a_small_disk(folder.path(), &args, blocks);
         let said = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{said}");
         assert!(said.contains(&format!("{out}/spec")) && said.contains("cannot write the file"), "{said}");

@@ -1,17 +1,10 @@
 //! `harness render` and experiments with pictures, as their users meet them.
 
+mod support;
+
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
-
-fn run(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_harness")).current_dir(folder).args(args).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
+use support::{run, text};
 
 #[test]
 fn every_structure_and_any_number_of_threads_write_the_same_file() {

@@ -2,6 +2,8 @@
 //!
 //! No key and no flag is listed here: keys are asked of the parser, flags of `--help`, so that new ones are tried too.
 
+mod support;
+
 use bvh_search::Method;
 use harness::peers::Peer;
 use harness::spec::{Experiment, Overrides};
@@ -9,7 +11,7 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use support::{run, text};
 use toml::{Table, Value};
 
 /// A step from a table to a value in it.
@@ -205,14 +207,10 @@ fn a_wrong_value_under_any_key_of_a_spec_is_refused_by_name() {
     assert!(found.is_empty(), "\n{}", found.into_iter().collect::<Vec<_>>().join("\n"));
 }
 
+/// The exit code, and all that is said.
 fn harness(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_harness"))
-        .current_dir(folder)
-        .args(args)
-        .stdin(Stdio::null())
-        .output()
-        .unwrap();
-    (output.status.code(), String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned())
+    let output = run(folder, args);
+    (output.status.code(), text(&[output.stdout, output.stderr].concat()))
 }
 
 /// The flags of a command with the name of their value, as its help lists them.

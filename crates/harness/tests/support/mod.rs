@@ -1,0 +1,42 @@
+//! The program as a child process, and what it leaves in a folder.
+#![allow(dead_code)] // each test file uses some of it
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_harness");
+
+/// The program in a folder, without input.
+pub fn harness(folder: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(PROGRAM);
+    command.current_dir(folder).args(args).stdin(Stdio::null());
+    command
+}
+
+/// What it says and how it ends.
+pub fn run(folder: &Path, args: &[&str]) -> Output {
+    harness(folder, args).output().unwrap()
+}
+
+/// [`run`] where no file may grow beyond so many blocks of 512 bytes; past the limit a write fails as on a full disk.
+pub fn run_on_a_small_disk(folder: &Path, args: &str, blocks: u32) -> Output {
+    let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec '{PROGRAM}' {args}");
+    Command::new("sh").args(["-c", &script]).current_dir(folder).output().unwrap()
+}
+
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// The CSV files without seconds, by name, and the resolved spec.
+pub fn reproducible(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut files: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| (name.ends_with(".csv") && !name.starts_with("timing")) || name == "resolved.toml")
+        .map(|name| (name.clone(), fs::read(folder.join(name)).unwrap()))
+        .collect();
+    files.sort();
+    files
+}
