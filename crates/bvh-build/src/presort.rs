@@ -22,9 +22,10 @@ impl Presorted {
         Self::sort(boxes, true, false)
     }
 
-    /// As [`new`](Self::new), unless `skip_sorted`, sorting also what is in order. With `x_without_area` a scene without
-    /// area is sorted along x alone, and the other axes have that order: every candidate split of its nodes costs
-    /// nothing, so that the halves along x are as good as any and, x being the lowest axis, what a greedy build takes.
+    /// As [`new`](Self::new), unless `skip_sorted`, sorting also what is in order. With `x_without_area` a scene
+    /// without area is sorted along x alone, and the other axes have that order: every candidate split of its nodes
+    /// costs nothing, so that the halves along x are as good as any and, x being the lowest axis, what a greedy build
+    /// takes.
     pub(crate) fn sort(boxes: &[Aabb], skip_sorted: bool, x_without_area: bool) -> Result<Self, BuildError> {
         check_scene(boxes)?;
         let sorted = |axis: usize| {
@@ -38,7 +39,7 @@ impl Presorted {
             (keyed.into_iter().map(|(_, index)| index).collect::<Vec<u32>>(), in_order)
         };
         let sorted = || {
-            if x_without_area && bounds(boxes).half_area() == 0.0 {
+            if x_without_area && Self::without_area(boxes) {
                 let x = sorted(0);
                 return [x.clone(), x.clone(), x];
             }
@@ -52,6 +53,11 @@ impl Presorted {
         let [x, y, z] = sorted();
         let (orders, in_order) = ([x.0, y.0, z.0], [x.1, y.1, z.1]);
         Ok(Self { boxes: boxes.iter().map(PackedAabb::from).collect(), orders, in_order })
+    }
+
+    /// Whether the box around all has no area, so that no tree costs anything; also if there are no boxes. O(n).
+    pub fn without_area(boxes: &[Aabb]) -> bool {
+        boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b)).half_area() == 0.0
     }
 
     /// Per axis, whether the objects came in order, so that they needed no sorting. So they do along an axis on which
@@ -77,11 +83,6 @@ impl Presorted {
     pub fn is_empty(&self) -> bool {
         self.boxes.is_empty()
     }
-}
-
-/// The box around all.
-fn bounds(boxes: &[Aabb]) -> Aabb {
-    boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b))
 }
 
 /// Refuses what no builder can take: too many objects, or a box that is not finite or is inverted.

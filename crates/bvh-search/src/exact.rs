@@ -37,11 +37,11 @@ impl Search for Config {
     }
 }
 
-/// The optimum in place of a search, if it takes no more than `work` and what the run has left, and the scene is one of
-/// three objects or more; fewer leave no choice. Ends the run.
+/// The optimum in place of a search, if the scene is [tiny](most_work_of_tiny) and it takes no more than `work` and
+/// what the run has left. Ends the run.
 pub(crate) fn instead(problem: &Problem, work: u64, run: &mut Run) -> Result<Option<Bvh>, SearchError> {
-    let n = problem.boxes.len();
-    let worth = (3..=MOST_OBJECTS).contains(&n) && most_work(n) <= work.min(run.left().work);
+    let least = most_work_of_tiny(problem.boxes.len());
+    let worth = least.is_some_and(|least| least <= work.min(run.left().work));
     if !worth || !problem.leaves_out(Omission::Tiny) {
         return Ok(None);
     }
@@ -50,9 +50,11 @@ pub(crate) fn instead(problem: &Problem, work: u64, run: &mut Run) -> Result<Opt
     Ok(Some(tree))
 }
 
-/// Divisions of a scene of so many objects, at most [`MOST_OBJECTS`], but for the 2ⁿ with an empty part.
-pub(crate) fn most_work(objects: usize) -> u64 {
-    3u64.pow(objects as u32) / 2
+/// The work that the optimum takes at most where it may stand in for a search: the divisions of a scene of so many
+/// objects, but for the 2ⁿ with an empty part. `None` for more than [`MOST_OBJECTS`], and for two or fewer, which leave
+/// no choice.
+pub(crate) fn most_work_of_tiny(objects: usize) -> Option<u64> {
+    (3..=MOST_OBJECTS).contains(&objects).then(|| 3u64.pow(objects as u32) / 2)
 }
 
 /// For every set of two objects or more, its part with the lowest object in the best division; and how many divisions

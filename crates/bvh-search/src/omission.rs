@@ -4,8 +4,8 @@ use crate::{exact, lower_bound};
 use bvh_build::{BuildError, Presorted};
 use bvh_core::Aabb;
 
-/// Something that some scenes do not need. None changes the cost of a tree that is built; of a search that is cut short or replaced, the
-/// cost is never higher.
+/// Something that some scenes do not need. None changes the cost of a tree that is built; of a search that is cut short
+/// or replaced, the cost is never higher.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Omission {
@@ -32,6 +32,8 @@ pub struct Facts {
     pub repeated: usize,
     /// The box around all.
     pub bounds: Aabb,
+    /// Whether that box has no area.
+    pub flat: bool,
     /// Per axis, whether the objects came in order.
     pub in_order: [bool; 3],
     /// Per axis, the lowest axis that orders all objects identically, usually itself.
@@ -41,34 +43,34 @@ pub struct Facts {
 }
 
 impl Facts {
-    /// Looks at a scene once. O(n).
+    /// Asks of a scene what builders and searches ask. O(n), sorting being by radix.
     pub fn of(boxes: &[Aabb]) -> Result<Self, BuildError> {
         let sorted = Presorted::new(boxes)?;
         Ok(Self {
             objects: boxes.len(),
             repeated: boxes.windows(2).filter(|pair| pair[0] == pair[1]).count(),
             bounds: boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b)),
+            flat: Presorted::without_area(boxes),
             in_order: sorted.in_order(),
             same_orders: sorted.same_orders(),
             floor: lower_bound::of_largest(boxes),
         })
     }
 
-    /// What is left out of the whole scene, and why. Parts of a scene may leave out more: orders that become the same further
-    /// down, and searches that meet the bound later.
+    /// What is left out of the whole scene, and why. Parts of a scene may leave out more: orders that become the same
+    /// further down, and searches that meet the bound later.
     pub fn omissions(&self) -> Vec<(Omission, String)> {
         const AXES: [&str; 3] = ["x", "y", "z"];
         let mut found = Vec::new();
         if self.objects < 2 {
             return found;
         }
-        let flat = self.bounds.half_area() == 0.0;
         for (axis, name) in AXES.into_iter().enumerate() {
             let same = self.same_orders[axis] as usize;
-            if self.in_order[axis] && !(flat && axis > 0) {
+            if self.in_order[axis] && !(self.flat && axis > 0) {
                 found.push((Omission::Sorted, format!("sorting along {name}: the objects come in that order")));
             }
-            if same != axis && !flat {
+            if same != axis && !self.flat {
                 let same = AXES[same];
                 found.push((
                     Omission::SameOrder,
@@ -76,11 +78,10 @@ impl Facts {
                 ));
             }
         }
-        if flat {
+        if self.flat {
             found.push((Omission::Flat, "splits along y and z: without area every tree costs nothing".into()));
         }
-        if (3..=exact::MOST_OBJECTS).contains(&self.objects) {
-            let work = exact::most_work(self.objects);
+        if let Some(work) = exact::most_work_of_tiny(self.objects) {
             let why = format!("the search `best`, given {work} nodes of work: the optimum takes no more");
             found.push((Omission::Tiny, why));
         }
