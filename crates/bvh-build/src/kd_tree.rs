@@ -2,9 +2,9 @@
 //!
 //! Wald & Havran 2006, 'On building fast kd-trees for ray tracing, and on doing that in O(N log N)', section 4.3.
 //!
-//! Differs from the paper: objects are their boxes, and the perfect split of a box is the box clipped to the cell. So no
-//! event is ever made anew or merged: those beyond a cell's faces are no candidates, and lists stay sorted by themselves.
-//! Depth (Pharr, Jakob & Humphreys, Physically Based Rendering, 4.4) and number of references are bounded.
+//! Differs from the paper: objects are their boxes, and the perfect split of a box is the box clipped to the cell. So
+//! no event is ever made anew or merged: those beyond a cell's faces are no candidates, and lists stay sorted by
+//! themselves. Depth (Pharr, Jakob & Humphreys, Physically Based Rendering, 4.4) and number of references are bounded.
 
 mod traverse;
 
@@ -29,7 +29,8 @@ impl Default for Config {
     }
 }
 
-/// A tree of cells that fill the root's box without overlap; an object is named by every leaf that its box reaches into.
+/// A tree of cells that fill the root's box without overlap; an object is named by every leaf that its box reaches
+/// into.
 #[derive(Clone, Debug)]
 pub struct KdTree {
     /// Around all objects.

@@ -12,7 +12,8 @@ fn triangles() -> Vec<Triangle> {
     (0..64u8).map(|i| triangle(i.into())).collect()
 }
 
-/// A builder of one's own, in the plain form that most have: two children at `first`, or `count` objects from `first` on.
+/// A builder of one's own, in the plain form that most have: two children at `first`, or `count` objects from `first`
+/// on.
 fn halves(boxes: &[Aabb]) -> Vec<FirstCountNode> {
     let mut nodes = vec![FirstCountNode { first: 0, count: boxes.len() as u32, ..Default::default() }];
     let mut at = 0;

@@ -6,8 +6,8 @@ use crate::{Aabb, Bvh, InvalidBvh, MAX_OBJECTS, Node, NodeKind};
 use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 
-/// A node as most libraries have it, 32 bytes in the order of `tinybvh`'s `BVHNode` and of many GPU tracers; `obvhs` has
-/// the same fields in another order.
+/// A node as most libraries have it, 32 bytes in the order of `tinybvh`'s `BVHNode` and of many GPU tracers; `obvhs`
+/// has the same fields in another order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct FirstCountNode {
@@ -43,7 +43,8 @@ impl Bvh {
     /// The tree of such arrays, in depth-first order. Nodes and ids that the root does not lead to are left out, and
     /// children may come before their parents. Refuses what leads out of bounds or to a node a second time. O(nodes).
     ///
-    /// What the boxes contain is left to [`validate`](crate::validate()); [`refit`](Bvh::refit) makes padded ones tight.
+    /// What the boxes contain is left to [`validate`](crate::validate()); [`refit`](Bvh::refit) makes padded ones
+    /// tight.
     pub fn from_first_count(nodes: &[FirstCountNode], prim_ids: &[u32]) -> Result<Self, InvalidBvh> {
         if nodes.len() > 2 * MAX_OBJECTS || prim_ids.len() > MAX_OBJECTS {
             return Err(InvalidBvh::TooManyObjects { objects: prim_ids.len().max(nodes.len() / 2) });
@@ -87,8 +88,8 @@ impl Bvh {
     }
 }
 
-/// The nodes of a binary tree, `spare` unused ones after the root. Pairs of siblings fill the tree's nodes from 1 on, and so
-/// begin at odd indices there.
+/// The nodes of a binary tree, `spare` unused ones after the root. Pairs of siblings fill the tree's nodes from 1 on,
+/// and so begin at odd indices there.
 fn first_count(tree: &Bvh, spare: usize) -> Vec<FirstCountNode> {
     let mut nodes = alloc::vec![FirstCountNode::default(); tree.nodes.len()];
     if nodes.len() > 1 {

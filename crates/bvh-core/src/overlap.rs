@@ -5,19 +5,21 @@ use crate::{Aabb, Bvh, NodeKind, Triangle};
 use alloc::vec::Vec;
 use glam::DVec3;
 
-/// The end-point overlap, EPO = Σ over nodes of C(node) · A((S \ Q(node)) ∩ box(node)) / A(S), where S is the surface of
-/// all triangles, Q(node) that of the triangles below the node, and C the traversal constant for an inner node, the
+/// The end-point overlap, EPO = Σ over nodes of C(node) · A((S \ Q(node)) ∩ box(node)) / A(S), where S is the surface
+/// of all triangles, Q(node) that of the triangles below the node, and C the traversal constant for an inner node, the
 /// intersection constant times the number of objects for a leaf. Dimensionless multiple of the constants' unit: the
 /// expected cost of nodes that a ray enters although it ends on a surface elsewhere. Together with the surface area
 /// heuristic it predicts times better than that alone.
 ///
-/// Areas are of triangles clipped against boxes, in f64, by Sutherland & Hodgman's algorithm, plane by plane: exact but for
-/// rounding. Boxes are closed: a triangle within a face of a box counts. 0 by definition for triangles without area.
+/// Areas are of triangles clipped against boxes, in f64, by Sutherland & Hodgman's algorithm, plane by plane: exact but
+/// for rounding. Boxes are closed: a triangle within a face of a box counts. 0 by definition for triangles without
+/// area.
 ///
-/// Time: O(Σ over triangles of the nodes whose boxes they meet), some n log n on common scenes and n² at most; memory O(n).
+/// Time: O(Σ over triangles of the nodes whose boxes they meet), some n log n on common scenes and n² at most; memory
+/// O(n).
 ///
-/// Source: Aila, Karras & Laine 2013, 'On quality metrics of bounding volume hierarchies', section 4.2. Differs from the
-/// paper: constants 1 and 1 by default, there 1.2 and 1.
+/// Source: Aila, Karras & Laine 2013, 'On quality metrics of bounding volume hierarchies', section 4.2. Differs from
+/// the paper: constants 1 and 1 by default, there 1.2 and 1.
 ///
 /// # Panics
 /// May panic on a tree that [`validate`](crate::validate()) refuses for the triangles' boxes.
@@ -141,7 +143,8 @@ mod tests {
             end_point_overlap(&tree, &triangles, &SahConstants { traversal: 1.0, intersection: 2.0 })
         };
         assert_eq!(overlap(2.0), 0.0);
-        // Half of the first one's box holds the second without its corner, 1/2 − 1/8; the second's holds 1/8 of the first.
+        // Half of the first one's box holds the second without its corner, 1/2 − 1/8; the second's holds 1/8 of the
+        // first.
         assert_eq!(overlap(0.5), 2.0 * (0.375 + 0.125) / 1.0);
         // Each holds the other.
         assert_eq!(overlap(0.0), 2.0);

@@ -41,7 +41,8 @@ impl Ray {
     const DIRECTION_RANGE: core::ops::RangeInclusive<f32> = pow2(-100)..=pow2(100);
 
     /// The ray from `origin` in `direction` over `t_min..=t_max`. Distances `t` are in multiples of the direction's
-    /// length, which need not be 1. An infinite `t_max` stands for the largest finite distance. Arrays `[f32; 3]` will do.
+    /// length, which need not be 1. An infinite `t_max` stands for the largest finite distance. Arrays `[f32; 3]` will
+    /// do.
     #[inline]
     pub fn new(
         origin: impl Into<Vec3>,

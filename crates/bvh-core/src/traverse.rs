@@ -9,7 +9,8 @@
 //! ```
 //! use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Shear, TestCounts, Triangle, nearest_hit};
 //! use glam::Vec3;
-//! let triangles = [0.0, 1.0].map(|z| Triangle([Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 0.0, z), Vec3::new(0.0, 1.0, z)]));
+//! let corners = |z| [Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 0.0, z), Vec3::new(0.0, 1.0, z)];
+//! let triangles = [0.0, 1.0].map(|z| Triangle(corners(z)));
 //! let [a, b] = triangles.map(|t| t.aabb());
 //! let tree = Bvh {
 //!     nodes: vec![Node::inner(a.union(&b), 1, 2), Node::leaf(a, 0, 1), Node::leaf(b, 1, 1)],
@@ -67,7 +68,8 @@ impl Counter for TestCounts {
 
 /// The nearest object that `ray` meets in its range; of several at the same distance the one of the lowest id.
 ///
-/// `tree` is a [`&Bvh`](crate::Bvh) or a view of one. `test(object, t_max)` gives the distance at which the ray meets the object, if that is in `ray.t_min()..=t_max`.
+/// `tree` is a [`&Bvh`](crate::Bvh) or a view of one. `test(object, t_max)` gives the distance at which the ray meets
+/// the object, if that is in `ray.t_min()..=t_max`.
 ///
 /// # Panics
 /// May panic, or not return, for a tree that [`validate`](crate::validate()) refuses.
@@ -225,8 +227,8 @@ fn walk<C: Counter>(
     }
 }
 
-/// Visits the nearer one of two children if it is a leaf. Returns what to visit next, if it is one of the two, and pushes
-/// the farther one if that comes later.
+/// Visits the nearer one of two children if it is a leaf. Returns what to visit next, if it is one of the two, and
+/// pushes the farther one if that comes later.
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "the state of a walk, in registers")]
 fn descend<C: Counter, const N: usize>(

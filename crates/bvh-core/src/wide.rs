@@ -15,7 +15,8 @@ use bytemuck::{Pod, Zeroable};
 /// ```
 /// use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};
 /// use glam::Vec3;
-/// let triangles = [0.0, 1.0].map(|z| Triangle([Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 0.0, z), Vec3::new(0.0, 1.0, z)]));
+/// let corners = |z| [Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 0.0, z), Vec3::new(0.0, 1.0, z)];
+/// let triangles = [0.0, 1.0].map(|z| Triangle(corners(z)));
 /// let [a, b] = triangles.map(|t| t.aabb());
 /// let tree = Bvh {
 ///     nodes: vec![Node::inner(a.union(&b), 1, 2), Node::leaf(a, 0, 1), Node::leaf(b, 1, 1)],
@@ -109,7 +110,8 @@ pub(crate) struct Pending {
 }
 
 impl WideBvh {
-    /// Lays out `tree`, valid over the boxes of `triangles`, with any number of children per node. O(n) time and memory.
+    /// Lays out `tree`, valid over the boxes of `triangles`, with any number of children per node. O(n) time and
+    /// memory.
     ///
     /// Which nodes of the tree survive, and which subtrees become one leaf, is decided exactly by dynamic programming:
     /// the result has the least expected time for a random line among all that can be made by leaving nodes out.

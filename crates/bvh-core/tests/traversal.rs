@@ -139,9 +139,9 @@ fn no_ray_leaves_a_closed_mesh_through_an_edge_or_a_vertex() {
     }
 }
 
-/// Two triangles side by side share an edge along one axis, and with it a face of both boxes. A ray that starts close to the
-/// edge and runs nearly along it meets the sheet next to the edge, where the rounding of the far corners moves the side on
-/// which a triangle is hit by far more than the rounding of the box test moves its box: without
+/// Two triangles side by side share an edge along one axis, and with it a face of both boxes. A ray that starts close
+/// to the edge and runs nearly along it meets the sheet next to the edge, where the rounding of the far corners moves
+/// the side on which a triangle is hit by far more than the rounding of the box test moves its box: without
 /// [`Slabs::MARGIN`](bvh_core::Slabs::MARGIN) this loses one of these rays in thirty.
 #[test]
 fn no_ray_slips_between_the_boxes_beside_a_long_edge() {

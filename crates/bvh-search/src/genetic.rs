@@ -8,8 +8,8 @@
 //! winner that neither crossover nor mutation touches; the number of swaps is drawn evenly from 0 to twice its mean;
 //! an individual that a generation leaves as it was is not evaluated again, though it counts as evaluated.
 //!
-//! *Not done*: resuming an insertion where a child's order first differs from its parent's. Of 2n/500 swapped places the
-//! first comes so early that about one insertion in twenty could be kept, less than it costs to keep trees.
+//! *Not done*: resuming an insertion where a child's order first differs from its parent's. Of 2n/500 swapped places
+//! the first comes so early that about one insertion in twenty could be kept, less than it costs to keep trees.
 
 use crate::error::require;
 use crate::insertion_orders::{Insertion, random_order};

@@ -9,8 +9,8 @@
 //! | Figure 1 | `k_best`, restricted by cardinality | 0.1 |
 //! | section 3.4 | `within`, restricted by value | any |
 //!
-//! GRASP's second phase, which the paper leaves to future work (sections 3.4 and 5), is `local_search`: every constructed
-//! tree is led to a local optimum of its own.
+//! GRASP's second phase, which the paper leaves to future work (sections 3.4 and 5), is `local_search`: every
+//! constructed tree is led to a local optimum of its own.
 //!
 //! Differs from the paper: nothing in the first two rules; for the others it does not say how noise acts, and here
 //! it is the probability of taking one of the candidates other than the best, all alike.

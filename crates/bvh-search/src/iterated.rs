@@ -1,8 +1,8 @@
 //! Iterated local search: kick the incumbent with a few random moves, descend again, keep the better one.
 //!
-//! Lourenço, Martin & Stützle 2003, acceptance 'better'. The plainest use of a descent beyond its first local optimum, and
-//! what [`rebuild`](crate::rebuild) and [`ruin_recreate`](crate::ruin_recreate) are to be measured against: they kick and
-//! descend in one small part of the tree at a time.
+//! Lourenço, Martin & Stützle 2003, acceptance 'better'. The plainest use of a descent beyond its first local optimum,
+//! and what [`rebuild`](crate::rebuild) and [`ruin_recreate`](crate::ruin_recreate) are to be measured against: they
+//! kick and descend in one small part of the tree at a time.
 
 use crate::annealing::{Move, Mover, Target};
 use crate::cooling::Move as _;

@@ -3,27 +3,27 @@
 //! # The bound
 //!
 //! Every object i has a weight wᵢ > 0; w(S) is the weight of a set. Let A(S) be the half area of the box around S and
-//! gᵢ(x) the least A(S) of all sets of two objects or more that contain i and weigh x or more. Let α be any function with
-//! α(p) + α(1 − p) = 1 for 0 < p < 1, and ψᵢ(wᵢ) = 0,
+//! gᵢ(x) the least A(S) of all sets of two objects or more that contain i and weigh x or more. Let α be any function
+//! with α(p) + α(1 − p) = 1 for 0 < p < 1, and ψᵢ(wᵢ) = 0,
 //!
 //! > ψᵢ(x) = min over y < x of ψᵢ(y) + α(y / x) · gᵢ(x) / y,
 //!
-//! where y is wᵢ or a greater weight that a set with i may have. Then **every binary tree over S with one object per leaf
-//! has an internal area of at least Σ wᵢ · ψᵢ(w(S)) over the objects i of S.**
+//! where y is wᵢ or a greater weight that a set with i may have. Then **every binary tree over S with one object per
+//! leaf has an internal area of at least Σ wᵢ · ψᵢ(w(S)) over the objects i of S.**
 //!
-//! *Proof*, by induction over the size of S. A single object has no inner node, and ψᵢ(wᵢ) = 0. Otherwise the root divides S
-//! into L and R; let x = w(S) and y = w(L). The area of the root is A(S), and A(S) ≥ gᵢ(x) for every i in S. By the
-//! definition of ψ, wᵢ · ψᵢ(x) ≤ wᵢ · ψᵢ(y) + α(y / x) · A(S) · wᵢ / y for the objects of L. Summed over L, whose weights
-//! add up to y, this is Σ wᵢ · ψᵢ(x) ≤ Σ wᵢ · ψᵢ(y) + α(y / x) · A(S), and likewise for R with α(1 − y / x). As both α add up
-//! to 1, the sum over S is at most A(S) plus the sums for L and R, which by induction are at most the internal
-//! areas of the subtrees. ∎
+//! *Proof*, by induction over the size of S. A single object has no inner node, and ψᵢ(wᵢ) = 0. Otherwise the root
+//! divides S into L and R; let x = w(S) and y = w(L). The area of the root is A(S), and A(S) ≥ gᵢ(x) for every i in S.
+//! By the definition of ψ, wᵢ · ψᵢ(x) ≤ wᵢ · ψᵢ(y) + α(y / x) · A(S) · wᵢ / y for the objects of L. Summed over L,
+//! whose weights add up to y, this is Σ wᵢ · ψᵢ(x) ≤ Σ wᵢ · ψᵢ(y) + α(y / x) · A(S), and likewise for R with α(1 − y /
+//! x). As both α add up to 1, the sum over S is at most A(S) plus the sums for L and R, which by induction are at most
+//! the internal areas of the subtrees. ∎
 //!
 //! With equal weights and α(p) = 1 − p this is ∫ (c(t) − 1) dt, where c(t) = Σ 1 / (the most objects in a box of
 //! area t with i) is a fractional count of the boxes of area t that are needed to cover all objects. That alone is
 //! never below the minimum spanning tree under the areas of unions of pairs, whose cost is the same integral over the
 //! number of connected components. The α used here, α(p) = h(p) / (h(p) + h(1 − p)) with
-//! h(p) = (1 − p^¼) / (1 − p), charges more to unequal divisions: a chain of log₂ n equal divisions then costs as much as it
-//! does in a tree, and not only ln n. Being a secant of a concave function, h decreases, so α decreases too.
+//! h(p) = (1 − p^¼) / (1 − p), charges more to unequal divisions: a chain of log₂ n equal divisions then costs as much
+//! as it does in a tree, and not only ln n. Being a secant of a concave function, h decreases, so α decreases too.
 //!
 //! # Computing less than it
 //!
@@ -33,8 +33,8 @@
 //! (`smallest_box`), which returns the least bound that is left when its effort ends, at the lower ends of bands of
 //! sizes, and for large sizes once for a group of neighbours together.
 //!
-//! Weights: large objects among small ones belong into clusters of their own, so that wᵢ grows with the square root of the
-//! area that i needs to be united with its nearest neighbour.
+//! Weights: large objects among small ones belong into clusters of their own, so that wᵢ grows with the square root of
+//! the area that i needs to be united with its nearest neighbour.
 
 mod smallest_box;
 
@@ -48,12 +48,12 @@ pub const DEFAULT_EFFORT: u32 = 16;
 /// A lower bound of [`bvh_core::cost::internal_area`] of every binary tree over `boxes` with one object per leaf, in
 /// world units squared; 0 for fewer than two objects. See the [module](self) for the proof.
 ///
-/// `effort` limits the search for the smallest boxes: so many times their neighbourhood is looked at; 0 looks once. Time
-/// grows with the effort and, for objects that are spread over space, with n log n; O(n²) where boxes overlap so
+/// `effort` limits the search for the smallest boxes: so many times their neighbourhood is looked at; 0 looks once.
+/// Time grows with the effort and, for objects that are spread over space, with n log n; O(n²) where boxes overlap so
 /// much that everything is a neighbour of everything. Memory O(n).
 ///
-/// The result is below the bound by 10⁻¹² of itself, more than all rounding errors together: areas are rounded as in the
-/// cost of a tree, in which they grow with the box, the sums of a few hundred terms and of all objects are not.
+/// The result is below the bound by 10⁻¹² of itself, more than all rounding errors together: areas are rounded as in
+/// the cost of a tree, in which they grow with the box, the sums of a few hundred terms and of all objects are not.
 pub fn internal_area(boxes: &[Aabb], effort: u32) -> Result<f64, BuildError> {
     let mut scene = Scene::new(boxes)?;
     let n = boxes.len();
@@ -84,14 +84,14 @@ pub fn internal_area(boxes: &[Aabb], effort: u32) -> Result<f64, BuildError> {
     Ok(shares.into_iter().collect::<Sum>().value() * (1.0 - 1e-12))
 }
 
-/// A lower bound that takes a moment: the area of the root, and the areas of all objects but the smallest and the largest,
-/// in world units squared; 0 for fewer than two objects. O(n). It is met where all boxes are the same, where every box is
-/// inside the next, and where nothing has an area.
+/// A lower bound that takes a moment: the area of the root, and the areas of all objects but the smallest and the
+/// largest, in world units squared; 0 for fewer than two objects. O(n). It is met where all boxes are the same, where
+/// every box is inside the next, and where nothing has an area.
 ///
 /// *Proof.* Every inner node has at least the area of the largest object below it. The inner nodes above `k` of the
-/// objects, but for the root, are k − 2 or more if these are all objects, and k − 1 or more otherwise: k paths to the root
-/// join in k − 1 nodes, and if something else is below the root, it joins them in one more. Take for the `k` objects those of area t
-/// or more, and integrate over t. ∎
+/// objects, but for the root, are k − 2 or more if these are all objects, and k − 1 or more otherwise: k paths to the
+/// root join in k − 1 nodes, and if something else is below the root, it joins them in one more. Take for the `k`
+/// objects those of area t or more, and integrate over t. ∎
 pub fn of_largest(boxes: &[Aabb]) -> f64 {
     if boxes.len() < 2 {
         return 0.0;
@@ -192,7 +192,8 @@ mod tests {
     use crate::{Budget, Problem, exact, solve};
     use proptest::prelude::*;
 
-    /// Boxes of very different sizes, `flat` axes without extent; every fourth scene is on a coarse grid, which makes ties, flat boxes and coincident ones.
+    /// Boxes of very different sizes, `flat` axes without extent; every fourth scene is on a coarse grid, which makes
+    /// ties, flat boxes and coincident ones.
     fn scene(n: usize, flat: usize) -> impl Strategy<Value = Vec<Aabb>> {
         let coordinate = (0u8..=255).prop_map(|at| f32::from(at) / 16.0);
         let aabb = (prop::array::uniform3(coordinate), prop::array::uniform3(0u8..=7), 1u8..=40);

@@ -6,8 +6,8 @@ use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate};
 
 /// Improves `tree`, over the objects of `boxes`, by the [portfolio](crate::portfolio) but for its builder, until the
 /// budget is spent or the observer cancels. The result has the same leaves, with as many objects in each; leaves of
-/// several objects are moved as a whole. The cost is the [internal area](bvh_core::cost::internal_area), with boxes made
-/// tight, and never above that of `tree`.
+/// several objects are moved as a whole. The cost is the [internal area](bvh_core::cost::internal_area), with boxes
+/// made tight, and never above that of `tree`.
 ///
 /// Refuses trees that are not [valid](validate), and inner nodes with more than two children.
 pub fn optimize(

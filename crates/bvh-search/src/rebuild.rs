@@ -1,13 +1,13 @@
 //! Rebuilding: find nodes that look badly split, build the hierarchy below them anew with other splits, keep what is
 //! better.
 //!
-//! Ng & Trifonov 2003, section 5: 'If at some node it appears that a wrong decision has been made so that the two children
-//! are highly imbalance and one is contributing significantly to the overall cost of the hierarchy, a different selection
-//! point can be made and this part of the hierarchy resembling a subtree can be rebuilt.'
+//! Ng & Trifonov 2003, section 5: 'If at some node it appears that a wrong decision has been made so that the two
+//! children are highly imbalance and one is contributing significantly to the overall cost of the hierarchy, a
+//! different selection point can be made and this part of the hierarchy resembling a subtree can be rebuilt.'
 //!
-//! Differs from the paper: nothing is stored at the nodes; the other splits are those of GRASP's randomised construction;
-//! what is rebuilt is led to a local optimum before it is compared, and its nodes once more among all others after, which
-//! makes the whole an iterated local search (Lourenço, Martin & Stützle 2003).
+//! Differs from the paper: nothing is stored at the nodes; the other splits are those of GRASP's randomised
+//! construction; what is rebuilt is led to a local optimum before it is compared, and its nodes once more among all
+//! others after, which makes the whole an iterated local search (Lourenço, Martin & Stützle 2003).
 
 use crate::error::require;
 use crate::grasp::{Candidates, Randomised};

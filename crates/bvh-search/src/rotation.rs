@@ -1,7 +1,7 @@
 //! Tree rotations: let subtrees one and two levels below a node change places, over and over, to a local optimum.
 //!
-//! Kensler 2008, 'Tree rotations for improving bounding volume hierarchies': a child with a grandchild on the other side
-//! (four ways), or two grandchildren of different sides (two ways).
+//! Kensler 2008, 'Tree rotations for improving bounding volume hierarchies': a child with a grandchild on the other
+//! side (four ways), or two grandchildren of different sides (two ways).
 //!
 //! Differs from the paper: hill climbing only; its annealing is [annealing](crate::annealing) on reinsertion moves, of
 //! which every rotation is one or two.
@@ -115,7 +115,8 @@ impl Rotation {
     }
 }
 
-/// The rotation at an inner node that saves most, if one saves anything. The node's own box is the same after all of them.
+/// The rotation at an inner node that saves most, if one saves anything. The node's own box is the same after all of
+/// them.
 #[inline(always)]
 fn best(tree: &Working, top: u32) -> Option<Rotation> {
     let area = |children| tree.union_of(children).half_area();

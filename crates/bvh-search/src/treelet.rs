@@ -1,11 +1,11 @@
 //! Treelet restructuring: give a small part of the tree its optimal shape, over and over, to a local optimum.
 //!
-//! Karras & Aila 2013, 'Fast parallel construction of high-quality bounding volume hierarchies', section 3: a treelet is
-//! grown from its root by opening the leaf of largest area; dynamic programming over the subsets of its leaves finds the
-//! best of all shapes. Domingues & Pedrini 2015 use other sizes.
+//! Karras & Aila 2013, 'Fast parallel construction of high-quality bounding volume hierarchies', section 3: a treelet
+//! is grown from its root by opening the leaf of largest area; dynamic programming over the subsets of its leaves finds
+//! the best of all shapes. Domingues & Pedrini 2015 use other sizes.
 //!
-//! Differs from them: any size from 3 to 12 at every node, bottom-up, until a whole sweep changes nothing; a treelet none
-//! of whose nodes has changed since it was last optimal is not solved again.
+//! Differs from them: any size from 3 to 12 at every node, bottom-up, until a whole sweep changes nothing; a treelet
+//! none of whose nodes has changed since it was last optimal is not solved again.
 
 use crate::error::require;
 use crate::incumbent::{Incumbent, until_still};

@@ -119,8 +119,8 @@ fn a_flat_axis_that_orders_like_no_other_may_have_the_best_split() {
     assert!(cost(&one_by_one) < cost(&in_turns));
 }
 
-/// Between equal boxes the value of a split is linear in the number on the left, so that none is better than those at the
-/// ends of the run; but one may be as good, and more balanced.
+/// Between equal boxes the value of a split is linear in the number on the left, so that none is better than those at
+/// the ends of the run; but one may be as good, and more balanced.
 #[test]
 fn a_tie_may_part_equal_boxes_so_that_merging_them_would_change_the_cost() {
     let (large, small) = (cube([0.0; 3], 4.0), cube([1.0; 3], 2.0));

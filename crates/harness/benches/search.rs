@@ -2,8 +2,8 @@
 //!
 //! `cargo bench -p harness --bench search -- [--seconds 0.1,1,10,60] [--threads 1,2] [--seed N] SCENE...`
 //!
-//! The time is that of the whole call, build and final conversion included. Threads take turns, and every further number
-//! of threads has 0.6 of the first one's time, so that a line should show no less in its later columns.
+//! The time is that of the whole call, build and final conversion included. Threads take turns, and every further
+//! number of threads has 0.6 of the first one's time, so that a line should show no less in its later columns.
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{cost, validate};

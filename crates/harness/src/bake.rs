@@ -83,8 +83,8 @@ impl FromStr for Effort {
     }
 }
 
-/// Searches until the budget is spent or `interrupted` becomes true, and writes the best tree found. Returns what there is
-/// to say. An interruption is an error that says that the file was written all the same.
+/// Searches until the budget is spent or `interrupted` becomes true, and writes the best tree found. Returns what there
+/// is to say. An interruption is an error that says that the file was written all the same.
 pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<String, Error> {
     let scene = Scene::load(&args.scene)?;
     let method = method(args)?;

@@ -5,8 +5,8 @@
 
 use toml::{Table, Value};
 
-/// The key that a spec's error is about, as `methods[1].noise`, if it is about one. `read` gives the error; it is called
-/// once for each key on the way, and each beside them.
+/// The key that a spec's error is about, as `methods[1].noise`, if it is about one. `read` gives the error; it is
+/// called once for each key on the way, and each beside them.
 pub fn find(spec: Table, read: impl Fn(Table) -> Option<String>) -> Option<String> {
     let mut spec = Value::Table(spec);
     let error = read_value(&read, spec.clone())?;
@@ -74,7 +74,8 @@ fn steps(spec: &mut Value, path: &[Step]) -> Vec<Step> {
     }
 }
 
-/// Removes what `step` leads to from the value at `path`; of an array also all that follows, whose order is the reader's.
+/// Removes what `step` leads to from the value at `path`; of an array also all that follows, whose order is the
+/// reader's.
 fn remove(spec: &mut Value, path: &[Step], step: &Step) {
     match (path.iter().try_fold(spec, follow), step) {
         (Some(Value::Table(table)), Step::Key(key)) => drop(table.remove(key)),

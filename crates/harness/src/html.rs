@@ -38,8 +38,8 @@ struct Section {
     provenance: Provenance,
 }
 
-/// Writes a page of all experiments in `results` to `out`. Quick variants are left out where the whole one is there, and
-/// folders without a finished experiment always. Returns the number of experiments.
+/// Writes a page of all experiments in `results` to `out`. Quick variants are left out where the whole one is there,
+/// and folders without a finished experiment always. Returns the number of experiments.
 pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
     let mut names = Vec::new();
     for entry in fs::read_dir(results).map_err(Error::io(results, "read the folder"))? {
@@ -122,9 +122,9 @@ fn page(sections: &[Section]) -> Markup {
             body {
                 h1 { "BVH by stochastic search: results" }
                 p {
-                    "Costs are ratios to the greedy Müller–Fellner tree of the same scene unless a table says otherwise. The \
-                     paper is Ng & Trifonov, Automatic Bounding Volume Hierarchy Generation Using Stochastic Search Methods \
-                     (2003); its scenes are gone, and stand-ins are called stand-ins."
+                    "Costs are ratios to the greedy Müller–Fellner tree of the same scene unless a table says \
+                     otherwise. The paper is Ng & Trifonov, Automatic Bounding Volume Hierarchy Generation Using \
+                     Stochastic Search Methods (2003); its scenes are gone, and stand-ins are called stand-ins."
                 }
                 nav { ul { @for section in sections { li { a href={ "#" (section.name) } { (section.name) } } } } }
                 @for section in sections { (experiment(section)) }
@@ -163,7 +163,8 @@ fn of_the_paper(rows: &[PaperRow]) -> String {
     let count = |begins: &str| theirs.iter().filter(|row| row.verdict.starts_with(begins)).count();
     let (agree, direction) = (count("agrees"), count("same direction"));
     format!(
-        "Numbers of the paper: {}. Ours agree with {agree}; {direction} more are on the same side of the base; {} differ.",
+        "Numbers of the paper: {}. Ours agree with {agree}; {direction} more are on the same side of the base; {} \
+         differ.",
         theirs.len(),
         theirs.len() - agree - direction,
     )

@@ -53,8 +53,8 @@ impl Lines {
     }
 }
 
-/// Inspects a file. Returns what there is to say, a line per fact, `what: value`. Refuses a file that is damaged, or for
-/// another scene than the one named.
+/// Inspects a file. Returns what there is to say, a line per fact, `what: value`. Refuses a file that is damaged, or
+/// for another scene than the one named.
 pub fn inspect(args: &InspectArgs) -> Result<String, Error> {
     let bytes = tree_file::read(&args.file)?;
     let file = tree_file::open(&args.file, &bytes)?;

@@ -37,8 +37,8 @@ pub(crate) fn base_cost(scene: &Scene, objective: &Objective) -> Result<f64, Err
     Ok(objective.cost(&muller_fellner::Config::default().build(&scene.boxes).map_err(refused)?))
 }
 
-/// What is proven of the scene's internal area: the exact optimum where gaps are measured from it, else a lower bound if
-/// the experiment asks for one.
+/// What is proven of the scene's internal area: the exact optimum where gaps are measured from it, else a lower bound
+/// if the experiment asks for one.
 fn bound(experiment: &Experiment, scene: &Scene) -> Result<Option<BoundRow>, Error> {
     let refused =
         |source| Error::Search { scene: scene.name.clone(), method: "the lower bound".into(), source };

@@ -230,8 +230,8 @@ pub struct BoundRow {
     pub lower_bound: f64,
 }
 
-/// One row of `best_known.csv` and `references.csv`: what gaps are measured from, for one scene and objective. Only binary
-/// trees with one object per leaf count.
+/// One row of `best_known.csv` and `references.csv`: what gaps are measured from, for one scene and objective. Only
+/// binary trees with one object per leaf count.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceRow {
     /// Name of the scene.

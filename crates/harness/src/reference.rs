@@ -2,8 +2,8 @@
 //!
 //! `best_known.csv` in the results folder has one row per scene and objective, improved at the end of every experiment
 //! that beats it. Reports that measure gaps read `references.csv` in the experiment's own folder: the rows as they were
-//! then. So later finds change no gap that was written; `--check` begins with the recorded references in place of the best
-//! known ones, and `--redraw` brings them, and the gaps, up to date.
+//! then. So later finds change no gap that was written; `--check` begins with the recorded references in place of the
+//! best known ones, and `--redraw` brings them, and the gaps, up to date.
 //!
 //! Only binary trees with one object per leaf count: wider nodes and leaves would make every cost beatable.
 
@@ -92,7 +92,8 @@ fn is_of(row: &ReferenceRow, scene: &LoadedScene) -> bool {
     row.scene == scene.name && row.objects == scene.objects && row.checksum == scene.checksum
 }
 
-/// What one run found, under its objective and under those that are columns of every run. `bound` is of the internal area.
+/// What one run found, under its objective and under those that are columns of every run. `bound` is of the internal
+/// area.
 fn finds(
     scene: &LoadedScene,
     objective: &Objective,

@@ -173,8 +173,8 @@ fn known_scenes() -> String {
     let names = standin::STAND_INS.iter().map(|scene| scene.name);
     let names = names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name));
     format!(
-        "accepted: {}, the path of an OBJ file, a case of the suite with a number of objects such as S34:20000, or either of the others with `:COUNT`, `:random:COUNT:SEED` or \
-         `:cluster:COUNT:SEED` for a subset",
+        "accepted: {}, the path of an OBJ file, a case of the suite with a number of objects such as S34:20000, or \
+         either of the others with `:COUNT`, `:random:COUNT:SEED` or `:cluster:COUNT:SEED` for a subset",
         names.collect::<Vec<_>>().join(", ")
     )
 }

@@ -1,8 +1,8 @@
 //! The folder of one experiment's results: one writer at a time, finished runs kept one by one, files replaced whole.
 //!
 //! While runs go on, each finished one is a folder `.partial/NNNNNN/` with the rows of its own, written under
-//! another name, synced, and renamed: after a crash, a full disk or `kill -9` every finished run is there. When all are,
-//! their rows are joined in the order of the spec, so the bytes do not depend on the order of finishing.
+//! another name, synced, and renamed: after a crash, a full disk or `kill -9` every finished run is there. When all
+//! are, their rows are joined in the order of the spec, so the bytes do not depend on the order of finishing.
 
 use crate::Error;
 use crate::record::{Row, to_bytes};

@@ -1,4 +1,5 @@
-//! Experiments that outgrow one machine: which runs a part has, and joining the parts into what one machine would write.
+//! Experiments that outgrow one machine: which runs a part has, and joining the parts into what one machine would
+//! write.
 
 use crate::Error;
 use crate::execute::{Resolved, conclude};

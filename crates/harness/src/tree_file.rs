@@ -8,8 +8,8 @@ use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// The tree over `boxes` in the file at `path`: refuses one that is damaged, or saved for another scene, and one that is
-/// not [valid](validate) over these boxes.
+/// The tree over `boxes` in the file at `path`: refuses one that is damaged, or saved for another scene, and one that
+/// is not [valid](validate) over these boxes.
 pub fn load_tree(path: &Path, boxes: &[Aabb]) -> Result<Bvh, Error> {
     let bytes = read(path)?;
     let refused = |source| Error::TreeFile { path: path.to_owned(), source };

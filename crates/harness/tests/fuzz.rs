@@ -1,7 +1,7 @@
 //! The fuzz targets on a stable compiler: the kept inputs, and as many mutations of them as time allows.
 //!
-//! `FUZZ_SECONDS=600 cargo test -p harness --test fuzz NAME` goes on for longer, each time with other mutations. An input
-//! that breaks a promise is printed; kept under `fuzz/corpus/NAME` it becomes a test for ever.
+//! `FUZZ_SECONDS=600 cargo test -p harness --test fuzz NAME` goes on for longer, each time with other mutations. An
+//! input that breaks a promise is printed; kept under `fuzz/corpus/NAME` it becomes a test for ever.
 
 #[path = "../fuzz/src/lib.rs"]
 mod targets;
@@ -21,7 +21,8 @@ fn files(folder: &Path) -> Vec<Vec<u8>> {
     paths.into_iter().filter(|path| path.is_file()).map(|path| fs::read(path).unwrap()).collect()
 }
 
-/// One to eight changes: bits, bytes, words that matter, numbers, and pieces cut, repeated, or taken from another input.
+/// One to eight changes: bits, bytes, words that matter, numbers, and pieces cut, repeated, or taken from another
+/// input.
 fn mutated(inputs: &[Vec<u8>], rng: &mut Stream) -> Vec<u8> {
     const WORDS: [u32; 10] =
         [0, 1, 1 << 31, u32::MAX, 0x7f80_0000, 0xff80_0000, 0x7fc0_0000, 0x7f7f_ffff, 0xff7f_ffff, 0x3f80_0000];

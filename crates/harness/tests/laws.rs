@@ -130,7 +130,10 @@ proptest! {
     #[test]
     fn a_reflection_keeps_the_cost_of_sorted_division(
         // Within a few exponents, so that no large box hides the differences of small ones.
-        corners in prop::collection::vec([0.5f32..8.0, 0.5f32..8.0, 0.5f32..8.0, 0.01f32..1.0, 0.01f32..1.0, 0.01f32..1.0], 16),
+        corners in prop::collection::vec(
+            [0.5f32..8.0, 0.5f32..8.0, 0.5f32..8.0, 0.01f32..1.0, 0.01f32..1.0, 0.01f32..1.0],
+            16,
+        ),
         axis in 0usize..3, k in -100i32..100,
     ) {
         let scale = libm::exp2(k.into()) as f32;

@@ -1,9 +1,9 @@
 //! Traversal of a KD-tree, with the answers of testing every object.
 //!
-//! A ray's interval in a cell is computed as a [`Slabs`] interval is, by the same operations, and only ever cut by split
-//! planes. So if an object's box lies on one side of a plane, its interval lies in that side's; if it reaches into both,
-//! so does the object's name, and the two intervals overlap: the cell in which a hit is found is never skipped. A hit
-//! outside the cell at hand is a hit all the same; cells that begin behind it are skipped.
+//! A ray's interval in a cell is computed as a [`Slabs`] interval is, by the same operations, and only ever cut by
+//! split planes. So if an object's box lies on one side of a plane, its interval lies in that side's; if it reaches
+//! into both, so does the object's name, and the two intervals overlap: the cell in which a hit is found is never
+//! skipped. A hit outside the cell at hand is a hit all the same; cells that begin behind it are skipped.
 
 use super::{Cell, KdTree};
 use bvh_core::{Counter, Hit, Ray, Slabs};
@@ -58,8 +58,8 @@ impl KdTree {
         found
     }
 
-    /// Hands the objects of leaves that the ray may meet to `leaf`, the nearest first, until it breaks. `leaf` may lower
-    /// the distance from which on cells are skipped.
+    /// Hands the objects of leaves that the ray may meet to `leaf`, the nearest first, until it breaks. `leaf` may
+    /// lower the distance from which on cells are skipped.
     #[inline(always)]
     fn walk<C: Counter>(
         &self,

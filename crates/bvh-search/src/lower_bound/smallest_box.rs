@@ -147,8 +147,8 @@ impl Scene {
         Grouped { from, groups: groups.iter().map(end).zip(areas.iter().copied()).collect() }
     }
 
-    /// At most the half area of every box that contains an object of the part `seed` and weighs at least `weight`, which must
-    /// not be more than all objects do; exactly the least such area for a single object and enough effort.
+    /// At most the half area of every box that contains an object of the part `seed` and weighs at least `weight`,
+    /// which must not be more than all objects do; exactly the least such area for a single object and enough effort.
     pub fn smallest_box(&self, seed: usize, weight: u64, effort: u32) -> f64 {
         search(self, seed, weight, effort)
     }

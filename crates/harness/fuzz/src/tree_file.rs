@@ -22,7 +22,8 @@ pub fn tree_file(bytes: &[u8]) {
         }
     }
     let (lines, len) = (held.len(), flat.len());
-    // SAFETY: `Line` is an array of bytes, so `lines` of them are 64 times as many initialised bytes, and `len` is no more.
+    // SAFETY: `Line` is an array of bytes, so `lines` of them are 64 times as many initialised bytes, and `len` is no
+    // more.
     let aligned = unsafe { std::slice::from_raw_parts(held.as_ptr().cast::<u8>(), lines * 64) };
     opened(&aligned[..len]);
     let _ = TreeFile::open(&flat).map(|file| (file.view().is_ok(), file.wide_view().is_ok()));

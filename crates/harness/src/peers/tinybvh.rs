@@ -75,7 +75,8 @@ fn binary(vertices: &[[f32; 4]]) -> Result<bvh::BVH<'_>, String> {
     bvh::BVH::new(vertices.into()).map_err(|error| error.to_string())
 }
 
-/// A ray with the room behind it that the C++ library takes to be part of it: its type has 128 bytes, that of the wrapper
+/// A ray with the room behind it that the C++ library takes to be part of it: its type has 128 bytes, that of the
+/// wrapper
 /// 64. The wrapper's constructor writes beyond these, and is not used for that reason.
 #[repr(C, align(64))]
 struct Padded {

@@ -155,7 +155,8 @@ fn summary(args: &Args, scene: &Scene, film: &Film, rays_per_pixel: u32, built: 
         let per_ray = |tests: u64| tests as f64 / film.rays as f64;
         let heat::Range { min, median, max, .. } = heat::range(film, rays_per_pixel);
         text += &format!(
-            "per ray: {:.2} boxes, {:.2} objects; per pixel: at least {min:.0} tests, median {median:.0}, at most {max:.0}\n",
+            "per ray: {:.2} boxes, {:.2} objects; per pixel: at least {min:.0} tests, median {median:.0}, at most \
+             {max:.0}\n",
             per_ray(film.counts.boxes),
             per_ray(film.counts.objects),
         );

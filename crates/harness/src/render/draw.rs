@@ -22,7 +22,8 @@ pub struct Options {
     pub depth: u32,
     /// Where the camera is; where it frames the scene best if not given.
     pub view: Option<View>,
-    /// Replace the lights that fit the view, if given. None at all: no shadow ray is sent, and light comes from the eye.
+    /// Replace the lights that fit the view, if given. None at all: no shadow ray is sent, and light comes from the
+    /// eye.
     pub lights: Option<Vec<DVec3>>,
     /// Whether there is a ground below the scene, where it is seen from outside.
     pub ground: bool,

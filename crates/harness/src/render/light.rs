@@ -166,8 +166,8 @@ impl<'a> World<'a> {
         }
     }
 
-    /// A point in front of the surface, from which a ray does not meet it again: rounding moves a hit by some units in the
-    /// last place of the largest number at hand, this by a few dozen.
+    /// A point in front of the surface, from which a ray does not meet it again: rounding moves a hit by some units in
+    /// the last place of the largest number at hand, this by a few dozen.
     fn lifted(&self, surface: &Surface, seen_from: DVec3) -> DVec3 {
         let size = surface.point.abs().max(seen_from.abs()).max_element();
         surface.point + surface.normal * (size * (64.0 * f64::from(f32::EPSILON)))

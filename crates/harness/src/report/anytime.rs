@@ -76,8 +76,8 @@ impl Config {
     fn figure(&self, panels: Vec<Panel>) -> Figure {
         Figure {
             title: format!("{}: {}", self.source, self.title),
-            caption: "Cost of the incumbent over the best known cost of the scene, minus 1: median and quartiles over repetitions. \
-                      Points are builders. A curve falls through the floor where it is the best known."
+            caption: "Cost of the incumbent over the best known cost of the scene, minus 1: median and quartiles over \
+                      repetitions. Points are builders. A curve falls through the floor where it is the best known."
                 .into(),
             columns: 2,
             panels,

@@ -1,4 +1,5 @@
-//! The fraction of all pairs of scene and target that runs have solved within some time: one curve per method over everything.
+//! The fraction of all pairs of scene and target that runs have solved within some time: one curve per method over
+//! everything.
 //!
 //! The aggregated empirical cumulative distribution of run times of Hansen et al. 2021 ('COCO').
 

@@ -118,8 +118,8 @@ impl Config {
         let high = finals.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let average = pool.iter().sum::<f64>() / pool.len() as f64;
         output.text += &format!(
-            "{}: {}\n{shown}: final cost {middle:.2} ({low:.2} to {high:.2} over {} runs), {:.3} of the average order's \
-             {average:.2}, {:.3} of Müller–Fellner's {base:.2}\n\n",
+            "{}: {}\n{shown}: final cost {middle:.2} ({low:.2} to {high:.2} over {} runs), {:.3} of the average \
+             order's {average:.2}, {:.3} of Müller–Fellner's {base:.2}\n\n",
             self.source,
             self.title,
             finals.len(),

@@ -1,4 +1,5 @@
-//! The numbers behind the figures: medians and quartiles of costs and gaps, primal integrals, and the lower bound beside them.
+//! The numbers behind the figures: medians and quartiles of costs and gaps, primal integrals, and the lower bound
+//! beside them.
 
 use super::progress::{Along, longest, series};
 use super::statistics::{median, primal_integral, quantile};
@@ -139,8 +140,8 @@ impl Config {
             ]);
         }
         format!(
-            "{}\nGaps are to the exact optimum or the best known cost, the bound is relative to that; the primal integral is the \
-             mean gap over the longest run's time:\n{table}\n",
+            "{}\nGaps are to the exact optimum or the best known cost, the bound is relative to that; the primal \
+             integral is the mean gap over the longest run's time:\n{table}\n",
             self.title
         )
     }

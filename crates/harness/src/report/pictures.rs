@@ -1,4 +1,5 @@
-//! The second document's table: one picture by brute force, by a KD-tree and by trees; tests, and apart from them seconds.
+//! The second document's table: one picture by brute force, by a KD-tree and by trees; tests, and apart from them
+//! seconds.
 
 use super::statistics::median;
 use super::{Output, Rows, text_table};

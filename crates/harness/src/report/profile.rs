@@ -1,4 +1,5 @@
-//! Performance profiles (Dolan & Moré 2002): on what fraction of the problems a method is within a factor of the fastest.
+//! Performance profiles (Dolan & Moré 2002): on what fraction of the problems a method is within a factor of the
+//! fastest.
 
 use super::progress::{Along, median_reached, series};
 use super::target::Target;
@@ -92,8 +93,8 @@ impl Config {
         Figure {
             title: format!("{}: {}", self.source, self.title),
             caption: format!(
-                "On what fraction of {problems} problems the median run is within a factor of the fastest method's. A problem \
-                 is a scene with a target: {}.",
+                "On what fraction of {problems} problems the median run is within a factor of the fastest method's. A \
+                 problem is a scene with a target: {}.",
                 targets.join(", ")
             ),
             columns: 1,

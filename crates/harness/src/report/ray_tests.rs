@@ -138,9 +138,10 @@ impl Config {
         };
         Figure {
             title: format!("{}: {}", self.source, self.title),
-            caption: "Mean number of tests against boxes, whiskers the 95 % interval; of several runs the one of median \
-                      tests. The paper's rays start inside and end at any hit."
-                .into(),
+            caption:
+                "Mean number of tests against boxes, whiskers the 95 % interval; of several runs the one of \
+                 median tests. The paper's rays start inside and end at any hit."
+                    .into(),
             columns: 2,
             panels: rows.scenes().into_iter().map(panel).collect(),
             looks: vec![(PAPER.into(), Look::Reference)],

@@ -26,7 +26,8 @@ pub struct Config {
     pub targets: Vec<Target>,
 }
 
-/// One step of a distribution, as written to `timing_run_times.csv`, `run_times_evaluations.csv` and `run_times_work.csv`.
+/// One step of a distribution, as written to `timing_run_times.csv`, `run_times_evaluations.csv` and
+/// `run_times_work.csv`.
 #[derive(Serialize)]
 struct Step<'a> {
     scene: &'a str,
@@ -37,7 +38,8 @@ struct Step<'a> {
     solved_fraction: f64,
 }
 
-/// One fit, as written to `timing_run_times_fit.csv` and so on; shift, mean and median are in the unit of the file's axis.
+/// One fit, as written to `timing_run_times_fit.csv` and so on; shift, mean and median are in the unit of the file's
+/// axis.
 #[derive(Serialize)]
 struct Fit<'a> {
     scene: &'a str,
@@ -117,8 +119,8 @@ impl Config {
         looks.push((FIT.into(), Look::Reference));
         let scenes: Vec<String> = rows.scenes().into_iter().map(|(scene, _)| rows.shown(scene)).collect();
         let caption = format!(
-            "{}. Fraction of runs with an incumbent at or below the target. A curve ends where the longest run did; a method \
-             without one never got there. Dashed black: time-to-target fits.",
+            "{}. Fraction of runs with an incumbent at or below the target. A curve ends where the longest run did; a \
+             method without one never got there. Dashed black: time-to-target fits.",
             scenes.join(", ")
         );
         Figure { title: format!("{}: {}", self.source, self.title), caption, columns: 2, panels, looks }

@@ -43,7 +43,8 @@ struct Row<'a> {
     statistic: f64,
     p_value: f64,
     holm_p_value: f64,
-    /// How likely a run of the method ends below one of the other, ties counting a half; across scenes, its mean over them.
+    /// How likely a run of the method ends below one of the other, ties counting a half; across scenes, its mean over
+    /// them.
     a12: f64,
     /// `lower` or `higher` cost than the other's if the corrected p-value is below the level, else `not different`.
     verdict: &'static str,

@@ -52,8 +52,8 @@ pub fn expected_best_of(pool: &[f64], m: usize) -> Option<f64> {
 }
 
 /// The primal integral (Berthold 2013) up to `horizon`, divided by it: the mean over that time of the primal gap
-/// |cost − reference| / max(cost, reference), which is 1 before the first incumbent. `incumbents` are times and costs, both
-/// ascending in time. 0 is the reference at once, 1 is nothing at all. `None` unless the horizon is above 0.
+/// |cost − reference| / max(cost, reference), which is 1 before the first incumbent. `incumbents` are times and costs,
+/// both ascending in time. 0 is the reference at once, 1 is nothing at all. `None` unless the horizon is above 0.
 pub fn primal_integral(incumbents: &[(f64, f64)], reference: f64, horizon: f64) -> Option<f64> {
     let gap = |cost: f64| {
         let greater = cost.max(reference);

@@ -56,7 +56,8 @@ fn reading(speeds: &[Speed], ranks: &[Rank]) -> String {
     let layouts: Vec<String> = layouts.iter().filter_map(of).collect();
     let correlation = quantile(&ranks.iter().filter_map(|rank| rank.spearman).collect::<Vec<_>>(), 0.5);
     let correlation = correlation.map_or_else(String::new, |median| {
-        format!(" Rank correlation of cost and time per ray over trees: {median:.2} (median over scenes, layouts and rays).")
+        format!(" Rank correlation of cost and time per ray over trees: {median:.2} (median over scenes, layouts and \
+                 rays).")
     });
     format!("Million rays per second: {}.{correlation}", layouts.join(", "))
 }
@@ -141,8 +142,8 @@ impl Config {
         let figure = Figure {
             title: format!("{}: {}", self.source, self.title),
             caption:
-                "One point per tree; one thread, the fastest of several turns. Cost is the total area of inner nodes over \
-                      that of the greedy tree."
+                "One point per tree; one thread, the fastest of several turns. Cost is the total area of inner nodes \
+                 over that of the greedy tree."
                     .into(),
             columns: 2,
             panels,

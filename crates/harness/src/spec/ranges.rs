@@ -21,7 +21,8 @@ const fn from_one_to(most: f64) -> Range {
     (Included(1.0), Included(most))
 }
 
-/// Keys without indices, with their range. Of a table whose keys are names, or of an array, the key stands for all in it.
+/// Keys without indices, with their range. Of a table whose keys are names, or of an array, the key stands for all in
+/// it.
 const RANGES: &[(&str, Range)] = &[
     ("seed", NOT_NEGATIVE),
     ("repetitions", SOME),

@@ -1,7 +1,7 @@
 //! Stand-in for escher: staircases that interlock under three directions of gravity.
 //!
-//! After the print 'Relativity'. Each gravity has its own flights, landings, arcade and balustrades in one room; the flights
-//! differ in length, place and bearing, so that no symmetry of the axes decides a split. Walls and
+//! After the print 'Relativity'. Each gravity has its own flights, landings, arcade and balustrades in one room; the
+//! flights differ in length, place and bearing, so that no symmetry of the axes decides a split. Walls and
 //! floors are a few large polygons. World units are chosen so that the greedy MF tree costs about
 //! 4.8e5, as the original's did.
 

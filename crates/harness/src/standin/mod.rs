@@ -1,7 +1,8 @@
 //! The built-in scenes: stand-ins for the paper's five originals, and spheres for ray tracing.
 //!
-//! The originals are no longer distributed. The stand-ins have the originals' sizes and character, not their triangles: compare ratios to the greedy
-//! tree's cost, never absolute costs. Every generator is deterministic to the bit on every machine.
+//! The originals are no longer distributed. The stand-ins have the originals' sizes and character, not their triangles:
+//! compare ratios to the greedy tree's cost, never absolute costs. Every generator is deterministic to the bit on every
+//! machine.
 
 pub mod bijou;
 pub mod cloister;

@@ -1,4 +1,5 @@
-//! What the cases ask that is not a scene to be built: rays that are none, files, budgets, threads, edges of parameters.
+//! What the cases ask that is not a scene to be built: rays that are none, files, budgets, threads, edges of
+//! parameters.
 
 use super::examine::{ROUNDING, check_outcome, check_scale, run};
 use super::{Verdict, is_builder, scenes, tracing};

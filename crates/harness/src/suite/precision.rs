@@ -283,9 +283,9 @@ fn figure(rows: &[Row], timing: &[Timing]) -> Figure {
     let time = |kind| own_time(kind).map(|row| row.nanoseconds_per_object / 1000.0).collect();
     Figure {
         title: "What f32 areas cost: Müller–Fellner's choices against exact arithmetic".into(),
-        caption: "Stiff scenes of the suite. Above, how often the chosen split is not the best one, at the nodes of the \
-                  exact tree; then the cost of the whole tree over the exact one's; below, the time of one plain sweep, \
-                  the same code for both."
+        caption: "Stiff scenes of the suite. Above, how often the chosen split is not the best one, at the nodes of \
+                  the exact tree; then the cost of the whole tree over the exact one's; below, the time of one plain \
+                  sweep, the same code for both."
             .into(),
         columns: 1,
         panels: vec![

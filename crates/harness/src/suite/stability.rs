@@ -228,9 +228,10 @@ fn report(store: &Store) -> Result<String, Error> {
     let cells = scenes.iter().flat_map(|scene| columns.iter().map(move |column| cell(scene, column))).collect();
     let map = HeatMap {
         title: "Stiff and extreme cases".into(),
-        caption: "Every case with all that can be asked: methods, traversals, readers, and other libraries. Numbers are \
-                  depths of trees; where a promise was broken, which. Grey: not asked."
-            .into(),
+        caption:
+            "Every case with all that can be asked: methods, traversals, readers, and other libraries. Numbers \
+             are depths of trees; where a promise was broken, which. Grey: not asked."
+                .into(),
         row_label: "case".into(),
         column_label: String::new(),
         rows: scenes,

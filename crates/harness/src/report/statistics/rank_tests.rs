@@ -1,8 +1,9 @@
 //! Tests of whether one method is really better than another: by ranks, so that no distribution is assumed.
 //!
-//! P values are two-sided: twice the smaller tail, at most 1. For samples of up to [`MOST_EXACT`] values they are exact,
-//! given the ranks, ties included: every assignment of the ranks is counted, by dynamic programming over their sums. Larger
-//! samples use the normal approximation with the variance corrected for ties and the statistic for continuity.
+//! P values are two-sided: twice the smaller tail, at most 1. For samples of up to [`MOST_EXACT`] values they are
+//! exact, given the ranks, ties included: every assignment of the ranks is counted, by dynamic programming over their
+//! sums. Larger samples use the normal approximation with the variance corrected for ties and the statistic for
+//! continuity.
 
 use super::ranks;
 
@@ -19,7 +20,8 @@ pub struct Test {
     pub p_value: f64,
 }
 
-/// Wilcoxon's signed-rank test (Wilcoxon 1945) of paired differences; those of 0 are left out. `None` if no others are left.
+/// Wilcoxon's signed-rank test (Wilcoxon 1945) of paired differences; those of 0 are left out. `None` if no others are
+/// left.
 pub fn wilcoxon_signed_rank(differences: &[f64]) -> Option<Test> {
     let differences: Vec<f64> = differences.iter().copied().filter(|&difference| difference != 0.0).collect();
     (!differences.is_empty()).then(|| signed_ranks(&differences, differences.len() <= MOST_EXACT))
@@ -60,14 +62,15 @@ fn rank_sum(first: &[f64], second: &[f64], exact: bool) -> Test {
     Test { statistic, p_value }
 }
 
-/// The effect size A₁₂ (Vargha & Delaney 2000): how likely a value of the first sample is greater than one of the second,
-/// ties counting a half. 0.5 is no difference. `None` if either is empty.
+/// The effect size A₁₂ (Vargha & Delaney 2000): how likely a value of the first sample is greater than one of the
+/// second, ties counting a half. 0.5 is no difference. `None` if either is empty.
 pub fn a12(first: &[f64], second: &[f64]) -> Option<f64> {
     let pairs = (first.len() * second.len()) as f64;
     mann_whitney(first, second).map(|test| test.statistic / pairs)
 }
 
-/// P values of tests made together, corrected so that all of those below α are right with probability 1 − α (Holm 1979).
+/// P values of tests made together, corrected so that all of those below α are right with probability 1 − α (Holm
+/// 1979).
 pub fn holm(p_values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p_values.len()).collect();
     order.sort_by(|&a, &b| p_values[a].total_cmp(&p_values[b]));
@@ -130,8 +133,8 @@ mod tests {
     #[test]
     #[allow(clippy::approx_constant, reason = "3.14 is a measurement here")]
     fn the_worked_examples_of_hollander_and_wolfe_come_out() {
-        // Hollander & Wolfe 1973, depression scale before and after (p. 29) and permeability of membranes (p. 69), as in
-        // the manual of R's wilcox.test: one-sided p-values 0.01953 and 0.1272.
+        // Hollander & Wolfe 1973, depression scale before and after (p. 29) and permeability of membranes (p. 69), as
+        // in the manual of R's wilcox.test: one-sided p-values 0.01953 and 0.1272.
         let before = [1.83, 0.50, 1.62, 2.48, 1.68, 1.88, 1.55, 3.06, 1.30];
         let after = [0.878, 0.647, 0.598, 2.05, 1.06, 1.29, 1.06, 3.14, 1.29];
         let differences: Vec<f64> = before.iter().zip(after).map(|(before, after)| before - after).collect();

@@ -1,7 +1,7 @@
 //! The shifted exponential distribution of the time that a randomised search takes to reach a target.
 //!
-//! Aiex, Resende & Ribeiro 2007, 'TTT plots: a perl program to create time-to-target plots'; Hoos & Stützle 1998 for runs
-//! that never reach it.
+//! Aiex, Resende & Ribeiro 2007, 'TTT plots: a perl program to create time-to-target plots'; Hoos & Stützle 1998 for
+//! runs that never reach it.
 
 /// P(solved within t) = 1 − exp(−(t − shift) / mean) from `shift` on, both in the unit of the times.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,8 +13,8 @@ pub struct ShiftedExponential {
 }
 
 impl ShiftedExponential {
-    /// Fitted, as in the source, to the quartiles of the times of `runs` runs of which some were `solved`, in any order:
-    /// robust against outliers, and possible as long as three quarters were solved. `None` otherwise, or if the
+    /// Fitted, as in the source, to the quartiles of the times of `runs` runs of which some were `solved`, in any
+    /// order: robust against outliers, and possible as long as three quarters were solved. `None` otherwise, or if the
     /// quartiles are equal.
     pub fn fit(solved: &[f64], runs: usize) -> Option<Self> {
         let mut sorted = solved.to_vec();
