@@ -50,6 +50,9 @@ pub const FETCHED: [(&str, &str); 2] = [("sponza", "bvh"), ("kitchen", "obvhs")]
 /// The second document's sphere scenes: name and number of spheres.
 pub const SPHERES: [(&str, usize); 3] = [("spheres75", 75), ("spheres750", 750), ("spheres7500", 7500)];
 
+/// Most objects of a case of the suite: ten gigabytes of them, their boxes and a tree.
+const MOST_OF_SUITE: usize = 100_000_000;
+
 impl Scene {
     /// Loads a scene by the name or path that a spec or `--scene` gives, or the [`Part`] of it that the name ends with.
     pub fn load(name: &str) -> Result<Self, Error> {
@@ -96,9 +99,11 @@ impl Scene {
     /// The scene of a case of the suite, made of so many objects, or about so many where others make no such scene.
     fn of_suite(case: &str, name: &str, objects: usize) -> Result<Self, Error> {
         let scene = examine::case(case).and_then(suite::Case::scene);
+        let scene = scene.filter(|_| (1..=MOST_OF_SUITE).contains(&objects));
         match scene.map_or(vec![], |case| (case.scene)(objects)) {
             none if none.is_empty() => {
-                Err(Error::Scene { name: name.into(), message: "a scene has 1 object or more".into() })
+                let message = format!("a case of the suite has 1 to {MOST_OF_SUITE} objects");
+                Err(Error::Scene { name: name.into(), message })
             }
             some => {
                 let corners = some.iter().map(|triangle| triangle.0).collect();
@@ -204,6 +209,15 @@ mod tests {
         assert!((1..30).all(|i| scene.boxes[i] != scene.boxes[i - 1]));
         for wrong in ["spheres75:0", "spheres75:76"] {
             assert!(Scene::load(wrong).unwrap_err().to_string().contains("1 to 75"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_case_of_the_suite_has_no_more_objects_than_memory_has_room_for() {
+        assert_eq!(Scene::load("S34:50").unwrap().boxes.len(), 50);
+        for wrong in ["S34:0", "S34:100000001", "S34:18446744073709551615"] {
+            let message = Scene::load(wrong).unwrap_err().to_string();
+            assert!(message.contains(wrong) && message.contains("1 to 100000000"), "{message}");
         }
     }
 

@@ -105,6 +105,11 @@ fn join(name: &str, parts: &[Part], out: &Path) -> Result<String, Error> {
     }
     let resolved: Resolved = toml::from_str(&first.resolved)
         .map_err(|error| fail(format!("{}/resolved.toml: {error}", first.partial.display())))?;
+    // Somebody may have edited it: no more runs are looked for than a spec could ask for.
+    resolved
+        .experiment
+        .check_runs()
+        .map_err(|message| fail(format!("{}/resolved.toml: {message}", first.partial.display())))?;
     let of_scene: Vec<_> = resolved.experiment.runs().collect();
     let runs = of_scene.len() * resolved.scenes.len();
     let named = |index: usize| {

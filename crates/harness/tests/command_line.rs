@@ -239,6 +239,11 @@ fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_di
     );
     refused(&["merge", "one", "two", "three", "--out", "merged"], 1, &["different specs"]);
     refused(&["merge", "one", "--out", "one"], 2, &["--out one"]);
+
+    let resolved = folder.path().join("one/spec/.partial/resolved.toml");
+    let edited = fs::read_to_string(&resolved).unwrap().replace("repetitions = 3", "repetitions = 4294967295");
+    fs::write(&resolved, edited).unwrap();
+    refused(&["merge", "one", "--out", "merged"], 1, &["one/spec/.partial/resolved.toml: ", "runs; accepted"]);
 }
 
 #[test]

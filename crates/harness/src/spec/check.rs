@@ -36,7 +36,7 @@ impl Experiment {
     }
 
     /// That there are some, and not too many.
-    fn check_runs(&self) -> Result<(), String> {
+    pub(crate) fn check_runs(&self) -> Result<(), String> {
         let scenes = self.scenes.iter().map(|name| part::names(name)).fold(0, u64::saturating_add);
         let runs =
             [self.methods.len() as u64, self.repetitions.into()].into_iter().fold(scenes, u64::saturating_mul);

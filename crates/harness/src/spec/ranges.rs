@@ -26,7 +26,8 @@ const fn from_one_to(most: f64) -> Range {
 const RANGES: &[(&str, Range)] = &[
     ("seed", NOT_NEGATIVE),
     ("repetitions", SOME),
-    ("threads", SOME),
+    // As --jobs.
+    ("threads", from_one_to(1024.0)),
     ("lower_bound", NOT_NEGATIVE),
     ("budget", NOT_NEGATIVE),
     ("objective.sah", NOT_NEGATIVE),
