@@ -2,9 +2,9 @@
 
 use super::progress::{Along, Series, series};
 use super::statistics::quantile;
-use super::{Output, Rows, text_table};
+use super::{Output, Rows, looks, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Look, Panel};
+use crate::chart::{Axis, Figure, Layer, Panel};
 use serde::{Deserialize, Serialize};
 
 /// Error against run time.
@@ -81,7 +81,7 @@ impl Config {
                 .into(),
             columns: 2,
             panels,
-            looks: self.methods.iter().cloned().zip((0..).map(Look::Slot)).collect(),
+            looks: looks(&self.methods),
         }
     }
 

@@ -5,9 +5,9 @@
 
 use super::progress::{Along, longest, reached, series};
 use super::target::Target;
-use super::{Output, Rows, text_table};
+use super::{Output, Rows, looks, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Look, Panel};
+use crate::chart::{Axis, Figure, Layer, Panel};
 use serde::{Deserialize, Serialize};
 
 /// The aggregate distribution of run times.
@@ -91,7 +91,7 @@ impl Config {
             ),
             columns: 1,
             panels: vec![panel],
-            looks: self.methods.iter().cloned().zip((0..).map(Look::Slot)).collect(),
+            looks: looks(&self.methods),
         }
     }
 }

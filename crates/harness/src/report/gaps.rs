@@ -1,9 +1,9 @@
 //! How far from the exact optimum every method ends on small scenes, and how tight the lower bound is there.
 
 use super::statistics::quantile;
-use super::{Output, Rows, text_table};
+use super::{Output, Rows, looks, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Look, Panel};
+use crate::chart::{Axis, Figure, Layer, Panel};
 use crate::record::to_bytes;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -101,7 +101,7 @@ impl Config {
         );
         let mut panels = self.panels(&summaries);
         panels.extend(bound_panels(&tightness));
-        let looks = self.methods.iter().cloned().zip((0..).map(Look::Slot)).collect();
+        let looks = looks(&self.methods);
         let figure = Figure { title: self.title.clone(), caption, columns: 2, panels, looks };
         let mut csv = vec![("gaps".into(), to_bytes(&summaries, Path::new("gaps.csv"))?)];
         if !tightness.is_empty() {

@@ -226,6 +226,11 @@ impl Rows {
         self.runs.iter().filter(move |run| run.scene == scene && run.method == method)
     }
 
+    /// The seconds of the runs of one method on one scene.
+    pub fn seconds_of(&self, scene: &str, method: &str) -> impl Iterator<Item = f64> {
+        self.timing.iter().filter(move |row| row.scene == scene && row.method == method).map(|row| row.seconds)
+    }
+
     /// The costs of one method's trials on one scene over base, one list per repetition, in order.
     pub fn trials_over_base(&self, scene: &str, method: &str) -> Vec<Vec<f64>> {
         let base = self.base_cost(scene);
@@ -297,6 +302,11 @@ pub fn verdict(paper: f64, ours: f64, tolerance: f64) -> String {
         (false, false) => format!("same direction, {relation}"),
         (false, true) => format!("differs, {relation}"),
     }
+}
+
+/// Every method with a look of its own, the same in all panels.
+fn looks(methods: &[String]) -> Vec<(String, chart::Look)> {
+    methods.iter().cloned().zip((0..).map(chart::Look::Slot)).collect()
 }
 
 /// An empty table for the terminal.

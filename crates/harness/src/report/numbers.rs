@@ -98,8 +98,7 @@ impl Config {
                     primal_integral_evaluations: evaluations,
                     primal_integral_work: work,
                 });
-                let own = rows.timing.iter().filter(|row| row.scene == scene && row.method == *method);
-                let seconds: Vec<f64> = own.map(|row| row.seconds).collect();
+                let seconds: Vec<f64> = rows.seconds_of(scene, method).collect();
                 let at = |q| quantile(&seconds, q).unwrap_or(f64::NAN);
                 timing.push(Timing {
                     scene,

@@ -139,6 +139,5 @@ pub(super) fn fastest<'a>(rows: &'a Rows, scene: &str, method: &str, kind: &str)
 
 /// The seconds of the method's fastest repetition.
 pub(super) fn build_seconds(rows: &Rows, scene: &str, method: &str) -> Option<f64> {
-    let own = rows.timing.iter().filter(|row| row.scene == scene && row.method == method);
-    minimum(own.map(|row| row.seconds))
+    minimum(rows.seconds_of(scene, method))
 }

@@ -3,9 +3,9 @@
 
 use super::progress::{Along, median_reached, series};
 use super::target::Target;
-use super::{Output, Rows};
+use super::{Output, Rows, looks};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Look, Panel};
+use crate::chart::{Axis, Figure, Layer, Panel};
 use serde::{Deserialize, Serialize};
 
 /// A performance profile. A problem is a scene with a target.
@@ -99,7 +99,7 @@ impl Config {
             ),
             columns: 1,
             panels: vec![panel],
-            looks: self.methods.iter().cloned().zip((0..).map(Look::Slot)).collect(),
+            looks: looks(&self.methods),
         }
     }
 }

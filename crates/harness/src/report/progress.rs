@@ -84,9 +84,8 @@ pub fn series(rows: &Rows, scene: &str, method: &str, along: Along) -> Vec<Serie
 
 /// Where the longest run of a method on a scene ended; 0 if there is none.
 pub fn longest(rows: &Rows, scene: &str, method: &str, along: Along) -> f64 {
-    let timing = || rows.timing.iter().filter(|row| row.scene == scene && row.method == method);
     match along {
-        Along::Seconds => timing().map(|row| row.seconds).fold(0.0, f64::max),
+        Along::Seconds => rows.seconds_of(scene, method).fold(0.0, f64::max),
         Along::Evaluations => rows.runs_of(scene, method).map(|run| run.evaluations as f64).fold(0.0, f64::max),
         Along::Work => rows.runs_of(scene, method).map(|run| run.work as f64).fold(0.0, f64::max),
     }

@@ -6,7 +6,7 @@
 use super::progress::{Along, longest, median_reached, reached, series};
 use super::statistics::time_to_target::ShiftedExponential;
 use super::target::Target;
-use super::{Output, Rows, text_table};
+use super::{Output, Rows, looks, text_table};
 use crate::Error;
 use crate::chart::{Axis, Figure, Layer, Look, Panel};
 use serde::{Deserialize, Serialize};
@@ -115,7 +115,7 @@ impl Config {
     }
 
     fn figure(&self, rows: &Rows, panels: Vec<Panel>) -> Figure {
-        let mut looks: Vec<_> = self.methods.iter().cloned().zip((0..).map(Look::Slot)).collect();
+        let mut looks = looks(&self.methods);
         looks.push((FIT.into(), Look::Reference));
         let scenes: Vec<String> = rows.scenes().into_iter().map(|(scene, _)| rows.shown(scene)).collect();
         let caption = format!(

@@ -40,13 +40,7 @@ struct Ratio<'a> {
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let seconds = |scene: &str, method: &str| -> Vec<f64> {
-            rows.timing
-                .iter()
-                .filter(|row| row.scene == scene && row.method == method)
-                .map(|row| row.seconds)
-                .collect()
-        };
+        let seconds = |scene: &str, method: &str| rows.seconds_of(scene, method).collect::<Vec<f64>>();
         let scenes = rows.scenes();
         let mut ratios = Vec::new();
         let first = self.methods.first().map_or("", String::as_str);
