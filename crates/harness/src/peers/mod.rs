@@ -221,6 +221,13 @@ mod tests {
     }
 
     #[test]
+    fn a_fraction_of_nodes_that_is_none_is_named() {
+        let obvhs = |ratio| Peer::Obvhs(Obvhs { reinsertion: Some(ratio), ..Default::default() });
+        assert_eq!(obvhs(-0.5).check(), Err("reinsertion is -0.5; accepted: 0 to 100".into()));
+        assert_eq!(obvhs(2.0).check(), Ok(()));
+    }
+
+    #[test]
     fn trees_of_other_libraries_are_valid_and_have_one_object_per_leaf() {
         let scene = Scene::load("escher:500").unwrap();
         for peer in all() {
