@@ -23,19 +23,19 @@ struct Node {
 };
 static_assert(sizeof(Header) == 192 && sizeof(Node) == 32);
 
-static uint64_t mix(uint64_t state, uint64_t word) {
-    state = (state ^ word) * 0x9e3779b97f4a7c15u;
-    return state << 29 | state >> 35;
-}
+static uint64_t rotate(uint64_t x, int by) { return x << by | x >> (64 - by); }
 
 static uint64_t checksum(std::vector<char> bytes) {
-    uint64_t lanes[4] = {1, 2, 3, 4}, result = bytes.size(), word;
-    bytes.resize((bytes.size() + 31) / 32 * 32);
+    uint64_t lanes[32], result = bytes.size(), word;
+    for (int k = 0; k < 32; ++k) lanes[k] = k + 1;
+    bytes.resize((bytes.size() + 255) / 256 * 256);
     for (size_t i = 0; i < bytes.size() / 8; ++i) {
         std::memcpy(&word, &bytes[8 * i], 8);
-        lanes[i % 4] = mix(lanes[i % 4], word);
+        uint64_t& lane = lanes[i % 32];
+        lane = rotate(lane ^ word, 16) * 33;
+        lane ^= lane >> 23;
     }
-    for (uint64_t lane : lanes) result = mix(result, lane);
+    for (uint64_t lane : lanes) result = rotate((result ^ lane) * 0x9e3779b97f4a7c15u, 29);
     return result;
 }
 

@@ -3,22 +3,22 @@
 import struct
 import sys
 
-M, MASK = 0x9E3779B97F4A7C15, (1 << 64) - 1
+MASK = (1 << 64) - 1
 
 
-def mix(state, word):
-    state = (state ^ word) * M & MASK
-    return state << 29 & MASK | state >> 35
+def rotate(x, by):
+    return x << by & MASK | x >> 64 - by
 
 
 def checksum(data):
-    words = struct.unpack("<%dQ" % (-(-len(data) // 32) * 4), data + bytes(-len(data) % 32))
+    words = struct.unpack("<%dQ" % (-(-len(data) // 256) * 32), data + bytes(-len(data) % 256))
     result = len(data)
-    for lane in range(4):
+    for lane in range(32):
         state = lane + 1
-        for word in words[lane::4]:
-            state = mix(state, word)
-        result = mix(result, state)
+        for word in words[lane::32]:
+            state = rotate(state ^ word, 16) * 33 & MASK
+            state ^= state >> 23
+        result = rotate((result ^ state) * 0x9E3779B97F4A7C15 & MASK, 29)
     return result
 
 

@@ -61,10 +61,10 @@ impl Node {
         if self.is_leaf() { NodeKind::Leaf { first, count } } else { NodeKind::Inner { first, count } }
     }
 
-    /// `first`, `count`, and whether the node is a leaf, without a branch.
+    /// `first`, and the count with its highest bit set for a leaf.
     #[inline(always)]
-    pub(crate) fn parts(&self) -> (u32, u32, bool) {
-        (self.first, self.tagged_count & !LEAF, self.is_leaf())
+    pub(crate) fn words(&self) -> [u32; 2] {
+        [self.first, self.tagged_count]
     }
 
     /// Whether the node is a leaf.

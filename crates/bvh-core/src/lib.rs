@@ -42,6 +42,7 @@ mod stack;
 mod traverse;
 mod triangle;
 mod validate;
+mod validate_plain;
 mod validate_wide;
 mod vector;
 mod wide;

@@ -1,4 +1,4 @@
-//! Time to load a tree, every check included, against the time to build one.
+//! Time to load a tree, every check included, against the time to build one; and where the time to load goes.
 //!
 //! `cargo bench -p harness --bench load`
 
@@ -6,10 +6,12 @@ mod paired;
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::file::{self, Origin, TreeFile};
-use harness::scene::Scene;
+use bvh_core::{Triangle, WideBvh};
+use harness::scene::{Primitives, Scene};
 use memmap2::Mmap;
 use paired::{Contender, compare};
 use std::fs::{self, File};
+use std::hint::black_box;
 use std::path::Path;
 
 fn main() {
@@ -27,18 +29,26 @@ fn loads(scene: &Scene, path: &Path) {
     let (boxes, config) = (&scene.boxes, muller_fellner::Config::default());
     let tree = config.build(boxes).expect("finite boxes");
     fs::write(path, file::save(&tree, boxes, &Origin::default()).expect("a valid tree")).expect("a file");
+    let held = map(path);
+    let file = TreeFile::open(&held).expect("a tree file");
     let contenders: Vec<Contender> = vec![
         ("Müller–Fellner, one thread", Box::new(|| drop(config.build(boxes)))),
         (
             "map, check, view",
             Box::new(|| {
-                let file = File::open(path).expect("the file");
-                // SAFETY: nobody else writes to this file.
-                let bytes = unsafe { Mmap::map(&file) }.expect("a mapping");
+                let bytes = map(path);
                 let view = TreeFile::open(&bytes).and_then(|file| file.for_boxes(boxes)?.view());
                 assert_eq!(view.expect("the tree").nodes.len(), tree.nodes.len());
             }),
         ),
+        (
+            "  of that: map, touch every page, unmap",
+            Box::new(|| _ = black_box(map(path).iter().step_by(4096).fold(0, |all, byte| all ^ byte))),
+        ),
+        ("  of that: checksum of the file", Box::new(|| _ = black_box(TreeFile::open(&held)))),
+        ("  of that: checksum of the boxes", Box::new(|| _ = black_box(file::boxes_checksum(boxes)))),
+        ("  of that: structure", Box::new(|| _ = black_box(file.view()))),
+        ("one addition per eight bytes of the file", Box::new(|| _ = black_box(sum(&held)))),
         (
             "read, check, copy",
             Box::new(|| {
@@ -47,6 +57,39 @@ fn loads(scene: &Scene, path: &Path) {
             }),
         ),
     ];
+    let title = format!("{}, {} objects, {} bytes", scene.name, boxes.len(), held.len());
+    compare(&title, 25, contenders);
+
+    let Primitives::Triangles(corners) = &scene.primitives else { return };
+    let triangles: &[Triangle] = &corners.iter().copied().map(Triangle).collect::<Vec<_>>();
+    fs::write(path, file::save_wide(&tree, triangles, &Origin::default()).expect("a valid tree"))
+        .expect("a file");
     let bytes = fs::metadata(path).expect("the file").len();
-    compare(&format!("{}, {} objects, {bytes} bytes", scene.name, boxes.len()), 25, contenders);
+    let contenders: Vec<Contender> = vec![
+        (
+            "Müller–Fellner, then the wide layout",
+            Box::new(|| drop(config.build(boxes).map(|tree| WideBvh::new(&tree, triangles)))),
+        ),
+        (
+            "map, check, view",
+            Box::new(|| {
+                let bytes = map(path);
+                let file = TreeFile::open(&bytes).and_then(|file| file.for_triangles(triangles));
+                _ = black_box(file.expect("the file").wide_view().expect("the layout"));
+            }),
+        ),
+    ];
+    compare(&format!("{}, wide layout, {bytes} bytes", scene.name), 25, contenders);
+}
+
+fn map(path: &Path) -> Mmap {
+    let file = File::open(path).expect("the file");
+    // SAFETY: nobody else writes to this file while it is mapped.
+    unsafe { Mmap::map(&file) }.expect("a mapping")
+}
+
+/// What reading the bytes costs at least.
+fn sum(bytes: &[u8]) -> u64 {
+    let words = bytes.as_chunks::<8>().0;
+    words.iter().fold(0, |sum, word| sum.wrapping_add(u64::from_le_bytes(*word)))
 }

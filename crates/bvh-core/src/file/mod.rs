@@ -63,11 +63,12 @@
 //! | 0..144 | `f32[3][3][4]` | corner, axis, lane of up to four triangles; zeros in unused lanes |
 //! | 144..160 | `u32[4]` | object ids, 2^32 − 1 in unused lanes; 2^30 added to the first marks a leaf's last block |
 //!
-//! The checksum is defined in words of eight bytes: see [`boxes_checksum`]'s module, or the reader in Python that comes
-//! with the repository, in full: with `w` the words of the bytes padded by zeros to a multiple of 32 bytes, `M` =
-//! 0x9e3779b97f4a7c15 and `mix(h, x) = rotate_left((h xor x) · M mod 2^64, 29)`, four lanes begin as 1, 2, 3, 4, word `i`
-//! makes lane `i mod 4` into `mix(lane, w[i])`, and the result is
-//! `mix(mix(mix(mix(bytes, lane 0), lane 1), lane 2), lane 3)`, `bytes` being the length before padding.
+//! The checksum, in full, with arithmetic modulo 2^64: let `w` be the words of eight bytes of what it covers, padded by
+//! zeros to a multiple of 256 bytes. Of 32 lanes, lane `k` begins as `k + 1`, and word `i` changes lane `i mod 32`:
+//! with `x = rotate_left(lane xor w[i], 16)` and `y = x + (x << 5)` it becomes `y xor (y >> 23)`. The result is
+//! `mix(… mix(mix(bytes, lane 0), lane 1) …, lane 31)` where `bytes` is the length before padding and
+//! `mix(h, x) = rotate_left((h xor x) · 0x9e3779b97f4a7c15, 29)`. The readers in Python and C++ that come with the
+//! repository compute it too.
 //!
 //! # Loading without copying
 //!
@@ -81,7 +82,7 @@ pub use crate::checksum::{boxes_checksum, triangles_checksum};
 pub use header::{Header, Layout};
 
 use crate::block::Block;
-use crate::checksum::{checksum, le_bytes};
+use crate::checksum::{BLOCK, checksum, le_bytes};
 use crate::cost::Objective;
 use crate::validate::check_structure;
 use crate::validate_wide::check_wide;
@@ -243,14 +244,15 @@ impl<'a> TreeFile<'a> {
         if found != expected {
             return Err(FileError::Length { found, expected });
         }
-        let (head, body) = bytes.split_at(Header::BYTES);
-        let mut cleared = [0; Header::BYTES];
-        cleared.copy_from_slice(head);
+        // The header, with what the checksum's first block takes in after it.
+        let (start, rest) = bytes.split_at(bytes.len().min(BLOCK));
+        let mut cleared = [0; BLOCK];
+        cleared[..start.len()].copy_from_slice(start);
         cleared[Header::CHECKSUM].fill(0);
-        if checksum(&[&cleared, body]).to_le_bytes() != head[Header::CHECKSUM] {
+        if checksum(&[&cleared[..start.len()], rest]).to_le_bytes() != start[Header::CHECKSUM] {
             return Err(FileError::Checksum);
         }
-        let (nodes, other) = body.split_at(nodes as usize);
+        let (nodes, other) = bytes[Header::BYTES..].split_at(nodes as usize);
         Ok(Self { header, sections: [nodes, other] })
     }
 

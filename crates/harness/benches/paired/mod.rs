@@ -6,7 +6,7 @@ use std::time::Instant;
 /// A named piece of work.
 pub type Contender<'a> = (&'a str, Box<dyn FnMut() + 'a>);
 
-/// Runs all contenders in turns, `rounds` times after one warm-up, and prints each one's median time and the
+/// Runs all contenders in turns, `rounds` times after one warm-up, and prints each one's median and least time and the
 /// quartiles of its ratios to the first, round by round.
 pub fn compare(title: &str, rounds: usize, mut contenders: Vec<Contender<'_>>) {
     let mut seconds = vec![Vec::with_capacity(rounds); contenders.len()];
@@ -24,6 +24,9 @@ pub fn compare(title: &str, rounds: usize, mut contenders: Vec<Contender<'_>>) {
         let ratios: Vec<f64> = times.iter().zip(&seconds[0]).map(|(own, first)| own / first).collect();
         let [low, middle, high] = [0.25, 0.5, 0.75].map(|q| quantile(&ratios, q).unwrap_or(f64::NAN));
         let median = quantile(times, 0.5).unwrap_or(f64::NAN) * 1e3;
-        println!("  {name:<44} {median:9.3} ms   ratio {middle:.3}  ({low:.3} to {high:.3})");
+        let least = times.iter().copied().fold(f64::INFINITY, f64::min) * 1e3;
+        println!(
+            "  {name:<44} {median:9.3} ms, least {least:9.3} ms   ratio {middle:.4}  ({low:.4} to {high:.4})"
+        );
     }
 }
