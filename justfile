@@ -22,6 +22,7 @@ table4:
 # Times of builders against other libraries.
 bench:
     cargo bench -p harness --bench build --features peers
+    cargo bench -p harness --bench peers --features peers -- escher
 
 docs:
     cargo doc --workspace --no-deps --open

@@ -4,13 +4,18 @@
 //! along a space-filling curve; each finds the nearest among its `radius` neighbours on either side, by the area of the
 //! box around both, and those that find each other are joined, round by round.
 //!
-//! Differs from the paper: Morton cells are cubes, so that flat scenes are not distorted; equally near neighbours are told
-//! apart by the bits in which their positions differ, so that clusters without a difference pair off; a round that would
-//! join few also joins neighbours along the curve, so that there are O(log n) rounds whatever the scene.
+//! Differs from the paper: Morton cells are cubes, so that flat scenes are not distorted; the first rounds may look at
+//! next neighbours only; among equally near neighbours the nearest along the curve is taken, and next neighbours by the
+//! parity of their position, so that clusters without a difference pair off; a round after one that joined few also joins
+//! neighbours along the curve, so that there are O(log n) rounds whatever the scene.
+
+mod curve;
+mod nearest;
 
 use crate::presort::check_scene;
 use crate::{BuildError, Builder};
-use bvh_core::{Aabb, Bvh, Node, PackedAabb, with_vector_instructions};
+use bvh_core::{Aabb, Bvh, Node, PackedAabb};
+use nearest::{CHUNK, Scratch};
 
 /// How far to look for a neighbour.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,186 +27,210 @@ use bvh_core::{Aabb, Bvh, Node, PackedAabb, with_vector_instructions};
 pub struct Config {
     /// Clusters looked at on either side, 1 to 1000. Default 24.
     pub radius: u32,
+    /// Rounds at first that look at the next cluster on either side only: faster, and often no worse. Default 0.
+    pub near_rounds: u32,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { radius: 24 }
+        Self { radius: 24, near_rounds: 0 }
     }
 }
 
 impl Builder for Config {
-    /// O(radius · n), and a sort. Rounds run on all threads of the current rayon pool, with the same result as on one.
+    /// O(radius · n), and a radix sort. Neighbours are looked for on all threads of the current rayon pool, with the same
+    /// result as on one.
     fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
+        Along::new(boxes)?.build(self)
+    }
+}
+
+/// The objects of a scene along the curve: what is the same for every radius.
+#[derive(Clone, Debug)]
+pub struct Along {
+    /// One box per object, by index.
+    boxes: Vec<PackedAabb>,
+    /// The box around all.
+    all: PackedAabb,
+    /// The objects along the curve.
+    order: Vec<u32>,
+}
+
+impl Along {
+    /// Checks and sorts. O(n): a radix sort.
+    pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
         check_scene(boxes)?;
-        if !(1..=1000).contains(&self.radius) {
+        let boxes: Vec<PackedAabb> = boxes.iter().map(PackedAabb::from).collect();
+        let all = boxes.iter().fold(PackedAabb::EMPTY, |all, b| all.union(b));
+        let order = curve::order(&boxes, &all);
+        Ok(Self { boxes, all, order })
+    }
+
+    /// Clusters what was sorted.
+    pub fn build(self, config: &Config) -> Result<Bvh, BuildError> {
+        if !(1..=1000).contains(&config.radius) {
             let (parameter, accepted) = ("radius", "1 to 1000");
-            return Err(BuildError::Parameter { parameter, found: self.radius.into(), accepted });
+            return Err(BuildError::Parameter { parameter, found: config.radius.into(), accepted });
         }
-        let mut clusters: Vec<Cluster> =
-            curve(boxes).into_iter().map(|object| Cluster::new(&boxes[object as usize], object)).collect();
-        let mut joined: Vec<[Cluster; 2]> = Vec::with_capacity(boxes.len());
-        while clusters.len() > 1 {
-            let nearest = all_nearest(&clusters, self.radius as usize);
-            clusters = join(&clusters, &nearest, boxes.len(), &mut joined);
+        let Self { boxes, all, order } = self;
+        if boxes.is_empty() {
+            return Ok(Bvh::default());
         }
-        Ok(clusters.first().map_or_else(Bvh::default, |root| to_bvh(*root, &joined, boxes.len())))
-    }
-}
-
-/// A subtree: object `index`, or from `n` on the joint `index - n`.
-#[derive(Clone, Copy, Debug)]
-struct Cluster {
-    aabb: PackedAabb,
-    index: u32,
-}
-
-impl Cluster {
-    fn new(aabb: &Aabb, index: u32) -> Self {
-        Self { aabb: PackedAabb::from(aabb), index }
-    }
-}
-
-/// The objects along the Morton curve through their box centres, equal codes by index. The grid has 2^21 cubes along the
-/// longest side of the centres' box.
-fn curve(boxes: &[Aabb]) -> Vec<u32> {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for b in boxes {
-        for axis in 0..3 {
-            low[axis] = low[axis].min(b.doubled_centroid()[axis]);
-            high[axis] = high[axis].max(b.doubled_centroid()[axis]);
+        let scale = scale(&all);
+        let mut clusters = Clusters::new(order.iter().map(|&object| boxes[object as usize]).collect());
+        let mut round = 0;
+        while clusters.boxes.len() > 1 {
+            let radius = if round < config.near_rounds { 1 } else { config.radius as usize };
+            clusters.find_nearest(scale, radius);
+            clusters.join();
+            round += 1;
         }
-    }
-    let side = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
-    let cells = if side > 0.0 { f64::from((1 << 21) - 1) / side } else { 0.0 };
-    let mut keyed: Vec<(u64, u32)> = boxes
-        .iter()
-        .zip(0..)
-        .map(|(b, index)| {
-            let code = |axis: usize| spread(((b.doubled_centroid()[axis] - low[axis]) * cells) as u64);
-            (code(0) << 2 | code(1) << 1 | code(2), index)
-        })
-        .collect();
-    radsort::sort_by_key(&mut keyed, |&(code, _)| code);
-    keyed.into_iter().map(|(_, index)| index).collect()
-}
-
-/// Moves bit i of 21 to bit 3·i.
-fn spread(bits: u64) -> u64 {
-    let mut bits = bits & 0x1f_ffff;
-    for (shift, mask) in [
-        (32, 0x001f_0000_0000_ffff),
-        (16, 0x001f_0000_ff00_00ff),
-        (8, 0x100f_00f0_0f00_f00f),
-        (4, 0x10c3_0c30_c30c_30c3),
-        (2, 0x1249_2492_4924_9249),
-    ] {
-        bits = (bits | bits << shift) & mask;
-    }
-    bits
-}
-
-/// Clusters whose neighbours are found by one task.
-const CHUNK: usize = 1024;
-
-/// The position of every cluster's nearest neighbour within `radius` positions, of at least two clusters.
-fn all_nearest(clusters: &[Cluster], radius: usize) -> Vec<u32> {
-    let mut nearest = vec![0; clusters.len()];
-    let part = |(number, found): (usize, &mut [u32])| nearest_of(clusters, radius, number * CHUNK, found);
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        nearest.par_chunks_mut(CHUNK).enumerate().for_each(part);
-    }
-    #[cfg(not(feature = "rayon"))]
-    nearest.chunks_mut(CHUNK).enumerate().for_each(part);
-    nearest
-}
-
-with_vector_instructions! {
-    /// The nearest neighbours of the clusters from `start` on, as many as `found` has room for.
-    nearest_of = nearest_of_plain(clusters: &[Cluster], radius: usize, start: usize, found: &mut [u32])
-}
-
-#[inline(always)]
-fn nearest_of_plain(clusters: &[Cluster], radius: usize, start: usize, found: &mut [u32]) {
-    for (at, found) in (start..).zip(found) {
-        let aabb = clusters[at].aabb;
-        let mut best = (f64::INFINITY, usize::MAX, at);
-        let first = at.saturating_sub(radius);
-        for (other, cluster) in (first..).zip(&clusters[first..(at + radius + 1).min(clusters.len())]) {
-            if other != at {
-                // The same for both of a pair, and different for all pairs of one cluster.
-                let area = aabb.union(&cluster.aabb).half_area();
-                if (area, at ^ other) < (best.0, best.1) {
-                    best = (area, at ^ other, other);
-                }
-            }
-        }
-        *found = best.2 as u32;
+        Ok(Bvh { nodes: clusters.into_nodes(), prim_ids: order })
     }
 }
 
-/// A round that joins fewer pairs than one for so many clusters is helped.
+/// The power of two that brings the longest side of the box around all to between 1 and 2. 1 if it has no extent.
+fn scale(all: &PackedAabb) -> f64 {
+    let side = all.extent().max_element();
+    if side > 0.0 { 2f64.powi(-libm::ilogb(side)) } else { 1.0 }
+}
+
+/// Marks what is above a cluster as an object.
+const LEAF: u32 = 1 << 31;
+
+/// The subtrees that are not yet joined, along the curve, and the nodes below them.
+struct Clusters {
+    boxes: Vec<PackedAabb>,
+    /// What is below each: its first child, or the object's position along the curve and [`LEAF`].
+    below: Vec<u32>,
+    /// How far on the nearest neighbour of each is.
+    nearest: Vec<i32>,
+    /// The first clusters of the pairs joined in a round, and the clusters that are left after it.
+    joined: Vec<u32>,
+    kept: Vec<u32>,
+    /// The tree's nodes, filled from the last to the first, so that parents come before their children.
+    nodes: Vec<Node>,
+    /// Nodes not yet filled.
+    free: usize,
+    /// Whether the last round joined few.
+    slow: bool,
+    scratch: Scratch,
+}
+
+/// A round that joins fewer pairs than one for so many clusters is slow.
 const SLOW: usize = 32;
 
-/// Joins clusters that are each other's nearest, in the place of the first of the two. The others keep their order.
-fn join(clusters: &[Cluster], nearest: &[u32], n: usize, joined: &mut Vec<[Cluster; 2]>) -> Vec<Cluster> {
-    let mutual = |at: usize| nearest[nearest[at] as usize] as usize == at;
-    let pairs = (0..clusters.len()).filter(|&at| mutual(at)).count() / 2;
-    let slow = pairs < clusters.len().div_ceil(SLOW);
-    let mut next = Vec::with_capacity(clusters.len());
-    let mut at = 0;
-    while at < clusters.len() {
-        let partner = if mutual(at) {
-            nearest[at] as usize
-        } else if slow && at + 1 < clusters.len() && !mutual(at + 1) {
-            at + 1
-        } else {
-            at
-        };
-        if partner == at {
-            next.push(clusters[at]);
-        } else if partner > at {
-            let pair = [clusters[at], clusters[partner]];
-            next.push(Cluster { aabb: pair[0].aabb.union(&pair[1].aabb), index: (n + joined.len()) as u32 });
-            joined.push(pair);
+impl Clusters {
+    /// One object each.
+    fn new(boxes: Vec<PackedAabb>) -> Self {
+        let n = boxes.len();
+        Self {
+            boxes,
+            below: (0..n as u32).map(|at| at | LEAF).collect(),
+            nearest: vec![0; n],
+            joined: vec![0; n],
+            kept: vec![0; n],
+            nodes: vec![Node::leaf(Aabb::EMPTY, 0, 0); 2 * n - 1],
+            free: 2 * n - 1,
+            slow: false,
+            scratch: Scratch::default(),
         }
-        // A neighbour along the curve has been dealt with, too.
-        at += if partner == at + 1 { 2 } else { 1 };
     }
-    next
+
+    fn find_nearest(&mut self, scale: f64, radius: usize) {
+        let nearest = &mut self.nearest[..self.boxes.len()];
+        #[cfg(feature = "rayon")]
+        if nearest.len() * radius >= PARALLEL_PAIRS && rayon::current_num_threads() > 1 {
+            use rayon::prelude::*;
+            nearest.par_chunks_mut(CHUNK).enumerate().for_each_init(
+                Scratch::default,
+                |scratch, (number, found)| {
+                    nearest::find(&self.boxes, scale, radius, number * CHUNK, found, scratch);
+                },
+            );
+            return;
+        }
+        for (number, found) in nearest.chunks_mut(CHUNK).enumerate() {
+            nearest::find(&self.boxes, scale, radius, number * CHUNK, found, &mut self.scratch);
+        }
+    }
+
+    /// Whether the cluster is its nearest's nearest.
+    #[inline(always)]
+    fn is_mutual(&self, at: usize) -> bool {
+        self.nearest[at.wrapping_add_signed(self.nearest[at] as isize)] == -self.nearest[at]
+    }
+
+    /// Lets clusters next to each other find each other where they found nobody.
+    fn pair_the_rest(&mut self) {
+        let mut at = 0;
+        while at + 1 < self.boxes.len() {
+            if self.is_mutual(at) || self.is_mutual(at + 1) {
+                at += 1;
+            } else {
+                (self.nearest[at], self.nearest[at + 1]) = (1, -1);
+                at += 2;
+            }
+        }
+    }
+
+    /// Joins clusters that are each other's nearest, in the place of the first of the two. The others keep their order.
+    fn join(&mut self) {
+        if self.slow {
+            self.pair_the_rest();
+        }
+        let count = self.boxes.len();
+        let (nearest, joined, kept) =
+            (&self.nearest[..count], &mut self.joined[..count], &mut self.kept[..count]);
+        // Whether a cluster is joined cannot be predicted: no branch depends on it.
+        let (mut pairs, mut left) = (0, 0);
+        for at in 0..count {
+            let far = nearest[at];
+            let other = at.wrapping_add_signed(far as isize);
+            let mutual = nearest[other] == -far;
+            (joined[pairs], kept[left]) = (at as u32, at as u32);
+            pairs += usize::from(mutual & (far > 0));
+            left += usize::from(!mutual | (far > 0));
+        }
+        let (boxes, below) = (&mut self.boxes[..count], &mut self.below[..count]);
+        for at in joined[..pairs].iter().map(|&at| at as usize) {
+            let other = at.wrapping_add_signed(nearest[at] as isize);
+            self.free -= 2;
+            let pair = &mut self.nodes[self.free..][..2];
+            (pair[0], pair[1]) = (node((boxes[at], below[at])), node((boxes[other], below[other])));
+            (boxes[at], below[at]) = (boxes[at].union(&boxes[other]), self.free as u32);
+        }
+        for (to, at) in kept[..left].iter().map(|&at| at as usize).enumerate() {
+            (boxes[to], below[to]) = (boxes[at], below[at]);
+        }
+        self.slow = pairs < count.div_ceil(SLOW);
+        self.boxes.truncate(left);
+    }
+
+    /// The nodes, when one cluster is left.
+    fn into_nodes(mut self) -> Vec<Node> {
+        self.nodes[0] = node((self.boxes[0], self.below[0]));
+        self.nodes
+    }
 }
 
-/// The tree below `root`, children adjacent, objects in leaf order.
-fn to_bvh(root: Cluster, joined: &[[Cluster; 2]], n: usize) -> Bvh {
-    let placeholder = Node::leaf(Aabb::EMPTY, 0, 0);
-    let mut tree = Bvh { nodes: Vec::with_capacity(2 * n - 1), prim_ids: Vec::with_capacity(n) };
-    tree.nodes.push(placeholder);
-    let mut stack = vec![(root, 0)];
-    while let Some((Cluster { aabb, index }, to)) = stack.pop() {
-        let aabb = Aabb::from(&aabb);
-        tree.nodes[to] = match (index as usize).checked_sub(n) {
-            None => {
-                tree.prim_ids.push(index);
-                Node::leaf(aabb, tree.prim_ids.len() as u32 - 1, 1)
-            }
-            Some(joint) => {
-                let first = tree.nodes.len();
-                tree.nodes.extend([placeholder; 2]);
-                let [left, right] = joined[joint];
-                stack.extend([(right, first + 1), (left, first)]);
-                Node::inner(aabb, first as u32, 2)
-            }
-        };
-    }
-    tree
+/// Clusters times radius from which on threads pay.
+#[cfg(feature = "rayon")]
+const PARALLEL_PAIRS: usize = 1 << 16;
+
+/// The node of a cluster.
+#[inline(always)]
+fn node((aabb, below): (PackedAabb, u32)) -> Node {
+    let aabb = Aabb::from(&aabb);
+    let (leaf, inner) = (Node::leaf(aabb, below & !LEAF, 1), Node::inner(aabb, below, 2));
+    if below & LEAF != 0 { leaf } else { inner }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use bvh_core::validate;
+    use proptest::prelude::*;
 
     fn cube(at: [f32; 3], size: f32) -> Aabb {
         Aabb::from((at, at.map(|c| c + size)))
@@ -237,7 +266,7 @@ mod tests {
     #[test]
     fn a_radius_over_all_objects_joins_the_closest_pair_first() {
         let boxes = [0.0, 100.0, 10.0, 107.0].map(|x| cube([x, 0.0, 0.0], 1.0));
-        let tree = Config { radius: 4 }.build(&boxes).unwrap();
+        let tree = Config { radius: 4, ..Config::default() }.build(&boxes).unwrap();
         let sides: Vec<f32> = tree.nodes[0].children().map(|child| tree.nodes[child].aabb.max.x).collect();
         assert_eq!(sides, [11.0, 108.0]);
     }
@@ -267,25 +296,113 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             assert_eq!(pool.install(|| Config::default().build(&boxes).unwrap()), tree);
         }
-        for factor in [2f32.powi(-60), 2f32.powi(60)] {
+        for factor in [2f32.powi(-100), 2f32.powi(-60), 2f32.powi(60), 2f32.powi(100)] {
             let scaled: Vec<Aabb> =
                 boxes.iter().map(|b| Aabb { min: b.min * factor, max: b.max * factor }).collect();
             assert_eq!(Config::default().build(&scaled).unwrap().prim_ids, tree.prim_ids);
         }
     }
 
-    #[test]
-    fn bits_are_spread_by_threes() {
-        for bit in 0..21 {
-            assert_eq!(spread(1 << bit), 1 << (3 * bit));
+    /// The objects below every inner node, sorted, by the definition: no arrays of planes, no f32, no early exit.
+    fn oracle(boxes: &[Aabb], config: &Config) -> Vec<Vec<u32>> {
+        let packed: Vec<PackedAabb> = boxes.iter().map(PackedAabb::from).collect();
+        let all = packed.iter().fold(PackedAabb::EMPTY, |all, b| all.union(b));
+        let mut clusters: Vec<(Aabb, Vec<u32>)> =
+            curve::order(&packed, &all).into_iter().map(|id| (boxes[id as usize], vec![id])).collect();
+        let (mut joined, mut slow) = (Vec::new(), false);
+        for round in 0.. {
+            let n = clusters.len();
+            if n == 1 {
+                break;
+            }
+            let radius = if round < config.near_rounds { 1 } else { config.radius as usize };
+            let key = |at: usize, other: usize| {
+                let area = clusters[at].0.union(&clusters[other].0).half_area();
+                let (distance, next) = (at.abs_diff(other), at.abs_diff(other) == 1);
+                let behind = if next { at.min(other) % 2 == 1 } else { other > at };
+                (area, distance, behind)
+            };
+            let nearest = |at: usize| {
+                let others = (at.saturating_sub(radius)..n.min(at + radius + 1)).filter(|&other| other != at);
+                others.min_by(|&a, &b| key(at, a).partial_cmp(&key(at, b)).unwrap()).unwrap()
+            };
+            let mut nearest: Vec<usize> = (0..n).map(nearest).collect();
+            let mutual = |nearest: &[usize], at: usize| nearest[nearest[at]] == at;
+            for at in 0..n - 1 {
+                if slow && !mutual(&nearest, at) && !mutual(&nearest, at + 1) {
+                    (nearest[at], nearest[at + 1]) = (at + 1, at);
+                }
+            }
+            let mut next = Vec::new();
+            for at in 0..n {
+                let other = nearest[at];
+                if !mutual(&nearest, at) {
+                    next.push(clusters[at].clone());
+                } else if other > at {
+                    let mut ids = [clusters[at].1.clone(), clusters[other].1.clone()].concat();
+                    ids.sort_unstable();
+                    joined.push(ids.clone());
+                    next.push((clusters[at].0.union(&clusters[other].0), ids));
+                }
+            }
+            slow = n - next.len() < n.div_ceil(SLOW);
+            clusters = next;
         }
-        assert_eq!(spread(u64::MAX), (0..21).map(|bit| 1 << (3 * bit)).sum());
+        joined.sort();
+        joined
+    }
+
+    fn below_inner_nodes(tree: &Bvh) -> Vec<Vec<u32>> {
+        let mut below: Vec<Vec<u32>> = vec![Vec::new(); tree.nodes.len()];
+        for at in (0..tree.nodes.len()).rev() {
+            let node = &tree.nodes[at];
+            let mut ids = tree.prim_ids[node.prims()].to_vec();
+            node.children().for_each(|child| ids.extend_from_slice(&below[child]));
+            ids.sort_unstable();
+            below[at] = ids;
+        }
+        let mut inner: Vec<_> = below.into_iter().filter(|ids| ids.len() > 1).collect();
+        inner.sort();
+        inner
+    }
+
+    proptest! {
+        #[test]
+        fn trees_are_those_of_the_definition(
+            // Small integers: areas are exact in f32, and many are equal.
+            corners in prop::collection::vec(([0u8..40, 0u8..40, 0u8..6], [0u8..5, 0u8..5, 0u8..5]), 1..90),
+            radius in 1u32..30, near_rounds in 0u32..3, exponent in prop::sample::select(vec![-60, 0, 100]),
+        ) {
+            let place = |c: u8| f32::from(c) * 2f32.powi(exponent);
+            let boxes: Vec<Aabb> = corners
+                .iter()
+                .map(|(low, size)| Aabb::from((low.map(place), [0, 1, 2].map(|axis| place(low[axis] + size[axis])))))
+                .collect();
+            let config = Config { radius, near_rounds };
+            let tree = config.build(&boxes).unwrap();
+            prop_assert!(validate(&tree, &boxes).is_ok());
+            prop_assert_eq!(below_inner_nodes(&tree), oracle(&boxes, &config));
+        }
+
+        #[test]
+        fn any_finite_boxes_give_a_valid_tree(
+            corners in prop::collection::vec(prop::array::uniform6(prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL
+                | prop::num::f32::ZERO), 1..60),
+            radius in 1u32..20,
+        ) {
+            let boxes: Vec<Aabb> = corners
+                .iter()
+                .map(|&[a, b, c, d, e, f]| Aabb::from(([a.min(d), b.min(e), c.min(f)], [a.max(d), b.max(e), c.max(f)])))
+                .collect();
+            let tree = Config { radius, ..Config::default() }.build(&boxes).unwrap();
+            prop_assert!(validate(&tree, &boxes).is_ok());
+        }
     }
 
     #[test]
     fn a_radius_outside_its_range_is_named() {
         for radius in [0, 1001] {
-            let error = Config { radius }.build(&[]).unwrap_err().to_string();
+            let error = Config { radius, ..Config::default() }.build(&[]).unwrap_err().to_string();
             assert_eq!(error, format!("radius is {radius}; accepted: 1 to 1000"));
         }
     }

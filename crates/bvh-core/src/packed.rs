@@ -40,6 +40,24 @@ impl PackedAabb {
         x * y + y * z + z * x
     }
 
+    /// Twice the centre, as [`Aabb::doubled_centroid`] but for the sign of zeros; the fourth lane 0.
+    #[inline(always)]
+    pub fn doubled_centroid(&self) -> DVec4 {
+        self.max.as_dvec4() - self.negated_min.as_dvec4()
+    }
+
+    /// `-min` and `max`; the fourth numbers of an object's box are 0.
+    #[inline(always)]
+    pub fn planes(&self) -> [[f32; 4]; 2] {
+        [self.negated_min.to_array(), self.max.to_array()]
+    }
+
+    /// The lower corner, the fourth lane of no meaning.
+    #[inline(always)]
+    pub fn min(&self) -> DVec4 {
+        -self.negated_min.as_dvec4()
+    }
+
     /// Side lengths in world units, the fourth lane 0.
     #[inline(always)]
     pub fn extent(&self) -> DVec4 {
@@ -84,6 +102,9 @@ mod tests {
             let plain = a.union(&b);
             prop_assert_eq!(Aabb::from(&packed), plain);
             prop_assert_eq!(packed.half_area().to_bits(), plain.half_area().to_bits());
+            prop_assert_eq!(packed.doubled_centroid().truncate(), plain.doubled_centroid());
+            let [[x, y, z, _], high] = packed.planes();
+            prop_assert_eq!(Aabb::from(([-x, -y, -z], [high[0], high[1], high[2]])), plain);
         }
     }
 }

@@ -4,7 +4,8 @@ use crate::reinsertion::TOLERANCE;
 use crate::working::Working;
 use crate::{Observer, Omission, Problem, Quota, Run, SearchError, Tally, lower_bound};
 use bvh_build::Builder;
-use bvh_core::{Bvh, cost};
+use bvh_core::Bvh;
+use bvh_core::cost::{self, Objective};
 
 /// The best tree so far. Local search lowers the internal area; for binary trees with one object per leaf every
 /// objective of a [`Problem`] grows with it, so that lowering it lowers them all.
@@ -23,18 +24,27 @@ impl<'p> Incumbent<'p> {
         problem: &Problem<'p>,
         run: &mut Run,
     ) -> Result<(Self, Working), SearchError> {
-        Self::begin(builder.build(problem.boxes)?, problem, run)
+        let incumbent = Self::begin(builder.build(problem.boxes)?, problem, run);
+        // Builders leave no box wider than it must be.
+        let working = Working::from_tight(&incumbent.tree, incumbent.area)?;
+        Ok((incumbent, working))
     }
 
-    /// Begins with a valid tree.
-    pub fn begin(tree: Bvh, problem: &Problem<'p>, run: &mut Run) -> Result<(Self, Working), SearchError> {
-        let working = Working::from_bvh(&tree, problem.boxes)?;
-        run.record(problem.objective.cost(&tree), tree.nodes.len() as u64);
-        let met = problem.leaves_out(Omission::BoundMet);
-        let floor = if met { lower_bound::of_largest(problem.boxes) } else { f64::NEG_INFINITY };
-        let incumbent = Self { problem: *problem, area: cost::internal_area(&tree), tree, floor };
+    /// Begins with a valid tree, whose boxes are tight.
+    pub fn begin(tree: Bvh, problem: &Problem<'p>, run: &mut Run) -> Self {
+        let mut incumbent = Self::begin_unbounded(tree, problem, run);
+        if problem.leaves_out(Omission::BoundMet) {
+            incumbent.floor = lower_bound::of_largest(problem.boxes);
+        }
         incumbent.settle(run);
-        Ok((incumbent, working))
+        incumbent
+    }
+
+    /// As [`begin`](Self::begin), without looking whether the tree meets a bound: for when there is no time.
+    pub fn begin_unbounded(tree: Bvh, problem: &Problem<'p>, run: &mut Run) -> Self {
+        let (cost, area) = costs(problem, &tree);
+        run.record(cost, tree.nodes.len() as u64);
+        Self { problem: *problem, area, tree, floor: f64::NEG_INFINITY }
     }
 
     /// Ends the run if nothing can be better but for rounding.
@@ -51,13 +61,23 @@ impl<'p> Incumbent<'p> {
 
     /// Keeps `tree` if it is better than all before. O(n).
     pub fn offer(&mut self, tree: &Working, run: &mut Run) -> bool {
+        self.offer_as(tree, Working::to_bvh, run)
+    }
+
+    /// As [`offer`](Self::offer), in [another order](Working::to_bvh_level_by_level).
+    pub fn offer_level_by_level(&mut self, tree: &Working, run: &mut Run) -> bool {
+        self.offer_as(tree, Working::to_bvh_level_by_level, run)
+    }
+
+    fn offer_as(&mut self, tree: &Working, convert: fn(&Working) -> Bvh, run: &mut Run) -> bool {
         if tree.area() >= self.area {
             return false;
         }
-        let candidate = tree.to_bvh();
-        let improved = run.improve(self.problem.objective.cost(&candidate));
+        let candidate = convert(tree);
+        let (cost, area) = costs(&self.problem, &candidate);
+        let improved = run.improve(cost);
         if improved {
-            self.area = cost::internal_area(&candidate);
+            self.area = area;
             self.tree = candidate;
             self.settle(run);
         }
@@ -84,6 +104,13 @@ impl<'p> Incumbent<'p> {
             }
         }
     }
+}
+
+/// The tree's cost by the problem's objective, and its internal area.
+fn costs(problem: &Problem, tree: &Bvh) -> (f64, f64) {
+    let cost = problem.objective.cost(tree);
+    let area = if problem.objective == Objective::InternalArea { cost } else { cost::internal_area(tree) };
+    (cost, area)
 }
 
 /// Sweeps until a sweep keeps nothing, the quota is reached, or the observer says so.

@@ -41,6 +41,7 @@ mod optimize;
 mod pieces;
 mod place;
 pub mod portfolio;
+mod quick;
 pub mod random_orders;
 pub mod rebuild;
 #[cfg(feature = "serde")]

@@ -39,7 +39,7 @@
 mod smallest_box;
 
 use bvh_build::BuildError;
-use bvh_core::{Aabb, cost::Sum};
+use bvh_core::{Aabb, PackedAabb, cost::Sum};
 use smallest_box::{Grouped, Scene};
 
 /// The effort that is worth its time.
@@ -96,11 +96,15 @@ pub fn of_largest(boxes: &[Aabb]) -> f64 {
     if boxes.len() < 2 {
         return 0.0;
     }
-    let areas = || boxes.iter().map(Aabb::half_area);
-    let (least, most) =
-        areas().fold((f64::INFINITY, 0.0f64), |(least, most), area| (least.min(area), most.max(area)));
-    let root = boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b)).half_area();
-    let sum: Sum = areas().chain([root, -least, -most]).collect();
+    let (mut least, mut most, mut root, mut sum) = (f64::INFINITY, 0.0f64, PackedAabb::EMPTY, Sum::default());
+    for aabb in boxes.iter().map(PackedAabb::from) {
+        let area = aabb.half_area();
+        (least, most) = (least.min(area), most.max(area));
+        root.grow(&aabb);
+        sum.add(area);
+    }
+    let root = root.half_area();
+    [root, -least, -most].into_iter().for_each(|area| sum.add(area));
     sum.value().max(root)
 }
 

@@ -1,6 +1,7 @@
 //! Any binary tree in, a better one out: for those who have a builder of their own.
 
 use crate::incumbent::Incumbent;
+use crate::working::Working;
 use crate::{Budget, Observer, Outcome, Problem, Run, Search, SearchError, portfolio, solve};
 use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate};
 
@@ -53,7 +54,8 @@ struct From<'a> {
 impl Search for From<'_> {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         self.config.check()?;
-        let (mut best, mut tree) = Incumbent::begin(self.tree.clone(), problem, run)?;
+        let mut tree = Working::from_bvh(&self.tree, problem.boxes)?;
+        let mut best = Incumbent::begin(self.tree.clone(), problem, run);
         self.config.improve(&mut tree, seed, &mut best, run);
         Ok(best.tree)
     }

@@ -1,5 +1,7 @@
 //! `best`: the methods that pay, in the order that pays, for any budget.
 //!
+//! 0. If the budget is small, milliseconds, unless a start is named: clustering, reinsertion, and no more
+//!    if these take it all.
 //! 1. Greedy division with |L|^0.9.
 //! 2. If the end is known, from the budget's work or the observer's [progress](crate::Observer::progress): one long descent
 //!    of the temperature of annealed ruin and recreate that ends there. It starts at once, since what a local search had
@@ -14,6 +16,7 @@ use crate::cooling::{Cooling, anneal, cool};
 use crate::error::require;
 use crate::fusing::fuse;
 use crate::incumbent::Incumbent;
+use crate::quick::{self, Quick};
 use crate::ruin_recreate::{Mover, Ruin, Scale};
 use crate::start::Start;
 use crate::stream::{Stream, stream};
@@ -50,8 +53,10 @@ pub struct Config {
     pub pieces: u32,
     /// The move.
     pub ruin: Ruin,
-    /// The builder of the start.
-    pub start: Start,
+    /// The builder of the start. By default that of least cost for the budget: agglomerative clustering if it is
+    /// small, else division with |L|^0.9.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub start: Option<Start>,
 }
 
 impl Default for Config {
@@ -66,7 +71,7 @@ impl Default for Config {
             cold: 0.003,
             pieces: 0,
             ruin: Ruin { scale: Scale::Top, ..Ruin::default() },
-            start: Start::default(),
+            start: None,
         }
     }
 }
@@ -197,7 +202,12 @@ impl Search for Config {
         if let Some(optimum) = exact::instead(problem, own, run)? {
             return Ok(optimum);
         }
-        let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
+        let quick = if self.start.is_none() { quick::search(problem, run)? } else { None };
+        let (mut best, mut tree) = match quick {
+            Some(Quick::Tree(tree)) => return Ok(tree),
+            Some(Quick::Optimum(best, tree)) => (best, tree),
+            None => Incumbent::build(&self.start.clone().unwrap_or_default(), problem, run)?,
+        };
         self.improve(&mut tree, seed, &mut best, run);
         Ok(best.tree)
     }

@@ -99,6 +99,36 @@ impl Working {
         Ok(Self::from_nodes(nodes))
     }
 
+    /// As [`from_bvh`](Self::from_bvh) for a tree whose boxes are tight and whose internal area is `area`: in one pass.
+    pub fn from_tight(tree: &Bvh, area: f64) -> Result<Self, SearchError> {
+        let mut nodes = Vec::with_capacity(tree.nodes.len() + 1);
+        nodes.push(Node::ANCHOR);
+        // Two more than there are nodes, for what leaves write: whether a node is one cannot be predicted.
+        let mut parents = vec![ANCHOR; tree.nodes.len() + 2];
+        for (index, (node, at)) in tree.nodes.iter().zip(1..).enumerate() {
+            let (first, count, leaf) = match node.kind() {
+                NodeKind::Inner { first, count } => (first, count, false),
+                NodeKind::Leaf { first, .. } => (first, 2, true),
+            };
+            if count != 2 {
+                return Err(SearchError::NotBinary { node: index, children: count });
+            }
+            let below = if leaf { tree.nodes.len() } else { first as usize };
+            (parents[below], parents[below + 1]) = (at, at);
+            let object = tree.prim_ids[if leaf { first as usize } else { 0 }];
+            let children = if leaf { [NONE, object] } else { [first + 1, first + 2] };
+            let aabb = PackedAabb::from(&node.aabb);
+            let (area, parent) = (aabb.half_area(), parents[index]);
+            nodes.push(Node { aabb, area, parent, children, ..Node::ANCHOR });
+        }
+        if nodes.len() > 1 {
+            nodes[0].children[0] = 1;
+        }
+        let mut working = Self { nodes, ..Self::default() };
+        working.area.add(area);
+        Ok(working)
+    }
+
     /// A tree of nodes written elsewhere, linked, the anchor first.
     pub fn from_nodes(mut nodes: Vec<Node>) -> Self {
         nodes.iter_mut().for_each(|node| node.stamp = 0);
@@ -113,22 +143,52 @@ impl Working {
         let Some(root) = self.root() else { return tree };
         let count = self.nodes.len() - 1;
         let placeholder = BvhNode::leaf(Aabb::EMPTY, 0, 0);
-        tree.nodes = Vec::with_capacity(count);
-        tree.nodes.push(placeholder);
-        let mut stack = vec![(root, 0)];
-        while let Some((at, to)) = stack.pop() {
+        tree.nodes = vec![placeholder; count];
+        tree.prim_ids = Vec::with_capacity(self.objects());
+        let mut free = 1;
+        let mut stack = Vec::with_capacity(64);
+        let mut next = Some((root, 0));
+        while let Some((at, to)) = next {
             let node = &self.nodes[at as usize];
             let aabb = Aabb::from(&node.aabb);
-            tree.nodes[to as usize] = if node.is_leaf() {
-                tree.prim_ids.push(node.children[1]);
-                BvhNode::leaf(aabb, tree.prim_ids.len() as u32 - 1, 1)
+            let [left, right] = node.children;
+            if left == NONE {
+                tree.nodes[to as usize] = BvhNode::leaf(aabb, tree.prim_ids.len() as u32, 1);
+                tree.prim_ids.push(right);
+                next = stack.pop();
             } else {
-                let first = tree.nodes.len() as u32;
-                tree.nodes.extend([placeholder; 2]);
-                stack.extend([(node.children[1], first + 1), (node.children[0], first)]);
-                BvhNode::inner(aabb, first, 2)
-            };
+                tree.nodes[to as usize] = BvhNode::inner(aabb, free, 2);
+                stack.push((right, free + 1));
+                next = Some((left, free));
+                free += 2;
+            }
         }
+        tree
+    }
+
+    /// As [`to_bvh`](Self::to_bvh), but level by level: faster if large nodes are close to each other in memory, and for
+    /// rays a little slower.
+    pub fn to_bvh_level_by_level(&self) -> Bvh {
+        let mut tree = Bvh::default();
+        let Some(root) = self.root() else { return tree };
+        let (count, objects) = (self.nodes.len() - 1, self.objects());
+        tree.nodes.reserve_exact(count);
+        // Room for what is written whether or not a node is a leaf, which cannot be predicted.
+        tree.prim_ids = vec![0; objects + 1];
+        let mut sources = vec![root; count + 2];
+        let (mut free, mut leaves) = (1, 0);
+        for at in 0..count {
+            let node = &self.nodes[sources[at] as usize];
+            let (leaf, aabb) = (node.is_leaf(), Aabb::from(&node.aabb));
+            (sources[free], sources[free + 1]) = (node.children[0], node.children[1]);
+            tree.prim_ids[leaves] = node.children[1];
+            let (inner_node, leaf_node) =
+                (BvhNode::inner(aabb, free as u32, 2), BvhNode::leaf(aabb, leaves as u32, 1));
+            tree.nodes.push(if leaf { leaf_node } else { inner_node });
+            free += 2 * usize::from(!leaf);
+            leaves += usize::from(leaf);
+        }
+        tree.prim_ids.truncate(objects);
         tree
     }
 
@@ -324,6 +384,28 @@ mod tests {
         let tree = muller_fellner::Config::default().build(&boxes).unwrap();
         let working = Working::from_bvh(&tree, &boxes).unwrap();
         (boxes, working)
+    }
+
+    #[test]
+    fn a_tight_tree_is_taken_over_as_it_is() {
+        let (_, working) = scene(100);
+        let tree = working.to_bvh();
+        let taken = Working::from_tight(&tree, working.internal_area()).unwrap();
+        assert_tight(&taken, &scene(100).0);
+        assert_eq!((taken.area(), taken.to_bvh()), (working.internal_area(), tree));
+    }
+
+    #[test]
+    fn a_tree_is_the_same_level_by_level() {
+        for n in [1, 2, 3, 100] {
+            let (boxes, working) = scene(n);
+            let tree = working.to_bvh_level_by_level();
+            validate(&tree, &boxes).unwrap();
+            assert_eq!(Working::from_bvh(&tree, &boxes).unwrap().to_bvh(), working.to_bvh());
+            assert!(tree.nodes.windows(2).all(|pair| pair[0].is_leaf()
+                || pair[1].is_leaf()
+                || pair[0].children().start < pair[1].children().start));
+        }
     }
 
     /// Every box is the union below it, every parent the right one.

@@ -5,9 +5,12 @@
 //! The time is that of the whole call, build and final conversion included. Threads take turns, and every further
 //! number of threads has 0.6 of the first one's time, so that a line should show no less in its later columns.
 
+mod clock;
+
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{cost, validate};
-use bvh_search::{Budget, Observer, Problem, portfolio, solve};
+use bvh_search::{Budget, Problem, portfolio, solve};
+use clock::Clock;
 use harness::scene::Scene;
 use std::time::Instant;
 
@@ -16,22 +19,6 @@ const LESS_TIME: f64 = 0.6;
 
 /// The part of the time that the search may plan with: the conversion of its result takes the rest.
 const PLANNED: f64 = 0.97;
-
-/// A limit in seconds, known to the search.
-struct Clock {
-    start: Instant,
-    seconds: f64,
-}
-
-impl Observer for Clock {
-    fn progress(&self) -> Option<f64> {
-        Some(self.start.elapsed().as_secs_f64() / self.seconds)
-    }
-
-    fn cancelled(&self) -> bool {
-        self.start.elapsed().as_secs_f64() >= self.seconds
-    }
-}
 
 fn main() {
     let (mut seconds, mut threads, mut seed) = (vec![0.1, 1.0, 10.0, 60.0], vec![1, 2], 1);

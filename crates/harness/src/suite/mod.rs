@@ -231,7 +231,9 @@ pub fn methods() -> Vec<(String, Method)> {
         let config = goldsmith_salmon::Config { descent, pair_inner };
         methods.push((format!("goldsmith_salmon, {config:?}"), Method::GoldsmithSalmon(config)));
     }
-    methods
-        .push(("agglomerative, radius 1".into(), Method::Agglomerative(agglomerative::Config { radius: 1 })));
+    methods.push((
+        "agglomerative, radius 1".into(),
+        Method::Agglomerative(agglomerative::Config { radius: 1, ..Default::default() }),
+    ));
     methods
 }

@@ -1,0 +1,138 @@
+//! The Morton curve: objects by the point of a grid that is nearest to their centre, neighbours in space mostly neighbours in order.
+
+use bvh_core::glam::DVec4;
+use bvh_core::{PackedAabb, with_vector_instructions};
+
+/// The objects along the Morton curve through their box centres, equal codes by index. The grid has 2^21 points along the
+/// longest side of `all`, the box around all, as far apart along the others.
+pub(super) fn order(boxes: &[PackedAabb], all: &PackedAabb) -> Vec<u32> {
+    let codes = codes(boxes, all);
+    let mut order: Vec<(u32, u32)> = codes.iter().zip(0..).map(|(&code, index)| (high(code), index)).collect();
+    if order.len() < DIGITS {
+        order.sort_unstable_by_key(|&(_, index)| (codes[index as usize], index));
+    } else {
+        sort(&mut order);
+        // The lower half of the codes matters only where the upper one does not decide, which is seldom.
+        let mut start = 0;
+        for end in 1..=order.len() {
+            if end == order.len() || order[end].0 != order[start].0 {
+                if end > start + 1 {
+                    order[start..end].sort_by_key(|&(_, index)| codes[index as usize]);
+                }
+                start = end;
+            }
+        }
+    }
+    order.into_iter().map(|(_, index)| index).collect()
+}
+
+/// Values of a digit of the radix sort: few passes over many objects.
+const DIGITS: usize = 1 << 11;
+
+/// Sorts by the key, equal ones as they were: three passes, the lowest digit first.
+fn sort(keyed: &mut Vec<(u32, u32)>) {
+    let digit = |key: u32, pass: usize| (key >> (11 * pass)) as usize % DIGITS;
+    let mut ends = [[0u32; DIGITS]; 3];
+    for &(key, _) in keyed.iter() {
+        (0..3).for_each(|pass| ends[pass][digit(key, pass)] += 1);
+    }
+    let mut sorted = vec![(0, 0); keyed.len()];
+    for (pass, starts) in ends.iter_mut().enumerate() {
+        let mut before = 0;
+        for start in starts.iter_mut() {
+            before += std::mem::replace(start, before);
+        }
+        for &(key, index) in keyed.iter() {
+            let start = &mut starts[digit(key, pass)];
+            sorted[*start as usize] = (key, index);
+            *start += 1;
+        }
+        std::mem::swap(keyed, &mut sorted);
+    }
+}
+
+/// The upper half of a code of 63 bits.
+fn high(code: u64) -> u32 {
+    (code >> 31) as u32
+}
+
+with_vector_instructions! {
+    /// The code of every box's centre.
+    codes = codes_plain(boxes: &[PackedAabb], all: &PackedAabb) -> Vec<u64>
+}
+
+#[inline(always)]
+fn codes_plain(boxes: &[PackedAabb], all: &PackedAabb) -> Vec<u64> {
+    let low = 2.0 * all.min();
+    let side = 2.0 * all.extent().max_element();
+    let cells = if side > 0.0 { f64::from((1 << 21) - 1) / side } else { 0.0 };
+    // Added to a number far below it, it leaves the nearest integer in the lowest bits.
+    let integers = DVec4::splat((1u64 << 52) as f64);
+    boxes
+        .iter()
+        .map(|b| {
+            let cell = (b.doubled_centroid() - low) * cells + integers;
+            let [x, y, z, _] = spread(cell.to_array().map(f64::to_bits));
+            x << 2 | y << 1 | z
+        })
+        .collect()
+}
+
+/// Moves bit i of 21 to bit 3·i, in each of four numbers.
+#[inline(always)]
+fn spread(mut bits: [u64; 4]) -> [u64; 4] {
+    bits = bits.map(|bits| bits & 0x1f_ffff);
+    for (shift, mask) in [
+        (32, 0x001f_0000_0000_ffff),
+        (16, 0x001f_0000_ff00_00ff),
+        (8, 0x100f_00f0_0f00_f00f),
+        (4, 0x10c3_0c30_c30c_30c3),
+        (2, 0x1249_2492_4924_9249),
+    ] {
+        bits = bits.map(|bits| (bits | bits << shift) & mask);
+    }
+    bits
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_core::Aabb;
+    use proptest::prelude::*;
+
+    #[test]
+    fn bits_are_spread_by_threes() {
+        for bit in 0..21 {
+            assert_eq!(spread([0, 1, 1 << bit, 0]), [0, 1, 1 << (3 * bit), 0]);
+        }
+        assert_eq!(spread([u64::MAX; 4]), [(0..21).map(|bit| 1 << (3 * bit)).sum(); 4]);
+    }
+
+    #[test]
+    fn many_keys_are_sorted_stably() {
+        let mut keyed: Vec<(u32, u32)> =
+            (0..50_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> (i % 31), i)).collect();
+        let mut expected = keyed.clone();
+        expected.sort();
+        sort(&mut keyed);
+        assert_eq!(keyed, expected);
+    }
+
+    proptest! {
+        #[test]
+        fn objects_are_ordered_by_code_and_then_by_index(
+            points in prop::collection::vec((0u8..5, 0u32..1 << 22, prop::sample::select(vec![1e-7f32, 1.0])), 0..60), copies in prop::sample::select(vec![1usize, 100])
+        ) {
+            // Coarse or fine coordinates: many codes agree in their upper half, some altogether.
+            let point = |&(x, y, scale): &(u8, u32, f32)| [f32::from(x), y as f32 * 1e-6 * scale, scale];
+            let boxes: Vec<PackedAabb> =
+                points.iter().map(|p| PackedAabb::from(&Aabb::from((point(p), point(p))))).collect();
+            let boxes = boxes.repeat(copies);
+            let all = boxes.iter().fold(PackedAabb::EMPTY, |all, b| all.union(b));
+            let codes = codes(&boxes, &all);
+            let mut expected: Vec<u32> = (0..boxes.len() as u32).collect();
+            expected.sort_by_key(|&index| (codes[index as usize], index));
+            prop_assert_eq!(order(&boxes, &all), expected);
+        }
+    }
+}

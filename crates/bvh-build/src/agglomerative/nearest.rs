@@ -1,0 +1,114 @@
+//! Every cluster's nearest neighbour along the curve: several at a time, each distance in turn.
+
+use bvh_core::{PackedAabb, with_vector_instructions};
+
+/// Clusters whose neighbours are found at once.
+pub(super) const CHUNK: usize = 512;
+
+/// Planes of a chunk and its surroundings, one array per coordinate, and what comes of them.
+#[derive(Debug, Default)]
+pub(super) struct Scratch {
+    planes: [Vec<f32>; 6],
+    /// Lengths of the boxes around two clusters, then their areas in place of the first.
+    sides: [Vec<f32>; 3],
+    /// Per cluster, the bits of the least area so far.
+    least: Vec<i32>,
+    /// What was found at lesser distances: apart from what is written, which would be written slowly otherwise.
+    before: Vec<i32>,
+}
+
+with_vector_instructions! {
+    /// How far on the nearest neighbours of the clusters from `start` on are, as many as `found` has room for, at most
+    /// [`CHUNK`]: the least area of the box around both, then the least distance, then the parity of the position if they
+    /// are next to each other, else the one before. Clusters are looked at up to `radius` positions before and after.
+    ///
+    /// Areas are f32, of coordinates multiplied by `scale`, a power of two with which they can neither overflow nor be
+    /// equal for all but clusters 2^60 times smaller than the scene.
+    pub(super) find = find_plain(
+        boxes: &[PackedAabb], scale: f64, radius: usize, start: usize, found: &mut [i32], scratch: &mut Scratch)
+}
+
+#[inline(always)]
+fn find_plain(
+    boxes: &[PackedAabb],
+    scale: f64,
+    radius: usize,
+    start: usize,
+    found: &mut [i32],
+    scratch: &mut Scratch,
+) {
+    let len = found.len();
+    let Scratch { planes, sides, least, before } = scratch;
+    // Position p of the chunk is at radius + p. No pair with what is beyond the ends has a finite area.
+    let (first, last) = (start.saturating_sub(radius), (start + len + radius).min(boxes.len()));
+    let offset = first + radius - start;
+    for plane in planes.iter_mut() {
+        plane.resize(len + 2 * radius, f32::INFINITY);
+        plane[..offset].fill(f32::INFINITY);
+        plane[offset + last - first..].fill(f32::INFINITY);
+    }
+    let [a, b, c, d, e, f] = planes.each_mut().map(|plane| &mut plane[offset..offset + last - first]);
+    for (at, aabb) in boxes[first..last].iter().enumerate() {
+        let [low, high] = aabb.planes().map(|plane| plane.map(|x| (f64::from(x) * scale) as f32));
+        [a[at], b[at], c[at]] = [low[0], low[1], low[2]];
+        [d[at], e[at], f[at]] = [high[0], high[1], high[2]];
+    }
+    sides.iter_mut().for_each(|side| side.resize(len + radius, 0.0));
+    least.clear();
+    least.resize(len, i32::MAX);
+    before.resize(len, 0);
+    for distance in 1..=radius {
+        // The pairs of `distance` whose second is in the chunk, then those whose first is.
+        let pairs = len + distance;
+        for (axis, side) in sides.iter_mut().enumerate() {
+            let [low, high] =
+                [axis, axis + 3].map(|plane| &planes[plane][radius - distance..][..pairs + distance]);
+            joint_sides(low, high, distance, &mut side[..pairs]);
+        }
+        let [x, y, z] = sides.each_mut().map(|side| &mut side[..pairs]);
+        for ((x, y), z) in x.iter_mut().zip(y.iter()).zip(z.iter()) {
+            *x = *x * *y + *y * *z + *z * *x;
+        }
+        before.copy_from_slice(found);
+        take_nearer(x, start, distance, least, before, found);
+    }
+}
+
+/// The length of the box around the clusters at `p` and `p + distance`, for all that `sides` has room for.
+#[inline(always)]
+fn joint_sides(low: &[f32], high: &[f32], distance: usize, sides: &mut [f32]) {
+    let larger = |a: f32, b: f32| if a > b { a } else { b };
+    let pairs = sides.len();
+    let (low, low_on) = (&low[..pairs], &low[distance..][..pairs]);
+    let (high, high_on) = (&high[..pairs], &high[distance..][..pairs]);
+    for at in 0..pairs {
+        sides[at] = larger(low[at], low_on[at]) + larger(high[at], high_on[at]);
+    }
+}
+
+/// Takes those neighbours, `distance` before and after, that are nearer than all before. Areas are ordered as their bits
+/// are, which lets everything be done without a branch.
+#[inline(always)]
+fn take_nearer(
+    areas: &[f32],
+    start: usize,
+    distance: usize,
+    least: &mut [i32],
+    known: &[i32],
+    found: &mut [i32],
+) {
+    let len = found.len();
+    let (before, after) = (&areas[..len], &areas[distance..][..len]);
+    let (least, known) = (&mut least[..len], &known[..len]);
+    let (far, next) = (distance as i32, i32::from(distance == 1));
+    for at in 0..len {
+        let (before, after) = (before[at].to_bits() as i32, after[at].to_bits() as i32);
+        // Of two that are equally near the one after, for next neighbours at even positions.
+        let even = !(start + at) as i32 & next;
+        let backwards = -i32::from(after >= before + even);
+        let area = after.min(before);
+        let nearer = -i32::from(area < least[at]);
+        least[at] = area.min(least[at]);
+        found[at] = known[at] ^ (known[at] ^ ((far ^ backwards) - backwards)) & nearer;
+    }
+}
