@@ -4,8 +4,10 @@
 //!    if these take it all.
 //! 1. Greedy division with |L|^0.9.
 //! 2. If the end is known, from the budget's work or the observer's [progress](crate::Observer::progress): one long descent
-//!    of the temperature of annealed ruin and recreate that ends there. It starts at once, since what a local search had
-//!    found would be forgotten; and at equal work it ends lower than several, one after another or side by side and fused.
+//!    of the temperature of annealed ruin and recreate. It starts at once, since what a local search had found would be
+//!    forgotten; and at equal work it ends lower than several equal ones, one after another or side by side and fused. If
+//!    there is much to be done, several short descents from a lower temperature follow it: each loosens everything but the
+//!    top of the tree, finds other optima here better and there worse, and fusing keeps the better ones.
 //! 3. If it is not: reinsertion to a local optimum, then generations, each annealed from the incumbent and longer than the
 //!    one before.
 //!
@@ -47,6 +49,14 @@ pub struct Config {
     pub hottest: f64,
     /// Last temperature, above 0. Default 0.003.
     pub cold: f64,
+    /// First temperature of the descents after a long one, above 0. Default 0.05.
+    pub reheat: f64,
+    /// Their number, 0 to 1000. Default 6.
+    pub reheats: u32,
+    /// The part of the work or time that is kept for them, above 0 and below 1. Default 0.3.
+    pub reheated: f64,
+    /// A descent is long, and there are others after it, from this work per object on, above 0. Default 7000.
+    pub reheats_from: f64,
     /// Disjoint pieces of the tree that are annealed at once, 0 to 4096; so many threads can help. The default, 0, is
     /// the whole tree, which is a little better at equal work; but four per thread if the time is known and there are
     /// several threads.
@@ -69,6 +79,10 @@ impl Default for Config {
             heat: 0.02,
             hottest: 0.2,
             cold: 0.003,
+            reheat: 0.05,
+            reheats: 6,
+            reheated: 0.3,
+            reheats_from: 7000.0,
             pieces: 0,
             ruin: Ruin { scale: Scale::Top, ..Ruin::default() },
             start: None,
@@ -81,9 +95,15 @@ impl Config {
         for (name, found) in [("first", self.first), ("growth", self.growth), ("longest", self.longest)] {
             require(found >= 1.0 && found.is_finite(), name, found, "1 or more")?;
         }
-        for (name, found) in [("heat", self.heat), ("hottest", self.hottest), ("cold", self.cold)] {
+        for (name, found) in
+            [("heat", self.heat), ("hottest", self.hottest), ("cold", self.cold), ("reheat", self.reheat)]
+        {
             require(found > 0.0 && found.is_finite(), name, found, "above 0")?;
         }
+        require(self.reheats_from > 0.0, "reheats_from", self.reheats_from, "above 0")?;
+        let part = self.reheated;
+        require(part > 0.0 && part < 1.0, "reheated", part, "above 0, below 1")?;
+        require(self.reheats <= 1000, "reheats", self.reheats.into(), "0 to 1000")?;
         require(self.pieces <= 4096, "pieces", self.pieces.into(), "0 to 4096")?;
         self.ruin.check()
     }
@@ -98,9 +118,8 @@ impl Config {
         let timed = observer.progress().is_some();
         let known = timed || run.left().work <= own;
         let mut left = own.min(run.left().work);
-        let (mut length, mut generations) = (self.first, MOST_GENERATIONS);
         if known {
-            length = left as f64 / n as f64;
+            let mut length = left as f64 / n as f64;
             if timed {
                 let quota = Quota { work: left.min(PROBE * n), ..run.left() };
                 let (tally, in_time) = self.probe(tree, stream(seed, 0), quota, observer);
@@ -108,50 +127,82 @@ impl Config {
                 run.count(tally);
                 length = length.min(in_time / n as f64);
             }
-            let longest = self.longest.min(WORK_PER_PAIR * n as f64);
-            generations = (length / longest).ceil().clamp(1.0, MOST_GENERATIONS as f64) as u64;
-            length /= generations as f64;
+            let (all, began) = (left, observer.progress().unwrap_or(0.0));
+            for (number, Descent { hot, until }) in (0..).zip(self.plan(length, n)) {
+                let work = if timed { left } else { left.min((until * all as f64) as u64 - (all - left)) };
+                let cooling = self.cooling(hot, work, began + (1.0 - began) * until, run);
+                self.descend(tree, [seed, number], &cooling, number == 0, best, run, &mut left);
+            }
         } else {
             best.descend(tree, u32::MAX, run, |tree, _, quota, observer| {
                 reinsertion::sweep_by_area(tree, quota, observer)
             });
-        }
-        for number in 0..generations {
-            if run.stopped().is_some() || left == 0 {
-                break;
-            }
-            let rest = generations - number;
-            let hot = (self.heat * length / 1000.0).min(self.hottest).max(self.cold);
-            let work = if timed {
-                left
-            } else if known {
-                left / rest
-            } else {
-                left.min((length * n as f64) as u64)
-            };
-            let end = observer.progress().map_or(1.0, |now| now + (1.0 - now) / rest as f64);
-            let quota = Quota { work, ..run.left() };
-            let cooling = Cooling { hot, cold: self.cold, quota, end, pieces: self.pieces(timed) };
-            let mut annealed = tree.clone();
-            let mover = || Mover::new(&self.ruin);
-            let streams = [seed, 1 + (number << 40)];
-            anneal(mover, &cooling, &mut annealed, streams, observer, &mut |tree, tally| {
-                left = left.saturating_sub(tally.work);
-                run.count(tally);
-                if tree.area() < best.area() * (1.0 - WORTH_AN_EVENT) {
-                    best.offer(tree, run);
-                }
-            });
-            *tree = if known && number == 0 && annealed.area() < tree.area() {
-                annealed
-            } else {
-                fuse(&[tree, &annealed])
-            };
-            best.offer(tree, run);
-            if !known {
+            let mut length = self.first;
+            for number in 0..MOST_GENERATIONS {
+                let cooling = self.cooling(self.hot(length), left.min((length * n as f64) as u64), 1.0, run);
+                self.descend(tree, [seed, number], &cooling, false, best, run, &mut left);
                 length *= self.growth;
             }
         }
+    }
+
+    /// The descents of so much work per object.
+    fn plan(&self, length: f64, n: u64) -> Vec<Descent> {
+        let longest = self.longest.min(WORK_PER_PAIR * n as f64);
+        let equal = (length / longest).ceil().clamp(1.0, MOST_GENERATIONS as f64);
+        let length = length / equal;
+        let reheats = if length < self.reheats_from { 0 } else { self.reheats };
+        let kept = if reheats == 0 { 0.0 } else { self.reheated };
+        let mut plan = Vec::new();
+        for number in 0..equal as u64 {
+            for reheat in 0..=reheats {
+                let part = 1.0 - kept + kept * f64::from(reheat) / f64::from(reheats.max(1));
+                let hot = self.hot(length);
+                plan.push(Descent {
+                    hot: if reheat == 0 { hot } else { hot.min(self.reheat) },
+                    until: (number as f64 + part) / equal,
+                });
+            }
+        }
+        plan
+    }
+
+    /// First temperature of a descent of so much work per object.
+    fn hot(&self, length: f64) -> f64 {
+        (self.heat * length / 1000.0).min(self.hottest).max(self.cold)
+    }
+
+    fn cooling(&self, hot: f64, work: u64, end: f64, run: &Run) -> Cooling {
+        let (quota, timed) = (Quota { work, ..run.left() }, run.observer().progress().is_some());
+        Cooling { hot: hot.max(self.cold), cold: self.cold, quota, end, pieces: self.pieces(timed) }
+    }
+
+    /// One descent from the incumbent, and what it ends with fused with that, unless it is the first and better.
+    #[expect(clippy::too_many_arguments, reason = "the state of `improve`")]
+    fn descend(
+        &self,
+        tree: &mut Working,
+        [seed, number]: [u64; 2],
+        cooling: &Cooling,
+        first: bool,
+        best: &mut Incumbent,
+        run: &mut Run,
+        left: &mut u64,
+    ) {
+        if run.stopped().is_some() || *left == 0 {
+            return;
+        }
+        let (mut annealed, observer) = (tree.clone(), run.observer());
+        let streams = [seed, 1 + (number << 40)];
+        anneal(|| Mover::new(&self.ruin), cooling, &mut annealed, streams, observer, &mut |tree, tally| {
+            *left = left.saturating_sub(tally.work);
+            run.count(tally);
+            if tree.area() < best.area() * (1.0 - WORTH_AN_EVENT) {
+                best.offer(tree, run);
+            }
+        });
+        *tree = if first && annealed.area() < tree.area() { annealed } else { fuse(&[tree, &annealed]) };
+        best.offer(tree, run);
     }
 
     /// Moves at the lowest temperature. Also returns the work for which the rest of the time is enough at this rate.
@@ -180,6 +231,14 @@ impl Config {
         let _ = timed;
         self.pieces.max(1)
     }
+}
+
+/// A descent of the temperature, as planned.
+struct Descent {
+    /// Its first temperature.
+    hot: f64,
+    /// The part of all work, or time, that is over when it ends.
+    until: f64,
 }
 
 /// What the incumbent must gain in a round to be converted and reported before the end of a generation.
