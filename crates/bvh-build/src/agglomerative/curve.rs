@@ -1,12 +1,13 @@
-//! The Morton curve: objects by the point of a grid that is nearest to their centre, neighbours in space mostly neighbours in order.
+//! The Morton curve: objects by the point of a grid that is nearest to their centre, neighbours in space mostly neighbours
+//! in order.
 
 use bvh_core::glam::DVec4;
 use bvh_core::{PackedAabb, with_vector_instructions};
 
 /// The objects along the Morton curve through their box centres, equal codes by index. The grid has 2^21 points along the
-/// longest side of `all`, the box around all, as far apart along the others.
-pub(super) fn order(boxes: &[PackedAabb], all: &PackedAabb) -> Vec<u32> {
-    let codes = codes(boxes, all);
+/// longest side of the box around all centres, as far apart along the others.
+pub(super) fn order(boxes: &[PackedAabb]) -> Vec<u32> {
+    let codes = codes(boxes);
     let mut order: Vec<(u32, u32)> = codes.iter().zip(0..).map(|(&code, index)| (high(code), index)).collect();
     if order.len() < DIGITS {
         order.sort_unstable_by_key(|&(_, index)| (codes[index as usize], index));
@@ -58,13 +59,16 @@ fn high(code: u64) -> u32 {
 
 with_vector_instructions! {
     /// The code of every box's centre.
-    codes = codes_plain(boxes: &[PackedAabb], all: &PackedAabb) -> Vec<u64>
+    codes = codes_plain(boxes: &[PackedAabb]) -> Vec<u64>
 }
 
 #[inline(always)]
-fn codes_plain(boxes: &[PackedAabb], all: &PackedAabb) -> Vec<u64> {
-    let low = 2.0 * all.min();
-    let side = 2.0 * all.extent().max_element();
+fn codes_plain(boxes: &[PackedAabb]) -> Vec<u64> {
+    let (mut low, mut high) = (DVec4::INFINITY, DVec4::NEG_INFINITY);
+    for centre in boxes.iter().map(PackedAabb::doubled_centroid) {
+        (low, high) = (low.min(centre), high.max(centre));
+    }
+    let side = (high - low).max_element();
     let cells = if side > 0.0 { f64::from((1 << 21) - 1) / side } else { 0.0 };
     // Added to a number far below it, it leaves the nearest integer in the lowest bits.
     let integers = DVec4::splat((1u64 << 52) as f64);
@@ -121,18 +125,18 @@ mod tests {
     proptest! {
         #[test]
         fn objects_are_ordered_by_code_and_then_by_index(
-            points in prop::collection::vec((0u8..5, 0u32..1 << 22, prop::sample::select(vec![1e-7f32, 1.0])), 0..60), copies in prop::sample::select(vec![1usize, 100])
+            points in prop::collection::vec((0u8..5, 0u32..1 << 22, prop::sample::select(vec![1e-7f32, 1.0])), 0..60),
+            copies in prop::sample::select(vec![1usize, 100]),
         ) {
             // Coarse or fine coordinates: many codes agree in their upper half, some altogether.
             let point = |&(x, y, scale): &(u8, u32, f32)| [f32::from(x), y as f32 * 1e-6 * scale, scale];
             let boxes: Vec<PackedAabb> =
                 points.iter().map(|p| PackedAabb::from(&Aabb::from((point(p), point(p))))).collect();
             let boxes = boxes.repeat(copies);
-            let all = boxes.iter().fold(PackedAabb::EMPTY, |all, b| all.union(b));
-            let codes = codes(&boxes, &all);
+            let codes = codes(&boxes);
             let mut expected: Vec<u32> = (0..boxes.len() as u32).collect();
             expected.sort_by_key(|&index| (codes[index as usize], index));
-            prop_assert_eq!(order(&boxes, &all), expected);
+            prop_assert_eq!(order(&boxes), expected);
         }
     }
 }

@@ -19,8 +19,7 @@ pub(super) struct Scratch {
 
 with_vector_instructions! {
     /// How far on the nearest neighbours of the clusters from `start` on are, as many as `found` has room for, at most
-    /// [`CHUNK`]: the least area of the box around both, then the least distance, then the parity of the position if they
-    /// are next to each other, else the one before. Clusters are looked at up to `radius` positions before and after.
+    /// [`CHUNK`]: the least area of the box around both, then the least exclusive or of the positions. Clusters are looked at up to `radius` positions before and after.
     ///
     /// Areas are f32, of coordinates multiplied by `scale`, a power of two with which they can neither overflow nor be
     /// equal for all but clusters 2^60 times smaller than the scene.
@@ -100,15 +99,21 @@ fn take_nearer(
     let len = found.len();
     let (before, after) = (&areas[..len], &areas[distance..][..len]);
     let (least, known) = (&mut least[..len], &known[..len]);
-    let (far, next) = (distance as i32, i32::from(distance == 1));
+    let far = distance as i32;
     for at in 0..len {
         let (before, after) = (before[at].to_bits() as i32, after[at].to_bits() as i32);
-        // Of two that are equally near the one after, for next neighbours at even positions.
-        let even = !(start + at) as i32 & next;
-        let backwards = -i32::from(after >= before + even);
-        let area = after.min(before);
-        let nearer = -i32::from(area < least[at]);
+        let position = (start + at) as i32;
+        let bits = |on: i32| position ^ (position + on);
+        let backwards = is_less([before, bits(-far)], [after, bits(far)]);
+        let (area, on) = (after.min(before), (far ^ backwards) - backwards);
+        let nearer = is_less([area, bits(on)], [least[at], bits(known[at])]);
         least[at] = area.min(least[at]);
-        found[at] = known[at] ^ (known[at] ^ ((far ^ backwards) - backwards)) & nearer;
+        found[at] = known[at] ^ (known[at] ^ on) & nearer;
     }
+}
+
+/// All ones if `a` is less than `b`, or as much and its second number less; else zero.
+#[inline(always)]
+fn is_less(a: [i32; 2], b: [i32; 2]) -> i32 {
+    -(i32::from(a[0] < b[0]) | i32::from(a[0] == b[0]) & i32::from(a[1] < b[1]))
 }
