@@ -129,7 +129,8 @@ impl Config {
             }
             let (all, began) = (left, observer.progress().unwrap_or(0.0));
             for (number, Descent { hot, until }) in (0..).zip(self.plan(length, n)) {
-                let work = if timed { left } else { left.min((until * all as f64) as u64 - (all - left)) };
+                let due = (until * all as f64) as u64;
+                let work = if timed { left } else { left.min(due.saturating_sub(all - left)) };
                 let cooling = self.cooling(hot, work, began + (1.0 - began) * until, run);
                 self.descend(tree, [seed, number], &cooling, number == 0, best, run, &mut left);
             }
@@ -189,7 +190,7 @@ impl Config {
         run: &mut Run,
         left: &mut u64,
     ) {
-        if run.stopped().is_some() || *left == 0 {
+        if run.stopped().is_some() || cooling.quota.work == 0 {
             return;
         }
         let (mut annealed, observer) = (tree.clone(), run.observer());
