@@ -1,13 +1,14 @@
 //! Agglomerative clustering: bottom-up, join clusters that are each other's nearest nearby.
 //!
-//! Meister & Bittner 2018, 'Parallel locally-ordered clustering for bounding volume hierarchy construction'. Clusters lie
-//! along a space-filling curve; each finds the nearest among its `radius` neighbours on either side, by the area of the
-//! box around both, and those that find each other are joined, round by round.
+//! Meister & Bittner 2018, 'Parallel locally-ordered clustering for bounding volume hierarchy construction'. Clusters
+//! lie along a space-filling curve; each finds the nearest among its `radius` neighbours on either side, by the area of
+//! the box around both, and those that find each other are joined, round by round.
 //!
 //! Differs from the paper: Morton cells are cubes, so that flat scenes are not distorted; the first rounds may look at
 //! next neighbours only; of equally near neighbours that is taken whose position has the least exclusive or with the
-//! cluster's own, so that regular grids divide by powers of two and clusters without a difference pair off; a round after
-//! one that joined few also joins neighbours along the curve, so that there are O(log n) rounds whatever the scene.
+//! cluster's own, so that regular grids divide by powers of two and clusters without a difference pair off; a round
+//! after one that joined few also joins neighbours along the curve, so that there are O(log n) rounds whatever the
+//! scene.
 
 mod curve;
 mod nearest;
@@ -37,10 +38,21 @@ impl Default for Config {
     }
 }
 
+impl Config {
+    fn check(&self) -> Result<(), BuildError> {
+        if (1..=1000).contains(&self.radius) {
+            return Ok(());
+        }
+        let (parameter, accepted) = ("radius", "1 to 1000");
+        Err(BuildError::Parameter { parameter, found: self.radius.into(), accepted })
+    }
+}
+
 impl Builder for Config {
-    /// O(radius · n), and a radix sort. Neighbours are looked for on all threads of the current rayon pool, with the same
-    /// result as on one.
+    /// O(radius · n), and a radix sort. Neighbours are looked for on all threads of the current rayon pool, with the
+    /// same result as on one.
     fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
+        self.check()?;
         Along::new(boxes)?.build(self)
     }
 }
@@ -57,7 +69,7 @@ pub struct Along {
 }
 
 impl Along {
-    /// Checks and sorts. O(n): a radix sort.
+    /// Checks and sorts: a radix sort in O(n), O(n log n) if most objects are within a thousandth of the scene.
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
         check_scene(boxes)?;
         let boxes: Vec<PackedAabb> = boxes.iter().map(PackedAabb::from).collect();
@@ -68,10 +80,7 @@ impl Along {
 
     /// Clusters what was sorted.
     pub fn build(self, config: &Config) -> Result<Bvh, BuildError> {
-        if !(1..=1000).contains(&config.radius) {
-            let (parameter, accepted) = ("radius", "1 to 1000");
-            return Err(BuildError::Parameter { parameter, found: config.radius.into(), accepted });
-        }
+        config.check()?;
         let Self { boxes, all, order } = self;
         if boxes.is_empty() {
             return Ok(Bvh::default());
@@ -241,16 +250,6 @@ mod tests {
         (0..n).map(|i| cube([hash(i, 3), hash(i, 11), hash(i, 19)], hash(i, 27) / 32.0)).collect()
     }
 
-    fn depth(tree: &Bvh) -> usize {
-        let mut depths = vec![0; tree.nodes.len()];
-        for (at, node) in tree.nodes.iter().enumerate() {
-            for child in node.children() {
-                depths[child] = depths[at] + 1;
-            }
-        }
-        depths.into_iter().max().unwrap_or(0)
-    }
-
     #[test]
     fn trees_are_valid_and_tight() {
         for n in [0, 1, 2, 3, 4, 5, 100, 3000] {
@@ -272,7 +271,7 @@ mod tests {
     #[test]
     fn clusters_without_a_difference_pair_off_into_a_balanced_tree() {
         for boxes in [vec![cube([0.1; 3], 1.0); 1 << 12], vec![cube([0.1; 3], 0.0); 1 << 12]] {
-            assert_eq!(depth(&Config::default().build(&boxes).unwrap()), 12);
+            assert_eq!(Config::default().build(&boxes).unwrap().depth(), 12);
         }
     }
 
@@ -282,7 +281,7 @@ mod tests {
         let boxes: Vec<Aabb> = (1..20_000u16).map(|i| cube([-f32::from(i); 3], 2.0 * f32::from(i))).collect();
         let tree = Config::default().build(&boxes).unwrap();
         validate(&tree, &boxes).unwrap();
-        assert!(depth(&tree) < 1000, "{}", depth(&tree));
+        assert!(tree.depth() < 1000, "{}", tree.depth());
     }
 
     #[test]
@@ -392,6 +391,20 @@ mod tests {
             let tree = Config { radius, ..Config::default() }.build(&boxes).unwrap();
             prop_assert!(validate(&tree, &boxes).is_ok());
         }
+    }
+
+    #[test]
+    fn a_plane_far_from_the_origin_for_its_size_does_not_hide_areas() {
+        let flat = |x: f32| -> Vec<Aabb> {
+            let rows = [0.0f32, 10.0, 11.0, 20.0, 21.0, 30.0, 31.0, 40.0].map(|row| row * 1e-10);
+            rows.map(|y| Aabb::from(([x, y, 0.0], [x, y + 1e-10, 1e-10]))).to_vec()
+        };
+        assert_eq!(below_inner_nodes(&built(&flat(1e32))), below_inner_nodes(&built(&flat(0.0))));
+        assert!(below_inner_nodes(&built(&flat(1e32))).contains(&vec![1, 2]));
+    }
+
+    fn built(boxes: &[Aabb]) -> Bvh {
+        Config::default().build(boxes).unwrap()
     }
 
     #[test]

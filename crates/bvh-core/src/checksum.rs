@@ -1,4 +1,4 @@
-//! A 64-bit checksum at the speed of memory that no change within eight bytes escapes.
+//! A 64-bit checksum at the speed of memory that no change within one of its words escapes.
 //!
 //! Bytes are taken as little-endian words of eight, padded with zeros to a multiple of 32 words. Word `i` goes to lane
 //! `i mod 32`, from lanes that begin as 1, 2, …, 32. With arithmetic modulo 2^64, a lane takes in a word by

@@ -52,12 +52,6 @@ impl PackedAabb {
         [self.negated_min.to_array(), self.max.to_array()]
     }
 
-    /// The lower corner, the fourth lane of no meaning.
-    #[inline(always)]
-    pub fn min(&self) -> DVec4 {
-        -self.negated_min.as_dvec4()
-    }
-
     /// Side lengths in world units, the fourth lane 0.
     #[inline(always)]
     pub fn extent(&self) -> DVec4 {

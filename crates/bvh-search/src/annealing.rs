@@ -4,9 +4,8 @@
 //! Temperatures are relative to the area that taking the subtree out saves, so that one schedule suits nodes of all
 //! sizes.
 
-use crate::cooling::{self, Cooling, Starts, anneal};
+use crate::cooling::{self, Descent, Starts};
 use crate::error::require;
-use crate::incumbent::Incumbent;
 use crate::start::Start;
 use crate::stream::Stream;
 use crate::working::{ANCHOR, Working};
@@ -77,18 +76,9 @@ impl Search for Config {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         let climb = self.step.climb;
         require((1..u32::MAX).contains(&climb), "climb", climb.into(), "1 to 4294967294")?;
-        require(self.hot.is_finite() && self.hot > 0.0, "hot", self.hot, "above 0")?;
-        require(self.cold > 0.0 && self.cold <= self.hot, "cold", self.cold, "above 0, not above hot")?;
-        let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
-        let mut quota = run.left();
-        quota.work = quota.work.min(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
-        let cooling = Cooling { hot: self.hot, cold: self.cold, quota, end: 1.0, pieces: 1 };
-        let observer = run.observer();
-        anneal(|| Mover::new(&self.step), &cooling, &mut tree, [seed, 0], observer, &mut |tree, tally| {
-            run.count(tally);
-            best.offer(tree, run);
-        });
-        Ok(best.tree)
+        let Self { hot, cold, work_per_object, .. } = *self;
+        let descent = Descent { heat: [hot, cold], work_per_object, start: &self.start };
+        descent.search(|| Mover::new(&self.step), problem, seed, run)
     }
 }
 

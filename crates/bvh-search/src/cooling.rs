@@ -2,10 +2,13 @@
 //!
 //! Kirkpatrick, Gelatt & Vecchi 1983. Cools geometrically, by the part of the work done.
 
+use crate::error::require;
+use crate::incumbent::Incumbent;
+use crate::start::Start;
 use crate::stream::Stream;
 use crate::working::Working;
-use crate::{Observer, Quota, Tally, pieces};
-use bvh_core::with_vector_instructions;
+use crate::{Observer, Problem, Quota, Run, SearchError, Tally, pieces};
+use bvh_core::{Bvh, with_vector_instructions};
 use rand::RngExt;
 use std::ops::Range;
 
@@ -19,8 +22,8 @@ pub(crate) trait Move {
     fn starts(&mut self) -> &mut Starts;
 }
 
-/// Where moves begin. In a large tree, at any node of a part of the memory, where neighbours in the tree are neighbours,
-/// for some moves, and then in another part: so that they find nodes in a cache.
+/// Where moves begin. In a large tree, at any node of a part of the memory, where neighbours in the tree are
+/// neighbours, for some moves, and then in another part: so that they find nodes in a cache.
 #[derive(Debug, Default)]
 pub(crate) struct Starts {
     /// Only at these nodes, unless there are none.
@@ -76,6 +79,36 @@ pub(crate) struct Cooling {
     pub pieces: u32,
 }
 
+/// A search that is one descent of the temperature, from the first to the second.
+pub(crate) struct Descent<'a> {
+    pub heat: [f64; 2],
+    pub work_per_object: u64,
+    pub start: &'a Start,
+}
+
+impl Descent<'_> {
+    /// From the start, by moves of one kind; what is left of the budget is done if it is less.
+    pub fn search<M: Move>(
+        &self,
+        mover: impl Fn() -> M + Sync,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Result<Bvh, SearchError> {
+        let [hot, cold] = self.heat;
+        require(hot.is_finite() && hot > 0.0, "hot", hot, "above 0")?;
+        require(cold > 0.0 && cold <= hot, "cold", cold, "above 0, not above hot")?;
+        let (mut best, mut tree) = Incumbent::build(self.start, problem, run)?;
+        let quota = run.left().at_most(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
+        let (cooling, observer) = (Cooling { hot, cold, quota, end: 1.0, pieces: 1 }, run.observer());
+        anneal(mover, &cooling, &mut tree, [seed, 0], observer, &mut |tree, tally| {
+            run.count(tally);
+            best.offer(tree, run);
+        });
+        Ok(best.tree)
+    }
+}
+
 /// Work per object after which nodes are laid out anew, a hundredth of all but within these bounds.
 const WORK_PER_ROUND: [u64; 2] = [64, 256];
 
@@ -83,7 +116,8 @@ const WORK_PER_ROUND: [u64; 2] = [64, 256];
 const WORK_OF_SWEEPS: u64 = 300;
 
 /// Cools `tree`, then sweeps it to a local optimum of reinsertion. Shows the tree to `round` along the way, with what
-/// was done since the last time. Every round has its own stream of `seed`, and every piece of it, from number `first` on.
+/// was done since the last time. Every round has its own stream of `seed`, and every piece of it, from number `first`
+/// on.
 ///
 /// If the observer knows the time, temperatures follow whichever is nearer to its end, the time or the work.
 pub(crate) fn anneal<M: Move>(

@@ -33,11 +33,16 @@ impl<'p> Incumbent<'p> {
     /// Begins with a valid tree, whose boxes are tight.
     pub fn begin(tree: Bvh, problem: &Problem<'p>, run: &mut Run) -> Self {
         let mut incumbent = Self::begin_unbounded(tree, problem, run);
-        if problem.leaves_out(Omission::BoundMet) {
-            incumbent.floor = lower_bound::of_largest(problem.boxes);
-        }
-        incumbent.settle(run);
+        incumbent.bound(run);
         incumbent
+    }
+
+    /// Looks whether the tree meets a bound, from now on.
+    pub fn bound(&mut self, run: &mut Run) {
+        if self.problem.leaves_out(Omission::BoundMet) {
+            self.floor = lower_bound::of_largest(self.problem.boxes);
+        }
+        self.settle(run);
     }
 
     /// As [`begin`](Self::begin), without looking whether the tree meets a bound: for when there is no time.

@@ -51,8 +51,7 @@ impl Search for Config {
         require((1..u32::MAX).contains(&self.climb), "climb", self.climb.into(), "1 to 4294967294")?;
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
         let n = problem.boxes.len() as u64;
-        let mut quota = run.left();
-        quota.work = quota.work.min(self.work_per_object.saturating_mul(n));
+        let quota = run.left().at_most(self.work_per_object.saturating_mul(n));
         let mut total = self.local_search.descend(&mut tree, quota, run.observer());
         run.count(total);
         best.offer(&tree, run);

@@ -21,8 +21,8 @@ const WHOLE: f64 = 0.125;
 /// How many levels below the roots of the pieces moves on the whole tree may begin.
 const BELOW: u8 = 6;
 
-/// One round of cooling of a `tree` in preorder, which it is again in the end: at first in about so many pieces, if more
-/// than one, then as a whole, where the moves begin near the nodes that are in no piece.
+/// One round of cooling of a `tree` in preorder, which it is again in the end: at first in about so many pieces, if
+/// more than one, then as a whole, where the moves begin near the nodes that are in no piece.
 pub(crate) fn cool_in_pieces<M: Move>(
     mover: &(impl Fn() -> M + Sync),
     tree: &mut Working,

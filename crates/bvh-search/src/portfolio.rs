@@ -3,16 +3,17 @@
 //! 0. If the budget is small, milliseconds, unless a start is named: clustering, reinsertion, and no more
 //!    if these take it all.
 //! 1. Greedy division with |L|^0.9.
-//! 2. If the end is known, from the budget's work or the observer's [progress](crate::Observer::progress): one long descent
-//!    of the temperature of annealed ruin and recreate. It starts at once, since what a local search had found would be
-//!    forgotten; and at equal work it ends lower than several equal ones, one after another or side by side and fused. If
-//!    there is much to be done, several short descents from a lower temperature follow it: each loosens everything but the
-//!    top of the tree, finds other optima here better and there worse, and fusing keeps the better ones.
-//! 3. If it is not: reinsertion to a local optimum, then generations, each annealed from the incumbent and longer than the
-//!    one before.
+//! 2. If the end is known, from the budget's work or the observer's [progress](crate::Observer::progress): one long
+//!    descent of the temperature of annealed ruin and recreate. It starts at once, since what a local search had found
+//!    would be forgotten; and at equal work it ends lower than several equal ones, one after another or side by side
+//!    and fused. If there is much to be done, several short descents from a lower temperature follow it: each loosens
+//!    everything but the top of the tree, finds other optima here better and there worse, and fusing keeps the better
+//!    ones.
+//! 3. If it is not: reinsertion to a local optimum, then generations, each annealed from the incumbent and longer than
+//!    the one before.
 //!
-//! What a generation ends with is fused with the incumbent, unless it is the first: that keeps every part that became
-//! better and drops every part that became worse.
+//! What a descent ends with is fused with the incumbent, unless the end is known and it is the first, and better: that
+//! keeps every part that became better and drops every part that became worse.
 
 use crate::cooling::{Cooling, anneal, cool};
 use crate::error::require;
@@ -128,10 +129,14 @@ impl Config {
                 length = length.min(in_time / n as f64);
             }
             let (all, began) = (left, observer.progress().unwrap_or(0.0));
-            for (number, Descent { hot, until }) in (0..).zip(self.plan(length, n)) {
+            for (number, Planned { hot, until }) in (0..).zip(self.plan(length, n)) {
                 let due = (until * all as f64) as u64;
                 let work = if timed { left } else { left.min(due.saturating_sub(all - left)) };
-                let cooling = self.cooling(hot, work, began + (1.0 - began) * until, run);
+                let end = began + (1.0 - began) * until;
+                if observer.progress().is_some_and(|now| now >= end) {
+                    continue;
+                }
+                let cooling = self.cooling(hot, work, end, run);
                 self.descend(tree, [seed, number], &cooling, number == 0, best, run, &mut left);
             }
         } else {
@@ -148,7 +153,7 @@ impl Config {
     }
 
     /// The descents of so much work per object.
-    fn plan(&self, length: f64, n: u64) -> Vec<Descent> {
+    fn plan(&self, length: f64, n: u64) -> Vec<Planned> {
         let longest = self.longest.min(WORK_PER_PAIR * n as f64);
         let equal = (length / longest).ceil().clamp(1.0, MOST_GENERATIONS as f64);
         let length = length / equal;
@@ -159,7 +164,7 @@ impl Config {
             for reheat in 0..=reheats {
                 let part = 1.0 - kept + kept * f64::from(reheat) / f64::from(reheats.max(1));
                 let hot = self.hot(length);
-                plan.push(Descent {
+                plan.push(Planned {
                     hot: if reheat == 0 { hot } else { hot.min(self.reheat) },
                     until: (number as f64 + part) / equal,
                 });
@@ -235,7 +240,7 @@ impl Config {
 }
 
 /// A descent of the temperature, as planned.
-struct Descent {
+struct Planned {
     /// Its first temperature.
     hot: f64,
     /// The part of all work, or time, that is over when it ends.
@@ -255,7 +260,7 @@ const PROBE: u64 = 16;
 const MOST_GENERATIONS: u64 = 10_000;
 
 impl Search for Config {
-    /// Chains run in parallel, each with a stream of its own.
+    /// Pieces, if there are several, are annealed in parallel, each with a stream of its own.
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         self.check()?;
         let own = self.work_per_object.saturating_mul(problem.boxes.len() as u64);

@@ -1,7 +1,7 @@
 //! Small budgets: agglomerative clustering, and reinsertion of the largest nodes for as long as there is time.
 //!
-//! Bittner, Hapala & Havran 2013 reinsert those nodes first that cost most: few nodes near the root have most of the area
-//! that can be saved. Above these budgets annealing from a greedy division ends lower.
+//! Bittner, Hapala & Havran 2013 reinsert those nodes first that cost most: few nodes near the root have most of the
+//! area that can be saved. Above these budgets annealing from a greedy division ends lower.
 //!
 //! A time is compared with that of sorting the objects along a curve, which comes first in any case: so many times that
 //! long, what can be done, found by measurement. The sort takes about 20 ns per object.
@@ -10,7 +10,7 @@ use crate::incumbent::Incumbent;
 use crate::reinsertion::{sort_by_area, sweep};
 use crate::start::construction;
 use crate::working::Working;
-use crate::{Observer, Problem, Run, SearchError};
+use crate::{Observer, Problem, Run, SearchError, Tally};
 use bvh_build::Builder;
 use bvh_build::agglomerative::{Along, Config};
 use bvh_core::{Bvh, cost};
@@ -29,8 +29,8 @@ const MOST_WORK: u64 = 64;
 /// Times the sort's time from which on a budget is not small.
 const MOST_TIME: f64 = 50.0;
 
-/// Work per object, and times the sort's time, from which on the better of two starts is taken. Division is ahead on smooth
-/// surfaces; it takes ten times as long as the sort.
+/// Work per object, and times the sort's time, from which on the better of two starts is taken. Division is ahead on
+/// smooth surfaces; it takes ten times as long as the sort.
 const TWO_STARTS: (u64, f64) = (30, 30.0);
 
 /// What so many times the sort's time are enough for, without any reinsertion.
@@ -76,6 +76,7 @@ pub(crate) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<
     let (mut start, mut front) = (along.build(&START)?, FRONT);
     if two_starts {
         let divided = construction().build(problem.boxes)?;
+        run.count(Tally { moves: 1, kept: 0, work: divided.nodes.len() as u64 });
         if cost::internal_area(&divided) < cost::internal_area(&start) {
             (start, front) = (divided, usize::MAX);
         }
@@ -96,9 +97,14 @@ pub(crate) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<
     let still = reinsert_largest(&mut tree, front, end, run);
     if still {
         best.offer(&tree, run);
+        best.bound(run);
         return Ok(Some(Quick::Optimum(best, tree)));
     }
-    best.offer_level_by_level(&tree, run);
+    if built.is_some() {
+        best.offer_level_by_level(&tree, run);
+    } else {
+        best.offer(&tree, run);
+    }
     Ok(Some(Quick::Tree(best.tree)))
 }
 
@@ -108,8 +114,8 @@ const FIRST: f64 = 0.01;
 /// Moves between two looks at the clock.
 const MOVES: usize = 32;
 
-/// Reinsertion of more and more of the largest nodes, until the observer's progress is at `end` or the run stops. Returns
-/// whether a local optimum came first.
+/// Reinsertion of more and more of the largest nodes, until the observer's progress is at `end` or the run stops.
+/// Returns whether a local optimum came first.
 fn reinsert_largest(tree: &mut Working, front: usize, end: f64, run: &mut Run) -> bool {
     let observer: &dyn Observer = run.observer();
     let (mut part, mut order) = (FIRST, Vec::new());
@@ -131,11 +137,12 @@ fn reinsert_largest(tree: &mut Working, front: usize, end: f64, run: &mut Run) -
     }
 }
 
-/// Nodes among which the largest are looked for, for each of these: clustering makes large ones last, and they come first.
+/// Nodes among which the largest are looked for, for each of these: clustering makes large ones last, and they come
+/// first.
 const FRONT: usize = 4;
 
-/// The largest nodes, about this part of all, the largest first, equal ones by index. Only so many of the first nodes are
-/// looked at, times the number of nodes asked for.
+/// The largest nodes, about this part of all, the largest first, equal ones by index. Only so many of the first nodes
+/// are looked at, times the number of nodes asked for.
 fn largest(tree: &Working, part: f64, front: usize, order: &mut Vec<u32>) {
     let nodes = tree.nodes.len() - 1;
     let count = ((part * nodes as f64) as usize).clamp(1, nodes);

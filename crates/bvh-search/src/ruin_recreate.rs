@@ -4,9 +4,8 @@
 //! Schrimpf et al. 2000 (ruin and recreate); Kirkpatrick, Gelatt & Vecchi 1983; Shaw 1998 (related removal).
 //! Temperatures are relative to an area of the move, so that one schedule suits nodes of all sizes.
 
-use crate::cooling::{Cooling, Move, Starts, anneal};
+use crate::cooling::{Descent, Move, Starts};
 use crate::error::require;
-use crate::incumbent::Incumbent;
 use crate::place::PlaceSearch;
 use crate::start::Start;
 use crate::stream::Stream;
@@ -43,15 +42,8 @@ impl Default for Config {
     }
 }
 
-impl Config {
-    fn check(&self) -> Result<(), SearchError> {
-        self.ruin.check()?;
-        require(self.hot.is_finite() && self.hot > 0.0, "hot", self.hot, "above 0")?;
-        require(self.cold > 0.0 && self.cold <= self.hot, "cold", self.cold, "above 0, not above hot")
-    }
-}
-
-/// A move: from a random node, the larger of two, some levels up, and from there several random descents, each to a subtree taken out.
+/// A move: from a random node, the larger of two, some levels up, and from there several random descents, each to a
+/// subtree taken out.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -93,17 +85,10 @@ impl Ruin {
 
 impl Search for Config {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
-        self.check()?;
-        let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
-        let mut quota = run.left();
-        quota.work = quota.work.min(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
-        let cooling = Cooling { hot: self.hot, cold: self.cold, quota, end: 1.0, pieces: 1 };
-        let observer = run.observer();
-        anneal(|| Mover::new(&self.ruin), &cooling, &mut tree, [seed, 0], observer, &mut |tree, tally| {
-            run.count(tally);
-            best.offer(tree, run);
-        });
-        Ok(best.tree)
+        self.ruin.check()?;
+        let Self { hot, cold, work_per_object, .. } = *self;
+        let descent = Descent { heat: [hot, cold], work_per_object, start: &self.start };
+        descent.search(|| Mover::new(&self.ruin), problem, seed, run)
     }
 }
 

@@ -112,6 +112,12 @@ impl Quota {
         done.moves >= self.moves || done.work >= self.work
     }
 
+    /// No more work than that.
+    #[must_use]
+    pub fn at_most(self, work: u64) -> Self {
+        Self { work: self.work.min(work), ..self }
+    }
+
     /// What is left after something was done.
     #[must_use]
     pub fn less(&self, done: &Tally) -> Self {

@@ -2,8 +2,9 @@
 //!
 //! `cargo bench -p harness --bench peers --features peers -- [--rounds N] SCENE...`
 //!
-//! With `RUSTFLAGS="-C target-cpu=native"`, which `obvhs` gains from. One thread, one object per leaf, cost over that of
-//! greedy Müller–Fellner. A library's time is its least over the rounds, without the conversion of its tree; the time of
+//! With `RUSTFLAGS="-C target-cpu=native"`, which `obvhs` gains from. One thread, one object per leaf, cost over that
+//! of greedy Müller–Fellner. A library's time is its least over the rounds, without the conversion of its tree; the
+//! time of
 //! `best` is that of the whole call. Rounds are in turns. Of the rounds of `best`, that of least cost among those that were
 //! done in the library's time, as far as a clock tells; else the quickest.
 

@@ -1,11 +1,11 @@
-//! The Morton curve: objects by the point of a grid that is nearest to their centre, neighbours in space mostly neighbours
-//! in order.
+//! The Morton curve: objects by the point of a grid that is nearest to their centre, neighbours in space mostly
+//! neighbours in order.
 
 use bvh_core::glam::DVec4;
 use bvh_core::{PackedAabb, with_vector_instructions};
 
-/// The objects along the Morton curve through their box centres, equal codes by index. The grid has 2^21 points along the
-/// longest side of the box around all centres, as far apart along the others.
+/// The objects along the Morton curve through their box centres, equal codes by index. The grid has 2^21 points along
+/// the longest side of the box around all centres, as far apart along the others.
 pub(super) fn order(boxes: &[PackedAabb]) -> Vec<u32> {
     let codes = codes(boxes);
     let mut order: Vec<(u32, u32)> = codes.iter().zip(0..).map(|(&code, index)| (high(code), index)).collect();

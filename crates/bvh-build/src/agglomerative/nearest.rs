@@ -17,12 +17,17 @@ pub(super) struct Scratch {
     before: Vec<i32>,
 }
 
+/// Coordinates are taken to be this at most, scaled. Only along an axis on which all boxes are one plane, far from the
+/// origin for the scene's size, are any larger: extents are below 2, and an f32 has 24 bits.
+const FARTHEST: f64 = (1u64 << 40) as f64;
+
 with_vector_instructions! {
     /// How far on the nearest neighbours of the clusters from `start` on are, as many as `found` has room for, at most
-    /// [`CHUNK`]: the least area of the box around both, then the least exclusive or of the positions. Clusters are looked at up to `radius` positions before and after.
+    /// [`CHUNK`]: the least area of the box around both, then the least exclusive or of the positions. Clusters are
+    /// looked at up to `radius` positions before and after.
     ///
-    /// Areas are f32, of coordinates multiplied by `scale`, a power of two with which they can neither overflow nor be
-    /// equal for all but clusters 2^60 times smaller than the scene.
+    /// Areas are f32, of coordinates multiplied by `scale`, a power of two with which they cannot overflow, and are
+    /// zero only for clusters some 2^60 times smaller than the scene.
     pub(super) find = find_plain(
         boxes: &[PackedAabb], scale: f64, radius: usize, start: usize, found: &mut [i32], scratch: &mut Scratch)
 }
@@ -48,7 +53,8 @@ fn find_plain(
     }
     let [a, b, c, d, e, f] = planes.each_mut().map(|plane| &mut plane[offset..offset + last - first]);
     for (at, aabb) in boxes[first..last].iter().enumerate() {
-        let [low, high] = aabb.planes().map(|plane| plane.map(|x| (f64::from(x) * scale) as f32));
+        let [low, high] =
+            aabb.planes().map(|plane| plane.map(|x| (f64::from(x) * scale).clamp(-FARTHEST, FARTHEST) as f32));
         [a[at], b[at], c[at]] = [low[0], low[1], low[2]];
         [d[at], e[at], f[at]] = [high[0], high[1], high[2]];
     }
@@ -85,8 +91,8 @@ fn joint_sides(low: &[f32], high: &[f32], distance: usize, sides: &mut [f32]) {
     }
 }
 
-/// Takes those neighbours, `distance` before and after, that are nearer than all before. Areas are ordered as their bits
-/// are, which lets everything be done without a branch.
+/// Takes those neighbours, `distance` before and after, that are nearer than all before. Areas are ordered as their
+/// bits are, which lets everything be done without a branch.
 #[inline(always)]
 fn take_nearer(
     areas: &[f32],

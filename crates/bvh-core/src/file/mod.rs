@@ -60,7 +60,7 @@
 //!
 //! | bytes of a block | type | field |
 //! |---|---|---|
-//! | 0..144 | `f32[3][3][4]` | corner, axis, lane of up to four triangles; zeros in unused lanes |
+//! | 0..144 | `f32[3][3][4]` | corner, axis, lane of up to four triangles; +∞ in unused lanes |
 //! | 144..160 | `u32[4]` | object ids, 2^32 − 1 in unused lanes; 2^30 added to the first marks a leaf's last block |
 //!
 //! The checksum, in full, with arithmetic modulo 2^64: let `w` be the words of eight bytes of what it covers, padded by
@@ -220,8 +220,8 @@ fn write(header: &Header, sections: &[&[u8]]) -> Result<Vec<u8>, FileError> {
 
 /// Bytes whose length and checksum are right; what they hold is checked when it is asked for.
 ///
-/// For files that are mapped, not read: with `bytes` any `&[u8]`, `TreeFile::open(bytes)?.for_boxes(&boxes)?.view()?` is
-/// a tree to trace, whatever the bytes are: nothing in a view that was handed out leads out of bounds or in circles.
+/// For files that are mapped, not read: with `bytes` any `&[u8]`, `TreeFile::open(bytes)?.for_boxes(&boxes)?.view()?`
+/// is a tree to trace, whatever the bytes are: nothing in a view that was handed out leads out of bounds or in circles.
 /// Only [`for_boxes`](Self::for_boxes) refuses a tree of another scene.
 #[derive(Clone, Debug)]
 pub struct TreeFile<'a> {

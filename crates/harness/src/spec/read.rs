@@ -28,10 +28,10 @@ impl Experiment {
     pub fn parse(path: &Path, text: &str, overrides: &Overrides) -> Result<Self, Error> {
         let fail = |message: String| Error::Spec { file: path.to_owned(), message };
         let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| fail(error.to_string()))?;
-        let quick = table.remove("quick");
         if let Some((key, value)) = never_right(&table) {
             return Err(fail(format!("{key} is {value}; accepted under any key: finite numbers, no dates")));
         }
+        let quick = table.remove("quick");
         let mut name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         // Parsed from the text where possible, so that errors show its line.
         let mut experiment: Self = if overrides.quick || quick.is_some() {

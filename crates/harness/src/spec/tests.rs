@@ -138,6 +138,13 @@ fn another_library_is_accepted_exactly_with_its_feature() {
 }
 
 #[test]
+fn quick_takes_no_infinity_either() {
+    let text = format!("{GOOD}[quick]\nobjective = {{ sah = {{ traversal = inf }} }}\n");
+    let error = read(&text, &Overrides { quick: true, ..Default::default() }).unwrap_err().to_string();
+    assert!(error.contains("quick.objective.sah.traversal is inf"), "{error}");
+}
+
+#[test]
 fn quick_replaces_keys_and_names_its_results_apart() {
     let text = format!("{GOOD}repetitions = 5\n[quick]\nrepetitions = 2\n");
     let quick = read(&text, &Overrides { quick: true, ..Default::default() }).unwrap();

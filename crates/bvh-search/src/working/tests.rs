@@ -1,0 +1,150 @@
+//! The working form against brute force, move by move.
+
+use super::*;
+use crate::place::PlaceSearch;
+use crate::stream::stream;
+use bvh_build::{Builder, muller_fellner};
+use bvh_core::{Aabb, validate};
+use rand::RngExt;
+
+fn scene(n: usize) -> (Vec<Aabb>, Working) {
+    let mut rng = stream(1, 0);
+    let mut coordinate = |scale: f32| scale * rng.random::<f32>();
+    let boxes: Vec<Aabb> = (0..n)
+        .map(|_| {
+            let low = [(); 3].map(|()| coordinate(1.0));
+            let size = coordinate(0.3);
+            Aabb::from((low, low.map(|c| c + coordinate(size))))
+        })
+        .collect();
+    let tree = muller_fellner::Config::default().build(&boxes).unwrap();
+    let working = Working::from_bvh(&tree, &boxes).unwrap();
+    (boxes, working)
+}
+
+#[test]
+fn a_tight_tree_is_taken_over_as_it_is() {
+    let (_, working) = scene(100);
+    let tree = working.to_bvh();
+    let taken = Working::from_tight(&tree, working.internal_area()).unwrap();
+    assert_tight(&taken, &scene(100).0);
+    assert_eq!((taken.area(), taken.to_bvh()), (working.internal_area(), tree));
+}
+
+#[test]
+fn a_tree_is_the_same_level_by_level() {
+    for n in [1, 2, 3, 100] {
+        let (boxes, working) = scene(n);
+        let tree = working.to_bvh_level_by_level();
+        validate(&tree, &boxes).unwrap();
+        assert_eq!(Working::from_bvh(&tree, &boxes).unwrap().to_bvh(), working.to_bvh());
+        assert!(tree.nodes.windows(2).all(|pair| pair[0].is_leaf()
+            || pair[1].is_leaf()
+            || pair[0].children().start < pair[1].children().start));
+    }
+}
+
+/// Every box is the union below it, every parent the right one.
+fn assert_tight(tree: &Working, boxes: &[Aabb]) {
+    let bvh = tree.to_bvh();
+    validate(&bvh, boxes).unwrap();
+    let mut tight = bvh.clone();
+    tight.refit(boxes);
+    assert_eq!(bvh, tight);
+    for at in tree.preorder() {
+        let node = &tree.nodes[at as usize];
+        assert!(node.is_leaf() || node.children.iter().all(|&child| tree.nodes[child as usize].parent == at));
+        assert_eq!(node.area, node.aabb.half_area());
+    }
+}
+
+/// A random node that is not the root.
+fn any(tree: &Working, rng: &mut impl RngExt) -> u32 {
+    loop {
+        let node = rng.random_range(1..tree.nodes.len() as u32);
+        if tree.nodes[node as usize].parent != ANCHOR {
+            return node;
+        }
+    }
+}
+
+#[test]
+fn conversion_there_and_back_changes_nothing() {
+    for n in [0, 1, 2, 3, 50] {
+        let (boxes, tree) = scene(n);
+        let again = Working::from_bvh(&tree.to_bvh(), &boxes).unwrap();
+        assert_eq!(again.to_bvh(), tree.to_bvh());
+        assert_eq!(tree.in_preorder().to_bvh(), tree.to_bvh());
+        assert_eq!(tree.objects(), n);
+    }
+}
+
+#[test]
+fn the_incremental_area_equals_the_recomputed_one_after_each_of_a_million_moves() {
+    let (boxes, mut tree) = scene(60);
+    let mut rng = stream(2, 0);
+    for number in 0..1_000_000 {
+        tree.begin();
+        let node = any(&tree, &mut rng);
+        tree.detach(node);
+        let places = tree.preorder();
+        tree.attach(node, places[rng.random_range(0..places.len())]);
+        if rng.random_bool(0.3) {
+            tree.undo();
+        }
+        let recomputed = tree.internal_area();
+        assert!((tree.area() - recomputed).abs() <= 1e-12 * recomputed, "{number}");
+        if number % 10_000 == 0 {
+            assert_tight(&tree, &boxes);
+        }
+    }
+}
+
+#[test]
+fn undoing_restores_every_bit() {
+    let (_, mut tree) = scene(40);
+    let mut rng = stream(3, 0);
+    for _ in 0..1000 {
+        let before = (tree.to_bvh(), tree.area().to_bits());
+        tree.begin();
+        for _ in 0..rng.random_range(1..5) {
+            let node = any(&tree, &mut rng);
+            tree.detach(node);
+            let root = tree.nodes[0].children[0];
+            tree.attach(node, root);
+        }
+        tree.undo();
+        assert_eq!(before, (tree.to_bvh(), tree.area().to_bits()));
+    }
+}
+
+#[test]
+fn the_best_place_is_the_best_of_all_whether_the_node_is_out_or_only_thought_to_be() {
+    let (_, mut tree) = scene(60);
+    let mut rng = stream(4, 0);
+    let mut search = PlaceSearch::default();
+    for _ in 0..300 {
+        let node = any(&tree, &mut rng);
+        let start = tree.area();
+        let (found, own) = search.attached(&tree, node, 0.0);
+        tree.begin();
+        let (saved, sibling, _) = tree.detach(node);
+        assert!((saved - own).abs() <= 1e-12 * saved);
+        let without = tree.clone();
+        let costs = without.preorder().into_iter().map(|place| {
+            let mut tree = without.clone();
+            tree.attach(node, place).0
+        });
+        let least = costs.fold(f64::INFINITY, f64::min);
+        let (aabb, area) = (tree.nodes[node as usize].aabb, tree.nodes[node as usize].area);
+        for first in [sibling, NONE, any(&tree, &mut rng)] {
+            let place = search.detached(&tree, (&aabb, area), first, f64::INFINITY).unwrap();
+            assert!((place.cost - least).abs() <= 1e-12 * least, "{} {least}", place.cost);
+        }
+        assert!(search.detached(&tree, (&aabb, area), sibling, least * (1.0 - 1e-9)).is_none());
+        assert!((found.map_or(own, |place| place.cost) - least).abs() <= 1e-12 * least);
+        let place = found.map_or(sibling, |place| place.beside);
+        let (added, _) = tree.attach(node, place);
+        assert!((added - least).abs() <= 1e-12 * least && tree.area() <= start * (1.0 + 1e-12));
+    }
+}
