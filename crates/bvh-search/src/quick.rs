@@ -27,11 +27,11 @@ pub(crate) enum Quick<'p> {
 const MOST_WORK: u64 = 64;
 
 /// Times the sort's time from which on a budget is not small.
-const MOST_TIME: f64 = 50.0;
+const MOST_TIME: f64 = 24.0;
 
 /// Work per object, and times the sort's time, from which on the better of two starts is taken. Division is ahead on
 /// smooth surfaces; it takes ten times as long as the sort.
-const TWO_STARTS: (u64, f64) = (30, 30.0);
+const TWO_STARTS: (u64, f64) = (30, 18.0);
 
 /// What so many times the sort's time are enough for, without any reinsertion.
 const BUILDS: [(f64, Config); 4] = [
