@@ -137,7 +137,8 @@ impl Config {
                     continue;
                 }
                 let cooling = self.cooling(hot, work, end, run);
-                self.descend(tree, [seed, number], &cooling, number == 0, best, run, &mut left);
+                left =
+                    left.saturating_sub(self.descend(tree, [seed, number], &cooling, number == 0, best, run));
             }
         } else {
             best.descend(tree, u32::MAX, run, |tree, _, quota, observer| {
@@ -146,7 +147,7 @@ impl Config {
             let mut length = self.first;
             for number in 0..MOST_GENERATIONS {
                 let cooling = self.cooling(self.hot(length), left.min((length * n as f64) as u64), 1.0, run);
-                self.descend(tree, [seed, number], &cooling, false, best, run, &mut left);
+                left = left.saturating_sub(self.descend(tree, [seed, number], &cooling, false, best, run));
                 length *= self.growth;
             }
         }
@@ -157,25 +158,23 @@ impl Config {
         let longest = self.longest.min(WORK_PER_PAIR * n as f64);
         let equal = (length / longest).ceil().clamp(1.0, MOST_GENERATIONS as f64);
         let length = length / equal;
+        let hot = self.hot(length);
         let reheats = if length < self.reheats_from { 0 } else { self.reheats };
         let kept = if reheats == 0 { 0.0 } else { self.reheated };
         let mut plan = Vec::new();
         for number in 0..equal as u64 {
             for reheat in 0..=reheats {
+                let hot = if reheat == 0 { hot } else { hot.min(self.reheat) };
                 let part = 1.0 - kept + kept * f64::from(reheat) / f64::from(reheats.max(1));
-                let hot = self.hot(length);
-                plan.push(Planned {
-                    hot: if reheat == 0 { hot } else { hot.min(self.reheat) },
-                    until: (number as f64 + part) / equal,
-                });
+                plan.push(Planned { hot, until: (number as f64 + part) / equal });
             }
         }
         plan
     }
 
-    /// First temperature of a descent of so much work per object.
+    /// First temperature of a descent of so much work per object, unless the last one is higher.
     fn hot(&self, length: f64) -> f64 {
-        (self.heat * length / 1000.0).min(self.hottest).max(self.cold)
+        (self.heat * length / 1000.0).min(self.hottest)
     }
 
     fn cooling(&self, hot: f64, work: u64, end: f64, run: &Run) -> Cooling {
@@ -183,8 +182,8 @@ impl Config {
         Cooling { hot: hot.max(self.cold), cold: self.cold, quota, end, pieces: self.pieces(timed) }
     }
 
-    /// One descent from the incumbent, and what it ends with fused with that, unless it is the first and better.
-    #[expect(clippy::too_many_arguments, reason = "the state of `improve`")]
+    /// One descent from the incumbent, and what it ends with fused with that, unless it is the first and better. Returns
+    /// its work.
     fn descend(
         &self,
         tree: &mut Working,
@@ -193,15 +192,14 @@ impl Config {
         first: bool,
         best: &mut Incumbent,
         run: &mut Run,
-        left: &mut u64,
-    ) {
+    ) -> u64 {
         if run.stopped().is_some() || cooling.quota.work == 0 {
-            return;
+            return 0;
         }
-        let (mut annealed, observer) = (tree.clone(), run.observer());
+        let (mut annealed, mut done, observer) = (tree.clone(), Tally::default(), run.observer());
         let streams = [seed, 1 + (number << 40)];
         anneal(|| Mover::new(&self.ruin), cooling, &mut annealed, streams, observer, &mut |tree, tally| {
-            *left = left.saturating_sub(tally.work);
+            done += tally;
             run.count(tally);
             if tree.area() < best.area() * (1.0 - WORTH_AN_EVENT) {
                 best.offer(tree, run);
@@ -209,6 +207,7 @@ impl Config {
         });
         *tree = if first && annealed.area() < tree.area() { annealed } else { fuse(&[tree, &annealed]) };
         best.offer(tree, run);
+        done.work
     }
 
     /// Moves at the lowest temperature. Also returns the work for which the rest of the time is enough at this rate.

@@ -82,11 +82,10 @@ pub(crate) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<
         }
     }
     let built = observer.progress();
-    let mut best = if built.is_some() {
-        Incumbent::begin_unbounded(start, problem, run)
-    } else {
-        Incumbent::begin(start, problem, run)
-    };
+    let mut best = Incumbent::begin_unbounded(start, problem, run);
+    if built.is_none() {
+        best.bound(run);
+    }
     let mut tree = Working::from_tight(&best.tree, best.area())?;
     // The conversion at the end takes about as long as the one at the beginning, or what the caches make of it.
     let finish = if large { 2.7 } else { 1.5 };
@@ -97,7 +96,9 @@ pub(crate) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<
     let still = reinsert_largest(&mut tree, front, end, run);
     if still {
         best.offer(&tree, run);
-        best.bound(run);
+        if built.is_some() {
+            best.bound(run);
+        }
         return Ok(Some(Quick::Optimum(best, tree)));
     }
     if built.is_some() {

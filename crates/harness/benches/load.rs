@@ -5,9 +5,9 @@
 mod paired;
 
 use bvh_build::{Builder, muller_fellner};
+use bvh_core::WideBvh;
 use bvh_core::file::{self, Origin, TreeFile};
-use bvh_core::{Triangle, WideBvh};
-use harness::scene::{Primitives, Scene};
+use harness::scene::Scene;
 use memmap2::Mmap;
 use paired::{Contender, compare};
 use std::fs::{self, File};
@@ -60,8 +60,7 @@ fn loads(scene: &Scene, path: &Path) {
     let title = format!("{}, {} objects, {} bytes", scene.name, boxes.len(), held.len());
     compare(&title, 25, contenders);
 
-    let Primitives::Triangles(corners) = &scene.primitives else { return };
-    let triangles: &[Triangle] = &corners.iter().copied().map(Triangle).collect::<Vec<_>>();
+    let Ok(triangles) = &scene.triangles() else { return };
     fs::write(path, file::save_wide(&tree, triangles, &Origin::default()).expect("a valid tree"))
         .expect("a file");
     let bytes = fs::metadata(path).expect("the file").len();

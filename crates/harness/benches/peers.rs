@@ -4,19 +4,15 @@
 //!
 //! With `RUSTFLAGS="-C target-cpu=native"`, which `obvhs` gains from. One thread, one object per leaf, cost over that
 //! of greedy Müller–Fellner. A library's time is its least over the rounds, without the conversion of its tree; the
-//! time of
-//! `best` is that of the whole call. Rounds are in turns. Of the rounds of `best`, that of least cost among those that were
-//! done in the library's time, as far as a clock tells; else the quickest.
+//! time of `best` is that of the whole call. Rounds are in turns. Of the rounds of `best`, that of least cost among
+//! those that were done in the library's time, as far as a clock tells; else the quickest.
 
 mod clock;
 
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::{cost, validate};
-use bvh_search::{Budget, Problem, portfolio, solve};
-use clock::Clock;
+use bvh_core::cost;
 use harness::peers::{NoSettings, Obvhs, Peer, Preset};
 use harness::scene::Scene;
-use std::time::Instant;
 
 /// The part of a library's time that `best` may plan with: other programs disturb both.
 const PLANNED: f64 = 0.99;
@@ -62,7 +58,6 @@ fn libraries() -> Vec<(String, Peer)> {
 fn measure(scene: &Scene, rounds: usize) {
     let greedy = muller_fellner::Config::default().build(&scene.boxes).expect("finite boxes");
     let base = cost::internal_area(&greedy);
-    let problem = Problem::new(&scene.boxes);
     let name = scene.name.rsplit('/').next().unwrap_or_default();
     for (library, peer) in libraries() {
         let theirs = || peer.build(scene).expect("a library of this program");
@@ -73,13 +68,8 @@ fn measure(scene: &Scene, rounds: usize) {
             let built = theirs();
             least = least.min(built.seconds);
             their_cost = cost::internal_area(&built.tree) / base;
-            let clock = Clock { start: Instant::now(), seconds: PLANNED * least };
-            let outcome =
-                solve(&portfolio::Config::default(), &problem, round as u64, Budget::default(), &clock);
-            let taken = clock.start.elapsed().as_secs_f64();
-            let tree = outcome.expect("a tree").tree;
-            validate(&tree, &scene.boxes).expect("a valid tree");
-            ours.push((taken, cost::internal_area(&tree) / base));
+            let (taken, area) = clock::best(scene, PLANNED * least, round as u64);
+            ours.push((taken, area / base));
         }
         let in_time = ours.iter().filter(|(taken, _)| *taken <= SAME * least);
         let (taken, our_cost) = *in_time

@@ -8,11 +8,8 @@
 mod clock;
 
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::{cost, validate};
-use bvh_search::{Budget, Problem, portfolio, solve};
-use clock::Clock;
+use bvh_core::cost;
 use harness::scene::Scene;
-use std::time::Instant;
 
 /// The part of the first number of threads' time that further ones have.
 const LESS_TIME: f64 = 0.6;
@@ -54,13 +51,8 @@ fn measure(scene: &Scene, seconds: &[f64], threads: &[usize], seed: u64) {
         for &threads in threads {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads");
             let limit = if threads > 1 { LESS_TIME * limit } else { limit };
-            let clock = Clock { start: Instant::now(), seconds: PLANNED * limit };
-            let (config, problem) = (portfolio::Config::default(), Problem::new(&scene.boxes));
-            let outcome = pool.install(|| solve(&config, &problem, seed, Budget::default(), &clock));
-            let taken = clock.start.elapsed().as_secs_f64();
-            let tree = outcome.expect("a tree").tree;
-            validate(&tree, &scene.boxes).expect("a valid tree");
-            let below = 100.0 * (1.0 - cost::internal_area(&tree) / base);
+            let (taken, area) = pool.install(|| clock::best(scene, PLANNED * limit, seed));
+            let below = 100.0 * (1.0 - area / base);
             let name = scene.name.rsplit('/').next().unwrap_or_default();
             println!("{name:<24} {threads:>7} {limit:>7.2} {taken:>10.3} {below:>10.3}");
         }
