@@ -52,6 +52,7 @@ pub mod ruin_recreate;
 mod run;
 #[cfg(test)]
 mod scatter;
+mod slab;
 mod start;
 mod stream;
 pub mod treelet;

@@ -7,6 +7,7 @@
 use crate::cooling::{Descent, Move, Starts};
 use crate::error::require;
 use crate::place::PlaceSearch;
+use crate::slab::Slab;
 use crate::start::Start;
 use crate::stream::Stream;
 use crate::working::{ANCHOR, Working};
@@ -43,7 +44,7 @@ impl Default for Config {
 }
 
 /// A move: from a random node, the larger of two, some levels up, and from there several random descents, each to a
-/// subtree taken out.
+/// subtree taken out; or all that lies in a slab at one side of the box there, which alone lets the box shrink.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -53,8 +54,14 @@ impl Default for Config {
 pub struct Ruin {
     /// Most levels from the random node up to the top of the ruined part, at least 1. Default 8.
     pub climb: u32,
-    /// Most subtrees taken out at once, at least 1. Default 14.
+    /// Most subtrees taken out by random descents, at least 1. Default 14.
     pub removed: u32,
+    /// The part of the moves that take a slab out, 0 to 1. Default 0.2.
+    pub slabs: f64,
+    /// The thickest slab, as a part of the box, 0 to 1. Default 0.6.
+    pub thickness: f32,
+    /// Most subtrees of a slab: there is no move if it has more. At least 1. Default 24.
+    pub most: u32,
     /// What temperatures are relative to. Default `saved`.
     pub scale: Scale,
 }
@@ -72,14 +79,17 @@ pub enum Scale {
 
 impl Default for Ruin {
     fn default() -> Self {
-        Self { climb: 8, removed: 14, scale: Scale::Saved }
+        Self { climb: 8, removed: 14, slabs: 0.2, thickness: 0.6, most: 24, scale: Scale::Saved }
     }
 }
 
 impl Ruin {
     pub(crate) fn check(&self) -> Result<(), SearchError> {
         require(self.climb >= 1 && self.climb < u32::MAX, "climb", self.climb.into(), "1 to 4294967294")?;
-        require(self.removed >= 1, "removed", self.removed.into(), "1 or more")
+        require(self.removed >= 1, "removed", self.removed.into(), "1 or more")?;
+        require((0.0..=1.0).contains(&self.slabs), "slabs", self.slabs, "0 to 1")?;
+        require((0.0..=1.0).contains(&self.thickness), "thickness", self.thickness.into(), "0 to 1")?;
+        require(self.most >= 1, "most", self.most.into(), "1 or more")
     }
 }
 
@@ -98,15 +108,73 @@ pub(crate) struct Mover<'a> {
     ruin: &'a Ruin,
     starts: Starts,
     search: PlaceSearch,
-    /// Roots of the subtrees taken out, each with the sibling it had.
-    out: Vec<(u32, u32)>,
+    slab: Slab,
+    out: Out,
     /// Nodes visited outside of the search.
     work: u64,
 }
 
+/// What a move has taken out.
+#[derive(Debug, Default)]
+struct Out {
+    /// Roots of the subtrees, each with the sibling it had.
+    roots: Vec<(u32, u32)>,
+    /// The area that this saves.
+    saved: f64,
+    /// The area of the roots: what they will cost at least.
+    least: f64,
+}
+
+impl Out {
+    /// Takes a subtree out. Returns the nodes visited.
+    #[inline(always)]
+    fn take(&mut self, tree: &mut Working, node: u32) -> u64 {
+        let (saved, sibling, visits) = tree.detach(node);
+        self.saved += saved;
+        self.least += tree.nodes[node as usize].area;
+        self.roots.push((node, sibling));
+        visits
+    }
+}
+
 impl<'a> Mover<'a> {
     pub fn new(ruin: &'a Ruin) -> Self {
-        Self { ruin, starts: Starts::default(), search: PlaceSearch::default(), out: Vec::new(), work: 0 }
+        let (starts, search, slab, out) = Default::default();
+        Self { ruin, starts, search, slab, out, work: 0 }
+    }
+
+    /// Takes subtrees out below the child on this side of `above`, up to one level further down than the move has
+    /// climbed. There always is such a child.
+    #[inline(always)]
+    fn scattered(&mut self, tree: &mut Working, above: u32, side: usize, levels: u32, rng: &mut Stream) {
+        for _ in 0..rng.random_range(1..=self.ruin.removed) {
+            let mut node = tree.nodes[above as usize].children[side];
+            if tree.nodes[node as usize].is_leaf() {
+                break;
+            }
+            for _ in 0..rng.random_range(1..=levels + 1) {
+                if tree.nodes[node as usize].is_leaf() {
+                    break;
+                }
+                node = tree.nodes[node as usize].children[usize::from(rng.random::<bool>())];
+            }
+            self.work += self.out.take(tree, node);
+        }
+    }
+
+    /// Takes a slab of that child's box out, but leaves the child something.
+    #[inline(always)]
+    fn slab(&mut self, tree: &mut Working, above: u32, side: usize, rng: &mut Stream) {
+        let Ruin { thickness, most, .. } = *self.ruin;
+        let top = tree.nodes[above as usize].children[side];
+        if !tree.nodes[top as usize].is_leaf() {
+            self.work += self.slab.find(tree, top, thickness, most as usize, rng);
+            for &node in &self.slab.roots {
+                if tree.nodes[above as usize].children[side] != node {
+                    self.work += self.out.take(tree, node);
+                }
+            }
+        }
     }
 }
 
@@ -136,36 +204,24 @@ impl Move for Mover<'_> {
             return false;
         };
         let top_area = tree.nodes[top as usize].area;
-        let (mut total, mut least) = (0.0, 0.0);
         tree.begin();
-        self.out.clear();
-        for _ in 0..rng.random_range(1..=ruin.removed) {
-            let mut node = tree.nodes[above as usize].children[side];
-            if tree.nodes[node as usize].is_leaf() {
-                break;
-            }
-            for _ in 0..rng.random_range(1..=levels + 1) {
-                if tree.nodes[node as usize].is_leaf() {
-                    break;
-                }
-                node = tree.nodes[node as usize].children[usize::from(rng.random::<bool>())];
-            }
-            let (saved, sibling, visits) = tree.detach(node);
-            self.work += visits;
-            total += saved;
-            // Every subtree out will cost its own area at least.
-            least += tree.nodes[node as usize].area;
-            self.out.push((node, sibling));
+        self.out.roots.clear();
+        (self.out.saved, self.out.least) = (0.0, 0.0);
+        if rng.random::<f64>() < ruin.slabs {
+            self.slab(tree, above, side, rng);
+        } else {
+            self.scattered(tree, above, side, levels, rng);
         }
-        self.out.shuffle(rng);
+        let Out { roots, saved, least } = &mut self.out;
+        roots.shuffle(rng);
         // The dice of Metropolis are cast first: what would lead above the limit need not be finished.
         let chance = 1.0 - rng.random::<f64>();
         let scale = match ruin.scale {
-            Scale::Saved => total,
+            Scale::Saved => *saved,
             Scale::Top => top_area,
         };
-        let mut limit = total - temperature * scale * libm::log(chance) - least;
-        for &(node, first) in &self.out {
+        let mut limit = *saved - temperature * scale * libm::log(chance) - *least;
+        for &(node, first) in &*roots {
             let item = &tree.nodes[node as usize];
             let (aabb, area) = (item.aabb, item.area);
             limit += area;
