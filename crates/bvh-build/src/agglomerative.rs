@@ -17,6 +17,7 @@ use crate::presort::check_scene;
 use crate::{BuildError, Builder};
 use bvh_core::{Aabb, Bvh, Node, PackedAabb};
 use nearest::{CHUNK, Scratch};
+use std::mem::MaybeUninit;
 
 /// How far to look for a neighbour.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,6 +79,11 @@ impl Along {
         Ok(Self { boxes, all, order })
     }
 
+    /// The objects along the curve.
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
     /// Clusters what was sorted.
     pub fn build(self, config: &Config) -> Result<Bvh, BuildError> {
         config.check()?;
@@ -117,8 +123,9 @@ struct Clusters {
     /// The first clusters of the pairs joined in a round, and the clusters that are left after it.
     joined: Vec<u32>,
     kept: Vec<u32>,
-    /// The tree's nodes, filled from the last to the first, so that parents come before their children.
-    nodes: Vec<Node>,
+    /// The tree's nodes, filled from the last to the first, so that parents come before their children. They are not
+    /// filled with anything before, which would take a fifteenth of the time.
+    nodes: Box<[MaybeUninit<Node>]>,
     /// Nodes not yet filled.
     free: usize,
     /// Whether the last round joined few.
@@ -139,7 +146,7 @@ impl Clusters {
             nearest: vec![0; n],
             joined: vec![0; n],
             kept: vec![0; n],
-            nodes: vec![Node::leaf(Aabb::EMPTY, 0, 0); 2 * n - 1],
+            nodes: Box::new_uninit_slice(2 * n - 1),
             free: 2 * n - 1,
             slow: false,
             scratch: Scratch::default(),
@@ -206,7 +213,8 @@ impl Clusters {
             let other = at.wrapping_add_signed(nearest[at] as isize);
             self.free -= 2;
             let pair = &mut self.nodes[self.free..][..2];
-            (pair[0], pair[1]) = (node((boxes[at], below[at])), node((boxes[other], below[other])));
+            pair[0].write(node((boxes[at], below[at])));
+            pair[1].write(node((boxes[other], below[other])));
             (boxes[at], below[at]) = (boxes[at].union(&boxes[other]), self.free as u32);
         }
         for (to, at) in kept[..left].iter().map(|&at| at as usize).enumerate() {
@@ -218,8 +226,11 @@ impl Clusters {
 
     /// The nodes, when one cluster is left.
     fn into_nodes(mut self) -> Vec<Node> {
-        self.nodes[0] = node((self.boxes[0], self.below[0]));
-        self.nodes
+        self.nodes[0].write(node((self.boxes[0], self.below[0])));
+        assert_eq!(self.free, 1);
+        // SAFETY: `free` began at the number of nodes, and each time it was lowered, to 1 in the end, those passed were
+        // filled; node 0 has just been.
+        unsafe { self.nodes.assume_init() }.into_vec()
     }
 }
 

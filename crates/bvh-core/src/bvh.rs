@@ -61,6 +61,12 @@ impl Node {
         if self.is_leaf() { NodeKind::Leaf { first, count } } else { NodeKind::Inner { first, count } }
     }
 
+    /// Lets the node refer to others, as many as before: children or entries of `prim_ids` from `first` on.
+    #[inline(always)]
+    pub fn set_first(&mut self, first: u32) {
+        self.first = first;
+    }
+
     /// `first`, and the count with its highest bit set for a leaf.
     #[inline(always)]
     pub(crate) fn words(&self) -> [u32; 2] {

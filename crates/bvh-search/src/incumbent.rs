@@ -66,19 +66,11 @@ impl<'p> Incumbent<'p> {
 
     /// Keeps `tree` if it is better than all before. O(n).
     pub fn offer(&mut self, tree: &Working, run: &mut Run) -> bool {
-        self.offer_as(tree, Working::to_bvh, run)
+        tree.area() < self.area && self.offer_tree(tree.to_bvh(), run)
     }
 
-    /// As [`offer`](Self::offer), in [another order](Working::to_bvh_level_by_level).
-    pub fn offer_level_by_level(&mut self, tree: &Working, run: &mut Run) -> bool {
-        self.offer_as(tree, Working::to_bvh_level_by_level, run)
-    }
-
-    fn offer_as(&mut self, tree: &Working, convert: fn(&Working) -> Bvh, run: &mut Run) -> bool {
-        if tree.area() >= self.area {
-            return false;
-        }
-        let candidate = convert(tree);
+    /// As [`offer`](Self::offer), for a valid tree that needs no conversion.
+    pub fn offer_tree(&mut self, candidate: Bvh, run: &mut Run) -> bool {
         let (cost, area) = costs(&self.problem, &candidate);
         let improved = run.improve(cost);
         if improved {

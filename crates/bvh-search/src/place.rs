@@ -4,8 +4,27 @@
 //! below X costs less than what X and its ancestors grow plus the area of B, which bounds the search. It begins at a
 //! place that is likely good and looks near it first (Meister & Bittner 2018), so that the bound is low from the start.
 
-use crate::working::{ANCHOR, NONE, Node, Working};
+use crate::working::{ANCHOR, NONE, Working};
 use bvh_core::PackedAabb;
+
+/// A binary tree in which a place can be looked for, and a subtree moved there.
+pub(crate) trait Linked {
+    /// What is above the root.
+    const ABOVE: u32;
+    /// What a node is below.
+    fn parent(&self, at: u32) -> u32;
+    /// Both children, none of a leaf.
+    fn children(&self, at: u32) -> Option<[u32; 2]>;
+    /// The child of `at` that is not `child`.
+    fn other(&self, at: u32, child: u32) -> u32;
+    /// Exact union of everything below.
+    fn aabb(&self, at: u32) -> PackedAabb;
+    /// Its half area.
+    fn area(&self, at: u32) -> f64;
+    /// Moves `node` and what is below it beside `place`, which is neither below it nor its parent nor its sibling. Boxes
+    /// are made tight. Returns the nodes visited.
+    fn reinsert(&mut self, node: u32, place: u32) -> u64;
+}
 
 /// Buffers of a search, and how many nodes it visited.
 #[derive(Debug, Default)]
@@ -66,20 +85,19 @@ impl PlaceSearch {
     /// The cheapest place for `node`, which stays where it is while the search pretends that it is gone. `None` if no
     /// place costs less than its own by more than `tolerance` times that. Also returns what its own costs.
     #[inline(always)]
-    pub fn attached(&mut self, tree: &Working, node: u32, tolerance: f64) -> (Option<Place>, f64) {
-        let Node { aabb, area, parent, .. } = tree.nodes[node as usize];
+    pub fn attached<T: Linked>(&mut self, tree: &T, node: u32, tolerance: f64) -> (Option<Place>, f64) {
+        let (aabb, area, parent) = (tree.aabb(node), tree.area(node), tree.parent(node));
         self.path.clear();
-        let sibling = tree.nodes[parent as usize].other(node);
-        let Node { aabb: mut rest, area: rest_area, .. } = tree.nodes[sibling as usize];
-        let Node { area: joint, parent: mut at, .. } = tree.nodes[parent as usize];
+        let sibling = tree.other(parent, node);
+        let (mut rest, rest_area) = (tree.aabb(sibling), tree.area(sibling));
+        let (joint, mut at) = (tree.area(parent), tree.parent(parent));
         self.path.push(Step { node: sibling, below: NONE, joint, growth: joint - rest_area });
         let mut below = parent;
-        while at != ANCHOR {
-            let ancestor = &tree.nodes[at as usize];
-            rest.grow(&tree.nodes[ancestor.other(below) as usize].aabb);
-            let growth = ancestor.area - rest.half_area();
-            self.path.push(Step { node: at, below, joint: ancestor.area, growth });
-            (below, at) = (at, ancestor.parent);
+        while at != T::ABOVE {
+            let area = tree.area(at);
+            rest.grow(&tree.aabb(tree.other(at, below)));
+            self.path.push(Step { node: at, below, joint: area, growth: area - rest.half_area() });
+            (below, at) = (at, tree.parent(at));
         }
         let mut best = Place { beside: NONE, cost: f64::INFINITY };
         self.climb(&mut best);
@@ -108,20 +126,19 @@ impl PlaceSearch {
 
     /// Looks at everything beside and below the path, from its first node up.
     #[inline(always)]
-    fn search(&mut self, tree: &Working, item: Item, best: &mut Place) {
+    fn search(&mut self, tree: &impl Linked, item: Item, best: &mut Place) {
         for &Step { node: at, below, growth, .. } in &self.path {
             if growth + item.1 >= best.cost {
                 continue;
             }
-            let node = &tree.nodes[at as usize];
             if below == NONE {
-                if !node.is_leaf() {
+                if tree.children(at).is_some() {
                     self.stack.push((at, growth));
                 }
             } else {
-                let other = node.other(below);
+                let other = tree.other(at, below);
                 self.visits += 1;
-                let open = try_place(&tree.nodes[other as usize], other, item.0, growth, best);
+                let open = try_place(tree, other, item.0, growth, best);
                 if open + item.1 < best.cost {
                     self.stack.push((other, open));
                 }
@@ -131,10 +148,10 @@ impl PlaceSearch {
                 if growth + item.1 >= best.cost {
                     continue;
                 }
-                let [left, right] = tree.nodes[at as usize].children;
+                let Some([left, right]) = tree.children(at) else { continue };
                 self.visits += 2;
-                let mut first = (left, try_place(&tree.nodes[left as usize], left, item.0, growth, best));
-                let mut second = (right, try_place(&tree.nodes[right as usize], right, item.0, growth, best));
+                let mut first = (left, try_place(tree, left, item.0, growth, best));
+                let mut second = (right, try_place(tree, right, item.0, growth, best));
                 if second.1 < first.1 {
                     std::mem::swap(&mut first, &mut second);
                 }
@@ -151,10 +168,10 @@ impl PlaceSearch {
 
 /// Tries the place beside a node. Returns the growth down to and with the node, infinite for a leaf.
 #[inline(always)]
-fn try_place(node: &Node, at: u32, aabb: &PackedAabb, growth: f64, best: &mut Place) -> f64 {
-    let cost = growth + node.aabb.union(aabb).half_area();
+fn try_place(tree: &impl Linked, at: u32, aabb: &PackedAabb, growth: f64, best: &mut Place) -> f64 {
+    let cost = growth + tree.aabb(at).union(aabb).half_area();
     if cost < best.cost {
         *best = Place { beside: at, cost };
     }
-    if node.is_leaf() { f64::INFINITY } else { cost - node.area }
+    if tree.children(at).is_none() { f64::INFINITY } else { cost - tree.area(at) }
 }

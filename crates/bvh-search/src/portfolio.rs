@@ -121,18 +121,23 @@ impl Config {
         let mut left = own.min(run.left().work);
         if known {
             let mut length = left as f64 / n as f64;
+            // When to be done, with what is converted at the end still to come.
+            let mut end_of_all = 1.0;
             if timed {
                 let quota = Quota { work: left.min(PROBE * n), ..run.left() };
                 let (tally, in_time) = self.probe(tree, stream(seed, 0), quota, observer);
                 left = left.saturating_sub(tally.work);
                 run.count(tally);
+                let now = observer.progress().unwrap_or(1.0);
+                let finish = if n < LARGE { FINISH } else { LARGE_FINISH };
+                end_of_all = 1.0 - (1.0 - now) * (finish * n as f64 / in_time).min(0.5);
                 length = length.min(in_time / n as f64);
             }
             let (all, began) = (left, observer.progress().unwrap_or(0.0));
             for (number, Planned { hot, until }) in (0..).zip(self.plan(length, n)) {
                 let due = (until * all as f64) as u64;
                 let work = if timed { left } else { left.min(due.saturating_sub(all - left)) };
-                let end = began + (1.0 - began) * until;
+                let end = began + (end_of_all - began) * until;
                 if observer.progress().is_some_and(|now| now >= end) {
                     continue;
                 }
@@ -196,7 +201,8 @@ impl Config {
         if run.stopped().is_some() || cooling.quota.work == 0 {
             return 0;
         }
-        let (mut annealed, mut done, observer) = (tree.clone(), Tally::default(), run.observer());
+        let observer: &dyn Observer = &Until { observer: run.observer(), end: cooling.end };
+        let (mut annealed, mut done) = (tree.clone(), Tally::default());
         let streams = [seed, 1 + (number << 40)];
         anneal(|| Mover::new(&self.ruin), cooling, &mut annealed, streams, observer, &mut |tree, tally| {
             done += tally;
@@ -238,6 +244,22 @@ impl Config {
     }
 }
 
+/// An observer who has a search return at `end`, if that is before all the time has passed.
+struct Until<'a> {
+    observer: &'a dyn Observer,
+    end: f64,
+}
+
+impl Observer for Until<'_> {
+    fn cancelled(&self) -> bool {
+        self.observer.cancelled() || self.progress().is_some_and(|now| now >= self.end)
+    }
+
+    fn progress(&self) -> Option<f64> {
+        self.observer.progress()
+    }
+}
+
 /// A descent of the temperature, as planned.
 struct Planned {
     /// Its first temperature.
@@ -251,6 +273,13 @@ const WORTH_AN_EVENT: f64 = 1e-3;
 
 /// Work per pair of objects above which two descents end lower than one: so for the smallest scenes.
 const WORK_PER_PAIR: f64 = 200.0;
+
+/// Work per object that takes as long as what comes after the last move: a tree is sorted, converted and valued.
+const FINISH: f64 = 4.0;
+
+/// In a scene of so many objects, whose nodes do not fit into a core's cache, it takes longer.
+const LARGE: u64 = 1 << 14;
+const LARGE_FINISH: f64 = 10.0;
 
 /// Work per object after which the rate of work is known.
 const PROBE: u64 = 16;

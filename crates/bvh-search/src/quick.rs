@@ -4,16 +4,20 @@
 //! area that can be saved. Above these budgets annealing from a greedy division ends lower.
 //!
 //! A time is compared with that of sorting the objects along a curve, which comes first in any case: so many times that
-//! long, what can be done, found by measurement. The sort takes about 20 ns per object.
+//! long, what can be done, found by measurement. The sort takes about 25 ns per object.
+
+mod siblings;
 
 use crate::incumbent::Incumbent;
-use crate::reinsertion::{sort_by_area, sweep};
+use crate::place::Linked;
+use crate::reinsertion::sweep;
 use crate::start::construction;
 use crate::working::Working;
 use crate::{Observer, Problem, Run, SearchError, Tally};
 use bvh_build::Builder;
 use bvh_build::agglomerative::{Along, Config};
-use bvh_core::{Bvh, cost};
+use bvh_core::{Aabb, Bvh, cost};
+use siblings::Siblings;
 
 /// What a small budget was enough for.
 pub(crate) enum Quick<'p> {
@@ -26,53 +30,51 @@ pub(crate) enum Quick<'p> {
 /// Work per object from which on a budget is not small.
 const MOST_WORK: u64 = 64;
 
-/// Times the sort's time from which on a budget is not small.
-const MOST_TIME: f64 = 24.0;
+/// Times the sort's time from which on a budget is not small; if there are several threads, which annealing can use.
+const MOST_TIME: f64 = 64.0;
+#[cfg(feature = "rayon")]
+const MOST_TIME_OF_THREADS: f64 = 24.0;
 
 /// Work per object, and times the sort's time, from which on the better of two starts is taken. Division is ahead on
-/// smooth surfaces; it takes ten times as long as the sort.
+/// smooth surfaces; it takes 14 times as long as the sort.
 const TWO_STARTS: (u64, f64) = (30, 18.0);
 
 /// What so many times the sort's time are enough for, without any reinsertion.
 const BUILDS: [(f64, Config); 4] = [
-    (2.6, Config { radius: 1, near_rounds: 0 }),
-    (3.6, Config { radius: 2, near_rounds: 0 }),
-    (4.4, Config { radius: 8, near_rounds: 2 }),
-    (5.4, LONGEST_BUILD),
+    (2.5, Config { radius: 1, near_rounds: 0 }),
+    (2.75, Config { radius: 2, near_rounds: 0 }),
+    (3.0, Config { radius: 4, near_rounds: 2 }),
+    (3.5, START),
 ];
 
-/// The last of them is best up to a longer time in [`LARGE`] scenes, whose conversions take longer.
-const LARGE_BUILD: (f64, Config) = (6.5, LONGEST_BUILD);
-
-const LONGEST_BUILD: Config = Config { radius: 14, near_rounds: 1 };
-
 /// The start of reinsertion.
-const START: Config = Config { radius: 8, near_rounds: 2 };
+const START: Config = Config { radius: 5, near_rounds: 1 };
 
-/// Objects whose nodes do not fit into a core's cache.
-const LARGE: usize = 1 << 14;
+/// Times the sort's time that a tree takes after its reinsertion, to be put in order and valued.
+const FINISH: f64 = 0.75;
 
 /// The search for a small budget; nothing if it is not small.
 pub(crate) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<Quick<'p>>, SearchError> {
     let (observer, n) = (run.observer(), problem.boxes.len());
     let (began, work) = (observer.progress(), run.left().work / n.max(1) as u64);
-    let large = n >= LARGE;
     if n < 3 || began.is_none() && work >= MOST_WORK {
         return Ok(None);
     }
     let along = Along::new(problem.boxes)?;
-    let mut two_starts = work >= TWO_STARTS.0;
+    let (mut two_starts, mut end) = (work >= TWO_STARTS.0, f64::INFINITY);
     if let (Some(began), Some(sorted)) = (began, observer.progress()) {
-        let times = (1.0 - began) / (sorted - began).max(1e-9);
-        if times >= MOST_TIME {
+        let sort = (sorted - began).max(1e-9);
+        let times = (1.0 - began) / sort;
+        if times >= most_time() {
             return Ok(None);
         }
-        let builds = BUILDS.into_iter().chain(large.then_some(LARGE_BUILD));
-        if let Some((_, config)) = builds.into_iter().find(|(enough, _)| times < *enough) {
+        if let Some((_, config)) = BUILDS.into_iter().find(|(enough, _)| times < *enough) {
             return Ok(Some(Quick::Tree(Incumbent::begin_unbounded(along.build(&config)?, problem, run).tree)));
         }
-        two_starts = times >= TWO_STARTS.1;
+        (two_starts, end) = (times >= TWO_STARTS.1, 1.0 - FINISH * sort);
     }
+    // A division counts little as work, so that it is tried in any case unless time is what counts.
+    let two_starts = two_starts && (began.is_none() || division_may_be_ahead(&along, problem, run)?);
     let (mut start, mut front) = (along.build(&START)?, FRONT);
     if two_starts {
         let divided = construction().build(problem.boxes)?;
@@ -81,43 +83,77 @@ pub(crate) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<
             (start, front) = (divided, usize::MAX);
         }
     }
-    let built = observer.progress();
-    let mut best = Incumbent::begin_unbounded(start, problem, run);
-    if built.is_none() {
+    // If there is a clock, the start is not valued: what becomes of it is better.
+    let mut before = None;
+    if began.is_none() {
+        before = Some(Incumbent::begin(start.clone(), problem, run));
+    } else {
+        run.count(Tally { moves: 1, kept: 0, work: start.nodes.len() as u64 });
+    }
+    let mut tree = Siblings::new(start);
+    let still = reinsert_largest(&mut tree, front, end, run);
+    let tree = tree.into_tree();
+    let mut best = match before {
+        Some(mut best) => {
+            best.offer_tree(tree, run);
+            best
+        }
+        None => Incumbent::begin_unbounded(tree, problem, run),
+    };
+    if !still {
+        return Ok(Some(Quick::Tree(best.tree)));
+    }
+    if began.is_some() {
         best.bound(run);
     }
-    let mut tree = Working::from_tight(&best.tree, best.area())?;
-    // The conversion at the end takes about as long as the one at the beginning, or what the caches make of it.
-    let finish = if large { 2.7 } else { 1.5 };
-    let end = match (built, observer.progress()) {
-        (Some(built), Some(now)) => 1.0 - finish * (now - built),
-        _ => f64::INFINITY,
-    };
-    let still = reinsert_largest(&mut tree, front, end, run);
-    if still {
-        best.offer(&tree, run);
-        if built.is_some() {
-            best.bound(run);
-        }
-        return Ok(Some(Quick::Optimum(best, tree)));
+    let tree = Working::from_tight(&best.tree, best.area())?;
+    Ok(Some(Quick::Optimum(best, tree)))
+}
+
+fn most_time() -> f64 {
+    #[cfg(feature = "rayon")]
+    if rayon::current_num_threads() > 1 {
+        return MOST_TIME_OF_THREADS;
     }
-    if built.is_some() {
-        best.offer_level_by_level(&tree, run);
-    } else {
-        best.offer(&tree, run);
+    MOST_TIME
+}
+
+/// Stretches of the curve on which the two starts are compared, and one over the part of all objects that they have.
+const SAMPLES: (usize, usize) = (4, 8);
+
+/// Objects below which the comparison saves nothing.
+const SAMPLED: usize = 2048;
+
+/// Cost of division over that of clustering there, below which it is ahead on the whole: on smooth surfaces it is 0.93 to
+/// 0.98, else 0.99 to 1.11.
+const AHEAD: f64 = 0.98;
+
+/// Whether a division is worth its time: it must be ahead on parts of the scene. Takes about a tenth of that time.
+fn division_may_be_ahead(along: &Along, problem: &Problem, run: &mut Run) -> Result<bool, SearchError> {
+    let (order, (stretches, part)) = (along.order(), SAMPLES);
+    if order.len() < SAMPLED {
+        return Ok(true);
     }
-    Ok(Some(Quick::Tree(best.tree)))
+    let (mut divided, mut clustered) = (0.0, 0.0);
+    for stretch in order.chunks(order.len().div_ceil(stretches)) {
+        let objects = &stretch[..stretch.len() / part];
+        let boxes: Vec<Aabb> = objects.iter().map(|&object| problem.boxes[object as usize]).collect();
+        divided += cost::internal_area(&construction().build(&boxes)?);
+        clustered += cost::internal_area(&START.build(&boxes)?);
+        run.count(Tally { moves: 2, kept: 0, work: 4 * boxes.len() as u64 });
+    }
+    Ok(divided < AHEAD * clustered)
 }
 
 /// Part of all nodes that are tried first; twice as many every time.
 const FIRST: f64 = 0.01;
 
 /// Moves between two looks at the clock.
-const MOVES: usize = 32;
+const MOVES: usize = 16;
 
 /// Reinsertion of more and more of the largest nodes, until the observer's progress is at `end` or the run stops.
 /// Returns whether a local optimum came first.
-fn reinsert_largest(tree: &mut Working, front: usize, end: f64, run: &mut Run) -> bool {
+fn reinsert_largest(tree: &mut Siblings, front: usize, end: f64, run: &mut Run) -> bool {
     let observer: &dyn Observer = run.observer();
     let (mut part, mut order) = (FIRST, Vec::new());
     loop {
@@ -144,18 +180,20 @@ const FRONT: usize = 4;
 
 /// The largest nodes, about this part of all, the largest first, equal ones by index. Only so many of the first nodes
 /// are looked at, times the number of nodes asked for.
-fn largest(tree: &Working, part: f64, front: usize, order: &mut Vec<u32>) {
-    let nodes = tree.nodes.len() - 1;
+fn largest(tree: &Siblings, part: f64, front: usize, order: &mut Vec<u32>) {
+    let nodes = tree.len() - 1;
     let count = ((part * nodes as f64) as usize).clamp(1, nodes);
-    order.clear();
-    order.extend(1..=count.saturating_mul(front).min(nodes) as u32);
-    if count < order.len() {
-        let area = |at: u32| tree.nodes[at as usize].area;
-        order.select_nth_unstable_by(count, |&a, &b| area(b).total_cmp(&area(a)).then(a.cmp(&b)));
-        order.truncate(count);
-        order.sort_unstable();
+    let looked_at = 1..=count.saturating_mul(front).min(nodes) as u32;
+    // No area is below zero, so that they are ordered as their bits are.
+    let key = |at: u32| (!tree.area(at).to_bits(), at);
+    let mut keyed: Vec<(u64, u32)> = looked_at.map(key).collect();
+    if count < keyed.len() {
+        keyed.select_nth_unstable(count);
+        keyed.truncate(count);
     }
-    sort_by_area(tree, order);
+    keyed.sort_unstable();
+    order.clear();
+    order.extend(keyed.into_iter().map(|(_, at)| at));
 }
 
 #[cfg(test)]
@@ -198,7 +236,7 @@ mod tests {
     #[test]
     fn every_short_time_gives_a_valid_tree() {
         let boxes = scatter(300);
-        for times in 1..70 {
+        for times in 1..100 {
             let clock = Asked { times, asked: AtomicU32::new(0) };
             let found =
                 solve(&portfolio::Config::default(), &Problem::new(&boxes), 1, Budget::default(), &clock);
@@ -221,9 +259,9 @@ mod tests {
     fn the_largest_nodes_are_those_that_a_full_sort_puts_first() {
         let boxes = scatter(300);
         let tree = Config::default().build(&boxes).unwrap();
-        let tree = Working::from_tight(&tree, 0.0).unwrap();
-        let mut all: Vec<u32> = (1..tree.nodes.len() as u32).collect();
-        sort_by_area(&tree, &mut all);
+        let tree = Siblings::new(tree);
+        let mut all: Vec<u32> = (1..tree.len() as u32).collect();
+        all.sort_by(|&a, &b| tree.area(b).total_cmp(&tree.area(a)));
         let mut order = Vec::new();
         for part in [0.001, 0.1, 0.5, 1.0] {
             largest(&tree, part, usize::MAX, &mut order);

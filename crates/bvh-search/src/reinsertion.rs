@@ -7,11 +7,11 @@
 
 use crate::error::require;
 use crate::incumbent::{Incumbent, until_still};
-use crate::place::PlaceSearch;
+use crate::place::{Linked, PlaceSearch};
 use crate::run::Tally;
 use crate::start::Start;
 use crate::stream::stream;
-use crate::working::{ANCHOR, Working};
+use crate::working::Working;
 use crate::{Observer, Problem, Quota, Run, Search, SearchError};
 use bvh_core::Bvh;
 use bvh_core::with_vector_instructions;
@@ -85,15 +85,15 @@ pub(crate) fn to_local_optimum(tree: &mut Working, quota: Quota, observer: &dyn 
 with_vector_instructions! {
     /// Tries to improve the place of every node of `order` once. Stops early when the quota is reached or
     /// the observer says so.
-    pub(crate) sweep = sweep_plain(
-        tree: &mut Working, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally
+    pub(crate) sweep = sweep_plain<T: Linked>(
+        tree: &mut T, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally
 }
 
 /// A place must be better by this part of its cost: above rounding, so that no two places take turns.
 pub(crate) const TOLERANCE: f64 = 1e-12;
 
 #[inline(always)]
-fn sweep_plain(tree: &mut Working, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally {
+fn sweep_plain<T: Linked>(tree: &mut T, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally {
     let mut swept = Tally::default();
     let mut search = PlaceSearch::default();
     for &node in order {
@@ -101,14 +101,12 @@ fn sweep_plain(tree: &mut Working, order: &[u32], quota: Quota, observer: &dyn O
         if quota.is_reached(&done) || swept.moves % 256 == 255 && observer.cancelled() {
             break;
         }
-        if tree.nodes[node as usize].parent == ANCHOR {
+        if tree.parent(node) == T::ABOVE {
             continue;
         }
         swept.moves += 1;
         if let (Some(place), _) = search.attached(tree, node, TOLERANCE) {
-            tree.begin();
-            let (_, _, visits) = tree.detach(node);
-            swept.work += visits + tree.attach(node, place.beside).1;
+            swept.work += tree.reinsert(node, place.beside);
             swept.kept += 1;
         }
     }

@@ -4,6 +4,7 @@
 //! a subtree keeps its parent node with it; attaching uses that node again, so that nothing is ever allocated.
 
 mod convert;
+mod linked;
 
 use bvh_core::PackedAabb;
 use bvh_core::cost::Sum;

@@ -97,30 +97,4 @@ impl Working {
         }
         tree
     }
-
-    /// As [`to_bvh`](Self::to_bvh), but level by level: faster if large nodes are close to each other in memory, and for
-    /// rays a little slower.
-    pub fn to_bvh_level_by_level(&self) -> Bvh {
-        let mut tree = Bvh::default();
-        let Some(root) = self.root() else { return tree };
-        let (count, objects) = (self.nodes.len() - 1, self.objects());
-        tree.nodes.reserve_exact(count);
-        // Room for what is written whether or not a node is a leaf, which cannot be predicted.
-        tree.prim_ids = vec![0; objects + 1];
-        let mut sources = vec![root; count + 2];
-        let (mut free, mut leaves) = (1, 0);
-        for at in 0..count {
-            let node = &self.nodes[sources[at] as usize];
-            let (leaf, aabb) = (node.is_leaf(), Aabb::from(&node.aabb));
-            (sources[free], sources[free + 1]) = (node.children[0], node.children[1]);
-            tree.prim_ids[leaves] = node.children[1];
-            let (inner_node, leaf_node) =
-                (BvhNode::inner(aabb, free as u32, 2), BvhNode::leaf(aabb, leaves as u32, 1));
-            tree.nodes.push(if leaf { leaf_node } else { inner_node });
-            free += 2 * usize::from(!leaf);
-            leaves += usize::from(leaf);
-        }
-        tree.prim_ids.truncate(objects);
-        tree
-    }
 }

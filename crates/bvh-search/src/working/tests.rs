@@ -31,19 +31,6 @@ fn a_tight_tree_is_taken_over_as_it_is() {
     assert_eq!((taken.area(), taken.to_bvh()), (working.internal_area(), tree));
 }
 
-#[test]
-fn a_tree_is_the_same_level_by_level() {
-    for n in [1, 2, 3, 100] {
-        let (boxes, working) = scene(n);
-        let tree = working.to_bvh_level_by_level();
-        validate(&tree, &boxes).unwrap();
-        assert_eq!(Working::from_bvh(&tree, &boxes).unwrap().to_bvh(), working.to_bvh());
-        assert!(tree.nodes.windows(2).all(|pair| pair[0].is_leaf()
-            || pair[1].is_leaf()
-            || pair[0].children().start < pair[1].children().start));
-    }
-}
-
 /// Every box is the union below it, every parent the right one.
 fn assert_tight(tree: &Working, boxes: &[Aabb]) {
     let bvh = tree.to_bvh();
