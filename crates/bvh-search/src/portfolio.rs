@@ -62,6 +62,9 @@ pub struct Config {
     /// the whole tree, which is a little better at equal work; but four per thread if the time is known and there are
     /// several threads.
     pub pieces: u32,
+    /// Work per object of a descent from which on its temperatures are relative to [the top](Scale::Top) whatever the
+    /// move says, above 0: longer ones end lower then, shorter ones higher. Default 20 000.
+    pub top_from: f64,
     /// The move.
     pub ruin: Ruin,
     /// The builder of the start. By default that of least cost for the budget: agglomerative clustering if it is
@@ -85,7 +88,8 @@ impl Default for Config {
             reheated: 0.3,
             reheats_from: 7000.0,
             pieces: 0,
-            ruin: Ruin { scale: Scale::Top, ..Ruin::default() },
+            top_from: 20_000.0,
+            ruin: Ruin::default(),
             start: None,
         }
     }
@@ -102,6 +106,7 @@ impl Config {
             require(found > 0.0 && found.is_finite(), name, found, "above 0")?;
         }
         require(self.reheats_from > 0.0, "reheats_from", self.reheats_from, "above 0")?;
+        require(self.top_from > 0.0, "top_from", self.top_from, "above 0")?;
         let part = self.reheated;
         require(part > 0.0 && part < 1.0, "reheated", part, "above 0, below 1")?;
         require(self.reheats <= 1000, "reheats", self.reheats.into(), "0 to 1000")?;
@@ -134,7 +139,8 @@ impl Config {
                 length = length.min(in_time / n as f64);
             }
             let (all, began) = (left, observer.progress().unwrap_or(0.0));
-            for (number, Planned { hot, until }) in (0..).zip(self.plan(length, n)) {
+            let (plan, ruin) = self.plan(length, n);
+            for (number, Planned { hot, until }) in (0..).zip(plan) {
                 let due = (until * all as f64) as u64;
                 let work = if timed { left } else { left.min(due.saturating_sub(all - left)) };
                 let end = began + (end_of_all - began) * until;
@@ -142,8 +148,8 @@ impl Config {
                     continue;
                 }
                 let cooling = self.cooling(hot, work, end, run);
-                left =
-                    left.saturating_sub(self.descend(tree, [seed, number], &cooling, number == 0, best, run));
+                let done = self.descend(tree, [seed, number], (&cooling, &ruin), number == 0, best, run);
+                left = left.saturating_sub(done);
             }
         } else {
             best.descend(tree, u32::MAX, run, |tree, _, quota, observer| {
@@ -152,14 +158,16 @@ impl Config {
             let mut length = self.first;
             for number in 0..MOST_GENERATIONS {
                 let cooling = self.cooling(self.hot(length), left.min((length * n as f64) as u64), 1.0, run);
-                left = left.saturating_sub(self.descend(tree, [seed, number], &cooling, false, best, run));
+                let ruin = self.ruin_of(length);
+                let done = self.descend(tree, [seed, number], (&cooling, &ruin), false, best, run);
+                left = left.saturating_sub(done);
                 length *= self.growth;
             }
         }
     }
 
-    /// The descents of so much work per object.
-    fn plan(&self, length: f64, n: u64) -> Vec<Planned> {
+    /// The descents of so much work per object, and their move.
+    fn plan(&self, length: f64, n: u64) -> (Vec<Planned>, Ruin) {
         let longest = self.longest.min(WORK_PER_PAIR * n as f64);
         let equal = (length / longest).ceil().clamp(1.0, MOST_GENERATIONS as f64);
         let length = length / equal;
@@ -174,7 +182,13 @@ impl Config {
                 plan.push(Planned { hot, until: (number as f64 + part) / equal });
             }
         }
-        plan
+        (plan, self.ruin_of(length))
+    }
+
+    /// The move of a descent of so much work per object.
+    fn ruin_of(&self, length: f64) -> Ruin {
+        let scale = if length < self.top_from { self.ruin.scale } else { Scale::Top };
+        Ruin { scale, ..self.ruin.clone() }
     }
 
     /// First temperature of a descent of so much work per object, unless the last one is higher.
@@ -193,7 +207,7 @@ impl Config {
         &self,
         tree: &mut Working,
         [seed, number]: [u64; 2],
-        cooling: &Cooling,
+        (cooling, ruin): (&Cooling, &Ruin),
         first: bool,
         best: &mut Incumbent,
         run: &mut Run,
@@ -204,7 +218,7 @@ impl Config {
         let observer: &dyn Observer = &Until { observer: run.observer(), end: cooling.end };
         let (mut annealed, mut done) = (tree.clone(), Tally::default());
         let streams = [seed, 1 + (number << 40)];
-        anneal(|| Mover::new(&self.ruin), cooling, &mut annealed, streams, observer, &mut |tree, tally| {
+        anneal(|| Mover::new(ruin), cooling, &mut annealed, streams, observer, &mut |tree, tally| {
             done += tally;
             run.count(tally);
             if tree.area() < best.area() * (1.0 - WORTH_AN_EVENT) {
