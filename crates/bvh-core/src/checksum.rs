@@ -1,14 +1,17 @@
 //! A 64-bit checksum at the speed of memory that no change within one of its words escapes.
 //!
-//! Bytes are taken as little-endian words of eight, padded with zeros to a multiple of 32 words. Word `i` goes to lane
-//! `i mod 32`, from lanes that begin as 1, 2, …, 32. With arithmetic modulo 2^64, a lane takes in a word by
+//! The bytes are cut into four quarters: of `b` bytes they begin at 0, `q`, `2q` and `3q`, with `q` the least multiple of
+//! 256 for which `4q` is no less than `b`, and end where the next begins or all bytes do. Within a quarter, bytes are
+//! taken as little-endian words of eight, padded with zeros to a multiple of 32 words. Word `i` goes to lane `i mod 32`,
+//! from lanes that begin as 1, 2, …, 32. With arithmetic modulo 2^64, a lane takes in a word by
 //!
 //! ```text
 //! x = rotate_left(lane ^ word, 16);  x = x + (x << 5);  lane = x ^ (x >> 23)
 //! ```
 //!
-//! In the end `sum`, at first the number of bytes, takes in the lanes in turn:
-//! `sum = rotate_left((sum ^ lane) · M, 29)` with M odd.
+//! In the end a quarter's `sum`, at first the number of its bytes, takes in its lanes in turn:
+//! `sum = rotate_left((sum ^ lane) · M, 29)` with M odd. Likewise the checksum, at first the number of all bytes, takes
+//! in the sums of the quarters.
 //!
 //! Why these steps: every one is a bijection of what it takes in and of what it goes on from, hence a change of one
 //! word, and so of any byte, changes the result with certainty. Changes in several lanes meet only in the
@@ -26,7 +29,9 @@ use bytemuck::Pod;
 /// Words taken in side by side: enough that none waits for the one before it.
 const LANES: usize = 32;
 /// Bytes taken in at a time.
-pub(crate) const BLOCK: usize = 8 * LANES;
+const BLOCK: usize = 8 * LANES;
+/// Bytes taken in of one quarter before the next.
+const STEP: usize = 4 * BLOCK;
 
 #[inline(always)]
 fn absorb(lane: u64, word: u64) -> u64 {
@@ -35,59 +40,102 @@ fn absorb(lane: u64, word: u64) -> u64 {
     spread ^ (spread >> 23)
 }
 
+#[inline(always)]
+fn absorb_block(lanes: &mut [u64; LANES], block: &[u8; BLOCK]) {
+    for (lane, word) in lanes.iter_mut().zip(block.as_chunks::<8>().0) {
+        *lane = absorb(*lane, u64::from_le_bytes(*word));
+    }
+}
+
 /// With 2^64 divided by the golden ratio, odd.
 #[inline(always)]
 fn mix(state: u64, word: u64) -> u64 {
     (state ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
 }
 
-#[cfg(feature = "std")]
-crate::with_vector_instructions! {
-    /// Takes in blocks, with the vector instructions that the processor has.
-    absorb_blocks = absorb_blocks_plain(lanes: &mut [u64; LANES], blocks: &[[u8; BLOCK]])
+/// The sum of a quarter, of which bytes come piece by piece.
+struct Quarter {
+    lanes: [u64; LANES],
+    length: usize,
 }
-#[cfg(not(feature = "std"))]
-use absorb_blocks_plain as absorb_blocks;
 
-#[inline(always)]
-fn absorb_blocks_plain(lanes: &mut [u64; LANES], blocks: &[[u8; BLOCK]]) {
-    // In registers, of which each holds several lanes.
-    let mut own = *lanes;
-    for block in blocks {
-        for (lane, word) in own.iter_mut().zip(block.as_chunks::<8>().0) {
-            *lane = absorb(*lane, u64::from_le_bytes(*word));
-        }
+impl Quarter {
+    fn new() -> Self {
+        Self { lanes: core::array::from_fn(|lane| lane as u64 + 1), length: 0 }
     }
-    *lanes = own;
-}
 
-/// The checksum of the parts, one after the other. All but the last must be multiples of [`BLOCK`] bytes long.
-pub(crate) fn checksum(parts: &[&[u8]]) -> u64 {
-    let mut lanes = core::array::from_fn(|lane| lane as u64 + 1);
-    let mut length = 0;
-    for part in parts {
-        let (whole, rest) = part.as_chunks();
-        absorb_blocks(&mut lanes, whole);
+    /// Takes in bytes, the rest after whole blocks padded with zeros: only the last may have one.
+    #[inline(always)]
+    fn add(&mut self, bytes: &[u8]) {
+        let (blocks, rest) = bytes.as_chunks::<BLOCK>();
+        // In registers, of which each holds several lanes.
+        let mut lanes = self.lanes;
+        for block in blocks {
+            absorb_block(&mut lanes, block);
+        }
         if !rest.is_empty() {
             let mut padded = [0; BLOCK];
             padded[..rest.len()].copy_from_slice(rest);
-            absorb_blocks(&mut lanes, &[padded]);
+            absorb_block(&mut lanes, &padded);
         }
-        length += part.len() as u64;
+        self.lanes = lanes;
+        self.length += bytes.len();
     }
-    lanes.into_iter().fold(length, mix)
+
+    #[inline(always)]
+    fn sum(self) -> u64 {
+        self.lanes.into_iter().fold(self.length as u64, mix)
+    }
+}
+
+#[cfg(feature = "std")]
+crate::with_vector_instructions! {
+    /// The checksum of some bytes, with the vector instructions that the processor has.
+    pub(crate) checksum = checksum_plain(bytes: &[u8]) -> u64
+}
+#[cfg(not(feature = "std"))]
+pub(crate) use checksum_plain as checksum;
+
+#[inline(always)]
+pub(crate) fn checksum_plain(bytes: &[u8]) -> u64 {
+    checksum_and_visit(bytes, |_, _| ())
+}
+
+/// The checksum of some bytes. Shows what has just been taken in to `visit`, with where it begins, while it is still in
+/// the cache: all bytes once, in pieces from a multiple of [`BLOCK`] on.
+///
+/// Of quarters, so that memory is read in four places at a time: what a processor fetches ahead ends with a page.
+#[inline(always)]
+pub(crate) fn checksum_and_visit(bytes: &[u8], mut visit: impl FnMut(usize, &[u8])) -> u64 {
+    let quarter = bytes.len().div_ceil(4 * BLOCK) * BLOCK;
+    let ends = [1, 2, 3, 4].map(|number| (number * quarter).min(bytes.len()));
+    let starts = [0, ends[0], ends[1], ends[2]];
+    let mut quarters = [(); 4].map(|()| Quarter::new());
+    for at in (0..quarter).step_by(STEP) {
+        let pieces = [0, 1, 2, 3].map(|number| {
+            let start = ends[number].min(starts[number] + at);
+            (start, &bytes[start..ends[number].min(start + STEP)])
+        });
+        for (quarter, (_, piece)) in quarters.iter_mut().zip(pieces) {
+            quarter.add(piece);
+        }
+        for (start, piece) in pieces {
+            visit(start, piece);
+        }
+    }
+    quarters.into_iter().fold(bytes.len() as u64, |sum, quarter| mix(sum, quarter.sum()))
 }
 
 /// The checksum of objects' boxes, by which a tree file knows its scene: of min x, y, z, max x, y, z of each, f32,
 /// little-endian. O(n).
 pub fn boxes_checksum(boxes: &[Aabb]) -> u64 {
-    checksum(&[&le_bytes(boxes)])
+    checksum(&le_bytes(boxes))
 }
 
 /// The checksum of triangles, by which the file of a wide layout knows its scene: of x, y, z of each corner, f32,
 /// little-endian. O(n).
 pub fn triangles_checksum(triangles: &[Triangle]) -> u64 {
-    checksum(&[&le_bytes(triangles)])
+    checksum(&le_bytes(triangles))
 }
 
 /// The bytes of values made of four-byte words, little-endian on any machine.
@@ -131,45 +179,63 @@ mod tests {
         lanes[0] = absorb(1, 0x0807_0605_0403_0201);
         lanes[1] = absorb(2, 9);
         (2..32).for_each(|lane| lanes[lane] = absorb(lane as u64 + 1, 0));
-        assert_eq!(checksum(&[&[1, 2, 3, 4, 5, 6, 7, 8, 9]]), lanes.iter().fold(9, |h, &lane| mix(h, lane)));
+        let untouched: [u64; 32] = core::array::from_fn(|lane| lane as u64 + 1);
+        let [first, other] =
+            [(lanes, 9), (untouched, 0)].map(|(lanes, bytes)| lanes.into_iter().fold(bytes, mix));
+        let sum = [first, other, other, other].into_iter().fold(9, mix);
+        assert_eq!(checksum(&[1, 2, 3, 4, 5, 6, 7, 8, 9]), sum);
     }
 
     #[test]
     fn checksums_are_the_same_everywhere_and_for_ever() {
         let bytes: Vec<u8> = (0..2000u32).map(|i| (i * i / 7) as u8).collect();
-        let sums = [0, 1, 256, 2000].map(|length| checksum(&[&bytes[..length]]));
+        let sums = [0, 1, 256, 2000].map(|length| checksum(&bytes[..length]));
         assert_eq!(
             sums,
-            [0xcc69_775f_2293_f753, 0xc7b6_c60f_e13f_bdd7, 0x5b2b_c5f5_b2a5_37a1, 0xc25d_020e_5a74_86c9]
+            [0x42e7_2dc3_6868_92be, 0xa261_feb5_c057_6f8e, 0x642f_9a91_d8ed_1246, 0x0227_405d_4f2d_01cd]
         );
-        let (mut fast, mut plain) = ([7; LANES], [7; LANES]);
-        absorb_blocks(&mut fast, bytes.as_chunks().0);
-        absorb_blocks_plain(&mut plain, bytes.as_chunks().0);
-        assert_eq!(fast, plain);
+        assert_eq!(checksum(&bytes), checksum_plain(&bytes));
     }
 
     #[test]
     fn lengths_and_places_of_zeros_count() {
-        assert!(is_free_of_repetitions((0..1000).map(|length| checksum(&[&vec![0; length]])).collect()));
+        assert!(is_free_of_repetitions((0..2100).map(|length| checksum(&vec![0; length])).collect()));
     }
 
     #[test]
-    fn parts_of_whole_blocks_are_as_good_as_one() {
-        let bytes: Vec<u8> = (0..=255).cycle().take(700).collect();
-        assert_eq!(checksum(&[&bytes[..512], &bytes[512..]]), checksum(&[&bytes]));
+    fn bytes_are_visited_once_and_quarters_have_sums_of_their_own() {
+        let bytes: Vec<u8> = (0..=250).cycle().take(12_000).collect();
+        for length in (0..1100).chain([2047, 2048, 2049, 4096, 4097, 8191, 8193, 12_000]) {
+            let bytes = &bytes[..length];
+            let mut seen = vec![0; length];
+            let sum = checksum_and_visit(bytes, |start, piece| {
+                assert_eq!(piece, &bytes[start..start + piece.len()]);
+                assert!(piece.is_empty() || start % 256 == 0);
+                seen[start..start + piece.len()].iter_mut().for_each(|times| *times += 1);
+            });
+            assert_eq!(seen, vec![1; length]);
+            let quarter = length.div_ceil(1024) * 256;
+            let mut parts = bytes.chunks(quarter.max(1));
+            let sums = [(); 4].map(|()| {
+                let mut own = Quarter::new();
+                own.add(parts.next().unwrap_or_default());
+                own.sum()
+            });
+            assert_eq!(sum, sums.into_iter().fold(length as u64, mix), "{length}");
+        }
     }
 
     #[test]
     fn no_flipped_bit_is_like_another_and_none_undoes_another() {
-        let mut bytes = vec![0; 768];
-        let whole = checksum(&[&bytes]);
+        let mut bytes = vec![0; 4 * 768];
+        let whole = checksum(&bytes);
         let mut flipped = |bits: &[usize]| {
             bits.iter().for_each(|bit| bytes[bit / 8] ^= 1 << (bit % 8));
-            let sum = checksum(&[&bytes]);
+            let sum = checksum(&bytes);
             bits.iter().for_each(|bit| bytes[bit / 8] ^= 1 << (bit % 8));
             sum
         };
-        let single: Vec<u64> = (0..6144).map(|bit| flipped(&[bit])).collect();
+        let single: Vec<u64> = (0..4 * 6144).map(|bit| flipped(&[bit])).collect();
         assert!(is_free_of_repetitions([&single[..], &[whole]].concat()));
         // The words of one lane that follow the first.
         for (bit, other) in
@@ -208,7 +274,8 @@ mod tests {
     #[test]
     fn pairs_of_moves_by_whole_numbers_do_not_cancel() {
         let mut boxes = cubes();
-        boxes.truncate(70);
+        // The first 70 are in one quarter.
+        boxes.truncate(280);
         let whole = boxes_checksum(&boxes);
         // Box 10 ends in the word that follows box 0's first in its lane. The words of box 32 are in the lanes of those
         // of box 0, three words later, and those of box 64 six.
