@@ -30,7 +30,7 @@ use bytemuck::Pod;
 const LANES: usize = 32;
 /// Bytes taken in at a time.
 const BLOCK: usize = 8 * LANES;
-/// Bytes taken in of one quarter before the next.
+/// Bytes taken in of one quarter before the next: with more, memory rests while what is there is looked at.
 const STEP: usize = 4 * BLOCK;
 
 #[inline(always)]
@@ -40,52 +40,41 @@ fn absorb(lane: u64, word: u64) -> u64 {
     spread ^ (spread >> 23)
 }
 
-#[inline(always)]
-fn absorb_block(lanes: &mut [u64; LANES], block: &[u8; BLOCK]) {
-    for (lane, word) in lanes.iter_mut().zip(block.as_chunks::<8>().0) {
-        *lane = absorb(*lane, u64::from_le_bytes(*word));
-    }
-}
-
 /// With 2^64 divided by the golden ratio, odd.
 #[inline(always)]
 fn mix(state: u64, word: u64) -> u64 {
     (state ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
 }
 
-/// The sum of a quarter, of which bytes come piece by piece.
-struct Quarter {
-    lanes: [u64; LANES],
-    length: usize,
-}
-
-impl Quarter {
-    fn new() -> Self {
-        Self { lanes: core::array::from_fn(|lane| lane as u64 + 1), length: 0 }
+/// What the lanes begin as.
+const BEGIN: [u64; LANES] = {
+    let mut lanes = [0; LANES];
+    let mut lane = 0;
+    while lane < LANES {
+        lanes[lane] = lane as u64 + 1;
+        lane += 1;
     }
+    lanes
+};
 
-    /// Takes in bytes, the rest after whole blocks padded with zeros: only the last may have one.
-    #[inline(always)]
-    fn add(&mut self, bytes: &[u8]) {
-        let (blocks, rest) = bytes.as_chunks::<BLOCK>();
-        // In registers, of which each holds several lanes.
-        let mut lanes = self.lanes;
-        for block in blocks {
-            absorb_block(&mut lanes, block);
+/// Takes in bytes of a quarter, the rest after whole blocks padded with zeros: only the last may have one.
+#[inline(always)]
+fn absorb_bytes(lanes: &mut [u64; LANES], bytes: &[u8]) {
+    let (blocks, rest) = bytes.as_chunks::<BLOCK>();
+    // In registers, of which each holds several lanes.
+    let mut own = *lanes;
+    let mut take = |block: &[u8; BLOCK]| {
+        for (lane, word) in own.iter_mut().zip(block.as_chunks::<8>().0) {
+            *lane = absorb(*lane, u64::from_le_bytes(*word));
         }
-        if !rest.is_empty() {
-            let mut padded = [0; BLOCK];
-            padded[..rest.len()].copy_from_slice(rest);
-            absorb_block(&mut lanes, &padded);
-        }
-        self.lanes = lanes;
-        self.length += bytes.len();
+    };
+    blocks.iter().for_each(&mut take);
+    if !rest.is_empty() {
+        let mut padded = [0; BLOCK];
+        padded[..rest.len()].copy_from_slice(rest);
+        take(&padded);
     }
-
-    #[inline(always)]
-    fn sum(self) -> u64 {
-        self.lanes.into_iter().fold(self.length as u64, mix)
-    }
+    *lanes = own;
 }
 
 #[cfg(feature = "std")]
@@ -102,28 +91,30 @@ pub(crate) fn checksum_plain(bytes: &[u8]) -> u64 {
 }
 
 /// The checksum of some bytes. Shows what has just been taken in to `visit`, with where it begins, while it is still in
-/// the cache: all bytes once, in pieces from a multiple of [`BLOCK`] on.
+/// the cache: all bytes once, in pieces from a multiple of 256 on.
 ///
 /// Of quarters, so that memory is read in four places at a time: what a processor fetches ahead ends with a page.
 #[inline(always)]
 pub(crate) fn checksum_and_visit(bytes: &[u8], mut visit: impl FnMut(usize, &[u8])) -> u64 {
     let quarter = bytes.len().div_ceil(4 * BLOCK) * BLOCK;
-    let ends = [1, 2, 3, 4].map(|number| (number * quarter).min(bytes.len()));
-    let starts = [0, ends[0], ends[1], ends[2]];
-    let mut quarters = [(); 4].map(|()| Quarter::new());
+    let part =
+        |from: usize, to: usize| (from.min(bytes.len()), &bytes[from.min(bytes.len())..to.min(bytes.len())]);
+    let starts = [0, 1, 2, 3].map(|number| number * quarter);
+    let mut lanes = [BEGIN; 4];
     for at in (0..quarter).step_by(STEP) {
-        let pieces = [0, 1, 2, 3].map(|number| {
-            let start = ends[number].min(starts[number] + at);
-            (start, &bytes[start..ends[number].min(start + STEP)])
-        });
-        for (quarter, (_, piece)) in quarters.iter_mut().zip(pieces) {
-            quarter.add(piece);
+        let pieces = starts.map(|start| part(start + at, start + quarter.min(at + STEP)));
+        for (lanes, (_, piece)) in lanes.iter_mut().zip(pieces) {
+            absorb_bytes(lanes, piece);
         }
         for (start, piece) in pieces {
             visit(start, piece);
         }
     }
-    quarters.into_iter().fold(bytes.len() as u64, |sum, quarter| mix(sum, quarter.sum()))
+    let sums = [0, 1, 2, 3].map(|number| {
+        let (_, whole) = part(starts[number], starts[number] + quarter);
+        lanes[number].into_iter().fold(whole.len() as u64, mix)
+    });
+    sums.into_iter().fold(bytes.len() as u64, mix)
 }
 
 /// The checksum of objects' boxes, by which a tree file knows its scene: of min x, y, z, max x, y, z of each, f32,
@@ -217,9 +208,9 @@ mod tests {
             let quarter = length.div_ceil(1024) * 256;
             let mut parts = bytes.chunks(quarter.max(1));
             let sums = [(); 4].map(|()| {
-                let mut own = Quarter::new();
-                own.add(parts.next().unwrap_or_default());
-                own.sum()
+                let (part, mut lanes) = (parts.next().unwrap_or_default(), BEGIN);
+                absorb_bytes(&mut lanes, part);
+                lanes.into_iter().fold(part.len() as u64, mix)
             });
             assert_eq!(sum, sums.into_iter().fold(length as u64, mix), "{length}");
         }
