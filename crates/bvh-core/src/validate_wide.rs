@@ -63,7 +63,7 @@ fn lanes(planes: &[[f32; 8]; 6], bounds: &Aabb) -> [[bool; 8]; 2] {
 /// Checks that `wide` is a layout over `objects` triangles: every node and leaf reached once, every triangle in exactly
 /// one leaf, every box inside its parent's. O(nodes + blocks), no recursion; safe on any bits.
 #[inline(always)]
-fn check_wide_plain(wide: WideView, objects: usize) -> Result<(), InvalidWide> {
+pub(crate) fn check_wide_plain(wide: WideView, objects: usize) -> Result<(), InvalidWide> {
     let WideView { nodes, blocks, .. } = wide;
     if objects > MAX_OBJECTS || blocks.is_empty() != (objects == 0) || nodes.len() > 2 * objects {
         return Err(InvalidWide::Counts { nodes: nodes.len(), blocks: blocks.len(), objects });
