@@ -1,9 +1,9 @@
 //! A 64-bit checksum at the speed of memory that no change within one of its words escapes.
 //!
-//! The bytes are cut into four quarters: of `b` bytes they begin at 0, `q`, `2q` and `3q`, with `q` the least multiple of
-//! 256 for which `4q` is no less than `b`, and end where the next begins or all bytes do. Within a quarter, bytes are
-//! taken as little-endian words of eight, padded with zeros to a multiple of 32 words. Word `i` goes to lane `i mod 32`,
-//! from lanes that begin as 1, 2, …, 32. With arithmetic modulo 2^64, a lane takes in a word by
+//! The bytes are cut into four quarters: of `b` bytes they begin at 0, `q`, `2q` and `3q`, with `q` the least multiple
+//! of 256 for which `4q` is no less than `b`, and end where the next begins or all bytes do. Within a quarter, bytes
+//! are taken as little-endian words of eight, padded with zeros to a multiple of 32 words. Word `i` goes to lane
+//! `i mod 32`, from lanes that begin as 1, 2, …, 32. With arithmetic modulo 2^64, a lane takes in a word by
 //!
 //! ```text
 //! x = rotate_left(lane ^ word, 16);  x = x + (x << 5);  lane = x ^ (x >> 23)

@@ -37,8 +37,8 @@ fn is_plain_with(tree: BvhView, objects: usize, words: impl Fn(&[Node; 8]) -> [[
     })
 }
 
-/// The checksum of `bytes`, which are those of `tree`, nodes first, and whether the tree is [plain](is_plain). Every byte
-/// comes from memory once. O(bytes).
+/// The checksum of `bytes`, which are those of `tree`, nodes first, and whether the tree is [plain](is_plain). Every
+/// byte comes from memory once. O(bytes).
 pub(crate) fn checksum_and_is_plain(bytes: &[u8], tree: BvhView, objects: usize) -> (u64, bool) {
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
     {

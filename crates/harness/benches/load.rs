@@ -1,8 +1,8 @@
 //! Time to load a tree, every check included, against the time to build one; and where the time to load goes.
 //!
-//! After a build, caches hold what it has worked on, and the file, the boxes and the kernel's records of the file's pages
-//! come from memory; 'once more at once' finds them in caches. What mapping takes depends on the pieces of memory in which
-//! the kernel happens to hold the file, of one page to hundreds.
+//! After a build, caches hold what it has worked on, and the file, the boxes and the kernel's records of the file's
+//! pages come from memory; 'once more at once' finds them in caches. What mapping takes depends on the pieces of memory
+//! in which the kernel happens to hold the file, of one page to hundreds.
 //!
 //! `cargo bench -p harness --bench load`
 
