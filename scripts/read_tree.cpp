@@ -25,7 +25,9 @@ static_assert(sizeof(Header) == 192 && sizeof(Node) == 32);
 
 static uint64_t rotate(uint64_t x, int by) { return x << by | x >> (64 - by); }
 
-static uint64_t checksum(std::vector<char> bytes) {
+static uint64_t mix(uint64_t h, uint64_t x) { return rotate((h ^ x) * 0x9e3779b97f4a7c15u, 29); }
+
+static uint64_t quarter_sum(std::vector<char> bytes) {
     uint64_t lanes[32], result = bytes.size(), word;
     for (int k = 0; k < 32; ++k) lanes[k] = k + 1;
     bytes.resize((bytes.size() + 255) / 256 * 256);
@@ -35,7 +37,17 @@ static uint64_t checksum(std::vector<char> bytes) {
         lane = rotate(lane ^ word, 16) * 33;
         lane ^= lane >> 23;
     }
-    for (uint64_t lane : lanes) result = rotate((result ^ lane) * 0x9e3779b97f4a7c15u, 29);
+    for (uint64_t lane : lanes) result = mix(result, lane);
+    return result;
+}
+
+static uint64_t checksum(const char* bytes, size_t count) {
+    const size_t quarter = (count + 1023) / 1024 * 256;
+    uint64_t result = count;
+    for (int k = 0; k < 4; ++k) {
+        const char *begin = bytes + std::min(k * quarter, count), *end = bytes + std::min((k + 1) * quarter, count);
+        result = mix(result, quarter_sum({begin, end}));
+    }
     return result;
 }
 
@@ -48,8 +60,9 @@ int main(int argc, char** argv) {
         header.layout != 0 || bytes.size() != sizeof header + 32 * header.nodes + 4 * header.objects) {
         return std::fprintf(stderr, "not a tree file of version 1, or cut\n"), 1;
     }
-    std::fill_n(&bytes[184], 8, 0);
-    if (checksum(bytes) != header.checksum) return std::fprintf(stderr, "damaged\n"), 1;
+    const uint64_t rest = checksum(bytes.data() + sizeof header, bytes.size() - sizeof header);
+    std::memcpy(&bytes[184], &rest, sizeof rest);
+    if (checksum(bytes.data(), sizeof header) != header.checksum) return std::fprintf(stderr, "damaged\n"), 1;
     std::vector<Node> nodes(header.nodes);
     if (!nodes.empty()) std::memcpy(nodes.data(), &bytes[192], 32 * nodes.size());
     std::vector<unsigned> depth(nodes.size() + 1);

@@ -10,7 +10,11 @@ def rotate(x, by):
     return x << by & MASK | x >> 64 - by
 
 
-def checksum(data):
+def mix(h, x):
+    return rotate((h ^ x) * 0x9E3779B97F4A7C15 & MASK, 29)
+
+
+def quarter_sum(data):
     words = struct.unpack("<%dQ" % (-(-len(data) // 256) * 32), data + bytes(-len(data) % 256))
     result = len(data)
     for lane in range(32):
@@ -18,7 +22,14 @@ def checksum(data):
         for word in words[lane::32]:
             state = rotate(state ^ word, 16) * 33 & MASK
             state ^= state >> 23
-        result = rotate((result ^ state) * 0x9E3779B97F4A7C15 & MASK, 29)
+        result = mix(result, state)
+    return result
+
+
+def checksum(data):
+    quarter, result = -(-len(data) // 1024) * 256, len(data)
+    for number in range(4):
+        result = mix(result, quarter_sum(data[number * quarter:(number + 1) * quarter]))
     return result
 
 
@@ -28,7 +39,7 @@ if len(data) < 192 or data[:8] != b"\x89BVH\r\n\x1a\n" or struct.unpack_from("<2
 layout, objective, count, objects, _, cost, _, _, seed, work, scene = struct.unpack_from("<2I3Q3d3Q", data, 16)
 if layout != 0 or len(data) != 192 + 32 * count + 4 * objects:
     sys.exit("not a tree, or cut")
-if checksum(data[:184] + bytes(8) + data[192:]) != struct.unpack_from("<Q", data, 184)[0]:
+if checksum(data[:184] + struct.pack("<Q", checksum(data[192:]))) != struct.unpack_from("<Q", data, 184)[0]:
     sys.exit("damaged")
 nodes = list(struct.iter_unpack("<6f2I", data[192:192 + 32 * count]))
 ids = struct.unpack_from("<%dI" % objects, data, 192 + 32 * count)

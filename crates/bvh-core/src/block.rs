@@ -1,6 +1,6 @@
 //! Four triangles side by side, for tests of one ray against all of them.
 
-use crate::{MAX_OBJECTS, Shear, Triangle};
+use crate::{Aabb, MAX_OBJECTS, Shear, Triangle};
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4};
 
@@ -49,6 +49,20 @@ impl Block {
     #[inline(always)]
     pub(crate) fn is_last(&self) -> bool {
         self.ids[0] & Self::LAST != 0
+    }
+
+    /// Whether all corners of all triangles are inside a box; never if one is NaN.
+    #[inline(always)]
+    pub(crate) fn is_inside(&self, bounds: &Aabb) -> bool {
+        let [_, second, third, fourth] = self.ids.map(|id| id == Self::UNUSED);
+        let mut inside = 0b1111;
+        for corner in &self.corners {
+            for (axis, coordinates) in corner.iter().enumerate() {
+                let (least, most) = (Vec4::splat(bounds.min[axis]), Vec4::splat(bounds.max[axis]));
+                inside &= (coordinates.cmpge(least) & coordinates.cmple(most)).bitmask();
+            }
+        }
+        inside | u32::from(second) << 1 | u32::from(third) << 2 | u32::from(fourth) << 3 == 0b1111
     }
 
     /// A bit per triangle that the ray may meet before `t_max`. [`Triangle::intersect`] would reject all others: by the

@@ -1,14 +1,17 @@
 //! A 64-bit checksum at the speed of memory that no change within one of its words escapes.
 //!
-//! Bytes are taken as little-endian words of eight, padded with zeros to a multiple of 32 words. Word `i` goes to lane
+//! The bytes are cut into four quarters: of `b` bytes they begin at 0, `q`, `2q` and `3q`, with `q` the least multiple
+//! of 256 for which `4q` is no less than `b`, and end where the next begins or all bytes do. Within a quarter, bytes
+//! are taken as little-endian words of eight, padded with zeros to a multiple of 32 words. Word `i` goes to lane
 //! `i mod 32`, from lanes that begin as 1, 2, …, 32. With arithmetic modulo 2^64, a lane takes in a word by
 //!
 //! ```text
 //! x = rotate_left(lane ^ word, 16);  x = x + (x << 5);  lane = x ^ (x >> 23)
 //! ```
 //!
-//! In the end `sum`, at first the number of bytes, takes in the lanes in turn:
-//! `sum = rotate_left((sum ^ lane) · M, 29)` with M odd.
+//! In the end a quarter's `sum`, at first the number of its bytes, takes in its lanes in turn:
+//! `sum = rotate_left((sum ^ lane) · M, 29)` with M odd. Likewise the checksum, at first the number of all bytes, takes
+//! in the sums of the quarters.
 //!
 //! Why these steps: every one is a bijection of what it takes in and of what it goes on from, hence a change of one
 //! word, and so of any byte, changes the result with certainty. Changes in several lanes meet only in the
@@ -26,7 +29,9 @@ use bytemuck::Pod;
 /// Words taken in side by side: enough that none waits for the one before it.
 const LANES: usize = 32;
 /// Bytes taken in at a time.
-pub(crate) const BLOCK: usize = 8 * LANES;
+const BLOCK: usize = 8 * LANES;
+/// Bytes taken in of one quarter before the next: with more, memory rests while what is there is looked at.
+const STEP: usize = 4 * BLOCK;
 
 #[inline(always)]
 fn absorb(lane: u64, word: u64) -> u64 {
@@ -41,53 +46,87 @@ fn mix(state: u64, word: u64) -> u64 {
     (state ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
 }
 
-#[cfg(feature = "std")]
-crate::with_vector_instructions! {
-    /// Takes in blocks, with the vector instructions that the processor has.
-    absorb_blocks = absorb_blocks_plain(lanes: &mut [u64; LANES], blocks: &[[u8; BLOCK]])
-}
-#[cfg(not(feature = "std"))]
-use absorb_blocks_plain as absorb_blocks;
+/// What the lanes begin as.
+const BEGIN: [u64; LANES] = {
+    let mut lanes = [0; LANES];
+    let mut lane = 0;
+    while lane < LANES {
+        lanes[lane] = lane as u64 + 1;
+        lane += 1;
+    }
+    lanes
+};
 
+/// Takes in bytes of a quarter, the rest after whole blocks padded with zeros: only the last may have one.
 #[inline(always)]
-fn absorb_blocks_plain(lanes: &mut [u64; LANES], blocks: &[[u8; BLOCK]]) {
+fn absorb_bytes(lanes: &mut [u64; LANES], bytes: &[u8]) {
+    let (blocks, rest) = bytes.as_chunks::<BLOCK>();
     // In registers, of which each holds several lanes.
     let mut own = *lanes;
-    for block in blocks {
+    let mut take = |block: &[u8; BLOCK]| {
         for (lane, word) in own.iter_mut().zip(block.as_chunks::<8>().0) {
             *lane = absorb(*lane, u64::from_le_bytes(*word));
         }
+    };
+    blocks.iter().for_each(&mut take);
+    if !rest.is_empty() {
+        let mut padded = [0; BLOCK];
+        padded[..rest.len()].copy_from_slice(rest);
+        take(&padded);
     }
     *lanes = own;
 }
 
-/// The checksum of the parts, one after the other. All but the last must be multiples of [`BLOCK`] bytes long.
-pub(crate) fn checksum(parts: &[&[u8]]) -> u64 {
-    let mut lanes = core::array::from_fn(|lane| lane as u64 + 1);
-    let mut length = 0;
-    for part in parts {
-        let (whole, rest) = part.as_chunks();
-        absorb_blocks(&mut lanes, whole);
-        if !rest.is_empty() {
-            let mut padded = [0; BLOCK];
-            padded[..rest.len()].copy_from_slice(rest);
-            absorb_blocks(&mut lanes, &[padded]);
+#[cfg(feature = "std")]
+crate::with_vector_instructions! {
+    /// The checksum of some bytes, with the vector instructions that the processor has.
+    pub(crate) checksum = checksum_plain(bytes: &[u8]) -> u64
+}
+#[cfg(not(feature = "std"))]
+pub(crate) use checksum_plain as checksum;
+
+#[inline(always)]
+pub(crate) fn checksum_plain(bytes: &[u8]) -> u64 {
+    checksum_and_visit(bytes, |_, _| ())
+}
+
+/// The checksum of some bytes. Shows what has just been taken in to `visit`, with where it begins, while it is still in
+/// the cache: all bytes once, in pieces from a multiple of 256 on.
+///
+/// Of quarters, so that memory is read in four places at a time: what a processor fetches ahead ends with a page.
+#[inline(always)]
+pub(crate) fn checksum_and_visit(bytes: &[u8], mut visit: impl FnMut(usize, &[u8])) -> u64 {
+    let quarter = bytes.len().div_ceil(4 * BLOCK) * BLOCK;
+    let part =
+        |from: usize, to: usize| (from.min(bytes.len()), &bytes[from.min(bytes.len())..to.min(bytes.len())]);
+    let starts = [0, 1, 2, 3].map(|number| number * quarter);
+    let mut lanes = [BEGIN; 4];
+    for at in (0..quarter).step_by(STEP) {
+        let pieces = starts.map(|start| part(start + at, start + quarter.min(at + STEP)));
+        for (lanes, (_, piece)) in lanes.iter_mut().zip(pieces) {
+            absorb_bytes(lanes, piece);
         }
-        length += part.len() as u64;
+        for (start, piece) in pieces {
+            visit(start, piece);
+        }
     }
-    lanes.into_iter().fold(length, mix)
+    let sums = [0, 1, 2, 3].map(|number| {
+        let (_, whole) = part(starts[number], starts[number] + quarter);
+        lanes[number].into_iter().fold(whole.len() as u64, mix)
+    });
+    sums.into_iter().fold(bytes.len() as u64, mix)
 }
 
 /// The checksum of objects' boxes, by which a tree file knows its scene: of min x, y, z, max x, y, z of each, f32,
 /// little-endian. O(n).
 pub fn boxes_checksum(boxes: &[Aabb]) -> u64 {
-    checksum(&[&le_bytes(boxes)])
+    checksum(&le_bytes(boxes))
 }
 
 /// The checksum of triangles, by which the file of a wide layout knows its scene: of x, y, z of each corner, f32,
 /// little-endian. O(n).
 pub fn triangles_checksum(triangles: &[Triangle]) -> u64 {
-    checksum(&[&le_bytes(triangles)])
+    checksum(&le_bytes(triangles))
 }
 
 /// The bytes of values made of four-byte words, little-endian on any machine.
@@ -131,45 +170,63 @@ mod tests {
         lanes[0] = absorb(1, 0x0807_0605_0403_0201);
         lanes[1] = absorb(2, 9);
         (2..32).for_each(|lane| lanes[lane] = absorb(lane as u64 + 1, 0));
-        assert_eq!(checksum(&[&[1, 2, 3, 4, 5, 6, 7, 8, 9]]), lanes.iter().fold(9, |h, &lane| mix(h, lane)));
+        let untouched: [u64; 32] = core::array::from_fn(|lane| lane as u64 + 1);
+        let [first, other] =
+            [(lanes, 9), (untouched, 0)].map(|(lanes, bytes)| lanes.into_iter().fold(bytes, mix));
+        let sum = [first, other, other, other].into_iter().fold(9, mix);
+        assert_eq!(checksum(&[1, 2, 3, 4, 5, 6, 7, 8, 9]), sum);
     }
 
     #[test]
     fn checksums_are_the_same_everywhere_and_for_ever() {
         let bytes: Vec<u8> = (0..2000u32).map(|i| (i * i / 7) as u8).collect();
-        let sums = [0, 1, 256, 2000].map(|length| checksum(&[&bytes[..length]]));
+        let sums = [0, 1, 256, 2000].map(|length| checksum(&bytes[..length]));
         assert_eq!(
             sums,
-            [0xcc69_775f_2293_f753, 0xc7b6_c60f_e13f_bdd7, 0x5b2b_c5f5_b2a5_37a1, 0xc25d_020e_5a74_86c9]
+            [0x42e7_2dc3_6868_92be, 0xa261_feb5_c057_6f8e, 0x642f_9a91_d8ed_1246, 0x0227_405d_4f2d_01cd]
         );
-        let (mut fast, mut plain) = ([7; LANES], [7; LANES]);
-        absorb_blocks(&mut fast, bytes.as_chunks().0);
-        absorb_blocks_plain(&mut plain, bytes.as_chunks().0);
-        assert_eq!(fast, plain);
+        assert_eq!(checksum(&bytes), checksum_plain(&bytes));
     }
 
     #[test]
     fn lengths_and_places_of_zeros_count() {
-        assert!(is_free_of_repetitions((0..1000).map(|length| checksum(&[&vec![0; length]])).collect()));
+        assert!(is_free_of_repetitions((0..2100).map(|length| checksum(&vec![0; length])).collect()));
     }
 
     #[test]
-    fn parts_of_whole_blocks_are_as_good_as_one() {
-        let bytes: Vec<u8> = (0..=255).cycle().take(700).collect();
-        assert_eq!(checksum(&[&bytes[..512], &bytes[512..]]), checksum(&[&bytes]));
+    fn bytes_are_visited_once_and_quarters_have_sums_of_their_own() {
+        let bytes: Vec<u8> = (0..=250).cycle().take(12_000).collect();
+        for length in (0..1100).chain([2047, 2048, 2049, 4096, 4097, 8191, 8193, 12_000]) {
+            let bytes = &bytes[..length];
+            let mut seen = vec![0; length];
+            let sum = checksum_and_visit(bytes, |start, piece| {
+                assert_eq!(piece, &bytes[start..start + piece.len()]);
+                assert!(piece.is_empty() || start % 256 == 0);
+                seen[start..start + piece.len()].iter_mut().for_each(|times| *times += 1);
+            });
+            assert_eq!(seen, vec![1; length]);
+            let quarter = length.div_ceil(1024) * 256;
+            let mut parts = bytes.chunks(quarter.max(1));
+            let sums = [(); 4].map(|()| {
+                let (part, mut lanes) = (parts.next().unwrap_or_default(), BEGIN);
+                absorb_bytes(&mut lanes, part);
+                lanes.into_iter().fold(part.len() as u64, mix)
+            });
+            assert_eq!(sum, sums.into_iter().fold(length as u64, mix), "{length}");
+        }
     }
 
     #[test]
     fn no_flipped_bit_is_like_another_and_none_undoes_another() {
-        let mut bytes = vec![0; 768];
-        let whole = checksum(&[&bytes]);
+        let mut bytes = vec![0; 4 * 768];
+        let whole = checksum(&bytes);
         let mut flipped = |bits: &[usize]| {
             bits.iter().for_each(|bit| bytes[bit / 8] ^= 1 << (bit % 8));
-            let sum = checksum(&[&bytes]);
+            let sum = checksum(&bytes);
             bits.iter().for_each(|bit| bytes[bit / 8] ^= 1 << (bit % 8));
             sum
         };
-        let single: Vec<u64> = (0..6144).map(|bit| flipped(&[bit])).collect();
+        let single: Vec<u64> = (0..4 * 6144).map(|bit| flipped(&[bit])).collect();
         assert!(is_free_of_repetitions([&single[..], &[whole]].concat()));
         // The words of one lane that follow the first.
         for (bit, other) in
@@ -208,7 +265,8 @@ mod tests {
     #[test]
     fn pairs_of_moves_by_whole_numbers_do_not_cancel() {
         let mut boxes = cubes();
-        boxes.truncate(70);
+        // The first 70 are in one quarter.
+        boxes.truncate(280);
         let whole = boxes_checksum(&boxes);
         // Box 10 ends in the word that follows box 0's first in its lane. The words of box 32 are in the lanes of those
         // of box 0, three words later, and those of box 64 six.

@@ -34,9 +34,36 @@ pub enum InvalidWide {
     Missing { object: usize },
 }
 
+#[cfg(feature = "std")]
+crate::with_vector_instructions! {
+    /// [`check_wide_plain`], with the vector instructions that the processor has.
+    pub(crate) check_wide = check_wide_plain(wide: WideView, objects: usize) -> Result<(), InvalidWide>
+}
+#[cfg(not(feature = "std"))]
+pub(crate) use check_wide_plain as check_wide;
+
+/// Whether each lane of a node is unused, NaN throughout, and whether it has a finite box inside `bounds`.
+#[inline(always)]
+fn lanes(planes: &[[f32; 8]; 6], bounds: &Aabb) -> [[bool; 8]; 2] {
+    // All bits or none, for vector registers.
+    let all = |is_so: bool| u32::from(is_so).wrapping_neg();
+    let (mut unused, mut inside) = ([u32::MAX; 8], [u32::MAX; 8]);
+    for axis in 0..3 {
+        let (least, most) = (bounds.min[axis], bounds.max[axis]);
+        for lane in 0..8 {
+            let (low, high) = (planes[axis][lane], planes[axis + 3][lane]);
+            unused[lane] &= all(low.is_nan()) & all(high.is_nan());
+            inside[lane] &= all(low >= least) & all(low <= high) & all(high <= most);
+            inside[lane] &= all(low > f32::NEG_INFINITY) & all(high < f32::INFINITY);
+        }
+    }
+    [unused, inside].map(|lanes| lanes.map(|lane| lane != 0))
+}
+
 /// Checks that `wide` is a layout over `objects` triangles: every node and leaf reached once, every triangle in exactly
 /// one leaf, every box inside its parent's. O(nodes + blocks), no recursion; safe on any bits.
-pub(crate) fn check_wide(wide: WideView, objects: usize) -> Result<(), InvalidWide> {
+#[inline(always)]
+pub(crate) fn check_wide_plain(wide: WideView, objects: usize) -> Result<(), InvalidWide> {
     let WideView { nodes, blocks, .. } = wide;
     if objects > MAX_OBJECTS || blocks.is_empty() != (objects == 0) || nodes.len() > 2 * objects {
         return Err(InvalidWide::Counts { nodes: nodes.len(), blocks: blocks.len(), objects });
@@ -50,18 +77,19 @@ pub(crate) fn check_wide(wide: WideView, objects: usize) -> Result<(), InvalidWi
         leaves.set(0);
     }
     for (index, node) in nodes.iter().enumerate() {
+        let [unused, inside] = lanes(&node.planes, &node_bounds[index]);
         for lane in 0..8 {
-            let plane = |plane: usize| node.planes[plane][lane];
-            let aabb = Aabb::from([[plane(0), plane(1), plane(2)], [plane(3), plane(4), plane(5)]]);
-            if (0..6).all(|number| plane(number).is_nan()) {
+            if unused[lane] {
                 if node.children[lane].target() != WideTarget::Node(0) {
                     return Err(InvalidWide::Child { node: index, lane });
                 }
                 continue;
             }
-            if aabb.check().is_err() || !node_bounds[index].contains(&aabb) {
+            if !inside[lane] {
                 return Err(InvalidWide::Box { node: index, lane });
             }
+            let plane = |plane: usize| node.planes[plane][lane];
+            let aabb = Aabb::from([[plane(0), plane(1), plane(2)], [plane(3), plane(4), plane(5)]]);
             let is_named_once = match node.children[lane].target() {
                 WideTarget::Node(child) if child > index && child < nodes.len() => {
                     node_bounds[child] = aabb;
@@ -89,12 +117,14 @@ pub(crate) fn check_wide(wide: WideView, objects: usize) -> Result<(), InvalidWi
         if !begins_leaf(index) {
             leaf_bounds[index] = leaf_bounds[index - 1];
         }
+        let is_inside = block.is_inside(&leaf_bounds[index]);
         for (lane, id) in block.ids().into_iter().enumerate() {
             let Some(object) = id else { continue };
             if object as usize >= objects || !seen.set(object as usize) {
                 return Err(InvalidWide::Object { block: index, object, objects });
             }
-            if !block.triangle(lane).is_some_and(|(_, t)| leaf_bounds[index].contains(&t.aabb())) {
+            if !is_inside && !block.triangle(lane).is_some_and(|(_, t)| leaf_bounds[index].contains(&t.aabb()))
+            {
                 return Err(InvalidWide::Outside { block: index });
             }
         }
@@ -102,5 +132,56 @@ pub(crate) fn check_wide(wide: WideView, objects: usize) -> Result<(), InvalidWi
     match (0..objects).find(|&object| !seen.get(object)) {
         Some(object) => Err(InvalidWide::Missing { object }),
         None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Triangle;
+    use crate::block::Block;
+    use glam::Vec3;
+
+    const VALUES: [f32; 9] = [f32::NEG_INFINITY, -2.0, -1.0, -0.0, 0.0, 1.0, 2.0, f32::INFINITY, f32::NAN];
+
+    #[test]
+    fn lanes_are_judged_as_boxes_are() {
+        let bounds =
+            [[-1.0, 1.0], [f32::NEG_INFINITY, f32::INFINITY], [0.0, f32::MAX], [1.0, -1.0], [f32::NAN; 2]];
+        for [least, most] in bounds {
+            let bounds = Aabb::from([[least, -1.0, -1.0], [most, 1.0, 1.0]]);
+            for (axis, low, high) in (0..3)
+                .flat_map(|axis| VALUES.into_iter().flat_map(move |low| VALUES.map(|high| (axis, low, high))))
+            {
+                let mut planes = [[0.0; 8]; 6];
+                planes[4][1] = f32::NAN;
+                planes.iter_mut().for_each(|plane| plane[2] = f32::NAN);
+                (planes[axis][3], planes[axis + 3][3]) = (low, high);
+                (planes[axis][2], planes[axis + 3][2]) = (high, low);
+                let [unused, inside] = lanes(&planes, &bounds);
+                for lane in 0..8 {
+                    let [a, b, c, d, e, f] = planes.map(|plane| plane[lane]);
+                    let aabb = Aabb::from([[a, b, c], [d, e, f]]);
+                    assert_eq!(inside[lane], aabb.check().is_ok() && bounds.contains(&aabb), "{aabb:?}");
+                    assert_eq!(unused[lane], [a, b, c, d, e, f].iter().all(|plane| plane.is_nan()), "{aabb:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn blocks_inside_a_box_are_those_of_which_all_triangles_are() {
+        let bounds = Aabb::from([[-1.0; 3], [1.0; 3]]);
+        for count in 1..=4 {
+            for (lane, corner, axis) in (0..36).map(|place| (place / 9, place / 3 % 3, place % 3)) {
+                for value in VALUES {
+                    let mut triangles = [Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]); 4];
+                    triangles[lane].0[corner][axis] = value;
+                    let block = Block::chain(&[0, 1, 2, 3][..count], &triangles).next().unwrap();
+                    let is_inside = lane >= count || value.abs() <= 1.0;
+                    assert_eq!(block.is_inside(&bounds), is_inside, "{value} in lane {lane} of {count}");
+                }
+            }
+        }
     }
 }

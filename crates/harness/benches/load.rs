@@ -1,5 +1,9 @@
 //! Time to load a tree, every check included, against the time to build one; and where the time to load goes.
 //!
+//! After a build, caches hold what it has worked on, and the file, the boxes and the kernel's records of the file's
+//! pages come from memory; 'once more at once' finds them in caches. What mapping takes depends on the pieces of memory
+//! in which the kernel happens to hold the file, of one page to hundreds.
+//!
 //! `cargo bench -p harness --bench load`
 
 mod paired;
@@ -9,10 +13,12 @@ use bvh_core::WideBvh;
 use bvh_core::file::{self, Origin, TreeFile};
 use harness::scene::Scene;
 use memmap2::Mmap;
-use paired::{Contender, compare};
+use paired::{Contender, compare, compare_each_after};
 use std::fs::{self, File};
 use std::hint::black_box;
 use std::path::Path;
+
+const MULLER_FELLNER: &str = "Müller–Fellner, one thread";
 
 fn main() {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of threads");
@@ -30,36 +36,43 @@ fn loads(scene: &Scene, path: &Path) {
     let tree = config.build(boxes).expect("finite boxes");
     fs::write(path, file::save(&tree, boxes, &Origin::default()).expect("a valid tree")).expect("a file");
     let held = map(path);
-    let file = TreeFile::open(&held).expect("a tree file");
-    let contenders: Vec<Contender> = vec![
-        ("Müller–Fellner, one thread", Box::new(|| drop(config.build(boxes)))),
-        (
-            "map, check, view",
-            Box::new(|| {
-                let bytes = map(path);
-                let view = TreeFile::open(&bytes).and_then(|file| file.for_boxes(boxes)?.view());
-                assert_eq!(view.expect("the tree").nodes.len(), tree.nodes.len());
-            }),
-        ),
-        (
-            "  of that: map, touch every page, unmap",
-            Box::new(|| _ = black_box(map(path).iter().step_by(4096).fold(0, |all, byte| all ^ byte))),
-        ),
-        ("  of that: checksum of the file", Box::new(|| _ = black_box(TreeFile::open(&held)))),
-        ("  of that: checksum of the boxes", Box::new(|| _ = black_box(file::boxes_checksum(boxes)))),
-        ("  of that: structure", Box::new(|| _ = black_box(file.view()))),
-        ("one addition per eight bytes of the file", Box::new(|| _ = black_box(sum(&held)))),
-        (
-            "read, check, copy",
-            Box::new(|| {
-                let bytes = fs::read(path).expect("the file");
-                assert_eq!(file::load(&bytes, boxes).expect("the tree").nodes.len(), tree.nodes.len());
-            }),
-        ),
+    let build = || drop(config.build(boxes));
+    let load = || {
+        let bytes = map(path);
+        let view = TreeFile::open(&bytes).and_then(|file| file.for_boxes(boxes)?.view());
+        assert_eq!(view.expect("the tree").nodes.len(), tree.nodes.len());
+    };
+    let parts = || -> Vec<Contender> {
+        let touch = || _ = black_box(map(path).iter().step_by(4096).fold(0, |all, byte| all ^ byte));
+        vec![
+            ("  of that: map, touch every page, unmap", Box::new(touch)),
+            (
+                "  of that: checksum and structure of the file",
+                Box::new(|| _ = black_box(TreeFile::open(&held))),
+            ),
+            ("  of that: checksum of the boxes", Box::new(|| _ = black_box(file::boxes_checksum(boxes)))),
+            ("one addition per eight bytes of the file", Box::new(|| _ = black_box(sum(&held)))),
+        ]
+    };
+    let copy = || {
+        let bytes = fs::read(path).expect("the file");
+        assert_eq!(file::load(&bytes, boxes).expect("the tree").nodes.len(), tree.nodes.len());
+    };
+    let mut contenders: Vec<Contender> = vec![
+        (MULLER_FELLNER, Box::new(build)),
+        ("map, check, view: at once after that build", Box::new(load)),
+        ("map, check, view: once more at once", Box::new(load)),
     ];
+    contenders.extend(parts());
+    contenders.push(("read, check, copy", Box::new(copy)));
     let title = format!("{}, {} objects, {} bytes", scene.name, boxes.len(), held.len());
     compare(&title, 25, contenders);
 
+    // Of which caches hold what the build has left there.
+    let mut contenders: Vec<Contender> =
+        vec![(MULLER_FELLNER, Box::new(build)), ("map, check, view", Box::new(load))];
+    contenders.extend(parts());
+    compare_each_after(build, &format!("{title}, each at once after a build"), 25, contenders);
     let Ok(triangles) = &scene.triangles() else { return };
     fs::write(path, file::save_wide(&tree, triangles, &Origin::default()).expect("a valid tree"))
         .expect("a file");

@@ -36,7 +36,7 @@
 //! | 88..96 | `u64` | checksum of the scene: of its boxes, min then max; for a wide layout of its triangles' corners |
 //! | 96..120 | `f32[6]` | box of the root, min then max; min +∞ and max −∞ without objects |
 //! | 120..184 | `u8[64]` | name of the method, UTF-8, zeros after it |
-//! | 184..192 | `u64` | checksum of the whole file, with these eight bytes taken as zeros |
+//! | 184..192 | `u64` | checksum of the whole file, see below |
 //! | 192.. | | the nodes |
 //!
 //! **Tree**: nodes of 32 bytes, then a `u32` per object.
@@ -63,12 +63,17 @@
 //! | 0..144 | `f32[3][3][4]` | corner, axis, lane of up to four triangles; +∞ in unused lanes |
 //! | 144..160 | `u32[4]` | object ids, 2^32 − 1 in unused lanes; 2^30 added to the first marks a leaf's last block |
 //!
-//! The checksum, in full, with arithmetic modulo 2^64: let `w` be the words of eight bytes of what it covers, padded by
-//! zeros to a multiple of 256 bytes. Of 32 lanes, lane `k` begins as `k + 1`, and word `i` changes lane `i mod 32`:
-//! with `x = rotate_left(lane xor w[i], 16)` and `y = x + (x << 5)` it becomes `y xor (y >> 23)`. The result is
-//! `mix(… mix(mix(bytes, lane 0), lane 1) …, lane 31)` where `bytes` is the length before padding and
-//! `mix(h, x) = rotate_left((h xor x) · 0x9e3779b97f4a7c15, 29)`. The readers in Python and C++ that come with the
-//! repository compute it too.
+//! The checksum of the whole file is that of the header, in which the checksum of all that follows the header takes its
+//! place.
+//!
+//! A checksum, in full, with arithmetic modulo 2^64 and `mix(h, x) = rotate_left((h xor x) · 0x9e3779b97f4a7c15, 29)`:
+//! of `b` bytes, let `q` be the least multiple of 256 with `4q` no less than `b`. The four quarters begin at 0, `q`,
+//! `2q` and `3q` and end where the next begins or all bytes do. For each, let `w` be its words of eight bytes, padded
+//! by zeros to a multiple of 256 bytes. Of 32 lanes, lane `k` begins as `k + 1`, and word `i` changes lane `i mod 32`: with
+//! `x = rotate_left(lane xor w[i], 16)` and `y = x + (x << 5)` it becomes `y xor (y >> 23)`. The quarter's sum is
+//! `mix(… mix(mix(n, lane 0), lane 1) …, lane 31)` with `n` its number of bytes before padding, and the result
+//! `mix(mix(mix(mix(b, sum 0), sum 1), sum 2), sum 3)`. The readers in Python and C++ that come with the repository
+//! compute it too.
 //!
 //! # Loading without copying
 //!
@@ -82,9 +87,10 @@ pub use crate::checksum::{boxes_checksum, triangles_checksum};
 pub use header::{Header, Layout};
 
 use crate::block::Block;
-use crate::checksum::{BLOCK, checksum, le_bytes};
+use crate::checksum::{checksum, le_bytes};
 use crate::cost::Objective;
 use crate::validate::check_structure;
+use crate::validate_plain::checksum_and_is_plain;
 use crate::validate_wide::check_wide;
 use crate::wide::WideNode;
 use crate::{Aabb, Bvh, BvhView, InvalidBvh, InvalidWide, Node, Triangle, WideBvh, WideView, validate};
@@ -213,9 +219,18 @@ fn write(header: &Header, sections: &[&[u8]]) -> Result<Vec<u8>, FileError> {
     let mut bytes = header.encode()?;
     bytes.reserve_exact(sections.iter().map(|section| section.len()).sum());
     sections.iter().for_each(|section| bytes.extend_from_slice(section));
-    let sum = checksum(&[&bytes]);
-    bytes[Header::CHECKSUM].copy_from_slice(&sum.to_le_bytes());
+    let (header, body) = bytes.split_at_mut(Header::BYTES);
+    let sum = whole_checksum(header, checksum(body));
+    header[Header::CHECKSUM].copy_from_slice(&sum.to_le_bytes());
     Ok(bytes)
+}
+
+/// The checksum of a file: of its header, with the checksum of what follows it in that place.
+fn whole_checksum(header: &[u8], rest: u64) -> u64 {
+    let mut covered = [0; Header::BYTES];
+    covered.copy_from_slice(header);
+    covered[Header::CHECKSUM].copy_from_slice(&rest.to_le_bytes());
+    checksum(&covered)
 }
 
 /// Bytes whose length and checksum are right; what they hold is checked when it is asked for.
@@ -228,6 +243,8 @@ pub struct TreeFile<'a> {
     header: Header,
     /// The nodes, and what follows them.
     sections: [&'a [u8]; 2],
+    /// Whether the bytes are, where they lie, a tree known to be sound.
+    is_sound: bool,
 }
 
 impl<'a> TreeFile<'a> {
@@ -244,16 +261,17 @@ impl<'a> TreeFile<'a> {
         if found != expected {
             return Err(FileError::Length { found, expected });
         }
-        // The header, with what the checksum's first block takes in after it.
-        let (start, rest) = bytes.split_at(bytes.len().min(BLOCK));
-        let mut cleared = [0; BLOCK];
-        cleared[..start.len()].copy_from_slice(start);
-        cleared[Header::CHECKSUM].fill(0);
-        if checksum(&[&cleared[..start.len()], rest]).to_le_bytes() != start[Header::CHECKSUM] {
+        let (start, body) = bytes.split_at(Header::BYTES);
+        let sections: [&[u8]; 2] = body.split_at(nodes as usize).into();
+        let tree = if header.layout == Layout::Tree { view_of(sections).ok() } else { None };
+        let (sum, is_sound) = match tree {
+            Some(tree) => checksum_and_is_plain(body, tree, header.objects),
+            None => (checksum(body), false),
+        };
+        if whole_checksum(start, sum).to_le_bytes() != start[Header::CHECKSUM] {
             return Err(FileError::Checksum);
         }
-        let (nodes, other) = bytes[Header::BYTES..].split_at(nodes as usize);
-        Ok(Self { header, sections: [nodes, other] })
+        Ok(Self { header, sections, is_sound })
     }
 
     /// What the file says about itself.
@@ -288,16 +306,21 @@ impl<'a> TreeFile<'a> {
     pub fn tree(&self) -> Result<Bvh, FileError> {
         self.expect(Layout::Tree)?;
         let tree = Bvh { nodes: copied(self.sections[0]), prim_ids: copied(self.sections[1]) };
-        check_structure((&tree).into(), self.header.objects)?;
+        self.check((&tree).into())?;
         Ok(tree)
     }
 
     /// The tree where it lies, checked likewise.
     pub fn view(&self) -> Result<BvhView<'a>, FileError> {
         self.expect(Layout::Tree)?;
-        let tree = BvhView { nodes: cast(self.sections[0])?, prim_ids: cast(self.sections[1])? };
-        check_structure(tree, self.header.objects)?;
+        let tree = view_of(self.sections)?;
+        self.check(tree)?;
         Ok(tree)
+    }
+
+    /// Checks the structure of the tree that the file holds, if that has not been done yet.
+    fn check(&self, tree: BvhView) -> Result<(), InvalidBvh> {
+        if self.is_sound { Ok(()) } else { check_structure(tree, self.header.objects) }
     }
 
     /// The wide layout, copied, its structure and the nesting of its boxes checked. O(nodes + objects).
@@ -322,6 +345,11 @@ impl<'a> TreeFile<'a> {
         let found = self.header.layout;
         if found == expected { Ok(()) } else { Err(FileError::Layout { found, expected }) }
     }
+}
+
+/// A tree's nodes and object ids, where they lie.
+fn view_of([nodes, ids]: [&[u8]; 2]) -> Result<BvhView<'_>, FileError> {
+    Ok(BvhView { nodes: cast(nodes)?, prim_ids: cast(ids)? })
 }
 
 /// Bytes as values of four-byte words, where they lie.

@@ -8,10 +8,21 @@ pub type Contender<'a> = (&'a str, Box<dyn FnMut() + 'a>);
 
 /// Runs all contenders in turns, `rounds` times after one warm-up, and prints each one's median and least time and the
 /// quartiles of its ratios to the first, round by round.
-pub fn compare(title: &str, rounds: usize, mut contenders: Vec<Contender<'_>>) {
+pub fn compare(title: &str, rounds: usize, contenders: Vec<Contender<'_>>) {
+    compare_each_after(|| (), title, rounds, contenders);
+}
+
+/// The same, with something done before each that is not timed.
+pub fn compare_each_after(
+    mut before: impl FnMut(),
+    title: &str,
+    rounds: usize,
+    mut contenders: Vec<Contender<'_>>,
+) {
     let mut seconds = vec![Vec::with_capacity(rounds); contenders.len()];
     for round in 0..=rounds {
         for ((_, work), times) in contenders.iter_mut().zip(&mut seconds) {
+            before();
             let start = Instant::now();
             work();
             if round > 0 {

@@ -50,20 +50,30 @@ fn mend_start(bytes: &mut [u8], counts: bool) {
 
 /// Writes the checksum, from its description in `bvh_core::file`.
 fn seal(bytes: &mut [u8]) {
-    bytes[184..192].fill(0);
-    let mut lanes: [u64; 32] = std::array::from_fn(|lane| lane as u64 + 1);
-    for part in bytes.chunks(256) {
-        let mut words = [0; 256];
-        words[..part.len()].copy_from_slice(part);
-        for (lane, word) in lanes.iter_mut().zip(words.as_chunks::<8>().0) {
-            let x = (*lane ^ u64::from_le_bytes(*word)).rotate_left(16);
-            let y = x.wrapping_add(x << 5);
-            *lane = y ^ (y >> 23);
+    let (header, rest) = bytes.split_at_mut(Header::BYTES);
+    header[184..192].copy_from_slice(&checksum(rest).to_le_bytes());
+    let sum = checksum(header);
+    header[184..192].copy_from_slice(&sum.to_le_bytes());
+}
+
+fn checksum(bytes: &[u8]) -> u64 {
+    let mix = |state: u64, word: u64| (state ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
+    let mut quarters = bytes.chunks((bytes.len().div_ceil(1024) * 256).max(1));
+    let mut result = bytes.len() as u64;
+    for quarter in [(); 4].map(|()| quarters.next().unwrap_or_default()) {
+        let mut lanes: [u64; 32] = std::array::from_fn(|lane| lane as u64 + 1);
+        for part in quarter.chunks(256) {
+            let mut words = [0; 256];
+            words[..part.len()].copy_from_slice(part);
+            for (lane, word) in lanes.iter_mut().zip(words.as_chunks::<8>().0) {
+                let x = (*lane ^ u64::from_le_bytes(*word)).rotate_left(16);
+                let y = x.wrapping_add(x << 5);
+                *lane = y ^ (y >> 23);
+            }
         }
+        result = mix(result, lanes.into_iter().fold(quarter.len() as u64, mix));
     }
-    let mix = |state: u64, lane: u64| (state ^ lane).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
-    let sum = lanes.into_iter().fold(bytes.len() as u64, mix);
-    bytes[184..192].copy_from_slice(&sum.to_le_bytes());
+    result
 }
 
 fn opened(bytes: &[u8]) {
