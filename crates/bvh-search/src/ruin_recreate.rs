@@ -59,7 +59,7 @@ pub struct Ruin {
     /// The part of the moves that take a slab out, 0 to 1. Default 0.2.
     pub slabs: f64,
     /// The thickest slab, as a part of the box, 0 to 1. Default 0.6.
-    pub thickness: f32,
+    pub thickness: f64,
     /// Most subtrees of a slab: there is no move if it has more. At least 1. Default 24.
     pub most: u32,
     /// What temperatures are relative to. Default `saved`.
@@ -88,7 +88,7 @@ impl Ruin {
         require(self.climb >= 1 && self.climb < u32::MAX, "climb", self.climb.into(), "1 to 4294967294")?;
         require(self.removed >= 1, "removed", self.removed.into(), "1 or more")?;
         require((0.0..=1.0).contains(&self.slabs), "slabs", self.slabs, "0 to 1")?;
-        require((0.0..=1.0).contains(&self.thickness), "thickness", self.thickness.into(), "0 to 1")?;
+        require((0.0..=1.0).contains(&self.thickness), "thickness", self.thickness, "0 to 1")?;
         require(self.most >= 1, "most", self.most.into(), "1 or more")
     }
 }

@@ -17,17 +17,17 @@ impl Slab {
     /// subtrees below that lie in it, and the leaves that reach the side through it. None if they were more than `most`.
     /// Returns the nodes visited.
     #[inline(always)]
-    pub fn find(&mut self, tree: &Working, top: u32, thickness: f32, most: usize, rng: &mut Stream) -> u64 {
+    pub fn find(&mut self, tree: &Working, top: u32, thickness: f64, most: usize, rng: &mut Stream) -> u64 {
         self.roots.clear();
         self.stack.clear();
         let (side, axis) = (rng.random_range(0..2), rng.random_range(0..3));
-        // Where a node begins and ends, seen from within along the axis.
+        // Where a node begins and ends, seen from within along the axis. In f64, so that scenes of all scales are alike.
         let span = |at: u32| {
             let planes = tree.nodes[at as usize].aabb.planes();
-            (-planes[1 - side][axis], planes[side][axis])
+            (-f64::from(planes[1 - side][axis]), f64::from(planes[side][axis]))
         };
         let (begin, end) = span(top);
-        let limit = end - thickness * rng.random::<f32>() * (end - begin);
+        let limit = end - thickness * rng.random::<f64>() * (end - begin);
         let mut visits = 0;
         self.stack.extend(tree.nodes[top as usize].children);
         while let Some(at) = self.stack.pop() {
