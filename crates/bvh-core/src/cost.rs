@@ -58,7 +58,8 @@ impl Default for SahConstants {
 /// Source: Ng & Trifonov 2003, section 3.3. Differs from the paper: half areas in place of whole ones, as
 /// its own implementation does (section 3.2).
 pub fn internal_area(tree: &Bvh) -> f64 {
-    // Whether a node is a leaf cannot be predicted: both are computed, one is selected, and adding nothing changes nothing.
+    // Whether a node is a leaf cannot be predicted: both are computed and one is selected. Adding nothing changes
+    // nothing.
     let area = |node: &Node| core::hint::select_unpredictable(node.is_leaf(), 0.0, node.aabb.half_area());
     tree.nodes.iter().map(area).collect::<Sum>().value()
 }

@@ -176,8 +176,9 @@ pub(crate) fn anneal<M: Move>(
 
 with_vector_instructions! {
     /// Moves until the quota is reached, while the temperature falls geometrically from the first to the second.
-    pub(crate) cool = cool_plain<M: Move>(mover: &mut M, tree: &mut Working, heat: [f64; 2], quota: Quota, rng: &mut Stream,
-        observer: &dyn Observer) -> Tally
+    pub(crate) cool = cool_plain<M: Move>(
+        mover: &mut M, tree: &mut Working, heat: [f64; 2], quota: Quota, rng: &mut Stream, observer: &dyn Observer)
+        -> Tally
 }
 
 #[inline(always)]
@@ -210,9 +211,9 @@ fn cool_plain<M: Move>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scatter::scatter;
+    use crate::scatter::{built, scatter};
     use crate::{annealing, ruin_recreate};
-    use bvh_build::{Builder, muller_fellner};
+    use bvh_build::muller_fellner;
     use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
     /// Counts the moves of another kind, and checks the tree after every one.
@@ -241,8 +242,7 @@ mod tests {
 
     fn check<M: Move>(inner: impl Fn() -> M + Sync) {
         let boxes = scatter(60);
-        let start = muller_fellner::Config::default().build(&boxes).unwrap();
-        let mut tree = Working::from_bvh(&start, &boxes).unwrap();
+        let mut tree = built(&muller_fellner::Config::default(), &boxes);
         let quota = Quota { moves: 300_000, work: u64::MAX / 1024 };
         let cooling = Cooling { hot: 0.5, cold: 0.4, quota, end: 1.0, pieces: 1 };
         let moves = AtomicU64::new(0);

@@ -86,8 +86,9 @@ fn key(object: u32) -> u128 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scatter::built;
     use crate::stream::stream;
-    use bvh_build::{Builder, muller_fellner};
+    use bvh_build::muller_fellner;
     use bvh_core::{Aabb, validate};
     use rand::RngExt;
 
@@ -99,8 +100,7 @@ mod tests {
                 Aabb::from((at, at.map(|c| c + 1.0)))
             })
             .collect();
-        let good = muller_fellner::Config::default().build(&boxes).unwrap();
-        let good = Working::from_bvh(&good, &boxes).unwrap();
+        let good = built(&muller_fellner::Config::default(), &boxes);
         let [left, right] = good.nodes[good.root().unwrap() as usize].children;
         // Two parents, each spoilt on one side of the root.
         let spoilt = |side: u32| {

@@ -25,9 +25,13 @@ impl<'p> Incumbent<'p> {
         run: &mut Run,
     ) -> Result<(Self, Working), SearchError> {
         let incumbent = Self::begin(builder.build(problem.boxes)?, problem, run);
-        // Builders leave no box wider than it must be.
-        let working = Working::from_tight(&incumbent.tree, incumbent.area)?;
+        let working = incumbent.working()?;
         Ok((incumbent, working))
+    }
+
+    /// The working form of the best tree. No box is wider than it must be: builders leave none, and moves none.
+    pub fn working(&self) -> Result<Working, SearchError> {
+        Working::from_tight(&self.tree, self.area)
     }
 
     /// Begins with a valid tree, whose boxes are tight.

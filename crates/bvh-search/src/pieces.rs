@@ -166,14 +166,13 @@ fn each<T: Send>(parts: &[Part], work: impl Fn(usize, &Part) -> T + Send + Sync)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scatter::scatter;
-    use bvh_build::{Builder, muller_fellner};
+    use crate::scatter::{built, scatter};
+    use bvh_build::muller_fellner;
 
     #[test]
     fn pieces_are_disjoint_and_putting_them_back_restores_the_tree() {
         let boxes = scatter(3000);
-        let tree = muller_fellner::Config::default().build(&boxes).unwrap();
-        let tree = Working::from_bvh(&tree, &boxes).unwrap().in_preorder();
+        let tree = built(&muller_fellner::Config::default(), &boxes).in_preorder();
         for most in [20, 100, 1000, 2999] {
             let (parts, starts) = cut(&tree, most);
             assert!(parts.windows(2).all(|pair| pair[0].root + pair[0].nodes <= pair[1].root));

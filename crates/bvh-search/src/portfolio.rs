@@ -129,7 +129,7 @@ impl Config {
             // When to be done, with what is converted at the end still to come.
             let mut end_of_all = 1.0;
             if timed {
-                let quota = Quota { work: left.min(PROBE * n), ..run.left() };
+                let quota = run.left().at_most(left.min(PROBE * n));
                 let (tally, in_time) = self.probe(tree, stream(seed, 0), quota, observer);
                 left = left.saturating_sub(tally.work);
                 run.count(tally);

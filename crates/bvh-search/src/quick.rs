@@ -106,7 +106,7 @@ pub(crate) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<
     if began.is_some() {
         best.bound(run);
     }
-    let tree = Working::from_tight(&best.tree, best.area())?;
+    let tree = best.working()?;
     Ok(Some(Quick::Optimum(best, tree)))
 }
 

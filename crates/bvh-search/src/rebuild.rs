@@ -92,7 +92,7 @@ impl Search for Config {
             let mut round = Tally::default();
             while round.work < n * WORK_PER_OBJECT && !run.observer().cancelled() {
                 let left = run.left().less(&round);
-                let quota = Quota { work: left.work.min(own.saturating_sub(round.work)), ..left };
+                let quota = left.at_most(own.saturating_sub(round.work));
                 if quota.work < enough || quota.moves == 0 {
                     break;
                 }
@@ -279,15 +279,14 @@ fn graft(tree: &mut Working, part: &Part, shape: &Working) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scatter::scatter;
-    use bvh_build::Builder;
+    use crate::scatter::{built, scatter};
+    use bvh_build::median_cut;
     use bvh_core::validate;
 
     #[test]
     fn grafting_changes_the_part_alone_and_areas_stay_exact() {
         let boxes = scatter(400);
-        let start = bvh_build::median_cut::Config::default().build(&boxes).unwrap();
-        let mut tree = Working::from_bvh(&start, &boxes).unwrap();
+        let mut tree = built(&median_cut::Config::default(), &boxes);
         let (config, mut rng) = (Config { objects: 50, ..Config::default() }, stream(1, 0));
         let (mut kept, begin) = (0, tree.area());
         for number in 0..300 {
@@ -320,8 +319,7 @@ mod tests {
     #[test]
     fn parts_of_one_batch_have_no_leaf_in_common() {
         let boxes = scatter(100);
-        let start = Config::default().start.build(&boxes).unwrap();
-        let tree = Working::from_bvh(&start, &boxes).unwrap();
+        let tree = built(&Config::default().start, &boxes);
         let (config, mut rng) = (Config { objects: 30, ..Config::default() }, stream(1, 0));
         let mut several = 0;
         for _ in 0..200 {

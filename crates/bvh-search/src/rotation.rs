@@ -153,9 +153,9 @@ fn best(tree: &Working, top: u32) -> Option<Rotation> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scatter::scatter;
-    use bvh_build::Builder;
-    use bvh_core::{Aabb, validate};
+    use crate::scatter::{built, scatter};
+    use bvh_build::median_cut;
+    use bvh_core::validate;
 
     /// The total areas of every tree that one rotation makes of this one, boxes recomputed from nothing.
     fn neighbours(tree: &Working, tops: &[u32]) -> Vec<f64> {
@@ -192,17 +192,12 @@ mod tests {
         found
     }
 
-    fn balanced(boxes: &[Aabb]) -> Working {
-        let start = bvh_build::median_cut::Config::default().build(boxes).unwrap();
-        Working::from_bvh(&start, boxes).unwrap()
-    }
-
     #[test]
     fn a_local_optimum_is_better_than_every_neighbour_and_areas_stay_exact() {
         for (n, order) in [(40, Order::BottomUp), (60, Order::ByArea), (2, Order::ByArea), (3, Order::BottomUp)]
         {
             let boxes = scatter(n);
-            let mut tree = balanced(&boxes);
+            let mut tree = built(&median_cut::Config::default(), &boxes);
             until_still(Quota::ENDLESS, &(), |quota| {
                 let nodes = order.of(&tree);
                 let swept = sweep(&mut tree, &nodes, quota, &());
@@ -220,7 +215,7 @@ mod tests {
 
     #[test]
     fn the_rotation_chosen_is_the_best_of_all_at_its_node() {
-        let tree = balanced(&scatter(64));
+        let tree = built(&median_cut::Config::default(), &scatter(64));
         for top in tree.preorder() {
             if tree.nodes[top as usize].is_leaf() {
                 continue;

@@ -126,6 +126,11 @@ struct Out {
 }
 
 impl Out {
+    fn clear(&mut self) {
+        self.roots.clear();
+        (self.saved, self.least) = (0.0, 0.0);
+    }
+
     /// Takes a subtree out. Returns the nodes visited.
     #[inline(always)]
     fn take(&mut self, tree: &mut Working, node: u32) -> u64 {
@@ -167,12 +172,13 @@ impl<'a> Mover<'a> {
     fn slab(&mut self, tree: &mut Working, above: u32, side: usize, rng: &mut Stream) {
         let Ruin { thickness, most, .. } = *self.ruin;
         let top = tree.nodes[above as usize].children[side];
-        if !tree.nodes[top as usize].is_leaf() {
-            self.work += self.slab.find(tree, top, thickness, most as usize, rng);
-            for &node in &self.slab.roots {
-                if tree.nodes[above as usize].children[side] != node {
-                    self.work += self.out.take(tree, node);
-                }
+        if tree.nodes[top as usize].is_leaf() {
+            return;
+        }
+        self.work += self.slab.find(tree, top, thickness, most as usize, rng);
+        for &node in &self.slab.roots {
+            if tree.nodes[above as usize].children[side] != node {
+                self.work += self.out.take(tree, node);
             }
         }
     }
@@ -205,8 +211,7 @@ impl Move for Mover<'_> {
         };
         let top_area = tree.nodes[top as usize].area;
         tree.begin();
-        self.out.roots.clear();
-        (self.out.saved, self.out.least) = (0.0, 0.0);
+        self.out.clear();
         if rng.random::<f64>() < ruin.slabs {
             self.slab(tree, above, side, rng);
         } else {

@@ -1,5 +1,7 @@
-//! A scene for the unit tests of searches.
+//! A scene for the unit tests of searches, and trees over any.
 
+use crate::working::Working;
+use bvh_build::Builder;
 use bvh_core::Aabb;
 
 /// A reproducible scatter of `n` small boxes.
@@ -11,4 +13,9 @@ pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
             Aabb::from((low, low.map(|c| c + hash(i, 27) / 32.0)))
         })
         .collect()
+}
+
+/// The working form of a binary tree over finite boxes.
+pub(crate) fn built(builder: &dyn Builder, boxes: &[Aabb]) -> Working {
+    Working::from_bvh(&builder.build(boxes).unwrap(), boxes).unwrap()
 }

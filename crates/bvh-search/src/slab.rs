@@ -53,16 +53,15 @@ impl Slab {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scatter::scatter;
+    use crate::scatter::{built, scatter};
     use crate::stream::stream;
     use crate::working::ANCHOR;
-    use bvh_build::{Builder, muller_fellner};
+    use bvh_build::muller_fellner;
 
     #[test]
     fn a_box_shrinks_when_a_slab_of_it_is_taken_out() {
         let boxes = scatter(300);
-        let start = muller_fellner::Config::default().build(&boxes).unwrap();
-        let mut tree = Working::from_bvh(&start, &boxes).unwrap();
+        let mut tree = built(&muller_fellner::Config::default(), &boxes);
         let (mut rng, mut slab, mut found) = (stream(8, 0), Slab::default(), 0);
         for _ in 0..2000 {
             let top = rng.random_range(1..tree.nodes.len() as u32);

@@ -213,21 +213,16 @@ impl Solver {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scatter::scatter;
+    use crate::scatter::{built, scatter};
     use crate::{Budget, Method, solve};
-    use bvh_build::Builder;
-    use bvh_core::{Aabb, cost, validate};
-
-    fn balanced(boxes: &[Aabb]) -> Working {
-        let start = bvh_build::median_cut::Config::default().build(boxes).unwrap();
-        Working::from_bvh(&start, boxes).unwrap()
-    }
+    use bvh_build::median_cut;
+    use bvh_core::{cost, validate};
 
     #[test]
     fn boxes_and_areas_stay_exact_and_a_local_optimum_is_one() {
         for size in [3, 5, 7, 12] {
             let boxes = scatter(150);
-            let mut tree = balanced(&boxes);
+            let mut tree = built(&median_cut::Config::default(), &boxes);
             let (mut solver, start) = (Solver::new(size, &tree), tree.area());
             until_still(Quota::ENDLESS, &(), |quota| {
                 let swept = sweep(&mut tree, &mut solver, quota, &());
@@ -250,7 +245,7 @@ mod tests {
         // Another start of more freedom finds nothing better either.
         for n in 3..=9 {
             let boxes = scatter(n);
-            let mut tree = balanced(&boxes);
+            let mut tree = built(&median_cut::Config::default(), &boxes);
             let mut solver = Solver::new(n, &tree);
             until_still(Quota::ENDLESS, &(), |quota| sweep(&mut tree, &mut solver, quota, &()));
             let outcome = solve(

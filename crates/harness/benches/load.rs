@@ -68,11 +68,12 @@ fn loads(scene: &Scene, path: &Path) {
     let title = format!("{}, {} objects, {} bytes", scene.name, boxes.len(), held.len());
     compare(&title, 25, contenders);
 
-    // Of which caches hold what the build has left there.
+    // The parts too when caches hold what a build has left there.
     let mut contenders: Vec<Contender> =
         vec![(MULLER_FELLNER, Box::new(build)), ("map, check, view", Box::new(load))];
     contenders.extend(parts());
     compare_each_after(build, &format!("{title}, each at once after a build"), 25, contenders);
+
     let Ok(triangles) = &scene.triangles() else { return };
     fs::write(path, file::save_wide(&tree, triangles, &Origin::default()).expect("a valid tree"))
         .expect("a file");

@@ -32,6 +32,9 @@ pub fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<TreeFile<'a>, Error> {
     TreeFile::open(bytes).map_err(|source| Error::TreeFile { path: path.to_owned(), source })
 }
 
+/// Bytes of a reserved file written at a time.
+const PIECE: usize = 1 << 21;
+
 /// A file to be written later, its place on the disk taken now: whoever searches for hours is told before, not
 /// after, that the result cannot be kept. Dropped, it leaves nothing behind.
 #[derive(Debug)]
@@ -61,9 +64,9 @@ impl Reserved {
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let mut unfinished = builder.tempfile_in(folder).map_err(Error::io(folder, "create a file there"))?;
         // In large pieces: the kernel keeps the file in memory in such, and maps few large ones faster than many small.
-        let zeros = vec![0; bytes.min(1 << 21)];
+        let zeros = vec![0; bytes.min(PIECE)];
         (0..bytes)
-            .step_by(1 << 21)
+            .step_by(PIECE)
             .try_for_each(|at| unfinished.write_all(&zeros[..zeros.len().min(bytes - at)]))
             .and_then(|()| unfinished.as_file().sync_all())
             .map_err(Error::io(&path, "reserve the file's space"))?;

@@ -69,8 +69,8 @@
 //! A checksum, in full, with arithmetic modulo 2^64 and `mix(h, x) = rotate_left((h xor x) · 0x9e3779b97f4a7c15, 29)`:
 //! of `b` bytes, let `q` be the least multiple of 256 with `4q` no less than `b`. The four quarters begin at 0, `q`,
 //! `2q` and `3q` and end where the next begins or all bytes do. For each, let `w` be its words of eight bytes, padded
-//! by zeros to a multiple of 256 bytes. Of 32 lanes, lane `k` begins as `k + 1`, and word `i` changes lane `i mod 32`: with
-//! `x = rotate_left(lane xor w[i], 16)` and `y = x + (x << 5)` it becomes `y xor (y >> 23)`. The quarter's sum is
+//! by zeros to a multiple of 256 bytes. Of 32 lanes, lane `k` begins as `k + 1`, and word `i` changes lane `i mod 32`:
+//! with `x = rotate_left(lane xor w[i], 16)` and `y = x + (x << 5)` it becomes `y xor (y >> 23)`. The quarter's sum is
 //! `mix(… mix(mix(n, lane 0), lane 1) …, lane 31)` with `n` its number of bytes before padding, and the result
 //! `mix(mix(mix(mix(b, sum 0), sum 1), sum 2), sum 3)`. The readers in Python and C++ that come with the repository
 //! compute it too.

@@ -186,7 +186,7 @@ impl Linked for Siblings {
         let joint = self.node(node).aabb.union(&displaced.aabb);
         self.put(sibling, displaced);
         self.put(parent, rest);
-        self.put(place, Node::inner(joint, (node - 1) / 2 * 2 + 1, 2));
+        self.put(place, Node::inner(joint, node.min(sibling), 2));
         2 + self.tighten(self.parent(parent)) + self.tighten(self.parent(place))
     }
 }

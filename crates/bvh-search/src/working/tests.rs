@@ -2,8 +2,9 @@
 
 use super::*;
 use crate::place::PlaceSearch;
+use crate::scatter::built;
 use crate::stream::stream;
-use bvh_build::{Builder, muller_fellner};
+use bvh_build::muller_fellner;
 use bvh_core::{Aabb, validate};
 use rand::RngExt;
 
@@ -17,8 +18,7 @@ fn scene(n: usize) -> (Vec<Aabb>, Working) {
             Aabb::from((low, low.map(|c| c + coordinate(size))))
         })
         .collect();
-    let tree = muller_fellner::Config::default().build(&boxes).unwrap();
-    let working = Working::from_bvh(&tree, &boxes).unwrap();
+    let working = built(&muller_fellner::Config::default(), &boxes);
     (boxes, working)
 }
 
