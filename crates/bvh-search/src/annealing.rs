@@ -4,9 +4,10 @@
 //! Temperatures are relative to the area that taking the subtree out saves, so that one schedule suits nodes of all
 //! sizes.
 
-use crate::cooling::{self, Descent, Starts};
+use crate::cooling::{self, Descent};
 use crate::error::require;
 use crate::start::Start;
+use crate::starts::Starts;
 use crate::stream::Stream;
 use crate::working::{ANCHOR, Working};
 use crate::{Problem, Run, Search, SearchError};
@@ -41,8 +42,8 @@ impl Default for Config {
     }
 }
 
-/// A move: a random subtree, the larger of two, is taken out; from its place some levels up, to the top of the part in
-/// which it gets another place.
+/// A move: a random subtree, more often one below a large node, is taken out; from its place some levels up, to the top
+/// of the part in which it gets another place.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",

@@ -5,12 +5,11 @@
 use crate::error::require;
 use crate::incumbent::Incumbent;
 use crate::start::Start;
+use crate::starts::Starts;
 use crate::stream::Stream;
 use crate::working::Working;
 use crate::{Observer, Problem, Quota, Run, SearchError, Tally, pieces};
 use bvh_core::{Bvh, with_vector_instructions};
-use rand::RngExt;
-use std::ops::Range;
 
 /// A kind of move.
 pub(crate) trait Move {
@@ -20,48 +19,6 @@ pub(crate) trait Move {
     fn work(&self) -> u64;
     /// Where moves begin.
     fn starts(&mut self) -> &mut Starts;
-}
-
-/// Where moves begin. In a large tree, at any node of a part of the memory, where neighbours in the tree are
-/// neighbours, for some moves, and then in another part: so that they find nodes in a cache.
-#[derive(Debug, Default)]
-pub(crate) struct Starts {
-    /// Only at these nodes, unless there are none.
-    pub only: Vec<u32>,
-    middle: u32,
-    draws: u32,
-}
-
-/// Nodes from the middle of the part to its ends.
-const REACH: u32 = 4096;
-
-/// Moves in one part: a pass over everything takes few of all moves even of a short search.
-const DRAWS: u32 = 256;
-
-impl Starts {
-    /// The larger of two random nodes: large ones are few, and what they can gain is large.
-    #[inline(always)]
-    pub fn draw(&mut self, tree: &Working, rng: &mut Stream) -> u32 {
-        let [a, b] = if self.only.is_empty() {
-            let range = self.part(tree.nodes.len() as u32, rng);
-            [(); 2].map(|()| rng.random_range(range.clone()))
-        } else {
-            [(); 2].map(|()| self.only[rng.random_range(0..self.only.len())])
-        };
-        if tree.nodes[b as usize].area > tree.nodes[a as usize].area { b } else { a }
-    }
-
-    #[inline(always)]
-    fn part(&mut self, len: u32, rng: &mut Stream) -> Range<u32> {
-        if len < 16 * REACH {
-            return 1..len;
-        }
-        if self.draws == 0 {
-            (self.middle, self.draws) = (rng.random_range(1..len), DRAWS);
-        }
-        self.draws -= 1;
-        self.middle.saturating_sub(REACH).max(1)..(self.middle + REACH).min(len)
-    }
 }
 
 /// One descent of the temperature.

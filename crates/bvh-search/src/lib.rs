@@ -54,6 +54,7 @@ mod run;
 mod scatter;
 mod slab;
 mod start;
+mod starts;
 mod stream;
 pub mod treelet;
 mod working;

@@ -4,6 +4,7 @@
 //! between rounds moves have the whole tree, so that everything can move everywhere.
 
 use crate::cooling::{Move, cool};
+use crate::starts::Starts;
 use crate::stream::stream;
 use crate::working::{ANCHOR, NONE, Node, Working};
 use crate::{Observer, Quota, Tally, reinsertion};
@@ -49,7 +50,7 @@ pub(crate) fn cool_in_pieces<M: Move>(
             (piece.in_preorder(), tally)
         });
         done += put_back(tree, &parts, found);
-        whole.starts().only = starts;
+        *whole.starts() = Starts::among(starts);
     }
     done += cool(&mut whole, tree, heat, quota.less(&done), &mut rng, observer);
     *tree = tree.in_preorder();

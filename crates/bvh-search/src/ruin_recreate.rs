@@ -4,11 +4,12 @@
 //! Schrimpf et al. 2000 (ruin and recreate); Kirkpatrick, Gelatt & Vecchi 1983; Shaw 1998 (related removal).
 //! Temperatures are relative to an area of the move, so that one schedule suits nodes of all sizes.
 
-use crate::cooling::{Descent, Move, Starts};
+use crate::cooling::{Descent, Move};
 use crate::error::require;
 use crate::place::PlaceSearch;
 use crate::slab::Slab;
 use crate::start::Start;
+use crate::starts::Starts;
 use crate::stream::Stream;
 use crate::working::{ANCHOR, Working};
 use crate::{Problem, Run, Search, SearchError};
@@ -43,8 +44,8 @@ impl Default for Config {
     }
 }
 
-/// A move: from a random node, the larger of two, some levels up, and from there several random descents, each to a
-/// subtree taken out; or all that lies in a slab at one side of the box there, which alone lets the box shrink.
+/// A move: from a random node, more often one below a large node, some levels up, and from there several random descents,
+/// each to a subtree taken out; or all that lies in a slab at one side of the box there, which alone lets the box shrink.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",

@@ -1,0 +1,141 @@
+//! Where moves begin: most often below large nodes, where there is most to gain.
+
+use crate::stream::Stream;
+use crate::working::{ANCHOR, Working};
+use rand::RngExt;
+use std::ops::Range;
+
+/// Draws nodes of a tree, each in proportion to the square root of its parent's area as it was at the first draw: were
+/// it that of the node, no point would ever be moved, and were all nodes alike, most moves would be spent where next to
+/// nothing can be gained.
+///
+/// In a large tree they are of a part of the memory for some moves, where neighbours in the tree are neighbours, and
+/// then of another part, so that moves find nodes in a cache.
+#[derive(Debug, Default)]
+pub(crate) struct Starts {
+    /// Only these nodes, unless there are none.
+    only: Vec<u32>,
+    /// What all nodes before weigh, by position; that of all nodes last.
+    sums: Vec<f64>,
+    /// The part of the moves to come, by position.
+    part: Range<usize>,
+    draws: u32,
+}
+
+/// Nodes from the middle of a part to its ends.
+const REACH: usize = 4096;
+
+/// Moves in one part: a pass over everything takes few of all moves even of a short search.
+const DRAWS: u32 = 256;
+
+impl Starts {
+    /// Draws only these nodes, unless there are none.
+    pub fn among(only: Vec<u32>) -> Self {
+        Self { only, ..Self::default() }
+    }
+
+    /// A node of the tree, which has the nodes that it had at the first draw.
+    #[inline(always)]
+    pub fn draw(&mut self, tree: &Working, rng: &mut Stream) -> u32 {
+        if self.draws == 0 {
+            self.move_on(tree, rng);
+        }
+        self.draws -= 1;
+        let position = self.position(self.part.clone(), rng);
+        self.only.get(position).map_or(position as u32 + 1, |&node| node)
+    }
+
+    /// A position of these.
+    #[inline(always)]
+    fn position(&self, part: Range<usize>, rng: &mut Stream) -> usize {
+        let [low, high] = [part.start, part.end].map(|at| self.sums[at]);
+        let drawn = low + rng.random::<f64>() * (high - low);
+        let before = self.sums[part.start + 1..part.end].partition_point(|&sum| sum <= drawn);
+        part.start + before
+    }
+
+    /// Chooses the next part.
+    #[inline(never)]
+    fn move_on(&mut self, tree: &Working, rng: &mut Stream) {
+        if self.sums.is_empty() {
+            self.weigh(tree);
+        }
+        let all = self.sums.len() - 1;
+        (self.part, self.draws) = (0..all, u32::MAX);
+        if all >= 16 * REACH {
+            let middle = self.position(0..all, rng);
+            (self.part, self.draws) = (middle.saturating_sub(REACH)..(middle + REACH).min(all), DRAWS);
+        }
+    }
+
+    /// O(n).
+    fn weigh(&mut self, tree: &Working) {
+        let weight = |at: u32| {
+            let parent = tree.nodes[at as usize].parent;
+            tree.nodes[if parent == ANCHOR { at } else { parent } as usize].area.sqrt()
+        };
+        let add = |sums: &mut Vec<f64>, at: u32| sums.push(sums[sums.len() - 1] + weight(at));
+        self.sums.push(0.0);
+        if self.only.is_empty() {
+            self.sums.reserve(tree.nodes.len() - 1);
+            (1..tree.nodes.len() as u32).for_each(|at| add(&mut self.sums, at));
+        } else {
+            self.only.iter().for_each(|&at| add(&mut self.sums, at));
+        }
+        if self.sums.last() == Some(&0.0) {
+            // No box has an area: nothing can be gained anywhere.
+            (0..).zip(&mut self.sums).for_each(|(position, sum)| *sum = f64::from(position));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scatter::{built, scatter};
+    use crate::stream::stream;
+    use bvh_build::muller_fellner;
+    use bvh_core::Aabb;
+
+    /// How often each node was drawn.
+    fn drawn(starts: &mut Starts, tree: &Working, times: u32) -> Vec<u32> {
+        let (mut counts, mut rng) = (vec![0; tree.nodes.len()], stream(6, 0));
+        (0..times).for_each(|_| counts[starts.draw(tree, &mut rng) as usize] += 1);
+        counts
+    }
+
+    #[test]
+    fn nodes_are_drawn_by_the_square_root_of_their_parents_area() {
+        let tree = built(&muller_fellner::Config::default(), &scatter(50));
+        for only in [vec![], vec![7, 3, 60, 12]] {
+            let nodes: Vec<u32> = if only.is_empty() { (1..100).collect() } else { only.clone() };
+            let weight = |&at: &u32| {
+                let parent = tree.nodes[at as usize].parent;
+                tree.nodes[if parent == ANCHOR { at } else { parent } as usize].area.sqrt()
+            };
+            let (total, times) = (nodes.iter().map(weight).sum::<f64>(), 400_000);
+            let counts = drawn(&mut Starts::among(only), &tree, times);
+            assert_eq!(counts.iter().sum::<u32>(), nodes.iter().map(|&at| counts[at as usize]).sum());
+            for at in nodes {
+                let expected = f64::from(times) * weight(&at) / total;
+                let off = (f64::from(counts[at as usize]) - expected).abs();
+                assert!(off < 5.0 * expected.sqrt(), "node {at}: {} of {expected}", counts[at as usize]);
+            }
+        }
+    }
+
+    #[test]
+    fn every_part_of_a_large_tree_is_drawn_from_some_time() {
+        let tree = built(&muller_fellner::Config::default(), &scatter(40_000));
+        let counts = drawn(&mut Starts::default(), &tree, 2_000_000);
+        assert!(counts[1..].chunks(512).all(|part| part.iter().sum::<u32>() > 0));
+    }
+
+    #[test]
+    fn nodes_without_area_are_drawn_alike() {
+        let points: Vec<Aabb> = (0..50).map(|_| Aabb::from(([1.0; 3], [1.0; 3]))).collect();
+        let tree = built(&muller_fellner::Config::default(), &points);
+        let counts = drawn(&mut Starts::default(), &tree, 100_000);
+        assert!(counts[1..].iter().all(|count| (700..1400).contains(count)), "{counts:?}");
+    }
+}
