@@ -50,7 +50,7 @@ pub struct Config {
     pub hottest: f64,
     /// Last temperature, above 0. Default 0.003.
     pub cold: f64,
-    /// First temperature of the descents after a long one, above 0. Default 0.05.
+    /// First temperature of the descents after a long one, above 0. Default 0.07.
     pub reheat: f64,
     /// Their number, 0 to 1000. Default 6.
     pub reheats: u32,
@@ -83,7 +83,7 @@ impl Default for Config {
             heat: 0.02,
             hottest: 0.2,
             cold: 0.003,
-            reheat: 0.05,
+            reheat: 0.07,
             reheats: 6,
             reheated: 0.3,
             reheats_from: 7000.0,
