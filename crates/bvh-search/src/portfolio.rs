@@ -134,8 +134,7 @@ impl Config {
                 left = left.saturating_sub(tally.work);
                 run.count(tally);
                 let now = observer.progress().unwrap_or(1.0);
-                let finish = if n < LARGE { FINISH } else { LARGE_FINISH };
-                end_of_all = 1.0 - (1.0 - now) * (finish * n as f64 / in_time).min(0.5);
+                end_of_all = 1.0 - (1.0 - now) * (FINISH * n as f64 / in_time).min(0.5);
                 length = length.min(in_time / n as f64);
             }
             let (all, began) = (left, observer.progress().unwrap_or(0.0));
@@ -289,14 +288,10 @@ const WORTH_AN_EVENT: f64 = 1e-3;
 const WORK_PER_PAIR: f64 = 200.0;
 
 /// Work per object that takes as long as what comes after the last move: a tree is sorted, converted and valued.
-const FINISH: f64 = 4.0;
-
-/// In a scene of so many objects, whose nodes do not fit into a core's cache, it takes longer.
-const LARGE: u64 = 1 << 14;
-const LARGE_FINISH: f64 = 10.0;
+const FINISH: f64 = 10.0;
 
 /// Work per object after which the rate of work is known.
-const PROBE: u64 = 16;
+const PROBE: u64 = 4;
 
 /// Ends the schedule when generations do not grow.
 const MOST_GENERATIONS: u64 = 10_000;
