@@ -4,7 +4,7 @@
 //! between rounds moves have the whole tree, so that everything can move everywhere.
 
 use crate::cooling::{Move, cool};
-use crate::starts::Starts;
+use crate::starts::{self, Starts};
 use crate::stream::stream;
 use crate::working::{ANCHOR, NONE, Node, Working};
 use crate::{Observer, Quota, Tally, reinsertion};
@@ -34,13 +34,15 @@ pub(crate) fn cool_in_pieces<M: Move>(
     observer: &dyn Observer,
 ) -> Tally {
     let (mut rng, mut whole, mut done) = (stream(seed, first), mover(), Tally::default());
-    let most = tree.objects() as f64 / f64::from(pieces);
-    if pieces > 1 && most >= f64::from(LEAST) {
+    if pieces > 1 && tree.objects() as f64 >= f64::from(pieces) * f64::from(LEAST) {
         // At another size in every round, so that other subtrees are at the borders.
-        let (parts, starts) = cut(tree, (most * (0.5 + 0.5 * rng.random::<f64>())) as u32);
-        let nodes: u32 = parts.iter().map(|part| part.nodes).sum();
+        let smaller = 0.5 + 0.5 * rng.random::<f64>();
+        let (parts, starts) = cut(tree, smaller / f64::from(pieces), |at| starts::weight(tree, at));
+        let all: f64 = parts.iter().map(|part| part.weight).sum();
         let share = |part: &Part| {
-            let work = quota.work as f64 * (1.0 - WHOLE) * f64::from(part.nodes) / f64::from(nodes);
+            // Of parts without weight, each has as much.
+            let part = if all > 0.0 { part.weight / all } else { 1.0 / parts.len() as f64 };
+            let work = quota.work as f64 * (1.0 - WHOLE) * part;
             Quota { work: work as u64, moves: quota.moves / (parts.len() as u64 + 1) }
         };
         let found = each(&parts, |number, part| {
@@ -66,7 +68,7 @@ pub(crate) fn descend_in_pieces(
 ) -> Tally {
     let mut done = Tally::default();
     if pieces > 1 {
-        let (parts, _) = cut(tree, tree.objects() as u32 / pieces);
+        let (parts, _) = cut(tree, 1.0 / f64::from(pieces), |_| 1.0);
         let share = |all: u64| all / (2 * parts.len().max(1) as u64);
         let share = Quota { work: share(quota.work), moves: share(quota.moves) };
         let found = each(&parts, |_, part| {
@@ -85,29 +87,36 @@ pub(crate) fn descend_in_pieces(
 struct Part {
     root: u32,
     nodes: u32,
+    /// That of all these nodes.
+    weight: f64,
 }
 
-/// The largest subtrees of at most `most` objects each, without the smallest, of a tree in preorder; and the nodes that
-/// are in none or near the top of one. O(n).
-fn cut(tree: &Working, most: u32) -> (Vec<Part>, Vec<u32>) {
-    let mut sizes = vec![1u32; tree.nodes.len()];
+/// The largest subtrees that weigh at most `most` of the whole each, without the smallest, of a tree in preorder; and the
+/// nodes that are in none or near the top of one. O(n).
+fn cut(tree: &Working, most: f64, weight: impl Fn(u32) -> f64) -> (Vec<Part>, Vec<u32>) {
+    let mut totals = vec![(1u32, 0.0); tree.nodes.len()];
     for (at, node) in tree.nodes.iter().enumerate().skip(1).rev() {
+        let mut total = (1, weight(at as u32));
         if !node.is_leaf() {
-            sizes[at] = 1 + node.children.iter().map(|&child| sizes[child as usize]).sum::<u32>();
+            for (nodes, weight) in node.children.map(|child| totals[child as usize]) {
+                total = (total.0 + nodes, total.1 + weight);
+            }
         }
+        totals[at] = total;
     }
+    let most = most * tree.root().map_or(0.0, |root| totals[root as usize].1);
     // The level in a part, 1 for its root; 0 outside.
     let mut depths = vec![0u8; tree.nodes.len()];
     let (mut parts, mut starts) = (vec![], vec![]);
     for (at, node) in (0..).zip(&tree.nodes).skip(1) {
         let above = depths[node.parent as usize];
-        let nodes = sizes[at as usize];
+        let (nodes, weight) = totals[at as usize];
         if above > 0 {
             depths[at as usize] = above.saturating_add(1);
-        } else if nodes < 2 * most {
+        } else if weight <= most {
             depths[at as usize] = 1;
             if nodes >= 2 * LEAST {
-                parts.push(Part { root: at, nodes });
+                parts.push(Part { root: at, nodes, weight });
             }
         }
         if depths[at as usize] <= BELOW {
@@ -174,12 +183,15 @@ mod tests {
     fn pieces_are_disjoint_and_putting_them_back_restores_the_tree() {
         let boxes = scatter(3000);
         let tree = built(&muller_fellner::Config::default(), &boxes).in_preorder();
-        for most in [20, 100, 1000, 2999] {
-            let (parts, starts) = cut(&tree, most);
+        for most in [0.007, 0.03, 0.3, 0.99] {
+            let (parts, starts) = cut(&tree, most, |_| 1.0);
             assert!(parts.windows(2).all(|pair| pair[0].root + pair[0].nodes <= pair[1].root));
-            assert!(parts.iter().all(|part| part.nodes < 2 * most && starts.contains(&part.root)));
+            assert!(
+                parts.iter().all(|part| f64::from(part.nodes) <= most * 5999.0 && starts.contains(&part.root))
+            );
+            assert!(parts.iter().all(|part| f64::from(part.nodes).to_bits() == part.weight.to_bits()));
             let covered: u32 = parts.iter().map(|part| part.nodes).sum();
-            assert!(covered > if most > 20 { 3000 } else { 1000 }, "{covered}");
+            assert!(covered > if most > 0.01 { 3000 } else { 1000 }, "{covered}");
             let taken = |part: &Part| (part.take(&tree), Tally { work: 1, ..Tally::default() });
             let mut again = tree.clone();
             let tally = put_back(&mut again, &parts, parts.iter().map(taken).collect());

@@ -70,11 +70,7 @@ impl Starts {
 
     /// O(n).
     fn weigh(&mut self, tree: &Working) {
-        let weight = |at: u32| {
-            let parent = tree.nodes[at as usize].parent;
-            tree.nodes[if parent == ANCHOR { at } else { parent } as usize].area.sqrt()
-        };
-        let add = |sums: &mut Vec<f64>, at: u32| sums.push(sums[sums.len() - 1] + weight(at));
+        let add = |sums: &mut Vec<f64>, at: u32| sums.push(sums[sums.len() - 1] + weight(tree, at));
         self.sums.push(0.0);
         if self.only.is_empty() {
             self.sums.reserve(tree.nodes.len() - 1);
@@ -87,6 +83,13 @@ impl Starts {
             (0..).zip(&mut self.sums).for_each(|(position, sum)| *sum = f64::from(position));
         }
     }
+}
+
+/// What a node is drawn in proportion to: the square root of its parent's area, of its own at the root.
+#[inline(always)]
+pub(crate) fn weight(tree: &Working, at: u32) -> f64 {
+    let parent = tree.nodes[at as usize].parent;
+    tree.nodes[if parent == ANCHOR { at } else { parent } as usize].area.sqrt()
 }
 
 #[cfg(test)]
