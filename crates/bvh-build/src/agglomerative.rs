@@ -79,6 +79,11 @@ impl Along {
         Ok(Self { boxes, all, order })
     }
 
+    /// The objects along the curve.
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
     /// Clusters what was sorted.
     pub fn build(self, config: &Config) -> Result<Bvh, BuildError> {
         config.check()?;

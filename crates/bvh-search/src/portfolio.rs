@@ -13,7 +13,8 @@
 //!    the one before.
 //!
 //! What a descent ends with is fused with the incumbent, unless the end is known and it is the first, and better: that
-//! keeps every part that became better and drops every part that became worse.
+//! keeps every part that became better and drops every part that became worse. If the first is worse under a clock,
+//! there was no time to do anything, nor is there for fusing.
 
 use crate::cooling::{Cooling, anneal, cool};
 use crate::error::require;
@@ -146,7 +147,7 @@ impl Config {
                 if observer.progress().is_some_and(|now| now >= end) {
                     continue;
                 }
-                let cooling = self.cooling(hot, work, end, run);
+                let cooling = self.cooling(hot, work, end, length, run);
                 let done = self.descend(tree, [seed, number], (&cooling, &ruin), number == 0, best, run);
                 left = left.saturating_sub(done);
             }
@@ -156,7 +157,8 @@ impl Config {
             });
             let mut length = self.first;
             for number in 0..MOST_GENERATIONS {
-                let cooling = self.cooling(self.hot(length), left.min((length * n as f64) as u64), 1.0, run);
+                let work = left.min((length * n as f64) as u64);
+                let cooling = self.cooling(self.hot(length), work, 1.0, length, run);
                 let ruin = self.ruin_of(length);
                 let done = self.descend(tree, [seed, number], (&cooling, &ruin), false, best, run);
                 left = left.saturating_sub(done);
@@ -195,9 +197,10 @@ impl Config {
         (self.heat * length / 1000.0).min(self.hottest)
     }
 
-    fn cooling(&self, hot: f64, work: u64, end: f64, run: &Run) -> Cooling {
-        let (quota, timed) = (Quota { work, ..run.left() }, run.observer().progress().is_some());
-        Cooling { hot: hot.max(self.cold), cold: self.cold, quota, end, pieces: self.pieces(timed) }
+    fn cooling(&self, hot: f64, work: u64, end: f64, length: f64, run: &Run) -> Cooling {
+        let quota = Quota { work, ..run.left() };
+        let pieces = self.pieces(run.observer().progress().is_some(), length);
+        Cooling { hot: hot.max(self.cold), cold: self.cold, quota, end, pieces }
     }
 
     /// One descent from the incumbent, and what it ends with fused with that, unless it is the first and better. Returns
@@ -224,7 +227,11 @@ impl Config {
                 best.offer(tree, run);
             }
         });
-        *tree = if first && annealed.area() < tree.area() { annealed } else { fuse(&[tree, &annealed]) };
+        if first && annealed.area() < tree.area() {
+            *tree = annealed;
+        } else if !first || observer.progress().is_none() {
+            *tree = fuse(&[tree, &annealed]);
+        }
         best.offer(tree, run);
         done.work
     }
@@ -246,13 +253,13 @@ impl Config {
         (tally, in_time)
     }
 
-    /// How many pieces to anneal at once.
-    fn pieces(&self, timed: bool) -> u32 {
+    /// How many pieces to anneal at once, with so much work per object.
+    fn pieces(&self, timed: bool, length: f64) -> u32 {
         #[cfg(feature = "rayon")]
-        if self.pieces == 0 && timed && rayon::current_num_threads() > 1 {
+        if self.pieces == 0 && timed && length >= WORTH_PIECES && rayon::current_num_threads() > 1 {
             return 4 * rayon::current_num_threads().min(1024) as u32;
         }
-        let _ = timed;
+        let _ = (timed, length);
         self.pieces.max(1)
     }
 }
@@ -289,6 +296,10 @@ const WORK_PER_PAIR: f64 = 200.0;
 
 /// Work per object that takes as long as what comes after the last move: a tree is sorted, converted and valued.
 const FINISH: f64 = 10.0;
+
+/// Work per object of all descents from which on pieces pay, if there are threads for them: less is not enough for the
+/// rounds in which they are cut.
+const WORTH_PIECES: f64 = 256.0;
 
 /// Work per object after which the rate of work is known.
 const PROBE: u64 = 4;
