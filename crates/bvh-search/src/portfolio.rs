@@ -203,8 +203,8 @@ impl Config {
         Cooling { hot: hot.max(self.cold), cold: self.cold, quota, end, pieces }
     }
 
-    /// One descent from the incumbent, and what it ends with fused with that, unless it is the first and better. Returns
-    /// its work.
+    /// One descent from the incumbent. What it ends with is fused with that; but if it is the first, taken when better,
+    /// and dropped when not and there is a clock. Returns its work.
     fn descend(
         &self,
         tree: &mut Working,

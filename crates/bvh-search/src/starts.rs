@@ -41,7 +41,12 @@ impl Starts {
             self.move_on(tree, rng);
         }
         self.draws -= 1;
-        let position = self.position(self.part.clone(), rng);
+        self.node(self.position(self.part.clone(), rng))
+    }
+
+    /// The node at this position.
+    #[inline(always)]
+    fn node(&self, position: usize) -> u32 {
         self.only.get(position).map_or(position as u32 + 1, |&node| node)
     }
 
@@ -70,15 +75,15 @@ impl Starts {
 
     /// O(n).
     fn weigh(&mut self, tree: &Working) {
-        let add = |sums: &mut Vec<f64>, at: u32| sums.push(sums[sums.len() - 1] + weight(tree, at));
-        self.sums.push(0.0);
-        if self.only.is_empty() {
-            self.sums.reserve(tree.nodes.len() - 1);
-            (1..tree.nodes.len() as u32).for_each(|at| add(&mut self.sums, at));
-        } else {
-            self.only.iter().for_each(|&at| add(&mut self.sums, at));
+        let all = if self.only.is_empty() { tree.nodes.len() - 1 } else { self.only.len() };
+        self.sums.reserve(all + 1);
+        let mut sum = 0.0;
+        self.sums.push(sum);
+        for position in 0..all {
+            sum += weight(tree, self.node(position));
+            self.sums.push(sum);
         }
-        if self.sums.last() == Some(&0.0) {
+        if sum == 0.0 {
             // No box has an area: nothing can be gained anywhere.
             (0..).zip(&mut self.sums).for_each(|(position, sum)| *sum = f64::from(position));
         }
