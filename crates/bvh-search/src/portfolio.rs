@@ -198,7 +198,7 @@ impl Config {
     }
 
     fn cooling(&self, hot: f64, work: u64, end: f64, length: f64, run: &Run) -> Cooling {
-        let quota = Quota { work, ..run.left() };
+        let quota = run.left().at_most(work);
         let pieces = self.pieces(run.observer().progress().is_some(), length);
         Cooling { hot: hot.max(self.cold), cold: self.cold, quota, end, pieces }
     }

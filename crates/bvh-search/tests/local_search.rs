@@ -168,6 +168,18 @@ fn budgets_end_a_search_where_they_say() {
 }
 
 #[test]
+fn a_budget_barely_above_what_the_portfolio_does_without_one_is_kept() {
+    let boxes = scatter(1000, 4);
+    for work_per_object in [100, 200, 300, 400] {
+        let config = portfolio::Config { work_per_object, first: 50.0, ..Default::default() };
+        // The start and the first descent are not in what the portfolio counts as its own.
+        let max_work = work_per_object * 1000 + 60_000;
+        let outcome = solve(&config, &Problem::new(&boxes), 5, work(max_work), &()).unwrap();
+        assert!(outcome.work <= max_work + 2000, "{} of {max_work}", outcome.work);
+    }
+}
+
+#[test]
 fn a_cancelled_search_returns_what_it_has() {
     struct AfterTheStart(AtomicBool);
     impl Observer for AfterTheStart {
