@@ -49,6 +49,45 @@ struct Step {
     growth: f64,
 }
 
+/// All that is below a node on one side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Region {
+    pub above: u32,
+    pub side: usize,
+}
+
+impl Region {
+    /// The whole tree.
+    pub const ALL: Self = Self { above: ANCHOR, side: 0 };
+
+    /// What is below `above`, which has this child.
+    #[inline(always)]
+    pub fn of(tree: &Working, above: u32, child: u32) -> Self {
+        Self { above, side: usize::from(tree.nodes[above as usize].children[0] != child) }
+    }
+
+    /// Its root.
+    #[inline(always)]
+    pub fn root(self, tree: &Working) -> u32 {
+        tree.nodes[self.above as usize].children[self.side]
+    }
+
+    /// The smallest one with this and more whose box holds `aabb`, or the whole tree.
+    #[inline(always)]
+    pub fn around(self, tree: &Working, aabb: &PackedAabb) -> Self {
+        let mut region = self;
+        while region.above != ANCHOR {
+            let root = region.above;
+            region = Self::of(tree, tree.nodes[root as usize].parent, root);
+            let whole = &tree.nodes[root as usize].aabb;
+            if whole.union(aabb) == *whole {
+                break;
+            }
+        }
+        region
+    }
+}
+
 /// A place and what it costs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Place {
@@ -60,16 +99,23 @@ pub(crate) struct Place {
 type Item<'a> = (&'a PackedAabb, f64);
 
 impl PlaceSearch {
-    /// The cheapest place for a *detached* item, if one costs less than `limit`. Begins at `first`, or at the root if
-    /// `first` is itself detached.
+    /// The cheapest place in a region for a *detached* item, if one costs less than `limit`. The region is the whole tree
+    /// or its box holds the item's. Begins at `first` in it, or at its root if `first` is itself detached.
     #[inline(always)]
-    pub fn detached(&mut self, tree: &Working, item: Item, first: u32, limit: f64) -> Option<Place> {
+    pub fn detached(
+        &mut self,
+        tree: &Working,
+        region: Region,
+        item: Item,
+        first: u32,
+        limit: f64,
+    ) -> Option<Place> {
         self.path.clear();
         let (mut at, mut below) = (first, NONE);
-        while at != ANCHOR {
+        while at != region.above {
             if at == NONE {
                 self.path.clear();
-                (at, below) = (tree.nodes[ANCHOR as usize].children[0], NONE);
+                (at, below) = (region.root(tree), NONE);
             }
             let node = &tree.nodes[at as usize];
             let joint = node.aabb.union(item.0).half_area();

@@ -9,8 +9,9 @@ use std::ops::Range;
 /// it that of the node, no point would ever be moved, and were all nodes alike, most moves would be spent where next to
 /// nothing can be gained.
 ///
-/// In a large tree they are of a part of the memory for some moves, where neighbours in the tree are neighbours, and
-/// then of another part, so that moves find nodes in a cache.
+/// In a tree that is not small they are of a part of the memory for some moves, where neighbours in the tree are
+/// neighbours, and then of another part, so that moves find nodes in a cache. Parts follow one another by the golden
+/// section of the whole, which comes everywhere about equally often however few they are.
 #[derive(Debug, Default)]
 pub(crate) struct Starts {
     /// Only these nodes, unless there are none.
@@ -19,14 +20,20 @@ pub(crate) struct Starts {
     sums: Vec<f64>,
     /// The part of the moves to come, by position.
     part: Range<usize>,
+    /// Where the middle of the part was drawn, 0 to 1.
+    middle: f64,
     draws: u32,
 }
 
-/// Nodes from the middle of a part to its ends.
-const REACH: usize = 4096;
+/// Nodes from the middle of a part to its ends: together, with what is above them, they are in the cache next to the
+/// smallest. Eight times as many made moves on 66 000 objects take a fifth longer.
+const REACH: usize = 512;
 
 /// Moves in one part: a pass over everything takes few of all moves even of a short search.
-const DRAWS: u32 = 256;
+const DRAWS: u32 = 128;
+
+/// The golden section.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 impl Starts {
     /// Draws only these nodes, unless there are none.
@@ -41,7 +48,7 @@ impl Starts {
             self.move_on(tree, rng);
         }
         self.draws -= 1;
-        self.node(self.position(self.part.clone(), rng))
+        self.node(self.position(self.part.clone(), rng.random()))
     }
 
     /// The node at this position.
@@ -50,11 +57,11 @@ impl Starts {
         self.only.get(position).map_or(position as u32 + 1, |&node| node)
     }
 
-    /// A position of these.
+    /// The position of these up to which there is so much of their weight.
     #[inline(always)]
-    fn position(&self, part: Range<usize>, rng: &mut Stream) -> usize {
+    fn position(&self, part: Range<usize>, drawn: f64) -> usize {
         let [low, high] = [part.start, part.end].map(|at| self.sums[at]);
-        let drawn = low + rng.random::<f64>() * (high - low);
+        let drawn = low + drawn * (high - low);
         let before = self.sums[part.start + 1..part.end].partition_point(|&sum| sum <= drawn);
         part.start + before
     }
@@ -64,11 +71,13 @@ impl Starts {
     fn move_on(&mut self, tree: &Working, rng: &mut Stream) {
         if self.sums.is_empty() {
             self.weigh(tree);
+            self.middle = rng.random();
         }
         let all = self.sums.len() - 1;
         (self.part, self.draws) = (0..all, u32::MAX);
         if all >= 16 * REACH {
-            let middle = self.position(0..all, rng);
+            self.middle = (self.middle + GOLDEN).fract();
+            let middle = self.position(0..all, self.middle);
             (self.part, self.draws) = (middle.saturating_sub(REACH)..(middle + REACH).min(all), DRAWS);
         }
     }

@@ -1,7 +1,7 @@
 //! The working form against brute force, move by move.
 
 use super::*;
-use crate::place::PlaceSearch;
+use crate::place::{PlaceSearch, Region};
 use crate::scatter::built;
 use crate::stream::stream;
 use bvh_build::muller_fellner;
@@ -125,13 +125,57 @@ fn the_best_place_is_the_best_of_all_whether_the_node_is_out_or_only_thought_to_
         let least = costs.fold(f64::INFINITY, f64::min);
         let (aabb, area) = (tree.nodes[node as usize].aabb, tree.nodes[node as usize].area);
         for first in [sibling, NONE, any(&tree, &mut rng)] {
-            let place = search.detached(&tree, (&aabb, area), first, f64::INFINITY).unwrap();
+            let place = search.detached(&tree, Region::ALL, (&aabb, area), first, f64::INFINITY).unwrap();
             assert!((place.cost - least).abs() <= 1e-12 * least, "{} {least}", place.cost);
         }
-        assert!(search.detached(&tree, (&aabb, area), sibling, least * (1.0 - 1e-9)).is_none());
+        let below = least * (1.0 - 1e-9);
+        assert!(search.detached(&tree, Region::ALL, (&aabb, area), sibling, below).is_none());
         assert!((found.map_or(own, |place| place.cost) - least).abs() <= 1e-12 * least);
         let place = found.map_or(sibling, |place| place.beside);
         let (added, _) = tree.attach(node, place);
         assert!((added - least).abs() <= 1e-12 * least && tree.area() <= start * (1.0 + 1e-12));
     }
+}
+
+#[test]
+fn the_best_place_in_a_region_is_the_best_there_and_costs_what_it_adds() {
+    let (_, tree) = scene(60);
+    let (mut rng, mut search, mut elsewhere) = (stream(5, 0), PlaceSearch::default(), 0);
+    for _ in 0..200 {
+        let mut tree = tree.clone();
+        // At random, so that the best place often is far away.
+        for _ in 0..20 {
+            let node = any(&tree, &mut rng);
+            tree.detach(node);
+            let places = tree.preorder();
+            tree.attach(node, places[rng.random_range(0..places.len())]);
+        }
+        let node = any(&tree, &mut rng);
+        let (_, sibling, _) = tree.detach(node);
+        let (aabb, area) = (tree.nodes[node as usize].aabb, tree.nodes[node as usize].area);
+        let above = tree.nodes[sibling as usize].parent;
+        let region = Region::of(&tree, above, sibling).around(&tree, &aabb);
+        let root = region.root(&tree);
+        let inside = |&place: &u32| {
+            let mut at = place;
+            while at != root && at != ANCHOR {
+                at = tree.nodes[at as usize].parent;
+            }
+            at == root
+        };
+        assert!(
+            region == Region::ALL
+                || tree.nodes[root as usize].aabb.union(&aabb) == tree.nodes[root as usize].aabb
+        );
+        let cost = |place| tree.clone().attach(node, place).0;
+        let [least, everywhere] = [tree.preorder().into_iter().filter(inside).collect(), tree.preorder()]
+            .map(|places: Vec<u32>| places.into_iter().map(cost).fold(f64::INFINITY, f64::min));
+        for first in [sibling, NONE] {
+            let place = search.detached(&tree, region, (&aabb, area), first, f64::INFINITY).unwrap();
+            assert!(inside(&place.beside));
+            assert!((place.cost - least).abs() <= 1e-12 * least, "{} {least}", place.cost);
+        }
+        elsewhere += u32::from(everywhere < least * (1.0 - 1e-9));
+    }
+    assert!(elsewhere > 20, "{elsewhere}");
 }
