@@ -40,9 +40,7 @@ pub(crate) fn cool_in_pieces<M: Move>(
         let (parts, starts) = cut(tree, smaller / f64::from(pieces), |at| starts::weight(tree, at));
         let all: f64 = parts.iter().map(|part| part.weight).sum();
         let share = |part: &Part| {
-            // Of parts without weight, each has as much.
-            let part = if all > 0.0 { part.weight / all } else { 1.0 / parts.len() as f64 };
-            let work = quota.work as f64 * (1.0 - WHOLE) * part;
+            let work = quota.work as f64 * (1.0 - WHOLE) * (part.weight / all);
             Quota { work: work as u64, moves: quota.moves / (parts.len() as u64 + 1) }
         };
         let found = each(&parts, |number, part| {

@@ -92,18 +92,15 @@ impl Starts {
             sum += weight(tree, self.node(position));
             self.sums.push(sum);
         }
-        if sum == 0.0 {
-            // No box has an area: nothing can be gained anywhere.
-            (0..).zip(&mut self.sums).for_each(|(position, sum)| *sum = f64::from(position));
-        }
     }
 }
 
-/// What a node is drawn in proportion to: the square root of its parent's area, of its own at the root.
+/// What a node is drawn in proportion to: the square root of its parent's area, of its own at the root; and next to nothing
+/// more, so that nodes are drawn alike where none has an area.
 #[inline(always)]
 pub(crate) fn weight(tree: &Working, at: u32) -> f64 {
     let parent = tree.nodes[at as usize].parent;
-    tree.nodes[if parent == ANCHOR { at } else { parent } as usize].area.sqrt()
+    tree.nodes[if parent == ANCHOR { at } else { parent } as usize].area.sqrt() + f64::MIN_POSITIVE
 }
 
 #[cfg(test)]
