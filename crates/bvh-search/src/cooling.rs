@@ -212,7 +212,7 @@ mod tests {
     #[test]
     fn areas_stay_exact_after_each_of_a_million_annealed_moves() {
         let ruin = ruin_recreate::Ruin::default();
-        check(|| ruin_recreate::Mover::new(&ruin));
+        check(|| ruin_recreate::Mover::new(&ruin, 1000.0));
         for target in [annealing::Target::Random, annealing::Target::Best] {
             let step = annealing::Move { target, ..Default::default() };
             check(|| annealing::Mover::new(&step));

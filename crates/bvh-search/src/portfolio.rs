@@ -139,7 +139,7 @@ impl Config {
                 length = length.min(in_time / n as f64);
             }
             let (all, began) = (left, observer.progress().unwrap_or(0.0));
-            let (plan, ruin) = self.plan(length, n);
+            let (plan, each) = self.plan(length, n);
             for (number, Planned { hot, until }) in (0..).zip(plan) {
                 let due = (until * all as f64) as u64;
                 let work = if timed { left } else { left.min(due.saturating_sub(all - left)) };
@@ -148,7 +148,7 @@ impl Config {
                     continue;
                 }
                 let cooling = self.cooling(hot, work, end, length, run);
-                let done = self.descend(tree, [seed, number], (&cooling, &ruin), number == 0, best, run);
+                let done = self.descend(tree, [seed, number], (&cooling, each), number == 0, best, run);
                 left = left.saturating_sub(done);
             }
         } else {
@@ -159,16 +159,15 @@ impl Config {
             for number in 0..MOST_GENERATIONS {
                 let work = left.min((length * n as f64) as u64);
                 let cooling = self.cooling(self.hot(length), work, 1.0, length, run);
-                let ruin = self.ruin_of(length);
-                let done = self.descend(tree, [seed, number], (&cooling, &ruin), false, best, run);
+                let done = self.descend(tree, [seed, number], (&cooling, length), false, best, run);
                 left = left.saturating_sub(done);
                 length *= self.growth;
             }
         }
     }
 
-    /// The descents of so much work per object, and their move.
-    fn plan(&self, length: f64, n: u64) -> (Vec<Planned>, Ruin) {
+    /// The descents of so much work per object, and that of each long one.
+    fn plan(&self, length: f64, n: u64) -> (Vec<Planned>, f64) {
         let longest = self.longest.min(WORK_PER_PAIR * n as f64);
         let equal = (length / longest).ceil().clamp(1.0, MOST_GENERATIONS as f64);
         let length = length / equal;
@@ -183,7 +182,7 @@ impl Config {
                 plan.push(Planned { hot, until: (number as f64 + part) / equal });
             }
         }
-        (plan, self.ruin_of(length))
+        (plan, length)
     }
 
     /// The move of a descent of so much work per object.
@@ -209,7 +208,7 @@ impl Config {
         &self,
         tree: &mut Working,
         [seed, number]: [u64; 2],
-        (cooling, ruin): (&Cooling, &Ruin),
+        (cooling, length): (&Cooling, f64),
         first: bool,
         best: &mut Incumbent,
         run: &mut Run,
@@ -220,7 +219,8 @@ impl Config {
         let observer: &dyn Observer = &Until { observer: run.observer(), end: cooling.end };
         let (mut annealed, mut done) = (tree.clone(), Tally::default());
         let streams = [seed, 1 + (number << 40)];
-        anneal(|| Mover::new(ruin), cooling, &mut annealed, streams, observer, &mut |tree, tally| {
+        let ruin = self.ruin_of(length);
+        anneal(|| Mover::new(&ruin, length), cooling, &mut annealed, streams, observer, &mut |tree, tally| {
             done += tally;
             run.count(tally);
             if tree.area() < best.area() * (1.0 - WORTH_AN_EVENT) {
@@ -245,7 +245,8 @@ impl Config {
         observer: &dyn Observer,
     ) -> (Tally, f64) {
         let began = observer.progress();
-        let tally = cool(&mut Mover::new(&self.ruin), tree, [self.cold; 2], quota, &mut rng, observer);
+        let tally =
+            cool(&mut Mover::new(&self.ruin, PROBE as f64), tree, [self.cold; 2], quota, &mut rng, observer);
         let in_time = match (began, observer.progress()) {
             (Some(began), Some(now)) => tally.work as f64 * (1.0 - now).max(0.0) / (now - began).max(1e-9),
             _ => f64::INFINITY,

@@ -104,7 +104,9 @@ impl Search for Config {
         self.ruin.check()?;
         let Self { hot, cold, work_per_object, .. } = *self;
         let descent = Descent { heat: [hot, cold], work_per_object, start: &self.start };
-        descent.search(|| Mover::new(&self.ruin), problem, seed, run)
+        let length = run.left().work as f64 / problem.boxes.len().max(1) as f64;
+        let length = length.min(work_per_object as f64);
+        descent.search(|| Mover::new(&self.ruin, length), problem, seed, run)
     }
 }
 
@@ -149,9 +151,10 @@ impl Out {
 }
 
 impl<'a> Mover<'a> {
-    pub fn new(ruin: &'a Ruin) -> Self {
-        let (starts, search, slab, out) = Default::default();
-        Self { ruin, starts, search, slab, out, work: 0 }
+    /// Of a descent of so much work per object.
+    pub fn new(ruin: &'a Ruin, length: f64) -> Self {
+        let (search, slab, out) = Default::default();
+        Self { ruin, starts: Starts::of_work(length), search, slab, out, work: 0 }
     }
 
     /// Takes subtrees of the region out, up to one level further down than the move has climbed. It always has a root.
