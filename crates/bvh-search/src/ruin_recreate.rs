@@ -64,8 +64,8 @@ pub struct Ruin {
     /// Most subtrees of a slab: there is no move if it has more. At least 1. Default 24.
     pub most: u32,
     /// The part of the moves that look for places only near, 0 to 1: in the smallest subtree with the ruined part and
-    /// more whose box holds what that has held. Further up they seldom find any: with the default, 0.6, there are a
-    /// quarter more moves in the same work.
+    /// more whose box holds what that has held. Further up they seldom find any, and there are a quarter more moves in
+    /// the same work. Default 0.6.
     pub near: f64,
     /// What temperatures are relative to. Default `saved`.
     pub scale: Scale,
@@ -104,8 +104,7 @@ impl Search for Config {
         self.ruin.check()?;
         let Self { hot, cold, work_per_object, .. } = *self;
         let descent = Descent { heat: [hot, cold], work_per_object, start: &self.start };
-        let length = run.left().work as f64 / problem.boxes.len().max(1) as f64;
-        let length = length.min(work_per_object as f64);
+        let length = work_per_object.min(run.left().work / problem.boxes.len().max(1) as u64) as f64;
         descent.search(|| Mover::new(&self.ruin, length), problem, seed, run)
     }
 }
