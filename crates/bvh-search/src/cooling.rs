@@ -102,7 +102,7 @@ pub(crate) fn anneal<M: Move>(
     }
     // Parts of the work or time: done, and for one node of work.
     let (mut part, mut rate) = (0.0, 1.0 / work as f64);
-    *tree = tree.in_preorder();
+    tree.sort_in_preorder();
     while part < 1.0 {
         let step = rate * next as f64;
         let heat = [part, part + step].map(temperature);

@@ -47,13 +47,14 @@ pub(crate) fn cool_in_pieces<M: Move>(
             let mut piece = part.take(tree);
             let rng = &mut stream(seed, first + 1 + number as u64);
             let tally = cool(&mut mover(), &mut piece, heat, share(part), rng, observer);
-            (piece.in_preorder(), tally)
+            piece.sort_in_preorder();
+            (piece, tally)
         });
         done += put_back(tree, &parts, found);
         *whole.starts() = Starts::among(starts);
     }
     done += cool(&mut whole, tree, heat, quota.less(&done), &mut rng, observer);
-    *tree = tree.in_preorder();
+    tree.sort_in_preorder();
     done
 }
 
@@ -72,7 +73,8 @@ pub(crate) fn descend_in_pieces(
         let found = each(&parts, |_, part| {
             let mut piece = part.take(tree);
             let tally = reinsertion::to_local_optimum(&mut piece, share, observer);
-            (piece.in_preorder(), tally)
+            piece.sort_in_preorder();
+            (piece, tally)
         });
         done += put_back(tree, &parts, found);
     }
@@ -180,7 +182,8 @@ mod tests {
     #[test]
     fn pieces_are_disjoint_and_putting_them_back_restores_the_tree() {
         let boxes = scatter(3000);
-        let tree = built(&muller_fellner::Config::default(), &boxes).in_preorder();
+        let mut tree = built(&muller_fellner::Config::default(), &boxes);
+        tree.sort_in_preorder();
         for most in [0.007, 0.03, 0.3, 0.99] {
             let (parts, starts) = cut(&tree, most, |_| 1.0);
             assert!(parts.windows(2).all(|pair| pair[0].root + pair[0].nodes <= pair[1].root));

@@ -177,39 +177,48 @@ impl PlaceSearch {
             if growth + item.1 >= best.cost {
                 continue;
             }
-            if below == NONE {
-                if tree.children(at).is_some() {
-                    self.stack.push((at, growth));
-                }
-            } else {
+            let mut next = (at, growth);
+            if below != NONE {
                 let other = tree.other(at, below);
                 self.visits += 1;
-                let open = try_place(tree, other, item.0, growth, best);
-                if open + item.1 < best.cost {
-                    self.stack.push((other, open));
+                next = (other, try_place(tree, other, item.0, growth, best));
+                if next.1 + item.1 >= best.cost {
+                    continue;
                 }
             }
             // Everything below, the more promising child first.
-            while let Some((at, growth)) = self.stack.pop() {
-                if growth + item.1 >= best.cost {
-                    continue;
+            loop {
+                if let Some([left, right]) = tree.children(next.0) {
+                    self.visits += 2;
+                    let mut first = (left, try_place(tree, left, item.0, next.1, best));
+                    let mut second = (right, try_place(tree, right, item.0, next.1, best));
+                    if second.1 < first.1 {
+                        std::mem::swap(&mut first, &mut second);
+                    }
+                    if second.1 + item.1 < best.cost {
+                        self.stack.push(second);
+                    }
+                    if first.1 + item.1 < best.cost {
+                        next = first;
+                        continue;
+                    }
                 }
-                let Some([left, right]) = tree.children(at) else { continue };
-                self.visits += 2;
-                let mut first = (left, try_place(tree, left, item.0, growth, best));
-                let mut second = (right, try_place(tree, right, item.0, growth, best));
-                if second.1 < first.1 {
-                    std::mem::swap(&mut first, &mut second);
-                }
-                if second.1 + item.1 < best.cost {
-                    self.stack.push(second);
-                }
-                if first.1 + item.1 < best.cost {
-                    self.stack.push(first);
-                }
+                let Some(rest) = pop(&mut self.stack, item.1, best.cost) else { break };
+                next = rest;
             }
         }
     }
+}
+
+/// The next node on the stack below which there may be a place for less than `limit`.
+#[inline(always)]
+fn pop(stack: &mut Vec<(u32, f64)>, area: f64, limit: f64) -> Option<(u32, f64)> {
+    while let Some(next) = stack.pop() {
+        if next.1 + area < limit {
+            return Some(next);
+        }
+    }
+    None
 }
 
 /// Tries the place beside a node. Returns the growth down to and with the node, infinite for a leaf.

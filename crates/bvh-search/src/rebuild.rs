@@ -88,7 +88,7 @@ impl Search for Config {
         // What a batch may take; it is not begun with less.
         let enough = BATCH * WORK_PER_OBJECT * n.min(self.objects.into());
         while run.stopped().is_none() && own.min(run.left().work) >= enough {
-            tree = tree.in_preorder();
+            tree.sort_in_preorder();
             let mut round = Tally::default();
             while round.work < n * WORK_PER_OBJECT && !run.observer().cancelled() {
                 let left = run.left().less(&round);

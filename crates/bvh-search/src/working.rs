@@ -58,11 +58,20 @@ pub(crate) struct Working {
     added: f64,
     journal: Vec<Node>,
     change: u64,
+    /// Empty: the room of the nodes before they were last sorted.
+    spare: Vec<Node>,
 }
 
 impl Default for Working {
     fn default() -> Self {
-        Self { nodes: vec![Node::ANCHOR], area: Sum::default(), added: 0.0, journal: Vec::new(), change: 0 }
+        Self {
+            nodes: vec![Node::ANCHOR],
+            area: Sum::default(),
+            added: 0.0,
+            journal: Vec::new(),
+            change: 0,
+            spare: Vec::new(),
+        }
     }
 }
 
@@ -225,23 +234,28 @@ impl Working {
         order
     }
 
-    /// The same tree with its nodes in preorder, so that neighbours in the tree are neighbours in memory. O(n).
-    pub fn in_preorder(&self) -> Self {
-        let order = self.preorder();
-        let mut new = vec![ANCHOR; self.nodes.len()];
-        order.iter().zip(1..).for_each(|(&old, at)| new[old as usize] = at);
-        let mut nodes = vec![self.nodes[0]];
-        nodes.extend(order.iter().map(|&old| self.nodes[old as usize]));
-        for node in &mut nodes {
+    /// Puts the nodes in preorder, so that neighbours in the tree are neighbours in memory. O(n).
+    pub fn sort_in_preorder(&mut self) {
+        let mut nodes = std::mem::take(&mut self.spare);
+        nodes.reserve(self.nodes.len());
+        nodes.push(Node { stamp: 0, ..self.nodes[0] });
+        // Nodes to come, each with where its parent has gone and on which side of it it is.
+        let mut stack: Vec<(u32, u32, usize)> = self.root().map(|root| (root, ANCHOR, 0)).into_iter().collect();
+        let mut area = Sum::default();
+        while let Some((old, parent, side)) = stack.pop() {
+            let (at, node) = (nodes.len() as u32, self.nodes[old as usize]);
+            nodes.push(Node { parent, stamp: 0, ..node });
+            nodes[parent as usize].children[side] = at;
             if !node.is_leaf() {
-                node.children =
-                    node.children.map(|child| if child == NONE { NONE } else { new[child as usize] });
-            }
-            if node.parent != NONE {
-                node.parent = new[node.parent as usize];
+                area.add(node.area);
+                stack.extend([(node.children[1], at, 1), (node.children[0], at, 0)]);
             }
         }
-        Self::from_nodes(nodes)
+        self.spare = std::mem::replace(&mut self.nodes, nodes);
+        self.spare.clear();
+        (self.area, self.added, self.change) = (Sum::default(), 0.0, 0);
+        self.area.add(area.value());
+        self.journal.clear();
     }
 }
 
