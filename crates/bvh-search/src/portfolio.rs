@@ -300,6 +300,7 @@ const FINISH: f64 = 10.0;
 
 /// Work per object of all descents from which on pieces pay, if there are threads for them: less is not enough for the
 /// rounds in which they are cut.
+#[cfg(feature = "rayon")]
 const WORTH_PIECES: f64 = 256.0;
 
 /// Work per object after which the rate of work is known.
