@@ -188,10 +188,11 @@ impl PlaceSearch {
             }
             // Everything below, the more promising child first.
             loop {
-                if let Some([left, right]) = tree.children(next.0) {
+                let (node, growth) = next;
+                if let Some([left, right]) = tree.children(node) {
                     self.visits += 2;
-                    let mut first = (left, try_place(tree, left, item.0, next.1, best));
-                    let mut second = (right, try_place(tree, right, item.0, next.1, best));
+                    let mut first = (left, try_place(tree, left, item.0, growth, best));
+                    let mut second = (right, try_place(tree, right, item.0, growth, best));
                     if second.1 < first.1 {
                         std::mem::swap(&mut first, &mut second);
                     }

@@ -30,15 +30,16 @@ pub(crate) enum Quick<'p> {
 /// Work per object from which on annealing ends lower.
 const MOST_WORK: u64 = 20;
 
-/// Times the sort's time from which on annealing ends lower. The division that it begins with takes 14 to 20 of them, 27
-/// where objects are sorted quickly, and half as much again when the machine is disturbed. With 35 annealing gains one
-/// percent on some scenes and loses ten on others.
+/// Times the sort's time from which on annealing ends lower, with one thread. The division that it begins with takes 14 to
+/// 20 of them, 27 where objects are sorted quickly, and half as much again when the machine is disturbed. With 35 annealing
+/// gains one percent on some scenes and loses ten on others.
 const MOST_TIME: f64 = 45.0;
 
 /// How many times as long the sort may take in memory that is used for the first time.
 const COLD: f64 = 2.5;
 
-/// Times the sort's time from which on the better of two starts is taken. Division is ahead on smooth surfaces.
+/// Times the sort's time from which on the better of two starts is taken, with one thread. Division is ahead on smooth
+/// surfaces.
 const TWO_STARTS: f64 = 28.0;
 
 /// What so many times the sort's time are enough for, without any reinsertion.
@@ -67,8 +68,7 @@ pub(crate) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<
     if let (Some(began), Some(sorted)) = (began, observer.progress()) {
         let sort = (sorted - began).max(1e-9);
         let times = (1.0 - began) / sort;
-        let [two_starts_from, annealing_from] =
-            [TWO_STARTS, MOST_TIME].map(|times| times * division_by_threads());
+        let [two_starts_from, annealing_from] = [TWO_STARTS, MOST_TIME].map(|times| times * part_by_threads());
         if times >= annealing_from
             || times >= annealing_from / COLD && (1.0 - began) / warm_sort(problem, observer)? >= annealing_from
         {
@@ -115,11 +115,16 @@ pub(crate) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<
     Ok(Some(Quick::Optimum(best, tree)))
 }
 
-/// The part of the time of one thread that a division takes: two make it in 0.58 of it, and the sort in all.
-fn division_by_threads() -> f64 {
+/// The part of one thread's times that is enough with several: two divide in 0.58 of the time of one, but do not sort any
+/// faster.
+#[cfg(feature = "rayon")]
+const SEVERAL_THREADS: f64 = 0.65;
+
+/// The part of one thread's times that is enough here.
+fn part_by_threads() -> f64 {
     #[cfg(feature = "rayon")]
     if rayon::current_num_threads() > 1 {
-        return 0.65;
+        return SEVERAL_THREADS;
     }
     1.0
 }
