@@ -10,7 +10,7 @@ use bvh_core::{Aabb, Bvh};
 use bvh_search::grasp::{self, Candidates};
 use bvh_search::{Budget, Problem, Stream, solve};
 use glam::Vec3;
-use harness::scene::Scene;
+use harness::scenes::Scene;
 use paired::{Contender, compare};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;

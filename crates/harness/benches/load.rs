@@ -11,7 +11,7 @@ mod paired;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::WideBvh;
 use bvh_core::file::{self, Origin, TreeFile};
-use harness::scene::Scene;
+use harness::scenes::Scene;
 use memmap2::Mmap;
 use paired::{Contender, compare, compare_each_after};
 use std::fs::{self, File};

@@ -12,7 +12,7 @@ mod clock;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost;
 use harness::peers::{NoSettings, Obvhs, Peer, Preset};
-use harness::scene::Scene;
+use harness::scenes::Scene;
 
 /// The part of a library's time that `best` may plan with: other programs disturb both.
 const PLANNED: f64 = 0.99;

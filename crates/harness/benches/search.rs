@@ -9,7 +9,7 @@ mod clock;
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost;
-use harness::scene::Scene;
+use harness::scenes::Scene;
 
 /// The part of the first number of threads' time that further ones have.
 const LESS_TIME: f64 = 0.6;

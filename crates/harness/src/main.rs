@@ -1,17 +1,17 @@
 //! The command line: reads arguments, calls the library, prints what it returns, sets the exit code.
 
 use clap::{Args, Parser, Subcommand};
-use harness::arguments::{input_file, input_folder, output_file, output_folder};
-use harness::bake::{BakeArgs, bake};
-use harness::execute::Extent;
-use harness::inspect::{InspectArgs, inspect};
+use harness::cli::arguments::{input_file, input_folder, output_file, output_folder};
+use harness::cli::bake::{BakeArgs, bake};
+use harness::cli::inspect::{InspectArgs, inspect};
 use harness::render::command as render;
-use harness::scene::{FETCHED, SPHERES, Scene, fetched_path};
+use harness::run::execute::Extent;
+use harness::run::merge::{self, Shard};
+use harness::scenes::standin::STAND_INS;
+use harness::scenes::{FETCHED, SPHERES, Scene, fetched_path};
 use harness::spec::{Experiment, Overrides};
-use harness::standin::STAND_INS;
-use harness::suite::child;
-use harness::sweep::{self, Shard};
-use harness::{Error, check, execute, explain, html, reference};
+use harness::stress::child;
+use harness::{Error, cli::explain, report::page, run::check, run::execute, run::reference};
 use std::fmt::Arguments;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -254,13 +254,13 @@ fn check(args: &RunArgs, experiment: &Experiment) -> Result<usize, Error> {
 }
 
 fn write_page(results: &Path, out: &Path) -> Result<(), Error> {
-    let experiments = html::write(results, out)?;
+    let experiments = page::write(results, out)?;
     say(format_args!("{experiments} experiments: {}", out.display()));
     Ok(())
 }
 
 fn merge(folders: &[PathBuf], out: &Path) -> Result<(), Error> {
-    for (name, text) in sweep::merge(folders, out)? {
+    for (name, text) in merge::merge(folders, out)? {
         say(format_args!("{text}Results: {}", out.join(name).display()));
     }
     Ok(())

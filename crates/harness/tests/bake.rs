@@ -2,8 +2,8 @@
 
 mod support;
 
-use harness::scene::Scene;
-use harness::tree_file::load_tree;
+use harness::files::load_tree;
+use harness::scenes::Scene;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;

@@ -22,11 +22,11 @@
 use bvh_core::{Aabb, cost};
 use bvh_search::{Method, Outcome, exact};
 use glam::Vec3;
-use harness::suite::examine::{ROUNDING, check_outcome, check_scale, run};
-use harness::suite::transform::{
+use harness::stress::examine::{ROUNDING, check_outcome, check_scale, run};
+use harness::stress::transform::{
     distinct_centres, mirrored, same_topology, scale_range, shuffled, translated, with_axes,
 };
-use harness::suite::{EXACT_OBJECTS, methods};
+use harness::stress::{EXACT_OBJECTS, methods};
 use proptest::prelude::*;
 
 /// Nodes per object that a search may make or visit.

@@ -1,7 +1,7 @@
 //! OBJ files as people write them, and as nobody should: what is read, and what is refused in which line.
 
 use glam::Vec3;
-use harness::obj::{Mesh, ObjError, load, parse};
+use harness::scenes::obj::{Mesh, ObjError, load, parse};
 use proptest::prelude::*;
 use std::path::Path;
 

@@ -1,6 +1,6 @@
 //! The committed comparisons with the paper: every difference has a reason.
 
-use harness::record::{PaperRow, read};
+use harness::run::rows::{PaperRow, read};
 use std::path::Path;
 
 #[test]

@@ -84,7 +84,7 @@ document = { 'brute force' = 32.77, 'KD-tree' = 1.8 }
     assert!(text(&output.stdout).contains("same picture"), "{}", text(&output.stdout));
     let results = folder.path().join("results/spec");
     let mut reader = csv::Reader::from_path(results.join("renders.csv")).unwrap();
-    let rows: Vec<harness::record::RenderRow> = reader.deserialize().map(Result::unwrap).collect();
+    let rows: Vec<harness::run::rows::RenderRow> = reader.deserialize().map(Result::unwrap).collect();
     assert_eq!(rows.len(), 2 * (2 + 2 * 2));
     for scene in rows.chunks(6) {
         assert!(scene.iter().all(|row| row.picture == scene[0].picture && row.rays == scene[0].rays));

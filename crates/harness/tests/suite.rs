@@ -2,7 +2,7 @@
 
 use bvh_core::{cost::Objective, validate};
 use bvh_search::{Budget, Method, Problem, StopReason, solve};
-use harness::suite::{
+use harness::stress::{
     self, CASES, Case, Cell, Check, EXACT_OBJECTS, PARTS, Size, examine, is_builder, scenes, tracing,
 };
 use std::collections::BTreeSet;
@@ -55,7 +55,7 @@ fn every_scene_has_the_size_it_is_asked_for() {
 /// The methods of one half, so that two threads share them.
 fn check_methods(half: usize) {
     let mut found = Vec::new();
-    for (label, method) in suite::methods().into_iter().skip(half).step_by(2) {
+    for (label, method) in stress::methods().into_iter().skip(half).step_by(2) {
         for case in &CASES {
             found.extend(broken(case, &label, case.of_method(&method, Size::Few, WORK)));
         }
@@ -136,7 +136,7 @@ fn the_rays_of_the_suite_hit_miss_and_cover_every_kind() {
 
 #[test]
 fn every_objective_is_what_its_method_reports() {
-    for (label, method) in suite::methods() {
+    for (label, method) in stress::methods() {
         let n = if let Method::Exact(_) = method { EXACT_OBJECTS } else { 60 };
         for make in [scenes::uniform, scenes::identical_points, scenes::giant_over_small] {
             let boxes = scenes::boxes(&make(n));
@@ -162,7 +162,7 @@ fn a_cancelled_method_says_so() {
         }
     }
     let boxes = scenes::boxes(&scenes::uniform(EXACT_OBJECTS));
-    for (label, method) in suite::methods() {
+    for (label, method) in stress::methods() {
         let cancelled = solve(&method, &Problem::new(&boxes), 1, Budget::default(), &Impatient).unwrap();
         assert_eq!(cancelled.stop, StopReason::Cancelled, "{label}");
     }

@@ -10,7 +10,7 @@ use bvh_core::{
     cost::SahConstants, nearest_hit, nearest_hit_of_all,
 };
 use glam::Vec3;
-use harness::scene::{Primitives, Scene};
+use harness::scenes::{Primitives, Scene};
 use rayon::prelude::*;
 use support::{Random, ball, grid_box, rays, soup};
 

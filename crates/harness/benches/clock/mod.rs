@@ -2,7 +2,7 @@
 
 use bvh_core::{cost, validate};
 use bvh_search::{Budget, Observer, Problem, portfolio, solve};
-use harness::scene::Scene;
+use harness::scenes::Scene;
 use std::time::Instant;
 
 /// From now on, so many seconds.

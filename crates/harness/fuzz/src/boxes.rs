@@ -5,8 +5,8 @@ use bvh_build::{Builder, kd_tree, muller_fellner};
 use bvh_core::cost::{self, SahConstants};
 use bvh_core::{Aabb, Bvh, check_boxes, collapse_leaves, file, validate};
 use bvh_search::{Budget, Method, Problem, SearchError, lower_bound, optimize, portfolio, solve};
-use harness::suite::EXACT_OBJECTS;
-use harness::suite::examine::{ROUNDING, check_outcome};
+use harness::stress::EXACT_OBJECTS;
+use harness::stress::examine::{ROUNDING, check_outcome};
 
 /// Most boxes of one input.
 const MOST: usize = 20;

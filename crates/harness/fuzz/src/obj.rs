@@ -1,6 +1,6 @@
 //! OBJ files of any bytes.
 
-use harness::obj::parse;
+use harness::scenes::obj::parse;
 use std::fmt::Write;
 use std::path::Path;
 

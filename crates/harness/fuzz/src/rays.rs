@@ -4,7 +4,7 @@ use super::bytes::Bytes;
 use bvh_build::{Builder, goldsmith_salmon, kd_tree, muller_fellner};
 use bvh_core::{Aabb, Hit, Ray, Sphere, Triangle, any_hit, clip_to_box, nearest_hit, nearest_hit_of_all};
 use glam::Vec3;
-use harness::suite::tracing::{TRAVERSALS, check};
+use harness::stress::tracing::{TRAVERSALS, check};
 
 /// The bytes: how to read the rest, the number of triangles, an exponent, then triangles, then rays.
 pub fn rays(bytes: &[u8]) {

@@ -1,8 +1,8 @@
 //! The crate `bvh`.
 
 use super::{Built, Raw, Theirs, convert};
-use crate::rays::Query;
-use crate::tracing::{Contender, timed};
+use crate::measure::rays::Query;
+use crate::measure::{Contender, timed};
 use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
 use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh as TheirBvh, BvhNode};

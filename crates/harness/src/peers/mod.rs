@@ -10,8 +10,8 @@ mod obvhs;
 #[cfg(feature = "peer-tinybvh")]
 mod tinybvh;
 
-use crate::scene::Scene;
-use crate::tracing::Contender;
+use crate::measure::Contender;
+use crate::scenes::Scene;
 use bvh_core::Bvh;
 #[cfg(feature = "peers")]
 use bvh_core::{Aabb, Node, Ray};
@@ -207,7 +207,7 @@ fn convert(boxes: &[Aabb], node: impl Fn(usize) -> (Aabb, Theirs)) -> Bvh {
 #[cfg(all(test, feature = "peers"))]
 mod tests {
     use super::*;
-    use crate::tracing::{self, Kind};
+    use crate::measure::{self, Kind};
     use bvh_core::validate;
 
     fn all() -> Vec<Peer> {
@@ -241,13 +241,13 @@ mod tests {
     fn other_libraries_find_nearly_all_hits_and_nothing_else() {
         let scene = Scene::load("escher:2000").unwrap();
         let tree = Peer::Bvh(NoSettings {}).build(&scene).unwrap().tree;
-        let rays = tracing::rays(Kind::Incoherent, 4000, &scene, &tree, &Default::default(), 1);
-        let reference = tracing::reference(Kind::Incoherent, &rays, &scene, &tree);
+        let rays = measure::rays(Kind::Incoherent, 4000, &scene, &tree, &Default::default(), 1);
+        let reference = measure::reference(Kind::Incoherent, &rays, &scene, &tree);
         for peer in all() {
             for contender in peer.contenders(&scene).unwrap() {
                 let mut hits = vec![None; rays.len()];
                 (contender.trace)(Kind::Incoherent.query(), &rays, &mut hits);
-                let found = tracing::disagreements(&reference, &hits, &tree, &rays);
+                let found = measure::disagreements(&reference, &hits, &tree, &rays);
                 assert!(found.missed + found.false_hits + found.other < 20, "{peer:?}: {found:?}");
             }
         }

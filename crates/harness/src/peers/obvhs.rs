@@ -1,8 +1,8 @@
 //! The crate `obvhs`.
 
 use super::{Built, Obvhs, Preset, Raw, Theirs, convert};
-use crate::rays::Query;
-use crate::tracing::{Contender, timed};
+use crate::measure::rays::Query;
+use crate::measure::{Contender, timed};
 use ::obvhs::bvh2::{Bvh2, builder as binary};
 use ::obvhs::cwbvh::builder as wide;
 use ::obvhs::ray::{Ray as TheirRay, RayHit};

@@ -1,8 +1,8 @@
 //! The crate `tinybvh-rs`, a wrapper of the C++ library tinybvh.
 
 use super::{Built, Theirs, convert};
-use crate::rays::Query;
-use crate::tracing::{Contender, timed};
+use crate::measure::rays::Query;
+use crate::measure::{Contender, timed};
 use bvh_core::{Aabb, Hit, Ray};
 use glam::Vec3;
 use std::time::Instant;

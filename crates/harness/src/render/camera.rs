@@ -1,6 +1,6 @@
 //! Where the eye is: a view given or found, and the rays through its pixels.
 
-use crate::scene::{Primitives, Scene};
+use crate::scenes::{Primitives, Scene};
 use bvh_core::Aabb;
 use glam::DVec3;
 

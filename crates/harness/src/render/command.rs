@@ -6,7 +6,7 @@ use super::film::Film;
 use super::tracer::{Structure, Tracer};
 use super::{heat, image};
 use crate::Error;
-use crate::scene::Scene;
+use crate::scenes::Scene;
 use bvh_core::Aabb;
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};

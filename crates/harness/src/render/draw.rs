@@ -4,7 +4,7 @@ use super::camera::{self, Camera, View};
 use super::film::{Film, Tile};
 use super::light::{self, Light, World};
 use super::tracer::Tracer;
-use crate::scene::Scene;
+use crate::scenes::Scene;
 use bvh_core::Aabb;
 use glam::DVec3;
 use rayon::prelude::*;

@@ -3,9 +3,9 @@
 use super::draw::{Options, render};
 use super::film::Film;
 use super::tracer::{Structure, Tracer};
-use crate::record::{RenderRow, RenderTimeRow};
-use crate::scene::{Scene, fnv1a};
-use crate::{Error, record::RunRow};
+use crate::run::rows::{RenderRow, RenderTimeRow};
+use crate::scenes::{Scene, fnv1a};
+use crate::{Error, run::rows::RunRow};
 use bvh_core::Bvh;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;

@@ -1,7 +1,7 @@
 //! The heat map: how many tests each pixel took, as a colour, with a key below.
 
 use super::film::Film;
-use crate::{Error, chart};
+use crate::{Error, figures};
 use resvg::tiny_skia::Pixmap;
 
 /// 'inferno' of matplotlib (van der Walt & Smith 2015; CC0), every sixteenth part: evenly brighter to the eye.
@@ -52,8 +52,8 @@ pub fn map(film: &Film, rays_per_pixel: u32) -> Result<Vec<[u8; 3]>, Error> {
     let range = range(film, rays_per_pixel);
     let top = range.top.max(f64::MIN_POSITIVE) * f64::from(rays_per_pixel);
     let mut pixels: Vec<[u8; 3]> = film.tests.iter().map(|&tests| colour(tests as f64 / top)).collect();
-    let key = Pixmap::decode_png(&chart::png(&key(film.width, &range))?)
-        .map_err(|error| chart::ChartError::Png { reason: error.to_string() })?;
+    let key = Pixmap::decode_png(&figures::png(&key(film.width, &range))?)
+        .map_err(|error| figures::ChartError::Png { reason: error.to_string() })?;
     for row in key.pixels().chunks(key.width() as usize) {
         let own = row.iter().map(|pixel| [pixel.red(), pixel.green(), pixel.blue()]);
         pixels.extend(own.take(film.width as usize));

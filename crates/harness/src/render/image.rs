@@ -1,6 +1,6 @@
 //! From light to the bytes of a PNG file.
 
-use crate::{Error, store};
+use crate::{Error, run::store};
 use glam::DVec3;
 use std::path::Path;
 

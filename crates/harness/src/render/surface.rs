@@ -1,7 +1,7 @@
 //! What a ray has met: where, which way it faces, and what it looks like.
 
 use super::tracer::Tracer;
-use crate::scene::Primitives;
+use crate::scenes::Primitives;
 use bvh_core::{Aabb, Hit};
 use glam::DVec3;
 

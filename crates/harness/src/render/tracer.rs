@@ -1,8 +1,8 @@
 //! The structures a picture can be traced with, behind two questions: what is hit first, and is anything hit.
 
 use crate::Error;
-use crate::scene::{Primitives, Scene};
-use crate::tree_file::load_tree;
+use crate::files::load_tree;
+use crate::scenes::{Primitives, Scene};
 use bvh_build::kd_tree::KdTree;
 use bvh_build::{BuildError, Builder, kd_tree, muller_fellner};
 use bvh_core::{

@@ -4,7 +4,7 @@ use super::progress::{Along, Series, series};
 use super::statistics::quantile;
 use super::{Output, Rows, looks, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Panel};
+use crate::figures::{Axis, Figure, Layer, Panel};
 use serde::{Deserialize, Serialize};
 
 /// Error against run time.

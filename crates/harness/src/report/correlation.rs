@@ -3,8 +3,8 @@
 use super::statistics::{pearson, range, spearman};
 use super::{Output, Rows, display_name, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Panel};
-use crate::record::{RayRow, RunRow, to_bytes};
+use crate::figures::{Axis, Figure, Layer, Panel};
+use crate::run::rows::{RayRow, RunRow, to_bytes};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -7,7 +7,7 @@ use super::progress::{Along, longest, reached, series};
 use super::target::Target;
 use super::{Output, Rows, looks, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Panel};
+use crate::figures::{Axis, Figure, Layer, Panel};
 use serde::{Deserialize, Serialize};
 
 /// The aggregate distribution of run times.

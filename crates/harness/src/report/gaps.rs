@@ -3,8 +3,8 @@
 use super::statistics::quantile;
 use super::{Output, Rows, looks, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Panel};
-use crate::record::to_bytes;
+use crate::figures::{Axis, Figure, Layer, Panel};
+use crate::run::rows::to_bytes;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

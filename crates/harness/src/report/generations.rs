@@ -3,8 +3,8 @@
 use super::statistics::{expected_best_of, median};
 use super::{Output, Rows, display_name};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Look, Panel};
-use crate::record::{PaperRow, to_bytes};
+use crate::figures::{Axis, Figure, Layer, Look, Panel};
+use crate::run::rows::{PaperRow, to_bytes};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -108,7 +108,7 @@ impl Config {
         scene: &str,
         shown: &str,
         rows: &Rows,
-        runs: &[Vec<&crate::record::HistoryRow>],
+        runs: &[Vec<&crate::run::rows::HistoryRow>],
         pool: &[f64],
         output: &mut Output,
     ) {
@@ -196,7 +196,7 @@ impl Config {
 const PAPER: &str = "paper, range of final costs over runs";
 
 /// The run whose final cost is the median, the lower of two.
-fn middle_run(runs: &[Vec<&crate::record::HistoryRow>]) -> Option<usize> {
+fn middle_run(runs: &[Vec<&crate::run::rows::HistoryRow>]) -> Option<usize> {
     let mut order: Vec<usize> = (0..runs.len()).filter(|&run| !runs[run].is_empty()).collect();
     let last = |run: usize| runs[run].last().map_or(f64::INFINITY, |row| row.incumbent);
     order.sort_by(|&a, &b| last(a).total_cmp(&last(b)));

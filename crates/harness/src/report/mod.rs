@@ -11,6 +11,7 @@ pub mod gaps;
 pub mod generations;
 pub mod numbers;
 pub mod omissions;
+pub mod page;
 pub mod pareto;
 pub mod peers;
 pub mod pictures;
@@ -26,12 +27,12 @@ pub mod times;
 pub mod traversal;
 pub mod trials;
 
-use crate::record::{
+use crate::run::rows::{
     self, BoundRow, ClockRow, HistoryRow, PaperRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row,
     RunRow, TimingRow, TraceRow, TraceTimeRow,
 };
-use crate::store::Store;
-use crate::{Error, chart};
+use crate::run::store::Store;
+use crate::{Error, figures};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -176,17 +177,17 @@ impl Rows {
     /// Reads the CSV files in an experiment's folder.
     pub fn read(folder: &Path) -> Result<Self, Error> {
         Ok(Self {
-            runs: record::read(&folder.join(RunRow::FILE))?,
-            history: record::read_if_any(folder)?,
-            timing: record::read_if_any(folder)?,
-            rays: record::read_if_any(folder)?,
-            bounds: record::read_if_any(folder)?,
-            clock: record::read_if_any(folder)?,
-            references: record::read_if_any(folder)?,
-            renders: record::read_if_any(folder)?,
-            render_times: record::read_if_any(folder)?,
-            traces: record::read_if_any(folder)?,
-            trace_times: record::read_if_any(folder)?,
+            runs: rows::read(&folder.join(RunRow::FILE))?,
+            history: rows::read_if_any(folder)?,
+            timing: rows::read_if_any(folder)?,
+            rays: rows::read_if_any(folder)?,
+            bounds: rows::read_if_any(folder)?,
+            clock: rows::read_if_any(folder)?,
+            references: rows::read_if_any(folder)?,
+            renders: rows::read_if_any(folder)?,
+            render_times: rows::read_if_any(folder)?,
+            traces: rows::read_if_any(folder)?,
+            trace_times: rows::read_if_any(folder)?,
         })
     }
 
@@ -250,7 +251,7 @@ pub struct Output {
     /// Further CSV files: name without extension, and bytes. Names that begin with `timing` hold seconds.
     pub csv: Vec<(String, Vec<u8>)>,
     /// Figures: name without extension, and what they show.
-    pub figures: Vec<(String, chart::Figure)>,
+    pub figures: Vec<(String, figures::Figure)>,
     /// Comparisons with the paper.
     pub paper: Vec<PaperRow>,
     /// For the terminal.
@@ -275,15 +276,15 @@ pub fn write_all(reports: &[Report], store: &Store) -> Result<String, Error> {
             store.write(&format!("{name}.csv"), bytes)?;
         }
         for (name, figure) in &output.figures {
-            let svg = chart::svg(figure)?;
+            let svg = figures::svg(figure)?;
             store.write(&format!("{name}.svg"), svg.as_bytes())?;
-            store.write(&format!("{name}.png"), &chart::png(&svg)?)?;
+            store.write(&format!("{name}.png"), &figures::png(&svg)?)?;
         }
         paper.extend(output.paper);
         text += &output.text;
     }
     if !paper.is_empty() {
-        store.write("paper.csv", &record::to_bytes(&paper, Path::new("paper.csv"))?)?;
+        store.write("paper.csv", &rows::to_bytes(&paper, Path::new("paper.csv"))?)?;
     }
     Ok(text)
 }
@@ -305,8 +306,8 @@ pub fn verdict(paper: f64, ours: f64, tolerance: f64) -> String {
 }
 
 /// Every method with a look of its own, the same in all panels.
-fn looks(methods: &[String]) -> Vec<(String, chart::Look)> {
-    methods.iter().cloned().zip((0..).map(chart::Look::Slot)).collect()
+fn looks(methods: &[String]) -> Vec<(String, figures::Look)> {
+    methods.iter().cloned().zip((0..).map(figures::Look::Slot)).collect()
 }
 
 /// An empty table for the terminal.

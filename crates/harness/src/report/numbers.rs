@@ -5,8 +5,8 @@ use super::progress::{Along, longest, series};
 use super::statistics::{median, primal_integral, quantile};
 use super::{Output, Rows, text_table};
 use crate::Error;
-use crate::record::to_bytes;
-use crate::reference::is_optimum;
+use crate::run::reference::is_optimum;
+use crate::run::rows::to_bytes;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

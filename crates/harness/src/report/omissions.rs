@@ -3,8 +3,8 @@
 use super::statistics::quantile;
 use super::{Output, Rows, display_name, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Panel};
-use crate::record::to_bytes;
+use crate::figures::{Axis, Figure, Layer, Panel};
+use crate::run::rows::to_bytes;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -127,7 +127,7 @@ impl Config {
 impl Pair {
     fn compare<'a>(&'a self, rows: &Rows, scene: &'a str) -> Result<Compared<'a>, Error> {
         let pairs: Vec<_> = rows.runs_of(scene, &self.out).zip(rows.runs_of(scene, &self.kept)).collect();
-        let same = |(out, kept): &(&crate::record::RunRow, &crate::record::RunRow)| {
+        let same = |(out, kept): &(&crate::run::rows::RunRow, &crate::run::rows::RunRow)| {
             out.cost.to_bits() == kept.cost.to_bits()
         };
         if let Some((out, kept)) =
@@ -139,7 +139,7 @@ impl Pair {
             });
         }
         let ratio = |out: f64, kept: f64| if kept > 0.0 { out / kept } else { 1.0 };
-        let work = |side: fn(&(&crate::record::RunRow, &crate::record::RunRow)) -> u64| {
+        let work = |side: fn(&(&crate::run::rows::RunRow, &crate::run::rows::RunRow)) -> u64| {
             pairs.iter().map(side).sum::<u64>() as f64
         };
         Ok(Compared {

@@ -4,8 +4,8 @@ use super::peers::{build_seconds, fastest};
 use super::traversal::distinct;
 use super::{Output, Rows, display_name, over};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Panel};
-use crate::record::to_bytes;
+use crate::figures::{Axis, Figure, Layer, Panel};
+use crate::run::rows::to_bytes;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -4,7 +4,7 @@ use super::statistics::{minimum, range};
 use super::traversal::distinct;
 use super::{Output, Rows, display_name, over, text_table};
 use crate::Error;
-use crate::record::{TraceRow, to_bytes};
+use crate::run::rows::{TraceRow, to_bytes};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -4,9 +4,9 @@
 use super::statistics::median;
 use super::{Output, Rows, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Look, Panel};
-use crate::record::{RenderRow, to_bytes};
+use crate::figures::{Axis, Figure, Layer, Look, Panel};
 use crate::render::experiment::BASELINES;
+use crate::run::rows::{RenderRow, to_bytes};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -5,7 +5,7 @@ use super::progress::{Along, median_reached, series};
 use super::target::Target;
 use super::{Output, Rows, looks};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Panel};
+use crate::figures::{Axis, Figure, Layer, Panel};
 use serde::{Deserialize, Serialize};
 
 /// A performance profile. A problem is a scene with a target.

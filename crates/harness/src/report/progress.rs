@@ -3,7 +3,7 @@
 use super::Rows;
 use super::statistics::median;
 use crate::Error;
-use crate::record::to_bytes;
+use crate::run::rows::to_bytes;
 use serde::Serialize;
 use std::path::Path;
 

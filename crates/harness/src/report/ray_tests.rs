@@ -3,8 +3,8 @@
 use super::statistics::{median, range};
 use super::{Output, Rows, display_name, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Look, Panel};
-use crate::record::{PaperRow, RayRow, to_bytes};
+use crate::figures::{Axis, Figure, Layer, Look, Panel};
+use crate::run::rows::{PaperRow, RayRow, to_bytes};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -81,7 +81,7 @@ impl Config {
     ) -> Option<Row<'a>> {
         let first = middle_run(rows, scene, self.methods.first()?, family, query)?;
         let own = middle_run(rows, scene, method, family, query)?;
-        let same_run = |run: &&crate::record::RunRow| {
+        let same_run = |run: &&crate::run::rows::RunRow| {
             run.scene == scene && run.method == method && run.repetition == own.repetition
         };
         let paper = (family == "inside" && query == "any").then(|| self.paper.get(scene)).flatten();

@@ -8,7 +8,7 @@ use super::statistics::time_to_target::ShiftedExponential;
 use super::target::Target;
 use super::{Output, Rows, looks, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Look, Panel};
+use crate::figures::{Axis, Figure, Layer, Look, Panel};
 use serde::{Deserialize, Serialize};
 
 /// Run-time distributions.

@@ -4,7 +4,7 @@ use super::statistics::median;
 use super::statistics::rank_tests::{Test, a12, holm, mann_whitney, wilcoxon_signed_rank};
 use super::{Output, Rows, text_table};
 use crate::Error;
-use crate::record::to_bytes;
+use crate::run::rows::to_bytes;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

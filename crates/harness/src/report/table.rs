@@ -3,8 +3,8 @@
 use super::statistics::{expected_best_of, median, minimum, range};
 use super::{Output, Rows, display_name, over, text_table, verdict};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Panel};
-use crate::record::{PaperRow, to_bytes};
+use crate::figures::{Axis, Figure, Layer, Panel};
+use crate::run::rows::{PaperRow, to_bytes};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -3,8 +3,8 @@
 use super::statistics::{median, quantile, range};
 use super::{Output, Rows, display_name, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Panel};
-use crate::record::to_bytes;
+use crate::figures::{Axis, Figure, Layer, Panel};
+use crate::run::rows::to_bytes;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -3,8 +3,8 @@
 use super::statistics::{pearson, quantile, range, spearman};
 use super::{Output, Rows, display_name, over, text_table};
 use crate::Error;
-use crate::chart::{Axis, Figure, Layer, Panel};
-use crate::record::{RunRow, TraceRow, to_bytes};
+use crate::figures::{Axis, Figure, Layer, Panel};
+use crate::run::rows::{RunRow, TraceRow, to_bytes};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

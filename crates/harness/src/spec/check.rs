@@ -2,7 +2,7 @@
 
 use super::{Contestant, Experiment, Labelled, ranges};
 use crate::report::Report;
-use crate::{part, suite};
+use crate::{scenes::subset, stress};
 use bvh_search::{Budget, Method, Problem, solve};
 use std::collections::HashSet;
 
@@ -23,13 +23,13 @@ impl Experiment {
     /// Their names; whether they are there is found when they are loaded.
     fn check_scenes(&self) -> Result<(), String> {
         if self.suite.is_some() {
-            if let Some(unknown) = self.scenes.iter().find(|id| suite::examine::case(id).is_none()) {
+            if let Some(unknown) = self.scenes.iter().find(|id| stress::examine::case(id).is_none()) {
                 return Err(format!("scene {unknown} is no case of the suite; accepted: S01 to S45"));
             }
         } else if self.scenes.is_empty() {
             return Err("scenes is empty; accepted: at least one name or path".into());
         }
-        match self.scenes.iter().find(|name| part::names(name) == 0) {
+        match self.scenes.iter().find(|name| subset::names(name) == 0) {
             Some(none) => Err(format!("scenes: {none:?} ends before it begins; accepted: A..B with A up to B")),
             None => Ok(()),
         }
@@ -37,7 +37,7 @@ impl Experiment {
 
     /// That there are some, and not too many.
     pub(crate) fn check_runs(&self) -> Result<(), String> {
-        let scenes = self.scenes.iter().map(|name| part::names(name)).fold(0, u64::saturating_add);
+        let scenes = self.scenes.iter().map(|name| subset::names(name)).fold(0, u64::saturating_add);
         let runs =
             [self.methods.len() as u64, self.repetitions.into()].into_iter().fold(scenes, u64::saturating_mul);
         if runs > MOST_RUNS {

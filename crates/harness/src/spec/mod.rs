@@ -4,13 +4,14 @@
 //! that of numbers, `method` one entry of `methods`.
 
 mod check;
+mod culprit;
 mod method;
 mod ranges;
 mod read;
 
 use crate::report::Report;
-use crate::scene::{Scene, fnv1a};
-use crate::{Error, part, rays, render, suite, tracing};
+use crate::scenes::{Scene, fnv1a};
+use crate::{Error, measure, measure::rays, render, scenes::subset, stress};
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, exact};
 pub use method::{Contestant, Labelled};
@@ -32,7 +33,7 @@ pub struct Experiment {
     pub question: String,
     /// A measurement over the suite of stiff cases, in place of runs on scenes. Default none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub suite: Option<suite::Measure>,
+    pub suite: Option<stress::Measure>,
     /// Names or paths of the scenes; `A..B` after a colon stands for all numbers from A to B. With `suite`, names of
     /// cases, none for all.
     #[serde(default)]
@@ -72,7 +73,7 @@ pub struct Experiment {
     pub render: Option<render::experiment::Config>,
     /// Rays traced through the tree of every method's first run, in all layouts, in turns. Default none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tracing: Option<tracing::Config>,
+    pub tracing: Option<measure::Config>,
     /// Tables and figures made from the rows. Default none.
     #[serde(default)]
     pub reports: Vec<Report>,
@@ -85,7 +86,7 @@ fn one<T: From<u8>>() -> T {
 impl Experiment {
     /// Loads the scenes, those optional ones that are there included. Returns them and the names of those left out.
     pub fn load_scenes(&self) -> Result<(Vec<Scene>, Vec<String>), Error> {
-        let names = self.scenes.iter().flat_map(|name| part::expand(name));
+        let names = self.scenes.iter().flat_map(|name| subset::expand(name));
         let mut scenes = names.map(|name| Scene::load(&name)).collect::<Result<Vec<_>, _>>()?;
         let mut left_out = Vec::new();
         for name in &self.optional_scenes {

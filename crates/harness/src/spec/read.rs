@@ -1,7 +1,7 @@
 //! From a spec's text to an [`Experiment`]: what the command line changes, and which key is at fault.
 
 use super::{Contestant, Experiment, Labelled};
-use crate::{Error, culprit};
+use crate::{Error, spec::culprit};
 use bvh_search::Method;
 use serde::Deserialize;
 use std::path::Path;

@@ -6,9 +6,9 @@ use super::exact_area::{half_area, internal_area, ratio};
 use super::scenes;
 use super::transform::scaled;
 use crate::Error;
-use crate::chart::{self, Axis, Figure, Layer, Panel};
-use crate::record::to_bytes;
-use crate::store::Store;
+use crate::figures::{self, Axis, Figure, Layer, Panel};
+use crate::run::rows::to_bytes;
+use crate::run::store::Store;
 use bvh_core::{Aabb, Bvh, Node};
 use num_bigint::{BigInt, BigUint};
 use num_traits::Zero;
@@ -248,9 +248,9 @@ impl Config {
         }
         store.write("precision.csv", &to_bytes(&rows, Path::new("precision.csv"))?)?;
         store.write("timing_precision.csv", &to_bytes(&timing, Path::new("timing_precision.csv"))?)?;
-        let svg = chart::svg(&figure(&rows, &timing))?;
+        let svg = figures::svg(&figure(&rows, &timing))?;
         store.write("precision.svg", svg.as_bytes())?;
-        store.write("precision.png", &chart::png(&svg)?)?;
+        store.write("precision.png", &figures::png(&svg)?)?;
         Ok(text(&rows))
     }
 

@@ -8,10 +8,10 @@
 //! Only binary trees with one object per leaf count: wider nodes and leaves would make every cost beatable.
 
 use crate::Error;
-use crate::execute::{LoadedScene, Resolved};
-use crate::record::{BoundRow, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
 use crate::report::Report;
-use crate::store::{Store, write_whole};
+use crate::run::execute::{LoadedScene, Resolved};
+use crate::run::rows::{BoundRow, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
+use crate::run::store::{Store, write_whole};
 use bvh_core::cost::Objective;
 use bvh_search::exact;
 use std::fs::{self, File};

@@ -3,8 +3,8 @@
 //! Ng & Trifonov 2003, section 4: random rays from inside the root's box, any hit ahead of the origin ends a ray. Lines
 //! through the whole box, all of whose boxes are visited, are what the surface area costs assume.
 
-use crate::record::RayRow;
-use crate::scene::{Primitives, Scene};
+use crate::run::rows::RayRow;
+use crate::scenes::{Primitives, Scene};
 use bvh_core::{Aabb, Bvh, Ray, Shear, TestCounts, Triangle, any_hit, nearest_hit};
 use bvh_search::Stream;
 use glam::DVec3;

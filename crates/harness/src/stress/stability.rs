@@ -3,10 +3,10 @@
 use super::examine::Examined;
 use super::{CASES, Case, Cell, PARTS, SceneCase, Size, child, is_builder, tracing};
 use crate::Error;
-use crate::chart::{self, HeatMap, Key};
-use crate::record::{read, to_bytes};
+use crate::figures::{self, HeatMap, Key};
+use crate::run::rows::{read, to_bytes};
+use crate::run::store::Store;
 use crate::spec::{Contestant, Labelled};
-use crate::store::Store;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Duration;
@@ -220,7 +220,7 @@ fn report(store: &Store) -> Result<String, Error> {
     let (scenes, columns) = (names(|row| &row.scene), names(|row| &row.method));
     let cell = |scene: &String, column: &String| {
         let row = rows.iter().find(|row| (&row.scene, &row.method) == (scene, column));
-        row.map_or(chart::Cell { value: f64::NAN, text: String::new() }, |row| chart::Cell {
+        row.map_or(figures::Cell { value: f64::NAN, text: String::new() }, |row| figures::Cell {
             value: f64::from(row.outcome as u8),
             text: row.text(),
         })
@@ -239,9 +239,9 @@ fn report(store: &Store) -> Result<String, Error> {
         cells,
         key: Key::Classes(CLASSES.map(String::from).into()),
     };
-    let svg = chart::heatmap_svg(&map)?;
+    let svg = figures::heatmap_svg(&map)?;
     store.write("stability.svg", svg.as_bytes())?;
-    store.write("stability.png", &chart::png(&svg)?)?;
+    store.write("stability.png", &figures::png(&svg)?)?;
     let count = |class| own.iter().filter(|row| row.outcome == class).count();
     let worst = own.iter().filter_map(|row| row.relative_error).fold(0.0, f64::max);
     let mut text = format!(

@@ -1,15 +1,15 @@
 //! Carries out the runs of an experiment: in parallel or one by one, with progress, until done or interrupted.
 
-use crate::job::{Job, Watch, base_cost, perform};
-use crate::provenance::Provenance;
-use crate::record::to_bytes;
 use crate::report;
-use crate::scene::Scene;
+use crate::run::job::{Job, Watch, base_cost, perform};
+use crate::run::merge::Shard;
+use crate::run::provenance::Provenance;
+use crate::run::rows::to_bytes;
+use crate::run::store::Store;
+use crate::scenes::Scene;
 use crate::spec::{Contestant, Experiment, Labelled};
-use crate::store::Store;
-use crate::suite::Measure;
-use crate::sweep::Shard;
-use crate::{Error, reference, store, tracing};
+use crate::stress::Measure;
+use crate::{Error, measure, run::reference, run::store};
 use bvh_core::Bvh;
 use bvh_search::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -35,7 +35,7 @@ pub struct Summary {
 pub struct Extent {
     /// Keep the finished runs of an interrupted experiment.
     pub resume: bool,
-    /// Do these runs only, and leave them to be [merged](crate::sweep::merge).
+    /// Do these runs only, and leave them to be [merged](crate::run::merge::merge).
     pub shard: Option<Shard>,
 }
 
@@ -215,7 +215,7 @@ fn over_suite(
 /// experiment are made again.
 fn trace(
     experiment: &Experiment,
-    config: &tracing::Config,
+    config: &measure::Config,
     jobs: &[Job],
     mut trees: BTreeMap<usize, Bvh>,
     watch: &Watch,
@@ -231,16 +231,16 @@ fn trace(
     let first_runs: Vec<(&Job, &Bvh)> = trees.iter().map(|(&index, tree)| (&jobs[index], tree)).collect();
     for of_scene in first_runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
         let scene = of_scene[0].0.scene;
-        let entries: Vec<tracing::Entry> = of_scene
+        let entries: Vec<measure::Entry> = of_scene
             .iter()
             .map(|&(job, tree)| {
                 let Labelled { label, method, .. } = job.labelled;
                 let peer = if let Contestant::Peer(peer) = method { Some(peer) } else { None };
-                tracing::Entry { method: label, tree, peer }
+                measure::Entry { method: label, tree, peer }
             })
             .collect();
         let seed = experiment.seed_of(&scene.name, "tracing", 0);
-        let measured = tracing::measure(config, scene, &entries, seed, || watch.cancelled())
+        let measured = measure::measure(config, scene, &entries, seed, || watch.cancelled())
             .map_err(|message| Error::Scene { name: scene.name.clone(), message })?;
         let (scene_rows, scene_times) = measured.ok_or_else(interrupted)?;
         rows.extend(scene_rows);

@@ -1,8 +1,8 @@
 //! The rays of every kind: through pixels, from what those hit to a light, and from anywhere to anywhere.
 
 use super::{Kind, reference};
-use crate::rays::{Family, random_ray};
-use crate::scene::Scene;
+use crate::measure::rays::{Family, random_ray};
+use crate::scenes::Scene;
 use bvh_core::{Bvh, Hit, Ray};
 use bvh_search::Stream;
 use glam::{DVec3, Vec3};

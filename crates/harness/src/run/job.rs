@@ -1,12 +1,12 @@
 //! One run of an experiment: a method on a scene, watched, and the rows of all that is measured of it.
 
 use crate::peers::{Built, Peer};
-use crate::record::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow};
 use crate::report::Report;
-use crate::scene::Scene;
+use crate::run::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow};
+use crate::run::store::FinishedRun;
+use crate::scenes::Scene;
 use crate::spec::{Contestant, Experiment, Labelled};
-use crate::store::FinishedRun;
-use crate::{Error, rays};
+use crate::{Error, measure::rays};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective, SahConstants};

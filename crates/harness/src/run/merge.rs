@@ -2,9 +2,9 @@
 //! write.
 
 use crate::Error;
-use crate::execute::{Resolved, conclude};
-use crate::provenance::Provenance;
-use crate::store::{self, FinishedRun, Store};
+use crate::run::execute::{Resolved, conclude};
+use crate::run::provenance::Provenance;
+use crate::run::store::{self, FinishedRun, Store};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs;

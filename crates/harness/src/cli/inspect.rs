@@ -1,8 +1,8 @@
 //! `harness inspect`: what a tree file is, what its tree costs, and what it looks like.
 
-use crate::scene::Scene;
-use crate::store::write_whole;
-use crate::{Error, record, tree_file};
+use crate::run::store::write_whole;
+use crate::scenes::Scene;
+use crate::{Error, files, run::rows};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_core::file::{FileError, Header, Layout, TreeFile};
@@ -56,8 +56,8 @@ impl Lines {
 /// Inspects a file. Returns what there is to say, a line per fact, `what: value`. Refuses a file that is damaged, or
 /// for another scene than the one named.
 pub fn inspect(args: &InspectArgs) -> Result<String, Error> {
-    let bytes = tree_file::read(&args.file)?;
-    let file = tree_file::open(&args.file, &bytes)?;
+    let bytes = files::read(&args.file)?;
+    let file = files::open(&args.file, &bytes)?;
     let scene = args.scene.as_deref().map(Scene::load).transpose()?;
     let mut lines = Lines::default();
     describe(file.header(), bytes.len(), &mut lines);
@@ -181,5 +181,5 @@ fn write_nodes(tree: &Bvh, path: &Path) -> Result<(), Error> {
         NodeRow { node, parent, kind, first, count, min_x, min_y, min_z, max_x, max_y, max_z }
     };
     let rows: Vec<NodeRow> = parents.into_iter().enumerate().map(row).collect();
-    write_whole(path, &record::to_bytes(&rows, path)?)
+    write_whole(path, &rows::to_bytes(&rows, path)?)
 }

@@ -1,8 +1,8 @@
 //! Our trees in their layouts, behind what all contenders can do: answer rays, against the clock, and count tests.
 
 use super::Layout;
-use crate::rays::Query;
-use crate::scene::Scene;
+use crate::measure::rays::Query;
+use crate::scenes::Scene;
 use bvh_core::cost::SahConstants;
 use bvh_core::{Bvh, Hit, Ray, Shear, TestCounts, Triangle, WideBvh, any_hit, collapse_leaves, nearest_hit};
 use std::borrow::Cow;

@@ -1,8 +1,8 @@
 //! Scenes by name or path: built-in stand-ins, the spheres, fetched meshes, and any OBJ file.
 
-use crate::part::Part;
-use crate::suite::{self, examine};
-use crate::{Error, obj, standin};
+use crate::scenes::subset::Part;
+use crate::stress::{self, examine};
+use crate::{Error, scenes::obj, scenes::standin};
 use bvh_core::{Aabb, Sphere, Triangle};
 use glam::Vec3;
 use std::path::{Path, PathBuf};
@@ -98,7 +98,7 @@ impl Scene {
 
     /// The scene of a case of the suite, made of so many objects, or about so many where others make no such scene.
     fn of_suite(case: &str, name: &str, objects: usize) -> Result<Self, Error> {
-        let scene = examine::case(case).and_then(suite::Case::scene);
+        let scene = examine::case(case).and_then(stress::Case::scene);
         let scene = scene.filter(|_| (1..=MOST_OF_SUITE).contains(&objects));
         match scene.map_or(vec![], |case| (case.scene)(objects)) {
             none if none.is_empty() => {

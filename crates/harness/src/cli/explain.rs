@@ -1,7 +1,7 @@
 //! `--explain`: what a scene does not need and is left out, and what was not asked for, said before the work.
 
 use crate::Error;
-use crate::scene::{Primitives, Scene};
+use crate::scenes::{Primitives, Scene};
 use crate::spec::Experiment;
 use bvh_search::SearchError;
 use bvh_search::omission::Facts;

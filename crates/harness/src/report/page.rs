@@ -1,12 +1,12 @@
 //! All results on one page: a self-contained HTML file that needs neither scripts nor other files.
 
 use crate::Error;
-use crate::chart;
-use crate::execute::Resolved;
-use crate::provenance::Provenance;
-use crate::record::PaperRow;
+use crate::figures;
 use crate::report::{Output, Rows};
-use crate::store::write_whole;
+use crate::run::execute::Resolved;
+use crate::run::provenance::Provenance;
+use crate::run::rows::PaperRow;
+use crate::run::store::write_whole;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::fs;
 use std::path::Path;
@@ -94,7 +94,7 @@ fn section(results: &Path, name: &str) -> Result<Section, Error> {
         all.paper.extend(output.paper);
         all.reading += &(output.reading + "\n");
         for (name, figure) in &output.figures {
-            figures.push((name.clone(), chart::svg(figure)?));
+            figures.push((name.clone(), figures::svg(figure)?));
         }
     }
     Ok(Section {

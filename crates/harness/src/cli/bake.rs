@@ -1,8 +1,8 @@
 //! `harness bake`: the best tree for a scene that a budget buys, kept in a file.
 
 use crate::Error;
-use crate::scene::Scene;
-use crate::tree_file::{self, Reserved, load_tree};
+use crate::files::{self, Reserved, load_tree};
+use crate::scenes::Scene;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost;
 use bvh_core::file::{self, Header, Origin};
@@ -146,7 +146,7 @@ fn method(args: &BakeArgs) -> Result<Method, Error> {
 /// The tree to go on from, and its header.
 fn start(path: &Path, scene: &Scene) -> Result<(bvh_core::Bvh, Header), Error> {
     let tree = load_tree(path, &scene.boxes)?;
-    let header = tree_file::open(path, &tree_file::read(path)?)?.header().clone();
+    let header = files::open(path, &files::read(path)?)?.header().clone();
     Ok((tree, header))
 }
 

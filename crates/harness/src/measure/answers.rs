@@ -53,8 +53,8 @@ fn compare(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Scene;
-    use crate::tracing::{Camera, Kind, cameras};
+    use crate::measure::{Camera, Kind, cameras};
+    use crate::scenes::Scene;
     use bvh_build::{Builder, muller_fellner};
 
     #[test]

@@ -5,7 +5,7 @@
 //! are, their rows are joined in the order of the spec, so the bytes do not depend on the order of finishing.
 
 use crate::Error;
-use crate::record::{Row, to_bytes};
+use crate::run::rows::{Row, to_bytes};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::Write;

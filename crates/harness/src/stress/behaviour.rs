@@ -3,10 +3,10 @@
 
 use super::examine::{ROUNDING, check_outcome, check_scale, run};
 use super::{Verdict, is_builder, scenes, tracing};
-use crate::obj;
-use crate::rays::{self, Family, Query};
-use crate::record::RayRow;
-use crate::scene::{Primitives, Scene};
+use crate::measure::rays::{self, Family, Query};
+use crate::run::rows::RayRow;
+use crate::scenes::obj;
+use crate::scenes::{Primitives, Scene};
 use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
 use bvh_core::{Aabb, Ray, Shear, Triangle, cost, file, validate};
 use bvh_search::grasp::{self, Candidates};

@@ -3,12 +3,13 @@
 mod answers;
 mod cameras;
 mod contenders;
+pub mod rays;
 
+use crate::measure::rays::Query;
 use crate::peers::Peer;
-use crate::rays::Query;
-use crate::record::{TraceRow, TraceTimeRow};
 use crate::report::statistics::{median, minimum};
-use crate::scene::Scene;
+use crate::run::rows::{TraceRow, TraceTimeRow};
+use crate::scenes::Scene;
 pub use answers::disagreements;
 use answers::exact_disagreements;
 use bvh_core::{Bvh, Hit, Ray, TestCounts};
