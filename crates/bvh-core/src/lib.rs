@@ -25,14 +25,13 @@
 extern crate alloc;
 
 mod aabb;
-mod block;
 mod bvh;
 mod checksum;
 mod collapse;
 pub mod cost;
+mod dispatch;
 pub mod file;
 mod first_count;
-mod lanes;
 mod overlap;
 mod packed;
 mod ray;
@@ -44,7 +43,6 @@ mod triangle;
 mod validate;
 mod validate_plain;
 mod validate_wide;
-mod vector;
 mod wide;
 
 pub use aabb::{Aabb, InvalidBox, InvalidBoxReason, check_boxes};

@@ -1,7 +1,7 @@
 //! The validator of wide layouts: nothing in one that passes leads out of bounds or in circles.
 
 use crate::validate::Marks;
-use crate::wide::{WideTarget, WideView};
+use crate::wide::{WideView, node::WideTarget};
 use crate::{Aabb, MAX_OBJECTS};
 
 /// Why a wide layout was refused. Nodes, lanes and blocks are named by index.
@@ -139,7 +139,7 @@ pub(crate) fn check_wide_plain(wide: WideView, objects: usize) -> Result<(), Inv
 mod tests {
     use super::*;
     use crate::Triangle;
-    use crate::block::Block;
+    use crate::wide::triangle4::Triangle4;
     use glam::Vec3;
 
     const VALUES: [f32; 9] = [f32::NEG_INFINITY, -2.0, -1.0, -0.0, 0.0, 1.0, 2.0, f32::INFINITY, f32::NAN];
@@ -177,7 +177,7 @@ mod tests {
                 for value in VALUES {
                     let mut triangles = [Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]); 4];
                     triangles[lane].0[corner][axis] = value;
-                    let block = Block::chain(&[0, 1, 2, 3][..count], &triangles).next().unwrap();
+                    let block = Triangle4::chain(&[0, 1, 2, 3][..count], &triangles).next().unwrap();
                     let is_inside = lane >= count || value.abs() <= 1.0;
                     assert_eq!(block.is_inside(&bounds), is_inside, "{value} in lane {lane} of {count}");
                 }

@@ -86,13 +86,13 @@ mod header;
 pub use crate::checksum::{boxes_checksum, triangles_checksum};
 pub use header::{Header, Layout};
 
-use crate::block::Block;
 use crate::checksum::{checksum, le_bytes};
 use crate::cost::Objective;
 use crate::validate::check_structure;
 use crate::validate_plain::checksum_and_is_plain;
 use crate::validate_wide::check_wide;
-use crate::wide::WideNode;
+use crate::wide::node::WideNode;
+use crate::wide::triangle4::Triangle4;
 use crate::{Aabb, Bvh, BvhView, InvalidBvh, InvalidWide, Node, Triangle, WideBvh, WideView, validate};
 use alloc::vec::Vec;
 use bytemuck::Pod;
@@ -253,7 +253,7 @@ impl<'a> TreeFile<'a> {
         let header = Header::decode(bytes)?;
         let (node, other) = match header.layout {
             Layout::Tree => (size_of::<Node>(), size_of::<u32>() * header.objects),
-            Layout::Wide => (size_of::<WideNode>(), size_of::<Block>() * header.blocks),
+            Layout::Wide => (size_of::<WideNode>(), size_of::<Triangle4>() * header.blocks),
         };
         // No overflow in 64 bits: counts are below 2^31.
         let (found, nodes) = (bytes.len() as u64, node as u64 * header.nodes as u64);

@@ -7,13 +7,13 @@ use glam::{Vec3, Vec4};
 /// Up to four triangles: `corners[corner][axis][lane]`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(32))]
-pub(crate) struct Block {
+pub(crate) struct Triangle4 {
     corners: [[Vec4; 3]; 3],
     /// The objects' ids; [`UNUSED`](Self::UNUSED) in lanes without a triangle.
     ids: [u32; 4],
 }
 
-impl Block {
+impl Triangle4 {
     pub(crate) const LANES: usize = 4;
     const UNUSED: u32 = u32::MAX;
     /// Added to the first id of a leaf's last block; ids themselves are below [`MAX_OBJECTS`].

@@ -1,0 +1,54 @@
+//! The arrays of a wide layout, owned or borrowed.
+
+use super::node::{Child, WideNode};
+use super::triangle4::Triangle4;
+use crate::Aabb;
+use alloc::vec::Vec;
+
+/// An immutable copy of a [`Bvh`] and its triangles, for tracing only.
+///
+/// Gives the answers of [`nearest_hit`](crate::nearest_hit) with [`Triangle::intersect`] over the same triangles, bit
+/// by bit, on every machine: with AVX2 where the processor has it and the feature `std` is on, else with portable code.
+///
+/// ```
+/// use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};
+/// use glam::Vec3;
+/// let corners = |z| [Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 0.0, z), Vec3::new(0.0, 1.0, z)];
+/// let triangles = [0.0, 1.0].map(|z| Triangle(corners(z)));
+/// let [a, b] = triangles.map(|t| t.aabb());
+/// let tree = Bvh {
+///     nodes: vec![Node::inner(a.union(&b), 1, 2), Node::leaf(a, 0, 1), Node::leaf(b, 1, 1)],
+///     prim_ids: vec![0, 1],
+/// };
+/// let wide = WideBvh::new(&tree, &triangles)?;
+/// let ray = Ray::half_line(Vec3::new(0.2, 0.2, 3.0), -Vec3::Z).unwrap();
+/// assert_eq!(wide.nearest_hit(&ray), Some(Hit { t: 2.0, object: 1 }));
+/// assert!(wide.any_hit(&ray));
+/// # Ok::<(), bvh_core::InvalidBvh>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct WideBvh {
+    pub(crate) bounds: Aabb,
+    /// `None` for the tree over no triangles.
+    pub(crate) root: Option<Child>,
+    pub(crate) nodes: Vec<WideNode>,
+    pub(crate) blocks: Vec<Triangle4>,
+}
+
+/// A [`WideBvh`] that lies elsewhere, in a mapped file for example.
+#[derive(Clone, Copy, Debug)]
+pub struct WideView<'a> {
+    pub(crate) bounds: Aabb,
+    pub(crate) root: Option<Child>,
+    pub(crate) nodes: &'a [WideNode],
+    pub(crate) blocks: &'a [Triangle4],
+}
+
+impl<'a> WideView<'a> {
+    /// A layout whose root is the first node, else the leaf of all blocks.
+    pub(crate) fn over(bounds: Aabb, nodes: &'a [WideNode], blocks: &'a [Triangle4]) -> Self {
+        let leaf = (!blocks.is_empty()).then_some(Child::leaf(0));
+        let root = if nodes.is_empty() { leaf } else { Some(Child::node(0)) };
+        Self { bounds, root, nodes, blocks }
+    }
+}
