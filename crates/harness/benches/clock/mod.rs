@@ -1,33 +1,18 @@
-//! A limit in seconds that the search knows and plans with, and `best` under it.
+//! `best` against the clock, as the benchmarks of whole searches need it.
 
 use bvh_core::{cost, validate};
-use bvh_search::{Budget, Observer, Problem, portfolio, solve};
+use bvh_search::{Budget, Problem, portfolio, solve};
+use harness::clock::Deadline;
 use harness::scenes::Scene;
-use std::time::Instant;
+use std::time::Duration;
 
-/// From now on, so many seconds.
-struct Clock {
-    start: Instant,
-    seconds: f64,
-}
-
-impl Observer for Clock {
-    fn progress(&self) -> Option<f64> {
-        Some(self.start.elapsed().as_secs_f64() / self.seconds)
-    }
-
-    fn cancelled(&self) -> bool {
-        self.start.elapsed().as_secs_f64() >= self.seconds
-    }
-}
-
-/// What `best` takes when it may plan with so many seconds, and the internal area of its tree, which is valid.
+/// The seconds that `best` takes when it may plan with `seconds`, and the internal area of its tree, which is valid.
 pub fn best(scene: &Scene, seconds: f64, seed: u64) -> (f64, f64) {
-    let clock = Clock { start: Instant::now(), seconds };
+    let deadline = Deadline::after(Duration::from_secs_f64(seconds));
     let (config, problem) = (portfolio::Config::default(), Problem::new(&scene.boxes));
-    let outcome = solve(&config, &problem, seed, Budget::default(), &clock);
-    let taken = clock.start.elapsed().as_secs_f64();
-    let tree = outcome.expect("a tree").tree;
+    let outcome = solve(&config, &problem, seed, Budget::default(), &deadline);
+    let taken = deadline.elapsed().as_secs_f64();
+    let tree = outcome.expect("finite boxes").tree;
     validate(&tree, &scene.boxes).expect("a valid tree");
     (taken, cost::internal_area(&tree))
 }
