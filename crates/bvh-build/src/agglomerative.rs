@@ -14,38 +14,18 @@ mod curve;
 mod nearest;
 
 use crate::presort::check_scene;
-use crate::{BuildError, Builder};
+use crate::{BuildError, Builder, Check};
 use bvh_core::{Aabb, Bvh, Node, PackedAabb};
 use nearest::{CHUNK, Scratch};
 use std::mem::MaybeUninit;
 
-/// How far to look for a neighbour.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(deny_unknown_fields, default)
-)]
-pub struct Config {
-    /// Clusters looked at on either side, 1 to 1000. Default 24.
-    pub radius: u32,
-    /// Rounds at first that look at the next cluster on either side only: faster, and often no worse. Default 0.
-    pub near_rounds: u32,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self { radius: 24, near_rounds: 0 }
-    }
-}
-
-impl Config {
-    fn check(&self) -> Result<(), BuildError> {
-        if (1..=1000).contains(&self.radius) {
-            return Ok(());
-        }
-        let (parameter, accepted) = ("radius", "1 to 1000");
-        Err(BuildError::Parameter { parameter, found: self.radius.into(), accepted })
+crate::config! {
+    /// How far to look for a neighbour.
+    pub struct Config {
+        /// Clusters looked at on either side.
+        radius: u32 = 24, in 1..=1000;
+        /// Number of first rounds that look only at the next cluster on either side: faster, and often no worse.
+        near_rounds: u32 = 0;
     }
 }
 

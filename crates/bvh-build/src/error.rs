@@ -1,5 +1,6 @@
 //! What a builder can refuse.
 
+use crate::OutOfRange;
 use bvh_core::{InvalidBox, MAX_OBJECTS};
 
 /// Why no tree was built. Nothing else can go wrong: every finite input gives a tree.
@@ -30,14 +31,7 @@ pub enum BuildError {
         /// Its weight.
         weight: f64,
     },
-    /// A parameter of the builder is outside its range.
-    #[error("{parameter} is {found}; accepted: {accepted}")]
-    Parameter {
-        /// The parameter's name in the configuration.
-        parameter: &'static str,
-        /// The value found.
-        found: f64,
-        /// The range that would be accepted.
-        accepted: &'static str,
-    },
+    /// A parameter of the builder is out of its range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
 }

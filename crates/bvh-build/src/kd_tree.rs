@@ -8,24 +8,20 @@
 
 mod traverse;
 
-use crate::BuildError;
+use crate::config::above;
 use crate::presort::check_scene;
+use crate::{BuildError, Check};
 use bvh_core::Aabb;
 
-/// How to split: constants of the surface area heuristic, in any unit.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Config {
-    /// Time of stepping through a cell, more than 0. Default 15, the paper's.
-    pub traversal: f64,
-    /// Time of testing an object, 0 or more. Default 20, the paper's.
-    pub intersection: f64,
-    /// What the cost of a split that cuts off empty space is multiplied by, 0 to 1. Default 0.8, the paper's.
-    pub empty_factor: f64,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self { traversal: 15.0, intersection: 20.0, empty_factor: 0.8 }
+crate::config! {
+    /// How to split: constants of the surface area heuristic, in any unit of time. The defaults are the paper's.
+    pub struct Config {
+        /// Time of stepping through a cell.
+        traversal: f64 = 15.0, in above(0.0);
+        /// Time of testing an object.
+        intersection: f64 = 20.0, in 0.0..;
+        /// Factor on the cost of a split that cuts off empty space.
+        empty_factor: f64 = 0.8, in 0.0..=1.0;
     }
 }
 
@@ -122,13 +118,7 @@ impl Config {
     /// At most 8 + 1.3 log₂ n deep, with at most 16 references per object.
     pub fn build(&self, boxes: &[Aabb]) -> Result<KdTree, BuildError> {
         check_scene(boxes)?;
-        let check = |parameter, found: f64, valid: bool, accepted| match valid && found.is_finite() {
-            true => Ok(()),
-            false => Err(BuildError::Parameter { parameter, found, accepted }),
-        };
-        check("traversal", self.traversal, self.traversal > 0.0, "a finite number above 0")?;
-        check("intersection", self.intersection, self.intersection >= 0.0, "a finite number, 0 or more")?;
-        check("empty_factor", self.empty_factor, (0.0..=1.0).contains(&self.empty_factor), "0 to 1")?;
+        self.check()?;
         let n = boxes.len();
         let bounds = boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
         let mut tree = KdTree { bounds, cells: vec![], objects: vec![], depth: 0 };

@@ -4,6 +4,7 @@
 //! recursion on data, and refuse boxes that are not finite by naming the object.
 
 pub mod agglomerative;
+pub mod config;
 pub mod division;
 mod error;
 pub mod evaluation;
@@ -14,11 +15,12 @@ pub mod muller_fellner;
 mod presort;
 pub mod sweep;
 
+pub use config::{Check, OutOfRange};
 pub use error::BuildError;
 pub use presort::Presorted;
 
-/// A builder: a configuration that turns boxes into a tree.
-pub trait Builder {
+/// A builder: a configuration that turns boxes into a tree, after it has been [checked](Check).
+pub trait Builder: Check {
     /// Builds a tree over `boxes`; `boxes[i]` bounds object `i`. No boxes give the tree without nodes.
     fn build(&self, boxes: &[bvh_core::Aabb]) -> Result<bvh_core::Bvh, BuildError>;
 }

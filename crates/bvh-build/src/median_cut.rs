@@ -6,27 +6,17 @@
 //! Differs from the sources: an odd object goes to the left half; equal centres are ordered by index.
 
 use crate::presort::check_scene;
-use crate::{BuildError, Builder};
+use crate::{BuildError, Builder, Check};
 use bvh_core::{Aabb, Bvh, Node};
 
-/// How to cut.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(deny_unknown_fields, default)
-)]
-pub struct Config {
-    /// Which axis a node is cut along. Default `alternating`.
-    pub axis: CutAxis,
-    /// A node with at most this fraction of all objects is a leaf, 0 to 1; a leaf may always hold one object.
-    /// Default 0: one object per leaf.
-    pub leaf_fraction: f64,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self { axis: CutAxis::Alternating, leaf_fraction: 0.0 }
+crate::config! {
+    /// How to cut.
+    pub struct Config {
+        /// Which axis a node is cut along.
+        axis: CutAxis = CutAxis::Alternating;
+        /// A node with at most this fraction of all objects is a leaf. A leaf may always hold one object: with 0, each
+        /// holds exactly one.
+        leaf_fraction: f64 = 0.0, in 0.0..=1.0;
     }
 }
 
@@ -51,10 +41,7 @@ impl Builder for Config {
     /// O(n log n); depth at most ⌈log₂ n⌉.
     fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
         check_scene(boxes)?;
-        if !(0.0..=1.0).contains(&self.leaf_fraction) {
-            let (parameter, accepted) = ("leaf_fraction", "0 to 1");
-            return Err(BuildError::Parameter { parameter, found: self.leaf_fraction, accepted });
-        }
+        self.check()?;
         let n = boxes.len();
         let max_leaf = ((n as f64 * self.leaf_fraction) as usize).max(1);
         let mut prim_ids: Vec<u32> = (0..n as u32).collect();

@@ -6,34 +6,24 @@
 //! Differs from the paper: divides down to single objects, as Ng & Trifonov do, not to a cost threshold; prunes
 //! scans exactly; ties go to the more balanced split, then the lower axis and position.
 
+use crate::config::{Accepts, Itself};
 use crate::division::{self, Workspace};
 use crate::evaluation::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, Evaluation};
 use crate::sweep::{SplitRule, TakeBest};
-use crate::{BuildError, Builder, Presorted};
+use crate::{BuildError, Builder, Check, OutOfRange, Presorted};
 use bvh_core::{Aabb, Bvh};
 
-/// How to divide.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(deny_unknown_fields, default)
-)]
-pub struct Config {
-    /// What a split is judged by. Default `area_times_count`, the original.
-    pub heuristic: Heuristic,
-    /// Whether axes that order a node's objects identically are scanned once. Changes no tree. Default true.
-    pub skip_same_order: bool,
-    /// Whether an axis along which the objects came in order is not sorted again. Changes no tree. Default true.
-    pub skip_sorted: bool,
-    /// Whether a scene without area, all on one line along an axis, is divided along x alone. Changes no tree. Default
-    /// true.
-    pub skip_flat: bool,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self { heuristic: Heuristic::default(), skip_same_order: true, skip_sorted: true, skip_flat: true }
+crate::config! {
+    /// How to divide.
+    pub struct Config {
+        /// What a split is judged by. By default the original's.
+        heuristic: Heuristic = Heuristic::AreaTimesCount, in Itself;
+        /// Whether axes that order a node's objects identically are scanned once. Changes no tree.
+        skip_same_order: bool = true;
+        /// Whether an axis along which the objects came in order is not sorted again. Changes no tree.
+        skip_sorted: bool = true;
+        /// Whether a scene without area, all on one line along an axis, is divided along x alone. Changes no tree.
+        skip_flat: bool = true;
     }
 }
 
@@ -50,13 +40,10 @@ pub enum Heuristic {
     AreaOnly(AreaOnly),
 }
 
-impl Heuristic {
-    /// Checks the parameter's range.
-    pub fn check(&self) -> Result<(), BuildError> {
-        match *self {
-            Self::AreaTimesPower(found) if !(0.0..=1.0).contains(&found) => {
-                Err(BuildError::Parameter { parameter: "area_times_power", found, accepted: "0 to 1" })
-            }
+impl Check for Heuristic {
+    fn check(&self) -> Result<(), OutOfRange> {
+        match self {
+            Self::AreaTimesPower(power) => (0.0..=1.0).check("area_times_power", power),
             _ => Ok(()),
         }
     }
@@ -65,7 +52,7 @@ impl Heuristic {
 impl Builder for Config {
     fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
         let scene = Presorted::sort(boxes, self.skip_sorted, self.skip_flat)?;
-        self.heuristic.check()?;
+        self.check()?;
         let mut tree = Bvh::default();
         match self.heuristic {
             Heuristic::AreaTimesCount => self.greedy(&scene, &AreaTimesCount, &mut tree),

@@ -213,7 +213,10 @@ fn what_cannot_be_built_is_refused_by_name() {
     bad[2].max.y = f32::NAN;
     assert!(matches!(Config::default().build(&bad), Err(BuildError::InvalidBox(error)) if error.index == 2));
     let config = Config { heuristic: Heuristic::AreaTimesPower(1.5), ..Config::default() };
-    assert_eq!(config.build(&boxes).unwrap_err().to_string(), "area_times_power is 1.5; accepted: 0 to 1");
+    assert_eq!(
+        config.build(&boxes).unwrap_err().to_string(),
+        "heuristic.area_times_power is 1.5; accepted: 0 to 1"
+    );
 }
 
 proptest! {

@@ -1,6 +1,6 @@
 //! What a search can refuse.
 
-use bvh_build::BuildError;
+use bvh_build::{BuildError, OutOfRange};
 use bvh_core::InvalidBvh;
 
 /// Why a search did not start. Once started, a search always returns a tree.
@@ -20,16 +20,9 @@ pub enum SearchError {
         /// Its number of children.
         children: u32,
     },
-    /// A parameter of the search is outside its range.
-    #[error("{parameter} is {found}; accepted: {accepted}")]
-    Parameter {
-        /// The parameter's name in the configuration.
-        parameter: &'static str,
-        /// The value found.
-        found: f64,
-        /// The range that would be accepted.
-        accepted: &'static str,
-    },
+    /// A parameter of the search is out of its range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
 }
 
 /// `Ok` if `holds`, else an error that names the parameter, what was found and what would be accepted.
@@ -39,5 +32,5 @@ pub(crate) fn require(
     found: f64,
     accepted: &'static str,
 ) -> Result<(), SearchError> {
-    if holds { Ok(()) } else { Err(SearchError::Parameter { parameter, found, accepted }) }
+    if holds { Ok(()) } else { Err(OutOfRange::new(parameter, found, accepted).into()) }
 }

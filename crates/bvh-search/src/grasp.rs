@@ -22,7 +22,7 @@ use crate::{LocalSearch, Observer, Problem, Quota, Run, Search, SearchError, Tal
 use bvh_build::division::Workspace;
 use bvh_build::evaluation::Evaluation;
 use bvh_build::sweep::{Split, SplitRule, Sweep};
-use bvh_build::{Presorted, muller_fellner};
+use bvh_build::{Check, Presorted, muller_fellner};
 use bvh_core::{Aabb, Bvh};
 use rand::RngExt;
 
@@ -90,7 +90,7 @@ impl Config {
             require((0.0..=1.0).contains(&noise), "noise", noise, "0 to 1")?;
         }
         self.candidates.check()?;
-        Ok(self.construction.heuristic.check()?)
+        Ok(self.construction.check()?)
     }
 
     /// Construction number `trial`, into `tree`.

@@ -18,7 +18,7 @@ use crate::stream::{Stream, stream};
 use crate::working::{ANCHOR, Working};
 use crate::{LocalSearch, Observer, Problem, Quota, Run, Search, SearchError, Tally};
 use bvh_build::division::Workspace;
-use bvh_build::{Presorted, muller_fellner};
+use bvh_build::{Check, Presorted, muller_fellner};
 use bvh_core::{Aabb, Bvh};
 use rand::RngExt;
 
@@ -75,7 +75,7 @@ impl Search for Config {
         require(self.tournament >= 1, "tournament", self.tournament.into(), "1 or more")?;
         require((0.0..=1.0).contains(&self.noise), "noise", self.noise, "0 to 1")?;
         self.candidates.check()?;
-        self.construction.heuristic.check().map_err(SearchError::from)?;
+        self.construction.check()?;
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
         let n = tree.objects() as u64;
         if n < 3 {

@@ -1,6 +1,6 @@
 //! The builders that local search can start from.
 
-use bvh_build::{BuildError, Builder, agglomerative, muller_fellner};
+use bvh_build::{BuildError, Builder, Check, OutOfRange, agglomerative, muller_fellner};
 use bvh_core::{Aabb, Bvh};
 
 /// A builder of one object per leaf. Different starts lead to different local optima.
@@ -24,6 +24,15 @@ impl Default for Start {
 pub(crate) fn construction() -> muller_fellner::Config {
     let heuristic = muller_fellner::Heuristic::AreaTimesPower(0.9);
     muller_fellner::Config { heuristic, ..Default::default() }
+}
+
+impl Check for Start {
+    fn check(&self) -> Result<(), OutOfRange> {
+        match self {
+            Self::MullerFellner(config) => config.check().map_err(|error| error.below("muller_fellner")),
+            Self::Agglomerative(config) => config.check().map_err(|error| error.below("agglomerative")),
+        }
+    }
 }
 
 impl Builder for Start {

@@ -1,0 +1,327 @@
+//! Configurations: a field declares its name, type, default and accepted values once, by [`config!`](crate::config!).
+//!
+//! ```
+//! bvh_build::config! {
+//!     /// How to measure.
+//!     pub struct Config {
+//!         /// Number of measurements.
+//!         count: u32 = 3, in 1..=1000;
+//!         /// Fraction of them that is thrown away, if any.
+//!         outliers: Option<f64>, in 0.0..=1.0;
+//!     }
+//! }
+//! use bvh_build::Check;
+//! assert_eq!(Config::default().check(), Ok(()));
+//! let refused = Config { outliers: Some(2.0), ..Config::default() }.check().unwrap_err();
+//! assert_eq!(refused.to_string(), "outliers is 2; accepted: 0 to 1");
+//! ```
+
+use std::collections::BTreeMap;
+use std::fmt::Display;
+use std::ops::Bound::{self, Excluded, Included, Unbounded};
+use std::ops::{RangeBounds, RangeFrom, RangeInclusive, RangeToInclusive};
+
+/// A parameter whose value is not accepted.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{key} is {found}; accepted: {accepted}")]
+pub struct OutOfRange {
+    /// The parameter's name; dots lead to those of inner configurations, as in TOML.
+    pub key: String,
+    /// The value found.
+    pub found: String,
+    /// The values that would be accepted, in words.
+    pub accepted: String,
+}
+
+impl OutOfRange {
+    /// The refusal of the value `found` of `key`.
+    pub fn new(key: impl Display, found: impl Display, accepted: impl Display) -> Self {
+        Self { key: key.to_string(), found: found.to_string(), accepted: accepted.to_string() }
+    }
+
+    /// The same refusal, seen from the configuration that holds the refused one under `key`.
+    #[must_use]
+    pub fn below(self, key: impl Display) -> Self {
+        let dot = if self.key.starts_with('[') { "" } else { "." };
+        Self { key: format!("{key}{dot}{}", self.key), ..self }
+    }
+}
+
+/// A value that knows whether all its parameters are in range.
+pub trait Check {
+    /// Refuses the first parameter that is out of its range.
+    fn check(&self) -> Result<(), OutOfRange> {
+        Ok(())
+    }
+}
+
+impl<C: Check> Check for Option<C> {
+    fn check(&self) -> Result<(), OutOfRange> {
+        self.iter().try_for_each(C::check)
+    }
+}
+
+impl<C: Check> Check for Vec<C> {
+    fn check(&self) -> Result<(), OutOfRange> {
+        let below = |(at, inner): (usize, &C)| inner.check().map_err(|error| error.below(format!("[{at}]")));
+        self.iter().enumerate().try_for_each(below)
+    }
+}
+
+/// The right side of a field's `in`: which values of type `V` are accepted.
+///
+/// Implemented by the ranges of the standard library for numbers and for collections of them, and by [`Itself`].
+pub trait Accepts<V: ?Sized> {
+    /// Refuses the value `found` of the parameter `key` unless it is accepted.
+    fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange>;
+}
+
+/// Accepts the values that pass their own [`Check`]: inner configurations.
+#[derive(Clone, Copy, Debug)]
+pub struct Itself;
+
+impl<C: Check> Accepts<C> for Itself {
+    fn check(&self, key: &str, found: &C) -> Result<(), OutOfRange> {
+        found.check().map_err(|error| error.below(key))
+    }
+}
+
+macro_rules! ranges {
+    ($($range:ty,)*) => { $(
+        impl<V: Numbers + ?Sized> Accepts<V> for $range {
+            fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange> {
+                let unlimited = matches!(self.end_bound(), Unbounded);
+                found.each(key, &|key, number| {
+                    if self.contains(number) && (number.is_finite() || !unlimited) {
+                        return Ok(());
+                    }
+                    Err(OutOfRange::new(key, number, in_words(self)))
+                })
+            }
+        }
+    )* };
+}
+
+// Not for all `R: RangeBounds`, which would leave no room for `Itself`.
+ranges! {
+    RangeInclusive<V::Number>, RangeFrom<V::Number>, RangeToInclusive<V::Number>,
+    (Bound<V::Number>, Bound<V::Number>),
+}
+
+/// All numbers above `low`, without `low` itself.
+pub const fn above<N>(low: N) -> (Bound<N>, Bound<N>) {
+    (Excluded(low), Unbounded)
+}
+
+fn in_words<N: Display>(range: &impl RangeBounds<N>) -> String {
+    match (range.start_bound(), range.end_bound()) {
+        (Included(low), Included(high)) => format!("{low} to {high}"),
+        (Excluded(low), Included(high)) => format!("above {low}, up to {high}"),
+        (Included(low), Excluded(high)) => format!("{low} or more, below {high}"),
+        (Excluded(low), Excluded(high)) => format!("above {low} and below {high}"),
+        (Included(low), Unbounded) => format!("{low} or more"),
+        (Excluded(low), Unbounded) => format!("above {low}"),
+        (Unbounded, Included(high)) => format!("at most {high}"),
+        (Unbounded, Excluded(high)) => format!("below {high}"),
+        (Unbounded, Unbounded) => "any finite number".into(),
+    }
+}
+
+/// A number that can be a parameter.
+pub trait Number: PartialOrd + Display {
+    /// Whether it is neither infinite nor NaN. Infinity is accepted only where a range names it as its end.
+    fn is_finite(&self) -> bool {
+        true
+    }
+}
+
+/// A number, or any collection of numbers of which each has to be in range.
+pub trait Numbers {
+    /// The type of the numbers.
+    type Number: Number;
+    /// Calls `check` with every number and its key, below `key` in a collection.
+    fn each(&self, key: &str, check: &CheckNumber<Self::Number>) -> Result<(), OutOfRange>;
+}
+
+/// What [`Numbers::each`] does to a key and its number.
+pub type CheckNumber<'a, N> = dyn Fn(&str, &N) -> Result<(), OutOfRange> + 'a;
+
+macro_rules! numbers {
+    ($($number:ident $(by $is_finite:path)?,)*) => { $(
+        impl Number for $number {
+            $(fn is_finite(&self) -> bool { $is_finite(*self) })?
+        }
+        impl Numbers for $number {
+            type Number = Self;
+            fn each(&self, key: &str, check: &CheckNumber<Self>) -> Result<(), OutOfRange> {
+                check(key, self)
+            }
+        }
+    )* };
+}
+
+numbers!(u8, u16, u32, u64, usize, i32, i64, f32 by f32::is_finite, f64 by f64::is_finite,);
+
+impl<V: Numbers> Numbers for Option<V> {
+    type Number = V::Number;
+    fn each(&self, key: &str, check: &CheckNumber<V::Number>) -> Result<(), OutOfRange> {
+        self.iter().try_for_each(|inner| inner.each(key, check))
+    }
+}
+
+impl<V: Numbers> Numbers for [V] {
+    type Number = V::Number;
+    fn each(&self, key: &str, check: &CheckNumber<V::Number>) -> Result<(), OutOfRange> {
+        self.iter().enumerate().try_for_each(|(at, inner)| inner.each(&format!("{key}[{at}]"), check))
+    }
+}
+
+impl<V: Numbers, const N: usize> Numbers for [V; N] {
+    type Number = V::Number;
+    fn each(&self, key: &str, check: &CheckNumber<V::Number>) -> Result<(), OutOfRange> {
+        self.as_slice().each(key, check)
+    }
+}
+
+impl<V: Numbers> Numbers for Vec<V> {
+    type Number = V::Number;
+    fn each(&self, key: &str, check: &CheckNumber<V::Number>) -> Result<(), OutOfRange> {
+        self.as_slice().each(key, check)
+    }
+}
+
+impl<V: Numbers> Numbers for BTreeMap<String, V> {
+    type Number = V::Number;
+    fn each(&self, key: &str, check: &CheckNumber<V::Number>) -> Result<(), OutOfRange> {
+        self.iter().try_for_each(|(name, inner)| inner.each(&format!("{key}.{name}"), check))
+    }
+}
+
+/// Declares a configuration: a struct with public fields, each `name: type = default, in accepted;`.
+///
+/// From the declaration follow the struct with `Clone`, `Debug`, `PartialEq` and [`Default`]; a sentence in the
+/// documentation of every field that states its default and the accepted values; [`Check`](crate::Check); and serde's
+/// traits, under the feature `serde` of the crate that calls the macro, with unknown keys refused and missing ones
+/// replaced by their defaults. A crate that always depends on serde writes `serde;` first.
+///
+/// Without `= default` a field has the default of its type, unsaid; without `in` every value is accepted. The right side
+/// of `in` is anything that [`Accepts`](crate::config::Accepts) the field's type. What several fields have to be
+/// together is checked by the function after the struct, as in `check Self::temperatures_fall;`.
+#[macro_export]
+macro_rules! config {
+    (@default) => { ::core::default::Default::default() };
+    (@default $default:expr) => { $default };
+    (@doc [] []) => { "" };
+    (@doc [] [$range:expr]) => { concat!("Accepted: `", stringify!($range), "`.") };
+    (@doc [$default:expr] []) => { concat!("Default `", stringify!($default), "`.") };
+    (@doc [$default:expr] [$range:expr]) => {
+        concat!("Default `", stringify!($default), "`; accepted: `", stringify!($range), "`.")
+    };
+    (@struct { $(#[$serde:meta])* }
+        $(#[$meta:meta])*
+        $visibility:vis struct $name:ident {
+            $($(#[$field_meta:meta])* $field:ident: $type:ty $(= $default:expr)? $(, in $range:expr)?;)*
+        }
+        $(check $together:expr;)?
+    ) => {
+        #[derive(Clone, Debug, PartialEq)]
+        $(#[$serde])*
+        $(#[$meta])*
+        $visibility struct $name {
+            $(
+                $(#[$field_meta])*
+                #[doc = $crate::config!(@doc [$($default)?] [$($range)?])]
+                pub $field: $type,
+            )*
+        }
+
+        impl ::core::default::Default for $name {
+            fn default() -> Self {
+                Self { $($field: $crate::config!(@default $($default)?)),* }
+            }
+        }
+
+        impl $crate::Check for $name {
+            fn check(&self) -> ::core::result::Result<(), $crate::OutOfRange> {
+                $($($crate::config::Accepts::check(&($range), stringify!($field), &self.$field)?;)?)*
+                $($together(self)?;)?
+                Ok(())
+            }
+        }
+    };
+    (serde; $($tokens:tt)*) => {
+        $crate::config! {
+            @struct {
+                #[derive(::serde::Serialize, ::serde::Deserialize)]
+                #[serde(deny_unknown_fields, default)]
+            }
+            $($tokens)*
+        }
+    };
+    ($($tokens:tt)*) => {
+        $crate::config! {
+            @struct {
+                #[cfg_attr(
+                    feature = "serde",
+                    derive(::serde::Serialize, ::serde::Deserialize),
+                    serde(deny_unknown_fields, default)
+                )]
+            }
+            $($tokens)*
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    crate::config! {
+        /// A configuration with another inside.
+        struct Outer {
+            /// Limited on both sides, without the lower end.
+            part: f64 = 0.5, in (Excluded(0.0), Included(1.0));
+            /// Anything finite above 0.
+            factor: f64 = 2.0, in above(0.0);
+            /// A list of whole numbers.
+            sizes: Vec<u32> = vec![1], in 1..;
+            /// Numbers by name.
+            by_name: BTreeMap<String, [f64; 2]>, in ..=9.0;
+            /// Other configurations.
+            inner: Vec<Inner>, in Itself;
+        }
+        check |outer: &Outer| match outer.sizes.is_sorted() {
+            true => Ok(()),
+            false => Err(OutOfRange::new("sizes", "not sorted", "ascending numbers")),
+        };
+    }
+
+    crate::config! {
+        /// Held by another configuration.
+        struct Inner {
+            /// May be infinite.
+            limit: f64 = f64::INFINITY, in 1.0..=f64::INFINITY;
+        }
+    }
+
+    #[test]
+    fn a_refusal_names_the_key_the_value_and_what_would_be_accepted() {
+        let refused = |change: fn(&mut Outer)| {
+            let mut outer = Outer::default();
+            change(&mut outer);
+            outer.check().map_err(|error| error.to_string())
+        };
+        assert_eq!(refused(|_| ()), Ok(()));
+        assert_eq!(refused(|outer| outer.part = 1.0), Ok(()));
+        let expect = |change, message: &str| assert_eq!(refused(change), Err(message.into()));
+        expect(|outer| outer.part = 0.0, "part is 0; accepted: above 0, up to 1");
+        expect(|outer| outer.part = f64::NAN, "part is NaN; accepted: above 0, up to 1");
+        expect(|outer| outer.factor = f64::INFINITY, "factor is inf; accepted: above 0");
+        expect(|outer| outer.sizes = vec![1, 0], "sizes[1] is 0; accepted: 1 or more");
+        expect(|outer| outer.sizes = vec![2, 1], "sizes is not sorted; accepted: ascending numbers");
+        let name = |outer: &mut Outer| outer.by_name = BTreeMap::from([("a".into(), [0.0, 10.0])]);
+        expect(name, "by_name.a[1] is 10; accepted: at most 9");
+        let inner = |outer: &mut Outer| outer.inner = vec![Inner::default(), Inner { limit: 0.0 }];
+        expect(inner, "inner[1].limit is 0; accepted: 1 to inf");
+    }
+}
