@@ -22,12 +22,24 @@ pub enum Error {
     /// A CSV file whose content is not what the harness writes.
     #[error("{}: {source}", .path.display())]
     Csv { path: PathBuf, source: csv::Error },
+    /// A TOML file among the results whose content is not what the harness writes.
+    #[error("{}: {source}", .path.display())]
+    Toml { path: PathBuf, source: toml::de::Error },
     /// Another harness is writing to the same folder.
     #[error("{} is in use by another harness; wait for it or choose another --out", .0.display())]
     Busy(PathBuf),
     /// A run failed.
     #[error("scene {scene}, method {method}: {source}")]
     Search { scene: String, method: String, source: bvh_search::SearchError },
+    /// Another library refused a scene.
+    #[error("scene {scene}, library {library}: {message}")]
+    Library { scene: String, library: &'static str, message: String },
+    /// Rays cannot be traced through this scene.
+    #[error("scene {scene}, tracing: {message}")]
+    Tracing { scene: String, message: String },
+    /// What was left out as not needed has changed a cost: a defect of the method.
+    #[error("scene {scene}: {message}; please report this")]
+    Ablation { scene: String, message: String },
     /// A method returned something that is not a tree over the scene: a defect of the method.
     #[error("scene {scene}, method {method} returned an invalid tree: {source}; please report this")]
     InvalidTree { scene: String, method: String, source: bvh_core::InvalidBvh },
@@ -69,6 +81,11 @@ impl Error {
     /// For `map_err` on file operations: names the path and what was tried.
     pub fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::Io { path: path.to_owned(), action, source }
+    }
+
+    /// For `map_err` on TOML that a harness has written: names the path.
+    pub fn toml(path: &Path) -> impl FnOnce(toml::de::Error) -> Self {
+        move |source| Self::Toml { path: path.to_owned(), source }
     }
 
     /// For `map_err` on CSV operations: names the path.

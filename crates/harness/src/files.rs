@@ -1,4 +1,4 @@
-//! Tree files on disk: read with every check, replaced whole.
+//! Files and folders: inputs are regular files, outputs are replaced whole, one harness writes to a folder at a time.
 
 use crate::Error;
 use bvh_core::file::{FileError, TreeFile};
@@ -7,6 +7,15 @@ use std::fs::{self, File};
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
+
+/// The bytes of the regular file at `path`.
+pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    fs::read(path).map_err(|source| match source.kind() {
+        io::ErrorKind::NotFound => Error::Usage(format!("{}: no such file", path.display())),
+        io::ErrorKind::IsADirectory => Error::Usage(format!("{}: a folder, not a tree file", path.display())),
+        _ => Error::Io { path: path.to_owned(), action: "read the file", source },
+    })
+}
 
 /// The tree over `boxes` in the file at `path`: refuses one that is damaged, or saved for another scene, and one that
 /// is not [valid](validate) over these boxes.
@@ -18,25 +27,43 @@ pub fn load_tree(path: &Path, boxes: &[Aabb]) -> Result<Bvh, Error> {
     Ok(tree)
 }
 
-/// The bytes of the file at `path`.
-pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
-    fs::read(path).map_err(|source| match source.kind() {
-        io::ErrorKind::NotFound => Error::Usage(format!("{}: no such file", path.display())),
-        io::ErrorKind::IsADirectory => Error::Usage(format!("{}: a folder, not a tree file", path.display())),
-        _ => Error::Io { path: path.to_owned(), action: "read the file", source },
-    })
-}
-
 /// Opens the bytes of a tree file; its name is for the error.
-pub fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<TreeFile<'a>, Error> {
+pub fn open_tree<'a>(path: &Path, bytes: &'a [u8]) -> Result<TreeFile<'a>, Error> {
     TreeFile::open(bytes).map_err(|source| Error::TreeFile { path: path.to_owned(), source })
 }
 
-/// Bytes of a reserved file written at a time.
+/// Replaces the file at `path` by `bytes`: at any moment it is the old file or the whole new one.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    Reserved::new(path, 0)?.write(bytes)
+}
+
+/// Writes a new file and waits until it is on the disk.
+pub fn write_synced(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    let write = |path: &Path| {
+        let mut file = File::create(path)?;
+        file.write_all(bytes)?;
+        file.sync_all()
+    };
+    write(path).map_err(Error::io(path, "write the file"))
+}
+
+/// Locks a folder of results against other harnesses until the file is dropped.
+pub fn lock_folder(folder: &Path) -> Result<File, Error> {
+    let path = folder.join(".lock");
+    let lock = File::create(&path).map_err(Error::io(&path, "create the file"))?;
+    match lock.try_lock() {
+        Ok(()) => Ok(lock),
+        Err(fs::TryLockError::WouldBlock) => Err(Error::Busy(folder.to_owned())),
+        Err(fs::TryLockError::Error(source)) => Err(Error::Io { path, action: "lock the file", source }),
+    }
+}
+
+/// Bytes of a reserved file written at a time. In large pieces, because the kernel caches large writes in large pages,
+/// which it maps faster than many small ones.
 const PIECE: usize = 1 << 21;
 
-/// A file to be written later, its place on the disk taken now: whoever searches for hours is told before, not
-/// after, that the result cannot be kept. Dropped, it leaves nothing behind.
+/// A file to be written later whose space on the disk is taken now: a search of hours learns at its beginning, not at
+/// its end, that its result cannot be kept. Leaves nothing behind if it is dropped unwritten.
 #[derive(Debug)]
 pub struct Reserved {
     path: PathBuf,
@@ -44,31 +71,29 @@ pub struct Reserved {
 }
 
 impl Reserved {
-    /// Takes `bytes` bytes beside `path`, under another name.
+    /// Takes `bytes` bytes in a file of another name beside `path`.
     pub fn new(path: &Path, bytes: usize) -> Result<Self, Error> {
-        // Links are followed: what they lead to is replaced, not they.
+        // A link stays, and its target is replaced.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        let name = path.file_name().filter(|_| !path.is_dir());
+        let name = path.file_name().filter(|_| path.is_file() || !path.exists());
         let Some(name) = name else {
-            return Err(Error::Usage(format!("{} is a folder; a file is to be written", path.display())));
+            return Err(Error::io(&path, "replace the file")(io::Error::other("not a regular file")));
         };
-        if path.exists() && !path.is_file() {
-            return Err(Error::Usage(format!("{} is not a regular file", path.display())));
-        }
         let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let prefix = format!("{}.", name.to_string_lossy());
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(".unfinished");
-        // As for any new file: what the user's mask leaves of it.
+        // The permissions of any new file, within the user's mask.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let mut unfinished = builder.tempfile_in(folder).map_err(Error::io(folder, "create a file there"))?;
-        // In large pieces: the kernel keeps the file in memory in such, and maps few large ones faster than many small.
+        let mut unfinished = builder
+            .tempfile_in(folder)
+            .map_err(Error::io(&path, "write the file: cannot create its new version"))?;
         let zeros = vec![0; bytes.min(PIECE)];
         (0..bytes)
             .step_by(PIECE)
             .try_for_each(|at| unfinished.write_all(&zeros[..zeros.len().min(bytes - at)]))
-            .and_then(|()| unfinished.as_file().sync_all())
+            .and_then(|()| if bytes > 0 { unfinished.as_file().sync_all() } else { Ok(()) })
             .map_err(Error::io(&path, "reserve the file's space"))?;
         Ok(Self { path, unfinished })
     }
@@ -85,8 +110,7 @@ impl Reserved {
         write(unfinished.as_file_mut()).map_err(Error::io(&path, "write the file"))?;
         let folder = path.parent().map(Path::to_owned);
         unfinished.persist(&path).map_err(|refused| Error::io(&path, "replace the file")(refused.error))?;
-        // The file is safe in any case; its new name outlasts a loss of power once the folder is synced too, where
-        // folders can be.
+        // Where folders can be synced, the new name outlasts a loss of power, too; the file is safe in any case.
         if let Some(folder) = folder.and_then(|folder| File::open(folder).ok()) {
             let _ = folder.sync_all();
         }
@@ -113,11 +137,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_file_is_refused() {
+    fn only_regular_files_are_replaced() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(matches!(Reserved::new(folder.path(), 1), Err(Error::Usage(_))));
-        assert!(matches!(Reserved::new(&folder.path().join("no/x.bvh"), 1), Err(Error::Io { .. })));
-        #[cfg(unix)]
-        assert!(matches!(Reserved::new(Path::new("/dev/null"), 1), Err(Error::Usage(_))));
+        for wrong in [folder.path(), &folder.path().join("no/x.bvh"), Path::new("/dev/null")] {
+            assert!(matches!(Reserved::new(wrong, 1), Err(Error::Io { .. })), "{}", wrong.display());
+        }
     }
 }

@@ -1,7 +1,26 @@
-//! Paths on the command line that are of the wrong kind: refused before any work, with the name of their flag.
+//! Arguments that several commands have, and the refusal of paths of the wrong kind before any work.
 
 use crate::Error;
 use std::path::Path;
+
+/// How many threads the program uses.
+#[derive(clap::Args, Clone, Copy, Debug, Default)]
+pub struct Jobs {
+    /// Number of threads, by default one per processor. Changes no result but times and what a budget of time buys.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+}
+
+impl Jobs {
+    /// Limits the program to this number of threads; to be called once.
+    pub fn apply(self) -> Result<(), Error> {
+        let Some(jobs) = self.jobs else { return Ok(()) };
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(jobs.into())
+            .build_global()
+            .map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))
+    }
+}
 
 fn refuse(flag: &str, path: &Path, found: &str, accepted: &str) -> Result<(), Error> {
     Err(Error::Usage(format!("{flag}: {} is {found}; accepted: {accepted}", path.display())))

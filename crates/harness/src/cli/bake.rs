@@ -1,6 +1,9 @@
 //! `harness bake`: the best tree for a scene that a budget buys, kept in a file.
 
 use crate::Error;
+use crate::cli::arguments::{Jobs, input_file, output_file};
+use crate::cli::explain;
+use crate::cli::output::print_line;
 use crate::files::{self, Reserved, load_tree};
 use crate::scenes::Scene;
 use bvh_build::{Builder, muller_fellner};
@@ -39,9 +42,9 @@ pub struct BakeArgs {
     /// Go on from the tree of an earlier bake of the same scene; the result is never worse.
     #[arg(long, value_name = "FILE.bvh")]
     pub from: Option<PathBuf>,
-    /// Number of threads; as many as processors if not given. Changes no result of a budget of work.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub jobs: Option<u16>,
+    /// Limits the threads.
+    #[command(flatten)]
+    pub jobs: Jobs,
     /// Say first what the scene does not need and is left out, and why.
     #[arg(long)]
     pub explain: bool,
@@ -83,10 +86,18 @@ impl FromStr for Effort {
     }
 }
 
-/// Searches until the budget is spent or `interrupted` becomes true, and writes the best tree found. Returns what there
-/// is to say. An interruption is an error that says that the file was written all the same.
-pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<String, Error> {
+/// Searches until the budget is spent or `interrupted` becomes true, writes the best tree found, and prints what it
+/// costs. An interruption is an error that says that the file was written all the same.
+pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+    if let Some(from) = &args.from {
+        input_file("--from", from)?;
+    }
+    output_file("--out", &args.out)?;
+    args.jobs.apply()?;
     let scene = Scene::load(&args.scene)?;
+    if args.explain {
+        print_line(&explain::scene(&scene)?);
+    }
     let method = method(args)?;
     let start = args.from.as_deref().map(|path| start(path, &scene)).transpose()?;
     let reserved = Reserved::new(&args.out, most_bytes(scene.boxes.len()))?;
@@ -118,7 +129,9 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<String, Error> 
         return Err(Error::Stopped { path: args.out.clone(), cost: outcome.cost });
     }
     let before = start.map(|(_, header)| header.cost);
-    Ok(summary(args, &scene, &outcome, base, before, seconds) + &format!("{} bytes", bytes.len()))
+    let summary = summary(args, &scene, &outcome, base, before, seconds);
+    print_line(&format!("{summary}{} bytes", bytes.len()));
+    Ok(())
 }
 
 /// The method by name, unless it could not do what is asked.
@@ -146,7 +159,7 @@ fn method(args: &BakeArgs) -> Result<Method, Error> {
 /// The tree to go on from, and its header.
 fn start(path: &Path, scene: &Scene) -> Result<(bvh_core::Bvh, Header), Error> {
     let tree = load_tree(path, &scene.boxes)?;
-    let header = files::open(path, &files::read(path)?)?.header().clone();
+    let header = files::open_tree(path, &files::read(path)?)?.header().clone();
     Ok((tree, header))
 }
 

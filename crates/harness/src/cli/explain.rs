@@ -1,6 +1,7 @@
 //! `--explain`: what a scene does not need and is left out, and what was not asked for, said before the work.
 
 use crate::Error;
+use crate::run::resolved::load_scenes;
 use crate::scenes::{Primitives, Scene};
 use crate::spec::Experiment;
 use bvh_search::SearchError;
@@ -8,7 +9,7 @@ use bvh_search::omission::Facts;
 
 /// What is left out of an experiment, scene by scene, and what it will run.
 pub fn experiment(experiment: &Experiment) -> Result<String, Error> {
-    let (scenes, _) = if experiment.suite.is_some() { Default::default() } else { experiment.load_scenes()? };
+    let (scenes, _) = if experiment.suite.is_some() { Default::default() } else { load_scenes(experiment)? };
     let mut text = format!("{}: {}\n", experiment.name, experiment.question);
     for of_one in &scenes {
         text += &scene(of_one)?;

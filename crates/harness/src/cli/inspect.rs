@@ -1,6 +1,7 @@
 //! `harness inspect`: what a tree file is, what its tree costs, and what it looks like.
 
-use crate::run::store::write_whole;
+use crate::cli::arguments::output_file;
+use crate::cli::output::print_line;
 use crate::scenes::Scene;
 use crate::{Error, files, run::rows};
 use bvh_build::{Builder, muller_fellner};
@@ -53,11 +54,14 @@ impl Lines {
     }
 }
 
-/// Inspects a file. Returns what there is to say, a line per fact, `what: value`. Refuses a file that is damaged, or
-/// for another scene than the one named.
-pub fn inspect(args: &InspectArgs) -> Result<String, Error> {
+/// Inspects a file, and prints a line per fact, `what: value`. Refuses a file that is damaged, or for another scene than
+/// the one named.
+pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
+    if let Some(nodes) = &args.nodes {
+        output_file("--nodes", nodes)?;
+    }
     let bytes = files::read(&args.file)?;
-    let file = files::open(&args.file, &bytes)?;
+    let file = files::open_tree(&args.file, &bytes)?;
     let scene = args.scene.as_deref().map(Scene::load).transpose()?;
     let mut lines = Lines::default();
     describe(file.header(), bytes.len(), &mut lines);
@@ -87,7 +91,8 @@ pub fn inspect(args: &InspectArgs) -> Result<String, Error> {
             lines.say("valid", "yes");
         }
     }
-    Ok(lines.0)
+    print_line(&lines.0);
+    Ok(())
 }
 
 /// What the header says.
@@ -181,5 +186,5 @@ fn write_nodes(tree: &Bvh, path: &Path) -> Result<(), Error> {
         NodeRow { node, parent, kind, first, count, min_x, min_y, min_z, max_x, max_y, max_z }
     };
     let rows: Vec<NodeRow> = parents.into_iter().enumerate().map(row).collect();
-    write_whole(path, &rows::to_bytes(&rows, path)?)
+    files::write(path, &rows::to_bytes(&rows, path)?)
 }

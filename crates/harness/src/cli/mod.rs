@@ -1,6 +1,12 @@
-//! The commands behind the command line, one file each.
+//! The commands of the program, one file each: arguments in, files and lines for the terminal out.
 
 pub mod arguments;
 pub mod bake;
 pub mod explain;
 pub mod inspect;
+pub mod merge;
+pub mod output;
+pub mod render;
+pub mod report;
+pub mod run;
+pub mod scenes;

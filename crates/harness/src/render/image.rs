@@ -1,6 +1,6 @@
 //! From light to the bytes of a PNG file.
 
-use crate::{Error, run::store};
+use crate::{Error, files};
 use glam::DVec3;
 use std::path::Path;
 
@@ -39,7 +39,7 @@ pub fn write_png(path: &Path, width: u32, pixels: &[[u8; 3]]) -> Result<(), Erro
         writer.finish()
     });
     encoded.map_err(|error| Error::io(path, "encode the picture")(std::io::Error::other(error)))?;
-    store::write_whole(path, &bytes)
+    files::write(path, &bytes)
 }
 
 #[cfg(test)]

@@ -9,12 +9,11 @@
 //! same scene gives the same bytes on every machine.
 
 pub mod camera;
-pub mod command;
 mod draw;
 pub mod experiment;
 mod film;
-mod heat;
-mod image;
+pub mod heat;
+pub mod image;
 mod light;
 mod surface;
 pub mod tracer;

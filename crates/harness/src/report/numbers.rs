@@ -5,7 +5,6 @@ use super::progress::{Along, longest, series};
 use super::statistics::{median, primal_integral, quantile};
 use super::{Output, Rows, text_table};
 use crate::Error;
-use crate::run::reference::is_optimum;
 use crate::run::rows::to_bytes;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -85,7 +84,7 @@ impl Config {
                     cost_over_base_quartile_1: over(base, 0.25),
                     cost_over_base_median: over(base, 0.5),
                     cost_over_base_quartile_3: over(base, 0.75),
-                    reference: if is_optimum(reference) { "exact optimum" } else { "best known" },
+                    reference: if reference.is_optimum() { "exact optimum" } else { "best known" },
                     reference_cost: reference.cost,
                     gap_quartile_1: over(reference.cost, 0.25) - 1.0,
                     gap_median: over(reference.cost, 0.5) - 1.0,

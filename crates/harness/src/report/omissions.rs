@@ -133,8 +133,8 @@ impl Pair {
         if let Some((out, kept)) =
             pairs.iter().find(|pair| !(same(pair) || self.may_be_lower && pair.0.cost < pair.1.cost))
         {
-            return Err(Error::Scene {
-                name: scene.into(),
+            return Err(Error::Ablation {
+                scene: scene.into(),
                 message: format!("{} left out: the cost is {}, and {} without", self.name, out.cost, kept.cost),
             });
         }

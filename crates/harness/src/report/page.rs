@@ -2,11 +2,11 @@
 
 use crate::Error;
 use crate::figures;
+use crate::files;
 use crate::report::{Output, Rows};
-use crate::run::execute::Resolved;
 use crate::run::provenance::Provenance;
+use crate::run::resolved::Resolved;
 use crate::run::rows::PaperRow;
-use crate::run::store::write_whole;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::fs;
 use std::path::Path;
@@ -63,19 +63,17 @@ pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
     }
     // What the paper has comes first.
     sections.sort_by(|a, b| (a.paper.is_empty(), &a.name).cmp(&(b.paper.is_empty(), &b.name)));
-    write_whole(out, page(&sections).into_string().as_bytes())?;
+    files::write(out, page(&sections).into_string().as_bytes())?;
     Ok(sections.len())
 }
 
 fn section(results: &Path, name: &str) -> Result<Section, Error> {
     let folder = results.join(name);
     let read = |path: &Path| fs::read_to_string(path).map_err(Error::io(path, "read the file"));
-    let bad =
-        |path: &Path, error: toml::de::Error| Error::Spec { file: path.to_owned(), message: error.to_string() };
     let path = folder.join("resolved.toml");
-    let resolved: Resolved = toml::from_str(&read(&path)?).map_err(|error| bad(&path, error))?;
+    let resolved: Resolved = toml::from_str(&read(&path)?).map_err(Error::toml(&path))?;
     let path = folder.join("provenance.toml");
-    let provenance = toml::from_str(&read(&path)?).map_err(|error| bad(&path, error))?;
+    let provenance = toml::from_str(&read(&path)?).map_err(Error::toml(&path))?;
     let (mut all, mut figures) = (Output::default(), Vec::new());
     // From the CSV files, as the figures beside them were; those of the suite are shown as they are.
     if resolved.experiment.suite.is_some() {

@@ -1,34 +1,26 @@
 //! Carries out the runs of an experiment: in parallel or one by one, with progress, until done or interrupted.
 
-use crate::report;
+use crate::Error;
+use crate::measure;
+use crate::run::finish::{Summary, conclude};
 use crate::run::job::{Job, Watch, base_cost, perform};
-use crate::run::merge::Shard;
 use crate::run::provenance::Provenance;
-use crate::run::rows::to_bytes;
+use crate::run::resolved::{Resolved, load_scenes, to_toml};
+use crate::run::rows::{Row, TraceRow, TraceTimeRow, to_bytes};
+use crate::run::shard::Shard;
 use crate::run::store::Store;
 use crate::scenes::Scene;
 use crate::spec::{Contestant, Experiment, Labelled};
 use crate::stress::Measure;
-use crate::{Error, measure, run::reference, run::store};
 use bvh_core::Bvh;
 use bvh_search::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::Path;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
-
-/// What a finished experiment leaves to say.
-#[derive(Clone, Debug, Default)]
-pub struct Summary {
-    /// Tables for the terminal.
-    pub text: String,
-    /// Optional scenes that were not there.
-    pub left_out: Vec<String>,
-}
+use std::sync::{Mutex, PoisonError};
 
 /// How much of an experiment is to be done.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,18 +31,25 @@ pub struct Extent {
     pub shard: Option<Shard>,
 }
 
-/// Runs `experiment` into `out/NAME/`. `interrupted` is watched: when it becomes true, finished runs are kept and the
-/// rest is given up.
+/// Trees that rays are traced through, by the number of their run.
+type Trees = BTreeMap<usize, Bvh>;
+
+/// Runs `experiment` into `out/NAME/`. As soon as `interrupted` becomes true, the unfinished runs are given up and the
+/// finished ones are kept.
 pub fn execute(
     experiment: &Experiment,
     out: &Path,
     extent: Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
+    let whole_only = [
+        (experiment.suite.is_some(), "the suite of cases is not done in parts"),
+        (experiment.tracing.is_some(), "rays are timed against each other, not in parts"),
+    ];
+    if let Some((_, why)) = whole_only.iter().find(|(whole, _)| *whole && extent.shard.is_some()) {
+        return Err(Error::Usage(format!("{}: {why}", experiment.name)));
+    }
     if let Some(measure) = &experiment.suite {
-        if extent.shard.is_some() {
-            return Err(Error::Usage(format!("{}: the suite of cases is not done in parts", experiment.name)));
-        }
         return over_suite(experiment, measure, out, interrupted);
     }
     let Some(threads) = experiment.threads else { return run(experiment, out, extent, interrupted) };
@@ -65,50 +64,68 @@ fn run(
     extent: Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
-    if extent.shard.is_some() && experiment.tracing.is_some() {
-        return Err(Error::Usage(format!(
-            "{}: rays are timed against each other, not in parts",
-            experiment.name
-        )));
-    }
-    let (scenes, left_out) = experiment.load_scenes()?;
-    let resolved = resolve(experiment, &scenes);
+    let (scenes, left_out) = load_scenes(experiment)?;
+    let resolved = Resolved::new(experiment, &scenes);
     let store = Store::open(out, &experiment.name, &to_toml(&resolved)?, extent.resume)?;
-    let bases = scenes
-        .par_iter()
-        .map(|scene| base_cost(scene, &experiment.objective))
-        .collect::<Result<Vec<_>, _>>()?;
-    let jobs: Vec<Job> = scenes
-        .iter()
-        .zip(bases)
-        .flat_map(|(scene, base)| {
-            experiment.runs().map(move |(labelled, repetition, first_of_scene)| Job {
-                scene,
-                base,
-                labelled,
-                repetition,
-                first_of_scene,
-            })
-        })
-        .collect();
-
+    let jobs = jobs(experiment, &scenes)?;
     let own: Vec<usize> =
         (0..jobs.len()).filter(|&index| extent.shard.is_none_or(|shard| shard.has(index))).collect();
+    let watch = Watch { bar: progress(own.len() as u64), interrupted };
+    watch.bar.set_message(experiment.name.clone());
+    let trees = perform_all(experiment, &jobs, &own, &store, &watch)?;
+    let provenance = Provenance::gather();
+    if let Some(shard) = extent.shard {
+        store.keep_shard(&to_toml(&provenance)?)?;
+        let text = format!("{} runs, part {shard}; `harness merge` joins the parts.\n", own.len());
+        return Ok(Summary { text, left_out });
+    }
+    if let Some(config) = &experiment.tracing {
+        trace(experiment, config, &jobs, trees, &watch, &store)?;
+    }
+    let text = conclude(&resolved, out, &provenance, store)?;
+    Ok(Summary { text, left_out })
+}
+
+/// All runs, scene by scene, in the order of the spec.
+fn jobs<'a>(experiment: &'a Experiment, scenes: &'a [Scene]) -> Result<Vec<Job<'a>>, Error> {
+    let bases = scenes.par_iter().map(|scene| base_cost(scene, &experiment.objective));
+    let bases = bases.collect::<Result<Vec<_>, _>>()?;
+    let of_scene = |(scene, base): (&'a Scene, f64)| {
+        experiment.runs().map(move |(labelled, repetition, first_of_scene)| Job {
+            scene,
+            base,
+            labelled,
+            repetition,
+            first_of_scene,
+        })
+    };
+    Ok(scenes.iter().zip(bases).flat_map(of_scene).collect())
+}
+
+/// Performs those of the runs in `own` that the store does not have yet, and keeps each as soon as it is finished.
+/// Returns the trees to be traced of the runs that were performed now.
+fn perform_all(
+    experiment: &Experiment,
+    jobs: &[Job],
+    own: &[usize],
+    store: &Store,
+    watch: &Watch,
+) -> Result<Trees, Error> {
     let mut todo: Vec<usize> = own.iter().copied().filter(|&index| !store.has(index)).collect();
     if experiment.sequential {
+        // Methods take turns, so that a disturbance of the machine does not hit all repetitions of one method.
         let scene = |index: usize| index / (experiment.methods.len() * experiment.repetitions as usize);
         todo.sort_by_key(|&index| (scene(index), jobs[index].repetition));
     }
-    // The trees that rays are traced through, by the number of their run.
-    let trees = Mutex::new(BTreeMap::new());
+    let trees = Mutex::new(Trees::new());
     let finished = AtomicUsize::new(own.len() - todo.len());
-    let watch = Watch { bar: progress(own.len() as u64, finished.load(Relaxed) as u64), interrupted };
-    watch.bar.set_message(experiment.name.clone());
+    watch.bar.set_position(finished.load(Relaxed) as u64);
+    watch.bar.reset_eta();
     let work = |&index: &usize| -> Result<(), Error> {
-        if let Some((run, tree)) = perform(experiment, &jobs[index], &watch)? {
+        if let Some((run, tree)) = perform(experiment, &jobs[index], watch)? {
             store.keep(index, &run)?;
             if experiment.tracing.is_some() && jobs[index].repetition == 0 {
-                trees.lock().unwrap_or_else(std::sync::PoisonError::into_inner).insert(index, tree);
+                trees.lock().unwrap_or_else(PoisonError::into_inner).insert(index, tree);
             }
             finished.fetch_add(1, Relaxed);
             watch.bar.inc(1);
@@ -119,74 +136,10 @@ fn run(
         if experiment.sequential { todo.iter().try_for_each(work) } else { todo.par_iter().try_for_each(work) };
     watch.bar.finish_and_clear();
     result?;
-    let finished = finished.load(Relaxed);
-    if finished < own.len() {
-        return Err(Error::Interrupted { finished, runs: own.len() });
+    match finished.into_inner() {
+        all if all == own.len() => Ok(trees.into_inner().unwrap_or_else(PoisonError::into_inner)),
+        finished => Err(Error::Interrupted { finished, runs: own.len() }),
     }
-    let provenance = Provenance::gather();
-    if let Some(shard) = extent.shard {
-        store.keep_shard(&to_toml(&provenance)?)?;
-        let text = format!("{finished} runs, part {shard}; `harness merge` joins the parts.\n");
-        return Ok(Summary { text, left_out });
-    }
-    if let Some(config) = &experiment.tracing {
-        let trees = trees.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-        trace(experiment, config, &jobs, trees, &watch, &store)?;
-    }
-    let text = conclude(&resolved, out, &provenance, store)?;
-    Ok(Summary { text, left_out })
-}
-
-/// Joins the kept runs and makes the reports. Returns the text for the terminal.
-pub(crate) fn conclude(
-    resolved: &Resolved,
-    out: &Path,
-    provenance: &Provenance,
-    store: Store,
-) -> Result<String, Error> {
-    store.join(resolved.experiment.runs().count() * resolved.scenes.len())?;
-    let text = report(resolved, out, provenance, &store)?;
-    store.write("provenance.toml", to_toml(provenance)?.as_bytes())?;
-    store.finish()?;
-    Ok(text)
-}
-
-/// Improves the best known costs and makes the reports of joined rows. Returns the text for the terminal.
-fn report(resolved: &Resolved, out: &Path, provenance: &Provenance, store: &Store) -> Result<String, Error> {
-    store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
-    reference::update(resolved, out, &provenance.revision, store)?;
-    report::write_all(&resolved.experiment.reports, store)
-}
-
-/// Makes the reports of finished runs again, with the references of now. Nothing is run: the spec must be the one that
-/// the rows in `out/NAME/` come from, but for its reports.
-pub fn report_again(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
-    let (scenes, left_out) = experiment.load_scenes()?;
-    let resolved = resolve(experiment, &scenes);
-    let folder = out.join(&experiment.name);
-    let refuse = |message: &str| Error::Usage(format!("{}: {message}", folder.display()));
-    if store::is_unfinished(&folder) {
-        return Err(refuse("the experiment was interrupted; finish it with --resume first"));
-    }
-    let read = |name: &str| {
-        let path = folder.join(name);
-        std::fs::read_to_string(&path).map_err(Error::io(&path, "read the file"))
-    };
-    let found = read("resolved.toml")?;
-    let same_runs = toml::from_str(&found).is_ok_and(|found: Resolved| {
-        let experiment = Experiment { reports: experiment.reports.clone(), ..found.experiment };
-        Resolved { experiment, ..found } == resolved
-    });
-    if !same_runs {
-        return Err(refuse("the rows come from another spec, scene or seed; run it again without --redraw"));
-    }
-    let store = Store::open(out, &experiment.name, &found, false)?;
-    // What the rows have found, their program has found.
-    let provenance: Provenance = toml::from_str(&read("provenance.toml")?)
-        .map_err(|error| refuse(&format!("provenance.toml: {}", error.message())))?;
-    let text = report(&resolved, out, &provenance, &store)?;
-    store.finish()?;
-    Ok(Summary { text, left_out })
 }
 
 /// Measures over the suite of stiff cases; always from the start.
@@ -196,7 +149,7 @@ fn over_suite(
     out: &Path,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
-    let resolved = to_toml(&resolve(experiment, &[]))?;
+    let resolved = to_toml(&Resolved::new(experiment, &[]))?;
     let store = Store::open(out, &experiment.name, &resolved, false)?;
     let text = match measure {
         Measure::Stability(config) => {
@@ -211,13 +164,13 @@ fn over_suite(
     Ok(Summary { text, left_out: vec![] })
 }
 
-/// Traces rays through the trees of all first runs, scene by scene. Trees of runs that were kept from an interrupted
-/// experiment are made again.
+/// Traces rays through the trees of all first runs, scene by scene. Rebuilds the trees of runs that were kept from an
+/// interrupted experiment.
 fn trace(
     experiment: &Experiment,
     config: &measure::Config,
     jobs: &[Job],
-    mut trees: BTreeMap<usize, Bvh>,
+    mut trees: Trees,
     watch: &Watch,
     store: &Store,
 ) -> Result<(), Error> {
@@ -241,49 +194,19 @@ fn trace(
             .collect();
         let seed = experiment.seed_of(&scene.name, "tracing", 0);
         let measured = measure::measure(config, scene, &entries, seed, || watch.cancelled())
-            .map_err(|message| Error::Scene { name: scene.name.clone(), message })?;
+            .map_err(|message| Error::Tracing { scene: scene.name.clone(), message })?;
         let (scene_rows, scene_times) = measured.ok_or_else(interrupted)?;
         rows.extend(scene_rows);
         times.extend(scene_times);
     }
-    store.write("traversal.csv", &to_bytes(&rows, Path::new("traversal.csv"))?)?;
-    store.write("timing_traversal.csv", &to_bytes(&times, Path::new("timing_traversal.csv"))?)
-}
-
-/// Contents of `resolved.toml`: the spec with every default spelled out, and which scenes it ran on.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Resolved {
-    pub experiment: Experiment,
-    pub scenes: Vec<LoadedScene>,
-}
-
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct LoadedScene {
-    pub name: String,
-    pub kind: String,
-    pub objects: usize,
-    pub checksum: String,
-}
-
-fn resolve(experiment: &Experiment, scenes: &[Scene]) -> Resolved {
-    let loaded = |scene: &Scene| LoadedScene {
-        name: scene.name.clone(),
-        kind: scene.kind.into(),
-        objects: scene.boxes.len(),
-        checksum: format!("{:016x}", scene.checksum()),
-    };
-    Resolved { experiment: experiment.clone(), scenes: scenes.iter().map(loaded).collect() }
-}
-
-fn to_toml(value: &impl Serialize) -> Result<String, Error> {
-    toml::to_string(value).map_err(|error| Error::Usage(format!("cannot be written as TOML: {error}")))
+    store.write(TraceRow::FILE, &to_bytes(&rows, Path::new(TraceRow::FILE))?)?;
+    store.write(TraceTimeRow::FILE, &to_bytes(&times, Path::new(TraceTimeRow::FILE))?)
 }
 
 /// A bar with the time left; hidden unless standard error is a terminal.
-fn progress(runs: u64, finished: u64) -> ProgressBar {
-    let bar = ProgressBar::new(runs).with_position(finished);
+fn progress(runs: u64) -> ProgressBar {
+    let bar = ProgressBar::new(runs);
     let template = "{msg} {wide_bar} {pos}/{len} runs, {eta} left";
     bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.reset_eta();
     bar
 }

@@ -174,7 +174,7 @@ fn build_by(
     objective: &Objective,
     stopwatch: &Stopwatch,
 ) -> Result<(Outcome, f64), Error> {
-    let refused = |message| Error::Scene { name: scene.name.clone(), message };
+    let refused = |message| Error::Library { scene: scene.name.clone(), library: peer.name(), message };
     let Built { tree, seconds } = peer.build(scene).map_err(refused)?;
     let (cost, work) = (objective.cost(&tree), tree.nodes.len() as u64);
     let event = Event { evaluations: 1, work, cost, incumbent: cost };

@@ -1,49 +1,14 @@
-//! Experiments that outgrow one machine: which runs a part has, and joining the parts into what one machine would
-//! write.
+//! Joins the parts of an experiment that was run on several machines into what one machine would have written.
 
 use crate::Error;
-use crate::run::execute::{Resolved, conclude};
+use crate::files;
+use crate::run::finish::conclude;
 use crate::run::provenance::Provenance;
+use crate::run::resolved::Resolved;
 use crate::run::store::{self, FinishedRun, Store};
 use std::collections::BTreeMap;
-use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
-
-/// The part `number` of `of`, both from 1; written `number/of`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
-    number: usize,
-    of: usize,
-}
-
-impl Shard {
-    /// Whether run `index` of the experiment belongs to this part. Neighbours go to different parts, so that a large
-    /// scene or a slow method is spread over all of them.
-    pub fn has(&self, index: usize) -> bool {
-        index % self.of == self.number - 1
-    }
-}
-
-impl fmt::Display for Shard {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.number, self.of)
-    }
-}
-
-impl FromStr for Shard {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let parsed = text
-            .split_once('/')
-            .and_then(|(number, of)| Some(Self { number: number.parse().ok()?, of: of.parse().ok()? }));
-        parsed
-            .filter(|shard| (1..=shard.of).contains(&shard.number))
-            .ok_or_else(|| "accepted: I/N with I from 1 to N, as 2/8".into())
-    }
-}
 
 /// One part of an experiment, as `--shard` left it.
 struct Part {
@@ -71,7 +36,7 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Vec<(String, String)>, E
             let partial = entry.path().join(".partial");
             let spec = partial.join("resolved.toml");
             if spec.is_file() {
-                locks.push(store::lock(&entry.path())?);
+                locks.push(files::lock_folder(&entry.path())?);
                 let resolved = fs::read_to_string(&spec).map_err(Error::io(&spec, "read the file"))?;
                 let name = entry.file_name().to_string_lossy().into_owned();
                 experiments.entry(name.clone()).or_default().push(Part { partial, resolved });
@@ -157,27 +122,4 @@ fn join(name: &str, parts: &[Part], out: &Path) -> Result<String, Error> {
 /// Whether both paths are one existing folder.
 fn same_folder(a: &Path, b: &Path) -> bool {
     a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_run_belongs_to_one_part() {
-        for of in 1..=7 {
-            let parts: Vec<Shard> = (1..=of).map(|number| Shard { number, of }).collect();
-            for index in 0..30 {
-                assert_eq!(parts.iter().filter(|part| part.has(index)).count(), 1);
-            }
-        }
-    }
-
-    #[test]
-    fn parts_are_written_as_they_are_read_and_wrong_ones_are_refused() {
-        assert_eq!("2/8".parse::<Shard>().unwrap().to_string(), "2/8");
-        for wrong in ["0/3", "4/3", "1/0", "1", "a/b", "-1/2", ""] {
-            assert!(wrong.parse::<Shard>().unwrap_err().contains("I/N"), "{wrong}");
-        }
-    }
 }

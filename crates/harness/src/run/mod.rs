@@ -2,9 +2,12 @@
 
 pub mod check;
 pub mod execute;
+pub mod finish;
 mod job;
 pub mod merge;
 pub mod provenance;
 pub mod reference;
+pub mod resolved;
 pub mod rows;
+pub mod shard;
 pub mod store;

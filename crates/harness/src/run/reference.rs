@@ -8,10 +8,11 @@
 //! Only binary trees with one object per leaf count: wider nodes and leaves would make every cost beatable.
 
 use crate::Error;
+use crate::files;
 use crate::report::Report;
-use crate::run::execute::{LoadedScene, Resolved};
-use crate::run::rows::{BoundRow, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
-use crate::run::store::{Store, write_whole};
+use crate::run::resolved::{LoadedScene, Resolved};
+use crate::run::rows::{BoundRow, ROUNDING, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
+use crate::run::store::Store;
 use bvh_core::cost::Objective;
 use bvh_search::exact;
 use std::fs::{self, File};
@@ -21,14 +22,6 @@ use std::path::Path;
 pub const BEST_KNOWN: &str = "best_known.csv";
 /// The file in the folder of an experiment.
 pub const REFERENCES: &str = ReferenceRow::FILE;
-
-/// Costs less apart than this, relatively, are equal: the rest is rounding.
-const ROUNDING: f64 = 1e-12;
-
-/// Whether a lower bound proves the reference to be the optimum.
-pub fn is_optimum(reference: &ReferenceRow) -> bool {
-    reference.lower_bound.is_some_and(|bound| bound >= reference.cost * (1.0 - ROUNDING))
-}
 
 /// Improves `out/best_known.csv` by the rows in the store's folder, and records the references there if a report needs
 /// them. One harness at a time does so; at any moment the file is the old one or the whole new one.
@@ -61,7 +54,7 @@ pub(crate) fn update(resolved: &Resolved, out: &Path, revision: &str, store: &St
         (row.scene.clone(), row.objects, row.checksum.clone(), row.objective.clone())
     });
     if known != before {
-        write_whole(&path, &to_bytes(&known, &path)?)?;
+        files::write(&path, &to_bytes(&known, &path)?)?;
     }
     if experiment.reports.iter().any(Report::needs_references) {
         store.write(REFERENCES, &to_bytes(&references, Path::new(REFERENCES))?)?;
@@ -177,9 +170,9 @@ mod tests {
     fn an_optimum_that_no_run_has_found_is_the_reference() {
         let mut known = Vec::new();
         offer(&mut known, row("a", 9.0, Some(6.0)), true);
-        assert!(known[0].cost == 6.0 && known[0].method == "exact" && is_optimum(&known[0]));
+        assert!(known[0].cost == 6.0 && known[0].method == "exact" && known[0].is_optimum());
         offer(&mut known, row("a", 6.0 + 1e-14, Some(6.0)), true);
         assert_eq!((known.len(), known[0].cost), (1, 6.0));
-        assert!(!is_optimum(&row("a", 6.0, Some(5.0))));
+        assert!(!row("a", 6.0, Some(5.0)).is_optimum());
     }
 }

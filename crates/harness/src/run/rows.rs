@@ -254,6 +254,16 @@ pub struct ReferenceRow {
     pub lower_bound: Option<f64>,
 }
 
+/// Costs that differ by less than this, relatively, are equal: the rest is rounding.
+pub const ROUNDING: f64 = 1e-12;
+
+impl ReferenceRow {
+    /// Whether the lower bound proves the reference to be the optimum.
+    pub fn is_optimum(&self) -> bool {
+        self.lower_bound.is_some_and(|bound| bound >= self.cost * (1.0 - ROUNDING))
+    }
+}
+
 /// One row of `paper.csv`: a number of the paper beside ours.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PaperRow {

@@ -5,10 +5,10 @@
 //! are, their rows are joined in the order of the spec, so the bytes do not depend on the order of finishing.
 
 use crate::Error;
+use crate::files;
 use crate::run::rows::{Row, to_bytes};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// The rows of one finished run: for every kind that it has, the CSV file of its own.
@@ -63,7 +63,7 @@ impl Store {
         let folder = out.join(name);
         let partial = folder.join(".partial");
         fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
-        let lock = lock(&folder)?;
+        let lock = files::lock_folder(&folder)?;
         let removed = folder.join(REMOVED);
         if removed.exists() {
             fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))?;
@@ -84,7 +84,7 @@ impl Store {
                     fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))?;
                 }
                 fs::create_dir_all(&partial).map_err(Error::io(&partial, "create the folder"))?;
-                write_whole(&spec, resolved.as_bytes())?;
+                files::write(&spec, resolved.as_bytes())?;
             }
         }
         Ok(Self { folder, partial, _lock: lock })
@@ -113,7 +113,7 @@ impl Store {
         }
         fs::create_dir(&unfinished).map_err(Error::io(&unfinished, "create the folder"))?;
         for (name, bytes) in &run.files {
-            write_synced(&unfinished.join(name), bytes)?;
+            files::write_synced(&unfinished.join(name), bytes)?;
         }
         fs::rename(&unfinished, &part).map_err(Error::io(&part, "rename the folder"))
     }
@@ -134,19 +134,19 @@ impl Store {
                 let header = bytes.iter().position(|&byte| byte == b'\n').map_or(bytes.len(), |end| end + 1);
                 joined.extend_from_slice(if joined.is_empty() { &bytes } else { &bytes[header..] });
             }
-            write_whole(&self.folder.join(name), &joined)?;
+            files::write(&self.folder.join(name), &joined)?;
         }
         Ok(())
     }
 
     /// Writes another file of the results.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
-        write_whole(&self.folder.join(name), bytes)
+        files::write(&self.folder.join(name), bytes)
     }
 
     /// Leaves the finished runs of a shard for merging, with where they come from.
     pub fn keep_shard(self, provenance: &str) -> Result<(), Error> {
-        write_whole(&self.partial.join("provenance.toml"), provenance.as_bytes())
+        files::write(&self.partial.join("provenance.toml"), provenance.as_bytes())
     }
 
     /// Removes what only an interrupted experiment needs. The lock file stays: removing it would race.
@@ -155,17 +155,6 @@ impl Store {
         let removed = self.folder.join(REMOVED);
         fs::rename(&self.partial, &removed).map_err(Error::io(&self.partial, "rename the folder"))?;
         fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))
-    }
-}
-
-/// Locks an experiment's folder against other harnesses until the file is dropped.
-pub fn lock(folder: &Path) -> Result<File, Error> {
-    let path = folder.join(".lock");
-    let lock = File::create(&path).map_err(Error::io(&path, "create the file"))?;
-    match lock.try_lock() {
-        Ok(()) => Ok(lock),
-        Err(fs::TryLockError::WouldBlock) => Err(Error::Busy(folder.to_owned())),
-        Err(fs::TryLockError::Error(source)) => Err(Error::Io { path, action: "lock the file", source }),
     }
 }
 
@@ -183,29 +172,6 @@ fn file_names(folder: &Path) -> Result<BTreeSet<String>, Error> {
     let entries = fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))?;
     let name = |entry: std::io::Result<fs::DirEntry>| Ok(entry?.file_name().to_string_lossy().into_owned());
     entries.map(name).collect::<std::io::Result<_>>().map_err(Error::io(folder, "read the folder"))
-}
-
-/// Replaces the file at `path` by `bytes`: at any moment it is the old file or the whole new one.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let mut unfinished = path.as_os_str().to_owned();
-    unfinished.push(".unfinished");
-    let unfinished = PathBuf::from(unfinished);
-    let written = write_synced(&unfinished, bytes)
-        .and_then(|()| fs::rename(&unfinished, path).map_err(Error::io(path, "replace the file")));
-    if written.is_err() {
-        // On a full disk what is left of it would be in the way.
-        let _ = fs::remove_file(&unfinished);
-    }
-    written
-}
-
-fn write_synced(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let write = |path: &Path| {
-        let mut file = File::create(path)?;
-        file.write_all(bytes)?;
-        file.sync_all()
-    };
-    write(path).map_err(Error::io(path, "write the file"))
 }
 
 #[cfg(test)]

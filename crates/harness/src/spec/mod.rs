@@ -10,14 +10,13 @@ mod ranges;
 mod read;
 
 use crate::report::Report;
-use crate::scenes::{Scene, fnv1a};
-use crate::{Error, measure, measure::rays, render, scenes::subset, stress};
+use crate::scenes::fnv1a;
+use crate::{measure, measure::rays, render, stress};
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, exact};
 pub use method::{Contestant, Labelled};
 pub use read::Overrides;
 use serde::{Deserialize, Serialize};
-use std::collections::HashSet;
 
 /// A checked experiment: every method on every scene, so many times, and how to report it.
 ///
@@ -84,24 +83,6 @@ fn one<T: From<u8>>() -> T {
 }
 
 impl Experiment {
-    /// Loads the scenes, those optional ones that are there included. Returns them and the names of those left out.
-    pub fn load_scenes(&self) -> Result<(Vec<Scene>, Vec<String>), Error> {
-        let names = self.scenes.iter().flat_map(|name| subset::expand(name));
-        let mut scenes = names.map(|name| Scene::load(&name)).collect::<Result<Vec<_>, _>>()?;
-        let mut left_out = Vec::new();
-        for name in &self.optional_scenes {
-            match Scene::load(name) {
-                Ok(scene) => scenes.push(scene),
-                Err(_) => left_out.push(name.clone()),
-            }
-        }
-        let mut names = HashSet::new();
-        match scenes.iter().find(|scene| !names.insert(&scene.name)) {
-            Some(twice) => Err(Error::Usage(format!("two scenes are called {}; name each once", twice.name))),
-            None => Ok((scenes, left_out)),
-        }
-    }
-
     /// The runs on one scene in order: method, repetition, and whether it is the first.
     pub fn runs(&self) -> impl Iterator<Item = (&Labelled, u32, bool)> {
         let of = |labelled| (0..self.repetitions).map(move |repetition| (labelled, repetition));

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::peers::Peer;
+use std::collections::HashSet;
 
 const GOOD: &str = "question = 'q'\nscenes = ['escher']\nmethods = [{ method = 'grasp', noise = 0.1 }]\n";
 

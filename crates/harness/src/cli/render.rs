@@ -1,22 +1,21 @@
 //! `harness render`: arguments in, a PNG file and a line of numbers out.
 
-use super::camera::{self, View};
-use super::draw::{Options, render, tiles};
-use super::film::Film;
-use super::tracer::{Structure, Tracer};
-use super::{heat, image};
 use crate::Error;
+use crate::cli::arguments::{Jobs, input_file, output_file};
+use crate::cli::output::print_line;
+use crate::render::camera::{self, View};
+use crate::render::{Film, Options, Structure, Tracer, heat, image, render as draw, tiles};
 use crate::scenes::Scene;
 use bvh_core::Aabb;
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
 
-/// What `harness render` is asked for.
+/// Draw a scene with a small Whitted ray tracer; the picture is the same with any structure.
 #[derive(clap::Args, Clone, Debug)]
-pub struct Args {
+pub struct RenderArgs {
     /// Name or path of the scene, as in `harness scenes`.
     #[arg(value_name = "SCENE")]
     pub scene: String,
@@ -56,9 +55,9 @@ pub struct Args {
     /// No ground under a scene that is seen from outside.
     #[arg(long)]
     pub no_ground: bool,
-    /// Number of threads; as many as processors if not given. Changes nothing but the time.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub jobs: Option<u16>,
+    /// Limits the threads.
+    #[command(flatten)]
+    pub jobs: Jobs,
 }
 
 /// Most pixels of a picture: a gigabyte of them and their counts.
@@ -92,7 +91,7 @@ fn angle(text: &str) -> Result<f64, String> {
     }
 }
 
-impl Args {
+impl RenderArgs {
     fn options(&self, scene: &Scene) -> Options {
         let (width, height) = self.size;
         let bounds = scene.boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
@@ -111,8 +110,13 @@ impl Args {
     }
 }
 
-/// Draws the picture and writes it. Returns what is to be said about it.
-pub fn run(args: &Args, interrupted: &AtomicBool) -> Result<String, Error> {
+/// Draws the picture, writes it, and prints how long it took.
+pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+    if args.accel.ends_with(".bvh") {
+        input_file("--accel", Path::new(&args.accel))?;
+    }
+    output_file("--out", &args.out)?;
+    args.jobs.apply()?;
     let scene = Scene::load(&args.scene)?;
     if args.heatmap && args.accel == "wide" {
         return Err(Error::Usage(
@@ -131,7 +135,7 @@ pub fn run(args: &Args, interrupted: &AtomicBool) -> Result<String, Error> {
         bar.inc(1);
         !interrupted.load(Relaxed)
     };
-    let film = render(&scene, &tracer, &options, &tile_done);
+    let film = draw(&scene, &tracer, &options, &tile_done);
     bar.finish_and_clear();
     let film = film.ok_or(Error::Abandoned)?;
     let rendered = start.elapsed().as_secs_f64() - built;
@@ -141,10 +145,18 @@ pub fn run(args: &Args, interrupted: &AtomicBool) -> Result<String, Error> {
     } else {
         image::write_png(&args.out, film.width, &film.pixels)?;
     }
-    Ok(summary(args, &scene, &film, rays_per_pixel, built, rendered))
+    print_line(&summary(args, &scene, &film, rays_per_pixel, built, rendered));
+    Ok(())
 }
 
-fn summary(args: &Args, scene: &Scene, film: &Film, rays_per_pixel: u32, built: f64, rendered: f64) -> String {
+fn summary(
+    args: &RenderArgs,
+    scene: &Scene,
+    film: &Film,
+    rays_per_pixel: u32,
+    built: f64,
+    rendered: f64,
+) -> String {
     let mut text = format!(
         "{}: {} objects, {} rays; built in {built:.3} s, rendered in {rendered:.3} s\n",
         scene.name,

@@ -1,0 +1,27 @@
+//! `harness merge`: joins the parts of experiments that were run with `--shard`.
+
+use crate::Error;
+use crate::cli::arguments::output_folder;
+use crate::cli::output::print_line;
+use crate::run;
+use std::path::PathBuf;
+
+/// Join the parts of experiments made with --shard into what one run would have written.
+#[derive(clap::Args, Clone, Debug)]
+pub struct MergeArgs {
+    /// Folders that were given as --out to runs with --shard.
+    #[arg(value_name = "DIR", required = true)]
+    pub folders: Vec<PathBuf>,
+    /// Folder for the results.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// Merges, and prints the tables of every experiment.
+pub fn merge(args: &MergeArgs) -> Result<(), Error> {
+    output_folder("--out", &args.out)?;
+    for (name, text) in run::merge::merge(&args.folders, &args.out)? {
+        print_line(&format!("{text}Results: {}", args.out.join(name).display()));
+    }
+    Ok(())
+}

@@ -1,0 +1,105 @@
+//! `harness SPEC.toml...`: runs experiments, compares them with committed results, or makes their reports again.
+
+use crate::Error;
+use crate::cli::arguments::{Jobs, output_folder};
+use crate::cli::explain;
+use crate::cli::output::print_line;
+use crate::run::execute::{Extent, execute};
+use crate::run::shard::Shard;
+use crate::run::{check, finish, reference};
+use crate::spec::{Experiment, Overrides};
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+
+/// Run experiments.
+#[derive(clap::Args, Clone, Debug)]
+pub struct RunArgs {
+    /// Experiment specs, run one after the other.
+    #[arg(value_name = "SPEC.toml", required = true)]
+    pub specs: Vec<PathBuf>,
+    /// Folder for the results; each experiment has a folder of its own in it.
+    #[arg(long, value_name = "DIR", default_value = "results")]
+    pub out: PathBuf,
+    /// Scene to run on in place of the spec's, by name or path of an OBJ file; may be repeated.
+    #[arg(long = "scene", value_name = "NAME|PATH")]
+    pub scenes: Vec<String>,
+    /// Limits the threads.
+    #[command(flatten)]
+    pub jobs: Jobs,
+    /// Seed in place of the spec's.
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Run the spec's smaller variant, into a folder of its own.
+    #[arg(long)]
+    pub quick: bool,
+    /// Compare with the committed results instead of writing any; exit code 1 on a difference.
+    #[arg(long, conflicts_with = "resume")]
+    pub check: bool,
+    /// Make the tables and figures again from the rows there are, with the best known costs of now; run nothing.
+    #[arg(long, conflicts_with_all = ["check", "resume", "shard"])]
+    pub redraw: bool,
+    /// Keep the finished runs of an interrupted experiment and do the rest.
+    #[arg(long)]
+    pub resume: bool,
+    /// Do only the I-th of N parts of the runs, from 1, and leave them for `harness merge`. Every part needs an --out
+    /// of its own.
+    #[arg(long, value_name = "I/N", conflicts_with = "check")]
+    pub shard: Option<Shard>,
+    /// Print first what each scene does not need and is left out, and why.
+    #[arg(long)]
+    pub explain: bool,
+}
+
+/// Runs all experiments, and prints their tables.
+pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+    output_folder("--out", &args.out)?;
+    args.jobs.apply()?;
+    let overrides = Overrides { scenes: args.scenes.clone(), seed: args.seed, quick: args.quick };
+    // All specs are checked before the first one is run.
+    let experiments =
+        args.specs.iter().map(|path| Experiment::read(path, &overrides)).collect::<Result<Vec<_>, _>>()?;
+    let extent = Extent { resume: args.resume, shard: args.shard };
+    let mut differences = 0;
+    for experiment in &experiments {
+        if args.explain {
+            print_line(&explain::experiment(experiment)?);
+        }
+        if args.check {
+            differences += compare(args, experiment, interrupted)?;
+            continue;
+        }
+        let summary = if args.redraw {
+            finish::redraw(experiment, &args.out)?
+        } else {
+            execute(experiment, &args.out, extent, interrupted)?
+        };
+        print_line(&experiment.question);
+        for name in &summary.left_out {
+            print_line(&format!("(without {name}: scripts/fetch-scenes brings it)"));
+        }
+        let folder = args.out.join(&experiment.name);
+        print_line(&format!("\n{}Results: {}", summary.text, folder.display()));
+    }
+    if differences > 0 { Err(Error::Differs { differences }) } else { Ok(()) }
+}
+
+/// Runs into a temporary folder and prints how the rows differ from the committed ones. Returns the number of
+/// differences.
+fn compare(args: &RunArgs, experiment: &Experiment, interrupted: &AtomicBool) -> Result<usize, Error> {
+    let temporary = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
+    let (fresh, committed) = (temporary.path().join(&experiment.name), args.out.join(&experiment.name));
+    reference::adopt(&committed, temporary.path())?;
+    let summary = execute(experiment, temporary.path(), Extent::default(), interrupted)?;
+    let found = check::compare(&fresh, &committed, &summary.left_out)?;
+    let name = &experiment.name;
+    for scene in &summary.left_out {
+        print_line(&format!("{name}: scene {scene} is not fetched; its rows are not compared"));
+    }
+    for difference in &found {
+        print_line(&format!("{name}: {difference}"));
+    }
+    if found.is_empty() {
+        print_line(&format!("{name}: as committed"));
+    }
+    Ok(found.len())
+}

@@ -1,0 +1,65 @@
+//! What an experiment comes to: its spec with every default spelled out, and the scenes it runs on.
+
+use crate::Error;
+use crate::scenes::{Scene, subset};
+use crate::spec::Experiment;
+use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
+
+/// Contents of `resolved.toml`.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Resolved {
+    pub experiment: Experiment,
+    pub scenes: Vec<LoadedScene>,
+}
+
+/// A scene by what identifies it.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct LoadedScene {
+    pub name: String,
+    pub kind: String,
+    pub objects: usize,
+    /// [`Scene::checksum`], hexadecimal.
+    pub checksum: String,
+}
+
+impl Resolved {
+    /// An experiment with the scenes that were loaded for it.
+    pub fn new(experiment: &Experiment, scenes: &[Scene]) -> Self {
+        let loaded = |scene: &Scene| LoadedScene {
+            name: scene.name.clone(),
+            kind: scene.kind.into(),
+            objects: scene.boxes.len(),
+            checksum: format!("{:016x}", scene.checksum()),
+        };
+        Self { experiment: experiment.clone(), scenes: scenes.iter().map(loaded).collect() }
+    }
+
+    /// Number of runs over all scenes.
+    pub fn run_count(&self) -> usize {
+        self.experiment.runs().count() * self.scenes.len()
+    }
+}
+
+/// Loads an experiment's scenes. Returns them and the names of the optional ones that are not there.
+pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>), Error> {
+    let names = experiment.scenes.iter().flat_map(|name| subset::expand(name));
+    let mut scenes = names.map(|name| Scene::load(&name)).collect::<Result<Vec<_>, _>>()?;
+    let mut left_out = Vec::new();
+    for name in &experiment.optional_scenes {
+        match Scene::load(name) {
+            Ok(scene) => scenes.push(scene),
+            Err(_) => left_out.push(name.clone()),
+        }
+    }
+    let mut names = HashSet::new();
+    match scenes.iter().find(|scene| !names.insert(&scene.name)) {
+        Some(twice) => Err(Error::Usage(format!("two scenes are called {}; name each once", twice.name))),
+        None => Ok((scenes, left_out)),
+    }
+}
+
+/// `value` as TOML.
+pub(crate) fn to_toml(value: &impl Serialize) -> Result<String, Error> {
+    toml::to_string(value).map_err(|error| Error::Usage(format!("cannot be written as TOML: {error}")))
+}
