@@ -1,36 +1,40 @@
-//! Who is ahead at each budget: every other library's time and cost, and the cost of `best` given the same time.
+//! Who is ahead at each budget: the time and cost of every other library, and the cost of `best` in the same time.
 //!
 //! `cargo bench -p harness --bench peers --features peers -- [--rounds N] SCENE...`
 //!
 //! With `RUSTFLAGS="-C target-cpu=native"`, which `obvhs` gains from. One thread, one object per leaf, cost over that
-//! of greedy Müller–Fellner. A library's time is its least over the rounds, without the conversion of its tree; the
-//! time of `best` is that of the whole call. Rounds are in turns. Of the rounds of `best`, that of least cost among
-//! those that were done in the library's time, as far as a clock tells; else the quickest.
+//! of greedy Müller–Fellner. Rounds are in turns. A library's time is its least over the rounds, without the conversion of
+//! its tree; the time of `best` is that of the whole call. The table shows the round of `best` with the least cost among
+//! the rounds that took no longer than the library, or the quickest if all took longer.
 
 mod clock;
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost;
+use clap::Parser;
 use harness::peers::{NoSettings, Obvhs, Peer, Preset};
 use harness::scenes::Scene;
 
-/// The part of a library's time that `best` may plan with: other programs disturb both.
+/// The fraction of a library's time that `best` may plan with: other programs disturb both.
 const PLANNED: f64 = 0.99;
 
-/// What counts as the same time.
+/// Times whose ratio is at most this count as the same.
 const SAME: f64 = 1.02;
 
+#[derive(Parser)]
+struct Args {
+    /// Names or paths of scenes.
+    #[arg(required = true)]
+    scenes: Vec<String>,
+    #[arg(long, default_value_t = 15)]
+    rounds: usize,
+    /// Cargo passes this to every benchmark.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
 fn main() {
-    let (mut rounds, mut scenes) = (15, Vec::new());
-    let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--rounds" => {
-                rounds = arguments.next().and_then(|text| text.parse().ok()).expect("a number of rounds")
-            }
-            _ => scenes.push(argument),
-        }
-    }
+    let Args { scenes, rounds, .. } = Args::parse();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of one thread");
     println!("{:<16} {:<18} {:>9} {:>7} {:>9} {:>7}", "scene", "library", "time/ms", "cost", "best/ms", "cost");
     for name in scenes {

@@ -2,33 +2,42 @@
 //!
 //! `cargo bench -p harness --bench search -- [--seconds 0.1,1,10,60] [--threads 1,2] [--seed N] SCENE...`
 //!
-//! The time is that of the whole call, build and final conversion included. Threads take turns, and every further
-//! number of threads has 0.6 of the first one's time, so that a line should show no less in its later columns.
+//! The time is that of the whole call, with the build and the final conversion. The numbers of threads take turns. Runs on
+//! more than one thread have 0.6 of the limit, after which they should be no worse than one thread after all of it.
 
 mod clock;
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost;
+use clap::Parser;
 use harness::scenes::Scene;
 
-/// The part of the first number of threads' time that further ones have.
+/// The fraction of the limit that runs on more than one thread have.
 const LESS_TIME: f64 = 0.6;
 
-/// The part of the time that the search may plan with: the conversion of its result takes the rest.
+/// The fraction of the limit that the search may plan with: the conversion of its result takes the rest.
 const PLANNED: f64 = 0.97;
 
+#[derive(Parser)]
+struct Args {
+    /// Names or paths of scenes of triangles.
+    #[arg(required = true)]
+    scenes: Vec<String>,
+    /// Limits, in seconds.
+    #[arg(long, value_delimiter = ',', default_value = "0.1,1,10,60")]
+    seconds: Vec<f64>,
+    /// Numbers of threads.
+    #[arg(long, value_delimiter = ',', default_value = "1,2")]
+    threads: Vec<usize>,
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Cargo passes this to every benchmark.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
 fn main() {
-    let (mut seconds, mut threads, mut seed) = (vec![0.1, 1.0, 10.0, 60.0], vec![1, 2], 1);
-    let mut scenes = Vec::new();
-    let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--seconds" => seconds = list(arguments.next()),
-            "--threads" => threads = list(arguments.next()),
-            "--seed" => seed = list(arguments.next())[0],
-            _ => scenes.push(argument),
-        }
-    }
+    let Args { scenes, seconds, threads, seed, .. } = Args::parse();
     println!("{:<24} {:>7} {:>7} {:>10} {:>10}", "scene", "threads", "limit/s", "taken/s", "below/%");
     for name in scenes {
         match Scene::load(&name) {
@@ -36,12 +45,6 @@ fn main() {
             Err(error) => println!("{error}"),
         }
     }
-}
-
-/// The numbers of a list with commas.
-fn list<T: std::str::FromStr>(text: Option<String>) -> Vec<T> {
-    let number = |part: &str| part.parse().unwrap_or_else(|_| panic!("`{part}` is no number"));
-    text.expect("an option wants a list").split(',').map(number).collect()
 }
 
 fn measure(scene: &Scene, seconds: &[f64], threads: &[usize], seed: u64) {

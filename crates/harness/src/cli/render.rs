@@ -3,8 +3,9 @@
 use crate::Error;
 use crate::cli::arguments::{Jobs, input_file, output_file};
 use crate::cli::output::print_line;
-use crate::render::camera::{self, View};
-use crate::render::{Film, Options, Structure, Tracer, heat, image, render as draw, tiles};
+use crate::measure::Accelerator;
+use crate::measure::camera::View;
+use crate::render::{Film, Options, framing, heat, image, render as draw, structure, tiles};
 use crate::scenes::Scene;
 use bvh_core::Aabb;
 use glam::DVec3;
@@ -95,7 +96,7 @@ impl RenderArgs {
     fn options(&self, scene: &Scene) -> Options {
         let (width, height) = self.size;
         let bounds = scene.boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
-        let automatic = camera::automatic(scene, &bounds, f64::from(width) / f64::from(height));
+        let automatic = framing::automatic(scene, &bounds, f64::from(width) / f64::from(height));
         let view = match (self.from, self.at) {
             (None, None) => View { fov: self.fov.unwrap_or(automatic.fov), ..automatic },
             (from, at) => View {
@@ -125,7 +126,7 @@ pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> 
     }
     let options = args.options(&scene);
     let start = Instant::now();
-    let tracer = Tracer::new(&scene, Structure::by_name(&args.accel, &scene)?);
+    let accelerator = Accelerator::new(&scene.primitives, structure::by_name(&args.accel, &scene)?);
     let built = start.elapsed().as_secs_f64();
     let bar = ProgressBar::new(tiles(&options));
     let template = "{msg} {wide_bar} {pos}/{len} tiles, {eta} left";
@@ -135,7 +136,7 @@ pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> 
         bar.inc(1);
         !interrupted.load(Relaxed)
     };
-    let film = draw(&scene, &tracer, &options, &tile_done);
+    let film = draw(&scene, &accelerator, &options, &tile_done);
     bar.finish_and_clear();
     let film = film.ok_or(Error::Abandoned)?;
     let rendered = start.elapsed().as_secs_f64() - built;

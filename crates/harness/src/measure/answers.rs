@@ -1,9 +1,11 @@
-//! How answers to rays differ from the right ones.
+//! Counts the answers to rays that differ from the right ones.
 
-use super::contenders::SOME_HIT;
 use bvh_core::{Bvh, Hit, Ray};
 
-/// How answers differ from the right ones.
+/// The answer of an any-hit query that hits.
+pub const SOME_HIT: Hit = Hit { t: 0.0, object: 0 };
+
+/// Numbers of answers that differ from the right ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Disagreements {
     /// Rays that should hit and do not.
@@ -14,11 +16,11 @@ pub struct Disagreements {
     pub other: u64,
 }
 
-/// By what distances may differ, in multiples of the root box's diagonal, before they are of different hits.
+/// Hits whose distances differ by more, in multiples of the root box's diagonal, are different hits.
 const TOLERANCE: f64 = 1e-4;
 
-/// How answers of another library differ. Distances are compared, with a tolerance, and not objects: of two triangles
-/// that share an edge either is right.
+/// Wrong answers of another library. Distances are compared with a tolerance, and objects are not: where two triangles
+/// share an edge, either is right.
 pub fn disagreements(right: &[Option<Hit>], found: &[Option<Hit>], tree: &Bvh, rays: &[Ray]) -> Disagreements {
     let diagonal = tree.root_aabb().map_or(0.0, |root| root.extent().length());
     compare(right, found, |index, right, found| {
@@ -28,7 +30,7 @@ pub fn disagreements(right: &[Option<Hit>], found: &[Option<Hit>], tree: &Bvh, r
     })
 }
 
-/// How answers of ours differ: by any bit.
+/// Wrong answers of ours, which must be right bit by bit.
 pub(super) fn exact_disagreements(right: &[Option<Hit>], found: &[Option<Hit>]) -> Disagreements {
     compare(right, found, |_, right, found| right == found)
 }
@@ -53,7 +55,7 @@ fn compare(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::{Camera, Kind, cameras};
+    use crate::measure::rays::{Kind, Viewpoint, rays};
     use crate::scenes::Scene;
     use bvh_build::{Builder, muller_fellner};
 
@@ -61,7 +63,7 @@ mod tests {
     fn answers_are_compared_by_place_and_not_by_object() {
         let scene = Scene::load("escher:100").unwrap();
         let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
-        let rays = cameras::rays(Kind::Primary, 4, &scene, &tree, &Camera::default(), 1);
+        let rays = rays(Kind::Primary, 4, &scene, &tree, &Viewpoint::default(), 1);
         let hit = |t, object| Some(Hit { t, object });
         let right = [hit(1.0, 1), hit(1.0, 1), None, hit(1.0, 1)];
         let found = [hit(1.0, 2), None, hit(1.0, 1), hit(2.0, 1)];

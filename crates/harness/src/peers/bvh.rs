@@ -1,8 +1,8 @@
 //! The crate `bvh`.
 
 use super::{Built, Raw, Theirs, convert};
-use crate::measure::rays::Query;
-use crate::measure::{Contender, timed};
+use crate::measure::Query;
+use crate::measure::speed::{Contender, Tracer, timed};
 use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
 use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh as TheirBvh, BvhNode};
@@ -130,9 +130,7 @@ pub(super) fn contender(triangles: &[[Vec3; 3]]) -> Contender<'_> {
     };
     Contender {
         layout: "binary, their own".into(),
-        exact: false,
         preparation_seconds,
-        trace: Box::new(trace),
-        count: None,
+        tracer: Tracer::Other(Box::new(trace)),
     }
 }

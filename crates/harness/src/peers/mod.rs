@@ -10,7 +10,7 @@ mod obvhs;
 #[cfg(feature = "peer-tinybvh")]
 mod tinybvh;
 
-use crate::measure::Contender;
+use crate::measure::speed::Contender;
 use crate::scenes::Scene;
 use bvh_core::Bvh;
 #[cfg(feature = "peers")]
@@ -207,7 +207,9 @@ fn convert(boxes: &[Aabb], node: impl Fn(usize) -> (Aabb, Theirs)) -> Bvh {
 #[cfg(all(test, feature = "peers"))]
 mod tests {
     use super::*;
-    use crate::measure::{self, Kind};
+    use crate::measure::rays::{Kind, rays};
+    use crate::measure::speed::Tracer;
+    use crate::measure::{Accelerator, Query, disagreements};
     use bvh_core::validate;
 
     fn all() -> Vec<Peer> {
@@ -241,13 +243,14 @@ mod tests {
     fn other_libraries_find_nearly_all_hits_and_nothing_else() {
         let scene = Scene::load("escher:2000").unwrap();
         let tree = Peer::Bvh(NoSettings {}).build(&scene).unwrap().tree;
-        let rays = measure::rays(Kind::Incoherent, 4000, &scene, &tree, &Default::default(), 1);
-        let reference = measure::reference(Kind::Incoherent, &rays, &scene, &tree);
+        let rays = rays(Kind::Incoherent, 4000, &scene, &tree, &Default::default(), 1);
+        let mut right = vec![None; rays.len()];
+        Tracer::Own(Accelerator::of_tree(&scene.primitives, &tree)).trace(Query::Nearest, &rays, &mut right);
         for peer in all() {
             for contender in peer.contenders(&scene).unwrap() {
                 let mut hits = vec![None; rays.len()];
-                (contender.trace)(Kind::Incoherent.query(), &rays, &mut hits);
-                let found = measure::disagreements(&reference, &hits, &tree, &rays);
+                contender.tracer.trace(Query::Nearest, &rays, &mut hits);
+                let found = disagreements(&right, &hits, &tree, &rays);
                 assert!(found.missed + found.false_hits + found.other < 20, "{peer:?}: {found:?}");
             }
         }

@@ -1,8 +1,8 @@
 //! The crate `obvhs`.
 
 use super::{Built, Obvhs, Preset, Raw, Theirs, convert};
-use crate::measure::rays::Query;
-use crate::measure::{Contender, timed};
+use crate::measure::Query;
+use crate::measure::speed::{Contender, Tracer, timed};
 use ::obvhs::bvh2::{Bvh2, builder as binary};
 use ::obvhs::cwbvh::builder as wide;
 use ::obvhs::ray::{Ray as TheirRay, RayHit};
@@ -104,10 +104,8 @@ pub(super) fn contenders(config: &Obvhs, triangles: &[[Vec3; 3]]) -> Vec<Contend
     let trace_wide = traced_by!(compressed, in_order(&compressed.primitive_indices));
     let contender = |layout: &str, time: Duration, trace| Contender {
         layout: layout.into(),
-        exact: false,
         preparation_seconds: time.as_secs_f64(),
-        trace,
-        count: None,
+        tracer: Tracer::Other(trace),
     };
     vec![
         contender("binary, their own", binary_time, Box::new(trace_binary) as _),

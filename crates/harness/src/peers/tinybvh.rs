@@ -1,8 +1,8 @@
 //! The crate `tinybvh-rs`, a wrapper of the C++ library tinybvh.
 
 use super::{Built, Theirs, convert};
-use crate::measure::rays::Query;
-use crate::measure::{Contender, timed};
+use crate::measure::Query;
+use crate::measure::speed::{Contender, Tracer, timed};
 use bvh_core::{Aabb, Hit, Ray};
 use glam::Vec3;
 use std::time::Instant;
@@ -49,10 +49,8 @@ pub(super) fn contenders(triangles: &[[Vec3; 3]]) -> Result<Vec<Contender<'_>>, 
     };
     let contender = |layout: &str, preparation_seconds, trace| Contender {
         layout: layout.into(),
-        exact: false,
         preparation_seconds,
-        trace,
-        count: None,
+        tracer: Tracer::Other(trace),
     };
     #[cfg_attr(not(target_feature = "avx2"), allow(unused_mut, reason = "no wide layouts without"))]
     let mut contenders = vec![contender("binary, their own", binary_seconds, Box::new(trace_binary) as _)];

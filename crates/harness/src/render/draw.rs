@@ -1,9 +1,10 @@
 //! From a scene and a view to a picture: tiles in parallel, the same bytes on any number of threads.
 
-use super::camera::{self, Camera, View};
 use super::film::{Film, Tile};
+use super::framing;
 use super::light::{self, Light, World};
-use super::tracer::Tracer;
+use crate::measure::Accelerator;
+use crate::measure::camera::{Camera, View};
 use crate::scenes::Scene;
 use bvh_core::Aabb;
 use glam::DVec3;
@@ -20,12 +21,12 @@ pub struct Options {
     pub samples: u32,
     /// Mirror reflections that are followed one after the other.
     pub depth: u32,
-    /// Where the camera is; where it frames the scene best if not given.
+    /// The view; without one, the whole scene is framed.
     pub view: Option<View>,
-    /// Replace the lights that fit the view, if given. None at all: no shadow ray is sent, and light comes from the
-    /// eye.
+    /// Lights in place of those that fit the view. If the list is empty, surfaces are lit from the eye and no shadow ray
+    /// is sent.
     pub lights: Option<Vec<DVec3>>,
-    /// Whether there is a ground below the scene, where it is seen from outside.
+    /// Whether there is a ground below a scene that is seen from outside.
     pub ground: bool,
 }
 
@@ -35,7 +36,7 @@ impl Default for Options {
     }
 }
 
-/// Pixels of a tile's side. A tile is what a thread does between two looks at the progress.
+/// Pixels on a tile's side. A thread reports progress after every tile.
 const TILE: u32 = 16;
 
 /// Number of tiles that [`render`] reports.
@@ -47,22 +48,22 @@ pub fn tiles(options: &Options) -> u64 {
 /// false, the picture is given up and `None` returned.
 pub fn render(
     scene: &Scene,
-    tracer: &Tracer,
+    accelerator: &Accelerator,
     options: &Options,
     tile_done: &(dyn Fn() -> bool + Sync),
 ) -> Option<Film> {
     let bounds = scene.boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
     let (width, height) = (options.width, options.height);
-    let up = camera::up(scene);
+    let up = framing::up(scene);
     let aspect = f64::from(width) / f64::from(height);
-    let automatic = || camera::automatic(scene, &bounds, aspect);
+    let automatic = || framing::automatic(scene, &bounds, aspect);
     let view = options.view.clone().unwrap_or_else(automatic);
     let camera = Camera::new(&view, up, width, height);
     let lights = match &options.lights {
         Some(positions) => Light::white(positions),
         None => light::automatic(&view, up, &bounds),
     };
-    let world = World::new(tracer, &view, up, &bounds, lights, options.ground, options.depth);
+    let world = World::new(accelerator, &view, up, &bounds, lights, options.ground, options.depth);
     let columns = width.div_ceil(TILE);
     let finished: Option<Vec<Tile>> = (0..tiles(options) as u32)
         .into_par_iter()
@@ -78,25 +79,26 @@ pub fn render(
 
 #[cfg(test)]
 mod tests {
-    use super::super::tracer::Structure;
     use super::*;
+    use crate::measure::Structure;
     use bvh_build::{Builder, goldsmith_salmon, kd_tree, muller_fellner};
     use bvh_core::WideBvh;
+    use std::borrow::Cow;
 
-    fn structures(scene: &Scene) -> Vec<Structure> {
+    fn structures(scene: &Scene) -> Vec<Structure<'static>> {
         let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap();
         let mut structures = vec![
             Structure::Brute,
             Structure::KdTree(kd_tree::Config::default().build(&scene.boxes).unwrap()),
-            Structure::Tree(goldsmith_salmon::Config::default().build(&scene.boxes).unwrap()),
+            Structure::Tree(Cow::Owned(goldsmith_salmon::Config::default().build(&scene.boxes).unwrap())),
         ];
         structures.extend(scene.triangles().map(|own| Structure::Wide(WideBvh::new(&greedy, &own).unwrap())));
-        structures.push(Structure::Tree(greedy));
+        structures.push(Structure::Tree(Cow::Owned(greedy)));
         structures
     }
 
     fn picture(scene: &Scene, structure: Structure, options: &Options) -> Film {
-        render(scene, &Tracer::new(scene, structure), options, &|| true).unwrap()
+        render(scene, &Accelerator::new(&scene.primitives, structure), options, &|| true).unwrap()
     }
 
     #[test]
@@ -148,7 +150,7 @@ mod tests {
     #[test]
     fn a_picture_is_given_up_when_asked_to() {
         let scene = Scene::load("spheres75").unwrap();
-        let tracer = Tracer::new(&scene, Structure::Brute);
-        assert_eq!(render(&scene, &tracer, &Options::default(), &|| false), None);
+        let brute = Accelerator::new(&scene.primitives, Structure::Brute);
+        assert_eq!(render(&scene, &brute, &Options::default(), &|| false), None);
     }
 }

@@ -1,16 +1,19 @@
-//! Pictures as measurements: the tests and the seconds that a run's tree takes, beside brute force and a KD-tree.
+//! Pictures as measurements: the tests and the seconds that they take with a run's tree, with brute force and with a
+//! KD-tree.
 
 use super::draw::{Options, render};
 use super::film::Film;
-use super::tracer::{Structure, Tracer};
+use super::structure;
+use crate::measure::{Accelerator, Structure};
 use crate::run::rows::{RenderRow, RenderTimeRow};
 use crate::scenes::{Scene, fnv1a};
 use crate::{Error, run::rows::RunRow};
 use bvh_core::Bvh;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::time::Instant;
 
-/// The picture that is drawn of every run's tree, from where the scene is framed best.
+/// The picture that is drawn with every run's tree; it frames the whole scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
@@ -27,7 +30,7 @@ fn one() -> u32 {
     1
 }
 
-/// What is not a tree of ours, by the names it has in tables.
+/// The structures that are not trees of ours: their names in tables, and the names that `--accel` accepts.
 pub const BASELINES: [(&str, &str); 2] = [("brute force", "brute"), ("KD-tree", "kdtree")];
 
 /// Seconds after which a picture is not drawn once more.
@@ -49,16 +52,16 @@ impl Config {
         let mut structures = Vec::new();
         for (label, name) in BASELINES.into_iter().filter(|_| first) {
             let start = Instant::now();
-            let structure = Structure::by_name(name, scene)?;
+            let structure = structure::by_name(name, scene)?;
             structures.push((label, structure, 0, start.elapsed().as_secs_f64()));
         }
-        structures.push((&run.method, Structure::Tree(tree.clone()), run.repetition, build_seconds));
+        structures.push((&run.method, Structure::Tree(Cow::Borrowed(tree)), run.repetition, build_seconds));
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         let pool = pool.map_err(|error| Error::Usage(format!("cannot start a thread: {error}")))?;
         let (mut rows, mut times) = (Vec::new(), Vec::new());
         for (method, structure, repetition, build_seconds) in structures {
-            let tracer = Tracer::new(scene, structure);
-            let (film, seconds) = pool.install(|| self.draw(scene, &tracer));
+            let accelerator = Accelerator::new(&scene.primitives, structure);
+            let (film, seconds) = pool.install(|| self.draw(scene, &accelerator));
             let per_ray = |tests: u64| tests as f64 / film.rays as f64;
             let (boxes, objects) = (film.counts.boxes, film.counts.objects);
             rows.push(RenderRow {
@@ -84,13 +87,13 @@ impl Config {
     }
 
     /// The picture, and how long it took each time.
-    fn draw(&self, scene: &Scene, tracer: &Tracer) -> (Film, Vec<f64>) {
+    fn draw(&self, scene: &Scene, accelerator: &Accelerator) -> (Film, Vec<f64>) {
         let Self { width, height, samples } = *self;
         let options = Options { width, height, samples, ..Options::default() };
         let mut seconds = Vec::new();
         loop {
             let start = Instant::now();
-            let film = render(scene, tracer, &options, &|| true);
+            let film = render(scene, accelerator, &options, &|| true);
             seconds.push(start.elapsed().as_secs_f64());
             let done = seconds.iter().sum::<f64>() >= REPEAT_WITHIN || seconds.len() == MOST_REPEATS;
             if let Some(film) = film.filter(|_| done) {

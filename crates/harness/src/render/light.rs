@@ -1,10 +1,10 @@
 //! How bright a pixel is: rays through it, to the lights, and mirrored.
 
-use super::camera::{Camera, View};
 use super::film::Tile;
 use super::image;
 use super::surface::{Ground, Surface};
-use super::tracer::Tracer;
+use crate::measure::Accelerator;
+use crate::measure::camera::{Camera, View};
 use bvh_core::{Aabb, Ray, TestCounts};
 use glam::DVec3;
 use std::ops::Range;
@@ -66,7 +66,7 @@ pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
 
 /// All that a ray can meet.
 pub struct World<'a> {
-    tracer: &'a Tracer<'a>,
+    accelerator: &'a Accelerator<'a>,
     up: DVec3,
     lights: Vec<Light>,
     ground: Option<Ground>,
@@ -89,7 +89,7 @@ const AMBIENT: f64 = 0.42;
 
 impl<'a> World<'a> {
     pub fn new(
-        tracer: &'a Tracer<'a>,
+        accelerator: &'a Accelerator<'a>,
         view: &View,
         up: DVec3,
         bounds: &Aabb,
@@ -98,8 +98,9 @@ impl<'a> World<'a> {
         depth: u32,
     ) -> Self {
         // From inside, a scene is its own ground.
-        let ground = (ground && !view.is_inside(bounds)).then(|| Ground::below(tracer, bounds, up));
-        Self { tracer, up, lights, ground: ground.flatten(), depth }
+        let ground =
+            (ground && !view.is_inside(bounds)).then(|| Ground::below(accelerator.objects(), bounds, up));
+        Self { accelerator, up, lights, ground: ground.flatten(), depth }
     }
 
     /// A tile of the picture, `samples`² rays per pixel.
@@ -155,11 +156,11 @@ impl<'a> World<'a> {
     fn meet(&self, origin: DVec3, direction: DVec3, tally: &mut Tally) -> Option<Surface> {
         tally.rays += 1;
         let ray = Ray::half_line(origin.as_vec3(), direction.as_vec3());
-        let hit = ray.ok().and_then(|ray| self.tracer.nearest_hit(&ray, &mut tally.counts));
+        let hit = ray.ok().and_then(|ray| self.accelerator.nearest_hit(&ray, &mut tally.counts));
         let ground = self.ground.as_ref().and_then(|ground| Some((ground, ground.meet(origin, direction)?)));
         match (hit, ground) {
             (Some(hit), ground) if ground.is_none_or(|(_, distance)| f64::from(hit.t) <= distance) => {
-                Some(Surface::of_object(self.tracer, &hit, origin, direction))
+                Some(Surface::of_object(self.accelerator.objects(), &hit, origin, direction))
             }
             (_, Some((ground, distance))) => Some(ground.surface(origin, direction, distance)),
             (_, None) => None,
@@ -214,7 +215,7 @@ impl<'a> World<'a> {
     fn is_shadowed(&self, start: DVec3, towards: DVec3, distance: f64, tally: &mut Tally) -> bool {
         tally.rays += 1;
         let ray = Ray::new(start.as_vec3(), towards.as_vec3(), 0.0, distance as f32);
-        ray.is_ok_and(|ray| self.tracer.any_hit(&ray, &mut tally.counts))
+        ray.is_ok_and(|ray| self.accelerator.any_hit(&ray, &mut tally.counts))
     }
 
     /// The light from where nothing is.

@@ -4,21 +4,19 @@
 //! reflection to a limited depth. Differs from the paper: a fixed grid of rays per pixel in place of adaptive ones; no
 //! refraction; a hemisphere of ambient light, and a ground where the scene is seen from outside.
 //!
-//! Data flows one way: [`View`] → [`Camera`](camera::Camera) → rays → [`Tracer`] → `Surface` →
-//! light → [`Film`]. Everything but ray tests is in f64, with `libm` where the platform's functions may differ, so the
-//! same scene gives the same bytes on every machine.
+//! Data flows one way: [`View`](crate::measure::camera::View) → [`Camera`](crate::measure::camera::Camera) → rays →
+//! [`Accelerator`](crate::measure::Accelerator) → `Surface` → light → [`Film`]. Everything but ray tests is in f64, with
+//! `libm` where the platform's functions may differ, so the same scene gives the same bytes on every machine.
 
-pub mod camera;
 mod draw;
 pub mod experiment;
 mod film;
+pub mod framing;
 pub mod heat;
 pub mod image;
 mod light;
+pub mod structure;
 mod surface;
-pub mod tracer;
 
-pub use camera::View;
 pub use draw::{Options, render, tiles};
 pub use film::Film;
-pub use tracer::{Structure, Tracer};

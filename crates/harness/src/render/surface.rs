@@ -1,6 +1,5 @@
 //! What a ray has met: where, which way it faces, and what it looks like.
 
-use super::tracer::Tracer;
 use crate::scenes::Primitives;
 use bvh_core::{Aabb, Hit};
 use glam::DVec3;
@@ -35,10 +34,10 @@ const COLOURS: [DVec3; 6] = [
 
 impl Surface {
     /// Of the object that was hit by the ray from `origin` in `direction`.
-    pub fn of_object(tracer: &Tracer, hit: &Hit, origin: DVec3, direction: DVec3) -> Self {
+    pub fn of_object(objects: &Primitives, hit: &Hit, origin: DVec3, direction: DVec3) -> Self {
         let id = hit.object as usize;
         let met = origin + direction * f64::from(hit.t);
-        let (point, normal, colour, mirror) = match tracer.objects {
+        let (point, normal, colour, mirror) = match objects {
             Primitives::Triangles(triangles) => {
                 let [a, b, c] = triangles[id].map(|corner| corner.as_dvec3());
                 // Scaled so that tiny triangles keep a normal.
@@ -70,10 +69,10 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// Under the bounds of the tracer's objects; `None` under nothing or a single point.
-    pub fn below(tracer: &Tracer, bounds: &Aabb, up: DVec3) -> Option<Self> {
+    /// The ground under objects with these bounds; `None` under nothing and under a single point.
+    pub fn below(objects: &Primitives, bounds: &Aabb, up: DVec3) -> Option<Self> {
         bounds.check().ok()?;
-        let checkered = matches!(tracer.objects, Primitives::Spheres(_));
+        let checkered = matches!(objects, Primitives::Spheres(_));
         let gap = if checkered { 0.05 } else { 1e-3 };
         let radius = bounds.extent().length() / 2.0;
         if radius == 0.0 {

@@ -1,7 +1,7 @@
 //! Carries out the runs of an experiment: in parallel or one by one, with progress, until done or interrupted.
 
 use crate::Error;
-use crate::measure;
+use crate::measure::speed;
 use crate::run::finish::{Summary, conclude};
 use crate::run::job::{Job, Watch, base_cost, perform};
 use crate::run::provenance::Provenance;
@@ -10,7 +10,7 @@ use crate::run::rows::{Row, TraceRow, TraceTimeRow, to_bytes};
 use crate::run::shard::Shard;
 use crate::run::store::Store;
 use crate::scenes::Scene;
-use crate::spec::{Contestant, Experiment, Labelled};
+use crate::spec::{Contestant, Experiment};
 use crate::stress::Measure;
 use bvh_core::Bvh;
 use bvh_search::Observer;
@@ -168,7 +168,7 @@ fn over_suite(
 /// interrupted experiment.
 fn trace(
     experiment: &Experiment,
-    config: &measure::Config,
+    config: &speed::Config,
     jobs: &[Job],
     mut trees: Trees,
     watch: &Watch,
@@ -184,17 +184,17 @@ fn trace(
     let first_runs: Vec<(&Job, &Bvh)> = trees.iter().map(|(&index, tree)| (&jobs[index], tree)).collect();
     for of_scene in first_runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
         let scene = of_scene[0].0.scene;
-        let entries: Vec<measure::Entry> = of_scene
-            .iter()
-            .map(|&(job, tree)| {
-                let Labelled { label, method, .. } = job.labelled;
-                let peer = if let Contestant::Peer(peer) = method { Some(peer) } else { None };
-                measure::Entry { method: label, tree, peer }
-            })
-            .collect();
+        let mut contenders = Vec::new();
+        for &(job, tree) in of_scene {
+            let made = match &job.labelled.method {
+                Contestant::Ours(_) => speed::own_contenders(&config.layouts, scene, tree),
+                Contestant::Peer(peer) => peer.contenders(scene),
+            };
+            let made = made.map_err(|message| Error::Tracing { scene: scene.name.clone(), message })?;
+            contenders.extend(made.into_iter().map(|contender| (job.labelled.label.as_str(), contender)));
+        }
         let seed = experiment.seed_of(&scene.name, "tracing", 0);
-        let measured = measure::measure(config, scene, &entries, seed, || watch.cancelled())
-            .map_err(|message| Error::Tracing { scene: scene.name.clone(), message })?;
+        let measured = speed::measure(config, scene, of_scene[0].1, &contenders, seed, || watch.cancelled());
         let (scene_rows, scene_times) = measured.ok_or_else(interrupted)?;
         rows.extend(scene_rows);
         times.extend(scene_times);

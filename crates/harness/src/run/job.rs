@@ -6,7 +6,7 @@ use crate::run::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow
 use crate::run::store::FinishedRun;
 use crate::scenes::Scene;
 use crate::spec::{Contestant, Experiment, Labelled};
-use crate::{Error, measure::rays};
+use crate::{Error, measure::empirical_cost};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective, SahConstants};
@@ -122,7 +122,7 @@ pub(crate) fn perform(
         incumbent: event.incumbent,
     };
     let history: Vec<HistoryRow> = outcome.history.iter().map(row).collect();
-    let ray_row = |config: &rays::Config| {
+    let ray_row = |config: &empirical_cost::Config| {
         let (family, query) = (format!("{:?}", config.family), format!("{:?}", config.query));
         // The same rays for all methods: their differences are then the trees'.
         let ray_seed = experiment.seed_of(&scene_name, &format!("rays {family}"), 0);
@@ -136,7 +136,7 @@ pub(crate) fn perform(
             query,
             ..Default::default()
         };
-        rays::measure(config, scene, tree, ray_seed, named)
+        empirical_cost::measure(config, scene, tree, ray_seed, named)
     };
     let rays: Vec<RayRow> = experiment.rays.iter().map(ray_row).collect();
     let clock = if experiment.reports.iter().any(Report::needs_clock) { stopwatch.seconds() } else { vec![] };

@@ -9,9 +9,10 @@ mod method;
 mod ranges;
 mod read;
 
+use crate::measure::{empirical_cost, speed};
 use crate::report::Report;
 use crate::scenes::fnv1a;
-use crate::{measure, measure::rays, render, stress};
+use crate::{render, stress};
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, exact};
 pub use method::{Contestant, Labelled};
@@ -66,13 +67,13 @@ pub struct Experiment {
     pub methods: Vec<Labelled>,
     /// Measurements of every run's tree with random rays. Default none.
     #[serde(default)]
-    pub rays: Vec<rays::Config>,
+    pub rays: Vec<empirical_cost::Config>,
     /// A picture drawn with every run's tree, and with brute force and a KD-tree. Default none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub render: Option<render::experiment::Config>,
     /// Rays traced through the tree of every method's first run, in all layouts, in turns. Default none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tracing: Option<measure::Config>,
+    pub tracing: Option<speed::Config>,
     /// Tables and figures made from the rows. Default none.
     #[serde(default)]
     pub reports: Vec<Report>,

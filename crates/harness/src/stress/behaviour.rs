@@ -3,7 +3,7 @@
 
 use super::examine::{ROUNDING, check_outcome, check_scale, run};
 use super::{Verdict, is_builder, scenes, tracing};
-use crate::measure::rays::{self, Family, Query};
+use crate::measure::{Query, empirical_cost, rays::Family};
 use crate::run::rows::RayRow;
 use crate::scenes::obj;
 use crate::scenes::{Primitives, Scene};
@@ -41,7 +41,7 @@ pub fn no_such_rays() -> Verdict {
 
 /// S16: an empty range hits nothing, an infinite one is the longest finite one, a single point hits what is there.
 pub fn ranges_are_defined() -> Verdict {
-    let triangle = [Triangle([Vec3::ZERO, Vec3::X, Vec3::Y])];
+    let triangle = Primitives::Triangles(vec![[Vec3::ZERO, Vec3::X, Vec3::Y]]);
     let origin = Vec3::new(0.25, 0.25, -2.0);
     for (t_min, t_max, expected) in [
         (0.0, f32::INFINITY, true),
@@ -54,9 +54,12 @@ pub fn ranges_are_defined() -> Verdict {
     ] {
         let ray = Ray::new(origin, Vec3::Z, t_min, t_max).map_err(|error| error.to_string())?;
         for (name, traversal) in tracing::TRAVERSALS {
-            let (nearest, any) = traversal(&triangle)?(&ray);
-            let agree = nearest.is_some() == expected && any == expected;
-            require(agree, || format!("{name}: range {t_min}..={t_max} gives {nearest:?} and {any}"))?;
+            for accelerator in traversal(&triangle)? {
+                let (nearest, any) =
+                    (accelerator.nearest_hit(&ray, &mut ()), accelerator.any_hit(&ray, &mut ()));
+                let agree = nearest.is_some() == expected && any == expected;
+                require(agree, || format!("{name}: range {t_min}..={t_max} gives {nearest:?} and {any}"))?;
+            }
         }
     }
     for (t_min, t_max) in [(f32::NAN, 1.0), (0.0, f32::NAN), (-1.0, 1.0)] {
@@ -314,8 +317,8 @@ pub fn estimates_converge() -> Verdict {
     let tree = muller_fellner::Config::default().build(&scene.boxes).map_err(|error| error.to_string())?;
     validate(&tree, &scene.boxes).map_err(|error| error.to_string())?;
     let measure = |count, seed| {
-        let config = rays::Config { family: Family::Inside, query: Query::Any, count };
-        rays::measure(&config, &scene, &tree, seed, RayRow::default())
+        let config = empirical_cost::Config { family: Family::Inside, query: Query::Any, count };
+        empirical_cost::measure(&config, &scene, &tree, seed, RayRow::default())
     };
     const FEWEST: u64 = 2000;
     let truth = measure(1 << 18, 0).boxes_per_ray;

@@ -1,70 +1,57 @@
 //! Every traversal against testing every triangle, and the rays that make it hard.
 
 use super::Verdict;
+use crate::measure::{Accelerator, Structure};
+use crate::scenes::Primitives;
 use bvh_build::{BuildError, Builder, goldsmith_salmon, kd_tree, muller_fellner};
-use bvh_core::{Aabb, Bvh, Hit, Ray, Shear, Triangle, WideBvh, any_hit, nearest_hit, nearest_hit_of_all};
+use bvh_core::{Aabb, Bvh, Hit, Ray, Shear, Triangle, WideBvh, nearest_hit_of_all};
 use bvh_search::Stream;
 use glam::Vec3;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
+use std::borrow::Cow;
 
-/// Answers rays: the nearest hit, and whether there is any.
-pub type Tracer = Box<dyn Fn(&Ray) -> (Option<Hit>, bool)>;
-
-/// What prepares a scene for rays; or why it cannot.
-pub type Traversal = fn(&[Triangle]) -> Result<Tracer, String>;
+/// What prepares triangles for rays, in one way or several; or why it cannot.
+pub type Traversal = fn(&Primitives) -> Result<Vec<Accelerator<'_>>, String>;
 
 /// Every traversal by name: a further one is one line.
 pub const TRAVERSALS: &[(&str, Traversal)] = &[
-    ("binary tree", |scene| over_tree(scene, &muller_fellner::Config::default())),
-    ("n-ary tree", |scene| over_tree(scene, &goldsmith_salmon::Config::default())),
-    ("wide, SIMD", |scene| wide(scene, |wide, ray| (wide.nearest_hit(ray), wide.any_hit(ray)))),
-    ("wide, portable", |scene| {
-        wide(scene, |wide, ray| (wide.view().nearest_hit_portable(ray), wide.view().any_hit_portable(ray)))
+    ("binary tree", |objects| over(objects, Structure::Tree(Cow::Owned(binary(objects)?)))),
+    ("n-ary tree", |objects| over(objects, Structure::Tree(Cow::Owned(n_ary(objects)?)))),
+    ("wide, SIMD", |objects| over_wide(objects, Structure::Wide)),
+    ("wide, portable", |objects| over_wide(objects, Structure::WidePortable)),
+    ("KD-tree", |objects| {
+        let cells = kd_tree::Config::default().build(&objects.boxes()).map_err(|error| error.to_string())?;
+        over(objects, Structure::KdTree(cells))
     }),
-    ("KD-tree", over_cells),
 ];
 
-fn build(scene: &[Triangle], builder: &dyn Builder) -> Result<Bvh, String> {
-    builder.build(&super::scenes::boxes(scene)).map_err(|error: BuildError| error.to_string())
+fn binary(objects: &Primitives) -> Result<Bvh, String> {
+    muller_fellner::Config::default().build(&objects.boxes()).map_err(|error: BuildError| error.to_string())
 }
 
-fn over_tree(scene: &[Triangle], builder: &dyn Builder) -> Result<Tracer, String> {
-    let (tree, triangles) = (build(scene, builder)?, scene.to_vec());
-    Ok(Box::new(move |ray| {
-        let shear = Shear::new(ray);
-        let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
-        let any = any_hit(&tree, ray, |id| test(id, ray.t_max()).is_some(), &mut ());
-        (nearest_hit(&tree, ray, test, &mut ()), any)
-    }))
+fn n_ary(objects: &Primitives) -> Result<Bvh, String> {
+    goldsmith_salmon::Config::default().build(&objects.boxes()).map_err(|error: BuildError| error.to_string())
 }
 
-fn over_cells(scene: &[Triangle]) -> Result<Tracer, String> {
-    let cells =
-        kd_tree::Config::default().build(&super::scenes::boxes(scene)).map_err(|error| error.to_string())?;
-    let triangles = scene.to_vec();
-    Ok(Box::new(move |ray| {
-        let shear = Shear::new(ray);
-        let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
-        let any = cells.any_hit(ray, |id| test(id, ray.t_max()).is_some(), &mut ());
-        (cells.nearest_hit(ray, test, &mut ()), any)
-    }))
+fn over<'a>(objects: &'a Primitives, structure: Structure<'a>) -> Result<Vec<Accelerator<'a>>, String> {
+    Ok(vec![Accelerator::new(objects, structure)])
 }
 
-fn wide(scene: &[Triangle], answer: fn(&WideBvh, &Ray) -> (Option<Hit>, bool)) -> Result<Tracer, String> {
-    // From binary trees and from ones with many children.
-    let layouts = [
-        build(scene, &muller_fellner::Config::default())?,
-        build(scene, &goldsmith_salmon::Config::default())?,
-    ]
-    .map(|tree| WideBvh::new(&tree, scene).map_err(|error| error.to_string()));
-    let [binary, n_ary] = layouts;
-    let (binary, n_ary) = (binary?, n_ary?);
-    Ok(Box::new(move |ray| {
-        let (one, other) = (answer(&binary, ray), answer(&n_ary, ray));
-        // Two layouts that disagree: one of them differs from brute force.
-        if bits(one.0) == bits(other.0) { (one.0, one.1 && other.1) } else { (None, !one.1) }
-    }))
+/// Wide layouts of a binary tree and of one with many children per node.
+fn over_wide(
+    objects: &Primitives,
+    structure: fn(WideBvh) -> Structure<'static>,
+) -> Result<Vec<Accelerator<'_>>, String> {
+    let Primitives::Triangles(corners) = objects else {
+        return Err("only triangles have a wide layout".into());
+    };
+    let triangles: Vec<Triangle> = corners.iter().copied().map(Triangle).collect();
+    let layout = |tree: Bvh| {
+        let wide = WideBvh::new(&tree, &triangles).map_err(|error| error.to_string())?;
+        Ok(Accelerator::new(objects, structure(wide)))
+    };
+    [binary(objects)?, n_ary(objects)?].into_iter().map(layout).collect()
 }
 
 /// The answer of testing every triangle.
@@ -80,14 +67,17 @@ fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
 
 /// P3: the traversal gives the answer of brute force for all rays, bit by bit. Says how many hit.
 pub fn check(traversal: Traversal, triangles: &[Triangle], rays: &[Ray]) -> Verdict {
-    let trace = traversal(triangles)?;
+    let objects = Primitives::Triangles(triangles.iter().map(|triangle| triangle.0).collect());
+    let accelerators = traversal(&objects)?;
     let mut hits = 0;
     for ray in rays {
         let expected = brute_force(triangles, ray);
         hits += usize::from(expected.is_some());
-        let (nearest, any) = trace(ray);
-        if bits(nearest) != bits(expected) || any != expected.is_some() {
-            return Err(format!("P3: {ray:?} gives {nearest:?} and {any}, every triangle {expected:?}"));
+        for accelerator in &accelerators {
+            let (nearest, any) = (accelerator.nearest_hit(ray, &mut ()), accelerator.any_hit(ray, &mut ()));
+            if bits(nearest) != bits(expected) || any != expected.is_some() {
+                return Err(format!("P3: {ray:?} gives {nearest:?} and {any}, every triangle {expected:?}"));
+            }
         }
     }
     Ok(format!("{hits} of {} rays hit", rays.len()))

@@ -1,32 +1,11 @@
-//! Where the eye is: a view given or found, and the rays through its pixels.
+//! Finds a view that shows a whole scene.
 
+use crate::measure::camera::{View, frame};
 use crate::scenes::{Primitives, Scene};
 use bvh_core::Aabb;
 use glam::DVec3;
 
-/// A view of a scene, in world units.
-#[derive(Clone, Debug, PartialEq)]
-pub struct View {
-    /// The eye.
-    pub from: DVec3,
-    /// What is in the middle of the picture.
-    pub at: DVec3,
-    /// Angle of view from the lower edge of the picture to the upper one, degrees, above 0 and below 180.
-    pub fov: f64,
-}
-
-impl View {
-    /// Degrees, unless something else is asked for: a moderate wide angle.
-    pub const FOV: f64 = 40.0;
-
-    /// Whether the eye is in this box.
-    pub fn is_inside(&self, bounds: &Aabb) -> bool {
-        let eye = self.from.as_vec3();
-        bounds.contains(&Aabb { min: eye, max: eye })
-    }
-}
-
-/// Views of scenes that are to be seen from inside: name, eye, middle of the picture, angle.
+/// Views of scenes that should be seen from inside: name, eye, middle of the picture, angle.
 const INSIDE: [(&str, [f64; 3], [f64; 3], f64); 1] = [("sponza", [-11.3, 1.9, -0.9], [3.0, 4.4, 0.5], 62.0)];
 
 /// The direction that is up: y, as most modellers have it, but z in the stand-ins.
@@ -34,8 +13,8 @@ pub fn up(scene: &Scene) -> DVec3 {
     if scene.kind == "stand-in" { DVec3::Z } else { DVec3::Y }
 }
 
-/// A view for a scene: one known to be good, or else from outside, from above and a little from the side, at the
-/// distance at which the whole box just fits.
+/// A view of a scene: a known good one, or else from outside, from above and a little from the side, at the distance at
+/// which the whole box just fits.
 pub fn automatic(scene: &Scene, bounds: &Aabb, aspect: f64) -> View {
     if let Some((_, from, at, fov)) = INSIDE.iter().find(|view| view.0 == scene.name) {
         let view = View { from: (*from).into(), at: (*at).into(), fov: *fov };
@@ -45,7 +24,7 @@ pub fn automatic(scene: &Scene, bounds: &Aabb, aspect: f64) -> View {
         }
     }
     let up = up(scene);
-    // From further above for meshes, whose floor would otherwise be seen edge on.
+    // Meshes are seen from further above, because their floor would otherwise be seen edge on.
     let (side, height) = match scene.primitives {
         Primitives::Triangles(_) => (0.62, 0.58),
         Primitives::Spheres(_) => (0.20, 0.17),
@@ -54,8 +33,8 @@ pub fn automatic(scene: &Scene, bounds: &Aabb, aspect: f64) -> View {
     framing(bounds, up.cross(front) * side + up * height + front, up, aspect, View::FOV)
 }
 
-/// The view of a box from `towards_eye` at the least distance at which it is inside the picture, with a small border.
-/// Of a box without extent or of none, from one unit away.
+/// The view of a box from the direction `towards_eye`, at the least distance at which the whole box is inside the
+/// picture, with a small border. An empty box and a single point are seen from one unit away.
 fn framing(bounds: &Aabb, towards_eye: DVec3, up: DVec3, aspect: f64, fov: f64) -> View {
     let (center, half) = match bounds.check() {
         Ok(()) => (bounds.doubled_centroid() * 0.5, bounds.extent() * 0.5),
@@ -77,44 +56,10 @@ fn framing(bounds: &Aabb, towards_eye: DVec3, up: DVec3, aspect: f64, fov: f64) 
     View { from: center + back * distance, at: center, fov }
 }
 
-/// Right and top of a picture seen in this direction.
-fn frame(forward: DVec3, up: DVec3) -> [DVec3; 2] {
-    // Straight up or down: any right will do.
-    let right = forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
-    [right, right.cross(forward)]
-}
-
-/// A view ready to make rays.
-#[derive(Clone, Debug)]
-pub struct Camera {
-    /// Where all rays begin.
-    pub origin: DVec3,
-    /// To the upper left corner of the picture.
-    corner: DVec3,
-    /// From one pixel to the next, to the right and down.
-    steps: [DVec3; 2],
-}
-
-impl Camera {
-    /// The camera of a picture of this size in pixels. A view from where it looks at looks along −z.
-    pub fn new(view: &View, up: DVec3, width: u32, height: u32) -> Self {
-        let forward = (view.at - view.from).try_normalize().unwrap_or(DVec3::NEG_Z);
-        let [right, top] = frame(forward, up);
-        let pixel = 2.0 * libm::tan(view.fov.to_radians() / 2.0) / f64::from(height);
-        let steps = [right * pixel, -top * pixel];
-        let corner = forward - (steps[0] * f64::from(width) + steps[1] * f64::from(height)) * 0.5;
-        Self { origin: view.from, corner, steps }
-    }
-
-    /// The unit direction through a point of the picture, in pixels from its upper left corner.
-    pub fn direction(&self, x: f64, y: f64) -> DVec3 {
-        (self.corner + self.steps[0] * x + self.steps[1] * y).normalize()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::camera::Camera;
 
     #[test]
     fn every_corner_of_every_box_is_in_the_picture_and_one_is_near_its_edge() {
@@ -136,14 +81,6 @@ mod tests {
                 widest = widest.max(place(0).abs() / 150.0).max(place(1).abs() / 100.0);
             }
             assert!(widest > 0.9, "{bounds:?}: {widest}");
-        }
-    }
-
-    #[test]
-    fn the_middle_of_the_picture_looks_at_the_middle_of_the_view() {
-        for at in [DVec3::X, DVec3::Y, DVec3::new(1.0, -2.0, 0.3)] {
-            let camera = Camera::new(&View { from: DVec3::ZERO, at, fov: 60.0 }, DVec3::Y, 640, 480);
-            assert!(camera.direction(320.0, 240.0).distance(at.normalize()) < 1e-12);
         }
     }
 

@@ -1,0 +1,276 @@
+//! Rays per second, and tests per ray: every contender in turns, on one thread, with all answers compared.
+
+use super::accelerator::{Accelerator, Query, Structure};
+use super::answers::{self, SOME_HIT};
+use super::rays::{Kind, Viewpoint, rays};
+use crate::report::statistics::{median, minimum};
+use crate::run::rows::{TraceRow, TraceTimeRow};
+use crate::scenes::Scene;
+use bvh_core::cost::SahConstants;
+use bvh_core::{Bvh, Hit, Ray, TestCounts, WideBvh, collapse_leaves};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// Which rays are traced how often through which layouts, on scenes of triangles.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Rays of each kind, at least 1. Default a million.
+    #[serde(default = "million")]
+    pub count: u32,
+    /// Turns in which every contender traces all rays of a kind, after one that is not timed. Default 5.
+    #[serde(default = "five")]
+    pub rounds: u32,
+    /// Kinds of rays. Default all.
+    #[serde(default = "every_kind")]
+    pub rays: Vec<Kind>,
+    /// Layouts of our trees. Default all.
+    #[serde(default = "every_layout")]
+    pub layouts: Vec<Layout>,
+    /// Cameras of primary rays by scene. Default one outside the root's box.
+    #[serde(default)]
+    pub cameras: BTreeMap<String, Viewpoint>,
+}
+
+fn million() -> u32 {
+    1_000_000
+}
+
+fn five() -> u32 {
+    5
+}
+
+fn every_kind() -> Vec<Kind> {
+    vec![Kind::Incoherent, Kind::Primary, Kind::Shadow]
+}
+
+fn every_layout() -> Vec<Layout> {
+    vec![Layout::Binary, Layout::BinaryLeaves, Layout::Wide, Layout::WidePortable]
+}
+
+/// A way to lay out one of our trees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Layout {
+    /// The tree as it is.
+    Binary,
+    /// The tree with its leaves merged where the surface area heuristic, both constants 1, says so.
+    BinaryLeaves,
+    /// [`WideBvh`] with the best instructions of this machine.
+    Wide,
+    /// [`WideBvh`] with portable code.
+    WidePortable,
+}
+
+/// Answers rays, the distance and the object of a hit for each (any of both for an any-hit query), and returns the
+/// seconds that each part of the rays took.
+pub type Trace<'a> = Box<dyn Fn(Query, &[Ray], &mut [Option<Hit>]) -> Vec<f64> + 'a>;
+
+/// What traces the rays of a contender.
+pub enum Tracer<'a> {
+    /// One of ours. Its answers must be right bit by bit, and its tests are counted.
+    Own(Accelerator<'a>),
+    /// Another library's.
+    Other(Trace<'a>),
+}
+
+impl Tracer<'_> {
+    /// Traces all rays; as [`Trace`].
+    pub fn trace(&self, query: Query, rays: &[Ray], hits: &mut [Option<Hit>]) -> Vec<f64> {
+        match (self, query) {
+            (Self::Other(trace), _) => trace(query, rays, hits),
+            (Self::Own(own), Query::Any) => {
+                timed(rays, hits, |ray| own.any_hit(ray, &mut ()).then_some(SOME_HIT))
+            }
+            (Self::Own(own), _) => timed(rays, hits, |ray| own.nearest_hit(ray, &mut ())),
+        }
+    }
+}
+
+/// A structure that traces rays, and what it is called in tables.
+pub struct Contender<'a> {
+    /// Name of the layout.
+    pub layout: String,
+    /// The time it took to make the layout: of ours from a tree, of another library's from triangles.
+    pub preparation_seconds: f64,
+    /// What traces.
+    pub tracer: Tracer<'a>,
+}
+
+/// Rays whose time is taken together. They are few, so that in some turn no other program interrupts them.
+const PART: usize = 4096;
+
+/// Answers every ray and returns the seconds that each part of them took.
+#[inline(always)]
+pub fn timed<R>(rays: &[R], hits: &mut [Option<Hit>], mut answer: impl FnMut(&R) -> Option<Hit>) -> Vec<f64> {
+    let part = |(rays, hits): (&[R], &mut [Option<Hit>])| {
+        let start = Instant::now();
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = answer(ray);
+        }
+        start.elapsed().as_secs_f64()
+    };
+    rays.chunks(PART).zip(hits.chunks_mut(PART)).map(part).collect()
+}
+
+/// One of our trees, valid over the scene, in each of these layouts. An error says why there is no such layout.
+pub fn own_contenders<'a>(
+    layouts: &[Layout],
+    scene: &'a Scene,
+    tree: &'a Bvh,
+) -> Result<Vec<Contender<'a>>, String> {
+    let contender = |&layout: &Layout| {
+        let triangles = scene.triangles().map_err(|error| error.to_string())?;
+        let start = Instant::now();
+        let wide = || WideBvh::new(tree, &triangles).map_err(|error| error.to_string());
+        let (name, structure) = match layout {
+            Layout::Binary => ("binary", Structure::Tree(Cow::Borrowed(tree))),
+            Layout::BinaryLeaves => {
+                let merged = collapse_leaves(tree, &SahConstants::default());
+                ("binary, merged leaves", Structure::Tree(Cow::Owned(merged)))
+            }
+            Layout::Wide => ("wide", Structure::Wide(wide()?)),
+            Layout::WidePortable => ("wide, portable", Structure::WidePortable(wide()?)),
+        };
+        Ok(Contender {
+            layout: name.into(),
+            preparation_seconds: start.elapsed().as_secs_f64(),
+            tracer: Tracer::Own(Accelerator::new(&scene.primitives, structure)),
+        })
+    };
+    layouts.iter().map(contender).collect()
+}
+
+/// The rows of one scene.
+pub type Rows = (Vec<TraceRow>, Vec<TraceTimeRow>);
+
+/// Traces rays, the same for all, through the contenders of a scene, each with its method's label. `tree` is any valid
+/// tree over the scene: the right answers, which are the same for every tree, come from it. `seed` draws the rays.
+/// `None` as soon as `cancelled` says so.
+pub fn measure(
+    config: &Config,
+    scene: &Scene,
+    tree: &Bvh,
+    contenders: &[(&str, Contender)],
+    seed: u64,
+    cancelled: impl Fn() -> bool,
+) -> Option<Rows> {
+    let (mut rows, mut times) = Rows::default();
+    let viewpoint = config.cameras.get(&scene.name).copied().unwrap_or_default();
+    let reference = Tracer::Own(Accelerator::of_tree(&scene.primitives, tree));
+    for &kind in &config.rays {
+        let rays = rays(kind, config.count, scene, tree, &viewpoint, seed);
+        let mut right = vec![None; rays.len()];
+        reference.trace(kind.query(), &rays, &mut right);
+        let of_kind = OfKind { scene, tree, kind, rays: &rays, right: &right };
+        let mut hits = vec![None; rays.len()];
+        // By contender, and by part of the rays, the seconds of each turn.
+        let mut turns = vec![vec![Vec::new(); rays.len().div_ceil(PART)]; contenders.len()];
+        for round in 0..=config.rounds {
+            for ((method, contender), turns) in contenders.iter().zip(&mut turns) {
+                if cancelled() {
+                    return None;
+                }
+                hits.fill(None);
+                let seconds = contender.tracer.trace(kind.query(), &rays, &mut hits);
+                if round == 0 {
+                    rows.push(of_kind.row(method, contender, &hits));
+                } else {
+                    turns.iter_mut().zip(seconds).for_each(|(turns, seconds)| turns.push(seconds));
+                }
+            }
+        }
+        for ((method, contender), parts) in contenders.iter().zip(&turns) {
+            let sum = |of: fn(&[f64]) -> Option<f64>| parts.iter().filter_map(|turns| of(turns)).sum();
+            times.push(TraceTimeRow {
+                scene: scene.name.clone(),
+                method: (*method).into(),
+                layout: contender.layout.clone(),
+                rays: kind.name().into(),
+                count: rays.len() as u64,
+                rounds: config.rounds,
+                preparation_seconds: contender.preparation_seconds,
+                seconds: sum(|turns| minimum(turns.iter().copied())),
+                median_seconds: sum(median),
+            });
+        }
+    }
+    Some((rows, times))
+}
+
+/// The rays of one kind on one scene, and their right answers.
+struct OfKind<'a> {
+    scene: &'a Scene,
+    tree: &'a Bvh,
+    kind: Kind,
+    rays: &'a [Ray],
+    right: &'a [Option<Hit>],
+}
+
+impl OfKind<'_> {
+    /// What a contender found, beside the right answers, and the tests that it took.
+    fn row(&self, method: &str, contender: &Contender, hits: &[Option<Hit>]) -> TraceRow {
+        let query = self.kind.query();
+        let found = match (&contender.tracer, query) {
+            (Tracer::Own(_), Query::Nearest) => answers::exact_disagreements(self.right, hits),
+            _ => answers::disagreements(self.right, hits, self.tree, self.rays),
+        };
+        let counts = match &contender.tracer {
+            Tracer::Own(own) => {
+                let mut counts = TestCounts::default();
+                self.rays.iter().for_each(|ray| _ = own.count(query, ray, &mut counts));
+                Some(counts)
+            }
+            Tracer::Other(_) => None,
+        };
+        let per_ray = |tests: u64| tests as f64 / self.rays.len().max(1) as f64;
+        TraceRow {
+            scene: self.scene.name.clone(),
+            method: method.into(),
+            layout: contender.layout.clone(),
+            rays: self.kind.name().into(),
+            count: self.rays.len() as u64,
+            hits: hits.iter().flatten().count() as u64,
+            missed_hits: found.missed,
+            false_hits: found.false_hits,
+            other_hits: found.other,
+            boxes_per_ray: counts.map(|counts| per_ray(counts.boxes)),
+            objects_per_ray: counts.map(|counts| per_ray(counts.objects)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_build::{Builder, median_cut, muller_fellner};
+
+    #[test]
+    fn all_layouts_of_all_trees_answer_bit_by_bit_the_same() {
+        let scene = Scene::load("escher:3000").unwrap();
+        let good = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+        let bad = median_cut::Config::default().build(&scene.boxes).unwrap();
+        let config: Config = toml::from_str("count = 5000\nrounds = 2").unwrap();
+        let mut contenders = Vec::new();
+        for (method, tree) in [("good", &good), ("bad", &bad)] {
+            let own = own_contenders(&config.layouts, &scene, tree).unwrap();
+            contenders.extend(own.into_iter().map(|contender| (method, contender)));
+        }
+        let (rows, times) = measure(&config, &scene, &good, &contenders, 1, || false).unwrap();
+        assert_eq!((rows.len(), times.len()), (24, 24));
+        assert!(times.iter().all(|row| 0.0 < row.seconds && row.seconds <= row.median_seconds));
+        for row in &rows {
+            assert!(row.hits > 100 && row.hits < row.count, "{row:?}");
+            assert_eq!((row.missed_hits, row.false_hits, row.other_hits), (0, 0, 0), "{row:?}");
+        }
+        let boxes = |method: &str, layout: &str| -> f64 {
+            let own = rows.iter().filter(|row| row.method == method && row.layout == layout);
+            own.filter_map(|row| row.boxes_per_ray).sum()
+        };
+        assert!(boxes("good", "binary") < boxes("bad", "binary"));
+        assert!(boxes("good", "wide") < boxes("bad", "wide"));
+        assert_eq!(boxes("good", "wide"), boxes("good", "wide, portable"));
+    }
+}
