@@ -74,7 +74,7 @@ fn loads(scene: &Scene, path: &Path) {
     contenders.extend(parts());
     compare_each_after(build, &format!("{title}, each at once after a build"), 25, contenders);
 
-    let Ok(triangles) = &scene.triangles() else { return };
+    let Ok(triangles) = scene.triangles() else { return };
     fs::write(path, file::save_wide(&tree, triangles, &Origin::default()).expect("a valid tree"))
         .expect("a file");
     let bytes = fs::metadata(path).expect("the file").len();

@@ -3,7 +3,7 @@
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Bvh, cost};
 use harness::scenes::Scene;
-use harness::scenes::standin::STAND_INS;
+use harness::scenes::stand_ins::STAND_INS;
 
 /// Σ of inner half areas, every node's box recomputed from the objects below it and no node's box read.
 fn from_objects(tree: &Bvh, boxes: &[Aabb]) -> f64 {

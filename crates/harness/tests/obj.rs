@@ -1,5 +1,6 @@
 //! OBJ files as people write them, and as nobody should: what is read, and what is refused in which line.
 
+use bvh_core::Triangle;
 use glam::Vec3;
 use harness::scenes::obj::{Mesh, ObjError, load, parse};
 use proptest::prelude::*;
@@ -25,7 +26,7 @@ fn refusal(statements: &str) -> String {
 #[test]
 fn a_triangle_has_its_corners_and_leaves_two_vertices_unused() {
     let read = mesh("f 1 2 3\n");
-    assert_eq!(read.triangles, [[Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y]]);
+    assert_eq!(read.triangles, [Triangle([Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y])]);
     assert_eq!(read.unused_vertices, 2);
     assert_eq!((read.short_faces, read.degenerate_triangles), (0, 0));
 }
@@ -77,7 +78,7 @@ fn a_face_may_name_vertices_below_it() {
 #[test]
 fn a_weight_divides_the_coordinates() {
     let weighted = read("v 2 4 6 2\nv 0 0 0 -1\nv 1 0 0\nf 1 2 3\n").unwrap();
-    assert_eq!(weighted.triangles[0][0], Vec3::new(1.0, 2.0, 3.0));
+    assert_eq!(weighted.triangles[0].0[0], Vec3::new(1.0, 2.0, 3.0));
 }
 
 #[test]
@@ -160,7 +161,7 @@ proptest! {
     ) {
         if let Ok(mesh) = read(words.join(&b' ')) {
             prop_assert!(!mesh.triangles.is_empty());
-            prop_assert!(mesh.triangles.iter().flatten().all(|corner| corner.is_finite()));
+            prop_assert!(mesh.triangles.iter().flat_map(|t| t.0).all(|corner| corner.is_finite()));
             prop_assert!(mesh.degenerate_triangles <= mesh.triangles.len());
         }
     }
@@ -181,7 +182,7 @@ proptest! {
             text += "f -3 -2 -1\n";
         }
         let read = read(text).unwrap();
-        let expected: Vec<_> = corners.iter().map(|t| t.map(Vec3::from_array)).collect();
+        let expected: Vec<_> = corners.iter().map(|&t| Triangle::from(t)).collect();
         prop_assert_eq!(read.triangles, expected);
         prop_assert_eq!(read.unused_vertices, 0);
     }

@@ -2,9 +2,14 @@
 
 use bvh_core::{cost::Objective, validate};
 use bvh_search::{Budget, Method, Problem, StopReason, solve};
+use harness::measure::{Accelerator, Structure};
+use harness::scenes::stiff::{self, STIFF};
+use harness::scenes::{Primitives, Scene};
 use harness::stress::{
-    self, CASES, Case, Cell, Check, EXACT_OBJECTS, PARTS, Size, examine, is_builder, scenes, tracing,
+    self, CASES, Case, Cell, Check, EXACT_OBJECTS, Part, Size, examine, is_builder,
+    tracing::{self, TRAVERSALS},
 };
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// Nodes per object that a search may make or visit here.
@@ -32,9 +37,7 @@ fn every_case_from_s01_to_s45_is_there_and_checked() {
         for check in case.checks {
             match check {
                 Check::Method(Some(name), _) => assert!(Method::NAMES.contains(name), "{}: {name}", case.id),
-                Check::Part(part, _) => {
-                    assert!(PARTS.contains(part), "{}: {part}", case.id)
-                }
+                Check::Scene(_) => assert!(stiff::by_id(case.id).is_some(), "{} has no scene", case.id),
                 _ => {}
             }
         }
@@ -46,10 +49,11 @@ fn every_scene_has_the_size_it_is_asked_for() {
     for case in &CASES {
         if let Some(scene) = case.scene() {
             let few = scene.sizes[0];
-            assert_eq!((scene.scene)(few).len(), few, "{}", case.id);
+            assert_eq!(case.triangles(few).len(), few, "{}", case.id);
             assert!(scene.sizes.is_sorted(), "{}", case.id);
         }
     }
+    assert_eq!(STIFF.len(), CASES.iter().filter(|case| case.scene().is_some()).count());
 }
 
 /// The methods of one half, so that two threads share them.
@@ -80,7 +84,7 @@ fn every_scene_holds_for_every_builder_at_a_larger_size() {
         Method::all().iter().filter(|m| is_builder(m)).flat_map(|m| CASES.iter().map(move |c| (m, c)))
     {
         if let Some(scene) = case.scene() {
-            let examined = examine::examine(scene, method, Size::Many, WORK);
+            let examined = examine::examine(case, scene, method, Size::Many, WORK);
             found.extend(broken(case, method.name(), examined.err().map(Cell::Broken)));
         }
     }
@@ -95,7 +99,7 @@ fn every_scene_holds_for_every_builder_at_its_full_size() {
         Method::all().iter().filter(|m| is_builder(m)).flat_map(|m| CASES.iter().map(move |c| (m, c)))
     {
         if let Some(scene) = case.scene() {
-            let examined = examine::examine(scene, method, Size::All, WORK);
+            let examined = examine::examine(case, scene, method, Size::All, WORK);
             found.extend(broken(case, method.name(), examined.err().map(Cell::Broken)));
         }
     }
@@ -106,25 +110,53 @@ fn every_scene_holds_for_every_builder_at_its_full_size() {
 fn every_traversal_answers_as_brute_force_on_every_scene() {
     let mut found = Vec::new();
     for case in &CASES {
-        for (name, traversal) in tracing::TRAVERSALS {
+        for (name, traversal) in TRAVERSALS {
             found.extend(broken(case, name, case.of_traversal(*traversal, 1500)));
         }
     }
     assert_kept(found);
 }
 
+/// Four meshes and a closed box, by rays drawn from several seeds.
+#[test]
+#[ignore = "slow: a million rays, each against every triangle"]
+fn every_traversal_answers_a_million_rays_as_brute_force() {
+    let clusters = ["escher", "bijou", "konistil", "pinecon2"].map(|name| format!("{name}:cluster:200:1"));
+    let meshes = clusters.map(|name| Scene::load(&name).unwrap().primitives);
+    let meshes = meshes.into_iter().chain([Primitives::Triangles(stiff::closed_box(192))]);
+    let mut jobs = Vec::new();
+    for objects in meshes {
+        jobs.extend((0..20).map(|seed| (objects.clone(), seed)));
+    }
+    let broken: Vec<String> = jobs
+        .par_iter()
+        .flat_map_iter(|(objects, seed)| {
+            let Primitives::Triangles(triangles) = objects else { unreachable!("all are meshes") };
+            let rays = tracing::rays(triangles, 10_000, *seed);
+            TRAVERSALS.iter().filter_map(move |(name, traversal)| {
+                let broken = tracing::check(*traversal, objects, &rays).err()?;
+                Some(format!("{name}, seed {seed}: {broken}"))
+            })
+        })
+        .collect();
+    assert_kept(broken);
+}
+
 #[test]
 fn every_other_part_keeps_its_promises() {
-    let parts = CASES.iter().flat_map(|case| PARTS.map(|part| broken(case, part, case.of_part(part))));
+    let parts =
+        CASES.iter().flat_map(|case| Part::ALL.map(|part| broken(case, part.name(), case.of_part(part))));
     assert_kept(parts.flatten().collect());
 }
 
 #[test]
 fn the_rays_of_the_suite_hit_miss_and_cover_every_kind() {
-    let triangles = scenes::closed_box(192);
+    let triangles = stiff::closed_box(192);
     let rays = tracing::rays(&triangles, 1500, 1);
     assert_eq!(rays.len(), 1500);
-    let hits = rays.iter().filter(|ray| tracing::brute_force(&triangles, ray).is_some()).count();
+    let objects = Primitives::Triangles(triangles);
+    let brute_force = Accelerator::new(&objects, Structure::Brute);
+    let hits = rays.iter().filter(|ray| brute_force.any_hit(ray, &mut ())).count();
     assert!((300..1200).contains(&hits), "{hits}");
     let zeros = rays.iter().flat_map(|ray| ray.direction().to_array()).filter(|&d| d == 0.0);
     let signs: BTreeSet<u32> = zeros.map(f32::to_bits).collect();
@@ -138,8 +170,8 @@ fn the_rays_of_the_suite_hit_miss_and_cover_every_kind() {
 fn every_objective_is_what_its_method_reports() {
     for (label, method) in stress::methods() {
         let n = if let Method::Exact(_) = method { EXACT_OBJECTS } else { 60 };
-        for make in [scenes::uniform, scenes::identical_points, scenes::giant_over_small] {
-            let boxes = scenes::boxes(&make(n));
+        for make in [stiff::uniform, stiff::identical_points, stiff::giant_over_small] {
+            let boxes = stiff::boxes(&make(n));
             for objective in [Objective::GoldsmithSalmon, Objective::Sah(Default::default())] {
                 let budget = examine::budget(&method, n, WORK);
                 let outcome =
@@ -161,7 +193,7 @@ fn a_cancelled_method_says_so() {
             true
         }
     }
-    let boxes = scenes::boxes(&scenes::uniform(EXACT_OBJECTS));
+    let boxes = stiff::boxes(&stiff::uniform(EXACT_OBJECTS));
     for (label, method) in stress::methods() {
         let cancelled = solve(&method, &Problem::new(&boxes), 1, Budget::default(), &Impatient).unwrap();
         assert_eq!(cancelled.stop, StopReason::Cancelled, "{label}");

@@ -18,7 +18,7 @@ pub fn obj(bytes: &[u8]) {
     assert!(!mesh.triangles.is_empty() && mesh.degenerate_triangles <= mesh.triangles.len());
     let mut text = String::new();
     for triangle in &mesh.triangles {
-        for corner in triangle {
+        for corner in triangle.0 {
             assert!(corner.is_finite());
             let _ = writeln!(text, "v {:e} {} {}", corner.x, corner.y, corner.z);
         }

@@ -4,6 +4,7 @@ use super::bytes::Bytes;
 use bvh_build::{Builder, goldsmith_salmon, kd_tree, muller_fellner};
 use bvh_core::{Aabb, Hit, Ray, Sphere, Triangle, any_hit, clip_to_box, nearest_hit, nearest_hit_of_all};
 use glam::Vec3;
+use harness::scenes::Primitives;
 use harness::stress::tracing::{TRAVERSALS, check};
 
 /// The bytes: how to read the rest, the number of triangles, an exponent, then triangles, then rays.
@@ -37,8 +38,9 @@ pub fn rays(bytes: &[u8]) {
             ),
         }
     }
+    let objects = Primitives::Triangles(triangles.clone());
     for (name, traversal) in TRAVERSALS {
-        check(*traversal, &triangles, &rays).unwrap_or_else(|broken| panic!("{name}: {broken}"));
+        check(*traversal, &objects, &rays).unwrap_or_else(|broken| panic!("{name}: {broken}"));
     }
     let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
     let spheres: Vec<Sphere> =

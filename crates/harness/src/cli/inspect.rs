@@ -85,7 +85,7 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
             }
             file.wide().map_err(refused)?;
             if let Some(scene) = &scene {
-                file.for_triangles(&scene.triangles().unwrap_or_default()).map_err(refused)?;
+                file.for_triangles(scene.triangles().unwrap_or_default()).map_err(refused)?;
                 lines.say("scene", &scene.name);
             }
             lines.say("valid", "yes");
@@ -163,7 +163,7 @@ fn against(tree: &Bvh, file: TreeFile, scene: &Scene, lines: &mut Lines) -> Resu
     }
     match scene.triangles() {
         Ok(triangles) => {
-            let overlap = cost::end_point_overlap(tree, &triangles, &SahConstants::default());
+            let overlap = cost::end_point_overlap(tree, triangles, &SahConstants::default());
             lines.say("end-point overlap", overlap);
         }
         Err(_) => lines.say("end-point overlap", "of triangles only"),

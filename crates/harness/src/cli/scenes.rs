@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::cli::output::print_line;
-use crate::scenes::standin::STAND_INS;
+use crate::scenes::stand_ins::STAND_INS;
 use crate::scenes::{FETCHED, SPHERES, Scene, fetched_path};
 
 /// Prints a table of the built-in scenes: their sizes, and what each stands in for.

@@ -3,7 +3,7 @@
 use crate::scenes::Primitives;
 use bvh_build::kd_tree::KdTree;
 use bvh_core::{
-    Bvh, Counter, Hit, Ray, Shear, Triangle, WideBvh, any_hit, any_hit_of_all, nearest_hit, nearest_hit_of_all,
+    Bvh, Counter, Hit, Ray, Shear, WideBvh, any_hit, any_hit_of_all, nearest_hit, nearest_hit_of_all,
 };
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -99,7 +99,7 @@ impl<'a> Accelerator<'a> {
             (Structure::WidePortable(wide), _) => wide.view().nearest_hit_counted(ray, counter),
             (structure, Primitives::Triangles(triangles)) => {
                 let shear = Shear::new(ray);
-                let test = |id: u32, t_max| Triangle(triangles[id as usize]).intersect(&shear, t_max);
+                let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
                 structure.nearest_hit(triangles.len(), ray, test, counter)
             }
             (structure, Primitives::Spheres(spheres)) => {
@@ -143,7 +143,7 @@ impl<'a> Accelerator<'a> {
         match self.objects {
             Primitives::Triangles(triangles) => {
                 let shear = Shear::new(ray);
-                let test = |id: u32| note(Triangle(triangles[id as usize]).intersect(&shear, ray.t_max()));
+                let test = |id: u32| note(triangles[id as usize].intersect(&shear, ray.t_max()));
                 self.structure.any_hit(triangles.len(), ray, test, counter);
             }
             Primitives::Spheres(spheres) => {

@@ -124,7 +124,7 @@ pub fn own_contenders<'a>(
     let contender = |&layout: &Layout| {
         let triangles = scene.triangles().map_err(|error| error.to_string())?;
         let start = Instant::now();
-        let wide = || WideBvh::new(tree, &triangles).map_err(|error| error.to_string());
+        let wide = || WideBvh::new(tree, triangles).map_err(|error| error.to_string());
         let (name, structure) = match layout {
             Layout::Binary => ("binary", Structure::Tree(Cow::Borrowed(tree))),
             Layout::BinaryLeaves => {

@@ -7,7 +7,7 @@ use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
 use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh as TheirBvh, BvhNode};
 use ::bvh::ray::Ray as TheirRay;
-use bvh_core::{Aabb, Bvh, Hit, Ray};
+use bvh_core::{Aabb, Bvh, Hit, Ray, Triangle};
 use glam::Vec3;
 use nalgebra::{Point3, Vector3};
 use std::time::Instant;
@@ -96,8 +96,8 @@ pub(super) fn raw(boxes: &[Aabb]) -> Raw {
 
 /// The iterator by distance, ended at the first box that begins behind the nearest hit: of the library's traversals the
 /// only one that is ordered and has no limit of depth. Its triangle test sees front sides only and is asked for both.
-pub(super) fn contender(triangles: &[[Vec3; 3]]) -> Contender<'_> {
-    let mut shapes = shapes(triangles.iter().map(|&corners| (Aabb::around(corners), corners)));
+pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
+    let mut shapes = shapes(triangles.iter().map(|triangle| (triangle.aabb(), triangle.0)));
     let start = Instant::now();
     let tree = TheirBvh::build(&mut shapes);
     let preparation_seconds = start.elapsed().as_secs_f64();

@@ -132,7 +132,7 @@ impl Peer {
             #[cfg(feature = "peers")]
             Self::Obvhs(config) => Ok(obvhs::build(config, &scene.boxes)),
             #[cfg(feature = "peer-tinybvh")]
-            Self::Tinybvh(_) => tinybvh::build(corners(scene)?, &scene.boxes),
+            Self::Tinybvh(_) => tinybvh::build(triangles(scene)?, &scene.boxes),
             #[allow(unreachable_patterns, reason = "not without the features")]
             _ => Err(format!("this program was built without the library {}", self.name())),
         }
@@ -153,11 +153,11 @@ impl Peer {
     pub fn contenders<'a>(&self, scene: &'a Scene) -> Result<Vec<Contender<'a>>, String> {
         match self {
             #[cfg(feature = "peers")]
-            Self::Bvh(_) => Ok(vec![bvh::contender(corners(scene)?)]),
+            Self::Bvh(_) => Ok(vec![bvh::contender(triangles(scene)?)]),
             #[cfg(feature = "peers")]
-            Self::Obvhs(config) => Ok(obvhs::contenders(config, corners(scene)?)),
+            Self::Obvhs(config) => Ok(obvhs::contenders(config, triangles(scene)?)),
             #[cfg(feature = "peer-tinybvh")]
-            Self::Tinybvh(_) => tinybvh::contenders(corners(scene)?),
+            Self::Tinybvh(_) => tinybvh::contenders(triangles(scene)?),
             #[allow(unreachable_patterns, reason = "not without the features")]
             _ => Err(format!("this program was built without the library {}", self.name())),
         }
@@ -165,8 +165,8 @@ impl Peer {
 }
 
 #[cfg(feature = "peers")]
-fn corners(scene: &Scene) -> Result<&[[glam::Vec3; 3]], String> {
-    scene.corners().map_err(|error| error.to_string())
+fn triangles(scene: &Scene) -> Result<&[bvh_core::Triangle], String> {
+    scene.triangles().map_err(|error| error.to_string())
 }
 
 /// What is below a node of a library's tree.

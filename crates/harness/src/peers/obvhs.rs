@@ -9,7 +9,7 @@ use ::obvhs::ray::{Ray as TheirRay, RayHit};
 use ::obvhs::rt_triangle::RtTriangle;
 use ::obvhs::triangle::Triangle as TheirTriangle;
 use ::obvhs::{BvhBuildParams, aabb};
-use bvh_core::{Aabb, Bvh, Hit, Ray};
+use bvh_core::{Aabb, Bvh, Hit, Ray, Triangle};
 use glam::{Vec3, Vec3A};
 use std::time::Duration;
 
@@ -89,11 +89,11 @@ macro_rules! traced_by {
 
 /// The binary tree and the eight-wide compressed one of the preset, with triangles in the order of leaves, as the
 /// library recommends. Its directions are unit vectors; ours are too, but for rounding.
-pub(super) fn contenders(config: &Obvhs, triangles: &[[Vec3; 3]]) -> Vec<Contender<'static>> {
+pub(super) fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contender<'static>> {
     let corner = |p: Vec3| Vec3A::from(p);
     let theirs: Vec<TheirTriangle> = triangles
         .iter()
-        .map(|&[a, b, c]| TheirTriangle { v0: corner(a), v1: corner(b), v2: corner(c) })
+        .map(|&Triangle([a, b, c])| TheirTriangle { v0: corner(a), v1: corner(b), v2: corner(c) })
         .collect();
     let in_order =
         |ids: &[u32]| -> Vec<RtTriangle> { ids.iter().map(|&id| (&theirs[id as usize]).into()).collect() };

@@ -3,19 +3,18 @@
 use super::{Built, Theirs, convert};
 use crate::measure::Query;
 use crate::measure::speed::{Contender, Tracer, timed};
-use bvh_core::{Aabb, Hit, Ray};
-use glam::Vec3;
+use bvh_core::{Aabb, Hit, Ray, Triangle};
 use std::time::Instant;
 use tinybvh_rs::{Intersection, Intersector, Ray as TheirRay, bvh};
 #[cfg(target_feature = "avx2")]
 use tinybvh_rs::{bvh8_cpu, mbvh};
 
-fn vertices(triangles: &[[Vec3; 3]]) -> Vec<[f32; 4]> {
-    triangles.as_flattened().iter().map(|p| [p.x, p.y, p.z, 0.0]).collect()
+fn vertices(triangles: &[Triangle]) -> Vec<[f32; 4]> {
+    triangles.iter().flat_map(|triangle| triangle.0).map(|p| [p.x, p.y, p.z, 0.0]).collect()
 }
 
 /// Its binned builder over the triangles' boxes, leaves split down to one triangle afterwards.
-pub(super) fn build(triangles: &[[Vec3; 3]], boxes: &[Aabb]) -> Result<Built, String> {
+pub(super) fn build(triangles: &[Triangle], boxes: &[Aabb]) -> Result<Built, String> {
     let vertices = vertices(triangles);
     let start = Instant::now();
     let mut built = bvh::BVH::new(vertices.as_slice().into()).map_err(|error| error.to_string())?;
@@ -35,7 +34,7 @@ pub(super) fn build(triangles: &[[Vec3; 3]], boxes: &[Aabb]) -> Result<Built, St
 
 /// The binary tree with its own leaves and, in a program compiled for a processor with AVX2, its eight-wide layout: of
 /// that tree and of the one with split triangles (SBVH).
-pub(super) fn contenders(triangles: &[[Vec3; 3]]) -> Result<Vec<Contender<'_>>, String> {
+pub(super) fn contenders(triangles: &[Triangle]) -> Result<Vec<Contender<'_>>, String> {
     let start = Instant::now();
     binary(&vertices(triangles))?;
     let binary_seconds = start.elapsed().as_secs_f64();

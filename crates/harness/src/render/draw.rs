@@ -54,7 +54,7 @@ pub fn render(
 ) -> Option<Film> {
     let bounds = scene.boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
     let (width, height) = (options.width, options.height);
-    let up = framing::up(scene);
+    let up = scene.up();
     let aspect = f64::from(width) / f64::from(height);
     let automatic = || framing::automatic(scene, &bounds, aspect);
     let view = options.view.clone().unwrap_or_else(automatic);
@@ -92,7 +92,7 @@ mod tests {
             Structure::KdTree(kd_tree::Config::default().build(&scene.boxes).unwrap()),
             Structure::Tree(Cow::Owned(goldsmith_salmon::Config::default().build(&scene.boxes).unwrap())),
         ];
-        structures.extend(scene.triangles().map(|own| Structure::Wide(WideBvh::new(&greedy, &own).unwrap())));
+        structures.extend(scene.triangles().map(|own| Structure::Wide(WideBvh::new(&greedy, own).unwrap())));
         structures.push(Structure::Tree(Cow::Owned(greedy)));
         structures
     }

@@ -8,11 +8,6 @@ use glam::DVec3;
 /// Views of scenes that should be seen from inside: name, eye, middle of the picture, angle.
 const INSIDE: [(&str, [f64; 3], [f64; 3], f64); 1] = [("sponza", [-11.3, 1.9, -0.9], [3.0, 4.4, 0.5], 62.0)];
 
-/// The direction that is up: y, as most modellers have it, but z in the stand-ins.
-pub fn up(scene: &Scene) -> DVec3 {
-    if scene.kind == "stand-in" { DVec3::Z } else { DVec3::Y }
-}
-
 /// A view of a scene: a known good one, or else from outside, from above and a little from the side, at the distance at
 /// which the whole box just fits.
 pub fn automatic(scene: &Scene, bounds: &Aabb, aspect: f64) -> View {
@@ -23,7 +18,7 @@ pub fn automatic(scene: &Scene, bounds: &Aabb, aspect: f64) -> View {
             return view;
         }
     }
-    let up = up(scene);
+    let up = scene.up();
     // Meshes are seen from further above, because their floor would otherwise be seen edge on.
     let (side, height) = match scene.primitives {
         Primitives::Triangles(_) => (0.62, 0.58),

@@ -28,7 +28,7 @@ pub fn by_name(name: &str, scene: &Scene) -> Result<Structure<'static>, Error> {
             let triangles = scene.triangles().map_err(|error| {
                 Error::Usage(format!("--accel wide: {error}, or --accel brute, kdtree, bvh"))
             })?;
-            let wide = WideBvh::new(&greedy()?, &triangles).map_err(|source| Error::InvalidTree {
+            let wide = WideBvh::new(&greedy()?, triangles).map_err(|source| Error::InvalidTree {
                 scene: scene.name.clone(),
                 method: name.into(),
                 source,

@@ -39,7 +39,7 @@ impl Surface {
         let met = origin + direction * f64::from(hit.t);
         let (point, normal, colour, mirror) = match objects {
             Primitives::Triangles(triangles) => {
-                let [a, b, c] = triangles[id].map(|corner| corner.as_dvec3());
+                let [a, b, c] = triangles[id].0.map(|corner| corner.as_dvec3());
                 // Scaled so that tiny triangles keep a normal.
                 let (ab, ac) = ((b - a).normalize_or_zero(), (c - a).normalize_or_zero());
                 (met, ab.cross(ac).normalize_or(-direction), PLASTER, 0.0)

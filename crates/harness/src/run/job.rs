@@ -93,7 +93,7 @@ pub(crate) fn perform(
     let internal_area = cost::internal_area(tree);
     let run = RunRow {
         scene: scene_name.clone(),
-        scene_kind: scene.kind.into(),
+        scene_kind: scene.kind.to_string(),
         method: method.clone(),
         seed,
         repetition,

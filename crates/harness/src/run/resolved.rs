@@ -28,7 +28,7 @@ impl Resolved {
     pub fn new(experiment: &Experiment, scenes: &[Scene]) -> Self {
         let loaded = |scene: &Scene| LoadedScene {
             name: scene.name.clone(),
-            kind: scene.kind.into(),
+            kind: scene.kind.to_string(),
             objects: scene.boxes.len(),
             checksum: format!("{:016x}", scene.checksum()),
         };

@@ -1,8 +1,12 @@
-//! Scenes by name: stand-ins made in code, spheres, meshes from files, and subsets of all of them.
+//! Scenes by name: procedural ones, meshes from OBJ files, and subsets of all of them.
 
+mod fnv;
 pub mod obj;
 mod scene;
-pub mod standin;
+pub mod spheres;
+pub mod stand_ins;
+pub mod stiff;
 pub mod subset;
 
-pub use scene::{FETCHED, NoTriangles, Primitives, SPHERES, Scene, fetched_path, fnv1a};
+pub use fnv::fnv1a;
+pub use scene::{FETCHED, NoTriangles, Primitives, SPHERES, Scene, SceneKind, fetched_path};

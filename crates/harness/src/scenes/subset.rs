@@ -1,23 +1,23 @@
-//! Parts of scenes by name: evenly spaced, at random, or around one object.
+//! Subsets of scenes by name: evenly spaced, at random, or around one object.
 
 use bvh_core::Aabb;
 use bvh_search::Stream;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 
-/// Which of a scene's objects to take; what follows the scene's name.
+/// Which objects of a scene to take, as the end of its name says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// `:COUNT`: so many, evenly spaced in their order.
+pub enum Subset {
+    /// `:COUNT`: this many, evenly spaced in the scene's order.
     Spaced(usize),
-    /// `:random:COUNT:SEED`: so many distinct ones.
+    /// `:random:COUNT:SEED`: this many, drawn without replacement.
     Random(usize, u64),
-    /// `:cluster:COUNT:SEED`: so many around a random one, nearest box centres first.
+    /// `:cluster:COUNT:SEED`: this many around a random object, those with the nearest box centres.
     Cluster(usize, u64),
 }
 
-impl Part {
-    /// The scene's name and the part, if `name` ends like one.
+impl Subset {
+    /// The scene's name and the subset, if `name` ends like one.
     pub fn parse(name: &str) -> Option<(&str, Self)> {
         let (before, last) = name.rsplit_once(':')?;
         let seeded = || {
@@ -33,14 +33,15 @@ impl Part {
         seeded().or_else(|| Some((before, Self::Spaced(last.parse().ok()?))))
     }
 
-    /// How many objects it has.
+    /// Number of objects.
     pub fn count(&self) -> usize {
         match *self {
             Self::Spaced(count) | Self::Random(count, _) | Self::Cluster(count, _) => count,
         }
     }
 
-    /// Their indices in order, for a count of 1 to as many as there are boxes.
+    /// The objects' indices in ascending order. The count must be 1 to the number of boxes. O(n log n) for a cluster,
+    /// else O(n).
     pub fn choose(&self, boxes: &[Aabb]) -> Vec<usize> {
         let all = boxes.len();
         let mut chosen = match *self {
@@ -63,19 +64,19 @@ impl Part {
     }
 }
 
-/// How many names [`expand`] makes of this one.
+/// Number of names that [`expand`] makes of this one.
 pub fn names(name: &str) -> u64 {
     let ranges = name.split(':').skip(1).filter_map(range);
     ranges.map(|(low, high)| (u64::from(high) + 1).saturating_sub(low.into())).fold(1, u64::saturating_mul)
 }
 
-/// The numbers of `A..B`.
+/// The ends of `A..B`.
 fn range(word: &str) -> Option<(u32, u32)> {
     let (low, high) = word.split_once("..")?;
     Some((low.parse().ok()?, high.parse().ok()?))
 }
 
-/// `name` with every `A..B` after a colon replaced by A, A + 1, … B: many parts of a scene on one line of a spec.
+/// `name` with every `A..B` after a colon replaced by A, A + 1, …, B: many subsets of a scene on one line of a spec.
 pub fn expand(name: &str) -> Vec<String> {
     let mut names = vec![String::new()];
     for (index, word) in name.split(':').enumerate() {
@@ -96,12 +97,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_are_told_by_what_follows_the_name() {
-        assert_eq!(Part::parse("a:30"), Some(("a", Part::Spaced(30))));
-        assert_eq!(Part::parse("a:random:12:7"), Some(("a", Part::Random(12, 7))));
-        assert_eq!(Part::parse("c:/b.obj:cluster:6:0"), Some(("c:/b.obj", Part::Cluster(6, 0))));
+    fn subsets_are_told_by_what_follows_the_name() {
+        assert_eq!(Subset::parse("a:30"), Some(("a", Subset::Spaced(30))));
+        assert_eq!(Subset::parse("a:random:12:7"), Some(("a", Subset::Random(12, 7))));
+        assert_eq!(Subset::parse("c:/b.obj:cluster:6:0"), Some(("c:/b.obj", Subset::Cluster(6, 0))));
         for none in ["a", "c:/b.obj", "a:cluster:6:x", "a:cluster"] {
-            assert_eq!(Part::parse(none), None, "{none}");
+            assert_eq!(Subset::parse(none), None, "{none}");
         }
     }
 
@@ -120,11 +121,11 @@ mod tests {
         let cube = |x: f32| Aabb::from(([x * x, 0.0, 0.0], [x * x + 1.0, 1.0, 1.0]));
         let boxes: Vec<Aabb> = (0..100u8).map(f32::from).map(cube).collect();
         for seed in 0..20 {
-            let random = Part::Random(30, seed).choose(&boxes);
+            let random = Subset::Random(30, seed).choose(&boxes);
             assert!(random.is_sorted_by(|a, b| a < b) && random.len() == 30);
-            let cluster = Part::Cluster(9, seed).choose(&boxes);
+            let cluster = Subset::Cluster(9, seed).choose(&boxes);
             assert!(cluster.windows(2).all(|pair| pair[1] == pair[0] + 1) && cluster.len() == 9, "{cluster:?}");
         }
-        assert_ne!(Part::Random(30, 1).choose(&boxes), Part::Random(30, 2).choose(&boxes));
+        assert_ne!(Subset::Random(30, 1).choose(&boxes), Subset::Random(30, 2).choose(&boxes));
     }
 }

@@ -23,7 +23,7 @@ impl Experiment {
     /// Their names; whether they are there is found when they are loaded.
     fn check_scenes(&self) -> Result<(), String> {
         if self.suite.is_some() {
-            if let Some(unknown) = self.scenes.iter().find(|id| stress::examine::case(id).is_none()) {
+            if let Some(unknown) = self.scenes.iter().find(|id| stress::by_id(id).is_none()) {
                 return Err(format!("scene {unknown} is no case of the suite; accepted: S01 to S45"));
             }
         } else if self.scenes.is_empty() {

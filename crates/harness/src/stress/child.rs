@@ -1,33 +1,14 @@
 //! What runs in a process of its own: other libraries, whose crash or hang must not end the run, and builds whose peak
 //! memory is to be known.
 
-use super::examine::case;
-use super::scenes;
+use super::peers::{self, Found};
+use crate::scenes::stiff;
 use bvh_search::{Budget, Method, Problem, solve};
-use serde::{Deserialize, Serialize};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// The hidden command of the harness that [`main`] carries out.
 pub const COMMAND: &str = "suite-child";
-
-/// The other libraries, by name; none without the feature `peers`.
-#[cfg(feature = "peers")]
-pub use super::peers::NAMES as PEERS;
-/// The other libraries, by name; none without the feature `peers`.
-#[cfg(not(feature = "peers"))]
-pub const PEERS: &[&str] = &[];
-
-/// What a child says of another library's tree.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Found {
-    /// Edges from the root to the deepest leaf.
-    pub depth: usize,
-    /// The internal area.
-    pub cost: f64,
-    /// The promises that it broke; empty if none.
-    pub broken: String,
-}
 
 /// Runs this very program again and returns what it prints; an error if it fails or takes longer than `limit`.
 fn ask(arguments: [&str; 3], limit: Duration) -> Result<String, String> {
@@ -46,7 +27,7 @@ fn ask(arguments: [&str; 3], limit: Duration) -> Result<String, String> {
         match child.try_wait().map_err(|error| error.to_string())? {
             Some(_) => break,
             None if start.elapsed() > limit => {
-                // Gone already, or going.
+                // It may have ended meanwhile.
                 let _ = child.kill();
                 let _ = child.wait();
                 return Err(format!("no end within {} s", limit.as_secs()));
@@ -68,7 +49,7 @@ pub fn examine(peer: &str, case: &str, objects: usize, limit: Duration) -> Resul
     toml::from_str(&answer).map_err(|error| error.to_string())
 }
 
-/// The most memory that a build takes beyond its boxes, in a child; `None` where the system does not tell.
+/// Peak memory of a build beyond its boxes, in bytes, in a child; `None` where the system does not report it.
 pub fn peak_bytes(method: &Method, case: &str, objects: usize) -> Option<u64> {
     let method = toml::to_string(method).ok()?;
     let answer = ask([&method, case, &objects.to_string()], Duration::from_secs(3600)).ok()?;
@@ -77,14 +58,13 @@ pub fn peak_bytes(method: &Method, case: &str, objects: usize) -> Option<u64> {
 
 /// What the child does: `subject` is a library's name or a method as a spec writes it. Returns what to print.
 pub fn main(subject: &str, id: &str, objects: usize) -> Result<String, String> {
-    let scene = case(id).and_then(super::Case::scene).ok_or_else(|| format!("{id} is no case with a scene"))?;
-    let triangles = (scene.scene)(objects);
-    #[cfg(feature = "peers")]
-    if let Some(found) = super::peers::examine(subject, &triangles) {
+    let generator = stiff::by_id(id).ok_or_else(|| format!("{id} is no case with a scene"))?;
+    let triangles = generator(objects);
+    if let Some(found) = peers::examine(subject, &triangles) {
         return toml::to_string(&found).map_err(|error| error.to_string());
     }
     let method: Method = toml::from_str(subject).map_err(|error| error.to_string())?;
-    let boxes = scenes::boxes(&triangles);
+    let boxes = stiff::boxes(&triangles);
     drop(triangles);
     let before = status("VmRSS");
     let outcome =
@@ -93,11 +73,11 @@ pub fn main(subject: &str, id: &str, objects: usize) -> Result<String, String> {
     drop(outcome);
     match (before, peak) {
         (Some(before), Some(peak)) => Ok(peak.saturating_sub(before).to_string()),
-        _ => Err("the system does not tell".into()),
+        _ => Err("this system does not report memory".into()),
     }
 }
 
-/// A size in bytes as Linux tells it.
+/// A size in bytes from the process status of Linux.
 fn status(key: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(':'))?;

@@ -1,68 +1,72 @@
 //! One method on one scene: whether the promises P1, P2 and P4 to P7 are kept, and the numbers to report.
 
+use super::case::{Case, SceneCase, Size, is_builder};
 use super::exact_area::{internal_area, relative_error};
+use super::promise::Promise::{P1, P2};
+use super::promise::{Broken, Verdict, ensure};
 use super::transform::{same_topology, scale_range, scaled, scaled_area};
-use super::{Case, SceneCase, Size, Verdict, is_builder, scenes};
+use crate::scenes::stiff;
 use bvh_core::cost;
 use bvh_core::{Aabb, validate};
 use bvh_search::{Budget, Method, Outcome, Problem, SearchError, solve};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
-/// A cost may differ from the exact one by this much, relative to it.
+/// Largest relative error of a cost.
 pub const ROUNDING: f64 = 1e-12;
 
-/// Scenes of more objects are not built for every number of threads and every scale.
+/// Most objects of a scene that is built again for other numbers of threads and at other scales.
 const REPEATED: usize = 20_000;
 
-/// What there is to say of one method on one scene.
+/// What was found of one method on one scene.
 #[derive(Clone, Debug, Default)]
 pub struct Examined {
-    /// Numbers of objects.
+    /// Number of objects.
     pub objects: usize,
     /// Edges from the root to the deepest leaf.
     pub depth: usize,
     /// The internal area.
     pub cost: f64,
-    /// Of the cost, against exact arithmetic.
+    /// Of the cost against exact arithmetic.
     pub relative_error: f64,
-    /// Of the method alone.
+    /// Seconds that the method took.
     pub seconds: f64,
     /// Further findings.
     pub note: String,
 }
 
-/// The budget of a method on so many objects. Builders have none.
+/// The budget of a method on a scene of `objects` objects; builders have none.
 pub fn budget(method: &Method, objects: usize, work_per_object: u64) -> Budget {
     let work = work_per_object.saturating_mul(objects as u64 + 1);
     Budget { max_evaluations: None, max_work: (!is_builder(method)).then_some(work) }
 }
 
 /// Runs a method with seed 1; a panic is a broken promise.
-pub fn run(method: &Method, boxes: &[Aabb], work_per_object: u64) -> Result<Outcome, String> {
+pub fn run(method: &Method, boxes: &[Aabb], work_per_object: u64) -> Result<Outcome, Broken> {
     let budget = budget(method, boxes.len(), work_per_object);
     let solved = catch_unwind(AssertUnwindSafe(|| solve(method, &Problem::new(boxes), 1, budget, &())));
     match solved {
         Ok(Ok(outcome)) => Ok(outcome),
-        Ok(Err(error)) => Err(format!("P1: refused: {error}")),
-        Err(panic) => Err(format!("P1: panicked: {}", message(&*panic))),
+        Ok(Err(error)) => Err(P1.broken(format!("refused: {error}"))),
+        Err(panic) => Err(panicked(&*panic)),
     }
 }
 
-fn message(panic: &(dyn std::any::Any + Send)) -> String {
+fn panicked(panic: &(dyn std::any::Any + Send)) -> Broken {
     let text = panic.downcast_ref::<String>().cloned();
-    text.or_else(|| panic.downcast_ref::<&str>().map(|&text| text.into())).unwrap_or_default()
+    let text = text.or_else(|| panic.downcast_ref::<&str>().map(|&text| text.into()));
+    P1.broken(format!("panicked: {}", text.unwrap_or_default()))
 }
 
 /// Checks a method on the scene of a case at a size.
 pub fn examine(
-    case: &SceneCase,
+    case: &Case,
+    scene: &SceneCase,
     method: &Method,
     size: Size,
     work_per_object: u64,
-) -> Result<Examined, String> {
-    let objects = case.objects(method, size);
-    let boxes = scenes::boxes(&(case.scene)(objects));
+) -> Result<Examined, Broken> {
+    let boxes = stiff::boxes(&case.triangles(scene.objects(method, size)));
     let start = Instant::now();
     let outcome = run(method, &boxes, work_per_object)?;
     let seconds = start.elapsed().as_secs_f64();
@@ -75,47 +79,45 @@ pub fn examine(
             check_scale(method, &boxes, work_per_object, &outcome, k)?;
         }
     }
-    let note = case.also.map_or(Ok(String::new()), |also| also(method, &boxes, &outcome))?;
+    let note = scene.also.map_or(Ok(String::new()), |also| also(method, &boxes, &outcome))?;
     let (depth, cost) = (outcome.tree.depth(), outcome.cost);
     Ok(Examined { objects: boxes.len(), depth, cost, relative_error, seconds, note })
 }
 
 /// P2 and P7: the tree is valid and tight, its cost finite, exact but for rounding, the best of the history and no
 /// higher than the start's. Returns the relative error of the cost.
-pub fn check_outcome(boxes: &[Aabb], outcome: &Outcome) -> Result<f64, String> {
+pub fn check_outcome(boxes: &[Aabb], outcome: &Outcome) -> Result<f64, Broken> {
     let Outcome { tree, cost, history, .. } = outcome;
-    validate(tree, boxes).map_err(|error| format!("P2: {error}"))?;
-    if !tree.is_tight(boxes) {
-        return Err("P2: boxes are not tight".into());
-    }
+    validate(tree, boxes).map_err(|error| P2.broken(error))?;
+    ensure!(tree.is_tight(boxes), P2: "boxes are not tight");
     let costs = [*cost, cost::internal_area(tree), cost::goldsmith_salmon(tree)];
-    if !costs.iter().all(|cost| cost.is_finite() && *cost >= 0.0) {
-        return Err(format!("P7: costs {costs:?}"));
-    }
+    ensure!(costs.iter().all(|cost| cost.is_finite() && *cost >= 0.0), P7: "costs {costs:?}");
     let error = relative_error(*cost, &internal_area(tree));
-    if error > ROUNDING {
-        return Err(format!("P7: the cost {cost} is off by {error:e} of the exact one"));
-    }
+    ensure!(error <= ROUNDING, P7: "the cost {cost} is off by {error:e} of the exact one");
     let best = history.iter().map(|event| event.cost).fold(f64::INFINITY, f64::min);
-    if best != *cost {
-        return Err(format!("P7: the cost is {cost}, the best of the history {best}"));
-    }
+    ensure!(best == *cost, P7: "the cost is {cost}, the best of the history {best}");
     Ok(error)
 }
 
+/// Runs `work` on this many threads.
+pub fn on_threads<T: Send>(
+    threads: usize,
+    work: impl FnOnce() -> Result<T, Broken> + Send,
+) -> Result<T, Broken> {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Broken::case)?.install(work)
+}
+
 /// P4: the same tree and history on one thread and on three.
-pub fn check_threads(
+fn check_threads(
     method: &Method,
     boxes: &[Aabb],
     work_per_object: u64,
     outcome: &Outcome,
-) -> Result<(), String> {
+) -> Result<(), Broken> {
     for threads in [1, 3] {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| e.to_string())?;
-        let other = pool.install(|| run(method, boxes, work_per_object))?;
-        if (&other.tree, &other.history) != (&outcome.tree, &outcome.history) {
-            return Err(format!("P4: another outcome on {threads} threads"));
-        }
+        let other = on_threads(threads, || run(method, boxes, work_per_object))?;
+        let same = (&other.tree, &other.history) == (&outcome.tree, &outcome.history);
+        ensure!(same, P4: "another outcome on {threads} threads");
     }
     Ok(())
 }
@@ -127,15 +129,11 @@ pub fn check_scale(
     work_per_object: u64,
     outcome: &Outcome,
     k: i32,
-) -> Result<(), String> {
+) -> Result<(), Broken> {
     let other = run(method, &scaled(boxes, k), work_per_object)?;
-    if !same_topology(&other.tree, &outcome.tree) {
-        return Err(format!("P5: another tree at scale 2^{k}"));
-    }
+    ensure!(same_topology(&other.tree, &outcome.tree), P5: "another tree at scale 2^{k}");
     let (expected, found) = (scaled_area(outcome.cost, k), other.cost);
-    if found != expected {
-        return Err(format!("P5: the cost at scale 2^{k} is {found}, not {expected}"));
-    }
+    ensure!(found == expected, P5: "the cost at scale 2^{k} is {found}, not {expected}");
     Ok(())
 }
 
@@ -147,13 +145,8 @@ pub fn refuses(method: &Method, boxes: &[Aabb], object: usize) -> Verdict {
         Ok(Err(error @ SearchError::Build(_))) if error.to_string().contains(&format!("object {object} ")) => {
             Ok(error.to_string())
         }
-        Ok(Err(error)) => Err(format!("P1: the error names no object {object}: {error}")),
-        Ok(Ok(_)) => Err(format!("P1: built a tree over object {object}")),
-        Err(panic) => Err(format!("P1: panicked: {}", message(&*panic))),
+        Ok(Err(error)) => Err(P1.broken(format!("the error names no object {object}: {error}"))),
+        Ok(Ok(_)) => Err(P1.broken(format!("built a tree over object {object}"))),
+        Err(panic) => Err(panicked(&*panic)),
     }
-}
-
-/// The case of this identifier.
-pub fn case(id: &str) -> Option<&'static Case> {
-    super::CASES.iter().find(|case| case.id == id)
 }

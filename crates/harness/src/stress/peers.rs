@@ -1,64 +1,100 @@
-//! Other libraries on the same scenes, by the same promises. Only ever called in a child process.
+//! Other libraries on the same scenes, by the same promises. Their crash or hang would end the program: they are only
+//! ever called in a child process.
 
-use super::child::Found;
-use super::tracing::{brute_force, rays};
-use super::transform::{same_topology, scale_range, scaled};
-use super::{exact_area, scenes};
-use crate::peers::{NoSettings, Obvhs, Peer, Preset, Raw};
-use bvh_core::{Ray, Shear, Triangle, cost, validate};
+use serde::{Deserialize, Serialize};
 
-/// The libraries by name. A further one is one line, here and in [`peer`].
-pub const NAMES: &[&str] = &["bvh 0.13", "obvhs 0.4 fast", "obvhs 0.4 slow"];
-
-fn peer(name: &str) -> Option<Peer> {
-    let obvhs = |preset| Peer::Obvhs(Obvhs { preset, reinsertion: None });
-    match name {
-        "bvh 0.13" => Some(Peer::Bvh(NoSettings {})),
-        "obvhs 0.4 fast" => Some(obvhs(Preset::Fast)),
-        "obvhs 0.4 slow" => Some(obvhs(Preset::Slow)),
-        _ => None,
-    }
+/// What is found of another library's tree.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Found {
+    /// Edges from the root to the deepest leaf.
+    pub depth: usize,
+    /// The internal area.
+    pub cost: f64,
+    /// The promises that it broke, as [`Broken`](super::promise::Broken) shows them.
+    pub broken: Vec<String>,
 }
 
-/// Rays per scene.
-const RAYS: usize = 500;
-/// More objects are not traced by brute force nor scaled.
-const FEW: usize = 1000;
+#[cfg(feature = "peers")]
+pub use compiled_in::{NAMES, examine};
 
-/// The library's tree over the triangles; `None` if there is no such library.
-pub fn examine(name: &str, triangles: &[Triangle]) -> Option<Found> {
-    let peer = peer(name)?;
-    let boxes = scenes::boxes(triangles);
-    let Raw { tree, nearest } = peer.raw(&boxes)?;
-    let mut broken = Vec::new();
-    let valid = validate(&tree, &boxes);
-    if let Err(error) = &valid {
-        broken.push(format!("P2: {error}"));
-    }
-    let (mut depth, mut area) = (0, f64::NAN);
-    if valid.is_ok() {
-        (depth, area) = (tree.depth(), cost::internal_area(&tree));
-        if exact_area::relative_error(area, &exact_area::internal_area(&tree)) > super::examine::ROUNDING {
-            broken.push(format!("P7: cost {area}"));
+/// The other libraries by name; none without the feature `peers`.
+#[cfg(not(feature = "peers"))]
+pub const NAMES: &[&str] = &[];
+
+/// The library's tree over the triangles; `None`, as no library is compiled in.
+#[cfg(not(feature = "peers"))]
+pub fn examine(_: &str, _: &[bvh_core::Triangle]) -> Option<Found> {
+    None
+}
+
+#[cfg(feature = "peers")]
+mod compiled_in {
+    use super::Found;
+    use crate::measure::{Accelerator, Structure};
+    use crate::peers::{NoSettings, Obvhs, Peer, Preset, Raw};
+    use crate::scenes::{Primitives, stiff};
+    use crate::stress::exact_area;
+    use crate::stress::examine::ROUNDING;
+    use crate::stress::promise::Promise::{P2, P3, P5, P7};
+    use crate::stress::tracing::rays;
+    use crate::stress::transform::{same_topology, scale_range, scaled};
+    use bvh_core::{Ray, Shear, Triangle, cost, validate};
+
+    /// The libraries by name. A further one is one line, here and in [`peer`].
+    pub const NAMES: &[&str] = &["bvh 0.13", "obvhs 0.4 fast", "obvhs 0.4 slow"];
+
+    fn peer(name: &str) -> Option<Peer> {
+        let obvhs = |preset| Peer::Obvhs(Obvhs { preset, reinsertion: None });
+        match name {
+            "bvh 0.13" => Some(Peer::Bvh(NoSettings {})),
+            "obvhs 0.4 fast" => Some(obvhs(Preset::Fast)),
+            "obvhs 0.4 slow" => Some(obvhs(Preset::Slow)),
+            _ => None,
         }
     }
-    if triangles.len() <= FEW {
-        let differs = |ray: &&Ray| {
-            let shear = Shear::new(ray);
-            let found = nearest(ray, &|id| triangles[id as usize].intersect(&shear, ray.t_max()));
-            found != brute_force(triangles, ray).map(|hit| hit.t)
-        };
-        let misses = rays(triangles, RAYS, 1).iter().filter(differs).count();
-        if misses > 0 {
-            broken.push(format!("P3: {misses} of {RAYS} rays differ from brute force"));
+
+    /// Rays per scene.
+    const RAYS: usize = 500;
+    /// Most objects of a scene that is traced by brute force and scaled.
+    const FEW: usize = 1000;
+
+    /// The library's tree over the triangles; `None` if there is no such library.
+    pub fn examine(name: &str, triangles: &[Triangle]) -> Option<Found> {
+        let peer = peer(name)?;
+        let boxes = stiff::boxes(triangles);
+        let Raw { tree, nearest } = peer.raw(&boxes)?;
+        let mut broken = Vec::new();
+        let valid = validate(&tree, &boxes);
+        if let Err(error) = &valid {
+            broken.push(P2.broken(error));
         }
-        let range = scale_range(&boxes);
-        for k in [(*range.start()).max(-120), (*range.end()).min(120)] {
-            let other = peer.raw(&scaled(&boxes, k));
-            if !other.is_some_and(|other| same_topology(&other.tree, &tree)) {
-                broken.push(format!("P5: another tree at scale 2^{k}"));
+        let (mut depth, mut area) = (0, f64::NAN);
+        if valid.is_ok() {
+            (depth, area) = (tree.depth(), cost::internal_area(&tree));
+            if exact_area::relative_error(area, &exact_area::internal_area(&tree)) > ROUNDING {
+                broken.push(P7.broken(format!("cost {area}")));
             }
         }
+        if triangles.len() <= FEW {
+            let objects = Primitives::Triangles(triangles.to_vec());
+            let brute_force = Accelerator::new(&objects, Structure::Brute);
+            let differs = |ray: &&Ray| {
+                let shear = Shear::new(ray);
+                let found = nearest(ray, &|id| triangles[id as usize].intersect(&shear, ray.t_max()));
+                found != brute_force.nearest_hit(ray, &mut ()).map(|hit| hit.t)
+            };
+            let misses = rays(triangles, RAYS, 1).iter().filter(differs).count();
+            if misses > 0 {
+                broken.push(P3.broken(format!("{misses} of {RAYS} rays differ from brute force")));
+            }
+            let range = scale_range(&boxes);
+            for k in [(*range.start()).max(-120), (*range.end()).min(120)] {
+                let other = peer.raw(&scaled(&boxes, k));
+                if !other.is_some_and(|other| same_topology(&other.tree, &tree)) {
+                    broken.push(P5.broken(format!("another tree at scale 2^{k}")));
+                }
+            }
+        }
+        Some(Found { depth, cost: area, broken: broken.iter().map(ToString::to_string).collect() })
     }
-    Some(Found { depth, cost: area, broken: broken.join("; ") })
 }

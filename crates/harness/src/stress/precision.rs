@@ -3,12 +3,13 @@
 //! One plain sweep, the same code for every kind of number, stands in for the builder's, which has f64 areas only.
 
 use super::exact_area::{half_area, internal_area, ratio};
-use super::scenes;
+use super::table::by_id;
 use super::transform::scaled;
 use crate::Error;
 use crate::figures::{self, Axis, Figure, Layer, Panel};
 use crate::run::rows::to_bytes;
 use crate::run::store::Store;
+use crate::scenes::stiff;
 use bvh_core::{Aabb, Bvh, Node};
 use num_bigint::{BigInt, BigUint};
 use num_traits::Zero;
@@ -207,16 +208,17 @@ fn decisions(boxes: &[Aabb]) -> Decisions {
 }
 
 /// The stiff scenes on which precision could matter, by case.
-fn stiff(n: usize) -> Vec<(String, Vec<Aabb>)> {
+fn scenes(n: usize) -> Vec<(String, Vec<Aabb>)> {
     let mut found: Vec<(String, Vec<Aabb>)> = Vec::new();
-    let uniform = scenes::boxes(&scenes::uniform(n));
+    let uniform = stiff::boxes(&stiff::uniform(n));
     for k in [-120, -72, -68, 0, 56, 60, 120] {
         found.push((format!("S21 2^{k}"), scaled(&uniform, k)));
     }
     for id in ["S06", "S09", "S22", "S23", "S24", "S25", "S27", "S28", "S29", "S30", "S31"] {
-        if let Some(scene) = super::examine::case(id).and_then(super::Case::scene) {
-            let objects = n.min(scene.sizes[2]);
-            found.push((id.into(), scenes::boxes(&(scene.scene)(objects))));
+        if let Some(case) = by_id(id)
+            && let Some(scene) = case.scene()
+        {
+            found.push((id.into(), stiff::boxes(&case.triangles(n.min(scene.sizes[2])))));
         }
     }
     found
@@ -226,7 +228,7 @@ impl Config {
     /// Measures everything and writes the CSV files and the figure.
     pub fn execute(&self, store: &Store) -> Result<String, Error> {
         let (mut rows, mut timing) = (Vec::new(), Vec::new());
-        for (scene, boxes) in stiff(self.objects) {
+        for (scene, boxes) in scenes(self.objects) {
             let Decisions { area, all, wrong, undecided } = decisions(&boxes);
             let measured = [self.timed::<f32>(&boxes), self.timed::<f64>(&boxes)];
             for (kind, (tree, seconds)) in measured.into_iter().enumerate() {
@@ -316,8 +318,8 @@ mod tests {
 
     #[test]
     fn the_plain_sweep_in_f64_builds_the_trees_of_the_builder() {
-        for make in [scenes::uniform, scenes::overlapping, scenes::planar_grid, scenes::two_densities] {
-            let boxes = scenes::boxes(&make(200));
+        for make in [stiff::uniform, stiff::overlapping, stiff::planar_grid, stiff::two_densities] {
+            let boxes = stiff::boxes(&make(200));
             let plain = build(&boxes, |orders| chosen::<f64>(&boxes, orders));
             let built = muller_fellner::Config::default().build(&boxes).unwrap();
             assert_eq!(internal_area(&plain), internal_area(&built));
@@ -326,7 +328,7 @@ mod tests {
 
     #[test]
     fn f32_is_lost_where_its_areas_vanish_or_overflow_and_f64_is_not() {
-        let uniform = scenes::boxes(&scenes::uniform(60));
+        let uniform = stiff::boxes(&stiff::uniform(60));
         for k in [-100, 100] {
             let Decisions { all, wrong, undecided, .. } = decisions(&scaled(&uniform, k));
             assert!(wrong[0] > all / 2, "{wrong:?} of {all}");

@@ -1,13 +1,19 @@
 //! The experiment `stability`: every case with every method, traversal and part, as rows and a heat map.
 
+use super::case::{Case, Part, SceneCase, Size, is_builder};
+use super::cell::Cell;
 use super::examine::Examined;
-use super::{CASES, Case, Cell, PARTS, SceneCase, Size, child, is_builder, tracing};
+use super::peers::{self, Found};
+use super::promise::{Broken, Promise};
+use super::table::CASES;
+use super::{child, tracing};
 use crate::Error;
 use crate::figures::{self, HeatMap, Key};
 use crate::run::rows::{read, to_bytes};
 use crate::run::store::Store;
 use crate::spec::{Contestant, Labelled};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
@@ -92,7 +98,7 @@ impl Row {
         };
         match cell {
             Cell::Refused(error) => (row(Class::Refused, error), None),
-            Cell::Broken(promise) => (row(Class::Broken, promise), None),
+            Cell::Broken(broken) => (row(Class::Broken, broken.to_string()), None),
             Cell::Kept(examined) if case.scene().is_some() && examined.seconds > 0.0 => {
                 let Examined { objects, depth, cost, relative_error, .. } = examined;
                 let (depth, cost, relative_error) = (Some(depth), Some(cost), Some(relative_error));
@@ -103,24 +109,43 @@ impl Row {
         }
     }
 
-    /// The promises named in a broken cell, or the depth.
+    /// A row of another library, whose note lists broken promises.
+    fn of_peer(
+        case: &Case,
+        peer: &str,
+        outcome: Class,
+        objects: usize,
+        found: Option<&Found>,
+        broken: &[String],
+    ) -> Self {
+        Self {
+            scene: format!("{} {}", case.id, case.name),
+            method: peer.into(),
+            outcome,
+            objects,
+            depth: found.map(|found| found.depth),
+            cost: found.map(|found| found.cost).filter(|cost| cost.is_finite()),
+            relative_error: None,
+            note: broken.join(BETWEEN),
+        }
+    }
+
+    /// What the heat map shows: the broken promises, or the depth.
     fn text(&self) -> String {
         match self.outcome {
+            Class::Kept | Class::Refused => self.depth.map_or_else(String::new, |depth| depth.to_string()),
             Class::Broken | Class::Dead => {
-                let promises = self.note.split([' ', ':', ';']).filter(|word| {
-                    word.len() == 2
-                        && word.starts_with('P')
-                        && word.ends_with(|digit: char| digit.is_ascii_digit())
-                });
-                let mut promises: Vec<&str> = promises.collect();
-                promises.sort_unstable();
-                promises.dedup();
-                if promises.is_empty() { "!".into() } else { promises.join(" ") }
+                let broken = self.note.split(BETWEEN).map(Broken::from);
+                let promises: BTreeSet<Promise> = broken.filter_map(|broken| broken.promise).collect();
+                let names: Vec<String> = promises.iter().map(Promise::to_string).collect();
+                if names.is_empty() { "!".into() } else { names.join(" ") }
             }
-            _ => self.depth.map_or_else(String::new, |depth| depth.to_string()),
         }
     }
 }
+
+/// Separates broken promises in a note.
+const BETWEEN: &str = "; ";
 
 impl Config {
     /// Runs the cases (all if none are named) and writes rows, times and the heat map.
@@ -161,8 +186,10 @@ impl Config {
                 Some(Row::new(case, name, case.of_traversal(*traversal, self.rays)?).0)
             });
             rows.extend(traversals);
-            rows.extend(PARTS.iter().filter_map(|part| Some(Row::new(case, part, case.of_part(part)?).0)));
-            for peer in child::PEERS {
+            rows.extend(
+                Part::ALL.iter().filter_map(|&part| Some(Row::new(case, part.name(), case.of_part(part)?).0)),
+            );
+            for peer in peers::NAMES {
                 peers.extend(case.scene().map(|scene| self.peer(case, scene, peer)));
             }
         }
@@ -177,25 +204,22 @@ impl Config {
     /// Another library on a case: few objects with all checks, then many.
     fn peer(&self, case: &Case, scene: &SceneCase, peer: &str) -> Row {
         let limit = Duration::from_secs(self.seconds_per_peer.max(1));
-        let mut last = Row::new(case, peer, Cell::Broken(String::new())).0;
-        let mut broken = Vec::new();
-        for objects in [scene.sizes[0], scene.sizes[1]] {
-            last.objects = objects;
+        let (mut last, mut broken) = (None, Vec::new());
+        let [few, many, _] = scene.sizes;
+        for objects in [few, many] {
             match child::examine(peer, case.id, objects, limit) {
                 Ok(found) => {
-                    (last.depth, last.cost) = (Some(found.depth), found.cost.is_finite().then_some(found.cost));
-                    if !found.broken.is_empty() {
-                        broken.push(found.broken);
-                    }
+                    broken.extend_from_slice(&found.broken);
+                    last = Some(found);
                 }
                 Err(end) => {
-                    broken.push(format!("P1: {end} on {objects} objects"));
-                    return Row { outcome: Class::Dead, note: broken.join("; "), ..last };
+                    broken.push(Promise::P1.broken(format!("{end} on {objects} objects")).to_string());
+                    return Row::of_peer(case, peer, Class::Dead, objects, last.as_ref(), &broken);
                 }
             }
         }
         let outcome = if broken.is_empty() { Class::Kept } else { Class::Broken };
-        Row { outcome, note: broken.join("; "), ..last }
+        Row::of_peer(case, peer, outcome, many, last.as_ref(), &broken)
     }
 }
 

@@ -1,83 +1,79 @@
 //! Every traversal against testing every triangle, and the rays that make it hard.
 
-use super::Verdict;
+use super::promise::{Broken, Verdict, ensure};
 use crate::measure::{Accelerator, Structure};
 use crate::scenes::Primitives;
-use bvh_build::{BuildError, Builder, goldsmith_salmon, kd_tree, muller_fellner};
-use bvh_core::{Aabb, Bvh, Hit, Ray, Shear, Triangle, WideBvh, nearest_hit_of_all};
+use bvh_build::{Builder, goldsmith_salmon, kd_tree, median_cut, muller_fellner};
+use bvh_core::{Aabb, Bvh, Hit, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants};
 use bvh_search::Stream;
 use glam::Vec3;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use std::borrow::Cow;
 
-/// What prepares triangles for rays, in one way or several; or why it cannot.
+/// Prepares triangles for rays, in one way or several; or says why it cannot.
 pub type Traversal = fn(&Primitives) -> Result<Vec<Accelerator<'_>>, String>;
 
 /// Every traversal by name: a further one is one line.
 pub const TRAVERSALS: &[(&str, Traversal)] = &[
-    ("binary tree", |objects| over(objects, Structure::Tree(Cow::Owned(binary(objects)?)))),
-    ("n-ary tree", |objects| over(objects, Structure::Tree(Cow::Owned(n_ary(objects)?)))),
-    ("wide, SIMD", |objects| over_wide(objects, Structure::Wide)),
-    ("wide, portable", |objects| over_wide(objects, Structure::WidePortable)),
+    ("binary tree", over_binary_trees),
+    ("n-ary tree", |objects| {
+        let tree = build(objects, &goldsmith_salmon::Config::default())?;
+        Ok(vec![Accelerator::new(objects, Structure::Tree(Cow::Owned(tree)))])
+    }),
+    ("wide, SIMD", |objects| over_wide_layouts(objects, Structure::Wide)),
+    ("wide, portable", |objects| over_wide_layouts(objects, Structure::WidePortable)),
     ("KD-tree", |objects| {
         let cells = kd_tree::Config::default().build(&objects.boxes()).map_err(|error| error.to_string())?;
-        over(objects, Structure::KdTree(cells))
+        Ok(vec![Accelerator::new(objects, Structure::KdTree(cells))])
     }),
 ];
 
-fn binary(objects: &Primitives) -> Result<Bvh, String> {
-    muller_fellner::Config::default().build(&objects.boxes()).map_err(|error: BuildError| error.to_string())
+fn build(objects: &Primitives, builder: &dyn Builder) -> Result<Bvh, String> {
+    builder.build(&objects.boxes()).map_err(|error| error.to_string())
 }
 
-fn n_ary(objects: &Primitives) -> Result<Bvh, String> {
-    goldsmith_salmon::Config::default().build(&objects.boxes()).map_err(|error: BuildError| error.to_string())
+/// With one object per leaf, with the leaves that the surface area heuristic merges, and with a tenth of all objects in
+/// every leaf.
+fn over_binary_trees(objects: &Primitives) -> Result<Vec<Accelerator<'_>>, String> {
+    let greedy = build(objects, &muller_fellner::Config::default())?;
+    let merged = collapse_leaves(&greedy, &SahConstants::default());
+    let tenths = median_cut::Config { leaf_fraction: 0.1, ..Default::default() };
+    let trees = [greedy, merged, build(objects, &tenths)?];
+    Ok(trees.map(|tree| Accelerator::new(objects, Structure::Tree(Cow::Owned(tree)))).into())
 }
 
-fn over<'a>(objects: &'a Primitives, structure: Structure<'a>) -> Result<Vec<Accelerator<'a>>, String> {
-    Ok(vec![Accelerator::new(objects, structure)])
-}
-
-/// Wide layouts of a binary tree and of one with many children per node.
-fn over_wide(
+/// Of a binary tree and of one with many children per node.
+fn over_wide_layouts(
     objects: &Primitives,
     structure: fn(WideBvh) -> Structure<'static>,
 ) -> Result<Vec<Accelerator<'_>>, String> {
-    let Primitives::Triangles(corners) = objects else {
+    let Primitives::Triangles(triangles) = objects else {
         return Err("only triangles have a wide layout".into());
     };
-    let triangles: Vec<Triangle> = corners.iter().copied().map(Triangle).collect();
-    let layout = |tree: Bvh| {
-        let wide = WideBvh::new(&tree, &triangles).map_err(|error| error.to_string())?;
+    let layout = |builder: &dyn Builder| -> Result<_, String> {
+        let wide = WideBvh::new(&build(objects, builder)?, triangles).map_err(|error| error.to_string())?;
         Ok(Accelerator::new(objects, structure(wide)))
     };
-    [binary(objects)?, n_ary(objects)?].into_iter().map(layout).collect()
-}
-
-/// The answer of testing every triangle.
-pub fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
-    let shear = Shear::new(ray);
-    let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
-    nearest_hit_of_all(triangles.len() as u32, ray, test, &mut ())
+    Ok(vec![layout(&muller_fellner::Config::default())?, layout(&goldsmith_salmon::Config::default())?])
 }
 
 fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
     hit.map(|hit| (hit.t.to_bits(), hit.object))
 }
 
-/// P3: the traversal gives the answer of brute force for all rays, bit by bit. Says how many hit.
-pub fn check(traversal: Traversal, triangles: &[Triangle], rays: &[Ray]) -> Verdict {
-    let objects = Primitives::Triangles(triangles.iter().map(|triangle| triangle.0).collect());
-    let accelerators = traversal(&objects)?;
+/// P3: the traversal gives the answer of testing every object for all rays, bit by bit. Says how many hit.
+pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Verdict {
+    let accelerators = traversal(objects).map_err(Broken::case)?;
+    let brute_force = Accelerator::new(objects, Structure::Brute);
     let mut hits = 0;
     for ray in rays {
-        let expected = brute_force(triangles, ray);
+        let expected = brute_force.nearest_hit(ray, &mut ());
         hits += usize::from(expected.is_some());
         for accelerator in &accelerators {
             let (nearest, any) = (accelerator.nearest_hit(ray, &mut ()), accelerator.any_hit(ray, &mut ()));
-            if bits(nearest) != bits(expected) || any != expected.is_some() {
-                return Err(format!("P3: {ray:?} gives {nearest:?} and {any}, every triangle {expected:?}"));
-            }
+            let same = bits(nearest) == bits(expected) && any == expected.is_some();
+            ensure!(same, P3: "{ray:?} gives {nearest:?} and {any}, testing every object {expected:?}");
         }
     }
     Ok(format!("{hits} of {} rays hit", rays.len()))

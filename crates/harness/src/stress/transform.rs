@@ -85,11 +85,11 @@ pub fn same_topology(a: &Bvh, b: &Bvh) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stress::scenes;
+    use crate::scenes::stiff;
 
     #[test]
     fn scaling_within_the_range_is_exact_and_beyond_it_is_not() {
-        let boxes = scenes::boxes(&scenes::uniform(50));
+        let boxes = stiff::boxes(&stiff::uniform(50));
         let range = scale_range(&boxes);
         assert!(*range.start() <= -120 && *range.end() >= 120);
         for k in [*range.start(), *range.end()] {
@@ -100,7 +100,7 @@ mod tests {
 
     #[test]
     fn two_reflections_and_three_turns_change_nothing() {
-        let boxes = scenes::boxes(&scenes::symmetric(50));
+        let boxes = stiff::boxes(&stiff::symmetric(50));
         assert_eq!(mirrored(&mirrored(&boxes, 1), 1), boxes);
         assert_ne!(mirrored(&boxes, 1), boxes);
         let turn = |boxes: Vec<Aabb>| with_axes(&boxes, [1, 2, 0]);

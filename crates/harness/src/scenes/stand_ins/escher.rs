@@ -5,8 +5,9 @@
 //! floors are a few large polygons. World units are chosen so that the greedy MF tree costs about
 //! 4.8e5, as the original's did.
 
-use super::patch::{Mesh, about_z, circle, cos_sin, fraction, on_circle, placed, upright};
-use glam::{DMat3, DVec3, Vec3};
+use super::mesh_builder::{MeshBuilder, about_z, circle, cos_sin, fraction, on_circle, placed, upright};
+use bvh_core::Triangle;
+use glam::{DMat3, DVec3};
 
 /// World units per tread depth.
 const UNIT: f64 = 2.17;
@@ -18,8 +19,8 @@ const RAIL: f64 = 2.6;
 const ROOM: f64 = 30.0;
 
 /// The triangles of the scene; the same bytes at every call and on every machine.
-pub fn triangles() -> Vec<[Vec3; 3]> {
-    let mut room = Mesh::default();
+pub fn triangles() -> Vec<Triangle> {
+    let mut room = MeshBuilder::default();
     // Cyclic changes of the axes: each column set sends 'up' to another axis.
     let gravities = [
         DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::Z),
@@ -78,8 +79,8 @@ struct Plan {
 }
 
 /// One gravity's floor, flights, landings and arcade; up is z.
-fn storey(plan: &Plan) -> Mesh {
-    let mut storey = Mesh::default();
+fn storey(plan: &Plan) -> MeshBuilder {
+    let mut storey = MeshBuilder::default();
     storey.grid(3, 2, |i, j| DVec3::new(fraction(i, 3), fraction(j, 2), 0.0) * ROOM);
 
     // First flight along x to a landing, second along y to a gallery, third down at an angle of its
@@ -114,8 +115,8 @@ fn storey(plan: &Plan) -> Mesh {
 
 /// A flight of `steps` along x with balustrades on both sides; its underside is a slope or, upside
 /// down, stairs too.
-fn flight(steps: usize, width: f64, climbs_beneath: bool) -> Mesh {
-    let mut flight = Mesh::default();
+fn flight(steps: usize, width: f64, climbs_beneath: bool) -> MeshBuilder {
+    let mut flight = MeshBuilder::default();
     let run = steps as f64;
     let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z * RISE);
     let depth = 2.5;
@@ -165,7 +166,7 @@ fn flight(steps: usize, width: f64, climbs_beneath: bool) -> Mesh {
 
 /// A slab with its near corner at `corner`, its top at that height, and a balustrade along its far
 /// side.
-fn landing(mesh: &mut Mesh, corner: DVec3, length: f64, width: f64) {
+fn landing(mesh: &mut MeshBuilder, corner: DVec3, length: f64, width: f64) {
     mesh.cuboid(corner - DVec3::Z * 0.8, corner + DVec3::new(length, width, 0.0));
     let posts = (length / 0.9) as usize;
     let feet: Vec<_> =
@@ -175,10 +176,10 @@ fn landing(mesh: &mut Mesh, corner: DVec3, length: f64, width: f64) {
 
 /// Square balusters set on the diagonal at `feet`, a handrail over them, and a turned newel at
 /// either end.
-fn balustrade(mesh: &mut Mesh, feet: &[DVec3]) {
+fn balustrade(mesh: &mut MeshBuilder, feet: &[DVec3]) {
     let up = DVec3::Z * RAIL;
     for &foot in feet {
-        let mut baluster = Mesh::default();
+        let mut baluster = MeshBuilder::default();
         baluster.revolve(&[(0.08, 0.0), (0.08, RAIL)], 4);
         mesh.place(&baluster, &upright(0.0, foot.x, foot.y, foot.z));
     }
@@ -188,7 +189,7 @@ fn balustrade(mesh: &mut Mesh, feet: &[DVec3]) {
     let rail = [(0.16, -0.08), (0.16, 0.06), (0.07, 0.14), (-0.07, 0.14), (-0.16, 0.06), (-0.16, -0.08)];
     mesh.sweep(&[first + up, last + up], DVec3::Z, &rail, |_| 1.0);
     for (end, turns) in [(first, 0.03), (last, 0.07)] {
-        let mut newel = Mesh::default();
+        let mut newel = MeshBuilder::default();
         newel.revolve(&[(0.2, -0.4), (0.2, 2.2), (0.13, 2.4), (0.13, 2.8), (0.24, 3.0), (0.0, 3.3)], 5);
         mesh.place(&newel, &upright(turns, end.x, end.y, end.z));
     }
@@ -196,9 +197,9 @@ fn balustrade(mesh: &mut Mesh, feet: &[DVec3]) {
 
 /// An arch on two square piers of height `pier`, with a moulding around it; stands on z = 0, passes
 /// along y.
-fn gate(radius: f64, half_width: f64, pier: f64, segments: usize) -> Mesh {
-    let mut gate = Mesh::default();
-    let mut arch = Mesh::default();
+fn gate(radius: f64, half_width: f64, pier: f64, segments: usize) -> MeshBuilder {
+    let mut gate = MeshBuilder::default();
+    let mut arch = MeshBuilder::default();
     arch.arch(radius, half_width, radius + 0.8, 1.0, segments);
     let path: Vec<_> = (0..=segments)
         .map(|k| cos_sin(0.5 * fraction(k, segments)))
@@ -214,8 +215,8 @@ fn gate(radius: f64, half_width: f64, pier: f64, segments: usize) -> Mesh {
 }
 
 /// A spiral stair of `steps` wedges about a column, with a winding handrail.
-fn spiral(steps: usize) -> Mesh {
-    let mut spiral = Mesh::default();
+fn spiral(steps: usize) -> MeshBuilder {
+    let mut spiral = MeshBuilder::default();
     let (per_step, rise, radius) = (0.062, 0.9, 3.4);
     let height = steps as f64 * rise;
     spiral.revolve(
@@ -239,7 +240,7 @@ fn spiral(steps: usize) -> Mesh {
         .map(|k| on_circle(radius - 0.2, (k as f64 + 0.5) * per_step, k as f64 * rise + rise + RAIL))
         .collect();
     for (k, &top) in rail.iter().enumerate().take(steps) {
-        let mut rod = Mesh::default();
+        let mut rod = MeshBuilder::default();
         rod.revolve(&[(0.06, -RAIL), (0.06, 0.0)], 5);
         spiral.place(&rod, &placed(about_z(k as f64 * per_step), top));
     }

@@ -5,8 +5,11 @@
 //! leans against the axes. World units are chosen so that the greedy MF tree costs about 1.7e7, as
 //! the original's did.
 
-use super::patch::{Mesh, about_x, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright};
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use super::mesh_builder::{
+    MeshBuilder, about_x, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright,
+};
+use bvh_core::Triangle;
+use glam::{DAffine3, DMat3, DVec3};
 
 /// World units per inner radius of the shank.
 const UNIT: f64 = 118.0;
@@ -15,8 +18,8 @@ const UNIT: f64 = 118.0;
 const CUSHION: f64 = 2.6;
 
 /// The triangles of the scene; the same bytes at every call and on every machine.
-pub fn triangles() -> Vec<[Vec3; 3]> {
-    let mut scene = Mesh::default();
+pub fn triangles() -> Vec<Triangle> {
+    let mut scene = MeshBuilder::default();
     let lean = about_z(0.09) * about_x(0.045) * about_y(-0.03);
     scene.place(&ring(), &placed(lean, DVec3::new(0.0, 0.0, 1.12)));
     scene.place(&chain(44), &DAffine3::IDENTITY);
@@ -30,8 +33,8 @@ pub fn triangles() -> Vec<[Vec3; 3]> {
 }
 
 /// A brilliant of girdle radius 1, its girdle plane at z = 0, its table up: 110 triangles.
-fn brilliant() -> Mesh {
-    let mut stone = Mesh::default();
+fn brilliant() -> MeshBuilder {
+    let mut stone = MeshBuilder::default();
     let eighth = |k: usize| fraction(k, 8);
     let table = |k: usize| on_circle(0.56, eighth(k), 0.33);
     let star = |k: usize| on_circle(0.78, eighth(k) + 1.0 / 16.0, 0.2);
@@ -54,8 +57,8 @@ fn brilliant() -> Mesh {
 }
 
 /// The ring, its finger hole along y, the main stone above on the z axis; inner radius 1.
-fn ring() -> Mesh {
-    let mut ring = Mesh::default();
+fn ring() -> MeshBuilder {
+    let mut ring = MeshBuilder::default();
     shank(&mut ring);
     let stone = brilliant();
     let head = 1.62;
@@ -119,7 +122,7 @@ fn surface(away: f64, across: f64) -> f64 {
 
 /// The shank: flat inside, domed outside, wider at the head; finer towards the head than at the
 /// back.
-fn shank(mesh: &mut Mesh) {
+fn shank(mesh: &mut MeshBuilder) {
     let dome = 9;
     let steps = 72;
     mesh.grid(dome + 2, steps, |i, j| {
@@ -145,26 +148,26 @@ fn small(size: f64) -> DAffine3 {
 }
 
 /// A grain of metal between two stones: a coarse dome of radius 1.
-fn bead() -> Mesh {
-    let mut bead = Mesh::default();
+fn bead() -> MeshBuilder {
+    let mut bead = MeshBuilder::default();
     bead.revolve(&[(1.0, -0.5), (1.0, 0.3), (0.6, 0.85), (0.0, 1.0)], 6);
     bead
 }
 
 /// A torus about the z axis.
-fn torus(radius: f64, thickness: f64, segments: usize, sides: usize) -> Mesh {
+fn torus(radius: f64, thickness: f64, segments: usize, sides: usize) -> MeshBuilder {
     let profile: Vec<_> = (0..=sides)
         .map(|i| on_circle(thickness, fraction(i, sides), 0.0))
         .map(|corner| (radius + corner.x, corner.y))
         .collect();
-    let mut torus = Mesh::default();
+    let mut torus = MeshBuilder::default();
     torus.revolve(&profile, segments);
     torus
 }
 
 /// A chain of `links` oval links, alternately flat and on edge, laid in a wave around the ring.
-fn chain(links: usize) -> Mesh {
-    let mut chain = Mesh::default();
+fn chain(links: usize) -> MeshBuilder {
+    let mut chain = MeshBuilder::default();
     let link = torus(0.06, 0.016, 12, 6);
     let at = |t: f64| {
         let spot = on_circle(1.75 + 0.22 * cos_sin(2.5 * t).0, 0.55 + 0.8 * t, 0.0);
@@ -184,7 +187,7 @@ fn chain(links: usize) -> Mesh {
 }
 
 /// A padded top over a plain box.
-fn cushion(mesh: &mut Mesh) {
+fn cushion(mesh: &mut MeshBuilder) {
     mesh.cuboid(DVec3::new(-CUSHION, -CUSHION, -0.9), DVec3::new(CUSHION, CUSHION, -0.35));
     mesh.grid(20, 20, |i, j| {
         let (x, y) = (CUSHION * (2.0 * fraction(i, 20) - 1.0), CUSHION * (2.0 * fraction(j, 20) - 1.0));

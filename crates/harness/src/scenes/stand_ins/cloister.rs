@@ -6,8 +6,11 @@
 //! the well and the garden lie oblique. World units are chosen so that the greedy MF tree costs
 //! about 1.8e9, as the original's did.
 
-use super::patch::{Mesh, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright};
-use glam::{DMat3, DVec3, Vec3};
+use super::mesh_builder::{
+    MeshBuilder, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright,
+};
+use bvh_core::Triangle;
+use glam::{DMat3, DVec3};
 use std::f64::consts::SQRT_2;
 
 /// World units per metre.
@@ -22,8 +25,8 @@ const SPRING: f64 = 3.0;
 const EAVES: f64 = 5.4;
 
 /// The triangles of the scene; the same bytes at every call and on every machine.
-pub fn triangles() -> Vec<[Vec3; 3]> {
-    let mut cloister = Mesh::default();
+pub fn triangles() -> Vec<Triangle> {
+    let mut cloister = MeshBuilder::default();
     // Court sides in bays: long walks along x, short ones along y.
     let (long, short) = (9, 7);
     let half = DVec3::new(long as f64, short as f64, 0.0) * (0.5 * BAY);
@@ -42,15 +45,15 @@ pub fn triangles() -> Vec<[Vec3; 3]> {
 
 /// The pieces that are repeated in every bay.
 struct Parts {
-    column: Mesh,
-    arch: Mesh,
-    vault: Mesh,
-    tile: Mesh,
+    column: MeshBuilder,
+    arch: MeshBuilder,
+    vault: MeshBuilder,
+    tile: MeshBuilder,
 }
 
 impl Parts {
     fn new() -> Self {
-        let mut tile = Mesh::default();
+        let mut tile = MeshBuilder::default();
         // A barrel tile of length 1 down the slope, slightly conical.
         tile.grid(3, 1, |i, j| {
             let (c, s) = cos_sin(0.5 * fraction(i, 3));
@@ -62,9 +65,9 @@ impl Parts {
 }
 
 /// One column on z = 0, 2.3 m high.
-fn column() -> Mesh {
-    let mut column = Mesh::default();
-    let square = |mesh: &mut Mesh, half: f64, low: f64, high: f64| {
+fn column() -> MeshBuilder {
+    let mut column = MeshBuilder::default();
+    let square = |mesh: &mut MeshBuilder, half: f64, low: f64, high: f64| {
         mesh.cuboid(DVec3::new(-half, -half, low), DVec3::new(half, half, high));
     };
     square(&mut column, 0.17, 0.0, 0.12);
@@ -80,7 +83,7 @@ fn column() -> Mesh {
     for k in 0..8 {
         // Leaves in two rows, curling outwards at the tip.
         let (low, tall) = if k % 2 == 0 { (1.87, 0.22) } else { (1.93, 0.24) };
-        let mut leaf = Mesh::default();
+        let mut leaf = MeshBuilder::default();
         leaf.grid(2, 4, |i, j| {
             let (u, v) = (fraction(i, 2) - 0.5, fraction(j, 4));
             let width = 0.085 * (1.0 - v * v * v) + 0.012;
@@ -96,8 +99,8 @@ fn column() -> Mesh {
 }
 
 /// The arch over one bay with its moulding on both faces; springs at z = 0, centred on x = 0.
-fn arcade_arch() -> Mesh {
-    let mut arch = Mesh::default();
+fn arcade_arch() -> MeshBuilder {
+    let mut arch = MeshBuilder::default();
     let radius = 0.5 * BAY - 0.42;
     arch.arch(radius, 0.5 * BAY, EAVES - SPRING, 0.5, 14);
     for face in [-0.25, 0.25] {
@@ -114,13 +117,13 @@ fn arcade_arch() -> Mesh {
 
 /// A groin vault over one square bay, centred on the z axis, springing at z = 0: the lower envelope
 /// of two barrels is left open, so four webs meet in the groins; diagonal ribs run below these.
-fn vault() -> Mesh {
-    let mut vault = Mesh::default();
+fn vault() -> MeshBuilder {
+    let mut vault = MeshBuilder::default();
     let half = 0.5 * BAY;
     let crown = |t: f64| cos_sin(0.25 * t);
     for k in 0..4 {
         // One web: from the groin (|y| = x) to the wall arch at x = half, courses parallel to y.
-        let mut web = Mesh::default();
+        let mut web = MeshBuilder::default();
         web.grid(6, 6, |i, j| {
             let (c, s) = crown(fraction(j, 6));
             let reach = half * c;
@@ -142,16 +145,16 @@ fn vault() -> Mesh {
 }
 
 /// The keystone where the ribs of a vault cross.
-fn boss() -> Mesh {
-    let mut boss = Mesh::default();
+fn boss() -> MeshBuilder {
+    let mut boss = MeshBuilder::default();
     boss.revolve(&[(0.0, 0.0), (0.1, 0.02), (0.18, 0.08), (0.2, 0.16), (0.17, 0.2)], 10);
     boss
 }
 
 /// A walk of `bays` bays along x, centred, its arcade in the plane y = 0 and its back wall at y =
 /// −`BAY`.
-fn walk(parts: &Parts, bays: usize) -> Mesh {
-    let mut walk = Mesh::default();
+fn walk(parts: &Parts, bays: usize) -> MeshBuilder {
+    let mut walk = MeshBuilder::default();
     let start = -0.5 * BAY * bays as f64;
     let end = -start;
     let back = -BAY - 0.25;
@@ -181,20 +184,20 @@ fn walk(parts: &Parts, bays: usize) -> Mesh {
     walk.quad(bed(start, 0.0), bed(end, 0.0), bed(outer, back), bed(-outer, back));
     // The back wall: three polygons with a doorway between them, closed above by its arch.
     let door = start + BAY * (0.5 + (bays / 2) as f64);
-    let upright_quad = |mesh: &mut Mesh, from: f64, to: f64, low: f64, high: f64| {
+    let upright_quad = |mesh: &mut MeshBuilder, from: f64, to: f64, low: f64, high: f64| {
         let at = |x: f64, z: f64| DVec3::new(x, back, z);
         mesh.quad(at(from, low), at(to, low), at(to, high), at(from, high));
     };
     upright_quad(&mut walk, -outer, door - 1.0, 0.0, 6.9);
     upright_quad(&mut walk, door + 1.0, outer, 0.0, 6.9);
     upright_quad(&mut walk, door - 1.0, door + 1.0, 4.2, 6.9);
-    let mut doorway = Mesh::default();
+    let mut doorway = MeshBuilder::default();
     doorway.arch(0.8, 1.0, 1.7, 0.4, 18);
     for x in [-1.0, 0.8] {
         doorway.cuboid(DVec3::new(x, -0.2, -2.5), DVec3::new(x + 0.2, 0.2, 0.0));
     }
     // The door leaf stands ajar.
-    let mut leaf = Mesh::default();
+    let mut leaf = MeshBuilder::default();
     leaf.cuboid(DVec3::ZERO, DVec3::new(1.5, 0.06, 2.4));
     for z in [0.4, 1.2, 2.0] {
         leaf.cuboid(DVec3::new(0.0, -0.02, z), DVec3::new(1.1, 0.08, z + 0.06));
@@ -206,7 +209,7 @@ fn walk(parts: &Parts, bays: usize) -> Mesh {
 }
 
 /// A slender stepped pier against the arcade's court side.
-fn buttress(mesh: &mut Mesh, x: f64) {
+fn buttress(mesh: &mut MeshBuilder, x: f64) {
     let at = |dx: f64, y: f64, z: f64| DVec3::new(x + dx, y, z);
     for (depth, low, high) in [(0.52, 3.1, 3.9), (0.42, 3.9, 4.9)] {
         mesh.cuboid(at(-0.14, 0.25, low), at(0.14, depth, high));
@@ -216,7 +219,7 @@ fn buttress(mesh: &mut Mesh, x: f64) {
 
 /// The floor of one bay: a border of long slabs around a lozenge of square tiles, whose size
 /// changes from bay to bay.
-fn paving(mesh: &mut Mesh, x: f64, bay: usize) {
+fn paving(mesh: &mut MeshBuilder, x: f64, bay: usize) {
     let tiles = 3 + bay % 3;
     let (middle, half) = (DVec3::new(x + 0.5 * BAY, -0.5 * BAY - 0.1, 0.0), 0.5 * BAY - 0.3);
     for k in 0..4 {
@@ -234,7 +237,7 @@ fn paving(mesh: &mut Mesh, x: f64, bay: usize) {
 
 /// The lean-to roof over a walk, `half` its arcade's half length: rafters below, boarding in five
 /// panels, rows of barrel tiles above; mitred at both corners.
-fn roof(mesh: &mut Mesh, parts: &Parts, half: f64) {
+fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
     let (eaves, ridge) = (DVec3::new(0.0, 0.7, EAVES), DVec3::new(0.0, -BAY - 0.25, EAVES + 1.5));
     let slope = (ridge - eaves).length();
     let up = (ridge - eaves) / slope;
@@ -270,19 +273,19 @@ fn roof(mesh: &mut Mesh, parts: &Parts, half: f64) {
 }
 
 /// The garden: paths that cross obliquely over one lawn, and hedges of plain boxes.
-fn court(mesh: &mut Mesh, half: DVec3) {
+fn court(mesh: &mut MeshBuilder, half: DVec3) {
     let inner = half - DVec3::new(0.25, 0.25, 0.0);
     let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
     mesh.grid(3, 2, |i, j| at(inner.x * (2.0 * fraction(i, 3) - 1.0), inner.y * (j as f64 - 1.0), -0.1));
     for (turns, length) in [(0.037, 14.0), (0.287, 11.0)] {
-        let mut path = Mesh::default();
+        let mut path = MeshBuilder::default();
         let stones = 18;
         path.grid(stones, 2, |i, j| {
             at((2.0 * fraction(i, stones) - 1.0) * length, 0.7 * (j as f64 - 1.0), -0.06)
         });
         mesh.place(&path, &upright(turns, 2.1, -1.4, 0.0));
         for (x, y) in [(3.0, 1.0), (3.0, -1.6), (-9.0, 1.0), (-9.0, -1.6)] {
-            let mut hedge = Mesh::default();
+            let mut hedge = MeshBuilder::default();
             hedge.cuboid(at(x, y, -0.1), at(x + 6.0, y + 0.6, 0.55));
             mesh.place(&hedge, &upright(turns, 2.1, -1.4, 0.0));
         }
@@ -290,8 +293,8 @@ fn court(mesh: &mut Mesh, half: DVec3) {
 }
 
 /// The well: three octagonal steps, a carved round kerb, an iron yoke with chain and bucket.
-fn well() -> Mesh {
-    let mut well = Mesh::default();
+fn well() -> MeshBuilder {
+    let mut well = MeshBuilder::default();
     well.revolve(&[(2.0, -0.1), (2.0, 0.1), (1.65, 0.1), (1.65, 0.3), (1.3, 0.3), (1.3, 0.5), (0.7, 0.5)], 8);
     let kerb = [
         (0.95, 0.5),
@@ -307,7 +310,7 @@ fn well() -> Mesh {
     well.revolve(&kerb, 36);
     for k in 0..12 {
         // Blind arches around the kerb.
-        let mut niche = Mesh::default();
+        let mut niche = MeshBuilder::default();
         niche.arch(0.13, 0.2, 0.19, 0.05, 8);
         well.place(&niche, &(upright(fraction(k, 12), 0.0, 0.0, 0.0) * upright(0.25, 0.88, 0.0, 0.88)));
     }
@@ -316,7 +319,7 @@ fn well() -> Mesh {
         .map(|(c, s)| DVec3::new(0.83 * c, 0.0, 1.36 + 1.9 * libm::sqrt(s)))
         .collect();
     well.sweep(&yoke, DVec3::Y, &circle(0.035, 7), |_| 1.0);
-    let mut link = Mesh::default();
+    let mut link = MeshBuilder::default();
     let ring: Vec<_> =
         (0..=6).map(|i| on_circle(0.012, fraction(i, 6), 0.0)).map(|p| (0.03 + p.x, p.y)).collect();
     link.revolve(&ring, 9);
@@ -329,8 +332,8 @@ fn well() -> Mesh {
 }
 
 /// A wooden bucket, hoops included.
-fn bucket() -> Mesh {
-    let mut bucket = Mesh::default();
+fn bucket() -> MeshBuilder {
+    let mut bucket = MeshBuilder::default();
     bucket.revolve(
         &[
             (0.0, 0.0),

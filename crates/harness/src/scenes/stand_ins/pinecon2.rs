@@ -5,8 +5,9 @@
 //! seeded jitter. World units are chosen so that the greedy MF tree costs about 1.4e6, as the
 //! original's did.
 
-use super::patch::{Mesh, about_x, about_y, about_z, circle, cos_sin, fraction, jitter, placed};
-use glam::{DMat3, DVec3, Vec3};
+use super::mesh_builder::{MeshBuilder, about_x, about_y, about_z, circle, cos_sin, fraction, jitter, placed};
+use bvh_core::Triangle;
+use glam::{DMat3, DVec3};
 
 /// World units per cone height.
 const UNIT: f64 = 104.0;
@@ -16,8 +17,8 @@ const SCALES: usize = 122;
 const SUB_SCALES: usize = 6;
 
 /// The triangles of the scene; the same bytes at every call and on every machine.
-pub fn triangles() -> Vec<[Vec3; 3]> {
-    let mut cone = Mesh::default();
+pub fn triangles() -> Vec<Triangle> {
+    let mut cone = MeshBuilder::default();
     let core = [0.0, 0.0, 0.25, 0.5, 0.75, 1.0].map(|t| (0.6 * belly(t), 0.97 * t));
     let closed: Vec<_> = [(0.0, -0.04)].into_iter().chain(core).chain([(0.0, 1.0)]).collect();
     cone.revolve(&closed, 14);
@@ -44,8 +45,8 @@ fn belly(t: f64) -> f64 {
 }
 
 /// One scale of length 1 along z, its outer face towards +x, with its sub-scales.
-fn scale(index: usize) -> Mesh {
-    let mut scale = Mesh::default();
+fn scale(index: usize) -> MeshBuilder {
+    let mut scale = MeshBuilder::default();
     blade(&mut scale, 5, 3, 0.0);
     blade(&mut scale, 2, 2, -0.06);
     for k in 0..SUB_SCALES {
@@ -54,7 +55,7 @@ fn scale(index: usize) -> Mesh {
         let (c, s) = cos_sin(k as f64 * GOLDEN + 0.5 * jitter(5, index));
         let (u, v) = (radius * c, 0.62 + radius * s);
         let tilt = about_y(0.1 + 0.02 * jitter(6, index * SUB_SCALES + k)) * about_x(-0.12 * u);
-        let mut sub = Mesh::default();
+        let mut sub = MeshBuilder::default();
         blade(&mut sub, 2, 1, 0.0);
         let tip = face(0.5, 1.0, 0.0);
         sub.polygon(&[tip, face(0.3, 0.7, 0.0), face(0.5, 0.85, 0.3), face(0.7, 0.7, 0.0)]);
@@ -66,7 +67,7 @@ fn scale(index: usize) -> Mesh {
 }
 
 /// Adds a blade's face, `lift` above the middle surface.
-fn blade(mesh: &mut Mesh, columns: usize, rows: usize, lift: f64) {
+fn blade(mesh: &mut MeshBuilder, columns: usize, rows: usize, lift: f64) {
     mesh.grid(columns, rows, |i, j| face(fraction(i, columns), fraction(j, rows), lift));
 }
 

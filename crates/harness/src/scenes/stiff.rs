@@ -1,12 +1,56 @@
-//! The stiff and extreme scenes, each a function of the number of objects.
+//! The stiff and extreme scenes: each a function of the number of objects, found by the identifier of its case.
 //!
-//! All are made of triangles, so that everything can be traced; a scene of boxes has in each the triangle over its
-//! diagonal, whose box it is. The same number gives the same scene on every machine.
+//! All consist of triangles, so that everything can be traced; a scene of boxes has in each box the triangle over its
+//! diagonal. The same number gives the same scene on every machine.
 
 use bvh_core::{Aabb, Triangle};
 use bvh_search::Stream;
 use glam::Vec3;
+use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
+
+/// Makes a scene of so many triangles, or of about as many where no such scene exists.
+pub type Generator = fn(usize) -> Vec<Triangle>;
+
+/// Every stiff scene by the identifier of the case that builds and traces it.
+pub const STIFF: [(&str, Generator); 31] = [
+    ("S01", uniform),
+    ("S02", uniform),
+    ("S03", uniform),
+    ("S04", identical_boxes),
+    ("S05", identical_points),
+    ("S06", concentric),
+    ("S07", identical_boxes),
+    ("S08", collinear_centres),
+    ("S09", planar_grid),
+    ("S10", on_a_line),
+    ("S11", facets),
+    ("S12", closed_box),
+    ("S13", closed_box),
+    ("S14", closed_box),
+    ("S17", degenerate),
+    ("S21", uniform),
+    ("S22", denormal),
+    ("S23", enormous),
+    ("S24", far_away),
+    ("S25", powers_of_two),
+    ("S26", sorted),
+    ("S27", teapot_in_a_stadium),
+    ("S28", giant_over_small),
+    ("S29", slivers),
+    ("S30", overlapping),
+    ("S31", two_densities),
+    ("S32", symmetric),
+    ("S33", uniform),
+    ("S34", tenfold),
+    ("S36", uniform),
+    ("S45", two_cubes),
+];
+
+/// The generator of the case `id`, such as `S34`.
+pub fn by_id(id: &str) -> Option<Generator> {
+    STIFF.iter().find(|(known, _)| *known == id).map(|(_, generator)| *generator)
+}
 
 /// The boxes of the triangles.
 pub fn boxes(triangles: &[Triangle]) -> Vec<Aabb> {
@@ -67,18 +111,13 @@ pub fn concentric(n: usize) -> Vec<Triangle> {
 /// S08: centres on the x axis, sizes from 1 to 9, in mixed order.
 pub fn collinear_centres(n: usize) -> Vec<Triangle> {
     let mut order: Vec<usize> = (0..n).collect();
-    shuffle(&mut order, 8);
+    order.shuffle(&mut random(8));
     let place = |i: usize| {
         let half = Vec3::new(1.0, (1 + i % 5) as f32, (1 + i % 9) as f32) / 2.0;
         let center = Vec3::X * (3 * i) as f32;
         diagonal(Aabb { min: center - half, max: center + half })
     };
     order.into_iter().map(place).collect()
-}
-
-fn shuffle<T>(items: &mut [T], salt: u64) {
-    use rand::seq::SliceRandom;
-    items.shuffle(&mut random(salt));
 }
 
 /// S09: triangles of a square grid of cells in a plane, row by row.
@@ -91,7 +130,7 @@ pub fn planar_grid(n: usize) -> Vec<Triangle> {
 /// S10: segments on the x axis, in mixed order.
 pub fn on_a_line(n: usize) -> Vec<Triangle> {
     let mut order: Vec<usize> = (0..n).collect();
-    shuffle(&mut order, 10);
+    order.shuffle(&mut random(10));
     let segment = |i: usize| [0.0, 1.0, 0.5].map(|x| Vec3::X * (2.0 * i as f32 + x));
     order.into_iter().map(|i| Triangle(segment(i))).collect()
 }

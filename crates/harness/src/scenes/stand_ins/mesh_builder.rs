@@ -1,18 +1,19 @@
 //! Turns surfaces, swept profiles and placed copies into triangles, for the mesh stand-ins.
 //!
-//! All coordinates are f64 until [`Mesh::finish`] rounds each of them to f32 once. Angles are in
+//! All coordinates are f64 until [`MeshBuilder::finish`] rounds each of them to f32 once. Angles are in
 //! turns, so that quarter turns are exact; sine and cosine come from `libm`, so that every machine
 //! gets the same bytes.
 
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use bvh_core::Triangle;
+use glam::{DAffine3, DMat3, DVec3};
 
 /// Triangles under construction, in the order in which they were added.
 #[derive(Default)]
-pub struct Mesh {
+pub struct MeshBuilder {
     triangles: Vec<[DVec3; 3]>,
 }
 
-impl Mesh {
+impl MeshBuilder {
     /// Adds one triangle.
     pub fn triangle(&mut self, a: DVec3, b: DVec3, c: DVec3) {
         self.triangles.push([a, b, c]);
@@ -111,20 +112,17 @@ impl Mesh {
     }
 
     /// Adds a copy of `part`, moved by `placement`.
-    pub fn place(&mut self, part: &Mesh, placement: &DAffine3) {
+    pub fn place(&mut self, part: &MeshBuilder, placement: &DAffine3) {
         let moved = |corner: DVec3| placement.transform_point3(corner);
         self.triangles.extend(part.triangles.iter().map(|triangle| triangle.map(moved)));
     }
 
-    /// Multiplies by `unit`, adds `origin`, rounds to f32 and leaves out the triangles that have no
-    /// area (the quadrilaterals at a pole have one each).
-    pub fn finish(self, unit: f64, origin: DVec3) -> Vec<[Vec3; 3]> {
+    /// Multiplies by `unit`, adds `origin`, rounds to f32 and drops the triangles without area (a quadrilateral at a
+    /// pole gives one).
+    pub fn finish(self, unit: f64, origin: DVec3) -> Vec<Triangle> {
         let rounded = |corner: DVec3| (corner * unit + origin).as_vec3();
-        let has_area = |[a, b, c]: &[Vec3; 3]| {
-            let (a, b, c) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
-            (b - a).cross(c - a) != DVec3::ZERO
-        };
-        self.triangles.into_iter().map(|triangle| triangle.map(rounded)).filter(has_area).collect()
+        let triangles = self.triangles.into_iter().map(|corners| Triangle(corners.map(rounded)));
+        triangles.filter(|triangle| !triangle.is_degenerate()).collect()
     }
 }
 
@@ -149,7 +147,7 @@ pub fn on_circle(radius: f64, turns: f64, z: f64) -> DVec3 {
     DVec3::new(radius * c, radius * s, z)
 }
 
-/// A regular polygon of `sides` corners as a profile for [`Mesh::sweep`].
+/// A regular polygon of `sides` corners as a profile for [`MeshBuilder::sweep`].
 pub fn circle(radius: f64, sides: usize) -> Vec<(f64, f64)> {
     (0..sides).map(|i| cos_sin(fraction(i, sides))).map(|(c, s)| (radius * c, radius * s)).collect()
 }
@@ -213,21 +211,21 @@ mod tests {
 
     #[test]
     fn a_cuboid_and_a_closed_sweep_enclose_their_volume() {
-        let volume = |mesh: &Mesh| {
+        let volume = |mesh: &MeshBuilder| {
             let six: f64 = mesh.triangles.iter().map(|[a, b, c]| a.cross(*b).dot(*c)).sum();
             (six / 6.0).abs()
         };
-        let mut cuboid = Mesh::default();
+        let mut cuboid = MeshBuilder::default();
         cuboid.cuboid(DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0));
         assert_eq!(volume(&cuboid), 6.0);
-        let mut bar = Mesh::default();
+        let mut bar = MeshBuilder::default();
         bar.revolve(&[(0.0, 0.0), (1.0, 0.0), (1.0, 5.0), (0.0, 5.0)], 4);
         assert!((volume(&bar) - 10.0).abs() < 1e-12);
     }
 
     #[test]
     fn triangles_without_area_are_left_out() {
-        let mut cone = Mesh::default();
+        let mut cone = MeshBuilder::default();
         cone.revolve(&[(1.0, 0.0), (0.0, 1.0)], 9);
         assert_eq!(cone.triangles.len(), 18);
         assert_eq!(cone.finish(1.0, DVec3::ZERO).len(), 9);

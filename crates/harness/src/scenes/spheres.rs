@@ -1,10 +1,10 @@
-//! Spheres for the ray tracing rows: the document's 75, and the same picture with more of them.
+//! Sphere scenes for ray tracing: the 75 spheres of the second source document, and more of them at the same density.
 //!
 //! Centres follow Roberts' (2018) additive recurrence on the plastic-number generalization of the
 //! golden ratio, which keeps any number of points evenly apart without a grid. Differs from the
 //! document: it gives no positions.
 
-use super::patch::jitter;
+use super::stand_ins::jitter;
 use bvh_core::Sphere;
 use glam::DVec3;
 
@@ -52,6 +52,17 @@ mod tests {
                 assert!(sphere.center.abs().cmple(HALF_SIZE.as_vec3()).all(), "{count}: {sphere:?}");
             }
         }
+    }
+
+    #[test]
+    fn no_machine_changes_a_bit_of_any_sphere() {
+        let fingerprints = [75, 750, 7500].map(|count| {
+            let spheres = spheres(count);
+            let numbers = spheres.iter().flat_map(|s| [s.center.x, s.center.y, s.center.z, s.radius]);
+            crate::scenes::fnv1a(numbers.flat_map(f32::to_le_bytes))
+        });
+        let pinned = [0xfc00_d4e2_6fbf_f38a, 0xbb9c_cd48_f5fe_ee71, 0x8b82_4c8d_585f_1de7];
+        assert_eq!(fingerprints, pinned, "{fingerprints:#x?}");
     }
 
     #[test]

@@ -4,8 +4,9 @@
 //! wires and lattice masts are long and thin; the terrain is one coarse sheet, fine only where the
 //! town stands. Ground, houses and trees are irregular by a small seeded jitter.
 
-use super::patch::{Mesh, about_z, circle, cos_sin, fraction, jitter, placed, upright};
-use glam::{DMat3, DVec3, Vec3};
+use super::mesh_builder::{MeshBuilder, about_z, circle, cos_sin, fraction, jitter, placed, upright};
+use bvh_core::Triangle;
+use glam::{DMat3, DVec3};
 
 /// World units per metre.
 const UNIT: f64 = 1000.0;
@@ -19,8 +20,8 @@ const CELLS: (usize, usize) = (36, 27);
 const TRACK: f64 = 78.0;
 
 /// The triangles of the scene; the same bytes at every call and on every machine.
-pub fn triangles() -> Vec<[Vec3; 3]> {
-    let mut valley = Mesh::default();
+pub fn triangles() -> Vec<Triangle> {
+    let mut valley = MeshBuilder::default();
     terrain(&mut valley);
     railway(&mut valley);
     viaduct(&mut valley);
@@ -80,7 +81,7 @@ fn aligned(x: f64) -> DMat3 {
 }
 
 /// The ground: two triangles per cell, 4 × 4 times as many within the town, without stitching.
-fn terrain(mesh: &mut Mesh) {
+fn terrain(mesh: &mut MeshBuilder) {
     for j in 0..CELLS.1 {
         for i in 0..CELLS.0 {
             let size = DVec3::new(SIZE.0 / CELLS.0 as f64, SIZE.1 / CELLS.1 as f64, 0.0);
@@ -97,7 +98,7 @@ fn terrain(mesh: &mut Mesh) {
 }
 
 /// Two tracks on an embankment: rails, sleepers near the station, masts and contact wires.
-fn railway(mesh: &mut Mesh) {
+fn railway(mesh: &mut MeshBuilder) {
     let steps = 64;
     let at = |k: usize| SIZE.0 * fraction(k, steps);
     let bed = [(-14.0, TRACK - 9.0), (-6.0, TRACK - 0.6), (6.0, TRACK - 0.6), (14.0, TRACK - 9.0)];
@@ -107,7 +108,7 @@ fn railway(mesh: &mut Mesh) {
         let path: Vec<_> = (0..=steps).map(|k| beside(at(k), aside, TRACK)).collect();
         mesh.sweep(&path, DVec3::Z, &rail, |_| 1.0);
     }
-    let mut sleeper = Mesh::default();
+    let mut sleeper = MeshBuilder::default();
     sleeper.cuboid(DVec3::new(-0.13, -1.3, -0.2), DVec3::new(0.13, 1.3, 0.0));
     for k in 0..110 {
         let x = 1428.0 + 1.3 * k as f64;
@@ -126,16 +127,16 @@ fn railway(mesh: &mut Mesh) {
 }
 
 /// A viaduct that crosses valley and main line: round arches on tall tapered piers.
-fn viaduct(mesh: &mut Mesh) {
+fn viaduct(mesh: &mut MeshBuilder) {
     let (spans, span) = (28, 24.0);
-    let mut bay = Mesh::default();
-    let mut arch = Mesh::default();
+    let mut bay = MeshBuilder::default();
+    let mut arch = MeshBuilder::default();
     arch.arch(9.5, 12.0, 12.5, 7.0, 14);
     bay.place(&arch, &upright(0.0, 0.0, 0.0, -13.5));
     for y in [-3.6, 3.2] {
         bay.cuboid(DVec3::new(-12.0, y, -1.0), DVec3::new(12.0, y + 0.4, 0.9));
     }
-    let mut pier = Mesh::default();
+    let mut pier = MeshBuilder::default();
     pier.revolve(&[(5.6, -75.0), (5.2, -60.0), (4.2, -14.5), (4.6, -14.2), (4.6, -13.5)], 4);
     for k in 0..spans {
         let place = placed(aligned(430.0) * about_z(0.231), beside(430.0, 0.0, 118.0))
@@ -147,8 +148,8 @@ fn viaduct(mesh: &mut Mesh) {
 
 /// The station: a glazed barrel roof on ribs, platforms, a hall with a row of arches, a clock
 /// tower.
-fn station(mesh: &mut Mesh) {
-    let mut station = Mesh::default();
+fn station(mesh: &mut MeshBuilder) {
+    let mut station = MeshBuilder::default();
     let (length, half, ribs) = (140.0, 19.0, 15);
     let vault = |t: f64, x: f64, reach: f64| {
         let (c, s) = cos_sin(0.5 * t);
@@ -160,7 +161,7 @@ fn station(mesh: &mut Mesh) {
         let path: Vec<_> = (0..=18).map(|i| vault(fraction(i, 18), x, half - 0.3)).collect();
         station.sweep(&path, DVec3::X, &[(-0.2, -0.12), (0.2, -0.12), (0.2, 0.12), (-0.2, 0.12)], |_| 1.0);
         for y in [-half, half] {
-            let mut post = Mesh::default();
+            let mut post = MeshBuilder::default();
             post.revolve(&[(0.45, 0.0), (0.25, 0.6), (0.2, 6.4), (0.5, 7.0)], 8);
             station.place(&post, &upright(0.02, x, y, 0.0));
         }
@@ -168,7 +169,7 @@ fn station(mesh: &mut Mesh) {
     for (low, high) in [(-12.0, -4.2), (4.2, 17.0)] {
         station.cuboid(DVec3::new(-0.7 * length, low, -0.6), DVec3::new(0.7 * length, high, 0.75));
     }
-    let mut bay = Mesh::default();
+    let mut bay = MeshBuilder::default();
     bay.arch(2.6, 3.5, 4.2, 0.8, 12);
     for k in 0..14 {
         station.place(&bay, &upright(0.0, 7.0 * (k as f64 - 6.5), 23.0, 4.0));
@@ -179,7 +180,7 @@ fn station(mesh: &mut Mesh) {
     }
     station.place(&house(98.0, 14.0, 9.0, 5.0), &upright(0.0, 0.0, 31.0, 0.0));
     station.cuboid(DVec3::new(50.0, 24.0, 0.0), DVec3::new(58.0, 32.0, 27.0));
-    let mut cap = Mesh::default();
+    let mut cap = MeshBuilder::default();
     cap.revolve(&[(6.4, 27.0), (5.0, 31.0), (1.2, 34.0), (0.9, 38.0), (0.0, 41.0)], 8);
     station.place(&cap, &upright(1.0 / 16.0, 54.0, 28.0, 0.0));
     mesh.place(&station, &placed(aligned(1500.0), beside(1500.0, 0.0, TRACK)));
@@ -187,8 +188,8 @@ fn station(mesh: &mut Mesh) {
 
 /// A gabled house, `length` along x, with eaves, windows, a door and a chimney; stands on z = 0,
 /// sunk a little.
-fn house(length: f64, width: f64, wall: f64, gable: f64) -> Mesh {
-    let mut house = Mesh::default();
+fn house(length: f64, width: f64, wall: f64, gable: f64) -> MeshBuilder {
+    let mut house = MeshBuilder::default();
     let (x, y) = (0.5 * length, 0.5 * width);
     let at = |i: f64, j: f64, z: f64| DVec3::new(i, j, z);
     for side in [-1.0, 1.0] {
@@ -231,7 +232,7 @@ fn house(length: f64, width: f64, wall: f64, gable: f64) -> Mesh {
 }
 
 /// Streets of houses, each turned its own way, around a church on the rise behind the station.
-fn town(mesh: &mut Mesh) {
+fn town(mesh: &mut MeshBuilder) {
     for street in 0..6 {
         for k in 0..40 {
             let index = street * 40 + k;
@@ -254,20 +255,20 @@ fn town(mesh: &mut Mesh) {
 }
 
 /// A church with nave, round apse and a tower with an octagonal spire.
-fn church() -> Mesh {
+fn church() -> MeshBuilder {
     let mut church = house(34.0, 14.0, 12.0, 8.0);
-    let mut apse = Mesh::default();
+    let mut apse = MeshBuilder::default();
     apse.revolve(&[(5.5, -4.0), (5.5, 9.0), (5.9, 9.3), (0.0, 14.0)], 16);
     church.place(&apse, &upright(0.0, 17.0, 0.0, 0.0));
     church.cuboid(DVec3::new(-25.0, -4.0, -4.0), DVec3::new(-17.0, 4.0, 30.0));
-    let mut spire = Mesh::default();
+    let mut spire = MeshBuilder::default();
     spire.revolve(&[(5.2, 29.5), (3.2, 34.0), (0.15, 62.0), (0.0, 64.0)], 8);
     church.place(&spire, &upright(1.0 / 16.0, -21.0, 0.0, 0.0));
     church
 }
 
 /// A power line on lattice masts over the hills, its wires sagging between them.
-fn power_line(mesh: &mut Mesh) {
+fn power_line(mesh: &mut MeshBuilder) {
     let masts = 10;
     let foot = |k: usize| {
         let (x, y) = (70.0 + 255.0 * k as f64, 220.0 + 26.0 * k as f64);
@@ -294,8 +295,8 @@ fn power_line(mesh: &mut Mesh) {
 }
 
 /// A lattice mast of thin bars: four legs, cross braces in every storey, two arms.
-fn mast() -> Mesh {
-    let mut mast = Mesh::default();
+fn mast() -> MeshBuilder {
+    let mut mast = MeshBuilder::default();
     let storeys = 5;
     let corner = |k: usize, storey: usize| {
         let t = fraction(storey, storeys);
@@ -320,7 +321,7 @@ fn mast() -> Mesh {
 }
 
 /// Firs on the slopes: a pyramid on a thin trunk.
-fn forest(mesh: &mut Mesh) {
+fn forest(mesh: &mut MeshBuilder) {
     for k in 0..520 {
         // Low-discrepancy spots (plastic number), left out where town and railway are.
         let unit = |step: f64| (0.5 + step * k as f64) - (0.5 + step * k as f64).floor();
@@ -329,7 +330,7 @@ fn forest(mesh: &mut Mesh) {
         if (-120.0..420.0).contains(&aside) {
             continue;
         }
-        let mut fir = Mesh::default();
+        let mut fir = MeshBuilder::default();
         let height = 17.0 + 6.0 * jitter(30, k);
         fir.revolve(&[(0.3, -1.0), (0.3, 3.0)], 3);
         fir.revolve(&[(0.24 * height, 2.5), (0.0, height)], 6);

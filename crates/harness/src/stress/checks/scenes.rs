@@ -1,24 +1,18 @@
-//! What single cases promise beside P1 to P7, of one method's outcome on their scene.
+//! What single cases promise besides P1 to P7 of one method's outcome on their scene.
 
-use super::Verdict;
-use super::examine::{ROUNDING, run};
-use super::scenes::STADIUM;
-use super::transform::{mirrored, same_topology, shuffled};
+use crate::scenes::stiff::STADIUM;
+use crate::stress::examine::{ROUNDING, run};
+use crate::stress::promise::{Broken, Verdict, ensure};
+use crate::stress::transform::{mirrored, same_topology, shuffled};
 use bvh_build::muller_fellner;
-use bvh_core::cost;
-use bvh_core::{Aabb, Bvh};
+use bvh_core::{Aabb, Bvh, cost};
 use bvh_search::{Method, Outcome};
-
-/// What holds, or why it does not.
-fn require(holds: bool, otherwise: impl FnOnce() -> String) -> Verdict {
-    if holds { Ok(String::new()) } else { Err(otherwise()) }
-}
 
 fn is_top_down(method: &Method) -> bool {
     matches!(method, Method::MullerFellner(_) | Method::MedianCut(_))
 }
 
-/// Whether the method is Müller–Fellner's own: the readings of Table 2 are made to be worse.
+/// Whether the method is Müller–Fellner's own: the readings of Table 2 give worse trees on purpose.
 fn is_greedy(method: &Method) -> bool {
     matches!(method, Method::MullerFellner(config) if config.heuristic == Default::default())
 }
@@ -30,19 +24,22 @@ fn levels(objects: usize) -> usize {
 
 /// S01: no node, no cost.
 pub fn empty_tree(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
-    require(outcome.tree == Bvh::default() && outcome.cost == 0.0, || format!("{:?}", outcome.tree))
+    ensure!(outcome.tree == Bvh::default() && outcome.cost == 0.0, "{:?}", outcome.tree);
+    Ok(String::new())
 }
 
 /// S02: one leaf, no cost.
 pub fn one_leaf(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
     let nodes = &outcome.tree.nodes;
-    require(nodes.len() == 1 && nodes[0].is_leaf() && outcome.cost == 0.0, || format!("{nodes:?}"))
+    ensure!(nodes.len() == 1 && nodes[0].is_leaf() && outcome.cost == 0.0, "{nodes:?}");
+    Ok(String::new())
 }
 
 /// S03: one inner node over two leaves.
 pub fn one_inner_node(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
     let nodes = &outcome.tree.nodes;
-    require(nodes.len() == 3 && outcome.tree.inner_count() == 1, || format!("{nodes:?}"))
+    ensure!(nodes.len() == 3 && outcome.tree.inner_count() == 1, "{nodes:?}");
+    Ok(String::new())
 }
 
 /// S04, S07: the top-down builders halve, and order by index.
@@ -51,33 +48,35 @@ pub fn balanced(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     if !is_top_down(method) {
         return Ok(String::new());
     }
-    require(depth <= levels(boxes.len()) + 1, || format!("depth {depth} over {} equal boxes", boxes.len()))?;
+    ensure!(depth <= levels(boxes.len()) + 1, "depth {depth} over {} equal boxes", boxes.len());
     if let Method::MullerFellner(_) = method {
         let by_index = outcome.tree.prim_ids.iter().zip(0..).all(|(&id, at)| id == at);
-        require(by_index, || "equal boxes are not in the order of their indices".into())?;
+        ensure!(by_index, "equal boxes are not in the order of their indices");
     }
     Ok(format!("⌈log2 n⌉ = {}", levels(boxes.len())))
 }
 
-/// S05: as S04, and free of cost.
-pub fn balanced_for_nothing(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
-    require(outcome.cost == 0.0, || format!("P7: points cost {}", outcome.cost))?;
+/// S05: as S04, and the cost is 0.
+pub fn balanced_at_no_cost(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
+    ensure!(outcome.cost == 0.0, P7: "points cost {}", outcome.cost);
     balanced(method, boxes, outcome)
 }
 
-/// S10: the top-down builders have the least depth there is.
-pub fn shallow_for_nothing(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
-    require(outcome.cost == 0.0, || format!("P7: segments on a line cost {}", outcome.cost))?;
+/// S10: the cost is 0, and the top-down builders' trees are as shallow as can be.
+pub fn shallow_at_no_cost(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
+    ensure!(outcome.cost == 0.0, P7: "segments on a line cost {}", outcome.cost);
     let (depth, least) = (outcome.tree.depth(), levels(boxes.len()));
-    require(!is_top_down(method) || depth == least, || format!("depth {depth}, {least} would do"))
+    ensure!(!is_top_down(method) || depth == least, "depth {depth}, {least} would do");
+    Ok(String::new())
 }
 
-/// S08: that axes order the objects alike is found, and changes nothing.
+/// S08: axes that order the objects alike are recognised, and the tree is the same.
 pub fn same_orders_change_nothing(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     let Method::MullerFellner(config) = method else { return Ok(String::new()) };
     let config = muller_fellner::Config { skip_same_order: !config.skip_same_order, ..config.clone() };
     let other = run(&Method::MullerFellner(config), boxes, 0)?;
-    require(other.tree == outcome.tree, || "another tree without the search for identical orders".into())
+    ensure!(other.tree == outcome.tree, "another tree without the search for identical orders");
+    Ok(String::new())
 }
 
 /// S09: every level of a good tree over a grid covers it about once.
@@ -85,11 +84,11 @@ pub fn about_one_cover_per_level(method: &Method, boxes: &[Aabb], outcome: &Outc
     let covers = cost::over_root_area(&outcome.tree, outcome.cost);
     let limit = 1.1 * levels(boxes.len()) as f64;
     let binary = is_greedy(method) || matches!(method, Method::Agglomerative(_) | Method::Best(_));
-    require(!binary || covers <= limit, || format!("{covers} root areas, {limit} are normal"))?;
+    ensure!(!binary || covers <= limit, "{covers} root areas, {limit} are normal");
     Ok(format!("{covers:.2} root areas"))
 }
 
-/// S27: some node near the root has the teapot, and nothing else, below it.
+/// S27: a node near the root holds the teapot and nothing else.
 pub fn teapot_is_isolated(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     if !(is_greedy(method) || matches!(method, Method::Best(_) | Method::Reinsertion(_) | Method::Exact(_))) {
         return Ok(String::new());
@@ -102,17 +101,17 @@ pub fn teapot_is_isolated(method: &Method, boxes: &[Aabb], outcome: &Outcome) ->
         let below = objects_below(tree, node);
         let inside = below.iter().filter(|&&id| id as usize >= STADIUM).count();
         if inside == below.len() {
-            let whole = inside == teapot;
-            require(whole, || format!("only {inside} of {teapot} together below level {level}"))?;
-            return require(level <= 8, || format!("isolated at level {level} only"))
-                .map(|_| format!("isolated at level {level}"));
+            ensure!(inside == teapot, "only {inside} of {teapot} together below level {level}");
+            ensure!(level <= 8, "isolated at level {level} only");
+            return Ok(format!("isolated at level {level}"));
         }
         at = tree.nodes[node].children().max_by_key(|&child| {
             objects_below(tree, child).iter().filter(|&&id| id as usize >= STADIUM).count()
         });
         level += 1;
     }
-    require(teapot == 0, || "never isolated".into())
+    ensure!(teapot == 0, "never isolated");
+    Ok(String::new())
 }
 
 fn objects_below(tree: &Bvh, node: usize) -> Vec<u32> {
@@ -124,7 +123,7 @@ fn objects_below(tree: &Bvh, node: usize) -> Vec<u32> {
     ids
 }
 
-/// S28: the costs of binary and of wider trees, to be compared.
+/// S28: reports the costs by which binary trees and wider ones are compared.
 pub fn both_costs(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
     let tree = &outcome.tree;
     let widest = tree.nodes.iter().map(|node| node.children().len()).max().unwrap_or(0);
@@ -135,9 +134,9 @@ pub fn both_costs(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
 /// S32: the reflected scene costs the same.
 ///
 /// Insertion and the exact optimum look at areas and indices only, which no reflection changes. Müller–Fellner breaks
-/// ties between equally good cuts towards the lower end, which a reflection exchanges; in this scene both are alike.
-/// Not asked of median cut, which gives an odd object to the lower half, of Morton curves, which begin at a corner, and
-/// of searches that draw positions.
+/// ties between equally good cuts towards the lower end, which a reflection exchanges; in this scene both ends are
+/// alike. It is not asked of median cut, which gives an odd object to the lower half, of Morton curves, which begin at a
+/// corner, or of searches that draw positions.
 pub fn reflection_costs_the_same(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     if !matches!(method, Method::MullerFellner(_) | Method::GoldsmithSalmon(_) | Method::Exact(_)) {
         return Ok(String::new());
@@ -145,18 +144,18 @@ pub fn reflection_costs_the_same(method: &Method, boxes: &[Aabb], outcome: &Outc
     for axis in 0..3 {
         let other = run(method, &mirrored(boxes, axis), 0)?;
         let close = (other.cost - outcome.cost).abs() <= ROUNDING * outcome.cost;
-        require(close, || format!("axis {axis} reflected: cost {} and {}", other.cost, outcome.cost))?;
+        ensure!(close, "axis {axis} reflected: cost {} and {}", other.cost, outcome.cost);
     }
     Ok("three reflections".into())
 }
 
-/// S33: the order of the objects changes nothing where no two centres coincide; insertion, whose subject it is, gives a
-/// distribution.
+/// S33: the order of the objects changes nothing where no two centres coincide. Insertion depends on it: the range of
+/// its costs is reported.
 pub fn order_does_not_matter(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     const ORDERS: u64 = 20;
     if let Method::GoldsmithSalmon(_) = method {
         let costs = (0..ORDERS).map(|seed| Ok(run(method, &shuffled(boxes, seed).0, 0)?.cost / outcome.cost));
-        let mut costs = costs.collect::<Result<Vec<f64>, String>>()?;
+        let mut costs = costs.collect::<Result<Vec<f64>, Broken>>()?;
         costs.sort_by(f64::total_cmp);
         let [low, high] = [costs.first(), costs.last()].map(|cost| cost.copied().unwrap_or(f64::NAN));
         return Ok(format!("{ORDERS} orders: {low:.3} to {high:.3} of this cost"));
@@ -167,14 +166,15 @@ pub fn order_does_not_matter(method: &Method, boxes: &[Aabb], outcome: &Outcome)
     let (permuted, order) = shuffled(boxes, 33);
     let mut other = run(method, &permuted, 0)?;
     other.tree.prim_ids.iter_mut().for_each(|id| *id = order[*id as usize]);
-    require(same_topology(&other.tree, &outcome.tree) && other.cost == outcome.cost, || {
-        format!("another order of the objects: cost {} and {}", other.cost, outcome.cost)
-    })
+    let same = same_topology(&other.tree, &outcome.tree) && other.cost == outcome.cost;
+    ensure!(same, "another order of the objects: cost {} and {}", other.cost, outcome.cost);
+    Ok(String::new())
 }
 
 /// S45: the root has 3 · 1 + 1 · 1 + 1 · 3.
 pub fn seven(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
     let tree = &outcome.tree;
     let costs = [outcome.cost, cost::goldsmith_salmon(tree), cost::sah(tree, &Default::default())];
-    require(costs == [7.0, 2.0, 13.0 / 7.0], || format!("costs {costs:?}"))
+    ensure!(costs == [7.0, 2.0, 13.0 / 7.0], "costs {costs:?}");
+    Ok(String::new())
 }

@@ -1,0 +1,153 @@
+//! What a case is: a stiff scene, checks of methods, or checks of other parts of the program.
+
+use super::promise::Verdict;
+use crate::scenes::stiff;
+use bvh_core::{Aabb, Triangle};
+use bvh_search::{Method, Outcome};
+
+/// One case.
+#[derive(Debug)]
+pub struct Case {
+    /// `S01` to `S45`; also names its scene in [`stiff`].
+    pub id: &'static str,
+    /// What it is.
+    pub name: &'static str,
+    /// How the promises are checked; at least one way.
+    pub checks: &'static [Check],
+}
+
+/// One way to check.
+#[derive(Debug)]
+pub enum Check {
+    /// Every method builds the scene of the case, every traversal traces it.
+    Scene(SceneCase),
+    /// Every method refuses these boxes and names the object.
+    Refused {
+        /// Makes this many boxes.
+        boxes: fn(usize) -> Vec<Aabb>,
+        /// Index of the object that is named.
+        object: usize,
+    },
+    /// Asked of the method of this name, or of all.
+    Method(Option<&'static str>, fn(&Method) -> Verdict),
+    /// Asked of another part of the program.
+    Part(Part, fn() -> Verdict),
+}
+
+/// A part of the program that is neither method nor traversal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Rays and their ranges.
+    Rays,
+    /// The reader of OBJ files.
+    ObjFiles,
+    /// The reader of tree files.
+    TreeFiles,
+    /// Costs that are kept while a tree changes.
+    Costs,
+}
+
+impl Part {
+    /// All of them, in the order of the tables.
+    pub const ALL: [Self; 4] = [Self::Rays, Self::ObjFiles, Self::TreeFiles, Self::Costs];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rays => "rays",
+            Self::ObjFiles => "OBJ files",
+            Self::TreeFiles => "tree files",
+            Self::Costs => "costs",
+        }
+    }
+}
+
+/// How the scene of a case is built and traced.
+#[derive(Debug)]
+pub struct SceneCase {
+    /// Numbers of objects by [`Size`].
+    pub sizes: [usize; 3],
+    /// What else is promised of this scene.
+    pub also: Option<Also>,
+}
+
+/// A promise about one method's outcome on one scene.
+pub type Also = fn(&Method, &[Aabb], &Outcome) -> Verdict;
+
+/// How large a scene is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Size {
+    /// For every method and every ray.
+    Few,
+    /// For builders, in the tests.
+    Many,
+    /// For builders, as the case is meant.
+    All,
+}
+
+impl Case {
+    /// How its scene is checked, if it has one.
+    pub fn scene(&self) -> Option<&SceneCase> {
+        self.checks.iter().find_map(|check| match check {
+            Check::Scene(scene) => Some(scene),
+            _ => None,
+        })
+    }
+
+    /// Its scene of so many triangles; none if the case has no scene.
+    pub fn triangles(&self, objects: usize) -> Vec<Triangle> {
+        stiff::by_id(self.id).map_or_else(Vec::new, |triangles| triangles(objects))
+    }
+}
+
+/// Whether the method is a builder: one evaluation, no search.
+pub fn is_builder(method: &Method) -> bool {
+    use Method::{Agglomerative, GoldsmithSalmon, MedianCut, MullerFellner};
+    matches!(method, MullerFellner(_) | MedianCut(_) | GoldsmithSalmon(_) | Agglomerative(_))
+}
+
+/// Objects of the scenes for the exact optimum.
+pub const EXACT_OBJECTS: usize = 12;
+
+impl SceneCase {
+    /// Number of objects that a method gets: searches few, the exact optimum [`EXACT_OBJECTS`] at most.
+    pub fn objects(&self, method: &Method, size: Size) -> usize {
+        let few = self.sizes[Size::Few as usize];
+        match method {
+            Method::Exact(_) => few.min(EXACT_OBJECTS),
+            builder if is_builder(builder) => self.sizes[size as usize],
+            _ => few,
+        }
+    }
+}
+
+/// Every method of the registry and every builder in its other forms, with labels.
+pub fn methods() -> Vec<(String, Method)> {
+    use bvh_build::{agglomerative, evaluation::AreaOnly, goldsmith_salmon, median_cut, muller_fellner};
+    use goldsmith_salmon::Descent;
+    use muller_fellner::Heuristic;
+    let mut methods: Vec<(String, Method)> =
+        Method::all().into_iter().map(|method| (method.name().to_owned(), method)).collect();
+    let readings = [
+        AreaOnly::Sum,
+        AreaOnly::InnerSum,
+        AreaOnly::Max,
+        AreaOnly::SumOfSquares,
+        AreaOnly::Difference,
+        AreaOnly::Product,
+    ];
+    for heuristic in readings.map(Heuristic::AreaOnly).into_iter().chain([Heuristic::AreaTimesPower(0.9)]) {
+        let config = muller_fellner::Config { heuristic, ..Default::default() };
+        methods.push((format!("muller_fellner, {heuristic:?}"), Method::MullerFellner(config)));
+    }
+    let longest = median_cut::Config { axis: median_cut::CutAxis::Longest, ..Default::default() };
+    methods.push(("median_cut, longest".into(), Method::MedianCut(longest)));
+    for (descent, pair_inner) in [(Descent::Cost, true), (Descent::Area, false), (Descent::Area, true)] {
+        let config = goldsmith_salmon::Config { descent, pair_inner };
+        methods.push((format!("goldsmith_salmon, {config:?}"), Method::GoldsmithSalmon(config)));
+    }
+    let narrow = agglomerative::Config { radius: 1, ..Default::default() };
+    methods.push(("agglomerative, radius 1".into(), Method::Agglomerative(narrow)));
+    methods
+}

@@ -1,0 +1,85 @@
+//! Carries out the checks of one case for one method, traversal or part: a cell of the suite's table.
+
+use super::case::{Case, Check, EXACT_OBJECTS, Part, Size};
+use super::examine::{self, Examined};
+use super::promise::{Broken, Promise, Verdict};
+use super::tracing;
+use crate::scenes::Primitives;
+use bvh_search::Method;
+
+/// The outcome of one case for one method, traversal or part.
+#[derive(Clone, Debug)]
+pub enum Cell {
+    /// All promises are kept.
+    Kept(Examined),
+    /// Refused with a typed error that names the object, as promised.
+    Refused(String),
+    /// The promise that was broken.
+    Broken(Broken),
+}
+
+impl From<Verdict> for Cell {
+    fn from(verdict: Verdict) -> Self {
+        match verdict {
+            Ok(note) => Self::Kept(Examined { note, ..Default::default() }),
+            Err(broken) => Self::Broken(broken),
+        }
+    }
+}
+
+impl Cell {
+    /// This and a further check of the same case and subject: what is broken, else the numbers of the first and the
+    /// notes of both.
+    fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Broken(broken), _) => Self::Broken(broken),
+            (Self::Kept(first), Self::Kept(other)) => {
+                let note = [first.note.as_str(), &other.note].join(" ").trim().to_owned();
+                Self::Kept(Examined { note, ..first })
+            }
+            (_, other) => other,
+        }
+    }
+}
+
+impl Case {
+    /// All that is asked of a method; `None` if nothing is. A scene is checked at [`Size::Few`] and then at `size`.
+    pub fn of_method(&self, method: &Method, size: Size, work_per_object: u64) -> Option<Cell> {
+        let cells = self.checks.iter().filter_map(|check| match check {
+            Check::Scene(scene) => {
+                let examine = |size| examine::examine(self, scene, method, size, work_per_object);
+                let grows = scene.objects(method, size) > scene.objects(method, Size::Few);
+                let first = if grows { examine(Size::Few).map(drop) } else { Ok(()) };
+                Some(first.and_then(|()| examine(size)).map_or_else(Cell::Broken, Cell::Kept))
+            }
+            Check::Refused { boxes, object } => {
+                let objects = if let Method::Exact(_) = method { EXACT_OBJECTS } else { 100 };
+                let refused = examine::refuses(method, &boxes(objects), *object);
+                Some(refused.map_or_else(Cell::Broken, Cell::Refused))
+            }
+            Check::Method(name, check) => {
+                name.is_none_or(|name| name == method.name()).then(|| check(method).into())
+            }
+            Check::Part(..) => None,
+        });
+        cells.reduce(Cell::and)
+    }
+
+    /// Whether a traversal answers the scene's rays; `None` if there is no scene.
+    pub fn of_traversal(&self, traversal: tracing::Traversal, rays: usize) -> Option<Cell> {
+        let triangles = self.triangles(self.scene()?.sizes[Size::Few as usize]);
+        let traced = std::panic::catch_unwind(|| {
+            let rays = tracing::rays(&triangles, rays, 1);
+            tracing::check(traversal, &Primitives::Triangles(triangles), &rays)
+        });
+        Some(traced.unwrap_or_else(|_| Err(Promise::P1.broken("panicked"))).into())
+    }
+
+    /// What is asked of another part; `None` if nothing is.
+    pub fn of_part(&self, part: Part) -> Option<Cell> {
+        self.checks.iter().find_map(|check| match check {
+            Check::Part(of, check) if *of == part => Some(check().into()),
+            _ => None,
+        })
+    }
+}

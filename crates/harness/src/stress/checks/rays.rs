@@ -1,0 +1,85 @@
+//! What the cases ask of rays, their ranges, and the estimator that traces random ones.
+
+use crate::measure::{Query, empirical_cost, rays::Family};
+use crate::run::rows::RayRow;
+use crate::scenes::{Primitives, Scene, SceneKind, stiff};
+use crate::stress::promise::{Broken, Verdict, ensure};
+use crate::stress::tracing;
+use bvh_build::{Builder, muller_fellner};
+use bvh_core::{Ray, Triangle, validate};
+use glam::Vec3;
+
+/// S15: zero, NaN and infinite directions and origins are refused before any traversal.
+pub fn no_such_rays() -> Verdict {
+    let (nan, inf) = (f32::NAN, f32::INFINITY);
+    let directions =
+        [Vec3::ZERO, -Vec3::ZERO, Vec3::NAN, Vec3::X * nan, Vec3::Y * inf, Vec3::new(1.0, -inf, 0.0)];
+    for bad in directions {
+        ensure!(Ray::half_line(Vec3::ZERO, bad).is_err(), "direction {bad} is accepted");
+    }
+    let origins = [Vec3::NAN, Vec3::new(0.0, inf, 0.0), Vec3::new(0.0, 0.0, nan)];
+    for bad in origins {
+        ensure!(Ray::half_line(bad, Vec3::X).is_err(), "origin {bad} is accepted");
+    }
+    Ok(format!("{} refused", directions.len() + origins.len()))
+}
+
+/// S16: an empty range hits nothing, an infinite one is the longest finite one, a single point hits what is there.
+pub fn ranges_are_defined() -> Verdict {
+    let triangle = Primitives::Triangles(vec![Triangle([Vec3::ZERO, Vec3::X, Vec3::Y])]);
+    let origin = Vec3::new(0.25, 0.25, -2.0);
+    for (t_min, t_max, expected) in [
+        (0.0, f32::INFINITY, true),
+        (2.0, 2.0, true),
+        (1.0, 1.0, false),
+        (2.0, 1.0, false),
+        (0.0, 2f32.next_down(), false),
+        (2f32.next_up(), f32::INFINITY, false),
+        (f32::INFINITY, f32::INFINITY, false),
+    ] {
+        let ray = Ray::new(origin, Vec3::Z, t_min, t_max).map_err(Broken::case)?;
+        for (name, traversal) in tracing::TRAVERSALS {
+            for accelerator in traversal(&triangle).map_err(Broken::case)? {
+                let (nearest, any) =
+                    (accelerator.nearest_hit(&ray, &mut ()), accelerator.any_hit(&ray, &mut ()));
+                let agree = nearest.is_some() == expected && any == expected;
+                ensure!(agree, "{name}: range {t_min}..={t_max} gives {nearest:?} and {any}");
+            }
+        }
+    }
+    for (t_min, t_max) in [(f32::NAN, 1.0), (0.0, f32::NAN), (-1.0, 1.0)] {
+        ensure!(Ray::new(origin, Vec3::Z, t_min, t_max).is_err(), "range {t_min}..={t_max} is accepted");
+    }
+    Ok(String::new())
+}
+
+/// S44: four times the rays halve the standard error, and the 95 % intervals cover what many more rays find.
+pub fn estimates_converge() -> Verdict {
+    let primitives = Primitives::Triangles(stiff::uniform(500));
+    let scene = Scene::new("uniform", SceneKind::Procedural, primitives);
+    let tree = muller_fellner::Config::default().build(&scene.boxes).map_err(Broken::case)?;
+    validate(&tree, &scene.boxes).map_err(Broken::case)?;
+    let measure = |count, seed| {
+        let config = empirical_cost::Config { family: Family::Inside, query: Query::Any, count };
+        empirical_cost::measure(&config, &scene, &tree, seed, RayRow::default())
+    };
+    const FEWEST: u64 = 2000;
+    const SEEDS: u64 = 60;
+    let truth = measure(1 << 18, 0).boxes_per_ray;
+    let mut covered = 0;
+    let mut errors = [0.0; 3];
+    for seed in 1..=SEEDS {
+        let row = measure(FEWEST, seed);
+        covered += u64::from((row.boxes_low..=row.boxes_high).contains(&truth));
+        if seed <= 5 {
+            for (factor, error) in [1, 4, 16].into_iter().zip(&mut errors) {
+                *error += measure(FEWEST * factor, seed).boxes_standard_error;
+            }
+        }
+    }
+    let ratios = [errors[0] / errors[1], errors[1] / errors[2]];
+    ensure!(ratios.iter().all(|ratio| (ratio - 2.0).abs() < 0.15), "standard errors fall by {ratios:?}");
+    // Fewer than 51 of 60 would happen once in a thousand times.
+    ensure!(covered >= 51, "{covered} of {SEEDS} intervals cover {truth}");
+    Ok(format!("{covered} of {SEEDS} intervals cover"))
+}
