@@ -2,7 +2,7 @@
 
 use crate::{Problem, Run, Search, SearchError};
 use bvh_core::Bvh;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// One line per method: its name in specs and tables, and the configuration that runs it.
 macro_rules! methods {
@@ -18,6 +18,15 @@ macro_rules! methods {
         impl Method {
             /// The names of all methods.
             pub const NAMES: &[&str] = &[$($name),*];
+
+            /// Reads the parameters of the method called `name`; `None` if there is none of this name. Unlike
+            /// deserialising a whole method, hands `parameters` on unbuffered, so that its errors know their place.
+            pub fn read<'de, D: Deserializer<'de>>(name: &str, parameters: D) -> Result<Option<Self>, D::Error> {
+                match name {
+                    $($name => <$config>::deserialize(parameters).map(|config| Some(Self::$variant(config))),)*
+                    _ => Ok(None),
+                }
+            }
 
             /// Every method with its default parameters.
             pub fn all() -> Vec<Self> {

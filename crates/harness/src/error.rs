@@ -1,5 +1,6 @@
 //! What can go wrong in the harness, and the exit code that says so.
 
+use bvh_search::SearchError;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -30,7 +31,7 @@ pub enum Error {
     Busy(PathBuf),
     /// A run failed.
     #[error("scene {scene}, method {method}: {source}")]
-    Search { scene: String, method: String, source: bvh_search::SearchError },
+    Search { scene: String, method: String, source: Box<SearchError> },
     /// Another library refused a scene.
     #[error("scene {scene}, library {library}: {message}")]
     Library { scene: String, library: &'static str, message: String },
@@ -81,6 +82,12 @@ impl Error {
     /// For `map_err` on file operations: names the path and what was tried.
     pub fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::Io { path: path.to_owned(), action, source }
+    }
+
+    /// For `map_err` on builders and searches: names the scene and the method.
+    pub fn search<E: Into<SearchError>>(scene: &str, method: &str) -> impl FnOnce(E) -> Self {
+        let (scene, method) = (scene.to_owned(), method.to_owned());
+        move |source| Self::Search { scene, method, source: Box::new(source.into()) }
     }
 
     /// For `map_err` on TOML that a harness has written: names the path.

@@ -12,9 +12,15 @@ use tempfile::NamedTempFile;
 pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
     fs::read(path).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => Error::Usage(format!("{}: no such file", path.display())),
-        io::ErrorKind::IsADirectory => Error::Usage(format!("{}: a folder, not a tree file", path.display())),
+        io::ErrorKind::IsADirectory => Error::Usage(format!("{}: a folder; accepted: a file", path.display())),
         _ => Error::Io { path: path.to_owned(), action: "read the file", source },
     })
+}
+
+/// The text of the regular file at `path`.
+pub fn read_text(path: &Path) -> Result<String, Error> {
+    String::from_utf8(read(path)?)
+        .map_err(|error| Error::Usage(format!("{}: {}; accepted: UTF-8", path.display(), error.utf8_error())))
 }
 
 /// The tree over `boxes` in the file at `path`: refuses one that is damaged, or saved for another scene, and one that

@@ -4,22 +4,20 @@ use crate::Error;
 use crate::cli::arguments::{Jobs, input_file, output_file};
 use crate::cli::explain;
 use crate::cli::output::print_line;
+use crate::clock::Deadline;
 use crate::files::{self, Reserved, load_tree};
 use crate::scenes::Scene;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost;
 use bvh_core::file::{self, Header, Origin};
-use bvh_search::{
-    Budget, Event, Method, Observer, Outcome, Problem, SearchError, StopReason, optimize, portfolio, solve,
-};
+use bvh_search::{Budget, Event, Method, Observer, Outcome, Problem, StopReason, optimize, portfolio, solve};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 /// Search for the best tree of a scene within a budget, and save it.
 #[derive(Args, Clone, Debug)]
@@ -102,22 +100,22 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let start = args.from.as_deref().map(|path| start(path, &scene)).transpose()?;
     let reserved = Reserved::new(&args.out, most_bytes(scene.boxes.len()))?;
 
-    let refused = |source| Error::Search { scene: scene.name.clone(), method: args.method.clone(), source };
     let greedy = muller_fellner::Config::default().build(&scene.boxes);
-    let base = cost::internal_area(&greedy.map_err(|source| refused(SearchError::Build(source)))?);
+    let base = cost::internal_area(&greedy.map_err(Error::search(&scene.name, &args.method))?);
     let watch = Watch::new(args.budget, base, interrupted);
     let budget = match args.budget {
         Effort::Time(_) => Budget::default(),
         Effort::Work(work) => Budget { max_work: Some(work), ..Budget::default() },
     };
-    let search = || match (&start, &method) {
+    let outcome = match (&start, &method) {
         (Some((tree, _)), Method::Best(config)) => {
             optimize(tree, &scene.boxes, config, args.seed, budget, &watch)
         }
         _ => solve(&method, &Problem::new(&scene.boxes), args.seed, budget, &watch),
     };
-    let outcome = watch.during(search).map_err(refused)?;
-    let seconds = watch.start.elapsed().as_secs_f64();
+    watch.bar.finish_and_clear();
+    let outcome = outcome.map_err(Error::search(&scene.name, &args.method))?;
+    let seconds = watch.deadline.elapsed().as_secs_f64();
 
     let spent = start.as_ref().map_or(0, |(_, header)| header.work);
     let work = spent.saturating_add(outcome.work);
@@ -206,73 +204,46 @@ fn gain(cost: f64, base: f64) -> String {
     if percent >= 0.0 { format!("{percent:.2} % below") } else { format!("{:.2} % above", -percent) }
 }
 
-/// The clock of a bake: shows how it goes and says when it is over.
+/// Watches a bake: ends it with its budget of time or when it is interrupted, and shows its progress.
 struct Watch<'a> {
     bar: ProgressBar,
-    start: Instant,
+    deadline: Deadline,
     effort: Effort,
     base: f64,
-    last: Mutex<Option<(Event, Duration)>>,
-    over: AtomicBool,
+    last: Mutex<Option<Event>>,
+    /// When the bar was last brought up to date, in milliseconds since the beginning.
+    shown: AtomicU64,
     interrupted: &'a AtomicBool,
 }
 
 impl<'a> Watch<'a> {
     fn new(effort: Effort, base: f64, interrupted: &'a AtomicBool) -> Self {
-        // Hidden unless standard error is a terminal. In thousandths of the budget.
+        // In thousandths of the budget; hidden unless standard error is a terminal.
         let bar = ProgressBar::new(1000);
         let style = ProgressStyle::with_template("{wide_bar} {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        let (last, over) = (Mutex::default(), AtomicBool::new(false));
-        Self { bar, start: Instant::now(), effort, base, last, over, interrupted }
+        let limit = if let Effort::Time(limit) = effort { limit } else { Duration::MAX };
+        let (deadline, last, shown) = (Deadline::after(limit), Mutex::default(), AtomicU64::default());
+        Self { bar, deadline, effort, base, last, shown, interrupted }
     }
 
-    /// Runs `search` while another thread keeps the time.
-    fn during<T>(&self, search: impl FnOnce() -> T) -> T {
-        let found = std::thread::scope(|scope| {
-            let (running, ended) = channel();
-            scope.spawn(move || self.keep_time(&ended));
-            let found = search();
-            drop(running);
-            found
-        });
-        self.bar.finish_and_clear();
-        found
-    }
-
-    fn keep_time(&self, ended: &Receiver<()>) {
-        const REFRESH: Duration = Duration::from_millis(100);
-        loop {
-            let elapsed = self.start.elapsed();
-            let wait = match self.effort {
-                Effort::Time(budget) if elapsed >= budget => {
-                    self.over.store(true, Relaxed);
-                    REFRESH
-                }
-                Effort::Time(budget) => REFRESH.min(budget - elapsed),
-                Effort::Work(_) => REFRESH,
-            };
-            if ended.recv_timeout(wait) != Err(RecvTimeoutError::Timeout) {
-                return;
-            }
-            self.show(self.start.elapsed());
+    /// Shows incumbent, gain, rate and time left, ten times a second.
+    fn show(&self) {
+        const REFRESH_MILLISECONDS: u64 = 100;
+        if self.bar.is_hidden() {
+            return;
         }
-    }
-
-    /// Incumbent, gain, rate and time left.
-    fn show(&self, elapsed: Duration) {
-        let last = *self.last.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let Some((event, at)) = last else { return };
-        let seconds = at.as_secs_f64().max(1e-9);
-        let (done, left) = match self.effort {
-            Effort::Time(budget) => (
-                elapsed.as_secs_f64() / budget.as_secs_f64().max(1e-9),
-                budget.saturating_sub(elapsed).as_secs_f64(),
-            ),
-            Effort::Work(work) => {
-                let done = event.work as f64 / work.max(1) as f64;
-                (done, seconds / done.max(1e-9) - elapsed.as_secs_f64())
-            }
+        let elapsed = self.deadline.elapsed();
+        let (now, before) = (elapsed.as_millis() as u64, self.shown.load(Relaxed));
+        let due = now >= before + REFRESH_MILLISECONDS;
+        if !due || self.shown.compare_exchange(before, now, Relaxed, Relaxed).is_err() {
+            return;
+        }
+        let Some(event) = *self.last.lock().unwrap_or_else(PoisonError::into_inner) else { return };
+        let seconds = elapsed.as_secs_f64().max(1e-9);
+        let done = match self.effort {
+            Effort::Time(_) => self.deadline.fraction(),
+            Effort::Work(work) => event.work as f64 / work.max(1) as f64,
         };
         self.bar.set_position((1000.0 * done.min(1.0)) as u64);
         self.bar.set_message(format!(
@@ -280,26 +251,23 @@ impl<'a> Watch<'a> {
             event.incumbent,
             gain(event.incumbent, self.base),
             event.evaluations as f64 / seconds / 1e6,
-            left.max(0.0)
+            (seconds / done.max(1e-9) - seconds).max(0.0)
         ));
     }
 }
 
 impl Observer for Watch<'_> {
     fn event(&self, event: &Event) {
-        let now = Some((*event, self.start.elapsed()));
-        *self.last.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = now;
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(*event);
     }
 
     fn cancelled(&self) -> bool {
-        self.over.load(Relaxed) || self.interrupted.load(Relaxed)
+        self.show();
+        self.interrupted.load(Relaxed) || matches!(self.effort, Effort::Time(_)) && self.deadline.has_passed()
     }
 
     fn progress(&self) -> Option<f64> {
-        match self.effort {
-            Effort::Time(budget) => Some(self.start.elapsed().div_duration_f64(budget).min(1.0)),
-            Effort::Work(_) => None,
-        }
+        matches!(self.effort, Effort::Time(_)).then(|| self.deadline.fraction())
     }
 }
 

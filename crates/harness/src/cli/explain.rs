@@ -4,7 +4,6 @@ use crate::Error;
 use crate::run::resolved::load_scenes;
 use crate::scenes::{Primitives, Scene};
 use crate::spec::Experiment;
-use bvh_search::SearchError;
 use bvh_search::omission::Facts;
 
 /// What is left out of an experiment, scene by scene, and what it will run.
@@ -40,11 +39,7 @@ pub fn experiment(experiment: &Experiment) -> Result<String, Error> {
 
 /// What is left out of a scene, one line each.
 pub fn scene(scene: &Scene) -> Result<String, Error> {
-    let facts = Facts::of(&scene.boxes).map_err(|source| Error::Search {
-        scene: scene.name.clone(),
-        method: "--explain".into(),
-        source: SearchError::Build(source),
-    })?;
+    let facts = Facts::of(&scene.boxes).map_err(Error::search(&scene.name, "--explain"))?;
     let kind = match scene.primitives {
         Primitives::Triangles(_) => "triangles",
         Primitives::Spheres(_) => "spheres",

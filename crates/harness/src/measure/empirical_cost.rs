@@ -7,22 +7,23 @@ use super::accelerator::{Accelerator, Query};
 use super::rays::{Family, random_ray};
 use crate::run::rows::RayRow;
 use crate::scenes::Scene;
+use bvh_build::config;
 use bvh_core::{Bvh, TestCounts};
 use bvh_search::Stream;
 use rand::SeedableRng;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-/// Random rays, and what they ask.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// Their distribution.
-    pub family: Family,
-    /// What they ask.
-    pub query: Query,
-    /// How many there are, at least 1.
-    pub count: u64,
+config! {
+    serde;
+    /// Random rays, and what they ask.
+    pub struct Config {
+        /// Their distribution.
+        family: Family = Family::Inside;
+        /// What they ask.
+        query: Query = Query::Any;
+        /// How many there are.
+        count: u64 = 10_000, in 1..;
+    }
 }
 
 /// Sums over some rays: whole numbers, so that the order of addition does not matter.

@@ -6,6 +6,7 @@ use super::rays::{Kind, Viewpoint, rays};
 use crate::report::statistics::{median, minimum};
 use crate::run::rows::{TraceRow, TraceTimeRow};
 use crate::scenes::Scene;
+use bvh_build::config;
 use bvh_core::cost::SahConstants;
 use bvh_core::{Bvh, Hit, Ray, TestCounts, WideBvh, collapse_leaves};
 use serde::{Deserialize, Serialize};
@@ -13,42 +14,25 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-/// Which rays are traced how often through which layouts, on scenes of triangles.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// Rays of each kind, at least 1. Default a million.
-    #[serde(default = "million")]
-    pub count: u32,
-    /// Turns in which every contender traces all rays of a kind, after one that is not timed. Default 5.
-    #[serde(default = "five")]
-    pub rounds: u32,
-    /// Kinds of rays. Default all.
-    #[serde(default = "every_kind")]
-    pub rays: Vec<Kind>,
-    /// Layouts of our trees. Default all.
-    #[serde(default = "every_layout")]
-    pub layouts: Vec<Layout>,
-    /// Cameras of primary rays by scene. Default one outside the root's box.
-    #[serde(default)]
-    pub cameras: BTreeMap<String, Viewpoint>,
+config! {
+    serde;
+    /// Which rays are traced how often through which layouts, on scenes of triangles.
+    pub struct Config {
+        /// Rays of each kind.
+        count: u32 = 1_000_000, in 1..=MOST_RAYS;
+        /// Turns in which every contender traces all rays of a kind, after one that is not timed.
+        rounds: u32 = 5, in 1..=1_000_000;
+        /// Kinds of rays.
+        rays: Vec<Kind> = vec![Kind::Incoherent, Kind::Primary, Kind::Shadow];
+        /// Layouts of our trees.
+        layouts: Vec<Layout> = vec![Layout::Binary, Layout::BinaryLeaves, Layout::Wide, Layout::WidePortable];
+        /// Cameras of primary rays by scene; for other scenes one outside the root's box.
+        cameras: BTreeMap<String, Viewpoint>;
+    }
 }
 
-fn million() -> u32 {
-    1_000_000
-}
-
-fn five() -> u32 {
-    5
-}
-
-fn every_kind() -> Vec<Kind> {
-    vec![Kind::Incoherent, Kind::Primary, Kind::Shadow]
-}
-
-fn every_layout() -> Vec<Layout> {
-    vec![Layout::Binary, Layout::BinaryLeaves, Layout::Wide, Layout::WidePortable]
-}
+/// Most rays of a kind, all in memory at once.
+const MOST_RAYS: u32 = 100_000_000;
 
 /// A way to lay out one of our trees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -12,10 +12,12 @@ mod tinybvh;
 
 use crate::measure::speed::Contender;
 use crate::scenes::Scene;
+use bvh_build::OutOfRange;
+use bvh_build::config::Accepts;
 use bvh_core::Bvh;
 #[cfg(feature = "peers")]
 use bvh_core::{Aabb, Node, Ray};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// A library with its settings, as a spec names it.
 ///
@@ -96,6 +98,16 @@ impl Peer {
     /// The names of all libraries.
     pub const NAMES: &[&str] = &["bvh", "obvhs", "tinybvh"];
 
+    /// Reads the settings of the library called `name`; `None` if there is none of this name.
+    pub fn read<'de, D: Deserializer<'de>>(name: &str, settings: D) -> Result<Option<Self>, D::Error> {
+        match name {
+            "bvh" => NoSettings::deserialize(settings).map(|settings| Some(Self::Bvh(settings))),
+            "obvhs" => Obvhs::deserialize(settings).map(|settings| Some(Self::Obvhs(settings))),
+            "tinybvh" => NoSettings::deserialize(settings).map(|settings| Some(Self::Tinybvh(settings))),
+            _ => Ok(None),
+        }
+    }
+
     /// The library's name.
     pub fn name(&self) -> &'static str {
         match self {
@@ -114,11 +126,9 @@ impl Peer {
     }
 
     /// Checks the ranges of the settings.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), OutOfRange> {
         match self {
-            Self::Obvhs(Obvhs { reinsertion: Some(ratio), .. }) if !(0.0..=100.0).contains(ratio) => {
-                Err(format!("reinsertion is {ratio}; accepted: 0 to 100"))
-            }
+            Self::Obvhs(settings) => (0.0..=100.0).check("reinsertion", &settings.reinsertion),
             _ => Ok(()),
         }
     }

@@ -8,26 +8,22 @@ use crate::measure::{Accelerator, Structure};
 use crate::run::rows::{RenderRow, RenderTimeRow};
 use crate::scenes::{Scene, fnv1a};
 use crate::{Error, run::rows::RunRow};
+use bvh_build::config;
 use bvh_core::Bvh;
-use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::time::Instant;
 
-/// The picture that is drawn with every run's tree; it frames the whole scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// In pixels, 1 to 10 000.
-    pub width: u32,
-    /// In pixels, 1 to 10 000.
-    pub height: u32,
-    /// `samples`² rays go through each pixel, 1 to 16. Default 1.
-    #[serde(default = "one")]
-    pub samples: u32,
-}
-
-fn one() -> u32 {
-    1
+config! {
+    serde;
+    /// The picture that is drawn with every run's tree; it frames the whole scene.
+    pub struct Config {
+        /// In pixels.
+        width: u32 = 320, in 1..=10_000;
+        /// In pixels.
+        height: u32 = 180, in 1..=10_000;
+        /// `samples`² rays go through each pixel.
+        samples: u32 = 1, in 1..=16;
+    }
 }
 
 /// The structures that are not trees of ours: their names in tables, and the names that `--accel` accepts.

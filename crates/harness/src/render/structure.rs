@@ -14,11 +14,7 @@ pub const ACCEPTED: &str = "brute, kdtree, bvh, wide, or the path of a .bvh file
 
 /// The structure that `--accel` names, built over the scene; trees by greedy Müller–Fellner division.
 pub fn by_name(name: &str, scene: &Scene) -> Result<Structure<'static>, Error> {
-    let refused = |source: BuildError| Error::Search {
-        scene: scene.name.clone(),
-        method: name.into(),
-        source: source.into(),
-    };
+    let refused = |source: BuildError| Error::search(&scene.name, name)(source);
     let greedy = || muller_fellner::Config::default().build(&scene.boxes).map_err(refused);
     match name {
         "brute" => Ok(Structure::Brute),

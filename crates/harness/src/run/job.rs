@@ -1,16 +1,20 @@
 //! One run of an experiment: a method on a scene, watched, and the rows of all that is measured of it.
 
+use crate::Error;
+use crate::measure::rays::Family;
+use crate::measure::{Query, empirical_cost};
 use crate::peers::{Built, Peer};
 use crate::report::Report;
 use crate::run::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow};
 use crate::run::store::FinishedRun;
 use crate::scenes::Scene;
 use crate::spec::{Contestant, Experiment, Labelled};
-use crate::{Error, measure::empirical_cost};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective, SahConstants};
-use bvh_search::{Budget, Event, Observer, Outcome, Problem, StopReason, exact, lower_bound, solve};
+use bvh_search::{
+    Budget, Event, Observer, Outcome, Problem, SearchError, StopReason, exact, lower_bound, solve,
+};
 use indicatif::ProgressBar;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -29,27 +33,22 @@ pub(crate) struct Job<'a> {
 
 /// The cost of the scene's greedy Müller–Fellner tree, the base of all ratios.
 pub(crate) fn base_cost(scene: &Scene, objective: &Objective) -> Result<f64, Error> {
-    let refused = |source| Error::Search {
-        scene: scene.name.clone(),
-        method: "muller_fellner, the base".into(),
-        source: bvh_search::SearchError::Build(source),
-    };
-    Ok(objective.cost(&muller_fellner::Config::default().build(&scene.boxes).map_err(refused)?))
+    let tree = muller_fellner::Config::default().build(&scene.boxes);
+    Ok(objective.cost(&tree.map_err(Error::search(&scene.name, "muller_fellner, the base"))?))
 }
 
 /// What is proven of the scene's internal area: the exact optimum where gaps are measured from it, else a lower bound
 /// if the experiment asks for one.
 fn bound(experiment: &Experiment, scene: &Scene) -> Result<Option<BoundRow>, Error> {
-    let refused =
-        |source| Error::Search { scene: scene.name.clone(), method: "the lower bound".into(), source };
     let lower_bound = if experiment.needs_optimum(scene.boxes.len()) {
-        solve(&exact::Config {}, &Problem::new(&scene.boxes), 0, Budget::default(), &()).map_err(refused)?.cost
+        let problem = Problem::new(&scene.boxes);
+        solve(&exact::Config {}, &problem, 0, Budget::default(), &()).map(|outcome| outcome.cost)
     } else if let Some(effort) = experiment.lower_bound {
-        let bound = lower_bound::internal_area(&scene.boxes, effort);
-        bound.map_err(bvh_search::SearchError::Build).map_err(refused)?
+        lower_bound::internal_area(&scene.boxes, effort).map_err(SearchError::Build)
     } else {
         return Ok(None);
     };
+    let lower_bound = lower_bound.map_err(Error::search(&scene.name, "the lower bound"))?;
     Ok(Some(BoundRow { scene: scene.name.clone(), objects: scene.boxes.len(), lower_bound }))
 }
 
@@ -59,112 +58,59 @@ pub(crate) fn perform(
     job: &Job,
     watch: &Watch,
 ) -> Result<Option<(FinishedRun, Bvh)>, Error> {
-    let Job { scene, base, labelled, repetition, .. } = *job;
-    let Labelled { label, method, .. } = labelled;
     if watch.cancelled() {
         return Ok(None);
     }
-    let seed = experiment.seed_of(&scene.name, labelled.seed_as.as_ref().unwrap_or(label), repetition);
-    let problem =
-        Problem { objective: experiment.objective, keep: &labelled.keep, ..Problem::new(&scene.boxes) };
+    let Job { scene, labelled, .. } = *job;
+    let seeds = labelled.seed_as.as_ref().unwrap_or(&labelled.label);
+    let seed = experiment.seed_of(&scene.name, seeds, job.repetition);
     let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
-    let names = || (scene.name.clone(), label.clone());
-    let (outcome, seconds) = match method {
-        Contestant::Ours(method) => {
-            let outcome = solve(method, &problem, seed, experiment.budget_of(labelled), &stopwatch);
-            let seconds = stopwatch.start.elapsed().as_secs_f64();
-            let outcome = outcome.map_err(|source| {
-                let (scene, method) = names();
-                Error::Search { scene, method, source }
-            })?;
-            (outcome, seconds)
-        }
-        Contestant::Peer(peer) => build_by(peer, scene, &experiment.objective, &stopwatch)?,
-    };
+    let (outcome, seconds) = solve_or_build(experiment, job, seed, &stopwatch)?;
     if watch.cancelled() {
         return Ok(None);
     }
-    let tree = &outcome.tree;
-    bvh_core::validate(tree, &scene.boxes).map_err(|source| {
-        let (scene, method) = names();
-        Error::InvalidTree { scene, method, source }
+    bvh_core::validate(&outcome.tree, &scene.boxes).map_err(|source| Error::InvalidTree {
+        scene: scene.name.clone(),
+        method: labelled.label.clone(),
+        source,
     })?;
-    let (scene_name, method) = names();
-    let internal_area = cost::internal_area(tree);
-    let run = RunRow {
-        scene: scene_name.clone(),
-        scene_kind: scene.kind.to_string(),
-        method: method.clone(),
-        seed,
-        repetition,
-        objects: scene.boxes.len(),
-        evaluations: outcome.evaluations,
-        work: outcome.work,
-        stop: outcome.stop,
-        cost: outcome.cost,
-        base_cost: base,
-        cost_over_base: if base > 0.0 { outcome.cost / base } else { 1.0 },
-        cost_over_root_area: cost::over_root_area(tree, internal_area),
-        internal_area,
-        goldsmith_salmon: cost::goldsmith_salmon(tree),
-        sah: cost::sah(tree, &SahConstants::default()),
-        nodes: tree.nodes.len(),
-        depth: tree.depth(),
-    };
-    let row = |event: &Event| HistoryRow {
-        scene: scene_name.clone(),
-        method: method.clone(),
-        seed,
-        repetition,
-        evaluations: event.evaluations,
-        work: event.work,
-        cost: event.cost,
-        incumbent: event.incumbent,
-    };
-    let history: Vec<HistoryRow> = outcome.history.iter().map(row).collect();
-    let ray_row = |config: &empirical_cost::Config| {
-        let (family, query) = (format!("{:?}", config.family), format!("{:?}", config.query));
-        // The same rays for all methods: their differences are then the trees'.
-        let ray_seed = experiment.seed_of(&scene_name, &format!("rays {family}"), 0);
-        let [family, query] = [family, query].map(|name| name.to_lowercase());
-        let named = RayRow {
-            scene: scene_name.clone(),
-            method: method.clone(),
-            seed,
-            repetition,
-            family,
-            query,
-            ..Default::default()
-        };
-        empirical_cost::measure(config, scene, tree, ray_seed, named)
-    };
-    let rays: Vec<RayRow> = experiment.rays.iter().map(ray_row).collect();
-    let clock = if experiment.reports.iter().any(Report::needs_clock) { stopwatch.seconds() } else { vec![] };
-    let clock_row = |(event, seconds)| ClockRow {
-        scene: scene_name.clone(),
-        method: method.clone(),
-        repetition,
-        event,
-        seconds,
-    };
-    let clock: Vec<ClockRow> = clock.into_iter().enumerate().map(clock_row).collect();
+    let solved = Solved { experiment, job, seed, outcome: &outcome, seconds };
+    let run = solved.run_row();
     let bounds = if job.first_of_scene { bound(experiment, scene)? } else { None };
     let (renders, render_times) = match &experiment.render {
-        Some(config) => config.measure(scene, tree, &run, seconds, job.first_of_scene)?,
+        Some(config) => config.measure(scene, &outcome.tree, &run, seconds, job.first_of_scene)?,
         None => Default::default(),
     };
-    let threads = rayon::current_num_threads();
-    let timing = TimingRow { scene: scene_name, method, seed, repetition, threads, seconds };
     let mut finished = FinishedRun::default();
     finished.add(&[run])?;
-    finished.add(&history)?;
-    finished.add(&[timing])?;
-    finished.add(&rays)?;
-    finished.add(&clock)?;
+    finished.add(&solved.history_rows())?;
+    finished.add(&[solved.timing_row()])?;
+    finished.add(&solved.ray_rows())?;
+    finished.add(&solved.clock_rows(&stopwatch))?;
     finished.add(bounds.as_slice())?;
     finished.add(&renders)?;
     finished.add(&render_times)?;
     Ok(Some((finished, outcome.tree)))
+}
+
+/// The tree of a job's method, and the seconds that it took.
+fn solve_or_build(
+    experiment: &Experiment,
+    job: &Job,
+    seed: u64,
+    stopwatch: &Stopwatch,
+) -> Result<(Outcome, f64), Error> {
+    let Job { scene, labelled, .. } = *job;
+    match &labelled.method {
+        Contestant::Ours(method) => {
+            let problem =
+                Problem { objective: experiment.objective, keep: &labelled.keep, ..Problem::new(&scene.boxes) };
+            let outcome = solve(method, &problem, seed, experiment.budget_of(labelled), stopwatch);
+            let seconds = stopwatch.start.elapsed().as_secs_f64();
+            Ok((outcome.map_err(Error::search(&scene.name, &labelled.label))?, seconds))
+        }
+        Contestant::Peer(peer) => build_by(peer, scene, &experiment.objective, stopwatch),
+    }
 }
 
 /// A tree by another library, as a search of one evaluation, and the seconds of the building alone.
@@ -181,6 +127,105 @@ fn build_by(
     stopwatch.note(seconds);
     let stop = StopReason::Completed;
     Ok((Outcome { tree, cost, evaluations: 1, work, stop, history: vec![event] }, seconds))
+}
+
+/// A job whose tree is found: makes the rows.
+struct Solved<'a> {
+    experiment: &'a Experiment,
+    job: &'a Job<'a>,
+    seed: u64,
+    outcome: &'a Outcome,
+    seconds: f64,
+}
+
+impl Solved<'_> {
+    /// What begins nearly every row: scene, method and repetition.
+    fn identity(&self) -> (String, String, u32) {
+        (self.job.scene.name.clone(), self.job.labelled.label.clone(), self.job.repetition)
+    }
+
+    fn run_row(&self) -> RunRow {
+        let Self { job: &Job { scene, base, .. }, seed, outcome, .. } = *self;
+        let tree = &outcome.tree;
+        let (scene_name, method, repetition) = self.identity();
+        let internal_area = cost::internal_area(tree);
+        RunRow {
+            scene: scene_name,
+            scene_kind: scene.kind.to_string(),
+            method,
+            seed,
+            repetition,
+            objects: scene.boxes.len(),
+            evaluations: outcome.evaluations,
+            work: outcome.work,
+            stop: outcome.stop,
+            cost: outcome.cost,
+            base_cost: base,
+            cost_over_base: if base > 0.0 { outcome.cost / base } else { 1.0 },
+            cost_over_root_area: cost::over_root_area(tree, internal_area),
+            internal_area,
+            goldsmith_salmon: cost::goldsmith_salmon(tree),
+            sah: cost::sah(tree, &SahConstants::default()),
+            nodes: tree.nodes.len(),
+            depth: tree.depth(),
+        }
+    }
+
+    fn history_rows(&self) -> Vec<HistoryRow> {
+        let row = |event: &Event| {
+            let Event { evaluations, work, cost, incumbent } = *event;
+            let (scene, method, repetition) = self.identity();
+            HistoryRow { scene, method, seed: self.seed, repetition, evaluations, work, cost, incumbent }
+        };
+        self.outcome.history.iter().map(row).collect()
+    }
+
+    fn timing_row(&self) -> TimingRow {
+        let (scene, method, repetition) = self.identity();
+        let threads = rayon::current_num_threads();
+        TimingRow { scene, method, seed: self.seed, repetition, threads, seconds: self.seconds }
+    }
+
+    /// When each event happened, if a report asks for it.
+    fn clock_rows(&self, stopwatch: &Stopwatch) -> Vec<ClockRow> {
+        if !self.experiment.reports.iter().any(Report::needs_clock) {
+            return vec![];
+        }
+        let row = |(event, seconds)| {
+            let (scene, method, repetition) = self.identity();
+            ClockRow { scene, method, repetition, event, seconds }
+        };
+        stopwatch.seconds().into_iter().enumerate().map(row).collect()
+    }
+
+    fn ray_rows(&self) -> Vec<RayRow> {
+        let Self { experiment, job: &Job { scene, .. }, seed, .. } = *self;
+        let row = |config: &empirical_cost::Config| {
+            let (family, of_family) = match config.family {
+                Family::Inside => ("inside", "rays Inside"),
+                Family::Lines => ("lines", "rays Lines"),
+            };
+            let query = match config.query {
+                Query::Any => "any",
+                Query::Nearest => "nearest",
+                Query::All => "all",
+            };
+            let (scene_name, method, repetition) = self.identity();
+            // Every method gets the same rays, so that differences between methods come from their trees.
+            let ray_seed = experiment.seed_of(&scene_name, of_family, 0);
+            let named = RayRow {
+                scene: scene_name,
+                method,
+                seed,
+                repetition,
+                family: family.into(),
+                query: query.into(),
+                ..Default::default()
+            };
+            empirical_cost::measure(config, scene, &self.outcome.tree, ray_seed, named)
+        };
+        experiment.rays.iter().map(row).collect()
+    }
 }
 
 /// Follows all runs: moves the bar, passes an interruption on.

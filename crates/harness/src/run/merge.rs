@@ -73,7 +73,7 @@ fn join(name: &str, parts: &[Part], out: &Path) -> Result<String, Error> {
     // Somebody may have edited it: no more runs are looked for than a spec could ask for.
     resolved
         .experiment
-        .check_runs()
+        .check_run_count()
         .map_err(|message| fail(format!("{}/resolved.toml: {message}", first.partial.display())))?;
     let of_scene: Vec<_> = resolved.experiment.runs().collect();
     let runs = of_scene.len() * resolved.scenes.len();

@@ -1,104 +1,128 @@
 //! What types alone do not say of a spec, part by part. Messages name the key, what was found, what would be accepted.
 
+use super::fault::Fault;
 use super::{Contestant, Experiment, Labelled, ranges};
 use crate::report::Report;
 use crate::{scenes::subset, stress};
-use bvh_search::{Budget, Method, Problem, solve};
+use bvh_build::config::Accepts;
+use bvh_build::{BuildError, OutOfRange};
+use bvh_core::cost::{Objective, SahConstants};
+use bvh_search::{Budget, Method, Problem, SearchError, solve};
 use std::collections::HashSet;
 
 /// Most runs of an experiment.
 const MOST_RUNS: u64 = 10_000_000;
 
 impl Experiment {
-    /// Everything that types alone do not say.
-    pub(super) fn check(&self) -> Result<(), String> {
+    /// Checks everything that types and the ranges of single keys leave open, but methods and reports.
+    pub(super) fn check_together(&self) -> Result<(), OutOfRange> {
+        if self.question.trim().is_empty() {
+            return Err(OutOfRange::new("question", "empty", "what the experiment asks, for its readers"));
+        }
+        if let Objective::Sah(SahConstants { traversal, intersection }) = &self.objective {
+            (0.0..).check("objective.sah.traversal", traversal)?;
+            (0.0..).check("objective.sah.intersection", intersection)?;
+        }
         self.check_scenes()?;
-        self.check_runs()?;
-        ranges::check(self)?;
-        self.check_labels()?;
-        self.methods.iter().enumerate().try_for_each(|(index, method)| self.check_method(index, method))?;
-        self.reports.iter().enumerate().try_for_each(|(index, report)| self.check_report(index, report))
+        self.check_run_count()
     }
 
-    /// Their names; whether they are there is found when they are loaded.
-    fn check_scenes(&self) -> Result<(), String> {
+    /// Checks the scenes' names; whether the scenes are there is found when they are loaded.
+    fn check_scenes(&self) -> Result<(), OutOfRange> {
         if self.suite.is_some() {
             if let Some(unknown) = self.scenes.iter().find(|id| stress::by_id(id).is_none()) {
-                return Err(format!("scene {unknown} is no case of the suite; accepted: S01 to S45"));
+                return Err(OutOfRange::new(
+                    "scenes",
+                    format!("{unknown:?}"),
+                    "cases of the suite, S01 to S45",
+                ));
             }
         } else if self.scenes.is_empty() {
-            return Err("scenes is empty; accepted: at least one name or path".into());
+            return Err(OutOfRange::new("scenes", "empty", "at least one name or path"));
         }
         match self.scenes.iter().find(|name| subset::names(name) == 0) {
-            Some(none) => Err(format!("scenes: {none:?} ends before it begins; accepted: A..B with A up to B")),
+            Some(none) => Err(OutOfRange::new("scenes", format!("{none:?}"), "A..B with A up to B")),
             None => Ok(()),
         }
     }
 
-    /// That there are some, and not too many.
-    pub(crate) fn check_runs(&self) -> Result<(), String> {
+    /// Checks that there are runs, and not too many.
+    pub(crate) fn check_run_count(&self) -> Result<(), OutOfRange> {
         let scenes = self.scenes.iter().map(|name| subset::names(name)).fold(0, u64::saturating_add);
         let runs =
             [self.methods.len() as u64, self.repetitions.into()].into_iter().fold(scenes, u64::saturating_mul);
         if runs > MOST_RUNS {
-            return Err(format!(
-                "scenes, methods and repetitions make {runs} runs; accepted: up to {MOST_RUNS}"
-            ));
+            let product = "the product of the numbers of scenes, methods and repetitions";
+            return Err(OutOfRange::new(product, format!("{runs} runs"), format!("up to {MOST_RUNS}")));
         }
         if self.methods.is_empty() {
-            return Err("methods is empty; accepted: at least one table with a `method`".into());
+            return Err(OutOfRange::new("methods", "empty", "at least one table with a `method`"));
         }
         Ok(())
     }
 
-    /// No two methods have the same.
-    fn check_labels(&self) -> Result<(), String> {
+    /// Checks that labels are unique, and the parameters of every method.
+    pub(super) fn check_methods(&self) -> Result<(), Fault> {
         let mut labels = HashSet::new();
-        match self.methods.iter().enumerate().find(|(_, method)| !labels.insert(&method.label)) {
-            Some((index, Labelled { label, .. })) => {
-                Err(format!("methods[{index}].label is {label:?} for the second time; accepted: unique labels"))
+        for (index, labelled) in self.methods.iter().enumerate() {
+            let at = |fault: Fault| fault.below(&format!("methods[{index}]"));
+            if !labels.insert(&labelled.label) {
+                let found = format!("{:?} for the second time", labelled.label);
+                return Err(at(Fault::new("label", found, "unique labels")));
             }
-            None => Ok(()),
+            self.check_method(labelled).map_err(at)?;
         }
+        Ok(())
     }
 
-    /// Its parameters; of another library, whether it is compiled in.
-    fn check_method(&self, index: usize, labelled: &Labelled) -> Result<(), String> {
-        let label = &labelled.label;
-        match &labelled.method {
-            Contestant::Peer(_) if self.suite.is_some() => {
-                Err(format!("{label} is another library; accepted in the suite: its key `peers`"))
+    fn check_method(&self, Labelled { method, .. }: &Labelled) -> Result<(), Fault> {
+        match method {
+            Contestant::Peer(peer) if self.suite.is_some() => {
+                let found = format!("{:?}, another library", peer.name());
+                Err(Fault::new("method", found, "in the suite: its key `peers`"))
             }
             Contestant::Peer(peer) => match peer.missing_feature() {
                 Some(feature) => {
-                    let (name, ours) = (peer.name(), Method::NAMES.join(", "));
-                    Err(format!(
-                        "methods[{index}].method is {name:?}, another library, which needs `cargo run --release -p \
-                         harness --features {feature}`; accepted without: {ours}"
-                    ))
+                    let found = format!(
+                        "{:?}, another library, which needs `cargo run --release -p harness --features {feature}`",
+                        peer.name()
+                    );
+                    Err(Fault::new("method", found, format!("without it {}", Method::NAMES.join(", "))))
                 }
-                None => peer.check().map_err(|error| format!("methods[{index}] ({label}): {error}")),
+                None => Ok(peer.check()?),
             },
             Contestant::Ours(method) => {
-                // A search checks its own parameters before it looks at the scene: let it, on the scene of nothing.
+                // A search checks its parameters before it looks at the scene, which is empty here.
                 let budget = Budget { max_evaluations: Some(1), max_work: None };
                 let nothing = Problem { objective: self.objective, ..Problem::new(&[]) };
-                let tried = solve(method, &nothing, 0, budget, &());
-                tried.map(drop).map_err(|error| format!("methods[{index}] ({label}): {error}"))
+                match solve(method, &nothing, 0, budget, &()) {
+                    Err(SearchError::OutOfRange(error) | SearchError::Build(BuildError::OutOfRange(error))) => {
+                        Err(error.into())
+                    }
+                    Err(error) => Err(Fault::new("method", error, "parameters that it runs with")),
+                    Ok(_) => Ok(()),
+                }
             }
         }
     }
 
-    /// That it speaks of methods that there are.
-    fn check_report(&self, index: usize, report: &Report) -> Result<(), String> {
-        let known: Vec<&str> = self.methods.iter().map(|method| method.label.as_str()).collect();
-        match report.labels().into_iter().find(|label| !known.contains(&label.as_str())) {
-            Some(label) => {
-                let (known, key) = (known.join(", "), key_of(report, label).unwrap_or_default());
-                Err(format!("reports[{index}] names method {label:?}{key}; accepted: {known}"))
+    /// Checks that reports name only methods that there are.
+    pub(super) fn check_reports(&self) -> Result<(), Fault> {
+        ranges::check(self)?;
+        let known: HashSet<&str> = self.methods.iter().map(|method| method.label.as_str()).collect();
+        for (index, report) in self.reports.iter().enumerate() {
+            if let Some(unknown) = report.labels().into_iter().find(|label| !known.contains(label.as_str())) {
+                let mut known: Vec<&str> = known.into_iter().collect();
+                known.sort_unstable();
+                let key = key_of(report, unknown).unwrap_or_default();
+                return Err(Fault::new(
+                    format!("reports[{index}]{key}"),
+                    format!("{unknown:?}, no label of a method"),
+                    known.join(", "),
+                ));
             }
-            None => Ok(()),
         }
+        Ok(())
     }
 }
 
@@ -122,5 +146,5 @@ fn key_of(report: &Report, label: &str) -> Option<String> {
         Some(found?.0.clone())
     };
     let inner = value.as_array().and_then(|tables| tables.iter().find_map(of_table));
-    Some(inner.map_or_else(|| format!(" under {key}"), |inner| format!(" under {inner} of {key}")))
+    Some(inner.map_or_else(|| format!(".{key}"), |inner| format!(".{key}.{inner}")))
 }

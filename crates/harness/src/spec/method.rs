@@ -1,12 +1,14 @@
 //! One entry of a spec's `methods`: what is run, with its label, limits and seeds.
 
+use super::fault::{self, Fault};
 use crate::peers::Peer;
 use bvh_search::{Budget, Method, Omission};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
+use toml::{Table, Value};
 
 /// A method with the label that tables and figures show, by default its name, and limits of its own, if it has any.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "toml::Table", into = "toml::Table")]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(into = "Table")]
 pub struct Labelled {
     /// Unique within the experiment.
     pub label: String,
@@ -29,54 +31,58 @@ pub enum Contestant {
     Peer(Peer),
 }
 
-impl TryFrom<toml::Table> for Labelled {
-    type Error = String;
+/// The keys of an entry besides those of its method.
+#[derive(Default, Serialize, Deserialize)]
+#[serde(default)]
+struct Frame {
+    label: Option<String>,
+    budget: Option<Budget>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    keep: Vec<Omission>,
+    seed_as: Option<String>,
+}
 
-    fn try_from(mut table: toml::Table) -> Result<Self, String> {
-        let known = |name: &String| Method::NAMES.iter().chain(Peer::NAMES).any(|known| known == name);
-        let mut text = |key: &str| match table.remove(key) {
-            Some(toml::Value::String(text)) => Ok(Some(text)),
-            Some(found) => Err(format!("{key} is {found}; accepted: a text")),
-            None => Ok(None),
+impl Labelled {
+    /// A method under its own name, without limits.
+    pub fn new(method: Method) -> Self {
+        let label = method.name().into();
+        Self { label, method: Contestant::Ours(method), budget: None, keep: vec![], seed_as: None }
+    }
+
+    /// Reads an entry, and names the key that an error is about.
+    pub(super) fn read(mut table: Table) -> Result<Self, Fault> {
+        let frame = ["label", "budget", "keep", "seed_as"];
+        let frame = frame.into_iter().filter_map(|key| table.remove_entry(key)).collect();
+        let Frame { label, budget, keep, seed_as } = fault::deserialize(frame)?;
+        let tag = table.remove("method");
+        let accepted = || format!("{}, or the libraries {}", Method::NAMES.join(", "), Peer::NAMES.join(", "));
+        let Some(Value::String(name)) = &tag else {
+            let found = tag.map_or("missing".into(), |found| found.to_string());
+            return Err(Fault::new("method", found, accepted()));
         };
-        let (label, seed_as) = (text("label")?, text("seed_as")?);
-        let budget = table.remove("budget").map(Budget::deserialize).transpose();
-        let budget = budget.map_err(|error| format!("budget: {}", error.message()))?;
-        let keep = table.remove("keep").map_or(Ok(vec![]), Vec::deserialize);
-        let keep = keep.map_err(|error| format!("keep: {}", error.message()))?;
-        let name = match table.get("method") {
-            Some(toml::Value::String(name)) if known(name) => name.clone(),
-            found => {
-                let found = found.map_or_else(|| "is missing".to_owned(), |found| format!("is {found}"));
-                let (ours, peers) = (Method::NAMES.join(", "), Peer::NAMES.join(", "));
-                return Err(format!("method {found}; accepted: {ours}, or the libraries {peers}"));
+        let method = fault::tracked(table, |deserializer| {
+            if Method::NAMES.contains(&name.as_str()) {
+                Method::read(name, deserializer).map(|method| method.map(Contestant::Ours))
+            } else {
+                Peer::read(name, deserializer).map(|peer| peer.map(Contestant::Peer))
             }
-        };
-        let method = if Method::NAMES.contains(&name.as_str()) {
-            Method::deserialize(table).map(Contestant::Ours)
-        } else {
-            Peer::deserialize(table).map(Contestant::Peer)
-        };
-        let method = method.map_err(|error| format!("{name}: {}", error.message()))?;
-        Ok(Self { label: label.unwrap_or(name), method, budget, keep, seed_as })
+        })?;
+        let Some(method) = method else { return Err(Fault::new("method", format!("{name:?}"), accepted())) };
+        Ok(Self { label: label.unwrap_or_else(|| name.clone()), method, budget, keep, seed_as })
     }
 }
 
-impl From<Labelled> for toml::Table {
-    fn from(labelled: Labelled) -> Self {
-        let mut table = Self::try_from(&labelled.method).unwrap_or_default();
-        table.insert("label".into(), labelled.label.into());
-        if let Some(budget) = labelled.budget.and_then(|budget| toml::Value::try_from(budget).ok()) {
-            table.insert("budget".into(), budget);
-        }
-        if !labelled.keep.is_empty()
-            && let Ok(keep) = toml::Value::try_from(labelled.keep)
-        {
-            table.insert("keep".into(), keep);
-        }
-        if let Some(label) = labelled.seed_as {
-            table.insert("seed_as".into(), label.into());
-        }
+impl<'de> Deserialize<'de> for Labelled {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Self::read(Table::deserialize(deserializer)?).map_err(serde::de::Error::custom)
+    }
+}
+
+impl From<Labelled> for Table {
+    fn from(Labelled { label, method, budget, keep, seed_as }: Labelled) -> Self {
+        let mut table = Self::try_from(&method).unwrap_or_default();
+        let frame = Frame { label: Some(label), budget, keep, seed_as };
+        table.extend(Self::try_from(&frame).unwrap_or_default());
         table
     }
 }

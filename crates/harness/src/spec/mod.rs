@@ -1,10 +1,10 @@
 //! Experiment specs: TOML in, a checked [`Experiment`] out, or an error with file, key, found and accepted.
 //!
-//! `read` is the way from text to values, `check` what types alone do not say, `ranges`
-//! that of numbers, `method` one entry of `methods`.
+//! [`read`] leads from text to values, [`check`] refuses what types alone do not, [`fault`] says where and what is wrong,
+//! and [`method`] is one entry of `methods`.
 
 mod check;
-mod culprit;
+mod fault;
 mod method;
 mod ranges;
 mod read;
@@ -13,74 +13,57 @@ use crate::measure::{empirical_cost, speed};
 use crate::report::Report;
 use crate::scenes::fnv1a;
 use crate::{render, stress};
+use bvh_build::config;
+use bvh_build::config::Itself;
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, exact};
 pub use method::{Contestant, Labelled};
 pub use read::Overrides;
-use serde::{Deserialize, Serialize};
 
-/// A checked experiment: every method on every scene, so many times, and how to report it.
-///
-/// These are also the keys of a spec, except that `quick` may hold a table of keys that replace others under
-/// `--quick`. Serialised, with every default spelled out, it is `resolved.toml`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Experiment {
-    /// Name of the results folder: the spec file's stem, `-quick` appended under `--quick`.
-    #[serde(default)]
-    pub name: String,
-    /// What the experiment asks, for its readers.
-    pub question: String,
-    /// A measurement over the suite of stiff cases, in place of runs on scenes. Default none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub suite: Option<stress::Measure>,
-    /// Names or paths of the scenes; `A..B` after a colon stands for all numbers from A to B. With `suite`, names of
-    /// cases, none for all.
-    #[serde(default)]
-    pub scenes: Vec<String>,
-    /// Scenes that are left out, with a note, where they have not been fetched. Default none.
-    #[serde(default)]
-    pub optional_scenes: Vec<String>,
-    /// Every run's seed is derived from this one, the experiment, the scene, the method and the repetition. Default 1.
-    #[serde(default = "one")]
-    pub seed: u64,
-    /// Runs of every method on every scene, at least 1. Default 1.
-    #[serde(default = "one")]
-    pub repetitions: u32,
-    /// One run at a time, methods in turns, because their times are the result. Default false.
-    #[serde(default)]
-    pub sequential: bool,
-    /// Threads that every run has in place of all, at least 1. Default none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub threads: Option<u16>,
-    /// What `cost` means. Default the paper's objective.
-    #[serde(default)]
-    pub objective: Objective,
-    /// Limits of every run. Default none.
-    #[serde(default)]
-    pub budget: Budget,
-    /// Effort of a lower bound of every scene's internal area. Default none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lower_bound: Option<u32>,
-    /// What is run, at least one; with `suite`, none for every method of the registry.
-    #[serde(default)]
-    pub methods: Vec<Labelled>,
-    /// Measurements of every run's tree with random rays. Default none.
-    #[serde(default)]
-    pub rays: Vec<empirical_cost::Config>,
-    /// A picture drawn with every run's tree, and with brute force and a KD-tree. Default none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub render: Option<render::experiment::Config>,
-    /// Rays traced through the tree of every method's first run, in all layouts, in turns. Default none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tracing: Option<speed::Config>,
-    /// Tables and figures made from the rows. Default none.
-    #[serde(default)]
-    pub reports: Vec<Report>,
-}
-
-fn one<T: From<u8>>() -> T {
-    1.into()
+config! {
+    serde;
+    /// A checked experiment: every method on every scene, a number of times, and how to report it.
+    ///
+    /// These are also the keys of a spec, except that `quick` may hold a table of keys that replace others under
+    /// `--quick`. Serialised, with every default spelled out, it is `resolved.toml`.
+    pub struct Experiment {
+        /// Name of the results folder, from the spec's file.
+        name: String;
+        /// The question that the experiment answers, for its readers.
+        question: String;
+        /// A measurement over the suite of stiff cases, in place of runs on scenes.
+        suite: Option<stress::Measure>, in Itself;
+        /// Names or paths of the scenes; `A..B` after a colon stands for all numbers from A to B. With `suite`, names
+        /// of cases, none for all.
+        scenes: Vec<String>;
+        /// Scenes that are left out, with a note, where they have not been fetched.
+        optional_scenes: Vec<String>;
+        /// Every run's seed is derived from this one, the experiment, the scene, the method and the repetition.
+        seed: u64 = 1, in 0..=i64::MAX as u64;
+        /// Runs of every method on every scene.
+        repetitions: u32 = 1, in 1..;
+        /// Whether runs are done one at a time, methods in turns, because their times are the result.
+        sequential: bool;
+        /// Threads of every run; by default those of the program.
+        threads: Option<u16>, in 1..=1024;
+        /// What `cost` means; by default the paper's objective.
+        objective: Objective;
+        /// Limits of every run; by default none.
+        budget: Budget;
+        /// Effort of a lower bound of every scene's internal area; by default no bound is sought.
+        lower_bound: Option<u32>;
+        /// What is run, at least one; with `suite`, none for every method of the registry.
+        methods: Vec<Labelled>;
+        /// Measurements of every run's tree with random rays.
+        rays: Vec<empirical_cost::Config>, in Itself;
+        /// A picture drawn with every run's tree, and with brute force and a KD-tree.
+        render: Option<render::experiment::Config>, in Itself;
+        /// Rays traced through the tree of every method's first run, in all layouts, in turns.
+        tracing: Option<speed::Config>, in Itself;
+        /// Tables and figures made from the rows.
+        reports: Vec<Report>;
+    }
+    check Self::check_together;
 }
 
 impl Experiment {

@@ -3,46 +3,20 @@
 //! Parameters of methods are left to the methods, which check them for callers without a spec too.
 
 use super::Experiment;
+use super::fault::Fault;
 use crate::report::Report;
 use std::ops::Bound::{self, Excluded, Included, Unbounded};
 use std::ops::RangeBounds;
 
-/// Most rays of a kind, all in memory at once.
-const MOST_RAYS: f64 = 1e8;
-
 type Range = (Bound<f64>, Bound<f64>);
 
-const ANY: Range = (Unbounded, Unbounded);
 const NOT_NEGATIVE: Range = (Included(0.0), Unbounded);
 const POSITIVE: Range = (Excluded(0.0), Unbounded);
 const SOME: Range = (Included(1.0), Unbounded);
 
-const fn from_one_to(most: f64) -> Range {
-    (Included(1.0), Included(most))
-}
-
 /// Keys without indices, with their range. Of a table whose keys are names, or of an array, the key stands for all in
 /// it.
 const RANGES: &[(&str, Range)] = &[
-    ("seed", NOT_NEGATIVE),
-    ("repetitions", SOME),
-    // As --jobs.
-    ("threads", from_one_to(1024.0)),
-    ("lower_bound", NOT_NEGATIVE),
-    ("budget", NOT_NEGATIVE),
-    ("objective.sah", NOT_NEGATIVE),
-    ("suite.stability.work_per_object", SOME),
-    ("suite.stability.rays", from_one_to(MOST_RAYS)),
-    ("suite.stability.seconds_per_peer", SOME),
-    ("suite.precision.objects", (Included(3.0), Included(1e7))),
-    ("suite.precision.repetitions", SOME),
-    ("rays.count", SOME),
-    ("render.width", from_one_to(1e4)),
-    ("render.height", from_one_to(1e4)),
-    ("render.samples", from_one_to(16.0)),
-    ("tracing.count", from_one_to(MOST_RAYS)),
-    ("tracing.rounds", from_one_to(MOST_RAYS)),
-    ("tracing.cameras", ANY),
     ("reports.at_seconds", POSITIVE),
     ("reports.best_of", SOME),
     ("reports.columns.best_of", SOME),
@@ -58,16 +32,10 @@ const RANGES: &[(&str, Range)] = &[
 ];
 
 /// Checks all numbers but those of methods, and what several numbers must be together.
-pub(super) fn check(experiment: &Experiment) -> Result<(), String> {
-    // More than a spec can say; the command line can.
-    if i64::try_from(experiment.seed).is_err() {
-        return Err(format!("seed is {}; accepted: 0 to {}", experiment.seed, i64::MAX));
-    }
-    let table = without_methods(experiment).map_err(|error| error.to_string())?;
+pub(super) fn check(experiment: &Experiment) -> Result<(), Fault> {
+    let table = without_methods(experiment).map_err(|error| Fault::new("a value", error, "TOML"))?;
     numbers(&table, &mut |shown, key, found| match range(key) {
-        Some(range) if !range.contains(&found) => {
-            Err(format!("{shown} is {found}; accepted: {}", in_words(range)))
-        }
+        Some(range) if !range.contains(&found) => Err(Fault::new(shown, found, in_words(range))),
         _ => Ok(()),
     })?;
     experiment.reports.iter().enumerate().try_for_each(|(index, report)| together(index, report))
@@ -97,8 +65,8 @@ fn in_words(range: Range) -> String {
 /// Calls `visit` with every number, its key as messages show it, and its key without indices.
 fn numbers(
     value: &toml::Value,
-    visit: &mut impl FnMut(&str, &str, f64) -> Result<(), String>,
-) -> Result<(), String> {
+    visit: &mut impl FnMut(&str, &str, f64) -> Result<(), Fault>,
+) -> Result<(), Fault> {
     let mut open = vec![(String::new(), String::new(), value)];
     while let Some((shown, key, value)) = open.pop() {
         let below = |name: &String| {
@@ -126,9 +94,9 @@ fn numbers(
 }
 
 /// Lists of a report: not empty, in order, of the length of another.
-fn together(index: usize, report: &Report) -> Result<(), String> {
+fn together(index: usize, report: &Report) -> Result<(), Fault> {
     let refuse = |key: &str, found: String, accepted: &str| {
-        Err(format!("reports[{index}].{key} is {found}; accepted: {accepted}"))
+        Err(Fault::new(format!("reports[{index}].{key}"), found, accepted))
     };
     if report.labels().is_empty() {
         let key = match report {
@@ -183,42 +151,5 @@ fn together(index: usize, report: &Report) -> Result<(), String> {
             refuse(&format!("paper.{scene}"), format!("a list of {} numbers", numbers.len()), &accepted)
         }
         None => Ok(()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::Overrides;
-    use super::*;
-    use crate::peers::Peer;
-    use std::path::Path;
-
-    #[test]
-    fn every_number_of_the_committed_experiments_has_a_range() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments");
-        let mut count = 0;
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            let text = std::fs::read_to_string(&path).unwrap();
-            let Ok(experiment) = Experiment::parse(&path, &text, &Overrides::default()) else {
-                // Other libraries may not be compiled in.
-                assert!(Peer::NAMES.iter().any(|name| text.contains(name)), "{}", path.display());
-                continue;
-            };
-            numbers(&without_methods(&experiment).unwrap(), &mut |shown, key, _| {
-                assert!(range(key).is_some(), "{}: {shown}", path.display());
-                count += 1;
-                Ok(())
-            })
-            .unwrap();
-        }
-        assert!(count > 100, "{count}");
-    }
-
-    #[test]
-    fn a_key_has_the_range_of_the_table_that_it_is_in_and_of_no_namesake() {
-        assert_eq!(range("reports.paper.escher"), Some(POSITIVE));
-        assert_eq!(range("reports.paperback"), None);
-        assert_eq!(range("tracing.cameras.escher.eye"), Some(ANY));
     }
 }

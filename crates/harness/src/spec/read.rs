@@ -1,10 +1,14 @@
-//! From a spec's text to an [`Experiment`]: what the command line changes, and which key is at fault.
+//! From a spec's text to a checked [`Experiment`], with what the command line changes.
 
-use super::{Contestant, Experiment, Labelled};
-use crate::{Error, spec::culprit};
+use super::fault::{self, Fault, line_of};
+use super::{Experiment, Labelled};
+use crate::Error;
+use crate::files;
+use crate::report::Report;
+use bvh_build::Check;
 use bvh_search::Method;
-use serde::Deserialize;
 use std::path::Path;
+use toml::{Table, Value};
 
 /// What the command line changes in every spec.
 #[derive(Clone, Debug, Default)]
@@ -20,43 +24,44 @@ pub struct Overrides {
 impl Experiment {
     /// Reads and checks the spec at `path`. Does not load its scenes.
     pub fn read(path: &Path, overrides: &Overrides) -> Result<Self, Error> {
-        let fail = |error: std::io::Error| Error::Spec { file: path.to_owned(), message: error.to_string() };
-        Self::parse(path, &std::fs::read_to_string(path).map_err(fail)?, overrides)
+        Self::parse(path, &files::read_text(path)?, overrides)
     }
 
     /// Reads and checks a spec's text; `path` gives it its name.
     pub fn parse(path: &Path, text: &str, overrides: &Overrides) -> Result<Self, Error> {
-        let fail = |message: String| Error::Spec { file: path.to_owned(), message };
-        let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| fail(error.to_string()))?;
+        let refuse = |message: String| Error::Spec { file: path.to_owned(), message };
+        let table: Table = text.parse().map_err(|error: toml::de::Error| refuse(error.to_string()))?;
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        Self::from_table(table, &name, overrides).map_err(|fault| {
+            // A key that `quick` replaces stands there, not where it is read.
+            let quick = overrides.quick.then(|| line_of(text, &format!("quick.{}", fault.key))).flatten();
+            let line = quick.or_else(|| line_of(text, &fault.key));
+            refuse(line.map_or_else(|| fault.to_string(), |line| format!("line {line}: {fault}")))
+        })
+    }
+
+    fn from_table(mut table: Table, name: &str, overrides: &Overrides) -> Result<Self, Fault> {
         if let Some((key, value)) = never_right(&table) {
-            return Err(fail(format!("{key} is {value}; accepted under any key: finite numbers, no dates")));
+            return Err(Fault::new(key, value, "under any key finite numbers, and no dates"));
         }
+        if let Some(found) = table.get("name") {
+            return Err(Fault::new("name", found, "none, the file's name is used"));
+        }
+        let mut name = name.to_owned();
         let quick = table.remove("quick");
-        let mut name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        // Parsed from the text where possible, so that errors show its line.
-        let mut experiment: Self = if overrides.quick || quick.is_some() {
-            if overrides.quick {
-                name += "-quick";
-                match quick {
-                    Some(toml::Value::Table(quick)) => replace(&mut table, quick),
-                    Some(found) => {
-                        return Err(fail(format!("quick is {found}; accepted: a table of keys to replace")));
-                    }
-                    None => {}
-                }
+        if overrides.quick {
+            name += "-quick";
+            match quick {
+                Some(Value::Table(quick)) => replace(&mut table, quick),
+                Some(found) => return Err(Fault::new("quick", found, "a table of keys to replace")),
+                None => {}
             }
-            Self::deserialize(table.clone())
-        } else {
-            toml::from_str(text)
         }
-        .map_err(|error| fail(explain(&error, table)))?;
-        if !experiment.name.is_empty() {
-            return Err(fail(format!(
-                "name is {:?}; accepted: none, the file's name is used",
-                experiment.name
-            )));
-        }
-        experiment.name = name;
+        // Serde forgets the path to an error within a table that says itself of which type it is.
+        let methods = list(&mut table, "methods", Labelled::read)?;
+        let reports = list(&mut table, "reports", fault::deserialize::<Report>)?;
+        let mut experiment: Self = fault::deserialize(table)?;
+        (experiment.name, experiment.methods, experiment.reports) = (name, methods, reports);
         if let Some(seed) = overrides.seed {
             experiment.seed = seed;
         }
@@ -65,30 +70,37 @@ impl Experiment {
             experiment.optional_scenes.clear();
         }
         if experiment.suite.is_some() && experiment.methods.is_empty() {
-            let labelled = |method: Method| Labelled {
-                label: method.name().into(),
-                method: Contestant::Ours(method),
-                budget: None,
-                keep: vec![],
-                seed_as: None,
-            };
-            experiment.methods = Method::all().into_iter().map(labelled).collect();
+            experiment.methods = Method::all().into_iter().map(Labelled::new).collect();
         }
-        experiment.check().map_err(fail)?;
+        experiment.check()?;
+        experiment.check_methods()?;
+        experiment.check_reports()?;
         Ok(experiment)
     }
 }
 
-/// The first value that no key takes, with its key: a number that is none or infinite, or a date.
-fn never_right(table: &toml::Table) -> Option<(String, &toml::Value)> {
-    fn within(key: String, value: &toml::Value) -> Option<(String, &toml::Value)> {
+/// Takes the list of tables under `key` out of a spec, and reads each table by `read`.
+fn list<T>(table: &mut Table, key: &str, read: impl Fn(Table) -> Result<T, Fault>) -> Result<Vec<T>, Fault> {
+    let entries = match table.remove(key) {
+        None => return Ok(vec![]),
+        Some(Value::Array(entries)) => entries,
+        Some(found) => return Err(Fault::new(key, found, "a list of tables")),
+    };
+    let read = |(at, entry): (usize, Value)| match entry {
+        Value::Table(entry) => read(entry).map_err(|fault| fault.below(&format!("{key}[{at}]"))),
+        found => Err(Fault::new(format!("{key}[{at}]"), found, "a table")),
+    };
+    entries.into_iter().enumerate().map(read).collect()
+}
+
+/// The first value that no key takes, with its key: a number that is infinite or NaN, or a date.
+fn never_right(table: &Table) -> Option<(String, &Value)> {
+    fn within(key: String, value: &Value) -> Option<(String, &Value)> {
         match value {
-            toml::Value::Float(number) if !number.is_finite() => Some((key, value)),
-            toml::Value::Datetime(_) => Some((key, value)),
-            toml::Value::Table(table) => {
-                never_right(table).map(|(inner, value)| (format!("{key}.{inner}"), value))
-            }
-            toml::Value::Array(array) => {
+            Value::Float(number) if !number.is_finite() => Some((key, value)),
+            Value::Datetime(_) => Some((key, value)),
+            Value::Table(table) => never_right(table).map(|(inner, value)| (format!("{key}.{inner}"), value)),
+            Value::Array(array) => {
                 array.iter().enumerate().find_map(|(index, value)| within(format!("{key}[{index}]"), value))
             }
             _ => None,
@@ -97,23 +109,11 @@ fn never_right(table: &toml::Table) -> Option<(String, &toml::Value)> {
     table.iter().find_map(|(key, value)| within(key.clone(), value))
 }
 
-/// What the parser says, and the key that it is about.
-fn explain(error: &toml::de::Error, table: toml::Table) -> String {
-    let read =
-        |table| Experiment::deserialize(table).err().map(|error: toml::de::Error| error.message().to_owned());
-    let said = error.to_string();
-    let shown = if error.span().is_some() { &said } else { error.message() };
-    match culprit::find(table, read) {
-        Some(key) => format!("{} (key {key})", shown.trim()),
-        None => said.trim().to_owned(),
-    }
-}
-
 /// Replaces keys of `table` by those of `by`, tables key by key.
-fn replace(table: &mut toml::Table, by: toml::Table) {
+fn replace(table: &mut Table, by: Table) {
     for (key, value) in by {
         match (table.get_mut(&key), value) {
-            (Some(toml::Value::Table(old)), toml::Value::Table(new)) => replace(old, new),
+            (Some(Value::Table(old)), Value::Table(new)) => replace(old, new),
             (_, value) => {
                 table.insert(key, value);
             }

@@ -17,17 +17,27 @@ mod table;
 pub mod tracing;
 pub mod transform;
 
+use bvh_build::OutOfRange;
 pub use case::{Case, Check, EXACT_OBJECTS, Part, Size, is_builder, methods};
 pub use cell::Cell;
 pub use promise::{Broken, Promise, Verdict};
 pub use table::{CASES, by_id};
 
 /// A measurement over the suite, as a spec asks for it.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
     /// Every case with every method.
     Stability(stability::Config),
     /// Areas in f32 and f64 against exact ones.
     Precision(precision::Config),
+}
+
+impl bvh_build::Check for Measure {
+    fn check(&self) -> Result<(), OutOfRange> {
+        match self {
+            Self::Stability(config) => config.check().map_err(|error| error.below("stability")),
+            Self::Precision(config) => config.check().map_err(|error| error.below("precision")),
+        }
+    }
 }

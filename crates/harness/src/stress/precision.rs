@@ -10,6 +10,7 @@ use crate::figures::{self, Axis, Figure, Layer, Panel};
 use crate::run::rows::to_bytes;
 use crate::run::store::Store;
 use crate::scenes::stiff;
+use bvh_build::config;
 use bvh_core::{Aabb, Bvh, Node};
 use num_bigint::{BigInt, BigUint};
 use num_traits::Zero;
@@ -18,14 +19,15 @@ use std::ops::Add;
 use std::path::Path;
 use std::time::Instant;
 
-/// What is measured.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// Objects per scene, at least 3.
-    pub objects: usize,
-    /// Builds per time; the shortest counts. At least 1.
-    pub repetitions: u32,
+config! {
+    serde;
+    /// What is measured.
+    pub struct Config {
+        /// Objects per scene.
+        objects: usize = 1500, in 3..=10_000_000;
+        /// Builds per time; the shortest counts.
+        repetitions: u32 = 7, in 1..;
+    }
 }
 
 /// One kind of number on one scene, as written to `precision.csv`.

@@ -12,28 +12,25 @@ use crate::figures::{self, HeatMap, Key};
 use crate::run::rows::{read, to_bytes};
 use crate::run::store::Store;
 use crate::spec::{Contestant, Labelled};
+use bvh_build::config;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
-/// What is run.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// How large the scenes of builders are.
-    pub builders: Size,
-    /// Nodes per object that a search may make or visit.
-    pub work_per_object: u64,
-    /// Rays per scene and traversal.
-    pub rays: usize,
-    /// Seconds after which another library's build of a case, where any are compiled in, counts as hanging.
-    #[serde(default = "twenty")]
-    pub seconds_per_peer: u64,
-}
-
-fn twenty() -> u64 {
-    20
+config! {
+    serde;
+    /// What is run.
+    pub struct Config {
+        /// How large the scenes of builders are.
+        builders: Size = Size::Many;
+        /// Nodes per object that a search may make or visit.
+        work_per_object: u64 = 1000, in 1..;
+        /// Rays per scene and traversal.
+        rays: usize = 5000, in 1..=100_000_000;
+        /// Seconds after which another library's build of a case, where any are compiled in, counts as hanging.
+        seconds_per_peer: u64 = 20, in 1..;
+    }
 }
 
 /// How a cell ended.
