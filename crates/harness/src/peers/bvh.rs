@@ -1,18 +1,18 @@
 //! The crate `bvh`.
 
-use super::{Built, Raw, Theirs, convert};
+use super::{Built, Raw};
 use crate::measure::Query;
 use crate::measure::speed::{Contender, Tracer, timed};
 use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
 use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh as TheirBvh, BvhNode};
 use ::bvh::ray::Ray as TheirRay;
-use bvh_core::{Aabb, Bvh, Hit, Ray, Triangle};
+use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle};
 use glam::Vec3;
 use nalgebra::{Point3, Vector3};
 use std::time::Instant;
 
-/// A box that may know its triangle.
+/// An object's box, and its corners if it is a triangle.
 #[derive(Clone)]
 struct Shape {
     aabb: TheirAabb<f32, 3>,
@@ -51,7 +51,7 @@ fn shapes<'a>(boxes: impl Iterator<Item = (Aabb, [Vec3; 3])> + 'a) -> Vec<Shape>
     (0..).zip(boxes).map(shape).collect()
 }
 
-/// A ray with the library's unit direction.
+/// The ray as the library's type, which makes its direction a unit vector.
 fn ray(ray: &Ray) -> TheirRay<f32, 3> {
     let direction = ray.direction();
     TheirRay::new(point(ray.origin()), Vector3::new(direction.x, direction.y, direction.z))
@@ -61,16 +61,29 @@ fn shapes_of_boxes(boxes: &[Aabb]) -> Vec<Shape> {
     shapes(boxes.iter().map(|&aabb| (aabb, [aabb.min; 3])))
 }
 
-/// A leaf has the object's box and no other; an inner node what its two boxes contain.
+/// The tree as our type. Theirs keeps the boxes of children in their parent, none for the root and none in leaves: here
+/// an inner node has the union of its children's boxes, and a leaf its object's box.
 fn to_ours(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
     let corner = |p: Point3<f32>| Vec3::new(p.x, p.y, p.z);
     let aabb = |b: TheirAabb<f32, 3>| Aabb { min: corner(b.min), max: corner(b.max) };
-    convert(boxes, |index| match theirs.nodes[index] {
-        BvhNode::Leaf { shape_index, .. } => (boxes[shape_index], Theirs::Leaf(vec![shape_index as u32])),
-        BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } => {
-            (aabb(child_l_aabb).union(&aabb(child_r_aabb)), Theirs::Inner([child_l_index, child_r_index]))
-        }
-    })
+    let unknown = Node::leaf(Aabb::EMPTY, 0, 0);
+    let (mut nodes, mut prim_ids) = (vec![unknown; boxes.len().min(1)], Vec::new());
+    let mut open = vec![(0, 0); nodes.len()];
+    while let Some((from, to)) = open.pop() {
+        nodes[to] = match theirs.nodes[from] {
+            BvhNode::Leaf { shape_index, .. } => {
+                prim_ids.push(shape_index as u32);
+                Node::leaf(boxes[shape_index], prim_ids.len() as u32 - 1, 1)
+            }
+            BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } => {
+                let first = nodes.len();
+                nodes.extend([unknown; 2]);
+                open.extend([(child_r_index, first + 1), (child_l_index, first)]);
+                Node::inner(aabb(child_l_aabb).union(&aabb(child_r_aabb)), first as u32, 2)
+            }
+        };
+    }
+    Bvh { nodes, prim_ids }
 }
 
 /// Builds on one thread; the library's leaves have one object.
@@ -82,7 +95,7 @@ pub(super) fn build(boxes: &[Aabb]) -> Built {
     Built::tight(to_ours(&theirs, boxes), seconds, boxes)
 }
 
-/// Its recursive traversal, which collects all objects whose boxes the ray meets.
+/// Its tree and its recursive traversal, which collects all objects whose boxes the ray meets.
 pub(super) fn raw(boxes: &[Aabb]) -> Raw {
     let mut shapes = shapes_of_boxes(boxes);
     let theirs = TheirBvh::build(&mut shapes);
@@ -94,8 +107,8 @@ pub(super) fn raw(boxes: &[Aabb]) -> Raw {
     Raw { tree, nearest: Box::new(nearest) }
 }
 
-/// The iterator by distance, ended at the first box that begins behind the nearest hit: of the library's traversals the
-/// only one that is ordered and has no limit of depth. Its triangle test sees front sides only and is asked for both.
+/// The iterator by distance, ended at the first box that begins behind the nearest hit: the library's only traversal that
+/// is ordered and works at any depth. Its triangle test sees front sides only, so each triangle is tested both ways round.
 pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
     let mut shapes = shapes(triangles.iter().map(|triangle| (triangle.aabb(), triangle.0)));
     let start = Instant::now();

@@ -7,8 +7,6 @@
 mod bvh;
 #[cfg(feature = "peers")]
 mod obvhs;
-#[cfg(feature = "peer-tinybvh")]
-mod tinybvh;
 
 use crate::measure::speed::Contender;
 use crate::scenes::Scene;
@@ -16,13 +14,13 @@ use bvh_build::OutOfRange;
 use bvh_build::config::Accepts;
 use bvh_core::Bvh;
 #[cfg(feature = "peers")]
-use bvh_core::{Aabb, Node, Ray};
+use bvh_core::{Aabb, Ray};
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// A library with its settings, as a spec names it.
 ///
-/// Its tree, for the costs and the build time, has one object per leaf, as ours do. Its rays go through what the
-/// library makes for rays by the same settings: with its own leaves, and with split triangles where it splits them.
+/// For costs and build times it builds a tree with one object per leaf, as ours have. For rays it builds its own
+/// structures by the same settings: with its own leaves, and with split triangles where it splits them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "method", rename_all = "snake_case")]
 pub enum Peer {
@@ -30,8 +28,6 @@ pub enum Peer {
     Bvh(NoSettings),
     /// The crate `obvhs`: parallel locally ordered clustering, then reinsertion.
     Obvhs(Obvhs),
-    /// The crate `tinybvh-rs`, for the C++ library tinybvh: binned surface area heuristic. It has no settings.
-    Tinybvh(NoSettings),
 }
 
 /// The settings of a library that has none.
@@ -68,9 +64,9 @@ pub enum Preset {
 /// A library's tree.
 #[derive(Clone, Debug)]
 pub struct Built {
-    /// As our type, boxes made tight.
+    /// The tree as our type, with tight boxes.
     pub tree: Bvh,
-    /// What the library took to build it, conversions left out.
+    /// The time that the library took to build it, without conversions.
     pub seconds: f64,
 }
 
@@ -82,10 +78,10 @@ impl Built {
     }
 }
 
-/// What a library makes of boxes, for the suite: nothing of it mended.
+/// A library's tree over boxes and its traversal, as they are, for the stress suite.
 #[cfg(feature = "peers")]
 pub(crate) struct Raw {
-    /// As our type, with the library's boxes.
+    /// The tree as our type, with the library's boxes.
     pub(crate) tree: Bvh,
     /// The nearest distance at which a ray meets an object, by the library's own traversal and the caller's test.
     pub(crate) nearest: Nearest,
@@ -96,14 +92,13 @@ pub(crate) type Nearest = Box<dyn Fn(&Ray, &dyn Fn(u32) -> Option<f32>) -> Optio
 
 impl Peer {
     /// The names of all libraries.
-    pub const NAMES: &[&str] = &["bvh", "obvhs", "tinybvh"];
+    pub const NAMES: &[&str] = &["bvh", "obvhs"];
 
     /// Reads the settings of the library called `name`; `None` if there is none of this name.
     pub fn read<'de, D: Deserializer<'de>>(name: &str, settings: D) -> Result<Option<Self>, D::Error> {
         match name {
             "bvh" => NoSettings::deserialize(settings).map(|settings| Some(Self::Bvh(settings))),
             "obvhs" => Obvhs::deserialize(settings).map(|settings| Some(Self::Obvhs(settings))),
-            "tinybvh" => NoSettings::deserialize(settings).map(|settings| Some(Self::Tinybvh(settings))),
             _ => Ok(None),
         }
     }
@@ -113,16 +108,12 @@ impl Peer {
         match self {
             Self::Bvh(_) => "bvh",
             Self::Obvhs(_) => "obvhs",
-            Self::Tinybvh(_) => "tinybvh",
         }
     }
 
     /// The cargo feature that the program lacks to use this library, if it does.
     pub fn missing_feature(&self) -> Option<&'static str> {
-        match self {
-            Self::Bvh(_) | Self::Obvhs(_) => (!cfg!(feature = "peers")).then_some("peers"),
-            Self::Tinybvh(_) => (!cfg!(feature = "peer-tinybvh")).then_some("peer-tinybvh"),
-        }
+        (!cfg!(feature = "peers")).then_some("peers")
     }
 
     /// Checks the ranges of the settings.
@@ -141,20 +132,17 @@ impl Peer {
             Self::Bvh(_) => Ok(bvh::build(&scene.boxes)),
             #[cfg(feature = "peers")]
             Self::Obvhs(config) => Ok(obvhs::build(config, &scene.boxes)),
-            #[cfg(feature = "peer-tinybvh")]
-            Self::Tinybvh(_) => tinybvh::build(triangles(scene)?, &scene.boxes),
-            #[allow(unreachable_patterns, reason = "not without the features")]
+            #[cfg(not(feature = "peers"))]
             _ => Err(format!("this program was built without the library {}", self.name())),
         }
     }
 
-    /// The tree over boxes by the settings as they are; `None` for a library whose traversal takes no other's test.
+    /// The tree over boxes by the settings as they are.
     #[cfg(feature = "peers")]
-    pub(crate) fn raw(&self, boxes: &[Aabb]) -> Option<Raw> {
+    pub(crate) fn raw(&self, boxes: &[Aabb]) -> Raw {
         match self {
-            Self::Bvh(_) => Some(bvh::raw(boxes)),
-            Self::Obvhs(config) => Some(obvhs::raw(config, boxes)),
-            Self::Tinybvh(_) => None,
+            Self::Bvh(_) => bvh::raw(boxes),
+            Self::Obvhs(config) => obvhs::raw(config, boxes),
         }
     }
 
@@ -166,9 +154,7 @@ impl Peer {
             Self::Bvh(_) => Ok(vec![bvh::contender(triangles(scene)?)]),
             #[cfg(feature = "peers")]
             Self::Obvhs(config) => Ok(obvhs::contenders(config, triangles(scene)?)),
-            #[cfg(feature = "peer-tinybvh")]
-            Self::Tinybvh(_) => tinybvh::contenders(triangles(scene)?),
-            #[allow(unreachable_patterns, reason = "not without the features")]
+            #[cfg(not(feature = "peers"))]
             _ => Err(format!("this program was built without the library {}", self.name())),
         }
     }
@@ -177,41 +163,6 @@ impl Peer {
 #[cfg(feature = "peers")]
 fn triangles(scene: &Scene) -> Result<&[bvh_core::Triangle], String> {
     scene.triangles().map_err(|error| error.to_string())
-}
-
-/// What is below a node of a library's tree.
-#[cfg(feature = "peers")]
-enum Theirs {
-    Inner([usize; 2]),
-    Leaf(Vec<u32>),
-}
-
-/// The tree below node 0 as our type, with the boxes that `node` gives.
-#[cfg(feature = "peers")]
-fn convert(boxes: &[Aabb], node: impl Fn(usize) -> (Aabb, Theirs)) -> Bvh {
-    let mut tree = Bvh::default();
-    if boxes.is_empty() {
-        return tree;
-    }
-    tree.nodes.push(Node::leaf(Aabb::EMPTY, 0, 0));
-    let mut open = vec![(0, 0)];
-    while let Some((theirs, ours)) = open.pop() {
-        let (aabb, content) = node(theirs);
-        tree.nodes[ours] = match content {
-            Theirs::Leaf(objects) => {
-                let first = tree.prim_ids.len() as u32;
-                tree.prim_ids.extend_from_slice(&objects);
-                Node::leaf(aabb, first, objects.len() as u32)
-            }
-            Theirs::Inner(children) => {
-                let first = tree.nodes.len();
-                tree.nodes.extend([Node::leaf(Aabb::EMPTY, 0, 0); 2]);
-                open.extend(children.into_iter().zip(first..first + 2).rev());
-                Node::inner(aabb, first as u32, 2)
-            }
-        };
-    }
-    tree
 }
 
 #[cfg(all(test, feature = "peers"))]
@@ -226,14 +177,11 @@ mod tests {
         let mut peers = vec![Peer::Bvh(NoSettings {})];
         let presets = [Preset::Fastest, Preset::Medium, Preset::VerySlow];
         peers.extend(presets.map(|preset| Peer::Obvhs(Obvhs { preset, reinsertion: None })));
-        if cfg!(feature = "peer-tinybvh") {
-            peers.push(Peer::Tinybvh(NoSettings {}));
-        }
         peers
     }
 
     #[test]
-    fn a_fraction_of_nodes_that_is_none_is_named() {
+    fn a_fraction_out_of_range_is_refused_by_its_name() {
         let obvhs = |ratio| Peer::Obvhs(Obvhs { reinsertion: Some(ratio), ..Default::default() });
         let refused = obvhs(-0.5).check().unwrap_err().to_string();
         assert_eq!(refused, "reinsertion is -0.5; accepted: 0 to 100");

@@ -1,6 +1,6 @@
 //! The crate `obvhs`.
 
-use super::{Built, Obvhs, Preset, Raw, Theirs, convert};
+use super::{Built, Obvhs, Preset, Raw};
 use crate::measure::Query;
 use crate::measure::speed::{Contender, Tracer, timed};
 use ::obvhs::bvh2::{Bvh2, builder as binary};
@@ -9,7 +9,7 @@ use ::obvhs::ray::{Ray as TheirRay, RayHit};
 use ::obvhs::rt_triangle::RtTriangle;
 use ::obvhs::triangle::Triangle as TheirTriangle;
 use ::obvhs::{BvhBuildParams, aabb};
-use bvh_core::{Aabb, Bvh, Hit, Ray, Triangle};
+use bvh_core::{Aabb, Bvh, FirstCountNode, Hit, Ray, Triangle};
 use glam::{Vec3, Vec3A};
 use std::time::Duration;
 
@@ -35,35 +35,39 @@ fn build_over(boxes: &[Aabb], parameters: BvhBuildParams) -> (Bvh2, Duration) {
 }
 
 fn to_ours(theirs: &Bvh2, boxes: &[Aabb]) -> Bvh {
-    convert(boxes, |index| {
-        let node = &theirs.nodes[index];
-        let aabb = Aabb { min: node.aabb().min.into(), max: node.aabb().max.into() };
-        let first = node.first_index as usize;
-        match node.prim_count as usize {
-            0 => (aabb, Theirs::Inner([first, first + 1])),
-            count => (aabb, Theirs::Leaf(theirs.primitive_indices[first..first + count].to_vec())),
-        }
-    })
+    if boxes.is_empty() {
+        return Bvh::default();
+    }
+    let ours = |node: &::obvhs::bvh2::node::Bvh2Node| FirstCountNode {
+        min: node.aabb().min.into(),
+        first: node.first_index,
+        max: node.aabb().max.into(),
+        count: node.prim_count,
+    };
+    let nodes: Vec<FirstCountNode> = theirs.nodes.iter().map(ours).collect();
+    Bvh::from_first_count(&nodes, &theirs.primitive_indices)
+        .unwrap_or_else(|error| panic!("obvhs built no tree: {error}"))
 }
 
 fn ray(ray: &Ray, t_max: f32) -> TheirRay {
     TheirRay::new(ray.origin().into(), ray.direction().into(), ray.t_min(), t_max)
 }
 
-/// Builds over boxes: one object per leaf, and no split triangles. Its own stopwatch leaves out conversions and checks.
+/// Builds over boxes, with one object per leaf and no split triangles. The library's own stopwatch leaves out conversions
+/// and checks.
 pub(super) fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
     let parameters = BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..parameters(config) };
     let (theirs, time) = build_over(boxes, parameters);
     Built::tight(to_ours(&theirs, boxes), time.as_secs_f64(), boxes)
 }
 
-/// The preset as it is: leaves of several objects.
+/// The preset as it is, with several objects per leaf.
 pub(super) fn raw(config: &Obvhs, boxes: &[Aabb]) -> Raw {
     let (theirs, _) = build_over(boxes, parameters(config));
     let tree = to_ours(&theirs, boxes);
     let nearest = move |ray: &Ray, test: &dyn Fn(u32) -> Option<f32>| {
         let mut hit = RayHit::none();
-        // Theirs takes hits below the end of the range only.
+        // The library takes only hits before the end of the range.
         theirs.ray_traverse(self::ray(ray, ray.t_max().next_up()), &mut hit, |_, at| {
             test(theirs.primitive_indices[at]).unwrap_or(f32::INFINITY)
         });
@@ -73,7 +77,8 @@ pub(super) fn raw(config: &Obvhs, boxes: &[Aabb]) -> Raw {
     Raw { tree, nearest: Box::new(nearest) }
 }
 
-/// What traces by a tree over `triangles` in the order of its leaves: its types have the same functions, but no trait.
+/// A [`Trace`](crate::measure::speed::Trace) by a tree over `triangles` in the order of its leaves. The library's trees
+/// have the same functions but no common trait.
 macro_rules! traced_by {
     ($tree:ident, $triangles:expr) => {{
         let triangles: Vec<RtTriangle> = $triangles;
@@ -87,8 +92,8 @@ macro_rules! traced_by {
     }};
 }
 
-/// The binary tree and the eight-wide compressed one of the preset, with triangles in the order of leaves, as the
-/// library recommends. Its directions are unit vectors; ours are too, but for rounding.
+/// The preset's binary tree and its compressed eight-wide tree, with triangles in the order of leaves, as the library
+/// recommends. It expects unit directions; ours are, up to rounding.
 pub(super) fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contender<'static>> {
     let corner = |p: Vec3| Vec3A::from(p);
     let theirs: Vec<TheirTriangle> = triangles

@@ -102,28 +102,6 @@ mod tests {
     }
 
     #[test]
-    fn every_structure_gives_the_same_picture() {
-        let options = Options { width: 41, height: 23, samples: 1, ..Options::default() };
-        for name in ["spheres75", "escher:cluster:600:1", "bijou:random:300:1", "cloister:cluster:500:2"] {
-            let scene = Scene::load(name).unwrap();
-            let films: Vec<Film> =
-                structures(&scene).into_iter().map(|structure| picture(&scene, structure, &options)).collect();
-            let distinct: std::collections::HashSet<_> = films[0].pixels.iter().collect();
-            assert!(distinct.len() > 100, "{name}: {} colours", distinct.len());
-            for film in &films {
-                assert_eq!(film.pixels.len(), 41 * 23);
-                assert!(film.pixels == films[0].pixels && film.rays == films[0].rays, "{name}");
-            }
-            assert_eq!(
-                films[0].counts.objects,
-                films[0].tests.iter().sum::<u64>(),
-                "brute force tests no boxes"
-            );
-            assert!(films[1].counts.objects < films[0].counts.objects, "a KD-tree saves tests");
-        }
-    }
-
-    #[test]
     fn any_number_of_threads_and_any_size_give_the_same_pixels() {
         let scene = Scene::load("spheres75").unwrap();
         for (width, height) in [(1, 1), (16, 16), (17, 33), (5, 40)] {

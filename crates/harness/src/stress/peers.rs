@@ -62,7 +62,7 @@ mod compiled_in {
     pub fn examine(name: &str, triangles: &[Triangle]) -> Option<Found> {
         let peer = peer(name)?;
         let boxes = stiff::boxes(triangles);
-        let Raw { tree, nearest } = peer.raw(&boxes)?;
+        let Raw { tree, nearest } = peer.raw(&boxes);
         let mut broken = Vec::new();
         let valid = validate(&tree, &boxes);
         if let Err(error) = &valid {
@@ -90,7 +90,7 @@ mod compiled_in {
             let range = scale_range(&boxes);
             for k in [(*range.start()).max(-120), (*range.end()).min(120)] {
                 let other = peer.raw(&scaled(&boxes, k));
-                if !other.is_some_and(|other| same_topology(&other.tree, &tree)) {
+                if !same_topology(&other.tree, &tree) {
                     broken.push(P5.broken(format!("another tree at scale 2^{k}")));
                 }
             }
