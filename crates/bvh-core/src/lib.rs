@@ -26,7 +26,6 @@ extern crate alloc;
 
 mod aabb;
 mod bvh;
-mod checksum;
 mod collapse;
 pub mod cost;
 mod dispatch;
@@ -41,8 +40,6 @@ mod stack;
 mod traverse;
 mod triangle;
 mod validate;
-mod validate_plain;
-mod validate_wide;
 mod wide;
 
 pub use aabb::{Aabb, InvalidBox, InvalidBoxReason, check_boxes};
@@ -56,7 +53,6 @@ pub use sphere::Sphere;
 pub use traverse::{Counter, TestCounts, any_hit, any_hit_of_all, nearest_hit, nearest_hit_of_all};
 pub use triangle::{Shear, Triangle};
 pub use validate::{InvalidBvh, validate};
-pub use validate_wide::InvalidWide;
 pub use wide::{WideBvh, WideView};
 
 pub use glam;

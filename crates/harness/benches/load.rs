@@ -9,7 +9,6 @@
 mod paired;
 
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::WideBvh;
 use bvh_core::file::{self, Origin, TreeFile};
 use harness::scenes::Scene;
 use memmap2::Mmap;
@@ -46,9 +45,10 @@ fn loads(scene: &Scene, path: &Path) {
         let touch = || _ = black_box(map(path).iter().step_by(4096).fold(0, |all, byte| all ^ byte));
         vec![
             ("  of that: map, touch every page, unmap", Box::new(touch)),
+            ("  of that: checksum of the file", Box::new(|| _ = black_box(TreeFile::open(&held).is_ok()))),
             (
                 "  of that: checksum and structure of the file",
-                Box::new(|| _ = black_box(TreeFile::open(&held))),
+                Box::new(|| _ = black_box(TreeFile::open(&held).and_then(|file| Ok(file.view()?.nodes.len())))),
             ),
             ("  of that: checksum of the boxes", Box::new(|| _ = black_box(file::boxes_checksum(boxes)))),
             ("one addition per eight bytes of the file", Box::new(|| _ = black_box(sum(&held)))),
@@ -73,26 +73,6 @@ fn loads(scene: &Scene, path: &Path) {
         vec![(MULLER_FELLNER, Box::new(build)), ("map, check, view", Box::new(load))];
     contenders.extend(parts());
     compare_each_after(build, &format!("{title}, each at once after a build"), 25, contenders);
-
-    let Ok(triangles) = scene.triangles() else { return };
-    fs::write(path, file::save_wide(&tree, triangles, &Origin::default()).expect("a valid tree"))
-        .expect("a file");
-    let bytes = fs::metadata(path).expect("the file").len();
-    let contenders: Vec<Contender> = vec![
-        (
-            "Müller–Fellner, then the wide layout",
-            Box::new(|| drop(config.build(boxes).map(|tree| WideBvh::new(&tree, triangles)))),
-        ),
-        (
-            "map, check, view",
-            Box::new(|| {
-                let bytes = map(path);
-                let file = TreeFile::open(&bytes).and_then(|file| file.for_triangles(triangles));
-                _ = black_box(file.expect("the file").wide_view().expect("the layout"));
-            }),
-        ),
-    ];
-    compare(&format!("{}, wide layout, {bytes} bytes", scene.name), 25, contenders);
 }
 
 fn map(path: &Path) -> Mmap {

@@ -1,77 +1,49 @@
-//! The first 192 bytes of a tree file: what it is, how large, how good, and for which scene.
+//! The first 192 bytes of a tree file: format, sizes, cost, origin, and the checksum of the scene.
 
-use super::{FileError, Origin};
+use super::FileError;
 use crate::cost::{Objective, SahConstants};
 use crate::{Aabb, MAX_OBJECTS};
 use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// What a file holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Layout {
-    /// A [`Bvh`](crate::Bvh).
-    Tree,
-    /// A [`WideBvh`](crate::WideBvh).
-    Wide,
-}
-
-impl core::fmt::Display for Layout {
-    fn fmt(&self, f: &mut core::fmt::Formatter) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Tree => "tree",
-            Self::Wide => "wide layout",
-        })
-    }
-}
-
 /// The header of a tree file. [The format](super) says where each field lies.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
-    /// What the file holds.
-    pub layout: Layout,
-    /// Number of nodes, of the layout's own kind.
+    /// Number of nodes.
     pub nodes: usize,
     /// Number of objects.
     pub objects: usize,
-    /// Number of blocks of four triangles; 0 for a tree.
-    pub blocks: usize,
-    /// Which cost `cost` is.
+    /// The objective that `cost` is a value of.
     pub objective: Objective,
     /// The tree's cost when it was saved.
     pub cost: f64,
     /// The seed of the search.
     pub seed: u64,
-    /// Its work, in nodes made or visited.
+    /// The search's work, in nodes made or visited.
     pub work: u64,
-    /// The [checksum](super::boxes_checksum) of the boxes the tree is for; of the [triangles](super::triangles_checksum)
-    /// for a wide layout.
-    pub scene: u64,
-    /// The root's box; [`Aabb::EMPTY`] without objects.
+    /// The [checksum](super::boxes_checksum) of the boxes that the tree was built over.
+    pub scene: u32,
+    /// The root's box; [`Aabb::EMPTY`] if there are no objects.
     pub bounds: Aabb,
-    /// The name of the method that made the tree.
+    /// The name of the method that built the tree.
     pub method: String,
 }
 
 impl Header {
     /// Bytes of a header.
     pub const BYTES: usize = 192;
-    /// The first eight bytes of every tree file. Transfers that change line ends or strip high bits show in them.
+    /// The first eight bytes of every tree file, chosen after PNG's: a transfer that converts line ends or clears high
+    /// bits changes them.
     pub const MAGIC: [u8; 8] = *b"\x89BVH\r\n\x1a\n";
     /// The version of the format that this crate writes and reads.
-    pub const VERSION: u32 = 1;
-    /// Written in the file's byte order.
+    pub const VERSION: u32 = 2;
+    /// Stored in the file's byte order, so that its bytes tell the order.
     const ENDIANNESS: u32 = 0x0102_0304;
-    /// Where the checksum lies.
-    pub(super) const CHECKSUM: core::ops::Range<usize> = 184..192;
+    /// The last field, which every other byte of the file is covered by.
+    pub(super) const CHECKSUM: core::ops::Range<usize> = 188..192;
 
-    pub(super) fn new(layout: Layout, origin: &Origin, cost: f64, scene: u64, bounds: Aabb) -> Self {
-        let Origin { method, seed, work, objective } = *origin;
-        let method = method.to_owned();
-        Self { layout, nodes: 0, objects: 0, blocks: 0, objective, cost, seed, work, scene, bounds, method }
-    }
-
-    /// The bytes, checksum left 0.
+    /// The bytes, with a checksum of 0.
     pub(super) fn encode(&self) -> Result<Vec<u8>, FileError> {
         let name = self.method.as_bytes();
         if name.len() > 64 || name.contains(&0) {
@@ -84,16 +56,13 @@ impl Header {
         };
         let mut bytes = Vec::with_capacity(Self::BYTES);
         bytes.extend_from_slice(&Self::MAGIC);
-        for word in [Self::VERSION, Self::ENDIANNESS, self.layout as u32, objective] {
+        for word in [Self::VERSION, Self::ENDIANNESS, objective, self.scene] {
             bytes.extend_from_slice(&word.to_le_bytes());
         }
-        for count in [self.nodes, self.objects, self.blocks] {
-            bytes.extend_from_slice(&(count as u64).to_le_bytes());
+        for word in [self.nodes as u64, self.objects as u64, self.seed, self.work] {
+            bytes.extend_from_slice(&word.to_le_bytes());
         }
         for number in [self.cost, constants[0], constants[1]] {
-            bytes.extend_from_slice(&number.to_le_bytes());
-        }
-        for number in [self.seed, self.work, self.scene] {
             bytes.extend_from_slice(&number.to_le_bytes());
         }
         for coordinate in [self.bounds.min, self.bounds.max].iter().flat_map(|corner| corner.to_array()) {
@@ -104,7 +73,8 @@ impl Header {
         Ok(bytes)
     }
 
-    /// Reads a header, in the order in which errors help most; the checksum is not looked at.
+    /// Reads all fields but the checksum. Of several faults it reports the one that says most about the file: that it
+    /// is no tree file before its byte order, the byte order before the version, the version before any other field.
     pub(super) fn decode(bytes: &[u8]) -> Result<Self, FileError> {
         let mut fields = Fields(bytes);
         let magic: [u8; 8] = fields.take().ok_or(FileError::Magic)?;
@@ -115,25 +85,20 @@ impl Header {
         if mark == Self::ENDIANNESS.to_be_bytes() {
             return Err(FileError::Endianness);
         }
-        let version = u32::from_le_bytes(version);
-        if version != Self::VERSION {
-            return Err(FileError::Version { found: version });
+        match u32::from_le_bytes(version) {
+            Self::VERSION => {}
+            found if found < Self::VERSION => return Err(FileError::OldVersion { found }),
+            found => return Err(FileError::NewVersion { found }),
         }
         if mark != Self::ENDIANNESS.to_le_bytes() {
             return Err(FileError::Field("endianness mark"));
         }
-        let layout = match u32::from_le_bytes(fields.need()?) {
-            0 => Layout::Tree,
-            1 => Layout::Wide,
-            _ => return Err(FileError::Field("layout")),
-        };
-        let objective = u32::from_le_bytes(fields.need()?);
-        let [nodes, objects, blocks]: [u64; 3] = fields.words()?;
-        // The most nodes are those of a binary tree with one object per leaf, and as many blocks as objects.
+        let [objective, scene] = [fields.need()?, fields.need()?].map(u32::from_le_bytes);
+        let [nodes, objects, seed, work]: [u64; 4] = fields.words()?;
+        // A binary tree with one object per leaf has the most nodes.
         let most = |limit: u64| move |count: &u64| *count <= limit;
         let objects = Some(objects).filter(most(MAX_OBJECTS as u64)).ok_or(FileError::Field("objects"))?;
         let nodes = Some(nodes).filter(most(2 * objects)).ok_or(FileError::Field("nodes"))?;
-        let blocks = Some(blocks).filter(most(objects)).ok_or(FileError::Field("blocks"))?;
         let [cost, traversal, intersection] = fields.words()?.map(f64::from_bits);
         let objective = match objective {
             0 => Objective::InternalArea,
@@ -141,7 +106,6 @@ impl Header {
             2 => Objective::Sah(SahConstants { traversal, intersection }),
             _ => return Err(FileError::Field("objective")),
         };
-        let [seed, work, scene] = fields.words()?;
         let mut corners = [[0.0; 3]; 2];
         for coordinate in corners.as_flattened_mut() {
             *coordinate = f32::from_le_bytes(fields.need()?);
@@ -149,14 +113,13 @@ impl Header {
         let name: [u8; 64] = fields.need()?;
         let end = name.iter().position(|&byte| byte == 0).unwrap_or(name.len());
         let method = core::str::from_utf8(&name[..end]).map_err(|_| FileError::Method)?.to_owned();
-        let [_checksum] = fields.words()?;
-        let (nodes, objects, blocks) = (nodes as usize, objects as usize, blocks as usize);
-        let bounds = Aabb::from(corners);
-        Ok(Self { layout, nodes, objects, blocks, objective, cost, seed, work, scene, bounds, method })
+        let _reserved_and_checksum: [u8; 24] = fields.need()?;
+        let (nodes, objects, bounds) = (nodes as usize, objects as usize, Aabb::from(corners));
+        Ok(Self { nodes, objects, objective, cost, seed, work, scene, bounds, method })
     }
 }
 
-/// The bytes that have not been read yet.
+/// The bytes that are still to be read.
 struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {

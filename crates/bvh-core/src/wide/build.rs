@@ -124,7 +124,6 @@ mod tests {
     use super::*;
     use crate::Node;
     use crate::collapse::tests::{exhaustive, objects, scene};
-    use crate::wide::node::WideTarget;
 
     /// The box of every node, with 0, and of every leaf, with its number of blocks.
     fn boxes(wide: &WideBvh) -> impl Iterator<Item = (Aabb, usize)> {
@@ -132,11 +131,9 @@ mod tests {
             min: [0, 1, 2].map(|axis| node.planes[axis][lane]).into(),
             max: [3, 4, 5].map(|axis| node.planes[axis][lane]).into(),
         };
-        let blocks = |child: Child| match child.target() {
-            WideTarget::Node(_) => 0,
-            WideTarget::Block(first) => {
-                1 + wide.blocks[first..].iter().take_while(|block| !block.is_last()).count()
-            }
+        let blocks = |child: Child| match child.is_node() {
+            true => 0,
+            false => 1 + wide.blocks[child.index()..].iter().take_while(|block| !block.is_last()).count(),
         };
         let root = wide.root.map(|root| (wide.bounds, blocks(root)));
         root.into_iter().chain(wide.nodes.iter().flat_map(move |node| {

@@ -43,12 +43,3 @@ pub struct WideView<'a> {
     pub(crate) nodes: &'a [WideNode],
     pub(crate) blocks: &'a [Triangle4],
 }
-
-impl<'a> WideView<'a> {
-    /// A layout whose root is the first node, else the leaf of all blocks.
-    pub(crate) fn over(bounds: Aabb, nodes: &'a [WideNode], blocks: &'a [Triangle4]) -> Self {
-        let leaf = (!blocks.is_empty()).then_some(Child::leaf(0));
-        let root = if nodes.is_empty() { leaf } else { Some(Child::node(0)) };
-        Self { bounds, root, nodes, blocks }
-    }
-}

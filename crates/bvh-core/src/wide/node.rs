@@ -54,18 +54,6 @@ impl Child {
     pub(crate) fn index(self) -> usize {
         (self.0 & !Self::LEAF) as usize
     }
-
-    /// The node or the block that this refers to.
-    pub(crate) fn target(self) -> WideTarget {
-        if self.is_node() { WideTarget::Node(self.index()) } else { WideTarget::Block(self.index()) }
-    }
-}
-
-/// What a [`Child`] refers to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum WideTarget {
-    Node(usize),
-    Block(usize),
 }
 
 /// A child that the ray enters at `entry`, to be visited later.

@@ -38,31 +38,10 @@ impl Triangle4 {
         })
     }
 
-    /// The ids in the lanes, the first one used, without what marks a last block; `None` in unused lanes.
-    pub(crate) fn ids(&self) -> [Option<u32>; 4] {
-        let [first, others @ ..] = self.ids;
-        let id = |id| (id != Self::UNUSED).then_some(id);
-        [Some(first & !Self::LAST), id(others[0]), id(others[1]), id(others[2])]
-    }
-
     /// Whether this is a leaf's last block.
     #[inline(always)]
     pub(crate) fn is_last(&self) -> bool {
         self.ids[0] & Self::LAST != 0
-    }
-
-    /// Whether all corners of all triangles are inside a box; never if one is NaN.
-    #[inline(always)]
-    pub(crate) fn is_inside(&self, bounds: &Aabb) -> bool {
-        let [_, second, third, fourth] = self.ids.map(|id| id == Self::UNUSED);
-        let mut inside = 0b1111;
-        for corner in &self.corners {
-            for (axis, coordinates) in corner.iter().enumerate() {
-                let (least, most) = (Vec4::splat(bounds.min[axis]), Vec4::splat(bounds.max[axis]));
-                inside &= (coordinates.cmpge(least) & coordinates.cmple(most)).bitmask();
-            }
-        }
-        inside | u32::from(second) << 1 | u32::from(third) << 2 | u32::from(fourth) << 3 == 0b1111
     }
 
     /// A bit per triangle that the ray may meet before `t_max`. [`Triangle::intersect`] would reject all others: by the

@@ -6,7 +6,7 @@ use crate::scenes::Scene;
 use crate::{Error, files, run::rows};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
-use bvh_core::file::{FileError, Header, Layout, TreeFile};
+use bvh_core::file::{FileError, Header, TreeFile};
 use bvh_core::{Bvh, NodeKind, validate};
 use clap::Args;
 use serde::Serialize;
@@ -66,30 +66,14 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     let mut lines = Lines::default();
     describe(file.header(), bytes.len(), &mut lines);
     let refused = |source| Error::TreeFile { path: args.file.clone(), source };
-    match file.header().layout {
-        Layout::Tree => {
-            let tree = file.tree().map_err(refused)?;
-            measure(&tree, &mut lines);
-            if let Some(path) = &args.nodes {
-                write_nodes(&tree, path)?;
-            }
-            match &scene {
-                Some(scene) => against(&tree, file, scene, &mut lines).map_err(refused)?,
-                None => lines.say("valid", "as a tree; with a scene its objects are checked too"),
-            }
-        }
-        Layout::Wide => {
-            if args.nodes.is_some() {
-                let path = args.file.display();
-                return Err(Error::Usage(format!("{path} is a wide layout; --nodes is for trees")));
-            }
-            file.wide().map_err(refused)?;
-            if let Some(scene) = &scene {
-                file.for_triangles(scene.triangles().unwrap_or_default()).map_err(refused)?;
-                lines.say("scene", &scene.name);
-            }
-            lines.say("valid", "yes");
-        }
+    let tree = file.tree().map_err(refused)?;
+    measure(&tree, &mut lines);
+    if let Some(path) = &args.nodes {
+        write_nodes(&tree, path)?;
+    }
+    match &scene {
+        Some(scene) => against(&tree, file, scene, &mut lines).map_err(refused)?,
+        None => lines.say("valid", "as a tree; with a scene its objects are checked too"),
     }
     print_line(&lines.0);
     Ok(())
@@ -104,7 +88,6 @@ fn describe(header: &Header, bytes: usize, lines: &mut Lines) {
             format!("surface area heuristic, traversal {traversal}, intersection {intersection}")
         }
     };
-    lines.say("layout", header.layout);
     lines.say("version", Header::VERSION);
     lines.say("bytes", bytes);
     lines.say("method", &header.method);
@@ -112,12 +95,9 @@ fn describe(header: &Header, bytes: usize, lines: &mut Lines) {
     lines.say("work", header.work);
     lines.say("objective", objective);
     lines.say("cost when saved", header.cost);
-    lines.say("checksum of the scene", format_args!("{:016x}", header.scene));
+    lines.say("checksum of the scene", format_args!("{:08x}", header.scene));
     lines.say("objects", header.objects);
     lines.say("nodes", header.nodes);
-    if header.layout == Layout::Wide {
-        lines.say("blocks", header.blocks);
-    }
 }
 
 /// What can be computed from the tree alone.

@@ -1,6 +1,7 @@
-//! The one validator: says whether a tree is one, and over the objects it claims.
+//! The one validator: whether nodes and object ids form a tree over exactly the given objects.
 
-use crate::validate_plain::is_plain;
+mod fast_path;
+
 use crate::{Aabb, Bvh, BvhView, MAX_OBJECTS, NodeKind};
 use alloc::vec::Vec;
 
@@ -40,8 +41,9 @@ pub enum InvalidBvh {
     ObjectOutside { node: usize, object: usize },
 }
 
-/// Checks that `tree` is a tree over exactly the objects of `boxes`: every node reached once, every object in
-/// exactly one leaf, every box inside its parent's bit by bit. O(nodes + objects), no recursion; safe on any bits.
+/// Checks that `tree` is a tree over exactly the objects of `boxes`: every node is reached once, every object is in
+/// exactly one leaf, and every box lies inside its parent's, compared without tolerance. O(nodes + objects), no
+/// recursion; safe on any bits.
 pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
     check_structure(tree.into(), boxes.len())?;
     for (node, at) in tree.nodes.iter().enumerate() {
@@ -56,13 +58,16 @@ pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
     Ok(())
 }
 
-/// [`validate`] without the boxes: what makes a traversal end and stay in bounds.
+/// [`validate`] without the boxes: the properties that make a traversal end and stay in bounds.
+///
+/// Loading a tree spends most of its time here, so the most common kind of tree is passed by a check without
+/// unpredictable branches. Any other tree, and any fault, goes to [`find_fault`].
 pub(crate) fn check_structure(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
-    if is_plain(tree, objects) { Ok(()) } else { name_damage(tree, objects) }
+    if fast_path::passes(tree, objects) { Ok(()) } else { find_fault(tree, objects) }
 }
 
-/// The first thing that is wrong with a tree's structure, if anything is.
-pub(crate) fn name_damage(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
+/// The first fault in a tree's structure, if it has any.
+fn find_fault(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
     let nodes = tree.nodes.len();
     if objects > MAX_OBJECTS {
         return Err(InvalidBvh::TooManyObjects { objects });
@@ -74,7 +79,7 @@ pub(crate) fn name_damage(tree: BvhView, objects: usize) -> Result<(), InvalidBv
         return Err(InvalidBvh::NodeCount { nodes, objects });
     }
     let (mut reached, mut placed) = (Marks::new(nodes), Marks::new(objects));
-    // Of every node but the root, and of every object, if each is marked once.
+    // Every node but the root is a child once, every object in a leaf once, if none is repeated and the sums are right.
     let (mut children, mut prims) = (0, 0);
     let mut repeated = None;
     for (index, node) in tree.nodes.iter().enumerate() {
@@ -125,7 +130,7 @@ pub(crate) fn name_damage(tree: BvhView, objects: usize) -> Result<(), InvalidBv
     Ok(())
 }
 
-/// A bit per index.
+/// One bit per index.
 pub(crate) struct Marks(Vec<u64>);
 
 impl Marks {
@@ -133,7 +138,7 @@ impl Marks {
         Self(alloc::vec![0; len.div_ceil(64)])
     }
 
-    /// Marks an index. Returns whether it was not marked before.
+    /// Marks an index and returns whether it was unmarked before.
     #[inline(always)]
     pub(crate) fn set(&mut self, index: usize) -> bool {
         let (word, bit) = (&mut self.0[index / 64], 1 << (index % 64));
