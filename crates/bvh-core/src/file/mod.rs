@@ -64,11 +64,12 @@ mod header;
 pub use header::Header;
 
 use crate::cost::Objective;
-use crate::validate::check_structure;
+use crate::validate::{FastPath, check_structure};
 use crate::{Aabb, Bvh, BvhView, InvalidBvh, Node, validate};
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
 use bytemuck::Pod;
+use core::ops::Range;
 use crc32fast::Hasher;
 
 /// Why bytes were not accepted as a tree, or a tree was not written.
@@ -195,17 +196,27 @@ pub fn boxes_checksum(boxes: &[Aabb]) -> u32 {
     crc32fast::hash(&le_bytes(boxes))
 }
 
-/// The checksum of a file of at least a header's length.
-fn checksum(file: &[u8]) -> u32 {
+/// Bytes that the checksum and the check of the structure take in turns: enough that neither is slowed down by the
+/// change, and few enough that the second finds them in the cache.
+const PIECE: usize = 8192;
+
+/// The checksum of a file of at least a header's length. Shows every piece of what follows the header to `visit`.
+fn checksum(file: &[u8], mut visit: impl FnMut(Range<usize>)) -> u32 {
+    let (header, body) = file.split_at(Header::BYTES);
     let mut hasher = Hasher::new();
-    hasher.update(&file[Header::BYTES..]);
-    hasher.update(&file[..Header::CHECKSUM.start]);
+    let mut start = 0;
+    for piece in body.chunks(PIECE) {
+        hasher.update(piece);
+        visit(start..start + piece.len());
+        start += piece.len();
+    }
+    hasher.update(&header[..Header::CHECKSUM.start]);
     hasher.finalize()
 }
 
 /// Writes the checksum into a file.
 fn seal(file: &mut [u8]) {
-    let sum = checksum(file);
+    let sum = checksum(file, |_| ());
     file[Header::CHECKSUM].copy_from_slice(&sum.to_le_bytes());
 }
 
@@ -219,6 +230,8 @@ pub struct TreeFile<'a> {
     header: Header,
     nodes: &'a [u8],
     prim_ids: &'a [u8],
+    /// Whether the tree has passed the check of its structure where it lies.
+    is_sound: bool,
 }
 
 impl<'a> TreeFile<'a> {
@@ -233,11 +246,15 @@ impl<'a> TreeFile<'a> {
         if found != expected {
             return Err(FileError::Length { found, expected });
         }
-        if checksum(bytes).to_le_bytes() != bytes[Header::CHECKSUM] {
+        let (nodes, prim_ids) = bytes[Header::BYTES..].split_at(node_bytes as usize);
+        let mut file = Self { header, nodes, prim_ids, is_sound: false };
+        let mut fast_path = file.cast().ok().and_then(|tree| FastPath::new(tree, file.header.objects));
+        let sum = checksum(bytes, |piece| fast_path.iter_mut().for_each(|check| check.add(piece.clone())));
+        if sum.to_le_bytes() != bytes[Header::CHECKSUM] {
             return Err(FileError::Checksum);
         }
-        let (nodes, prim_ids) = bytes[Header::BYTES..].split_at(node_bytes as usize);
-        Ok(Self { header, nodes, prim_ids })
+        file.is_sound = fast_path.is_some_and(FastPath::finish);
+        Ok(file)
     }
 
     /// The origin, size and cost of the tree.
@@ -261,15 +278,24 @@ impl<'a> TreeFile<'a> {
     /// left to the checksum, or to [`validate`](validate()). O(nodes + objects).
     pub fn tree(&self) -> Result<Bvh, FileError> {
         let tree = Bvh { nodes: copied(self.nodes), prim_ids: copied(self.prim_ids) };
-        check_structure((&tree).into(), self.header.objects)?;
+        self.check((&tree).into())?;
         Ok(tree)
     }
 
     /// The tree where it lies, checked as by [`tree`](Self::tree).
     pub fn view(&self) -> Result<BvhView<'a>, FileError> {
-        let tree = BvhView { nodes: cast(self.nodes)?, prim_ids: cast(self.prim_ids)? };
-        check_structure(tree, self.header.objects)?;
+        let tree = self.cast()?;
+        self.check(tree)?;
         Ok(tree)
+    }
+
+    fn cast(&self) -> Result<BvhView<'a>, FileError> {
+        Ok(BvhView { nodes: cast(self.nodes)?, prim_ids: cast(self.prim_ids)? })
+    }
+
+    /// Checks the structure of the file's tree unless that was done with the checksum.
+    fn check(&self, tree: BvhView) -> Result<(), InvalidBvh> {
+        if self.is_sound { Ok(()) } else { check_structure(tree, self.header.objects) }
     }
 }
 

@@ -2,6 +2,8 @@
 
 mod fast_path;
 
+pub(crate) use fast_path::FastPath;
+
 use crate::{Aabb, Bvh, BvhView, MAX_OBJECTS, NodeKind};
 use alloc::vec::Vec;
 
@@ -63,7 +65,7 @@ pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
 /// Loading a tree spends most of its time here, so the most common kind of tree is passed by a check without
 /// unpredictable branches. Any other tree, and any fault, goes to [`find_fault`].
 pub(crate) fn check_structure(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
-    if fast_path::passes(tree, objects) { Ok(()) } else { find_fault(tree, objects) }
+    if FastPath::passes(tree, objects) { Ok(()) } else { find_fault(tree, objects) }
 }
 
 /// The first fault in a tree's structure, if it has any.

@@ -1,6 +1,6 @@
 //! Four triangles side by side, for tests of one ray against all of them.
 
-use crate::{Aabb, MAX_OBJECTS, Shear, Triangle};
+use crate::{MAX_OBJECTS, Shear, Triangle};
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4};
 
