@@ -9,13 +9,13 @@
 
 struct Header {
     char magic[8];
-    uint32_t version, endianness, layout, objective;
-    uint64_t nodes, objects, blocks;
+    uint32_t version, endianness, objective, scene;
+    uint64_t nodes, objects, seed, work;
     double cost, traversal, intersection;
-    uint64_t seed, work, scene;
     float bounds[6];
     char method[64];
-    uint64_t checksum;
+    char zeros[20];
+    uint32_t checksum;
 };
 struct Node {
     float min[3], max[3];
@@ -23,32 +23,19 @@ struct Node {
 };
 static_assert(sizeof(Header) == 192 && sizeof(Node) == 32);
 
-static uint64_t rotate(uint64_t x, int by) { return x << by | x >> (64 - by); }
-
-static uint64_t mix(uint64_t h, uint64_t x) { return rotate((h ^ x) * 0x9e3779b97f4a7c15u, 29); }
-
-static uint64_t quarter_sum(std::vector<char> bytes) {
-    uint64_t lanes[32], result = bytes.size(), word;
-    for (int k = 0; k < 32; ++k) lanes[k] = k + 1;
-    bytes.resize((bytes.size() + 255) / 256 * 256);
-    for (size_t i = 0; i < bytes.size() / 8; ++i) {
-        std::memcpy(&word, &bytes[8 * i], 8);
-        uint64_t& lane = lanes[i % 32];
-        lane = rotate(lane ^ word, 16) * 33;
-        lane ^= lane >> 23;
-    }
-    for (uint64_t lane : lanes) result = mix(result, lane);
-    return result;
-}
-
-static uint64_t checksum(const char* bytes, size_t count) {
-    const size_t quarter = (count + 1023) / 1024 * 256;
-    uint64_t result = count;
-    for (int k = 0; k < 4; ++k) {
-        const char *begin = bytes + std::min(k * quarter, count), *end = bytes + std::min((k + 1) * quarter, count);
-        result = mix(result, quarter_sum({begin, end}));
-    }
-    return result;
+// CRC-32 of zlib; `sum` is that of the bytes before.
+static uint32_t crc32(const char* bytes, size_t count, uint32_t sum = 0) {
+    static const std::vector<uint32_t> table = [] {
+        std::vector<uint32_t> table(256);
+        for (uint32_t byte = 0; byte < 256; ++byte) {
+            table[byte] = byte;
+            for (int bit = 0; bit < 8; ++bit) table[byte] = table[byte] >> 1 ^ (table[byte] & 1) * 0xedb88320u;
+        }
+        return table;
+    }();
+    sum = ~sum;
+    for (size_t i = 0; i < count; ++i) sum = sum >> 8 ^ table[(sum ^ uint8_t(bytes[i])) & 255];
+    return ~sum;
 }
 
 int main(int argc, char** argv) {
@@ -56,13 +43,12 @@ int main(int argc, char** argv) {
     std::vector<char> bytes((std::istreambuf_iterator<char>(file)), {});
     Header header{};
     if (bytes.size() >= sizeof header) std::memcpy(&header, bytes.data(), sizeof header);
-    if (std::memcmp(header.magic, "\x89" "BVH\r\n\x1a\n", 8) || header.version != 1 || header.endianness != 0x01020304 ||
-        header.layout != 0 || bytes.size() != sizeof header + 32 * header.nodes + 4 * header.objects) {
-        return std::fprintf(stderr, "not a tree file of version 1, or cut\n"), 1;
+    if (std::memcmp(header.magic, "\x89" "BVH\r\n\x1a\n", 8) || header.version != 2 || header.endianness != 0x01020304 ||
+        bytes.size() != sizeof header + 32 * header.nodes + 4 * header.objects) {
+        return std::fprintf(stderr, "not a tree file of version 2, or cut\n"), 1;
     }
-    const uint64_t rest = checksum(bytes.data() + sizeof header, bytes.size() - sizeof header);
-    std::memcpy(&bytes[184], &rest, sizeof rest);
-    if (checksum(bytes.data(), sizeof header) != header.checksum) return std::fprintf(stderr, "damaged\n"), 1;
+    const uint32_t body = crc32(bytes.data() + sizeof header, bytes.size() - sizeof header);
+    if (crc32(bytes.data(), 188, body) != header.checksum) return std::fprintf(stderr, "damaged\n"), 1;
     std::vector<Node> nodes(header.nodes);
     if (!nodes.empty()) std::memcpy(nodes.data(), &bytes[192], 32 * nodes.size());
     std::vector<unsigned> depth(nodes.size() + 1);

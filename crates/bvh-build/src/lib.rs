@@ -1,23 +1,18 @@
 //! Builders of bounding volume hierarchies: boxes in, one [`Bvh`](bvh_core::Bvh) out.
 //!
-//! Every builder is one file with a `Config` and sees the objects' boxes only. All are deterministic, use no
-//! recursion on data, and refuse boxes that are not finite by naming the object.
+//! Every builder is a module with a `Config` and sees the objects' boxes only. All are deterministic, use no recursion
+//! on data, and refuse boxes that are not finite by naming the object.
 
-pub mod agglomerative;
 pub mod config;
-pub mod division;
 mod error;
-pub mod evaluation;
 pub mod goldsmith_salmon;
 pub mod kd_tree;
-pub mod median_cut;
-pub mod muller_fellner;
-mod presort;
-pub mod sweep;
+pub mod ploc;
+pub mod top_down;
 
 pub use config::{Check, OutOfRange};
 pub use error::BuildError;
-pub use presort::Presorted;
+pub use top_down::{Presorted, median_cut, muller_fellner};
 
 /// A builder: a configuration that turns boxes into a tree, after it has been [checked](Check).
 pub trait Builder: Check {

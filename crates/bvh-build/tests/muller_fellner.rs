@@ -1,7 +1,7 @@
 //! Müller–Fellner against an O(n²) transcription of the paper, and the laws it must obey.
 
-use bvh_build::evaluation::AreaOnly;
 use bvh_build::muller_fellner::{Config, Heuristic};
+use bvh_build::top_down::AreaOnly;
 use bvh_build::{BuildError, Builder};
 use bvh_core::{Aabb, Bvh, NodeKind, cost, validate};
 use proptest::prelude::*;

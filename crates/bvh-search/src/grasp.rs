@@ -19,9 +19,9 @@ use crate::error::require;
 use crate::stream::{Stream, stream};
 use crate::working::Working;
 use crate::{LocalSearch, Observer, Problem, Quota, Run, Search, SearchError, Tally};
-use bvh_build::division::Workspace;
-use bvh_build::evaluation::Evaluation;
-use bvh_build::sweep::{Split, SplitRule, Sweep};
+use bvh_build::top_down::SplitCost;
+use bvh_build::top_down::Workspace;
+use bvh_build::top_down::{Split, SplitRule, Sweep};
 use bvh_build::{Check, Presorted, muller_fellner};
 use bvh_core::{Aabb, Bvh};
 use rand::RngExt;
@@ -207,7 +207,7 @@ impl Randomised {
 impl SplitRule for Randomised {
     /// The dice are cast before the node is scanned: what will not be chosen need not be known.
     #[inline(always)]
-    fn choose<E: Evaluation>(&mut self, node: &mut Sweep<'_, E>) -> Split {
+    fn choose<C: SplitCost>(&mut self, node: &mut Sweep<'_, C>) -> Split {
         let Self { candidates, noise, rng, list } = self;
         if noise.is_some_and(|noise| !rng.random_bool(noise)) {
             return node.best();

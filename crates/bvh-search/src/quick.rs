@@ -15,7 +15,7 @@ use crate::start::construction;
 use crate::working::Working;
 use crate::{Observer, Problem, Run, SearchError, Tally};
 use bvh_build::Builder;
-use bvh_build::agglomerative::{Along, Config};
+use bvh_build::ploc::{Config, MortonOrder};
 use bvh_core::{Aabb, Bvh, cost};
 use siblings::Siblings;
 
@@ -63,7 +63,7 @@ pub(crate) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<
     if n < 3 || began.is_none() && work >= MOST_WORK {
         return Ok(None);
     }
-    let along = Along::new(problem.boxes)?;
+    let along = MortonOrder::new(problem.boxes)?;
     let (mut two_starts, mut end) = (false, f64::INFINITY);
     if let (Some(began), Some(sorted)) = (began, observer.progress()) {
         let sort = (sorted - began).max(1e-9);
@@ -136,7 +136,7 @@ const TIMED: usize = 16;
 fn warm_sort(problem: &Problem, observer: &dyn Observer) -> Result<f64, SearchError> {
     let boxes = &problem.boxes[..problem.boxes.len().div_ceil(TIMED)];
     let began = observer.progress().unwrap_or(0.0);
-    Along::new(boxes)?;
+    MortonOrder::new(boxes)?;
     let took = observer.progress().unwrap_or(0.0) - began;
     Ok((took * problem.boxes.len() as f64 / boxes.len() as f64).max(1e-9))
 }
@@ -152,7 +152,7 @@ const SAMPLED: usize = 2048;
 const AHEAD: f64 = 0.975;
 
 /// Whether a division is worth its time: it must be ahead on parts of the scene. Takes about a tenth of that time.
-fn division_may_be_ahead(along: &Along, problem: &Problem, run: &mut Run) -> Result<bool, SearchError> {
+fn division_may_be_ahead(along: &MortonOrder, problem: &Problem, run: &mut Run) -> Result<bool, SearchError> {
     let (order, (stretches, part)) = (along.order(), SAMPLES);
     if order.len() < SAMPLED {
         return Ok(true);

@@ -17,7 +17,7 @@ use crate::start::{Start, construction};
 use crate::stream::{Stream, stream};
 use crate::working::{ANCHOR, Working};
 use crate::{LocalSearch, Observer, Problem, Quota, Run, Search, SearchError, Tally};
-use bvh_build::division::Workspace;
+use bvh_build::top_down::Workspace;
 use bvh_build::{Check, Presorted, muller_fellner};
 use bvh_core::{Aabb, Bvh};
 use rand::RngExt;

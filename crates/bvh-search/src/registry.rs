@@ -55,7 +55,7 @@ methods! {
     /// Incremental insertion, in index order.
     "goldsmith_salmon" => GoldsmithSalmon(bvh_build::goldsmith_salmon::Config),
     /// Bottom-up clustering.
-    "agglomerative" => Agglomerative(bvh_build::agglomerative::Config),
+    "agglomerative" => Agglomerative(bvh_build::ploc::Config),
     /// Randomised Müller–Fellner.
     "grasp" => Grasp(crate::grasp::Config),
     /// Goldsmith–Salmon insertion in random orders.

@@ -1,6 +1,6 @@
 //! The builders that local search can start from.
 
-use bvh_build::{BuildError, Builder, Check, OutOfRange, agglomerative, muller_fellner};
+use bvh_build::{BuildError, Builder, Check, OutOfRange, muller_fellner, ploc};
 use bvh_core::{Aabb, Bvh};
 
 /// A builder of one object per leaf. Different starts lead to different local optima.
@@ -10,7 +10,7 @@ pub enum Start {
     /// Greedy top-down division.
     MullerFellner(muller_fellner::Config),
     /// Bottom-up clustering: ahead on some scenes of architecture and machines, far behind on smooth surfaces.
-    Agglomerative(agglomerative::Config),
+    Agglomerative(ploc::Config),
 }
 
 impl Default for Start {

@@ -4,7 +4,7 @@
 
 mod paired;
 
-use bvh_build::division::Workspace;
+use bvh_build::top_down::Workspace;
 use bvh_build::{Builder, Presorted, goldsmith_salmon, muller_fellner};
 use bvh_core::{Aabb, Bvh};
 use bvh_search::grasp::{self, Candidates};
@@ -63,7 +63,7 @@ fn one_thread(scene: &Scene) {
         let scene = Presorted::new(boxes).expect("finite boxes");
         let (mut workspace, mut tree) = (Workspace::default(), Bvh::default());
         for _ in 0..TRIALS {
-            config.construct(&scene, &mut bvh_build::sweep::TakeBest, &mut workspace, &mut tree);
+            config.construct(&scene, &mut bvh_build::top_down::TakeBest, &mut workspace, &mut tree);
             std::hint::black_box(bvh_core::cost::internal_area(&tree));
         }
     };

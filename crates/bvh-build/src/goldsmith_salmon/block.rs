@@ -1,5 +1,5 @@
-//! The working form of the tree: children in blocks of four, side by side, so that one look at memory and one vector
-//! comparison serve four boxes.
+//! The working form of the tree: children in blocks of four, so that one access to memory and one vector comparison
+//! serve four boxes.
 
 use super::Object;
 
@@ -7,28 +7,28 @@ use super::Object;
 pub(super) const LANES: usize = 4;
 /// Marks a leaf in a link.
 pub(super) const LEAF: u32 = 1 << 31;
-/// No node: above the root.
+/// The missing parent of the root.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Four children of one node, side by side. A node with more has several blocks in a row, their number a power of
-/// two: full ones move to twice the room. A node has no record of its own, only its lane in its parent's block,
-/// and is named by `block · LANES + lane`.
+/// Four children of one node, side by side. A node with more children has several consecutive blocks, whose number is a
+/// power of two: when they are full they move to twice the space. A node has no record of its own but a lane in its
+/// parent's block, and is named by `block · LANES + lane`.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Block {
-    /// −min.xyz, max.xyz of each.
+    /// −min.xyz, max.xyz of each child.
     pub(super) bounds: [[f32; LANES]; 6],
     /// An inner child's first block; a leaf's object, marked [`LEAF`].
     pub(super) link: [u32; LANES],
-    /// An inner child's number of children; 2, those of the pair, for a leaf.
+    /// An inner child's number of children; 2 for a leaf, the children of the pair that it may become.
     pub(super) count: [u32; LANES],
-    /// An inner child's half area. For a leaf what its growth is counted from: nothing, or its half area if children
-    /// are chosen by area.
+    /// An inner child's half area. For a leaf, the area from which its growth is counted: 0, or its half area if
+    /// children are chosen by area.
     pub(super) area: [f64; LANES],
 }
 
 impl Block {
-    /// Lanes without a child: leaves that contain nothing and would grow without bound.
+    /// Unused lanes hold leaves that contain nothing and would grow without bound.
     pub(super) const EMPTY: Self = Self {
         bounds: [[f32::INFINITY; LANES]; 6],
         link: [LEAF; LANES],
@@ -43,7 +43,7 @@ impl Block {
         (lanes != 0).then(|| lanes.trailing_zeros() as usize % LANES)
     }
 
-    /// One bit per inner child that contains `b`. The compiler makes nothing good of the plain version below.
+    /// One bit per inner child that contains `b`. Compilers do not vectorise the plain version below.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     fn containing(&self, b: &[f32; 6]) -> u32 {
@@ -54,7 +54,7 @@ impl Block {
             let side = |i: usize| _mm_cmple_ps(_mm_set1_ps(b[i]), lanes(self.bounds[i]));
             let sides = |i: usize| _mm_and_ps(side(i), side(i + 1));
             let contains = _mm_and_ps(_mm_and_ps(sides(0), sides(2)), sides(4));
-            // LEAF is a float's sign bit, and the mask takes the sign bits.
+            // `LEAF` is the sign bit of a float, and the mask collects sign bits.
             let [a, b, c, d] = self.link;
             let leaves = _mm_castsi128_ps(_mm_setr_epi32(a as i32, b as i32, c as i32, d as i32));
             _mm_movemask_ps(_mm_andnot_ps(leaves, contains)) as u32
@@ -74,7 +74,7 @@ impl Block {
         (0..LANES).map(|lane| u32::from(contains(lane)) << lane).sum()
     }
 
-    /// The half area of the union of a child and `b`, the operations as in [`bvh_core::PackedAabb::half_area`].
+    /// The half area of the union of a child and `b`, by the operations of [`bvh_core::PackedAabb::half_area`].
     #[inline(always)]
     pub(super) fn union_area(&self, lane: usize, b: &[f32; 6]) -> f64 {
         let bound = |i: usize| f64::from(larger(self.bounds[i][lane], b[i]));
@@ -122,7 +122,7 @@ impl Block {
     }
 }
 
-/// One instruction, unlike `f32::max`, which minds NaN.
+/// A single instruction, unlike `f32::max`, which handles NaN.
 #[inline(always)]
 fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }

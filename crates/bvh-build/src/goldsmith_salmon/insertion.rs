@@ -1,16 +1,16 @@
-//! The walk down the tree and the choice of the place where an object is attached.
+//! The descent of an object, the choice of the node where it stops, and its insertion there.
 
 use super::block::{Block, LANES, NONE, family, place};
 use super::{Object, Scene, Workspace};
 use bvh_core::cost::Sum;
 use std::ops::Range;
 
-/// A [`Config`](super::Config) that the compiler knows.
+/// A [`Config`](super::Config) known at compile time.
 pub(super) trait Rule {
     const BY_AREA: bool;
     const PAIR_INNER: bool;
 
-    /// What the growth of a leaf is counted from.
+    /// The area from which the growth of a leaf is counted.
     #[inline(always)]
     fn leaf_area(object: &Object) -> f64 {
         if Self::BY_AREA { object.area } else { 0.0 }
@@ -25,24 +25,24 @@ impl<const BY_AREA: bool, const PAIR_INNER: bool> Rule for Rules<BY_AREA, PAIR_I
     const PAIR_INNER: bool = PAIR_INNER;
 }
 
-/// Objects that walk down together. On its own a walk waits for memory at every node.
+/// Number of objects that descend together, because a single descent waits for memory at every node.
 const BATCH: usize = 4;
 
-/// The first part of the paths of a batch: the nodes that contain the object, which the others below do not.
+/// The upper parts of a batch's paths: the nodes that contain the object, below which no node does.
 #[derive(Debug, Default)]
 pub(super) struct Walk {
-    /// One row per block looked at: for each object the node found there, if any. A node is found in the same row
-    /// whoever looks for it.
+    /// One row per block that was searched: for each object the node found there, if any. All objects find the same
+    /// node in the same row.
     trail: Vec<[u32; BATCH]>,
-    /// For each object the row in which its last node was found; its later rows mean nothing.
+    /// For each object the row in which its last node was found. Later rows have no meaning for it.
     last: [usize; BATCH],
 }
 
 impl Walk {
-    /// Walks down from the nodes in row `from`.
+    /// Descends from the nodes in row `from`.
     #[inline(always)]
     fn descend(&mut self, blocks: &[Block], objects: &[Object; BATCH], walkers: Range<usize>, from: usize) {
-        // The blocks still to be looked at.
+        // The blocks still to be searched.
         let mut ahead = [(0, 0); BATCH];
         for walker in walkers {
             let (first, count) = family(blocks, self.trail[from][walker]);
@@ -74,26 +74,26 @@ impl Walk {
     }
 }
 
-/// A node of the path that does not contain the object, with the half area it would have.
+/// A node on the path that does not contain the object, with the half area of their union.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grown {
     node: u32,
     area: f64,
 }
 
-/// Where to attach an object.
+/// A place where an object can be attached.
 struct Stop {
     /// The increase of Σ S · children.
     increase: f64,
     node: u32,
-    /// The first block of the node and its siblings, when it is to be paired.
+    /// The first block of the node and its siblings, if the object is paired with the node.
     pair_among: Option<usize>,
-    /// How many of the nodes in `grown` are enlarged.
+    /// Number of the nodes in `grown` that are enlarged.
     grown: usize,
 }
 
-/// Inserts the objects of a valid order. The containing part of the path is looked up for a batch of objects at once
-/// and, where an insertion of the batch changed the tree below one of its nodes, again from there.
+/// Inserts the objects of a valid order and returns the tree's cost. The upper part of the path is found for a batch of
+/// objects at once, and again from the node below which an insertion of the same batch has changed the tree.
 #[inline(always)]
 pub(super) fn insert_each<R: Rule>(scene: &Scene, order: &[u32], workspace: &mut Workspace) -> f64 {
     let Workspace { blocks, walk, grown, .. } = workspace;
@@ -133,22 +133,22 @@ pub(super) fn insert_each<R: Rule>(scene: &Scene, order: &[u32], workspace: &mut
     if rest.is_empty() || root_area <= 0.0 { 0.0 } else { cost.value() / root_area }
 }
 
-/// The stop of least increase on the path, of which `last` is the last node that contains the object. Leaves the rest
-/// of the path in `grown`.
+/// The stop of least increase on the path whose last node to contain the object is `last`. Fills `grown` with the rest
+/// of the path.
 #[inline(always)]
 fn find_stop<R: Rule>(blocks: &[Block], object: &Object, last: u32, grown: &mut Vec<Grown>) -> Stop {
     grown.clear();
-    // A node that contains the object asks for its own area and nothing else: no node above asks for less.
+    // Stopping at a node that contains the object adds the node's area and nothing else. No node above adds less.
     let (block, lane) = place(last);
     let increase = if last == NONE { f64::INFINITY } else { blocks[block].area[lane] };
     let mut stop = Stop { increase, node: last, pair_among: None, grown: 0 };
     let (mut first, mut count) = family(blocks, last);
     let mut inherited = 0.0;
-    // Every stop further down asks for at least what is inherited and the object's own area.
+    // Every stop further down adds at least the growth of the nodes above it and the object's own area.
     while inherited + object.area < stop.increase {
         let (mut least, mut next) = (f64::INFINITY, Grown { node: NONE, area: 0.0 });
         for (at, block) in blocks.iter().enumerate().skip(first).take(count.div_ceil(LANES)) {
-            // Only leaves from here on: each asks for at least twice the object's area.
+            // Only leaves follow, each of which adds at least twice the object's area.
             if block.is_leaf(0) {
                 let beaten = !R::BY_AREA && least <= 2.0 * object.area;
                 let useless = inherited + 2.0 * object.area >= stop.increase
@@ -191,13 +191,13 @@ fn find_stop<R: Rule>(blocks: &[Block], object: &Object, last: u32, grown: &mut 
     stop
 }
 
-/// Makes the object a child of the stop, or of a new inner node in its stead. Returns the place of the grown node.
+/// Makes the object a child of the stop, or of a new inner node that replaces it. Returns the grown node.
 #[inline(always)]
 fn attach<R: Rule>(blocks: &mut Vec<Block>, stop: &Stop, object: &Object, id: u32) -> u32 {
     let (mut block, mut lane) = place(stop.node);
     if let Some(among) = stop.pair_among {
         if blocks[block].is_leaf(lane) {
-            // It changes places with the first leaf, so that inner nodes stay in front.
+            // The leaf is swapped with the first leaf, so that inner nodes stay in front.
             let mut front = among;
             while !blocks[front].is_leaf(LANES - 1) {
                 front += 1;

@@ -1,20 +1,20 @@
 //! Traversal of a KD-tree, with the answers of testing every object.
 //!
-//! A ray's interval in a cell is computed as a [`Slabs`] interval is, by the same operations, and only ever cut by
-//! split planes. So if an object's box lies on one side of a plane, its interval lies in that side's; if it reaches
-//! into both, so does the object's name, and the two intervals overlap: the cell in which a hit is found is never
-//! skipped. A hit outside the cell at hand is a hit all the same; cells that begin behind it are skipped.
+//! A ray's interval in a cell is computed by the operations of [`Slabs`] and only ever cut by split planes. An object's
+//! box on one side of a plane therefore has its interval within that side's. A box on both sides is referenced from
+//! both, and the two intervals overlap. So no cell that contains a hit is skipped. A hit outside the current cell counts
+//! as well, and cells that begin behind it are skipped.
 
 use super::{Cell, KdTree};
 use bvh_core::{Counter, Hit, Ray, Slabs};
 use std::ops::ControlFlow;
 
 impl KdTree {
-    /// The nearest object that `ray` meets in its range; of several at the same distance the one of the lowest id.
-    /// `test` and the answer are those of [`bvh_core::nearest_hit`], bit by bit.
+    /// The nearest object that `ray` hits in its range; of several at the same distance, the one with the lowest id.
+    /// Takes the same `test` as [`bvh_core::nearest_hit`] and gives the same answer, bit by bit.
     ///
-    /// `counter` counts the root's box and every split plane that is met as one box, and an object as often as it is
-    /// tested: one that reaches into several cells may be tested in each.
+    /// `counter` counts the root's box and every visited split plane as one box each, and an object as often as it is
+    /// tested: in each of the cells that it overlaps, at most.
     #[inline]
     pub fn nearest_hit(
         &self,
@@ -41,7 +41,7 @@ impl KdTree {
         nearest
     }
 
-    /// Whether `ray` meets any object in its range; see [`bvh_core::any_hit`] and [`nearest_hit`](Self::nearest_hit).
+    /// Whether `ray` hits any object in its range; see [`bvh_core::any_hit`] and [`nearest_hit`](Self::nearest_hit).
     #[inline]
     pub fn any_hit(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool, counter: &mut impl Counter) -> bool {
         let mut found = false;
@@ -58,8 +58,8 @@ impl KdTree {
         found
     }
 
-    /// Hands the objects of leaves that the ray may meet to `leaf`, the nearest first, until it breaks. `leaf` may
-    /// lower the distance from which on cells are skipped.
+    /// Calls `leaf` with the objects of every leaf that the ray may hit, from near to far, until it breaks. `leaf` may
+    /// lower the distance beyond which cells are skipped.
     #[inline(always)]
     fn walk<C: Counter>(
         &self,
@@ -78,7 +78,7 @@ impl KdTree {
         if entry > exit || entry > t_max {
             return;
         }
-        // A level leaves at most one cell for later: this cannot overflow.
+        // Every level leaves at most one cell pending, so the stack cannot overflow.
         let mut stack = [(0, 0.0, 0.0); Self::MAX_DEPTH];
         let mut pending = 0;
         let mut cell = 0;

@@ -197,15 +197,12 @@ mod tests {
     use crate::place::PlaceSearch;
     use crate::scatter::scatter;
     use crate::stream::stream;
-    use bvh_build::{Builder, agglomerative, muller_fellner};
+    use bvh_build::{Builder, muller_fellner, ploc};
     use bvh_core::{Aabb, cost, validate};
     use rand::RngExt;
 
     fn starts(boxes: &[Aabb]) -> [Bvh; 2] {
-        [
-            agglomerative::Config::default().build(boxes).unwrap(),
-            muller_fellner::Config::default().build(boxes).unwrap(),
-        ]
+        [ploc::Config::default().build(boxes).unwrap(), muller_fellner::Config::default().build(boxes).unwrap()]
     }
 
     /// The places that a node other than the root may be moved to.

@@ -124,7 +124,7 @@ impl SceneCase {
 
 /// Every method of the registry and every builder in its other forms, with labels.
 pub fn methods() -> Vec<(String, Method)> {
-    use bvh_build::{agglomerative, evaluation::AreaOnly, goldsmith_salmon, median_cut, muller_fellner};
+    use bvh_build::{goldsmith_salmon, median_cut, muller_fellner, ploc, top_down::AreaOnly};
     use goldsmith_salmon::Descent;
     use muller_fellner::Heuristic;
     let mut methods: Vec<(String, Method)> =
@@ -147,7 +147,7 @@ pub fn methods() -> Vec<(String, Method)> {
         let config = goldsmith_salmon::Config { descent, pair_inner };
         methods.push((format!("goldsmith_salmon, {config:?}"), Method::GoldsmithSalmon(config)));
     }
-    let narrow = agglomerative::Config { radius: 1, ..Default::default() };
+    let narrow = ploc::Config { radius: 1, ..Default::default() };
     methods.push(("agglomerative, radius 1".into(), Method::Agglomerative(narrow)));
     methods
 }

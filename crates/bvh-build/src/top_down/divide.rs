@@ -1,22 +1,18 @@
-//! Top-down object division: carries out the splits that a [`SplitRule`] chooses, from the root to single objects.
+//! The division of a scene, from the root down to single objects, by the splits that a [`SplitRule`] chooses.
 //!
-//! Three sorted lists are partitioned stably, so that nothing is sorted twice (Ng & Trifonov 2003, Table 1). The
-//! layout follows from the counts alone: a node over m objects has its 2m − 2 descendants in one block, children
-//! first, then the left child's block, then the right's. So subtrees can be built in any order, or in parallel,
-//! into the same bytes.
+//! The objects' orders along the three axes are partitioned stably, so that nothing is sorted twice (Ng & Trifonov 2003,
+//! Table 1). A node's place follows from the numbers of objects alone: a node over m objects has its 2m − 2 descendants
+//! in one block, which holds the two children, then the left child's block, then the right child's. So subtrees can be
+//! built in any order, or in parallel, into the same bytes.
 
-use crate::Presorted;
-use crate::evaluation::Evaluation;
-use crate::sweep::{Block, SplitRule, Sweep, union_of};
+use super::presort::{PARALLEL_OBJECTS, Presorted, note_same_orders};
+use super::split_cost::SplitCost;
+use super::sweep::{Block, SplitRule, Sweep, union_of};
 use bvh_core::{Aabb, Bvh, Node, PackedAabb, with_vector_instructions};
 #[cfg(feature = "rayon")]
 use std::sync::Mutex;
 
-/// Subtrees of at least this many objects are built by parallel tasks: large enough that a task's start is lost
-/// in its work.
-pub const PARALLEL_OBJECTS: usize = 4096;
-
-/// Buffers of a build, reusable for builds over the same number of objects without allocating again.
+/// Buffers of a build. Further builds over the same number of objects reuse them without allocating.
 #[derive(Debug, Default)]
 pub struct Workspace {
     orders: [Vec<u32>; 2],
@@ -26,8 +22,8 @@ pub struct Workspace {
 /// Buffers of one thread.
 #[derive(Debug, Default)]
 struct Scratch {
-    /// Per object of the scene: 1 while it goes to the left. Not shared between threads, though their objects are
-    /// disjoint: neighbouring objects in different subtrees would fight for cache lines.
+    /// Per object of the scene, 1 if it goes to the left. Each thread has its own array, although the threads' objects
+    /// are disjoint, because objects of different subtrees would share cache lines.
     goes_left: Vec<u8>,
     goes_right: Vec<u32>,
     blocks: [Vec<Block>; 3],
@@ -46,7 +42,7 @@ struct Frame {
     known: Known,
 }
 
-/// What is known of a node before it is divided.
+/// Facts about a node that are known before it is divided.
 #[derive(Clone, Copy, Debug)]
 struct Known {
     aabb: PackedAabb,
@@ -54,9 +50,9 @@ struct Known {
     same_as: [u8; 3],
 }
 
-/// A subtree that can be built on its own, below a node already written: exclusive parts of all arrays.
+/// A subtree below a node that is already written, with exclusive parts of all arrays: it can be built independently.
 struct Task<'a> {
-    /// The descendants' block, 2·objects − 2 nodes, and its place in the whole tree.
+    /// The descendants' block, 2·objects − 2 nodes, and its position in the whole tree.
     below: &'a mut [Node],
     below_at: u32,
     objects_at: u32,
@@ -64,51 +60,51 @@ struct Task<'a> {
     known: Known,
 }
 
-/// What all tasks of a build share.
-struct Shared<'a, E> {
+/// The input that all tasks of a build share.
+struct Shared<'a, C> {
     boxes: &'a [PackedAabb],
-    evaluation: &'a E,
+    split_cost: &'a C,
     /// Whether to look for axes that order a node's objects identically.
     skip_same_order: bool,
 }
 
-/// Divides the scene by `rule` into `tree`, reusing the tree's and the workspace's memory. Expected O(n log n);
-/// O(n²) when every split peels off one object. One thread.
-pub fn divide<E: Evaluation, R: SplitRule>(
+/// Divides the scene by `rule` into `tree` on one thread, reusing the memory of tree and workspace. O(n log n) for
+/// balanced splits, O(n²) if every split separates a single object.
+pub fn divide<C: SplitCost, R: SplitRule>(
     scene: &Presorted,
-    evaluation: &E,
+    split_cost: &C,
     rule: &mut R,
     skip_same_order: bool,
     workspace: &mut Workspace,
     tree: &mut Bvh,
 ) {
-    if let Some((shared, task, scratch)) = prepare(scene, evaluation, skip_same_order, workspace, tree) {
+    if let Some((shared, task, scratch)) = prepare(scene, split_cost, skip_same_order, workspace, tree) {
         build(&shared, task, rule, scratch);
     }
 }
 
-/// As [`divide`], on the threads of the current rayon pool, into the same bytes: `rule` must have no memory.
+/// As [`divide`], on the threads of the current rayon pool and with the same bytes. `rule` is copied into every task.
 #[cfg(feature = "rayon")]
-pub fn divide_parallel<E: Evaluation, R: SplitRule + Copy + Send + Sync>(
+pub fn divide_parallel<C: SplitCost, R: SplitRule + Copy + Send + Sync>(
     scene: &Presorted,
-    evaluation: &E,
+    split_cost: &C,
     rule: R,
     skip_same_order: bool,
     workspace: &mut Workspace,
     tree: &mut Bvh,
 ) {
-    fn spawn<'s, E: Evaluation, R: SplitRule + Copy + Send + Sync + 's>(
+    fn spawn<'s, C: SplitCost, R: SplitRule + Copy + Send + Sync + 's>(
         scope: &rayon::Scope<'s>,
-        shared: &'s Shared<'s, E>,
+        shared: &'s Shared<'s, C>,
         scratches: &'s Mutex<Vec<Scratch>>,
         mut task: Task<'s>,
         mut rule: R,
     ) {
-        // At most one per thread is ever made. A poisoned lock is taken all the same: buffers have no invariant.
+        // At most one set of buffers per thread is made. Buffers have no invariant, so a poisoned lock does no harm.
         let pooled = || scratches.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let mut scratch = pooled().pop().unwrap_or_default();
         scratch.goes_left.resize(shared.boxes.len(), 0);
-        // A loop, not a recursion: one side goes to the pool, the other stays, however unbalanced the splits.
+        // A loop rather than a recursion: one side goes to the pool and the other stays, however unbalanced the splits.
         while task.objects() >= PARALLEL_OBJECTS {
             let (left, right) = split_task(shared, task, &mut rule, &mut scratch);
             let (larger, smaller) =
@@ -123,21 +119,21 @@ pub fn divide_parallel<E: Evaluation, R: SplitRule + Copy + Send + Sync>(
         build(shared, task, &mut rule, &mut scratch);
         pooled().push(scratch);
     }
-    if let Some((shared, task, scratch)) = prepare(scene, evaluation, skip_same_order, workspace, tree) {
+    if let Some((shared, task, scratch)) = prepare(scene, split_cost, skip_same_order, workspace, tree) {
         let shared = &shared;
         let scratches = &Mutex::new(vec![std::mem::take(scratch)]);
         rayon::scope(|scope| spawn(scope, shared, scratches, task, rule));
     }
 }
 
-/// Sizes all arrays, writes the root, and cuts the arrays into its task; `None` for the scene without objects.
-fn prepare<'a, E>(
+/// Sizes all arrays, writes the root, and returns the root's task; `None` for a scene without objects.
+fn prepare<'a, C>(
     scene: &'a Presorted,
-    evaluation: &'a E,
+    split_cost: &'a C,
     skip_same_order: bool,
     workspace: &'a mut Workspace,
     tree: &'a mut Bvh,
-) -> Option<(Shared<'a, E>, Task<'a>, &'a mut Scratch)> {
+) -> Option<(Shared<'a, C>, Task<'a>, &'a mut Scratch)> {
     let n = scene.len();
     let Workspace { orders: [y, z], scratch } = workspace;
     tree.prim_ids.clone_from(&scene.orders[0]);
@@ -148,7 +144,7 @@ fn prepare<'a, E>(
     let (root, below) = tree.nodes.split_first_mut()?;
     let aabb = union_of(&scene.boxes, &tree.prim_ids);
     *root = if n == 1 { Node::leaf((&aabb).into(), 0, 1) } else { Node::inner((&aabb).into(), 1, 2) };
-    let shared = Shared { boxes: &scene.boxes, evaluation, skip_same_order };
+    let shared = Shared { boxes: &scene.boxes, split_cost, skip_same_order };
     let known = Known { aabb, same_as: [0, 1, 2] };
     Some((
         shared,
@@ -166,8 +162,8 @@ impl Task<'_> {
 
 /// Divides the task's node, of two or more objects, writes its children and returns them as tasks.
 #[cfg(feature = "rayon")]
-fn split_task<'a, E: Evaluation, R: SplitRule>(
-    shared: &Shared<'_, E>,
+fn split_task<'a, C: SplitCost, R: SplitRule>(
+    shared: &Shared<'_, C>,
     task: Task<'a>,
     rule: &mut R,
     scratch: &mut Scratch,
@@ -205,22 +201,22 @@ fn split_task<'a, E: Evaluation, R: SplitRule>(
 
 with_vector_instructions! {
     /// [`build_plain`], with the vector instructions that the processor has.
-    build = build_plain<E: Evaluation, R: SplitRule>(
-        shared: &Shared<'_, E>, task: Task<'_>, rule: &mut R, scratch: &mut Scratch)
+    build = build_plain<C: SplitCost, R: SplitRule>(
+        shared: &Shared<'_, C>, task: Task<'_>, rule: &mut R, scratch: &mut Scratch)
 }
 
 with_vector_instructions! {
-    /// [`split_node`], likewise.
+    /// [`split_node`], with the vector instructions that the processor has.
     #[cfg(feature = "rayon")]
-    split_node_fast = split_node<E: Evaluation, R: SplitRule>(
-        shared: &Shared<'_, E>, orders: [&mut [u32]; 3], known: Known, rule: &mut R, scratch: &mut Scratch)
+    split_node_fast = split_node<C: SplitCost, R: SplitRule>(
+        shared: &Shared<'_, C>, orders: [&mut [u32]; 3], known: Known, rule: &mut R, scratch: &mut Scratch)
         -> (usize, [Known; 2])
 }
 
-/// Builds everything below a task's node with an explicit stack, the left child first.
+/// Builds everything below a task's node, left subtrees first, with an explicit stack.
 #[inline(always)]
-fn build_plain<E: Evaluation, R: SplitRule>(
-    shared: &Shared<'_, E>,
+fn build_plain<C: SplitCost, R: SplitRule>(
+    shared: &Shared<'_, C>,
     task: Task<'_>,
     rule: &mut R,
     scratch: &mut Scratch,
@@ -259,11 +255,11 @@ fn build_plain<E: Evaluation, R: SplitRule>(
     scratch.stack = stack;
 }
 
-/// Lets the rule split a node of two or more objects and partitions its lists. Returns the number of objects on
-/// the left and what is known of both sides.
+/// Lets the rule split a node of two or more objects and partitions its orders. Returns the number of objects on the
+/// left and the facts about both sides.
 #[inline(always)]
-fn split_node<E: Evaluation, R: SplitRule>(
-    shared: &Shared<'_, E>,
+fn split_node<C: SplitCost, R: SplitRule>(
+    shared: &Shared<'_, C>,
     orders: [&mut [u32]; 3],
     Known { aabb, mut same_as }: Known,
     rule: &mut R,
@@ -275,7 +271,7 @@ fn split_node<E: Evaluation, R: SplitRule>(
     let [x, y, z] = orders;
     let mut sweep = Sweep {
         boxes: shared.boxes,
-        evaluation: shared.evaluation,
+        split_cost: shared.split_cost,
         orders: [&*x, &*y, &*z],
         same_as,
         aabb,
@@ -298,27 +294,7 @@ fn split_node<E: Evaluation, R: SplitRule>(
     (left, known)
 }
 
-/// Finds axes whose orders have become identical. Once they are, they are in the whole subtree.
-///
-/// Source: Ng & Trifonov 2003, section 3.2.
-#[inline(always)]
-pub(crate) fn note_same_orders(orders: [&[u32]; 3], same_as: &mut [u8; 3]) {
-    for (low, high) in [(0u8, 1u8), (0, 2), (1, 2)] {
-        let (a, b) = (low as usize, high as usize);
-        // The first elements usually differ, which saves the call that compares the rest.
-        if same_as[a] == low
-            && same_as[b] == high
-            && orders[a].first() == orders[b].first()
-            && orders[a] == orders[b]
-        {
-            for axis in same_as.iter_mut().filter(|axis| **axis == high) {
-                *axis = low;
-            }
-        }
-    }
-}
-
-/// Moves the objects that go left to the front, keeping the order on both sides. Without branches.
+/// Moves the objects that go left to the front and keeps the order on both sides, without branches.
 #[inline(always)]
 fn partition(order: &mut [u32], goes_right: &mut Vec<u32>, goes_left: &[u8]) {
     if goes_right.len() < order.len() {

@@ -1,33 +1,33 @@
-//! Every cluster's nearest neighbour along the curve: several at a time, each distance in turn.
+//! Every cluster's nearest neighbour in Morton order: vectorised over clusters, one distance after the other.
 
 use bvh_core::{PackedAabb, with_vector_instructions};
 
-/// Clusters whose neighbours are found at once.
+/// Clusters whose neighbours are found in one call.
 pub(super) const CHUNK: usize = 512;
 
-/// Planes of a chunk and its surroundings, one array per coordinate, and what comes of them.
+/// Buffers of one call of [`find`]: the boxes of a chunk and its surroundings as one array per plane, and results.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
     planes: [Vec<f32>; 6],
-    /// Lengths of the boxes around two clusters, then their areas in place of the first.
+    /// Per pair of clusters, the side lengths of the joint box; its area later replaces the first.
     sides: [Vec<f32>; 3],
-    /// Per cluster, the bits of the least area so far.
+    /// Per cluster, the bits of the smallest area so far.
     least: Vec<i32>,
-    /// What was found at lesser distances: apart from what is written, which would be written slowly otherwise.
+    /// Copy of the results so far: reading and writing the same array would keep the loop from being vectorised.
     before: Vec<i32>,
 }
 
-/// Coordinates are taken to be this at most, scaled. Only along an axis on which all boxes are one plane, far from the
-/// origin for the scene's size, are any larger: extents are below 2, and an f32 has 24 bits.
+/// Scaled coordinates are clamped to this magnitude. Only an axis along which all boxes lie in one plane, far from the
+/// origin for the scene's size, has larger ones: extents are below 2, and an f32 has 24 bits.
 const FARTHEST: f64 = (1u64 << 40) as f64;
 
 with_vector_instructions! {
-    /// How far on the nearest neighbours of the clusters from `start` on are, as many as `found` has room for, at most
-    /// [`CHUNK`]: the least area of the box around both, then the least exclusive or of the positions. Clusters are
-    /// looked at up to `radius` positions before and after.
+    /// Finds the nearest neighbours of the `found.len()` clusters from `start` on, at most [`CHUNK`], among those up to
+    /// `radius` positions before and after, and writes their distances, negative for neighbours before. The nearest
+    /// has the smallest joint box; of equals, the least exclusive or of its position and the cluster's.
     ///
-    /// Areas are f32, of coordinates multiplied by `scale`, a power of two with which they cannot overflow, and are
-    /// zero only for clusters some 2^60 times smaller than the scene.
+    /// Areas are f32. Coordinates are first multiplied by `scale`, a power of two, so that no area overflows, and only
+    /// clusters some 2^60 times smaller than the scene have area 0.
     pub(super) find = find_plain(
         boxes: &[PackedAabb], scale: f64, radius: usize, start: usize, found: &mut [i32], scratch: &mut Scratch)
 }
@@ -43,7 +43,7 @@ fn find_plain(
 ) {
     let len = found.len();
     let Scratch { planes, sides, least, before } = scratch;
-    // Position p of the chunk is at radius + p. No pair with what is beyond the ends has a finite area.
+    // Position p of the chunk is stored at radius + p. Beyond the ends lie boxes at infinity, whose areas never win.
     let (first, last) = (start.saturating_sub(radius), (start + len + radius).min(boxes.len()));
     let offset = first + radius - start;
     for plane in planes.iter_mut() {
@@ -63,7 +63,7 @@ fn find_plain(
     least.resize(len, i32::MAX);
     before.resize(len, 0);
     for distance in 1..=radius {
-        // The pairs of `distance` whose second is in the chunk, then those whose first is.
+        // All pairs at this distance of which at least one cluster is in the chunk.
         let pairs = len + distance;
         for (axis, side) in sides.iter_mut().enumerate() {
             let [low, high] =
@@ -79,7 +79,7 @@ fn find_plain(
     }
 }
 
-/// The length of the box around the clusters at `p` and `p + distance`, for all that `sides` has room for.
+/// The side lengths of the joint boxes of the clusters at p and p + distance, for every p that `sides` has room for.
 #[inline(always)]
 fn joint_sides(low: &[f32], high: &[f32], distance: usize, sides: &mut [f32]) {
     let larger = |a: f32, b: f32| if a > b { a } else { b };
@@ -91,8 +91,8 @@ fn joint_sides(low: &[f32], high: &[f32], distance: usize, sides: &mut [f32]) {
     }
 }
 
-/// Takes those neighbours, `distance` before and after, that are nearer than all before. Areas are ordered as their
-/// bits are, which lets everything be done without a branch.
+/// Takes the neighbours `distance` before and after a cluster where they are nearer than all neighbours so far. Areas
+/// compare as their bits do, so that no branch is needed.
 #[inline(always)]
 fn take_nearer(
     areas: &[f32],
@@ -118,7 +118,7 @@ fn take_nearer(
     }
 }
 
-/// All ones if `a` is less than `b`, or as much and its second number less; else zero.
+/// −1, all bits set, if `a` precedes `b` lexicographically; else 0.
 #[inline(always)]
 fn is_less(a: [i32; 2], b: [i32; 2]) -> i32 {
     -(i32::from(a[0] < b[0]) | i32::from(a[0] == b[0]) & i32::from(a[1] < b[1]))

@@ -1,11 +1,11 @@
-//! Median cut: halve the objects at the median of their box centres.
+//! Median cut: halves the objects of a node at the median of their box centres.
 //!
 //! Kay & Kajiya 1986, 'Ray tracing complex scenes', alternate the axes; Chang's CSS 552 report splits the longest
 //! axis of the node's box and stops at 10 % of all objects.
 //!
 //! Differs from the sources: an odd object goes to the left half; equal centres are ordered by index.
 
-use crate::presort::check_scene;
+use crate::error::check_scene;
 use crate::{BuildError, Builder, Check};
 use bvh_core::{Aabb, Bvh, Node};
 

@@ -1,14 +1,14 @@
-//! What a split of a node is worth: the Müller–Fellner estimate, its weighted forms, and Table 2's alternatives.
+//! The cost of a split: the Müller–Fellner estimate, its weighted forms, and the alternatives of Table 2.
 //!
-//! A split is judged by its two sides alone. The division by the parent's area and the factor 2 of a surface
+//! A split's cost depends on its two sides alone. The division by the parent's area and the factor 2 of a surface
 //! drop out (Ng & Trifonov 2003, section 3.2).
 
-/// Judges the splits of a node by the box and the *load* of either side, where the load of a side is a sum over
-/// its objects: their number, or their weight.
+/// The cost of a node's splits, from the area and the *load* of either side. The load is a sum over a side's objects: of
+/// ones, or of weights.
 ///
-/// A side's value must not shrink as objects are added to it, nor [`join`](Self::join) or
-/// [`bound`](Self::bound) as values grow: scans prune by that, exactly.
-pub trait Evaluation: Sync {
+/// A side's value must not shrink as objects are added to it, nor may [`join`](Self::join) or [`bound`](Self::bound)
+/// as values grow. Scans rely on this to prune without changing a result.
+pub trait SplitCost: Sync {
     /// The load of one object. Default 1.
     #[inline(always)]
     fn load(&self, _object: u32) -> f64 {
@@ -19,14 +19,14 @@ pub trait Evaluation: Sync {
     fn total_load(&self, objects: &[u32]) -> f64 {
         objects.len() as f64
     }
-    /// The value of a side with this half area and load, finite and not negative.
+    /// The value of a side with this half area and load: finite and not negative.
     fn side(&self, area: f64, load: f64) -> f64;
     /// The cost of a split, from the values of its sides; symmetric.
     #[inline(always)]
     fn join(&self, left: f64, right: f64) -> f64 {
         left + right
     }
-    /// A lower bound of the cost of all splits whose sides have at least these values. Default: [`join`](Self::join).
+    /// A lower bound on the cost of all splits whose sides have at least these values. Default: [`join`](Self::join).
     #[inline(always)]
     fn bound(&self, left: f64, right: f64) -> f64 {
         self.join(left, right)
@@ -39,7 +39,7 @@ pub trait Evaluation: Sync {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AreaTimesCount;
 
-impl Evaluation for AreaTimesCount {
+impl SplitCost for AreaTimesCount {
     #[inline(always)]
     fn side(&self, area: f64, load: f64) -> f64 {
         area * load
@@ -52,7 +52,7 @@ impl Evaluation for AreaTimesCount {
 #[derive(Clone, Copy, Debug)]
 pub struct AreaTimesWeight<'a>(pub &'a [f32]);
 
-impl Evaluation for AreaTimesWeight<'_> {
+impl SplitCost for AreaTimesWeight<'_> {
     #[inline(always)]
     fn load(&self, object: u32) -> f64 {
         f64::from(self.0[object as usize])
@@ -67,22 +67,22 @@ impl Evaluation for AreaTimesWeight<'_> {
     }
 }
 
-/// S(L)·|L|^p + S(R)·|R|^p, with a table of the powers: p a little below 1 often gives a better tree, because the
-/// number of objects overstates the cost of a side that will itself be divided.
+/// S(L)·|L|^p + S(R)·|R|^p. A p slightly below 1 often gives a better tree, because the number of objects overstates
+/// the cost of a side that will itself be divided.
 ///
 /// Differs from the paper: p = 1 there.
 #[derive(Clone, Debug)]
 pub struct AreaTimesPower(Vec<f64>);
 
 impl AreaTimesPower {
-    /// A table for up to `objects` objects; `exponent` within 0..=1. The powers are computed in software, so that
-    /// they are the same on every machine.
+    /// A table of powers for up to `objects` objects, with `exponent` within 0..=1. They are computed in software, so
+    /// that they are the same on every machine.
     pub fn new(objects: usize, exponent: f64) -> Self {
         Self((0..=objects).map(|count| libm::pow(count as f64, exponent)).collect())
     }
 }
 
-impl Evaluation for AreaTimesPower {
+impl SplitCost for AreaTimesPower {
     #[inline(always)]
     fn side(&self, area: f64, load: f64) -> f64 {
         area * self.0[load as usize]
@@ -103,13 +103,13 @@ pub enum AreaOnly {
     Max,
     /// S(L)² + S(R)², between the sum and the maximum.
     SumOfSquares,
-    /// |S(L) − S(R)|, equal areas.
+    /// |S(L) − S(R)|, least for equal areas.
     Difference,
     /// S(L) · S(R).
     Product,
 }
 
-impl Evaluation for AreaOnly {
+impl SplitCost for AreaOnly {
     #[inline(always)]
     fn side(&self, area: f64, load: f64) -> f64 {
         match self {
@@ -129,7 +129,7 @@ impl Evaluation for AreaOnly {
     }
     #[inline(always)]
     fn bound(&self, left: f64, right: f64) -> f64 {
-        // The difference alone may shrink as a side grows.
+        // Only the difference may shrink as a side grows.
         if *self == Self::Difference { 0.0 } else { self.join(left, right) }
     }
 }

@@ -2,30 +2,30 @@
 //!
 //! Goldsmith & Salmon 1987, 'Automatic creation of object hierarchies for ray tracing', as described by Ng & Trifonov
 //! 2003, sections 1 and 4, and by Ericson 2005, 'Real-time collision detection', section 6.2.3.1. The first object is
-//! the root. Each next one walks down a single path, without backtracking, to a leaf. It could stop at every node N
-//! of the path, and does so where the cost Σ S(node) · children grows least, S a half area:
+//! the root. Every further object descends a single path to a leaf, without backtracking. It may stop at any node N of
+//! the path, and stops where the cost Σ S(node) · children grows least, with S the half area:
 //!
-//! - an inner N takes it as a further child: the increase is S(N ∪ object), plus children · growth of S for N and
+//! - an inner N takes the object as a further child, which adds S(N ∪ object), and children · growth of S for N and
 //!   every node above it;
-//! - a leaf N is paired with it under a new inner node: 2 · S(N ∪ object), plus the same for every node above.
+//! - a leaf N is paired with the object under a new inner node, which adds 2 · S(N ∪ object), and children · growth of
+//!   S for every node above it.
 //!
-//! The expected cost is the sum divided by S(root), which all choices share: the root's own growth counts as well.
+//! The expected cost is this sum divided by S(root). All choices share the divisor, so the root's growth counts, too.
 //!
-//! What the sources leave open: an inner child that contains the object is the next node of the path before any
-//! other child; otherwise [`Descent`] says. Of equal children the first is taken, inner nodes before leaves, inner
-//! nodes in the order in which they became such. (Goldsmith & Salmon take the nearest centre, or any.) Of equal stops
-//! the first is taken, from the last node that contains the object downwards, and a further child before a pair: a
-//! scene without area becomes one wide node, not a chain.
+//! The sources leave some choices open. Here an inner child that contains the object is next on the path before any
+//! other child; among the others, [`Descent`] decides. Of equal children the first is taken: inner nodes before leaves,
+//! and inner nodes in the order in which they became inner nodes. (Goldsmith & Salmon take the nearest centre, or any.)
+//! Of equal stops the first is taken, from the last node that contains the object downwards, and a further child before
+//! a pair, so that a scene without area becomes one wide node instead of a chain.
 //!
-//! *Complexity.* O(path · children) per object: expected O(n log n) in all for a random order. The rule has worse
-//! cases, and prices them itself: objects sorted along a line become a chain of about n/4 levels, all of which grow
-//! with every object, O(n²) in all. Identical, nested or flat objects make very wide nodes, rightly; leaves that
-//! cannot be the answer are skipped there, so these take O(1) per object.
+//! *Complexity.* O(path · children) per object, hence O(n log n) expected for a random order. In the worst case objects
+//! sorted along a line become a chain of about n/4 levels, all of which grow with every object: O(n²). Identical,
+//! nested or flat objects make very wide nodes, in which leaves that cannot be chosen are skipped: O(1) per object.
 
 mod block;
 mod insertion;
 
-use crate::presort::check_scene;
+use crate::error::check_scene;
 use crate::{BuildError, Builder};
 use block::{Block, LANES, LEAF, family, place};
 use bvh_core::{Aabb, Bvh, Node};
@@ -43,16 +43,16 @@ crate::config! {
     }
 }
 
-/// Which child is the next node of the path, of those that do not contain the object.
+/// The choice of the next node on the path among children that do not contain the object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Descent {
     /// The child whose cost grows least: by children · growth of S for an inner node, and by 2 · S(pair) for a leaf,
-    /// which costs nothing before. Ng & Trifonov's 'minimal increase in cost'.
+    /// which cost nothing before. Ng & Trifonov's 'minimal increase in cost'.
     #[default]
     Cost,
-    /// The child whose area grows least, inner node or leaf. Ericson's reading of Goldsmith & Salmon; within 3 % of
-    /// the mean cost of the other. Where many leaves nest in one another, a build takes O(n²).
+    /// The child whose area grows least, whether inner node or leaf: Ericson's reading of Goldsmith & Salmon. Its mean
+    /// cost is within 3 % of the other's. A build takes O(n²) where many leaves nest in one another.
     Area,
 }
 
@@ -92,7 +92,7 @@ impl Scene {
     }
 }
 
-/// Why an insertion order was refused: it must name every object of the scene once.
+/// Why an insertion order was refused. It must name every object of the scene exactly once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidOrder {
     /// Too few or too many entries.
@@ -103,7 +103,7 @@ pub enum InvalidOrder {
         /// Number of objects in the scene.
         objects: usize,
     },
-    /// An entry that is no object of the scene.
+    /// An entry is no object of the scene.
     #[error("position {position} of the order names object {object}, of {objects}")]
     NoObject {
         /// Index of the entry.
@@ -113,7 +113,7 @@ pub enum InvalidOrder {
         /// Number of objects in the scene.
         objects: usize,
     },
-    /// An object named before.
+    /// An object is named for the second time.
     #[error("position {position} of the order names object {object} again")]
     Repeated {
         /// Index of the second entry.
@@ -123,23 +123,23 @@ pub enum InvalidOrder {
     },
 }
 
-/// The tree while it grows, and the buffers of a build; reused, a build allocates nothing. At most 192 bytes per
+/// The growing tree and the buffers of a build, reused by further builds without allocating. Takes at most 192 bytes per
 /// object, typically 100.
 #[derive(Debug, Default)]
 pub struct Workspace {
     /// Block 0 holds the root alone.
     blocks: Vec<Block>,
     walk: Walk,
-    /// The enlarged nodes of the path.
+    /// The nodes of the path that the object enlarges.
     grown: Vec<insertion::Grown>,
     named: Vec<bool>,
     stack: Vec<(u32, u32)>,
 }
 
 impl Config {
-    /// Builds by inserting the scene's objects in the given order and returns the tree's
-    /// [`goldsmith_salmon`](bvh_core::cost::goldsmith_salmon) cost, kept incrementally; equal orders give equal
-    /// bits. [`Workspace::write`] then gives the tree. A refused order leaves the workspace's tree as it was.
+    /// Inserts the scene's objects in the given order and returns the tree's cost by
+    /// [`goldsmith_salmon`](bvh_core::cost::goldsmith_salmon), which is maintained incrementally. Equal orders give equal
+    /// bits. [`Workspace::write`] then writes the tree. A refused order leaves the workspace's tree as it was.
     pub fn insert_all(
         &self,
         scene: &Scene,
@@ -173,8 +173,8 @@ impl Builder for Config {
 }
 
 impl Workspace {
-    /// Writes the tree last built into `tree`, reusing its memory: children next to each other in their order, the
-    /// blocks of the inner ones' descendants one after the other behind them. O(n).
+    /// Writes the tree built last into `tree` and reuses its memory. Children are adjacent and in their order; after
+    /// them come their descendants, one child's after the other's. O(n).
     pub fn write(&mut self, tree: &mut Bvh) {
         let Self { blocks, stack, .. } = self;
         let Bvh { nodes, prim_ids } = tree;
@@ -188,7 +188,7 @@ impl Workspace {
         stack.push((0, 0));
         while let Some((index, node)) = stack.pop() {
             let (block, lane) = place(node);
-            // As in `Aabb::from(&PackedAabb)`, 0 is added so that no sign of a zero depends on the order.
+            // As in `Aabb::from(&PackedAabb)`, adding 0 keeps the signs of zeros from depending on the order.
             let [x, y, z, far_x, far_y, far_z] = blocks[block].bounds.map(|bounds| bounds[lane]);
             let aabb = Aabb::from(([0.0 - x, 0.0 - y, 0.0 - z], [far_x + 0.0, far_y + 0.0, far_z + 0.0]));
             if blocks[block].is_leaf(lane) {

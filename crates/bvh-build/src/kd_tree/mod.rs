@@ -1,37 +1,36 @@
-//! A KD-tree by the surface area heuristic: a baseline beside hierarchies, not our one tree type.
+//! A KD-tree by the surface area heuristic: a baseline for comparison with bounding volume hierarchies.
 //!
 //! Wald & Havran 2006, 'On building fast kd-trees for ray tracing, and on doing that in O(N log N)', section 4.3.
 //!
-//! Differs from the paper: objects are their boxes, and the perfect split of a box is the box clipped to the cell. So
-//! no event is ever made anew or merged: those beyond a cell's faces are no candidates, and lists stay sorted by
-//! themselves. Depth (Pharr, Jakob & Humphreys, Physically Based Rendering, 4.4) and number of references are bounded.
+//! Differs from the paper: objects are boxes, whose perfect split is the box clipped to the cell. So events are never
+//! regenerated or merged: those outside a cell are no candidates, and lists stay sorted. The depth (Pharr, Jakob &
+//! Humphreys, Physically Based Rendering, 4.4) and the number of references are bounded.
 
 mod traverse;
 
 use crate::config::above;
-use crate::presort::check_scene;
+use crate::error::check_scene;
 use crate::{BuildError, Check};
 use bvh_core::Aabb;
 
 crate::config! {
     /// How to split: constants of the surface area heuristic, in any unit of time. The defaults are the paper's.
     pub struct Config {
-        /// Time of stepping through a cell.
+        /// Time to step through a cell.
         traversal: f64 = 15.0, in above(0.0);
-        /// Time of testing an object.
+        /// Time to test an object.
         intersection: f64 = 20.0, in 0.0..;
         /// Factor on the cost of a split that cuts off empty space.
         empty_factor: f64 = 0.8, in 0.0..=1.0;
     }
 }
 
-/// A tree of cells that fill the root's box without overlap; an object is named by every leaf that its box reaches
-/// into.
+/// A tree of cells that fill the root's box without overlap. An object is named by every leaf that its box overlaps.
 #[derive(Clone, Debug)]
 pub struct KdTree {
-    /// Around all objects.
+    /// The box around all objects.
     bounds: Aabb,
-    /// Root first, children after their parents and side by side.
+    /// The root first; siblings are adjacent and come after their parent.
     cells: Vec<Cell>,
     objects: Vec<u32>,
     depth: usize,
@@ -39,14 +38,14 @@ pub struct KdTree {
 
 #[derive(Clone, Copy, Debug)]
 enum Cell {
-    /// Cut at `position`; the child below is at index `below`, the one above comes next.
+    /// Cut at `position`. The child below the plane is at index `below`, the child above it at the next index.
     Inner { axis: u8, position: f32, below: u32 },
     /// Names a range of `objects`.
     Leaf { first: u32, count: u32 },
 }
 
 impl KdTree {
-    /// No tree is deeper, whatever its number of objects: what the limit of [`Config::build`] gives for 2^31.
+    /// The limit on the depth in [`Config::build`] for 2^31 objects, more than there can be.
     const MAX_DEPTH: usize = 49;
 
     /// Number of cells, inner ones included.
@@ -54,7 +53,7 @@ impl KdTree {
         self.cells.len()
     }
 
-    /// How often leaves name an object: at least the number of objects.
+    /// Number of times that leaves name an object: at least the number of objects.
     pub fn references(&self) -> usize {
         self.objects.len()
     }
@@ -65,8 +64,8 @@ impl KdTree {
     }
 }
 
-/// Where an object's box begins or ends along an axis. Ordered as a sweep must meet them: what ends at a plane is no
-/// longer above it, what begins there not yet below.
+/// The beginning or the end of an object's box along an axis. At equal positions ends come first and starts last: a box
+/// that ends at a plane is not above it, and one that starts there is not below.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Event {
     position: f32,
@@ -77,7 +76,7 @@ struct Event {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
     End,
-    /// A box without extent along the axis: begins and ends at once.
+    /// Both, for a box without extent along the axis.
     Planar,
     Start,
 }
@@ -92,20 +91,20 @@ enum Side {
 struct Split {
     axis: usize,
     position: f32,
-    /// Whether boxes in the plane go below it, or else above.
+    /// Whether boxes that lie in the plane go below it rather than above.
     planar_below: bool,
     below: usize,
     above: usize,
 }
 
-/// A cell that is not made yet.
+/// A cell that is still to be made.
 struct Frame {
     cell: usize,
     bounds: Aabb,
     events: [Vec<Event>; 3],
     count: usize,
     depth: usize,
-    /// References that the leaves below may have.
+    /// Upper limit on the references of the leaves below.
     budget: usize,
 }
 
@@ -173,7 +172,7 @@ impl Config {
         Ok(tree)
     }
 
-    /// The cheapest split within the budget, unless a leaf is cheaper; the lower axis and position on ties.
+    /// The cheapest split within the budget, or `None` if a leaf is cheaper. Ties go to the lower axis and position.
     fn best_split(&self, frame: &Frame) -> Option<Split> {
         let mut best: Option<Split> = None;
         let mut limit = self.intersection * frame.count as f64;
@@ -182,7 +181,8 @@ impl Config {
         for axis in 0..3 {
             let (low, high) = (frame.bounds.min[axis], frame.bounds.max[axis]);
             let (u, v) = (extent[(axis + 1) % 3], extent[(axis + 2) % 3]);
-            // The chance that a line through the cell meets the part of this length; of a cell without area, its part.
+            // The probability that a line through the cell meets the part of this length, or the part's share of the
+            // length if the cell has no area.
             let chance = |length: f64| {
                 if area > 0.0 { (u * v + length * (u + v)) / area } else { length / extent[axis] }
             };
@@ -233,7 +233,7 @@ impl Split {
     }
 }
 
-/// The events of all objects along one axis, in order.
+/// The sorted events of all objects along one axis.
 fn events(boxes: &[Aabb], axis: usize) -> Vec<Event> {
     let mut events = Vec::with_capacity(2 * boxes.len());
     for (b, object) in boxes.iter().zip(0..) {

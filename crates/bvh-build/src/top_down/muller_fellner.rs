@@ -3,20 +3,22 @@
 //! Müller & Fellner 1999, 'Hybrid scene structuring with application to ray tracing', as described by Ng &
 //! Trifonov 2003, sections 3.1 and 3.2.
 //!
-//! Differs from the paper: divides down to single objects, as Ng & Trifonov do, not to a cost threshold; prunes
-//! scans exactly; ties go to the more balanced split, then the lower axis and position.
+//! Differs from the paper: nodes are divided down to single objects, as by Ng & Trifonov, not to a cost threshold.
+//! Scans are pruned without changing their result. Ties go to the more balanced split, then to the lower axis and
+//! position.
 
+use super::divide::{self, Workspace};
+use super::presort::{PARALLEL_OBJECTS, Presorted};
+use super::split_cost::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, SplitCost};
+use super::sweep::{SplitRule, TakeBest};
 use crate::config::{Accepts, Itself};
-use crate::division::{self, Workspace};
-use crate::evaluation::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, Evaluation};
-use crate::sweep::{SplitRule, TakeBest};
-use crate::{BuildError, Builder, Check, OutOfRange, Presorted};
+use crate::{BuildError, Builder, Check, OutOfRange};
 use bvh_core::{Aabb, Bvh};
 
 crate::config! {
     /// How to divide.
     pub struct Config {
-        /// What a split is judged by. By default the original's.
+        /// The cost of a split. The default is the original's.
         heuristic: Heuristic = Heuristic::AreaTimesCount, in Itself;
         /// Whether axes that order a node's objects identically are scanned once. Changes no tree.
         skip_same_order: bool = true;
@@ -27,7 +29,7 @@ crate::config! {
     }
 }
 
-/// What a split is judged by.
+/// The cost of a split.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Heuristic {
@@ -66,8 +68,8 @@ impl Builder for Config {
 }
 
 impl Config {
-    /// Builds with `weights[i]` the expected cost C_obj of intersecting object `i`: any unit, finite, not negative.
-    /// Replaces the configured heuristic.
+    /// Builds with `weights[i]` as the expected cost C_obj of intersecting object `i`, in any unit, finite and not
+    /// negative. The configured heuristic is not used.
     pub fn build_weighted(&self, boxes: &[Aabb], weights: &[f32]) -> Result<Bvh, BuildError> {
         let scene = Presorted::sort(boxes, self.skip_sorted, self.skip_flat)?;
         if weights.len() != boxes.len() {
@@ -81,24 +83,17 @@ impl Config {
         Ok(tree)
     }
 
-    fn greedy<E: Evaluation>(&self, scene: &Presorted, evaluation: &E, tree: &mut Bvh) {
+    fn greedy<C: SplitCost>(&self, scene: &Presorted, split_cost: &C, tree: &mut Bvh) {
         let workspace = &mut Workspace::default();
         #[cfg(feature = "rayon")]
-        if scene.len() >= division::PARALLEL_OBJECTS && rayon::current_num_threads() > 1 {
-            return division::divide_parallel(
-                scene,
-                evaluation,
-                TakeBest,
-                self.skip_same_order,
-                workspace,
-                tree,
-            );
+        if scene.len() >= PARALLEL_OBJECTS && rayon::current_num_threads() > 1 {
+            return divide::divide_parallel(scene, split_cost, TakeBest, self.skip_same_order, workspace, tree);
         }
-        division::divide(scene, evaluation, &mut TakeBest, self.skip_same_order, workspace, tree);
+        divide::divide(scene, split_cost, &mut TakeBest, self.skip_same_order, workspace, tree);
     }
 
-    /// Divides by another rule than 'take the best': one randomised construction, on one thread. Reuses the memory
-    /// of `workspace` and `tree`. The heuristic's parameter must be in range, see [`Heuristic::check`].
+    /// Divides by any rule, such as a randomised one, on one thread. Reuses the memory of `workspace` and `tree`. The
+    /// heuristic's parameter must be [in range](Check).
     pub fn construct(
         &self,
         scene: &Presorted,
@@ -108,12 +103,12 @@ impl Config {
     ) {
         let skip = self.skip_same_order;
         match self.heuristic {
-            Heuristic::AreaTimesCount => division::divide(scene, &AreaTimesCount, rule, skip, workspace, tree),
+            Heuristic::AreaTimesCount => divide::divide(scene, &AreaTimesCount, rule, skip, workspace, tree),
             Heuristic::AreaTimesPower(p) => {
                 let powers = AreaTimesPower::new(scene.len(), p);
-                division::divide(scene, &powers, rule, skip, workspace, tree);
+                divide::divide(scene, &powers, rule, skip, workspace, tree);
             }
-            Heuristic::AreaOnly(reading) => division::divide(scene, &reading, rule, skip, workspace, tree),
+            Heuristic::AreaOnly(reading) => divide::divide(scene, &reading, rule, skip, workspace, tree),
         }
     }
 }

@@ -1,13 +1,13 @@
-//! The candidate splits of one node: every position along every axis, evaluated by two scans per axis.
+//! The candidate splits of one node: every position along every axis, valued by two scans per axis.
 
-use crate::evaluation::Evaluation;
+use super::split_cost::SplitCost;
 use bvh_core::PackedAabb;
 use std::cmp::Ordering;
 
 /// A candidate: the first `left` objects in the order of `axis` against the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Split {
-    /// By the node's [`Evaluation`]; lower is better.
+    /// By the build's [`SplitCost`]; lower is better.
     pub cost: f64,
     /// 0, 1 or 2.
     pub axis: u8,
@@ -20,8 +20,8 @@ pub struct Split {
 impl Split {
     const NONE: Self = Self { cost: f64::INFINITY, axis: u8::MAX, left: 0, imbalance: u32::MAX };
 
-    /// Cheaper first; of equal cost the more balanced, then the lower axis, then the lower position. A total
-    /// order, so that ties never depend on the order of evaluation, and input without area is halved.
+    /// Cheaper first; of equal cost the more balanced, then the lower axis, then the lower position. The order is total,
+    /// so that ties do not depend on the order in which candidates are met, and input without area is halved.
     #[inline]
     fn rank(&self, other: &Self) -> Ordering {
         self.cost.total_cmp(&other.cost).then_with(|| {
@@ -30,35 +30,35 @@ impl Split {
     }
 }
 
-/// How a builder picks one of a node's candidates. Asked once per node of three or more objects, parents first,
-/// the left subtree before the right.
+/// The choice among a node's candidates. It is asked for once per node of three or more objects, for parents before
+/// their children and for a left subtree before the right one.
 pub trait SplitRule {
     /// Picks a split of the node, one that a method of `node` returned.
-    fn choose<E: Evaluation>(&mut self, node: &mut Sweep<'_, E>) -> Split;
+    fn choose<C: SplitCost>(&mut self, node: &mut Sweep<'_, C>) -> Split;
 }
 
-/// The deterministic rule of Müller & Fellner: take the best.
+/// The deterministic rule of Müller & Fellner: takes the best candidate.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TakeBest;
 
 impl SplitRule for TakeBest {
     #[inline(always)]
-    fn choose<E: Evaluation>(&mut self, node: &mut Sweep<'_, E>) -> Split {
+    fn choose<C: SplitCost>(&mut self, node: &mut Sweep<'_, C>) -> Split {
         node.best()
     }
 }
 
-/// Objects per block of a scan; nodes of up to twice as many are one block. Measured: 8 and 32 are slower.
+/// Objects per block of a scan; nodes of up to twice as many form one block. Blocks of 8 and of 32 were slower.
 const BLOCK: usize = 16;
 
 /// The surroundings of one block of consecutive objects in a node's order.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Block {
-    /// The box of all objects before the block, their load and their value as a left side.
+pub(super) struct Block {
+    /// The box of all objects before the block, their load, and their value as a left side.
     left: PackedAabb,
     left_load: f64,
     left_value: f64,
-    /// Likewise for all objects after the block, as a right side.
+    /// Likewise of all objects after the block, as a right side.
     right: PackedAabb,
     right_load: f64,
     right_value: f64,
@@ -77,20 +77,20 @@ impl Block {
 
 /// The objects of one node in the order of each axis, ready to be scanned. At least two objects.
 #[derive(Debug)]
-pub struct Sweep<'a, E> {
-    pub(crate) boxes: &'a [PackedAabb],
-    pub(crate) evaluation: &'a E,
-    pub(crate) orders: [&'a [u32]; 3],
+pub struct Sweep<'a, C> {
+    pub(super) boxes: &'a [PackedAabb],
+    pub(super) split_cost: &'a C,
+    pub(super) orders: [&'a [u32]; 3],
     /// Per axis, the lowest axis known to order the node's objects identically, usually itself.
-    pub(crate) same_as: [u8; 3],
+    pub(super) same_as: [u8; 3],
     /// The node's box.
-    pub(crate) aabb: PackedAabb,
-    /// Scratch: per axis, the blocks of its last scan.
-    pub(crate) blocks: &'a mut [Vec<Block>; 3],
+    pub(super) aabb: PackedAabb,
+    /// Per axis, the blocks of its last scan.
+    pub(super) blocks: &'a mut [Vec<Block>; 3],
 }
 
-impl<E: Evaluation> Sweep<'_, E> {
-    /// The best candidate of all axes. O(n); prunes exactly.
+impl<C: SplitCost> Sweep<'_, C> {
+    /// The best candidate of all axes. O(n).
     #[inline(always)]
     pub fn best(&mut self) -> Split {
         let mut best = Split::NONE;
@@ -106,7 +106,7 @@ impl<E: Evaluation> Sweep<'_, E> {
         self.improve(self.same_as[axis as usize], Split::NONE)
     }
 
-    /// The best candidates of the three axes into `list`, the best of all first. O(n).
+    /// Fills `list` with the best candidate of each axis, the best of all first. O(n).
     #[inline(always)]
     pub fn axis_bests(&mut self, list: &mut Vec<Split>) {
         list.clear();
@@ -131,7 +131,7 @@ impl<E: Evaluation> Sweep<'_, E> {
         best
     }
 
-    /// The `k` best candidates of all axes into `list`, best first; fewer when there are fewer. Expected O(n)
+    /// Fills `list` with the `k` best candidates of all axes, best first, or with all if there are fewer. Expected O(n)
     /// for small `k`, O(n·k) at worst.
     #[inline(always)]
     pub fn k_best(&mut self, k: usize, list: &mut Vec<Split>) {
@@ -152,7 +152,7 @@ impl<E: Evaluation> Sweep<'_, E> {
         }
     }
 
-    /// The best candidate and all others of cost below (1 + `alpha`) times the best into `list`, best first.
+    /// Fills `list` with the best candidate and all others that cost less than (1 + `alpha`) times as much, best first.
     /// O(n log n) at worst.
     #[inline(always)]
     pub fn within(&mut self, alpha: f64, list: &mut Vec<Split>) {
@@ -180,58 +180,59 @@ impl<E: Evaluation> Sweep<'_, E> {
         self.orders[0].len()
     }
 
-    /// The axes that need scanning: identical orders have identical candidates, and the lower axis wins ties.
+    /// The axes to scan. Identical orders have identical candidates, of which ties prefer the lower axis's.
     #[inline(always)]
-    fn distinct_axes(&self) -> impl Iterator<Item = u8> + use<E> {
+    fn distinct_axes(&self) -> impl Iterator<Item = u8> + use<C> {
         let same_as = self.same_as;
         (0..3).filter(move |&axis| same_as[axis as usize] == axis)
     }
 
-    /// Shows `visit` every candidate of `axis` that costs at most `bound`, and some others, each once, in no
-    /// particular order. `visit` returns the bound from there on. With `BEST`, candidates dearer than another one
-    /// shown later may be left out.
+    /// Calls `visit` once for every candidate of `axis` that costs at most `bound`, and for some others, in any order.
+    /// `visit` returns the bound that holds from then on. With `BEST`, a candidate may be skipped if a cheaper one is
+    /// shown later.
     ///
-    /// Objects are taken in blocks. One pass gathers each block's box; scans over the blocks from either end
-    /// value the candidates between them; and since a side's value only grows as it gains objects, the left
-    /// side at a block's start with the right side at its end bounds every candidate inside. Few blocks survive.
+    /// Objects are taken in blocks. One pass gathers each block's box, and scans over the blocks from both ends value
+    /// the candidates between blocks. A side's value only grows as it gains objects, so the left side at a block's
+    /// start and the right side at its end bound the cost of every candidate inside; most blocks need no closer look.
     ///
     /// Source: Ng & Trifonov 2003, section 3.2. Differs from the paper: the blocks, which change no result.
     #[inline(always)]
     fn scan<const BEST: bool>(&mut self, axis: u8, mut bound: f64, mut visit: impl FnMut(Split) -> f64) {
-        let Self { boxes, evaluation, .. } = self;
+        let Self { boxes, split_cost, .. } = self;
         let order = self.orders[axis as usize];
         let n = order.len();
         let candidate =
             |cost, left: usize| Split { cost, axis, left: left as u32, imbalance: n.abs_diff(2 * left) as u32 };
 
         if boxes[order[0] as usize] == self.aabb && boxes[order[n - 1] as usize] == self.aabb {
-            // Every side of every candidate has the node's box, so all cost the same but for rounding: halve.
+            // The first and the last object fill the node's box, so every side of every candidate has that box, and all
+            // candidates cost the same but for rounding. The node is halved.
             let area = self.aabb.half_area();
             let (left, right) = order.split_at(n / 2);
-            let [left, right] = [left, right].map(|side| evaluation.side(area, evaluation.total_load(side)));
-            // What another node left here must not be taken for this one's, see `side_boxes`.
+            let [left, right] = [left, right].map(|side| split_cost.side(area, split_cost.total_load(side)));
+            // Blocks of another node must not be taken for this one's in `side_boxes`.
             self.blocks[axis as usize].clear();
-            visit(candidate(evaluation.join(left, right), n / 2));
+            visit(candidate(split_cost.join(left, right), n / 2));
             return;
         }
-        // A small node is one block with nothing around it.
+        // A small node is one block that nothing surrounds.
         let (size, blocks) = if n <= 2 * BLOCK {
             (n, &[Block::NONE][..])
         } else {
             let blocks = &mut self.blocks[axis as usize];
-            gather_blocks(boxes, *evaluation, order, blocks);
+            gather_blocks(boxes, *split_cost, order, blocks);
             for (index, pair) in blocks.windows(2).enumerate() {
-                let cost = evaluation.join(pair[1].left_value, pair[0].right_value);
+                let cost = split_cost.join(pair[1].left_value, pair[0].right_value);
                 bound = visit(candidate(cost, (index + 1) * BLOCK));
             }
             (BLOCK, &blocks[..])
         };
         let mut costs = [0.0; 2 * BLOCK];
         for (index, (block, objects)) in blocks.iter().zip(order.chunks(size)).enumerate() {
-            if evaluation.bound(block.left_value, block.right_value) > bound {
+            if split_cost.bound(block.left_value, block.right_value) > bound {
                 continue;
             }
-            let lowest = value_block(boxes, *evaluation, objects, block, &mut costs);
+            let lowest = value_block(boxes, *split_cost, objects, block, &mut costs);
             bound = if BEST { bound.min(lowest) } else { bound };
             if lowest <= bound {
                 for (left, &cost) in costs.iter().enumerate().take(objects.len()).skip(1) {
@@ -245,7 +246,7 @@ impl<E: Evaluation> Sweep<'_, E> {
 
     /// The boxes of both sides of a candidate that one of this sweep's methods returned. O(1) but for small nodes.
     #[inline(always)]
-    pub(crate) fn side_boxes(&self, split: &Split) -> [PackedAabb; 2] {
+    pub(super) fn side_boxes(&self, split: &Split) -> [PackedAabb; 2] {
         let (axis, left) = (split.axis as usize, split.left as usize);
         let order = self.orders[axis];
         if order.len() <= 2 * BLOCK {
@@ -264,37 +265,37 @@ impl<E: Evaluation> Sweep<'_, E> {
 
 /// The surroundings of every block of `order`.
 #[inline(always)]
-fn gather_blocks<E: Evaluation>(boxes: &[PackedAabb], evaluation: &E, order: &[u32], blocks: &mut Vec<Block>) {
+fn gather_blocks<C: SplitCost>(boxes: &[PackedAabb], split_cost: &C, order: &[u32], blocks: &mut Vec<Block>) {
     blocks.clear();
-    // Each block's own box, for now in the place of the box before it.
+    // Each block's own box is kept where the box of all objects before it goes later.
     blocks.extend(order.chunks(BLOCK).map(|objects| Block { left: union_of(boxes, objects), ..Block::NONE }));
     let (mut aabb, mut load) = (PackedAabb::EMPTY, 0.0);
     for (block, objects) in blocks.iter_mut().zip(order.chunks(BLOCK)).rev() {
         if aabb != PackedAabb::EMPTY {
-            block.right_value = evaluation.side(aabb.half_area(), load);
+            block.right_value = split_cost.side(aabb.half_area(), load);
         }
         (block.right, block.right_load) = (aabb, load);
         aabb.grow(&block.left);
-        load += evaluation.total_load(objects);
+        load += split_cost.total_load(objects);
     }
     let (mut aabb, mut load) = (PackedAabb::EMPTY, 0.0);
     for (block, objects) in blocks.iter_mut().zip(order.chunks(BLOCK)) {
         if aabb != PackedAabb::EMPTY {
-            block.left_value = evaluation.side(aabb.half_area(), load);
+            block.left_value = split_cost.side(aabb.half_area(), load);
         }
         let own = std::mem::replace(&mut block.left, aabb);
         block.left_load = load;
         aabb.grow(&own);
-        load += evaluation.total_load(objects);
+        load += split_cost.total_load(objects);
     }
 }
 
-/// The costs of the candidates inside one block: `costs[i]` of the one that puts i of the block's objects on the
-/// left, 1 ≤ i < objects. Returns the lowest. Without branches: small nodes are where a build spends its time.
+/// Computes the costs of the candidates inside one block, `costs[i]` for i of the block's objects on the left,
+/// 1 ≤ i < objects, and returns the lowest. Has no branches, because a build spends most of its time in small nodes.
 #[inline(always)]
-fn value_block<E: Evaluation>(
+fn value_block<C: SplitCost>(
     boxes: &[PackedAabb],
-    evaluation: &E,
+    split_cost: &C,
     objects: &[u32],
     block: &Block,
     costs: &mut [f64; 2 * BLOCK],
@@ -302,15 +303,15 @@ fn value_block<E: Evaluation>(
     let (mut aabb, mut load) = (block.right, block.right_load);
     for (&object, value) in objects.iter().zip(costs.iter_mut()).skip(1).rev() {
         aabb.grow(&boxes[object as usize]);
-        load += evaluation.load(object);
-        *value = evaluation.side(aabb.half_area(), load);
+        load += split_cost.load(object);
+        *value = split_cost.side(aabb.half_area(), load);
     }
     let (mut aabb, mut load) = (block.left, block.left_load);
     let mut lowest = f64::INFINITY;
     for (&object, cost) in objects[..objects.len() - 1].iter().zip(&mut costs[1..]) {
         aabb.grow(&boxes[object as usize]);
-        load += evaluation.load(object);
-        *cost = evaluation.join(evaluation.side(aabb.half_area(), load), *cost);
+        load += split_cost.load(object);
+        *cost = split_cost.join(split_cost.side(aabb.half_area(), load), *cost);
         lowest = if *cost < lowest { *cost } else { lowest };
     }
     lowest
@@ -318,7 +319,7 @@ fn value_block<E: Evaluation>(
 
 /// The box of several objects.
 #[inline(always)]
-pub(crate) fn union_of(boxes: &[PackedAabb], objects: &[u32]) -> PackedAabb {
+pub(super) fn union_of(boxes: &[PackedAabb], objects: &[u32]) -> PackedAabb {
     let mut aabb = PackedAabb::EMPTY;
     for &object in objects {
         aabb.grow(&boxes[object as usize]);

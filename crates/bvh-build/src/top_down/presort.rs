@@ -1,16 +1,21 @@
 //! The objects of a scene, checked, packed and sorted once along every axis.
 
 use crate::BuildError;
-use bvh_core::{Aabb, MAX_OBJECTS, PackedAabb, check_boxes};
+use crate::error::check_scene;
+use bvh_core::{Aabb, PackedAabb};
 
-/// The input of every top-down build of one scene: sort once, build as often as you like.
+/// Number of objects from which on sorting and division run in parallel: large enough that the start of a task takes a
+/// negligible part of its time.
+pub const PARALLEL_OBJECTS: usize = 4096;
+
+/// A scene's objects, sorted along every axis: the input of any number of top-down builds.
 #[derive(Clone, Debug)]
 pub struct Presorted {
     /// One box per object.
-    pub(crate) boxes: Vec<PackedAabb>,
+    pub(super) boxes: Vec<PackedAabb>,
     /// Per axis, the objects by increasing box centre, equal centres by index.
-    pub(crate) orders: [Vec<u32>; 3],
-    /// Per axis, whether the objects came in order.
+    pub(super) orders: [Vec<u32>; 3],
+    /// Per axis, whether the objects already came in order.
     in_order: [bool; 3],
 }
 
@@ -22,16 +27,15 @@ impl Presorted {
         Self::sort(boxes, true, false)
     }
 
-    /// As [`new`](Self::new), unless `skip_sorted`, sorting also what is in order. With `x_without_area` a scene
-    /// without area is sorted along x alone, and the other axes have that order: every candidate split of its nodes
-    /// costs nothing, so that the halves along x are as good as any and, x being the lowest axis, what a greedy build
-    /// takes.
+    /// As [`new`](Self::new). Without `skip_sorted`, objects that already came in order are sorted, too. With
+    /// `x_without_area`, a scene without area is sorted along x alone and has that order along all axes: every candidate
+    /// split of its nodes costs nothing, and of those a greedy build takes the halves along the lowest axis.
     pub(crate) fn sort(boxes: &[Aabb], skip_sorted: bool, x_without_area: bool) -> Result<Self, BuildError> {
         check_scene(boxes)?;
         let sorted = |axis: usize| {
             let mut keyed: Vec<(f64, u32)> =
                 boxes.iter().zip(0..).map(|(b, index)| (b.doubled_centroid()[axis], index)).collect();
-            // Seldom true, and then seldom found out late.
+            // Most unsorted scenes are found to be so within a few objects.
             let in_order = keyed.is_sorted_by_key(|&(key, _)| key);
             if !(in_order && skip_sorted) {
                 radsort::sort_by_key(&mut keyed, |&(key, _)| key);
@@ -44,7 +48,7 @@ impl Presorted {
                 return [x.clone(), x.clone(), x];
             }
             #[cfg(feature = "rayon")]
-            if boxes.len() >= crate::division::PARALLEL_OBJECTS {
+            if boxes.len() >= PARALLEL_OBJECTS {
                 let (x, (y, z)) = rayon::join(|| sorted(0), || rayon::join(|| sorted(1), || sorted(2)));
                 return [x, y, z];
             }
@@ -55,13 +59,13 @@ impl Presorted {
         Ok(Self { boxes: boxes.iter().map(PackedAabb::from).collect(), orders, in_order })
     }
 
-    /// Whether the box around all has no area, so that no tree costs anything; also if there are no boxes. O(n).
+    /// Whether the box around all objects has no area, so that every tree costs nothing; true without boxes. O(n).
     pub fn without_area(boxes: &[Aabb]) -> bool {
         boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b)).half_area() == 0.0
     }
 
-    /// Per axis, whether the objects came in order, so that they needed no sorting. So they do along an axis on which
-    /// all box centres coincide.
+    /// Per axis, whether the objects came in order and needed no sorting, as along an axis on which all box centres
+    /// coincide.
     pub fn in_order(&self) -> [bool; 3] {
         self.in_order
     }
@@ -70,7 +74,7 @@ impl Presorted {
     pub fn same_orders(&self) -> [u8; 3] {
         let orders = self.orders.each_ref().map(Vec::as_slice);
         let mut same_as = [0, 1, 2];
-        crate::division::note_same_orders(orders, &mut same_as);
+        note_same_orders(orders, &mut same_as);
         same_as
     }
 
@@ -85,12 +89,24 @@ impl Presorted {
     }
 }
 
-/// Refuses what no builder can take: too many objects, or a box that is not finite or is inverted.
-pub(crate) fn check_scene(boxes: &[Aabb]) -> Result<(), BuildError> {
-    if boxes.len() > MAX_OBJECTS {
-        return Err(BuildError::TooManyObjects { objects: boxes.len() });
+/// Finds axes that order a node's objects identically, given those of its parent. They do so in the whole subtree.
+///
+/// Source: Ng & Trifonov 2003, section 3.2.
+#[inline(always)]
+pub(super) fn note_same_orders(orders: [&[u32]; 3], same_as: &mut [u8; 3]) {
+    for (low, high) in [(0u8, 1u8), (0, 2), (1, 2)] {
+        let (a, b) = (low as usize, high as usize);
+        // The first elements usually differ, which saves the call that compares the rest.
+        if same_as[a] == low
+            && same_as[b] == high
+            && orders[a].first() == orders[b].first()
+            && orders[a] == orders[b]
+        {
+            for axis in same_as.iter_mut().filter(|axis| **axis == high) {
+                *axis = low;
+            }
+        }
     }
-    Ok(check_boxes(boxes)?)
 }
 
 #[cfg(test)]

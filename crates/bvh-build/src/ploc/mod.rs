@@ -1,0 +1,266 @@
+//! Agglomerative clustering: repeatedly joins clusters that are each other's nearest neighbour along the Morton curve.
+//!
+//! Meister & Bittner 2018, 'Parallel locally-ordered clustering for bounding volume hierarchy construction' (PLOC).
+//! Clusters lie in Morton order. In every round each cluster finds its nearest neighbour among the `radius` clusters on
+//! either side, by the area of the joint box, and every two clusters that find each other are joined.
+//!
+//! Differs from the paper: Morton cells are cubes, so that flat scenes are not distorted. The first rounds may look at
+//! adjacent clusters only. Of equally near neighbours the one is taken whose position has the least exclusive or with
+//! the cluster's own, so that regular grids are divided by powers of two and identical clusters pair off. A round that
+//! follows one with few joins also joins adjacent clusters that found no partner, which bounds the rounds by O(log n)
+//! for any scene.
+
+mod clusters;
+mod morton;
+mod neighbours;
+
+use crate::error::check_scene;
+use crate::{BuildError, Builder, Check};
+use bvh_core::{Aabb, Bvh, PackedAabb};
+use clusters::Clusters;
+
+crate::config! {
+    /// How far to look for a neighbour.
+    pub struct Config {
+        /// Clusters looked at on either side.
+        radius: u32 = 24, in 1..=1000;
+        /// Number of first rounds that look only at the next cluster on either side: faster, and often no worse.
+        near_rounds: u32 = 0;
+    }
+}
+
+impl Builder for Config {
+    /// O(radius · n), and a radix sort. The search for neighbours uses all threads of the current rayon pool; their
+    /// number does not change the tree.
+    fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
+        self.check()?;
+        MortonOrder::new(boxes)?.build(self)
+    }
+}
+
+/// The objects of a scene in Morton order, which builds with any radius start from.
+#[derive(Clone, Debug)]
+pub struct MortonOrder {
+    /// One box per object, by index.
+    boxes: Vec<PackedAabb>,
+    /// The box around all objects.
+    bounds: PackedAabb,
+    /// The objects in order.
+    order: Vec<u32>,
+}
+
+impl MortonOrder {
+    /// Checks and sorts: a radix sort in O(n), O(n log n) if most objects are within a thousandth of the scene's size.
+    pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
+        check_scene(boxes)?;
+        let boxes: Vec<PackedAabb> = boxes.iter().map(PackedAabb::from).collect();
+        let bounds = boxes.iter().fold(PackedAabb::EMPTY, |bounds, b| bounds.union(b));
+        let order = morton::order(&boxes);
+        Ok(Self { boxes, bounds, order })
+    }
+
+    /// The objects in order.
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// Clusters the sorted objects.
+    pub fn build(self, config: &Config) -> Result<Bvh, BuildError> {
+        config.check()?;
+        let Self { boxes, bounds, order } = self;
+        if boxes.is_empty() {
+            return Ok(Bvh::default());
+        }
+        let boxes = order.iter().map(|&object| boxes[object as usize]).collect();
+        let mut clusters = Clusters::new(boxes, &bounds);
+        let mut round = 0;
+        while clusters.count() > 1 {
+            let radius = if round < config.near_rounds { 1 } else { config.radius as usize };
+            clusters.find_nearest(radius);
+            clusters.join();
+            round += 1;
+        }
+        Ok(Bvh { nodes: clusters.into_nodes(), prim_ids: order })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_core::validate;
+    use proptest::prelude::*;
+
+    fn cube(at: [f32; 3], size: f32) -> Aabb {
+        Aabb::from((at, at.map(|c| c + size)))
+    }
+
+    fn scatter(n: u32) -> Vec<Aabb> {
+        let hash = |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 65_521) as f32;
+        (0..n).map(|i| cube([hash(i, 3), hash(i, 11), hash(i, 19)], hash(i, 27) / 32.0)).collect()
+    }
+
+    #[test]
+    fn trees_are_valid_and_tight() {
+        for n in [0, 1, 2, 3, 4, 5, 100, 3000] {
+            let boxes = scatter(n);
+            let tree = Config::default().build(&boxes).unwrap();
+            validate(&tree, &boxes).unwrap();
+            assert!(tree.is_tight(&boxes));
+        }
+    }
+
+    #[test]
+    fn a_radius_over_all_objects_joins_the_closest_pair_first() {
+        let boxes = [0.0, 100.0, 10.0, 107.0].map(|x| cube([x, 0.0, 0.0], 1.0));
+        let tree = Config { radius: 4, ..Config::default() }.build(&boxes).unwrap();
+        let sides: Vec<f32> = tree.nodes[0].children().map(|child| tree.nodes[child].aabb.max.x).collect();
+        assert_eq!(sides, [11.0, 108.0]);
+    }
+
+    #[test]
+    fn clusters_without_a_difference_pair_off_into_a_balanced_tree() {
+        for boxes in [vec![cube([0.1; 3], 1.0); 1 << 12], vec![cube([0.1; 3], 0.0); 1 << 12]] {
+            assert_eq!(Config::default().build(&boxes).unwrap().depth(), 12);
+        }
+    }
+
+    #[test]
+    fn no_scene_takes_more_rounds_than_a_multiple_of_the_logarithm() {
+        // One inside the other: every cluster's nearest is the smallest.
+        let boxes: Vec<Aabb> = (1..20_000u16).map(|i| cube([-f32::from(i); 3], 2.0 * f32::from(i))).collect();
+        let tree = Config::default().build(&boxes).unwrap();
+        validate(&tree, &boxes).unwrap();
+        assert!(tree.depth() < 1000, "{}", tree.depth());
+    }
+
+    #[test]
+    fn neither_threads_nor_a_scale_by_powers_of_two_change_the_tree() {
+        let boxes = scatter(5000);
+        let tree = Config::default().build(&boxes).unwrap();
+        #[cfg(feature = "rayon")]
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            assert_eq!(pool.install(|| Config::default().build(&boxes).unwrap()), tree);
+        }
+        for factor in [2f32.powi(-100), 2f32.powi(-60), 2f32.powi(60), 2f32.powi(100)] {
+            let scaled: Vec<Aabb> =
+                boxes.iter().map(|b| Aabb { min: b.min * factor, max: b.max * factor }).collect();
+            assert_eq!(Config::default().build(&scaled).unwrap().prim_ids, tree.prim_ids);
+        }
+    }
+
+    /// The objects below every inner node, sorted, as the definition has them: without arrays of planes, f32, or early exits.
+    fn oracle(boxes: &[Aabb], config: &Config) -> Vec<Vec<u32>> {
+        let packed: Vec<PackedAabb> = boxes.iter().map(PackedAabb::from).collect();
+        let mut current: Vec<(Aabb, Vec<u32>)> =
+            morton::order(&packed).into_iter().map(|id| (boxes[id as usize], vec![id])).collect();
+        let (mut joined, mut few) = (Vec::new(), false);
+        for round in 0.. {
+            let n = current.len();
+            if n == 1 {
+                break;
+            }
+            let radius = if round < config.near_rounds { 1 } else { config.radius as usize };
+            let key = |at: usize, other: usize| {
+                let area = current[at].0.union(&current[other].0).half_area();
+                (area, at ^ other)
+            };
+            let nearest = |at: usize| {
+                let others = (at.saturating_sub(radius)..n.min(at + radius + 1)).filter(|&other| other != at);
+                others.min_by(|&a, &b| key(at, a).partial_cmp(&key(at, b)).unwrap()).unwrap()
+            };
+            let mut nearest: Vec<usize> = (0..n).map(nearest).collect();
+            let mutual = |nearest: &[usize], at: usize| nearest[nearest[at]] == at;
+            for at in 0..n - 1 {
+                if few && !mutual(&nearest, at) && !mutual(&nearest, at + 1) {
+                    (nearest[at], nearest[at + 1]) = (at + 1, at);
+                }
+            }
+            let mut next = Vec::new();
+            for at in 0..n {
+                let other = nearest[at];
+                if !mutual(&nearest, at) {
+                    next.push(current[at].clone());
+                } else if other > at {
+                    let mut ids = [current[at].1.clone(), current[other].1.clone()].concat();
+                    ids.sort_unstable();
+                    joined.push(ids.clone());
+                    next.push((current[at].0.union(&current[other].0), ids));
+                }
+            }
+            few = n - next.len() < n.div_ceil(clusters::FEW);
+            current = next;
+        }
+        joined.sort();
+        joined
+    }
+
+    fn below_inner_nodes(tree: &Bvh) -> Vec<Vec<u32>> {
+        let mut below: Vec<Vec<u32>> = vec![Vec::new(); tree.nodes.len()];
+        for at in (0..tree.nodes.len()).rev() {
+            let node = &tree.nodes[at];
+            let mut ids = tree.prim_ids[node.prims()].to_vec();
+            node.children().for_each(|child| ids.extend_from_slice(&below[child]));
+            ids.sort_unstable();
+            below[at] = ids;
+        }
+        let mut inner: Vec<_> = below.into_iter().filter(|ids| ids.len() > 1).collect();
+        inner.sort();
+        inner
+    }
+
+    proptest! {
+        #[test]
+        fn trees_are_those_of_the_definition(
+            // Small integers: areas are exact in f32, and many are equal.
+            corners in prop::collection::vec(([0u8..40, 0u8..40, 0u8..6], [0u8..5, 0u8..5, 0u8..5]), 1..90),
+            radius in 1u32..30, near_rounds in 0u32..3, exponent in prop::sample::select(vec![-60, 0, 100]),
+        ) {
+            let place = |c: u8| f32::from(c) * 2f32.powi(exponent);
+            let boxes: Vec<Aabb> = corners
+                .iter()
+                .map(|(low, size)| Aabb::from((low.map(place), [0, 1, 2].map(|axis| place(low[axis] + size[axis])))))
+                .collect();
+            let config = Config { radius, near_rounds };
+            let tree = config.build(&boxes).unwrap();
+            prop_assert!(validate(&tree, &boxes).is_ok());
+            prop_assert_eq!(below_inner_nodes(&tree), oracle(&boxes, &config));
+        }
+
+        #[test]
+        fn any_finite_boxes_give_a_valid_tree(
+            corners in prop::collection::vec(prop::array::uniform6(prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL
+                | prop::num::f32::ZERO), 1..60),
+            radius in 1u32..20,
+        ) {
+            let boxes: Vec<Aabb> = corners
+                .iter()
+                .map(|&[a, b, c, d, e, f]| Aabb::from(([a.min(d), b.min(e), c.min(f)], [a.max(d), b.max(e), c.max(f)])))
+                .collect();
+            let tree = Config { radius, ..Config::default() }.build(&boxes).unwrap();
+            prop_assert!(validate(&tree, &boxes).is_ok());
+        }
+    }
+
+    #[test]
+    fn a_plane_far_from_the_origin_for_its_size_does_not_hide_areas() {
+        let flat = |x: f32| -> Vec<Aabb> {
+            let rows = [0.0f32, 10.0, 11.0, 20.0, 21.0, 30.0, 31.0, 40.0].map(|row| row * 1e-10);
+            rows.map(|y| Aabb::from(([x, y, 0.0], [x, y + 1e-10, 1e-10]))).to_vec()
+        };
+        assert_eq!(below_inner_nodes(&built(&flat(1e32))), below_inner_nodes(&built(&flat(0.0))));
+        assert!(below_inner_nodes(&built(&flat(1e32))).contains(&vec![1, 2]));
+    }
+
+    fn built(boxes: &[Aabb]) -> Bvh {
+        Config::default().build(boxes).unwrap()
+    }
+
+    #[test]
+    fn a_radius_outside_its_range_is_named() {
+        for radius in [0, 1001] {
+            let error = Config { radius, ..Config::default() }.build(&[]).unwrap_err().to_string();
+            assert_eq!(error, format!("radius is {radius}; accepted: 1 to 1000"));
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! Top-down division: scenes sorted along every axis, the candidate splits of a node, and builders that choose among them.
+
+mod divide;
+pub mod median_cut;
+pub mod muller_fellner;
+mod presort;
+mod split_cost;
+mod sweep;
+
+#[cfg(feature = "rayon")]
+pub use divide::divide_parallel;
+pub use divide::{Workspace, divide};
+pub use presort::{PARALLEL_OBJECTS, Presorted};
+pub use split_cost::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, SplitCost};
+pub use sweep::{Split, SplitRule, Sweep, TakeBest};
