@@ -143,12 +143,12 @@ fn check_passes_on_equal_results_and_names_an_altered_number() {
 fn quick_seed_and_scene_change_what_is_run() {
     let folder = folder();
     assert!(run(folder.path(), &["spec.toml", "--quick"]).status.success());
-    let quick = fs::read_to_string(folder.path().join("results/spec-quick/runs.csv")).unwrap();
+    let quick = fs::read_to_string(folder.path().join("results/quick/spec/runs.csv")).unwrap();
     assert_eq!(quick.lines().count(), 1 + 3);
     fs::write(folder.path().join("two.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nf 1 2 3\nf 2 3 4\n").unwrap();
     let args = ["spec.toml", "--quick", "--scene", "two.obj", "--seed", "9", "--out", "other"];
     assert!(run(folder.path(), &args).status.success());
-    let other = fs::read_to_string(folder.path().join("other/spec-quick/runs.csv")).unwrap();
+    let other = fs::read_to_string(folder.path().join("other/quick/spec/runs.csv")).unwrap();
     assert!(other.contains("\ntwo,file,greedy,") && !other.contains("escher"), "{other}");
 }
 
@@ -166,7 +166,7 @@ fn what_is_wrong_is_named_and_costs_nothing_but_a_message() {
     for (args, code, parts) in [
         (&["missing.toml"][..], 2, &["missing.toml"][..]),
         (&["key.toml"], 2, &["key.toml", "repetition", "repetitions"]),
-        (&["parameter.toml"], 2, &["methods[1] (noise)", "noise is 2", "0 to 1"]),
+        (&["parameter.toml"], 2, &["line 7", "methods[1].noise is 2", "0 to 1"]),
         (&["scene.toml"], 2, &["sofa", "accepted: bijou"]),
         (&["label.toml"], 2, &["reports[0]", "nose", "accepted: greedy, noise, k"]),
         (&["spec.toml", "--scene", "nan.obj"], 2, &["nan.obj:2", "nan"]),
@@ -235,7 +235,9 @@ fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_di
     let differs = ["different runs.csv", "scene escher, method greedy, repetition 1"];
     refused(&[&folders[..], &["merged"]].concat(), 1, &differs);
     assert!(
-        run(folder.path(), &["spec.toml", "--seed", "9", "--shard", "2/3", "--out", "two"]).status.success()
+        run(folder.path(), &["spec.toml", "--seed", "9", "--shard", "2/3", "--out", "two", "--force"])
+            .status
+            .success()
     );
     refused(&["merge", "one", "two", "three", "--out", "merged"], 1, &["different specs"]);
     refused(&["merge", "one", "--out", "one"], 2, &["--out one"]);

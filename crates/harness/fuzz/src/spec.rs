@@ -11,7 +11,7 @@ pub fn spec(bytes: &[u8]) {
         let overrides = Overrides { quick, ..Default::default() };
         match Experiment::parse(path, text, &overrides) {
             Ok(experiment) => {
-                let mut expected = Experiment { name: String::new(), ..experiment };
+                let mut expected = Experiment { name: String::new(), quick: false, ..experiment };
                 let resolved = toml::to_string(&expected).unwrap();
                 let read = Experiment::parse(path, &resolved, &Overrides::default());
                 expected.name = "spec".into();

@@ -3,7 +3,8 @@
 use crate::Error;
 use crate::cli::arguments::output_folder;
 use crate::cli::output::print_line;
-use crate::run;
+use crate::run::merge;
+use crate::run::store::Existing;
 use std::path::PathBuf;
 
 /// Join the parts of experiments made with --shard into what one run would have written.
@@ -15,13 +16,17 @@ pub struct MergeArgs {
     /// Folder for the results.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Replace results that are there already.
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Merges, and prints the tables of every experiment.
 pub fn merge(args: &MergeArgs) -> Result<(), Error> {
     output_folder("--out", &args.out)?;
-    for (name, text) in run::merge::merge(&args.folders, &args.out)? {
-        print_line(&format!("{text}Results: {}", args.out.join(name).display()));
+    let existing = if args.force { Existing::Replace } else { Existing::Keep };
+    for (text, folder) in merge::merge(&args.folders, &args.out, existing)? {
+        print_line(&format!("{text}Results: {}", folder.display()));
     }
     Ok(())
 }

@@ -6,6 +6,7 @@ use crate::cli::explain;
 use crate::cli::output::print_line;
 use crate::run::execute::{Extent, execute};
 use crate::run::shard::Shard;
+use crate::run::store::Existing;
 use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
 use std::path::PathBuf;
@@ -29,7 +30,7 @@ pub struct RunArgs {
     /// Seed in place of the spec's.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Run the spec's smaller variant, into a folder of its own.
+    /// Run the spec's smaller variant, into the folder `quick` among the results.
     #[arg(long)]
     pub quick: bool,
     /// Compare with the committed results instead of writing any; exit code 1 on a difference.
@@ -41,6 +42,10 @@ pub struct RunArgs {
     /// Keep the finished runs of an interrupted experiment and do the rest.
     #[arg(long)]
     pub resume: bool,
+    /// Replace the results that are there already. Without it, finished results stay, and those of a repetition go
+    /// beside them, into a folder whose name ends with `.new`.
+    #[arg(long, conflicts_with_all = ["check", "redraw", "resume"])]
+    pub force: bool,
     /// Do only the I-th of N parts of the runs, from 1, and leave them for `harness merge`. Every part needs an --out
     /// of its own.
     #[arg(long, value_name = "I/N", conflicts_with = "check")]
@@ -58,7 +63,12 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     // All specs are checked before the first one is run.
     let experiments =
         args.specs.iter().map(|path| Experiment::read(path, &overrides)).collect::<Result<Vec<_>, _>>()?;
-    let extent = Extent { resume: args.resume, shard: args.shard };
+    let existing = match (args.resume, args.force) {
+        (true, _) => Existing::Resume,
+        (_, true) => Existing::Replace,
+        _ => Existing::Keep,
+    };
+    let extent = Extent { existing, shard: args.shard };
     let mut differences = 0;
     for experiment in &experiments {
         if args.explain {
@@ -77,8 +87,13 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         for name in &summary.left_out {
             print_line(&format!("(without {name}: scripts/fetch-scenes brings it)"));
         }
-        let folder = args.out.join(&experiment.name);
-        print_line(&format!("\n{}Results: {}", summary.text, folder.display()));
+        print_line(&format!("\n{}Results: {}", summary.text, summary.folder.display()));
+        if let Some(kept) = &summary.beside {
+            let same = check::compare(&summary.folder, kept, &summary.left_out)?.is_empty();
+            let same = if same { "the same" } else { "other" };
+            let kept = kept.display();
+            print_line(&format!("({kept} is kept and has {same} rows; --force would replace it)"));
+        }
     }
     if differences > 0 { Err(Error::Differs { differences }) } else { Ok(()) }
 }
@@ -87,7 +102,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
 /// differences.
 fn compare(args: &RunArgs, experiment: &Experiment, interrupted: &AtomicBool) -> Result<usize, Error> {
     let temporary = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
-    let (fresh, committed) = (temporary.path().join(&experiment.name), args.out.join(&experiment.name));
+    let (fresh, committed) = (temporary.path().join(experiment.folder()), args.out.join(experiment.folder()));
     reference::adopt(&committed, temporary.path())?;
     let summary = execute(experiment, temporary.path(), Extent::default(), interrupted)?;
     let found = check::compare(&fresh, &committed, &summary.left_out)?;

@@ -5,10 +5,12 @@ use crate::measure::speed;
 use crate::run::finish::{Summary, conclude};
 use crate::run::job::{Job, Watch, base_cost, perform};
 use crate::run::provenance::Provenance;
+use crate::run::reference::BestKnown;
 use crate::run::resolved::{Resolved, load_scenes, to_toml};
 use crate::run::rows::{Row, TraceRow, TraceTimeRow, to_bytes};
 use crate::run::shard::Shard;
-use crate::run::store::Store;
+use crate::run::store::{Existing, Store};
+use crate::run::target::Target;
 use crate::scenes::Scene;
 use crate::spec::{Contestant, Experiment};
 use crate::stress::Measure;
@@ -25,8 +27,8 @@ use std::sync::{Mutex, PoisonError};
 /// How much of an experiment is to be done.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Extent {
-    /// Keep the finished runs of an interrupted experiment.
-    pub resume: bool,
+    /// What happens to the results that are there already.
+    pub existing: Existing,
     /// Do these runs only, and leave them to be [merged](crate::run::merge::merge).
     pub shard: Option<Shard>,
 }
@@ -50,7 +52,7 @@ pub fn execute(
         return Err(Error::Usage(format!("{}: {why}", experiment.name)));
     }
     if let Some(measure) = &experiment.suite {
-        return over_suite(experiment, measure, out, interrupted);
+        return over_suite(experiment, measure, out, extent.existing, interrupted);
     }
     let Some(threads) = experiment.threads else { return run(experiment, out, extent, interrupted) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build();
@@ -66,7 +68,8 @@ fn run(
 ) -> Result<Summary, Error> {
     let (scenes, left_out) = load_scenes(experiment)?;
     let resolved = Resolved::new(experiment, &scenes);
-    let store = Store::open(out, &experiment.name, &to_toml(&resolved)?, extent.resume)?;
+    let Target { folder, beside } = Target::choose(out, &resolved, extent.existing, extent.shard.is_some())?;
+    let store = Store::open(&folder, &to_toml(&resolved)?, extent.existing)?;
     let jobs = jobs(experiment, &scenes)?;
     let own: Vec<usize> =
         (0..jobs.len()).filter(|&index| extent.shard.is_none_or(|shard| shard.has(index))).collect();
@@ -77,13 +80,14 @@ fn run(
     if let Some(shard) = extent.shard {
         store.keep_shard(&to_toml(&provenance)?)?;
         let text = format!("{} runs, part {shard}; `harness merge` joins the parts.\n", own.len());
-        return Ok(Summary { text, left_out });
+        return Ok(Summary { text, left_out, folder, beside });
     }
     if let Some(config) = &experiment.tracing {
         trace(experiment, config, &jobs, trees, &watch, &store)?;
     }
-    let text = conclude(&resolved, out, &provenance, store)?;
-    Ok(Summary { text, left_out })
+    let best_known = if beside.is_some() { BestKnown::Read(out) } else { BestKnown::Improve(out) };
+    let text = conclude(&resolved, best_known, &provenance, store)?;
+    Ok(Summary { text, left_out, folder, beside })
 }
 
 /// All runs, scene by scene, in the order of the spec.
@@ -147,10 +151,13 @@ fn over_suite(
     experiment: &Experiment,
     measure: &Measure,
     out: &Path,
+    existing: Existing,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
-    let resolved = to_toml(&Resolved::new(experiment, &[]))?;
-    let store = Store::open(out, &experiment.name, &resolved, false)?;
+    let resolved = Resolved::new(experiment, &[]);
+    let Target { folder, beside } = Target::choose(out, &resolved, existing, false)?;
+    let resolved = to_toml(&resolved)?;
+    let store = Store::open(&folder, &resolved, Existing::Replace)?;
     let text = match measure {
         Measure::Stability(config) => {
             let interrupted = || interrupted.load(Relaxed);
@@ -161,7 +168,7 @@ fn over_suite(
     store.write("resolved.toml", resolved.as_bytes())?;
     store.write("provenance.toml", to_toml(&Provenance::gather())?.as_bytes())?;
     store.finish()?;
-    Ok(Summary { text, left_out: vec![] })
+    Ok(Summary { text, left_out: vec![], folder, beside })
 }
 
 /// Traces rays through the trees of all first runs, scene by scene. Rebuilds the trees of runs that were kept from an

@@ -1,13 +1,14 @@
 //! From finished runs to results: joins their rows, brings the references up to date, makes the reports.
 
 use crate::Error;
+use crate::files;
 use crate::report;
 use crate::run::provenance::Provenance;
-use crate::run::reference;
-use crate::run::resolved::{Resolved, load_scenes, to_toml};
-use crate::run::store::{self, Store};
+use crate::run::reference::{self, BestKnown};
+use crate::run::resolved::{Resolved, to_toml};
+use crate::run::store::{self, Existing, Store};
 use crate::spec::Experiment;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What a finished experiment has to say.
 #[derive(Clone, Debug, Default)]
@@ -16,56 +17,59 @@ pub struct Summary {
     pub text: String,
     /// Optional scenes that are not there.
     pub left_out: Vec<String>,
+    /// The folder of the results.
+    pub folder: PathBuf,
+    /// The finished results that are kept, beside which those of a repetition lie.
+    pub beside: Option<PathBuf>,
 }
 
-/// Joins the kept runs and makes the reports. Returns the text for the terminal.
+/// Joins the kept runs and makes the reports. Returns the text for the terminal. Runs whose results lie beside others
+/// improve no best known costs.
 pub(crate) fn conclude(
     resolved: &Resolved,
-    out: &Path,
+    best_known: BestKnown,
     provenance: &Provenance,
     store: Store,
 ) -> Result<String, Error> {
     store.join(resolved.run_count())?;
-    let text = report(resolved, out, provenance, &store)?;
+    let text = report(resolved, best_known, provenance, &store)?;
     store.write("provenance.toml", to_toml(provenance)?.as_bytes())?;
     store.finish()?;
     Ok(text)
 }
 
 /// Improves the best known costs and makes the reports of joined rows. Returns the text for the terminal.
-fn report(resolved: &Resolved, out: &Path, provenance: &Provenance, store: &Store) -> Result<String, Error> {
+fn report(
+    resolved: &Resolved,
+    best_known: BestKnown,
+    provenance: &Provenance,
+    store: &Store,
+) -> Result<String, Error> {
     store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
-    reference::update(resolved, out, &provenance.revision, store)?;
+    reference::update(resolved, best_known, &provenance.revision, store)?;
     report::write_all(&resolved.experiment.reports, store)
 }
 
-/// Makes the reports of finished runs again, with the best known costs of now. Runs nothing: the rows in `out/NAME/`
-/// must come from the same spec, which may differ in its reports only.
+/// Makes the reports of finished runs again, with the best known costs of now. Runs nothing and loads no scene: the rows
+/// in `out/NAME/` must come from the same spec, which may differ in its reports only.
 pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
-    let (scenes, left_out) = load_scenes(experiment)?;
-    let resolved = Resolved::new(experiment, &scenes);
-    let folder = out.join(&experiment.name);
+    let folder = out.join(experiment.folder());
     let refuse = |message: &str| Error::Usage(format!("{}: {message}", folder.display()));
     if store::is_unfinished(&folder) {
         return Err(refuse("the experiment was interrupted; finish it with --resume first"));
     }
-    let read = |name: &str| {
-        let path = folder.join(name);
-        std::fs::read_to_string(&path).map_err(Error::io(&path, "read the file"))
-    };
-    let found = read("resolved.toml")?;
-    let same_runs = toml::from_str(&found).is_ok_and(|found: Resolved| {
-        let experiment = Experiment { reports: experiment.reports.clone(), ..found.experiment };
-        Resolved { experiment, ..found } == resolved
-    });
-    if !same_runs {
+    let text = files::read_text(&folder.join("resolved.toml"))?;
+    let found: Option<Resolved> = toml::from_str(&text).ok();
+    let resolved = found.filter(|found| found.has_runs_of(experiment));
+    let Some(Resolved { scenes, .. }) = resolved else {
         return Err(refuse("the rows come from another spec, scene or seed; run it again without --redraw"));
-    }
-    let store = Store::open(out, &experiment.name, &found, false)?;
+    };
+    let resolved = Resolved { experiment: experiment.clone(), scenes };
+    let store = Store::open(&folder, &text, Existing::Keep)?;
     // The rows stay those of the program that produced them, so its provenance is kept.
     let path = folder.join("provenance.toml");
-    let provenance: Provenance = toml::from_str(&read("provenance.toml")?).map_err(Error::toml(&path))?;
-    let text = report(&resolved, out, &provenance, &store)?;
+    let provenance: Provenance = toml::from_str(&files::read_text(&path)?).map_err(Error::toml(&path))?;
+    let text = report(&resolved, BestKnown::Improve(out), &provenance, &store)?;
     store.finish()?;
-    Ok(Summary { text, left_out })
+    Ok(Summary { text, left_out: vec![], folder, beside: None })
 }

@@ -4,86 +4,119 @@ use crate::Error;
 use crate::files;
 use crate::run::finish::conclude;
 use crate::run::provenance::Provenance;
+use crate::run::reference::BestKnown;
 use crate::run::resolved::Resolved;
-use crate::run::store::{self, FinishedRun, Store};
+use crate::run::store::{self, Existing, FinishedRun, Store};
+use crate::run::target::Target;
 use std::collections::BTreeMap;
-use std::fs;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-/// One part of an experiment, as `--shard` left it.
+/// One part of an experiment, as `--shard` left it, locked.
 struct Part {
     partial: PathBuf,
     resolved: String,
+    _lock: File,
 }
 
-/// At most so many missing runs are named one by one.
+/// At most this many missing runs are named one by one.
 const NAMED: usize = 5;
 
 /// Joins every experiment of which there is a part in one of `folders`, each the `--out` of a harness with `--shard`,
-/// into `out/NAME/`: but for seconds and provenance, the bytes that one machine would have written. The parts stay.
-/// Returns name and tables of every experiment.
+/// into its folder in `out`: except for seconds and provenance, the bytes that one machine would have written. The
+/// parts stay. Returns the tables of every experiment and where its results are.
 ///
 /// Refuses parts of different specs, scenes or seeds, runs that two parts have with different results, parts that
-/// are being written, and names the runs that are missing.
-pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Vec<(String, String)>, Error> {
-    // Held until the end, so that no part changes meanwhile.
-    let mut locks = Vec::new();
-    let mut experiments: BTreeMap<String, Vec<Part>> = BTreeMap::new();
+/// are being written, and missing runs, which it names.
+pub fn merge(folders: &[PathBuf], out: &Path, existing: Existing) -> Result<Vec<(String, PathBuf)>, Error> {
+    let mut experiments: BTreeMap<PathBuf, Vec<Part>> = BTreeMap::new();
     for folder in folders {
-        let mut names = Vec::new();
-        for entry in fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))? {
-            let entry = entry.map_err(Error::io(folder, "read the folder"))?;
-            let partial = entry.path().join(".partial");
-            let spec = partial.join("resolved.toml");
-            if spec.is_file() {
-                locks.push(files::lock_folder(&entry.path())?);
-                let resolved = fs::read_to_string(&spec).map_err(Error::io(&spec, "read the file"))?;
-                let name = entry.file_name().to_string_lossy().into_owned();
-                experiments.entry(name.clone()).or_default().push(Part { partial, resolved });
-                names.push(name);
-            }
-        }
-        if names.is_empty() {
+        let found = parts(folder)?;
+        if found.is_empty() {
             return Err(Error::Usage(format!(
                 "{} holds no part of an experiment; accepted: folders given as --out to runs with --shard",
                 folder.display()
             )));
         }
+        for (name, part) in found {
+            experiments.entry(name).or_default().push(part);
+        }
     }
-    experiments.into_iter().map(|(name, parts)| Ok((name.clone(), join(&name, &parts, out)?))).collect()
+    experiments.iter().map(|(name, parts)| join(name, parts, out, existing)).collect()
 }
 
-/// Joins the parts of one experiment.
-fn join(name: &str, parts: &[Part], out: &Path) -> Result<String, Error> {
-    let fail = |message: String| Error::Merge { experiment: name.to_owned(), message };
-    let Some(first) = parts.first() else { return Ok(String::new()) };
-    let target = out.join(name).join(".partial");
-    if parts.iter().any(|part| same_folder(&part.partial, &target)) {
+/// The parts in one `--out`, of whole experiments and of quick ones, by the names of their folders in it.
+fn parts(out: &Path) -> Result<Vec<(PathBuf, Part)>, Error> {
+    let quick = out.join("quick");
+    let mut parts = Vec::new();
+    for folder in [Some(out), quick.is_dir().then_some(quick.as_path())].into_iter().flatten() {
+        for entry in fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))? {
+            let path = entry.map_err(Error::io(folder, "read the folder"))?.path();
+            let partial = path.join(".partial");
+            let spec = partial.join("resolved.toml");
+            if spec.is_file() {
+                // Locked until the end, so that no part changes meanwhile.
+                let lock = files::lock_folder(&path)?;
+                let resolved = fs::read_to_string(&spec).map_err(Error::io(&spec, "read the file"))?;
+                let name = path.strip_prefix(out).unwrap_or(&path).to_owned();
+                parts.push((name, Part { partial, resolved, _lock: lock }));
+            }
+        }
+    }
+    Ok(parts)
+}
+
+/// Joins the parts of the experiment whose folder is called `name`.
+fn join(name: &Path, parts: &[Part], out: &Path, existing: Existing) -> Result<(String, PathBuf), Error> {
+    let fail = |message| Error::Merge { experiment: name.display().to_string(), message };
+    let own = out.join(name).join(".partial").canonicalize().ok();
+    if parts.iter().any(|part| own.is_some() && part.partial.canonicalize().ok() == own) {
         return Err(Error::Usage(format!("--out {} is also one of the parts; choose another", out.display())));
     }
-    if let Some(other) = parts.iter().find(|part| part.resolved != first.resolved) {
-        return Err(fail(format!(
-            "{} and {} are parts of different specs, scenes or seeds",
-            first.partial.display(),
-            other.partial.display()
-        )));
+    let resolved = common_spec(name, parts).map_err(fail)?;
+    let owners = owners(&resolved, parts, fail)?;
+    let Target { folder, beside } = Target::choose(out, &resolved, existing, false)?;
+    let store = Store::open(&folder, &parts[0].resolved, existing)?;
+    for (index, owner) in owners.iter().enumerate() {
+        store.keep(index, &FinishedRun::read(owner)?)?;
     }
-    let resolved: Resolved = toml::from_str(&first.resolved)
-        .map_err(|error| fail(format!("{}/resolved.toml: {error}", first.partial.display())))?;
-    // Somebody may have edited it: no more runs are looked for than a spec could ask for.
-    resolved
-        .experiment
-        .check_run_count()
-        .map_err(|message| fail(format!("{}/resolved.toml: {message}", first.partial.display())))?;
+    let mut provenance = Provenance::gather();
+    for part in parts {
+        let path = part.partial.join("provenance.toml");
+        if let Ok(text) = fs::read_to_string(&path) {
+            provenance.parts.push(toml::from_str(&text).map_err(Error::toml(&path))?);
+        }
+    }
+    let best_known = if beside.is_some() { BestKnown::Read(out) } else { BestKnown::Improve(out) };
+    Ok((conclude(&resolved, best_known, &provenance, store)?, folder))
+}
+
+/// What all parts were made of. Somebody may have edited it, so it is checked as far as the merging relies on it.
+fn common_spec(name: &Path, parts: &[Part]) -> Result<Resolved, String> {
+    let (first, others) = parts.split_first().ok_or("no parts")?;
+    if let Some(other) = others.iter().find(|part| part.resolved != first.resolved) {
+        let (first, other) = (first.partial.display(), other.partial.display());
+        return Err(format!("{first} and {other} are parts of different specs, scenes or seeds"));
+    }
+    let bad = |message: String| format!("{}/resolved.toml: {message}", first.partial.display());
+    let resolved: Resolved = toml::from_str(&first.resolved).map_err(|error| bad(error.to_string()))?;
+    if resolved.experiment.folder() != name {
+        return Err(bad(format!("name is {:?}; accepted: the folder's", resolved.experiment.name)));
+    }
+    resolved.experiment.check_run_count().map_err(|error| bad(error.to_string()))?;
+    Ok(resolved)
+}
+
+/// For every run a kept folder of it. Refuses runs of which there is none, or of which two differ.
+fn owners(resolved: &Resolved, parts: &[Part], fail: impl Fn(String) -> Error) -> Result<Vec<PathBuf>, Error> {
     let of_scene: Vec<_> = resolved.experiment.runs().collect();
-    let runs = of_scene.len() * resolved.scenes.len();
     let named = |index: usize| {
         let (labelled, repetition, _) = of_scene[index % of_scene.len()];
         let scene = &resolved.scenes[index / of_scene.len()].name;
         format!("scene {scene}, method {}, repetition {repetition}", labelled.label)
     };
     let (mut owners, mut missing) = (Vec::new(), Vec::new());
-    for index in 0..runs {
+    for index in 0..resolved.run_count() {
         let kept = parts.iter().map(|part| part.partial.join(store::part_name(index)));
         let kept: Vec<PathBuf> = kept.filter(|kept| kept.is_dir()).collect();
         let Some((owner, others)) = kept.split_first() else {
@@ -98,28 +131,11 @@ fn join(name: &str, parts: &[Part], out: &Path) -> Result<String, Error> {
         }
         owners.push(owner.clone());
     }
-    if !missing.is_empty() {
-        let first: Vec<String> = missing.iter().take(NAMED).copied().map(named).collect();
-        let more = if missing.len() > NAMED { "; and more" } else { "" };
-        return Err(fail(format!("{} of {runs} runs are missing: {}{more}", missing.len(), first.join("; "))));
+    if missing.is_empty() {
+        return Ok(owners);
     }
-
-    let store = Store::open(out, name, &first.resolved, false)?;
-    for (index, owner) in owners.iter().enumerate() {
-        store.keep(index, &FinishedRun::read(owner)?)?;
-    }
-    let mut provenance = Provenance::gather();
-    for part in parts {
-        let path = part.partial.join("provenance.toml");
-        if let Ok(text) = fs::read_to_string(&path) {
-            let own = toml::from_str(&text).map_err(|error| fail(format!("{}: {error}", path.display())))?;
-            provenance.parts.push(own);
-        }
-    }
-    conclude(&resolved, out, &provenance, store)
-}
-
-/// Whether both paths are one existing folder.
-fn same_folder(a: &Path, b: &Path) -> bool {
-    a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
+    let first: Vec<String> = missing.iter().take(NAMED).copied().map(named).collect();
+    let more = if missing.len() > NAMED { "; and more" } else { "" };
+    let (count, all) = (missing.len(), resolved.run_count());
+    Err(fail(format!("{count} of {all} runs are missing: {}{more}", first.join("; "))))
 }

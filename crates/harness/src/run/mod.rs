@@ -11,3 +11,4 @@ pub mod resolved;
 pub mod rows;
 pub mod shard;
 pub mod store;
+pub mod target;

@@ -23,9 +23,24 @@ pub const BEST_KNOWN: &str = "best_known.csv";
 /// The file in the folder of an experiment.
 pub const REFERENCES: &str = ReferenceRow::FILE;
 
+/// The folder with the best known costs.
+#[derive(Clone, Copy, Debug)]
+pub enum BestKnown<'a> {
+    /// They are read, and improved where a run was better.
+    Improve(&'a Path),
+    /// They are only read.
+    Read(&'a Path),
+}
+
 /// Improves `out/best_known.csv` by the rows in the store's folder, and records the references there if a report needs
 /// them. One harness at a time does so; at any moment the file is the old one or the whole new one.
-pub(crate) fn update(resolved: &Resolved, out: &Path, revision: &str, store: &Store) -> Result<(), Error> {
+pub(crate) fn update(
+    resolved: &Resolved,
+    best_known: BestKnown,
+    revision: &str,
+    store: &Store,
+) -> Result<(), Error> {
+    let (BestKnown::Improve(out) | BestKnown::Read(out)) = best_known;
     let runs: Vec<RunRow> = read(&store.folder().join("runs.csv"))?;
     let bounds: Vec<BoundRow> = read_if_any(store.folder())?;
     let lock_path = out.join(".lock");
@@ -53,7 +68,7 @@ pub(crate) fn update(resolved: &Resolved, out: &Path, revision: &str, store: &St
     known.sort_by_cached_key(|row| {
         (row.scene.clone(), row.objects, row.checksum.clone(), row.objective.clone())
     });
-    if known != before {
+    if known != before && matches!(best_known, BestKnown::Improve(_)) {
         files::write(&path, &to_bytes(&known, &path)?)?;
     }
     if experiment.reports.iter().any(Report::needs_references) {

@@ -35,6 +35,19 @@ impl Resolved {
         Self { experiment: experiment.clone(), scenes: scenes.iter().map(loaded).collect() }
     }
 
+    /// Whether the experiment asks for these runs; its reports may be others.
+    pub fn has_runs_of(&self, experiment: &Experiment) -> bool {
+        Experiment { reports: experiment.reports.clone(), ..self.experiment.clone() } == *experiment
+    }
+
+    /// Whether `found` has the same runs, and perhaps further ones on optional scenes.
+    pub fn repeats(&self, found: &Self) -> bool {
+        let optional = |name: &String| self.experiment.optional_scenes.contains(name);
+        found.has_runs_of(&self.experiment)
+            && self.scenes.iter().all(|scene| found.scenes.contains(scene))
+            && found.scenes.iter().all(|scene| self.scenes.contains(scene) || optional(&scene.name))
+    }
+
     /// Number of runs over all scenes.
     pub fn run_count(&self) -> usize {
         self.experiment.runs().count() * self.scenes.len()

@@ -45,6 +45,18 @@ impl FinishedRun {
     }
 }
 
+/// What happens to the results that are there already.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Existing {
+    /// They stay. A repetition of the same runs goes beside them; other runs are refused.
+    #[default]
+    Keep,
+    /// They stay, and those of an interrupted experiment are completed.
+    Resume,
+    /// They are replaced.
+    Replace,
+}
+
 /// What `.partial/` is called while it is removed.
 const REMOVED: &str = ".removed";
 
@@ -57,11 +69,10 @@ pub struct Store {
 }
 
 impl Store {
-    /// Creates and locks `out/name`. With `resume`, keeps the finished runs of an interrupted experiment, which must
-    /// have had the same resolved spec; without, discards them.
-    pub fn open(out: &Path, name: &str, resolved: &str, resume: bool) -> Result<Self, Error> {
-        let folder = out.join(name);
-        let partial = folder.join(".partial");
+    /// Creates and locks `folder`. Of an interrupted experiment whose finished runs are there, `existing` says whether
+    /// to resume it, which takes the same resolved spec, or to discard it; else it is refused.
+    pub fn open(folder: &Path, resolved: &str, existing: Existing) -> Result<Self, Error> {
+        let (folder, partial) = (folder.to_owned(), folder.join(".partial"));
         fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
         let lock = files::lock_folder(&folder)?;
         let removed = folder.join(REMOVED);
@@ -70,14 +81,20 @@ impl Store {
         }
         let spec = partial.join("resolved.toml");
         let found = fs::read_to_string(&spec).ok();
-        match found {
-            Some(found) if resume && found != resolved => {
-                return Err(Error::Usage(format!(
-                    "{}: the interrupted experiment had another spec, scene or seed; start over without --resume",
-                    folder.display()
-                )));
+        let refuse = |what: &str| Err(Error::Usage(format!("{}: {what}", folder.display())));
+        match (existing, found) {
+            (Existing::Resume, Some(found)) if found == resolved => {}
+            (Existing::Resume, Some(_)) => {
+                return refuse(
+                    "the interrupted experiment had another spec, scene or seed; --force discards it",
+                );
             }
-            Some(_) if resume => {}
+            (Existing::Keep, Some(_)) if has_finished_runs(&partial)? => {
+                return refuse(
+                    "there are finished runs of an interrupted experiment; --resume does the rest, --force \
+                     discards them",
+                );
+            }
             _ => {
                 if partial.is_dir() {
                     fs::rename(&partial, &removed).map_err(Error::io(&partial, "rename the folder"))?;
@@ -168,6 +185,11 @@ pub fn is_unfinished(folder: &Path) -> bool {
     folder.join(".partial").exists()
 }
 
+fn has_finished_runs(partial: &Path) -> Result<bool, Error> {
+    let is_run = |name: &String| !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_digit());
+    Ok(file_names(partial)?.iter().any(is_run))
+}
+
 fn file_names(folder: &Path) -> Result<BTreeSet<String>, Error> {
     let entries = fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))?;
     let name = |entry: std::io::Result<fs::DirEntry>| Ok(entry?.file_name().to_string_lossy().into_owned());
@@ -181,25 +203,29 @@ mod tests {
     #[test]
     fn a_second_writer_is_refused() {
         let out = tempfile::tempdir().unwrap();
-        let first = Store::open(out.path(), "x", "", false).unwrap();
-        assert!(matches!(Store::open(out.path(), "x", "", false), Err(Error::Busy(_))));
+        let open = || Store::open(&out.path().join("x"), "", Existing::Keep);
+        let first = open().unwrap();
+        assert!(matches!(open(), Err(Error::Busy(_))));
         drop(first);
-        assert!(Store::open(out.path(), "x", "", false).is_ok());
+        assert!(open().is_ok());
     }
 
     #[test]
-    fn only_the_same_spec_can_be_resumed() {
+    fn finished_runs_are_resumed_by_the_same_spec_only_and_discarded_only_if_asked() {
         let out = tempfile::tempdir().unwrap();
-        drop(Store::open(out.path(), "x", "a", false).unwrap());
-        assert!(matches!(Store::open(out.path(), "x", "b", true), Err(Error::Usage(_))));
-        assert!(Store::open(out.path(), "x", "a", true).is_ok());
+        let open = |resolved, existing| Store::open(&out.path().join("x"), resolved, existing);
+        open("a", Existing::Keep).unwrap().keep(0, &FinishedRun::default()).unwrap();
+        assert!(matches!(open("b", Existing::Resume), Err(Error::Usage(_))));
+        assert!(matches!(open("a", Existing::Keep), Err(Error::Usage(_))));
+        assert!(open("a", Existing::Resume).unwrap().has(0));
+        assert!(!open("a", Existing::Replace).unwrap().has(0));
     }
 
     #[test]
     fn a_file_where_the_folder_should_be_is_named() {
         let out = tempfile::tempdir().unwrap();
         fs::write(out.path().join("x"), "").unwrap();
-        let message = Store::open(out.path(), "x", "", false).unwrap_err().to_string();
+        let message = Store::open(&out.path().join("x"), "", Existing::Keep).unwrap_err().to_string();
         assert!(message.contains("cannot create the folder"), "{message}");
     }
 }

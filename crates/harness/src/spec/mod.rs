@@ -19,16 +19,20 @@ use bvh_core::cost::Objective;
 use bvh_search::{Budget, exact};
 pub use method::{Contestant, Labelled};
 pub use read::Overrides;
+use std::path::{Path, PathBuf};
 
 config! {
     serde;
     /// A checked experiment: every method on every scene, a number of times, and how to report it.
     ///
-    /// These are also the keys of a spec, except that `quick` may hold a table of keys that replace others under
+    /// These are also the keys of a spec, but for `name`, and for `quick`, a table of keys that replace others under
     /// `--quick`. Serialised, with every default spelled out, it is `resolved.toml`.
     pub struct Experiment {
         /// Name of the results folder, from the spec's file.
         name: String;
+        /// Whether this is the smaller variant of `--quick`.
+        #[serde(skip_serializing_if = "std::ops::Not::not")]
+        quick: bool;
         /// The question that the experiment answers, for its readers.
         question: String;
         /// A measurement over the suite of stiff cases, in place of runs on scenes.
@@ -67,6 +71,11 @@ config! {
 }
 
 impl Experiment {
+    /// The folder of its results within that of all results.
+    pub fn folder(&self) -> PathBuf {
+        if self.quick { Path::new("quick").join(&self.name) } else { self.name.clone().into() }
+    }
+
     /// The runs on one scene in order: method, repetition, and whether it is the first.
     pub fn runs(&self) -> impl Iterator<Item = (&Labelled, u32, bool)> {
         let of = |labelled| (0..self.repetitions).map(move |repetition| (labelled, repetition));
@@ -94,7 +103,8 @@ impl Experiment {
 
     /// The seed of one run, within 32 bits so that every spreadsheet keeps it exactly.
     pub fn seed_of(&self, scene: &str, label: &str, repetition: u32) -> u64 {
-        let identity = format!("{}\0{}\0{scene}\0{label}\0{repetition}", self.seed, self.name);
+        let variant = if self.quick { "-quick" } else { "" };
+        let identity = format!("{}\0{}{variant}\0{scene}\0{label}\0{repetition}", self.seed, self.name);
         let hash = fnv1a(identity.into_bytes());
         (hash ^ (hash >> 32)) & 0xffff_ffff
     }

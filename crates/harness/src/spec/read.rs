@@ -44,24 +44,20 @@ impl Experiment {
         if let Some((key, value)) = never_right(&table) {
             return Err(Fault::new(key, value, "under any key finite numbers, and no dates"));
         }
-        if let Some(found) = table.get("name") {
-            return Err(Fault::new("name", found, "none, the file's name is used"));
-        }
-        let mut name = name.to_owned();
-        let quick = table.remove("quick");
-        if overrides.quick {
-            name += "-quick";
-            match quick {
-                Some(Value::Table(quick)) => replace(&mut table, quick),
-                Some(found) => return Err(Fault::new("quick", found, "a table of keys to replace")),
-                None => {}
-            }
+        match table.remove("quick") {
+            Some(Value::Table(quick)) if overrides.quick => replace(&mut table, quick),
+            None | Some(Value::Table(_)) => {}
+            Some(found) => return Err(Fault::new("quick", found, "a table of keys to replace")),
         }
         // Serde forgets the path to an error within a table that says itself of which type it is.
         let methods = list(&mut table, "methods", Labelled::read)?;
         let reports = list(&mut table, "reports", fault::deserialize::<Report>)?;
         let mut experiment: Self = fault::deserialize(table)?;
-        (experiment.name, experiment.methods, experiment.reports) = (name, methods, reports);
+        if !experiment.name.is_empty() {
+            return Err(Fault::new("name", experiment.name, "none, the file's name is used"));
+        }
+        (experiment.name, experiment.quick) = (name.into(), overrides.quick);
+        (experiment.methods, experiment.reports) = (methods, reports);
         if let Some(seed) = overrides.seed {
             experiment.seed = seed;
         }

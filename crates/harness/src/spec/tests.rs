@@ -149,7 +149,7 @@ fn quick_takes_no_infinity_either() {
 fn quick_replaces_keys_and_names_its_results_apart() {
     let text = format!("{GOOD}repetitions = 5\n[quick]\nrepetitions = 2\n");
     let quick = read(&text, &Overrides { quick: true, ..Default::default() }).unwrap();
-    assert_eq!((quick.repetitions, quick.name.as_str()), (2, "spec-quick"));
+    assert_eq!((quick.repetitions, quick.folder()), (2, "quick/spec".into()));
     assert_eq!(read(&text, &Overrides::default()).unwrap().repetitions, 5);
 }
 
