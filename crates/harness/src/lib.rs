@@ -15,6 +15,7 @@ pub mod report;
 pub mod run;
 pub mod scenes;
 pub mod spec;
+pub mod statistics;
 pub mod stress;
 
 pub use error::Error;

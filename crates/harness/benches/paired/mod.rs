@@ -1,6 +1,6 @@
 //! Ratios of times measured in turns, so that a machine whose speed drifts does not favour either side.
 
-use harness::report::statistics::quantile;
+use harness::statistics::quantile;
 use std::time::Instant;
 
 /// A named piece of work.

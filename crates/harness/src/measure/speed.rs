@@ -3,7 +3,7 @@
 use super::accelerator::{Accelerator, Query, Structure};
 use super::answers::{self, SOME_HIT};
 use super::rays::{Kind, Viewpoint, rays};
-use crate::report::statistics::{median, minimum};
+use crate::statistics::{median, minimum};
 use crate::run::rows::{TraceRow, TraceTimeRow};
 use crate::scenes::Scene;
 use bvh_build::config;

@@ -1,36 +1,32 @@
 //! Error against run time: the gap of the incumbent to the exact optimum or the best known cost, along all three axes.
 
-use super::progress::{Along, Series, series};
-use super::statistics::quantile;
-use super::{Output, Rows, looks, text_table};
+use super::config::OneOrMore;
+use super::data::{Rows, ratio};
+use super::metric::Metric;
+use super::output::{Output, panel, text_table};
+use super::progress::{ProgressAxis, Series, series};
 use crate::Error;
-use crate::figures::{Axis, Figure, Layer, Panel};
-use serde::{Deserialize, Serialize};
+use crate::figures::Layer;
+use crate::statistics::{median, quartiles};
+use bvh_build::OutOfRange;
+use bvh_build::config::above;
+use serde::Serialize;
 
-/// Error against run time.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// What it belongs to.
-    pub source: String,
-    /// Heading.
-    pub title: String,
-    /// Name of the files; several such reports of one experiment need different ones. Default `anytime`.
-    #[serde(default = "anytime")]
-    pub file: String,
-    /// Labels of the methods. One event per run, as a builder has, is shown as a point.
-    pub methods: Vec<String>,
-    /// Seconds at which the table for the terminal reads the curves. Default 0.1, 1, 10 and 60.
-    #[serde(default = "decades")]
-    pub at_seconds: Vec<f64>,
-}
-
-fn anytime() -> String {
-    "anytime".into()
-}
-
-fn decades() -> Vec<f64> {
-    vec![0.1, 1.0, 10.0, 60.0]
+bvh_build::config! { serde;
+    /// Error against run time.
+    pub struct Config {
+        /// What it belongs to.
+        source: String;
+        /// Heading.
+        title: String;
+        /// Name of the files; several such reports of one experiment need different ones.
+        file: String = "anytime".into();
+        /// Labels of the methods. One event per run, as a builder has, is shown as a point.
+        methods: Vec<String>, in OneOrMore;
+        /// Seconds, ascending, at which the table for the terminal reads the curves.
+        at_seconds: Vec<f64> = vec![0.1, 1.0, 10.0, 60.0], in above(0.0);
+    }
+    check Self::check_names;
 }
 
 /// One point of a curve, as written to `timing_anytime.csv`, `anytime_evaluations.csv` and `anytime_work.csv`.
@@ -50,80 +46,74 @@ const PER_DECADE: f64 = 20.0;
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let mut output = Output::default();
-        for along in Along::ALL {
+        let mut output = Output::new(&self.source, &self.title);
+        let caption = "Cost of the incumbent over the best known cost of the scene, minus 1: median and quartiles over \
+                       repetitions. Points are builders. A curve falls through the floor where it is the best known.";
+        for axis in ProgressAxis::ALL {
             let (mut points, mut panels) = (Vec::new(), Vec::new());
-            for (scene, _) in rows.scenes() {
+            for scene in rows.scenes() {
                 let Some(reference) = rows.reference(scene) else { continue };
                 let mut layers = Vec::new();
                 for method in &self.methods {
-                    let runs = series(rows, scene, method, along);
-                    let start = points.len();
-                    points.extend(curve(scene, method, &runs, reference.cost));
-                    layers.extend(draw(method, &points[start..]));
+                    let own = curve(scene, method, &series(rows, scene, method, axis), reference.cost);
+                    layers.extend(draw(method, &own));
+                    points.extend(own);
                 }
-                let (x, y) = (Axis::log(along.label()), Axis::log("gap to the best known"));
-                panels.push(Panel { title: rows.shown(scene), x, y, layers });
+                panels.push(panel(rows.shown(scene), axis.axis(), Metric::Gap.axis(), layers));
             }
-            output.figures.push((along.file(&self.file), self.figure(panels)));
-            output.csv.push((along.file(&self.file), along.csv(&points)?));
+            output.add_figure(axis.file(&self.file), caption, 2, panels);
+            axis.add_csv(&mut output, &self.file, &points)?;
         }
-        output.text = self.text(rows);
+        self.add_table(&mut output, rows);
         output.reading = self.reading(rows);
         Ok(output)
     }
 
-    fn figure(&self, panels: Vec<Panel>) -> Figure {
-        Figure {
-            title: format!("{}: {}", self.source, self.title),
-            caption: "Cost of the incumbent over the best known cost of the scene, minus 1: median and quartiles over \
-                      repetitions. Points are builders. A curve falls through the floor where it is the best known."
-                .into(),
-            columns: 2,
-            panels,
-            looks: looks(&self.methods),
+    fn check_names(&self) -> Result<(), OutOfRange> {
+        if !self.at_seconds.is_sorted_by(|a, b| a < b) {
+            return Err(OutOfRange::new("at_seconds", format!("{:?}", self.at_seconds), "ascending numbers"));
         }
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        if self.file.is_empty() || !self.file.chars().all(plain) {
+            return Err(OutOfRange::new("file", format!("{:?}", self.file), "letters, digits, - and _"));
+        }
+        Ok(())
     }
 
     /// Which method ends lowest where, and how far below the greedy tree.
     fn reading(&self, rows: &Rows) -> String {
-        let lowest = |(scene, _): (&str, _)| {
-            let base = rows.base_cost(scene);
-            let median = |method: &String| {
-                let costs: Vec<f64> = rows.runs_of(scene, method).map(|run| run.cost).collect();
-                Some((quantile(&costs, 0.5)?, method.clone()))
-            };
-            let (cost, method) = self.methods.iter().filter_map(median).min_by(|a, b| a.0.total_cmp(&b.0))?;
-            Some(format!("{scene}: {method}, {:+.2} %", 100.0 * (cost / base - 1.0)))
+        let lowest = |scene: &str| {
+            let end = |method: &String| Some((median(&rows.final_ratios(scene, method))?, method.clone()));
+            let (cost, method) = self.methods.iter().filter_map(end).min_by(|a, b| a.0.total_cmp(&b.0))?;
+            Some(format!("{scene}: {method}, {}", percent(cost)))
         };
         let lowest: Vec<String> = rows.scenes().into_iter().filter_map(lowest).collect();
-        format!(
-            "The lowest median cost against the greedy tree's at the end of the runs, {}.",
-            lowest.join("; ")
-        )
+        let lowest = lowest.join("; ");
+        format!("The lowest median cost against the greedy tree's at the end of the runs, {lowest}.")
     }
 
-    fn text(&self, rows: &Rows) -> String {
+    fn add_table(&self, output: &mut Output, rows: &Rows) {
         let seconds = self.at_seconds.iter().map(|seconds| format!("{seconds} s"));
         let header: Vec<String> = ["scene".into(), "method".into()].into_iter().chain(seconds).collect();
         let mut table = text_table(header.iter().map(String::as_str));
-        for (scene, _) in rows.scenes() {
-            let base = rows.base_cost(scene);
+        for scene in rows.scenes() {
             for method in &self.methods {
-                let runs = series(rows, scene, method, Along::Seconds);
+                let runs = series(rows, scene, method, ProgressAxis::Seconds);
                 let cell = |&at: &f64| {
-                    let cost = quantile(&incumbents(&runs, at), 0.5);
-                    cost.map_or_else(String::new, |cost| format!("{:+.2} %", 100.0 * (cost / base - 1.0)))
+                    let cost = median(&incumbents(&runs, at));
+                    cost.map_or_else(String::new, |cost| percent(cost / rows.base_cost(scene)))
                 };
                 let name = [rows.shown(scene), method.clone()];
-                table.add_row(name.into_iter().chain(self.at_seconds.iter().map(cell)).collect::<Vec<_>>());
+                table.add_row(name.into_iter().chain(self.at_seconds.iter().map(cell)));
             }
         }
-        format!(
-            "{}: {}\nMedian cost against the greedy tree's, after so many seconds:\n{table}\n",
-            self.source, self.title
-        )
+        output.add_table("Median cost against the greedy tree's, after so many seconds:", &table);
     }
+}
+
+/// By how much a ratio to base is off the base.
+fn percent(ratio: f64) -> String {
+    format!("{:+.2} %", 100.0 * (ratio - 1.0))
 }
 
 /// What the runs that have an incumbent by then have it cost.
@@ -140,21 +130,12 @@ fn curve<'a>(scene: &'a str, method: &'a str, runs: &[Series], reference: f64) -
     }
     let steps = ((last / first).log10() * PER_DECADE).ceil().max(0.0) as u32;
     let place = |step: u32| if step == steps { last } else { first * 10f64.powf(f64::from(step) / PER_DECADE) };
-    (0..=steps)
-        .map(place)
-        .map(|x| {
-            let costs = incumbents(runs, x);
-            let gap = |q| quantile(&costs, q).map_or(f64::NAN, |cost| super::over(cost, reference) - 1.0);
-            Point {
-                scene,
-                method,
-                x,
-                gap_quartile_1: gap(0.25),
-                gap_median: gap(0.5),
-                gap_quartile_3: gap(0.75),
-            }
-        })
-        .collect()
+    let point = |x: f64| {
+        let [gap_quartile_1, gap_median, gap_quartile_3] =
+            quartiles(&incumbents(runs, x)).map(|cost| ratio(cost, reference) - 1.0);
+        Point { scene, method, x, gap_quartile_1, gap_median, gap_quartile_3 }
+    };
+    (0..=steps).map(place).map(point).collect()
 }
 
 /// A staircase with its band, or a marker for a single point.

@@ -1,24 +1,25 @@
 //! How far from the exact optimum every method ends on small scenes, and how tight the lower bound is there.
 
-use super::statistics::quantile;
-use super::{Output, Rows, looks, text_table};
+use super::config::OneOrMore;
+use super::data::Rows;
+use super::output::{Output, each, panel, text_table};
 use crate::Error;
-use crate::figures::{Axis, Figure, Layer, Panel};
-use crate::run::rows::to_bytes;
-use serde::{Deserialize, Serialize};
+use crate::figures::{Axis, Layer, Panel};
+use crate::scenes::subset::Part;
+use crate::statistics::{median, minimum, quantile};
+use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
-/// Gaps to the exact optimum.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// Heading.
-    pub title: String,
-    /// Labels of the methods to compare. Their trees must be binary with one object per leaf.
-    pub methods: Vec<String>,
-    /// Label of the method that finds the optimum.
-    pub optimum: String,
+bvh_build::config! { serde;
+    /// Gaps to the exact optimum.
+    pub struct Config {
+        /// Heading.
+        title: String;
+        /// Labels of the methods to compare. Their trees must be binary with one object per leaf.
+        methods: Vec<String>, in OneOrMore;
+        /// Label of the method that finds the optimum.
+        optimum: String;
+    }
 }
 
 /// A gap below this is rounding: the method has found the optimum.
@@ -29,7 +30,7 @@ const SOLVED: f64 = 1e-12;
 struct Gaps<'a> {
     method: &'a str,
     /// `random`, `cluster`, or `whole` for scenes that are no such part.
-    part: &'a str,
+    part: &'static str,
     objects: usize,
     runs: usize,
     solved_fraction: f64,
@@ -40,8 +41,8 @@ struct Gaps<'a> {
 
 /// The lower bound over the optimum, on all scenes of one kind and size, as written to `tightness.csv`.
 #[derive(Serialize)]
-struct Tightness<'a> {
-    part: &'a str,
+struct Tightness {
+    part: &'static str,
     objects: usize,
     scenes: usize,
     minimum_bound_over_optimum: f64,
@@ -49,138 +50,152 @@ struct Tightness<'a> {
     maximum_bound_over_optimum: f64,
 }
 
+/// The gaps of all runs by method, kind of part and number of objects, and the bounds over the optimum of all scenes by
+/// the latter two.
+struct Found<'a> {
+    gaps: BTreeMap<(&'a str, &'static str, usize), Vec<f64>>,
+    bounds: BTreeMap<(&'static str, usize), Vec<f64>>,
+    optima: usize,
+}
+
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
+        let found = self.find(rows);
+        let summaries = self.summaries(&found);
+        let tightness: Vec<Tightness> = found.bounds.iter().map(tightness).collect();
+        let mut output = Output::new("", &self.title);
+        output.add_csv("gaps", &summaries)?;
+        if !tightness.is_empty() {
+            output.add_csv("tightness", &tightness)?;
+        }
+        let caption = format!(
+            "{} small scenes. Left, the fraction of runs that end at the optimum; right, the worst gap of any. Below, \
+             the proven lower bound over the optimum: median, and from least to greatest.",
+            found.optima
+        );
+        let mut panels = self.draw(&summaries);
+        panels.extend(draw_bounds(&tightness));
+        output.add_figure("gaps", caption, 2, panels);
+        self.add_table(&mut output, &found);
+        output.reading = self.reading(&found);
+        Ok(output)
+    }
+
+    fn find<'a>(&self, rows: &'a Rows) -> Found<'a> {
         let optimal = rows.runs.iter().filter(|run| run.method == self.optimum);
         let optima: BTreeMap<&str, f64> = optimal.map(|run| (run.scene.as_str(), run.cost)).collect();
-        // By method, kind of part and size.
-        let mut gaps: BTreeMap<(&str, &str, usize), Vec<f64>> = BTreeMap::new();
+        let mut found = Found { gaps: BTreeMap::new(), bounds: BTreeMap::new(), optima: optima.len() };
         for run in rows.runs.iter().filter(|run| self.methods.contains(&run.method)) {
             if let Some(&optimum) = optima.get(run.scene.as_str()) {
                 let gap = if optimum > 0.0 { run.cost / optimum - 1.0 } else { run.cost };
-                gaps.entry((&run.method, part(&run.scene), run.objects)).or_default().push(gap);
+                found.gaps.entry((&run.method, part(&run.scene), run.objects)).or_default().push(gap);
             }
         }
-        let mut ratios: BTreeMap<(&str, usize), Vec<f64>> = BTreeMap::new();
         for row in &rows.bounds {
             if let Some(optimum) = optima.get(row.scene.as_str()).filter(|&&optimum| optimum > 0.0) {
-                ratios.entry((part(&row.scene), row.objects)).or_default().push(row.lower_bound / optimum);
+                found
+                    .bounds
+                    .entry((part(&row.scene), row.objects))
+                    .or_default()
+                    .push(row.lower_bound / optimum);
             }
         }
-        let at = |values: &[f64], q| quantile(values, q).unwrap_or(f64::NAN);
-        let mut summaries = Vec::new();
-        for method in &self.methods {
-            for (&(_, part, objects), gaps) in gaps.iter().filter(|((of, ..), _)| of == method) {
-                summaries.push(Gaps {
-                    method,
-                    part,
-                    objects,
-                    runs: gaps.len(),
-                    solved_fraction: solved(gaps),
-                    median_gap: at(gaps, 0.5),
-                    quantile_90_gap: at(gaps, 0.9),
-                    maximum_gap: at(gaps, 1.0),
-                });
-            }
-        }
-        let tightness: Vec<Tightness> = ratios
-            .iter()
-            .map(|(&(part, objects), ratios)| Tightness {
-                part,
-                objects,
-                scenes: ratios.len(),
-                minimum_bound_over_optimum: at(ratios, 0.0),
-                median_bound_over_optimum: at(ratios, 0.5),
-                maximum_bound_over_optimum: at(ratios, 1.0),
-            })
-            .collect();
-        let caption = format!(
-            "{} small scenes. Left, the fraction of runs that end at the optimum; right, the worst gap of any. \
-             Below, the proven lower bound over the optimum: median, and from least to greatest.",
-            optima.len()
-        );
-        let mut panels = self.panels(&summaries);
-        panels.extend(bound_panels(&tightness));
-        let looks = looks(&self.methods);
-        let figure = Figure { title: self.title.clone(), caption, columns: 2, panels, looks };
-        let mut csv = vec![("gaps".into(), to_bytes(&summaries, Path::new("gaps.csv"))?)];
-        if !tightness.is_empty() {
-            csv.push(("tightness".into(), to_bytes(&tightness, Path::new("tightness.csv"))?));
-        }
-        let text = self.text(&gaps, &ratios);
-        let reading = self.reading(&gaps, &ratios);
-        Ok(Output { csv, figures: vec![("gaps".into(), figure)], paper: vec![], text, reading })
+        found
     }
 
-    fn reading(
-        &self,
-        gaps: &BTreeMap<(&str, &str, usize), Vec<f64>>,
-        ratios: &BTreeMap<(&str, usize), Vec<f64>>,
-    ) -> String {
-        let solves = |method: &String| {
-            let own = gaps.iter().filter(|((of, ..), _)| of == method);
-            let all: Vec<f64> = own.flat_map(|(_, gaps)| gaps.iter().copied()).collect();
-            format!("{method} {:.1} %", 100.0 * solved(&all))
+    fn summaries<'a>(&self, found: &Found<'a>) -> Vec<Gaps<'a>> {
+        let summary = |(&(method, part, objects), gaps): (&(&'a str, &'static str, usize), &Vec<f64>)| Gaps {
+            method,
+            part,
+            objects,
+            runs: gaps.len(),
+            solved_fraction: solved(gaps),
+            median_gap: at(gaps, 0.5),
+            quantile_90_gap: at(gaps, 0.9),
+            maximum_gap: at(gaps, 1.0),
         };
-        let methods: Vec<String> = self.methods.iter().map(solves).collect();
-        let bounds: Vec<f64> = ratios.values().flatten().copied().collect();
-        let bound = quantile(&bounds, 0.5).map_or_else(String::new, |median| {
-            format!(" The lower bound is {median:.3} of the optimum (median).")
-        });
-        format!("Runs that end at the exact optimum: {}.{bound}", methods.join(", "))
+        let of = |method| found.gaps.iter().filter(move |((of, ..), _)| of == method);
+        self.methods.iter().flat_map(of).map(summary).collect()
     }
 
     /// Fraction solved and worst gap against size, for every kind of part.
-    fn panels(&self, summaries: &[Gaps]) -> Vec<Panel> {
+    fn draw(&self, summaries: &[Gaps]) -> Vec<Panel> {
         let parts: BTreeSet<&str> = summaries.iter().map(|summary| summary.part).collect();
-        let panel = |part: &str, title: &str, y: Axis, value: fn(&Gaps) -> f64| {
+        let draw = |part: &str, title: &str, y: Axis, value: fn(&Gaps) -> f64| {
             let line = |method: &String| {
                 let own = summaries.iter().filter(|summary| summary.part == part && summary.method == method);
                 let points = own.map(|summary| (summary.objects as f64, value(summary))).collect();
                 Layer::Line { name: method.clone(), points }
             };
-            let layers = self.methods.iter().map(line).collect();
-            Panel { title: format!("{part}, {title}"), x: Axis::linear("objects"), y, layers }
+            panel(
+                format!("{part}, {title}"),
+                Axis::linear("objects"),
+                y,
+                self.methods.iter().map(line).collect(),
+            )
         };
         let both = |part| {
             let fraction = Axis::linear("fraction of runs").range(0.0, 1.02);
             let gap = Axis::linear("greatest gap (%)").starting_at(0.0);
             [
-                panel(part, "solved", fraction, |summary| summary.solved_fraction),
-                panel(part, "greatest gap", gap, |summary| 100.0 * summary.maximum_gap.max(0.0)),
+                draw(part, "solved", fraction, |summary| summary.solved_fraction),
+                draw(part, "greatest gap", gap, |summary| 100.0 * summary.maximum_gap.max(0.0)),
             ]
         };
         parts.into_iter().flat_map(both).collect()
     }
 
-    /// Over all scenes.
-    fn text(
-        &self,
-        gaps: &BTreeMap<(&str, &str, usize), Vec<f64>>,
-        ratios: &BTreeMap<(&str, usize), Vec<f64>>,
-    ) -> String {
+    /// Every method over all scenes.
+    fn add_table(&self, output: &mut Output, found: &Found) {
         let header = ["method", "runs", "solved", "median gap", "90 % of gaps below", "greatest gap"];
         let mut table = text_table(header);
         for method in &self.methods {
-            let own = gaps.iter().filter(|((of, ..), _)| of == method);
-            let all: Vec<f64> = own.flat_map(|(_, gaps)| gaps.iter().copied()).collect();
-            let percent = |gap: f64| format!("{:.3} %", 100.0 * gap.max(0.0));
-            let at = |q| quantile(&all, q).map_or_else(String::new, percent);
+            let all = found.of(method);
+            let gap =
+                |q| quantile(&all, q).map_or_else(String::new, |gap| format!("{:.3} %", 100.0 * gap.max(0.0)));
             let solved = format!("{:.1} %", 100.0 * solved(&all));
-            table.add_row([method.clone(), all.len().to_string(), solved, at(0.5), at(0.9), at(1.0)]);
+            table.add_row([method.clone(), all.len().to_string(), solved, gap(0.5), gap(0.9), gap(1.0)]);
         }
-        let all: Vec<f64> = ratios.values().flatten().copied().collect();
-        let bound = quantile(&all, 0.0).zip(quantile(&all, 0.5)).map_or_else(String::new, |(least, median)| {
-            format!("lower bound / optimum: median {median:.3}, least {least:.3}\n")
-        });
-        format!("{}\n{table}\n{bound}\n", self.title)
+        output.add_table("Gaps to the exact optimum over all scenes:", &table);
+    }
+
+    fn reading(&self, found: &Found) -> String {
+        let solves = |method: &String| Some(format!("{method} {:.1} %", 100.0 * solved(&found.of(method))));
+        let methods = each(&self.methods, solves);
+        let bounds: Vec<f64> = found.bounds.values().flatten().copied().collect();
+        let bound =
+            minimum(bounds.iter().copied()).zip(median(&bounds)).map_or_else(String::new, |(least, median)| {
+                format!(
+                    " The lower bound is {median:.3} of the optimum (median), and nowhere less than {least:.3}."
+                )
+            });
+        format!("Runs that end at the exact optimum: {methods}.{bound}")
+    }
+}
+
+impl Found<'_> {
+    /// The gaps of all runs of a method.
+    fn of(&self, method: &str) -> Vec<f64> {
+        let own = self.gaps.iter().filter(|((of, ..), _)| *of == method);
+        own.flat_map(|(_, gaps)| gaps.iter().copied()).collect()
+    }
+}
+
+fn tightness((&(part, objects), bounds): (&(&'static str, usize), &Vec<f64>)) -> Tightness {
+    Tightness {
+        part,
+        objects,
+        scenes: bounds.len(),
+        minimum_bound_over_optimum: at(bounds, 0.0),
+        median_bound_over_optimum: at(bounds, 0.5),
+        maximum_bound_over_optimum: at(bounds, 1.0),
     }
 }
 
 /// The lower bound over the optimum against size, for every kind of part.
-fn bound_panels(tightness: &[Tightness]) -> Vec<Panel> {
+fn draw_bounds(tightness: &[Tightness]) -> Vec<Panel> {
     let parts: BTreeSet<&str> = tightness.iter().map(|row| row.part).collect();
-    let panel = |part| {
+    let draw = |part| {
         let own = || tightness.iter().filter(move |row| row.part == part);
         let range = |row: &Tightness| {
             (row.objects as f64, row.minimum_bound_over_optimum, row.maximum_bound_over_optimum)
@@ -192,14 +207,22 @@ fn bound_panels(tightness: &[Tightness]) -> Vec<Panel> {
             Layer::Line { name: name(), points: own().map(median).collect() },
         ];
         let y = Axis::linear("bound / optimum").range(0.0, 1.02);
-        Panel { title: format!("{part}, lower bound"), x: Axis::linear("objects"), y, layers }
+        panel(format!("{part}, lower bound"), Axis::linear("objects"), y, layers)
     };
-    parts.into_iter().map(panel).collect()
+    parts.into_iter().map(draw).collect()
 }
 
-/// Which kind of part of a scene it is: the word before its count and seed.
-fn part(scene: &str) -> &str {
-    scene.rsplit(':').nth(2).unwrap_or("whole")
+/// Which kind of part of a scene it is.
+fn part(scene: &str) -> &'static str {
+    match Part::parse(scene) {
+        Some((_, Part::Random(..))) => "random",
+        Some((_, Part::Cluster(..))) => "cluster",
+        Some((_, Part::Spaced(_))) | None => "whole",
+    }
+}
+
+fn at(values: &[f64], q: f64) -> f64 {
+    quantile(values, q).unwrap_or(f64::NAN)
 }
 
 /// The fraction of gaps that are no more than rounding.
@@ -210,12 +233,6 @@ fn solved(gaps: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_kind_of_part_is_the_word_before_count_and_seed() {
-        let scenes = ["a:cluster:6:1", "b:random:12:0", "c", "c:30"];
-        assert_eq!(scenes.map(part), ["cluster", "random", "whole", "whole"]);
-    }
 
     #[test]
     fn rounding_is_no_gap() {

@@ -1,38 +1,40 @@
 //! The paper's Figures 2 to 4: cost against generation, the median run and the range of all, with random picking.
 
-use super::statistics::{expected_best_of, median};
-use super::{Output, Rows, display_name};
+use super::data::Rows;
+use super::output::{Output, panel};
+use super::paper::{PaperRow, Verdict};
 use crate::Error;
-use crate::figures::{Axis, Figure, Layer, Look, Panel};
-use crate::run::rows::{PaperRow, to_bytes};
-use serde::{Deserialize, Serialize};
+use crate::figures::{Axis, Layer, Panel};
+use crate::run::rows::HistoryRow;
+use crate::statistics::{expected_best_of, median, range};
+use bvh_build::OutOfRange;
+use bvh_build::config::above;
+use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::Path;
 
-/// Cost against generation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// Where the paper has it, such as `Figure 2`.
-    pub source: String,
-    /// Heading.
-    pub title: String,
-    /// Label of the genetic algorithm.
-    pub method: String,
-    /// Label of the random picking of orders that it is compared with.
-    pub baseline: String,
-    /// The paper's lowest and highest final cost over runs, by scene.
-    #[serde(default)]
-    pub paper_final: BTreeMap<String, [f64; 2]>,
-    /// The paper's final cost over that of the average order.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub paper_gain: Option<f64>,
-    /// The generation after which the paper still sees some improvement.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub paper_improves_after: Option<usize>,
-    /// Why ours differs, where it does.
-    #[serde(default)]
-    pub reason: String,
+bvh_build::config! { serde;
+    /// Cost against generation.
+    pub struct Config {
+        /// Where the paper has it, such as `Figure 2`.
+        source: String;
+        /// Heading.
+        title: String;
+        /// Label of the genetic algorithm.
+        method: String;
+        /// Label of the random picking of orders that it is compared with.
+        baseline: String;
+        /// The paper's lowest and highest final cost over runs, by scene.
+        paper_final: BTreeMap<String, [f64; 2]>, in above(0.0);
+        /// The paper's final cost over that of the average order.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        paper_gain: Option<f64>, in above(0.0);
+        /// The generation after which the paper still sees some improvement.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        paper_improves_after: Option<usize>;
+        /// Why ours differs, where it does.
+        reason: String;
+    }
+    check Self::check_order;
 }
 
 /// One generation, as written to `generations.csv`.
@@ -49,43 +51,67 @@ struct Generation<'a> {
     random_picking_cost: Option<f64>,
 }
 
+/// The histories of all runs on a scene, and the costs of random orders.
+struct Runs<'a> {
+    scene: &'a str,
+    runs: Vec<Vec<&'a HistoryRow>>,
+    /// Which of them has the median final cost, the lower of two.
+    middle: usize,
+    random: Vec<f64>,
+}
+
+/// Where the runs on a scene end.
+struct Final {
+    runs: usize,
+    low: f64,
+    median: f64,
+    high: f64,
+    /// The mean cost of random orders.
+    average: f64,
+    /// Müller–Fellner's cost.
+    base: f64,
+}
+
+const PAPER: &str = "paper, range of final costs over runs";
+
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let mut output = Output::default();
+        let mut output = Output::new(&self.source, &self.title);
         let (mut generations, mut panels) = (Vec::new(), Vec::new());
-        for (scene, kind) in rows.scenes() {
-            let runs = rows.histories(scene, &self.method);
-            let Some(middle) = middle_run(&runs) else { continue };
-            let pool: Vec<f64> =
-                rows.histories(scene, &self.baseline).concat().iter().map(|row| row.cost).collect();
-            let start = generations.len();
-            for (generation, row) in runs[middle].iter().enumerate() {
-                let costs = || runs.iter().filter_map(|run| run.get(generation)).map(|row| row.incumbent);
-                generations.push(Generation {
-                    scene,
-                    generation,
-                    median_run_cost: row.incumbent,
-                    lowest_cost: costs().fold(f64::INFINITY, f64::min),
-                    highest_cost: costs().fold(f64::NEG_INFINITY, f64::max),
-                    random_picking_cost: expected_best_of(&pool, row.evaluations as usize),
-                });
-            }
-            let shown = display_name(scene, kind);
-            panels.push(self.panel(scene, &shown, &generations[start..]));
-            self.compare(scene, &shown, rows, &runs, &pool, &mut output);
+        for scene in rows.scenes() {
+            let Some(runs) = self.runs(rows, scene) else { continue };
+            let own = runs.generations();
+            panels.push(self.draw(&rows.shown(scene), scene, &own));
+            generations.extend(own);
+            let Some(end) = runs.end(rows.base_cost(scene)) else { continue };
+            output.reading += &end.reading(&rows.shown(scene));
+            output.paper.extend(self.compare(&rows.shown(scene), &runs, &end));
         }
-        let caption =
-            "Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the median, and the \
-                       range of all runs. Random picking: the exact expectation for as many orders."
-                .into();
-        let title = format!("{}: {}", self.source, self.title);
-        let looks = vec![(PAPER.into(), Look::Reference)];
-        output.figures.push(("generations".into(), Figure { title, caption, columns: 1, panels, looks }));
-        output.csv.push(("generations".into(), to_bytes(&generations, Path::new("generations.csv"))?));
+        let caption = "Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the median, and the \
+                       range of all runs. Random picking: the exact expectation for as many orders.";
+        output.add_figure("generations", caption, 1, panels);
+        output.set_reference(PAPER);
+        output.add_csv("generations", &generations)?;
         Ok(output)
     }
 
-    fn panel(&self, scene: &str, shown: &str, generations: &[Generation]) -> Panel {
+    fn check_order(&self) -> Result<(), OutOfRange> {
+        let disordered = self.paper_final.iter().find(|(_, [low, high])| low > high);
+        disordered.map_or(Ok(()), |(scene, found)| {
+            Err(OutOfRange::new(format!("paper_final.{scene}"), format!("{found:?}"), "the lower number first"))
+        })
+    }
+
+    fn runs<'a>(&self, rows: &'a Rows, scene: &'a str) -> Option<Runs<'a>> {
+        let runs = rows.histories(scene, &self.method);
+        let last = |run: usize| runs[run].last().map_or(f64::INFINITY, |row| row.incumbent);
+        let mut order: Vec<usize> = (0..runs.len()).collect();
+        order.sort_by(|&a, &b| last(a).total_cmp(&last(b)));
+        let middle = *order.get(order.len().checked_sub(1)? / 2)?;
+        Some(Runs { scene, runs, middle, random: rows.trial_costs(scene, &self.baseline) })
+    }
+
+    fn draw(&self, shown: &str, scene: &str, generations: &[Generation]) -> Panel {
         let at = |generation: &Generation| generation.generation as f64;
         let median: Vec<_> = generations.iter().map(|g| (at(g), g.median_run_cost)).collect();
         let range = generations.iter().map(|g| (at(g), g.lowest_cost, g.highest_cost)).collect();
@@ -99,106 +125,71 @@ impl Config {
             let points = vec![(at(last), *low, (low + high) / 2.0, *high)];
             layers.push(Layer::ErrorBars { name: PAPER.into(), points });
         }
-        let y = Axis::linear("cost (Goldsmith–Salmon)");
-        Panel { title: shown.into(), x: Axis::linear("generation"), y, layers }
+        panel(shown, Axis::linear("generation"), Axis::linear("cost (Goldsmith–Salmon)"), layers)
     }
 
-    fn compare(
-        &self,
-        scene: &str,
-        shown: &str,
-        rows: &Rows,
-        runs: &[Vec<&crate::run::rows::HistoryRow>],
-        pool: &[f64],
-        output: &mut Output,
-    ) {
-        let finals: Vec<f64> = runs.iter().filter_map(|run| Some(run.last()?.incumbent)).collect();
-        let (Some(middle), base) = (median(&finals), rows.base_cost(scene)) else { return };
-        let low = finals.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = finals.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let average = pool.iter().sum::<f64>() / pool.len() as f64;
-        output.text += &format!(
-            "{}: {}\n{shown}: final cost {middle:.2} ({low:.2} to {high:.2} over {} runs), {:.3} of the average \
-             order's {average:.2}, {:.3} of Müller–Fellner's {base:.2}\n\n",
-            self.source,
-            self.title,
-            finals.len(),
-            middle / average,
-            middle / base,
-        );
-        output.reading += &format!(
-            "{shown}: {:.3} of the average order's cost, {:.3} of Müller–Fellner's, over {} runs. ",
-            middle / average,
-            middle / base,
-            finals.len()
-        );
-        let row = |quantity: &str, paper: String, ours: String, verdict: &str| PaperRow {
-            source: self.source.clone(),
-            scene: shown.into(),
-            quantity: quantity.into(),
-            paper,
-            ours,
-            paper_over_base: None,
-            ours_over_base: None,
-            verdict: verdict.into(),
-            reason: self.reason.clone(),
-        };
-        if let Some(&[paper_low, paper_high]) = self.paper_final.get(scene) {
-            let spread = |low: f64, high: f64| 2.0 * (high - low) / (high + low);
-            let (theirs, ours) = (spread(paper_low, paper_high), spread(low, high));
-            let verdict = if ours > theirs { "wider" } else { "narrower" };
-            output.paper.push(row(
-                "final costs over runs, lowest to highest, and (highest − lowest) / middle",
-                format!("{paper_low} to {paper_high}, {theirs:.3}"),
-                format!("{low:.2} to {high:.2}, {ours:.3}"),
-                verdict,
-            ));
-        }
-        if let Some(gain) = self.paper_gain {
-            let ours = middle / average;
-            output.paper.push(PaperRow {
-                paper_over_base: Some(gain),
-                ours_over_base: Some(ours),
-                ..row(
-                    "median final cost over the average order's",
-                    format!("{gain:.3}"),
-                    format!("{ours:.3}"),
-                    &super::verdict(gain, ours, 0.05),
-                )
-            });
-        }
-        if let Some(after) = self.paper_improves_after
-            && let Some(before) = middle_run(runs).and_then(|run| runs[run].get(after))
-        {
-            let ratio = middle / before.incumbent;
-            output.paper.push(PaperRow {
-                ours_over_base: Some(ratio),
-                ..row(
-                    &format!("final cost over that of generation {after}"),
-                    "some improvement".into(),
-                    format!("{ratio:.4}"),
-                    if ratio < 1.0 { "agrees" } else { "differs" },
-                )
-            });
-        }
-        output.paper.push(PaperRow {
-            ours_over_base: Some(middle / base),
-            ..row(
-                "median final cost over Müller–Fellner's, both Goldsmith–Salmon",
-                String::new(),
-                format!("{:.3}", middle / base),
-                "not in the paper by cost",
-            )
+    /// Our final costs beside the paper's spread, gain and late improvement, as far as the spec has them.
+    fn compare(&self, shown: &str, runs: &Runs, end: &Final) -> Vec<PaperRow> {
+        let row = |quantity: &str| PaperRow::new(&self.source, shown, quantity, &self.reason);
+        let spread = self.paper_final.get(runs.scene).map(|&[low, high]| {
+            let [theirs, ours] = [(low, high), (end.low, end.high)].map(|(l, h)| 2.0 * (h - l) / (h + l));
+            let quantity = "final costs over runs, lowest to highest, and (highest − lowest) / middle";
+            let verdict = if ours > theirs { Verdict::Wider } else { Verdict::Narrower };
+            let shown = format!("{:.2} to {:.2}, {ours:.3}", end.low, end.high);
+            row(quantity).compare(format!("{low} to {high}, {theirs:.3}"), shown, verdict)
         });
+        let gain = self.paper_gain.map(|gain| {
+            let ours = end.median / end.average;
+            let verdict = Verdict::of_ratios(gain, ours, 0.05);
+            let row = row("median final cost over the average order's");
+            row.compare(format!("{gain:.3}"), format!("{ours:.3}"), verdict).ratios(Some(gain), ours)
+        });
+        let late = self.paper_improves_after.and_then(|after| {
+            let ours = end.median / runs.runs[runs.middle].get(after)?.incumbent;
+            let verdict = if ours < 1.0 { Verdict::Agrees } else { Verdict::Differs };
+            let row = row(&format!("final cost over that of generation {after}"));
+            Some(row.compare("some improvement", format!("{ours:.4}"), verdict).ratios(None, ours))
+        });
+        let ours = end.median / end.base;
+        let over_base = row("median final cost over Müller–Fellner's, both Goldsmith–Salmon");
+        let over_base = over_base.compare("", format!("{ours:.3}"), Verdict::NotInPaper).ratios(None, ours);
+        [spread, gain, late, Some(over_base)].into_iter().flatten().collect()
     }
 }
 
-const PAPER: &str = "paper, range of final costs over runs";
+impl<'a> Runs<'a> {
+    fn generations(&self) -> Vec<Generation<'a>> {
+        let generation = |(generation, row): (usize, &&HistoryRow)| {
+            let costs = self.runs.iter().filter_map(|run| Some(run.get(generation)?.incumbent));
+            let (lowest_cost, highest_cost) = range(costs).unwrap_or((f64::NAN, f64::NAN));
+            Generation {
+                scene: self.scene,
+                generation,
+                median_run_cost: row.incumbent,
+                lowest_cost,
+                highest_cost,
+                random_picking_cost: expected_best_of(&self.random, row.evaluations as usize),
+            }
+        };
+        self.runs[self.middle].iter().enumerate().map(generation).collect()
+    }
 
-/// The run whose final cost is the median, the lower of two.
-fn middle_run(runs: &[Vec<&crate::run::rows::HistoryRow>]) -> Option<usize> {
-    let mut order: Vec<usize> = (0..runs.len()).filter(|&run| !runs[run].is_empty()).collect();
-    let last = |run: usize| runs[run].last().map_or(f64::INFINITY, |row| row.incumbent);
-    order.sort_by(|&a, &b| last(a).total_cmp(&last(b)));
-    order.get(order.len().checked_sub(1)? / 2).copied()
+    fn end(&self, base: f64) -> Option<Final> {
+        let costs: Vec<f64> = self.runs.iter().filter_map(|run| Some(run.last()?.incumbent)).collect();
+        let (low, high) = range(costs.iter().copied())?;
+        let average = self.random.iter().sum::<f64>() / self.random.len() as f64;
+        Some(Final { runs: costs.len(), low, median: median(&costs)?, high, average, base })
+    }
+}
+
+impl Final {
+    fn reading(&self, scene: &str) -> String {
+        let Self { runs, low, median, high, average, base } = self;
+        format!(
+            "{scene}: final cost {median:.2} ({low:.2} to {high:.2} over {runs} runs), {:.3} of the average order's \
+             cost and {:.3} of Müller–Fellner's. ",
+            median / average,
+            median / base
+        )
+    }
 }

@@ -1,36 +1,36 @@
 //! The ablation of what scenes do not need: that leaving it out changes no cost, and what it saves.
 
-use super::statistics::quantile;
-use super::{Output, Rows, display_name, text_table};
+use super::config::OneOrMore;
+use super::data::{Rows, ratio};
+use super::output::{Output, panel};
 use crate::Error;
-use crate::figures::{Axis, Figure, Layer, Panel};
-use crate::run::rows::to_bytes;
-use serde::{Deserialize, Serialize};
-use std::path::Path;
+use crate::figures::{Axis, Layer, Panel};
+use crate::run::rows::RunRow;
+use crate::statistics::quartiles;
+use serde::Serialize;
 
-/// An ablation. Fails if leaving something out has made a cost higher, or different where it must not.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// Heading.
-    pub title: String,
-    /// What is compared.
-    pub pairs: Vec<Pair>,
+bvh_build::config! { serde;
+    /// An ablation. Fails if leaving something out has made a cost higher, or different where it must not.
+    pub struct Config {
+        /// Heading.
+        title: String;
+        /// What is compared.
+        pairs: Vec<Pair>, in OneOrMore;
+    }
 }
 
-/// The same method with something left out and without.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Pair {
-    /// What is left out.
-    pub name: String,
-    /// Label of the method that leaves it out.
-    pub out: String,
-    /// Label of the method that does not.
-    pub kept: String,
-    /// Whether the cost may be lower with it left out, an optimum being in the place of a search. Default false.
-    #[serde(default)]
-    pub may_be_lower: bool,
+bvh_build::config! { serde;
+    /// The same method with something left out and without.
+    pub struct Pair {
+        /// What is left out.
+        name: String;
+        /// Label of the method that leaves it out.
+        out: String;
+        /// Label of the method that does not.
+        kept: String;
+        /// Whether the cost may be lower with it left out, an optimum being in the place of a search.
+        may_be_lower: bool = false;
+    }
 }
 
 /// One comparison, as written to `omissions.csv`.
@@ -59,89 +59,50 @@ struct Times<'a> {
 }
 
 impl Config {
-    /// The labels of all methods.
-    pub fn labels(&self) -> impl Iterator<Item = &String> {
-        self.pairs.iter().flat_map(|pair| [&pair.out, &pair.kept])
-    }
-
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let scenes = rows.scenes();
-        let (mut compared, mut times) = (Vec::new(), Vec::new());
-        for pair in &self.pairs {
-            for &(scene, _) in &scenes {
-                compared.push(pair.compare(rows, scene)?);
-                times.push(pair.times(rows, scene));
-            }
-        }
-        Ok(Output {
-            csv: vec![
-                ("omissions".into(), to_bytes(&compared, Path::new("omissions.csv"))?),
-                ("timing_omissions".into(), to_bytes(&times, Path::new("timing_omissions.csv"))?),
-            ],
-            figures: vec![("omissions".into(), self.figure(&scenes, &times))],
-            text: self.text(&scenes, &compared, &times),
-            ..Output::default()
-        })
+        let problems = || self.pairs.iter().flat_map(|pair| scenes.iter().map(move |scene| (pair, scene)));
+        let compared: Vec<Compared> =
+            problems().map(|(pair, scene)| pair.compare(rows, scene)).collect::<Result<_, _>>()?;
+        let times: Vec<Times> = problems().map(|(pair, scene)| pair.times(rows, scene)).collect();
+        let mut output = Output::new("", &self.title);
+        output.add_csv("omissions", &compared)?;
+        output.add_csv("timing_omissions", &times)?;
+        let caption = "Median of the ratios repetition by repetition.";
+        output.add_figure("omissions", caption, 1, vec![self.draw(rows, &times)]);
+        let columns = ["omission", "scene", "runs", "same_cost", "cost_ratio", "work_ratio"];
+        output.show("Cost and work with it left out over those without:", &compared, &columns)?;
+        let columns = ["omission", "scene", "ratio_low", "ratio_median", "ratio_high"];
+        output.show("Time with it left out over time without, median and quartiles:", &times, &columns)?;
+        Ok(output)
     }
 
-    fn figure(&self, scenes: &[(&str, &str)], times: &[Times]) -> Figure {
-        let names = scenes.iter().map(|&(scene, kind)| display_name(scene, kind)).collect();
+    fn draw(&self, rows: &Rows, times: &[Times]) -> Panel {
         let points = |pair: &Pair| {
             let own = times.iter().filter(|times| times.omission == pair.name).enumerate();
-            Layer::Points {
-                name: pair.name.clone(),
-                points: own.map(|(at, times)| (at as f64, times.ratio_median)).collect(),
-            }
+            let points = own.map(|(at, times)| (at as f64, times.ratio_median)).collect();
+            Layer::Points { name: pair.name.clone(), points }
         };
         let mut layers: Vec<Layer> = self.pairs.iter().map(points).collect();
         layers.push(Layer::HLine { y: 1.0, label: "nothing left out".into() });
         let y = Axis::log("time / time without leaving it out");
-        Figure {
-            title: self.title.clone(),
-            caption: "Median of the ratios repetition by repetition.".into(),
-            columns: 1,
-            panels: vec![Panel { title: String::new(), x: Axis::categories("", names), y, layers }],
-            ..Default::default()
-        }
-    }
-
-    fn text(&self, scenes: &[(&str, &str)], compared: &[Compared], times: &[Times]) -> String {
-        let mut table = text_table(["left out", "scene", "cost", "work", "time, quartiles"]);
-        for (Compared { omission, scene, same_cost, cost_ratio, work_ratio, .. }, times) in
-            compared.iter().zip(times)
-        {
-            let kind = scenes.iter().find(|(name, _)| name == scene).map_or("", |&(_, kind)| kind);
-            let Times { ratio_low, ratio_median, ratio_high, .. } = times;
-            table.add_row([
-                (*omission).to_owned(),
-                display_name(scene, kind),
-                if *same_cost { "same bits".into() } else { format!("{cost_ratio:.6}") },
-                format!("{work_ratio:.4}"),
-                format!("{ratio_median:.4}  ({ratio_low:.4} to {ratio_high:.4})"),
-            ]);
-        }
-        format!("{}\n{table}\n", self.title)
+        panel("", Axis::categories("", rows.all_shown()), y, layers)
     }
 }
 
 impl Pair {
     fn compare<'a>(&'a self, rows: &Rows, scene: &'a str) -> Result<Compared<'a>, Error> {
-        let pairs: Vec<_> = rows.runs_of(scene, &self.out).zip(rows.runs_of(scene, &self.kept)).collect();
-        let same = |(out, kept): &(&crate::run::rows::RunRow, &crate::run::rows::RunRow)| {
-            out.cost.to_bits() == kept.cost.to_bits()
-        };
-        if let Some((out, kept)) =
-            pairs.iter().find(|pair| !(same(pair) || self.may_be_lower && pair.0.cost < pair.1.cost))
-        {
+        let pairs: Vec<(&RunRow, &RunRow)> =
+            rows.runs_of(scene, &self.out).zip(rows.runs_of(scene, &self.kept)).collect();
+        let same = |(out, kept): &(&RunRow, &RunRow)| out.cost.to_bits() == kept.cost.to_bits();
+        let allowed = |pair: &(&RunRow, &RunRow)| same(pair) || self.may_be_lower && pair.0.cost < pair.1.cost;
+        if let Some((out, kept)) = pairs.iter().find(|pair| !allowed(pair)) {
             return Err(Error::Ablation {
                 scene: scene.into(),
                 message: format!("{} left out: the cost is {}, and {} without", self.name, out.cost, kept.cost),
             });
         }
-        let ratio = |out: f64, kept: f64| if kept > 0.0 { out / kept } else { 1.0 };
-        let work = |side: fn(&(&crate::run::rows::RunRow, &crate::run::rows::RunRow)) -> u64| {
-            pairs.iter().map(side).sum::<u64>() as f64
-        };
+        let work = |side: fn(&(&RunRow, &RunRow)) -> u64| pairs.iter().map(side).sum::<u64>() as f64;
         Ok(Compared {
             scene,
             omission: &self.name,
@@ -153,15 +114,9 @@ impl Pair {
     }
 
     fn times<'a>(&'a self, rows: &Rows, scene: &'a str) -> Times<'a> {
-        let seconds = |label: &'a str| {
-            rows.timing
-                .iter()
-                .filter(move |row| row.scene == scene && row.method == label)
-                .map(|row| row.seconds)
-        };
-        let ratios: Vec<f64> =
-            seconds(&self.out).zip(seconds(&self.kept)).map(|(out, kept)| out / kept).collect();
-        let at = |q| quantile(&ratios, q).unwrap_or(f64::NAN);
-        Times { scene, omission: &self.name, ratio_low: at(0.25), ratio_median: at(0.5), ratio_high: at(0.75) }
+        let [out, kept] = [&self.out, &self.kept].map(|label| rows.seconds_of(scene, label));
+        let ratios: Vec<f64> = out.iter().zip(kept).map(|(out, kept)| out / kept).collect();
+        let [ratio_low, ratio_median, ratio_high] = quartiles(&ratios);
+        Times { scene, omission: &self.name, ratio_low, ratio_median, ratio_high }
     }
 }

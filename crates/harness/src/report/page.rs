@@ -1,13 +1,14 @@
 //! All results on one page: a self-contained HTML file that needs neither scripts nor other files.
 
+use super::paper::{PaperRow, Verdict};
+use super::{PAPER_FILE, TEXT_FILE};
 use crate::Error;
-use crate::figures;
 use crate::files;
-use crate::report::{Output, Rows};
 use crate::run::provenance::Provenance;
 use crate::run::resolved::Resolved;
-use crate::run::rows::PaperRow;
+use crate::run::rows;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use serde::de::DeserializeOwned;
 use std::fs;
 use std::path::Path;
 
@@ -30,8 +31,8 @@ struct Section {
     name: String,
     question: String,
     stand_ins: bool,
-    reading: String,
-    tables: String,
+    /// What the reports printed.
+    text: String,
     paper: Vec<PaperRow>,
     /// Name and SVG text.
     figures: Vec<(String, String)>,
@@ -67,44 +68,37 @@ pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
     Ok(sections.len())
 }
 
+/// Reads what an experiment has written. Nothing is computed again.
 fn section(results: &Path, name: &str) -> Result<Section, Error> {
     let folder = results.join(name);
-    let read = |path: &Path| fs::read_to_string(path).map_err(Error::io(path, "read the file"));
-    let path = folder.join("resolved.toml");
-    let resolved: Resolved = toml::from_str(&read(&path)?).map_err(Error::toml(&path))?;
-    let path = folder.join("provenance.toml");
-    let provenance = toml::from_str(&read(&path)?).map_err(Error::toml(&path))?;
-    let (mut all, mut figures) = (Output::default(), Vec::new());
-    // From the CSV files, as the figures beside them were; those of the suite are shown as they are.
-    if resolved.experiment.suite.is_some() {
-        for entry in fs::read_dir(&folder).map_err(Error::io(&folder, "read the folder"))?.flatten() {
-            let path = entry.path();
-            if path.extension().is_some_and(|extension| extension == "svg") {
-                figures.push((entry.file_name().to_string_lossy().into_owned(), read(&path)?));
-            }
-        }
-        figures.sort();
-    }
-    let rows = if resolved.experiment.reports.is_empty() { Rows::default() } else { Rows::read(&folder)? };
-    for report in &resolved.experiment.reports {
-        let output = report.write(&rows)?;
-        all.text += &output.text;
-        all.paper.extend(output.paper);
-        all.reading += &(output.reading + "\n");
-        for (name, figure) in &output.figures {
-            figures.push((name.clone(), figures::svg(figure)?));
+    let resolved: Resolved = read_toml(&folder.join("resolved.toml"))?;
+    let provenance = read_toml(&folder.join("provenance.toml"))?;
+    let mut figures = Vec::new();
+    for entry in fs::read_dir(&folder).map_err(Error::io(&folder, "read the folder"))?.flatten() {
+        let path = entry.path();
+        if path.extension().is_some_and(|extension| extension == "svg") {
+            figures.push((entry.file_name().to_string_lossy().into_owned(), read(&path)?));
         }
     }
+    figures.sort();
+    let if_any = |name: &str| Some(folder.join(name)).filter(|path| path.is_file());
     Ok(Section {
         name: name.into(),
         question: resolved.experiment.question,
         stand_ins: resolved.scenes.iter().any(|scene| scene.kind == "stand-in"),
-        reading: all.reading,
-        tables: all.text,
-        paper: all.paper,
+        text: if_any(TEXT_FILE).map_or_else(|| Ok(String::new()), |path| read(&path))?,
+        paper: if_any(PAPER_FILE).map_or_else(|| Ok(vec![]), |path| rows::read(&path))?,
         figures,
         provenance,
     })
+}
+
+fn read(path: &Path) -> Result<String, Error> {
+    fs::read_to_string(path).map_err(Error::io(path, "read the file"))
+}
+
+fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
+    toml::from_str(&read(path)?).map_err(Error::toml(path))
 }
 
 fn page(sections: &[Section]) -> Markup {
@@ -140,12 +134,13 @@ fn experiment(section: &Section) -> Markup {
             p { strong { (question) } }
             @if section.stand_ins { p { "Scenes named as stand-ins are procedural stand-ins for the paper's." } }
             @if !section.paper.is_empty() { p.reading { (of_the_paper(&section.paper)) } }
-            @for line in section.reading.lines().filter(|line| !line.is_empty()) { p.reading { (line) } }
             @if !section.paper.is_empty() { (paper_table(&section.paper)) }
             @for (stem, svg) in &section.figures {
                 figure id={ (name) "-" (stem) } { (PreEscaped(drawing(svg))) }
             }
-            @if !section.tables.is_empty() { pre { (section.tables) } }
+            @for block in section.text.split("\n\n").filter(|block| !block.is_empty()) {
+                @if block.contains('\n') { pre { (block) } } @else { p.reading { (block) } }
+            }
             p.provenance {
                 code { (provenance.command) } ", revision " (provenance.revision) ", " (provenance.rustc) ", "
                 (provenance.cpu) ", " (provenance.threads) " thread(s), " (provenance.date)
@@ -157,9 +152,9 @@ fn experiment(section: &Section) -> Markup {
 
 /// How many of the paper's numbers ours agree with.
 fn of_the_paper(rows: &[PaperRow]) -> String {
-    let theirs: Vec<&PaperRow> = rows.iter().filter(|row| !row.paper.is_empty()).collect();
-    let count = |begins: &str| theirs.iter().filter(|row| row.verdict.starts_with(begins)).count();
-    let (agree, direction) = (count("agrees"), count("same direction"));
+    let theirs: Vec<Verdict> = rows.iter().filter(|row| !row.paper.is_empty()).map(|row| row.verdict).collect();
+    let agree = theirs.iter().filter(|verdict| **verdict == Verdict::Agrees).count();
+    let direction = theirs.iter().filter(|verdict| verdict.is_same_direction()).count();
     format!(
         "Numbers of the paper: {}. Ours agree with {agree}; {direction} more are on the same side of the base; {} \
          differ.",
@@ -185,7 +180,7 @@ fn paper_table(rows: &[PaperRow]) -> Markup {
                             td { (row.source) } td { (row.scene) } td { (row.quantity) }
                             td.number { (row.paper) } td.number { (row.ours) }
                             td.number { (ratio(row.paper_over_base)) } td.number { (ratio(row.ours_over_base)) }
-                            td { (row.verdict) }
+                            td { (row.verdict.name()) }
                         }
                     }
                 }
@@ -212,8 +207,7 @@ mod tests {
             name: "x".into(),
             question: "Is 1 < 2 & so on?".into(),
             stand_ins: true,
-            reading: "first\nsecond".into(),
-            tables: "<pre>".into(),
+            text: "first\n\nsecond\n\nTable:\n<pre>\n\n".into(),
             paper: vec![],
             figures: vec![("f".into(), "<?xml version=\"1.0\"?><svg width=\"1\"></svg>".into())],
             provenance,
@@ -221,7 +215,7 @@ mod tests {
         let page = page(&[section]).into_string();
         for part in [
             "1 &lt; 2 &amp; so",
-            "&lt;pre&gt;",
+            "<pre>Table:\n&lt;pre&gt;</pre>",
             "a&lt;b",
             "<svg width=\"1\">",
             "<p class=\"reading\">second</p>",

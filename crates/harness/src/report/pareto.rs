@@ -1,25 +1,12 @@
 //! Which methods are worth their time: cost against build time, and against the time of a ray.
 
-use super::peers::{build_seconds, fastest};
-use super::traversal::distinct;
-use super::{Output, Rows, display_name, over};
+use super::config::Methods;
+use super::data::Rows;
+use super::metric::Metric;
+use super::output::{Output, panel};
 use crate::Error;
-use crate::figures::{Axis, Figure, Layer, Panel};
-use crate::run::rows::to_bytes;
-use serde::{Deserialize, Serialize};
-use std::path::Path;
-
-/// Cost against time.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// What it belongs to.
-    pub source: String,
-    /// Heading.
-    pub title: String,
-    /// Labels of the methods.
-    pub methods: Vec<String>,
-}
+use crate::figures::Layer;
+use serde::Serialize;
 
 /// A method on a scene, as written to `timing_pareto.csv`.
 #[derive(Serialize)]
@@ -35,53 +22,49 @@ struct Point<'a> {
     on_front: bool,
 }
 
-impl Config {
-    pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let kinds = distinct(&rows.traces, |row| &row.rays);
-        let (mut points, mut builds, mut rays) = (Vec::new(), Vec::new(), Vec::new());
-        for (scene, kind) in rows.scenes() {
-            let point = |method: &'_ String| {
-                let run = rows.first_run(scene, method)?;
-                let ns = kinds.first().and_then(|kind| fastest(rows, scene, method, kind));
-                Some((build_seconds(rows, scene, method)?, over(run.cost, run.base_cost), ns.map(|ns| ns.1)))
-            };
-            let own: Vec<_> = self.methods.iter().filter_map(|method| Some((method, point(method)?))).collect();
-            let front = front(own.iter().map(|(_, (seconds, cost, _))| (*seconds, *cost)).collect());
-            let panel = |x: Axis, y: Axis, layers| Panel { title: display_name(scene, kind), x, y, layers };
-            let single =
-                |method: &String, at: (f64, f64)| Layer::Points { name: method.clone(), points: vec![at] };
-            let mut layers: Vec<Layer> =
-                own.iter().map(|(method, (seconds, cost, _))| single(method, (*seconds, *cost))).collect();
-            layers.push(Layer::Steps { name: "best so far".into(), points: front.clone() });
-            builds.push(panel(Axis::log("build time (s)"), Axis::linear("cost / base"), layers));
-            let traced = own.iter().filter_map(|(method, (_, cost, ns))| Some(single(method, ((*ns)?, *cost))));
-            rays.push(panel(Axis::linear("ns per ray"), Axis::linear("cost / base"), traced.collect()));
-            points.extend(own.iter().map(|&(method, (build_seconds, cost_over_base, ns_per_ray))| Point {
-                scene,
-                method,
-                build_seconds,
-                cost_over_base,
-                ns_per_ray,
-                on_front: front.contains(&(build_seconds, cost_over_base)),
-            }));
+pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
+    let kind = rows.traced_kinds().first().copied();
+    let (mut points, mut builds, mut rays) = (Vec::new(), Vec::new(), Vec::new());
+    for scene in rows.scenes() {
+        let mut own: Vec<Point> =
+            config.methods.iter().filter_map(|method| point(rows, scene, method, kind)).collect();
+        let front = front(own.iter().map(|point| (point.build_seconds, point.cost_over_base)).collect());
+        for point in &mut own {
+            point.on_front = front.contains(&(point.build_seconds, point.cost_over_base));
         }
-        let caption = "Cost is the total area of inner nodes over that of the greedy tree; one object per leaf, one \
-                       thread.";
-        let figure = |caption: &str, panels| Figure {
-            title: format!("{}: {}", self.source, self.title),
-            caption: caption.into(),
-            columns: 2,
-            panels,
-            looks: vec![],
+        let layer = |point: &Point, x| {
+            let points = vec![(x, point.cost_over_base)];
+            Layer::Points { name: point.method.to_owned(), points }
         };
-        let mut figures = vec![("pareto".to_owned(), figure(caption, builds))];
-        if let Some(kind) = kinds.first() {
-            let caption = format!("{caption} Rays: {kind}, each method by its fastest layout.");
-            figures.push(("pareto_rays".into(), figure(&caption, rays)));
-        }
-        let csv = vec![("timing_pareto".into(), to_bytes(&points, Path::new("timing_pareto.csv"))?)];
-        Ok(Output { csv, figures, ..Output::default() })
+        let mut layers: Vec<Layer> = own.iter().map(|point| layer(point, point.build_seconds)).collect();
+        layers.push(Layer::Steps { name: "best so far".into(), points: front });
+        let cost = || Metric::CostOverBase.axis();
+        builds.push(panel(rows.shown(scene), Metric::BuildSeconds.axis(), cost(), layers));
+        let traced = own.iter().filter_map(|point| Some(layer(point, point.ns_per_ray?))).collect();
+        rays.push(panel(rows.shown(scene), Metric::NsPerRay.axis(), cost(), traced));
+        points.extend(own);
     }
+    let mut output = Output::new(&config.source, &config.title);
+    output.add_csv("timing_pareto", &points)?;
+    let caption =
+        "Cost is the total area of inner nodes over that of the greedy tree; one object per leaf, one thread.";
+    output.add_figure("pareto", caption, 2, builds);
+    if let Some(kind) = kind {
+        let caption = format!("{caption} Rays: {kind}, each method by its fastest layout.");
+        output.add_figure("pareto_rays", caption, 2, rays);
+    }
+    Ok(output)
+}
+
+fn point<'a>(rows: &Rows, scene: &'a str, method: &'a str, kind: Option<&str>) -> Option<Point<'a>> {
+    Some(Point {
+        scene,
+        method,
+        build_seconds: rows.build_seconds(scene, method)?,
+        cost_over_base: Metric::CostOverBase.of_run(rows.runs_of(scene, method).next()?)?,
+        ns_per_ray: kind.and_then(|kind| rows.fastest_layout(scene, method, kind)).map(|(_, ns)| ns),
+        on_front: false,
+    })
 }
 
 /// The points that have a lower y than all points of no greater x, by x.

@@ -1,27 +1,14 @@
 //! Performance profiles (Dolan & Moré 2002): on what fraction of the problems a method is within a factor of the
 //! fastest.
 
-use super::progress::{Along, median_reached, series};
-use super::target::Target;
-use super::{Output, Rows, looks};
+use super::attempt::attempts;
+use super::config::Targets;
+use super::data::Rows;
+use super::output::{Output, each, panel};
+use super::progress::ProgressAxis;
 use crate::Error;
-use crate::figures::{Axis, Figure, Layer, Panel};
-use serde::{Deserialize, Serialize};
-
-/// A performance profile. A problem is a scene with a target.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// What it belongs to.
-    pub source: String,
-    /// Heading.
-    pub title: String,
-    /// Labels of the methods.
-    pub methods: Vec<String>,
-    /// What is to be reached. Default base, base −1 %, best known +1 % and +0.1 %.
-    #[serde(default = "Target::usual")]
-    pub targets: Vec<Target>,
-}
+use crate::figures::{Axis, Layer, Panel};
+use serde::Serialize;
 
 /// One method on one problem, as written to `timing_profile.csv`, `profile_evaluations.csv` and `profile_work.csv`.
 #[derive(Serialize)]
@@ -34,74 +21,54 @@ struct Row<'a> {
     ratio_to_fastest: Option<f64>,
 }
 
-impl Config {
-    pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let mut output = Output::default();
-        for along in Along::ALL {
-            let mut table: Vec<Row> = Vec::new();
-            let mut problems = 0;
-            for (scene, _) in rows.scenes() {
-                for target in &self.targets {
-                    let Some(cost) = target.cost(rows, scene) else { continue };
-                    problems += 1;
-                    let times: Vec<Option<f64>> = self
-                        .methods
-                        .iter()
-                        .map(|method| median_reached(&series(rows, scene, method, along), cost))
-                        .collect();
-                    let fastest = times.iter().flatten().copied().reduce(f64::min);
-                    table.extend(self.methods.iter().zip(times).map(|(method, x)| Row {
-                        scene,
-                        target: target.name(),
-                        method,
-                        x,
-                        ratio_to_fastest: x.zip(fastest).map(|(x, fastest)| x / fastest),
-                    }));
-                }
-            }
-            output.figures.push((along.file("profile"), self.figure(&table, problems, along)));
-            output.csv.push((along.file("profile"), along.csv(&table)?));
-            if along == Along::Work {
-                output.reading = self.reading(&table, problems);
-            }
-        }
-        Ok(output)
-    }
-
-    fn reading(&self, table: &[Row], problems: usize) -> String {
-        let of = |method: &String| {
-            let own = || table.iter().filter(|row| row.method == method).filter_map(|row| row.ratio_to_fastest);
-            let fastest = own().filter(|ratio| *ratio <= 1.0).count();
-            format!("{method} {} ({fastest} as the fastest)", own().count())
-        };
-        let all: Vec<String> = self.methods.iter().map(of).collect();
-        format!("Of {problems} problems, a scene with a target each, solved by work: {}.", all.join(", "))
-    }
-
-    fn figure(&self, table: &[Row], problems: usize, along: Along) -> Figure {
-        let end = table.iter().filter_map(|row| row.ratio_to_fastest).fold(1.0, f64::max) * 1.2;
-        let layer = |method: &String| {
-            let own = table.iter().filter(|row| row.method == method);
-            let mut ratios: Vec<f64> = own.filter_map(|row| row.ratio_to_fastest).collect();
-            ratios.sort_by(f64::total_cmp);
-            Layer::Steps { name: method.clone(), points: profile(&ratios, problems, end) }
-        };
-        let x = Axis::log(format!("{} over that of the fastest method", along.label())).range(1.0, end);
-        let y = Axis::linear("fraction of problems").range(0.0, 1.02);
-        let panel = Panel { title: String::new(), x, y, layers: self.methods.iter().map(layer).collect() };
-        let targets: Vec<String> = self.targets.iter().map(Target::name).collect();
-        Figure {
-            title: format!("{}: {}", self.source, self.title),
-            caption: format!(
-                "On what fraction of {problems} problems the median run is within a factor of the fastest method's. A \
-                 problem is a scene with a target: {}.",
-                targets.join(", ")
-            ),
-            columns: 1,
-            panels: vec![panel],
-            looks: looks(&self.methods),
+pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
+    let mut output = Output::new(&config.source, &config.title);
+    for axis in ProgressAxis::ALL {
+        let table = ratios(config, rows, axis);
+        let problems = table.len() / config.methods.len().max(1);
+        axis.add_csv(&mut output, "profile", &table)?;
+        let caption = format!(
+            "On what fraction of {problems} problems the median run is within a factor of the fastest method's. A \
+             problem is a scene with a target: {}.",
+            each(&config.targets, |target| Some(target.to_string()))
+        );
+        let panels = vec![draw(config, &table, problems, axis)];
+        output.add_figure(axis.file("profile"), caption, 1, panels);
+        if axis == ProgressAxis::Work {
+            output.reading = reading(config, &table, problems);
         }
     }
+    Ok(output)
+}
+
+/// Every method on every problem, problem by problem.
+fn ratios<'a>(config: &'a Targets, rows: &'a Rows, axis: ProgressAxis) -> Vec<Row<'a>> {
+    let attempts = attempts(config, rows, axis);
+    let problems = attempts.chunks(config.methods.len().max(1));
+    let of_problem = problems.flat_map(|attempts| {
+        let fastest = attempts.iter().filter_map(|attempt| attempt.median).reduce(f64::min);
+        attempts.iter().map(move |attempt| Row {
+            scene: attempt.scene,
+            target: attempt.target.to_string(),
+            method: attempt.method,
+            x: attempt.median,
+            ratio_to_fastest: attempt.median.zip(fastest).map(|(x, fastest)| x / fastest),
+        })
+    });
+    of_problem.collect()
+}
+
+fn draw(config: &Targets, table: &[Row], problems: usize, axis: ProgressAxis) -> Panel {
+    let end = table.iter().filter_map(|row| row.ratio_to_fastest).fold(1.0, f64::max) * 1.2;
+    let layer = |method: &String| {
+        let own = table.iter().filter(|row| row.method == method);
+        let mut ratios: Vec<f64> = own.filter_map(|row| row.ratio_to_fastest).collect();
+        ratios.sort_by(f64::total_cmp);
+        Layer::Steps { name: method.clone(), points: profile(&ratios, problems, end) }
+    };
+    let x = Axis::log(format!("{} over that of the fastest method", axis.label())).range(1.0, end);
+    let y = Axis::linear("fraction of problems").range(0.0, 1.02);
+    panel("", x, y, config.methods.iter().map(layer).collect())
 }
 
 /// The fraction of the problems whose sorted ratio is at most x, from 1 to `end`.
@@ -114,9 +81,18 @@ fn profile(ratios: &[f64], problems: usize, end: f64) -> Vec<(f64, f64)> {
     steps
 }
 
+fn reading(config: &Targets, table: &[Row], problems: usize) -> String {
+    let solved = each(&config.methods, |method| {
+        let own = || table.iter().filter(|row| row.method == method).filter_map(|row| row.ratio_to_fastest);
+        let fastest = own().filter(|ratio| *ratio <= 1.0).count();
+        Some(format!("{method} {} ({fastest} as the fastest)", own().count()))
+    });
+    format!("Of {problems} problems, a scene with a target each, solved by work: {solved}.")
+}
+
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::profile;
 
     #[test]
     fn a_profile_begins_with_the_wins_and_ends_with_what_was_solved() {

@@ -1,15 +1,16 @@
 //! How far runs have come along the three axes of run time: wall seconds, evaluations, and work units.
 
-use super::Rows;
-use super::statistics::median;
+use super::data::Rows;
+use super::metric::Metric;
+use super::output::Output;
 use crate::Error;
-use crate::run::rows::to_bytes;
+use crate::figures::Axis;
+use crate::statistics::median;
 use serde::Serialize;
-use std::path::Path;
 
 /// What run time is measured by. Seconds belong to a machine and go into timing files only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Along {
+pub enum ProgressAxis {
     /// Wall time.
     Seconds,
     /// Trees or moves.
@@ -18,11 +19,11 @@ pub enum Along {
     Work,
 }
 
-impl Along {
+impl ProgressAxis {
     /// Every axis.
     pub const ALL: [Self; 3] = [Self::Seconds, Self::Evaluations, Self::Work];
 
-    /// Of an axis of a figure.
+    /// What stands along an axis of a figure.
     pub fn label(self) -> &'static str {
         match self {
             Self::Seconds => "time (s)",
@@ -31,8 +32,13 @@ impl Along {
         }
     }
 
-    /// Of a column of a CSV file.
-    pub fn column(self) -> &'static str {
+    /// An axis of a figure.
+    pub fn axis(self) -> Axis {
+        Axis::log(self.label())
+    }
+
+    /// The name of a column of a CSV file.
+    fn column(self) -> &'static str {
         match self {
             Self::Seconds => "seconds",
             Self::Evaluations => "evaluations",
@@ -48,15 +54,17 @@ impl Along {
         }
     }
 
-    /// The bytes of a CSV file of rows whose column `x` is measured along this axis, and is called after it.
-    pub fn csv(self, rows: &[impl Serialize]) -> Result<Vec<u8>, Error> {
-        let bytes = to_bytes(rows, Path::new(self.column()))?;
-        let end = bytes.iter().position(|&byte| byte == b'\n').unwrap_or(bytes.len());
-        let (header, body) = bytes.split_at(end);
-        let header = String::from_utf8_lossy(header);
-        let columns: Vec<&str> =
-            header.split(',').map(|column| if column == "x" { self.column() } else { column }).collect();
-        Ok([columns.join(",").as_bytes(), body].concat())
+    /// Adds a CSV file of rows whose column `x` is measured along this axis, and is called after it.
+    pub fn add_csv(self, output: &mut Output, kind: &str, rows: &[impl Serialize]) -> Result<(), Error> {
+        output.add_csv(self.file(kind), rows)?;
+        if let Some((_, bytes)) = output.csv.last_mut() {
+            let end = bytes.iter().position(|&byte| byte == b'\n').unwrap_or(bytes.len());
+            let header = String::from_utf8_lossy(&bytes[..end]).into_owned();
+            let named = |column| if column == "x" { self.column() } else { column };
+            let columns: Vec<&str> = header.split(',').map(named).collect();
+            bytes.splice(..end, columns.join(",").into_bytes());
+        }
+        Ok(())
     }
 }
 
@@ -64,31 +72,33 @@ impl Along {
 pub type Series = Vec<(f64, f64)>;
 
 /// The incumbents of every run of a method on a scene.
-pub fn series(rows: &Rows, scene: &str, method: &str, along: Along) -> Vec<Series> {
-    let own: Vec<(u32, (f64, f64))> = rows
-        .history
-        .iter()
-        .enumerate()
-        .filter(|(_, row)| row.scene == scene && row.method == method)
-        .map(|(at, row)| {
-            let x = match along {
-                Along::Seconds => rows.clock.get(at).map_or(f64::NAN, |clock| clock.seconds),
-                Along::Evaluations => row.evaluations as f64,
-                Along::Work => row.work as f64,
-            };
-            (row.repetition, (x, row.incumbent))
-        })
-        .collect();
-    own.chunk_by(|a, b| a.0 == b.0).map(|run| run.iter().map(|(_, point)| *point).collect()).collect()
+pub fn series(rows: &Rows, scene: &str, method: &str, axis: ProgressAxis) -> Vec<Series> {
+    let own = rows.history.iter().enumerate().filter(|(_, row)| row.scene == scene && row.method == method);
+    let points = own.map(|(at, row)| {
+        let x = match axis {
+            ProgressAxis::Seconds => rows.clock.get(at).map_or(f64::NAN, |clock| clock.seconds),
+            ProgressAxis::Evaluations => row.evaluations as f64,
+            ProgressAxis::Work => row.work as f64,
+        };
+        (row.repetition, (x, row.incumbent))
+    });
+    let points: Vec<(u32, (f64, f64))> = points.collect();
+    points.chunk_by(|a, b| a.0 == b.0).map(|run| run.iter().map(|(_, point)| *point).collect()).collect()
 }
 
 /// Where the longest run of a method on a scene ended; 0 if there is none.
-pub fn longest(rows: &Rows, scene: &str, method: &str, along: Along) -> f64 {
-    match along {
-        Along::Seconds => rows.seconds_of(scene, method).fold(0.0, f64::max),
-        Along::Evaluations => rows.runs_of(scene, method).map(|run| run.evaluations as f64).fold(0.0, f64::max),
-        Along::Work => rows.runs_of(scene, method).map(|run| run.work as f64).fold(0.0, f64::max),
-    }
+pub fn longest(rows: &Rows, scene: &str, method: &str, axis: ProgressAxis) -> f64 {
+    let ends: Vec<f64> = match axis {
+        ProgressAxis::Seconds => rows.seconds_of(scene, method),
+        ProgressAxis::Evaluations => rows.runs_of(scene, method).map(|run| run.evaluations as f64).collect(),
+        ProgressAxis::Work => rows.runs_of(scene, method).map(|run| run.work as f64).collect(),
+    };
+    ends.into_iter().fold(0.0, f64::max)
+}
+
+/// Where the longest run of any of these methods on a scene ended.
+pub fn longest_of_all(rows: &Rows, scene: &str, methods: &[String], axis: ProgressAxis) -> f64 {
+    methods.iter().map(|method| longest(rows, scene, method, axis)).fold(0.0, f64::max)
 }
 
 /// When a run first had an incumbent of at most this cost; `None` if it never had.
@@ -98,8 +108,8 @@ pub fn reached(run: &Series, cost: f64) -> Option<f64> {
 
 /// When the median run had an incumbent of at most this cost, unsolved runs last; `None` if it never had.
 pub fn median_reached(runs: &[Series], cost: f64) -> Option<f64> {
-    let times: Vec<f64> = runs.iter().map(|run| reached(run, cost).unwrap_or(f64::INFINITY)).collect();
-    // Between a number and infinity there is only infinity, and between two of them nothing.
+    let times: Vec<f64> = runs.iter().map(|run| reached(run, cost).unwrap_or(Metric::WORST)).collect();
+    // Between a number and infinity there is only infinity, and between two infinities there is NaN.
     median(&times).filter(|time| time.is_finite())
 }
 
@@ -122,18 +132,17 @@ mod tests {
             scene: &'static str,
             x: f64,
         }
-        let bytes = Along::Work.csv(&[Row { scene: "x", x: 2.0 }]).unwrap();
-        assert_eq!(String::from_utf8(bytes).unwrap(), "scene,work\nx,2.0\n");
-        let files = Along::ALL.map(|along| along.file("a"));
+        let mut output = Output::default();
+        ProgressAxis::Work.add_csv(&mut output, "a", &[Row { scene: "x", x: 2.0 }]).unwrap();
+        assert_eq!(output.csv, [("a_work".to_owned(), b"scene,work\nx,2.0\n".to_vec())]);
+        let files = ProgressAxis::ALL.map(|axis| axis.file("a"));
         assert_eq!(files, ["timing_a", "a_evaluations", "a_work"]);
     }
 
     #[test]
     fn a_target_is_reached_by_the_first_incumbent_at_or_below_it() {
         let run = vec![(1.0, 9.0), (2.0, 7.0), (5.0, 6.0)];
-        assert_eq!(
-            [9.5, 7.0, 6.5, 1.0].map(|cost| reached(&run, cost)),
-            [Some(1.0), Some(2.0), Some(5.0), None]
-        );
+        let when = [9.5, 7.0, 6.5, 1.0].map(|cost| reached(&run, cost));
+        assert_eq!(when, [Some(1.0), Some(2.0), Some(5.0), None]);
     }
 }

@@ -1,42 +1,40 @@
 //! Tests per random ray: what the paper calls the number of intersections, methods by scenes.
 
-use super::statistics::{median, range};
-use super::{Output, Rows, display_name, text_table};
+use super::config::{OneOrMore, first, one_for_each};
+use super::data::Rows;
+use super::metric::Metric;
+use super::output::{Output, each, panel};
+use super::paper::{PaperRow, Verdict};
 use crate::Error;
-use crate::figures::{Axis, Figure, Layer, Look, Panel};
-use crate::run::rows::{PaperRow, RayRow, to_bytes};
-use serde::{Deserialize, Serialize};
+use crate::figures::{Axis, Layer, Panel};
+use crate::run::rows::RayRow;
+use crate::statistics::{median, range};
+use bvh_build::config::above;
+use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::Path;
 
-/// A comparison of methods by tests per ray.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// Where the paper has it.
-    pub source: String,
-    /// Heading.
-    pub title: String,
-    /// Labels of the methods; ratios are to the first.
-    pub methods: Vec<String>,
-    /// The paper's numbers of tests by scene, in the order of `methods`, which may go on without them.
-    #[serde(default)]
-    pub paper: BTreeMap<String, Vec<f64>>,
-    /// Ratios within this relative distance of the paper's agree with it. Default 0.1: it gives two digits.
-    #[serde(default = "a_tenth")]
-    pub tolerance: f64,
-    /// Why ours differs, where it does.
-    #[serde(default)]
-    pub reason: String,
-}
-
-fn a_tenth() -> f64 {
-    0.1
+bvh_build::config! { serde;
+    /// A comparison of methods by tests per ray.
+    pub struct Config {
+        /// Where the paper has it.
+        source: String;
+        /// Heading.
+        title: String;
+        /// Labels of the methods; ratios are to the first.
+        methods: Vec<String>, in OneOrMore;
+        /// The paper's numbers of tests by scene, in the order of `methods`, which may go on without them.
+        paper: BTreeMap<String, Vec<f64>>, in above(0.0);
+        /// Ratios within this relative distance of the paper's agree with it: it gives two digits.
+        tolerance: f64 = 0.1, in 0.0..=1.0;
+        /// Why ours differs, where it does.
+        reason: String;
+    }
+    check |config: &Self| one_for_each(&config.paper, &config.methods);
 }
 
 /// One method on one scene by one measurement, as written to `ray_tests.csv`: the run of median cost.
 #[derive(Serialize)]
-struct Row<'a> {
+struct Measured<'a> {
     scene: &'a str,
     method: &'a str,
     family: &'a str,
@@ -51,151 +49,117 @@ struct Row<'a> {
     paper_boxes_per_ray: Option<f64>,
 }
 
+/// The kind of rays that the paper sends: they start inside and end at any hit.
+const OF_PAPER: (&str, &str) = ("inside", "any");
+
+const PAPER: &str = "paper";
+
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let mut output = Output::default();
         let mut table = Vec::new();
-        for (scene, kind) in rows.scenes() {
-            let start = table.len();
-            for measurement in measurements(rows) {
-                for (index, method) in self.methods.iter().enumerate() {
-                    table.extend(self.row(rows, scene, method, measurement, index));
-                }
+        for scene in rows.scenes() {
+            for kind in rows.ray_kinds() {
+                let methods = self.methods.iter().enumerate();
+                table.extend(methods.filter_map(|(at, method)| self.measured(rows, scene, method, kind, at)));
             }
-            self.compare(&display_name(scene, kind), &table[start..], &mut output);
         }
-        output.text = self.text(rows, &table);
+        let mut output = Output::new(&self.source, &self.title);
+        output.add_csv("ray_tests", &table)?;
+        let caption = "Mean number of tests against boxes, whiskers the 95 % interval; of several runs the one of \
+                       median tests. The paper's rays start inside and end at any hit.";
+        let panels = rows.scenes().into_iter().map(|scene| self.draw(rows, scene, &table)).collect();
+        output.add_figure("ray_tests", caption, 2, panels);
+        output.set_reference(PAPER);
+        output.paper = self.compare(rows, &table);
+        let columns = [
+            "scene",
+            "method",
+            "family",
+            "query",
+            "boxes_low",
+            "boxes_per_ray",
+            "boxes_high",
+            "boxes_over_first",
+            "paper_boxes_per_ray",
+        ];
+        output.show("Box tests per ray with 95 % intervals:", &table, &columns)?;
         output.reading = self.reading(&table);
-        output.figures.push(("ray_tests".into(), self.figure(rows, &table)));
-        output.csv.push(("ray_tests".into(), to_bytes(&table, Path::new("ray_tests.csv"))?));
         Ok(output)
     }
 
-    fn row<'a>(
-        &'a self,
+    fn measured<'a>(
+        &self,
         rows: &'a Rows,
         scene: &'a str,
         method: &'a str,
-        (family, query): (&'a str, &'a str),
+        kind: (&'a str, &'a str),
         index: usize,
-    ) -> Option<Row<'a>> {
-        let first = middle_run(rows, scene, self.methods.first()?, family, query)?;
-        let own = middle_run(rows, scene, method, family, query)?;
-        let same_run = |run: &&crate::run::rows::RunRow| {
-            run.scene == scene && run.method == method && run.repetition == own.repetition
-        };
-        let paper = (family == "inside" && query == "any").then(|| self.paper.get(scene)).flatten();
-        Some(Row {
+    ) -> Option<Measured<'a>> {
+        let of_first = middle_run(rows, scene, first(&self.methods), kind)?;
+        let own = middle_run(rows, scene, method, kind)?;
+        let run = rows.runs_of(scene, method).find(|run| run.repetition == own.repetition)?;
+        let paper = self.paper.get(scene).filter(|_| kind == OF_PAPER);
+        Some(Measured {
             scene,
             method,
-            family,
-            query,
+            family: kind.0,
+            query: kind.1,
             rays: own.rays,
             boxes_per_ray: own.boxes_per_ray,
             boxes_low: own.boxes_low,
             boxes_high: own.boxes_high,
             objects_per_ray: own.objects_per_ray,
-            goldsmith_salmon: rows.runs.iter().find(same_run)?.goldsmith_salmon,
-            boxes_over_first: own.boxes_per_ray / first.boxes_per_ray,
+            goldsmith_salmon: run.goldsmith_salmon,
+            boxes_over_first: own.boxes_per_ray / of_first.boxes_per_ray,
             paper_boxes_per_ray: paper.and_then(|paper| paper.get(index).copied()),
         })
     }
 
-    fn compare(&self, shown: &str, table: &[Row], output: &mut Output) {
-        let theirs = || table.iter().filter_map(|row| Some((row, row.paper_boxes_per_ray?)));
-        let Some((_, base)) = theirs().next() else { return };
-        for (row, paper) in theirs() {
-            let (paper_ratio, ours) = (paper / base, row.boxes_over_first);
-            output.paper.push(PaperRow {
-                source: self.source.clone(),
-                scene: shown.into(),
-                quantity: format!("tests per ray, {}, over the first method's", row.method),
-                paper: format!("{paper}"),
-                ours: format!("{:.2}", row.boxes_per_ray),
-                paper_over_base: Some(paper_ratio),
-                ours_over_base: Some(ours),
-                verdict: super::verdict(paper_ratio, ours, self.tolerance),
-                reason: self.reason.clone(),
-            });
-        }
-    }
-
-    fn figure(&self, rows: &Rows, table: &[Row]) -> Figure {
-        let panel = |(scene, kind): (&str, &str)| {
-            let bars = |(family, query): (&str, &str)| {
-                let own =
-                    table.iter().filter(|row| (row.scene, row.family, row.query) == (scene, family, query));
-                let (values, spread) = own
-                    .map(|row| (row.boxes_per_ray, (row.boxes_low, row.boxes_high)))
-                    .collect::<(Vec<_>, Vec<_>)>();
-                Layer::Bars { name: format!("{family}, {query}"), values, spread, base: 0.0 }
-            };
-            let mut layers: Vec<Layer> = measurements(rows).into_iter().map(bars).collect();
-            let paper = self.paper.get(scene).into_iter().flatten().enumerate().map(|(at, &y)| (at as f64, y));
-            layers.push(Layer::Points { name: PAPER.into(), points: paper.collect() });
-            let x = Axis::categories("", self.methods.clone());
-            Panel { title: display_name(scene, kind), x, y: Axis::linear("box tests per ray"), layers }
+    /// The paper's numbers beside ours, both over those of its first method.
+    fn compare(&self, rows: &Rows, table: &[Measured]) -> Vec<PaperRow> {
+        let compare = |row: &Measured| {
+            let of_first = |first: &&Measured| first.scene == row.scene && first.paper_boxes_per_ray.is_some();
+            let base = table.iter().find(of_first)?.paper_boxes_per_ray?;
+            let paper = row.paper_boxes_per_ray?;
+            let quantity = format!("tests per ray, {}, over the first method's", row.method);
+            let (theirs, ours) = (paper / base, row.boxes_over_first);
+            let verdict = Verdict::of_ratios(theirs, ours, self.tolerance);
+            let compared = PaperRow::new(&self.source, rows.shown(row.scene), quantity, &self.reason);
+            let shown = format!("{:.2}", row.boxes_per_ray);
+            Some(compared.compare(paper.to_string(), shown, verdict).ratios(Some(theirs), ours))
         };
-        Figure {
-            title: format!("{}: {}", self.source, self.title),
-            caption:
-                "Mean number of tests against boxes, whiskers the 95 % interval; of several runs the one of \
-                 median tests. The paper's rays start inside and end at any hit."
-                    .into(),
-            columns: 2,
-            panels: rows.scenes().into_iter().map(panel).collect(),
-            looks: vec![(PAPER.into(), Look::Reference)],
-        }
+        table.iter().filter_map(compare).collect()
     }
 
-    fn reading(&self, table: &[Row]) -> String {
-        let first = self.methods.first().map_or("", String::as_str);
-        let of = |method: &String| {
+    fn draw(&self, rows: &Rows, scene: &str, table: &[Measured]) -> Panel {
+        let bars = |(family, query): (&str, &str)| {
+            let own = table.iter().filter(|row| (row.scene, row.family, row.query) == (scene, family, query));
+            let bar = |row: &Measured| (row.boxes_per_ray, (row.boxes_low, row.boxes_high));
+            let (values, spread) = own.map(bar).collect();
+            Layer::Bars { name: format!("{family}, {query}"), values, spread, base: 0.0 }
+        };
+        let mut layers: Vec<Layer> = rows.ray_kinds().into_iter().map(bars).collect();
+        let paper = self.paper.get(scene).into_iter().flatten().enumerate().map(|(at, &y)| (at as f64, y));
+        layers.push(Layer::Points { name: PAPER.into(), points: paper.collect() });
+        let x = Axis::categories("", self.methods.clone());
+        panel(rows.shown(scene), x, Metric::BoxesPerRay.axis(), layers)
+    }
+
+    fn reading(&self, table: &[Measured]) -> String {
+        let ratios = each(self.methods.iter().skip(1), |method| {
             let own = table.iter().filter(|row| row.method == method).map(|row| row.boxes_over_first);
             let (low, high) = range(own)?;
             Some(format!("{method} {low:.2} to {high:.2}"))
-        };
-        let ratios: Vec<String> = self.methods.iter().skip(1).filter_map(of).collect();
-        format!("Box tests per ray over those of {first}: {}.", ratios.join(", "))
+        });
+        format!("Box tests per ray over those of {}: {ratios}.", first(&self.methods))
     }
-
-    fn text(&self, rows: &Rows, table: &[Row]) -> String {
-        let mut text = text_table(["scene", "method", "rays", "boxes per ray (95 %)", "over first", "paper"]);
-        for row in table {
-            text.add_row([
-                rows.shown(row.scene),
-                row.method.into(),
-                format!("{}, {}", row.family, row.query),
-                format!("{:.2}  ({:.2} to {:.2})", row.boxes_per_ray, row.boxes_low, row.boxes_high),
-                format!("{:.3}", row.boxes_over_first),
-                row.paper_boxes_per_ray.map_or_else(String::new, |paper| format!("{paper}")),
-            ]);
-        }
-        format!("{}: {}\n{text}\n", self.source, self.title)
-    }
-}
-
-const PAPER: &str = "paper";
-
-/// The kinds of rays sent, in order.
-fn measurements(rows: &Rows) -> Vec<(&str, &str)> {
-    let mut kinds: Vec<(&str, &str)> = Vec::new();
-    for row in &rows.rays {
-        let kind = (row.family.as_str(), row.query.as_str());
-        if !kinds.contains(&kind) {
-            kinds.push(kind);
-        }
-    }
-    kinds
 }
 
 /// Of a method's runs on a scene, with the most rays of the kind, the one of median tests per ray, the lower of two.
-fn middle_run<'a>(rows: &'a Rows, scene: &str, method: &str, family: &str, query: &str) -> Option<&'a RayRow> {
-    let of_kind = |row: &&RayRow| {
-        row.scene == scene && row.method == method && row.family == family && row.query == query
-    };
-    let most = rows.rays.iter().filter(of_kind).map(|row| row.rays).max()?;
-    let own: Vec<&RayRow> = rows.rays.iter().filter(of_kind).filter(|row| row.rays == most).collect();
+fn middle_run<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) -> Option<&'a RayRow> {
+    let mut own = rows.rays_of(scene, method, kind);
+    let most = own.iter().map(|row| row.rays).max()?;
+    own.retain(|row| row.rays == most);
     let middle = median(&own.iter().map(|row| row.boxes_per_ray).collect::<Vec<_>>())?;
     own.into_iter().min_by(|a, b| (a.boxes_per_ray - middle).abs().total_cmp(&(b.boxes_per_ray - middle).abs()))
 }

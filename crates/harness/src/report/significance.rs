@@ -1,30 +1,26 @@
 //! Whether one method really differs from others: paired across scenes, and run against run within each.
 
-use super::statistics::median;
-use super::statistics::rank_tests::{Test, a12, holm, mann_whitney, wilcoxon_signed_rank};
-use super::{Output, Rows, text_table};
+use super::config::OneOrMore;
+use super::data::Rows;
+use super::output::Output;
 use crate::Error;
-use crate::run::rows::to_bytes;
-use serde::{Deserialize, Serialize};
-use std::path::Path;
+use crate::statistics::median;
+use crate::statistics::rank::{Test, a12, holm, mann_whitney, wilcoxon_signed_rank};
+use serde::Serialize;
+use std::ops::Bound::Excluded;
 
-/// A comparison of one method's final costs with those of others.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// Heading.
-    pub title: String,
-    /// Label of the method that is compared.
-    pub method: String,
-    /// Labels of the others.
-    pub against: Vec<String>,
-    /// Corrected p-values below this are called different. Default 0.05.
-    #[serde(default = "five_percent")]
-    pub level: f64,
-}
-
-fn five_percent() -> f64 {
-    0.05
+bvh_build::config! { serde;
+    /// A comparison of one method's final costs with those of others.
+    pub struct Config {
+        /// Heading.
+        title: String;
+        /// Label of the method that is compared.
+        method: String;
+        /// Labels of the others.
+        against: Vec<String>, in OneOrMore;
+        /// Corrected p-values below this are called different.
+        level: f64 = 0.05, in (Excluded(0.0), Excluded(1.0));
+    }
 }
 
 /// One comparison, as written to `significance.csv`. Holm's correction is over all rows of the same test.
@@ -34,8 +30,7 @@ struct Row<'a> {
     scene: &'a str,
     method: &'a str,
     against: &'a str,
-    /// `Wilcoxon signed-rank`, of the medians over base, paired by scene; or `Mann–Whitney`, of the runs.
-    test: &'a str,
+    test: RankTest,
     /// Scenes, or runs of the method; and of the other.
     samples: usize,
     samples_against: usize,
@@ -46,76 +41,102 @@ struct Row<'a> {
     /// How likely a run of the method ends below one of the other, ties counting a half; across scenes, its mean over
     /// them.
     a12: f64,
-    /// `lower` or `higher` cost than the other's if the corrected p-value is below the level, else `not different`.
-    verdict: &'static str,
+    verdict: Difference,
 }
 
-const WILCOXON: &str = "Wilcoxon signed-rank";
-const MANN_WHITNEY: &str = "Mann–Whitney";
+/// In the place of the scene in rows across all scenes.
+const ALL: &str = "all";
+
+/// Which test a row is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+enum RankTest {
+    /// Of the medians over base, paired by scene.
+    #[serde(rename = "Wilcoxon signed-rank")]
+    Wilcoxon,
+    /// Of the runs on one scene.
+    #[serde(rename = "Mann–Whitney")]
+    MannWhitney,
+}
+
+/// How the method's cost compares with the other's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Difference {
+    /// The corrected p-value is below the level, and the method's cost is lower.
+    Lower,
+    /// The corrected p-value is below the level, and the method's cost is higher.
+    Higher,
+    /// The corrected p-value is not below the level.
+    #[serde(rename = "not different")]
+    None,
+}
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let across = self.against.iter().filter_map(|against| self.across(rows, against)).collect();
         let scenes = rows.scenes();
-        let within = scenes.iter().flat_map(|&(scene, _)| {
-            self.against.iter().filter_map(move |against| self.within(rows, scene, against))
-        });
+        let within = scenes
+            .iter()
+            .flat_map(|scene| self.against.iter().filter_map(move |against| self.within(rows, scene, against)));
         let mut table = self.judged(across);
         table.extend(self.judged(within.collect()));
-        Ok(Output {
-            csv: vec![("significance".into(), to_bytes(&table, Path::new("significance.csv"))?)],
-            text: self.text(rows, &table),
-            reading: self.reading(&table),
-            ..Output::default()
-        })
+        let mut output = Output::new("", &self.title);
+        output.add_csv("significance", &table)?;
+        let explanation =
+            format!("Cost of '{}' against that of others, p-values by Holm's correction:", self.method);
+        let columns = ["scene", "against", "test", "p_value", "holm_p_value", "a12", "verdict"];
+        output.show(&explanation, &table, &columns)?;
+        output.reading = self.reading(&table);
+        Ok(output)
     }
 
+    /// The signed-rank test of the medians on all scenes.
     fn across<'a>(&'a self, rows: &'a Rows, against: &'a str) -> Option<Row<'a>> {
         let (mut differences, mut sizes) = (Vec::new(), Vec::new());
-        for (scene, _) in rows.scenes() {
-            let [own, other] = [&self.method, against].map(|method| costs(rows, scene, method));
+        for scene in rows.scenes() {
+            let [own, other] = [&self.method, against].map(|method| rows.final_ratios(scene, method));
             differences.extend(median(&own).zip(median(&other)).map(|(own, other)| own - other));
             sizes.extend(a12(&other, &own));
         }
         let samples = differences.len();
         // Scenes on which both cost the same say nothing; if there are no others, nothing differs.
         let test = wilcoxon_signed_rank(&differences).unwrap_or(Test { statistic: 0.0, p_value: 1.0 });
-        let effect = sizes.iter().sum::<f64>() / samples as f64;
         let others = differences.iter().filter(|difference| **difference != 0.0).count() as f64;
         let lower = test.statistic < others * (others + 1.0) / 4.0;
-        (samples > 0).then(|| self.row(["all", against, WILCOXON], [samples, samples], test, effect, lower))
+        let row = Row {
+            scene: ALL,
+            method: &self.method,
+            against,
+            test: RankTest::Wilcoxon,
+            samples,
+            samples_against: samples,
+            statistic: test.statistic,
+            p_value: test.p_value,
+            holm_p_value: 1.0,
+            a12: sizes.iter().sum::<f64>() / samples as f64,
+            verdict: Difference::of(lower),
+        };
+        (samples > 0).then_some(row)
     }
 
+    /// The test of the runs on one scene; `None` if either method has only one, which says nothing about others.
     fn within<'a>(&'a self, rows: &'a Rows, scene: &'a str, against: &'a str) -> Option<Row<'a>> {
-        let [own, other] = [&self.method, against].map(|method| costs(rows, scene, method));
-        let (test, effect) = (mann_whitney(&own, &other)?, a12(&other, &own)?);
-        let samples = [own.len(), other.len()];
-        // One run says nothing about the others.
-        let some = samples.into_iter().all(|samples| samples > 1);
-        some.then(|| self.row([scene, against, MANN_WHITNEY], samples, test, effect, effect > 0.5))
-    }
-
-    fn row<'a>(
-        &'a self,
-        [scene, against, test]: [&'a str; 3],
-        [samples, samples_against]: [usize; 2],
-        Test { statistic, p_value }: Test,
-        a12: f64,
-        lower: bool,
-    ) -> Row<'a> {
-        Row {
+        let [own, other] = [&self.method, against].map(|method| rows.final_ratios(scene, method));
+        let (test, a12) = (mann_whitney(&own, &other)?, a12(&other, &own)?);
+        let row = Row {
             scene,
             method: &self.method,
             against,
-            test,
-            samples,
-            samples_against,
-            statistic,
-            p_value,
+            test: RankTest::MannWhitney,
+            samples: own.len(),
+            samples_against: other.len(),
+            statistic: test.statistic,
+            p_value: test.p_value,
             holm_p_value: 1.0,
             a12,
-            verdict: if lower { "lower" } else { "higher" },
-        }
+            verdict: Difference::of(a12 > 0.5),
+        };
+        (own.len() > 1 && other.len() > 1).then_some(row)
     }
 
     /// The rows of one test with their p-values corrected.
@@ -124,7 +145,7 @@ impl Config {
         for (row, p_value) in table.iter_mut().zip(corrected) {
             row.holm_p_value = p_value;
             if p_value >= self.level {
-                row.verdict = "not different";
+                row.verdict = Difference::None;
             }
         }
         table
@@ -132,48 +153,29 @@ impl Config {
 
     fn reading(&self, table: &[Row]) -> String {
         let of = |against: &String| {
-            let own = |verdict: Option<&str>| {
-                let within = table.iter().filter(|row| row.against == against && row.test == MANN_WHITNEY);
-                within.filter(|row| verdict.is_none_or(|verdict| row.verdict == verdict)).count()
-            };
-            let across = table.iter().find(|row| row.against == against && row.test == WILCOXON);
-            let across = across.map_or_else(String::new, |row| format!(", across all {}", row.verdict));
-            format!(
-                "{against}: lower on {}, higher on {} of {} scenes{across}",
-                own(Some("lower")),
-                own(Some("higher")),
-                own(None)
-            )
+            let own = || table.iter().filter(|row| row.against == against);
+            let count = |verdict| own().filter(|row| row.scene != ALL && row.verdict == verdict).count();
+            let scenes = own().filter(|row| row.scene != ALL).count();
+            let across = own().find(|row| row.scene == ALL).map_or("untested", |row| row.verdict.name());
+            let (lower, higher) = (count(Difference::Lower), count(Difference::Higher));
+            format!("{against}: lower on {lower}, higher on {higher} of {scenes} scenes, across all {across}")
         };
         let all: Vec<String> = self.against.iter().map(of).collect();
-        format!(
-            "Costs of {} after Holm's correction at {}, against {}.",
-            self.method,
-            self.level,
-            all.join("; against ")
-        )
-    }
-
-    fn text(&self, rows: &Rows, table: &[Row]) -> String {
-        let header = ["scene", "against", "test", "p", "p, Holm", "A12", "cost is"];
-        let mut text = text_table(header);
-        for row in table {
-            let scene = if row.scene == "all" { "all".into() } else { rows.shown(row.scene) };
-            text.add_row([
-                scene,
-                row.against.into(),
-                row.test.into(),
-                format!("{:.2e}", row.p_value),
-                format!("{:.2e}", row.holm_p_value),
-                format!("{:.2}", row.a12),
-                row.verdict.into(),
-            ]);
-        }
-        format!("{}: '{}' against others\n{text}\n", self.title, self.method)
+        let (method, level, all) = (&self.method, self.level, all.join("; against "));
+        format!("Costs of {method} after Holm's correction at {level}, against {all}.")
     }
 }
 
-/// The final costs of a method's runs over base.
-fn costs(rows: &Rows, scene: &str, method: &str) -> Vec<f64> {
-    rows.runs_of(scene, method).map(|run| super::over(run.cost, run.base_cost)).collect()
+impl Difference {
+    fn of(lower: bool) -> Self {
+        if lower { Self::Lower } else { Self::Higher }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Lower => "lower",
+            Self::Higher => "higher",
+            Self::None => "not different",
+        }
+    }
 }

@@ -1,23 +1,27 @@
 //! Costs to be reached: what it means that a run has solved a scene.
 
-use super::Rows;
+use super::data::Rows;
 use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::ops::Bound::{Excluded, Included};
 
-/// A cost relative to the greedy tree's or to the best known.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Target {
-    /// What the percentage is of.
-    pub of: Of,
-    /// So much above it, below if negative.
-    pub percent: f64,
+bvh_build::config! { serde;
+    /// A cost relative to the greedy tree's or to the best known.
+    #[derive(Copy)]
+    pub struct Target {
+        /// What the percentage is of.
+        of: Of;
+        /// By how much the target is above it; below it if negative.
+        percent: f64, in (Excluded(-100.0), Included(1e6));
+    }
 }
 
 /// What a target is relative to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Of {
     /// The greedy Müller–Fellner tree.
+    #[default]
     Base,
     /// The exact optimum of small scenes, else the best known cost.
     BestKnown,
@@ -30,27 +34,28 @@ impl Target {
         vec![of(Of::Base, 0.0), of(Of::Base, -1.0), of(Of::BestKnown, 1.0), of(Of::BestKnown, 0.1)]
     }
 
-    /// As figures show it.
-    pub fn name(&self) -> String {
-        let of = match self.of {
-            Of::Base => "base",
-            Of::BestKnown => "best known",
-        };
-        match self.percent {
-            0.0 => of.into(),
-            percent if percent < 0.0 => format!("{of} −{} %", -percent),
-            percent => format!("{of} +{percent} %"),
-        }
-    }
-
-    /// The cost on this scene; `None` if it has no reference.
+    /// The cost on this scene; `None` if the scene has no reference.
     pub fn cost(&self, rows: &Rows, scene: &str) -> Option<f64> {
         let of = match self.of {
             Of::Base => rows.base_cost(scene),
             Of::BestKnown => rows.reference(scene)?.cost,
         };
-        // No rounding where there is nothing to multiply with.
+        // A target of 0 % must be exactly the cost it is relative to.
         Some(if self.percent == 0.0 { of } else { of * (1.0 + self.percent / 100.0) })
+    }
+}
+
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let of = match self.of {
+            Of::Base => "base",
+            Of::BestKnown => "best known",
+        };
+        match self.percent {
+            0.0 => f.write_str(of),
+            percent if percent < 0.0 => write!(f, "{of} −{} %", -percent),
+            percent => write!(f, "{of} +{percent} %"),
+        }
     }
 }
 
@@ -60,7 +65,7 @@ mod tests {
 
     #[test]
     fn targets_are_named_as_in_the_field() {
-        let names: Vec<String> = Target::usual().iter().map(Target::name).collect();
+        let names: Vec<String> = Target::usual().iter().map(Target::to_string).collect();
         assert_eq!(names, ["base", "base −1 %", "best known +1 %", "best known +0.1 %"]);
     }
 }

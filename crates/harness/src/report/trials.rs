@@ -1,32 +1,32 @@
 //! The paper's Figure 1: cost against number of trials, one run's staircase and the exact expectation.
 
-use super::statistics::{expected_best_of, minimum};
-use super::{Output, Rows, display_name};
+use super::config::OneOrMore;
+use super::data::Rows;
+use super::output::{Output, each, panel};
+use super::paper::{PaperRow, Verdict};
 use crate::Error;
-use crate::figures::{Axis, Figure, Layer, Panel};
-use crate::run::rows::{PaperRow, to_bytes};
-use serde::{Deserialize, Serialize};
-use std::path::Path;
+use crate::figures::{Axis, Layer};
+use crate::statistics::{expected_best_of, minimum};
+use serde::Serialize;
 
-/// Cost against number of trials.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// Where the paper has it, such as `Figure 1`.
-    pub source: String,
-    /// Heading.
-    pub title: String,
-    /// Labels of the methods to compare.
-    pub methods: Vec<String>,
-    /// Figures end at, and methods are compared at, the best of so many trials. Use fewer than are run: the
-    /// expectation needs a pool to draw from.
-    pub best_of: usize,
-    /// The method that the paper found best.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub paper_best: Option<String>,
-    /// Why ours differs, where it does.
-    #[serde(default)]
-    pub reason: String,
+bvh_build::config! { serde;
+    /// Cost against number of trials.
+    pub struct Config {
+        /// Where the paper has it, such as `Figure 1`.
+        source: String;
+        /// Heading.
+        title: String;
+        /// Labels of the methods to compare.
+        methods: Vec<String>, in OneOrMore;
+        /// Figures end at, and methods are compared at, the best of so many trials. Use fewer than are run: the
+        /// expectation needs a pool to draw from.
+        best_of: usize = 100, in 1..;
+        /// The method that the paper found best.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        paper_best: Option<String>;
+        /// Why ours differs, where it does.
+        reason: String;
+    }
 }
 
 /// One point, as written to `trials.csv`.
@@ -43,81 +43,57 @@ struct Point<'a> {
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let mut points = Vec::new();
-        let mut output = Output::default();
-        let mut panels = Vec::new();
-        for (scene, kind) in rows.scenes() {
-            let mut staircases = Vec::new();
-            let mut expectations = Vec::new();
-            let mut ranking = Vec::new();
-            for method in &self.methods {
-                let trials = rows.trials_over_base(scene, method);
-                let (Some(first), pool) = (trials.first(), trials.concat()) else { continue };
-                let (mut staircase, mut expectation) = (Vec::new(), Vec::new());
-                for m in 1..=self.best_of.min(first.len()) {
-                    let single_run_over_base = minimum(first.iter().copied().take(m)).unwrap_or(f64::NAN);
-                    let Some(expected_over_base) = expected_best_of(&pool, m) else { break };
-                    staircase.push((m as f64, single_run_over_base));
-                    expectation.push((m as f64, expected_over_base));
-                    points.push(Point { scene, method, trials: m, single_run_over_base, expected_over_base });
-                }
-                if let Some(&(_, last)) = expectation.last() {
-                    ranking.push((last, method));
-                }
-                staircases.push(Layer::Steps { name: method.clone(), points: staircase });
-                expectations.push(Layer::Line { name: method.clone(), points: expectation });
-            }
-            let shown = display_name(scene, kind);
-            for (what, mut layers) in [("one run", staircases), ("expected", expectations)] {
+        let mut output = Output::new(&self.source, &self.title);
+        let (mut points, mut panels) = (Vec::new(), Vec::new());
+        for scene in rows.scenes() {
+            let curves: Vec<Vec<Point>> =
+                self.methods.iter().map(|method| self.curve(rows, scene, method)).collect();
+            let values = |value: fn(&Point) -> f64| {
+                let line =
+                    move |curve: &Vec<Point>| curve.iter().map(|p| (p.trials as f64, value(p))).collect();
+                self.methods.iter().cloned().zip(curves.iter().map(line))
+            };
+            let single = values(|point| point.single_run_over_base);
+            let single: Vec<Layer> = single.map(|(name, points)| Layer::Steps { name, points }).collect();
+            let expected = values(|point| point.expected_over_base);
+            let expected = expected.map(|(name, points)| Layer::Line { name, points }).collect();
+            for (what, mut layers) in [("one run", single), ("expected", expected)] {
                 layers.push(Layer::HLine { y: 1.0, label: "greedy".into() });
                 let (x, y) = (Axis::log("number of trials"), Axis::linear("best cost / base"));
-                panels.push(Panel { title: format!("{shown}, {what}"), x, y, layers });
+                panels.push(panel(format!("{}, {what}", rows.shown(scene)), x, y, layers));
             }
-            ranking.sort_by(|a, b| a.0.total_cmp(&b.0));
-            self.compare(&shown, &ranking, &mut output);
+            self.compare(&rows.shown(scene), &curves, &mut output);
+            points.extend(curves.into_iter().flatten());
         }
-        let caption =
-            "Lowest cost among so many trials, over that of the greedy tree. Left, one run, as in the paper; \
-                       right, the exact expectation from all trials run."
-                .into();
-        let figure = Figure {
-            title: format!("{}: {}", self.source, self.title),
-            caption,
-            columns: 2,
-            panels,
-            ..Default::default()
-        };
-        output.figures.push(("trials".into(), figure));
-        output.csv.push(("trials".into(), to_bytes(&points, Path::new("trials.csv"))?));
+        let caption = "Lowest cost among so many trials, over that of the greedy tree. Left, one run, as in the paper; \
+                       right, the exact expectation from all trials run.";
+        output.add_figure("trials", caption, 2, panels);
+        output.add_csv("trials", &points)?;
         Ok(output)
     }
 
-    fn compare(&self, scene: &str, ranking: &[(f64, &String)], output: &mut Output) {
-        if let (Some((low, best)), Some((high, worst))) = (ranking.first(), ranking.last()) {
-            let m = self.best_of;
-            output.reading += &format!(
-                "{scene}, expected best of {m}: {best} lowest with {low:.4} of base, {worst} highest with {high:.4}. "
-            );
-        }
-        let order = ranking.iter().map(|(ratio, method)| format!("{method}: {ratio:.4}")).collect::<Vec<_>>();
-        output.text += &format!(
-            "{}: {}\n{scene}, expected best of {}: {}\n\n",
-            self.source,
-            self.title,
-            self.best_of,
-            order.join(", ")
-        );
-        let (Some(paper), Some((ratio, best))) = (&self.paper_best, ranking.first()) else { return };
-        output.paper.push(PaperRow {
-            source: self.source.clone(),
-            scene: scene.into(),
-            quantity: format!("best of the compared, by the expected best of {}", self.best_of),
-            paper: paper.clone(),
-            ours: (*best).clone(),
-            paper_over_base: None,
-            ours_over_base: Some(*ratio),
-            verdict: if paper == *best { "agrees" } else { "differs" }.into(),
-            reason: self.reason.clone(),
-        });
+    fn curve<'a>(&self, rows: &Rows, scene: &'a str, method: &'a str) -> Vec<Point<'a>> {
+        let trials = rows.trials_over_base(scene, method);
+        let (Some(first), pool) = (trials.first(), trials.concat()) else { return Vec::new() };
+        let point = |trials: usize| {
+            let single_run_over_base = minimum(first.iter().copied().take(trials))?;
+            let expected_over_base = expected_best_of(&pool, trials)?;
+            Some(Point { scene, method, trials, single_run_over_base, expected_over_base })
+        };
+        (1..=self.best_of.min(first.len())).map_while(point).collect()
+    }
+
+    /// Ranks the methods by the expected best of as many trials as are compared.
+    fn compare(&self, scene: &str, curves: &[Vec<Point>], output: &mut Output) {
+        let mut ranking: Vec<&Point> = curves.iter().filter_map(|curve| curve.last()).collect();
+        ranking.sort_by(|a, b| a.expected_over_base.total_cmp(&b.expected_over_base));
+        let Some(best) = ranking.first() else { return };
+        let order = each(&ranking, |point| Some(format!("{}: {:.4}", point.method, point.expected_over_base)));
+        output.reading += &format!("{scene}, expected best of {} over base: {order}. ", self.best_of);
+        let Some(paper) = &self.paper_best else { return };
+        let quantity = format!("best of the compared, by the expected best of {}", self.best_of);
+        let verdict = if paper == best.method { Verdict::Agrees } else { Verdict::Differs };
+        let row = PaperRow::new(&self.source, scene, quantity, &self.reason);
+        output.paper.push(row.compare(paper, best.method, verdict).ratios(None, best.expected_over_base));
     }
 }

@@ -264,29 +264,6 @@ impl ReferenceRow {
     }
 }
 
-/// One row of `paper.csv`: a number of the paper beside ours.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PaperRow {
-    /// Where the paper has it.
-    pub source: String,
-    /// Scene, ours a stand-in.
-    pub scene: String,
-    /// What is compared.
-    pub quantity: String,
-    /// The paper's value.
-    pub paper: String,
-    /// Ours.
-    pub ours: String,
-    /// The paper's value as a ratio to its base; empty where that has no meaning.
-    pub paper_over_base: Option<f64>,
-    /// Ours likewise.
-    pub ours_over_base: Option<f64>,
-    /// `agrees`, or how it differs.
-    pub verdict: String,
-    /// Why, where known.
-    pub reason: String,
-}
-
 /// A kind of rows in a file of its own.
 pub trait Row: Serialize + DeserializeOwned {
     /// The CSV file that holds them; its name begins with `timing` if they hold seconds.

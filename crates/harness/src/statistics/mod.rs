@@ -1,6 +1,6 @@
-//! The statistics of reports: quantiles, the expected best of several trials, the primal integral, correlations, tests.
+//! Statistics: quantiles, the expected best of several trials, the primal integral, correlations, rank tests, time-to-target fits.
 
-pub mod rank_tests;
+pub mod rank;
 pub mod time_to_target;
 
 /// The `q`-quantile of finite values, 0 ≤ q ≤ 1, interpolated linearly between order statistics; `None` of none.
@@ -15,6 +15,11 @@ pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
 /// The median of finite values.
 pub fn median(values: &[f64]) -> Option<f64> {
     quantile(values, 0.5)
+}
+
+/// The lower quartile, the median and the upper quartile of finite values; NaN of none.
+pub fn quartiles(values: &[f64]) -> [f64; 3] {
+    [0.25, 0.5, 0.75].map(|q| quantile(values, q).unwrap_or(f64::NAN))
 }
 
 /// The lowest and the highest value.

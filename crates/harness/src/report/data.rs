@@ -1,0 +1,188 @@
+//! An experiment's rows as its CSV files hold them, and the selections of them that reports share.
+
+use crate::Error;
+use crate::run::rows::{
+    self, BoundRow, ClockRow, HistoryRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row, RunRow,
+    TimingRow, TraceRow, TraceTimeRow,
+};
+use crate::statistics::minimum;
+use std::path::Path;
+
+/// An experiment's rows.
+#[derive(Clone, Debug, Default)]
+pub struct Rows {
+    /// Of `runs.csv`.
+    pub runs: Vec<RunRow>,
+    /// Of `history.csv`.
+    pub history: Vec<HistoryRow>,
+    /// Of `timing.csv`.
+    pub timing: Vec<TimingRow>,
+    /// Of `rays.csv`; none if rays were not asked for.
+    pub rays: Vec<RayRow>,
+    /// Of `bounds.csv`; none if bounds were not asked for.
+    pub bounds: Vec<BoundRow>,
+    /// Of `timing_history.csv`; none if no report needs them, otherwise one for every row of `history`, in its order.
+    pub clock: Vec<ClockRow>,
+    /// Of `references.csv`, under the experiment's objective; none if no report needs them.
+    pub references: Vec<ReferenceRow>,
+    /// Of `renders.csv`; none if pictures were not asked for.
+    pub renders: Vec<RenderRow>,
+    /// Of `timing_renders.csv`, likewise.
+    pub render_times: Vec<RenderTimeRow>,
+    /// Of `traversal.csv`; none if rays were not traced.
+    pub traces: Vec<TraceRow>,
+    /// Of `timing_traversal.csv`, likewise.
+    pub trace_times: Vec<TraceTimeRow>,
+}
+
+impl Rows {
+    /// Reads the CSV files in an experiment's folder. Only `runs.csv` has to be there.
+    pub fn read(folder: &Path) -> Result<Self, Error> {
+        Ok(Self {
+            runs: rows::read(&folder.join(RunRow::FILE))?,
+            history: rows::read_if_any(folder)?,
+            timing: rows::read_if_any(folder)?,
+            rays: rows::read_if_any(folder)?,
+            bounds: rows::read_if_any(folder)?,
+            clock: rows::read_if_any(folder)?,
+            references: rows::read_if_any(folder)?,
+            renders: rows::read_if_any(folder)?,
+            render_times: rows::read_if_any(folder)?,
+            traces: rows::read_if_any(folder)?,
+            trace_times: rows::read_if_any(folder)?,
+        })
+    }
+
+    /// The scenes in the order of the rows.
+    pub fn scenes(&self) -> Vec<&str> {
+        distinct(self.runs.iter().map(|run| run.scene.as_str()))
+    }
+
+    /// The labels of the methods in the order of the rows.
+    pub fn methods(&self) -> Vec<&str> {
+        distinct(self.runs.iter().map(|run| run.method.as_str()))
+    }
+
+    /// The scene's kind, as in `runs.csv`.
+    pub fn kind(&self, scene: &str) -> &str {
+        self.runs.iter().find(|run| run.scene == scene).map_or("", |run| run.scene_kind.as_str())
+    }
+
+    /// The scene's name, followed by its kind unless it is a file: how tables and figures show it.
+    pub fn shown(&self, scene: &str) -> String {
+        match self.kind(scene) {
+            "file" => scene.into(),
+            kind => format!("{scene} ({kind})"),
+        }
+    }
+
+    /// The names of all scenes, as [`Rows::shown`].
+    pub fn all_shown(&self) -> Vec<String> {
+        self.scenes().into_iter().map(|scene| self.shown(scene)).collect()
+    }
+
+    /// The cost of the scene's greedy tree.
+    pub fn base_cost(&self, scene: &str) -> f64 {
+        self.runs.iter().find(|run| run.scene == scene).map_or(f64::NAN, |run| run.base_cost)
+    }
+
+    /// What gaps on the scene are measured from.
+    pub fn reference(&self, scene: &str) -> Option<&ReferenceRow> {
+        self.references.iter().find(|row| row.scene == scene)
+    }
+
+    /// The runs of one method on one scene.
+    pub fn runs_of(&self, scene: &str, method: &str) -> impl Iterator<Item = &RunRow> {
+        self.runs.iter().filter(move |run| run.scene == scene && run.method == method)
+    }
+
+    /// The costs over base with which the runs of one method on one scene ended.
+    pub fn final_ratios(&self, scene: &str, method: &str) -> Vec<f64> {
+        self.runs_of(scene, method).map(|run| ratio(run.cost, run.base_cost)).collect()
+    }
+
+    /// The seconds of the runs of one method on one scene.
+    pub fn seconds_of(&self, scene: &str, method: &str) -> Vec<f64> {
+        let own = self.timing.iter().filter(|row| row.scene == scene && row.method == method);
+        own.map(|row| row.seconds).collect()
+    }
+
+    /// The seconds of the method's fastest repetition.
+    pub fn build_seconds(&self, scene: &str, method: &str) -> Option<f64> {
+        minimum(self.seconds_of(scene, method))
+    }
+
+    /// The histories of one method on one scene, one per repetition.
+    pub fn histories(&self, scene: &str, method: &str) -> Vec<Vec<&HistoryRow>> {
+        let own = |row: &&HistoryRow| row.scene == scene && row.method == method;
+        let rows: Vec<&HistoryRow> = self.history.iter().filter(own).collect();
+        rows.chunk_by(|a, b| a.repetition == b.repetition).map(<[_]>::to_vec).collect()
+    }
+
+    /// The costs of all trials of one method on one scene, over all repetitions.
+    pub fn trial_costs(&self, scene: &str, method: &str) -> Vec<f64> {
+        self.histories(scene, method).concat().iter().map(|row| row.cost).collect()
+    }
+
+    /// The costs of one method's trials on one scene over base, one list per repetition, in order.
+    pub fn trials_over_base(&self, scene: &str, method: &str) -> Vec<Vec<f64>> {
+        let base = self.base_cost(scene);
+        let over_base = |history: Vec<&HistoryRow>| history.iter().map(|row| ratio(row.cost, base)).collect();
+        self.histories(scene, method).into_iter().map(over_base).collect()
+    }
+
+    /// The kinds of random rays sent: where they come from and what they ask.
+    pub fn ray_kinds(&self) -> Vec<(&str, &str)> {
+        distinct(self.rays.iter().map(|row| (row.family.as_str(), row.query.as_str())))
+    }
+
+    /// The measurements with random rays of one kind through the trees of one method on one scene.
+    pub fn rays_of(&self, scene: &str, method: &str, kind: (&str, &str)) -> Vec<&RayRow> {
+        let own = |row: &&RayRow| {
+            row.scene == scene && row.method == method && (row.family.as_str(), row.query.as_str()) == kind
+        };
+        self.rays.iter().filter(own).collect()
+    }
+
+    /// The layouts that rays were traced through.
+    pub fn layouts(&self) -> Vec<&str> {
+        distinct(self.traces.iter().map(|row| row.layout.as_str()))
+    }
+
+    /// The kinds of rays that were traced.
+    pub fn traced_kinds(&self) -> Vec<&str> {
+        distinct(self.traces.iter().map(|row| row.rays.as_str()))
+    }
+
+    /// Nanoseconds per ray.
+    pub fn ns_per_ray(&self, scene: &str, method: &str, layout: &str, rays: &str) -> Option<f64> {
+        let own = self
+            .trace_times
+            .iter()
+            .find(|row| row.scene == scene && row.method == method && row.layout == layout && row.rays == rays);
+        own.filter(|row| row.count > 0).map(|row| 1e9 * row.seconds / row.count as f64)
+    }
+
+    /// The method's layout that is fastest for these rays, with its nanoseconds per ray.
+    pub fn fastest_layout(&self, scene: &str, method: &str, rays: &str) -> Option<(&str, f64)> {
+        let layouts = self.layouts().into_iter();
+        let timed = layouts.filter_map(|layout| Some((layout, self.ns_per_ray(scene, method, layout, rays)?)));
+        timed.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+/// A ratio of costs; 1 when the denominator is 0, as in `runs.csv`.
+pub fn ratio(cost: f64, base: f64) -> f64 {
+    if base > 0.0 { cost / base } else { 1.0 }
+}
+
+/// The distinct items, in the order in which they first occur.
+fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
+    let mut found = Vec::new();
+    for item in items {
+        if !found.contains(&item) {
+            found.push(item);
+        }
+    }
+    found
+}

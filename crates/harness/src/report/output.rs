@@ -1,0 +1,153 @@
+//! What a report makes: CSV files, figures, comparisons with the paper, and text for the terminal.
+
+use super::paper::PaperRow;
+use crate::Error;
+use crate::figures::{Axis, Figure, Layer, Look, Panel};
+use crate::run::rows::to_bytes;
+use comfy_table::{Table, presets};
+use serde::Serialize;
+use std::path::Path;
+
+/// What a report makes.
+#[derive(Clone, Debug, Default)]
+pub struct Output {
+    /// Source and title of the report; the title of its figures and the first line of its text.
+    heading: String,
+    /// CSV files: name without extension, and bytes. Names that begin with `timing` hold seconds.
+    pub csv: Vec<(String, Vec<u8>)>,
+    /// Figures: name without extension, and what they show.
+    pub figures: Vec<(String, Figure)>,
+    /// Comparisons with the paper.
+    pub paper: Vec<PaperRow>,
+    /// The sentence that reads the result, made from its numbers; empty if the tables say it all.
+    pub reading: String,
+    /// The tables.
+    tables: String,
+}
+
+impl Output {
+    /// The empty output of a report with this title. The source may be empty.
+    pub fn new(source: &str, title: &str) -> Self {
+        let heading = if source.is_empty() { title.to_owned() } else { format!("{source}: {title}") };
+        Self { heading, ..Self::default() }
+    }
+
+    /// Adds the CSV file `name`, without its extension.
+    pub fn add_csv(&mut self, name: impl Into<String>, rows: &[impl Serialize]) -> Result<(), Error> {
+        let name = name.into();
+        let bytes = to_bytes(rows, Path::new(&name))?;
+        self.csv.push((name, bytes));
+        Ok(())
+    }
+
+    /// Adds a figure of these panels.
+    pub fn add_figure(
+        &mut self,
+        name: impl Into<String>,
+        caption: impl Into<String>,
+        columns: usize,
+        panels: Vec<Panel>,
+    ) {
+        let (title, looks) = (self.heading.clone(), vec![]);
+        self.figures.push((name.into(), Figure { title, caption: caption.into(), columns, panels, looks }));
+    }
+
+    /// Makes `series` of the last figure what the others are compared with.
+    pub fn set_reference(&mut self, series: &str) {
+        if let Some((_, figure)) = self.figures.last_mut() {
+            figure.looks.push((series.into(), Look::Reference));
+        }
+    }
+
+    /// Adds a table under a line that explains it.
+    pub fn add_table(&mut self, explanation: &str, table: &Table) {
+        self.tables += &format!("{explanation}\n{table}\n");
+    }
+
+    /// Adds a table of some columns of a CSV file's rows, under the columns' names, numbers with four digits.
+    pub fn show(&mut self, explanation: &str, rows: &[impl Serialize], columns: &[&str]) -> Result<(), Error> {
+        let path = Path::new("table");
+        let bytes = to_bytes(rows, path)?;
+        let mut reader = csv::Reader::from_reader(bytes.as_slice());
+        let header = reader.headers().map_err(Error::csv(path))?.clone();
+        let shown: Vec<usize> =
+            columns.iter().filter_map(|column| header.iter().position(|name| name == *column)).collect();
+        let mut table = text_table(columns.iter().copied());
+        for record in reader.records() {
+            let record = record.map_err(Error::csv(path))?;
+            table.add_row(shown.iter().map(|&at| four_digits(&record[at])));
+        }
+        self.add_table(explanation, &table);
+        Ok(())
+    }
+
+    /// Heading, reading and tables, for the terminal and for the page of all results. Blocks are separated by empty
+    /// lines.
+    pub fn text(&self) -> String {
+        let reading = self.reading.trim_end();
+        let blocks = [self.heading.as_str(), reading, &self.tables];
+        let some = blocks.into_iter().filter(|block| !block.is_empty());
+        some.map(|block| format!("{}\n\n", block.trim_end())).collect()
+    }
+}
+
+/// A number with four digits, and any other text, or a whole number, as it is.
+fn four_digits(text: &str) -> String {
+    let number = if text.contains('.') { text.parse::<f64>().ok() } else { None };
+    match number {
+        None => text.into(),
+        Some(0.0) => "0".into(),
+        Some(number) if !(1e-4..1e6).contains(&number.abs()) => format!("{number:.3e}"),
+        Some(number) => {
+            let decimals = (3 - number.abs().log10().floor() as i32).max(0) as usize;
+            format!("{number:.decimals$}")
+        }
+    }
+}
+
+/// An empty table for the terminal.
+pub fn text_table<'a>(header: impl IntoIterator<Item = &'a str>) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(header);
+    table
+}
+
+/// A panel.
+pub fn panel(title: impl Into<String>, x: Axis, y: Axis, layers: Vec<Layer>) -> Panel {
+    Panel { title: title.into(), x, y, layers }
+}
+
+/// What `say` has to say of each item, separated by commas.
+pub fn each<T>(items: impl IntoIterator<Item = T>, say: impl FnMut(T) -> Option<String>) -> String {
+    items.into_iter().filter_map(say).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_shown_with_four_digits_and_whole_ones_whole() {
+        let shown =
+            ["1.23456", "0.0123456", "12345.6", "1.5e-9", "0.0", "123456", "best", "-1.0"].map(four_digits);
+        assert_eq!(shown, ["1.235", "0.01235", "12346", "1.500e-9", "0", "123456", "best", "-1.000"]);
+    }
+
+    #[test]
+    fn a_table_has_the_columns_asked_for_under_their_names() {
+        #[derive(Serialize)]
+        struct Row {
+            scene: &'static str,
+            hidden: u32,
+            gap: f64,
+        }
+        let mut output = Output::new("", "title");
+        output.show("Gaps:", &[Row { scene: "escher", hidden: 77, gap: 0.5 }], &["gap", "scene"]).unwrap();
+        let text = output.text();
+        assert!(
+            ["title\n\nGaps:\n", "gap", "0.5000", "escher"].iter().all(|part| text.contains(part)),
+            "{text}"
+        );
+        assert!(!text.contains("77") && !text.contains("hidden"), "{text}");
+    }
+}
