@@ -3,9 +3,9 @@
 use super::accelerator::{Accelerator, Query, Structure};
 use super::answers::{self, SOME_HIT};
 use super::rays::{Kind, Viewpoint, rays};
-use crate::statistics::{median, minimum};
 use crate::run::rows::{TraceRow, TraceTimeRow};
 use crate::scenes::Scene;
+use crate::statistics::{median, minimum};
 use bvh_build::config;
 use bvh_core::cost::SahConstants;
 use bvh_core::{Bvh, Hit, Ray, TestCounts, WideBvh, collapse_leaves};

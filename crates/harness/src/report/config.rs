@@ -2,7 +2,7 @@
 
 use super::target::Target;
 use bvh_build::config::{Accepts, Itself};
-use bvh_build::{Check, OutOfRange};
+use bvh_build::OutOfRange;
 use std::collections::BTreeMap;
 
 bvh_build::config! { serde;

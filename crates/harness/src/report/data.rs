@@ -5,6 +5,7 @@ use crate::run::rows::{
     self, BoundRow, ClockRow, HistoryRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row, RunRow,
     TimingRow, TraceRow, TraceTimeRow,
 };
+use crate::scenes::SceneKind;
 use crate::statistics::minimum;
 use std::path::Path;
 
@@ -70,10 +71,8 @@ impl Rows {
 
     /// The scene's name, followed by its kind unless it is a file: how tables and figures show it.
     pub fn shown(&self, scene: &str) -> String {
-        match self.kind(scene) {
-            "file" => scene.into(),
-            kind => format!("{scene} ({kind})"),
-        }
+        let kind = self.kind(scene);
+        if kind == SceneKind::File.to_string() { scene.into() } else { format!("{scene} ({kind})") }
     }
 
     /// The names of all scenes, as [`Rows::shown`].

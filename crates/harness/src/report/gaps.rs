@@ -5,7 +5,7 @@ use super::data::Rows;
 use super::output::{Output, each, panel, text_table};
 use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
-use crate::scenes::subset::Part;
+use crate::scenes::subset::Subset;
 use crate::statistics::{median, minimum, quantile};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -214,10 +214,10 @@ fn draw_bounds(tightness: &[Tightness]) -> Vec<Panel> {
 
 /// Which kind of part of a scene it is.
 fn part(scene: &str) -> &'static str {
-    match Part::parse(scene) {
-        Some((_, Part::Random(..))) => "random",
-        Some((_, Part::Cluster(..))) => "cluster",
-        Some((_, Part::Spaced(_))) | None => "whole",
+    match Subset::parse(scene) {
+        Some((_, Subset::Random(..))) => "random",
+        Some((_, Subset::Cluster(..))) => "cluster",
+        Some((_, Subset::Spaced(_))) | None => "whole",
     }
 }
 

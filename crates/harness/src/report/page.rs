@@ -7,6 +7,7 @@ use crate::files;
 use crate::run::provenance::Provenance;
 use crate::run::resolved::Resolved;
 use crate::run::rows;
+use crate::scenes::SceneKind;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde::de::DeserializeOwned;
 use std::fs;
@@ -85,7 +86,7 @@ fn section(results: &Path, name: &str) -> Result<Section, Error> {
     Ok(Section {
         name: name.into(),
         question: resolved.experiment.question,
-        stand_ins: resolved.scenes.iter().any(|scene| scene.kind == "stand-in"),
+        stand_ins: resolved.scenes.iter().any(|scene| scene.kind == SceneKind::StandIn.to_string()),
         text: if_any(TEXT_FILE).map_or_else(|| Ok(String::new()), |path| read(&path))?,
         paper: if_any(PAPER_FILE).map_or_else(|| Ok(vec![]), |path| rows::read(&path))?,
         figures,

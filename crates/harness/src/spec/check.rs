@@ -1,7 +1,7 @@
 //! What types alone do not say of a spec, part by part. Messages name the key, what was found, what would be accepted.
 
 use super::fault::Fault;
-use super::{Contestant, Experiment, Labelled, ranges};
+use super::{Contestant, Experiment, Labelled};
 use crate::report::Report;
 use crate::{scenes::subset, stress};
 use bvh_build::config::Accepts;
@@ -14,7 +14,7 @@ use std::collections::HashSet;
 const MOST_RUNS: u64 = 10_000_000;
 
 impl Experiment {
-    /// Checks everything that types and the ranges of single keys leave open, but methods and reports.
+    /// Checks everything that types and the ranges of single keys leave open, but methods and the names in reports.
     pub(super) fn check_together(&self) -> Result<(), OutOfRange> {
         if self.question.trim().is_empty() {
             return Err(OutOfRange::new("question", "empty", "what the experiment asks, for its readers"));
@@ -108,7 +108,6 @@ impl Experiment {
 
     /// Checks that reports name only methods that there are.
     pub(super) fn check_reports(&self) -> Result<(), Fault> {
-        ranges::check(self)?;
         let known: HashSet<&str> = self.methods.iter().map(|method| method.label.as_str()).collect();
         for (index, report) in self.reports.iter().enumerate() {
             if let Some(unknown) = report.labels().into_iter().find(|label| !known.contains(label.as_str())) {

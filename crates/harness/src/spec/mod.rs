@@ -6,7 +6,6 @@
 mod check;
 mod fault;
 mod method;
-mod ranges;
 mod read;
 
 use crate::measure::{empirical_cost, speed};
@@ -65,7 +64,7 @@ config! {
         /// Rays traced through the tree of every method's first run, in all layouts, in turns.
         tracing: Option<speed::Config>, in Itself;
         /// Tables and figures made from the rows.
-        reports: Vec<Report>;
+        reports: Vec<Report>, in Itself;
     }
     check Self::check_together;
 }
