@@ -80,7 +80,7 @@ document = { 'brute force' = 32.77, 'KD-tree' = 1.8 }
     fs::write(folder.path().join("spec.toml"), spec).unwrap();
     let output = run(folder.path(), &["spec.toml"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("18.2 (1.8 s)"), "{}", text(&output.stdout));
+    assert!(text(&output.stdout).contains("18.21"), "{}", text(&output.stdout));
     assert!(text(&output.stdout).contains("same picture"), "{}", text(&output.stdout));
     let results = folder.path().join("results/spec");
     let mut reader = csv::Reader::from_path(results.join("renders.csv")).unwrap();

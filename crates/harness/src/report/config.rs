@@ -1,8 +1,8 @@
 //! What the configurations of reports share: keys that several kinds have, and what their lists have to be.
 
 use super::target::Target;
-use bvh_build::config::{Accepts, Itself};
 use bvh_build::OutOfRange;
+use bvh_build::config::{Accepts, Itself};
 use std::collections::BTreeMap;
 
 bvh_build::config! { serde;

@@ -2,11 +2,11 @@
 
 use super::config::OneOrMore;
 use super::data::Rows;
-use super::output::{Output, each, panel, text_table};
+use super::output::{Output, each, panel};
 use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::scenes::subset::Subset;
-use crate::statistics::{median, minimum, quantile};
+use crate::statistics::{median, quantile};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -76,7 +76,8 @@ impl Config {
         let mut panels = self.draw(&summaries);
         panels.extend(draw_bounds(&tightness));
         output.add_figure("gaps", caption, 2, panels);
-        self.add_table(&mut output, &found);
+        let columns = ["method", "part", "objects", "runs", "solved_fraction", "median_gap", "maximum_gap"];
+        output.show("Gaps to the exact optimum:", &summaries, &columns)?;
         output.reading = self.reading(&found);
         Ok(output)
     }
@@ -93,11 +94,8 @@ impl Config {
         }
         for row in &rows.bounds {
             if let Some(optimum) = optima.get(row.scene.as_str()).filter(|&&optimum| optimum > 0.0) {
-                found
-                    .bounds
-                    .entry((part(&row.scene), row.objects))
-                    .or_default()
-                    .push(row.lower_bound / optimum);
+                let same = found.bounds.entry((part(&row.scene), row.objects)).or_default();
+                same.push(row.lower_bound / optimum);
             }
         }
         found
@@ -127,12 +125,8 @@ impl Config {
                 let points = own.map(|summary| (summary.objects as f64, value(summary))).collect();
                 Layer::Line { name: method.clone(), points }
             };
-            panel(
-                format!("{part}, {title}"),
-                Axis::linear("objects"),
-                y,
-                self.methods.iter().map(line).collect(),
-            )
+            let lines = self.methods.iter().map(line).collect();
+            panel(format!("{part}, {title}"), Axis::linear("objects"), y, lines)
         };
         let both = |part| {
             let fraction = Axis::linear("fraction of runs").range(0.0, 1.02);
@@ -145,39 +139,22 @@ impl Config {
         parts.into_iter().flat_map(both).collect()
     }
 
-    /// Every method over all scenes.
-    fn add_table(&self, output: &mut Output, found: &Found) {
-        let header = ["method", "runs", "solved", "median gap", "90 % of gaps below", "greatest gap"];
-        let mut table = text_table(header);
-        for method in &self.methods {
-            let all = found.of(method);
-            let gap =
-                |q| quantile(&all, q).map_or_else(String::new, |gap| format!("{:.3} %", 100.0 * gap.max(0.0)));
-            let solved = format!("{:.1} %", 100.0 * solved(&all));
-            table.add_row([method.clone(), all.len().to_string(), solved, gap(0.5), gap(0.9), gap(1.0)]);
-        }
-        output.add_table("Gaps to the exact optimum over all scenes:", &table);
-    }
-
+    /// What every method reaches over all scenes, and how tight the lower bound is.
     fn reading(&self, found: &Found) -> String {
-        let solves = |method: &String| Some(format!("{method} {:.1} %", 100.0 * solved(&found.of(method))));
-        let methods = each(&self.methods, solves);
+        let methods = each(&self.methods, |method| {
+            let own = found.gaps.iter().filter(|((of, ..), _)| of == method);
+            let all: Vec<f64> = own.flat_map(|(_, gaps)| gaps.iter().copied()).collect();
+            let [solved, greatest] = [solved(&all), at(&all, 1.0).max(0.0)].map(|part| 100.0 * part);
+            Some(format!("{method} {solved:.1} % ({greatest:.3} %)"))
+        });
         let bounds: Vec<f64> = found.bounds.values().flatten().copied().collect();
-        let bound =
-            minimum(bounds.iter().copied()).zip(median(&bounds)).map_or_else(String::new, |(least, median)| {
-                format!(
-                    " The lower bound is {median:.3} of the optimum (median), and nowhere less than {least:.3}."
-                )
-            });
-        format!("Runs that end at the exact optimum: {methods}.{bound}")
-    }
-}
-
-impl Found<'_> {
-    /// The gaps of all runs of a method.
-    fn of(&self, method: &str) -> Vec<f64> {
-        let own = self.gaps.iter().filter(|((of, ..), _)| *of == method);
-        own.flat_map(|(_, gaps)| gaps.iter().copied()).collect()
+        let bound = median(&bounds).map_or_else(String::new, |median| {
+            format!(
+                " The lower bound is {median:.3} of the optimum (median), at least {:.3}.",
+                at(&bounds, 0.0)
+            )
+        });
+        format!("Runs that end at the exact optimum (and the greatest gap of the others): {methods}.{bound}")
     }
 }
 

@@ -34,13 +34,13 @@ pub mod trials;
 
 use crate::Error;
 use crate::figures::{self, Look};
-use crate::run::rows;
 use crate::run::store::Store;
 use bvh_build::{Check, OutOfRange};
 use data::Rows;
 use output::Output;
+use paper::{PaperRow, Verdict};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::collections::BTreeSet;
 
 /// Declares the kinds of reports: name in specs (in snake case), configuration, and the function that makes it.
 macro_rules! reports {
@@ -154,18 +154,19 @@ impl Report {
 /// The file that keeps what the reports printed. Its tables may have seconds, as its name says.
 pub const TEXT_FILE: &str = "timing_report.txt";
 
-/// The file of the comparisons with the paper.
-pub const PAPER_FILE: &str = "paper.csv";
-
 /// Makes all reports from the CSV files in the store's folder. Returns the text for the terminal, which
 /// [`TEXT_FILE`] keeps.
 pub fn write_all(reports: &[Report], store: &Store) -> Result<String, Error> {
     let rows = Rows::read(store.folder())?;
-    let looks: Vec<(String, Look)> =
-        rows.methods().into_iter().map(str::to_owned).zip((0..).map(Look::Slot)).collect();
-    let (mut text, mut paper) = (String::new(), Vec::new());
-    for report in reports {
-        let mut output = report.write(&rows)?;
+    let methods = rows.methods().into_iter().map(str::to_owned);
+    let looks: Vec<(String, Look)> = methods.zip((0..).map(Look::Slot)).collect();
+    let mut outputs = reports.iter().map(|report| report.write(&rows)).collect::<Result<Vec<_>, _>>()?;
+    let paper: Vec<PaperRow> =
+        outputs.iter_mut().flat_map(|output| std::mem::take(&mut output.paper)).collect();
+    if !paper.is_empty() {
+        outputs.push(beside_paper(&paper)?);
+    }
+    for output in &mut outputs {
         for (name, bytes) in &output.csv {
             store.write(&format!("{name}.csv"), bytes)?;
         }
@@ -176,14 +177,30 @@ pub fn write_all(reports: &[Report], store: &Store) -> Result<String, Error> {
             store.write(&format!("{name}.svg"), svg.as_bytes())?;
             store.write(&format!("{name}.png"), &figures::png(&svg)?)?;
         }
-        text += &output.text();
-        paper.extend(output.paper);
     }
-    if !paper.is_empty() {
-        store.write(PAPER_FILE, &rows::to_bytes(&paper, Path::new(PAPER_FILE))?)?;
-    }
+    let text: String = outputs.iter().map(Output::text).collect();
     if !text.is_empty() {
         store.write(TEXT_FILE, text.as_bytes())?;
     }
     Ok(text)
+}
+
+/// The comparisons of all reports of an experiment with the paper.
+fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
+    let theirs = || rows.iter().filter(|row| !row.paper.is_empty()).map(|row| row.verdict);
+    let agree = theirs().filter(|verdict| *verdict == Verdict::Agrees).count();
+    let direction = theirs().filter(|verdict| verdict.is_same_direction()).count();
+    let reasons: BTreeSet<&str> = rows.iter().map(|row| row.reason.as_str()).collect();
+    let mut output = Output::new("", "Ng & Trifonov 2003 beside our results");
+    output.reading = format!(
+        "Numbers of the paper: {}. Ours agree with {agree}; {direction} more are on the same side of the base; {} \
+         differ. {}",
+        theirs().count(),
+        theirs().count() - agree - direction,
+        reasons.into_iter().collect::<Vec<_>>().join(" ")
+    );
+    output.add_csv("paper", rows)?;
+    let columns = ["scene", "quantity", "paper", "ours", "paper_over_base", "ours_over_base", "verdict"];
+    output.show("Every number of the paper beside ours:", rows, &columns)?;
+    Ok(output)
 }

@@ -1,12 +1,10 @@
 //! All results on one page: a self-contained HTML file that needs neither scripts nor other files.
 
-use super::paper::{PaperRow, Verdict};
-use super::{PAPER_FILE, TEXT_FILE};
+use super::TEXT_FILE;
 use crate::Error;
 use crate::files;
 use crate::run::provenance::Provenance;
 use crate::run::resolved::Resolved;
-use crate::run::rows;
 use crate::scenes::SceneKind;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde::de::DeserializeOwned;
@@ -19,9 +17,6 @@ body { font: 16px/1.5 system-ui, sans-serif; color: #1b1f24; background: #fff; m
 h1 { font-size: 1.7rem; } h2 { font-size: 1.3rem; margin-top: 3rem; border-top: 1px solid #d0d7de; padding-top: 1rem; }
 nav ul { columns: 3; padding-left: 1.2rem; }
 .reading { border-left: 4px solid #0969da; padding-left: .8rem; }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .85rem; } th, td { padding: .2rem .6rem; text-align: left; vertical-align: top; }
-th { border-bottom: 2px solid #57606a; } tr + tr td { border-top: 1px solid #d8dee4; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
 pre { font-size: .75rem; line-height: 1.25; overflow-x: auto; background: #f6f8fa; padding: .6rem; }
 figure { margin: 1rem 0; } figure svg { max-width: 100%; height: auto; }
 footer, .provenance { color: #57606a; font-size: .8rem; }
@@ -34,7 +29,8 @@ struct Section {
     stand_ins: bool,
     /// What the reports printed.
     text: String,
-    paper: Vec<PaperRow>,
+    /// Whether it reproduces something of the paper's.
+    of_paper: bool,
     /// Name and SVG text.
     figures: Vec<(String, String)>,
     provenance: Provenance,
@@ -64,7 +60,7 @@ pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
         )));
     }
     // What the paper has comes first.
-    sections.sort_by(|a, b| (a.paper.is_empty(), &a.name).cmp(&(b.paper.is_empty(), &b.name)));
+    sections.sort_by(|a, b| (!a.of_paper, &a.name).cmp(&(!b.of_paper, &b.name)));
     files::write(out, page(&sections).into_string().as_bytes())?;
     Ok(sections.len())
 }
@@ -82,13 +78,13 @@ fn section(results: &Path, name: &str) -> Result<Section, Error> {
         }
     }
     figures.sort();
-    let if_any = |name: &str| Some(folder.join(name)).filter(|path| path.is_file());
+    let text = folder.join(TEXT_FILE);
     Ok(Section {
         name: name.into(),
         question: resolved.experiment.question,
         stand_ins: resolved.scenes.iter().any(|scene| scene.kind == SceneKind::StandIn.to_string()),
-        text: if_any(TEXT_FILE).map_or_else(|| Ok(String::new()), |path| read(&path))?,
-        paper: if_any(PAPER_FILE).map_or_else(|| Ok(vec![]), |path| rows::read(&path))?,
+        text: if text.is_file() { read(&text)? } else { String::new() },
+        of_paper: folder.join("paper.csv").is_file(),
         figures,
         provenance,
     })
@@ -134,8 +130,6 @@ fn experiment(section: &Section) -> Markup {
             h2 { (name) }
             p { strong { (question) } }
             @if section.stand_ins { p { "Scenes named as stand-ins are procedural stand-ins for the paper's." } }
-            @if !section.paper.is_empty() { p.reading { (of_the_paper(&section.paper)) } }
-            @if !section.paper.is_empty() { (paper_table(&section.paper)) }
             @for (stem, svg) in &section.figures {
                 figure id={ (name) "-" (stem) } { (PreEscaped(drawing(svg))) }
             }
@@ -148,47 +142,6 @@ fn experiment(section: &Section) -> Markup {
                 @if !provenance.parts.is_empty() { ", merged from " (provenance.parts.len()) " parts" }
             }
         }
-    }
-}
-
-/// How many of the paper's numbers ours agree with.
-fn of_the_paper(rows: &[PaperRow]) -> String {
-    let theirs: Vec<Verdict> = rows.iter().filter(|row| !row.paper.is_empty()).map(|row| row.verdict).collect();
-    let agree = theirs.iter().filter(|verdict| **verdict == Verdict::Agrees).count();
-    let direction = theirs.iter().filter(|verdict| verdict.is_same_direction()).count();
-    format!(
-        "Numbers of the paper: {}. Ours agree with {agree}; {direction} more are on the same side of the base; {} \
-         differ.",
-        theirs.len(),
-        theirs.len() - agree - direction,
-    )
-}
-
-fn paper_table(rows: &[PaperRow]) -> Markup {
-    let ratio = |ratio: Option<f64>| ratio.map_or_else(String::new, |ratio| format!("{ratio:.3}"));
-    html! {
-        div.scroll {
-            table {
-                thead {
-                    tr {
-                        th { "source" } th { "scene" } th { "quantity" } th { "paper" } th { "ours" }
-                        th { "paper / base" } th { "ours / base" } th { "verdict" }
-                    }
-                }
-                tbody {
-                    @for row in rows {
-                        tr title=(row.reason) {
-                            td { (row.source) } td { (row.scene) } td { (row.quantity) }
-                            td.number { (row.paper) } td.number { (row.ours) }
-                            td.number { (ratio(row.paper_over_base)) } td.number { (ratio(row.ours_over_base)) }
-                            td { (row.verdict.name()) }
-                        }
-                    }
-                }
-            }
-        }
-        @let reasons: std::collections::BTreeSet<&str> = rows.iter().map(|row| row.reason.as_str()).collect();
-        @for reason in reasons.into_iter().filter(|reason| !reason.is_empty()) { p { (reason) } }
     }
 }
 
@@ -209,7 +162,7 @@ mod tests {
             question: "Is 1 < 2 & so on?".into(),
             stand_ins: true,
             text: "first\n\nsecond\n\nTable:\n<pre>\n\n".into(),
-            paper: vec![],
+            of_paper: false,
             figures: vec![("f".into(), "<?xml version=\"1.0\"?><svg width=\"1\"></svg>".into())],
             provenance,
         };

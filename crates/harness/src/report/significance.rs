@@ -92,51 +92,51 @@ impl Config {
 
     /// The signed-rank test of the medians on all scenes.
     fn across<'a>(&'a self, rows: &'a Rows, against: &'a str) -> Option<Row<'a>> {
-        let (mut differences, mut sizes) = (Vec::new(), Vec::new());
+        let (mut differences, mut effects) = (Vec::new(), Vec::new());
         for scene in rows.scenes() {
             let [own, other] = [&self.method, against].map(|method| rows.final_ratios(scene, method));
             differences.extend(median(&own).zip(median(&other)).map(|(own, other)| own - other));
-            sizes.extend(a12(&other, &own));
+            effects.extend(a12(&other, &own));
         }
         let samples = differences.len();
         // Scenes on which both cost the same say nothing; if there are no others, nothing differs.
         let test = wilcoxon_signed_rank(&differences).unwrap_or(Test { statistic: 0.0, p_value: 1.0 });
         let others = differences.iter().filter(|difference| **difference != 0.0).count() as f64;
         let lower = test.statistic < others * (others + 1.0) / 4.0;
-        let row = Row {
-            scene: ALL,
-            method: &self.method,
-            against,
-            test: RankTest::Wilcoxon,
-            samples,
-            samples_against: samples,
-            statistic: test.statistic,
-            p_value: test.p_value,
-            holm_p_value: 1.0,
-            a12: sizes.iter().sum::<f64>() / samples as f64,
-            verdict: Difference::of(lower),
-        };
-        (samples > 0).then_some(row)
+        let row = self.row(ALL, against, [samples; 2], &test);
+        let a12 = effects.iter().sum::<f64>() / samples as f64;
+        (samples > 0).then_some(Row { test: RankTest::Wilcoxon, a12, verdict: Difference::of(lower), ..row })
     }
 
     /// The test of the runs on one scene; `None` if either method has only one, which says nothing about others.
     fn within<'a>(&'a self, rows: &'a Rows, scene: &'a str, against: &'a str) -> Option<Row<'a>> {
         let [own, other] = [&self.method, against].map(|method| rows.final_ratios(scene, method));
         let (test, a12) = (mann_whitney(&own, &other)?, a12(&other, &own)?);
-        let row = Row {
+        let row = self.row(scene, against, [own.len(), other.len()], &test);
+        let several = own.len() > 1 && other.len() > 1;
+        several.then_some(Row { a12, verdict: Difference::of(a12 > 0.5), ..row })
+    }
+
+    fn row<'a>(
+        &'a self,
+        scene: &'a str,
+        against: &'a str,
+        [samples, samples_against]: [usize; 2],
+        &Test { statistic, p_value }: &Test,
+    ) -> Row<'a> {
+        Row {
             scene,
             method: &self.method,
             against,
             test: RankTest::MannWhitney,
-            samples: own.len(),
-            samples_against: other.len(),
-            statistic: test.statistic,
-            p_value: test.p_value,
+            samples,
+            samples_against,
+            statistic,
+            p_value,
             holm_p_value: 1.0,
-            a12,
-            verdict: Difference::of(a12 > 0.5),
-        };
-        (own.len() > 1 && other.len() > 1).then_some(row)
+            a12: 0.5,
+            verdict: Difference::None,
+        }
     }
 
     /// The rows of one test with their p-values corrected.
