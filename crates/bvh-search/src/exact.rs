@@ -1,34 +1,34 @@
-//! The exact optimum of small scenes, by dynamic programming over subsets: what every other method is measured against.
+//! The exact optimum of small scenes, by dynamic programming over subsets: the measure of every other method.
 //!
 //! The class is *binary trees with one object per leaf*, over which all objectives of a [`Problem`] have the same
 //! optima: they grow with the internal area. Wider nodes would make it meaningless: merging an inner node into its
 //! parent removes a term that is never negative, so that a single node over all objects would always be the cheapest.
 //!
-//! What is below a node does not depend on what is above it. The least internal area of a tree over the set S is
+//! The best subtree below a node does not depend on the rest of the tree. The least internal area of a tree over the set S is
 //! therefore best(S) = A(S) + min over the divisions of S in two of best(L) + best(S ∖ L), with best = 0 for single
 //! objects: the recurrence of Karras & Aila 2013 for treelets, here for the whole tree.
 
-use crate::error::require;
-use crate::{Omission, Problem, Run, Search, SearchError};
+use crate::run::{Problem, Run, Search, SearchError, Shortcut};
 use bvh_build::BuildError;
+use bvh_build::config::Accepts;
 use bvh_core::{Aabb, Bvh, Node, check_boxes};
 
 /// The most objects a scene may have: 3¹⁶ / 2 divisions take a few hundredths of a second and 2¹⁶ sets 2.5 MB.
 pub const MOST_OBJECTS: usize = 16;
 
-/// Nothing to choose.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct Config {}
+bvh_build::config! {
+    /// Without parameters.
+    pub struct Config {}
+}
 
 impl Search for Config {
-    /// One evaluation, whose work is the number of divisions weighed. The tree is optimal up to the rounding of 15
-    /// additions; of equal divisions the one whose part with the first object is the least, as a bit set, is taken.
+    /// One evaluation, whose work is the number of divisions compared. The tree is optimal up to the rounding of 15
+    /// additions. Of equal divisions the one is taken whose part with the first object is the least as a bit set.
     ///
     /// Refuses scenes of more than [`MOST_OBJECTS`] objects. O(3ⁿ) time, O(2ⁿ) memory.
     fn search(&self, problem: &Problem, _seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         let n = problem.boxes.len();
-        require(n <= MOST_OBJECTS, "objects", n as f64, "at most 16")?;
+        (..=MOST_OBJECTS).check("objects", &n)?;
         check_boxes(problem.boxes).map_err(BuildError::from)?;
         let (part, work) = divisions(problem.boxes);
         let tree = if n == 0 { Bvh::default() } else { tree(problem.boxes, &part) };
@@ -37,28 +37,27 @@ impl Search for Config {
     }
 }
 
-/// The optimum in place of a search, if the scene is [tiny](most_work_of_tiny) and it takes no more than `work` and
-/// what the run has left. Ends the run.
+/// The optimum in place of a search, if the scene is [tiny](most_work_of_tiny) and the optimum takes no more work than
+/// `work` and the rest of the run's budget. Ends the run.
 pub(crate) fn instead(problem: &Problem, work: u64, run: &mut Run) -> Result<Option<Bvh>, SearchError> {
     let least = most_work_of_tiny(problem.boxes.len());
     let worth = least.is_some_and(|least| least <= work.min(run.left().work));
-    if !worth || !problem.leaves_out(Omission::Tiny) {
+    if !worth || !problem.allows(Shortcut::Tiny) {
         return Ok(None);
     }
     let tree = Config {}.search(problem, 0, run)?;
-    run.settle();
+    run.proved_optimal();
     Ok(Some(tree))
 }
 
-/// The work that the optimum takes at most where it may stand in for a search: the divisions of a scene of so many
-/// objects, but for the 2ⁿ with an empty part. `None` for more than [`MOST_OBJECTS`], and for two or fewer, which leave
-/// no choice.
+/// An upper bound of the work of the optimum where it may replace a search: the number of divisions, those with an empty
+/// part included. `None` for more than [`MOST_OBJECTS`], and for two objects or fewer, which have only one tree.
 pub(crate) fn most_work_of_tiny(objects: usize) -> Option<u64> {
     (3..=MOST_OBJECTS).contains(&objects).then(|| 3u64.pow(objects as u32) / 2)
 }
 
-/// For every set of two objects or more, its part with the lowest object in the best division; and how many divisions
-/// were weighed.
+/// For every set of two objects or more, the part with the lowest object in the best division of the set; and the number
+/// of divisions compared.
 fn divisions(boxes: &[Aabb]) -> (Vec<u32>, u64) {
     let sets = 1usize << boxes.len();
     let mut aabb = vec![Aabb::EMPTY; sets];
@@ -73,7 +72,8 @@ fn divisions(boxes: &[Aabb]) -> (Vec<u32>, u64) {
         if others == 0 {
             continue;
         }
-        // Every division once: the part with the lowest object, without it, is any proper subset of the others.
+        // `with` is the rest of the part with the lowest object: any proper subset of the others, so that every division
+        // is tried once.
         let (mut least, mut taken, mut with) = (f64::INFINITY, 0, 0);
         while with != others {
             let cost = best[with | lowest] + best[others ^ with];
@@ -112,7 +112,7 @@ fn tree(boxes: &[Aabb], part: &[u32]) -> Bvh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Budget, solve};
+    use crate::run::{Budget, solve};
     use bvh_core::validate;
 
     fn scatter(n: usize, salt: usize) -> Vec<Aabb> {
@@ -122,7 +122,7 @@ mod tests {
         (0..n).map(|i| Aabb::from((point(i), point(i).map(|c| c + at(i, 3) / 5.0)))).collect()
     }
 
-    /// The least internal area of a tree over these sets, by merging every two of them in turn: every binary tree.
+    /// The least internal area of all binary trees over these sets, by merging every two of them in turn.
     fn brute_force(sets: &[Aabb]) -> f64 {
         let mut least = if sets.len() < 2 { 0.0 } else { f64::INFINITY };
         for i in 0..sets.len() {
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn every_division_is_weighed_once() {
+    fn every_division_is_compared_once() {
         for n in 2..10u32 {
             let work = divisions(&scatter(n as usize, 1)).1;
             // Pairs of disjoint sets that are not empty.

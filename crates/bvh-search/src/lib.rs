@@ -1,13 +1,13 @@
 //! Stochastic search for better bounding volume hierarchies.
 //!
-//! A search is one file with a `Config` that implements [`Search`]. It proposes trees; the [`Run`] it is handed
-//! counts evaluations, keeps the incumbent's cost and the history, and says when to stop, so that no search can
-//! forget to. [`solve`] starts a search and returns its [`Outcome`]. Searches read no clock and hold no global
+//! A search is one file with a `Config` that implements [`Search`]. It proposes trees; the [`Run`] that it is given
+//! counts evaluations, keeps the incumbent's cost and the history, and says when to stop, so that no search can forget
+//! to. [`solve`] starts a search and returns its [`Outcome`]. Searches read no clock and hold no global
 //! state; the same seed gives the same outcome on any number of threads.
 //!
-//! [`portfolio`], called `best`, is the one to take; [`optimize()`] applies it to a tree made elsewhere. Local search
-//! minimises the internal area of binary trees with one object per leaf. For these every objective of a [`Problem`] is
-//! a constant plus a multiple of it, so all of them fall together.
+//! [`best`] is the one to take; [`optimize()`] applies it to a tree made elsewhere. Local search minimises the internal
+//! area of binary trees with one object per leaf. For these every objective of a [`Problem`] is a constant plus a multiple
+//! of it, so that all of them fall together.
 //!
 //! ```
 //! use bvh_core::Aabb;
@@ -24,48 +24,32 @@
 //! ```
 
 pub mod annealing;
-mod budget;
-mod cooling;
-mod error;
+pub mod best;
 pub mod exact;
-mod fusing;
-pub mod genetic;
-pub mod grasp;
-mod incumbent;
-mod insertion_orders;
-pub mod iterated;
-mod local_search;
+mod local;
 pub mod lower_bound;
-pub mod omission;
+mod multistart;
 mod optimize;
-mod pieces;
-mod place;
-pub mod portfolio;
-mod quick;
-pub mod random_orders;
-pub mod rebuild;
+mod orders;
+mod parallel;
 #[cfg(feature = "serde")]
 mod registry;
-pub mod reinsertion;
-pub mod rotation;
-pub mod ruin_recreate;
 mod run;
 #[cfg(test)]
 mod scatter;
-mod slab;
-mod start;
-mod starts;
-mod stream;
-pub mod treelet;
-mod working;
+pub mod shortcuts;
+mod tree;
+mod tuning;
 
-pub use budget::{Budget, StopReason};
-pub use error::SearchError;
-pub use local_search::LocalSearch;
-pub use omission::Omission;
+pub use annealing::ruin_recreate;
+pub use local::initial::Start;
+pub use local::{LocalSearch, reinsertion, rotation, treelet};
+pub use multistart::{grasp, iterated, rebuild};
 pub use optimize::optimize;
+pub use orders::{genetic, random_orders};
 #[cfg(feature = "serde")]
 pub use registry::Method;
-pub use run::{Event, Observer, Outcome, Problem, Quota, Run, Search, Tally, solve};
-pub use start::Start;
-pub use stream::Stream;
+pub use run::{
+    Budget, Event, Observer, Outcome, Problem, Quota, Run, Search, SearchError, Shortcut, StopReason, Stream,
+    Tally, solve,
+};

@@ -1,11 +1,13 @@
-//! Any binary tree in, a better one out: for those who have a builder of their own.
+//! Any binary tree in, a better one out: for callers with a builder of their own.
 
-use crate::incumbent::Incumbent;
-use crate::working::Working;
-use crate::{Budget, Observer, Outcome, Problem, Run, Search, SearchError, portfolio, solve};
+use crate::best;
+use crate::local::incumbent::Incumbent;
+use crate::run::{Budget, Observer, Outcome, Problem, Run, Search, SearchError, solve};
+use crate::tree::Working;
+use bvh_build::{Check, OutOfRange};
 use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate};
 
-/// Improves `tree`, over the objects of `boxes`, by the [portfolio](crate::portfolio) but for its builder, until the
+/// Improves `tree`, over the objects of `boxes`, by [`best`](crate::best) without its builder, until the
 /// budget is spent or the observer cancels. The result has the same leaves, with as many objects in each; leaves of
 /// several objects are moved as a whole. The cost is the [internal area](bvh_core::cost::internal_area), with boxes
 /// made tight, and never above that of `tree`.
@@ -14,14 +16,14 @@ use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate};
 pub fn optimize(
     tree: &Bvh,
     boxes: &[Aabb],
-    config: &portfolio::Config,
+    config: &best::Config,
     seed: u64,
     budget: Budget,
     observer: &dyn Observer,
 ) -> Result<Outcome, SearchError> {
     check_boxes(boxes).map_err(bvh_build::BuildError::from)?;
     validate(tree, boxes)?;
-    // Every leaf is one object, whose box is the leaf's; so to speak.
+    // To the search, every leaf is one object with the box of the leaf.
     let (mut tight, mut leaves) = (tree.clone(), Vec::new());
     tight.refit(boxes);
     for node in &mut tight.nodes {
@@ -45,18 +47,23 @@ pub fn optimize(
     Ok(outcome)
 }
 
-/// The portfolio, from a given tree.
+/// `best`, from a given tree.
 struct From<'a> {
     tree: Bvh,
-    config: &'a portfolio::Config,
+    config: &'a best::Config,
+}
+
+impl Check for From<'_> {
+    fn check(&self) -> Result<(), OutOfRange> {
+        self.config.check()
+    }
 }
 
 impl Search for From<'_> {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
-        self.config.check()?;
         let mut tree = Working::from_bvh(&self.tree, problem.boxes)?;
         let mut best = Incumbent::begin(self.tree.clone(), problem, run);
-        self.config.improve(&mut tree, seed, &mut best, run);
+        best::improve(self.config, &mut tree, seed, &mut best, run);
         Ok(best.tree)
     }
 }

@@ -1,6 +1,7 @@
-//! The one registry of methods: the only place that knows them all by name.
+//! The one registry of methods: the only place that knows all of them by name.
 
-use crate::{Problem, Run, Search, SearchError};
+use crate::run::{Problem, Run, Search, SearchError};
+use bvh_build::{Check, OutOfRange};
 use bvh_core::Bvh;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -39,6 +40,12 @@ macro_rules! methods {
             }
         }
 
+        impl Check for Method {
+            fn check(&self) -> Result<(), OutOfRange> {
+                match self { $(Self::$variant(config) => config.check()),* }
+            }
+        }
+
         impl Search for Method {
             fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
                 match self { $(Self::$variant(config) => config.search(problem, seed, run)),* }
@@ -70,14 +77,14 @@ methods! {
     "treelet" => Treelet(crate::treelet::Config),
     /// Annealing on single reinsertions.
     "annealing" => Annealing(crate::annealing::Config),
-    /// Kicks and descents.
+    /// Perturbations and local searches.
     "iterated_local_search" => IteratedLocalSearch(crate::iterated::Config),
-    /// Rebuilding what looks badly split.
+    /// Rebuilding of subtrees that look badly split.
     "rebuild" => Rebuild(crate::rebuild::Config),
     /// Annealed ruin and recreate.
     "ruin_recreate" => RuinRecreate(crate::ruin_recreate::Config),
     /// The exact optimum of small scenes.
     "exact" => Exact(crate::exact::Config),
-    /// All that pays, in the order that pays.
-    "best" => Best(crate::portfolio::Config),
+    /// All methods that pay, in the order that pays.
+    "best" => Best(crate::best::Config),
 }

@@ -1,6 +1,6 @@
 //! A scene for the unit tests of searches, and trees over any.
 
-use crate::working::Working;
+use crate::tree::Working;
 use bvh_build::Builder;
 use bvh_core::Aabb;
 

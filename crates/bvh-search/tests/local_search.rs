@@ -3,8 +3,8 @@
 use bvh_build::Builder;
 use bvh_core::{Aabb, Bvh, Node, cost, validate};
 use bvh_search::{
-    Budget, Event, Method, Observer, Outcome, Problem, SearchError, StopReason, optimize, portfolio,
-    reinsertion, ruin_recreate, solve,
+    Budget, Event, Method, Observer, Outcome, Problem, SearchError, StopReason, best, optimize, reinsertion,
+    ruin_recreate, solve,
 };
 use proptest::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
@@ -66,7 +66,7 @@ fn optimum(boxes: &[Aabb]) -> f64 {
 }
 
 #[test]
-fn no_method_goes_below_the_optimum_and_the_portfolio_reaches_it() {
+fn no_method_goes_below_the_optimum_and_the_best_reaches_it() {
     for instance in 0..60 {
         let boxes = scatter(3 + instance % 6, instance);
         let optimum = optimum(&boxes);
@@ -81,7 +81,7 @@ fn no_method_goes_below_the_optimum_and_the_portfolio_reaches_it() {
 }
 
 #[test]
-fn every_method_improves_on_its_start_and_the_portfolio_most() {
+fn every_method_improves_on_its_start_and_the_best_most() {
     let boxes = scatter(2000, 1);
     let start = cost::internal_area(&reinsertion::Config::default().start.build(&boxes).unwrap());
     let [reinsertion, rotated, treelets, single, rebuilt, annealed, best] = METHODS.map(|name| {
@@ -97,7 +97,7 @@ fn every_method_improves_on_its_start_and_the_portfolio_most() {
 #[test]
 fn the_result_does_not_depend_on_the_number_of_threads() {
     let boxes = scatter(1500, 2);
-    let pieces = portfolio::Config { pieces: 8, ..Default::default() };
+    let pieces = best::Config { pieces: 8, ..Default::default() };
     for method in methods().chain([Method::Best(pieces)]) {
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -168,11 +168,11 @@ fn budgets_end_a_search_where_they_say() {
 }
 
 #[test]
-fn a_budget_barely_above_what_the_portfolio_does_without_one_is_kept() {
+fn a_budget_barely_above_what_the_best_does_without_one_is_kept() {
     let boxes = scatter(1000, 4);
     for work_per_object in [100, 200, 300, 400] {
-        let config = portfolio::Config { work_per_object, first: 50.0, ..Default::default() };
-        // The start and the first descent are not in what the portfolio counts as its own.
+        let config = best::Config { work_per_object, first: 50.0, ..Default::default() };
+        // The start and the first descent are not in what the best counts as its own.
         let max_work = work_per_object * 1000 + 60_000;
         let outcome = solve(&config, &Problem::new(&boxes), 5, work(max_work), &()).unwrap();
         assert!(outcome.work <= max_work + 2000, "{} of {max_work}", outcome.work);
@@ -200,7 +200,7 @@ fn a_cancelled_search_returns_what_it_has() {
 }
 
 #[test]
-fn the_portfolio_ends_when_the_time_does_and_its_pieces_are_a_valid_tree() {
+fn the_best_ends_when_the_time_does_and_its_pieces_are_a_valid_tree() {
     /// Time passes by the question.
     struct Clock(AtomicU32);
     impl Observer for Clock {
@@ -213,7 +213,7 @@ fn the_portfolio_ends_when_the_time_does_and_its_pieces_are_a_valid_tree() {
     }
     let boxes = scatter(3000, 7);
     for pieces in [1, 8] {
-        let config = Method::Best(portfolio::Config { pieces, ..Default::default() });
+        let config = Method::Best(best::Config { pieces, ..Default::default() });
         let clock = Clock(0.into());
         let outcome = solve(&config, &Problem::new(&boxes), 1, Budget::default(), &clock).unwrap();
         validate(&outcome.tree, &boxes).unwrap();
@@ -243,7 +243,7 @@ fn chain(boxes: &[Aabb]) -> Bvh {
 fn the_deepest_tree_can_be_optimised() {
     let boxes = scatter(3000, 5);
     let tree = chain(&boxes);
-    let outcome = optimize(&tree, &boxes, &portfolio::Config::default(), 1, work(20_000_000), &()).unwrap();
+    let outcome = optimize(&tree, &boxes, &best::Config::default(), 1, work(20_000_000), &()).unwrap();
     validate(&outcome.tree, &boxes).unwrap();
     assert!(outcome.cost < cost::internal_area(&tree) / 4.0);
 }
@@ -259,7 +259,7 @@ fn leaves_of_several_objects_are_kept_and_other_trees_refused_by_name() {
         }
     }
     tree.prim_ids = tree.prim_ids.iter().flat_map(|&pair| [2 * pair, 2 * pair + 1]).collect();
-    let config = portfolio::Config::default();
+    let config = best::Config::default();
     let outcome = optimize(&tree, &boxes, &config, 1, work(1_000_000), &()).unwrap();
     validate(&outcome.tree, &boxes).unwrap();
     assert_eq!(outcome.tree.inner_count(), tree.inner_count());
@@ -282,7 +282,7 @@ fn parameters_outside_their_range_are_named() {
     assert_eq!(refused(Method::RuinRecreate(cold)), "cold is 1; accepted: above 0, not above hot");
     let sweeps = reinsertion::Config { sweeps: 0, ..Default::default() };
     assert_eq!(refused(Method::Reinsertion(sweeps)), "sweeps is 0; accepted: 1 or more");
-    let pieces = portfolio::Config { pieces: 5000, ..Default::default() };
+    let pieces = best::Config { pieces: 5000, ..Default::default() };
     assert_eq!(refused(Method::Best(pieces)), "pieces is 5000; accepted: 0 to 4096");
 }
 

@@ -37,7 +37,7 @@ fn instances(count: usize) -> Vec<Vec<Aabb>> {
 }
 
 #[test]
-fn no_method_goes_below_the_optimum_the_bound_neither_above_and_the_portfolio_reaches_it() {
+fn no_method_goes_below_the_optimum_the_bound_neither_above_and_the_best_reaches_it() {
     let instances = instances(280);
     let budget = Budget { max_evaluations: None, max_work: Some(300_000) };
     let mut reached = 0;

@@ -1,4 +1,4 @@
-//! The portfolio against the clock: percent below greedy Müller–Fellner, one triangle per leaf, after so many seconds.
+//! `best` against the clock: percent below greedy Müller–Fellner, one triangle per leaf, after so many seconds.
 //!
 //! `cargo bench -p harness --bench search -- [--seconds 0.1,1,10,60] [--threads 1,2] [--seed N] SCENE...`
 //!

@@ -43,9 +43,9 @@ impl From<&Aabb> for Reach {
     }
 }
 
-/// A node of the tree in which neighbours are looked up.
+/// A node of the tree in which neighbours are looked up: a group of objects that are near each other.
 #[derive(Clone, Debug)]
-struct Part {
+struct Cluster {
     /// Its objects, in tree order.
     objects: Range<usize>,
     /// The root is its own.
@@ -59,15 +59,15 @@ struct Part {
 }
 
 /// The objects in the order of a balanced tree over them, with weights.
-pub(super) struct Scene {
-    parts: Vec<Part>,
+pub(super) struct Clusters {
+    nodes: Vec<Cluster>,
     leaves: Vec<usize>,
     /// Of all objects before each, and of all.
     weight_before: Vec<u64>,
 }
 
-/// Parts of at most this part of the size that is asked for are in a box as soon as one of their objects is.
-const PARTS_PER_SIZE: u64 = 128;
+/// Parts of at most this cluster of the size that is asked for are in a box as soon as one of their objects is.
+const CLUSTERS_PER_SIZE: u64 = 128;
 
 /// Areas of smallest boxes with at least a certain weight, for groups of objects.
 pub(super) struct Grouped {
@@ -83,19 +83,19 @@ impl Grouped {
     }
 }
 
-impl Scene {
+impl Clusters {
     /// Every object weighs 1. Refuses what no builder accepts. O(n log n).
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
         let tree = Config { axis: CutAxis::Longest, ..Config::default() }.build(boxes)?;
         let reaches: Vec<Reach> = tree.prim_ids.iter().map(|&id| Reach::from(&boxes[id as usize])).collect();
-        let parts = parts(&tree, &reaches);
+        let nodes = nodes(&tree, &reaches);
         let mut leaves = vec![0; boxes.len()];
-        for (index, part) in parts.iter().enumerate().filter(|(_, part)| part.children == 0) {
-            leaves[part.objects.start] = index;
+        for (index, cluster) in nodes.iter().enumerate().filter(|(_, cluster)| cluster.children == 0) {
+            leaves[cluster.objects.start] = index;
         }
-        let mut scene = Self { parts, leaves, weight_before: vec![] };
-        scene.set_weights(&vec![1; boxes.len()]);
-        Ok(scene)
+        let mut clusters = Self { nodes, leaves, weight_before: vec![] };
+        clusters.set_weights(&vec![1; boxes.len()]);
+        Ok(clusters)
     }
 
     /// In tree order.
@@ -115,10 +115,10 @@ impl Scene {
 
     /// Half area of the box around all.
     pub fn area(&self) -> f64 {
-        self.parts.first().map_or(0.0, |root| root.half_area)
+        self.nodes.first().map_or(0.0, |root| root.half_area)
     }
 
-    /// The part of a single object.
+    /// The cluster of a single object.
     pub fn leaf(&self, at: usize) -> usize {
         self.leaves[at]
     }
@@ -127,15 +127,15 @@ impl Scene {
         self.weight_before[objects.end] - self.weight_before[objects.start]
     }
 
-    /// The largest parts that weigh at most so much or are single objects, in tree order.
+    /// The largest clusters that weigh at most so much or are single objects, in tree order.
     pub fn groups(&self, most: u64) -> Vec<usize> {
         let (mut groups, mut stack) = (vec![], vec![0]);
         while let Some(index) = stack.pop() {
-            let part = &self.parts[index];
-            if part.children == 0 || self.weight_of(&part.objects) <= most {
+            let cluster = &self.nodes[index];
+            if cluster.children == 0 || self.weight_of(&cluster.objects) <= most {
                 groups.push(index);
             } else {
-                stack.extend([part.children + 1, part.children]);
+                stack.extend([cluster.children + 1, cluster.children]);
             }
         }
         groups
@@ -143,11 +143,11 @@ impl Scene {
 
     /// Areas of groups, to be looked up by object.
     pub fn grouped(&self, from: u64, groups: &[usize], areas: &[f64]) -> Grouped {
-        let end = |&group: &usize| self.parts[group].objects.end;
+        let end = |&group: &usize| self.nodes[group].objects.end;
         Grouped { from, groups: groups.iter().map(end).zip(areas.iter().copied()).collect() }
     }
 
-    /// At most the half area of every box that contains an object of the part `seed` and weighs at least `weight`,
+    /// At most the half area of every box that contains an object of the cluster `seed` and weighs at least `weight`,
     /// which must not be more than all objects do; exactly the least such area for a single object and enough effort.
     pub fn smallest_box(&self, seed: usize, weight: u64, effort: u32) -> f64 {
         search(self, seed, weight, effort)
@@ -155,36 +155,36 @@ impl Scene {
 }
 
 /// The nodes with what is known of their objects. Parents come before children.
-fn parts(tree: &Bvh, reaches: &[Reach]) -> Vec<Part> {
-    let mut parts: Vec<Part> = Vec::with_capacity(tree.nodes.len());
+fn nodes(tree: &Bvh, reaches: &[Reach]) -> Vec<Cluster> {
+    let mut nodes: Vec<Cluster> = Vec::with_capacity(tree.nodes.len());
     for node in &tree.nodes {
         let (children, objects) = match node.kind() {
             NodeKind::Inner { first, .. } => (first as usize, 0..0),
             NodeKind::Leaf { .. } => (0, node.prims()),
         };
         let reach = reaches[objects.start];
-        parts.push(Part { objects, parent: 0, children, reach, half_area: node.aabb.half_area() });
+        nodes.push(Cluster { objects, parent: 0, children, reach, half_area: node.aabb.half_area() });
     }
-    for index in (0..parts.len()).rev() {
-        let first = parts[index].children;
+    for index in (0..nodes.len()).rev() {
+        let first = nodes[index].children;
         if first != 0 {
-            let (left, right) = (&parts[first], &parts[first + 1]);
+            let (left, right) = (&nodes[first], &nodes[first + 1]);
             let objects = left.objects.start..right.objects.end;
             let reach = left.reach.common(&right.reach);
-            parts[first].parent = index;
-            parts[first + 1].parent = index;
-            parts[index] = Part { objects, reach, ..parts[index].clone() };
+            nodes[first].parent = index;
+            nodes[first + 1].parent = index;
+            nodes[index] = Cluster { objects, reach, ..nodes[index].clone() };
         }
     }
-    parts
+    nodes
 }
 
-/// A part that a box may contain.
+/// A cluster that a box may contain.
 #[derive(Clone, Copy)]
 struct Member {
     /// The half area of the box around it and what must be inside.
     area: f64,
-    part: u32,
+    cluster: u32,
     weight: u32,
 }
 
@@ -202,14 +202,14 @@ impl Region {
     /// `None` if it has no box smaller than `known`, which becomes the area of the best box found.
     #[inline(always)]
     fn new(
-        scene: &Scene,
+        clusters: &Clusters,
         must: Reach,
         members: impl Iterator<Item = Member>,
         weight: u64,
         known: &mut f64,
     ) -> Option<Self> {
         let with = |member: Member| {
-            let area = must.union(&scene.parts[member.part as usize].reach).half_area();
+            let area = must.union(&clusters.nodes[member.cluster as usize].reach).half_area();
             Member { area, ..member }
         };
         let mut members: Vec<Member> = members.map(with).filter(|member| member.area < *known).collect();
@@ -221,7 +221,7 @@ impl Region {
         let (mut low, mut high, mut missing) = (0, members.len(), weight);
         while high - low > 1 {
             let half = (high - low) / 2;
-            let by_area = |a: &Member, b: &Member| a.area.total_cmp(&b.area).then(a.part.cmp(&b.part));
+            let by_area = |a: &Member, b: &Member| a.area.total_cmp(&b.area).then(a.cluster.cmp(&b.cluster));
             members[low..high].select_nth_unstable_by(half, by_area);
             let lower = weigh(&members[low..low + half]);
             if lower >= missing {
@@ -233,26 +233,26 @@ impl Region {
         }
         let bound = members[low].area;
         let region = Self { must, members, enough: low + 1, bound };
-        *known = known.min(region.around(scene).half_area());
+        *known = known.min(region.around(clusters).half_area());
         Some(region)
     }
 
     /// How far the members reach that need the least area and weigh enough.
     #[inline(always)]
-    fn nearest<'a>(&'a self, scene: &'a Scene) -> impl Iterator<Item = &'a Reach> {
-        self.members[..self.enough].iter().map(|member| &scene.parts[member.part as usize].reach)
+    fn nearest<'a>(&'a self, clusters: &'a Clusters) -> impl Iterator<Item = &'a Reach> {
+        self.members[..self.enough].iter().map(|member| &clusters.nodes[member.cluster as usize].reach)
     }
 
     /// The box around them, a good one of the region.
     #[inline(always)]
-    fn around(&self, scene: &Scene) -> Reach {
-        self.nearest(scene).fold(self.must, |union, reach| union.union(reach))
+    fn around(&self, clusters: &Clusters) -> Reach {
+        self.nearest(clusters).fold(self.must, |union, reach| union.union(reach))
     }
 
     /// Where to divide: the face whose move from `must` to the best box of the region costs most area, at the middle
     /// of the reaches that it passes.
-    fn division(&self, scene: &Scene) -> Option<(usize, f32)> {
-        let around = self.around(scene);
+    fn division(&self, clusters: &Clusters) -> Option<(usize, f32)> {
+        let around = self.around(clusters);
         let mut best = None;
         for face in [0, 1, 2, 4, 5, 6] {
             let mut moved = self.must;
@@ -263,8 +263,11 @@ impl Region {
             }
         }
         let (_, face) = best?;
-        let mut passed: Vec<f32> =
-            self.nearest(scene).map(|reach| reach.0[face]).filter(|&reach| reach > self.must.0[face]).collect();
+        let mut passed: Vec<f32> = self
+            .nearest(clusters)
+            .map(|reach| reach.0[face])
+            .filter(|&reach| reach > self.must.0[face])
+            .collect();
         let middle = passed.len() / 2;
         passed.select_nth_unstable_by(middle, f32::total_cmp);
         Some((face, passed[middle]))
@@ -272,21 +275,21 @@ impl Region {
 }
 
 with_vector_instructions! {
-    search = search_plain(scene: &Scene, seed: usize, weight: u64, effort: u32) -> f64
+    search = search_plain(clusters: &Clusters, seed: usize, weight: u64, effort: u32) -> f64
 }
 
 #[inline(always)]
-fn search_plain(scene: &Scene, seed: usize, weight: u64, effort: u32) -> f64 {
+fn search_plain(clusters: &Clusters, seed: usize, weight: u64, effort: u32) -> f64 {
     let mut around = seed;
-    while around != 0 && scene.weight_of(&scene.parts[around].objects) < weight {
-        around = scene.parts[around].parent;
+    while around != 0 && clusters.weight_of(&clusters.nodes[around].objects) < weight {
+        around = clusters.nodes[around].parent;
     }
-    let mut known = scene.parts[around].half_area;
-    let must = scene.parts[seed].reach;
-    let members = neighbours(scene, &must, weight / PARTS_PER_SIZE, known);
+    let mut known = clusters.nodes[around].half_area;
+    let must = clusters.nodes[seed].reach;
+    let members = neighbours(clusters, &must, weight / CLUSTERS_PER_SIZE, known);
     // Regions without smaller boxes are gone; the others together hold all of them.
     let mut regions: Vec<Region> =
-        Region::new(scene, must, members.into_iter(), weight, &mut known).into_iter().collect();
+        Region::new(clusters, must, members.into_iter(), weight, &mut known).into_iter().collect();
     let mut left = regions.iter().map(|region| region.members.len() as u64).sum::<u64>() * u64::from(effort);
     loop {
         let least = (0..regions.len()).min_by(|&a, &b| regions[a].bound.total_cmp(&regions[b].bound));
@@ -296,31 +299,31 @@ fn search_plain(scene: &Scene, seed: usize, weight: u64, effort: u32) -> f64 {
         }
         let region = regions.swap_remove(least);
         left = left.saturating_sub(2 * region.members.len() as u64);
-        let Some((face, at)) = region.division(scene) else { return region.bound };
+        let Some((face, at)) = region.division(clusters) else { return region.bound };
         let members = || region.members.iter().copied();
-        let short = members().filter(|member| scene.parts[member.part as usize].reach.0[face] < at);
+        let short = members().filter(|member| clusters.nodes[member.cluster as usize].reach.0[face] < at);
         let mut far = region.must;
         far.0[face] = at;
-        regions.extend(Region::new(scene, region.must, short, weight, &mut known));
-        regions.extend(Region::new(scene, far, members(), weight, &mut known));
+        regions.extend(Region::new(clusters, region.must, short, weight, &mut known));
+        regions.extend(Region::new(clusters, far, members(), weight, &mut known));
     }
 }
 
-/// The parts that need less area than `known` together with `must`: single objects, or as large as `most`.
+/// The clusters that need less area than `known` together with `must`: single objects, or as large as `most`.
 #[inline(always)]
-fn neighbours(scene: &Scene, must: &Reach, most: u64, known: f64) -> Vec<Member> {
+fn neighbours(clusters: &Clusters, must: &Reach, most: u64, known: f64) -> Vec<Member> {
     let (mut found, mut stack) = (vec![], vec![0]);
     while let Some(index) = stack.pop() {
-        let part = &scene.parts[index];
-        let area = must.union(&part.reach).half_area();
+        let cluster = &clusters.nodes[index];
+        let area = must.union(&cluster.reach).half_area();
         if area >= known {
             continue;
         }
-        let weight = scene.weight_of(&part.objects);
-        if part.children == 0 || weight <= most {
-            found.push(Member { area, part: index as u32, weight: weight as u32 });
+        let weight = clusters.weight_of(&cluster.objects);
+        if cluster.children == 0 || weight <= most {
+            found.push(Member { area, cluster: index as u32, weight: weight as u32 });
         } else {
-            stack.extend([part.children + 1, part.children]);
+            stack.extend([cluster.children + 1, cluster.children]);
         }
     }
     found

@@ -1,7 +1,7 @@
 //! `best` against the clock, as the benchmarks of whole searches need it.
 
 use bvh_core::{cost, validate};
-use bvh_search::{Budget, Problem, portfolio, solve};
+use bvh_search::{Budget, Problem, solve};
 use harness::clock::Deadline;
 use harness::scenes::Scene;
 use std::time::Duration;
@@ -9,7 +9,7 @@ use std::time::Duration;
 /// The seconds that `best` takes when it may plan with `seconds`, and the internal area of its tree, which is valid.
 pub fn best(scene: &Scene, seconds: f64, seed: u64) -> (f64, f64) {
     let deadline = Deadline::after(Duration::from_secs_f64(seconds));
-    let (config, problem) = (portfolio::Config::default(), Problem::new(&scene.boxes));
+    let (config, problem) = (bvh_search::best::Config::default(), Problem::new(&scene.boxes));
     let outcome = solve(&config, &problem, seed, Budget::default(), &deadline);
     let taken = deadline.elapsed().as_secs_f64();
     let tree = outcome.expect("finite boxes").tree;

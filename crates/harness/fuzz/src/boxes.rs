@@ -4,7 +4,7 @@ use super::bytes::Bytes;
 use bvh_build::{Builder, kd_tree, muller_fellner};
 use bvh_core::cost::{self, SahConstants};
 use bvh_core::{Aabb, Bvh, check_boxes, collapse_leaves, file, validate};
-use bvh_search::{Budget, Method, Problem, SearchError, lower_bound, optimize, portfolio, solve};
+use bvh_search::{Budget, Method, Problem, SearchError, best, lower_bound, optimize, solve};
 use harness::stress::EXACT_OBJECTS;
 use harness::stress::examine::{ROUNDING, check_outcome};
 
@@ -54,7 +54,7 @@ fn refused(boxes: &[Aabb], bad: usize, seed: u64, budget: Budget) {
     named("check", check_boxes(boxes).unwrap_err().to_string());
     named("KD-tree", kd_tree::Config::default().build(boxes).unwrap_err().to_string());
     named("bound", lower_bound::internal_area(boxes, 1).unwrap_err().to_string());
-    let config = portfolio::Config::default();
+    let config = best::Config::default();
     let tree = Bvh::default();
     named("optimize", optimize(&tree, boxes, &config, seed, budget, &()).unwrap_err().to_string());
 }
@@ -85,7 +85,7 @@ fn built(boxes: &[Aabb], seed: u64, budget: Budget) {
     let before = cost::internal_area(&greedy);
     let merged = collapse_leaves(&greedy, &SahConstants::default());
     for tree in [&greedy, &merged] {
-        let better = optimize(tree, boxes, &portfolio::Config::default(), seed, budget, &()).unwrap();
+        let better = optimize(tree, boxes, &best::Config::default(), seed, budget, &()).unwrap();
         validate(&better.tree, boxes).unwrap();
         assert!(better.cost <= before * (1.0 + ROUNDING));
     }

@@ -10,7 +10,8 @@ use crate::scenes::Scene;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost;
 use bvh_core::file::{self, Header, Origin};
-use bvh_search::{Budget, Event, Method, Observer, Outcome, Problem, StopReason, optimize, portfolio, solve};
+use bvh_search::best::{self, Horizon};
+use bvh_search::{Budget, Event, Method, Observer, Outcome, Problem, StopReason, optimize, solve};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
@@ -140,12 +141,9 @@ fn method(args: &BakeArgs) -> Result<Method, Error> {
             let accepted = Method::NAMES.join(", ");
             Err(Error::Usage(format!("--method {}: no such method; accepted: {accepted}", args.method)))
         }
-        Some(Method::Best(config)) if matches!(args.budget, Effort::Time(_)) => {
-            // The budget says when to end; generations grow until then.
-            Ok(Method::Best(portfolio::Config { work_per_object: u64::from(u32::MAX), ..config }))
-        }
         Some(Method::Best(config)) => {
-            Ok(Method::Best(portfolio::Config { work_per_object: u64::MAX, ..config }))
+            // The budget says when to end, whatever the method's own limit.
+            Ok(Method::Best(best::Config { horizon: Some(Horizon::Known), ..config }))
         }
         Some(_) if args.from.is_some() => {
             Err(Error::Usage(format!("--method {} cannot go on --from a tree; accepted: {BEST}", args.method)))

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::run::resolved::load_scenes;
 use crate::scenes::{Primitives, Scene};
 use crate::spec::Experiment;
-use bvh_search::omission::Facts;
+use bvh_search::shortcuts::Facts;
 
 /// What is left out of an experiment, scene by scene, and what it will run.
 pub fn experiment(experiment: &Experiment) -> Result<String, Error> {
@@ -46,7 +46,7 @@ pub fn scene(scene: &Scene) -> Result<String, Error> {
     };
     let size = facts.bounds.max - facts.bounds.min;
     let mut text = format!("{} ({}): {} {kind} within {size}\n", scene.name, scene.kind, facts.objects);
-    for (_, why) in facts.omissions() {
+    for (_, why) in facts.shortcuts() {
         text += &format!("  left out: {why}\n");
     }
     text += &format!("  left out: tests of anything but {kind}: there is a traversal for these alone\n");

@@ -103,8 +103,11 @@ fn solve_or_build(
     let Job { scene, labelled, .. } = *job;
     match &labelled.method {
         Contestant::Ours(method) => {
-            let problem =
-                Problem { objective: experiment.objective, keep: &labelled.keep, ..Problem::new(&scene.boxes) };
+            let problem = Problem {
+                objective: experiment.objective,
+                disabled: &labelled.keep,
+                ..Problem::new(&scene.boxes)
+            };
             let outcome = solve(method, &problem, seed, experiment.budget_of(labelled), stopwatch);
             let seconds = stopwatch.start.elapsed().as_secs_f64();
             Ok((outcome.map_err(Error::search(&scene.name, &labelled.label))?, seconds))

@@ -2,7 +2,7 @@
 
 use super::fault::{self, Fault};
 use crate::peers::Peer;
-use bvh_search::{Budget, Method, Omission};
+use bvh_search::{Budget, Method, Shortcut};
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::{Table, Value};
 
@@ -17,7 +17,7 @@ pub struct Labelled {
     /// Limits of its runs besides the experiment's: the lower of both counts. Default none.
     pub budget: Option<Budget>,
     /// What its runs do although the scene does not need it, to measure what leaving it out saves. Default nothing.
-    pub keep: Vec<Omission>,
+    pub keep: Vec<Shortcut>,
     /// Label whose seeds its runs have, for methods that are to differ in nothing else. Default its own.
     pub seed_as: Option<String>,
 }
@@ -38,7 +38,7 @@ struct Frame {
     label: Option<String>,
     budget: Option<Budget>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    keep: Vec<Omission>,
+    keep: Vec<Shortcut>,
     seed_as: Option<String>,
 }
 

@@ -1,0 +1,17 @@
+//! Simulated annealing of trees: one schedule for every kind of move.
+//!
+//! From the ground up: a [`Mover`] makes one Metropolis move ([`metropolis`]), beginning at a node drawn by
+//! [`node_sampler`]; [`subtrees`] cuts the tree, so that several threads can move at once; [`schedule`] lowers the
+//! temperature. [`single`] and [`ruin_recreate`] are the two kinds of moves, each a method of its own.
+
+mod metropolis;
+mod node_sampler;
+pub mod ruin_recreate;
+pub(crate) mod schedule;
+mod side;
+mod single;
+mod subtrees;
+
+pub(crate) use metropolis::{Mover, cool};
+pub(crate) use single::SingleMover;
+pub use single::{Config, SingleMove, Target};

@@ -1,0 +1,158 @@
+//! Where moves begin: most often below large nodes, where there is most to gain.
+
+use crate::run::Stream;
+use crate::tree::{ANCHOR, Working};
+use crate::tuning::{LEAST_WINDOWS, MOVES_PER_WINDOW, SHORT_RUN, WINDOW, WINDOW_OF_SHORT_RUNS};
+use rand::RngExt;
+use std::ops::Range;
+
+/// Draws nodes of a tree in preorder, each in proportion to the square root of its parent's area at the first draw.
+/// Weighting by the node's own area would never draw degenerate boxes; equal weights would waste moves on tiny nodes.
+///
+/// In large trees, consecutive draws come from one *window* of the nodes, which are neighbours in the tree, so that moves
+/// find their nodes in a cache. The golden section of the whole leads from one window to the next: it comes everywhere
+/// about equally often, however few windows there are.
+#[derive(Debug, Default)]
+pub(crate) struct NodeSampler {
+    /// The only nodes that are drawn; all nodes if empty.
+    only: Vec<u32>,
+    /// Prefix sums of the weights, by position, the total last.
+    sums: Vec<f64>,
+    /// The present window, by position.
+    window: Range<usize>,
+    /// The fraction of the total weight at which the window's middle was drawn, 0 to 1.
+    middle: f64,
+    /// Whether the run is so short that small windows would not cover the tree.
+    short_run: bool,
+    /// Draws left in this window.
+    draws: u32,
+}
+
+/// The golden section.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+impl NodeSampler {
+    /// For a run of this much work per object.
+    pub fn for_work(per_object: f64) -> Self {
+        Self { short_run: per_object < SHORT_RUN, ..Self::default() }
+    }
+
+    /// Draws only these nodes, unless there are none.
+    pub fn among(only: Vec<u32>) -> Self {
+        Self { only, ..Self::default() }
+    }
+
+    /// Draws a node of the tree, which must have the same nodes as at the first draw.
+    #[inline(always)]
+    pub fn draw(&mut self, tree: &Working, rng: &mut Stream) -> u32 {
+        if self.draws == 0 {
+            self.next_window(tree, rng);
+        }
+        self.draws -= 1;
+        self.node(self.position(self.window.clone(), rng.random()))
+    }
+
+    /// The node at this position.
+    #[inline(always)]
+    fn node(&self, position: usize) -> u32 {
+        self.only.get(position).map_or(position as u32 + 1, |&node| node)
+    }
+
+    /// The position in the window at which the fraction `drawn` of its weight is reached.
+    #[inline(always)]
+    fn position(&self, window: Range<usize>, drawn: f64) -> usize {
+        let [low, high] = [window.start, window.end].map(|at| self.sums[at]);
+        let drawn = low + drawn * (high - low);
+        let before = self.sums[window.start + 1..window.end].partition_point(|&sum| sum <= drawn);
+        window.start + before
+    }
+
+    /// Chooses the next window.
+    #[inline(never)]
+    fn next_window(&mut self, tree: &Working, rng: &mut Stream) {
+        if self.sums.is_empty() {
+            self.weigh(tree);
+            self.middle = rng.random();
+        }
+        let all = self.sums.len() - 1;
+        (self.window, self.draws) = (0..all, u32::MAX);
+        let reach = if self.short_run { WINDOW_OF_SHORT_RUNS * WINDOW } else { WINDOW };
+        if all >= LEAST_WINDOWS * reach {
+            self.middle = (self.middle + GOLDEN).fract();
+            let middle = self.position(0..all, self.middle);
+            (self.window, self.draws) =
+                (middle.saturating_sub(reach)..(middle + reach).min(all), MOVES_PER_WINDOW);
+        }
+    }
+
+    /// Sums up the weights. O(n).
+    fn weigh(&mut self, tree: &Working) {
+        let all = if self.only.is_empty() { tree.nodes.len() - 1 } else { self.only.len() };
+        self.sums.reserve(all + 1);
+        let mut sum = 0.0;
+        self.sums.push(sum);
+        for position in 0..all {
+            sum += weight(tree, self.node(position));
+            self.sums.push(sum);
+        }
+    }
+}
+
+/// The weight of a node: the square root of its parent's area, or of the root's own. The tiny summand makes all nodes equally
+/// likely where none has an area.
+#[inline(always)]
+pub(crate) fn weight(tree: &Working, at: u32) -> f64 {
+    let parent = tree.nodes[at as usize].parent;
+    tree.nodes[if parent == ANCHOR { at } else { parent } as usize].area.sqrt() + f64::MIN_POSITIVE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::stream;
+    use crate::scatter::{built, scatter};
+    use bvh_build::muller_fellner;
+    use bvh_core::Aabb;
+
+    /// How often each node was drawn.
+    fn drawn(sampler: &mut NodeSampler, tree: &Working, times: u32) -> Vec<u32> {
+        let (mut counts, mut rng) = (vec![0; tree.nodes.len()], stream(6, 0));
+        (0..times).for_each(|_| counts[sampler.draw(tree, &mut rng) as usize] += 1);
+        counts
+    }
+
+    #[test]
+    fn nodes_are_drawn_by_the_square_root_of_their_parents_area() {
+        let tree = built(&muller_fellner::Config::default(), &scatter(50));
+        for only in [vec![], vec![7, 3, 60, 12]] {
+            let nodes: Vec<u32> = if only.is_empty() { (1..100).collect() } else { only.clone() };
+            let weight = |&at: &u32| {
+                let parent = tree.nodes[at as usize].parent;
+                tree.nodes[if parent == ANCHOR { at } else { parent } as usize].area.sqrt()
+            };
+            let (total, times) = (nodes.iter().map(weight).sum::<f64>(), 400_000);
+            let counts = drawn(&mut NodeSampler::among(only), &tree, times);
+            assert_eq!(counts.iter().sum::<u32>(), nodes.iter().map(|&at| counts[at as usize]).sum());
+            for at in nodes {
+                let expected = f64::from(times) * weight(&at) / total;
+                let off = (f64::from(counts[at as usize]) - expected).abs();
+                assert!(off < 5.0 * expected.sqrt(), "node {at}: {} of {expected}", counts[at as usize]);
+            }
+        }
+    }
+
+    #[test]
+    fn every_part_of_a_large_tree_is_drawn_from_at_some_time() {
+        let tree = built(&muller_fellner::Config::default(), &scatter(40_000));
+        let counts = drawn(&mut NodeSampler::default(), &tree, 2_000_000);
+        assert!(counts[1..].chunks(512).all(|part| part.iter().sum::<u32>() > 0));
+    }
+
+    #[test]
+    fn nodes_without_area_are_equally_likely() {
+        let points: Vec<Aabb> = (0..50).map(|_| Aabb::from(([1.0; 3], [1.0; 3]))).collect();
+        let tree = built(&muller_fellner::Config::default(), &points);
+        let counts = drawn(&mut NodeSampler::default(), &tree, 100_000);
+        assert!(counts[1..].iter().all(|count| (700..1400).contains(count)), "{counts:?}");
+    }
+}

@@ -1,0 +1,219 @@
+//! Annealed ruin and recreate: take several related subtrees out, put each back where it costs least, and accept the
+//! result as simulated annealing does.
+//!
+//! Schrimpf et al. 2000 (ruin and recreate); Kirkpatrick, Gelatt & Vecchi 1983; Shaw 1998 (related removal).
+//! Temperatures are relative to an area of the move, so that one schedule suits nodes of all sizes.
+
+use super::metropolis::Mover;
+use super::node_sampler::NodeSampler;
+use super::schedule::{AnnealingRun, check_fall};
+use super::side::Side;
+use crate::local::initial::Start;
+use crate::run::{Problem, Run, Search, SearchError, Stream};
+use crate::tree::{ANCHOR, Node, PositionSearch, Scope, Working};
+use bvh_build::config::{Itself, above};
+use bvh_core::Bvh;
+use rand::RngExt;
+use rand::seq::SliceRandom;
+
+bvh_build::config! {
+    /// What to ruin, how to cool, and for how long.
+    pub struct Config {
+        /// The move.
+        ruin: Ruin, in Itself;
+        /// First temperature, relative to the move's `scale`. The default suits 8000 nodes of work per object or more; less
+        /// work needs a lower one, in proportion.
+        hot: f64 = 0.1, in above(0.0);
+        /// Last temperature, not above `hot`.
+        cold: f64 = 0.003, in above(0.0);
+        /// Work per object, unless the budget has less.
+        work_per_object: u64 = 10_000;
+        /// The builder of the initial tree.
+        start: Start, in Itself;
+    }
+    check |config: &Config| check_fall(config.hot, config.cold);
+}
+
+bvh_build::config! {
+    /// A move. Some levels up from a random node, more often one below a large node, is the *top* of the ruined part. Either
+    /// several random descents from there each end at a subtree that is taken out; or everything in a layer at one side of
+    /// the top's box is, without which that box cannot shrink. Then every subtree gets the best position.
+    pub struct Ruin {
+        /// Maximum number of levels from the random node up to the top.
+        climb: u32 = 8, in 1..=u32::MAX - 1;
+        /// Maximum number of subtrees taken out by random descents.
+        removed: u32 = 14, in 1..;
+        /// Fraction of the moves that take out a layer.
+        slabs: f64 = 0.2, in 0.0..=1.0;
+        /// Maximum thickness of the layer, as a fraction of the box.
+        thickness: f64 = 0.6, in 0.0..=1.0;
+        /// Maximum number of subtrees in a layer: with more there is no move.
+        most: u32 = 24, in 1..;
+        /// Fraction of the moves that look for positions nearby only: in the smallest subtree above the top whose box
+        /// contains the top's former box. Better positions are seldom further up, and a quarter more moves fit into the same
+        /// work.
+        near: f64 = 0.6, in 0.0..=1.0;
+        /// What temperatures are relative to.
+        scale: Scale = Scale::Saved;
+    }
+}
+
+/// The area that temperatures are relative to, so that one schedule suits nodes of all sizes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum Scale {
+    /// The area that the removal saves.
+    #[default]
+    Saved,
+    /// The area of the top of the ruined part.
+    Top,
+}
+
+impl Search for Config {
+    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+        let Self { hot, cold, work_per_object, .. } = *self;
+        let annealing = AnnealingRun { heat: [hot, cold], work_per_object, start: &self.start };
+        let length = work_per_object.min(run.left().work / problem.boxes.len().max(1) as u64) as f64;
+        annealing.search(|| RuinMover::new(&self.ruin, length), problem, seed, run)
+    }
+}
+
+/// Makes ruin-and-recreate moves.
+#[derive(Debug)]
+pub(crate) struct RuinMover<'a> {
+    ruin: &'a Ruin,
+    sampler: NodeSampler,
+    search: PositionSearch,
+    side: Side,
+    removed: Removed,
+    /// Nodes visited outside of the position search.
+    work: u64,
+}
+
+/// The subtrees that a move has taken out.
+#[derive(Debug, Default)]
+struct Removed {
+    /// Roots of the subtrees, each with its former sibling.
+    roots: Vec<(u32, u32)>,
+    /// The area that their removal saves.
+    saved: f64,
+    /// The total area of the roots: a lower bound of the cost of their new positions.
+    least: f64,
+}
+
+impl Removed {
+    fn clear(&mut self) {
+        self.roots.clear();
+        (self.saved, self.least) = (0.0, 0.0);
+    }
+
+    /// Takes a subtree out. Returns the number of nodes visited.
+    #[inline(always)]
+    fn take(&mut self, tree: &mut Working, node: u32) -> u64 {
+        let (saved, sibling, visits) = tree.detach(node);
+        self.saved += saved;
+        self.least += tree.nodes[node as usize].area;
+        self.roots.push((node, sibling));
+        visits
+    }
+}
+
+impl<'a> RuinMover<'a> {
+    /// For an annealing run of this much work per object.
+    pub fn new(ruin: &'a Ruin, length: f64) -> Self {
+        let (search, side, removed) = Default::default();
+        Self { ruin, sampler: NodeSampler::for_work(length), search, side, removed, work: 0 }
+    }
+
+    /// Takes scattered subtrees out of the scope, up to one level further down than the move has climbed. The scope keeps
+    /// a root.
+    #[inline(always)]
+    fn scattered(&mut self, tree: &mut Working, scope: Scope, levels: u32, rng: &mut Stream) {
+        for _ in 0..rng.random_range(1..=self.ruin.removed) {
+            let mut node = scope.root(tree);
+            if tree.nodes[node as usize].is_leaf() {
+                break;
+            }
+            for _ in 0..rng.random_range(1..=levels + 1) {
+                if tree.nodes[node as usize].is_leaf() {
+                    break;
+                }
+                node = tree.nodes[node as usize].children[usize::from(rng.random::<bool>())];
+            }
+            self.work += self.removed.take(tree, node);
+        }
+    }
+
+    /// Takes a layer at one side of the scope's box out, but leaves the scope a root.
+    #[inline(always)]
+    fn layer(&mut self, tree: &mut Working, scope: Scope, rng: &mut Stream) {
+        let Ruin { thickness, most, .. } = *self.ruin;
+        let top = scope.root(tree);
+        if tree.nodes[top as usize].is_leaf() {
+            return;
+        }
+        self.work += self.side.find(tree, top, thickness, most as usize, rng);
+        for &node in &self.side.roots {
+            if scope.root(tree) != node {
+                self.work += self.removed.take(tree, node);
+            }
+        }
+    }
+}
+
+impl Mover for RuinMover<'_> {
+    fn work(&self) -> u64 {
+        self.work + self.search.visits
+    }
+
+    fn sampler(&mut self) -> &mut NodeSampler {
+        &mut self.sampler
+    }
+
+    #[inline(always)]
+    fn step(&mut self, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
+        let ruin = self.ruin;
+        let mut top = self.sampler.draw(tree, rng);
+        let levels = rng.random_range(1..=ruin.climb);
+        let mut above = tree.nodes[top as usize].parent;
+        for _ in 0..levels {
+            if above == ANCHOR {
+                break;
+            }
+            top = above;
+            above = tree.nodes[top as usize].parent;
+        }
+        let scope = Scope::of(tree, above, top);
+        let Node { aabb: top_box, area: top_area, .. } = tree.nodes[top as usize];
+        tree.begin();
+        self.removed.clear();
+        if rng.random::<f64>() < ruin.slabs {
+            self.layer(tree, scope, rng);
+        } else {
+            self.scattered(tree, scope, levels, rng);
+        }
+        let near = rng.random::<f64>() < ruin.near;
+        let positions = if near { scope.around(tree, &top_box) } else { Scope::ALL };
+        let Removed { roots, saved, least } = &mut self.removed;
+        roots.shuffle(rng);
+        // Metropolis draws its random number first: a move that leads above the resulting limit need not be finished.
+        let chance = 1.0 - rng.random::<f64>();
+        let scale = match ruin.scale {
+            Scale::Saved => *saved,
+            Scale::Top => top_area,
+        };
+        let mut limit = *saved - temperature * scale * libm::log(chance) - *least;
+        for &(node, first) in &*roots {
+            let item = &tree.nodes[node as usize];
+            let (aabb, area) = (item.aabb, item.area);
+            limit += area;
+            let Some(position) = self.search.detached(tree, positions, (&aabb, area), first, limit) else {
+                tree.undo();
+                return false;
+            };
+            self.work += tree.attach(node, position.beside).1;
+            limit -= position.cost;
+        }
+        true
+    }
+}

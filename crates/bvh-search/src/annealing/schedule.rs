@@ -1,0 +1,189 @@
+//! Simulated annealing of a tree by any kind of move: rounds, temperatures, and the final local search.
+//!
+//! Kirkpatrick, Gelatt & Vecchi 1983. The temperature falls geometrically with the fraction of the work, or of the time,
+//! that is done:
+//!
+//! ```text
+//!   hot ┐
+//!       └──┐                       one step per round: the nodes are sorted, then every subtree and
+//!          └────┐                  the whole tree are moved while the temperature falls further
+//!               └─────────┐
+//!   cold                  └─────── passes of reinsertion to a local optimum
+//! ```
+
+use super::metropolis::Mover;
+use super::subtrees;
+use crate::local::incumbent::Incumbent;
+use crate::local::initial::Start;
+use crate::run::{Observer, Problem, Quota, Run, SearchError, Tally};
+use crate::tree::Working;
+use crate::tuning::{FINAL_PASSES_PART, FINAL_PASSES_WORK, LAST_ROUND, ROUNDS, WORK_PER_ROUND};
+use bvh_build::OutOfRange;
+use bvh_core::Bvh;
+
+/// The temperatures of one annealing run, and how long it lasts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Schedule {
+    /// First temperature.
+    pub hot: f64,
+    /// Last temperature.
+    pub cold: f64,
+    /// The work over which the temperature falls, and the maximum number of moves.
+    pub quota: Quota,
+    /// The observer's progress at which the run has to be done, if the observer reports any; greater than the progress at
+    /// the beginning.
+    pub end: f64,
+    /// Number of subtrees that are annealed at once, at least 1.
+    pub subtrees: u32,
+}
+
+/// A search that consists of one annealing run.
+pub(crate) struct AnnealingRun<'a> {
+    /// First and last temperature.
+    pub heat: [f64; 2],
+    pub work_per_object: u64,
+    pub start: &'a Start,
+}
+
+impl AnnealingRun<'_> {
+    /// Anneals the initial tree by moves of one kind, until the work of the run or the budget is done.
+    pub fn search<M: Mover>(
+        &self,
+        mover: impl Fn() -> M + Sync,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Result<Bvh, SearchError> {
+        let [hot, cold] = self.heat;
+        let (mut best, mut tree) = Incumbent::build(self.start, problem, run)?;
+        let quota = run.left().at_most(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
+        let (schedule, observer) = (Schedule { hot, cold, quota, end: 1.0, subtrees: 1 }, run.observer());
+        anneal(mover, &schedule, &mut tree, [seed, 0], observer, &mut |tree, tally| {
+            run.count(tally);
+            best.offer(tree, run);
+        });
+        Ok(best.tree)
+    }
+}
+
+/// Refuses a last temperature above the first.
+pub(crate) fn check_fall(hot: f64, cold: f64) -> Result<(), OutOfRange> {
+    if cold <= hot { Ok(()) } else { Err(OutOfRange::new("cold", cold, "above 0, not above hot")) }
+}
+
+/// Anneals `tree`, then improves it to a local optimum of reinsertion. After every round, `round` is shown the tree and the
+/// work since the previous call. Every round has its own random stream of `seed`, and so has every subtree of a round,
+/// from stream `first` on.
+///
+/// If the observer reports its progress, the temperature follows the work or the time, whichever is nearer to its end.
+pub(crate) fn anneal<M: Mover>(
+    mover: impl Fn() -> M + Sync,
+    schedule: &Schedule,
+    tree: &mut Working,
+    [seed, first]: [u64; 2],
+    observer: &dyn Observer,
+    round: &mut dyn FnMut(&Working, Tally),
+) {
+    let (n, Quota { work, moves }) = (tree.objects() as u64, schedule.quota);
+    if n < 3 {
+        return;
+    }
+    let final_passes = FINAL_PASSES_WORK.saturating_mul(n);
+    let work = work - (work / FINAL_PASSES_PART).min(final_passes);
+    let (mut done, mut streams) = (Tally::default(), first);
+    let factor = schedule.cold / schedule.hot;
+    let temperature = |fraction: f64| schedule.hot * libm::pow(factor, fraction.min(1.0));
+    let began = observer.progress();
+    let [short, long] = WORK_PER_ROUND.map(|work| work * n);
+    let mut next = (work / ROUNDS).clamp(short, long).min(work);
+    if began.is_some() {
+        next = next.min(short);
+    }
+    // The fraction of the work or time that is done, and the fraction per unit of work.
+    let (mut fraction, mut rate) = (0.0, 1.0 / work as f64);
+    tree.sort_in_preorder();
+    while fraction < 1.0 {
+        let step = rate * next as f64;
+        let heat = [fraction, fraction + step].map(temperature);
+        let is_last = began.is_none() && fraction + LAST_ROUND * step >= 1.0;
+        let end = if is_last { work } else { work.min(done.work + next) };
+        let quota = Quota { work: end, moves }.less(&done);
+        let tally = subtrees::cool(&mover, tree, heat, quota, schedule.subtrees, [seed, streams], observer);
+        streams += subtrees::STREAMS;
+        done += tally;
+        round(tree, tally);
+        if observer.cancelled() || schedule.quota.is_reached(&done) {
+            return;
+        }
+        fraction = done.work as f64 / work as f64;
+        if let (Some(began), Some(now)) = (began, observer.progress()) {
+            let passed = (now - began) / (schedule.end - began);
+            let per_node = passed / done.work as f64;
+            let kept = (per_node * final_passes as f64).min(1.0 / FINAL_PASSES_PART as f64);
+            let timed = passed / (1.0 - kept);
+            if timed > fraction {
+                (fraction, rate) = (timed, timed / done.work as f64);
+                next = ((1.0 / ROUNDS as f64 / rate) as u64).clamp(short, long);
+            }
+        }
+    }
+    let tally = subtrees::to_local_optimum(tree, schedule.subtrees, schedule.quota.less(&done), observer);
+    round(tree, tally);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::annealing::node_sampler::NodeSampler;
+    use crate::annealing::{ruin_recreate, single};
+    use crate::run::Stream;
+    use crate::scatter::{built, scatter};
+    use bvh_build::muller_fellner;
+    use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+    /// Counts the moves of another mover, and checks the tree after every one.
+    struct Checked<'a, M> {
+        inner: M,
+        moves: &'a AtomicU64,
+    }
+
+    impl<M: Mover> Mover for Checked<'_, M> {
+        fn step(&mut self, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
+            let before = tree.area();
+            let kept = self.inner.step(tree, temperature, rng);
+            let area = tree.internal_area();
+            let number = self.moves.fetch_add(1, Relaxed);
+            assert!((tree.area() - area).abs() <= 1e-12 * area, "move {number}");
+            assert!(kept || (tree.area() - before).abs() <= 1e-12 * before);
+            kept
+        }
+        fn work(&self) -> u64 {
+            self.inner.work()
+        }
+        fn sampler(&mut self) -> &mut NodeSampler {
+            self.inner.sampler()
+        }
+    }
+
+    fn check<M: Mover>(inner: impl Fn() -> M + Sync) {
+        let boxes = scatter(60);
+        let mut tree = built(&muller_fellner::Config::default(), &boxes);
+        let quota = Quota { moves: 300_000, work: u64::MAX / 1024 };
+        let schedule = Schedule { hot: 0.5, cold: 0.4, quota, end: 1.0, subtrees: 1 };
+        let moves = AtomicU64::new(0);
+        let mover = || Checked { inner: inner(), moves: &moves };
+        anneal(mover, &schedule, &mut tree, [1, 0], &(), &mut |_, _| ());
+        assert_eq!(moves.into_inner(), 300_000);
+        bvh_core::validate(&tree.to_bvh(), &boxes).unwrap();
+    }
+
+    #[test]
+    fn areas_stay_exact_after_each_of_a_million_annealed_moves() {
+        let ruin = ruin_recreate::Ruin::default();
+        check(|| ruin_recreate::RuinMover::new(&ruin, 1000.0));
+        for target in [single::Target::Random, single::Target::Best] {
+            let step = single::SingleMove { target, ..Default::default() };
+            check(|| single::SingleMover::new(&step));
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! Simulated annealing on single reinsertions: move one subtree to another position nearby, for better or for worse.
+//!
+//! Kirkpatrick, Gelatt & Vecchi 1983; Kensler 2008 anneals rotations, which are reinsertions over one or two levels.
+//! Temperatures are relative to the area that the removal of the subtree saves, so that one schedule suits nodes of all
+//! sizes.
+
+use super::metropolis::Mover;
+use super::node_sampler::NodeSampler;
+use super::schedule::{AnnealingRun, check_fall};
+use crate::local::initial::Start;
+use crate::run::{Problem, Run, Search, SearchError, Stream};
+use crate::tree::{ANCHOR, Working};
+use bvh_build::config::{Itself, above};
+use bvh_build::{Check, OutOfRange};
+use bvh_core::{Bvh, PackedAabb};
+use rand::RngExt;
+
+bvh_build::config! {
+    /// What to move where, how to cool, and for how long.
+    pub struct Config {
+        /// The move; `move` in specs.
+        #[cfg_attr(feature = "serde", serde(rename = "move"))]
+        step: SingleMove;
+        /// First temperature, relative to the area saved by the removal.
+        hot: f64 = 0.3, in above(0.0);
+        /// Last temperature, not above `hot`.
+        cold: f64 = 0.003, in above(0.0);
+        /// Work per object, unless the budget has less.
+        work_per_object: u64 = 10_000;
+        /// The builder of the initial tree.
+        start: Start, in Itself;
+    }
+    check Self::check_together;
+}
+
+bvh_build::config! {
+    /// A move: a random subtree, more often one below a large node, is taken out of the tree and placed again, not more than
+    /// some levels up from where it was.
+    pub struct SingleMove {
+        /// Maximum number of levels up.
+        climb: u32 = 12, in 1..=u32::MAX - 1;
+        /// Which position below the top of the climb the subtree gets.
+        target: Target = Target::Best;
+    }
+}
+
+impl Config {
+    fn check_together(&self) -> Result<(), OutOfRange> {
+        self.step.check().map_err(|error| error.below("move"))?;
+        check_fall(self.hot, self.cold)
+    }
+}
+
+/// Which position a subtree gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum Target {
+    /// The end of a random descent from the top, of at most one level more than the climb.
+    Random,
+    /// The best of all positions except its previous one.
+    Best,
+}
+
+impl Search for Config {
+    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+        let Self { hot, cold, work_per_object, .. } = *self;
+        let annealing = AnnealingRun { heat: [hot, cold], work_per_object, start: &self.start };
+        annealing.search(|| SingleMover::new(&self.step), problem, seed, run)
+    }
+}
+
+/// Moves one subtree at a time.
+#[derive(Debug)]
+pub(crate) struct SingleMover<'a> {
+    config: &'a SingleMove,
+    sampler: NodeSampler,
+    /// Inner nodes whose children remain to be examined, each with the growth of the node and of all its ancestors up to the
+    /// top.
+    stack: Vec<(u32, f64)>,
+    work: u64,
+}
+
+impl<'a> SingleMover<'a> {
+    pub fn new(config: &'a SingleMove) -> Self {
+        Self { config, sampler: NodeSampler::default(), stack: Vec::new(), work: 0 }
+    }
+
+    /// The cheapest position below `top`, or beside it, for a detached item, except beside `sibling`; `None` if none costs
+    /// less than `limit`. The growth above the top is not counted.
+    ///
+    /// An exact branch and bound like [`PositionSearch`](crate::tree::PositionSearch), which cannot replace it: that one
+    /// begins at the sibling and visits nodes in another order, so that its work, and with it every result, differs.
+    #[inline(always)]
+    fn best(
+        &mut self,
+        tree: &Working,
+        (aabb, area): (&PackedAabb, f64),
+        [top, sibling]: [u32; 2],
+        limit: f64,
+    ) -> Option<u32> {
+        let (mut best, mut least) = (None, limit);
+        let mut visits = 1;
+        let mut look = |at: u32, growth: f64, least: &mut f64, stack: &mut Vec<(u32, f64)>| {
+            let node = &tree.nodes[at as usize];
+            let cost = growth + node.aabb.union(aabb).half_area();
+            if cost < *least && at != sibling {
+                *least = cost;
+                best = Some(at);
+            }
+            let growth = cost - node.area;
+            if !node.is_leaf() && growth + area < *least {
+                stack.push((at, growth));
+            }
+        };
+        look(top, 0.0, &mut least, &mut self.stack);
+        while let Some((at, growth)) = self.stack.pop() {
+            if growth + area < least {
+                visits += 2;
+                for child in tree.nodes[at as usize].children {
+                    look(child, growth, &mut least, &mut self.stack);
+                }
+            }
+        }
+        self.work += visits;
+        best
+    }
+}
+
+impl Mover for SingleMover<'_> {
+    fn work(&self) -> u64 {
+        self.work
+    }
+
+    fn sampler(&mut self) -> &mut NodeSampler {
+        &mut self.sampler
+    }
+
+    #[inline(always)]
+    fn step(&mut self, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
+        self.work += 1;
+        let node = self.sampler.draw(tree, rng);
+        if tree.nodes[node as usize].parent == ANCHOR {
+            return false;
+        }
+        tree.begin();
+        let (saved, sibling, visits) = tree.detach(node);
+        self.work += visits;
+        let levels = rng.random_range(1..=self.config.climb);
+        let mut top = sibling;
+        for _ in 0..levels {
+            let above = tree.nodes[top as usize].parent;
+            if above == ANCHOR {
+                break;
+            }
+            top = above;
+        }
+        // Metropolis draws its random number first: positions above the resulting limit need not be examined.
+        let chance = 1.0 - rng.random::<f64>();
+        let limit = saved * (1.0 - temperature * libm::log(chance));
+        let target = match self.config.target {
+            Target::Random => {
+                let mut at = top;
+                for _ in 0..rng.random_range(0..=levels + 1) {
+                    if tree.nodes[at as usize].is_leaf() {
+                        break;
+                    }
+                    at = tree.nodes[at as usize].children[usize::from(rng.random::<bool>())];
+                    self.work += 1;
+                }
+                Some(at).filter(|&at| at != sibling)
+            }
+            Target::Best => {
+                let item = &tree.nodes[node as usize];
+                let (aabb, area) = (item.aabb, item.area);
+                self.best(tree, (&aabb, area), [top, sibling], limit)
+            }
+        };
+        let accepted = target.is_some_and(|target| {
+            let (added, visits) = tree.attach(node, target);
+            self.work += visits;
+            added < limit
+        });
+        if !accepted {
+            tree.undo();
+        }
+        accepted
+    }
+}

@@ -1,0 +1,167 @@
+//! From an initial tree to the end of the budget: annealing runs, each recombined with the incumbent.
+
+use super::config::{Config, Horizon};
+use super::plan::{Planned, plan};
+use super::recombine::recombine;
+use crate::annealing::cool;
+use crate::annealing::ruin_recreate::RuinMover;
+use crate::annealing::schedule::{Schedule, anneal};
+use crate::local::incumbent::Incumbent;
+use crate::local::reinsertion;
+use crate::parallel::threads;
+use crate::run::{Observer, Quota, Run, Stream, Tally, stream};
+use crate::tree::Working;
+use crate::tuning::{
+    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, SUBTREES_PER_THREAD, WORTH_AN_EVENT, WORTH_SUBTREES,
+};
+
+/// Improves the incumbent, whose working form is `tree`, until the work is done or the time is over.
+pub(crate) fn improve(config: &Config, tree: &mut Working, seed: u64, best: &mut Incumbent, run: &mut Run) {
+    let n = tree.objects() as u64;
+    if n < 3 {
+        return;
+    }
+    let (horizon, work) = config.horizon(n, run);
+    let mut search = Improvement { config, seed, n, left: work, best, run };
+    match horizon {
+        Horizon::Known => search.until_known_end(tree),
+        Horizon::Open => search.until_stopped(tree),
+    }
+}
+
+/// A search under way.
+struct Improvement<'a, 'p, 'r> {
+    config: &'a Config,
+    seed: u64,
+    /// Number of objects.
+    n: u64,
+    /// The work that is left.
+    left: u64,
+    best: &'a mut Incumbent<'p>,
+    run: &'a mut Run<'r>,
+}
+
+impl Improvement<'_, '_, '_> {
+    /// The plan of annealing runs, each due at a fraction of the work or of the time.
+    fn until_known_end(&mut self, tree: &mut Working) {
+        let (n, observer) = (self.n, self.run.observer());
+        let timed = observer.progress().is_some();
+        let mut length = self.left as f64 / n as f64;
+        // The progress at which to be done, so that there is time for the conversion.
+        let mut end_of_all = 1.0;
+        if timed {
+            let quota = self.run.left().at_most(self.left.min(PROBE * n));
+            let (tally, in_time) = self.probe(tree, stream(self.seed, 0), quota);
+            self.left = self.left.saturating_sub(tally.work);
+            self.run.count(tally);
+            let now = observer.progress().unwrap_or(1.0);
+            end_of_all = 1.0 - (1.0 - now) * (FINISH_WORK * n as f64 / in_time).min(FINISH_AT_MOST);
+            length = length.min(in_time / n as f64);
+        }
+        let (all, began) = (self.left, observer.progress().unwrap_or(0.0));
+        let (plan, each) = plan(self.config, length, n);
+        for (number, Planned { hot, until }) in (0..).zip(plan) {
+            let due = (until * all as f64) as u64;
+            let work = if timed { self.left } else { self.left.min(due.saturating_sub(all - self.left)) };
+            let end = began + (end_of_all - began) * until;
+            if observer.progress().is_some_and(|now| now >= end) {
+                continue;
+            }
+            let schedule = self.schedule(hot, work, end, length);
+            let first = number == 0;
+            self.anneal(tree, number, (&schedule, each), first);
+        }
+    }
+
+    /// A local optimum, then generations of growing length.
+    fn until_stopped(&mut self, tree: &mut Working) {
+        self.best.improve(tree, u32::MAX, self.run, |tree, _, quota, observer| {
+            reinsertion::pass_by_area(tree, quota, observer)
+        });
+        let mut length = self.config.first;
+        for number in 0..MOST_GENERATIONS {
+            let work = self.left.min((length * self.n as f64) as u64);
+            let schedule = self.schedule(self.config.hot(length), work, 1.0, length);
+            self.anneal(tree, number, (&schedule, length), false);
+            length *= self.config.growth;
+        }
+    }
+
+    /// The schedule of an annealing run; `length` is the work per object of the whole search, or of the generation.
+    fn schedule(&self, hot: f64, work: u64, end: f64, length: f64) -> Schedule {
+        let timed = self.run.observer().progress().is_some();
+        let by_threads = self.config.pieces == 0 && timed && length >= WORTH_SUBTREES && threads() > 1;
+        let subtrees = if by_threads {
+            (SUBTREES_PER_THREAD * threads().min(1024)) as u32
+        } else {
+            self.config.pieces.max(1)
+        };
+        let Config { cold, .. } = *self.config;
+        Schedule { hot: hot.max(cold), cold, quota: self.run.left().at_most(work), end, subtrees }
+    }
+
+    /// One annealing run from `tree`, which is recombined with the result. The `first` run of a plan, though, replaces
+    /// the tree if it ends better; and if it does not and there is a clock, there was no time for anything, nor is there
+    /// any for recombination.
+    fn anneal(&mut self, tree: &mut Working, number: u64, (schedule, length): (&Schedule, f64), first: bool) {
+        if self.run.stopped().is_some() || schedule.quota.work == 0 {
+            return;
+        }
+        let observer: &dyn Observer = &Until { observer: self.run.observer(), end: schedule.end };
+        let (mut annealed, mut done) = (tree.clone(), Tally::default());
+        // Every run has room for 2⁴⁰ random streams: those of 2¹⁶ rounds. Stream 0 is the probe's.
+        let streams = [self.seed, 1 + (number << 40)];
+        let ruin = self.config.ruin(length);
+        let (best, run) = (&mut *self.best, &mut *self.run);
+        anneal(
+            || RuinMover::new(&ruin, length),
+            schedule,
+            &mut annealed,
+            streams,
+            observer,
+            &mut |tree, tally| {
+                done += tally;
+                run.count(tally);
+                if tree.area() < best.area() * (1.0 - WORTH_AN_EVENT) {
+                    best.offer(tree, run);
+                }
+            },
+        );
+        if first && annealed.area() < tree.area() {
+            *tree = annealed;
+        } else if !first || observer.progress().is_none() {
+            *tree = recombine(&[tree, &annealed]);
+        }
+        best.offer(tree, run);
+        self.left = self.left.saturating_sub(done.work);
+    }
+
+    /// Moves at the lowest temperature. Also returns the work that fits into the rest of the time at this rate.
+    fn probe(&self, tree: &mut Working, mut rng: Stream, quota: Quota) -> (Tally, f64) {
+        let (observer, heat) = (self.run.observer(), [self.config.cold; 2]);
+        let began = observer.progress();
+        let mut mover = RuinMover::new(&self.config.ruin, PROBE as f64);
+        let tally = cool(&mut mover, tree, heat, quota, &mut rng, observer);
+        let in_time = match (began, observer.progress()) {
+            (Some(began), Some(now)) => tally.work as f64 * (1.0 - now).max(0.0) / (now - began).max(1e-9),
+            _ => f64::INFINITY,
+        };
+        (tally, in_time)
+    }
+}
+
+/// An observer that also cancels at `end`, if that is before all the time has passed.
+struct Until<'a> {
+    observer: &'a dyn Observer,
+    end: f64,
+}
+
+impl Observer for Until<'_> {
+    fn cancelled(&self) -> bool {
+        self.observer.cancelled() || self.progress().is_some_and(|now| now >= self.end)
+    }
+
+    fn progress(&self) -> Option<f64> {
+        self.observer.progress()
+    }
+}

@@ -1,0 +1,75 @@
+//! `best`: the methods that pay, in the order that pays, for any budget.
+//!
+//! Which method ends lowest depends on the time there is, from the few milliseconds of a build to the minutes of a bake:
+//!
+//! ```text
+//!   budget          milliseconds              seconds                    minutes
+//!   ───────────────────────────────────────────────────────────────────────────────────────────►
+//!   initial tree    clustering (PLOC)         top-down division with |L|^0.9
+//!   then            reinsertion of the        ┌─ end known ──────────────────────────────────┐
+//!                   largest nodes, as         │ hot                                          │
+//!                   many as there is          │   \            long annealing run            │
+//!                   time for                  │     \                                        │
+//!                                             │        \      |\   |\   |\    short runs,    │
+//!                                             │             \ | \  | \  | \   each recombined│
+//!                                             │ cold         \|  \ |  \ |  \  with the best  │
+//!                                             ├─ end open ───────────────────────────────────┤
+//!                                             │ local optimum, then generations of doubling  │
+//!                                             │ length:  |\  |_\  |____\  |_________\  ...   │
+//!                                             └──────────────────────────────────────────────┘
+//! ```
+//!
+//! *A few objects.* Where the [exact solver](crate::exact) takes less work than the budget has, its optimum is the answer.
+//!
+//! *Milliseconds* (`small_budget`). A clustering along the Morton curve is the fastest build that is worth starting from.
+//! Reinsertion then begins with the largest nodes, in which most of the area that can be saved lies, and stops when the
+//! time does. If a local optimum comes first, the search goes on as below.
+//!
+//! *The end is known*, from the budget's work or the observer's [progress](crate::Observer::progress). A greedy top-down
+//! division is followed at once by one long run of [annealed ruin and recreate](crate::ruin_recreate): a local search
+//! before it would be forgotten at its first temperature, and at equal work one long run ends lower than several short
+//! ones, one after another or side by side. If there is much to be done, several short runs from a lower temperature
+//! follow. Each loosens everything except the top of the tree and finds other optima, better in some places and worse in
+//! others.
+//!
+//! *The end is open.* Reinsertion to a local optimum, then generations, each annealed from the incumbent and longer than
+//! the one before, so that whenever the search is stopped, a constant fraction of the work has gone into the last
+//! generation.
+//!
+//! *Recombination.* The result of an annealing run is recombined with the incumbent, which keeps every subtree that became
+//! better and drops every subtree that became worse. Only the first run of a known end is not, if it ends better; if it
+//! ends worse under a clock, there was no time to do anything, nor is there any for recombination.
+//!
+//! The numbers that decide between all these are in one table, `tuning.rs`, and in [`Config`].
+
+mod config;
+mod improve;
+mod plan;
+mod recombine;
+mod small_budget;
+
+use crate::exact;
+use crate::local::incumbent::Incumbent;
+use crate::run::{Problem, Run, Search, SearchError};
+use bvh_core::Bvh;
+pub use config::{Config, Horizon};
+pub(crate) use improve::improve;
+use small_budget::SmallBudget;
+
+impl Search for Config {
+    /// Subtrees, if there are several, are annealed in parallel, each with a random stream of its own.
+    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+        let (_, work) = self.horizon(problem.boxes.len() as u64, run);
+        if let Some(optimum) = exact::instead(problem, work, run)? {
+            return Ok(optimum);
+        }
+        let small = if self.start.is_none() { small_budget::search(problem, run)? } else { None };
+        let (mut best, mut tree) = match small {
+            Some(SmallBudget::Tree(tree)) => return Ok(tree),
+            Some(SmallBudget::LocalOptimum(best, tree)) => (best, tree),
+            None => Incumbent::build(&self.start.clone().unwrap_or_default(), problem, run)?,
+        };
+        improve(self, &mut tree, seed, &mut best, run);
+        Ok(best.tree)
+    }
+}

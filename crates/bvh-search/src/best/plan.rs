@@ -1,0 +1,32 @@
+//! The annealing runs of a search whose end is known.
+
+use super::config::Config;
+use crate::tuning::{MOST_GENERATIONS, WORK_PER_PAIR};
+
+/// One annealing run of the plan.
+pub(super) struct Planned {
+    /// Its first temperature.
+    pub hot: f64,
+    /// The fraction of all work, or time, that is over when it ends.
+    pub until: f64,
+}
+
+/// The annealing runs for `length` work per object, and the work per object of each long run with the short ones that
+/// follow it.
+pub(super) fn plan(config: &Config, length: f64, n: u64) -> (Vec<Planned>, f64) {
+    let longest = config.longest.min(WORK_PER_PAIR * n as f64);
+    let equal = (length / longest).ceil().clamp(1.0, MOST_GENERATIONS as f64);
+    let length = length / equal;
+    let hot = config.hot(length);
+    let reheats = if length < config.reheats_from { 0 } else { config.reheats };
+    let kept = if reheats == 0 { 0.0 } else { config.reheated };
+    let mut plan = Vec::new();
+    for number in 0..equal as u64 {
+        for reheat in 0..=reheats {
+            let hot = if reheat == 0 { hot } else { hot.min(config.reheat) };
+            let part = 1.0 - kept + kept * f64::from(reheat) / f64::from(reheats.max(1));
+            plan.push(Planned { hot, until: (number as f64 + part) / equal });
+        }
+    }
+    (plan, length)
+}

@@ -1,0 +1,237 @@
+//! Budgets of milliseconds: clustering along the Morton curve, then reinsertion of the largest nodes while there is time.
+//!
+//! Bittner, Hapala & Havran 2013 first reinsert the nodes that cost most: few nodes near the root have most of the area
+//! that can be saved. With larger budgets, annealing from a top-down division ends lower.
+//!
+//! Time limits are measured in multiples of the time of the Morton sort, which always runs first.
+
+use crate::local::incumbent::Incumbent;
+use crate::local::initial::construction;
+use crate::local::reinsertion::pass;
+use crate::parallel::threads;
+use crate::run::{Observer, Problem, Run, SearchError, Tally};
+use crate::tree::{Linked, Siblings, Working};
+use crate::tuning::{
+    ANNEAL_FROM_TIME, ANNEAL_FROM_WORK, BUILDS, CLUSTERING, COLD_MEMORY, FINISH_TIME, FIRST_PASS, FRONT,
+    MOVES_PER_READING, SAMPLED_FROM, SAMPLED_PART, SAMPLES, SEVERAL_THREADS, TOP_DOWN_BELOW,
+    TWO_STARTS_FROM_TIME, WARM_SAMPLE,
+};
+use bvh_build::Builder;
+use bvh_build::ploc::MortonOrder;
+use bvh_core::{Aabb, Bvh, cost};
+
+/// The result of a small budget.
+pub(super) enum SmallBudget<'p> {
+    /// The budget is used up.
+    Tree(Bvh),
+    /// A local optimum of reinsertion came before the end of the budget: the search can go on.
+    LocalOptimum(Incumbent<'p>, Working),
+}
+
+/// The search for a small budget; `None` if the budget is not small.
+pub(super) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<SmallBudget<'p>>, SearchError> {
+    let (observer, n) = (run.observer(), problem.boxes.len());
+    let (began, work) = (observer.progress(), run.left().work / n.max(1) as u64);
+    if n < 3 || began.is_none() && work >= ANNEAL_FROM_WORK {
+        return Ok(None);
+    }
+    let along = MortonOrder::new(problem.boxes)?;
+    let (mut two_starts, mut end) = (false, f64::INFINITY);
+    if let (Some(began), Some(sorted)) = (began, observer.progress()) {
+        let sort = (sorted - began).max(1e-9);
+        let times = (1.0 - began) / sort;
+        let by_threads = if threads() > 1 { SEVERAL_THREADS } else { 1.0 };
+        let [two_starts_from, annealing_from] =
+            [TWO_STARTS_FROM_TIME, ANNEAL_FROM_TIME].map(|times| times * by_threads);
+        if times >= annealing_from
+            || times >= annealing_from / COLD_MEMORY
+                && (1.0 - began) / warm_sort(problem, observer)? >= annealing_from
+        {
+            return Ok(None);
+        }
+        if let Some((_, config)) = BUILDS.into_iter().find(|(enough, _)| times < *enough) {
+            return Ok(Some(SmallBudget::Tree(
+                Incumbent::begin_unbounded(along.build(&config)?, problem, run).tree,
+            )));
+        }
+        (two_starts, end) = (times >= two_starts_from, 1.0 - FINISH_TIME * sort);
+    }
+    let two_starts = two_starts && top_down_may_be_better(&along, problem, run)?;
+    let (mut start, mut front) = (along.build(&CLUSTERING)?, FRONT);
+    if two_starts {
+        let divided = construction().build(problem.boxes)?;
+        run.count(Tally { moves: 1, kept: 0, work: divided.nodes.len() as u64 });
+        if cost::internal_area(&divided) < cost::internal_area(&start) {
+            (start, front) = (divided, usize::MAX);
+        }
+    }
+    // Under a clock the initial tree is not evaluated: the result is better in any case.
+    let mut before = None;
+    if began.is_none() {
+        before = Some(Incumbent::begin(start.clone(), problem, run));
+    } else {
+        run.count(Tally { moves: 1, kept: 0, work: start.nodes.len() as u64 });
+    }
+    let mut tree = Siblings::new(start);
+    let still = reinsert_largest(&mut tree, front, end, run);
+    let tree = tree.into_tree();
+    let mut best = match before {
+        Some(mut best) => {
+            best.offer_tree(tree, run);
+            best
+        }
+        None => Incumbent::begin_unbounded(tree, problem, run),
+    };
+    if !still {
+        return Ok(Some(SmallBudget::Tree(best.tree)));
+    }
+    if began.is_some() {
+        best.bound(run);
+    }
+    let tree = best.working()?;
+    Ok(Some(SmallBudget::LocalOptimum(best, tree)))
+}
+
+/// Estimates the time of the sort in warm memory, which the steps after it have, as a fraction of all time.
+fn warm_sort(problem: &Problem, observer: &dyn Observer) -> Result<f64, SearchError> {
+    let boxes = &problem.boxes[..problem.boxes.len().div_ceil(WARM_SAMPLE)];
+    let began = observer.progress().unwrap_or(0.0);
+    MortonOrder::new(boxes)?;
+    let took = observer.progress().unwrap_or(0.0) - began;
+    Ok((took * problem.boxes.len() as f64 / boxes.len() as f64).max(1e-9))
+}
+
+/// Whether a top-down build is worth its time: it must be better than clustering on samples of the scene. Takes about a
+/// tenth of its time.
+fn top_down_may_be_better(order: &MortonOrder, problem: &Problem, run: &mut Run) -> Result<bool, SearchError> {
+    let order = along.order();
+    if order.len() < SAMPLED_FROM {
+        return Ok(true);
+    }
+    let (mut divided, mut clustered) = (0.0, 0.0);
+    for stretch in order.chunks(order.len().div_ceil(SAMPLES)) {
+        let objects = &stretch[..stretch.len() / SAMPLED_PART];
+        let boxes: Vec<Aabb> = objects.iter().map(|&object| problem.boxes[object as usize]).collect();
+        divided += cost::internal_area(&construction().build(&boxes)?);
+        clustered += cost::internal_area(&CLUSTERING.build(&boxes)?);
+        run.count(Tally { moves: 2, kept: 0, work: 4 * boxes.len() as u64 });
+    }
+    Ok(divided < TOP_DOWN_BELOW * clustered)
+}
+
+/// Reinserts more and more of the largest nodes, until the observer's progress is at `end` or the run stops. Returns whether
+/// a local optimum came first.
+fn reinsert_largest(tree: &mut Siblings, front: usize, end: f64, run: &mut Run) -> bool {
+    let observer: &dyn Observer = run.observer();
+    let (mut part, mut order) = (FIRST_PASS, Vec::new());
+    loop {
+        largest(tree, part, front, &mut order);
+        let mut kept = 0;
+        for some in order.chunks(MOVES_PER_READING) {
+            if run.stopped().is_some() || observer.progress().is_some_and(|now| now >= end) {
+                return false;
+            }
+            let tally = pass(tree, some, run.left(), observer);
+            run.count(tally);
+            kept += tally.kept;
+        }
+        if part >= 1.0 && kept == 0 {
+            return true;
+        }
+        part = (2.0 * part).min(1.0);
+    }
+}
+
+/// The k largest nodes, the largest first and equal ones by index, where k is about the fraction `part` of all nodes. Only the
+/// first `front` · k nodes are examined.
+fn largest(tree: &Siblings, part: f64, front: usize, order: &mut Vec<u32>) {
+    let nodes = tree.len() - 1;
+    let count = ((part * nodes as f64) as usize).clamp(1, nodes);
+    let examined = 1..=count.saturating_mul(front).min(nodes) as u32;
+    // No area is negative, so that areas are ordered as their bits are.
+    let key = |at: u32| (!tree.area(at).to_bits(), at);
+    let mut keyed: Vec<(u64, u32)> = examined.map(key).collect();
+    if count < keyed.len() {
+        keyed.select_nth_unstable(count);
+        keyed.truncate(count);
+    }
+    keyed.sort_unstable();
+    order.clear();
+    order.extend(keyed.into_iter().map(|(_, at)| at));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::best;
+    use crate::run::{Budget, solve};
+    use crate::scatter::scatter;
+    use bvh_build::ploc;
+    use bvh_core::validate;
+    use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+    /// A clock whose time is over after a number of readings.
+    struct Asked {
+        times: u32,
+        asked: AtomicU32,
+    }
+
+    impl Observer for Asked {
+        fn progress(&self) -> Option<f64> {
+            Some(f64::from(self.asked.fetch_add(1, Relaxed)) / f64::from(self.times))
+        }
+        fn cancelled(&self) -> bool {
+            self.asked.load(Relaxed) >= self.times
+        }
+    }
+
+    #[test]
+    fn every_small_budget_gives_a_valid_tree_and_the_next_no_worse_a_one() {
+        let boxes = scatter(300);
+        let mut before = f64::INFINITY;
+        for work in [1, 600, 1200, 2400, 4800, 5900] {
+            let budget = Budget { max_work: Some(work), ..Budget::default() };
+            let found = solve(&best::Config::default(), &Problem::new(&boxes), 1, budget, &()).unwrap();
+            validate(&found.tree, &boxes).unwrap();
+            assert_eq!(cost::internal_area(&found.tree), found.cost);
+            assert!(found.cost <= before, "{work}");
+            before = found.cost;
+        }
+    }
+
+    #[test]
+    fn every_short_time_gives_a_valid_tree() {
+        let boxes = scatter(300);
+        for times in 1..100 {
+            let clock = Asked { times, asked: AtomicU32::new(0) };
+            let found = solve(&best::Config::default(), &Problem::new(&boxes), 1, Budget::default(), &clock);
+            validate(&found.unwrap().tree, &boxes).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_start_that_is_named_is_the_start() {
+        let boxes = scatter(300);
+        let start = crate::local::initial::Start::MullerFellner(Default::default());
+        let config = best::Config { start: Some(start), ..Default::default() };
+        let budget = Budget { max_work: Some(1), ..Budget::default() };
+        let found = solve(&config, &Problem::new(&boxes), 1, budget, &()).unwrap();
+        let named = bvh_build::muller_fellner::Config::default().build(&boxes).unwrap();
+        assert_eq!(found.cost, cost::internal_area(&named));
+    }
+
+    #[test]
+    fn the_largest_nodes_are_those_that_a_full_sort_puts_first() {
+        let boxes = scatter(300);
+        let tree = ploc::Config::default().build(&boxes).unwrap();
+        let tree = Siblings::new(tree);
+        let mut all: Vec<u32> = (1..tree.len() as u32).collect();
+        all.sort_by(|&a, &b| tree.area(b).total_cmp(&tree.area(a)));
+        let mut order = Vec::new();
+        for part in [0.001, 0.1, 0.5, 1.0] {
+            largest(&tree, part, usize::MAX, &mut order);
+            assert_eq!(order, all[..order.len()]);
+        }
+        assert_eq!(order.len(), all.len());
+    }
+}

@@ -1,0 +1,117 @@
+//! The best tree of a local search: the working form is converted only when it is really better.
+
+use super::pass::TOLERANCE;
+use crate::lower_bound;
+use crate::run::{Observer, Problem, Quota, Run, SearchError, Shortcut, Tally};
+use crate::tree::Working;
+use bvh_build::Builder;
+use bvh_core::Bvh;
+use bvh_core::cost::{self, Objective};
+
+/// The best tree so far. Local search lowers the internal area; for binary trees with one object per leaf every
+/// objective of a [`Problem`] grows with it, so that lowering it lowers them all.
+pub(crate) struct Incumbent<'p> {
+    problem: Problem<'p>,
+    pub tree: Bvh,
+    area: f64,
+    /// An internal area below which there is no tree.
+    lower_bound: f64,
+}
+
+impl<'p> Incumbent<'p> {
+    /// Builds the initial tree, the first evaluation of the run. Also returns its working form.
+    pub fn build(
+        builder: &dyn Builder,
+        problem: &Problem<'p>,
+        run: &mut Run,
+    ) -> Result<(Self, Working), SearchError> {
+        let incumbent = Self::begin(builder.build(problem.boxes)?, problem, run);
+        let working = incumbent.working()?;
+        Ok((incumbent, working))
+    }
+
+    /// The working form of the best tree. Its boxes are tight, as builders and moves leave them.
+    pub fn working(&self) -> Result<Working, SearchError> {
+        Working::from_tight(&self.tree, self.area)
+    }
+
+    /// Begins with a valid tree whose boxes are tight.
+    pub fn begin(tree: Bvh, problem: &Problem<'p>, run: &mut Run) -> Self {
+        let mut incumbent = Self::begin_unbounded(tree, problem, run);
+        incumbent.bound(run);
+        incumbent
+    }
+
+    /// Ends the run now or later, as soon as the tree meets a lower bound.
+    pub fn bound(&mut self, run: &mut Run) {
+        if self.problem.allows(Shortcut::BoundMet) {
+            self.lower_bound = lower_bound::of_largest(self.problem.boxes);
+        }
+        self.stop_if_optimal(run);
+    }
+
+    /// As [`begin`](Self::begin), without a lower bound, where there is no time to compute one.
+    pub fn begin_unbounded(tree: Bvh, problem: &Problem<'p>, run: &mut Run) -> Self {
+        let (cost, area) = costs(problem, &tree);
+        run.record(cost, tree.nodes.len() as u64);
+        Self { problem: *problem, area, tree, lower_bound: f64::NEG_INFINITY }
+    }
+
+    /// Ends the run if no tree is better by more than rounding errors.
+    fn stop_if_optimal(&self, run: &mut Run) {
+        if self.area <= self.lower_bound * (1.0 + TOLERANCE) {
+            run.proved_optimal();
+        }
+    }
+
+    /// The internal area of the best tree.
+    pub fn area(&self) -> f64 {
+        self.area
+    }
+
+    /// Keeps `tree` if it is the best so far. O(n).
+    pub fn offer(&mut self, tree: &Working, run: &mut Run) -> bool {
+        tree.area() < self.area && self.offer_tree(tree.to_bvh(), run)
+    }
+
+    /// As [`offer`](Self::offer), for a valid tree that needs no conversion.
+    pub fn offer_tree(&mut self, candidate: Bvh, run: &mut Run) -> bool {
+        let (cost, area) = costs(&self.problem, &candidate);
+        let improved = run.improve(cost);
+        if improved {
+            self.area = area;
+            self.tree = candidate;
+            self.stop_if_optimal(run);
+        }
+        improved
+    }
+
+    /// Repeats a pass over `tree` until it keeps no move, at most `passes` times, and keeps the best tree. `pass` is
+    /// given the number of passes before it.
+    pub fn improve(
+        &mut self,
+        tree: &mut Working,
+        passes: u32,
+        run: &mut Run,
+        mut pass: impl FnMut(&mut Working, u32, Quota, &dyn Observer) -> Tally,
+    ) {
+        for number in 0..passes {
+            if run.stopped().is_some() {
+                break;
+            }
+            let done = pass(tree, number, run.left(), run.observer());
+            run.count(done);
+            self.offer(tree, run);
+            if done.kept == 0 {
+                break;
+            }
+        }
+    }
+}
+
+/// The tree's cost by the problem's objective, and its internal area.
+fn costs(problem: &Problem, tree: &Bvh) -> (f64, f64) {
+    let cost = problem.objective.cost(tree);
+    let area = if problem.objective == Objective::InternalArea { cost } else { cost::internal_area(tree) };
+    (cost, area)
+}

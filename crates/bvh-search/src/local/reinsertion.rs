@@ -1,0 +1,93 @@
+//! Reinsertion: take a subtree out and put it where it costs least, over and over, to a local optimum.
+//!
+//! Bittner, Hapala & Havran 2013; the position search of Meister & Bittner 2018.
+//!
+//! Differs from them: the search is exact and sequential, every node is tried, and the method ends only when a whole
+//! pass over the tree finds nothing.
+
+use super::incumbent::Incumbent;
+use super::initial::Start;
+use super::pass::{TOLERANCE, repeat, sort_by_area};
+use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Tally, stream};
+use crate::tree::{Linked, PositionSearch, Working};
+use bvh_build::config::Itself;
+use bvh_core::{Bvh, with_vector_instructions};
+use rand::seq::SliceRandom;
+
+bvh_build::config! {
+    /// In which order to try the nodes, how often, and from where.
+    pub struct Config {
+        /// The order of a pass over all nodes.
+        order: Order = Order::ByArea;
+        /// Maximum number of passes; the method ends earlier at a local optimum.
+        sweeps: u32 = 1000, in 1..;
+        /// The builder of the initial tree.
+        start: Start, in Itself;
+    }
+}
+
+/// The order of a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum Order {
+    /// The largest node first, equal ones by index.
+    ByArea,
+    /// Another random order every time.
+    Random,
+}
+
+impl Search for Config {
+    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+        let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
+        best.improve(&mut tree, self.sweeps, run, |tree, number, quota, observer| {
+            let mut order = tree.preorder();
+            match self.order {
+                Order::ByArea => sort_by_area(tree, &mut order),
+                Order::Random => order.shuffle(&mut stream(seed, number.into())),
+            }
+            pass(tree, &order, quota, observer)
+        });
+        Ok(best.tree)
+    }
+}
+
+/// Tries every node once, the largest first.
+pub(crate) fn pass_by_area(tree: &mut Working, quota: Quota, observer: &dyn Observer) -> Tally {
+    let mut order = tree.preorder();
+    sort_by_area(tree, &mut order);
+    pass(tree, &order, quota, observer)
+}
+
+/// Repeats passes by area until a local optimum.
+pub(crate) fn to_local_optimum(tree: &mut Working, quota: Quota, observer: &dyn Observer) -> Tally {
+    repeat(quota, observer, |quota| pass_by_area(tree, quota, observer))
+}
+
+with_vector_instructions! {
+    /// Tries to improve the position of every node of `order` once. Stops early when the quota is used up or the observer
+    /// cancels.
+    pub(crate) pass = pass_plain<T: Linked>(
+        tree: &mut T, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally
+}
+
+#[inline(always)]
+fn pass_plain<T: Linked>(tree: &mut T, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally {
+    let mut done = Tally::default();
+    let mut search = PositionSearch::default();
+    for &node in order {
+        let so_far = Tally { work: done.work + search.visits, ..done };
+        if quota.is_reached(&so_far) || done.moves % 256 == 255 && observer.cancelled() {
+            break;
+        }
+        if tree.parent(node) == T::ABOVE {
+            continue;
+        }
+        done.moves += 1;
+        if let (Some(position), _) = search.attached(tree, node, TOLERANCE) {
+            done.work += tree.reinsert(node, position.beside);
+            done.kept += 1;
+        }
+    }
+    done.work += search.visits;
+    done
+}

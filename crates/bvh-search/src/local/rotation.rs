@@ -1,0 +1,219 @@
+//! Tree rotations: swap subtrees one and two levels below a node, over and over, to a local optimum.
+//!
+//! Kensler 2008, 'Tree rotations for improving bounding volume hierarchies': a child is swapped with a grandchild of the
+//! other side (four ways), or two grandchildren of different sides are swapped (two ways).
+//!
+//! Differs from the paper: hill climbing only; its annealing is [annealing](crate::annealing) on reinsertion moves, of
+//! which every rotation is one or two.
+
+use super::incumbent::Incumbent;
+use super::initial::Start;
+use super::pass::{TOLERANCE, repeat, sort_by_area};
+use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Tally};
+use crate::tree::Working;
+use bvh_build::config::Itself;
+use bvh_core::{Bvh, with_vector_instructions};
+
+bvh_build::config! {
+    /// In which order to try the nodes, how often, and from where.
+    pub struct Config {
+        /// The order of a pass over all nodes.
+        order: Order = Order::BottomUp;
+        /// Maximum number of passes; the method ends earlier at a local optimum.
+        sweeps: u32 = 1000, in 1..;
+        /// The builder of the initial tree.
+        start: Start, in Itself;
+    }
+}
+
+/// The order of a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum Order {
+    /// Children before their parents.
+    BottomUp,
+    /// The largest node first, equal ones parents first.
+    ByArea,
+}
+
+impl Search for Config {
+    fn search(&self, problem: &Problem, _seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+        let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
+        best.improve(&mut tree, self.sweeps, run, |tree, _, quota, observer| {
+            pass(tree, &self.order.of(tree), quota, observer)
+        });
+        Ok(best.tree)
+    }
+}
+
+impl Order {
+    /// The nodes of a pass, in this order.
+    fn of(self, tree: &Working) -> Vec<u32> {
+        let mut order = tree.preorder();
+        match self {
+            Self::BottomUp => order.reverse(),
+            Self::ByArea => sort_by_area(tree, &mut order),
+        }
+        order
+    }
+}
+
+/// Repeats passes from the bottom up until a local optimum.
+pub(crate) fn to_local_optimum(tree: &mut Working, quota: Quota, observer: &dyn Observer) -> Tally {
+    repeat(quota, observer, |quota| {
+        let order = Order::BottomUp.of(tree);
+        pass(tree, &order, quota, observer)
+    })
+}
+
+with_vector_instructions! {
+    /// Makes the best rotation at every node of `order` where one pays. Stops early when the quota is used up or the
+    /// observer cancels.
+    pass = pass_plain(tree: &mut Working, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally
+}
+
+#[inline(always)]
+fn pass_plain(tree: &mut Working, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally {
+    let mut done = Tally::default();
+    for &node in order {
+        if tree.nodes[node as usize].is_leaf() {
+            continue;
+        }
+        if quota.is_reached(&done) || done.moves % 1024 == 1023 && observer.cancelled() {
+            break;
+        }
+        done.moves += 1;
+        // The node, its children and grandchildren.
+        done.work += 7;
+        if let Some(rotation) = best(tree, node) {
+            tree.begin();
+            rotation.apply(tree);
+            done.kept += 1;
+        }
+    }
+    done
+}
+
+/// A rotation, as the new children of two nodes, the lower node first.
+#[derive(Clone, Copy, Debug)]
+struct Rotation([(u32, [u32; 2]); 2]);
+
+impl Rotation {
+    fn apply(self, tree: &mut Working) {
+        self.0.into_iter().for_each(|(node, children)| tree.join(node, children));
+    }
+}
+
+/// The rotation at an inner node that saves most, if any saves area. None of them changes the node's own box.
+#[inline(always)]
+fn best(tree: &Working, top: u32) -> Option<Rotation> {
+    let area = |children| tree.union_of(children).half_area();
+    let node = |at: u32| &tree.nodes[at as usize];
+    let sides = node(top).children;
+    let (mut most, mut best) = (TOLERANCE * node(top).area, None);
+    for [from, other] in [sides, [sides[1], sides[0]]] {
+        if node(from).is_leaf() {
+            continue;
+        }
+        let pair = node(from).children;
+        for [leaves, stays] in [pair, [pair[1], pair[0]]] {
+            let saved = node(from).area - area([other, stays]);
+            if saved > most {
+                most = saved;
+                best = Some(Rotation([(from, [other, stays]), (top, [from, leaves])]));
+            }
+        }
+    }
+    let [left, right] = sides;
+    if !node(left).is_leaf() && !node(right).is_leaf() {
+        let ([a, b], pair) = (node(left).children, node(right).children);
+        for [c, d] in [pair, [pair[1], pair[0]]] {
+            let saved = node(left).area + node(right).area - area([a, c]) - area([b, d]);
+            if saved > most {
+                most = saved;
+                best = Some(Rotation([(left, [a, c]), (right, [b, d])]));
+            }
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scatter::{built, scatter};
+    use bvh_build::median_cut;
+    use bvh_core::validate;
+
+    /// The total areas of every tree that one rotation makes of this one, boxes recomputed from nothing.
+    fn neighbours(tree: &Working, tops: &[u32]) -> Vec<f64> {
+        let mut found = vec![];
+        for &top in tops {
+            let below = |at: u32| {
+                let node = &tree.nodes[at as usize];
+                if node.is_leaf() { vec![] } else { node.children.to_vec() }
+            };
+            let [Some(left), Some(right)] = [0, 1].map(|side| below(top).get(side).copied()) else {
+                continue;
+            };
+            let mut pairs: Vec<(u32, u32)> = below(left).into_iter().map(|below| (below, right)).collect();
+            pairs.extend(below(right).into_iter().map(|below| (below, left)));
+            pairs.extend(below(left).iter().flat_map(|&a| below(right).into_iter().map(move |b| (a, b))));
+            for (a, b) in pairs {
+                let mut other = tree.clone();
+                for (old, new) in [(a, b), (b, a)] {
+                    let parent = tree.nodes[old as usize].parent;
+                    let children = &mut other.nodes[parent as usize].children;
+                    children[usize::from(tree.nodes[parent as usize].children[0] != old)] = new;
+                    other.nodes[new as usize].parent = parent;
+                }
+                for at in other.preorder().into_iter().rev() {
+                    if !other.nodes[at as usize].is_leaf() {
+                        let aabb = other.union_of(other.nodes[at as usize].children);
+                        other.nodes[at as usize].area = aabb.half_area();
+                        other.nodes[at as usize].aabb = aabb;
+                    }
+                }
+                found.push(other.internal_area());
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn a_local_optimum_is_better_than_every_neighbour_and_areas_stay_exact() {
+        for (n, order) in [(40, Order::BottomUp), (60, Order::ByArea), (2, Order::ByArea), (3, Order::BottomUp)]
+        {
+            let boxes = scatter(n);
+            let mut tree = built(&median_cut::Config::default(), &boxes);
+            repeat(Quota::ENDLESS, &(), |quota| {
+                let nodes = order.of(&tree);
+                let done = pass(&mut tree, &nodes, quota, &());
+                let area = tree.internal_area();
+                assert!((tree.area() - area).abs() <= 1e-12 * area);
+                done
+            });
+            let found = tree.to_bvh();
+            validate(&found, &boxes).unwrap();
+            assert!(found.is_tight(&boxes));
+            let least = neighbours(&tree, &tree.preorder()).into_iter().fold(f64::INFINITY, f64::min);
+            assert!(tree.area() <= least * (1.0 + 1e-11), "{} {least}", tree.area());
+        }
+    }
+
+    #[test]
+    fn the_rotation_chosen_is_the_best_of_all_at_its_node() {
+        let tree = built(&median_cut::Config::default(), &scatter(64));
+        for top in tree.preorder() {
+            if tree.nodes[top as usize].is_leaf() {
+                continue;
+            }
+            let least = neighbours(&tree, &[top]).into_iter().fold(tree.area(), f64::min);
+            let mut rotated = tree.clone();
+            if let Some(rotation) = best(&tree, top) {
+                rotation.apply(&mut rotated);
+            }
+            assert!((rotated.area() - least).abs() <= 1e-12 * least, "{} {least}", rotated.area());
+        }
+    }
+}

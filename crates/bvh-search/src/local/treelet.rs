@@ -1,0 +1,259 @@
+//! Treelet restructuring: give a small part of the tree its optimal shape, over and over, to a local optimum.
+//!
+//! Karras & Aila 2013, 'Fast parallel construction of high-quality bounding volume hierarchies', section 3: a treelet
+//! is grown from its root by opening the leaf of largest area; dynamic programming over the subsets of its leaves finds
+//! the best of all shapes. Domingues & Pedrini 2015 use other sizes.
+//!
+//! Differs from them: any size from 3 to 12 at every node, bottom-up, until a whole pass changes nothing; a treelet
+//! none of whose nodes has changed since it was last optimal is not solved again.
+
+use super::incumbent::Incumbent;
+use super::initial::Start;
+use super::pass::{TOLERANCE, repeat};
+use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Tally};
+use crate::tree::{NONE, Working};
+use bvh_build::config::Itself;
+use bvh_core::{Bvh, PackedAabb, with_vector_instructions};
+
+bvh_build::config! {
+    /// How large treelets are, how often all are tried, and from where.
+    pub struct Config {
+        /// Leaves of a treelet. Solving one takes O(3^size) time. The paper takes 7.
+        size: u32 = 7, in 3..=12;
+        /// Maximum number of passes over all nodes; the method ends earlier at a local optimum.
+        sweeps: u32 = 1000, in 1..;
+        /// The builder of the initial tree.
+        start: Start, in Itself;
+    }
+}
+
+impl Search for Config {
+    fn search(&self, problem: &Problem, _seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+        let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
+        let mut solver = Solver::new(self.size, &tree);
+        best.improve(&mut tree, self.sweeps, run, |tree, _, quota, observer| {
+            pass(tree, &mut solver, quota, observer)
+        });
+        Ok(best.tree)
+    }
+}
+
+/// Repeats passes with treelets of 7 leaves until a local optimum.
+pub(crate) fn to_local_optimum(tree: &mut Working, quota: Quota, observer: &dyn Observer) -> Tally {
+    let mut solver = Solver::new(Config::default().size, tree);
+    repeat(quota, observer, |quota| pass(tree, &mut solver, quota, observer))
+}
+
+with_vector_instructions! {
+    /// Restructures the treelet of every node, children before parents, where that pays. Stops early when the quota is
+    /// used up or the observer cancels.
+    pass = pass_plain(tree: &mut Working, solver: &mut Solver, quota: Quota, observer: &dyn Observer) -> Tally
+}
+
+#[inline(always)]
+fn pass_plain(tree: &mut Working, solver: &mut Solver, quota: Quota, observer: &dyn Observer) -> Tally {
+    let mut done = Tally::default();
+    for root in tree.preorder().into_iter().rev() {
+        if tree.nodes[root as usize].is_leaf() {
+            continue;
+        }
+        if quota.is_reached(&done) || done.moves % 64 == 63 && observer.cancelled() {
+            break;
+        }
+        let fresh = solver.grow(tree, root);
+        done.work += 2 * solver.inner.len() as u64;
+        if !fresh || solver.leaves.len() < 3 {
+            continue;
+        }
+        done.moves += 1;
+        // One unit per subset for its box, and one per 16 divisions of a subset, which take about as long.
+        let size = solver.leaves.len() as u32;
+        done.work += 2u64.pow(size) + 3u64.pow(size) / 16;
+        if solver.solve(tree) {
+            tree.begin();
+            solver.restructure(tree);
+            done.kept += 1;
+        }
+        solver.solved[root as usize] = tree.changes();
+    }
+    done
+}
+
+/// One treelet and the best shapes of its subsets.
+#[derive(Debug)]
+struct Solver {
+    size: usize,
+    /// Per node of the tree, the number of changes begun when the treelet below it was last made optimal, at first
+    /// `NEVER`.
+    solved: Vec<u64>,
+    leaves: Vec<u32>,
+    /// The inner nodes, the root first.
+    inner: Vec<u32>,
+    /// Per subset of `leaves`: its box, the least area of the inner nodes over it, and one side of its best division.
+    boxes: Vec<PackedAabb>,
+    cost: Vec<f64>,
+    side: Vec<u16>,
+}
+
+/// Later than any change.
+const NEVER: u64 = u64::MAX;
+
+impl Solver {
+    fn new(size: u32, tree: &Working) -> Self {
+        let subsets = 1 << size;
+        Self {
+            size: size as usize,
+            solved: vec![NEVER; tree.nodes.len()],
+            leaves: Vec::new(),
+            inner: Vec::new(),
+            boxes: vec![PackedAabb::EMPTY; subsets],
+            cost: vec![0.0; subsets],
+            side: vec![0; subsets],
+        }
+    }
+
+    /// Opens the leaf of largest area until there are enough leaves. Returns whether anything in the treelet has changed
+    /// since it was solved.
+    #[inline(always)]
+    fn grow(&mut self, tree: &Working, root: u32) -> bool {
+        self.inner.clear();
+        self.leaves.clear();
+        self.leaves.push(root);
+        let mut last = 0;
+        while self.leaves.len() < self.size {
+            let mut largest = (-1.0, NONE as usize);
+            for (position, &leaf) in self.leaves.iter().enumerate() {
+                let node = &tree.nodes[leaf as usize];
+                if !node.is_leaf() && node.area > largest.0 {
+                    largest = (node.area, position);
+                }
+            }
+            let Some(place) = self.leaves.get_mut(largest.1) else { break };
+            let node = &tree.nodes[*place as usize];
+            last = last.max(node.stamp);
+            self.inner.push(*place);
+            *place = node.children[0];
+            self.leaves.push(node.children[1]);
+        }
+        let last = self.leaves.iter().fold(last, |last, &leaf| last.max(tree.nodes[leaf as usize].stamp));
+        let solved = self.solved[root as usize];
+        solved == NEVER || last > solved
+    }
+
+    /// Finds the best shape over every subset of the leaves. Returns whether the best shape over all of them is better
+    /// than the present one.
+    #[inline(always)]
+    fn solve(&mut self, tree: &Working) -> bool {
+        let all = (1usize << self.leaves.len()) - 1;
+        for (position, &leaf) in self.leaves.iter().enumerate() {
+            self.boxes[1 << position] = tree.nodes[leaf as usize].aabb;
+            self.cost[1 << position] = 0.0;
+        }
+        for set in 1..=all {
+            let rest = set & (set - 1);
+            if rest == 0 {
+                continue;
+            }
+            let lowest = set ^ rest;
+            self.boxes[set] = self.boxes[rest].union(&self.boxes[lowest]);
+            // `side` is the side without the lowest leaf, so that every division is tried once.
+            let (mut side, mut least, mut best) = (rest, f64::INFINITY, 0);
+            while side > 0 {
+                let cost = self.cost[side] + self.cost[set ^ side];
+                if cost < least {
+                    (least, best) = (cost, side);
+                }
+                side = (side - 1) & rest;
+            }
+            self.cost[set] = least + self.boxes[set].half_area();
+            self.side[set] = best as u16;
+        }
+        let before: f64 = self.inner.iter().map(|&node| tree.nodes[node as usize].area).sum();
+        self.cost[all] < before * (1.0 - TOLERANCE)
+    }
+
+    /// Gives the treelet the best shape.
+    #[inline(always)]
+    fn restructure(&mut self, tree: &mut Working) {
+        let all = (1usize << self.leaves.len()) - 1;
+        // Subsets and children of the inner nodes, from the root down.
+        let mut joints: [(usize, [u32; 2]); 12] = [(0, [NONE; 2]); 12];
+        joints[0].0 = all;
+        let mut used = 1;
+        for at in 0..self.inner.len() {
+            let set = joints[at].0;
+            let side = usize::from(self.side[set]);
+            joints[at].1 = [set ^ side, side].map(|part| {
+                if part.is_power_of_two() {
+                    self.leaves[part.trailing_zeros() as usize]
+                } else {
+                    joints[used].0 = part;
+                    used += 1;
+                    self.inner[used - 1]
+                }
+            });
+        }
+        for (&node, &(_, children)) in self.inner.iter().zip(&joints).rev() {
+            tree.join(node, children);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scatter::{built, scatter};
+    use crate::{Budget, Method, solve};
+    use bvh_build::median_cut;
+    use bvh_core::{cost, validate};
+
+    #[test]
+    fn boxes_and_areas_stay_exact_and_a_local_optimum_is_one() {
+        for size in [3, 5, 7, 12] {
+            let boxes = scatter(150);
+            let mut tree = built(&median_cut::Config::default(), &boxes);
+            let (mut solver, start) = (Solver::new(size, &tree), tree.area());
+            repeat(Quota::ENDLESS, &(), |quota| {
+                let done = pass(&mut tree, &mut solver, quota, &());
+                let area = tree.internal_area();
+                assert!((tree.area() - area).abs() <= 1e-12 * area);
+                done
+            });
+            assert!(tree.area() < start);
+            let found = tree.to_bvh();
+            validate(&found, &boxes).unwrap();
+            assert!(found.is_tight(&boxes));
+            // Nothing was skipped that would have paid.
+            let again = pass(&mut tree.clone(), &mut Solver::new(size, &tree), Quota::ENDLESS, &());
+            assert_eq!(again.kept, 0);
+        }
+    }
+
+    #[test]
+    fn a_treelet_that_spans_the_tree_makes_it_optimal() {
+        for n in 3..=9 {
+            let boxes = scatter(n);
+            let mut tree = built(&median_cut::Config::default(), &boxes);
+            let mut solver = Solver::new(n, &tree);
+            repeat(Quota::ENDLESS, &(), |quota| pass(&mut tree, &mut solver, quota, &()));
+            let outcome = solve(
+                &Method::Best(crate::best::Config { work_per_object: 20_000, ..Default::default() }),
+                &Problem::new(&boxes),
+                1,
+                Budget::default(),
+                &(),
+            );
+            let best = cost::internal_area(&outcome.unwrap().tree);
+            assert!((tree.area() - best).abs() <= 1e-12 * best, "{n}: {} {best}", tree.area());
+        }
+    }
+
+    #[test]
+    fn sizes_outside_their_range_are_named() {
+        for size in [2, 13] {
+            let config = Config { size, ..Config::default() };
+            let error = solve(&config, &Problem::new(&[]), 1, Budget::default(), &()).unwrap_err();
+            assert_eq!(error.to_string(), format!("size is {size}; accepted: 3 to 12"));
+        }
+    }
+}

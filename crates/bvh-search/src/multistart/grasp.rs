@@ -1,0 +1,315 @@
+//! GRASP's randomised construction: Müller–Fellner that sometimes does not take the best split.
+//!
+//! Ng & Trifonov 2003, section 3.4; Feo & Resende 1995. The four candidate rules of the paper are
+//!
+//! | | `candidates` | `noise` |
+//! |---|---|---|
+//! | Table 3 | `axis_best` | none: each of the three equally likely |
+//! | Table 4 | `axis_best` | 0.1 |
+//! | Figure 1 | `k_best`, restricted by cardinality | 0.1 |
+//! | section 3.4 | `within`, restricted by value | any |
+//!
+//! GRASP's second phase, which the paper leaves to future work (sections 3.4 and 5), is `local_search`: every
+//! constructed tree is improved to a local optimum of its own.
+//!
+//! Differs from the paper: nothing in the first two rules; for the others it does not say how noise acts, and here
+//! it is the probability of taking one of the candidates other than the best, each equally likely.
+
+use crate::local::LocalSearch;
+use crate::parallel::map_init;
+use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Stream, Tally, stream};
+use crate::tree::Working;
+use bvh_build::config::{Accepts, Itself};
+use bvh_build::top_down::{Split, SplitCost, SplitRule, Sweep, Workspace};
+use bvh_build::{Check, OutOfRange, Presorted, muller_fellner};
+use bvh_core::{Aabb, Bvh};
+use rand::RngExt;
+
+bvh_build::config! {
+    /// How to construct trees, and how many.
+    pub struct Config {
+        /// Number of independent constructions.
+        trials: u64 = 100, in 1..;
+        /// The splits of a node that may be chosen.
+        candidates: Candidates = Candidates::AxisBest, in Itself;
+        /// The probability of taking one of the candidates other than the best. Without it, all candidates are equally
+        /// likely.
+        #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+        noise: Option<f64>, in 0.0..=1.0;
+        /// How every constructed tree is improved; by default not at all, as in the paper.
+        #[cfg_attr(feature = "serde", serde(skip_serializing_if = "LocalSearch::is_none"))]
+        local_search: LocalSearch = LocalSearch::None;
+        /// The heuristic that ranks splits, and the rest of the greedy builder's configuration.
+        construction: muller_fellner::Config, in Itself;
+    }
+}
+
+/// The restricted candidate list of a node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum Candidates {
+    /// The best split of each of the three axes.
+    AxisBest,
+    /// The k best splits of all axes, k ≥ 1.
+    KBest(u32),
+    /// The best split and all that cost less than (1 + α) times as much, α ≥ 0.
+    Within(f64),
+}
+
+impl Check for Candidates {
+    fn check(&self) -> Result<(), OutOfRange> {
+        match self {
+            Self::AxisBest => Ok(()),
+            Self::KBest(k) => (1..).check("k_best", k),
+            Self::Within(alpha) => (0.0..).check("within", alpha),
+        }
+    }
+}
+
+impl Config {
+    /// Construction number `trial`, into `tree`.
+    fn construct(&self, scene: &Presorted, seed: u64, trial: u64, workspace: &mut Workspace, tree: &mut Bvh) {
+        let Self { candidates, noise, .. } = *self;
+        let mut rule = Randomised::new(candidates, noise, stream(seed, trial));
+        self.construction.construct(scene, &mut rule, workspace, tree);
+    }
+
+    /// Improves a tree to a local optimum; leaves it as it was if the observer cancels before.
+    fn improve(
+        &self,
+        tree: &mut Bvh,
+        boxes: &[Aabb],
+        observer: &dyn Observer,
+    ) -> Result<Improved, SearchError> {
+        if self.local_search.is_none() {
+            return Ok(Improved { finished: true, work: 0 });
+        }
+        let mut working = Working::from_bvh(tree, boxes)?;
+        let Tally { work, .. } = self.local_search.improve(&mut working, Quota::ENDLESS, observer);
+        let finished = !observer.cancelled();
+        if finished {
+            *tree = working.to_bvh();
+        }
+        Ok(Improved { finished, work })
+    }
+}
+
+/// How the local search of a constructed tree ended.
+#[derive(Clone, Copy, Debug)]
+struct Improved {
+    /// Whether the local optimum was reached and kept.
+    finished: bool,
+    /// Nodes visited.
+    work: u64,
+}
+
+impl Search for Config {
+    /// Trials are independent: each draws from a stream of its own, so they run in parallel.
+    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+        let scene = Presorted::new(problem.boxes)?;
+        let construction = (2 * scene.len() as u64).saturating_sub(1);
+        let observer = run.observer();
+        let attempt = |(workspace, tree): &mut (Workspace, Bvh), trial: u64| {
+            self.construct(&scene, seed, trial, workspace, tree);
+            let improved = self.improve(tree, problem.boxes, observer)?;
+            Ok::<_, SearchError>((problem.objective.cost(tree), improved))
+        };
+        // Trials whose work is not known in advance run in smaller batches, to waste less at the end of a budget.
+        let most = if self.local_search.is_none() { BATCH } else { SMALL_BATCH };
+        let (mut next, mut best) = (0, (0, true));
+        while next < self.trials && run.stopped().is_none() {
+            let end = self.trials.min(next.saturating_add(run.evaluations_left(construction).min(most)));
+            for (trial, result) in
+                (next..end).zip(map_init((end - next) as usize, Default::default, |buffers, at| {
+                    attempt(buffers, next + at as u64)
+                }))
+            {
+                let (cost, Improved { finished, work }) = result?;
+                if run.record(cost, construction + work) {
+                    best = (trial, finished);
+                }
+                if run.stopped().is_some() {
+                    break;
+                }
+            }
+            next = end;
+        }
+        // Trials keep only their costs: the incumbent is constructed once more, and improved to the end this time.
+        let (mut tree, (trial, finished)) = (Bvh::default(), best);
+        self.construct(&scene, seed, trial, &mut Workspace::default(), &mut tree);
+        if finished {
+            self.improve(&mut tree, problem.boxes, &())?;
+        }
+        Ok(tree)
+    }
+}
+
+/// Number of trials between two checks of the budget, without local search.
+const BATCH: u64 = 32;
+
+/// Number of trials between two checks of the budget, with local search.
+const SMALL_BATCH: u64 = 4;
+
+/// Draws a split from a node's restricted candidate list.
+pub(crate) struct Randomised {
+    candidates: Candidates,
+    noise: Option<f64>,
+    rng: Stream,
+    list: Vec<Split>,
+}
+
+impl Randomised {
+    pub fn new(candidates: Candidates, noise: Option<f64>, rng: Stream) -> Self {
+        Self { candidates, noise, rng, list: Vec::new() }
+    }
+}
+
+impl SplitRule for Randomised {
+    /// The random draw comes before the scan of the node, so that only the candidates that it can choose are looked for.
+    #[inline(always)]
+    fn choose<C: SplitCost>(&mut self, node: &mut Sweep<'_, C>) -> Split {
+        let Self { candidates, noise, rng, list } = self;
+        if noise.is_some_and(|noise| !rng.random_bool(noise)) {
+            return node.best();
+        }
+        match *candidates {
+            Candidates::AxisBest if noise.is_none() => return node.axis_best(rng.random_range(0..3u8)),
+            Candidates::AxisBest => node.axis_bests(list),
+            Candidates::KBest(k) => node.k_best(k as usize, list),
+            Candidates::Within(alpha) => node.within(alpha, list),
+        }
+        let first = u32::from(noise.is_some() && list.len() > 1);
+        list[rng.random_range(first..list.len() as u32) as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scatter::scatter;
+    use crate::{Budget, solve};
+    use bvh_build::Builder;
+    use bvh_core::validate;
+
+    fn configs() -> [Config; 6] {
+        let config = |candidates, noise| Config { trials: 12, candidates, noise, ..Config::default() };
+        [
+            config(Candidates::AxisBest, None),
+            config(Candidates::AxisBest, Some(0.1)),
+            config(Candidates::KBest(5), Some(0.1)),
+            config(Candidates::KBest(5), None),
+            config(Candidates::Within(0.05), Some(0.5)),
+            Config { local_search: LocalSearch::Treelet, ..config(Candidates::AxisBest, Some(0.1)) },
+        ]
+    }
+
+    #[test]
+    fn rules_that_leave_no_choice_construct_the_greedy_tree() {
+        let boxes = scatter(700);
+        let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
+        let every = [Candidates::AxisBest, Candidates::KBest(1), Candidates::KBest(9), Candidates::Within(0.0)];
+        for (candidates, noise) in every.map(|candidates| (candidates, Some(0.0))).into_iter().chain([
+            (Candidates::KBest(1), None),
+            (Candidates::KBest(1), Some(1.0)),
+            (Candidates::Within(0.0), None),
+        ]) {
+            let config = Config { trials: 2, candidates, noise, ..Config::default() };
+            let outcome = solve(&config, &Problem::new(&boxes), 7, Budget::default(), &()).unwrap();
+            assert_eq!(outcome.tree, greedy, "{config:?}");
+        }
+    }
+
+    #[test]
+    fn every_rule_constructs_valid_trees_whose_cost_is_the_recorded_one() {
+        for boxes in [scatter(300), scatter(1), scatter(2), scatter(3), vec![scatter(1)[0]; 100], vec![]] {
+            for config in configs() {
+                let problem = Problem::new(&boxes);
+                let outcome = solve(&config, &problem, 1, Budget::default(), &()).unwrap();
+                validate(&outcome.tree, &boxes).unwrap();
+                assert_eq!(outcome.cost, problem.objective.cost(&outcome.tree), "{config:?}");
+                assert_eq!(outcome.evaluations, 12);
+            }
+        }
+    }
+
+    #[test]
+    fn trials_do_not_depend_on_the_number_of_threads_or_of_trials() {
+        let boxes = scatter(500);
+        for config in configs() {
+            let on = |threads, trials| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let config = Config { trials, ..config.clone() };
+                pool.install(|| solve(&config, &Problem::new(&boxes), 3, Budget::default(), &()).unwrap())
+            };
+            let one = on(1, 50);
+            assert_eq!(one.history, on(3, 50).history, "{config:?}");
+            assert_eq!(one.tree, on(2, 50).tree, "{config:?}");
+            assert_eq!(one.history[..20], on(2, 20).history, "{config:?}");
+        }
+    }
+
+    #[test]
+    fn local_search_improves_every_trial_and_its_work_is_counted_on_any_number_of_threads() {
+        let boxes = scatter(500);
+        let run = |local_search, threads: usize, max_work| {
+            let config = Config { trials: 20, local_search, ..Config::default() };
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let budget = Budget { max_work, ..Budget::default() };
+            pool.install(|| solve(&config, &Problem::new(&boxes), 3, budget, &()).unwrap())
+        };
+        let plain = run(LocalSearch::None, 1, None);
+        for local_search in [LocalSearch::Rotation, LocalSearch::Treelet, LocalSearch::Reinsertion] {
+            let improved = run(local_search, 1, None);
+            let pairs = plain.history.iter().zip(&improved.history);
+            assert!(pairs.clone().all(|(before, after)| after.cost < before.cost && after.work > before.work));
+            let cut = |threads| run(local_search, threads, Some(improved.work / 3));
+            let (one, three) = (cut(1), cut(3));
+            assert_eq!((&one.tree, &one.history), (&three.tree, &three.history));
+            // The budget ends the search with the first trial that exceeds it.
+            let within = improved.history.iter().take_while(|event| event.work < improved.work / 3).count();
+            assert_eq!(one.history, improved.history[..=within]);
+        }
+    }
+
+    #[test]
+    fn a_trial_cut_off_by_the_observer_is_recorded_as_constructed() {
+        struct Cancelled;
+        impl Observer for Cancelled {
+            fn cancelled(&self) -> bool {
+                true
+            }
+        }
+        let boxes = scatter(500);
+        let config = Config { local_search: LocalSearch::Reinsertion, ..Config::default() };
+        let outcome = solve(&config, &Problem::new(&boxes), 3, Budget::default(), &Cancelled).unwrap();
+        let plain = Config { trials: 1, ..Config::default() };
+        let plain = solve(&plain, &Problem::new(&boxes), 3, Budget::default(), &()).unwrap();
+        assert_eq!((outcome.tree, outcome.cost), (plain.tree, plain.cost));
+    }
+
+    #[test]
+    fn noise_makes_trials_differ() {
+        let boxes = scatter(500);
+        for config in configs() {
+            let history = solve(&config, &Problem::new(&boxes), 3, Budget::default(), &()).unwrap().history;
+            assert!(history.iter().any(|event| event.cost != history[0].cost), "{config:?}");
+        }
+    }
+
+    #[test]
+    fn parameters_outside_their_range_are_named() {
+        let refused = |config: Config| {
+            solve(&config, &Problem::new(&[]), 1, Budget::default(), &()).unwrap_err().to_string()
+        };
+        let default = Config::default();
+        assert_eq!(refused(Config { trials: 0, ..default.clone() }), "trials is 0; accepted: 1 or more");
+        assert_eq!(
+            refused(Config { noise: Some(f64::NAN), ..default.clone() }),
+            "noise is NaN; accepted: 0 to 1"
+        );
+        let k_best = Config { candidates: Candidates::KBest(0), ..default.clone() };
+        assert_eq!(refused(k_best), "candidates.k_best is 0; accepted: 1 or more");
+        let within = Config { candidates: Candidates::Within(-1.0), ..default };
+        assert_eq!(refused(within), "candidates.within is -1; accepted: 0 or more");
+    }
+}

@@ -1,0 +1,301 @@
+//! Rebuilding: find nodes that look badly split, rebuild the subtrees below them with other splits, keep what is better.
+//!
+//! Ng & Trifonov 2003, section 5: 'If at some node it appears that a wrong decision has been made so that the two
+//! children are highly imbalance and one is contributing significantly to the overall cost of the hierarchy, a
+//! different selection point can be made and this part of the hierarchy resembling a subtree can be rebuilt.'
+//!
+//! Differs from the paper: nothing is stored at the nodes; the other splits come from GRASP's randomised construction; a
+//! rebuilt subtree is improved to a local optimum before it is compared, and its nodes are reinserted once among all
+//! others afterwards, which makes the whole an iterated local search (Lourenço, Martin & Stützle 2003).
+
+use super::grasp::{Candidates, Randomised};
+use crate::local::incumbent::Incumbent;
+use crate::local::initial::{Start, construction};
+use crate::local::pass::TOLERANCE;
+use crate::local::{LocalSearch, reinsertion};
+use crate::parallel;
+use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Stream, Tally, stream};
+use crate::tree::{ANCHOR, Working};
+use bvh_build::config::Itself;
+use bvh_build::top_down::Workspace;
+use bvh_build::{Presorted, muller_fellner};
+use bvh_core::{Aabb, Bvh};
+use rand::RngExt;
+
+bvh_build::config! {
+    /// Which subtrees to rebuild, how, and for how long.
+    pub struct Config {
+        /// Maximum number of objects of a rebuilt subtree.
+        objects: u32 = 200, in 3..=1_000_000;
+        /// Number of random nodes of which the one is taken whose children have the largest area. In measurements, more
+        /// of them, or the children's area relative to the node's, found no better nodes, and 1 hardly worse ones.
+        tournament: u32 = 2, in 1..;
+        /// Maximum number of levels from that node up to the root of the rebuilt subtree, since a bad split shows below
+        /// the split that caused it.
+        climb: u32 = 6;
+        /// The splits that may be chosen, as in [`grasp`](crate::grasp).
+        candidates: Candidates = Candidates::AxisBest, in Itself;
+        /// The probability of taking one of the candidates other than the best.
+        noise: f64 = 0.3, in 0.0..=1.0;
+        /// The heuristic that ranks splits; by default that of the initial tree.
+        construction: muller_fellner::Config = construction(), in Itself;
+        /// How a rebuilt subtree is improved before it is compared.
+        local_search: LocalSearch = LocalSearch::Reinsertion;
+        /// Work per object, unless the budget has less.
+        work_per_object: u64 = 10_000;
+        /// The builder of the initial tree, which is first improved to a local optimum.
+        start: Start, in Itself;
+    }
+}
+
+impl Search for Config {
+    /// Rebuilds disjoint subtrees in parallel, each with a random stream of its own.
+    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+        let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
+        let n = tree.objects() as u64;
+        if n < 3 {
+            return Ok(best.tree);
+        }
+        run.count(reinsertion::to_local_optimum(&mut tree, run.left(), run.observer()));
+        best.offer(&tree, run);
+        let (mut rng, mut number) = (stream(seed, 0), 0);
+        let mut own = self.work_per_object.saturating_mul(n);
+        // The work that a batch may take: it is not begun with less.
+        let enough = BATCH * WORK_PER_OBJECT * n.min(self.objects.into());
+        while run.stopped().is_none() && own.min(run.left().work) >= enough {
+            tree.sort_in_preorder();
+            let mut round = Tally::default();
+            while round.work < n * WORK_PER_OBJECT && !run.observer().cancelled() {
+                let left = run.left().less(&round);
+                let quota = left.at_most(own.saturating_sub(round.work));
+                if quota.work < enough || quota.moves == 0 {
+                    break;
+                }
+                let subtrees = self.select(&tree, &mut rng, quota.moves.min(BATCH), &mut round);
+                // The selection draws from stream 0.
+                let first = number + 1;
+                let share = Quota { work: quota.work / (2 * BATCH), ..Quota::ENDLESS };
+                let construct = |at: usize| {
+                    self.construct(&tree, &subtrees[at], share, stream(seed, first + at as u64), run.observer())
+                };
+                let found =
+                    parallel::map(subtrees.len(), construct).into_iter().collect::<Result<Vec<_>, _>>()?;
+                number += subtrees.len() as u64;
+                let limit = Quota { work: quota.work / 2, ..Quota::ENDLESS };
+                round += replace(&mut tree, &subtrees, &found, limit, run.observer());
+            }
+            own = own.saturating_sub(round.work);
+            run.count(round);
+            best.offer(&tree, run);
+        }
+        Ok(best.tree)
+    }
+}
+
+/// Number of subtrees that are rebuilt together.
+const BATCH: u64 = 4;
+
+/// Work per object of the scene between two sorts of the nodes; also about the work per object of one rebuilt subtree.
+const WORK_PER_OBJECT: u64 = 64;
+
+/// A subtree: its inner nodes, root first, its leaves, and the total area of its inner nodes.
+#[derive(Debug, Default)]
+struct Subtree {
+    inner: Vec<u32>,
+    leaves: Vec<u32>,
+    area: f64,
+}
+
+impl Subtree {
+    /// The subtree below `root`, unless it has more than `most` leaves.
+    fn below(tree: &Working, root: u32, most: u32) -> Option<Self> {
+        let mut subtree = Self::default();
+        let mut stack = vec![root];
+        while let Some(at) = stack.pop() {
+            let node = &tree.nodes[at as usize];
+            if node.is_leaf() {
+                subtree.leaves.push(at);
+            } else {
+                subtree.area += node.area;
+                subtree.inner.push(at);
+                stack.extend([node.children[1], node.children[0]]);
+            }
+            // A subtree has one leaf more than inner nodes.
+            if subtree.inner.len() >= most as usize {
+                return None;
+            }
+        }
+        Some(subtree)
+    }
+}
+
+impl Config {
+    /// Selects `picks` subtrees and returns the disjoint ones of suitable size.
+    fn select(&self, tree: &Working, rng: &mut Stream, picks: u64, tally: &mut Tally) -> Vec<Subtree> {
+        let mut subtrees: Vec<Subtree> = Vec::new();
+        for _ in 0..picks {
+            tally.moves += 1;
+            tally.work += u64::from(self.tournament);
+            let mut root = (-1.0, ANCHOR);
+            for _ in 0..self.tournament {
+                let at = rng.random_range(1..tree.nodes.len() as u32);
+                let contribution = contribution(tree, at);
+                if contribution > root.0 {
+                    root = (contribution, at);
+                }
+            }
+            let mut found = None;
+            let mut at = root.1;
+            for _ in 0..=rng.random_range(0..=self.climb) {
+                let Some(subtree) = Subtree::below(tree, at, self.objects) else { break };
+                tally.work += subtree.inner.len() as u64;
+                found = Some(subtree);
+                at = tree.nodes[at as usize].parent;
+                if at == ANCHOR {
+                    break;
+                }
+            }
+            let Some(subtree) = found.filter(|subtree| subtree.leaves.len() >= 3) else { continue };
+            // Of two subtrees with a common leaf, one contains the root of the other.
+            let holds = |one: &Subtree, other: &Subtree| one.inner.contains(&other.inner[0]);
+            if !subtrees.iter().any(|other| holds(other, &subtree) || holds(&subtree, other)) {
+                subtrees.push(subtree);
+            }
+        }
+        subtrees
+    }
+
+    /// Another tree over the leaves of a subtree, if it is better, and the work that it took.
+    fn construct(
+        &self,
+        tree: &Working,
+        subtree: &Subtree,
+        quota: Quota,
+        rng: Stream,
+        observer: &dyn Observer,
+    ) -> Result<(Option<Working>, Tally), SearchError> {
+        let boxes: Vec<Aabb> =
+            subtree.leaves.iter().map(|&leaf| Aabb::from(&tree.nodes[leaf as usize].aabb)).collect();
+        let mut rule = Randomised::new(self.candidates, Some(self.noise), rng);
+        let mut other = Bvh::default();
+        let scene = Presorted::new(&boxes)?;
+        self.construction.construct(&scene, &mut rule, &mut Workspace::default(), &mut other);
+        let mut other = Working::from_bvh(&other, &boxes)?;
+        let mut tally = self.local_search.improve(&mut other, quota, observer);
+        tally = Tally { moves: 0, kept: 0, work: tally.work + 2 * boxes.len() as u64 };
+        let better = other.area() < subtree.area * (1.0 - TOLERANCE);
+        Ok((better.then_some(other), tally))
+    }
+}
+
+/// The area of a node's children, 0 for a leaf.
+fn contribution(tree: &Working, at: u32) -> f64 {
+    let node = &tree.nodes[at as usize];
+    if node.is_leaf() { 0.0 } else { node.children.iter().map(|&child| tree.nodes[child as usize].area).sum() }
+}
+
+/// Replaces subtrees by the better ones, then tries all their nodes in all positions of the tree once.
+fn replace(
+    tree: &mut Working,
+    subtrees: &[Subtree],
+    found: &[(Option<Working>, Tally)],
+    quota: Quota,
+    observer: &dyn Observer,
+) -> Tally {
+    let (mut total, mut order) = (Tally::default(), Vec::new());
+    for (subtree, (other, tally)) in subtrees.iter().zip(found) {
+        total += *tally;
+        if let Some(other) = other {
+            tree.begin();
+            graft(tree, subtree, other);
+            total.kept += 1;
+            total.work += 2 * subtree.leaves.len() as u64;
+            order.extend(subtree.inner.iter().chain(&subtree.leaves));
+        }
+    }
+    total.work += reinsertion::pass(tree, &order, quota, observer).work;
+    total
+}
+
+/// Gives a subtree the shape of another tree over its leaves.
+fn graft(tree: &mut Working, subtree: &Subtree, shape: &Working) {
+    let order = shape.preorder();
+    let mut new = vec![ANCHOR; shape.nodes.len()];
+    let mut inner = subtree.inner.iter();
+    for &at in &order {
+        let node = &shape.nodes[at as usize];
+        new[at as usize] = if node.is_leaf() {
+            subtree.leaves[node.children[1] as usize]
+        } else {
+            inner.next().copied().unwrap_or(ANCHOR) // there are as many
+        };
+    }
+    for &at in order.iter().rev() {
+        let node = &shape.nodes[at as usize];
+        if !node.is_leaf() {
+            tree.join(new[at as usize], node.children.map(|child| new[child as usize]));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scatter::{built, scatter};
+    use bvh_build::median_cut;
+    use bvh_core::validate;
+
+    #[test]
+    fn grafting_changes_the_subtree_alone_and_areas_stay_exact() {
+        let boxes = scatter(400);
+        let mut tree = built(&median_cut::Config::default(), &boxes);
+        let (config, mut rng) = (Config { objects: 50, ..Config::default() }, stream(1, 0));
+        let (mut kept, begin) = (0, tree.area());
+        for number in 0..300 {
+            let subtrees = config.select(&tree, &mut rng, 4, &mut Tally::default());
+            let before = tree.area();
+            for subtree in &subtrees {
+                let found =
+                    config.construct(&tree, subtree, Quota::ENDLESS, stream(1, number + 1), &()).unwrap();
+                let Some(other) = found.0 else { continue };
+                tree.begin();
+                graft(&mut tree, subtree, &other);
+                let after = Subtree::below(&tree, subtree.inner[0], 50).unwrap();
+                assert!((after.area - other.area()).abs() <= 1e-12 * other.area());
+                let sorted = |leaves: &[u32]| {
+                    let mut leaves = leaves.to_vec();
+                    leaves.sort_unstable();
+                    leaves
+                };
+                assert_eq!(sorted(&after.leaves), sorted(&subtree.leaves));
+                kept += 1;
+            }
+            let area = tree.internal_area();
+            assert!((tree.area() - area).abs() <= 1e-12 * area && tree.area() <= before);
+        }
+        assert!(kept > 1 && tree.area() < begin, "{kept}");
+        let found = tree.to_bvh();
+        validate(&found, &boxes).unwrap();
+        assert!(found.is_tight(&boxes));
+    }
+
+    #[test]
+    fn subtrees_of_one_batch_have_no_leaf_in_common() {
+        let boxes = scatter(100);
+        let tree = built(&Config::default().start, &boxes);
+        let (config, mut rng) = (Config { objects: 30, ..Config::default() }, stream(1, 0));
+        let mut several = 0;
+        for _ in 0..200 {
+            let subtrees = config.select(&tree, &mut rng, 8, &mut Tally::default());
+            let mut leaves: Vec<u32> =
+                subtrees.iter().flat_map(|subtree| subtree.leaves.iter().copied()).collect();
+            let count = leaves.len();
+            leaves.sort_unstable();
+            leaves.dedup();
+            assert_eq!(leaves.len(), count);
+            assert!(subtrees.iter().all(|subtree| (3..=30).contains(&subtree.leaves.len())));
+            several += usize::from(subtrees.len() > 1);
+        }
+        assert!(several > 100);
+    }
+}

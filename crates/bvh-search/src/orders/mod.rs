@@ -1,0 +1,72 @@
+//! Searches over insertion orders. They share the fitness of an order: the cost of its Goldsmith–Salmon tree.
+
+pub mod genetic;
+pub mod random_orders;
+
+use crate::parallel::map_init;
+use crate::run::{Problem, SearchError, Stream};
+use bvh_build::goldsmith_salmon::{self, Scene, Workspace};
+use bvh_core::{Bvh, cost::Objective};
+use rand::seq::SliceRandom;
+
+/// A scene ready to be built from any insertion order.
+struct Insertion {
+    scene: Scene,
+    config: goldsmith_salmon::Config,
+    objective: Objective,
+}
+
+/// The buffers of one thread.
+type Buffers = (Workspace, Bvh);
+
+impl Insertion {
+    fn new(problem: &Problem, config: &goldsmith_salmon::Config) -> Result<Self, SearchError> {
+        Ok(Self { scene: Scene::new(problem.boxes)?, config: config.clone(), objective: problem.objective })
+    }
+
+    /// Number of objects.
+    fn len(&self) -> usize {
+        self.scene.len()
+    }
+
+    /// Nodes created or visited by an evaluation: a leaf per object and about as many inner nodes.
+    fn work(&self) -> u64 {
+        2 * self.scene.len() as u64
+    }
+
+    /// The cost of the tree of one order, which must be a permutation of the objects.
+    fn cost(&self, order: &[u32], (workspace, tree): &mut Buffers) -> f64 {
+        // An order that is not a permutation would be a defect of the search, and never becomes the incumbent.
+        let Ok(goldsmith_salmon) = self.config.insert_all(&self.scene, order, workspace) else {
+            debug_assert!(false, "orders are permutations");
+            return f64::INFINITY;
+        };
+        if self.objective == Objective::GoldsmithSalmon {
+            goldsmith_salmon
+        } else {
+            workspace.write(tree);
+            self.objective.cost(tree)
+        }
+    }
+
+    /// The tree of one order.
+    fn tree(&self, order: &[u32]) -> Bvh {
+        let (mut workspace, mut tree) = Buffers::default();
+        if self.config.insert_all(&self.scene, order, &mut workspace).is_ok() {
+            workspace.write(&mut tree);
+        }
+        tree
+    }
+
+    /// The costs of several orders, in their order, on all threads of the current rayon pool.
+    fn costs(&self, orders: &[&[u32]]) -> Vec<f64> {
+        map_init(orders.len(), Buffers::default, |buffers, at| self.cost(orders[at], buffers))
+    }
+}
+
+/// A permutation of `0..n`, each equally likely.
+fn random_order(n: usize, rng: &mut Stream) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..n as u32).collect();
+    order.shuffle(rng);
+    order
+}

@@ -1,0 +1,44 @@
+//! Random picking of insertion orders: the baseline of the genetic algorithm.
+//!
+//! Ng & Trifonov 2003, section 4: 'random picking of permutations (which was also tried)'.
+//!
+//! Differs from the paper: nothing known.
+
+use super::{Insertion, random_order};
+use crate::run::{Problem, Run, Search, SearchError, stream};
+use bvh_build::config::Itself;
+use bvh_build::goldsmith_salmon;
+use bvh_core::Bvh;
+
+bvh_build::config! {
+    /// How many orders to try.
+    pub struct Config {
+        /// Number of independent random orders.
+        trials: u64 = 100, in 1..;
+        /// How the objects are inserted.
+        insertion: goldsmith_salmon::Config, in Itself;
+    }
+}
+
+/// Number of orders between two checks of the budget.
+const BATCH: u64 = 64;
+
+impl Search for Config {
+    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+        let insertion = Insertion::new(problem, &self.insertion)?;
+        let order = |trial| random_order(insertion.len(), &mut stream(seed, trial));
+        let (mut next, mut best) = (0, 0);
+        while next < self.trials && run.stopped().is_none() {
+            let end = self.trials.min(next.saturating_add(run.evaluations_left(insertion.work()).min(BATCH)));
+            let orders: Vec<Vec<u32>> = (next..end).map(order).collect();
+            let orders: Vec<&[u32]> = orders.iter().map(Vec::as_slice).collect();
+            for (trial, cost) in (next..end).zip(insertion.costs(&orders)) {
+                if run.record(cost, insertion.work()) {
+                    best = trial;
+                }
+            }
+            next = end;
+        }
+        Ok(insertion.tree(&order(best)))
+    }
+}

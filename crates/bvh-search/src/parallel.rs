@@ -1,0 +1,40 @@
+//! Loops over independent tasks: on all threads of the current rayon pool, or on one without the feature `rayon`.
+//!
+//! Results come in the order of the tasks, whichever thread has done them.
+
+/// The results of the tasks `0..count`. Every thread has a state of its own, made by `init`: buffers that are reused.
+pub(crate) fn map_init<S, T: Send>(
+    count: usize,
+    init: impl Fn() -> S + Send + Sync,
+    task: impl Fn(&mut S, usize) -> T + Send + Sync,
+) -> Vec<T> {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        (0..count).into_par_iter().map_init(init, task).collect()
+    }
+    #[cfg(not(feature = "rayon"))]
+    {
+        let mut state = init();
+        (0..count).map(|number| task(&mut state, number)).collect()
+    }
+}
+
+/// The results of a few long tasks, of which any may be given to another thread.
+pub(crate) fn map<T: Send>(count: usize, task: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        (0..count).into_par_iter().with_max_len(1).map(task).collect()
+    }
+    #[cfg(not(feature = "rayon"))]
+    (0..count).map(task).collect()
+}
+
+/// Number of threads that share the tasks.
+pub(crate) fn threads() -> usize {
+    #[cfg(feature = "rayon")]
+    return rayon::current_num_threads();
+    #[cfg(not(feature = "rayon"))]
+    1
+}

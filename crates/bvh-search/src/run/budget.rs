@@ -1,0 +1,87 @@
+//! How much a search may do, how much it has done, and why it ended.
+
+use std::ops::AddAssign;
+
+/// Limits in machine-independent units; `None` is no limit. For a limit in seconds, cancel through the
+/// [`Observer`](crate::Observer).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields, default)
+)]
+pub struct Budget {
+    /// Maximum number of trees or moves to evaluate.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub max_evaluations: Option<u64>,
+    /// Maximum work, in nodes created or visited.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub max_work: Option<u64>,
+}
+
+/// Why a search returned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum StopReason {
+    /// It did all that its configuration asks for.
+    Completed,
+    /// No tree costs less than its incumbent.
+    Optimal,
+    /// [`Budget::max_evaluations`] was reached.
+    Evaluations,
+    /// [`Budget::max_work`] was reached.
+    Work,
+    /// The observer asked for it.
+    Cancelled,
+}
+
+/// What was done to a tree, for [`Run::count`](crate::Run::count).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Moves evaluated.
+    pub moves: u64,
+    /// Number of those moves that were kept.
+    pub kept: u64,
+    /// Nodes created or visited.
+    pub work: u64,
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.moves += other.moves;
+        self.kept += other.kept;
+        self.work += other.work;
+    }
+}
+
+/// How much may still be done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Quota {
+    /// Moves to evaluate.
+    pub moves: u64,
+    /// Nodes to create or visit.
+    pub work: u64,
+}
+
+impl Quota {
+    /// No limit.
+    pub const ENDLESS: Self = Self { moves: u64::MAX, work: u64::MAX };
+
+    /// Whether `done` has used up either limit.
+    #[inline(always)]
+    pub fn is_reached(&self, done: &Tally) -> bool {
+        done.moves >= self.moves || done.work >= self.work
+    }
+
+    /// The same quota with no more than this work.
+    #[must_use]
+    pub fn at_most(self, work: u64) -> Self {
+        Self { work: self.work.min(work), ..self }
+    }
+
+    /// What is left of the quota after `done`.
+    #[must_use]
+    pub fn less(&self, done: &Tally) -> Self {
+        Self { moves: self.moves.saturating_sub(done.moves), work: self.work.saturating_sub(done.work) }
+    }
+}

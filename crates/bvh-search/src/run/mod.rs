@@ -1,0 +1,170 @@
+//! One search at work: the only place that counts evaluations and work, keeps the incumbent's cost and the history,
+//! and decides when to stop.
+
+mod budget;
+mod error;
+mod observer;
+mod problem;
+mod stream;
+
+pub use budget::{Budget, Quota, StopReason, Tally};
+use bvh_build::{Builder, Check};
+use bvh_core::Bvh;
+pub use error::SearchError;
+pub use observer::{Event, Observer};
+pub use problem::{Problem, Shortcut};
+pub use stream::Stream;
+pub(crate) use stream::stream;
+
+/// A search, or a builder seen as a search of one evaluation.
+pub trait Search: Check {
+    /// Looks for a good tree, reports every evaluation to `run`, and returns the incumbent. Stops as soon as
+    /// [`Run::stopped`] says so, but never before one tree has been evaluated. The parameters have been
+    /// [checked](Check).
+    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError>;
+}
+
+impl<B: Builder> Search for B {
+    fn search(&self, problem: &Problem, _seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+        let tree = self.build(problem.boxes)?;
+        run.record(problem.objective.cost(&tree), tree.nodes.len() as u64);
+        Ok(tree)
+    }
+}
+
+/// The state that all searches have in common.
+pub struct Run<'a> {
+    budget: Budget,
+    observer: &'a dyn Observer,
+    evaluations: u64,
+    work: u64,
+    incumbent: f64,
+    optimal: bool,
+    history: Vec<Event>,
+}
+
+impl<'a> Run<'a> {
+    /// Counts one evaluation that took `work` nodes and found `cost`. Returns whether it is the new incumbent:
+    /// strictly cheaper than all before, so that of equal trees the first is kept.
+    pub fn record(&mut self, cost: f64, work: u64) -> bool {
+        self.record_generation(1, cost, work)
+    }
+
+    /// Counts several evaluations that took `work` nodes together and whose best found `cost`, as one event.
+    /// Returns whether it is the new incumbent.
+    pub fn record_generation(&mut self, evaluations: u64, cost: f64, work: u64) -> bool {
+        self.count(Tally { moves: evaluations, work, kept: 0 });
+        let improved = cost < self.incumbent;
+        if improved {
+            self.incumbent = cost;
+        }
+        self.report(cost);
+        improved
+    }
+
+    /// Counts moves without an event for each. Searches that make millions of moves report their improvements by
+    /// [`improve`](Self::improve).
+    pub fn count(&mut self, tally: Tally) {
+        self.evaluations = self.evaluations.saturating_add(tally.moves);
+        self.work = self.work.saturating_add(tally.work);
+    }
+
+    /// Records an event if moves that were already counted led to a new incumbent of this cost. Returns whether they
+    /// did.
+    pub fn improve(&mut self, cost: f64) -> bool {
+        let improved = cost < self.incumbent;
+        if improved {
+            self.incumbent = cost;
+            self.report(cost);
+        }
+        improved
+    }
+
+    fn report(&mut self, cost: f64) {
+        let Self { evaluations, work, incumbent, .. } = *self;
+        let event = Event { evaluations, work, cost, incumbent };
+        self.history.push(event);
+        self.observer.event(&event);
+    }
+
+    /// Ends the search, because no tree costs less than the incumbent.
+    pub fn proved_optimal(&mut self) {
+        self.optimal = true;
+    }
+
+    /// What is left of the budget: endless where it has no limit, nothing if the incumbent is optimal.
+    pub fn left(&self) -> Quota {
+        if self.optimal {
+            return Quota { work: 0, moves: 0 };
+        }
+        let left = |limit: Option<u64>, count| limit.map_or(u64::MAX, |limit| limit.saturating_sub(count));
+        Quota {
+            work: left(self.budget.max_work, self.work),
+            moves: left(self.budget.max_evaluations, self.evaluations),
+        }
+    }
+
+    /// The observer, which may be asked from other threads.
+    pub fn observer(&self) -> &'a dyn Observer {
+        self.observer
+    }
+
+    /// Why the search must return now, if it must.
+    pub fn stopped(&self) -> Option<StopReason> {
+        let reached = |limit: Option<u64>, count| limit.is_some_and(|limit| count >= limit);
+        if self.evaluations == 0 {
+            None
+        } else if self.observer.cancelled() {
+            Some(StopReason::Cancelled)
+        } else if self.optimal {
+            Some(StopReason::Optimal)
+        } else if reached(self.budget.max_evaluations, self.evaluations) {
+            Some(StopReason::Evaluations)
+        } else if reached(self.budget.max_work, self.work) {
+            Some(StopReason::Work)
+        } else {
+            None
+        }
+    }
+
+    /// How many evaluations of `work` nodes each are left in the budget, at least one before the first.
+    pub fn evaluations_left(&self, work: u64) -> u64 {
+        let left = self.left();
+        left.moves.min(left.work.div_ceil(work.max(1))).max(u64::from(self.evaluations == 0))
+    }
+}
+
+/// What a search found.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The incumbent.
+    pub tree: Bvh,
+    /// Its cost by the problem's objective.
+    pub cost: f64,
+    /// Trees or moves evaluated.
+    pub evaluations: u64,
+    /// Nodes created or visited.
+    pub work: u64,
+    /// Why the search returned.
+    pub stop: StopReason,
+    /// Every event, in order.
+    pub history: Vec<Event>,
+}
+
+/// Runs one search within `budget`, after a [check](Check) of its parameters; randomness comes from `seed` alone.
+pub fn solve(
+    search: &dyn Search,
+    problem: &Problem,
+    seed: u64,
+    budget: Budget,
+    observer: &dyn Observer,
+) -> Result<Outcome, SearchError> {
+    let incumbent = f64::INFINITY;
+    let mut run =
+        Run { budget, observer, evaluations: 0, work: 0, incumbent, optimal: false, history: Vec::new() };
+    search.check()?;
+    let tree = search.search(problem, seed, &mut run)?;
+    let stop = run.stopped().unwrap_or(StopReason::Completed);
+    let Run { evaluations, work, incumbent: cost, history, .. } = run;
+    Ok(Outcome { tree, cost, evaluations, work, stop, history })
+}

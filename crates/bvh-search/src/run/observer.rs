@@ -1,0 +1,31 @@
+//! How a caller follows a search, and stops it.
+
+/// One point of a search's history: a trial, a generation, or an improvement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// Trees or moves evaluated so far, including this one.
+    pub evaluations: u64,
+    /// Nodes created or visited so far.
+    pub work: u64,
+    /// The cost found now.
+    pub cost: f64,
+    /// The lowest cost so far.
+    pub incumbent: f64,
+}
+
+/// Follows a search from outside, from any thread. `()` watches nothing.
+pub trait Observer: Sync {
+    /// Called after every event of the history, in order.
+    fn event(&self, _event: &Event) {}
+    /// Polled often; the search returns its incumbent soon after this becomes true.
+    fn cancelled(&self) -> bool {
+        false
+    }
+    /// The elapsed fraction of the available time, 0 to 1, if the time of the cancellation is known in advance. The
+    /// search then plans to be done when this reaches 1. Such runs cannot be repeated exactly.
+    fn progress(&self) -> Option<f64> {
+        None
+    }
+}
+
+impl Observer for () {}

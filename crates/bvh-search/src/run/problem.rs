@@ -1,0 +1,47 @@
+//! What a search is asked for, and what it may skip on the way because the answer stays the same.
+
+use bvh_core::{Aabb, cost::Objective};
+
+/// What is searched for: the tree over `boxes` of least cost.
+#[derive(Clone, Copy, Debug)]
+pub struct Problem<'a> {
+    /// One box per object.
+    pub boxes: &'a [Aabb],
+    /// The cost to minimise.
+    pub objective: Objective,
+    /// Shortcuts that must not be taken, so that their savings can be measured. Empty in production.
+    pub disabled: &'a [Shortcut],
+}
+
+impl<'a> Problem<'a> {
+    /// The paper's problem: least total area of inner nodes.
+    pub fn new(boxes: &'a [Aabb]) -> Self {
+        Self { boxes, objective: Objective::default(), disabled: &[] }
+    }
+
+    /// Whether this shortcut may be taken where the scene allows it.
+    pub fn allows(&self, shortcut: Shortcut) -> bool {
+        !self.disabled.contains(&shortcut)
+    }
+}
+
+/// Work that some scenes do not need. No shortcut changes the cost of a tree that is built; a search that is ended early
+/// or replaced by the exact solver never returns a more expensive tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum Shortcut {
+    /// An axis that orders the objects as a lower axis does is neither scanned nor divided: its split candidates are
+    /// the same, and it loses ties. See
+    /// [`skip_same_order`](bvh_build::muller_fellner::Config::skip_same_order).
+    SameOrder,
+    /// Objects that come in order along an axis are not sorted along it, for example where all centres coincide. See
+    /// [`skip_sorted`](bvh_build::muller_fellner::Config::skip_sorted).
+    Sorted,
+    /// A scene without area is divided along x only. See
+    /// [`skip_flat`](bvh_build::muller_fellner::Config::skip_flat).
+    Flat,
+    /// A search ends when its incumbent meets [a lower bound](crate::lower_bound::of_largest).
+    BoundMet,
+    /// The search `best` is replaced by the [exact solver](crate::exact) where that takes less work.
+    Tiny,
+}

@@ -1,0 +1,100 @@
+//! Conversion between flat trees and the working form.
+
+use super::{ANCHOR, NONE, Node, Working};
+use crate::run::SearchError;
+use bvh_core::{Aabb, Bvh, Node as BvhNode, NodeKind, PackedAabb};
+
+impl Working {
+    /// The working form of a valid tree with one object per leaf, in O(n); boxes are made tight. Refuses inner nodes with
+    /// more than two children.
+    pub fn from_bvh(tree: &Bvh, boxes: &[Aabb]) -> Result<Self, SearchError> {
+        let mut nodes = Vec::with_capacity(tree.nodes.len() + 1);
+        nodes.push(Node::ANCHOR);
+        for (index, node) in tree.nodes.iter().enumerate() {
+            let children = match node.kind() {
+                NodeKind::Inner { first, count: 2 } => [first + 1, first + 2],
+                NodeKind::Leaf { first, .. } => [NONE, tree.prim_ids[first as usize]],
+                NodeKind::Inner { count, .. } => {
+                    return Err(SearchError::NotBinary { node: index, children: count });
+                }
+            };
+            nodes.push(Node { children, ..Node::ANCHOR });
+        }
+        if nodes.len() > 1 {
+            nodes[0].children[0] = 1;
+            nodes[1].parent = ANCHOR;
+        }
+        for at in (1..nodes.len()).rev() {
+            let [left, right] = nodes[at].children;
+            let aabb = if left == NONE {
+                PackedAabb::from(&boxes[right as usize])
+            } else {
+                nodes[left as usize].parent = at as u32;
+                nodes[right as usize].parent = at as u32;
+                nodes[left as usize].aabb.union(&nodes[right as usize].aabb)
+            };
+            nodes[at].aabb = aabb;
+            nodes[at].area = aabb.half_area();
+        }
+        Ok(Self::from_nodes(nodes))
+    }
+
+    /// As [`from_bvh`](Self::from_bvh), in one pass, for a tree whose boxes are tight and whose internal area is `area`.
+    pub fn from_tight(tree: &Bvh, area: f64) -> Result<Self, SearchError> {
+        let mut nodes = Vec::with_capacity(tree.nodes.len() + 1);
+        nodes.push(Node::ANCHOR);
+        // Two dummy slots for leaves, so that the store is branch-free: which nodes are leaves is unpredictable.
+        let mut parents = vec![ANCHOR; tree.nodes.len() + 2];
+        for (index, (node, at)) in tree.nodes.iter().zip(1..).enumerate() {
+            let (first, count, leaf) = match node.kind() {
+                NodeKind::Inner { first, count } => (first, count, false),
+                NodeKind::Leaf { first, .. } => (first, 2, true),
+            };
+            if count != 2 {
+                return Err(SearchError::NotBinary { node: index, children: count });
+            }
+            let below = if leaf { tree.nodes.len() } else { first as usize };
+            (parents[below], parents[below + 1]) = (at, at);
+            let object = tree.prim_ids[if leaf { first as usize } else { 0 }];
+            let children = if leaf { [NONE, object] } else { [first + 1, first + 2] };
+            let aabb = PackedAabb::from(&node.aabb);
+            let (area, parent) = (aabb.half_area(), parents[index]);
+            nodes.push(Node { aabb, area, parent, children, ..Node::ANCHOR });
+        }
+        if nodes.len() > 1 {
+            nodes[0].children[0] = 1;
+        }
+        let mut working = Self { nodes, ..Self::default() };
+        working.area.add(area);
+        Ok(working)
+    }
+
+    /// The tree, children adjacent and left before right, objects in leaf order.
+    pub fn to_bvh(&self) -> Bvh {
+        let mut tree = Bvh::default();
+        let Some(root) = self.root() else { return tree };
+        let count = self.nodes.len() - 1;
+        let placeholder = BvhNode::leaf(Aabb::EMPTY, 0, 0);
+        tree.nodes = vec![placeholder; count];
+        tree.prim_ids = Vec::with_capacity(self.objects());
+        let mut free = 1;
+        let mut stack = Vec::with_capacity(64);
+        let mut next = Some((root, 0));
+        while let Some((at, to)) = next {
+            let node = &self.nodes[at as usize];
+            let aabb = Aabb::from(&node.aabb);
+            let [left, right] = node.children;
+            if left == NONE {
+                tree.nodes[to as usize] = BvhNode::leaf(aabb, tree.prim_ids.len() as u32, 1);
+                tree.prim_ids.push(right);
+                next = stack.pop();
+            } else {
+                tree.nodes[to as usize] = BvhNode::inner(aabb, free, 2);
+                stack.push((right, free + 1));
+                next = Some((left, free));
+                free += 2;
+            }
+        }
+        tree
+    }
+}

@@ -1,0 +1,274 @@
+//! Trees that can be changed, and the search for the best position in them.
+//!
+//! [`Working`] is the working form of all searches: parents, packed boxes, cached areas, and a journal that undoes a
+//! change. Making it takes longer than a search of a few milliseconds has; that one changes the flat tree itself
+//! ([`Siblings`]). Both are [`Linked`], which is all that reinsertion needs.
+//!
+//! In the working form, node 0 is not a node but the *anchor*, whose first child is the root, so that the root needs no
+//! special case. A detached subtree keeps its parent node, and attaching uses that node again, so that nothing is ever
+//! allocated.
+
+mod convert;
+mod linked;
+mod position;
+mod siblings;
+
+use bvh_core::PackedAabb;
+use bvh_core::cost::Sum;
+pub(crate) use linked::Linked;
+pub(crate) use position::{PositionSearch, Scope};
+pub(crate) use siblings::Siblings;
+
+/// No node.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// The parent of the root.
+pub(crate) const ANCHOR: u32 = 0;
+
+/// A node of the working form: one cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Node {
+    /// Exact union of all boxes below.
+    pub aabb: PackedAabb,
+    /// Half area of `aabb`.
+    pub area: f64,
+    /// Number of the change during which the node was last written to the journal.
+    pub stamp: u64,
+    /// `NONE` for the spare parent of a detached subtree.
+    pub parent: u32,
+    /// Both children, or `[NONE, object]`.
+    pub children: [u32; 2],
+    /// In the journal only: the node's index.
+    pub index: u32,
+}
+
+impl Node {
+    const ANCHOR: Self =
+        Self { aabb: PackedAabb::EMPTY, area: 0.0, stamp: 0, parent: NONE, children: [NONE; 2], index: NONE };
+
+    #[inline(always)]
+    pub fn is_leaf(&self) -> bool {
+        self.children[0] == NONE
+    }
+
+    /// The child that is not `child`.
+    #[inline(always)]
+    pub fn other(&self, child: u32) -> u32 {
+        self.children[usize::from(self.children[0] == child)]
+    }
+}
+
+/// A binary tree under change. Leaves hold one object each.
+#[derive(Clone, Debug)]
+pub(crate) struct Working {
+    pub nodes: Vec<Node>,
+    /// Total area of the inner nodes when the current change began, and the area it has added since.
+    area: Sum,
+    added: f64,
+    journal: Vec<Node>,
+    change: u64,
+    /// Always empty; its capacity is reused by `sort_in_preorder`.
+    spare: Vec<Node>,
+}
+
+impl Default for Working {
+    fn default() -> Self {
+        Self {
+            nodes: vec![Node::ANCHOR],
+            area: Sum::default(),
+            added: 0.0,
+            journal: Vec::new(),
+            change: 0,
+            spare: Vec::new(),
+        }
+    }
+}
+
+impl Working {
+    /// A tree of linked nodes, the anchor first.
+    pub fn from_nodes(mut nodes: Vec<Node>) -> Self {
+        nodes.iter_mut().for_each(|node| node.stamp = 0);
+        let mut tree = Self { nodes, ..Self::default() };
+        tree.area.add(tree.internal_area());
+        tree
+    }
+
+    /// The root, unless there are no objects.
+    pub fn root(&self) -> Option<u32> {
+        Some(self.nodes[0].children[0]).filter(|&root| root != NONE)
+    }
+
+    /// Number of objects.
+    pub fn objects(&self) -> usize {
+        self.nodes.len() / 2
+    }
+
+    /// The total area of all inner nodes, kept incrementally by a compensated sum: every change adds one rounding error,
+    /// and nothing else.
+    pub fn area(&self) -> f64 {
+        self.area.value() + self.added
+    }
+
+    /// The total area of all inner nodes, recomputed. O(n).
+    pub fn internal_area(&self) -> f64 {
+        self.nodes.iter().filter(|node| !node.is_leaf()).map(|node| node.area).collect::<Sum>().value()
+    }
+
+    /// Begins a change, which can be undone as a whole until the next one begins.
+    #[inline(always)]
+    pub fn begin(&mut self) {
+        self.change += 1;
+        self.journal.clear();
+        self.area.add(self.added);
+        self.added = 0.0;
+    }
+
+    /// Undoes the current change exactly, to the last bit.
+    #[inline(always)]
+    pub fn undo(&mut self) {
+        self.added = 0.0;
+        for node in self.journal.drain(..) {
+            self.nodes[node.index as usize] = node;
+        }
+    }
+
+    /// The node, entered in the journal before it is written.
+    #[inline(always)]
+    fn write(&mut self, at: u32) -> &mut Node {
+        let node = &mut self.nodes[at as usize];
+        if node.stamp != self.change {
+            self.journal.push(Node { index: at, ..*node });
+            node.stamp = self.change;
+        }
+        node
+    }
+
+    /// Replaces the child `old` of `parent` by `new`.
+    #[inline(always)]
+    fn replace_child(&mut self, parent: u32, old: u32, new: u32) {
+        let children = &mut self.write(parent).children;
+        children[usize::from(children[0] != old)] = new;
+        self.write(new).parent = parent;
+    }
+
+    /// Takes the subtree of `node`, which is not the root, out of the tree together with its parent node. Boxes are made
+    /// tight. Returns the area saved, the sibling that replaced the parent, and the number of nodes visited.
+    #[inline(always)]
+    pub fn detach(&mut self, node: u32) -> (f64, u32, u64) {
+        let parent = self.nodes[node as usize].parent;
+        let Node { parent: above, area, .. } = self.nodes[parent as usize];
+        let sibling = self.nodes[parent as usize].other(node);
+        self.write(parent).parent = NONE;
+        self.replace_child(above, parent, sibling);
+        let (mut saved, mut at, mut visits) = (area, above, 2);
+        while at != ANCHOR {
+            let aabb = self.union_of(self.nodes[at as usize].children);
+            visits += 1;
+            if aabb == self.nodes[at as usize].aabb {
+                break;
+            }
+            let area = aabb.half_area();
+            let node = self.write(at);
+            saved += node.area - area;
+            (node.aabb, node.area) = (aabb, area);
+            at = node.parent;
+        }
+        self.added -= saved;
+        (saved, sibling, visits)
+    }
+
+    /// Puts a detached `node` beside `position`, with its parent node above both. Returns the area added and the number of
+    /// nodes visited.
+    #[inline(always)]
+    pub fn attach(&mut self, node: u32, position: u32) -> (f64, u64) {
+        let Node { aabb: added_box, parent, .. } = self.nodes[node as usize];
+        let Node { aabb, parent: above, .. } = self.nodes[position as usize];
+        self.replace_child(above, position, parent);
+        self.write(position).parent = parent;
+        let aabb = aabb.union(&added_box);
+        let area = aabb.half_area();
+        let joint = self.write(parent);
+        (joint.children, joint.aabb, joint.area) = ([position, node], aabb, area);
+        let (mut added, mut at, mut visits) = (area, above, 2);
+        while at != ANCHOR {
+            let grown = self.nodes[at as usize].aabb.union(&added_box);
+            visits += 1;
+            if grown == self.nodes[at as usize].aabb {
+                break;
+            }
+            let area = grown.half_area();
+            let node = self.write(at);
+            added += area - node.area;
+            (node.aabb, node.area) = (grown, area);
+            at = node.parent;
+        }
+        self.added += added;
+        (added, visits)
+    }
+
+    /// The box around two nodes.
+    #[inline(always)]
+    pub fn union_of(&self, [left, right]: [u32; 2]) -> PackedAabb {
+        self.nodes[left as usize].aabb.union(&self.nodes[right as usize].aabb)
+    }
+
+    /// Gives the inner node `at` these children and makes its box tight. Its ancestors are not updated: where several
+    /// nodes get new children, the lowest must come first, and the highest must keep its set of objects.
+    #[inline(always)]
+    pub fn join(&mut self, at: u32, children: [u32; 2]) {
+        let aabb = self.union_of(children);
+        let area = aabb.half_area();
+        children.into_iter().for_each(|child| self.write(child).parent = at);
+        let node = self.write(at);
+        let before = node.area;
+        (node.children, node.aabb, node.area) = (children, aabb, area);
+        self.added += area - before;
+    }
+
+    /// Number of changes begun so far, to be compared with a node's `stamp`.
+    pub fn changes(&self) -> u64 {
+        self.change
+    }
+
+    /// All nodes but the anchor, parents before children, left before right. O(n).
+    pub fn preorder(&self) -> Vec<u32> {
+        let mut order = Vec::with_capacity(self.nodes.len());
+        let mut stack: Vec<u32> = self.root().into_iter().collect();
+        while let Some(at) = stack.pop() {
+            order.push(at);
+            let node = &self.nodes[at as usize];
+            if !node.is_leaf() {
+                stack.extend([node.children[1], node.children[0]]);
+            }
+        }
+        order
+    }
+
+    /// Sorts the nodes in preorder, so that neighbours in the tree are neighbours in memory. O(n).
+    pub fn sort_in_preorder(&mut self) {
+        let mut nodes = std::mem::take(&mut self.spare);
+        nodes.reserve(self.nodes.len());
+        nodes.push(Node { stamp: 0, ..self.nodes[0] });
+        // Pending nodes: old index, new parent, side.
+        let mut stack: Vec<(u32, u32, usize)> = self.root().map(|root| (root, ANCHOR, 0)).into_iter().collect();
+        let mut area = Sum::default();
+        while let Some((old, parent, side)) = stack.pop() {
+            let (at, node) = (nodes.len() as u32, self.nodes[old as usize]);
+            nodes.push(Node { parent, stamp: 0, ..node });
+            nodes[parent as usize].children[side] = at;
+            if !node.is_leaf() {
+                area.add(node.area);
+                stack.extend([(node.children[1], at, 1), (node.children[0], at, 0)]);
+            }
+        }
+        self.spare = std::mem::replace(&mut self.nodes, nodes);
+        self.spare.clear();
+        (self.area, self.added, self.change) = (Sum::default(), 0.0, 0);
+        self.area.add(area.value());
+        self.journal.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,274 @@
+//! Reinsertion in the flat tree itself, with a list of parents beside it: for searches of a few milliseconds, in which
+//! conversion to and from the working form would take much of the time.
+//!
+//! Siblings stay adjacent: a node that moves takes its pair with it, as in Meister & Bittner 2018. A parent may then come
+//! after its children, which [`Siblings::into_tree`] repairs.
+
+use super::NONE;
+use super::linked::Linked;
+use bvh_core::{Bvh, Node, NodeKind, PackedAabb};
+use std::hint::select_unpredictable;
+
+/// A binary tree under change. The root is node 0; siblings are pairs: nodes 1 and 2, 3 and 4, and so on.
+#[cfg_attr(test, derive(Clone))]
+pub(crate) struct Siblings {
+    tree: Bvh,
+    /// The parent of every pair.
+    parents: Vec<u32>,
+}
+
+/// The pair that a node other than the root belongs to.
+#[inline(always)]
+fn pair(at: u32) -> usize {
+    (at as usize - 1) / 2
+}
+
+/// The first node of a pair.
+#[inline(always)]
+fn first(pair: u32) -> usize {
+    2 * pair as usize + 1
+}
+
+impl Siblings {
+    /// Takes over a tight binary tree of two objects or more, whose siblings are adjacent. O(n).
+    pub fn new(tree: Bvh) -> Self {
+        debug_assert!(tree.nodes.iter().all(|node| node.is_leaf() || node.children().len() == 2));
+        let pairs = tree.nodes.len() / 2;
+        // One dummy slot for leaves, so that the store is branch-free: which nodes are leaves is unpredictable.
+        let mut parents = vec![0; pairs + 1];
+        for (node, at) in tree.nodes.iter().zip(0..) {
+            let pair = if node.is_leaf() { pairs } else { pair(node.children().start as u32) };
+            parents[pair] = at;
+        }
+        parents.truncate(pairs);
+        Self { tree, parents }
+    }
+
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.tree.nodes.len()
+    }
+
+    #[inline(always)]
+    fn node(&self, at: u32) -> &Node {
+        &self.tree.nodes[at as usize]
+    }
+
+    /// Writes a node that was elsewhere to `at`.
+    #[inline(always)]
+    fn put(&mut self, at: u32, node: Node) {
+        if !node.is_leaf() {
+            self.parents[pair(node.children().start as u32)] = at;
+        }
+        self.tree.nodes[at as usize] = node;
+    }
+
+    /// Makes the boxes from `at` upwards tight until one does not change. Returns the number of nodes visited.
+    #[inline(always)]
+    fn tighten(&mut self, mut at: u32) -> u64 {
+        let mut visits = 0;
+        while at != NONE {
+            let [left, right] = self.children(at).expect("an inner node").map(|child| self.node(child).aabb);
+            visits += 1;
+            let (aabb, node) = (left.union(&right), &mut self.tree.nodes[at as usize]);
+            if aabb == node.aabb {
+                break;
+            }
+            node.aabb = aabb;
+            at = self.parent(at);
+        }
+        visits
+    }
+
+    /// The tree with parents before their children again. O(n).
+    pub fn into_tree(self) -> Bvh {
+        let Self { mut tree, parents } = self;
+        let PairOrder { sequence, late } = PairOrder::of(&parents);
+        let mut places = vec![0; sequence.len()];
+        sequence.iter().zip(0..).for_each(|(&from, to)| places[from as usize] = to);
+        let moved = |mut node: Node| {
+            let (NodeKind::Inner { first: before, .. } | NodeKind::Leaf { first: before, .. }) = node.kind();
+            let below = select_unpredictable(node.is_leaf(), 0, pair(before.max(1)));
+            let after = 2 * places[below] + 1;
+            node.set_first(select_unpredictable(node.is_leaf(), before, after));
+            node
+        };
+        // Late pairs are kept aside until it is their turn; the others move towards the front, if at all.
+        let nodes = tree.nodes.as_mut_slice();
+        let aside: Vec<Node> = late.iter().flat_map(|&pair| &nodes[first(pair)..][..2]).copied().collect();
+        let (mut aside, mut next) = (aside.chunks_exact(2), 0);
+        nodes[0] = moved(nodes[0]);
+        for (to, from) in (0..).zip(sequence) {
+            let (to, from, late) = (first(to), first(from), from < next);
+            if late {
+                let siblings = aside.next().expect("as many as late");
+                (nodes[to], nodes[to + 1]) = (moved(siblings[0]), moved(siblings[1]));
+            } else {
+                (nodes[to], nodes[to + 1]) = (moved(nodes[from]), moved(nodes[from + 1]));
+                next = (from / 2) as u32 + 1;
+            }
+        }
+        tree
+    }
+}
+
+/// An order of the pairs in which each comes after that of its parent: by number, but a pair with a lower number than its
+/// parent's pair follows that pair at once.
+struct PairOrder {
+    sequence: Vec<u32>,
+    /// The pairs that follow a pair with a higher number.
+    late: Vec<u32>,
+}
+
+impl PairOrder {
+    fn of(parents: &[u32]) -> Self {
+        const DONE: u32 = NONE - 1;
+        // Per pair, the last entry of `waiting` that waits for it. An entry is a pair and the previous entry.
+        let (mut last, mut waiting) = (vec![NONE; parents.len()], Vec::new());
+        let (mut sequence, mut late, mut ready) = (Vec::with_capacity(parents.len()), Vec::new(), Vec::new());
+        for (number, &parent) in (0..).zip(parents) {
+            if parent != 0 && last[pair(parent)] != DONE {
+                let entry = waiting.len() as u32;
+                waiting.push((number, std::mem::replace(&mut last[pair(parent)], entry)));
+                continue;
+            }
+            ready.push(number);
+            while let Some(at) = ready.pop() {
+                sequence.push(at);
+                if at != number {
+                    late.push(at);
+                }
+                let mut entry = std::mem::replace(&mut last[at as usize], DONE);
+                while entry != NONE {
+                    let (waits, before) = waiting[entry as usize];
+                    ready.push(waits);
+                    entry = before;
+                }
+            }
+        }
+        Self { sequence, late }
+    }
+}
+
+impl Linked for Siblings {
+    const ABOVE: u32 = NONE;
+
+    #[inline(always)]
+    fn parent(&self, at: u32) -> u32 {
+        if at == 0 { NONE } else { self.parents[pair(at)] }
+    }
+
+    #[inline(always)]
+    fn children(&self, at: u32) -> Option<[u32; 2]> {
+        let node = self.node(at);
+        let first = node.children().start as u32;
+        (!node.is_leaf()).then_some([first, first + 1])
+    }
+
+    #[inline(always)]
+    fn other(&self, _at: u32, child: u32) -> u32 {
+        ((child - 1) ^ 1) + 1
+    }
+
+    #[inline(always)]
+    fn aabb(&self, at: u32) -> PackedAabb {
+        PackedAabb::from(&self.node(at).aabb)
+    }
+
+    #[inline(always)]
+    fn area(&self, at: u32) -> f64 {
+        self.aabb(at).half_area()
+    }
+
+    #[inline(always)]
+    fn reinsert(&mut self, node: u32, position: u32) -> u64 {
+        let (parent, sibling) = (self.parent(node), self.other(NONE, node));
+        let (rest, displaced) = (*self.node(sibling), *self.node(position));
+        let joint = self.node(node).aabb.union(&displaced.aabb);
+        self.put(sibling, displaced);
+        self.put(parent, rest);
+        self.put(position, Node::inner(joint, node.min(sibling), 2));
+        2 + self.tighten(self.parent(parent)) + self.tighten(self.parent(position))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::stream;
+    use crate::scatter::scatter;
+    use crate::tree::PositionSearch;
+    use bvh_build::{Builder, muller_fellner, ploc};
+    use bvh_core::{Aabb, cost, validate};
+    use rand::RngExt;
+
+    fn starts(boxes: &[Aabb]) -> [Bvh; 2] {
+        [ploc::Config::default().build(boxes).unwrap(), muller_fellner::Config::default().build(boxes).unwrap()]
+    }
+
+    /// The positions that a node other than the root may be moved to.
+    fn positions(tree: &Siblings, node: u32) -> Vec<u32> {
+        let allowed = |&place: &u32| {
+            let mut above =
+                std::iter::successors(Some(place), |&at| Some(tree.parent(at)).filter(|&at| at != NONE));
+            place != tree.parent(node) && place != tree.other(NONE, node) && above.all(|at| at != node)
+        };
+        (0..tree.len() as u32).filter(allowed).collect()
+    }
+
+    #[test]
+    fn a_tree_stays_valid_and_tight_whatever_moves_are_made() {
+        let boxes = scatter(40);
+        let mut rng = stream(1, 0);
+        for start in starts(&boxes) {
+            let mut tree = Siblings::new(start);
+            for _ in 0..2000 {
+                let node = rng.random_range(1..tree.len() as u32);
+                let positions = positions(&tree, node);
+                if let Some(&place) = positions.get(rng.random_range(0..positions.len().max(1))) {
+                    tree.reinsert(node, place);
+                }
+                let ordered = tree.clone().into_tree();
+                validate(&ordered, &boxes).unwrap();
+                assert!(ordered.is_tight(&boxes));
+                assert_eq!(ordered.nodes.len(), tree.len());
+            }
+        }
+    }
+
+    #[test]
+    fn the_position_found_is_the_best_of_all_and_saves_what_is_said() {
+        let boxes = scatter(60);
+        let mut rng = stream(2, 0);
+        let mut search = PositionSearch::default();
+        for start in starts(&boxes) {
+            let mut tree = Siblings::new(start);
+            for _ in 0..200 {
+                let node = rng.random_range(1..tree.len() as u32);
+                let before = cost::internal_area(&tree.tree);
+                let (found, own) = search.attached(&tree, node, 0.0);
+                let least = positions(&tree, node).into_iter().map(|place| {
+                    let mut moved = tree.clone();
+                    moved.reinsert(node, place);
+                    cost::internal_area(&moved.tree)
+                });
+                let least = least.fold(before, f64::min);
+                let after = before - own + found.map_or(own, |place| place.cost);
+                assert!((after - least).abs() <= 1e-12 * before, "{after} {least}");
+                if let Some(place) = found {
+                    tree.reinsert(node, place.beside);
+                    assert!((cost::internal_area(&tree.tree) - after).abs() <= 1e-12 * before);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_tree_in_which_nothing_moved_comes_out_as_it_was() {
+        for objects in [2, 3, 100] {
+            for start in starts(&scatter(objects)) {
+                assert_eq!(Siblings::new(start.clone()).into_tree(), start);
+            }
+        }
+    }
+}

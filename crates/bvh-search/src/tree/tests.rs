@@ -1,0 +1,186 @@
+//! The working form against brute force, move by move.
+
+use super::*;
+use crate::run::stream;
+use crate::scatter::built;
+use bvh_build::muller_fellner;
+use bvh_core::{Aabb, validate};
+use rand::RngExt;
+
+fn scene(n: usize) -> (Vec<Aabb>, Working) {
+    let mut rng = stream(1, 0);
+    let mut coordinate = |scale: f32| scale * rng.random::<f32>();
+    let boxes: Vec<Aabb> = (0..n)
+        .map(|_| {
+            let low = [(); 3].map(|()| coordinate(1.0));
+            let size = coordinate(0.3);
+            Aabb::from((low, low.map(|c| c + coordinate(size))))
+        })
+        .collect();
+    let working = built(&muller_fellner::Config::default(), &boxes);
+    (boxes, working)
+}
+
+#[test]
+fn a_tight_tree_is_taken_over_as_it_is() {
+    let (_, working) = scene(100);
+    let tree = working.to_bvh();
+    let taken = Working::from_tight(&tree, working.internal_area()).unwrap();
+    assert_tight(&taken, &scene(100).0);
+    assert_eq!((taken.area(), taken.to_bvh()), (working.internal_area(), tree));
+}
+
+/// Every box is the union below it, every parent the right one.
+fn assert_tight(tree: &Working, boxes: &[Aabb]) {
+    let bvh = tree.to_bvh();
+    validate(&bvh, boxes).unwrap();
+    let mut tight = bvh.clone();
+    tight.refit(boxes);
+    assert_eq!(bvh, tight);
+    for at in tree.preorder() {
+        let node = &tree.nodes[at as usize];
+        assert!(node.is_leaf() || node.children.iter().all(|&child| tree.nodes[child as usize].parent == at));
+        assert_eq!(node.area, node.aabb.half_area());
+    }
+}
+
+/// A random node that is not the root.
+fn any(tree: &Working, rng: &mut impl RngExt) -> u32 {
+    loop {
+        let node = rng.random_range(1..tree.nodes.len() as u32);
+        if tree.nodes[node as usize].parent != ANCHOR {
+            return node;
+        }
+    }
+}
+
+#[test]
+fn conversion_there_and_back_changes_nothing() {
+    for n in [0, 1, 2, 3, 50] {
+        let (boxes, tree) = scene(n);
+        let again = Working::from_bvh(&tree.to_bvh(), &boxes).unwrap();
+        assert_eq!(again.to_bvh(), tree.to_bvh());
+        let mut sorted = tree.clone();
+        for _ in 0..2 {
+            sorted.sort_in_preorder();
+            assert!(sorted.preorder().into_iter().eq(1..sorted.nodes.len() as u32));
+            assert_eq!(sorted.to_bvh(), tree.to_bvh());
+            assert!((sorted.area() - tree.area()).abs() <= 1e-12 * tree.area());
+        }
+        assert_eq!(tree.objects(), n);
+    }
+}
+
+#[test]
+fn the_incremental_area_equals_the_recomputed_one_after_each_of_a_million_moves() {
+    let (boxes, mut tree) = scene(60);
+    let mut rng = stream(2, 0);
+    for number in 0..1_000_000 {
+        tree.begin();
+        let node = any(&tree, &mut rng);
+        tree.detach(node);
+        let places = tree.preorder();
+        tree.attach(node, places[rng.random_range(0..places.len())]);
+        if rng.random_bool(0.3) {
+            tree.undo();
+        }
+        let recomputed = tree.internal_area();
+        assert!((tree.area() - recomputed).abs() <= 1e-12 * recomputed, "{number}");
+        if number % 10_000 == 0 {
+            assert_tight(&tree, &boxes);
+        }
+    }
+}
+
+#[test]
+fn undoing_restores_every_bit() {
+    let (_, mut tree) = scene(40);
+    let mut rng = stream(3, 0);
+    for _ in 0..1000 {
+        let before = (tree.to_bvh(), tree.area().to_bits());
+        tree.begin();
+        for _ in 0..rng.random_range(1..5) {
+            let node = any(&tree, &mut rng);
+            tree.detach(node);
+            let root = tree.nodes[0].children[0];
+            tree.attach(node, root);
+        }
+        tree.undo();
+        assert_eq!(before, (tree.to_bvh(), tree.area().to_bits()));
+    }
+}
+
+#[test]
+fn the_best_place_is_the_best_of_all_whether_the_node_is_out_or_only_thought_to_be() {
+    let (_, mut tree) = scene(60);
+    let mut rng = stream(4, 0);
+    let mut search = PositionSearch::default();
+    for _ in 0..300 {
+        let node = any(&tree, &mut rng);
+        let start = tree.area();
+        let (found, own) = search.attached(&tree, node, 0.0);
+        tree.begin();
+        let (saved, sibling, _) = tree.detach(node);
+        assert!((saved - own).abs() <= 1e-12 * saved);
+        let without = tree.clone();
+        let costs = without.preorder().into_iter().map(|place| {
+            let mut tree = without.clone();
+            tree.attach(node, place).0
+        });
+        let least = costs.fold(f64::INFINITY, f64::min);
+        let (aabb, area) = (tree.nodes[node as usize].aabb, tree.nodes[node as usize].area);
+        for first in [sibling, NONE, any(&tree, &mut rng)] {
+            let place = search.detached(&tree, Scope::ALL, (&aabb, area), first, f64::INFINITY).unwrap();
+            assert!((place.cost - least).abs() <= 1e-12 * least, "{} {least}", place.cost);
+        }
+        let below = least * (1.0 - 1e-9);
+        assert!(search.detached(&tree, Scope::ALL, (&aabb, area), sibling, below).is_none());
+        assert!((found.map_or(own, |place| place.cost) - least).abs() <= 1e-12 * least);
+        let place = found.map_or(sibling, |place| place.beside);
+        let (added, _) = tree.attach(node, place);
+        assert!((added - least).abs() <= 1e-12 * least && tree.area() <= start * (1.0 + 1e-12));
+    }
+}
+
+#[test]
+fn the_best_place_in_a_region_is_the_best_there_and_costs_what_it_adds() {
+    let (_, tree) = scene(60);
+    let (mut rng, mut search, mut elsewhere) = (stream(5, 0), PositionSearch::default(), 0);
+    for _ in 0..200 {
+        let mut tree = tree.clone();
+        // At random, so that the best place often is far away.
+        for _ in 0..20 {
+            let node = any(&tree, &mut rng);
+            tree.detach(node);
+            let places = tree.preorder();
+            tree.attach(node, places[rng.random_range(0..places.len())]);
+        }
+        let node = any(&tree, &mut rng);
+        let (_, sibling, _) = tree.detach(node);
+        let (aabb, area) = (tree.nodes[node as usize].aabb, tree.nodes[node as usize].area);
+        let above = tree.nodes[sibling as usize].parent;
+        let region = Scope::of(&tree, above, sibling).around(&tree, &aabb);
+        let root = region.root(&tree);
+        let inside = |&place: &u32| {
+            let mut at = place;
+            while at != root && at != ANCHOR {
+                at = tree.nodes[at as usize].parent;
+            }
+            at == root
+        };
+        assert!(
+            region == Scope::ALL
+                || tree.nodes[root as usize].aabb.union(&aabb) == tree.nodes[root as usize].aabb
+        );
+        let cost = |place| tree.clone().attach(node, place).0;
+        let [least, everywhere] = [tree.preorder().into_iter().filter(inside).collect(), tree.preorder()]
+            .map(|places: Vec<u32>| places.into_iter().map(cost).fold(f64::INFINITY, f64::min));
+        for first in [sibling, NONE] {
+            let place = search.detached(&tree, region, (&aabb, area), first, f64::INFINITY).unwrap();
+            assert!(inside(&place.beside));
+            assert!((place.cost - least).abs() <= 1e-12 * least, "{} {least}", place.cost);
+        }
+        elsewhere += u32::from(everywhere < least * (1.0 - 1e-9));
+    }
+    assert!(elsewhere > 20, "{elsewhere}");
+}
