@@ -4,16 +4,15 @@
 //! optima: they grow with the internal area. Wider nodes would make it meaningless: merging an inner node into its
 //! parent removes a term that is never negative, so that a single node over all objects would always be the cheapest.
 //!
-//! The best subtree below a node does not depend on the rest of the tree. The least internal area of a tree over the set S is
-//! therefore best(S) = A(S) + min over the divisions of S in two of best(L) + best(S ∖ L), with best = 0 for single
-//! objects: the recurrence of Karras & Aila 2013 for treelets, here for the whole tree.
+//! The recurrence is that of Karras & Aila 2013 for treelets (`Subsets`), here for the whole tree.
 
 use crate::run::{Problem, Run, Search, SearchError, Shortcut};
+use crate::tree::Subsets;
 use bvh_build::BuildError;
 use bvh_build::config::Accepts;
-use bvh_core::{Aabb, Bvh, Node, check_boxes};
+use bvh_core::{Aabb, Bvh, Node, PackedAabb, check_boxes};
 
-/// The most objects a scene may have: 3¹⁶ / 2 divisions take a few hundredths of a second and 2¹⁶ sets 2.5 MB.
+/// The most objects a scene may have: 3¹⁶ / 2 divisions take a few hundredths of a second and 2¹⁶ sets 2.8 MB.
 pub const MOST_OBJECTS: usize = 16;
 
 bvh_build::config! {
@@ -30,9 +29,10 @@ impl Search for Config {
         let n = problem.boxes.len();
         (..=MOST_OBJECTS).check("objects", &n)?;
         check_boxes(problem.boxes).map_err(BuildError::from)?;
-        let (part, work) = divisions(problem.boxes);
-        let tree = if n == 0 { Bvh::default() } else { tree(problem.boxes, &part) };
-        run.record(problem.objective.cost(&tree), work);
+        let mut subsets = Subsets::new(n as u32);
+        subsets.solve(problem.boxes.iter().map(PackedAabb::from));
+        let tree = if n == 0 { Bvh::default() } else { tree(problem.boxes, &subsets) };
+        run.record(problem.objective.cost(&tree), 3u64.pow(n as u32).div_ceil(2) - (1 << n));
         Ok(tree)
     }
 }
@@ -56,53 +56,20 @@ pub(crate) fn most_work_of_tiny(objects: usize) -> Option<u64> {
     (3..=MOST_OBJECTS).contains(&objects).then(|| 3u64.pow(objects as u32) / 2)
 }
 
-/// For every set of two objects or more, the part with the lowest object in the best division of the set; and the number
-/// of divisions compared.
-fn divisions(boxes: &[Aabb]) -> (Vec<u32>, u64) {
-    let sets = 1usize << boxes.len();
-    let mut aabb = vec![Aabb::EMPTY; sets];
-    let mut best = vec![0.0; sets];
-    let mut part = vec![0; sets];
-    let mut work = 0;
-    // A set comes after all of its subsets.
-    for set in 1..sets {
-        let lowest = set & set.wrapping_neg();
-        let others = set ^ lowest;
-        aabb[set] = aabb[others].union(&boxes[set.trailing_zeros() as usize]);
-        if others == 0 {
-            continue;
-        }
-        // `with` is the rest of the part with the lowest object: any proper subset of the others, so that every division
-        // is tried once.
-        let (mut least, mut taken, mut with) = (f64::INFINITY, 0, 0);
-        while with != others {
-            let cost = best[with | lowest] + best[others ^ with];
-            if cost < least {
-                (least, taken) = (cost, with | lowest);
-            }
-            with = with.wrapping_sub(others) & others;
-        }
-        work += (1u64 << others.count_ones()) - 1;
-        best[set] = aabb[set].half_area() + least;
-        part[set] = taken as u32;
-    }
-    (part, work)
-}
-
-/// The tree of these divisions, over one object or more.
-fn tree(boxes: &[Aabb], part: &[u32]) -> Bvh {
+/// The tree of the best divisions of all sets, over one object or more.
+fn tree(boxes: &[Aabb], subsets: &Subsets) -> Bvh {
     let mut tree = Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, 1)], prim_ids: vec![] };
-    let mut stack = vec![(0, part.len() as u32 - 1)];
+    let mut stack = vec![(0, (1usize << boxes.len()) - 1)];
     while let Some((node, set)) = stack.pop() {
-        let left = part[set as usize];
-        if left == 0 {
+        if set.is_power_of_two() {
             tree.nodes[node] = Node::leaf(Aabb::EMPTY, tree.prim_ids.len() as u32, 1);
             tree.prim_ids.push(set.trailing_zeros());
         } else {
             let first = tree.nodes.len();
             tree.nodes[node] = Node::inner(Aabb::EMPTY, first as u32, 2);
             tree.nodes.extend([Node::leaf(Aabb::EMPTY, 0, 1); 2]);
-            stack.extend([(first + 1, set ^ left), (first, left)]);
+            let [left, right] = subsets.division(set);
+            stack.extend([(first + 1, right), (first, left)]);
         }
     }
     tree.refit(boxes);
@@ -113,14 +80,8 @@ fn tree(boxes: &[Aabb], part: &[u32]) -> Bvh {
 mod tests {
     use super::*;
     use crate::run::{Budget, solve};
+    use crate::scatter::scatter;
     use bvh_core::validate;
-
-    fn scatter(n: usize, salt: usize) -> Vec<Aabb> {
-        let at =
-            |i: usize, k: usize| ((i * 7 + salt * 13 + 1) * (k * 31 + 17) * 2_654_435 % 1009) as f32 / 100.0;
-        let point = |i: usize| [at(i, 0), at(i, 1), at(i, 2)];
-        (0..n).map(|i| Aabb::from((point(i), point(i).map(|c| c + at(i, 3) / 5.0)))).collect()
-    }
 
     /// The least internal area of all binary trees over these sets, by merging every two of them in turn.
     fn brute_force(sets: &[Aabb]) -> f64 {
@@ -141,7 +102,7 @@ mod tests {
     fn no_binary_tree_at_all_is_cheaper() {
         for n in 0..=7 {
             for salt in 0..6 {
-                let boxes = scatter(n, salt);
+                let boxes = scatter(100)[10 * salt..10 * salt + n].to_vec();
                 let found = solve(&Config {}, &Problem::new(&boxes), 1, Budget::default(), &()).unwrap();
                 validate(&found.tree, &boxes).unwrap();
                 let least = brute_force(&boxes);
@@ -155,18 +116,9 @@ mod tests {
         let refused = |boxes: &[Aabb]| {
             solve(&Config {}, &Problem::new(boxes), 1, Budget::default(), &()).unwrap_err().to_string()
         };
-        assert_eq!(refused(&scatter(17, 0)), format!("objects is 17; accepted: at most {MOST_OBJECTS}"));
-        let mut boxes = scatter(5, 0);
+        assert_eq!(refused(&scatter(17)), format!("objects is 17; accepted: at most {MOST_OBJECTS}"));
+        let mut boxes = scatter(5);
         boxes[3].max.x = f32::NAN;
         assert!(refused(&boxes).contains("object 3"));
-    }
-
-    #[test]
-    fn every_division_is_compared_once() {
-        for n in 2..10u32 {
-            let work = divisions(&scatter(n as usize, 1)).1;
-            // Pairs of disjoint sets that are not empty.
-            assert_eq!(work, 3u64.pow(n).div_ceil(2) - 2u64.pow(n));
-        }
     }
 }

@@ -3,13 +3,12 @@
 use crate::best;
 use crate::local::incumbent::Incumbent;
 use crate::run::{Budget, Observer, Outcome, Problem, Run, Search, SearchError, solve};
-use crate::tree::Working;
 use bvh_build::{Check, OutOfRange};
 use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate};
 
 /// Improves `tree`, over the objects of `boxes`, by [`best`](crate::best) without its builder, until the
-/// budget is spent or the observer cancels. The result has the same leaves, with as many objects in each; leaves of
-/// several objects are moved as a whole. The cost is the [internal area](bvh_core::cost::internal_area), with boxes
+/// budget is spent or the observer cancels. The result has the same leaves with the same objects; leaves of several
+/// objects are moved as a whole. The cost is the [internal area](bvh_core::cost::internal_area), with boxes
 /// made tight, and never above that of `tree`.
 ///
 /// Refuses trees that are not [valid](validate), and inner nodes with more than two children.
@@ -61,8 +60,8 @@ impl Check for From<'_> {
 
 impl Search for From<'_> {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
-        let mut tree = Working::from_bvh(&self.tree, problem.boxes)?;
         let mut best = Incumbent::begin(self.tree.clone(), problem, run);
+        let mut tree = best.working()?;
         best::improve(self.config, &mut tree, seed, &mut best, run);
         Ok(best.tree)
     }

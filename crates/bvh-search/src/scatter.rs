@@ -2,7 +2,7 @@
 
 use crate::tree::Working;
 use bvh_build::Builder;
-use bvh_core::Aabb;
+use bvh_core::{Aabb, cost};
 
 /// A reproducible scatter of `n` small boxes.
 pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
@@ -17,5 +17,6 @@ pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
 
 /// The working form of a binary tree over finite boxes.
 pub(crate) fn built(builder: &dyn Builder, boxes: &[Aabb]) -> Working {
-    Working::from_bvh(&builder.build(boxes).unwrap(), boxes).unwrap()
+    let tree = builder.build(boxes).unwrap();
+    Working::from_bvh(&tree, cost::internal_area(&tree)).unwrap()
 }

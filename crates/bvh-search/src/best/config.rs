@@ -39,12 +39,12 @@ bvh_build::config! {
         /// Work per object of an annealing run from which on its temperatures are relative to the [top](Scale::Top) of a
         /// move, whatever the move says: long runs end lower with it, short ones higher.
         top_from: f64 = 20_000.0, in (Excluded(0.0), Included(f64::INFINITY));
-        /// The move.
-        ruin: Ruin, in Itself;
         /// Whether to plan for the end of the budget. By default it is [`Known`](Horizon::Known) if the observer reports its
         /// progress, or if the budget has no more work than `work_per_object`.
         #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
         horizon: Option<Horizon>;
+        /// The move.
+        ruin: Ruin, in Itself;
         /// The builder of the initial tree. By default the one from which the budget leads to the lowest cost: clustering for
         /// milliseconds, else top-down division with |L|^0.9.
         #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]

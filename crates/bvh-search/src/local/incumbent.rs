@@ -32,7 +32,7 @@ impl<'p> Incumbent<'p> {
 
     /// The working form of the best tree. Its boxes are tight, as builders and moves leave them.
     pub fn working(&self) -> Result<Working, SearchError> {
-        Working::from_tight(&self.tree, self.area)
+        Working::from_bvh(&self.tree, self.area)
     }
 
     /// Begins with a valid tree whose boxes are tight.

@@ -11,9 +11,9 @@ use super::incumbent::Incumbent;
 use super::initial::Start;
 use super::pass::{TOLERANCE, repeat};
 use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Tally};
-use crate::tree::{NONE, Working};
+use crate::tree::{NONE, Subsets, Working};
 use bvh_build::config::Itself;
-use bvh_core::{Bvh, PackedAabb, with_vector_instructions};
+use bvh_core::{Bvh, with_vector_instructions};
 
 bvh_build::config! {
     /// How large treelets are, how often all are tried, and from where.
@@ -89,10 +89,7 @@ struct Solver {
     leaves: Vec<u32>,
     /// The inner nodes, the root first.
     inner: Vec<u32>,
-    /// Per subset of `leaves`: its box, the least area of the inner nodes over it, and one side of its best division.
-    boxes: Vec<PackedAabb>,
-    cost: Vec<f64>,
-    side: Vec<u16>,
+    subsets: Subsets,
 }
 
 /// Later than any change.
@@ -100,15 +97,12 @@ const NEVER: u64 = u64::MAX;
 
 impl Solver {
     fn new(size: u32, tree: &Working) -> Self {
-        let subsets = 1 << size;
         Self {
             size: size as usize,
             solved: vec![NEVER; tree.nodes.len()],
             leaves: Vec::new(),
             inner: Vec::new(),
-            boxes: vec![PackedAabb::EMPTY; subsets],
-            cost: vec![0.0; subsets],
-            side: vec![0; subsets],
+            subsets: Subsets::new(size),
         }
     }
 
@@ -140,36 +134,12 @@ impl Solver {
         solved == NEVER || last > solved
     }
 
-    /// Finds the best shape over every subset of the leaves. Returns whether the best shape over all of them is better
-    /// than the present one.
+    /// Finds the best shape. Returns whether it is better than the present one.
     #[inline(always)]
     fn solve(&mut self, tree: &Working) -> bool {
-        let all = (1usize << self.leaves.len()) - 1;
-        for (position, &leaf) in self.leaves.iter().enumerate() {
-            self.boxes[1 << position] = tree.nodes[leaf as usize].aabb;
-            self.cost[1 << position] = 0.0;
-        }
-        for set in 1..=all {
-            let rest = set & (set - 1);
-            if rest == 0 {
-                continue;
-            }
-            let lowest = set ^ rest;
-            self.boxes[set] = self.boxes[rest].union(&self.boxes[lowest]);
-            // `side` is the side without the lowest leaf, so that every division is tried once.
-            let (mut side, mut least, mut best) = (rest, f64::INFINITY, 0);
-            while side > 0 {
-                let cost = self.cost[side] + self.cost[set ^ side];
-                if cost < least {
-                    (least, best) = (cost, side);
-                }
-                side = (side - 1) & rest;
-            }
-            self.cost[set] = least + self.boxes[set].half_area();
-            self.side[set] = best as u16;
-        }
+        let least = self.subsets.solve(self.leaves.iter().map(|&leaf| tree.nodes[leaf as usize].aabb));
         let before: f64 = self.inner.iter().map(|&node| tree.nodes[node as usize].area).sum();
-        self.cost[all] < before * (1.0 - TOLERANCE)
+        least < before * (1.0 - TOLERANCE)
     }
 
     /// Gives the treelet the best shape.
@@ -181,9 +151,7 @@ impl Solver {
         joints[0].0 = all;
         let mut used = 1;
         for at in 0..self.inner.len() {
-            let set = joints[at].0;
-            let side = usize::from(self.side[set]);
-            joints[at].1 = [set ^ side, side].map(|part| {
+            joints[at].1 = self.subsets.division(joints[at].0).map(|part| {
                 if part.is_power_of_two() {
                     self.leaves[part.trailing_zeros() as usize]
                 } else {
@@ -245,15 +213,6 @@ mod tests {
             );
             let best = cost::internal_area(&outcome.unwrap().tree);
             assert!((tree.area() - best).abs() <= 1e-12 * best, "{n}: {} {best}", tree.area());
-        }
-    }
-
-    #[test]
-    fn sizes_outside_their_range_are_named() {
-        for size in [2, 13] {
-            let config = Config { size, ..Config::default() };
-            let error = solve(&config, &Problem::new(&[]), 1, Budget::default(), &()).unwrap_err();
-            assert_eq!(error.to_string(), format!("size is {size}; accepted: 3 to 12"));
         }
     }
 }

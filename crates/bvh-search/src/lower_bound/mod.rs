@@ -25,13 +25,13 @@
 //! h(p) = (1 − p^¼) / (1 − p), charges more to unequal divisions: a chain of log₂ n equal divisions then costs as much
 //! as it does in a tree, and not only ln n. Being a secant of a concave function, h decreases, so α decreases too.
 //!
-//! # Computing less than it
+//! # Rounding down
 //!
-//! All that is not computed exactly is rounded down. Weights are integers, and sizes fall into classes; a step between
-//! classes costs what the cheapest pair of their sizes does: y as large and x as small as can be, since α decreases and
+//! Everything that is not computed exactly is rounded down. Weights are integers, and sizes fall into classes; a step between
+//! classes has the cost of the cheapest pair of their sizes: y as large and x as small as can be, since α decreases and
 //! divisions leave the least weight of any object on either side. gᵢ is searched for by branch and bound
-//! (`smallest_box`), which returns the least bound that is left when its effort ends, at the lower ends of bands of
-//! sizes, and for large sizes once for a group of neighbours together.
+//! (`smallest_box`), which returns the least open bound when its effort ends; at the lower ends of bands of sizes;
+//! and for large sizes once for a whole group of neighbours.
 //!
 //! Weights: large objects among small ones belong into clusters of their own, so that wᵢ grows with the square root of
 //! the area that i needs to be united with its nearest neighbour.
@@ -131,7 +131,7 @@ fn weights(nearest: &[f64]) -> Vec<u64> {
     nearest.iter().map(|&area| (weight(area).round() as u64).clamp(LEAST_WEIGHT, MOST_WEIGHT)).collect()
 }
 
-/// The sizes at which boxes are searched for: one by one while single objects matter, then ever further apart.
+/// The sizes for which smallest boxes are searched: every size while single objects matter, then ever larger steps.
 fn bands(total: u64) -> impl Iterator<Item = u64> {
     let next = |&from: &u64| Some(from + if from < MOST_WEIGHT { 1 } else { from.div_ceil(6) });
     std::iter::successors(Some(2 * LEAST_WEIGHT + 1), next).take_while(move |&from| from < total)
@@ -165,7 +165,7 @@ impl Classes {
         Self { first, rates }
     }
 
-    /// ψ of the size of all objects, for an object of this weight whose smallest boxes have these areas by class.
+    /// ψ at the weight of all objects, for an object of this weight and the areas of its smallest boxes by class.
     fn least_path(&self, weight: u64, areas: &[f64]) -> f64 {
         let start = (weight - LEAST_WEIGHT) as usize;
         let mut least = vec![f64::INFINITY; self.first.len()];

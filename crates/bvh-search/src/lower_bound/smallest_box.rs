@@ -1,4 +1,4 @@
-//! The smallest box around an object and enough others: branch and bound over its six faces, stopped at any time.
+//! The smallest box around an object and enough others: branch and bound over its six faces, which may end at any time.
 
 use bvh_build::median_cut::{Config, CutAxis};
 use bvh_build::{BuildError, Builder};
@@ -6,8 +6,8 @@ use bvh_core::{Aabb, Bvh, NodeKind, with_vector_instructions};
 use std::ops::Range;
 
 /// How far a box reaches in six directions, as −min and max, each padded to four lanes. A box contains an object if it
-/// reaches as far in all; the union of boxes is the maximum, and the minimum over several objects is how far a box with
-/// any of them reaches at least.
+/// reaches as far in every direction. The maximum is the union of boxes; the minimum is a lower bound of the reach of every
+/// box that contains any one of several objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(32))]
 struct Reach([f32; 8]);
@@ -27,7 +27,7 @@ impl Reach {
         ))
     }
 
-    /// The least half area of a box that reaches so far; rounded as [`Aabb::half_area`], hence just as monotone.
+    /// The least half area of a box with this reach, rounded like [`Aabb::half_area`] and therefore as monotone.
     #[inline(always)]
     fn half_area(&self) -> f64 {
         let extent = |axis: usize| f64::max(f64::from(self.0[axis + 4]) + f64::from(self.0[axis]), 0.0);
@@ -46,15 +46,15 @@ impl From<&Aabb> for Reach {
 /// A node of the tree in which neighbours are looked up: a group of objects that are near each other.
 #[derive(Clone, Debug)]
 struct Cluster {
-    /// Its objects, in tree order.
+    /// The objects below the node, in tree order.
     objects: Range<usize>,
-    /// The root is its own.
+    /// The parent; the root is its own parent.
     parent: usize,
-    /// The first of two; 0 for leaves.
+    /// The first of two children; 0 for leaves.
     children: usize,
-    /// Common to all its objects.
+    /// The minimum over its objects.
     reach: Reach,
-    /// Of the box around all its objects.
+    /// Half area of the box around all its objects.
     half_area: f64,
 }
 
@@ -62,11 +62,11 @@ struct Cluster {
 pub(super) struct Clusters {
     nodes: Vec<Cluster>,
     leaves: Vec<usize>,
-    /// Of all objects before each, and of all.
+    /// Prefix sums of the weights, the total last.
     weight_before: Vec<u64>,
 }
 
-/// Parts of at most this cluster of the size that is asked for are in a box as soon as one of their objects is.
+/// A cluster that weighs at most 1/128 of the size in question counts as inside a box as soon as one of its objects is.
 const CLUSTERS_PER_SIZE: u64 = 128;
 
 /// Areas of smallest boxes with at least a certain weight, for groups of objects.
@@ -84,7 +84,7 @@ impl Grouped {
 }
 
 impl Clusters {
-    /// Every object weighs 1. Refuses what no builder accepts. O(n log n).
+    /// A tree of objects with weight 1 each. Refuses boxes that builders refuse. O(n log n).
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
         let tree = Config { axis: CutAxis::Longest, ..Config::default() }.build(boxes)?;
         let reaches: Vec<Reach> = tree.prim_ids.iter().map(|&id| Reach::from(&boxes[id as usize])).collect();
@@ -98,7 +98,7 @@ impl Clusters {
         Ok(clusters)
     }
 
-    /// In tree order.
+    /// Sets the weights of the objects, in tree order.
     pub fn set_weights(&mut self, weights: &[u64]) {
         let mut total = 0;
         let before = weights.iter().map(|weight| {
@@ -108,7 +108,7 @@ impl Clusters {
         self.weight_before = std::iter::once(0).chain(before).collect();
     }
 
-    /// Of all objects.
+    /// The weight of all objects.
     pub fn weight(&self) -> u64 {
         self.weight_before.last().copied().unwrap_or(0)
     }
@@ -127,7 +127,7 @@ impl Clusters {
         self.weight_before[objects.end] - self.weight_before[objects.start]
     }
 
-    /// The largest clusters that weigh at most so much or are single objects, in tree order.
+    /// The largest clusters that weigh at most `most` or are single objects, in tree order.
     pub fn groups(&self, most: u64) -> Vec<usize> {
         let (mut groups, mut stack) = (vec![], vec![0]);
         while let Some(index) = stack.pop() {
@@ -141,20 +141,20 @@ impl Clusters {
         groups
     }
 
-    /// Areas of groups, to be looked up by object.
+    /// The areas of groups, to be looked up by object.
     pub fn grouped(&self, from: u64, groups: &[usize], areas: &[f64]) -> Grouped {
         let end = |&group: &usize| self.nodes[group].objects.end;
         Grouped { from, groups: groups.iter().map(end).zip(areas.iter().copied()).collect() }
     }
 
-    /// At most the half area of every box that contains an object of the cluster `seed` and weighs at least `weight`,
-    /// which must not be more than all objects do; exactly the least such area for a single object and enough effort.
+    /// A lower bound of the half area of every box that contains an object of the cluster `seed` and weighs at least `weight`,
+    /// which must not be more than all objects do; the exact minimum for a single object and enough effort.
     pub fn smallest_box(&self, seed: usize, weight: u64, effort: u32) -> f64 {
         search(self, seed, weight, effort)
     }
 }
 
-/// The nodes with what is known of their objects. Parents come before children.
+/// The nodes of the tree with the summary of their objects. Parents come before children.
 fn nodes(tree: &Bvh, reaches: &[Reach]) -> Vec<Cluster> {
     let mut nodes: Vec<Cluster> = Vec::with_capacity(tree.nodes.len());
     for node in &tree.nodes {
@@ -182,24 +182,24 @@ fn nodes(tree: &Bvh, reaches: &[Reach]) -> Vec<Cluster> {
 /// A cluster that a box may contain.
 #[derive(Clone, Copy)]
 struct Member {
-    /// The half area of the box around it and what must be inside.
+    /// Half area of the box around the cluster and everything that must be inside.
     area: f64,
     cluster: u32,
     weight: u32,
 }
 
-/// All boxes that contain `must`, have nothing but `members`, weigh enough, and are smaller than one that is known.
+/// All boxes that contain `must` and only `members`, weigh enough, and are smaller than the best box known.
 struct Region {
     must: Reach,
     members: Vec<Member>,
-    /// As many of the members, those that need the least area, weigh enough.
+    /// Number of members that weigh enough together, taking those first that need the least area.
     enough: usize,
-    /// The area that the last of these needs: no box of the region is smaller.
+    /// The area that the last of them needs: no box of the region is smaller.
     bound: f64,
 }
 
 impl Region {
-    /// `None` if it has no box smaller than `known`, which becomes the area of the best box found.
+    /// `None` if the region has no box smaller than `known`, which is updated to the area of the best box found.
     #[inline(always)]
     fn new(
         clusters: &Clusters,
@@ -217,7 +217,7 @@ impl Region {
         if weigh(&members) < weight {
             return None;
         }
-        // The fewest that weigh enough end within `low..high`; all before `low` are among them.
+        // The smallest prefix that weighs enough ends within `low..high`.
         let (mut low, mut high, mut missing) = (0, members.len(), weight);
         while high - low > 1 {
             let half = (high - low) / 2;
@@ -237,20 +237,20 @@ impl Region {
         Some(region)
     }
 
-    /// How far the members reach that need the least area and weigh enough.
+    /// The reaches of the first `enough` members.
     #[inline(always)]
     fn nearest<'a>(&'a self, clusters: &'a Clusters) -> impl Iterator<Item = &'a Reach> {
         self.members[..self.enough].iter().map(|member| &clusters.nodes[member.cluster as usize].reach)
     }
 
-    /// The box around them, a good one of the region.
+    /// The box around them: a good box of the region.
     #[inline(always)]
     fn around(&self, clusters: &Clusters) -> Reach {
         self.nearest(clusters).fold(self.must, |union, reach| union.union(reach))
     }
 
-    /// Where to divide: the face whose move from `must` to the best box of the region costs most area, at the middle
-    /// of the reaches that it passes.
+    /// Where to divide the region: the face whose move from `must` to that box costs most area, at the median of the
+    /// reaches that it passes.
     fn division(&self, clusters: &Clusters) -> Option<(usize, f32)> {
         let around = self.around(clusters);
         let mut best = None;
@@ -287,7 +287,7 @@ fn search_plain(clusters: &Clusters, seed: usize, weight: u64, effort: u32) -> f
     let mut known = clusters.nodes[around].half_area;
     let must = clusters.nodes[seed].reach;
     let members = neighbours(clusters, &must, weight / CLUSTERS_PER_SIZE, known);
-    // Regions without smaller boxes are gone; the others together hold all of them.
+    // Regions without smaller boxes have been dropped; the others together contain all smaller boxes.
     let mut regions: Vec<Region> =
         Region::new(clusters, must, members.into_iter(), weight, &mut known).into_iter().collect();
     let mut left = regions.iter().map(|region| region.members.len() as u64).sum::<u64>() * u64::from(effort);
@@ -309,7 +309,7 @@ fn search_plain(clusters: &Clusters, seed: usize, weight: u64, effort: u32) -> f
     }
 }
 
-/// The clusters that need less area than `known` together with `must`: single objects, or as large as `most`.
+/// The clusters that need less area than `known` together with `must`: single objects, or clusters that weigh at most `most`.
 #[inline(always)]
 fn neighbours(clusters: &Clusters, must: &Reach, most: u64, known: f64) -> Vec<Member> {
     let (mut found, mut stack) = (vec![], vec![0]);

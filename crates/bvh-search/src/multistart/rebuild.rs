@@ -19,7 +19,7 @@ use crate::tree::{ANCHOR, Working};
 use bvh_build::config::Itself;
 use bvh_build::top_down::Workspace;
 use bvh_build::{Presorted, muller_fellner};
-use bvh_core::{Aabb, Bvh};
+use bvh_core::{Aabb, Bvh, cost};
 use rand::RngExt;
 
 bvh_build::config! {
@@ -180,7 +180,7 @@ impl Config {
         let mut other = Bvh::default();
         let scene = Presorted::new(&boxes)?;
         self.construction.construct(&scene, &mut rule, &mut Workspace::default(), &mut other);
-        let mut other = Working::from_bvh(&other, &boxes)?;
+        let mut other = Working::from_bvh(&other, cost::internal_area(&other))?;
         let mut tally = self.local_search.improve(&mut other, quota, observer);
         tally = Tally { moves: 0, kept: 0, work: tally.work + 2 * boxes.len() as u64 };
         let better = other.area() < subtree.area * (1.0 - TOLERANCE);
@@ -227,7 +227,7 @@ fn graft(tree: &mut Working, subtree: &Subtree, shape: &Working) {
         new[at as usize] = if node.is_leaf() {
             subtree.leaves[node.children[1] as usize]
         } else {
-            inner.next().copied().unwrap_or(ANCHOR) // there are as many
+            inner.next().copied().unwrap_or(ANCHOR) // both trees have the same number
         };
     }
     for &at in order.iter().rev() {

@@ -5,42 +5,9 @@ use crate::run::SearchError;
 use bvh_core::{Aabb, Bvh, Node as BvhNode, NodeKind, PackedAabb};
 
 impl Working {
-    /// The working form of a valid tree with one object per leaf, in O(n); boxes are made tight. Refuses inner nodes with
-    /// more than two children.
-    pub fn from_bvh(tree: &Bvh, boxes: &[Aabb]) -> Result<Self, SearchError> {
-        let mut nodes = Vec::with_capacity(tree.nodes.len() + 1);
-        nodes.push(Node::ANCHOR);
-        for (index, node) in tree.nodes.iter().enumerate() {
-            let children = match node.kind() {
-                NodeKind::Inner { first, count: 2 } => [first + 1, first + 2],
-                NodeKind::Leaf { first, .. } => [NONE, tree.prim_ids[first as usize]],
-                NodeKind::Inner { count, .. } => {
-                    return Err(SearchError::NotBinary { node: index, children: count });
-                }
-            };
-            nodes.push(Node { children, ..Node::ANCHOR });
-        }
-        if nodes.len() > 1 {
-            nodes[0].children[0] = 1;
-            nodes[1].parent = ANCHOR;
-        }
-        for at in (1..nodes.len()).rev() {
-            let [left, right] = nodes[at].children;
-            let aabb = if left == NONE {
-                PackedAabb::from(&boxes[right as usize])
-            } else {
-                nodes[left as usize].parent = at as u32;
-                nodes[right as usize].parent = at as u32;
-                nodes[left as usize].aabb.union(&nodes[right as usize].aabb)
-            };
-            nodes[at].aabb = aabb;
-            nodes[at].area = aabb.half_area();
-        }
-        Ok(Self::from_nodes(nodes))
-    }
-
-    /// As [`from_bvh`](Self::from_bvh), in one pass, for a tree whose boxes are tight and whose internal area is `area`.
-    pub fn from_tight(tree: &Bvh, area: f64) -> Result<Self, SearchError> {
+    /// The working form of a valid tree with one object per leaf, whose boxes are tight, as those of builders are, and whose
+    /// internal area is `area`. O(n). Refuses inner nodes with more than two children.
+    pub fn from_bvh(tree: &Bvh, area: f64) -> Result<Self, SearchError> {
         let mut nodes = Vec::with_capacity(tree.nodes.len() + 1);
         nodes.push(Node::ANCHOR);
         // Two dummy slots for leaves, so that the store is branch-free: which nodes are leaves is unpredictable.

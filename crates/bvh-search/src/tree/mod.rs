@@ -12,12 +12,14 @@ mod convert;
 mod linked;
 mod position;
 mod siblings;
+mod subsets;
 
 use bvh_core::PackedAabb;
 use bvh_core::cost::Sum;
 pub(crate) use linked::Linked;
 pub(crate) use position::{PositionSearch, Scope};
 pub(crate) use siblings::Siblings;
+pub(crate) use subsets::Subsets;
 
 /// No node.
 pub(crate) const NONE: u32 = u32::MAX;
