@@ -35,7 +35,7 @@ pub(super) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<
     if n < 3 || began.is_none() && work >= ANNEAL_FROM_WORK {
         return Ok(None);
     }
-    let along = MortonOrder::new(problem.boxes)?;
+    let morton = MortonOrder::new(problem.boxes)?;
     let (mut two_starts, mut end) = (false, f64::INFINITY);
     if let (Some(began), Some(sorted)) = (began, observer.progress()) {
         let sort = (sorted - began).max(1e-9);
@@ -51,13 +51,13 @@ pub(super) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<
         }
         if let Some((_, config)) = BUILDS.into_iter().find(|(enough, _)| times < *enough) {
             return Ok(Some(SmallBudget::Tree(
-                Incumbent::begin_unbounded(along.build(&config)?, problem, run).tree,
+                Incumbent::begin_unbounded(morton.build(&config)?, problem, run).tree,
             )));
         }
         (two_starts, end) = (times >= two_starts_from, 1.0 - FINISH_TIME * sort);
     }
-    let two_starts = two_starts && top_down_may_be_better(&along, problem, run)?;
-    let (mut start, mut front) = (along.build(&CLUSTERING)?, FRONT);
+    let two_starts = two_starts && top_down_may_be_better(&morton, problem, run)?;
+    let (mut start, mut front) = (morton.build(&CLUSTERING)?, FRONT);
     if two_starts {
         let divided = construction().build(problem.boxes)?;
         run.count(Tally { moves: 1, kept: 0, work: divided.nodes.len() as u64 });
@@ -103,8 +103,8 @@ fn warm_sort(problem: &Problem, observer: &dyn Observer) -> Result<f64, SearchEr
 
 /// Whether a top-down build is worth its time: it must be better than clustering on samples of the scene. Takes about a
 /// tenth of its time.
-fn top_down_may_be_better(order: &MortonOrder, problem: &Problem, run: &mut Run) -> Result<bool, SearchError> {
-    let order = along.order();
+fn top_down_may_be_better(morton: &MortonOrder, problem: &Problem, run: &mut Run) -> Result<bool, SearchError> {
+    let order = morton.order();
     if order.len() < SAMPLED_FROM {
         return Ok(true);
     }
