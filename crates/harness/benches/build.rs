@@ -57,7 +57,7 @@ fn one_thread(scene: &Scene) {
     contenders.extend(peers(boxes));
     compare(&format!("{}, {} objects, one thread", scene.name, boxes.len()), 25, contenders);
 
-    // Trials start from sorted objects, so many are measured together, the sort once.
+    // Trials start from sorted objects: many are measured together, so that the sort counts once.
     const TRIALS: u64 = 20;
     let greedy = || {
         let scene = Presorted::new(boxes).expect("finite boxes");
@@ -88,7 +88,7 @@ fn shuffled(n: u32) -> Vec<u32> {
     order
 }
 
-/// Builds by other libraries, without the feature none.
+/// No other libraries without the feature.
 #[cfg(not(feature = "peers"))]
 fn peers(_boxes: &[Aabb]) -> Vec<Contender<'_>> {
     Vec::new()

@@ -1,8 +1,8 @@
-//! Time to load a tree, every check included, against the time to build one; and where the time to load goes.
+//! The time to load a tree, with all checks, against the time to build one; and the parts of the time to load.
 //!
-//! After a build, caches hold what it has worked on, and the file, the boxes and the kernel's records of the file's
-//! pages come from memory; 'once more at once' finds them in caches. What mapping takes depends on the pieces of memory
-//! in which the kernel happens to hold the file, of one page to hundreds.
+//! After a build, caches hold the builder's data, so that the file, the boxes and the kernel's records of the file's
+//! pages come from memory; the second load in a row finds them in caches. The time to map a file depends on how the
+//! kernel happens to hold it in memory: in pieces of one page to hundreds of pages.
 //!
 //! `cargo bench -p harness --bench load`
 
@@ -59,19 +59,19 @@ fn loads(scene: &Scene, path: &Path) {
     };
     let mut contenders: Vec<Contender> = vec![
         (MULLER_FELLNER, Box::new(build)),
-        ("map, check, view: at once after that build", Box::new(load)),
-        ("map, check, view: once more at once", Box::new(load)),
+        ("map, check, view: right after that build", Box::new(load)),
+        ("map, check, view: once more right away", Box::new(load)),
     ];
     contenders.extend(parts());
     contenders.push(("read, check, copy", Box::new(copy)));
     let title = format!("{}, {} objects, {} bytes", scene.name, boxes.len(), held.len());
     compare(&title, 25, contenders);
 
-    // The parts too when caches hold what a build has left there.
+    // Every part is measured with the caches as a build leaves them.
     let mut contenders: Vec<Contender> =
         vec![(MULLER_FELLNER, Box::new(build)), ("map, check, view", Box::new(load))];
     contenders.extend(parts());
-    compare_each_after(build, &format!("{title}, each at once after a build"), 25, contenders);
+    compare_each_after(build, &format!("{title}, each right after a build"), 25, contenders);
 }
 
 fn map(path: &Path) -> Mmap {
@@ -80,7 +80,7 @@ fn map(path: &Path) -> Mmap {
     unsafe { Mmap::map(&file) }.expect("a mapping")
 }
 
-/// What reading the bytes costs at least.
+/// The least that reading the bytes can cost.
 fn sum(bytes: &[u8]) -> u64 {
     let words = bytes.as_chunks::<8>().0;
     words.iter().fold(0, |sum, word| sum.wrapping_add(u64::from_le_bytes(*word)))

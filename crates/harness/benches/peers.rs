@@ -3,9 +3,9 @@
 //! `cargo bench -p harness --bench peers --features peers -- [--rounds N] SCENE...`
 //!
 //! With `RUSTFLAGS="-C target-cpu=native"`, which `obvhs` gains from. One thread, one object per leaf, cost over that
-//! of greedy Müller–Fellner. Rounds are in turns. A library's time is its least over the rounds, without the conversion of
-//! its tree; the time of `best` is that of the whole call. The table shows the round of `best` with the least cost among
-//! the rounds that took no longer than the library, or the quickest if all took longer.
+//! of greedy Müller–Fellner. Rounds are in turns. A library's time is its least over the rounds, without the conversion
+//! of its tree; the time of `best` is that of the whole call. The table shows the round of `best` with the least cost
+//! among the rounds that took no longer than the library, or the quickest if all took longer.
 
 mod clock;
 

@@ -2,8 +2,8 @@
 //!
 //! `cargo bench -p harness --bench search -- [--seconds 0.1,1,10,60] [--threads 1,2] [--seed N] SCENE...`
 //!
-//! The time is that of the whole call, with the build and the final conversion. The numbers of threads take turns. Runs on
-//! more than one thread have 0.6 of the limit, after which they should be no worse than one thread after all of it.
+//! The time is that of the whole call, with the build and the final conversion. The numbers of threads take turns. Runs
+//! on more than one thread have 0.6 of the limit, after which they should be no worse than one thread after all of it.
 
 mod clock;
 

@@ -1,7 +1,7 @@
 //! The empirical cost of a tree: the number of tests that random rays take, with its standard error.
 //!
-//! Ng & Trifonov 2003, section 4: random rays from inside the root's box, and any hit ahead of the origin ends a ray. The
-//! surface area costs assume other rays: lines through the whole box that no hit ends.
+//! Ng & Trifonov 2003, section 4: random rays from inside the root's box, and any hit ahead of the origin ends a ray.
+//! The surface area costs assume other rays: lines through the whole box that no hit ends.
 
 use super::accelerator::{Accelerator, Query};
 use super::rays::{Family, random_ray};

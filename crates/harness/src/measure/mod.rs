@@ -1,4 +1,5 @@
-//! Rays through trees: what answers them, how many tests they take, how fast they are, and whether the answers are right.
+//! Rays through trees: what answers them, how many tests they take, how fast they are, and whether the answers are
+//! right.
 
 pub mod accelerator;
 mod answers;

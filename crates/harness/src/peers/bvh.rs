@@ -107,8 +107,9 @@ pub(super) fn raw(boxes: &[Aabb]) -> Raw {
     Raw { tree, nearest: Box::new(nearest) }
 }
 
-/// The iterator by distance, ended at the first box that begins behind the nearest hit: the library's only traversal that
-/// is ordered and works at any depth. Its triangle test sees front sides only, so each triangle is tested both ways round.
+/// The iterator by distance, ended at the first box that begins behind the nearest hit: the library's only traversal
+/// that is ordered and works at any depth. Its triangle test sees front sides only, so each triangle is tested both
+/// ways round.
 pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
     let mut shapes = shapes(triangles.iter().map(|triangle| (triangle.aabb(), triangle.0)));
     let start = Instant::now();

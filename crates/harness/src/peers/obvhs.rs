@@ -53,8 +53,8 @@ fn ray(ray: &Ray, t_max: f32) -> TheirRay {
     TheirRay::new(ray.origin().into(), ray.direction().into(), ray.t_min(), t_max)
 }
 
-/// Builds over boxes, with one object per leaf and no split triangles. The library's own stopwatch leaves out conversions
-/// and checks.
+/// Builds over boxes, with one object per leaf and no split triangles. The library's own stopwatch leaves out
+/// conversions and checks.
 pub(super) fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
     let parameters = BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..parameters(config) };
     let (theirs, time) = build_over(boxes, parameters);

@@ -13,18 +13,18 @@ use rayon::prelude::*;
 /// What is drawn, and how finely.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Of the picture, in pixels.
+    /// Pixels per row.
     pub width: u32,
-    /// Of the picture, in pixels.
+    /// Rows.
     pub height: u32,
-    /// Rays per pixel and direction, 1 or more: `samples`² rays per pixel, on a grid.
+    /// `samples`² rays go through each pixel, on a grid; 1 or more.
     pub samples: u32,
-    /// Mirror reflections that are followed one after the other.
+    /// The number of mirror reflections that are followed one after the other.
     pub depth: u32,
     /// The view; without one, the whole scene is framed.
     pub view: Option<View>,
-    /// Lights in place of those that fit the view. If the list is empty, surfaces are lit from the eye and no shadow ray
-    /// is sent.
+    /// Lights in place of those that fit the view. If the list is empty, surfaces are lit from the eye and no shadow
+    /// ray is sent.
     pub lights: Option<Vec<DVec3>>,
     /// Whether there is a ground below a scene that is seen from outside.
     pub ground: bool,
@@ -45,7 +45,7 @@ pub fn tiles(options: &Options) -> u64 {
 }
 
 /// Draws the scene on all threads of the current rayon pool. `tile_done` is called after every tile; once it returns
-/// false, the picture is given up and `None` returned.
+/// false, the picture is abandoned and `None` returned.
 pub fn render(
     scene: &Scene,
     accelerator: &Accelerator,
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_is_given_up_when_asked_to() {
+    fn a_picture_is_abandoned_when_asked_to() {
         let scene = Scene::load("spheres75").unwrap();
         let brute = Accelerator::new(&scene.primitives, Structure::Brute);
         assert_eq!(render(&scene, &brute, &Options::default(), &|| false), None);

@@ -29,14 +29,14 @@ config! {
 /// The structures that are not trees of ours: their names in tables, and the names that `--accel` accepts.
 pub const BASELINES: [(&str, &str); 2] = [("brute force", "brute"), ("KD-tree", "kdtree")];
 
-/// Seconds after which a picture is not drawn once more.
+/// A picture is drawn again until this many seconds have passed.
 const REPEAT_WITHIN: f64 = 2.0;
-/// How often a picture is drawn at most.
+/// A picture is drawn at most so often.
 const MOST_REPEATS: usize = 25;
 
 impl Config {
-    /// Draws the scene with the tree of `run`, which took `build_seconds`, on one thread; before that, if `first`,
-    /// with each of the [`BASELINES`].
+    /// Draws the scene on one thread with the tree of `run`, which took `build_seconds` to build. If `first`, draws it
+    /// with each of the [`BASELINES`] before that.
     pub fn measure(
         &self,
         scene: &Scene,
@@ -82,7 +82,7 @@ impl Config {
         Ok((rows, times))
     }
 
-    /// The picture, and how long it took each time.
+    /// The picture, and the seconds that each repetition took.
     fn draw(&self, scene: &Scene, accelerator: &Accelerator) -> (Film, Vec<f64>) {
         let Self { width, height, samples } = *self;
         let options = Options { width, height, samples, ..Options::default() };

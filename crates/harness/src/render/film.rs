@@ -1,31 +1,31 @@
-//! A finished picture with what it took, put together from tiles.
+//! A finished picture, put together from tiles.
 
 use bvh_core::TestCounts;
 
-/// A finished picture, and what it took. Rows from the top, pixels from the left.
+/// A finished picture, with the rays and tests that it took. Rows run from the top, pixels from the left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
-    /// In pixels.
+    /// Pixels per row.
     pub width: u32,
-    /// Red, green, blue of each pixel, sRGB.
+    /// The sRGB colour of each pixel.
     pub pixels: Vec<[u8; 3]>,
-    /// Per pixel, the tests of all its rays against boxes and objects.
+    /// For each pixel, the number of tests of all its rays against boxes and objects.
     pub tests: Vec<u64>,
     /// The tests of the whole picture.
     pub counts: TestCounts,
-    /// The rays of the whole picture: through pixels, to lights, and mirrored.
+    /// The rays of the whole picture: through pixels, to lights, and along mirror reflections.
     pub rays: u64,
 }
 
-/// One tile: its pixels row by row, and the tests of each.
+/// A rectangle of a picture, drawn by one thread.
 pub struct Tile {
-    /// In pixels.
+    /// Pixels per row.
     pub width: usize,
-    /// Colour, and tests of all rays.
+    /// The colour of each pixel and the number of tests of all its rays, row by row.
     pub pixels: Vec<([u8; 3], u64)>,
-    /// As the film's.
+    /// The tests of the whole tile.
     pub counts: TestCounts,
-    /// As the film's.
+    /// The rays of the whole tile.
     pub rays: u64,
 }
 

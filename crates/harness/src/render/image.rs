@@ -1,13 +1,13 @@
-//! From light to the bytes of a PNG file.
+//! Turns linear light into the bytes of a PNG file.
 
 use crate::{Error, files};
 use glam::DVec3;
 use std::path::Path;
 
-/// How long the film is exposed: white in the automatic light is just below white in the picture.
+/// Exposure by which a white surface in the automatic light comes out just below white.
 const EXPOSURE: f64 = 0.66;
 
-/// Linear light of any strength to 0..1, as film does: what is too bright loses its colour, not its shape.
+/// Maps linear light of any strength to 0..1, as film does: overexposed light loses its colour but not its shape.
 ///
 /// Source: Narkowicz 2015, 'ACES filmic tone mapping curve'.
 pub fn expose(light: DVec3) -> DVec3 {

@@ -1,4 +1,4 @@
-//! How bright a pixel is: rays through it, to the lights, and mirrored.
+//! Computes the light that reaches a pixel, by rays through it, to the lights, and along mirror reflections.
 
 use super::film::Tile;
 use super::image;
@@ -9,24 +9,25 @@ use bvh_core::{Aabb, Ray, TestCounts};
 use glam::DVec3;
 use std::ops::Range;
 
-/// A point that shines.
+/// A point light.
 #[derive(Clone, Debug)]
 pub struct Light {
     position: DVec3,
-    /// Linear red, green and blue, nearby.
+    /// Linear red, green and blue at distance 0.
     colour: DVec3,
-    /// The distance at which half of it is left.
+    /// The distance at which half of the light is left.
     reach: f64,
 }
 
 impl Light {
-    /// White lights at these positions that do not fade, together as bright as the automatic ones.
+    /// White lights at these positions. They do not fade with distance; together they are as bright as the automatic
+    /// ones.
     pub fn white(positions: &[DVec3]) -> Vec<Self> {
         let colour = DVec3::splat(1.3 / positions.len().max(1) as f64);
         positions.iter().map(|&position| Self { position, colour, reach: f64::INFINITY }).collect()
     }
 
-    /// How much of it arrives at a distance.
+    /// The light that arrives at a distance.
     fn at(&self, distance: f64) -> DVec3 {
         if self.reach.is_finite() {
             let relative = distance / self.reach;
@@ -37,8 +38,8 @@ impl Light {
     }
 }
 
-/// Lights for a view: from outside a warm one from the upper left and a weak cool one from the right; from inside a sun
-/// overhead, its light from the floor, and a weak lamp near the eye.
+/// Lights that suit a view. A scene seen from outside has a warm light at the upper left and a weak cool one at the
+/// right; a scene seen from inside has a sun overhead, sunlight reflected by the floor, and a weak lamp near the eye.
 pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     if bounds.check().is_err() {
         return vec![];
@@ -51,7 +52,7 @@ pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     if view.is_inside(bounds) {
         let sun = center + up * (4.0 * radius) + right * (0.85 * radius) + forward * (0.6 * radius);
         let lamp = view.from + up * (0.05 * radius) - right * (0.04 * radius);
-        // Where the sun's light falls: what walls and vaults get from there.
+        // Stands for the sunlight that falls on the floor here and is reflected to walls and vaults.
         let floor = view.at - up * (0.15 * radius) + right * (0.05 * radius);
         return vec![
             light(sun, [2.0, 1.72, 1.3], f64::INFINITY),
@@ -64,7 +65,7 @@ pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     vec![light(key, [1.25, 1.16, 1.02], f64::INFINITY), light(fill, [0.20, 0.24, 0.32], f64::INFINITY)]
 }
 
-/// All that a ray can meet.
+/// Everything that a ray can meet, and the light on it.
 pub struct World<'a> {
     accelerator: &'a Accelerator<'a>,
     up: DVec3,
@@ -73,7 +74,7 @@ pub struct World<'a> {
     depth: u32,
 }
 
-/// What the rays of a pixel took.
+/// The number of rays of a pixel, and of their tests.
 #[derive(Default)]
 struct Tally {
     counts: TestCounts,
@@ -84,7 +85,7 @@ const HORIZON: DVec3 = DVec3::new(0.58, 0.66, 0.76);
 const ZENITH: DVec3 = DVec3::new(0.11, 0.24, 0.50);
 /// Light from below, reflected by everything around.
 const BELOW: DVec3 = DVec3::new(0.22, 0.20, 0.18);
-/// How much of the surrounding light reaches a surface.
+/// The fraction of the surrounding light that reaches a surface.
 const AMBIENT: f64 = 0.42;
 
 impl<'a> World<'a> {
@@ -97,7 +98,7 @@ impl<'a> World<'a> {
         ground: bool,
         depth: u32,
     ) -> Self {
-        // From inside, a scene is its own ground.
+        // A scene that is seen from inside is its own ground.
         let ground =
             (ground && !view.is_inside(bounds)).then(|| Ground::below(accelerator.objects(), bounds, up));
         Self { accelerator, up, lights, ground: ground.flatten(), depth }
@@ -113,7 +114,7 @@ impl<'a> World<'a> {
                 for v in 0..samples {
                     for u in 0..samples {
                         let direction = camera.direction(f64::from(x) + offset(u), f64::from(y) + offset(v));
-                        // Each on its own: the mean of exposed samples has smooth edges even at highlights.
+                        // Samples are exposed before they are averaged, which keeps the edges of highlights smooth.
                         sum += image::expose(self.radiance(camera.origin, direction, &mut tally));
                     }
                 }
@@ -127,7 +128,7 @@ impl<'a> World<'a> {
         tile
     }
 
-    /// The light that comes from `direction`. Mirrors are followed in a loop, as each has only one reflection.
+    /// The light that comes from `direction`. Reflections are followed in a loop, as each surface has only one.
     fn radiance(&self, mut origin: DVec3, mut direction: DVec3, tally: &mut Tally) -> DVec3 {
         let mut light = DVec3::ZERO;
         let mut weight = 1.0;
@@ -152,7 +153,7 @@ impl<'a> World<'a> {
         light + weight * self.sky(direction)
     }
 
-    /// What the ray meets first, the ground included.
+    /// The first surface that the ray meets, the ground included.
     fn meet(&self, origin: DVec3, direction: DVec3, tally: &mut Tally) -> Option<Surface> {
         tally.rays += 1;
         let ray = Ray::half_line(origin.as_vec3(), direction.as_vec3());
@@ -167,14 +168,14 @@ impl<'a> World<'a> {
         }
     }
 
-    /// A point in front of the surface, from which a ray does not meet it again: rounding moves a hit by some units in
-    /// the last place of the largest number at hand, this by a few dozen.
+    /// A point just in front of the surface, from which a ray does not meet the same surface again. Rounding moves a
+    /// hit by a few units in the last place of the largest coordinate at hand; this moves it by a few dozen.
     fn lifted(&self, surface: &Surface, seen_from: DVec3) -> DVec3 {
         let size = surface.point.abs().max(seen_from.abs()).max_element();
         surface.point + surface.normal * (size * (64.0 * f64::from(f32::EPSILON)))
     }
 
-    /// The light that lights and surroundings send to the eye by way of the surface, mirrored surroundings excepted.
+    /// The light that the surface sends to the eye from lights and surroundings, without its mirror reflection.
     fn direct(
         &self,
         surface: &Surface,
@@ -195,7 +196,7 @@ impl<'a> World<'a> {
             let distance = to_light.length();
             let towards = to_light / distance;
             let cosine = surface.normal.dot(towards);
-            // NaN where the light is in the surface.
+            // The cosine is NaN where the light lies on the surface.
             if cosine.is_nan() || cosine <= 0.0 || self.is_shadowed(start, towards, distance, tally) {
                 continue;
             }
@@ -218,7 +219,7 @@ impl<'a> World<'a> {
         ray.is_ok_and(|ray| self.accelerator.any_hit(&ray, &mut tally.counts))
     }
 
-    /// The light from where nothing is.
+    /// The light from a direction in which there is nothing.
     fn sky(&self, direction: DVec3) -> DVec3 {
         HORIZON + (ZENITH - HORIZON) * direction.dot(self.up).clamp(0.0, 1.0)
     }

@@ -1,4 +1,4 @@
-//! What a ray has met: where, which way it faces, and what it looks like.
+//! The surface at the end of a ray: its place, its orientation and its looks.
 
 use crate::scenes::Primitives;
 use bvh_core::{Aabb, Hit};
@@ -7,22 +7,22 @@ use glam::DVec3;
 /// A point of a surface, seen from one side. Colours are linear red, green and blue.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// In world units.
+    /// The point, in world units.
     pub point: DVec3,
-    /// Of length 1, towards the side that is seen.
+    /// The unit normal on the side that is seen.
     pub normal: DVec3,
-    /// What it reflects evenly.
+    /// The fraction of light that it scatters evenly.
     pub colour: DVec3,
-    /// What it mirrors when looked at from straight above, 0 to 1; more at grazing angles, unless 0.
+    /// The fraction that it mirrors when seen from straight above, 0 to 1. It mirrors more at grazing angles, unless 0.
     pub mirror: f64,
-    /// How far the air hides it, 0 to 1.
+    /// The fraction of its light that haze hides, 0 to 1.
     pub haze: f64,
 }
 
-/// Plaster, for triangles: they have no colours of their own.
+/// The colour of triangles, plaster: meshes come without colours.
 const PLASTER: DVec3 = DVec3::new(0.80, 0.73, 0.64);
 
-/// For spheres, one after the other.
+/// The colours of spheres, in turn.
 const COLOURS: [DVec3; 6] = [
     DVec3::new(0.78, 0.16, 0.10),
     DVec3::new(0.90, 0.52, 0.08),
@@ -33,14 +33,14 @@ const COLOURS: [DVec3; 6] = [
 ];
 
 impl Surface {
-    /// Of the object that was hit by the ray from `origin` in `direction`.
+    /// The surface of the object that the ray from `origin` in `direction` has hit.
     pub fn of_object(objects: &Primitives, hit: &Hit, origin: DVec3, direction: DVec3) -> Self {
         let id = hit.object as usize;
         let met = origin + direction * f64::from(hit.t);
         let (point, normal, colour, mirror) = match objects {
             Primitives::Triangles(triangles) => {
                 let [a, b, c] = triangles[id].0.map(|corner| corner.as_dvec3());
-                // Scaled so that tiny triangles keep a normal.
+                // Edges are normalised first, so that tiny triangles have a normal.
                 let (ab, ac) = ((b - a).normalize_or_zero(), (c - a).normalize_or_zero());
                 (met, ab.cross(ac).normalize_or(-direction), PLASTER, 0.0)
             }
@@ -56,15 +56,15 @@ impl Surface {
     }
 }
 
-/// The plane that the scene stands on or hovers over. It is in no structure: to find it is one division.
+/// The plane that the scene stands on or hovers over. No structure contains it: one division finds it.
 #[derive(Clone, Debug)]
 pub struct Ground {
     up: DVec3,
     height: f64,
     center: DVec3,
-    /// Half of the scene's diagonal.
+    /// Half the diagonal of the scene's box.
     radius: f64,
-    /// Under spheres, which have no floor of their own to measure distances by.
+    /// Whether it is checkered, as it is under spheres, which have no floor of their own to judge distances by.
     checkered: bool,
 }
 
@@ -82,7 +82,7 @@ impl Ground {
         Some(Self { up, height, center: bounds.doubled_centroid() / 2.0, radius, checkered })
     }
 
-    /// The distance at which the ray meets the ground, from above.
+    /// The distance at which the ray meets the ground; `None` unless it comes from above.
     pub fn meet(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
         let (above, descent) = (origin.dot(self.up) - self.height, -direction.dot(self.up));
         (above > 0.0 && descent > 0.0).then(|| above / descent)
