@@ -124,28 +124,6 @@ mod tests {
     }
 
     #[test]
-    fn four_times_the_rays_halve_the_standard_error() {
-        let errors = [4_000, 16_000, 64_000]
-            .map(|count| measured(Family::Inside, Query::Any, count, 2).0.boxes_standard_error);
-        for pair in errors.windows(2) {
-            assert!((1.7..2.3).contains(&(pair[0] / pair[1])), "{errors:?}");
-        }
-    }
-
-    #[test]
-    fn the_interval_covers_the_truth_about_as_often_as_it_says() {
-        let truth = measured(Family::Inside, Query::Nearest, 400_000, 3).0.boxes_per_ray;
-        let covered = (0..100)
-            .filter(|seed| {
-                let row = measured(Family::Inside, Query::Nearest, 1000, 100 + seed).0;
-                (row.boxes_low..=row.boxes_high).contains(&truth)
-            })
-            .count();
-        // Binomial(100, 0.95) is within these limits with probability 0.9999.
-        assert!((86..=100).contains(&covered), "{covered} of 100");
-    }
-
-    #[test]
     fn any_hit_asks_less_than_nearest_and_nearest_less_than_all() {
         let boxes = [Query::Any, Query::Nearest, Query::All]
             .map(|query| measured(Family::Inside, query, 5_000, 4).0.boxes_per_ray);

@@ -81,24 +81,10 @@ pub fn render(
 mod tests {
     use super::*;
     use crate::measure::Structure;
-    use bvh_build::{Builder, goldsmith_salmon, kd_tree, muller_fellner};
-    use bvh_core::WideBvh;
-    use std::borrow::Cow;
 
-    fn structures(scene: &Scene) -> Vec<Structure<'static>> {
-        let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap();
-        let mut structures = vec![
-            Structure::Brute,
-            Structure::KdTree(kd_tree::Config::default().build(&scene.boxes).unwrap()),
-            Structure::Tree(Cow::Owned(goldsmith_salmon::Config::default().build(&scene.boxes).unwrap())),
-        ];
-        structures.extend(scene.triangles().map(|own| Structure::Wide(WideBvh::new(&greedy, own).unwrap())));
-        structures.push(Structure::Tree(Cow::Owned(greedy)));
-        structures
-    }
-
-    fn picture(scene: &Scene, structure: Structure, options: &Options) -> Film {
-        render(scene, &Accelerator::new(&scene.primitives, structure), options, &|| true).unwrap()
+    fn picture(scene: &Scene, options: &Options) -> Film {
+        let brute = Accelerator::new(&scene.primitives, Structure::Brute);
+        render(scene, &brute, options, &|| true).unwrap()
     }
 
     #[test]
@@ -108,7 +94,7 @@ mod tests {
             let options = Options { width, height, samples: 1, ..Options::default() };
             let films = [1, 3].map(|threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                pool.install(|| picture(&scene, structures(&scene).remove(1), &options))
+                pool.install(|| picture(&scene, &options))
             });
             assert_eq!(films[0].pixels.len(), (width * height) as usize);
             assert_eq!(films[0], films[1]);
@@ -120,7 +106,7 @@ mod tests {
         let scene = Scene::load("escher:cluster:600:1").unwrap();
         let options = Options { width: 32, height: 18, samples: 1, ground: false, ..Options::default() };
         let dark = Options { lights: Some(vec![]), ..options.clone() };
-        let rays = |options: &Options| picture(&scene, Structure::Brute, options).rays;
+        let rays = |options: &Options| picture(&scene, options).rays;
         assert_eq!(rays(&dark), 32 * 18, "triangles mirror nothing");
         assert!(rays(&options) > rays(&dark));
     }
