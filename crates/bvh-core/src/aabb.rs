@@ -1,15 +1,15 @@
-//! Axis-aligned boxes: what every builder, search and cost sees of an object.
+//! Axis-aligned boxes, which stand for the objects in every builder, search and cost.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec4};
 
-/// An axis-aligned bounding box in world units. Zero extents are legal; see [`Aabb::EMPTY`] for 'no box at all'.
+/// An axis-aligned bounding box in world units. Extents may be zero; [`Aabb::EMPTY`] is the box around nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Aabb {
     /// Lower corner.
     pub min: Vec3,
-    /// Upper corner, not below `min` in any component unless the box is empty.
+    /// Upper corner: at least `min` in every component unless the box is empty.
     pub max: Vec3,
 }
 
@@ -17,7 +17,7 @@ impl Aabb {
     /// The neutral element of [`union`](Aabb::union): contains nothing, area 0 by definition.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// The smallest box around `points`, [`Aabb::EMPTY`] when there are none.
+    /// The smallest box around `points`, [`Aabb::EMPTY`] if there are none.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
         points.into_iter().fold(Self::EMPTY, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
     }
@@ -31,9 +31,9 @@ impl Aabb {
 
     /// Half of the surface area, xy + yz + zx, in world units squared; 0 for an empty box.
     ///
-    /// Coordinates are promoted to f64 *before* they are subtracted, so any two finite f32 coordinates give a
-    /// finite area, and scaling by a power of two scales the area exactly. Monotone: a box inside another never
-    /// has the larger area, rounding included.
+    /// Coordinates are promoted to f64 *before* they are subtracted. So finite f32 coordinates always give a finite area,
+    /// and scaling by a power of two scales the area exactly. Monotone: a box inside another never has the larger area,
+    /// rounding included.
     #[inline]
     pub fn half_area(&self) -> f64 {
         let d = self.extent();
@@ -46,15 +46,15 @@ impl Aabb {
         self.max.as_dvec3() - self.min.as_dvec3()
     }
 
-    /// *Twice* the centre of the box. Exact for coordinates of similar magnitude and never out of range, which
-    /// is why sort keys use it in place of the centre; `+0` is added so that −0 and +0 are one key.
+    /// *Twice* the centre of the box, the sort key of builders: unlike the centre it is exact for coordinates of similar
+    /// magnitude and never out of range. Zeros are positive, so that −0 and +0 are one key.
     #[inline]
     pub fn doubled_centroid(&self) -> DVec3 {
         self.min.as_dvec3() + self.max.as_dvec3() + DVec3::ZERO
     }
 
-    /// Whether `other` lies inside this box, borders included, compared bit by bit without tolerance.
-    /// Everything contains an empty box.
+    /// Whether `other` lies inside this box or touches its border from inside, compared without tolerance. Every box
+    /// contains the empty box.
     #[inline]
     pub fn contains(&self, other: &Self) -> bool {
         // Four lanes at a time: min x, y, z, max x, then min z, max x, y, z.
@@ -79,7 +79,7 @@ impl Aabb {
         axis
     }
 
-    /// Whether the box is one an object may have: finite, and `min` not above `max`.
+    /// Refuses a box that no object may have: its coordinates must be finite, and `min` not above `max`.
     pub fn check(&self) -> Result<(), InvalidBoxReason> {
         if !(self.min.is_finite() && self.max.is_finite()) {
             Err(InvalidBoxReason::NotFinite)
@@ -104,7 +104,7 @@ impl From<[[f32; 3]; 2]> for Aabb {
     }
 }
 
-/// Why a box cannot be an object's.
+/// Why a box is not accepted as an object's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidBoxReason {
     /// A coordinate is NaN or infinite.
@@ -125,7 +125,7 @@ pub struct InvalidBox {
     pub reason: InvalidBoxReason,
 }
 
-/// Checks every object's box, in O(n); names the first offender.
+/// Refuses the first box that no object may have. O(n).
 pub fn check_boxes(boxes: &[Aabb]) -> Result<(), InvalidBox> {
     for (index, b) in boxes.iter().enumerate() {
         b.check().map_err(|reason| InvalidBox { index, reason })?;

@@ -1,4 +1,4 @@
-//! The one tree type: flat nodes with adjacent siblings, leaves that name ranges of object ids.
+//! The one tree type: flat nodes with adjacent siblings, and leaves that name ranges of object ids.
 
 use crate::Aabb;
 use alloc::vec::Vec;
@@ -13,10 +13,10 @@ const LEAF: u32 = 1 << 31;
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Node {
-    /// Contains everything below the node; the exact union when built by this workspace.
+    /// Contains everything below the node. The builders of this workspace make it the exact union.
     pub aabb: Aabb,
     first: u32,
-    /// The count; the highest bit marks a leaf.
+    /// The count, with its highest bit set for a leaf.
     tagged_count: u32,
 }
 
@@ -61,7 +61,7 @@ impl Node {
         if self.is_leaf() { NodeKind::Leaf { first, count } } else { NodeKind::Inner { first, count } }
     }
 
-    /// Lets the node refer to others, as many as before: children or entries of `prim_ids` from `first` on.
+    /// Moves the node's range of children or of entries of `prim_ids`, without changing its length, to `first`.
     #[inline(always)]
     pub fn set_first(&mut self, first: u32) {
         self.first = first;
@@ -100,9 +100,9 @@ impl Node {
 
 /// A bounding volume hierarchy over objects `0..n`.
 ///
-/// Node 0 is the root, the children of a node are adjacent and come after it, inner nodes have two *or more*
-/// children (Goldsmith–Salmon trees need that), and leaves name ranges of `prim_ids`, a permutation of the
-/// objects. A tree over no objects has no nodes. [`validate`](crate::validate()) checks all of this.
+/// Node 0 is the root. The children of a node are adjacent and come after it; inner nodes have two *or more* of them, as
+/// Goldsmith–Salmon trees need. Leaves name ranges of `prim_ids`, a permutation of the objects. A tree over no objects
+/// has no nodes. [`validate`](crate::validate()) checks all of this.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bvh {
     /// The nodes; one entry per node, the root first.
@@ -111,7 +111,7 @@ pub struct Bvh {
     pub prim_ids: Vec<u32>,
 }
 
-/// A [`Bvh`] that lies elsewhere, in a mapped file for example: what traversal takes.
+/// A borrowed [`Bvh`], in a mapped file for example; traversals take this type.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BvhView<'a> {
     /// As [`Bvh::nodes`].
@@ -151,8 +151,8 @@ impl Bvh {
         depth.into_iter().max().unwrap_or(0) as usize
     }
 
-    /// Recomputes every box from the leaves up, in O(nodes + objects): makes boxes tight after objects moved or
-    /// after another library padded them.
+    /// Recomputes every box from the leaves up. Boxes are tight again after objects have moved, or after another library
+    /// has padded them. O(nodes + objects).
     ///
     /// # Panics
     /// Panics if `boxes` has fewer entries than the tree's objects, or the tree is one that
@@ -163,8 +163,8 @@ impl Bvh {
         }
     }
 
-    /// Whether every box is the smallest around what is below it, so that [`refit`](Self::refit) would change nothing:
-    /// in O(nodes + objects).
+    /// Whether every box is the smallest around the node's children or objects, so that [`refit`](Self::refit) would
+    /// change nothing. O(nodes + objects).
     ///
     /// # Panics
     /// As [`refit`](Self::refit).

@@ -1,14 +1,14 @@
-//! Every cost the workspace reports, each a documented formula, in f64.
+//! Every cost that the workspace reports, as a documented formula in f64.
 //!
-//! Areas are *half* surface areas in world units squared, from coordinates promoted to f64 before subtraction.
-//! Sums are compensated, so that a cost does not depend on the order of the nodes beyond its last bit or two.
-//! Costs that are divided by the root's area are 0 by definition when that area is 0.
+//! Areas are *half* surface areas in world units squared, from coordinates promoted to f64 before subtraction. Sums are
+//! compensated, so that the order of the nodes changes at most a cost's last bit or two. Costs that are divided by the
+//! root's area are 0 by definition if that area is 0.
 
 use crate::{Bvh, Node, NodeKind};
 
 pub use crate::overlap::end_point_overlap;
 
-/// Which cost a search minimises and a row of results reports as `cost`.
+/// The cost that a search minimises and that results report as `cost`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Objective {
@@ -52,14 +52,14 @@ impl Default for SahConstants {
     }
 }
 
-/// The paper's objective: the total half area of all inner nodes' boxes, root included, leaves excluded, in
-/// world units squared. Compare it only within a scene. O(nodes).
+/// The paper's objective: the total half area of the boxes of all inner nodes, root included, in world units squared.
+/// Compare it only within a scene. O(nodes).
 ///
-/// Source: Ng & Trifonov 2003, section 3.3. Differs from the paper: half areas in place of whole ones, as
-/// its own implementation does (section 3.2).
+/// Source: Ng & Trifonov 2003, section 3.3. Differs from the paper: half areas instead of whole ones, as in the paper's
+/// own implementation (section 3.2).
 pub fn internal_area(tree: &Bvh) -> f64 {
-    // Whether a node is a leaf cannot be predicted: both are computed and one is selected. Adding nothing changes
-    // nothing.
+    // Whether a node is a leaf is unpredictable, so both values are computed and one is selected. Adding 0 changes no
+    // sum.
     let area = |node: &Node| core::hint::select_unpredictable(node.is_leaf(), 0.0, node.aabb.half_area());
     tree.nodes.iter().map(area).collect::<Sum>().value()
 }

@@ -1,4 +1,4 @@
-//! Trees as the plain arrays of other libraries: two children per node, `first` and `count`.
+//! Conversion from and to the arrays of other libraries: binary nodes with `first` and `count`.
 
 use crate::collapse::binary;
 use crate::validate::Marks;
@@ -6,8 +6,8 @@ use crate::{Aabb, Bvh, InvalidBvh, MAX_OBJECTS, Node, NodeKind};
 use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 
-/// A node as most libraries have it, 32 bytes in the order of `tinybvh`'s `BVHNode` and of many GPU tracers; `obvhs`
-/// has the same fields in another order.
+/// A binary node of 32 bytes, as in most libraries. The order of the fields is that of `tinybvh`'s `BVHNode` and of many
+/// GPU tracers; `obvhs` has the same fields in another order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct FirstCountNode {
@@ -22,8 +22,9 @@ pub struct FirstCountNode {
 }
 
 impl Bvh {
-    /// The tree's nodes with two children each, root first, children after parents; object ids are those of
-    /// [`prim_ids`](Bvh::prim_ids). Nodes with more children are halved, in their order. O(nodes).
+    /// The tree as binary nodes, the root first and children after their parents, to be used with the tree's
+    /// [`prim_ids`](Bvh::prim_ids). A node with more than two children becomes several, which halve them in their order.
+    /// O(nodes).
     ///
     /// # Panics
     /// May panic on a tree that [`validate`](crate::validate()) refuses.
@@ -31,8 +32,8 @@ impl Bvh {
         first_count(&binary(self), 0)
     }
 
-    /// As [`to_first_count`](Self::to_first_count), with an unused node at index 1, so that all pairs of siblings begin
-    /// at even indices and share a cache line, as `tinybvh` has them.
+    /// As [`to_first_count`](Self::to_first_count), with an unused node at index 1. So every pair of siblings begins at
+    /// an even index and shares a cache line, as in `tinybvh`.
     ///
     /// # Panics
     /// May panic on a tree that [`validate`](crate::validate()) refuses.
@@ -40,11 +41,12 @@ impl Bvh {
         first_count(&binary(self), 1)
     }
 
-    /// The tree of such arrays, in depth-first order. Nodes and ids that the root does not lead to are left out, and
-    /// children may come before their parents. Refuses what leads out of bounds or to a node a second time. O(nodes).
+    /// The tree of binary nodes and object ids, in depth-first order. Children may come before their parents; nodes and
+    /// ids that cannot be reached from the root are left out. Refuses indices out of bounds and nodes with two parents.
+    /// O(nodes).
     ///
-    /// What the boxes contain is left to [`validate`](crate::validate()); [`refit`](Bvh::refit) makes padded ones
-    /// tight.
+    /// Does not look at the boxes: [`validate`](crate::validate()) checks them, and [`refit`](Bvh::refit) makes padded
+    /// ones tight.
     pub fn from_first_count(nodes: &[FirstCountNode], prim_ids: &[u32]) -> Result<Self, InvalidBvh> {
         if nodes.len() > 2 * MAX_OBJECTS || prim_ids.len() > MAX_OBJECTS {
             return Err(InvalidBvh::TooManyObjects { objects: prim_ids.len().max(nodes.len() / 2) });
@@ -88,8 +90,8 @@ impl Bvh {
     }
 }
 
-/// The nodes of a binary tree, `spare` unused ones after the root. Pairs of siblings fill the tree's nodes from 1 on,
-/// and so begin at odd indices there.
+/// The nodes of a binary tree, with `spare` unused ones after the root. In the tree itself pairs of siblings begin at odd
+/// indices.
 fn first_count(tree: &Bvh, spare: usize) -> Vec<FirstCountNode> {
     let mut nodes = alloc::vec![FirstCountNode::default(); tree.nodes.len()];
     if nodes.len() > 1 {

@@ -1,10 +1,9 @@
-//! A box as one vector register, for the inner loops of builders and searches.
+//! Boxes in two vector registers, for the inner loops of builders and searches.
 
 use crate::Aabb;
 use glam::{DVec4, Vec4};
 
-/// A box stored as `-min` and `max`, so that a union is a maximum and an extent is an addition, four lanes at a
-/// time. Plain safe code over glam's vector types, one or two instructions each where the processor has them.
+/// A box stored as `-min` and `max`, so that a union is two maxima and an extent one addition, four lanes at a time.
 ///
 /// Holds the same numbers as an [`Aabb`] (negation is exact) and has the same half area, bit by bit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,8 +66,8 @@ impl From<&Aabb> for PackedAabb {
 }
 
 impl From<&PackedAabb> for Aabb {
-    /// `+0` is added so that a lower corner at zero is +0 whichever sign its objects had: unions must not
-    /// depend on the order in which −0 and +0 were met.
+    /// Coordinates at zero become +0 whichever sign they had: unions must not depend on the order in which −0 and +0
+    /// were met.
     #[inline]
     fn from(b: &PackedAabb) -> Self {
         Self { min: (Vec4::ZERO - b.negated_min).truncate(), max: (b.max + Vec4::ZERO).truncate() }

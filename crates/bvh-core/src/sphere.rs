@@ -1,9 +1,9 @@
-//! Spheres, hit from outside and from inside, near and far.
+//! Spheres and their intersection with rays, from outside and from inside.
 
 use crate::{Aabb, Ray, clip_to_box};
 use glam::Vec3;
 
-/// A sphere in world units; its surface can be hit from either side. One whose radius is not positive is never hit.
+/// A sphere in world units. Its surface can be hit from both sides; a sphere whose radius is not positive is never hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Sphere {
@@ -30,12 +30,12 @@ impl Sphere {
         Aabb { min: Vec3::from(corner(1.0)), max: -Vec3::from(corner(-1.0)) }
     }
 
-    /// The nearest distance in the ray's range, `t_max` at most, at which the ray meets the surface.
+    /// The nearest distance in the ray's range, at most `t_max`, at which the ray hits the surface. It lies in the interval
+    /// of the sphere's box (see [`clip_to_box`]).
     ///
-    /// In f64, where no product of finite f32 overflows, and with the distance of the *centre* from the line in the
-    /// discriminant and one of the two solutions from the other, so that spheres that are small, far away, or
-    /// touched do not suffer cancellation (Haines, Günther & Akenine-Möller 2019, 'Precision improvements for
-    /// ray/sphere intersection'). The distance lies in the interval of the sphere's box (see [`clip_to_box`]).
+    /// Computed in f64, where no product of finite f32 overflows. The discriminant uses the distance of the *centre* from
+    /// the line, and one solution follows from the other, so that small, distant and barely touched spheres suffer no
+    /// cancellation (Haines, Günther & Akenine-Möller 2019, 'Precision improvements for ray/sphere intersection').
     pub fn intersect(&self, ray: &Ray, t_max: f32) -> Option<f32> {
         if self.radius.is_nan() || self.radius <= 0.0 {
             return None;
@@ -52,7 +52,7 @@ impl Sphere {
         }
         let half_chord = libm::sqrt(length2 * discriminant);
         let q = along + half_chord.copysign(along);
-        // Factored: the difference of the squares would cancel near the surface.
+        // Factored, because the difference of the squares would cancel near the surface.
         let distance = to_center.length();
         let other = (distance - radius) * (distance + radius);
         let (first, second) = if along >= 0.0 { (other / q, q / length2) } else { (q / length2, other / q) };

@@ -1,8 +1,8 @@
-//! The stack of a traversal: as deep as it must be, and without an allocation for ordinary trees.
+//! The stack of a traversal, which allocates memory only for very deep trees.
 
 use alloc::vec::Vec;
 
-/// A stack whose upper `N` entries live inline and whose lower ones, if it gets that deep, on the heap.
+/// A stack that keeps its upper `N` entries inline, and the lower ones of a deep stack on the heap.
 pub(crate) struct Stack<T, const N: usize> {
     inline: [T; N],
     len: usize,
@@ -10,13 +10,13 @@ pub(crate) struct Stack<T, const N: usize> {
 }
 
 impl<T: Copy, const N: usize> Stack<T, N> {
-    /// The empty stack; `filler` is any value, quickest if all its bits are zero.
+    /// The empty stack. `filler` may be any value; one whose bits are all zero is fastest.
     #[inline(always)]
     pub(crate) fn new(filler: T) -> Self {
         Self { inline: [filler; N], len: 0, spilled: Vec::new() }
     }
 
-    /// Room for `K` more entries above the topmost, in any order; [`grow`](Self::grow) by as many as were written.
+    /// Space for `K` entries above the topmost. [`grow`](Self::grow) adds those that were written to the stack.
     #[inline(always)]
     pub(crate) fn room<const K: usize>(&mut self) -> &mut [T; K] {
         const { assert!(K <= N) };
@@ -53,7 +53,7 @@ impl<T: Copy, const N: usize> Stack<T, N> {
     }
 }
 
-/// Not a method: so that the stack's length stays in a register.
+/// Not a method, so that the stack's length stays in a register.
 #[cold]
 #[inline(never)]
 fn spill<T: Copy>(inline: &[T], spilled: &mut Vec<T>) {

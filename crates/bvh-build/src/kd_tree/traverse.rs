@@ -131,68 +131,35 @@ mod tests {
     use super::*;
     use bvh_core::{Aabb, TestCounts, clip_to_box, nearest_hit_of_all};
     use glam::Vec3;
+    use proptest::prelude::*;
 
-    /// SplitMix64 (Steele, Lea & Flood 2014), in -1..1.
-    fn random(state: &mut u64) -> f32 {
-        *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (((z ^ (z >> 31)) >> 39) as f32 - (1 << 24) as f32) / (1 << 24) as f32
-    }
-
-    fn point(state: &mut u64) -> Vec3 {
-        Vec3::new(random(state), random(state), random(state))
-    }
-
-    fn cases() -> Vec<(&'static str, Vec<Aabb>)> {
-        let mut s = 7;
-        let mut boxes = |n: usize, size: Vec3| -> Vec<Aabb> {
-            (0..n)
-                .map(|_| {
-                    let (a, b) = (point(&mut s), size * point(&mut s));
-                    Aabb { min: a.min(a + b), max: a.max(a + b) }
-                })
-                .collect()
+    /// Boxes between points of a small grid: many are flat, identical or nested, and many faces coincide.
+    fn boxes() -> impl Strategy<Value = Vec<Aabb>> {
+        let corner = || prop::array::uniform3(-3i8..4);
+        let between = |(a, b): ([i8; 3], [i8; 3])| {
+            Aabb::around([a, b].map(|corner| Vec3::from(corner.map(|c| f32::from(c) * 0.75))))
         };
-        let nested = |i: i32| Aabb { min: Vec3::splat(-i as f32), max: Vec3::splat(i as f32) };
-        vec![
-            ("none", vec![]),
-            ("one", boxes(1, Vec3::ONE)),
-            ("identical", vec![nested(1); 100]),
-            ("points", vec![nested(0); 100]),
-            ("small", boxes(1000, Vec3::splat(0.05))),
-            ("large", boxes(200, Vec3::ONE)),
-            ("flat", boxes(300, Vec3::new(0.1, 0.1, 0.0))),
-            ("needles", boxes(300, Vec3::new(3.0, 0.0, 1e-3))),
-            ("nested", (0..200).map(nested).collect()),
-            (
-                "line",
-                (0..200).map(|i| Aabb { min: Vec3::X * i as f32, max: Vec3::X * (i + 1) as f32 }).collect(),
-            ),
-        ]
+        prop::collection::vec((corner(), corner()).prop_map(between), 0..120)
     }
 
-    #[test]
-    fn trees_are_bounded_and_answer_as_brute_force_on_awkward_boxes() {
-        let mut s = 1;
-        for (name, boxes) in cases() {
+    proptest! {
+        #[test]
+        fn trees_are_bounded_and_give_the_answers_of_brute_force(
+            boxes in boxes(),
+            rays in prop::collection::vec((prop::array::uniform3(-9i8..10), prop::array::uniform3(-4i8..5)), 100),
+        ) {
             let tree = Config::default().build(&boxes).unwrap();
-            assert!(tree.references() >= boxes.len() && tree.references() <= 16 * boxes.len(), "{name}");
-            assert!(tree.depth() as f64 <= 8.0 + 1.3 * libm::log2(boxes.len().max(1) as f64), "{name}");
-            for i in 0..2000 {
-                let mut direction = point(&mut s);
-                if i % 3 == 0 {
-                    direction[i % 2] = if i % 4 == 0 { 0.0 } else { -0.0 };
-                }
-                let corner = boxes.get(i % boxes.len().max(1)).map_or(Vec3::ZERO, |b| b.min);
-                let origin = [corner - direction, point(&mut s) * 300.0, point(&mut s), corner][i % 4];
-                let towards = if i % 4 == 1 { corner - origin } else { direction };
-                let Ok(ray) = Ray::half_line(origin, towards) else { continue };
+            prop_assert!(tree.references() >= boxes.len() && tree.references() <= 16 * boxes.len());
+            prop_assert!(tree.depth() as f64 <= 8.0 + 1.3 * libm::log2(boxes.len().max(1) as f64));
+            for (origin, towards) in rays {
+                // Through corners, along faces and edges, and past them; zeros of both signs.
+                let point = |p: [i8; 3]| Vec3::from(p.map(|c| f32::from(c) * -0.375));
+                let Ok(ray) = Ray::half_line(point(origin), point(towards)) else { continue };
                 let solid = |id: u32, t_max| clip_to_box(&ray, &boxes[id as usize], ray.t_min(), t_max);
                 let expected = nearest_hit_of_all(boxes.len() as u32, &ray, solid, &mut ());
-                assert_eq!(tree.nearest_hit(&ray, solid, &mut ()), expected, "{name}: {ray:?}");
+                prop_assert_eq!(tree.nearest_hit(&ray, solid, &mut ()), expected, "{:?}", ray);
                 let any = tree.any_hit(&ray, |id| solid(id, f32::MAX).is_some(), &mut ());
-                assert_eq!(any, expected.is_some(), "{name}: {ray:?}");
+                prop_assert_eq!(any, expected.is_some(), "{:?}", ray);
             }
         }
     }
@@ -209,13 +176,5 @@ mod tests {
         assert_eq!(tree.nearest_hit(&ray, solid, &mut counts).map(|hit| hit.object), Some(30));
         assert_eq!(counts.objects, 1);
         assert!(counts.boxes <= 1 + tree.depth() as u64, "{counts:?}");
-    }
-
-    #[test]
-    fn parameters_out_of_range_are_refused_by_name() {
-        let refused = |config: Config| config.build(&[]).unwrap_err().to_string();
-        assert!(refused(Config { traversal: 0.0, ..Config::default() }).contains("traversal is 0"));
-        assert!(refused(Config { intersection: f64::NAN, ..Config::default() }).contains("intersection"));
-        assert!(refused(Config { empty_factor: 1.5, ..Config::default() }).contains("0 to 1"));
     }
 }

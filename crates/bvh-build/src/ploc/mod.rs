@@ -133,19 +133,14 @@ mod tests {
         assert!(tree.depth() < 1000, "{}", tree.depth());
     }
 
+    #[cfg(feature = "rayon")]
     #[test]
-    fn neither_threads_nor_a_scale_by_powers_of_two_change_the_tree() {
+    fn the_number_of_threads_does_not_change_the_tree() {
         let boxes = scatter(5000);
         let tree = Config::default().build(&boxes).unwrap();
-        #[cfg(feature = "rayon")]
         for threads in [1, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             assert_eq!(pool.install(|| Config::default().build(&boxes).unwrap()), tree);
-        }
-        for factor in [2f32.powi(-100), 2f32.powi(-60), 2f32.powi(60), 2f32.powi(100)] {
-            let scaled: Vec<Aabb> =
-                boxes.iter().map(|b| Aabb { min: b.min * factor, max: b.max * factor }).collect();
-            assert_eq!(Config::default().build(&scaled).unwrap().prim_ids, tree.prim_ids);
         }
     }
 
@@ -254,13 +249,5 @@ mod tests {
 
     fn built(boxes: &[Aabb]) -> Bvh {
         Config::default().build(boxes).unwrap()
-    }
-
-    #[test]
-    fn a_radius_outside_its_range_is_named() {
-        for radius in [0, 1001] {
-            let error = Config { radius, ..Config::default() }.build(&[]).unwrap_err().to_string();
-            assert_eq!(error, format!("radius is {radius}; accepted: 1 to 1000"));
-        }
     }
 }

@@ -8,50 +8,12 @@ use bvh_core::{PackedAabb, with_vector_instructions};
 pub(super) fn order(boxes: &[PackedAabb]) -> Vec<u32> {
     let codes = codes(boxes);
     let mut order: Vec<(u32, u32)> = codes.iter().zip(0..).map(|(&code, index)| (high(code), index)).collect();
-    if order.len() < DIGITS {
-        order.sort_unstable_by_key(|&(_, index)| (codes[index as usize], index));
-    } else {
-        sort(&mut order);
-        // The lower halves of the codes are compared only where the upper halves are equal, which is rare.
-        let mut start = 0;
-        for end in 1..=order.len() {
-            if end == order.len() || order[end].0 != order[start].0 {
-                if end > start + 1 {
-                    order[start..end].sort_by_key(|&(_, index)| codes[index as usize]);
-                }
-                start = end;
-            }
-        }
+    // The lower halves are compared only where the upper halves are equal, which is rare.
+    radsort::sort_by_key(&mut order, |&(high, _)| high);
+    for equal in order.chunk_by_mut(|a, b| a.0 == b.0).filter(|equal| equal.len() > 1) {
+        equal.sort_by_key(|&(_, index)| codes[index as usize]);
     }
     order.into_iter().map(|(_, index)| index).collect()
-}
-
-/// Values of a digit of the radix sort.
-const DIGITS: usize = 1 << 11;
-
-/// Sorts stably by the key: a radix sort, the lowest digit first.
-///
-/// Makes three passes by digits of 11 bits where the crate `radsort` makes four by digits of 8, and takes RADIX.
-/// This sort is the larger part of the fastest build, and `bvh-search` measures small time limits in multiples of it.
-fn sort(keyed: &mut Vec<(u32, u32)>) {
-    let digit = |key: u32, pass: usize| (key >> (11 * pass)) as usize % DIGITS;
-    let mut ends = [[0u32; DIGITS]; 3];
-    for &(key, _) in keyed.iter() {
-        (0..3).for_each(|pass| ends[pass][digit(key, pass)] += 1);
-    }
-    let mut sorted = vec![(0, 0); keyed.len()];
-    for (pass, starts) in ends.iter_mut().enumerate() {
-        let mut before = 0;
-        for start in starts.iter_mut() {
-            before += std::mem::replace(start, before);
-        }
-        for &(key, index) in keyed.iter() {
-            let start = &mut starts[digit(key, pass)];
-            sorted[*start as usize] = (key, index);
-            *start += 1;
-        }
-        std::mem::swap(keyed, &mut sorted);
-    }
 }
 
 /// The upper 32 bits of a code of 63 bits.
@@ -112,16 +74,6 @@ mod tests {
             assert_eq!(spread([0, 1, 1 << bit, 0]), [0, 1, 1 << (3 * bit), 0]);
         }
         assert_eq!(spread([u64::MAX; 4]), [(0..21).map(|bit| 1 << (3 * bit)).sum(); 4]);
-    }
-
-    #[test]
-    fn many_keys_are_sorted_stably() {
-        let mut keyed: Vec<(u32, u32)> =
-            (0..50_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> (i % 31), i)).collect();
-        let mut expected = keyed.clone();
-        expected.sort();
-        sort(&mut keyed);
-        assert_eq!(keyed, expected);
     }
 
     proptest! {
