@@ -39,17 +39,17 @@ use bvh_build::{Check, OutOfRange};
 use data::Rows;
 use output::Output;
 use paper::{PaperRow, Verdict};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeSet;
 
 /// Declares the kinds of reports: name in specs (in snake case), configuration, and the function that makes it.
 macro_rules! reports {
-    ($($(#[$doc:meta])* $kind:ident($config:ty) => $write:path;)*) => {
+    ($($(#[$doc:meta])* $name:literal => $kind:ident($config:ty) by $write:path;)*) => {
         /// One report of a spec.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-        #[serde(tag = "kind", rename_all = "snake_case")]
+        #[serde(tag = "kind")]
         pub enum Report {
-            $($(#[$doc])* $kind($config),)*
+            $($(#[$doc])* #[serde(rename = $name)] $kind($config),)*
         }
 
         impl Check for Report {
@@ -61,6 +61,18 @@ macro_rules! reports {
         }
 
         impl Report {
+            /// The names of all kinds.
+            pub const NAMES: &[&str] = &[$($name),*];
+
+            /// Reads the configuration of a report of the kind `name`; `None` if there is none of this name. Unlike
+            /// deserialising a whole report, hands `config` on unbuffered, so that its errors know their place.
+            pub fn read<'de, D: Deserializer<'de>>(name: &str, config: D) -> Result<Option<Self>, D::Error> {
+                match name {
+                    $($name => <$config>::deserialize(config).map(|config| Some(Self::$kind(config))),)*
+                    _ => Ok(None),
+                }
+            }
+
             fn write(&self, rows: &Rows) -> Result<Output, Error> {
                 match self {
                     $(Self::$kind(config) => $write(config, rows),)*
@@ -72,71 +84,88 @@ macro_rules! reports {
 
 reports! {
     /// Ratios to base, scenes by columns, beside the paper's.
-    Table(table::Config) => table::Config::write;
+    "table" => Table(table::Config) by table::Config::write;
     /// Cost against number of trials.
-    Trials(trials::Config) => trials::Config::write;
+    "trials" => Trials(trials::Config) by trials::Config::write;
     /// Times of runs against each other.
-    Times(times::Config) => times::Config::write;
+    "times" => Times(times::Config) by times::Config::write;
     /// Cost against generation.
-    Generations(generations::Config) => generations::Config::write;
+    "generations" => Generations(generations::Config) by generations::Config::write;
     /// The distribution of costs over trials.
-    Distribution(config::Methods) => distribution::write;
+    "distribution" => Distribution(config::Methods) by distribution::write;
     /// Tests per random ray, methods by scenes.
-    RayTests(ray_tests::Config) => ray_tests::Config::write;
+    "ray_tests" => RayTests(ray_tests::Config) by ray_tests::Config::write;
     /// The error of the ray estimator against the number of rays, for the first repetition.
-    Estimator(config::Methods) => estimator::write;
+    "estimator" => Estimator(config::Methods) by estimator::write;
     /// Costs against tests per ray over many trees; every repetition is one tree.
-    Correlation(config::Methods) => correlation::write;
+    "correlation" => Correlation(config::Methods) by correlation::write;
     /// Error against run time and against work.
-    Anytime(anytime::Config) => anytime::Config::write;
+    "anytime" => Anytime(anytime::Config) by anytime::Config::write;
     /// Gaps to the exact optimum of small scenes.
-    Gaps(gaps::Config) => gaps::Config::write;
+    "gaps" => Gaps(gaps::Config) by gaps::Config::write;
     /// Run-time distributions.
-    RunTimes(config::Targets) => run_times::write;
+    "run_times" => RunTimes(config::Targets) by run_times::write;
     /// The aggregate distribution of run times over scenes and targets.
-    Ecdf(config::Targets) => ecdf::write;
+    "ecdf" => Ecdf(config::Targets) by ecdf::write;
     /// Performance profiles.
-    Profile(config::Targets) => profile::write;
+    "profile" => Profile(config::Targets) by profile::write;
     /// Medians, quartiles and primal integrals.
-    Numbers(numbers::Config) => numbers::Config::write;
+    "numbers" => Numbers(numbers::Config) by numbers::Config::write;
     /// Whether methods really differ.
-    Significance(significance::Config) => significance::Config::write;
+    "significance" => Significance(significance::Config) by significance::Config::write;
     /// One picture by brute force, KD-tree and trees.
-    Pictures(pictures::Config) => pictures::Config::write;
+    "pictures" => Pictures(pictures::Config) by pictures::Config::write;
     /// Cost against build time and against time per ray.
-    Pareto(config::Methods) => pareto::write;
+    "pareto" => Pareto(config::Methods) by pareto::write;
     /// Other libraries beside ours.
-    Peers(peers::Config) => peers::Config::write;
+    "peers" => Peers(peers::Config) by peers::Config::write;
     /// Speed of rays by tree, layout and kind of rays, and how well the cost predicts it.
-    Traversal(config::Methods) => traversal::write;
+    "traversal" => Traversal(config::Methods) by traversal::write;
     /// What leaving something out saves.
-    Omissions(omissions::Config) => omissions::Config::write;
+    "omissions" => Omissions(omissions::Config) by omissions::Config::write;
 }
 
 impl Report {
-    /// The labels of the methods the report speaks of.
-    pub fn labels(&self) -> Vec<&String> {
-        match self {
-            Self::Distribution(config) | Self::Estimator(config) | Self::Correlation(config) => &config.methods,
-            Self::Pareto(config) | Self::Traversal(config) => &config.methods,
-            Self::RunTimes(config) | Self::Ecdf(config) | Self::Profile(config) => &config.methods,
-            Self::Trials(config) => &config.methods,
-            Self::Times(config) => &config.methods,
-            Self::RayTests(config) => &config.methods,
-            Self::Anytime(config) => &config.methods,
-            Self::Numbers(config) => &config.methods,
-            Self::Pictures(config) => &config.methods,
-            Self::Table(config) => return config.columns.iter().map(|column| &column.method).collect(),
-            Self::Generations(config) => return vec![&config.method, &config.baseline],
-            Self::Gaps(config) => return config.methods.iter().chain([&config.optimum]).collect(),
-            Self::Significance(config) => return config.against.iter().chain([&config.method]).collect(),
-            Self::Peers(config) => return config.methods.iter().chain([&config.ours]).collect(),
-            Self::Omissions(config) => {
-                return config.pairs.iter().flat_map(|pair| [&pair.out, &pair.kept]).collect();
-            }
+    /// The labels of the methods that the report names, each with its key.
+    pub fn labels(&self) -> Vec<(String, &str)> {
+        fn list<'a>(key: &str, labels: &'a [String]) -> Vec<(String, &'a str)> {
+            let keyed = |(at, label): (usize, &'a String)| (format!("{key}[{at}]"), label.as_str());
+            labels.iter().enumerate().map(keyed).collect()
         }
-        .iter()
-        .collect()
+        let (methods, others): (&[String], Vec<(String, &str)>) = match self {
+            Self::Distribution(config) | Self::Estimator(config) | Self::Correlation(config) => {
+                (&config.methods, vec![])
+            }
+            Self::Pareto(config) | Self::Traversal(config) => (&config.methods, vec![]),
+            Self::RunTimes(config) | Self::Ecdf(config) | Self::Profile(config) => (&config.methods, vec![]),
+            Self::Trials(config) => (&config.methods, vec![]),
+            Self::Times(config) => (&config.methods, vec![]),
+            Self::RayTests(config) => (&config.methods, vec![]),
+            Self::Anytime(config) => (&config.methods, vec![]),
+            Self::Numbers(config) => (&config.methods, vec![]),
+            Self::Pictures(config) => (&config.methods, vec![]),
+            Self::Gaps(config) => (&config.methods, vec![("optimum".into(), &config.optimum)]),
+            Self::Peers(config) => (&config.methods, vec![("ours".into(), &config.ours)]),
+            Self::Generations(config) => {
+                (&[], vec![("method".into(), &config.method), ("baseline".into(), &config.baseline)])
+            }
+            Self::Significance(config) => {
+                let against = list("against", &config.against);
+                (&[], against.into_iter().chain([("method".into(), config.method.as_str())]).collect())
+            }
+            Self::Table(config) => {
+                let column = |at: usize| (format!("columns[{at}].method"), config.columns[at].method.as_str());
+                (&[], (0..config.columns.len()).map(column).collect())
+            }
+            Self::Omissions(config) => {
+                let pair = |at: usize| {
+                    let pair = &config.pairs[at];
+                    [(format!("pairs[{at}].out"), pair.out.as_str()), (format!("pairs[{at}].kept"), &pair.kept)]
+                };
+                (&[], (0..config.pairs.len()).flat_map(pair).collect())
+            }
+        };
+        list("methods", methods).into_iter().chain(others).collect()
     }
 
     /// Whether the report asks when events happened.
@@ -155,8 +184,8 @@ impl Report {
 pub const TEXT_FILE: &str = "timing_report.txt";
 
 /// Makes all reports from the CSV files in the store's folder. Returns the text for the terminal, which
-/// [`TEXT_FILE`] keeps.
-pub fn write_all(reports: &[Report], store: &Store) -> Result<String, Error> {
+/// [`TEXT_FILE`] keeps. Figures are written only if they are `drawn`.
+pub fn write_all(reports: &[Report], store: &Store, drawn: bool) -> Result<String, Error> {
     let rows = Rows::read(store.folder())?;
     let methods = rows.methods().into_iter().map(str::to_owned);
     let looks: Vec<(String, Look)> = methods.zip((0..).map(Look::Slot)).collect();
@@ -170,7 +199,7 @@ pub fn write_all(reports: &[Report], store: &Store) -> Result<String, Error> {
         for (name, bytes) in &output.csv {
             store.write(&format!("{name}.csv"), bytes)?;
         }
-        for (name, figure) in &mut output.figures {
+        for (name, figure) in output.figures.iter_mut().filter(|_| drawn) {
             // A method looks the same in all figures of an experiment.
             figure.looks.extend(looks.iter().cloned());
             let svg = figures::svg(figure)?;

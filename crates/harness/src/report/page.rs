@@ -36,8 +36,8 @@ struct Section {
     provenance: Provenance,
 }
 
-/// Writes a page of all experiments in `results` to `out`. Quick variants are left out where the whole one is there,
-/// and folders without a finished experiment always. Returns the number of experiments.
+/// Writes a page of all finished experiments in `results` to `out`, without quick variants and the repetitions that lie
+/// beside others. Returns the number of experiments.
 pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
     let mut names = Vec::new();
     for entry in fs::read_dir(results).map_err(Error::io(results, "read the folder"))? {
@@ -46,11 +46,11 @@ pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
             names.push(entry.file_name().to_string_lossy().into_owned());
         }
     }
-    let whole =
-        |name: &String| name.strip_suffix("-quick").is_none_or(|whole| !names.iter().any(|n| n == whole));
+    let repeats =
+        |name: &String| name.strip_suffix(".new").is_some_and(|kept| names.iter().any(|name| name == kept));
     let mut sections = names
         .iter()
-        .filter(|name| whole(name))
+        .filter(|name| !repeats(name))
         .map(|name| section(results, name))
         .collect::<Result<Vec<_>, _>>()?;
     if sections.is_empty() {

@@ -47,7 +47,8 @@ fn report(
 ) -> Result<String, Error> {
     store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
     reference::update(resolved, best_known, &provenance.revision, store)?;
-    report::write_all(&resolved.experiment.reports, store)
+    // Of quick variants, nothing but the rows is compared or shown.
+    report::write_all(&resolved.experiment.reports, store, !resolved.experiment.quick)
 }
 
 /// Makes the reports of finished runs again, with the best known costs of now. Runs nothing and loads no scene: the rows

@@ -2,7 +2,6 @@
 
 use super::fault::Fault;
 use super::{Contestant, Experiment, Labelled};
-use crate::report::Report;
 use crate::{scenes::subset, stress};
 use bvh_build::config::Accepts;
 use bvh_build::{BuildError, OutOfRange};
@@ -110,40 +109,13 @@ impl Experiment {
     pub(super) fn check_reports(&self) -> Result<(), Fault> {
         let known: HashSet<&str> = self.methods.iter().map(|method| method.label.as_str()).collect();
         for (index, report) in self.reports.iter().enumerate() {
-            if let Some(unknown) = report.labels().into_iter().find(|label| !known.contains(label.as_str())) {
-                let mut known: Vec<&str> = known.into_iter().collect();
-                known.sort_unstable();
-                let key = key_of(report, unknown).unwrap_or_default();
-                return Err(Fault::new(
-                    format!("reports[{index}]{key}"),
-                    format!("{unknown:?}, no label of a method"),
-                    known.join(", "),
-                ));
+            if let Some((key, unknown)) = report.labels().into_iter().find(|(_, label)| !known.contains(label))
+            {
+                let known: Vec<&str> = self.methods.iter().map(|method| method.label.as_str()).collect();
+                let found = format!("{unknown:?}, no label of a method");
+                return Err(Fault::new(format!("reports[{index}].{key}"), found, known.join(", ")));
             }
         }
         Ok(())
     }
-}
-
-/// Under which key a report names a method, for the message.
-fn key_of(report: &Report, label: &str) -> Option<String> {
-    fn names(value: &toml::Value, label: &str) -> bool {
-        match value {
-            toml::Value::String(text) => text == label,
-            toml::Value::Array(array) => array.iter().any(|value| names(value, label)),
-            toml::Value::Table(table) => table.iter().any(|(key, value)| key != "name" && names(value, label)),
-            _ => false,
-        }
-    }
-    let texts = ["kind", "source", "title", "reason", "file"];
-    let table = toml::Table::try_from(report).ok()?;
-    let (key, value) =
-        table.iter().find(|(key, value)| !texts.contains(&key.as_str()) && names(value, label))?;
-    // One of several tables: the key in it, too.
-    let of_table = |table: &toml::Value| {
-        let found = table.as_table()?.iter().find(|(key, value)| *key != "name" && names(value, label));
-        Some(found?.0.clone())
-    };
-    let inner = value.as_array().and_then(|tables| tables.iter().find_map(of_table));
-    Some(inner.map_or_else(|| format!(".{key}"), |inner| format!(".{key}.{inner}")))
 }

@@ -6,7 +6,7 @@ use serde_path_to_error::{Deserializer, Track};
 use std::fmt;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
-use toml::{Spanned, Table};
+use toml::{Spanned, Table, Value};
 
 /// A refused value.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,11 +43,11 @@ impl From<OutOfRange> for Fault {
     }
 }
 
+/// A table on its way to a value, with the path to where it is.
+type Tracked<'a, 'b> = Deserializer<'a, 'b, Table>;
+
 /// Deserialises a table by `read`, and names the key that an error is about.
-pub fn tracked<T>(
-    table: Table,
-    read: impl FnOnce(Deserializer<Table>) -> Result<T, toml::de::Error>,
-) -> Result<T, Fault> {
+fn tracked<T>(table: Table, read: impl FnOnce(Tracked) -> Result<T, toml::de::Error>) -> Result<T, Fault> {
     let mut track = Track::new();
     read(Deserializer::new(table, &mut track)).map_err(|error| {
         let path = track.path();
@@ -59,6 +59,23 @@ pub fn tracked<T>(
 /// Deserialises a table, and names the key that an error is about.
 pub fn deserialize<T: DeserializeOwned>(table: Table) -> Result<T, Fault> {
     tracked(table, |deserializer| T::deserialize(deserializer))
+}
+
+/// Deserialises a table that says under `tag` what it is, by `read`, which returns `None` for a name that is none of
+/// the `accepted` ones. Serde's own enums with a tag would buffer the table and forget where an error is.
+pub fn tagged<T>(
+    mut table: Table,
+    tag: &str,
+    read: impl FnOnce(&str, Tracked) -> Result<Option<T>, toml::de::Error>,
+    accepted: impl FnOnce() -> String,
+) -> Result<T, Fault> {
+    let name = table.remove(tag);
+    let found = name.as_ref().map_or("missing".into(), Value::to_string);
+    let known = match name {
+        Some(Value::String(name)) => tracked(table, |deserializer| read(&name, deserializer))?,
+        _ => None,
+    };
+    known.ok_or_else(|| Fault::new(tag, found, accepted()))
 }
 
 /// The line of a TOML text, from 1, on which `key` stands, or the innermost table around it that is there.

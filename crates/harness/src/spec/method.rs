@@ -4,7 +4,7 @@ use super::fault::{self, Fault};
 use crate::peers::Peer;
 use bvh_search::{Budget, Method, Shortcut};
 use serde::{Deserialize, Deserializer, Serialize};
-use toml::{Table, Value};
+use toml::Table;
 
 /// A method with the label that tables and figures show, by default its name, and limits of its own, if it has any.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -31,6 +31,24 @@ pub enum Contestant {
     Peer(Peer),
 }
 
+impl Contestant {
+    /// Its name in specs.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Ours(method) => method.name(),
+            Self::Peer(peer) => peer.name(),
+        }
+    }
+
+    fn read<'de, D: Deserializer<'de>>(name: &str, parameters: D) -> Result<Option<Self>, D::Error> {
+        if Method::NAMES.contains(&name) {
+            Method::read(name, parameters).map(|method| method.map(Self::Ours))
+        } else {
+            Peer::read(name, parameters).map(|peer| peer.map(Self::Peer))
+        }
+    }
+}
+
 /// The keys of an entry besides those of its method.
 #[derive(Default, Serialize, Deserialize)]
 #[serde(default)]
@@ -54,21 +72,11 @@ impl Labelled {
         let frame = ["label", "budget", "keep", "seed_as"];
         let frame = frame.into_iter().filter_map(|key| table.remove_entry(key)).collect();
         let Frame { label, budget, keep, seed_as } = fault::deserialize(frame)?;
-        let tag = table.remove("method");
         let accepted = || format!("{}, or the libraries {}", Method::NAMES.join(", "), Peer::NAMES.join(", "));
-        let Some(Value::String(name)) = &tag else {
-            let found = tag.map_or("missing".into(), |found| found.to_string());
-            return Err(Fault::new("method", found, accepted()));
-        };
-        let method = fault::tracked(table, |deserializer| {
-            if Method::NAMES.contains(&name.as_str()) {
-                Method::read(name, deserializer).map(|method| method.map(Contestant::Ours))
-            } else {
-                Peer::read(name, deserializer).map(|peer| peer.map(Contestant::Peer))
-            }
-        })?;
-        let Some(method) = method else { return Err(Fault::new("method", format!("{name:?}"), accepted())) };
-        Ok(Self { label: label.unwrap_or_else(|| name.clone()), method, budget, keep, seed_as })
+        let method =
+            fault::tagged(table, "method", |name, parameters| Contestant::read(name, parameters), accepted)?;
+        let label = label.unwrap_or_else(|| method.name().into());
+        Ok(Self { label, method, budget, keep, seed_as })
     }
 }
 

@@ -51,7 +51,9 @@ impl Experiment {
         }
         // Serde forgets the path to an error within a table that says itself of which type it is.
         let methods = list(&mut table, "methods", Labelled::read)?;
-        let reports = list(&mut table, "reports", fault::deserialize::<Report>)?;
+        let reports = list(&mut table, "reports", |table| {
+            fault::tagged(table, "kind", |kind, config| Report::read(kind, config), || Report::NAMES.join(", "))
+        })?;
         let mut experiment: Self = fault::deserialize(table)?;
         if !experiment.name.is_empty() {
             return Err(Fault::new("name", experiment.name, "none, the file's name is used"));
