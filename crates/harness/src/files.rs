@@ -55,13 +55,25 @@ pub fn write_synced(path: &Path, bytes: &[u8]) -> Result<(), Error> {
 
 /// Locks a folder of results against other harnesses until the file is dropped.
 pub fn lock_folder(folder: &Path) -> Result<File, Error> {
-    let path = folder.join(".lock");
-    let lock = File::create(&path).map_err(Error::io(&path, "create the file"))?;
+    let (path, lock) = lock_file(folder)?;
     match lock.try_lock() {
         Ok(()) => Ok(lock),
         Err(fs::TryLockError::WouldBlock) => Err(Error::Busy(folder.to_owned())),
         Err(fs::TryLockError::Error(source)) => Err(Error::Io { path, action: "lock the file", source }),
     }
+}
+
+/// As [`lock_folder`], but waits for another harness, which holds this lock for moments only.
+pub fn wait_for_folder(folder: &Path) -> Result<File, Error> {
+    let (path, lock) = lock_file(folder)?;
+    lock.lock().map_err(Error::io(&path, "lock the file"))?;
+    Ok(lock)
+}
+
+fn lock_file(folder: &Path) -> Result<(PathBuf, File), Error> {
+    let path = folder.join(".lock");
+    let lock = File::create(&path).map_err(Error::io(&path, "create the file"))?;
+    Ok((path, lock))
 }
 
 /// Bytes of a reserved file written at a time. In large pieces, because the kernel caches large writes in large pages,

@@ -1,4 +1,4 @@
-//! Where results come from: revision, compiler, processor, threads, date. Kept apart from what can be reproduced.
+//! Where results come from: revision, compiler, processor, threads, date. In a file apart from the reproducible ones.
 
 use serde::{Deserialize, Serialize};
 use std::process::Command;
@@ -21,7 +21,7 @@ pub struct Provenance {
     pub threads: usize,
     /// When the results were completed, UTC.
     pub date: String,
-    /// Of every part, if the results are merged.
+    /// The provenance of every part, if the results are merged.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<Provenance>,
 }

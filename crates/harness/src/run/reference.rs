@@ -13,9 +13,9 @@ use crate::report::Report;
 use crate::run::resolved::{LoadedScene, Resolved};
 use crate::run::rows::{BoundRow, ROUNDING, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
 use crate::run::store::Store;
-use bvh_core::cost::Objective;
+use bvh_core::cost::{Objective, SahConstants};
 use bvh_search::exact;
-use std::fs::{self, File};
+use std::fs;
 use std::path::Path;
 
 /// The file in the results folder.
@@ -32,7 +32,7 @@ pub enum BestKnown<'a> {
     Read(&'a Path),
 }
 
-/// Improves `out/best_known.csv` by the rows in the store's folder, and records the references there if a report needs
+/// Improves the best known costs by the rows in the store's folder, and records the references there if a report needs
 /// them. One harness at a time does so; at any moment the file is the old one or the whole new one.
 pub(crate) fn update(
     resolved: &Resolved,
@@ -41,33 +41,29 @@ pub(crate) fn update(
     store: &Store,
 ) -> Result<(), Error> {
     let (BestKnown::Improve(out) | BestKnown::Read(out)) = best_known;
-    let runs: Vec<RunRow> = read(&store.folder().join("runs.csv"))?;
+    let runs: Vec<RunRow> = read_if_any(store.folder())?;
     let bounds: Vec<BoundRow> = read_if_any(store.folder())?;
-    let lock_path = out.join(".lock");
-    let lock = File::create(&lock_path).map_err(Error::io(&lock_path, "create the file"))?;
-    lock.lock().map_err(Error::io(&lock_path, "lock the file"))?;
+    let _lock = files::wait_for_folder(out)?;
     let path = out.join(BEST_KNOWN);
     let before: Vec<ReferenceRow> = if path.is_file() { read(&path)? } else { vec![] };
     let mut known = before.clone();
     let experiment = &resolved.experiment;
+    let objective = name(&experiment.objective);
     let mut references = Vec::new();
     for scene in &resolved.scenes {
         let small = experiment.needs_optimum(scene.objects);
-        // Hundreds of small scenes, as experiments on optimality have, are no news.
+        // The optima of the hundreds of small scenes of experiments on optimality would be no news.
         if scene.objects > exact::MOST_OBJECTS || small {
             let bound = bounds.iter().find(|row| row.scene == scene.name).map(|row| row.lower_bound);
             let own = runs.iter().filter(|run| run.scene == scene.name && run.nodes + 1 == 2 * run.objects);
-            for found in own.flat_map(|run| finds(scene, &experiment.objective, run, bound)) {
-                let revision = revision.to_owned();
-                offer(&mut known, ReferenceRow { revision, ..found }, small);
+            for found in own.flat_map(|run| finds(scene, &objective, run, bound)) {
+                offer(&mut known, ReferenceRow { revision: revision.to_owned(), ..found }, small);
             }
         }
-        let objective = name(&experiment.objective);
-        references.extend(known.iter().find(|row| is_of(row, scene) && row.objective == objective).cloned());
+        let key = (scene.name.as_str(), scene.objects, scene.checksum.as_str(), objective.as_str());
+        references.extend(known.iter().find(|row| key_of(row) == key).cloned());
     }
-    known.sort_by_cached_key(|row| {
-        (row.scene.clone(), row.objects, row.checksum.clone(), row.objective.clone())
-    });
+    known.sort_by(|a, b| key_of(a).cmp(&key_of(b)));
     if known != before && matches!(best_known, BestKnown::Improve(_)) {
         files::write(&path, &to_bytes(&known, &path)?)?;
     }
@@ -87,24 +83,27 @@ pub fn adopt(folder: &Path, out: &Path) -> Result<(), Error> {
     Ok(())
 }
 
+/// What a reference is of: scene, number of its objects, checksum of its boxes, and objective.
+fn key_of(row: &ReferenceRow) -> (&str, usize, &str, &str) {
+    (&row.scene, row.objects, &row.checksum, &row.objective)
+}
+
 /// The objective's name, as in [`ReferenceRow::objective`].
 fn name(objective: &Objective) -> String {
     match objective {
         Objective::InternalArea => "internal_area".into(),
         Objective::GoldsmithSalmon => "goldsmith_salmon".into(),
-        Objective::Sah(constants) => format!("{constants:?}"),
+        Objective::Sah(SahConstants { traversal, intersection }) => {
+            format!("SahConstants {{ traversal: {traversal:?}, intersection: {intersection:?} }}")
+        }
     }
 }
 
-fn is_of(row: &ReferenceRow, scene: &LoadedScene) -> bool {
-    row.scene == scene.name && row.objects == scene.objects && row.checksum == scene.checksum
-}
-
-/// What one run found, under its objective and under those that are columns of every run. `bound` is of the internal
-/// area.
+/// What one run found, under the experiment's objective and under those that are columns of every run. `bound` is a
+/// lower bound of the internal area.
 fn finds(
     scene: &LoadedScene,
-    objective: &Objective,
+    objective: &str,
     run: &RunRow,
     bound: Option<f64>,
 ) -> impl Iterator<Item = ReferenceRow> {
@@ -112,7 +111,7 @@ fn finds(
     let costs = [
         (name(&Objective::InternalArea), run.internal_area, bound),
         (name(&Objective::GoldsmithSalmon), run.goldsmith_salmon, bound.map(|bound| 2.0 * bound / root_area)),
-        (name(objective), run.cost, None),
+        (objective.to_owned(), run.cost, None),
     ];
     costs.into_iter().map(|(objective, cost, lower_bound)| ReferenceRow {
         scene: scene.name.clone(),
@@ -127,16 +126,13 @@ fn finds(
     })
 }
 
-/// Keeps what is better of a row and the one known, if there is one. If the bound is the `optimum`, it is the cost.
+/// Adds a row to the known ones, or keeps the better of it and the known row of the same key. The bound of an `optimum`
+/// is the cost, whether or not a run has found it.
 fn offer(known: &mut Vec<ReferenceRow>, mut found: ReferenceRow, optimum: bool) {
     if let Some(least) = found.lower_bound.filter(|&bound| optimum && bound < found.cost * (1.0 - ROUNDING)) {
         (found.cost, found.method, found.seed) = (least, "exact".into(), 0);
     }
-    let same = |row: &ReferenceRow| {
-        (&row.scene, row.objects, &row.checksum, &row.objective)
-            == (&found.scene, found.objects, &found.checksum, &found.objective)
-    };
-    let Some(old) = known.iter_mut().find(|row| same(row)) else {
+    let Some(old) = known.iter_mut().find(|row| key_of(row) == key_of(&found)) else {
         return known.push(found);
     };
     let lower_bound = old.lower_bound.into_iter().chain(found.lower_bound).reduce(f64::max);
