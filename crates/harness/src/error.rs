@@ -49,7 +49,7 @@ pub enum Error {
     TreeFile { path: PathBuf, source: bvh_core::file::FileError },
     /// A figure could not be drawn.
     #[error(transparent)]
-    Chart(#[from] crate::figures::ChartError),
+    Figure(#[from] crate::figures::FigureError),
     /// `--check` found other numbers than the committed ones.
     #[error(
         "{differences} difference(s) from the committed results; if they are meant, run again without --check"

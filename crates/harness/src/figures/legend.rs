@@ -1,16 +1,17 @@
-//! The key to the series of a figure, shared by all its panels.
+//! The key to the series and reference lines of a figure, shared by all its panels.
 
-use super::canvas::{Anchor, Canvas, Fault, Frame, Pen};
+use plotters::element::{DashedPathElement, Polygon};
+use plotters::prelude::DrawingBackend;
+
+use super::canvas::{Align, Fault, Frame, Sheet, pen, steps};
 use super::model::{Figure, Layer};
 use super::style::{INK, REFERENCE_LINE, Stroke, Strokes};
-use super::text::{BODY, Ruler};
+use super::text::{BODY, Fonts};
 
-/// Widths of samples of lines, of reference lines among bars, and of other marks.
-const LINE: f64 = 30.0;
-const RULE: f64 = 20.0;
-const MARK: f64 = 14.0;
+/// Width of a sample.
+const SAMPLE: f64 = 30.0;
 /// From a sample to its name, and from a name to the next sample.
-const GAPS: (f64, f64) = (7.0, 22.0);
+const GAPS: (f64, f64) = (7.0, 18.0);
 /// Height of a row.
 const ROW: f64 = 20.0;
 
@@ -19,174 +20,89 @@ struct Entry {
     name: String,
     stroke: Stroke,
     line: bool,
-    band: bool,
     marker: bool,
-    whisker: bool,
-    bar: bool,
+    /// It has bars or bands.
+    area: bool,
 }
 
-impl Entry {
-    fn new(name: &str, stroke: Stroke) -> Self {
-        let name = name.to_owned();
-        Self { name, stroke, line: false, band: false, marker: false, whisker: false, bar: false }
-    }
-}
-
-/// The entries, in order of the series' appearance, then the reference lines of bar charts.
-pub(super) struct Legend<'a> {
+/// The entries, in order of the series' appearance and then of the reference lines', in columns of equal width that
+/// are filled row by row.
+pub(super) struct Legend {
     entries: Vec<Entry>,
-    ruler: &'a Ruler,
-    /// Width of all samples.
-    sample: f64,
+    columns: usize,
+    column_width: f64,
 }
 
-/// Where the entries stand.
-pub(super) struct Arrangement {
-    /// Upper left corners, from that of the legend.
-    corners: Vec<(f64, f64)>,
-    /// Longest name in pixels.
-    room: f64,
-    pub width: f64,
-    pub height: f64,
-}
-
-impl<'a> Legend<'a> {
-    pub fn new(figure: &Figure, strokes: &Strokes, ruler: &'a Ruler) -> Self {
+impl Legend {
+    pub fn new(figure: &Figure, strokes: &Strokes, width: f64, fonts: &Fonts) -> Self {
         let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
-        let entry = |name: &str| {
+        let entry = |(name, stroke): &(String, Stroke)| {
             let has =
                 |kind: fn(&Layer) -> bool| layers().any(|layer| layer.name() == Some(name) && kind(layer));
+            let line = has(|layer| matches!(layer, Layer::Line { .. } | Layer::Steps { .. }));
+            let marker = has(|layer| matches!(layer, Layer::Points { .. } | Layer::ErrorBars { .. }));
+            let area = !line && has(|layer| !matches!(layer, Layer::Points { .. } | Layer::ErrorBars { .. }));
             Entry {
-                line: has(|layer| matches!(layer, Layer::Line { .. } | Layer::Steps { .. })),
-                band: has(|layer| matches!(layer, Layer::Band { .. } | Layer::StepBand { .. })),
-                marker: has(|layer| matches!(layer, Layer::Points { .. } | Layer::ErrorBars { .. })),
-                whisker: has(|layer| matches!(layer, Layer::ErrorBars { .. })),
-                bar: has(|layer| matches!(layer, Layer::Bars { .. })),
-                ..Entry::new(name, strokes.of(name))
+                name: name.clone(),
+                stroke: *stroke,
+                line,
+                marker: marker || line && strokes.marked_lines,
+                area,
             }
         };
-        let mut entries: Vec<Entry> = strokes.names().map(entry).collect();
-        let mut sample = if entries.iter().any(|entry| entry.line || entry.band) { LINE } else { MARK };
-        for panel in figure.panels.iter().filter(|panel| panel.has_bars()) {
-            for layer in &panel.layers {
-                let Layer::HLine { label, .. } = layer else { continue };
-                if !label.trim().is_empty() && entries.iter().all(|entry| entry.name != *label) {
-                    sample = sample.max(RULE);
-                    entries.push(Entry { line: true, ..Entry::new(label, REFERENCE_LINE) });
-                }
+        let mut entries: Vec<Entry> = strokes.series.iter().map(entry).collect();
+        for layer in layers() {
+            let (Layer::HLine { label, .. } | Layer::VLine { label, .. }) = layer else { continue };
+            if !label.trim().is_empty() && entries.iter().all(|entry| entry.name != *label) {
+                let (name, stroke) = (label.clone(), REFERENCE_LINE);
+                entries.push(Entry { name, stroke, line: true, marker: false, area: false });
             }
         }
-        Self { entries, ruler, sample }
-    }
-
-    /// One row if it fits the width, otherwise columns of equal width, filled row by row.
-    pub fn arrange(&self, width: f64) -> Arrangement {
-        let before = self.sample + GAPS.0;
-        let needed = |entry: &Entry| before + self.ruler.width(&entry.name, BODY) + GAPS.1;
-        let widths: Vec<f64> = self.entries.iter().map(needed).collect();
-        let (total, widest) = (widths.iter().sum::<f64>(), widths.iter().copied().fold(1.0, f64::max));
-        let count = widths.len();
-        let most = if total - GAPS.1 <= width { count } else { ((width + GAPS.1) / widest).floor() as usize };
+        let before = SAMPLE + GAPS.0;
+        let room = width - before;
+        entries.iter_mut().for_each(|entry| entry.name = fonts.shorten(&entry.name, room, BODY));
+        let column_width = before + fonts.widest(entries.iter().map(|entry| &entry.name), BODY) + GAPS.1;
+        let most = (((width + GAPS.1) / column_width).floor() as usize).max(1);
         // As even rows as possible: 4 + 4 rather than 7 + 1.
-        let rows = count.div_ceil(most.max(1));
-        let columns = count.div_ceil(rows.max(1)).max(1);
-        let corner = |index: usize| {
-            let left =
-                if rows <= 1 { widths.iter().take(index).sum() } else { widest * (index % columns) as f64 };
-            (left, ROW * (index / columns) as f64)
-        };
-        Arrangement {
-            corners: (0..count).map(corner).collect(),
-            room: width - before,
-            width: (if rows <= 1 { total } else { widest * columns as f64 } - GAPS.1).max(0.0),
-            height: ROW * rows as f64,
-        }
+        let columns = entries.len().div_ceil(entries.len().div_ceil(most).max(1)).max(1);
+        Self { entries, columns, column_width }
     }
 
-    /// Draws the entries with the arrangement's upper left corner at a point.
-    pub fn draw(
-        &self,
-        canvas: &mut Canvas,
-        (left, top): (f64, f64),
-        arrangement: &Arrangement,
-    ) -> Result<(), Fault> {
-        for (entry, &(x, y)) in self.entries.iter().zip(&arrangement.corners) {
-            let sample = Frame { left: left + x, top: top + y, width: self.sample, height: ROW };
-            let dash = if entry.line { entry.stroke.dash } else { &[] };
-            canvas.inside(sample, dash, |pen| self.draw_sample(pen, entry))?;
-        }
-        canvas.over(|pen| {
-            for (entry, &(x, y)) in self.entries.iter().zip(&arrangement.corners) {
-                let name = self.ruler.shorten(&entry.name, arrangement.room, BODY);
-                let at = (left + x + self.sample + GAPS.0, top + y + ROW / 2.0);
-                pen.text(at, &name, BODY, INK, Anchor::Start)?;
-            }
-            Ok(())
-        })
+    pub fn height(&self) -> f64 {
+        ROW * self.entries.len().div_ceil(self.columns) as f64
     }
 
-    fn draw_sample(&self, pen: &Pen, entry: &Entry) -> Result<(), Fault> {
-        let Stroke { colour, marker, .. } = entry.stroke;
-        let (centre, middle) = (self.sample / 2.0, ROW / 2.0);
-        if entry.band {
-            let band = Frame { left: 0.0, top: middle - 6.0, width: self.sample, height: 12.0 };
-            pen.rectangle(band, colour, 0.2)?;
-        }
-        if entry.bar {
-            let bar = Frame { left: centre - MARK / 2.0, top: middle - 6.0, width: MARK, height: 12.0 };
-            pen.rectangle(bar, colour, 1.0)?;
-        }
-        if entry.line {
-            pen.path(&[(0.0, middle), (self.sample, middle)], colour, 2.0)?;
-        }
-        if entry.whisker {
-            pen.path(&[(centre, middle - 8.0), (centre, middle + 8.0)], colour, 1.3)?;
-        }
-        if entry.marker {
-            pen.marker((centre, middle), marker, colour, 4.0, 1.0)?;
+    /// Draws the entries with their upper left corner at a point.
+    pub fn draw<B: DrawingBackend>(&self, sheet: &Sheet<B>, corner: (f64, f64)) -> Result<(), Fault<B>> {
+        for (index, entry) in self.entries.iter().enumerate() {
+            let left = corner.0 + self.column_width * (index % self.columns) as f64;
+            let middle = corner.1 + ROW * ((index / self.columns) as f64 + 0.5);
+            entry.draw(sheet, left, middle)?;
+            sheet.text((left + SAMPLE + GAPS.0, middle), &entry.name, BODY, INK, Align::Left)?;
         }
         Ok(())
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::super::model::{Axis, Panel};
-    use super::*;
-
-    fn figure(names: usize) -> Figure {
-        let layer = |i: usize| Layer::Line { name: format!("method {}", i % names), points: Vec::new() };
-        let layers = (0..2 * names).map(layer).collect();
-        let panel = Panel { title: String::new(), x: Axis::linear(""), y: Axis::linear(""), layers };
-        Figure { panels: vec![panel], ..Figure::default() }
-    }
-
-    #[test]
-    fn each_series_has_one_entry_and_no_two_entries_touch() {
-        let ruler = Ruler::new().unwrap();
-        for names in [1, 5, 8, 23] {
-            let strokes = Strokes::new(&figure(names));
-            let legend = Legend::new(&figure(names), &strokes, &ruler);
-            for width in [10.0, 200.0, 770.0] {
-                let arrangement = legend.arrange(width);
-                assert_eq!(arrangement.corners.len(), names);
-                assert!(arrangement.width <= width || arrangement.corners.iter().all(|corner| corner.0 == 0.0));
-                let taken = |entry: &Entry, &(left, top): &(f64, f64)| Frame {
-                    left,
-                    top,
-                    width: LINE + GAPS.0 + ruler.width(&entry.name, BODY),
-                    height: ROW,
-                };
-                let frames: Vec<Frame> = legend
-                    .entries
-                    .iter()
-                    .zip(&arrangement.corners)
-                    .map(|(entry, corner)| taken(entry, corner))
-                    .collect();
-                let clear =
-                    |(i, frame): (usize, &Frame)| frames[..i].iter().all(|other| !other.overlaps(*frame));
-                assert!(frames.iter().enumerate().all(clear), "{names} names in {width} pixels");
-            }
+impl Entry {
+    /// Draws a sample of the marks, its left end at a point.
+    fn draw<B: DrawingBackend>(&self, sheet: &Sheet<B>, left: f64, middle: f64) -> Result<(), Fault<B>> {
+        let (colour, style) = (self.stroke.colour, pen(self.stroke.colour, 2.0));
+        let ends = [left, left + SAMPLE].map(|x| (steps(x), steps(middle)));
+        if self.area {
+            sheet
+                .rectangle(Frame { left: left + 8.0, top: middle - 6.0, width: 14.0, height: 12.0 }, colour)?;
         }
+        if self.line {
+            let (on, off) = self.stroke.dash.unwrap_or((SAMPLE, 1.0));
+            sheet.0.draw(&DashedPathElement::new(ends, steps(on), steps(off), style))?;
+        }
+        if self.marker {
+            let (x, y) = (steps(left + SAMPLE / 2.0), steps(middle));
+            let corners: Vec<_> =
+                self.stroke.outline(4.0).into_iter().map(|(dx, dy)| (x + dx, y + dy)).collect();
+            sheet.0.draw(&Polygon::new(corners, colour))?;
+        }
+        Ok(())
     }
 }

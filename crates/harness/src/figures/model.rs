@@ -23,14 +23,14 @@ pub struct Figure {
 /// How the marks of a series are told from those of the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
-    /// The n-th combination of colour (Okabe and Ito's colour-blind-safe ones), dash and marker, from 0.
+    /// The n-th combination of colour, dash and marker, from 0; they repeat after 84.
     Slot(usize),
     /// Black and dashed: what the others are compared with, such as the paper's values.
     Reference,
 }
 
 /// One pair of axes with the layers drawn over each other, the first at the bottom of its kind:
-/// bands, then bars, lines, error bars and points, and at last all text.
+/// bands, then bars, error bars, reference lines, lines and points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {
     /// Printed bold above the panel; may be empty.
@@ -41,13 +41,6 @@ pub struct Panel {
     pub y: Axis,
     /// The data. Without any that can be drawn the panel says 'no data'.
     pub layers: Vec<Layer>,
-}
-
-impl Panel {
-    /// Whether bars are likely to cover labels of reference lines.
-    pub(super) fn has_bars(&self) -> bool {
-        self.layers.iter().any(|layer| matches!(layer, Layer::Bars { .. }))
-    }
 }
 
 /// What is measured along one side of a panel, and which part of it is shown.
@@ -171,24 +164,15 @@ pub enum Layer {
     HLine {
         /// Its height.
         y: f64,
-        /// Printed along the line or, in a panel with bars, in the legend; may be empty.
+        /// Its entry in the legend; may be empty.
         label: String,
     },
     /// A vertical reference line over the whole panel.
     VLine {
         /// Its place.
         x: f64,
-        /// Printed beside the line; may be empty.
+        /// Its entry in the legend; may be empty.
         label: String,
-    },
-    /// Text beside a point, put where it covers as little as possible.
-    Note {
-        /// The point's x.
-        x: f64,
-        /// The point's y.
-        y: f64,
-        /// The text, on one line.
-        text: String,
     },
 }
 
@@ -203,7 +187,7 @@ impl Layer {
             | Self::StepBand { name, .. }
             | Self::ErrorBars { name, .. }
             | Self::Bars { name, .. } => Some(name),
-            Self::HLine { .. } | Self::VLine { .. } | Self::Note { .. } => None,
+            Self::HLine { .. } | Self::VLine { .. } => None,
         }
     }
 }
@@ -217,46 +201,40 @@ pub struct HeatMap {
     pub caption: String,
     /// What the rows are, such as `case`; may be empty.
     pub row_label: String,
-    /// What the columns are; may be empty.
-    pub column_label: String,
     /// One name per row, from the top.
     pub rows: Vec<String>,
     /// One name per column, from the left.
     pub columns: Vec<String>,
     /// `rows.len() * columns.len()` cells, row by row.
     pub cells: Vec<Cell>,
-    /// What the colours mean.
-    pub key: Key,
+    /// What the colours mean, from best to worst; at most five.
+    pub classes: Vec<String>,
 }
 
 /// One cell of a heat map.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Cell {
-    /// What the colour shows. Grey where the key has no colour for it, such as NaN for 'not run'.
-    pub value: f64,
+    /// Which of the classes gives the cell its colour; grey if none does.
+    pub class: Option<usize>,
     /// Printed in the cell; may be empty.
     pub text: String,
 }
 
-/// What the colours of a heat map mean.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Key {
-    /// Value i, from 0, is the i-th of these classes, given from best to worst.
-    Classes(Vec<String>),
-    /// Numbers. Values outside a range that was set take its end's colour.
-    Numbers {
-        /// Label, scale (linear or logarithmic) and range.
-        axis: Axis,
-        /// The value that is neither good nor bad, such as a ratio of 1, drawn in white with blue
-        /// below and red above it. `None`: light to dark.
-        middle: Option<f64>,
-    },
+/// A strip of colours with a number at either end and a text between them, to stand below an image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ColourBar {
+    /// Width of the image below which it stands, in its pixels.
+    pub width: u32,
+    /// Colours from left to right, of equal widths.
+    pub colours: Vec<[u8; 3]>,
+    /// Printed below the left end, the middle and the right end.
+    pub labels: [String; 3],
 }
 
 /// Why there is no picture.
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "each message says what its fields are")]
-pub enum ChartError {
+pub enum FigureError {
     /// A heat map whose cells do not fill its table.
     #[error(
         "heat map '{title}' has {rows} rows of {columns} cells, and {cells} cells instead of their product"
@@ -268,12 +246,9 @@ pub enum ChartError {
     /// One of the fonts in the program could not be read.
     #[error("the embedded font could not be read: {reason}")]
     Font { reason: String },
-    /// Not an SVG.
-    #[error("the SVG to rasterise could not be read: {reason}")]
-    Svg { reason: String },
     /// More pixels than a PNG should have.
     #[error("a picture of {width} × {height} pixels is too large for a PNG; show fewer panels or rows")]
-    TooLarge { width: u32, height: u32 },
+    TooLarge { width: usize, height: usize },
     /// The PNG encoder failed.
     #[error("the PNG could not be encoded: {reason}")]
     Png { reason: String },

@@ -1,44 +1,224 @@
-//! Turns an SVG into a PNG with the embedded fonts only.
+//! Draws pictures into pixels: plotters' shapes at twice the resolution of the result, averaged, as a PNG or as plain
+//! RGB values.
 
-use std::sync::Arc;
+use std::convert::Infallible;
 
-use resvg::tiny_skia::{Color, Pixmap, Transform};
-use resvg::usvg::fontdb::Database;
-use resvg::usvg::{Options, Tree};
+use plotters::prelude::{DrawingBackend, IntoDrawingArea};
+use plotters::style::text_anchor::{HPos, VPos};
+use plotters_backend::{
+    BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingErrorKind, FontStyle, FontTransform,
+};
 
-use super::model::ChartError;
-use super::text::{BOLD, REGULAR};
+use super::canvas::{FONT_SIZE, Layout as _, Picture, STEPS, Sheet, steps};
+use super::model::FigureError;
+use super::text::{Fonts, Type};
 
-/// Pixels of the PNG per pixel of the SVG, each way.
+/// Pixels of a PNG per pixel of the SVG, each way.
 pub const PNG_SCALE: u32 = 2;
 /// Pixels in the largest PNG.
-const LARGEST: u64 = 100_000_000;
+const LARGEST: u64 = 40_000_000;
+/// Steps per pixel of the result, each way.
+const SAMPLES: usize = STEPS as usize / PNG_SCALE as usize;
 
-/// Rasterises an SVG at twice its size. Every text is set in DejaVu Sans, whatever fonts the machine
-/// has; characters outside Latin, Greek and mathematics show as empty boxes.
+/// A picture in RGB, row by row from the top.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pixels {
+    /// Pixels per row.
+    pub width: usize,
+    /// Number of rows.
+    pub height: usize,
+    /// `width * height` colours.
+    pub colours: Vec<[u8; 3]>,
+}
+
+/// plotters' backend for an image in memory.
+struct Raster<'a> {
+    width: i32,
+    height: i32,
+    colours: &'a mut [[u8; 3]],
+    fonts: &'a Fonts,
+}
+
+type Drawn = Result<(), DrawingErrorKind<Infallible>>;
+
+impl Raster<'_> {
+    fn blend(&mut self, x: i32, y: i32, colour: BackendColor) {
+        if (0..self.width).contains(&x) && (0..self.height).contains(&y) {
+            let pixel = &mut self.colours[y as usize * self.width as usize + x as usize];
+            let (red, green, blue) = colour.rgb;
+            for (old, new) in pixel.iter_mut().zip([red, green, blue]) {
+                let old_part = f64::from(*old);
+                *old = (old_part + (f64::from(new) - old_part) * colour.alpha).round() as u8;
+            }
+        }
+    }
+
+    /// Fills a polygon by the even-odd rule: every pixel whose centre is inside, once.
+    fn fill(&mut self, corners: &[(f64, f64)], colour: BackendColor) {
+        let bound =
+            |limit: f64, pick: fn(f64, f64) -> f64| corners.iter().map(|corner| corner.1).fold(limit, pick);
+        let first = |from: f64, end: i32| (from - 0.5).ceil().clamp(0.0, f64::from(end)) as i32;
+        let (top, bottom) = (bound(f64::INFINITY, f64::min), bound(f64::NEG_INFINITY, f64::max));
+        let mut crossings: Vec<f64> = Vec::new();
+        for y in first(top, self.height)..first(bottom, self.height) {
+            let middle = f64::from(y) + 0.5;
+            crossings.clear();
+            for (one, next) in corners.iter().zip(corners.iter().cycle().skip(1)) {
+                if (one.1 <= middle) != (next.1 <= middle) {
+                    crossings.push(one.0 + (middle - one.1) * (next.0 - one.0) / (next.1 - one.1));
+                }
+            }
+            crossings.sort_by(f64::total_cmp);
+            for pair in crossings.chunks_exact(2) {
+                for x in first(pair[0], self.width)..first(pair[1], self.width) {
+                    self.blend(x, y, colour);
+                }
+            }
+        }
+    }
+}
+
+fn float((x, y): BackendCoord) -> (f64, f64) {
+    (f64::from(x), f64::from(y))
+}
+
+impl DrawingBackend for Raster<'_> {
+    type ErrorType = Infallible;
+
+    fn get_size(&self) -> (u32, u32) {
+        (self.width as u32, self.height as u32)
+    }
+
+    fn ensure_prepared(&mut self) -> Drawn {
+        Ok(())
+    }
+
+    fn present(&mut self) -> Drawn {
+        Ok(())
+    }
+
+    fn draw_pixel(&mut self, (x, y): BackendCoord, colour: BackendColor) -> Drawn {
+        self.blend(x, y, colour);
+        Ok(())
+    }
+
+    fn draw_line<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S) -> Drawn {
+        self.draw_path([from, to], style)
+    }
+
+    fn draw_rect<S: BackendStyle>(
+        &mut self,
+        (left, top): BackendCoord,
+        (right, bottom): BackendCoord,
+        style: &S,
+        fill: bool,
+    ) -> Drawn {
+        let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
+        if fill { self.fill_polygon(corners, style) } else { self.draw_path(corners, style) }
+    }
+
+    /// A rectangle for every segment, which at inner points reaches as far beyond as to fill the joint.
+    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        path: I,
+        style: &S,
+    ) -> Drawn {
+        let points: Vec<(f64, f64)> = path.into_iter().map(float).collect();
+        let half = f64::from(style.stroke_width()) / 2.0;
+        let last = points.len().saturating_sub(2);
+        for (index, (&(x0, y0), &(x1, y1))) in points.iter().zip(points.iter().skip(1)).enumerate() {
+            let length = ((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0)).sqrt();
+            if length > 0.0 {
+                let (dx, dy) = ((x1 - x0) / length * half, (y1 - y0) / length * half);
+                let (before, after) = (f64::from(u8::from(index > 0)), f64::from(u8::from(index < last)));
+                let (x0, y0) = (x0 - dx * before, y0 - dy * before);
+                let (x1, y1) = (x1 + dx * after, y1 + dy * after);
+                let corners = [(x0 - dy, y0 + dx), (x1 - dy, y1 + dx), (x1 + dy, y1 - dx), (x0 + dy, y0 - dx)];
+                self.fill(&corners, style.color());
+            }
+        }
+        Ok(())
+    }
+
+    fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        path: I,
+        style: &S,
+    ) -> Drawn {
+        let corners: Vec<(f64, f64)> = path.into_iter().map(float).collect();
+        self.fill(&corners, style.color());
+        Ok(())
+    }
+
+    /// Places the baseline where plotters' SVG backend does.
+    fn draw_text<S: BackendTextStyle>(&mut self, text: &str, style: &S, (x, y): BackendCoord) -> Drawn {
+        /// Height of lower-case letters in DejaVu Sans, in font sizes.
+        const LOWER_CASE: f64 = 0.547;
+        let bold = matches!(style.style(), FontStyle::Bold);
+        let kind = Type { size: style.size() / FONT_SIZE, bold };
+        let width = self.fonts.width(text, kind);
+        let start = match style.anchor().h_pos {
+            HPos::Left => 0.0,
+            HPos::Center => -width / 2.0,
+            HPos::Right => -width,
+        };
+        let baseline = match style.anchor().v_pos {
+            VPos::Top => 0.76 * kind.size,
+            VPos::Center => 0.5 * LOWER_CASE * kind.size,
+            VPos::Bottom => -0.5 * LOWER_CASE * kind.size,
+        };
+        let (colour, turned) = (style.color(), matches!(style.transform(), FontTransform::Rotate270));
+        self.fonts.rasterise(text, kind, (start, baseline), |right, down, coverage| {
+            let (right, down) = if turned { (down, -1 - right) } else { (right, down) };
+            self.blend(x + right, y + down, colour.mix(coverage));
+        });
+        Ok(())
+    }
+}
+
+/// Draws a picture into pixels, [`PNG_SCALE`] of them per pixel of its SVG.
 ///
 /// # Errors
-/// [`ChartError::Svg`] if it is none, [`ChartError::TooLarge`] above a hundred million pixels,
-/// [`ChartError::Png`] if encoding fails.
-pub fn png(svg: &str) -> Result<Vec<u8>, ChartError> {
-    let mut fonts = Database::new();
-    fonts.load_font_data(REGULAR.to_vec());
-    fonts.load_font_data(BOLD.to_vec());
-    fonts.set_sans_serif_family("DejaVu Sans");
-    let options =
-        Options { font_family: "DejaVu Sans".to_owned(), fontdb: Arc::new(fonts), ..Options::default() };
-    let tree = Tree::from_str(svg, &options).map_err(|error| ChartError::Svg { reason: error.to_string() })?;
-    let size = tree.size().to_int_size();
-    let (width, height) = (size.width().saturating_mul(PNG_SCALE), size.height().saturating_mul(PNG_SCALE));
-    let too_large = ChartError::TooLarge { width, height };
-    if u64::from(width) * u64::from(height) > LARGEST {
-        return Err(too_large);
+/// [`FigureError::TooLarge`] above forty million pixels; otherwise as [`super::svg`].
+pub fn pixels(picture: &impl Picture) -> Result<Pixels, FigureError> {
+    let fonts = Fonts::new()?;
+    let layout = picture.lay_out(&fonts)?;
+    let (width, height) = layout.size();
+    let (across, down) = (steps(width.ceil()) as usize, steps(height.ceil()) as usize);
+    let (width, height) = (across / SAMPLES, down / SAMPLES);
+    if width as u64 * height as u64 > LARGEST {
+        return Err(FigureError::TooLarge { width, height });
     }
-    let mut pixels = Pixmap::new(width, height).ok_or(too_large)?;
-    pixels.fill(Color::WHITE);
-    let scale = PNG_SCALE as f32;
-    resvg::render(&tree, Transform::from_scale(scale, scale), &mut pixels.as_mut());
-    pixels.encode_png().map_err(|error| ChartError::Png { reason: error.to_string() })
+    let mut fine = vec![[255; 3]; across * down];
+    let raster = Raster { width: across as i32, height: down as i32, colours: &mut fine, fonts: &fonts };
+    layout
+        .draw(&Sheet(raster.into_drawing_area()))
+        .map_err(|fault| FigureError::Draw { title: picture.title().to_owned(), reason: fault.to_string() })?;
+    let colour = |index: usize| {
+        let corner = index / width * SAMPLES * across + index % width * SAMPLES;
+        let samples =
+            (0..SAMPLES * SAMPLES).map(|sample| fine[corner + sample / SAMPLES * across + sample % SAMPLES]);
+        let sum =
+            samples.fold([0; 3], |sum: [usize; 3], sample| [0, 1, 2].map(|c| sum[c] + usize::from(sample[c])));
+        sum.map(|part| (part / (SAMPLES * SAMPLES)) as u8)
+    };
+    Ok(Pixels { width, height, colours: (0..width * height).map(colour).collect() })
+}
+
+/// Draws a picture as a PNG, [`PNG_SCALE`] times as large as its SVG.
+///
+/// # Errors
+/// [`FigureError::Png`] if encoding fails; otherwise as [`pixels`].
+pub fn png(picture: &impl Picture) -> Result<Vec<u8>, FigureError> {
+    let Pixels { width, height, colours } = pixels(picture)?;
+    let failed = |error: png::EncodingError| FigureError::Png { reason: error.to_string() };
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    let mut writer = encoder.write_header().map_err(failed)?;
+    writer.write_image_data(colours.as_flattened()).map_err(failed)?;
+    writer.finish().map_err(failed)?;
+    Ok(bytes)
 }
 
 #[cfg(test)]
@@ -46,32 +226,32 @@ mod tests {
     use super::super::{Axis, Figure, Layer, Panel, svg};
     use super::*;
 
-    fn figure(title: &str) -> Figure {
+    fn figure(title: &str, panels: usize) -> Figure {
         let line = Layer::Line { name: String::new(), points: vec![(0.0, 0.0), (1.0, 1.0)] };
         let panel =
             Panel { title: String::new(), x: Axis::linear("x"), y: Axis::linear("y"), layers: vec![line] };
-        Figure { title: title.to_owned(), panels: vec![panel], ..Figure::default() }
-    }
-
-    fn pixels(svg: &str) -> Pixmap {
-        Pixmap::decode_png(&png(svg).unwrap()).unwrap()
+        Figure { title: title.to_owned(), panels: vec![panel; panels], ..Figure::default() }
     }
 
     #[test]
     fn the_png_is_twice_as_large_as_the_svg() {
-        let picture = svg(&figure("title")).unwrap();
-        let tree = Tree::from_str(&picture, &Options::default()).unwrap();
-        let size = (tree.size().width() as u32, tree.size().height() as u32);
-        let pixels = pixels(&picture);
-        assert_eq!((pixels.width(), pixels.height()), (PNG_SCALE * size.0, PNG_SCALE * size.1));
+        let figure = figure("title", 1);
+        let Pixels { width, height, .. } = pixels(&figure).unwrap();
+        let scale = PNG_SCALE as usize;
+        let size = format!("width=\"{}\" height=\"{}\"", width / scale, height / scale);
+        assert!(
+            svg(&figure).unwrap().starts_with(&format!("<svg xmlns=\"http://www.w3.org/2000/svg\" {size}"))
+        );
+        let decoded = png::Decoder::new(std::io::Cursor::new(png(&figure).unwrap())).read_info().unwrap();
+        assert_eq!((decoded.info().width as usize, decoded.info().height as usize), (width, height));
     }
 
     #[test]
     fn text_is_drawn_with_the_embedded_font() {
         let dark = |title: &str| {
-            let picture = pixels(&svg(&figure(title)).unwrap());
-            let head = picture.pixels().iter().take(PNG_SCALE as usize * 34 * picture.width() as usize);
-            head.filter(|pixel| pixel.red() < 100).count()
+            let picture = pixels(&figure(title, 1)).unwrap();
+            let head = picture.colours.iter().take(PNG_SCALE as usize * 34 * picture.width);
+            head.filter(|colour| colour[0] < 100).count()
         };
         // Fourteen letters of 17 pixels: some hundred dark pixels each at twice the size.
         assert!(dark("Error and time") > 14 * 40, "{} dark pixels", dark("Error and time"));
@@ -80,9 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_svg_is_an_error() {
-        assert!(matches!(png("no svg"), Err(ChartError::Svg { .. })));
-        let huge = r#"<svg xmlns="http://www.w3.org/2000/svg" width="20000" height="20000"/>"#;
-        assert!(matches!(png(huge), Err(ChartError::TooLarge { width: 40_000, height: 40_000 })));
+    fn a_picture_of_too_many_pixels_is_an_error() {
+        assert!(matches!(png(&figure("", 100)), Err(FigureError::TooLarge { width: 1600, .. })));
     }
 }

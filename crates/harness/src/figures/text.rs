@@ -1,35 +1,30 @@
-//! Measures and breaks text, in the embedded font, so that a layout needs no font of the machine.
+//! Measures, wraps and rasterises text in the embedded fonts, so that no figure depends on the machine's fonts.
 
-use skrifa::charmap::Charmap;
-use skrifa::instance::{LocationRef, Size};
-use skrifa::metrics::GlyphMetrics;
-use skrifa::{FontRef, MetadataProvider};
+use ab_glyph::{Font, FontRef, PxScale, point};
 
-use super::model::ChartError;
+use super::model::FigureError;
 
-/// DejaVu Sans, reduced to the characters figures use.
-pub(super) const REGULAR: &[u8] = include_bytes!("../../assets/DejaVuSans-subset.ttf");
+/// DejaVu Sans, reduced to the characters that figures use.
+const REGULAR: &[u8] = include_bytes!("../../assets/DejaVuSans-subset.ttf");
 /// DejaVu Sans Bold, reduced likewise.
-pub(super) const BOLD: &[u8] = include_bytes!("../../assets/DejaVuSans-Bold-subset.ttf");
+const BOLD: &[u8] = include_bytes!("../../assets/DejaVuSans-Bold-subset.ttf");
 
-/// The font's name, and what viewers without it should take: fonts not wider than it.
+/// The `font-family` of SVGs: DejaVu Sans, then fonts that are no wider.
 pub(super) const FAMILY: &str = "DejaVu Sans, Verdana, Arial, sans-serif";
-
-/// Height of a text line in font sizes.
-pub(super) const LINE: f64 = 1.3;
 
 /// Size and weight of a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Type {
+pub struct Type {
     /// Font size in pixels.
     pub size: f64,
+    /// Bold instead of regular.
     pub bold: bool,
 }
 
 impl Type {
-    /// Distance between the middles of two lines, in pixels.
+    /// Distance between two baselines in pixels.
     pub fn line(self) -> f64 {
-        self.size * LINE
+        1.3 * self.size
     }
 }
 
@@ -39,63 +34,67 @@ pub(super) const TITLE: Type = Type { size: 17.0, bold: true };
 pub(super) const HEADING: Type = Type { size: 14.0, bold: true };
 /// Captions, axis labels and legends.
 pub(super) const BODY: Type = Type { size: 13.0, bold: false };
-/// Ticks, notes and cells.
+/// Tick labels.
 pub(super) const SMALL: Type = Type { size: 12.0, bold: false };
 
-/// Widths of characters.
-pub(super) struct Ruler {
-    regular: (Charmap<'static>, GlyphMetrics<'static>),
-    bold: (Charmap<'static>, GlyphMetrics<'static>),
+/// The embedded fonts.
+pub struct Fonts {
+    regular: FontRef<'static>,
+    bold: FontRef<'static>,
 }
 
-impl Ruler {
-    pub fn new() -> Result<Self, ChartError> {
-        let face = |bytes| {
-            let font = FontRef::new(bytes).map_err(|error| ChartError::Font { reason: error.to_string() })?;
-            Ok((font.charmap(), font.glyph_metrics(Size::new(1.0), LocationRef::default())))
+impl Fonts {
+    /// Parses the embedded fonts.
+    pub fn new() -> Result<Self, FigureError> {
+        let font = |bytes| {
+            FontRef::try_from_slice(bytes).map_err(|error| FigureError::Font { reason: error.to_string() })
         };
-        Ok(Self { regular: face(REGULAR)?, bold: face(BOLD)? })
+        Ok(Self { regular: font(REGULAR)?, bold: font(BOLD)? })
     }
 
-    /// Width of a line of text in pixels. Characters the font lacks count as one font size.
+    fn font(&self, style: Type) -> &FontRef<'static> {
+        if style.bold { &self.bold } else { &self.regular }
+    }
+
+    fn advance(&self, character: char, style: Type) -> f64 {
+        let font = self.font(style);
+        let units = font.units_per_em().unwrap_or(1.0);
+        style.size * f64::from(font.h_advance_unscaled(font.glyph_id(character)) / units)
+    }
+
+    /// Width of a line of text in pixels, without kerning.
     pub fn width(&self, text: &str, style: Type) -> f64 {
-        let (map, metrics) = if style.bold { &self.bold } else { &self.regular };
-        let advance = |character| map.map(character).and_then(|glyph| metrics.advance_width(glyph));
-        text.chars().map(|character| f64::from(advance(character).unwrap_or(1.0))).sum::<f64>() * style.size
+        text.chars().map(|character| self.advance(character, style)).sum()
     }
 
     /// The largest width among lines of text, in pixels.
-    pub fn widest<'a>(&self, lines: impl IntoIterator<Item = &'a str>, style: Type) -> f64 {
+    pub fn widest<'a>(&self, lines: impl IntoIterator<Item = &'a String>, style: Type) -> f64 {
         lines.into_iter().map(|line| self.width(line, style)).fold(0.0, f64::max)
     }
 
-    /// The text in lines no wider than `width` pixels, broken at blanks, and inside words only where
-    /// a word alone is wider. Empty text has no lines.
+    /// Breaks a text at blanks into lines of at most `width` pixels. A word that is wider is broken anywhere. An
+    /// empty text has no lines.
     pub fn wrap(&self, text: &str, width: f64, style: Type) -> Vec<String> {
         let mut lines: Vec<String> = Vec::new();
-        for paragraph in text.lines() {
-            let mut line = String::new();
-            for word in paragraph.split_whitespace() {
-                let longer = if line.is_empty() { word.to_owned() } else { format!("{line} {word}") };
-                if self.width(&longer, style) <= width {
-                    line = longer;
-                    continue;
-                }
-                if !line.is_empty() {
-                    lines.push(std::mem::take(&mut line));
-                }
-                for character in word.chars() {
-                    line.push(character);
-                    if self.width(&line, style) > width && line.chars().nth(1).is_some() {
-                        line.pop();
-                        lines.push(std::mem::replace(&mut line, character.to_string()));
-                    }
-                }
+        let mut line = String::new();
+        for word in text.split_whitespace() {
+            let longer = if line.is_empty() { word.to_owned() } else { format!("{line} {word}") };
+            if self.width(&longer, style) <= width {
+                line = longer;
+                continue;
             }
             if !line.is_empty() {
-                lines.push(line);
+                lines.push(std::mem::take(&mut line));
+            }
+            for character in word.chars() {
+                line.push(character);
+                if self.width(&line, style) > width && line.chars().nth(1).is_some() {
+                    line.pop();
+                    lines.push(std::mem::replace(&mut line, character.to_string()));
+                }
             }
         }
+        lines.extend(Some(line).filter(|line| !line.is_empty()));
         lines
     }
 
@@ -104,14 +103,37 @@ impl Ruler {
         if self.width(text, style) <= width {
             return text.to_owned();
         }
-        let room = width - self.width("…", style);
-        let mut taken = 0.0;
+        let mut room = width - self.width("…", style);
         let fits = |character: &char| {
-            taken += self.width(character.encode_utf8(&mut [0; 4]), style);
-            taken <= room
+            room -= self.advance(*character, style);
+            room >= 0.0
         };
         let kept: String = text.chars().take_while(fits).collect();
         format!("{}…", kept.trim_end())
+    }
+
+    /// Calls `pixel(x, y, coverage)` for every pixel that a line of text covers, the start of its baseline at
+    /// `(x, y)`. A character that the fonts lack is an empty box.
+    pub fn rasterise(
+        &self,
+        text: &str,
+        style: Type,
+        (mut x, y): (f64, f64),
+        mut pixel: impl FnMut(i32, i32, f64),
+    ) {
+        let font = self.font(style);
+        let scale =
+            PxScale::from(style.size as f32 * font.height_unscaled() / font.units_per_em().unwrap_or(1.0));
+        for character in text.chars() {
+            let glyph = font.glyph_id(character).with_scale_and_position(scale, point(x as f32, y as f32));
+            if let Some(outline) = font.outline_glyph(glyph) {
+                let corner = outline.px_bounds().min;
+                outline.draw(|right, down, coverage| {
+                    pixel(corner.x as i32 + right as i32, corner.y as i32 + down as i32, f64::from(coverage));
+                });
+            }
+            x += self.advance(character, style);
+        }
     }
 }
 
@@ -121,31 +143,30 @@ mod tests {
 
     #[test]
     fn text_is_broken_at_blanks_into_lines_that_fit() {
-        let ruler = Ruler::new().unwrap();
+        let fonts = Fonts::new().unwrap();
         let words = "gap against seconds, median and quartiles of 25 seeds";
-        let lines = ruler.wrap(words, 120.0, BODY);
-        assert!(lines.len() > 1);
-        assert!(lines.iter().all(|line| ruler.width(line, BODY) <= 120.0));
+        let lines = fonts.wrap(words, 120.0, BODY);
+        assert!(lines.len() > 1 && fonts.widest(&lines, BODY) <= 120.0);
         assert_eq!(lines.join(" "), words);
-        assert_eq!(ruler.wrap("incomprehensibilities", 60.0, BODY).concat(), "incomprehensibilities");
-        assert!(ruler.wrap("", 60.0, BODY).is_empty());
-        assert_eq!(ruler.wrap("ab", 0.0, BODY), ["a", "b"]);
+        assert_eq!(fonts.wrap("incomprehensibilities", 60.0, BODY).concat(), "incomprehensibilities");
+        assert!(fonts.wrap("", 60.0, BODY).is_empty());
+        assert_eq!(fonts.wrap("ab", 0.0, BODY), ["a", "b"]);
     }
 
     #[test]
     fn shortened_text_ends_with_an_ellipsis_and_fits() {
-        let ruler = Ruler::new().unwrap();
-        let short = ruler.shorten("interlocking staircases", 80.0, SMALL);
-        assert!(short.ends_with('…') && ruler.width(&short, SMALL) <= 80.0);
-        assert_eq!(ruler.shorten("jewel", 80.0, SMALL), "jewel");
+        let fonts = Fonts::new().unwrap();
+        let short = fonts.shorten("interlocking staircases", 80.0, SMALL);
+        assert!(short.ends_with('…') && fonts.width(&short, SMALL) <= 80.0);
+        assert_eq!(fonts.shorten("jewel", 80.0, SMALL), "jewel");
     }
 
     #[test]
-    fn the_font_has_the_characters_of_figures() {
-        let ruler = Ruler::new().unwrap();
+    fn the_fonts_have_the_characters_of_figures() {
+        let fonts = Fonts::new().unwrap();
         for character in "aZ09 äéñß αΩπσ ×÷±−≤≥≈∞√∑ ⁰¹²³⁴⁵⁶⁷⁸⁹⁻ ₀₁₉ ←→↑↓ …–—’“” °µ½ ✓✗ ●■▲".chars()
         {
-            assert!(ruler.regular.0.map(character).is_some(), "no {character}");
+            assert_ne!(fonts.regular.glyph_id(character).0, 0, "no {character}");
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The heat map: how many tests each pixel took, as a colour, with a key below.
 
 use super::film::Film;
-use crate::{Error, figures};
-use resvg::tiny_skia::Pixmap;
+use crate::Error;
+use crate::figures::{self, ColourBar};
 
 /// 'inferno' of matplotlib (van der Walt & Smith 2015; CC0), every sixteenth part: evenly brighter to the eye.
 const INFERNO: [[u8; 3]; 17] = [
@@ -52,11 +52,9 @@ pub fn map(film: &Film, rays_per_pixel: u32) -> Result<Vec<[u8; 3]>, Error> {
     let range = range(film, rays_per_pixel);
     let top = range.top.max(f64::MIN_POSITIVE) * f64::from(rays_per_pixel);
     let mut pixels: Vec<[u8; 3]> = film.tests.iter().map(|&tests| colour(tests as f64 / top)).collect();
-    let key = Pixmap::decode_png(&figures::png(&key(film.width, &range))?)
-        .map_err(|error| figures::ChartError::Png { reason: error.to_string() })?;
-    for row in key.pixels().chunks(key.width() as usize) {
-        let own = row.iter().map(|pixel| [pixel.red(), pixel.green(), pixel.blue()]);
-        pixels.extend(own.take(film.width as usize));
+    let key = figures::pixels(&key(film.width, &range))?;
+    for row in key.colours.chunks(key.width) {
+        pixels.extend(row.iter().take(film.width as usize));
     }
     Ok(pixels)
 }
@@ -70,30 +68,15 @@ fn colour(at: f64) -> [u8; 3] {
     [0, 1, 2].map(|c| (f64::from(low[c]) + (f64::from(high[c]) - f64::from(low[c])) * part + 0.5) as u8)
 }
 
-/// A strip of colours with numbers, as an SVG of half the picture's width: rasterising doubles it.
-fn key(width: u32, range: &Range) -> String {
-    let width = f64::from(width.div_ceil(2));
-    let bar = (width - 16.0).max(1.0);
-    let stops: String = (0..INFERNO.len())
-        .map(|i| {
-            let [r, g, b] = INFERNO[i];
-            format!("<stop offset='{}' stop-color='rgb({r},{g},{b})'/>", i as f64 / (INFERNO.len() - 1) as f64)
-        })
-        .collect();
-    let text = |at: f64, anchor: &str, text: String| {
-        format!("<text x='{}' y='20' text-anchor='{anchor}'>{text}</text>", 8.0 + bar * at)
-    };
-    let texts = [
-        text(0.0, "start", "0".into()),
-        text(0.5, "middle", format!("tests per pixel: median {:.0}, most {:.0}", range.median, range.max)),
-        text(1.0, "end", format!("{:.0}", range.top)),
+/// The key: a strip of all colours with the ends of their range.
+fn key(width: u32, range: &Range) -> ColourBar {
+    let labels = [
+        "0".into(),
+        format!("tests per pixel: median {:.0}, most {:.0}", range.median, range.max),
+        format!("{:.0}", range.top),
     ];
-    format!(
-        "<svg xmlns='http://www.w3.org/2000/svg' width='{width}' height='25'><defs><linearGradient id='k'>{stops}\
-         </linearGradient></defs><rect width='{width}' height='25' fill='#fff'/><rect x='8' y='5' width='{bar}' \
-         height='6' fill='url(#k)'/><g font-family='DejaVu Sans' font-size='7' fill='#222'>{}</g></svg>",
-        texts.concat()
-    )
+    let colours = (0..=255).map(|part| colour(f64::from(part) / 255.0)).collect();
+    ColourBar { width, colours, labels }
 }
 
 #[cfg(test)]

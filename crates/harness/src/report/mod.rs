@@ -202,9 +202,8 @@ pub fn write_all(reports: &[Report], store: &Store, drawn: bool) -> Result<Strin
         for (name, figure) in output.figures.iter_mut().filter(|_| drawn) {
             // A method looks the same in all figures of an experiment.
             figure.looks.extend(looks.iter().cloned());
-            let svg = figures::svg(figure)?;
-            store.write(&format!("{name}.svg"), svg.as_bytes())?;
-            store.write(&format!("{name}.png"), &figures::png(&svg)?)?;
+            store.write(&format!("{name}.svg"), figures::svg(figure)?.as_bytes())?;
+            store.write(&format!("{name}.png"), &figures::png(figure)?)?;
         }
     }
     let text: String = outputs.iter().map(Output::text).collect();

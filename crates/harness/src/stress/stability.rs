@@ -8,7 +8,7 @@ use super::promise::{Broken, Promise};
 use super::table::CASES;
 use super::{child, tracing};
 use crate::Error;
-use crate::figures::{self, HeatMap, Key};
+use crate::figures::{self, HeatMap};
 use crate::run::rows::{read, to_bytes};
 use crate::run::store::Store;
 use crate::spec::{Contestant, Labelled};
@@ -241,10 +241,8 @@ fn report(store: &Store) -> Result<String, Error> {
     let (scenes, columns) = (names(|row| &row.scene), names(|row| &row.method));
     let cell = |scene: &String, column: &String| {
         let row = rows.iter().find(|row| (&row.scene, &row.method) == (scene, column));
-        row.map_or(figures::Cell { value: f64::NAN, text: String::new() }, |row| figures::Cell {
-            value: f64::from(row.outcome as u8),
-            text: row.text(),
-        })
+        let shown = |row: &Row| figures::Cell { class: Some(row.outcome as usize), text: row.text() };
+        row.map(shown).unwrap_or_default()
     };
     let cells = scenes.iter().flat_map(|scene| columns.iter().map(move |column| cell(scene, column))).collect();
     let map = HeatMap {
@@ -254,15 +252,13 @@ fn report(store: &Store) -> Result<String, Error> {
              are depths of trees; where a promise was broken, which. Grey: not asked."
                 .into(),
         row_label: "case".into(),
-        column_label: String::new(),
         rows: scenes,
         columns,
         cells,
-        key: Key::Classes(CLASSES.map(String::from).into()),
+        classes: CLASSES.map(String::from).into(),
     };
-    let svg = figures::heatmap_svg(&map)?;
-    store.write("stability.svg", svg.as_bytes())?;
-    store.write("stability.png", &figures::png(&svg)?)?;
+    store.write("stability.svg", figures::svg(&map)?.as_bytes())?;
+    store.write("stability.png", &figures::png(&map)?)?;
     let count = |class| own.iter().filter(|row| row.outcome == class).count();
     let worst = own.iter().filter_map(|row| row.relative_error).fold(0.0, f64::max);
     let mut text = format!(
