@@ -282,8 +282,7 @@ mod tests {
             Layer::VLine { x: 1.0, label: String::new() },
             Layer::HLine { y: 3.0, label: String::new() },
         ];
-        let (x, y, has_data) =
-            axes(&Panel { title: String::new(), x: Axis::linear(""), y: Axis::linear(""), layers });
+        let (x, y, has_data) = axes(&Panel { layers, ..Panel::default() });
         assert!(has_data && x.low < 1.0 && y.high > 3.0);
     }
 }

@@ -147,7 +147,7 @@ mod tests {
     fn a_million_points_are_drawn_as_few() {
         let wave = (0..1_000_000).map(|i| (f64::from(i) * 1e-4, f64::from(i % 97)));
         let layers = vec![Layer::Line { name: String::new(), points: wave.collect() }];
-        let panel = Panel { title: String::new(), x: Axis::linear("x"), y: Axis::linear("y"), layers };
+        let panel = Panel { layers, ..Panel::default() };
         let picture = svg(&Figure { panels: vec![panel], ..Figure::default() }).unwrap();
         assert!(picture.len() < 100_000, "{} bytes", picture.len());
     }

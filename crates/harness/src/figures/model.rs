@@ -31,7 +31,7 @@ pub enum Look {
 
 /// One pair of axes with the layers drawn over each other, the first at the bottom of its kind:
 /// bands, then bars, error bars, reference lines, lines and points.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Panel {
     /// Printed bold above the panel; may be empty.
     pub title: String,
@@ -44,7 +44,7 @@ pub struct Panel {
 }
 
 /// What is measured along one side of a panel, and which part of it is shown.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Axis {
     /// Name and unit, such as `time (s)`. A power of ten common to all ticks is appended to it.
     pub label: String,
@@ -59,9 +59,10 @@ pub struct Axis {
 }
 
 /// How values become positions along an axis.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Scale {
     /// Equal differences are equal distances. Values beyond ±10³⁰⁰ have no position.
+    #[default]
     Linear,
     /// Equal ratios are equal distances; values of 0 and below have no position.
     Log,
@@ -73,7 +74,7 @@ pub enum Scale {
 impl Axis {
     /// A linear axis around the data.
     pub fn linear(label: impl Into<String>) -> Self {
-        Self { label: label.into(), scale: Scale::Linear, low: None, high: None }
+        Self { label: label.into(), ..Self::default() }
     }
 
     /// A logarithmic axis around the data.

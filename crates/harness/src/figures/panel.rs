@@ -87,7 +87,7 @@ impl<'a> Plot<'a> {
             };
             depth = self.names.iter().map(size).fold(0.0, f64::max);
         } else {
-            self.x.rule((width / 55.0) as usize);
+            self.x.rule((width / 46.0) as usize);
         }
         self.title = fonts.wrap(&self.panel.title, width, HEADING);
         self.above = HEADING.line() * self.title.len() as f64 + 5.0;

@@ -223,44 +223,31 @@ pub fn png(picture: &impl Picture) -> Result<Vec<u8>, FigureError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Axis, Figure, Layer, Panel, svg};
+    use super::super::{Figure, Panel, svg};
     use super::*;
 
     fn figure(title: &str, panels: usize) -> Figure {
-        let line = Layer::Line { name: String::new(), points: vec![(0.0, 0.0), (1.0, 1.0)] };
-        let panel =
-            Panel { title: String::new(), x: Axis::linear("x"), y: Axis::linear("y"), layers: vec![line] };
-        Figure { title: title.to_owned(), panels: vec![panel; panels], ..Figure::default() }
+        Figure { title: title.to_owned(), panels: vec![Panel::default(); panels], ..Figure::default() }
     }
 
     #[test]
-    fn the_png_is_twice_as_large_as_the_svg() {
-        let figure = figure("title", 1);
-        let Pixels { width, height, .. } = pixels(&figure).unwrap();
-        let scale = PNG_SCALE as usize;
-        let size = format!("width=\"{}\" height=\"{}\"", width / scale, height / scale);
-        assert!(
-            svg(&figure).unwrap().starts_with(&format!("<svg xmlns=\"http://www.w3.org/2000/svg\" {size}"))
-        );
-        let decoded = png::Decoder::new(std::io::Cursor::new(png(&figure).unwrap())).read_info().unwrap();
-        assert_eq!((decoded.info().width as usize, decoded.info().height as usize), (width, height));
+    fn the_png_is_twice_as_large_as_the_svg_up_to_a_limit() {
+        let picture = figure("title", 1);
+        let decoded = png::Decoder::new(std::io::Cursor::new(png(&picture).unwrap())).read_info().unwrap();
+        let (width, height) = (decoded.info().width / PNG_SCALE, decoded.info().height / PNG_SCALE);
+        assert!(svg(&picture).unwrap().contains(&format!("width=\"{width}\" height=\"{height}\"")));
+        assert!(matches!(png(&figure("", 100)), Err(FigureError::TooLarge { width: 1600, .. })));
     }
 
     #[test]
     fn text_is_drawn_with_the_embedded_font() {
         let dark = |title: &str| {
-            let picture = pixels(&figure(title, 1)).unwrap();
-            let head = picture.colours.iter().take(PNG_SCALE as usize * 34 * picture.width);
-            head.filter(|colour| colour[0] < 100).count()
+            let picture = pixels(&figure(title, 0)).unwrap();
+            picture.colours.iter().filter(|colour| colour[0] < 100).count()
         };
         // Fourteen letters of 17 pixels: some hundred dark pixels each at twice the size.
         assert!(dark("Error and time") > 14 * 40, "{} dark pixels", dark("Error and time"));
         // A missing glyph would be a box like any other missing one.
         assert_ne!(dark("10⁻³ × α"), dark("10⁻² × α"));
-    }
-
-    #[test]
-    fn a_picture_of_too_many_pixels_is_an_error() {
-        assert!(matches!(png(&figure("", 100)), Err(FigureError::TooLarge { width: 1600, .. })));
     }
 }

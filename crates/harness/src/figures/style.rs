@@ -133,13 +133,13 @@ impl Strokes {
 
 #[cfg(test)]
 mod tests {
-    use super::super::model::{Axis, Panel};
+    use super::super::model::Panel;
     use super::*;
 
     fn strokes(names: &[String], looks: Vec<(String, Look)>) -> Strokes {
         let line = |name: &String| Layer::Line { name: name.clone(), points: Vec::new() };
         let layers = names.iter().chain(names.iter().rev()).map(line).collect();
-        let panel = Panel { title: String::new(), x: Axis::linear(""), y: Axis::linear(""), layers };
+        let panel = Panel { layers, ..Panel::default() };
         Strokes::new(&Figure { panels: vec![panel], looks, ..Figure::default() })
     }
 
