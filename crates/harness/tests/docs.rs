@@ -1,0 +1,203 @@
+//! Every number in the README and in `docs/` that can come from a committed CSV does: the text names file and rows in a
+//! comment, and `UPDATE_DOCS=1 cargo test -p harness --test docs` writes the value behind it.
+//!
+//! ```text
+//! <!-- value FILE | COLUMN=TEXT, … | AGGREGATE COLUMN | FORMAT -->0.988<!-- end -->
+//! <!-- pivot FILE | COLUMN=TEXT, … | ROWS × COLUMNS | AGGREGATE COLUMN [(COLUMN)] | FORMAT -->
+//! (a Markdown table; the column in parentheses is shown behind each value)
+//! <!-- end -->
+//! ```
+//! An aggregate is `only` (all rows agree), `min`, `max`, `median` or `count`; a format is a number of decimals, with
+//! `below` behind it for percent below one, `above` for percent above one, `percent` for a fraction. Conditions compare
+//! whole cells; `COLUMN!=TEXT` excludes, `*` stands for no condition.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+type Row = BTreeMap<String, String>;
+
+fn top() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The rows of a committed CSV that meet all conditions; at least one.
+fn rows(file: &str, conditions: &str) -> Vec<Row> {
+    let path = top().join("results").join(file);
+    let mut reader = csv::Reader::from_path(&path).unwrap_or_else(|error| panic!("{file}: {error}"));
+    let meets = |row: &Row| {
+        conditions == "*"
+            || conditions.split(", ").all(|condition| {
+                let (column, text, wanted) = match condition.split_once("!=") {
+                    Some((column, text)) => (column, text, false),
+                    None => {
+                        condition.split_once('=').map(|(column, text)| (column, text, true)).expect(conditions)
+                    }
+                };
+                let cell = row.get(column).unwrap_or_else(|| panic!("{file} has no column {column}"));
+                (cell == text) == wanted
+            })
+    };
+    let found: Vec<Row> = reader.deserialize().map(Result::unwrap).filter(meets).collect();
+    assert!(!found.is_empty(), "{file}: no row with {conditions}");
+    found
+}
+
+/// One number of the rows' `AGGREGATE COLUMN`; nothing if no row has one.
+fn aggregate(rows: &[&Row], what: &str) -> Option<f64> {
+    let (how, column) = what.split_once(' ').expect(what);
+    if how == "count" {
+        return Some(rows.len() as f64);
+    }
+    let cell = |row: &&Row| row.get(column).unwrap_or_else(|| panic!("no column {column}")).parse().ok();
+    let mut values: Vec<f64> = rows.iter().filter_map(cell).collect();
+    values.sort_by(f64::total_cmp);
+    let (first, last) = (*values.first()?, *values.last()?);
+    match how {
+        "only" => {
+            assert!(first == last, "{column} is from {first} to {last}, not one value");
+            Some(first)
+        }
+        "min" => Some(first),
+        "max" => Some(last),
+        "median" => Some(0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2])),
+        _ => panic!("{how}: accepted: only, min, max, median, count"),
+    }
+}
+
+/// Writes a number as a format says.
+fn write(value: f64, format: &str) -> String {
+    let (digits, unit) = format.split_once(' ').unwrap_or((format, ""));
+    let value = match unit {
+        "" => value,
+        "below" => 100.0 * (1.0 - value),
+        "above" => 100.0 * (value - 1.0),
+        "percent" => 100.0 * value,
+        _ => panic!("{unit}: accepted: below, above, percent"),
+    };
+    format!("{value:.*}", digits.parse().expect(format))
+}
+
+/// The different values of a column, in their order in the file.
+fn distinct(rows: &[Row], column: &str) -> Vec<String> {
+    let mut found: Vec<String> = Vec::new();
+    for row in rows {
+        if !found.contains(&row[column]) {
+            found.push(row[column].clone());
+        }
+    }
+    found
+}
+
+fn pivot(rows: &[Row], axes: &str, what: &str, format: &str) -> String {
+    let (down, across) = axes.split_once(" × ").expect(axes);
+    let (what, beside) = match what.split_once(" (") {
+        Some((what, beside)) => (what, Some(format!("only {}", beside.trim_end_matches(')')))),
+        None => (what, None),
+    };
+    let escape = |text: &str| text.replace('|', "\\|");
+    let columns = distinct(rows, across);
+    let mut lines =
+        vec![format!("| {down} | {} |", columns.iter().map(|c| escape(c)).collect::<Vec<_>>().join(" | "))];
+    lines.push(format!("|---|{}", "---|".repeat(columns.len())));
+    for name in distinct(rows, down) {
+        let cell = |column: &String| {
+            let here: Vec<&Row> =
+                rows.iter().filter(|row| row[down] == name && row[across] == *column).collect();
+            let text = aggregate(&here, what).map_or_else(String::new, |value| write(value, format));
+            match beside.as_ref().and_then(|what| aggregate(&here, what)) {
+                Some(value) => format!("{text} ({})", write(value, format)),
+                None => text,
+            }
+        };
+        let kind = rows.iter().find(|row| row[down] == name).and_then(|row| row.get("scene_kind"));
+        let note = match kind {
+            Some(kind) if down == "scene" && kind != "file" => format!(" ({kind})"),
+            _ => String::new(),
+        };
+        let cells: Vec<String> = columns.iter().map(cell).collect();
+        lines.push(format!("| {}{note} | {} |", escape(&name), cells.join(" | ")));
+    }
+    lines.join("\n")
+}
+
+/// The text with every value and table as the committed results have it.
+fn renewed(text: &str) -> String {
+    let (mut out, mut rest) = (String::new(), text);
+    while let Some(start) = rest.find("<!-- value ").into_iter().chain(rest.find("<!-- pivot ")).min() {
+        let open = start + rest[start..].find(" -->").expect("a comment ends") + 4;
+        let close = open
+            + rest[open..].find("<!-- end -->").unwrap_or_else(|| panic!("no end: {}", &rest[start..open]));
+        let directive = &rest[start + 5..open - 4];
+        let fields: Vec<&str> = directive[6..].split(" | ").collect();
+        out.push_str(&rest[..open]);
+        match fields[..] {
+            [file, conditions, what, format] => {
+                let rows = rows(file, conditions);
+                let value = aggregate(&rows.iter().collect::<Vec<_>>(), what).expect(directive);
+                out.push_str(&write(value, format));
+            }
+            [file, conditions, axes, what, format] => {
+                out.push_str(&format!("\n{}\n", pivot(&rows(file, conditions), axes, what, format)));
+            }
+            _ => panic!("{directive}"),
+        }
+        rest = &rest[close..];
+    }
+    out + rest
+}
+
+/// The README and every page of `docs/` and `results/`.
+fn pages() -> Vec<PathBuf> {
+    let mut pages = vec![top().join("README.md"), top().join("results/README.md")];
+    pages.extend(fs::read_dir(top().join("docs")).unwrap().map(|entry| entry.unwrap().path()));
+    pages.retain(|page| page.extension().is_some_and(|extension| extension == "md"));
+    pages.sort();
+    pages
+}
+
+#[test]
+fn the_documentation_shows_the_committed_numbers() {
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        let expected = renewed(&text);
+        if std::env::var_os("UPDATE_DOCS").is_some() {
+            fs::write(&page, &expected).unwrap();
+        } else {
+            let differs = text.lines().zip(expected.lines()).find(|(now, then)| now != then);
+            assert!(
+                text == expected,
+                "{}: {differs:?}; UPDATE_DOCS=1 cargo test -p harness --test docs rewrites it",
+                page.display()
+            );
+        }
+    }
+}
+
+#[test]
+fn every_link_of_the_documentation_leads_somewhere() {
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        for (_, link) in
+            text.split("](").skip(1).filter_map(|rest| rest.split_once(')').map(|(link, _)| ((), link)))
+        {
+            let target = link.split('#').next().unwrap_or_default();
+            if !target.is_empty() && !target.contains("://") {
+                assert!(page.parent().unwrap().join(target).exists(), "{}: {link}", page.display());
+            }
+        }
+    }
+}
+
+#[test]
+fn the_index_of_results_has_every_experiment_with_its_question() {
+    let index = fs::read_to_string(top().join("results/README.md")).unwrap();
+    for entry in fs::read_dir(top().join("experiments")).unwrap() {
+        let path = entry.unwrap().path();
+        let spec: toml::Table = toml::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+        let name = path.file_stem().unwrap().to_str().unwrap();
+        let question = spec["question"].as_str().unwrap();
+        let line = format!("| [{name}]({name}) | {question} |");
+        assert!(index.contains(&line), "results/README.md lacks: {line}");
+    }
+}
