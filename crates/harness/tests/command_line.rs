@@ -5,8 +5,7 @@ mod support;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::Duration;
-use support::{harness, reproducible, run, text};
+use support::{harness, reproducible, run, text, wait_for};
 
 const SPEC: &str = "
 question = 'Do results survive?'
@@ -81,27 +80,6 @@ fn any_number_of_threads_writes_the_same_bytes() {
     assert!(results[0] == results[1] && results[0] == results[2]);
 }
 
-#[test]
-fn a_killed_run_resumes_to_the_same_bytes() {
-    let folder = folder();
-    assert!(run(folder.path(), &["spec.toml", "--out", "whole"]).status.success());
-    let whole = reproducible(&folder.path().join("whole/spec"));
-    for milliseconds in [2, 5, 10, 20, 40, 80, 120, 200] {
-        let out = format!("killed{milliseconds}");
-        let mut child = harness(folder.path(), &["spec.toml", "--jobs", "1", "--out", &out])
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        std::thread::sleep(Duration::from_millis(milliseconds));
-        child.kill().unwrap();
-        child.wait().unwrap();
-        let output = run(folder.path(), &["spec.toml", "--resume", "--out", &out]);
-        assert!(output.status.success(), "{}", text(&output.stderr));
-        assert!(reproducible(&folder.path().join(out).join("spec")) == whole, "killed after {milliseconds} ms");
-    }
-}
-
 #[cfg(unix)]
 #[test]
 fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
@@ -110,8 +88,7 @@ fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
     fs::write(folder.path().join("spec.toml"), spec).unwrap();
     let child =
         harness(folder.path(), &["spec.toml"]).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    // The lock and the first finished runs exist by then; all of them take seconds.
-    std::thread::sleep(Duration::from_millis(400));
+    wait_for(&folder.path().join("results/spec/.partial/000000"));
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));

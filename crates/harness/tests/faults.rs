@@ -7,8 +7,8 @@ mod support;
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
-use support::{harness, reproducible, run, run_on_a_small_disk, text};
+use std::time::Duration;
+use support::{harness, reproducible, run, run_on_a_small_disk, text, wait_for};
 
 const SPEC: &str = "
 question = 'What survives?'
@@ -60,15 +60,6 @@ fn results(out: &Path) -> Vec<(String, Vec<u8>)> {
 fn whole(folder: &Path) -> Vec<(String, Vec<u8>)> {
     succeed(folder, &["spec.toml", "--out", "whole"]);
     results(&folder.join("whole"))
-}
-
-/// Waits until a file is there.
-fn wait_for(path: &Path) {
-    let start = Instant::now();
-    while !path.exists() {
-        assert!(start.elapsed() < Duration::from_secs(60), "{} never came", path.display());
-        std::thread::sleep(Duration::from_millis(1));
-    }
 }
 
 #[test]

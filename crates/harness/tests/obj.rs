@@ -57,7 +57,10 @@ fn spellings_of_the_same_triangle_agree() {
     let text = format!("{POINTS}f 1 2 3\n");
     assert_eq!(read(text.replace('\n', "\r\n")).unwrap(), expected);
     assert_eq!(read(text.replace('\n', "\r")).unwrap(), expected);
-    assert_eq!(read(format!("\u{feff}{text}")).unwrap(), expected);
+    // Two programs may each have added a mark.
+    for marks in ["\u{feff}", "\u{feff}\u{feff}"] {
+        assert_eq!(read(format!("{marks}{text}")).unwrap(), expected);
+    }
     assert_eq!(read([b"# caf\xe9\ng \xff\n", text.as_bytes()].concat()).unwrap(), expected);
     let colours = text.replacen("0 0 0", "0 0 0 1 0.5 nan", 1).replacen("1 0 0", "1 0 0 1 1 1 1", 1);
     assert_eq!(read(colours).unwrap(), expected);
@@ -85,6 +88,28 @@ fn a_weight_divides_the_coordinates() {
 fn faces_of_fewer_than_three_vertices_are_counted_and_left_out() {
     let read = mesh("f\nf 1\nf 1 2\nf 1 2 3\n");
     assert_eq!((read.short_faces, read.triangles.len()), (3, 1));
+}
+
+#[test]
+fn lines_with_unknown_keywords_are_counted_and_all_oddities_are_remarked_in_one_sentence() {
+    let read = mesh("V 7 7 7\nf 1 2 3\ncurv 0 1 \\\n1 2\nF 1 2 4\nf 1 2 2\nf 1 2\n");
+    assert_eq!(read.unknown, Some((2, 6, "V".into())));
+    let remark = read.remark().unwrap();
+    for part in
+        ["2 vertices are used by no face", "1 face has fewer", "1 triangle has no area", "`V` in line 6"]
+    {
+        assert!(remark.contains(part), "{part}: {remark}");
+    }
+    assert_eq!(mesh("f 1 2 3\nf 3 4 5\n").remark(), None);
+}
+
+#[test]
+fn a_face_of_too_many_vertices_is_refused_before_it_takes_memory() {
+    let face = |corners: usize| format!("{POINTS}f{}\n", " 1".repeat(corners));
+    assert_eq!(read(face(1 << 16)).unwrap().triangles.len(), (1 << 16) - 2);
+    assert!(
+        read(face((1 << 16) + 1)).unwrap_err().to_string().starts_with("scene.obj:6: face of more than 65536")
+    );
 }
 
 #[test]
@@ -138,6 +163,8 @@ fn what_holds_no_triangle_is_refused_in_one_sentence() {
     assert!(matches!(missing, ObjError::NotFound { .. }), "{missing}");
     let directory = load(folder).unwrap_err();
     assert!(matches!(directory, ObjError::Directory { .. }));
+    #[cfg(unix)]
+    assert!(matches!(load(Path::new("/dev/zero")), Err(ObjError::NotRegular { .. })));
     let manifest = load(&folder.join("Cargo.toml")).unwrap_err();
     assert!(matches!(manifest, ObjError::NoFaces { vertices: 0, .. }));
     assert!(matches!(read(" \r\n"), Err(ObjError::Empty { .. })));

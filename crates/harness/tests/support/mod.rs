@@ -4,6 +4,7 @@
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_harness");
 
@@ -23,6 +24,15 @@ pub fn run(folder: &Path, args: &[&str]) -> Output {
 pub fn run_on_a_small_disk(folder: &Path, args: &str, blocks: u32) -> Output {
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec '{PROGRAM}' {args}");
     Command::new("sh").args(["-c", &script]).current_dir(folder).output().unwrap()
+}
+
+/// Waits until a file or folder is there.
+pub fn wait_for(path: &Path) {
+    let start = Instant::now();
+    while !path.exists() {
+        assert!(start.elapsed() < Duration::from_secs(60), "{} never came", path.display());
+        std::thread::sleep(Duration::from_millis(1));
+    }
 }
 
 pub fn text(bytes: &[u8]) -> String {
