@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::cli::arguments::{Jobs, input_file, output_file};
 use crate::cli::explain;
-use crate::cli::output::print_line;
+use crate::cli::output::{print_error, print_line};
 use crate::clock::Deadline;
 use crate::files::{self, Reserved, load_tree};
 use crate::scenes::Scene;
@@ -94,6 +94,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     output_file("--out", &args.out)?;
     args.jobs.apply()?;
     let scene = Scene::load(&args.scene)?;
+    scene.remark.iter().for_each(|remark| print_error(remark));
     if args.explain {
         print_line(&explain::scene(&scene)?);
     }

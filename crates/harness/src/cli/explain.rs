@@ -46,6 +46,9 @@ pub fn scene(scene: &Scene) -> Result<String, Error> {
     };
     let size = facts.bounds.max - facts.bounds.min;
     let mut text = format!("{} ({}): {} {kind} within {size}\n", scene.name, scene.kind, facts.objects);
+    if let Some(remark) = &scene.remark {
+        text += &format!("  {remark}\n");
+    }
     for (_, why) in facts.shortcuts() {
         text += &format!("  left out: {why}\n");
     }

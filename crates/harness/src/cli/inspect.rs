@@ -1,7 +1,7 @@
 //! `harness inspect`: what a tree file is, what its tree costs, and what it looks like.
 
 use crate::cli::arguments::output_file;
-use crate::cli::output::print_line;
+use crate::cli::output::{print_error, print_line};
 use crate::scenes::Scene;
 use crate::{Error, files, run::rows};
 use bvh_build::{Builder, muller_fellner};
@@ -63,6 +63,7 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     let bytes = files::read(&args.file)?;
     let file = files::open_tree(&args.file, &bytes)?;
     let scene = args.scene.as_deref().map(Scene::load).transpose()?;
+    scene.iter().filter_map(|scene| scene.remark.as_ref()).for_each(|remark| print_error(remark));
     let mut lines = Lines::default();
     describe(file.header(), bytes.len(), &mut lines);
     let refused = |source| Error::TreeFile { path: args.file.clone(), source };

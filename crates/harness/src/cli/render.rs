@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::cli::arguments::{Jobs, input_file, output_file};
-use crate::cli::output::print_line;
+use crate::cli::output::{print_error, print_line};
 use crate::measure::Accelerator;
 use crate::measure::camera::View;
 use crate::render::{Film, Options, framing, heat, image, render as draw, structure, tiles};
@@ -119,6 +119,7 @@ pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> 
     output_file("--out", &args.out)?;
     args.jobs.apply()?;
     let scene = Scene::load(&args.scene)?;
+    scene.remark.iter().for_each(|remark| print_error(remark));
     if args.heatmap && args.accel == "wide" {
         return Err(Error::Usage(
             "--heatmap: the wide layout counts no tests; accepted with it: --accel brute, kdtree, bvh, FILE.bvh".into(),

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::cli::arguments::{Jobs, output_folder};
 use crate::cli::explain;
-use crate::cli::output::print_line;
+use crate::cli::output::{print_error, print_line};
 use crate::run::execute::{Extent, execute};
 use crate::run::shard::Shard;
 use crate::run::store::Existing;
@@ -83,6 +83,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         } else {
             execute(experiment, &args.out, extent, interrupted)?
         };
+        summary.remarks.iter().for_each(|remark| print_error(remark));
         print_line(&experiment.question);
         for name in &summary.left_out {
             print_line(&format!("(without {name}: scripts/fetch-scenes brings it)"));

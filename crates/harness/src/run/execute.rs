@@ -67,6 +67,8 @@ fn run(
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
     let (scenes, left_out) = load_scenes(experiment)?;
+    let mut remarks: Vec<String> = scenes.iter().filter_map(|scene| scene.remark.clone()).collect();
+    remarks.dedup();
     let resolved = Resolved::new(experiment, &scenes);
     let Target { folder, beside } = Target::choose(out, &resolved, extent.existing, extent.shard.is_some())?;
     let store = Store::open(&folder, &to_toml(&resolved)?, extent.existing)?;
@@ -80,14 +82,14 @@ fn run(
     if let Some(shard) = extent.shard {
         store.keep_shard(&to_toml(&provenance)?)?;
         let text = format!("{} runs, part {shard}; `harness merge` joins the parts.\n", own.len());
-        return Ok(Summary { text, left_out, folder, beside });
+        return Ok(Summary { text, left_out, remarks, folder, beside });
     }
     if let Some(config) = &experiment.tracing {
         trace(experiment, config, &jobs, trees, &watch, &store)?;
     }
     let best_known = if beside.is_some() { BestKnown::Read(out) } else { BestKnown::Improve(out) };
     let text = conclude(&resolved, best_known, &provenance, store)?;
-    Ok(Summary { text, left_out, folder, beside })
+    Ok(Summary { text, left_out, remarks, folder, beside })
 }
 
 /// All runs, scene by scene, in the order of the spec.
@@ -168,7 +170,7 @@ fn over_suite(
     store.write("resolved.toml", resolved.as_bytes())?;
     store.write("provenance.toml", to_toml(&Provenance::gather())?.as_bytes())?;
     store.finish()?;
-    Ok(Summary { text, left_out: vec![], folder, beside })
+    Ok(Summary { text, left_out: vec![], remarks: vec![], folder, beside })
 }
 
 /// Traces rays through the trees of all first runs, scene by scene. Rebuilds the trees of runs that were kept from an

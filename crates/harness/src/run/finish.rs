@@ -17,6 +17,8 @@ pub struct Summary {
     pub text: String,
     /// Optional scenes that are not there.
     pub left_out: Vec<String>,
+    /// What was noticed in scene files, one line each.
+    pub remarks: Vec<String>,
     /// The folder of the results.
     pub folder: PathBuf,
     /// The finished results that are kept, beside which those of a repetition lie.
@@ -72,5 +74,5 @@ pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     let provenance: Provenance = toml::from_str(&files::read_text(&path)?).map_err(Error::toml(&path))?;
     let text = report(&resolved, BestKnown::Improve(out), &provenance, &store)?;
     store.finish()?;
-    Ok(Summary { text, left_out: vec![], folder, beside: None })
+    Ok(Summary { text, left_out: vec![], remarks: vec![], folder, beside: None })
 }

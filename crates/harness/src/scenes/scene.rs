@@ -70,7 +70,7 @@ pub struct Scene {
     pub primitives: Primitives,
     /// One box per object.
     pub boxes: Vec<Aabb>,
-    /// What its file contains besides plain triangles, for the user to know; none if nothing does.
+    /// One line for the user about what its file contains besides plain triangles; none if nothing.
     pub remark: Option<String>,
 }
 
@@ -127,7 +127,7 @@ impl Scene {
         }
         let mesh = obj::load(&path).map_err(|error| refused(error.to_string()))?;
         let stem = path.file_stem().map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
-        let remark = mesh.remark();
+        let remark = mesh.remark().map(|remark| format!("scene {stem}: {remark}"));
         Ok(Self { remark, ..Self::new(&stem, SceneKind::File, Primitives::Triangles(mesh.triangles)) })
     }
 
