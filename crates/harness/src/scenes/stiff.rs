@@ -70,12 +70,12 @@ fn random(salt: u64) -> Stream {
     Stream::seed_from_u64(salt)
 }
 
-/// Uniform in the cube of side `size` from 0.
+/// A point uniform in the cube from 0 to `size`.
 fn point(rng: &mut Stream, size: f32) -> Vec3 {
     Vec3::from([(); 3].map(|()| rng.random::<f32>())) * size
 }
 
-/// A triangle at `corner` of at most this size.
+/// A triangle with this corner and edges of at most `size` along every axis.
 fn around(rng: &mut Stream, corner: Vec3, size: f32) -> Triangle {
     Triangle([corner, corner + point(rng, size), corner + point(rng, size)])
 }
@@ -85,7 +85,7 @@ fn many(n: usize, salt: u64, mut make: impl FnMut(&mut Stream, usize) -> Triangl
     (0..n).map(|i| make(&mut rng, i)).collect()
 }
 
-/// Small triangles, uniform; all coordinates within 1 to 18.
+/// Small triangles at uniform positions; all coordinates lie within 1 to 18.
 pub fn uniform(n: usize) -> Vec<Triangle> {
     many(n, 1, |rng, _| {
         let corner = point(rng, 16.0) + 1.0;
@@ -93,22 +93,22 @@ pub fn uniform(n: usize) -> Vec<Triangle> {
     })
 }
 
-/// S04, S07: one box again and again.
+/// S04, S07: the same box n times.
 pub fn identical_boxes(n: usize) -> Vec<Triangle> {
     vec![cube(Vec3::splat(0.1), 1.0); n]
 }
 
-/// S05: one point again and again.
+/// S05: the same point n times.
 pub fn identical_points(n: usize) -> Vec<Triangle> {
     vec![cube(Vec3::splat(0.1), 0.0); n]
 }
 
-/// S06: one inside the other.
+/// S06: boxes around one centre, each larger than the one before.
 pub fn concentric(n: usize) -> Vec<Triangle> {
     (1..=n).map(|i| cube(Vec3::splat(-(i as f32)), 2.0 * i as f32)).collect()
 }
 
-/// S08: centres on the x axis, sizes from 1 to 9, in mixed order.
+/// S08: boxes of sizes 1 to 9 whose centres lie on the x axis, in mixed order.
 pub fn collinear_centres(n: usize) -> Vec<Triangle> {
     let mut order: Vec<usize> = (0..n).collect();
     order.shuffle(&mut random(8));
@@ -120,7 +120,7 @@ pub fn collinear_centres(n: usize) -> Vec<Triangle> {
     order.into_iter().map(place).collect()
 }
 
-/// S09: triangles of a square grid of cells in a plane, row by row.
+/// S09: one triangle in every cell of a square grid in a plane, row by row.
 pub fn planar_grid(n: usize) -> Vec<Triangle> {
     let side = n.isqrt().max(1);
     let at = |i: usize| Vec3::new((i % side) as f32, (i / side) as f32, 0.0);
@@ -202,7 +202,7 @@ pub fn far_away(n: usize) -> Vec<Triangle> {
     triangles
 }
 
-/// S25: at 2^k, a quarter as large, from small to large; at most 250 objects.
+/// S25: cubes at 2^k whose sides are a quarter of that, from small to large; at most 250 objects are distinct.
 pub fn powers_of_two(n: usize) -> Vec<Triangle> {
     let low = -(n as i32) / 2;
     (0..n as i32)
@@ -211,7 +211,7 @@ pub fn powers_of_two(n: usize) -> Vec<Triangle> {
         .collect()
 }
 
-/// S26: scattered, sorted along x.
+/// S26: the uniform scene, sorted along x.
 pub fn sorted(n: usize) -> Vec<Triangle> {
     let mut triangles = uniform(n);
     triangles.sort_by(|a, b| a.0[0].x.total_cmp(&b.0[0].x));
@@ -244,7 +244,7 @@ pub fn giant_over_small(n: usize) -> Vec<Triangle> {
     triangles
 }
 
-/// S29: a million times as long as wide, in all directions.
+/// S29: triangles a million times as long as wide, in all directions.
 pub fn slivers(n: usize) -> Vec<Triangle> {
     many(n, 29, |rng, _| {
         let (a, along, across) = (point(rng, 100.0), point(rng, 2.0) - 1.0, point(rng, 2.0) - 1.0);
@@ -257,12 +257,12 @@ pub fn slivers(n: usize) -> Vec<Triangle> {
     })
 }
 
-/// S30: every corner anywhere.
+/// S30: triangles whose corners lie anywhere in the scene, so that most overlap.
 pub fn overlapping(n: usize) -> Vec<Triangle> {
     many(n, 30, |rng, _| Triangle([(); 3].map(|()| point(rng, 16.0))))
 }
 
-/// S31: half of the objects in a cube of a thousandth, half in one of a thousand.
+/// S31: half of the objects in a cube of side 0.001, half in one of side 1000.
 pub fn two_densities(n: usize) -> Vec<Triangle> {
     many(n, 31, |rng, i| {
         let size = if i % 2 == 0 { 1e-3 } else { 1e3 };
@@ -279,12 +279,12 @@ pub fn symmetric(n: usize) -> Vec<Triangle> {
     all.take(n).collect()
 }
 
-/// S34: every triangle ten times in succession.
+/// S34: the uniform scene with every triangle ten times in succession.
 pub fn tenfold(n: usize) -> Vec<Triangle> {
     uniform(n.div_ceil(10)).into_iter().flat_map(|t| [t; 10]).take(n).collect()
 }
 
-/// S45: two unit cubes, two apart, centre to centre.
+/// S45: two unit cubes whose centres are two apart.
 pub fn two_cubes(n: usize) -> Vec<Triangle> {
     [0.0, 2.0].map(|x| cube(Vec3::X * x, 1.0)).into_iter().take(n).collect()
 }

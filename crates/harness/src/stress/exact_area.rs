@@ -1,4 +1,4 @@
-//! The internal area of a tree without any rounding: what the reported cost is measured against.
+//! The internal area of a tree in exact arithmetic, against which reported costs are measured.
 
 use bvh_core::Bvh;
 use num_bigint::{BigInt, BigUint};

@@ -1,6 +1,6 @@
-//! What the precision of areas costs and buys: the Müller–Fellner sweep in f32 and in f64 against exact arithmetic.
+//! The experiment `precision`: what areas in f32 save in time and lose in decisions against areas in f64 and exact ones.
 //!
-//! One plain sweep, the same code for every kind of number, stands in for the builder's, which has f64 areas only.
+//! The builder has areas in f64 only, so a plain sweep, the same code for every kind of number, stands in for it.
 
 use super::exact_area::{half_area, internal_area, ratio};
 use super::table::by_id;
@@ -37,12 +37,12 @@ struct Row {
     /// `f32` or `f64`.
     method: String,
     objects: usize,
-    /// Nodes of the exact tree with a choice.
+    /// Inner nodes of the exact tree over three objects or more, where there is a choice.
     decisions: usize,
-    /// Where the split chosen there costs more than the best one, exactly.
+    /// Decisions for a split that costs more than the best one, in exact arithmetic.
     wrong: usize,
     wrong_fraction: f64,
-    /// Where no candidate has a finite cost.
+    /// Decisions in which no candidate has a finite cost.
     undecided: usize,
     /// The internal area of the whole tree over that of the exact one; 1 if both are 0.
     cost_over_exact: f64,
@@ -56,7 +56,7 @@ struct Timing {
     nanoseconds_per_object: f64,
 }
 
-/// What sides of a split are valued in: half area times number of objects. Both sides together are a cost.
+/// A kind of number for costs: the cost of a split is the sum over both sides of half area times number of objects.
 trait Number: Clone + PartialOrd + for<'a> Add<&'a Self, Output = Self> {
     fn side(aabb: &Aabb, count: usize) -> Self;
     fn is_finite(&self) -> bool;
@@ -174,12 +174,12 @@ fn build(boxes: &[Aabb], mut choose: impl FnMut(&[Vec<u32>; 3]) -> Split) -> Bvh
     tree
 }
 
-/// Halves what cannot be decided.
+/// The best split, or the middle of the first order where no cost is finite.
 fn chosen<N: Number>(boxes: &[Aabb], orders: &[Vec<u32>; 3]) -> Split {
     best::<N>(boxes, orders).map_or((0, orders[0].len() / 2), |(_, split)| split)
 }
 
-/// The internal area of the exact tree, and its number of decisions, wrong ones by f32 and f64, undecided ones.
+/// What f32 and f64 would have decided at the nodes of the exact tree.
 #[derive(Default)]
 struct Decisions {
     area: BigUint,

@@ -22,13 +22,13 @@ config! {
     serde;
     /// What is run.
     pub struct Config {
-        /// How large the scenes of builders are.
+        /// Size of the scenes that builders get.
         builders: Size = Size::Many;
-        /// Nodes per object that a search may make or visit.
+        /// Budget of a search: nodes per object that it may make or visit.
         work_per_object: u64 = 1000, in 1..;
         /// Rays per scene and traversal.
         rays: usize = 5000, in 1..=100_000_000;
-        /// Seconds after which another library's build of a case, where any are compiled in, counts as hanging.
+        /// Seconds after which the build of another library, if any is compiled in, counts as hanging.
         seconds_per_peer: u64 = 20, in 1..;
     }
 }
