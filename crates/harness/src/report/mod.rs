@@ -33,7 +33,7 @@ mod traversal;
 pub mod trials;
 
 use crate::Error;
-use crate::figures::{self, Look};
+use crate::figures::{self, Figure, Layer, Look};
 use crate::run::store::Store;
 use bvh_build::{Check, OutOfRange};
 use data::Rows;
@@ -187,8 +187,7 @@ pub const TEXT_FILE: &str = "timing_report.txt";
 /// [`TEXT_FILE`] keeps. Figures are written only if they are `drawn`.
 pub fn write_all(reports: &[Report], store: &Store, drawn: bool) -> Result<String, Error> {
     let rows = Rows::read(store.folder())?;
-    let methods = rows.methods().into_iter().map(str::to_owned);
-    let looks: Vec<(String, Look)> = methods.zip((0..).map(Look::Slot)).collect();
+    let methods = rows.methods();
     let mut outputs = reports.iter().map(|report| report.write(&rows)).collect::<Result<Vec<_>, _>>()?;
     let paper: Vec<PaperRow> =
         outputs.iter_mut().flat_map(|output| std::mem::take(&mut output.paper)).collect();
@@ -200,8 +199,7 @@ pub fn write_all(reports: &[Report], store: &Store, drawn: bool) -> Result<Strin
             store.write(&format!("{name}.csv"), bytes)?;
         }
         for (name, figure) in output.figures.iter_mut().filter(|_| drawn) {
-            // A method looks the same in all figures of an experiment.
-            figure.looks.extend(looks.iter().cloned());
+            figure.looks.extend(looks(&methods, figure));
             store.write(&format!("{name}.svg"), figures::svg(figure)?.as_bytes())?;
             store.write(&format!("{name}.png"), &figures::png(figure)?)?;
         }
@@ -211,6 +209,14 @@ pub fn write_all(reports: &[Report], store: &Store, drawn: bool) -> Result<Strin
         store.write(TEXT_FILE, text.as_bytes())?;
     }
     Ok(text)
+}
+
+/// The looks of the methods that a figure shows: the same in all figures of an experiment.
+fn looks(methods: &[&str], figure: &Figure) -> Vec<(String, Look)> {
+    let names = figure.panels.iter().flat_map(|panel| &panel.layers).filter_map(Layer::name);
+    let shown: BTreeSet<&str> = names.collect();
+    let slots = methods.iter().enumerate().filter(|(_, method)| shown.contains(*method));
+    slots.map(|(slot, method)| ((*method).to_owned(), Look::Slot(slot))).collect()
 }
 
 /// The comparisons of all reports of an experiment with the paper.
