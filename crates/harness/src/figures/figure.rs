@@ -69,6 +69,10 @@ impl Picture for Figure {
         let beside = plots.iter().map(|plot| plot.left).fold(0.0, f64::max);
         let width = (room / columns as f64 - beside - GUTTER.0).max(60.0);
         plots.iter_mut().for_each(|plot| plot.fit_width(width, fonts));
+        for upper in 0..plots.len().saturating_sub(columns) {
+            let (above, below) = plots.split_at_mut(upper + 1);
+            above[upper].share_x_label(&below[columns - 1]);
+        }
 
         let mut top = head.bottom + legend.height() + if legend.height() > 0.0 { 8.0 } else { 0.0 };
         let mut panels: Vec<(Plot, Frame)> = Vec::new();

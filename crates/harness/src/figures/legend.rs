@@ -46,7 +46,7 @@ impl Legend {
                 name: name.clone(),
                 stroke: *stroke,
                 line,
-                marker: marker || line && strokes.marked_lines,
+                marker: marker || line && strokes.marks(*stroke),
                 area,
             }
         };

@@ -95,6 +95,14 @@ impl<'a> Plot<'a> {
         self.below = (2.0 * TICK + depth + LABEL + BODY.line() * self.x_label.len() as f64).ceil();
     }
 
+    /// Leaves the label of the x axis to the panel below, if it has the same.
+    pub fn share_x_label(&mut self, below: &Self) {
+        if self.x_label == below.x_label {
+            self.below -= BODY.line() * self.x_label.len() as f64;
+            self.x_label.clear();
+        }
+    }
+
     /// Draws the panel with its plot in a place of the sheet.
     pub fn draw<B: DrawingBackend>(
         &self,
@@ -226,7 +234,7 @@ impl<B: DrawingBackend> Marks<'_, B> {
         let (order, stroke) = self.strokes.of(layer.name().unwrap_or_default());
         for path in self.paths(layer) {
             let markers =
-                if self.strokes.marked_lines { self.along(&path, 37.0 * order as f64) } else { Vec::new() };
+                if self.strokes.marks(stroke) { self.along(&path, 37.0 * order as f64) } else { Vec::new() };
             self.stroke(path, stroke, LINE)?;
             markers.into_iter().try_for_each(|at| self.marker(at, stroke, 3.5, 0.7))?;
         }
@@ -298,16 +306,26 @@ impl<B: DrawingBackend> Marks<'_, B> {
         runs(points.iter().map(at)).into_iter().map(|path| self.thinned(&stepped(path, stairs))).collect()
     }
 
-    /// Of successive points within half a pixel of x only the first, lowest, highest and last.
+    /// Of successive points within half a pixel of x only the first, lowest, highest and last, and of a level line only
+    /// the ends.
     fn thinned(&self, path: &[Point]) -> Vec<Point> {
         let column = |point: &Point| (self.plot.x.fraction(point.0) * self.frame.width * 2.0).floor();
         let mut kept: Vec<Point> = Vec::new();
         for points in path.chunk_by(|one, next| column(one) == column(next)) {
             let by_height = |one: &&Point, other: &&Point| one.1.total_cmp(&other.1);
             let (low, high) = (points.iter().min_by(by_height), points.iter().max_by(by_height));
-            kept.extend([points.first(), low, high, points.last()].into_iter().flatten());
+            for &point in [points.first(), low, high, points.last()].into_iter().flatten() {
+                if let [.., before, middle] = kept[..]
+                    && [before.1, middle.1] == [point.1; 2]
+                    && (before.0 <= middle.0) == (middle.0 <= point.0)
+                {
+                    kept.pop();
+                }
+                if kept.last() != Some(&point) {
+                    kept.push(point);
+                }
+            }
         }
-        kept.dedup();
         kept
     }
 

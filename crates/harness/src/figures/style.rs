@@ -35,7 +35,7 @@ const COLOURS: [RGBColor; 12] = [
 
 /// Lengths of a dash and of the gap after it, in pixels; a solid line has none.
 type Dash = Option<(f64, f64)>;
-/// The series' dashes; four successive series share one.
+/// The series' dashes. Four successive series share one, and the next series of the same colour has another.
 const DASHES: [Dash; 3] = [None, Some((9.0, 3.0)), Some((3.0, 2.5))];
 /// The dash of reference lines and series.
 const REFERENCE_DASH: Dash = Some((5.0, 4.0));
@@ -72,7 +72,7 @@ impl Stroke {
             }
             Look::Slot(slot) => Self {
                 colour: COLOURS[slot % COLOURS.len()],
-                dash: DASHES[slot / 4 % DASHES.len()],
+                dash: DASHES[(slot / 4 + slot / 12) % DASHES.len()],
                 marker: MARKERS[slot % MARKERS.len()],
             },
         }
@@ -102,26 +102,34 @@ const UNNAMED: Stroke = Stroke { colour: GREY, dash: None, marker: MARKERS[0] };
 pub(super) struct Strokes {
     pub series: Vec<(String, Stroke)>,
     /// Whether lines carry markers: colours and dashes tell no more than four of them apart at a glance.
-    pub marked_lines: bool,
+    marked_lines: bool,
 }
 
 impl Strokes {
     pub fn new(figure: &Figure) -> Self {
+        let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
+        let shown = |name: &str| layers().any(|layer| layer.name() == Some(name));
         let set = |name: &str| figure.looks.iter().find(|(known, _)| known == name).map(|&(_, look)| look);
-        let taken = |slot| figure.looks.iter().any(|&(_, look)| look == Look::Slot(slot));
+        let taken = |slot| figure.looks.iter().any(|(name, look)| *look == Look::Slot(slot) && shown(name));
         let mut free = (0..).filter(|&slot| !taken(slot)).map(Look::Slot);
         let (mut series, mut lines): (Vec<(String, Stroke)>, Vec<&str>) = (Vec::new(), Vec::new());
-        for layer in figure.panels.iter().flat_map(|panel| &panel.layers) {
+        for layer in layers() {
             let Some(name) = layer.name().filter(|name| !name.is_empty()) else { continue };
             if series.iter().all(|(known, _)| known != name) {
                 let look = set(name).or_else(|| free.next()).unwrap_or(Look::Reference);
                 series.push((name.to_owned(), Stroke::of(look)));
             }
-            if matches!(layer, Layer::Line { .. } | Layer::Steps { .. }) && !lines.contains(&name) {
+            let is_line = matches!(layer, Layer::Line { .. } | Layer::Steps { .. });
+            if is_line && set(name) != Some(Look::Reference) && !lines.contains(&name) {
                 lines.push(name);
             }
         }
         Self { series, marked_lines: lines.len() > 4 }
+    }
+
+    /// Whether the lines of a series carry markers.
+    pub fn marks(&self, stroke: Stroke) -> bool {
+        self.marked_lines && stroke.marker != REFERENCE_MARKER
     }
 
     /// The named series' place in the order of appearance, and its stroke; solid grey for the one without a name.
