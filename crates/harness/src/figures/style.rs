@@ -50,11 +50,11 @@ const MARKERS: [Star; 7] = [
     (3, 0.5, 0.75),
     (4, 0.71, 0.0),
     (3, 0.5, 0.25),
-    (4, 0.3, 0.0),
+    (4, 0.42, 0.0),
     (5, 0.45, 0.75),
 ];
 /// A tilted cross.
-const REFERENCE_MARKER: Star = (4, 0.3, 0.125);
+const REFERENCE_MARKER: Star = (4, 0.42, 0.125);
 
 /// How one series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
