@@ -48,38 +48,10 @@ impl Raster<'_> {
             let (red, green, blue) = colour.rgb;
             for (old, new) in pixel.iter_mut().zip([red, green, blue]) {
                 let old_part = f64::from(*old);
-                *old = (old_part + (f64::from(new) - old_part) * colour.alpha).round() as u8;
+                *old = (old_part + (f64::from(new) - old_part) * colour.alpha.max(0.0)).round() as u8;
             }
         }
     }
-
-    /// Fills a polygon by the even-odd rule: every pixel whose centre is inside, once.
-    fn fill(&mut self, corners: &[(f64, f64)], colour: BackendColor) {
-        let bound =
-            |limit: f64, pick: fn(f64, f64) -> f64| corners.iter().map(|corner| corner.1).fold(limit, pick);
-        let first = |from: f64, end: i32| (from - 0.5).ceil().clamp(0.0, f64::from(end)) as i32;
-        let (top, bottom) = (bound(f64::INFINITY, f64::min), bound(f64::NEG_INFINITY, f64::max));
-        let mut crossings: Vec<f64> = Vec::new();
-        for y in first(top, self.height)..first(bottom, self.height) {
-            let middle = f64::from(y) + 0.5;
-            crossings.clear();
-            for (one, next) in corners.iter().zip(corners.iter().cycle().skip(1)) {
-                if (one.1 <= middle) != (next.1 <= middle) {
-                    crossings.push(one.0 + (middle - one.1) * (next.0 - one.0) / (next.1 - one.1));
-                }
-            }
-            crossings.sort_by(f64::total_cmp);
-            for pair in crossings.chunks_exact(2) {
-                for x in first(pair[0], self.width)..first(pair[1], self.width) {
-                    self.blend(x, y, colour);
-                }
-            }
-        }
-    }
-}
-
-fn float((x, y): BackendCoord) -> (f64, f64) {
-    (f64::from(x), f64::from(y))
 }
 
 impl DrawingBackend for Raster<'_> {
@@ -102,51 +74,32 @@ impl DrawingBackend for Raster<'_> {
         Ok(())
     }
 
-    fn draw_line<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S) -> Drawn {
-        self.draw_path([from, to], style)
-    }
-
-    fn draw_rect<S: BackendStyle>(
-        &mut self,
-        (left, top): BackendCoord,
-        (right, bottom): BackendCoord,
-        style: &S,
-        fill: bool,
-    ) -> Drawn {
-        let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
-        if fill { self.fill_polygon(corners, style) } else { self.draw_path(corners, style) }
-    }
-
-    /// A rectangle for every segment, which at inner points reaches as far beyond as to fill the joint.
+    /// A rectangle for every segment, which at inner points reaches as far beyond as to fill the joint; plotters' own
+    /// outline of a thick line is ragged where dashes turn.
     fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
         &mut self,
         path: I,
         style: &S,
     ) -> Drawn {
-        let points: Vec<(f64, f64)> = path.into_iter().map(float).collect();
+        let points: Vec<(f64, f64)> = path.into_iter().map(|(x, y)| (f64::from(x), f64::from(y))).collect();
         let half = f64::from(style.stroke_width()) / 2.0;
-        let last = points.len().saturating_sub(2);
-        for (index, (&(x0, y0), &(x1, y1))) in points.iter().zip(points.iter().skip(1)).enumerate() {
-            let length = ((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0)).sqrt();
-            if length > 0.0 {
-                let (dx, dy) = ((x1 - x0) / length * half, (y1 - y0) / length * half);
-                let (before, after) = (f64::from(u8::from(index > 0)), f64::from(u8::from(index < last)));
-                let (x0, y0) = (x0 - dx * before, y0 - dy * before);
-                let (x1, y1) = (x1 + dx * after, y1 + dy * after);
-                let corners = [(x0 - dy, y0 + dx), (x1 - dy, y1 + dx), (x1 + dy, y1 - dx), (x0 + dy, y0 - dx)];
-                self.fill(&corners, style.color());
-            }
+        let joint = |index: usize| if index > 0 && index + 1 < points.len() { 1.0 } else { 0.0 };
+        for (index, ends) in points.windows(2).enumerate() {
+            let [(x0, y0), (x1, y1)] = [ends[0], ends[1]];
+            let length = ((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0)).sqrt().max(1e-9);
+            let (dx, dy) = ((x1 - x0) / length * half, (y1 - y0) / length * half);
+            let (before, after) = (joint(index), joint(index + 1));
+            let corner = |x: f64, y: f64, part: f64, side: f64| {
+                ((x + dx * part - dy * side).round() as i32, (y + dy * part + dx * side).round() as i32)
+            };
+            let corners = [
+                corner(x0, y0, -before, 1.0),
+                corner(x1, y1, after, 1.0),
+                corner(x1, y1, after, -1.0),
+                corner(x0, y0, -before, -1.0),
+            ];
+            self.fill_polygon(corners, &style.color())?;
         }
-        Ok(())
-    }
-
-    fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
-        &mut self,
-        path: I,
-        style: &S,
-    ) -> Drawn {
-        let corners: Vec<(f64, f64)> = path.into_iter().map(float).collect();
-        self.fill(&corners, style.color());
         Ok(())
     }
 
