@@ -16,6 +16,8 @@ const ROW: f64 = 20.0;
 const CELL: f64 = 110.0;
 /// Longest row or column name in pixels.
 const LONGEST: f64 = 190.0;
+/// Long row names.
+const SMALLER: Type = Type { size: 10.0, bold: false };
 /// Width of a class's sample in the key.
 const SAMPLE: f64 = 18.0;
 /// Cells without a class.
@@ -50,7 +52,8 @@ struct Table<'a> {
     top: f64,
     cell: f64,
     row: f64,
-    rows: Vec<String>,
+    /// The rows' names in lines, and their types.
+    rows: Vec<(Vec<String>, Type)>,
     columns: Vec<String>,
     /// The column names read upwards.
     upright: bool,
@@ -81,9 +84,15 @@ impl Picture for HeatMap {
             x += needed + 20.0;
         }
         let short = |name: &String| fonts.shorten(name, LONGEST, SMALL);
-        let rows: Vec<String> = self.rows.iter().map(short).collect();
+        // A long name stands in two smaller lines.
+        let in_lines = |name: &String| match fonts.width(name, SMALL) <= LONGEST {
+            true => (vec![name.clone()], SMALL),
+            false => (fonts.wrap(name, LONGEST, SMALLER).into_iter().take(2).collect(), SMALLER),
+        };
+        let rows: Vec<(Vec<String>, Type)> = self.rows.iter().map(in_lines).collect();
+        let beside = rows.iter().map(|(lines, kind)| fonts.widest(lines, *kind)).fold(0.0, f64::max);
         let columns: Vec<String> = self.columns.iter().map(short).collect();
-        let left = (BORDER + fonts.widest(rows.iter().chain([&short(&self.row_label)]), SMALL) + 8.0).ceil();
+        let left = (BORDER + beside.max(fonts.width(&self.row_label, SMALL)) + 8.0).ceil();
         let cell = ((WIDTH - left - BORDER) / columns.len().max(1) as f64).clamp(2.0, CELL);
         let widest = fonts.widest(&columns, SMALL);
         let upright = widest + 6.0 > cell;
@@ -110,7 +119,8 @@ impl Picture for HeatMap {
             .iter()
             .map(|Cell { text, .. }| lines(cell, text_type, text).into_iter().take(2).collect())
             .collect();
-        let row = if texts.iter().any(|lines| lines.len() > 1) { 2.0 * text_type.line() } else { ROW };
+        let two_lines = rows.iter().map(|(lines, _)| lines).chain(&texts).any(|lines| lines.len() > 1);
+        let row = if two_lines { 2.0 * SMALLER.line() } else { ROW };
         Ok(Table { map: self, head, key, left, top, cell, row, rows, columns, upright, texts, text_type })
     }
 }
@@ -135,9 +145,9 @@ impl Layout for Table<'_> {
             let x = self.left + self.cell * (index as f64 + 0.5);
             sheet.text((x, if self.upright { self.top - 5.0 } else { above }), name, SMALL, INK, align)?;
         }
-        for (index, name) in self.rows.iter().enumerate() {
-            let y = self.top + self.row * (index as f64 + 0.5);
-            sheet.text((self.left - 6.0, y), name, SMALL, INK, Align::Right)?;
+        for (index, (lines, kind)) in self.rows.iter().enumerate() {
+            let first = self.top + self.row * (index as f64 + 0.5) - kind.line() * lines.len() as f64 / 2.0;
+            sheet.lines((self.left - 6.0, first), lines, *kind, INK, Align::Right)?;
         }
         for (index, (cell, lines)) in self.map.cells.iter().zip(&self.texts).enumerate() {
             let (row, column) = (index / self.columns.len(), index % self.columns.len());
