@@ -1,8 +1,8 @@
 //! Simulated annealing of trees: one schedule for every kind of move.
 //!
-//! From the ground up: a [`Mover`] makes one Metropolis move ([`metropolis`]), beginning at a node drawn by
-//! [`node_sampler`]; [`subtrees`] cuts the tree, so that several threads can move at once; [`schedule`] lowers the
-//! temperature. [`single`] and [`ruin_recreate`] are the two kinds of moves, each a method of its own.
+//! From the ground up: a `Mover` makes one Metropolis move (`metropolis`), which begins at a node drawn by `node_sampler`;
+//! `subtrees` cuts the tree, so that several threads can move at once; `schedule` lowers the temperature. There are two
+//! kinds of moves, each a method of its own: single reinsertions, here, and [`ruin_recreate`].
 
 mod metropolis;
 mod node_sampler;
