@@ -1,7 +1,7 @@
 //! A series of Metropolis moves while the temperature falls.
 
 use super::node_sampler::NodeSampler;
-use crate::run::{Observer, Quota, Stream, Tally};
+use crate::run::{Observer, Quota, Stream, Tally, WORK_PER_POLL};
 use crate::tree::Working;
 use crate::tuning::MOVES_PER_TEMPERATURE;
 use bvh_core::with_vector_instructions;
@@ -33,16 +33,20 @@ fn cool_plain<M: Mover>(
     observer: &dyn Observer,
 ) -> Tally {
     let (mut tally, before) = (Tally::default(), mover.work());
-    let mut temperature = hot;
+    // Long moves ask the observer more often.
+    let (mut temperature, mut poll) = (hot, WORK_PER_POLL);
     loop {
         tally.work = mover.work() - before;
         if quota.is_reached(&tally) {
             return tally;
         }
-        if tally.moves % MOVES_PER_TEMPERATURE == 0 {
+        if tally.moves % MOVES_PER_TEMPERATURE == 0 || tally.work >= poll {
             if observer.cancelled() {
                 return tally;
             }
+            poll = tally.work + WORK_PER_POLL;
+        }
+        if tally.moves % MOVES_PER_TEMPERATURE == 0 {
             temperature = hot * libm::pow(cold / hot, tally.work as f64 / quota.work as f64);
         }
         tally.kept += u64::from(mover.step(tree, temperature, rng));

@@ -42,13 +42,13 @@ bvh_build::config! {
         /// Maximum number of levels from the random node up to the top.
         climb: u32 = 8, in 1..=u32::MAX - 1;
         /// Maximum number of subtrees taken out by random descents.
-        removed: u32 = 14, in 1..;
+        removed: u32 = 14, in 1..=1000;
         /// Fraction of the moves that take out a layer.
         slabs: f64 = 0.2, in 0.0..=1.0;
         /// Maximum thickness of the layer, as a fraction of the box.
         thickness: f64 = 0.6, in 0.0..=1.0;
         /// Maximum number of subtrees in a layer: with more there is no move.
-        most: u32 = 24, in 1..;
+        most: u32 = 24, in 1..=1000;
         /// Fraction of the moves that look for positions nearby only: in the smallest subtree above the top whose box
         /// contains the top's former box. Better positions are seldom further up, and a quarter more moves fit into the same
         /// work.

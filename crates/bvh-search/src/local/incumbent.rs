@@ -60,7 +60,7 @@ impl<'p> Incumbent<'p> {
     /// Ends the run if no tree is better by more than rounding errors.
     fn stop_if_optimal(&self, run: &mut Run) {
         if self.area <= self.lower_bound * (1.0 + TOLERANCE) {
-            run.proved_optimal();
+            run.proved_optimal(Shortcut::BoundMet);
         }
     }
 

@@ -8,7 +8,7 @@
 use super::incumbent::Incumbent;
 use super::initial::Start;
 use super::pass::{TOLERANCE, repeat, sort_by_area};
-use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Tally, stream};
+use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Tally, WORK_PER_POLL, stream};
 use crate::tree::{Linked, PositionSearch, Working};
 use bvh_build::config::Itself;
 use bvh_core::{Bvh, with_vector_instructions};
@@ -73,11 +73,17 @@ with_vector_instructions! {
 #[inline(always)]
 fn pass_plain<T: Linked>(tree: &mut T, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally {
     let mut done = Tally::default();
-    let mut search = PositionSearch::default();
+    let (mut search, mut poll) = (PositionSearch::default(), WORK_PER_POLL);
     for &node in order {
         let so_far = Tally { work: done.work + search.visits, ..done };
-        if quota.is_reached(&so_far) || done.moves % 256 == 255 && observer.cancelled() {
+        if quota.is_reached(&so_far) {
             break;
+        }
+        if so_far.work >= poll {
+            if observer.cancelled() {
+                break;
+            }
+            poll = so_far.work + WORK_PER_POLL;
         }
         if tree.parent(node) == T::ABOVE {
             continue;

@@ -105,9 +105,13 @@ impl Search for Config {
         let construction = (2 * scene.len() as u64).saturating_sub(1);
         let observer = run.observer();
         let attempt = |(workspace, tree): &mut (Workspace, Bvh), trial: u64| {
+            // The first trial is always made, so that there is a tree.
+            if trial > 0 && observer.cancelled() {
+                return Ok(None);
+            }
             self.construct(&scene, seed, trial, workspace, tree);
             let improved = self.improve(tree, observer)?;
-            Ok::<_, SearchError>((problem.objective.cost(tree), improved))
+            Ok::<_, SearchError>(Some((problem.objective.cost(tree), improved)))
         };
         // Trials whose work is not known in advance run in smaller batches, to waste less at the end of a budget.
         let most = if self.local_search.is_none() { BATCH } else { SMALL_BATCH };
@@ -118,7 +122,7 @@ impl Search for Config {
                 attempt(buffers, next + at as u64)
             });
             for (trial, result) in (next..end).zip(results) {
-                let (cost, Improved { finished, work }) = result?;
+                let Some((cost, Improved { finished, work })) = result? else { break };
                 if run.record(cost, construction + work) {
                     best = (trial, finished);
                 }

@@ -44,9 +44,13 @@ impl Search for Config {
             let (mut other, mut rng, mut mover) = (tree.clone(), stream(seed, number), SingleMover::new(&kick));
             number += 1;
             // At this temperature every move is accepted.
-            let kept = (0..kicks).filter(|_| mover.step(&mut other, f64::MAX, &mut rng)).count() as u64;
+            let (mut tally, observer) = (Tally::default(), run.observer());
+            while tally.moves < kicks && (tally.moves % 1024 > 0 || !observer.cancelled()) {
+                tally.kept += u64::from(mover.step(&mut other, f64::MAX, &mut rng));
+                tally.moves += 1;
+            }
             // The copy of the tree counts as work, too.
-            let mut tally = Tally { moves: kicks, kept, work: mover.work() + 2 * n };
+            tally.work = mover.work() + 2 * n;
             let left = quota.less(&total).less(&tally);
             tally += self.local_search.improve(&mut other, left, run.observer());
             total += tally;

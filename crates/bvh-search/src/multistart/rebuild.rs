@@ -29,10 +29,10 @@ bvh_build::config! {
         objects: u32 = 200, in 3..=1_000_000;
         /// Number of random nodes of which the one is taken whose children have the largest area. In measurements, more
         /// of them, or the children's area relative to the node's, found no better nodes, and 1 hardly worse ones.
-        tournament: u32 = 2, in 1..;
+        tournament: u32 = 2, in 1..=1000;
         /// Maximum number of levels from that node up to the root of the rebuilt subtree, since a bad split shows below
         /// the split that caused it.
-        climb: u32 = 6;
+        climb: u32 = 6, in 0..=1000;
         /// The splits that may be chosen, as in [`grasp`](crate::grasp).
         candidates: Candidates = Candidates::AxisBest, in Itself;
         /// The probability of taking one of the candidates other than the best.

@@ -4,8 +4,10 @@
 //! permutation of the objects, its fitness the cost of the tree from inserting them in that order. A generation consists
 //! of tournaments of two, one-point order crossover whose children replace the parents, mutation by swaps.
 //!
-//! Differs from the paper: nothing it states. Where it is silent: the best individual so far stays in the population
-//! as one more winner, untouched by crossover and mutation; the number of swaps is uniform between 0 and twice its mean;
+//! Differs from the paper: there is one tournament fewer than the population has individuals, because the best individual
+//! so far takes the place of one winner; the paper says that it 'is always kept' besides as many winners as the population
+//! has individuals, and that the size of the population is constant. Where the paper is silent: neither crossover nor
+//! mutation touches that individual; the number of swaps is uniform between 0 and twice its mean;
 //! an individual that a generation leaves unchanged is not evaluated again, though it counts as evaluated.
 //!
 //! *Not done*: resuming an insertion where a child's order first differs from its parent's. Of 2n/500 swapped positions
@@ -13,7 +15,7 @@
 
 use super::{Insertion, random_order};
 use crate::run::{Problem, Run, Search, SearchError, Stream, stream};
-use bvh_build::config::Itself;
+use bvh_build::config::{Accepts, Itself};
 use bvh_build::goldsmith_salmon;
 use bvh_core::Bvh;
 use rand::RngExt;
@@ -49,9 +51,12 @@ impl Search for Config {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         let insertion = Insertion::new(problem, &self.insertion)?;
         let mut rng = stream(seed, 0);
-        let mut population: Vec<Individual> = (0..self.population)
-            .map(|_| Individual { order: random_order(insertion.len(), &mut rng), cost: 0.0, evaluated: false })
-            .collect();
+        (..=MOST_ENTRIES / insertion.len().max(1)).check("population", &self.population)?;
+        let mut population: Vec<Individual> = Vec::new();
+        while population.len() < self.population && (population.is_empty() || !run.observer().cancelled()) {
+            let order = random_order(insertion.len(), &mut rng);
+            population.push(Individual { order, cost: f64::INFINITY, evaluated: false });
+        }
         let mut best = evaluate(&insertion, &mut population, run);
         let mut marks = vec![false; insertion.len()];
         for _ in 0..self.generations {
@@ -73,13 +78,19 @@ impl Search for Config {
     }
 }
 
+/// The most entries of all permutations together: 1 GB.
+const MOST_ENTRIES: usize = 1 << 28;
+
 /// Evaluates the individuals that have changed and records the generation. Returns the fittest, the first of equals.
+/// Individuals that a cancellation leaves without evaluation are no candidates.
 fn evaluate(insertion: &Insertion, population: &mut [Individual], run: &mut Run) -> Individual {
     let mut changed: Vec<&mut Individual> = population.iter_mut().filter(|i| !i.evaluated).collect();
     let orders: Vec<&[u32]> = changed.iter().map(|individual| individual.order.as_slice()).collect();
-    let (costs, work) = (insertion.costs(&orders), orders.len() as u64 * insertion.work());
+    let costs = insertion.costs(&orders, run.observer());
+    let missing = costs.iter().filter(|cost| cost.is_none()).count();
+    let work = (costs.len() - missing) as u64 * insertion.work();
     for (individual, cost) in changed.iter_mut().zip(costs) {
-        (individual.cost, individual.evaluated) = (cost, true);
+        (individual.cost, individual.evaluated) = (cost.unwrap_or(f64::INFINITY), cost.is_some());
     }
     let mut fittest = &population[0];
     for individual in &*population {
@@ -87,7 +98,7 @@ fn evaluate(insertion: &Insertion, population: &mut [Individual], run: &mut Run)
             fittest = individual;
         }
     }
-    run.record_generation(population.len() as u64, fittest.cost, work);
+    run.record_generation((population.len() - missing) as u64, fittest.cost, work);
     fittest.clone()
 }
 

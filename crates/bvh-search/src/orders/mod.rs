@@ -4,7 +4,7 @@ pub mod genetic;
 pub mod random_orders;
 
 use crate::parallel::map_init;
-use crate::run::{Problem, SearchError, Stream};
+use crate::run::{Observer, Problem, SearchError, Stream};
 use bvh_build::goldsmith_salmon::{self, Scene, Workspace};
 use bvh_core::{Bvh, cost::Objective};
 use rand::seq::SliceRandom;
@@ -58,9 +58,12 @@ impl Insertion {
         tree
     }
 
-    /// The costs of several orders, in their order, on all threads of the current rayon pool.
-    fn costs(&self, orders: &[&[u32]]) -> Vec<f64> {
-        map_init(orders.len(), Buffers::default, |buffers, at| self.cost(orders[at], buffers))
+    /// The costs of several orders, in their order, on all threads of the current rayon pool. The first is always
+    /// evaluated, the others unless the observer cancels before.
+    fn costs(&self, orders: &[&[u32]], observer: &dyn Observer) -> Vec<Option<f64>> {
+        map_init(orders.len(), Buffers::default, |buffers, at| {
+            (at == 0 || !observer.cancelled()).then(|| self.cost(orders[at], buffers))
+        })
     }
 }
 

@@ -32,7 +32,8 @@ impl Search for Config {
             let end = self.trials.min(next.saturating_add(run.evaluations_left(insertion.work()).min(BATCH)));
             let orders: Vec<Vec<u32>> = (next..end).map(order).collect();
             let orders: Vec<&[u32]> = orders.iter().map(Vec::as_slice).collect();
-            for (trial, cost) in (next..end).zip(insertion.costs(&orders)) {
+            for (trial, cost) in (next..end).zip(insertion.costs(&orders, run.observer())) {
+                let Some(cost) = cost else { break };
                 if run.record(cost, insertion.work()) {
                     best = trial;
                 }

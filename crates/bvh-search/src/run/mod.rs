@@ -11,6 +11,7 @@ pub use budget::{Budget, Quota, StopReason, Tally};
 use bvh_build::{Builder, Check};
 use bvh_core::Bvh;
 pub use error::SearchError;
+pub(crate) use observer::WORK_PER_POLL;
 pub use observer::{Event, Observer};
 pub use problem::{Problem, Shortcut};
 pub use stream::Stream;
@@ -39,7 +40,8 @@ pub struct Run<'a> {
     evaluations: u64,
     work: u64,
     incumbent: f64,
-    optimal: bool,
+    /// The proof that no tree costs less than the incumbent, if there is one.
+    optimal: Option<Shortcut>,
     history: Vec<Event>,
 }
 
@@ -87,14 +89,14 @@ impl<'a> Run<'a> {
         self.observer.event(&event);
     }
 
-    /// Ends the search, because no tree costs less than the incumbent.
-    pub fn proved_optimal(&mut self) {
-        self.optimal = true;
+    /// Ends the search, because this shortcut proved that no tree costs less than the incumbent.
+    pub fn proved_optimal(&mut self, by: Shortcut) {
+        self.optimal = Some(by);
     }
 
     /// What is left of the budget: endless where it has no limit, nothing if the incumbent is optimal.
     pub fn left(&self) -> Quota {
-        if self.optimal {
+        if self.optimal.is_some() {
             return Quota { work: 0, moves: 0 };
         }
         let left = |limit: Option<u64>, count| limit.map_or(u64::MAX, |limit| limit.saturating_sub(count));
@@ -116,7 +118,7 @@ impl<'a> Run<'a> {
             None
         } else if self.observer.cancelled() {
             Some(StopReason::Cancelled)
-        } else if self.optimal {
+        } else if self.optimal.is_some() {
             Some(StopReason::Optimal)
         } else if reached(self.budget.max_evaluations, self.evaluations) {
             Some(StopReason::Evaluations)
@@ -147,6 +149,9 @@ pub struct Outcome {
     pub work: u64,
     /// Why the search returned.
     pub stop: StopReason,
+    /// The shortcut that proved the tree optimal, if one did: with [`Shortcut::Tiny`], the tree is the exact solver's, which
+    /// took the place of the search.
+    pub proof: Option<Shortcut>,
     /// Every event, in order.
     pub history: Vec<Event>,
 }
@@ -161,10 +166,10 @@ pub fn solve(
 ) -> Result<Outcome, SearchError> {
     let incumbent = f64::INFINITY;
     let mut run =
-        Run { budget, observer, evaluations: 0, work: 0, incumbent, optimal: false, history: Vec::new() };
+        Run { budget, observer, evaluations: 0, work: 0, incumbent, optimal: None, history: Vec::new() };
     search.check()?;
     let tree = search.search(problem, seed, &mut run)?;
     let stop = run.stopped().unwrap_or(StopReason::Completed);
-    let Run { evaluations, work, incumbent: cost, history, .. } = run;
-    Ok(Outcome { tree, cost, evaluations, work, stop, history })
+    let Run { evaluations, work, incumbent: cost, optimal: proof, history, .. } = run;
+    Ok(Outcome { tree, cost, evaluations, work, stop, proof, history })
 }

@@ -13,6 +13,9 @@ pub struct Event {
     pub incumbent: f64,
 }
 
+/// Nodes visited between two polls of an observer: less than a millisecond, whatever a single move takes.
+pub(crate) const WORK_PER_POLL: u64 = 1 << 14;
+
 /// Follows a search from outside, from any thread. `()` watches nothing.
 pub trait Observer: Sync {
     /// Called after every event of the history, in order.

@@ -129,7 +129,7 @@ fn build_by(
     let event = Event { evaluations: 1, work, cost, incumbent: cost };
     stopwatch.note(seconds);
     let stop = StopReason::Completed;
-    Ok((Outcome { tree, cost, evaluations: 1, work, stop, history: vec![event] }, seconds))
+    Ok((Outcome { tree, cost, evaluations: 1, work, stop, proof: None, history: vec![event] }, seconds))
 }
 
 /// A job whose tree is found: makes the rows.

@@ -1,0 +1,67 @@
+//! A search returns soon after its observer cancels, whatever numbers its configuration has.
+
+use bvh_core::{Aabb, validate};
+use bvh_search::{
+    Budget, Method, Observer, Problem, genetic, grasp, random_orders, rebuild, ruin_recreate, solve,
+};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// Counts the polls, and cancels after so many.
+struct Polls {
+    polled: AtomicU64,
+    until: u64,
+}
+
+impl Observer for Polls {
+    fn cancelled(&self) -> bool {
+        self.polled.fetch_add(1, Relaxed) >= self.until
+    }
+}
+
+fn boxes(n: u32) -> Vec<Aabb> {
+    let at = |i: u32, k: u32| (i.wrapping_mul(2_654_435_761).rotate_left(k) >> 16) as f32;
+    let low = |i| [at(i, 3), at(i, 11), at(i, 19)];
+    (0..n).map(|i| Aabb::from((low(i), low(i).map(|c| c + 50.0)))).collect()
+}
+
+#[test]
+fn a_search_that_is_cancelled_at_once_evaluates_one_tree_only() {
+    let boxes = boxes(300);
+    for method in [
+        Method::Grasp(grasp::Config { trials: u64::MAX, ..Default::default() }),
+        Method::RandomOrders(random_orders::Config { trials: u64::MAX, ..Default::default() }),
+        Method::Genetic(genetic::Config { population: 800_000, generations: u64::MAX, ..Default::default() }),
+    ] {
+        let polls = Polls { polled: 0.into(), until: 0 };
+        let outcome = solve(&method, &Problem::new(&boxes), 1, Budget::default(), &polls).unwrap();
+        validate(&outcome.tree, &boxes).unwrap();
+        assert_eq!(outcome.evaluations, 1, "{}", method.name());
+    }
+}
+
+#[test]
+fn the_observer_is_polled_between_moves_however_long_they_are() {
+    let boxes = boxes(3000);
+    let ruin = ruin_recreate::Ruin { climb: 1000, removed: 1000, ..Default::default() };
+    let polls = Polls { polled: 0.into(), until: u64::MAX };
+    let budget = Budget { max_evaluations: Some(200), ..Budget::default() };
+    let config = ruin_recreate::Config { ruin, ..Default::default() };
+    let outcome = solve(&config, &Problem::new(&boxes), 1, budget, &polls).unwrap();
+    let long_moves = outcome.work / (1 << 16);
+    assert!(long_moves > 20 && polls.polled.into_inner() >= long_moves, "{long_moves}");
+}
+
+#[test]
+fn numbers_that_no_poll_could_interrupt_are_refused() {
+    let refused = |method: Method, boxes: &[Aabb]| {
+        solve(&method, &Problem::new(boxes), 1, Budget::default(), &()).unwrap_err().to_string()
+    };
+    let tournament = rebuild::Config { tournament: 1 << 31, ..Default::default() };
+    assert_eq!(refused(Method::Rebuild(tournament), &[]), "tournament is 2147483648; accepted: 1 to 1000");
+    let ruin = ruin_recreate::Ruin { removed: u32::MAX, ..Default::default() };
+    let ruin = ruin_recreate::Config { ruin, ..Default::default() };
+    assert_eq!(refused(Method::RuinRecreate(ruin), &[]), "ruin.removed is 4294967295; accepted: 1 to 1000");
+    let population = genetic::Config { population: 1_000_000, ..Default::default() };
+    let message = "population is 1000000; accepted: at most 262144";
+    assert_eq!(refused(Method::Genetic(population), &boxes(1024)), message);
+}
