@@ -1,0 +1,411 @@
+//! How many ray segments enter a box: a measure of boxes for the rays that are traced, in place of their area.
+//!
+//! The surface area heuristic prices a box by its area, because an endless uniform line meets a convex box with a chance
+//! proportional to it. Real rays start on surfaces, end at hits and come from a camera. [`RayDensity`] is made from a sample of
+//! such segments and gives the expected number that enter any box, in constant time.
+//!
+//! A segment enters a convex box at most once: either it starts inside, or it crosses one of the six faces inward. So
+//!
+//! ```text
+//!                 ┌──────────┐            entries(box) =   segments that start in the box
+//!     ───────────→│          │                           + rightward crossings of its left face
+//!                 │    •──→  │←───                       + leftward  crossings of its right face
+//!                 └──────────┘                           + the same for the other two axes
+//! ```
+//!
+//! On a grid each of these seven counts is a look-up in a summed-area table (Crow 1984). All seven tables have the same corners, so they are
+//! added up, with their signs, into one table per corner of a box: eight look-ups in all. Between grid points the tables
+//! are interpolated linearly in each coordinate.
+//!
+//! **Monotone.** A segment is recorded as the sequence of cells that it visits, one face at a time. Its coordinates are monotone along
+//! the way, so it visits the cells of a box of cells in one stretch, and the tables count segments that visit any of them: a larger box of cells has
+//! no smaller count. The interpolated value is the mean count over all shifts of a grid-rounded box, each axis rounded by a shift of its own that is the same for both
+//! of its ends; rounding preserves inclusion, so the mean is monotone too. Box corners are first rounded outward to
+//! 1/512 of a cell; all counts and weights are then integers whose products and sums stay below 2⁵³, so that
+//! the arithmetic is exact, and neither the order of summation nor the shortcut for boxes within one cell changes a bit.
+//!
+//! The idea of counting the rays that meet a box is that of Bittner & Havran 2009 (ray distribution heuristic, for kd-trees) and of
+//! Ng & Trifonov's empirical ray cost, section 4, which tested every box with every ray.
+
+use crate::Aabb;
+use alloc::vec;
+use alloc::vec::Vec;
+use glam::DVec3;
+
+/// Cells of the grid along each axis.
+const CELLS: usize = 32;
+/// Grid points along each axis.
+const POINTS: usize = CELLS + 1;
+/// Fractions of a cell that box corners are rounded to, as a power of two.
+const FRACTION_BITS: u32 = 9;
+const FRACTIONS: u32 = 1 << FRACTION_BITS;
+/// Most segments, so that all arithmetic is exact: 4 · 2²⁰ · 2²⁷ · 8 < 2⁵³.
+const MOST_SEGMENTS: usize = 1 << 20;
+
+/// A part of a ray: where it begins, and where it ends, in world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// Where the ray starts.
+    pub from: [f32; 3],
+    /// Where it ends: at its hit, or where it leaves the scene.
+    pub to: [f32; 3],
+}
+
+/// Why there is no density.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DensityError {
+    /// A segment has a coordinate that is NaN or infinite.
+    #[error("segment {index} has a coordinate that is not finite")]
+    NotFinite {
+        /// Index of the segment.
+        index: usize,
+    },
+    /// Too many segments to count them exactly.
+    #[error("{segments} segments; accepted: 1 to {MOST_SEGMENTS}")]
+    Count {
+        /// The number of segments.
+        segments: usize,
+    },
+    /// No segment meets the scene.
+    #[error("none of the segments meets the bounds of the scene")]
+    NoneMeets,
+    /// The weight of area is out of range.
+    #[error("the weight of area is {0}; accepted: 0 to 1")]
+    AreaWeight(f64),
+    /// The bounds are empty or not finite.
+    #[error("the bounds of the scene are empty or not finite")]
+    Bounds,
+}
+
+/// The expected number of segments that enter a box, mixed with the box's area; see the [module](self).
+///
+/// About 11 MB, whatever the number of segments. Made in O(segments · cells along one) and cloned by copying.
+#[derive(Clone, Debug)]
+pub struct RayDensity {
+    low: DVec3,
+    /// Fractions of cells per world unit.
+    scale: DVec3,
+    /// `[corner of the box][cell]`: the signed counts at the cell's eight grid points.
+    corners: Vec<[f32; 8]>,
+    /// `[cell]`: what a box within the cell needs; see [`within`].
+    cells: Vec<[f32; 16]>,
+    /// Segments that meet the bounds.
+    segments: u32,
+    /// Half area per fractional entry.
+    entry_weight: f64,
+    area_weight: f64,
+}
+
+/// Corners of a box in fractions of cells.
+struct Rounded {
+    low: [u32; 3],
+    high: [u32; 3],
+}
+
+impl RayDensity {
+    /// The density of `segments` over the scene with these bounds. `area_weight` is the part of a box's measure that is its
+    /// area, 0 to 1, so that boxes which no sample enters are not free; a tenth serves well.
+    ///
+    /// # Errors
+    /// [`DensityError`] if there are no segments, more than 2²⁰, none that meets the bounds, or one that is not finite.
+    pub fn new(bounds: &Aabb, segments: &[Segment], area_weight: f64) -> Result<Self, DensityError> {
+        if !(0.0..=1.0).contains(&area_weight) {
+            return Err(DensityError::AreaWeight(area_weight));
+        }
+        if segments.is_empty() || segments.len() > MOST_SEGMENTS {
+            return Err(DensityError::Count { segments: segments.len() });
+        }
+        let (low, high) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
+        let size = high - low;
+        if !(low.is_finite() && high.is_finite() && size.min_element() >= 0.0) {
+            return Err(DensityError::Bounds);
+        }
+        // A flat scene is given some thickness, so that rays cross it.
+        let thickness = (size.max_element() / 1024.0).max(f64::MIN_POSITIVE * 1e20);
+        let padding = (DVec3::splat(thickness) - size).max(DVec3::ZERO);
+        let (low, size) = (low - 0.5 * padding, size + padding);
+        let mut crossings = Crossings::new();
+        let cells_per_unit = DVec3::splat(CELLS as f64) / size;
+        for (index, segment) in segments.iter().enumerate() {
+            if !segment.from.iter().chain(&segment.to).all(|c| c.is_finite()) {
+                return Err(DensityError::NotFinite { index });
+            }
+            let place = |corner: [f32; 3]| (DVec3::from(corner.map(f64::from)) - low) * cells_per_unit;
+            crossings.record(place(segment.from), place(segment.to));
+        }
+        if crossings.segments == 0 {
+            return Err(DensityError::NoneMeets);
+        }
+        let root = bounds.half_area();
+        let fractional = f64::from(FRACTIONS) * f64::from(FRACTIONS) * f64::from(FRACTIONS);
+        Ok(Self {
+            low,
+            scale: cells_per_unit * f64::from(FRACTIONS),
+            corners: crossings.corner_tables(),
+            cells: crossings.cell_table(),
+            segments: crossings.segments,
+            entry_weight: (1.0 - area_weight) * root / (fractional * f64::from(crossings.segments)),
+            area_weight,
+        })
+    }
+
+    /// Number of segments that meet the bounds.
+    pub fn segments(&self) -> u32 {
+        self.segments
+    }
+
+    /// The expected number of segments that enter the box; 0 for the empty box. Constant time.
+    pub fn entries(&self, bounds: &Aabb) -> f64 {
+        let fractional = f64::from(FRACTIONS) * f64::from(FRACTIONS) * f64::from(FRACTIONS);
+        self.fractional_entries(bounds) / fractional
+    }
+
+    /// The box's measure in units of half area: that of the scene's bounds is their half area, whatever the segments.
+    /// Monotone under inclusion, rounding included. 0 for the empty box.
+    pub fn measure(&self, bounds: &Aabb) -> f64 {
+        self.entry_weight * self.fractional_entries(bounds) + self.area_weight * bounds.half_area()
+    }
+
+    /// Entries times 512³, an integer.
+    #[inline]
+    fn fractional_entries(&self, bounds: &Aabb) -> f64 {
+        if bounds.min.cmpgt(bounds.max).any() {
+            return 0.0;
+        }
+        let rounded = self.round(bounds);
+        let cell = rounded.low.map(cell_of);
+        if (0..3).all(|axis| rounded.high[axis] <= (cell[axis] as u32 + 1) << FRACTION_BITS) {
+            within(&self.cells[index(cell)], &rounded, cell)
+        } else {
+            self.across(&rounded)
+        }
+    }
+
+    /// The corners, rounded outward and clamped to the grid.
+    #[inline]
+    fn round(&self, bounds: &Aabb) -> Rounded {
+        let most = DVec3::splat(f64::from((CELLS as u32) << FRACTION_BITS));
+        let place = |corner: glam::Vec3| ((corner.as_dvec3() - self.low) * self.scale).clamp(DVec3::ZERO, most);
+        let (low, high) = (place(bounds.min), place(bounds.max));
+        // Coordinates are not negative: a cast rounds down.
+        let up = |value: f64| {
+            let down = value as u32;
+            down + u32::from(f64::from(down) < value)
+        };
+        Rounded { low: low.to_array().map(|c| c as u32), high: high.to_array().map(up) }
+    }
+
+    /// Sums the signed counts at the eight corners of the box.
+    fn across(&self, rounded: &Rounded) -> f64 {
+        let ends = [&rounded.low, &rounded.high];
+        let mut sum = 0.0;
+        for corner in 0..8 {
+            let at = [0, 1, 2].map(|axis| ends[corner >> axis & 1][axis]);
+            let cell = at.map(cell_of);
+            let values = &self.corners[corner * CELLS * CELLS * CELLS + index(cell)];
+            let part = [0, 1, 2].map(|axis| at[axis] - ((cell[axis] as u32) << FRACTION_BITS));
+            let [x, y, z] = part.map(|part| [f64::from(FRACTIONS - part), f64::from(part)]);
+            let xy = [x[0] * y[0], x[1] * y[0], x[0] * y[1], x[1] * y[1]];
+            let plane = |k: usize| (0..4).map(|i| xy[i] * f64::from(values[4 * k + i])).sum::<f64>();
+            sum += z[0] * plane(0) + z[1] * plane(1);
+        }
+        sum
+    }
+}
+
+/// The cell of a corner; the last one for the upper end of the grid.
+#[inline]
+fn cell_of(corner: u32) -> usize {
+    ((corner >> FRACTION_BITS) as usize).min(CELLS - 1)
+}
+
+#[inline]
+fn index(cell: [usize; 3]) -> usize {
+    (cell[2] * CELLS + cell[1]) * CELLS + cell[0]
+}
+
+/// The fractional entries of a box within one cell: the flux through each face of the cell, interpolated to the box's
+/// face, times that face's part of it; and the starts, times the box's part of the cell.
+#[inline]
+fn within(table: &[f32; 16], rounded: &Rounded, cell: [usize; 3]) -> f64 {
+    let begin = cell.map(|c| (c as u32) << FRACTION_BITS);
+    let low = [0, 1, 2].map(|axis| f64::from(rounded.low[axis] - begin[axis]));
+    let high = [0, 1, 2].map(|axis| f64::from(rounded.high[axis] - begin[axis]));
+    let size = [0, 1, 2].map(|axis| high[axis] - low[axis]);
+    let value = |at: usize| f64::from(table[at]);
+    let between = |at: usize, part: f64| value(at) * (f64::from(FRACTIONS) - part) + value(at + 1) * part;
+    let flux = |axis: usize| between(4 * axis, low[axis]) + between(4 * axis + 2, high[axis]);
+    let faces = flux(0) * (size[1] * size[2]) + flux(1) * (size[0] * size[2]) + flux(2) * (size[0] * size[1]);
+    faces + value(12) * (size[0] * size[1] * size[2])
+}
+
+/// Where segments start and which faces of cells they cross.
+struct Crossings {
+    segments: u32,
+    /// Per cell.
+    starts: Vec<u32>,
+    /// `[axis][downward][plane][cell of the plane]`.
+    faces: [[Vec<u32>; 2]; 3],
+}
+
+/// The two other axes, in their order.
+const OTHERS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
+
+impl Crossings {
+    fn new() -> Self {
+        let faces = || [0, 1].map(|_| vec![0; POINTS * CELLS * CELLS]);
+        Self { segments: 0, starts: vec![0; CELLS * CELLS * CELLS], faces: [faces(), faces(), faces()] }
+    }
+
+    /// Records a segment given in cells: the cells that it visits within the grid, face by face.
+    fn record(&mut self, from: DVec3, to: DVec3) {
+        let ray = to - from;
+        let most = CELLS as f64;
+        // The part within the grid.
+        let (mut first, mut last, mut entered) = (0.0f64, 1.0f64, None);
+        for axis in 0..3 {
+            if ray[axis] == 0.0 {
+                if !(0.0..=most).contains(&from[axis]) {
+                    return;
+                }
+                continue;
+            }
+            let (near, far) = if ray[axis] > 0.0 { (0.0, most) } else { (most, 0.0) };
+            let (enter, leave) = ((near - from[axis]) / ray[axis], (far - from[axis]) / ray[axis]);
+            if enter > first {
+                (first, entered) = (enter, Some(axis));
+            }
+            last = last.min(leave);
+        }
+        if first > last {
+            return;
+        }
+        self.segments += 1;
+        let cell_at = |t: f64| {
+            [0, 1, 2].map(|axis| ((from[axis] + t * ray[axis]).clamp(0.0, most) as usize).min(CELLS - 1))
+        };
+        let (mut cell, end) = (cell_at(first), cell_at(last));
+        match entered {
+            None => self.starts[index(cell)] += 1,
+            Some(axis) => {
+                cell[axis] = if ray[axis] > 0.0 { 0 } else { CELLS - 1 };
+                self.cross(axis, ray[axis] < 0.0, cell);
+            }
+        }
+        // From cell to cell, through the face that comes first, until the last cell: each axis takes exactly the steps
+        // that it has to go, so that the way ends there whatever the rounding.
+        while cell != end {
+            let when = |axis: usize| {
+                if cell[axis] == end[axis] {
+                    return f64::INFINITY;
+                }
+                let plane = if cell[axis] < end[axis] { cell[axis] + 1 } else { cell[axis] };
+                let t = (plane as f64 - from[axis]) / ray[axis];
+                if t.is_nan() { 0.0 } else { t.min(f64::MAX) }
+            };
+            let times = [when(0), when(1), when(2)];
+            let axis = (0..3).min_by(|&a, &b| times[a].total_cmp(&times[b])).unwrap_or(0);
+            let downward = end[axis] < cell[axis];
+            cell[axis] = if downward { cell[axis] - 1 } else { cell[axis] + 1 };
+            self.cross(axis, downward, cell);
+        }
+    }
+
+    /// Records that a segment has come into a cell across an axis.
+    fn cross(&mut self, axis: usize, downward: bool, into: [usize; 3]) {
+        let plane = into[axis] + usize::from(downward);
+        self.faces[axis][usize::from(downward)][face(axis, plane, into)] += 1;
+    }
+
+    /// The eight tables of signed counts; see the [module](self).
+    fn corner_tables(&self) -> Vec<[f32; 8]> {
+        let starts = summed_starts(&self.starts);
+        let faces = [0, 1, 2].map(|axis| [0, 1].map(|way| summed_faces(&self.faces[axis][way])));
+        let mut tables = Vec::with_capacity(8 * CELLS * CELLS * CELLS);
+        let point = |at: [usize; 3]| (at[2] * POINTS + at[1]) * POINTS + at[0];
+        for corner in 0..8usize {
+            let high = [0, 1, 2].map(|axis| corner >> axis & 1);
+            let sign = high.map(|high| if high == 1 { 1.0 } else { -1.0 });
+            let value = |at: [usize; 3]| -> f32 {
+                let mut sum = sign[0] * sign[1] * sign[2] * starts[point(at)] as f64;
+                for axis in 0..3 {
+                    let [u, v] = OTHERS[axis];
+                    // The lower face is entered upward, the upper one downward.
+                    let flux = faces[axis][high[axis]][(at[axis] * POINTS + at[v]) * POINTS + at[u]];
+                    sum += sign[u] * sign[v] * flux as f64;
+                }
+                sum as f32
+            };
+            for z in 0..CELLS {
+                for y in 0..CELLS {
+                    for x in 0..CELLS {
+                        tables.push(core::array::from_fn(|i| {
+                            value([x + (i & 1), y + (i >> 1 & 1), z + (i >> 2)])
+                        }));
+                    }
+                }
+            }
+        }
+        tables
+    }
+
+    /// For each cell the flux through its faces, upward at both planes and then downward, per axis; then its starts.
+    fn cell_table(&self) -> Vec<[f32; 16]> {
+        let mut table = Vec::with_capacity(CELLS * CELLS * CELLS);
+        for z in 0..CELLS {
+            for y in 0..CELLS {
+                for x in 0..CELLS {
+                    let cell = [x, y, z];
+                    let mut values = [0.0; 16];
+                    for (at, value) in values[..12].iter_mut().enumerate() {
+                        let (axis, way, upper) = (at / 4, at / 2 % 2, at % 2);
+                        *value = self.faces[axis][way][face(axis, cell[axis] + upper, cell)] as f32;
+                    }
+                    values[12] = self.starts[index(cell)] as f32;
+                    table.push(values);
+                }
+            }
+        }
+        table
+    }
+}
+
+/// Index of the face of a cell that lies in a plane.
+fn face(axis: usize, plane: usize, cell: [usize; 3]) -> usize {
+    let [u, v] = OTHERS[axis];
+    (plane * CELLS + cell[v]) * CELLS + cell[u]
+}
+
+/// Sums of all cells below each grid point: `[z][y][x]`.
+fn summed_starts(starts: &[u32]) -> Vec<i64> {
+    let mut sums = vec![0i64; POINTS * POINTS * POINTS];
+    let at = |x: usize, y: usize, z: usize| (z * POINTS + y) * POINTS + x;
+    for z in 1..POINTS {
+        for y in 1..POINTS {
+            let mut row = 0;
+            for x in 1..POINTS {
+                row += i64::from(starts[index([x - 1, y - 1, z - 1])]);
+                sums[at(x, y, z)] =
+                    row + sums[at(x, y - 1, z)] + sums[at(x, y, z - 1)] - sums[at(x, y - 1, z - 1)];
+            }
+        }
+    }
+    sums
+}
+
+/// In each plane, the sums of all faces below each grid point: `[plane][v][u]`.
+fn summed_faces(faces: &[u32]) -> Vec<i64> {
+    let mut sums = vec![0i64; POINTS * POINTS * POINTS];
+    for plane in 0..POINTS {
+        let at = |u: usize, v: usize| (plane * POINTS + v) * POINTS + u;
+        for v in 1..POINTS {
+            let mut row = 0;
+            for u in 1..POINTS {
+                row += i64::from(faces[(plane * CELLS + v - 1) * CELLS + u - 1]);
+                sums[at(u, v)] = row + sums[at(u, v - 1)];
+            }
+        }
+    }
+    sums
+}

@@ -1,0 +1,148 @@
+//! The ray density counts what it says: segment by segment on the grid, monotone everywhere, area for uniform lines.
+
+use bvh_core::{Aabb, DensityError, RayDensity, Segment};
+use proptest::prelude::*;
+
+/// Bounds whose cells have a side of 1, so that boxes with whole coordinates lie on the grid.
+const GRID: f32 = 32.0;
+
+fn bounds() -> Aabb {
+    Aabb::from([[0.0; 3], [GRID; 3]])
+}
+
+/// Numbers in 0..1 from a seed: SplitMix64.
+fn uniform(seed: u64) -> impl FnMut() -> f32 {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 40) as f32 / 16_777_216.0
+    }
+}
+
+/// Segments inside, through and beside the bounds.
+fn segments(count: usize, seed: u64) -> Vec<Segment> {
+    let mut next = uniform(seed);
+    let mut point = |spread: f32| [0, 1, 2].map(|_| GRID * (0.5 + spread * (next() - 0.5)));
+    (0..count)
+        .map(|i| {
+            if i % 2 == 0 {
+                Segment { from: point(1.0), to: point(1.0) }
+            } else {
+                Segment { from: point(3.0), to: point(1.5) }
+            }
+        })
+        .collect()
+}
+
+/// Whether the segment has a point in the box, by its slabs.
+fn meets(segment: &Segment, bounds: &Aabb) -> bool {
+    let (low, high) = (bounds.min.to_array(), bounds.max.to_array());
+    let (mut first, mut last) = (0.0f64, 1.0f64);
+    for axis in 0..3 {
+        let (from, to) = (f64::from(segment.from[axis]), f64::from(segment.to[axis]));
+        let cut = |plane: f32| (f64::from(plane) - from) / (to - from);
+        let (a, b) = (cut(low[axis]), cut(high[axis]));
+        first = first.max(a.min(b));
+        last = last.min(a.max(b));
+    }
+    first <= last
+}
+
+#[test]
+fn boxes_on_the_grid_are_entered_as_often_as_segments_meet_them() {
+    let segments = segments(3000, 1);
+    let density = RayDensity::new(&bounds(), &segments, 0.0).unwrap();
+    let mut next = uniform(2);
+    for _ in 0..2000 {
+        let ends = [0, 1, 2].map(|_| {
+            let (a, b) = ((next() * 33.0).floor(), (next() * 33.0).floor());
+            (a.min(b), a.max(b).max(a.min(b) + 1.0).min(GRID))
+        });
+        let cells = Aabb::from([ends.map(|end| end.0), ends.map(|end| end.1)]);
+        if cells.half_area() == 0.0 || ends.iter().any(|end| end.0 == end.1) {
+            continue;
+        }
+        let counted = segments.iter().filter(|segment| meets(segment, &cells)).count();
+        assert_eq!(density.entries(&cells), counted as f64, "{cells:?}");
+    }
+    assert_eq!(density.measure(&bounds()), bounds().half_area());
+}
+
+/// A box from two corners, any order.
+fn around(a: [f32; 3], b: [f32; 3]) -> Aabb {
+    let pick = |take: fn(f32, f32) -> f32| [0, 1, 2].map(|axis| take(a[axis], b[axis]));
+    Aabb::from([pick(f32::min), pick(f32::max)])
+}
+
+fn corner() -> impl Strategy<Value = [f32; 3]> {
+    let coordinate = prop_oneof![-1.0f32..33.0, (0u8..33).prop_map(f32::from), 15.0f32..15.2];
+    prop::array::uniform3(coordinate)
+}
+
+proptest! {
+    #[test]
+    fn a_larger_box_never_measures_less(a in corner(), b in corner(), c in corner(), d in corner(), seed in 0u64..4, share in 0.0f64..1.0) {
+        let density = RayDensity::new(&bounds(), &segments(200, seed), share).unwrap();
+        let inner = around(a, b);
+        let outer = inner.union(&around(c, d));
+        prop_assert!(density.measure(&inner) <= density.measure(&outer), "{inner:?} in {outer:?}");
+        prop_assert!(density.entries(&inner) <= density.entries(&outer));
+        prop_assert!(density.entries(&inner) >= 0.0 && density.entries(&outer) <= f64::from(density.segments()));
+    }
+
+    #[test]
+    fn boxes_within_a_cell_and_across_cells_agree(a in corner(), size in prop::array::uniform3(0.0f32..1.2), seed in 0u64..4) {
+        // The mean over a box's eight halves of each coordinate is no shortcut's: shifting by whole cells changes the path taken
+        // only, so compare with a grid whose cells are twice as large in world units and rays that are, too.
+        let density = RayDensity::new(&bounds(), &segments(200, seed), 0.0).unwrap();
+        let small = around(a, [0, 1, 2].map(|axis| a[axis] + size[axis]));
+        let double = |p: [f32; 3]| p.map(|c| 2.0 * c);
+        let twice: Vec<Segment> = segments(200, seed).iter().map(|s| Segment { from: double(s.from), to: double(s.to) }).collect();
+        let doubled = RayDensity::new(&Aabb::from([[0.0; 3], [2.0 * GRID; 3]]), &twice, 0.0).unwrap();
+        let large = Aabb::from([double(small.min.to_array()), double(small.max.to_array())]);
+        prop_assert_eq!(density.entries(&small), doubled.entries(&large));
+    }
+}
+
+#[test]
+fn uniform_endless_lines_give_the_area_back() {
+    let mut next = uniform(5);
+    let mut lines = Vec::new();
+    // Lines through two points of a sphere around the bounds, uniform and independent, are uniform lines.
+    let mut on_sphere = || loop {
+        let p = [0, 1, 2].map(|_| 2.0 * next() - 1.0);
+        let length = p.iter().map(|c| c * c).sum::<f32>();
+        if length > 1e-4 && length <= 1.0 {
+            return p.map(|c| 16.0 + 28.0 * c / length.sqrt());
+        }
+    };
+    while lines.len() < 400_000 {
+        lines.push(Segment { from: on_sphere(), to: on_sphere() });
+    }
+    let density = RayDensity::new(&bounds(), &lines, 0.0).unwrap();
+    for cells in [
+        [[4.0, 4.0, 4.0], [20.0, 12.0, 28.0]],
+        [[1.0, 1.0, 1.0], [5.0, 31.0, 6.0]],
+        [[8.0, 8.0, 8.0], [9.0, 9.0, 9.0]],
+    ] {
+        let cells = Aabb::from(cells);
+        let ratio = density.measure(&cells) / cells.half_area();
+        let deviation = 1.0 / density.entries(&cells).sqrt();
+        assert!((ratio - 1.0).abs() < 4.0 * deviation + 0.01, "{cells:?}: {ratio}");
+    }
+}
+
+#[test]
+fn nonsense_is_refused_by_name() {
+    let one = [Segment { from: [1.0; 3], to: [2.0; 3] }];
+    let nan = [one[0], Segment { from: [f32::NAN; 3], to: [2.0; 3] }];
+    let far = [Segment { from: [100.0; 3], to: [200.0; 3] }];
+    assert_eq!(RayDensity::new(&bounds(), &nan, 0.1).unwrap_err(), DensityError::NotFinite { index: 1 });
+    assert_eq!(RayDensity::new(&bounds(), &[], 0.1).unwrap_err(), DensityError::Count { segments: 0 });
+    assert_eq!(RayDensity::new(&bounds(), &far, 0.1).unwrap_err(), DensityError::NoneMeets);
+    assert_eq!(RayDensity::new(&bounds(), &one, -0.1).unwrap_err(), DensityError::AreaWeight(-0.1));
+    assert_eq!(RayDensity::new(&Aabb::EMPTY, &one, 0.1).unwrap_err(), DensityError::Bounds);
+}
