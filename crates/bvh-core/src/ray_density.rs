@@ -409,3 +409,38 @@ fn summed_faces(faces: &[u32]) -> Vec<i64> {
     }
     sums
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shortcut_within_a_cell_and_the_sum_over_corners_give_the_same_bits() {
+        let mut state = 1u64;
+        let mut next = |most: u32| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as u32 % most
+        };
+        let mut point = || [0, 1, 2].map(|_| next(1 << 20) as f32 / (1 << 15) as f32);
+        let segments: Vec<Segment> = (0..2000).map(|_| Segment { from: point(), to: point() }).collect();
+        let bounds = Aabb::from([[0.0; 3], [CELLS as f32; 3]]);
+        let density = RayDensity::new(&bounds, &segments, 0.0).unwrap();
+        let mut entered = 0;
+        for _ in 0..20_000 {
+            let cell = [0, 1, 2].map(|_| next(CELLS as u32) as usize);
+            let ends = [0, 1, 2].map(|_| [next(FRACTIONS + 1), next(FRACTIONS + 1)]);
+            let place = |axis: usize, part: u32| ((cell[axis] as u32) << FRACTION_BITS) + part;
+            let low = [0, 1, 2].map(|axis| place(axis, ends[axis][0].min(ends[axis][1])));
+            let high = [0, 1, 2].map(|axis| place(axis, ends[axis][0].max(ends[axis][1])));
+            let rounded = Rounded { low, high };
+            let home = rounded.low.map(cell_of);
+            // A lower corner at the upper end of its cell belongs to the next one.
+            if home == cell {
+                let short = within(&density.cells[index(cell)], &rounded, cell);
+                assert_eq!(short.to_bits(), density.across(&rounded).to_bits(), "{low:?} {high:?}");
+                entered += u32::from(short > 0.0);
+            }
+        }
+        assert!(entered > 5000);
+    }
+}
