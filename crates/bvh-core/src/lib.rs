@@ -55,6 +55,6 @@ pub use sphere::Sphere;
 pub use traverse::{Counter, TestCounts, any_hit, any_hit_of_all, nearest_hit, nearest_hit_of_all};
 pub use triangle::{Shear, Triangle};
 pub use validate::{InvalidBvh, validate};
-pub use wide::{WideBvh, WideView};
+pub use wide::{Coherence, Kernel, WideBvh};
 
 pub use glam;

@@ -1,6 +1,6 @@
 //! A ray that is always one: finite, with a direction, over a range of distances.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 /// The points `origin + t · direction` with `t_min <= t <= t_max`.
 ///
@@ -8,13 +8,17 @@ use glam::Vec3;
 /// further down meets a NaN. A range with `t_min > t_max` is empty and hits nothing; with `t_min == t_max` it is
 /// one point. Zero components of the direction may have either sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(16))]
 pub struct Ray {
-    origin: Vec3,
-    direction: Vec3,
-    /// 1 / direction, finite: ±`f32::MAX` where the direction is ±0 or nearly.
-    inverse: Vec3,
-    t_min: f32,
-    t_max: f32,
+    // Whole vectors: a load of four lanes cannot be served from the stores of single ones that have not reached the
+    // cache.
+    /// The origin, and the smallest distance.
+    origin: Vec4,
+    /// The direction, and the largest distance.
+    direction: Vec4,
+    /// 1 / direction, finite: ±`f32::MAX` where the direction is ±0 or nearly; and the least size of the three, which is
+    /// 1 / the direction's largest component.
+    inverse: Vec4,
 }
 
 /// Why there is no such ray.
@@ -51,21 +55,45 @@ impl Ray {
         t_max: f32,
     ) -> Result<Self, InvalidRay> {
         let (origin, direction) = (origin.into(), direction.into());
-        if !origin.is_finite() {
-            return Err(InvalidRay::Origin(origin));
+        // One comparison for all lanes; a NaN fails each.
+        let sizes = direction.extend(1.0).abs();
+        let longest = sizes.truncate().max_element();
+        let is_finite = (origin.extend(0.0).abs().cmple(Vec4::MAX) & sizes.cmple(Vec4::MAX)).all();
+        let is_range = (t_min >= 0.0) & !t_max.is_nan();
+        if !(is_finite & Self::DIRECTION_RANGE.contains(&longest) & is_range) {
+            return Err(Self::why_not(origin, direction, t_min, t_max));
         }
-        if !(direction.is_finite() && Self::DIRECTION_RANGE.contains(&direction.abs().max_element())) {
-            return Err(InvalidRay::Direction(direction));
-        }
-        if t_min.is_nan() || t_min < 0.0 || t_max.is_nan() {
-            return Err(InvalidRay::Range { t_min, t_max });
-        }
-        let inverse = direction.map(|d| {
-            let inverse = 1.0 / d;
-            if inverse.is_finite() { inverse } else { f32::MAX.copysign(d) }
-        });
+        Ok(Self::assume_valid(origin, direction, t_min, t_max))
+    }
+
+    /// [`new`](Self::new) without its checks, for a caller who knows that they would pass: the finite origin, a direction
+    /// whose largest component is between 2⁻¹⁰⁰ and 2¹⁰⁰, and `0 <= t_min`, none of them NaN. Of another ray every
+    /// answer may be wrong, but nothing worse happens.
+    #[inline]
+    pub fn assume_valid(origin: impl Into<Vec3>, direction: impl Into<Vec3>, t_min: f32, t_max: f32) -> Self {
+        let (origin, direction) = (origin.into(), direction.into());
+        let inverse = (1.0 / direction.extend(1.0)).max(Vec4::MIN).min(Vec4::MAX);
+        let sizes = inverse.abs();
+        let least = sizes.x.min(sizes.y).min(sizes.z);
         // A zero is +0.
-        Ok(Self { origin, direction, inverse, t_min: t_min + 0.0, t_max: t_max.min(f32::MAX) })
+        Self {
+            origin: origin.extend(t_min + 0.0),
+            direction: direction.extend(t_max.min(f32::MAX)),
+            inverse: inverse.with_w(least),
+        }
+    }
+
+    /// The first check of [`new`](Self::new) that fails.
+    #[cold]
+    fn why_not(origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> InvalidRay {
+        let longest = direction.abs().max_element();
+        if !origin.is_finite() {
+            InvalidRay::Origin(origin)
+        } else if !direction.is_finite() || !Self::DIRECTION_RANGE.contains(&longest) {
+            InvalidRay::Direction(direction)
+        } else {
+            InvalidRay::Range { t_min, t_max }
+        }
     }
 
     /// The whole half line: `t` from 0 to the largest finite distance.
@@ -77,37 +105,43 @@ impl Ray {
     /// Where `t` is 0; finite.
     #[inline]
     pub fn origin(&self) -> Vec3 {
-        self.origin
+        self.origin.truncate()
     }
 
     /// The step by which `t` counts; finite, not zero, any length.
     #[inline]
     pub fn direction(&self) -> Vec3 {
-        self.direction
+        self.direction.truncate()
     }
 
     /// The reciprocals of the direction's components; finite: ±`f32::MAX` where they would not be.
     #[inline]
     pub fn inverse_direction(&self) -> Vec3 {
-        self.inverse
+        self.inverse.truncate()
+    }
+
+    /// The least size of the reciprocals of the direction's components.
+    #[inline]
+    pub(crate) fn least_inverse(&self) -> f32 {
+        self.inverse.w
     }
 
     /// The smallest distance of a hit, 0 or more.
     #[inline]
     pub fn t_min(&self) -> f32 {
-        self.t_min
+        self.origin.w
     }
 
     /// The largest distance of a hit; finite.
     #[inline]
     pub fn t_max(&self) -> f32 {
-        self.t_max
+        self.direction.w
     }
 
     /// The point at distance `t`, in f32.
     #[inline]
     pub fn at(&self, t: f32) -> Vec3 {
-        self.origin + t * self.direction
+        self.origin() + t * self.direction()
     }
 }
 
@@ -121,6 +155,15 @@ pub struct Hit {
 }
 
 impl Hit {
+    /// What a batch writes for a ray that meets nothing: no object has this id, and no distance is so large.
+    pub const MISS: Self = Self { t: f32::INFINITY, object: u32::MAX };
+
+    /// Whether this is [`MISS`](Self::MISS).
+    #[inline]
+    pub fn is_miss(&self) -> bool {
+        self.object == u32::MAX
+    }
+
     /// Whether this hit is to be preferred: the nearer one, and of two at the same distance the one of the lower id,
     /// so that the answer does not depend on the order in which objects are tested.
     #[inline]
@@ -130,7 +173,7 @@ impl Hit {
 }
 
 /// 2^k for k from -126 to 127, in a constant.
-const fn pow2(k: i32) -> f32 {
+pub(crate) const fn pow2(k: i32) -> f32 {
     f32::from_bits(((k + 127) as u32) << 23)
 }
 

@@ -27,7 +27,7 @@ pub struct Shear {
     /// How far a step along z moves in x and in y; both at most 1.
     pub(crate) slope: [f32; 2],
     /// The direction along z.
-    depth: f64,
+    pub(crate) depth: f64,
     /// Its sign, ±1.
     pub(crate) forwards: f32,
     /// Its size and a little more: z beyond `t` times this is beyond `t`, rounding included.
@@ -40,13 +40,9 @@ impl Shear {
     pub fn new(ray: &Ray) -> Self {
         let (origin, direction) = (ray.origin().to_array(), ray.direction().to_array());
         let size = direction.map(f32::abs);
-        let z = if size[0] >= size[1] && size[0] >= size[2] {
-            0
-        } else if size[1] >= size[2] {
-            1
-        } else {
-            2
-        };
+        // The lowest axis on ties; without a branch, which could not be predicted.
+        let z = usize::from(size[1] > size[0]);
+        let z = if size[2] > size[0].max(size[1]) { 2 } else { z };
         const AXES: &[[usize; 3]; 3] = &[[1, 2, 0], [2, 0, 1], [0, 1, 2]];
         let axes @ [kx, ky, kz] = AXES[z];
         Self {

@@ -3,7 +3,7 @@
 mod support;
 
 use bvh_core::{
-    Aabb, Bvh, Hit, Ray, Shear, Sphere, TestCounts, Triangle, WideBvh, any_hit, any_hit_of_all, clip_to_box,
+    Aabb, Bvh, Hit, Kernel, Ray, Shear, Sphere, TestCounts, Triangle, WideBvh, any_hit, any_hit_of_all, clip_to_box,
     collapse_leaves, cost::SahConstants, nearest_hit, nearest_hit_of_all, validate,
 };
 use glam::Vec3;
@@ -31,11 +31,10 @@ fn check(name: &str, tree: &Bvh, triangles: &[Triangle], ray: &Ray, expected: Op
 
 fn check_wide(name: &str, wide: &WideBvh, ray: &Ray, expected: Option<Hit>) {
     let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
-    for hit in [wide.nearest_hit(ray), wide.view().nearest_hit_portable(ray)] {
-        assert_eq!(bits(hit), bits(expected), "{name}: {ray:?}");
-    }
-    for any in [wide.any_hit(ray), wide.view().any_hit_portable(ray)] {
-        assert_eq!(any, expected.is_some(), "{name}: {ray:?}");
+    for kernel in Kernel::ALL.into_iter().filter(|kernel| kernel.is_available()) {
+        let wide = wide.clone().with_kernel(kernel).unwrap();
+        assert_eq!(bits(wide.nearest_hit(ray)), bits(expected), "{name}, {kernel:?}: {ray:?}");
+        assert_eq!(wide.any_hit(ray), expected.is_some(), "{name}, {kernel:?}: {ray:?}");
     }
 }
 
@@ -165,7 +164,7 @@ fn no_ray_slips_between_the_boxes_beside_a_long_edge() {
             let shear = Shear::new(&ray);
             let test = |id: u32| triangles[id as usize].intersect(&shear, ray.t_max()).is_some();
             assert!(any_hit(&tree, &ray, test, &mut ()), "axis {axis}: {ray:?}");
-            assert!(wide.any_hit(&ray) && wide.view().any_hit_portable(&ray), "axis {axis}: {ray:?}");
+            assert!(wide.any_hit(&ray) && wide.any_hit_counted(&ray, &mut ()), "axis {axis}: {ray:?}");
         }
     }
 }

@@ -1,8 +1,9 @@
 //! The wide layout of least expected cost of a given tree.
 
+use super::kernel::Kernel;
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
-use super::triangle4::Triangle4;
+use super::triangles::TriangleBlock;
 use crate::collapse::{binary, collect};
 use crate::{Aabb, Bvh, NodeKind, Triangle};
 use alloc::{vec, vec::Vec};
@@ -32,7 +33,7 @@ fn decide(tree: &Bvh) -> Vec<Decision> {
     let mut decisions = vec![nothing; tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate().rev() {
         let area = (node.aabb.half_area() * scale) as f32;
-        let leaf_cost = |objects: u32| area * BLOCK_COST * objects.div_ceil(Triangle4::LANES as u32) as f32;
+        let leaf_cost = |objects: u32| area * BLOCK_COST * objects.div_ceil(TriangleBlock::LANES as u32) as f32;
         decisions[index] = match (node.kind(), &decisions[node.children()]) {
             (NodeKind::Inner { .. }, [a, b]) => {
                 let objects = a.objects + b.objects;
@@ -48,7 +49,7 @@ fn decide(tree: &Bvh) -> Vec<Decision> {
                     (decision.costs[slots - 1], decision.slots[slots - 1]) = (least, split as u8);
                 }
                 let (as_node, as_leaf) = (decision.costs[7] + area * NODE_COST, leaf_cost(objects));
-                decision.leaf = as_leaf < as_node || (as_leaf == as_node && objects <= Triangle4::LANES as u32);
+                decision.leaf = as_leaf < as_node || (as_leaf == as_node && objects <= TriangleBlock::LANES as u32);
                 decision.costs[0] = if decision.leaf { as_leaf } else { as_node };
                 // Fewer children where more are no better.
                 for slots in 1..7 {
@@ -71,7 +72,15 @@ fn decide(tree: &Bvh) -> Vec<Decision> {
 /// The wide layout of least expected cost. `tree` must be valid over the triangles' boxes.
 pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle]) -> WideBvh {
     let bounds = tree.root_aabb().unwrap_or(Aabb::EMPTY);
-    let mut wide = WideBvh { bounds, root: None, nodes: Vec::new(), blocks: Vec::new() };
+    let mut wide = WideBvh {
+        bounds,
+        root: None,
+        nodes: Vec::new(),
+        blocks: Vec::new(),
+        largest: bounds.min.abs().max(bounds.max.abs()).max_element(),
+        kernel: Kernel::Portable,
+        stack_need: 0,
+    };
     if tree.nodes.is_empty() {
         return wide;
     }
@@ -79,41 +88,47 @@ pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle]) -> WideBvh {
     let decisions = decide(tree);
     let mut ids = Vec::new();
     // Subtrees, and the lane that is to name each; none names the root.
-    let mut open = vec![(0, None)];
-    while let Some((subtree, place)) = open.pop() {
+    let mut open = vec![(0, None, 0)];
+    while let Some((subtree, place, waiting)) = open.pop() {
         let child = if decisions[subtree].leaf {
             let child = Child::leaf(wide.blocks.len() as u32);
             ids.clear();
             collect(tree, subtree, &mut ids);
-            wide.blocks.extend(Triangle4::chain(&ids, triangles));
+            ids.retain(|&id| !triangles[id as usize].is_degenerate());
+            if ids.is_empty() {
+                continue;
+            }
+            wide.blocks.extend(TriangleBlock::chain(&ids, triangles));
             child
         } else {
             let index = wide.nodes.len();
             wide.nodes.push(WideNode::EMPTY);
             // At most 8 slots are shared out: no more than 8 parts wait at any time.
             let mut parts = [(subtree, decisions[subtree].slots[7]); 8];
-            let mut waiting = 1;
-            let mut lane = 0;
-            while waiting > 0 {
-                waiting -= 1;
-                let (part, slots) = parts[waiting];
+            let (mut count, mut lane) = (1, 0);
+            while count > 0 {
+                count -= 1;
+                let (part, slots) = parts[count];
                 if slots == 0 {
-                    wide.nodes[index].set_box(lane, &tree.nodes[part].aabb);
-                    open.push((part, Some((index, lane))));
+                    open.push((part, Some((index, lane)), waiting + 7));
                     lane += 1;
                     continue;
                 }
                 let first = tree.nodes[part].children().start;
                 for (part, slots) in [(first + 1, slots >> 4), (first, slots & 15)] {
-                    parts[waiting] = (part, decisions[part].slots[usize::from(slots) - 1]);
-                    waiting += 1;
+                    parts[count] = (part, decisions[part].slots[usize::from(slots) - 1]);
+                    count += 1;
                 }
             }
             Child::node(index as u32)
         };
+        wide.stack_need = wide.stack_need.max(waiting);
         match place {
             None => wide.root = Some(child),
-            Some((node, lane)) => wide.nodes[node].children[lane] = child,
+            Some((node, lane)) => {
+                wide.nodes[node].children[lane] = child;
+                wide.nodes[node].set_box(lane, &tree.nodes[subtree].aabb);
+            }
         }
     }
     wide
@@ -147,7 +162,7 @@ mod tests {
         for seed in 0..6 {
             let (triangles, tree) = scene(11, seed);
             let cost_of_leaf = |aabb: &Aabb, objects: f64| {
-                aabb.half_area() * f64::from(BLOCK_COST) * (objects / Triangle4::LANES as f64).ceil()
+                aabb.half_area() * f64::from(BLOCK_COST) * (objects / TriangleBlock::LANES as f64).ceil()
             };
             // States: wide node, left out, or leaf; the root is not left out.
             let least = exhaustive(&tree, 3, |choice| {
@@ -178,7 +193,7 @@ mod tests {
             let found: f64 = boxes(&wide)
                 .map(|(aabb, blocks)| match blocks {
                     0 => aabb.half_area() * f64::from(NODE_COST),
-                    _ => cost_of_leaf(&aabb, (blocks * Triangle4::LANES) as f64),
+                    _ => cost_of_leaf(&aabb, (blocks * TriangleBlock::LANES) as f64),
                 })
                 .sum();
             assert!((found - least).abs() < 1e-5 * least, "seed {seed}: {found} is not {least}");

@@ -1,7 +1,8 @@
-//! The arrays of a wide layout, owned or borrowed.
+//! The arrays of a wide layout, and the kernel that traces it.
 
+use super::kernel::Kernel;
 use super::node::{Child, WideNode};
-use super::triangle4::Triangle4;
+use super::triangles::TriangleBlock;
 use crate::Aabb;
 use alloc::vec::Vec;
 
@@ -32,14 +33,11 @@ pub struct WideBvh {
     /// `None` for the tree over no triangles.
     pub(crate) root: Option<Child>,
     pub(crate) nodes: Vec<WideNode>,
-    pub(crate) blocks: Vec<Triangle4>,
-}
-
-/// A [`WideBvh`] that lies elsewhere, in a mapped file for example.
-#[derive(Clone, Copy, Debug)]
-pub struct WideView<'a> {
-    pub(crate) bounds: Aabb,
-    pub(crate) root: Option<Child>,
-    pub(crate) nodes: &'a [WideNode],
-    pub(crate) blocks: &'a [Triangle4],
+    pub(crate) blocks: Vec<TriangleBlock>,
+    /// The largest size of a coordinate.
+    pub(crate) largest: f32,
+    /// What traces it; the processor has its instructions.
+    pub(crate) kernel: Kernel,
+    /// The most children that can be waiting on the way through it.
+    pub(crate) stack_need: usize,
 }

@@ -1,20 +1,40 @@
-//! A tree of triangles laid out for speed: eight children per node and four triangles per leaf block, tested at once.
+//! A tree of triangles laid out for speed: eight children per node and eight triangles per leaf block, tested at once.
 
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod avx2;
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+mod avx512;
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+mod box_ray;
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+mod packet;
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+mod x86;
 mod build;
+mod kernel;
 mod layout;
-pub(crate) mod node;
+mod node;
 mod portable;
-mod traverse;
-pub(crate) mod triangle4;
+mod triangles;
 
-pub use layout::{WideBvh, WideView};
+pub use kernel::Kernel;
+pub use layout::WideBvh;
 
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate};
 use alloc::vec::Vec;
-use portable::Portable;
-use traverse::walk;
+use portable::walk;
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+use x86::STACK;
+
+/// What a caller expects of the rays of a batch. A hint: the answers are the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coherence {
+    /// Consecutive rays begin close to each other and run the same way, as those through neighbouring pixels or from
+    /// neighbouring points to a light. They are traced in packets of sixteen where they do, and else one by one.
+    Coherent,
+    /// Consecutive rays have little in common. They are traced one by one.
+    Incoherent,
+}
 
 impl WideBvh {
     /// Lays out `tree`, valid over the boxes of `triangles`, with any number of children per node. O(n) time and
@@ -24,76 +44,111 @@ impl WideBvh {
     /// the result has the least expected time for a random line among all that can be made by leaving nodes out.
     ///
     /// Source: Ylitie, Karras & Laine 2017, 'Efficient incoherent ray traversal on GPUs through compressed wide BVHs',
-    /// section 4.1. Differs from the paper: boxes in full precision; leaves of any size, paid per block of four.
+    /// section 4.1. Differs from the paper: boxes in full precision; leaves of any size, paid per block of eight.
     pub fn new(tree: &Bvh, triangles: &[Triangle]) -> Result<Self, InvalidBvh> {
         let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
         validate(tree, &boxes)?;
-        Ok(build::widen(tree, triangles))
-    }
-
-    /// The layout where it lies.
-    #[inline(always)]
-    pub fn view(&self) -> WideView<'_> {
-        WideView { bounds: self.bounds, root: self.root, nodes: &self.nodes, blocks: &self.blocks }
+        let mut wide = build::widen(tree, triangles);
+        wide.choose(Kernel::best());
+        Ok(wide)
     }
 
     /// The nearest triangle that `ray` meets in its range; of several at the same distance the one of the lowest id.
     #[inline]
     pub fn nearest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.view().nearest_hit(ray)
+        #[cfg(all(feature = "std", target_arch = "x86_64"))]
+        if self.kernel != Kernel::Portable {
+            // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
+            let (t, object) = unsafe {
+                match self.kernel {
+                    Kernel::Avx512 => avx512::nearest_hit(self, ray),
+                    _ => avx2::nearest_hit(self, ray),
+                }
+            };
+            return (object != u32::MAX).then_some(Hit { t, object });
+        }
+        self.nearest_hit_counted(ray, &mut ())
     }
 
     /// Whether `ray` meets any triangle in its range.
     #[inline]
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        self.view().any_hit(ray)
+        #[cfg(all(feature = "std", target_arch = "x86_64"))]
+        if self.kernel != Kernel::Portable {
+            // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
+            return unsafe {
+                match self.kernel {
+                    Kernel::Avx512 => avx512::any_hit(self, ray),
+                    _ => avx2::any_hit(self, ray),
+                }
+            };
+        }
+        self.any_hit_counted(ray, &mut ())
+    }
+
+    /// [`nearest_hit`](Self::nearest_hit) of every ray, into as many `hits`; [`Hit::MISS`] for a ray that meets nothing.
+    ///
+    /// # Panics
+    /// If `rays` and `hits` are not equally many.
+    pub fn nearest_hits(&self, rays: &[Ray], hits: &mut [Hit], coherence: Coherence) {
+        assert_eq!(rays.len(), hits.len(), "a hit for every ray");
+        #[cfg(all(feature = "std", target_arch = "x86_64"))]
+        if self.kernel == Kernel::Avx512 && coherence == Coherence::Coherent {
+            // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
+            return unsafe { avx512::nearest_hits(self, rays, hits) };
+        }
+        let _ = coherence;
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.nearest_hit(ray).unwrap_or(Hit::MISS);
+        }
+    }
+
+    /// [`any_hit`](Self::any_hit) of every ray, into as many `hits`.
+    ///
+    /// # Panics
+    /// If `rays` and `hits` are not equally many.
+    pub fn any_hits(&self, rays: &[Ray], hits: &mut [bool], coherence: Coherence) {
+        assert_eq!(rays.len(), hits.len(), "an answer for every ray");
+        #[cfg(all(feature = "std", target_arch = "x86_64"))]
+        if self.kernel == Kernel::Avx512 && coherence == Coherence::Coherent {
+            // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
+            return unsafe { avx512::any_hits(self, rays, hits) };
+        }
+        let _ = coherence;
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.any_hit(ray);
+        }
+    }
+
+    /// The same layout traced by another kernel; `None` if this processor cannot run it. Layouts of trees far deeper
+    /// than wide are traced by [`Kernel::Portable`] whatever is asked for.
+    pub fn with_kernel(mut self, kernel: Kernel) -> Option<Self> {
+        if !kernel.is_available() {
+            return None;
+        }
+        self.choose(kernel);
+        Some(self)
+    }
+
+    fn choose(&mut self, available: Kernel) {
+        self.kernel = if self.stack_need <= STACK { available } else { Kernel::Portable };
+    }
+
+    /// [`nearest_hit`](Self::nearest_hit) by [`Kernel::Portable`], with its tests counted: eight boxes for every node and
+    /// eight objects for every block of triangles, whether these have so many or not. The same counts on every machine.
+    #[inline(never)]
+    pub fn nearest_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
+        walk::<false>(self, ray, counter)
+    }
+
+    /// [`any_hit`](Self::any_hit) by [`Kernel::Portable`], with its tests counted likewise.
+    #[inline(never)]
+    pub fn any_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> bool {
+        walk::<true>(self, ray, counter).is_some()
     }
 
     /// Bytes of memory that nodes and triangles take.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..])
-    }
-}
-
-impl WideView<'_> {
-    /// As [`WideBvh::nearest_hit`].
-    #[inline]
-    pub fn nearest_hit(self, ray: &Ray) -> Option<Hit> {
-        #[cfg(all(feature = "std", target_arch = "x86_64"))]
-        if let Some(avx2) = avx2::Avx2::detect() {
-            return avx2.nearest_hit(self, ray);
-        }
-        self.nearest_hit_portable(ray)
-    }
-
-    /// As [`WideBvh::any_hit`].
-    #[inline]
-    pub fn any_hit(self, ray: &Ray) -> bool {
-        #[cfg(all(feature = "std", target_arch = "x86_64"))]
-        if let Some(avx2) = avx2::Avx2::detect() {
-            return avx2.any_hit(self, ray);
-        }
-        self.any_hit_portable(ray)
-    }
-
-    /// [`nearest_hit`](Self::nearest_hit) without instructions that the processor may lack.
-    pub fn nearest_hit_portable(self, ray: &Ray) -> Option<Hit> {
-        self.nearest_hit_counted(ray, &mut ())
-    }
-
-    /// [`any_hit`](Self::any_hit) without instructions that the processor may lack.
-    pub fn any_hit_portable(self, ray: &Ray) -> bool {
-        self.any_hit_counted(ray, &mut ())
-    }
-
-    /// [`nearest_hit_portable`](Self::nearest_hit_portable) with its tests counted: eight boxes for every node and four
-    /// objects for every block of triangles, whether these have so many or not. The same counts on every machine.
-    pub fn nearest_hit_counted(self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
-        walk::<Portable, false>(self, ray, counter)
-    }
-
-    /// [`any_hit_portable`](Self::any_hit_portable) with its tests counted likewise.
-    pub fn any_hit_counted(self, ray: &Ray, counter: &mut impl Counter) -> bool {
-        walk::<Portable, true>(self, ray, counter).is_some()
     }
 }

@@ -54,12 +54,14 @@ impl Child {
     pub(crate) fn index(self) -> usize {
         (self.0 & !Self::LEAF) as usize
     }
-}
 
-/// A child that the ray enters at `entry`, to be visited later.
-#[derive(Clone, Copy)]
-#[repr(C)]
-pub(crate) struct Pending {
-    pub(crate) entry: f32,
-    pub(crate) child: Child,
+    #[inline(always)]
+    pub(crate) fn bits(self) -> u32 {
+        self.0
+    }
+
+    #[inline(always)]
+    pub(crate) fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
 }

@@ -1,23 +1,59 @@
-//! The eight boxes of a node tested by portable code.
+//! The portable kernel: traversal of the wide layout by safe code for any machine, which can count its tests.
 
-use super::node::{Child, Pending, WideNode};
-use super::traverse::{Expand, WideRay};
-use crate::Slabs;
+use super::layout::WideBvh;
+use super::node::{Child, WideNode};
+use super::triangles::TriangleBlock;
+use crate::slabs::margin;
+use crate::stack::Stack;
+use crate::{Aabb, Counter, Hit, Ray, Shear, Slabs};
 
-/// Code for any machine.
-pub(crate) struct Portable;
+/// A child that the ray enters at `entry`, to be visited later.
+#[derive(Clone, Copy)]
+struct Pending {
+    entry: f32,
+    child: Child,
+}
 
-impl Expand for Portable {
+/// A ray prepared for wide nodes: the numbers of [`Slabs`].
+struct WideRay {
+    /// Which planes of a node the ray meets first, by axis, and which last.
+    near: [usize; 3],
+    far: [usize; 3],
+    /// The margins of [`Slabs`] for those planes.
+    near_origin: [f32; 3],
+    far_origin: [f32; 3],
+    inverse: [f32; 3],
+    t_min: f32,
+}
+
+impl WideRay {
     #[inline(always)]
-    fn expand(node: &WideNode, ray: &WideRay, t_max: f32, others: &mut [Pending; 8]) -> Option<(Child, usize)> {
-        let (mut entry, mut exit) = ([ray.t_min; 8], [f32::INFINITY; 8]);
+    fn new(ray: &Ray, bounds: &Aabb) -> Self {
+        let (origin, inverse) = (ray.origin(), ray.inverse_direction());
+        let margin = margin(ray, bounds).copysign(inverse);
+        let backwards = inverse.to_array().map(|x| (x.to_bits() >> 31) as usize);
+        Self {
+            near: [3 * backwards[0], 1 + 3 * backwards[1], 2 + 3 * backwards[2]],
+            far: [3 - 3 * backwards[0], 4 - 3 * backwards[1], 5 - 3 * backwards[2]],
+            near_origin: (origin + margin).to_array(),
+            far_origin: (origin - margin).to_array(),
+            inverse: inverse.to_array(),
+            t_min: ray.t_min(),
+        }
+    }
+
+    /// The nearest of the children that the ray enters before `t_max`, and the number of the others, which are written
+    /// to `others`, the nearest last. `None` if it enters none.
+    #[inline(always)]
+    fn enter(&self, node: &WideNode, t_max: f32, others: &mut [Pending; 8]) -> Option<(Child, usize)> {
+        let (mut entry, mut exit) = ([self.t_min; 8], [f32::INFINITY; 8]);
         for axis in 0..3 {
-            let (near, far) = (&node.planes[ray.near[axis]], &node.planes[ray.far[axis]]);
+            let (near, far) = (&node.planes[self.near[axis]], &node.planes[self.far[axis]]);
             for lane in 0..8 {
-                let t = (near[lane] - ray.near_origin[axis]) * ray.inverse[axis];
+                let t = (near[lane] - self.near_origin[axis]) * self.inverse[axis];
                 entry[lane] = if t > entry[lane] { t } else { entry[lane] };
                 // In unused lanes NaN, and it stays so.
-                let t = (far[lane] - ray.far_origin[axis]) * ray.inverse[axis];
+                let t = (far[lane] - self.far_origin[axis]) * self.inverse[axis];
                 exit[lane] = if exit[lane] < t { exit[lane] } else { t };
             }
         }
@@ -36,5 +72,54 @@ impl Expand for Portable {
         }
         let last = count.checked_sub(1)?;
         Some((others[last].child, last))
+    }
+}
+
+/// The nearest hit, or with `ANY` the first one found.
+pub(crate) fn walk<const ANY: bool>(wide: &WideBvh, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
+    let mut child = wide.root?;
+    let (shear, wide_ray) = (Shear::new(ray), WideRay::new(ray, &wide.bounds));
+    let mut nearest: Option<Hit> = None;
+    let mut t_max = ray.t_max();
+    let mut stack = Stack::<Pending, 32>::new(Pending { entry: 0.0, child: Child::node(0) });
+    loop {
+        if child.is_node() {
+            counter.boxes(WideNode::LANES);
+            if let Some((nearest, others)) = wide_ray.enter(&wide.nodes[child.index()], t_max, stack.room()) {
+                stack.grow(others);
+                child = nearest;
+                continue;
+            }
+        } else {
+            for block in &wide.blocks[child.index()..] {
+                (0..TriangleBlock::LANES).for_each(|_| counter.object());
+                let mut lanes = block.candidates(&shear);
+                while lanes != 0 {
+                    let lane = lanes.trailing_zeros() as usize;
+                    lanes &= lanes - 1;
+                    if let Some((object, triangle)) = block.triangle(lane)
+                        && let Some(t) = triangle.decide(&shear, t_max)
+                    {
+                        let hit = Hit { t, object };
+                        if ANY {
+                            return Some(hit);
+                        }
+                        if nearest.is_none_or(|nearest| hit.precedes(&nearest)) {
+                            nearest = Some(hit);
+                            t_max = t;
+                        }
+                    }
+                }
+                if block.is_last() {
+                    break;
+                }
+            }
+        }
+        child = loop {
+            let Some(pending) = stack.pop() else { return nearest };
+            if pending.entry <= t_max {
+                break pending.child;
+            }
+        };
     }
 }

@@ -1,0 +1,157 @@
+//! The AVX-512 kernel: eight boxes at once, entered children compressed into place.
+
+use super::box_ray::BoxRay;
+use super::layout::WideBvh;
+use super::node::{Child, WideNode};
+use super::packet::{Packet, RAYS};
+use super::x86::{Instructions, Pending, any, nearest};
+use crate::{Hit, Ray};
+use core::arch::x86_64::*;
+
+pub(crate) struct Avx512;
+
+/// Whether the processor has what the kernel needs.
+pub(crate) fn is_available() -> bool {
+    super::avx2::is_available()
+        && is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512vl")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512bw")
+}
+
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+pub(crate) unsafe fn nearest_hit(wide: &WideBvh, ray: &Ray) -> (f32, u32) {
+    // SAFETY: the caller's promises.
+    unsafe { nearest::<Avx512>(wide, ray) }
+}
+
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+pub(crate) unsafe fn any_hit(wide: &WideBvh, ray: &Ray) -> bool {
+    // SAFETY: the caller's promises.
+    unsafe { any::<Avx512>(wide, ray) }
+}
+
+/// The nearest hits of all rays, in packets where the rays are coherent.
+///
+/// # Safety
+/// As [`nearest`]; `rays` are as many as `hits`.
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+pub(crate) unsafe fn nearest_hits(wide: &WideBvh, rays: &[Ray], hits: &mut [Hit]) {
+    // SAFETY: the caller's promises.
+    unsafe {
+        let (packets, rest) = rays.as_chunks::<RAYS>();
+        for (rays, hits) in packets.iter().zip(hits.chunks_exact_mut(RAYS)) {
+            if let Some(mut packet) = Packet::new(rays, wide.largest) {
+                packet.trace::<false>(wide);
+                let (t, object) = packet.hits();
+                for (i, hit) in hits.iter_mut().enumerate() {
+                    *hit = if object[i] == u32::MAX { Hit::MISS } else { Hit { t: t[i], object: object[i] } };
+                }
+            } else {
+                for (ray, hit) in rays.iter().zip(hits) {
+                    let (t, object) = nearest_hit(wide, ray);
+                    *hit = if object == u32::MAX { Hit::MISS } else { Hit { t, object } };
+                }
+            }
+        }
+        for (ray, hit) in rest.iter().zip(&mut hits[rays.len() - rest.len()..]) {
+            let (t, object) = nearest_hit(wide, ray);
+            *hit = if object == u32::MAX { Hit::MISS } else { Hit { t, object } };
+        }
+    }
+}
+
+/// Whether each ray meets anything, in packets where the rays are coherent.
+///
+/// # Safety
+/// As [`nearest_hits`].
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+pub(crate) unsafe fn any_hits(wide: &WideBvh, rays: &[Ray], hits: &mut [bool]) {
+    // SAFETY: the caller's promises.
+    unsafe {
+        let (packets, rest) = rays.as_chunks::<RAYS>();
+        for (rays, hits) in packets.iter().zip(hits.chunks_exact_mut(RAYS)) {
+            if let Some(mut packet) = Packet::new(rays, wide.largest) {
+                packet.trace::<true>(wide);
+                let (_, object) = packet.hits();
+                (0..RAYS).for_each(|i| hits[i] = object[i] != u32::MAX);
+            } else {
+                rays.iter().zip(hits).for_each(|(ray, hit)| *hit = any_hit(wide, ray));
+            }
+        }
+        for (ray, hit) in rest.iter().zip(&mut hits[rays.len() - rest.len()..]) {
+            *hit = any_hit(wide, ray);
+        }
+    }
+}
+
+impl Instructions for Avx512 {
+    #[inline(always)]
+    unsafe fn boxes(node: &WideNode, ray: &BoxRay, t_min: f32, t_max: f32) -> (__m256, u32) {
+        // SAFETY: the caller's promises; loads are of whole arrays of 32 bytes.
+        unsafe {
+            let (entry, exit) = super::x86::interval(node, ray, t_min, t_max);
+            (entry, u32::from(_mm256_cmp_ps_mask::<_CMP_LE_OQ>(entry, exit)))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn sort(node: &WideNode, entry: __m256, mask: u32, stack: *mut Pending) -> Child {
+        // SAFETY: the caller's promises; the stack has room for eight entries.
+        unsafe {
+            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let keys = _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(entry)), lanes);
+            let children = _mm256_load_si256(node.children.as_ptr().cast());
+            // The nearest child first: the rest of the work is not on the way to it.
+            let least = _mm256_mask_mov_epi32(_mm256_set1_epi32(-1), mask as u8, keys);
+            let least = _mm_min_epu32(_mm256_castsi256_si128(least), _mm256_extracti128_si256::<1>(least));
+            let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0x4e>(least));
+            let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0xb1>(least));
+            let nearest = *node.children.get_unchecked((_mm_cvtsi128_si32(least) & 7) as usize);
+
+            let keys = _mm256_maskz_compress_epi32(mask as u8, keys);
+            if mask.count_ones() <= 4 {
+                // Descending, zeros last: three stages of two comparisons.
+                let x = _mm256_castsi256_si128(keys);
+                let s = _mm_shuffle_epi32::<0b10_11_00_01>(x);
+                let x = _mm_blend_epi32::<0b1010>(_mm_max_epu32(x, s), _mm_min_epu32(x, s));
+                let s = _mm_shuffle_epi32::<0b01_00_11_10>(x);
+                let x = _mm_blend_epi32::<0b1100>(_mm_max_epu32(x, s), _mm_min_epu32(x, s));
+                let s = _mm_shuffle_epi32::<0b11_01_10_00>(x);
+                let x = _mm_blend_epi32::<0b0100>(_mm_max_epu32(x, s), _mm_min_epu32(x, s));
+                let order = _mm_and_si128(x, _mm_set1_epi32(7));
+                let sorted = _mm256_permutevar8x32_epi32(children, _mm256_castsi128_si256(order));
+                let sorted = _mm256_castsi256_si128(sorted);
+                _mm_storeu_si128(stack.cast(), _mm_unpacklo_epi32(sorted, x));
+                _mm_storeu_si128(stack.add(2).cast(), _mm_unpackhi_epi32(sorted, x));
+            } else {
+                let n = mask.count_ones() as usize;
+                let keys: [u32; 8] = core::mem::transmute(keys);
+                let mut sorted = keys;
+                for i in 1..n {
+                    let key = keys[i];
+                    let mut at = i;
+                    while at > 0 && sorted[at - 1] < key {
+                        sorted[at] = sorted[at - 1];
+                        at -= 1;
+                    }
+                    sorted[at] = key;
+                }
+                for (i, key) in sorted.into_iter().enumerate().take(n) {
+                    let child = node.children.get_unchecked((key & 7) as usize).bits();
+                    stack.add(i).write(u64::from(key) << 32 | u64::from(child));
+                }
+            }
+            nearest
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn compress(node: &WideNode, mask: u32, stack: *mut Child) {
+        // SAFETY: the caller's promises; the stack has room for eight entries.
+        unsafe {
+            let children = _mm256_load_si256(node.children.as_ptr().cast());
+            _mm256_storeu_si256(stack.cast(), _mm256_maskz_compress_epi32(mask as u8, children));
+        }
+    }
+}

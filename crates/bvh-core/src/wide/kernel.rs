@@ -1,0 +1,35 @@
+//! The implementations of the wide layout's traversal, and which of them this processor can run.
+
+/// An implementation of the traversal of a [`WideBvh`](crate::WideBvh). All give the same answers, bit by bit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kernel {
+    /// Code for any machine; counts its tests on request.
+    Portable,
+    /// x86-64 with AVX2 and FMA. Needs the feature `std`, which detects them.
+    Avx2,
+    /// x86-64 with AVX-512 F, VL, DQ and BW. Needs the feature `std`, too.
+    Avx512,
+}
+
+impl Kernel {
+    /// All kernels, the fastest first.
+    pub const ALL: [Self; 3] = [Self::Avx512, Self::Avx2, Self::Portable];
+
+    /// Whether this processor can run the kernel.
+    pub fn is_available(self) -> bool {
+        match self {
+            Self::Portable => true,
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx2 => super::avx2::is_available(),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx512 => super::avx512::is_available(),
+            #[allow(unreachable_patterns)]
+            _ => false,
+        }
+    }
+
+    /// The fastest kernel that this processor can run.
+    pub fn best() -> Self {
+        Self::ALL.into_iter().find(|kernel| kernel.is_available()).unwrap_or(Self::Portable)
+    }
+}

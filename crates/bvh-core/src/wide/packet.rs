@@ -1,0 +1,426 @@
+//! Packets of sixteen coherent rays, one per lane of AVX-512: nodes are culled for all rays at once by interval
+//! arithmetic, boxes and triangles tested against sixteen rays each.
+
+use super::avx512::Avx512;
+use super::layout::WideBvh;
+use super::node::WideNode;
+use super::triangles::TriangleBlock;
+use super::x86::{Instructions, Pending, STACK};
+use super::{box_ray::BoxRay, node::Child};
+use crate::{Ray, Slabs};
+use core::arch::x86_64::*;
+use core::mem::MaybeUninit;
+
+/// Rays of a packet.
+pub(crate) const RAYS: usize = 16;
+
+/// Sixteen rays with the same signs of direction and the same largest component of it.
+pub(crate) struct Packet {
+    /// Indices of the planes that the rays meet first, by axis, and of those opposite.
+    near: [usize; 3],
+    far: [usize; 3],
+    /// As in [`BoxRay`], a ray per lane.
+    near_scale: [__m512; 3],
+    near_shift: [__m512; 3],
+    far_scale: [__m512; 3],
+    far_shift: [__m512; 3],
+    bounds: [AxisBounds; 3],
+    /// The axes of the shear; what follows is in their order.
+    axes: [usize; 3],
+    origin: [__m512; 3],
+    inverse: [__m512; 3],
+    slope: [__m512; 2],
+    depth: __m512,
+    t_min: __m512,
+    least_t_min: f32,
+    /// The nearest hits so far, or the ends of the rays.
+    t: __m512,
+    object: __m512i,
+}
+
+/// What interval arithmetic knows of sixteen rays along one axis: the origins with the margin of near and of far planes
+/// that make the distance least and greatest, and the least and the greatest scale.
+#[derive(Clone, Copy)]
+struct AxisBounds {
+    near_origin: f32,
+    far_origin: f32,
+    near_scale: [f32; 2],
+    far_scale: [f32; 2],
+}
+
+impl Packet {
+    /// Prepares sixteen rays; `None` if they are not coherent, or not all fit the bounds of [`BoxRay`].
+    ///
+    /// # Safety
+    /// The caller is compiled with AVX-512 F, VL, DQ and BW and with FMA.
+    #[inline(always)]
+    pub(crate) unsafe fn new(rays: &[Ray; RAYS], largest: f32) -> Option<Self> {
+        // SAFETY: rays are three vectors of four lanes; the rest is the caller's promise.
+        unsafe {
+            let [ox, oy, oz, t_min] = transpose(rays, 0);
+            let [dx, dy, dz, t_max] = transpose(rays, 1);
+            let [ix, iy, iz, least] = transpose(rays, 2);
+            let backwards = [_mm512_movepi32_mask(cast(ix)), _mm512_movepi32_mask(cast(iy)), _mm512_movepi32_mask(cast(iz))];
+            let coherent = |mask: u16| mask == 0 || mask == u16::MAX;
+            let (sx, sy, sz) = (_mm512_abs_ps(dx), _mm512_abs_ps(dy), _mm512_abs_ps(dz));
+            let second = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(sy, sx);
+            let third = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(sz, _mm512_max_ps(sx, sy));
+            let (origin, inverse, direction) = ([ox, oy, oz], [ix, iy, iz], [dx, dy, dz]);
+            let one_axis = coherent(third) && (third != 0 || coherent(second));
+            if !(coherent(backwards[0]) && coherent(backwards[1]) && coherent(backwards[2]) && one_axis) {
+                return None;
+            }
+
+            let size = _mm512_max_ps(_mm512_max_ps(_mm512_abs_ps(ox), _mm512_abs_ps(oy)), _mm512_abs_ps(oz));
+            let size = _mm512_add_ps(size, _mm512_set1_ps(largest));
+            let limit = _mm512_mul_ps(least, _mm512_set1_ps(BoxRay::CLAMP));
+            let in_range = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(size, _mm512_set1_ps(BoxRay::MOST_SIZE))
+                & _mm512_cmp_ps_mask::<_CMP_GE_OQ>(size, _mm512_set1_ps(BoxRay::LEAST_SIZE))
+                & _mm512_cmp_ps_mask::<_CMP_LT_OQ>(_mm512_mul_ps(size, limit), _mm512_set1_ps(BoxRay::MOST_SHIFT));
+            if in_range != u16::MAX {
+                return None;
+            }
+            let margin = _mm512_mul_ps(size, _mm512_set1_ps(BoxRay::MARGIN));
+            let zero = _mm512_setzero_ps();
+            let tiny = _mm512_set1_ps(BoxRay::UNDERFLOW);
+            let mut packet = Self {
+                near: [0; 3],
+                far: [0; 3],
+                near_scale: [zero; 3],
+                near_shift: [zero; 3],
+                far_scale: [zero; 3],
+                far_shift: [zero; 3],
+                bounds: [AxisBounds { near_origin: 0.0, far_origin: 0.0, near_scale: [0.0; 2], far_scale: [0.0; 2] }; 3],
+                axes: [0; 3],
+                origin: [zero; 3],
+                inverse: [zero; 3],
+                slope: [zero; 2],
+                depth: zero,
+                t_min,
+                least_t_min: _mm512_reduce_min_ps(t_min),
+                t: t_max,
+                object: _mm512_set1_epi32(-1),
+            };
+            for axis in 0..3 {
+                let scale = _mm512_min_ps(_mm512_max_ps(inverse[axis], _mm512_sub_ps(zero, limit)), limit);
+                let (near_scale, far_scale) = (
+                    _mm512_mul_ps(scale, _mm512_set1_ps(BoxRay::NEAR)),
+                    _mm512_mul_ps(scale, _mm512_set1_ps(BoxRay::FAR)),
+                );
+                let is_backwards = backwards[axis] != 0;
+                let margin = if is_backwards { _mm512_sub_ps(zero, margin) } else { margin };
+                let (near_origin, far_origin) = (_mm512_add_ps(origin[axis], margin), _mm512_sub_ps(origin[axis], margin));
+                packet.near_scale[axis] = near_scale;
+                packet.far_scale[axis] = far_scale;
+                packet.near_shift[axis] = _mm512_fnmsub_ps(near_origin, near_scale, tiny);
+                packet.far_shift[axis] = _mm512_fnmadd_ps(far_origin, far_scale, tiny);
+                let plane = axis + 3 * usize::from(is_backwards);
+                packet.near[axis] = plane;
+                packet.far[axis] = 2 * axis + 3 - plane;
+                // Distances grow with the plane minus the origin if the scale is positive, else the other way.
+                let (least_far, greatest_near) = if is_backwards {
+                    (_mm512_reduce_max_ps(far_origin), _mm512_reduce_min_ps(near_origin))
+                } else {
+                    (_mm512_reduce_min_ps(far_origin), _mm512_reduce_max_ps(near_origin))
+                };
+                packet.bounds[axis] = AxisBounds {
+                    near_origin: greatest_near,
+                    far_origin: least_far,
+                    near_scale: [_mm512_reduce_min_ps(near_scale), _mm512_reduce_max_ps(near_scale)],
+                    far_scale: [_mm512_reduce_min_ps(far_scale), _mm512_reduce_max_ps(far_scale)],
+                };
+            }
+            let kz = if third != 0 { 2 } else { usize::from(second != 0) };
+            packet.axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][kz];
+            let [kx, ky, kz] = packet.axes;
+            packet.origin = [origin[kx], origin[ky], origin[kz]];
+            packet.inverse = [inverse[kx], inverse[ky], inverse[kz]];
+            packet.slope = [_mm512_div_ps(direction[kx], direction[kz]), _mm512_div_ps(direction[ky], direction[kz])];
+            packet.depth = direction[kz];
+            Some(packet)
+        }
+    }
+
+    /// Traces the packet. With `ANY` a ray ends at its first hit, which need not be the nearest.
+    ///
+    /// # Safety
+    /// As [`nearest`](super::x86::nearest), with AVX-512.
+    #[inline(always)]
+    pub(crate) unsafe fn trace<const ANY: bool>(&mut self, wide: &WideBvh) {
+        let Some(root) = wide.root else { return };
+        // SAFETY: the caller's promises.
+        unsafe {
+            let (nodes, blocks) = (wide.nodes.as_ptr(), wide.blocks.as_ptr());
+            let mut stack = MaybeUninit::<[Pending; STACK + 8]>::uninit();
+            let base = stack.as_mut_ptr().cast::<Pending>();
+            let mut top = base;
+            let mut farthest = _mm512_reduce_max_ps(self.t);
+            let mut child = root;
+            loop {
+                while child.is_node() {
+                    let node = &*nodes.add(child.index());
+                    let (entry, mut mask) = self.cull(node, farthest);
+                    let mut others = mask;
+                    while others != 0 {
+                        let lane = others.trailing_zeros() as usize;
+                        if !self.enters(node, lane) {
+                            mask &= !(1 << lane);
+                        }
+                        others &= others - 1;
+                    }
+                    if mask & mask.wrapping_sub(1) == 0 {
+                        if mask == 0 {
+                            break;
+                        }
+                        child = *node.children.get_unchecked(mask.trailing_zeros() as usize);
+                        continue;
+                    }
+                    child = Avx512::sort(node, entry, mask, top);
+                    top = top.add(mask.count_ones() as usize - 1);
+                }
+                if !child.is_node() {
+                    let mut block = blocks.add(child.index());
+                    let mut is_hit = false;
+                    loop {
+                        for lane in 0..TriangleBlock::LANES {
+                            let candidates = self.candidates(&*block, lane);
+                            if candidates != 0 {
+                                is_hit |= self.decide::<ANY>(&*block, lane, candidates);
+                            }
+                        }
+                        if (*block).is_last() {
+                            break;
+                        }
+                        block = block.add(1);
+                    }
+                    if is_hit {
+                        farthest = _mm512_reduce_max_ps(self.t);
+                        if ANY && farthest < 0.0 {
+                            return;
+                        }
+                    }
+                }
+                child = loop {
+                    if top == base {
+                        return;
+                    }
+                    top = top.sub(1);
+                    let pending = *top;
+                    if (pending >> 32) as u32 <= farthest.to_bits() | 7 {
+                        break Child::from_bits(pending as u32);
+                    }
+                };
+            }
+        }
+    }
+
+    /// The least distance at which any ray may enter each child, and a bit per child that some ray may enter before
+    /// `farthest`: the bounds of `(plane − origin) · scale` over all rays. Conservative by the proof of [`BoxRay`], whose
+    /// first step is not needed here, since nothing is shifted.
+    #[inline(always)]
+    unsafe fn cull(&self, node: &WideNode, farthest: f32) -> (__m256, u32) {
+        // SAFETY: the caller's promises; loads are of whole, aligned planes of 32 bytes.
+        unsafe {
+            let tiny = _mm256_set1_ps(BoxRay::UNDERFLOW);
+            let (mut entry, mut exit) = (_mm256_set1_ps(self.least_t_min), _mm256_set1_ps(farthest));
+            for axis in 0..3 {
+                let bounds = &self.bounds[axis];
+                let near = _mm256_load_ps(node.planes.as_ptr().add(self.near[axis]).cast());
+                let near = _mm256_sub_ps(near, _mm256_set1_ps(bounds.near_origin));
+                let one = _mm256_fmsub_ps(near, _mm256_set1_ps(bounds.near_scale[0]), tiny);
+                let two = _mm256_fmsub_ps(near, _mm256_set1_ps(bounds.near_scale[1]), tiny);
+                // Of two zeros the instruction gives the second operand: entries are never −0.
+                entry = _mm256_max_ps(_mm256_min_ps(one, two), entry);
+                let far = _mm256_load_ps(node.planes.as_ptr().add(self.far[axis]).cast());
+                let far = _mm256_sub_ps(far, _mm256_set1_ps(bounds.far_origin));
+                let one = _mm256_fmadd_ps(far, _mm256_set1_ps(bounds.far_scale[0]), tiny);
+                let two = _mm256_fmadd_ps(far, _mm256_set1_ps(bounds.far_scale[1]), tiny);
+                // Of a NaN and a number the instruction gives the second operand: unused lanes stay NaN.
+                exit = _mm256_min_ps(exit, _mm256_max_ps(one, two));
+            }
+            (entry, u32::from(_mm256_cmp_ps_mask::<_CMP_LE_OQ>(entry, exit)))
+        }
+    }
+
+    /// Whether any ray enters the child in a lane before its nearest hit.
+    #[inline(always)]
+    unsafe fn enters(&self, node: &WideNode, lane: usize) -> bool {
+        // SAFETY: the caller's promises; planes are six, lanes eight.
+        unsafe {
+            let planes = node.planes.as_ptr().cast::<f32>().add(lane);
+            let (mut entry, mut exit) = (self.t_min, self.t);
+            for axis in 0..3 {
+                let near = _mm512_set1_ps(*planes.add(8 * self.near[axis]));
+                entry = _mm512_max_ps(entry, _mm512_fmadd_ps(near, self.near_scale[axis], self.near_shift[axis]));
+                let far = _mm512_set1_ps(*planes.add(8 * self.far[axis]));
+                exit = _mm512_min_ps(exit, _mm512_fmadd_ps(far, self.far_scale[axis], self.far_shift[axis]));
+            }
+            _mm512_cmp_ps_mask::<_CMP_LE_OQ>(entry, exit) != 0
+        }
+    }
+
+    /// One corner relative to the rays: along x, y and z of the shear.
+    #[inline(always)]
+    unsafe fn apply(&self, corner: &[[f32; TriangleBlock::LANES]; 3], lane: usize) -> [__m512; 3] {
+        // SAFETY: the caller's promises; axes are below 3.
+        unsafe {
+            let lanes = corner.as_ptr().cast::<f32>().add(lane);
+            let coordinate = |axis: usize| *lanes.add(axis * TriangleBlock::LANES);
+            let x = _mm512_sub_ps(_mm512_set1_ps(coordinate(self.axes[0])), self.origin[0]);
+            let y = _mm512_sub_ps(_mm512_set1_ps(coordinate(self.axes[1])), self.origin[1]);
+            let z = _mm512_sub_ps(_mm512_set1_ps(coordinate(self.axes[2])), self.origin[2]);
+            let (x_shift, y_shift) = (_mm512_mul_ps(self.slope[0], z), _mm512_mul_ps(self.slope[1], z));
+            [_mm512_sub_ps(x, x_shift), _mm512_sub_ps(y, y_shift), z]
+        }
+    }
+
+    /// A bit per ray whose line may meet the triangle in a lane, by the sides of its edges in f32.
+    #[inline(always)]
+    unsafe fn candidates(&self, block: &TriangleBlock, lane: usize) -> u16 {
+        // SAFETY: the caller's promises.
+        unsafe {
+            let [ax, ay, _] = self.apply(&block.corners[0], lane);
+            let [bx, by, _] = self.apply(&block.corners[1], lane);
+            let [cx, cy, _] = self.apply(&block.corners[2], lane);
+            let u = _mm512_sub_ps(_mm512_mul_ps(cx, by), _mm512_mul_ps(cy, bx));
+            let v = _mm512_sub_ps(_mm512_mul_ps(ax, cy), _mm512_mul_ps(ay, cx));
+            let w = _mm512_sub_ps(_mm512_mul_ps(bx, ay), _mm512_mul_ps(by, ax));
+            let zero = _mm512_setzero_ps();
+            let negative = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(_mm512_min_ps(_mm512_min_ps(u, v), w), zero);
+            let positive = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(_mm512_max_ps(_mm512_max_ps(u, v), w), zero);
+            !(negative & positive)
+        }
+    }
+
+    /// Decides exactly, as [`Triangle::intersect`](crate::Triangle::intersect), which rays hit the triangle in a lane, and
+    /// keeps those hits that precede the rays' nearest; whether there are any.
+    #[inline(always)]
+    unsafe fn decide<const ANY: bool>(&mut self, block: &TriangleBlock, lane: usize, candidates: u16) -> bool {
+        // SAFETY: the caller's promises.
+        unsafe {
+            let a = self.apply(&block.corners[0], lane);
+            let b = self.apply(&block.corners[1], lane);
+            let c = self.apply(&block.corners[2], lane);
+            let (low, low_t) = self.decide_half::<0>(&a, &b, &c);
+            let (high, high_t) = self.decide_half::<1>(&a, &b, &c);
+            let inside = candidates & (u16::from(low) | u16::from(high) << 8);
+            if inside == 0 {
+                return false;
+            }
+            let t = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low_t), high_t);
+
+            // The interval of the triangle's own box: the operations of `Slabs`.
+            let mut reach = _mm512_setzero_ps();
+            let mut corners = [[_mm512_setzero_ps(); 2]; 3];
+            for (i, &axis) in self.axes.iter().enumerate() {
+                let (a, b) = (block.corners[0][axis][lane], block.corners[1][axis][lane]);
+                let c = block.corners[2][axis][lane];
+                let (min, max) = (_mm512_set1_ps(a.min(b).min(c)), _mm512_set1_ps(a.max(b).max(c)));
+                let low = _mm512_abs_ps(_mm512_sub_ps(min, self.origin[i]));
+                let high = _mm512_abs_ps(_mm512_sub_ps(max, self.origin[i]));
+                reach = _mm512_max_ps(reach, _mm512_max_ps(low, high));
+                corners[i] = [min, max];
+            }
+            let reach = _mm512_mul_ps(reach, _mm512_set1_ps(Slabs::MARGIN));
+            let (mut entry, mut exit) = (self.t_min, _mm512_set1_ps(f32::INFINITY));
+            for (i, [min, max]) in corners.into_iter().enumerate() {
+                let own = _mm512_mul_ps(_mm512_abs_ps(self.origin[i]), _mm512_set1_ps(f32::EPSILON));
+                let margin = _mm512_add_ps(_mm512_add_ps(reach, own), _mm512_set1_ps(f32::MIN_POSITIVE));
+                let low = _mm512_mul_ps(_mm512_sub_ps(min, _mm512_add_ps(self.origin[i], margin)), self.inverse[i]);
+                let high = _mm512_mul_ps(_mm512_sub_ps(max, _mm512_sub_ps(self.origin[i], margin)), self.inverse[i]);
+                entry = _mm512_max_ps(entry, _mm512_min_ps(low, high));
+                exit = _mm512_min_ps(exit, _mm512_max_ps(low, high));
+            }
+            let exit = _mm512_mul_ps(exit, _mm512_set1_ps(Slabs::FAR));
+            let moved = _mm512_add_ps(_mm512_max_ps(_mm512_min_ps(t, exit), entry), _mm512_setzero_ps());
+            let inside = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(inside, entry, exit);
+            if ANY {
+                let hits = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(inside, moved, self.t);
+                // A ray that has its answer ends before it begins.
+                self.t = _mm512_mask_mov_ps(self.t, hits, _mm512_set1_ps(-1.0));
+                self.object = _mm512_mask_mov_epi32(self.object, hits, _mm512_setzero_si512());
+                return hits != 0;
+            }
+            let object = _mm512_set1_epi32(block.id(lane) as i32);
+            let nearer = _mm512_mask_cmp_ps_mask::<_CMP_LT_OQ>(inside, moved, self.t);
+            let equal = _mm512_mask_cmp_ps_mask::<_CMP_EQ_OQ>(inside, moved, self.t);
+            let hits = nearer | _mm512_mask_cmplt_epu32_mask(equal, object, self.object);
+            self.t = _mm512_mask_mov_ps(self.t, hits, moved);
+            self.object = _mm512_mask_mov_epi32(self.object, hits, object);
+            hits != 0
+        }
+    }
+
+    /// Eight of the rays against one triangle in f64: which have it in front of them and inside its edges, and where.
+    #[inline(always)]
+    unsafe fn decide_half<const HALF: i32>(&self, a: &[__m512; 3], b: &[__m512; 3], c: &[__m512; 3]) -> (u8, __m256) {
+        // SAFETY: the caller's promises.
+        unsafe {
+            let (ax, ay, az) = (double::<HALF>(a[0]), double::<HALF>(a[1]), double::<HALF>(a[2]));
+            let (bx, by, bz) = (double::<HALF>(b[0]), double::<HALF>(b[1]), double::<HALF>(b[2]));
+            let (cx, cy, cz) = (double::<HALF>(c[0]), double::<HALF>(c[1]), double::<HALF>(c[2]));
+            // Products of two f32 are exact in f64: fused or not, the difference is the same.
+            let u = _mm512_fmsub_pd(cx, by, _mm512_mul_pd(cy, bx));
+            let v = _mm512_fmsub_pd(ax, cy, _mm512_mul_pd(ay, cx));
+            let w = _mm512_fmsub_pd(bx, ay, _mm512_mul_pd(by, ax));
+            let zero = _mm512_setzero_pd();
+            let negative = _mm512_cmp_pd_mask::<_CMP_LT_OQ>(_mm512_min_pd(_mm512_min_pd(u, v), w), zero);
+            let positive = _mm512_cmp_pd_mask::<_CMP_GT_OQ>(_mm512_max_pd(_mm512_max_pd(u, v), w), zero);
+            let determinant = _mm512_add_pd(_mm512_add_pd(u, v), w);
+            let flat = _mm512_cmp_pd_mask::<_CMP_EQ_OQ>(determinant, zero);
+            let (u, v, w) = (_mm512_mul_pd(u, az), _mm512_mul_pd(v, bz), _mm512_mul_pd(w, cz));
+            let sum = _mm512_add_pd(_mm512_add_pd(u, v), w);
+            let t = _mm512_div_pd(sum, _mm512_mul_pd(determinant, double::<HALF>(self.depth)));
+            let after = _mm512_cmp_pd_mask::<_CMP_GE_OQ>(t, double::<HALF>(self.t_min));
+            (after & !(negative & positive | flat), _mm512_cvtpd_ps(t))
+        }
+    }
+
+    /// The distances and objects of the rays' hits; the object is `u32::MAX` for a ray without one.
+    #[inline(always)]
+    pub(crate) fn hits(&self) -> ([f32; RAYS], [u32; RAYS]) {
+        // SAFETY: both are sixteen plain values of four bytes.
+        unsafe { (core::mem::transmute::<__m512, [f32; RAYS]>(self.t), core::mem::transmute::<__m512i, [u32; RAYS]>(self.object)) }
+    }
+}
+
+#[inline(always)]
+unsafe fn cast(x: __m512) -> __m512i {
+    // SAFETY: the caller has AVX-512.
+    unsafe { _mm512_castps_si512(x) }
+}
+
+/// Eight of sixteen numbers in f64.
+#[inline(always)]
+unsafe fn double<const HALF: i32>(x: __m512) -> __m512d {
+    // SAFETY: the caller has AVX-512 DQ.
+    unsafe {
+        if HALF == 0 { _mm512_cvtps_pd(_mm512_castps512_ps256(x)) } else { _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(x)) }
+    }
+}
+
+/// One of the three vectors of sixteen rays, by component.
+#[inline(always)]
+unsafe fn transpose(rays: &[Ray; RAYS], vector: usize) -> [__m512; 4] {
+    // SAFETY: a ray is three vectors of four lanes, aligned to sixteen bytes.
+    unsafe {
+        let lanes = rays.as_ptr().cast::<f32>().add(4 * vector);
+        let mut rows = [_mm512_setzero_ps(); 4];
+        for (i, row) in rows.iter_mut().enumerate() {
+            // Rays i, i + 4, i + 8 and i + 12.
+            let ray = lanes.add(12 * i);
+            let low = _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(_mm_load_ps(ray)), _mm_load_ps(ray.add(48)));
+            let high = _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(_mm_load_ps(ray.add(96))), _mm_load_ps(ray.add(144)));
+            *row = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high);
+        }
+        let [a, b, c, d] = rows;
+        let (ab, cd) = (_mm512_unpacklo_ps(a, b), _mm512_unpacklo_ps(c, d));
+        let (ab_high, cd_high) = (_mm512_unpackhi_ps(a, b), _mm512_unpackhi_ps(c, d));
+        [
+            _mm512_shuffle_ps::<0b01_00_01_00>(ab, cd),
+            _mm512_shuffle_ps::<0b11_10_11_10>(ab, cd),
+            _mm512_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high),
+            _mm512_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high),
+        ]
+    }
+}

@@ -1,0 +1,88 @@
+//! Triangles side by side, for tests of one ray against all of them.
+
+use crate::{MAX_OBJECTS, Shear, Triangle};
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// Up to eight triangles of a leaf.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(32))]
+pub(crate) struct TriangleBlock {
+    /// `corners[corner][axis][lane]`.
+    pub(crate) corners: [[[f32; 4]; 3]; 3],
+    /// The objects' ids; [`UNUSED`](Self::UNUSED) in lanes without a triangle.
+    ids: [u32; 4],
+}
+
+impl TriangleBlock {
+    pub(crate) const LANES: usize = 4;
+    const UNUSED: u32 = u32::MAX;
+    /// Added to the first id of a leaf's last block; ids themselves are below [`MAX_OBJECTS`].
+    const LAST: u32 = MAX_OBJECTS as u32;
+
+    /// The blocks of one leaf of at least one triangle, none degenerate.
+    pub(crate) fn chain(ids: &[u32], triangles: &[Triangle]) -> impl Iterator<Item = Self> {
+        let blocks = ids.len().div_ceil(Self::LANES);
+        (1..).zip(ids.chunks(Self::LANES)).map(move |(number, ids)| {
+            let mut block = Self { ids: [Self::UNUSED; Self::LANES], ..Self::zeroed() };
+            block.ids[..ids.len()].copy_from_slice(ids);
+            for lane in 0..Self::LANES {
+                // Unused lanes repeat the last triangle: what they find, that one finds too, and its id is less.
+                let Triangle(corners) = triangles[ids[lane.min(ids.len() - 1)] as usize];
+                for (lanes, corner) in block.corners.iter_mut().zip(corners) {
+                    (0..3).for_each(|axis| lanes[axis][lane] = corner[axis]);
+                }
+            }
+            block.ids[0] |= if number == blocks { Self::LAST } else { 0 };
+            block
+        })
+    }
+
+    /// The id in a lane; the greatest of all in an unused one.
+    #[inline(always)]
+    pub(crate) fn id(&self, lane: usize) -> u32 {
+        let id = self.ids[lane];
+        if lane == 0 { id & !Self::LAST } else { id }
+    }
+
+    /// Whether this is a leaf's last block.
+    #[inline(always)]
+    pub(crate) fn is_last(&self) -> bool {
+        self.ids[0] & Self::LAST != 0
+    }
+
+    /// A bit per triangle that the ray's line may meet. [`Triangle::intersect`] would reject all others by the sides of
+    /// their edges, which are computed here as there, bit by bit.
+    #[inline(always)]
+    pub(crate) fn candidates(&self, shear: &Shear) -> u32 {
+        let [kx, ky, kz] = shear.axes;
+        let sheared = |corner: &[[f32; Self::LANES]; 3]| {
+            let (mut x, mut y) = ([0.0; Self::LANES], [0.0; Self::LANES]);
+            for lane in 0..Self::LANES {
+                let z = corner[kz][lane] - shear.origin[2];
+                x[lane] = (corner[kx][lane] - shear.origin[0]) - shear.slope[0] * z;
+                y[lane] = (corner[ky][lane] - shear.origin[1]) - shear.slope[1] * z;
+            }
+            (x, y)
+        };
+        let [a, b, c] = &self.corners;
+        let ((ax, ay), (bx, by), (cx, cy)) = (sheared(a), sheared(b), sheared(c));
+        let mut candidates = 0;
+        for i in 0..Self::LANES {
+            let (u, v) = (cx[i] * by[i] - cy[i] * bx[i], ax[i] * cy[i] - ay[i] * cx[i]);
+            let w = bx[i] * ay[i] - by[i] * ax[i];
+            let negative = (u < 0.0) | (v < 0.0) | (w < 0.0);
+            let positive = (u > 0.0) | (v > 0.0) | (w > 0.0);
+            candidates |= u32::from(!(negative & positive)) << i;
+        }
+        candidates
+    }
+
+    /// The triangle in a lane, and its id; `None` in an unused lane.
+    #[inline(always)]
+    pub(crate) fn triangle(&self, lane: usize) -> Option<(u32, Triangle)> {
+        let id = self.id(lane);
+        let corner = |corner: &[[f32; Self::LANES]; 3]| Vec3::from(corner.each_ref().map(|axis| axis[lane]));
+        (id != Self::UNUSED).then(|| (id, Triangle(self.corners.each_ref().map(corner))))
+    }
+}
