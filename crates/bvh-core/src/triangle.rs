@@ -28,10 +28,6 @@ pub struct Shear {
     pub(crate) slope: [f32; 2],
     /// The direction along z.
     pub(crate) depth: f64,
-    /// Its sign, ±1.
-    pub(crate) forwards: f32,
-    /// Its size and a little more: z beyond `t` times this is beyond `t`, rounding included.
-    pub(crate) farther: f32,
 }
 
 impl Shear {
@@ -51,8 +47,6 @@ impl Shear {
             origin: [origin[kx], origin[ky], origin[kz]],
             slope: [direction[kx] / direction[kz], direction[ky] / direction[kz]],
             depth: f64::from(direction[kz]),
-            forwards: 1.0f32.copysign(direction[kz]),
-            farther: size[z] * (1.0 + 1e-6),
         }
     }
 

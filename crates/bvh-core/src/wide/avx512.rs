@@ -100,7 +100,8 @@ impl Instructions for Avx512 {
         // SAFETY: the caller's promises; the stack has room for eight entries.
         unsafe {
             let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-            let keys = _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(entry)), lanes);
+            let keys =
+                _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(entry)), lanes);
             let children = _mm256_load_si256(node.children.as_ptr().cast());
             // The nearest child first: the rest of the work is not on the way to it.
             let least = _mm256_mask_mov_epi32(_mm256_set1_epi32(-1), mask as u8, keys);

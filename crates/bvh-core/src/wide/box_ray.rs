@@ -14,21 +14,21 @@ use core::arch::x86_64::*;
 ///
 /// *Proof.* Let u = 2⁻²⁴, `o`, `d` and `i` one component of origin, direction and reciprocal direction, D the largest
 /// component of the direction, S the largest component of the origin plus the largest coordinate of the scene, `m` the
-/// margin of [`Slabs`], at most 10uS + 2⁻¹²⁶, and `M` = 24uS the margin here. Take `i > 0`; the other sign mirrors every
+/// margin of [`Slabs`], at most 10uS + 2⁻¹²⁶, and `M` = 16uS the margin here. Take `i > 0`; the other sign mirrors every
 /// step. `Slabs` computes for a lower plane p, with L = o + m rounded, a value of at least
 /// (p − L) · i · (1 − 2u) − 2⁻¹⁴⁹ if p > L and no positive one otherwise, and for an upper plane, with the factor
 /// [`Slabs::FAR`] and U = o − m, at most (p − U) · i · (1 + 12u) + 2⁻¹⁴⁸.
 ///
 /// 1. *Shift.* With L' = o + M rounded, the shift −L' · s is off by at most u|L'|s + 2⁻¹⁵⁰ where s is the scale. As
-///    S ≥ 2⁻⁹⁰, the difference L' − L is at least 11uS, of which u|L'| < 2uS pays for this error; 9uS remain. Likewise
-///    for U' = o − M.
+///    S ≥ 2⁻⁹⁰, the difference L' − L is at least (16 − 10 − 2)uS − 2⁻¹²⁶, of which u|L'| pays for this
+///    error; 2.8uS remain. Likewise for U' = o − M.
 /// 2. *Scale.* Near planes use s = i(1 − 6u), far planes s = i(1 + 16u), each with one rounding, and the fused
 ///    operation rounds once: (1 − 5u)(1 + u) ≤ 1 − 2u and (1 + 15u)(1 − u) ≥ 1 + 12u.
 /// 3. *Underflow.* Subtracting τ = 2⁻¹⁴⁶ from near shifts and adding it to far ones pays for all absolute errors of
 ///    denormal numbers: where it is too small to change a shift c, |c| > 2⁻¹²³, and uSs of what step 1 left is larger.
 /// 4. *Clamp.* Where |d| is far smaller than D, i · o could overflow. So |i| is clamped to K = 2²⁴ / D. Nearer distances
 ///    to near planes are conservative. A far plane p that `Slabs` puts in front of the origin has p ≥ U, and then
-///    (p − U') · K ≥ 8uS · K = 8S / D, which no distance exceeds that `Slabs` accepts on the axis of D.
+///    (p − U') · K ≥ 2.8uS · K = 2.8S / D, which no distance exceeds that `Slabs` accepts on the axis of D.
 /// 5. *Overflow.* Rays with S ≥ 2⁶⁰, S · K ≥ 2¹²⁰ or S < 2⁻⁹⁰ are left to the portable kernel, which needs no bounds.
 ///
 /// Distances are compared as `max(near…, t_min) <= min(far…, t_max)`; `Slabs` moves a hit's distance into the interval
@@ -46,7 +46,7 @@ pub(crate) struct BoxRay {
 
 impl BoxRay {
     const U: f32 = f32::EPSILON / 2.0;
-    pub(crate) const MARGIN: f32 = 3.0 * Slabs::MARGIN;
+    pub(crate) const MARGIN: f32 = 2.0 * Slabs::MARGIN;
     pub(crate) const NEAR: f32 = 1.0 - 6.0 * Self::U;
     pub(crate) const FAR: f32 = 1.0 + 16.0 * Self::U;
     /// τ of step 3: 2⁻¹⁴⁶.
@@ -65,6 +65,12 @@ impl BoxRay {
     /// The caller is compiled with AVX2.
     #[inline(always)]
     pub(crate) unsafe fn new(ray: &Ray, largest: f32) -> Option<Self> {
+        // SAFETY: the caller's promise.
+        unsafe { Self::with_margin(ray, largest, Self::MARGIN) }
+    }
+
+    #[inline(always)]
+    unsafe fn with_margin(ray: &Ray, largest: f32, margin: f32) -> Option<Self> {
         // SAFETY: a ray is three vectors of four lanes; the rest is the caller's promise.
         unsafe {
             let lanes: *const f32 = (&raw const *ray).cast();
@@ -75,12 +81,13 @@ impl BoxRay {
             let size = _mm_max_ss(size, _mm_permute_ps::<0b10>(sizes));
             let size = _mm_cvtss_f32(size) + largest;
             let limit = ray.least_inverse() * Self::CLAMP;
-            let in_range = (size < Self::MOST_SIZE) & (size >= Self::LEAST_SIZE) & (size * limit < Self::MOST_SHIFT);
+            let in_range =
+                (size < Self::MOST_SIZE) & (size >= Self::LEAST_SIZE) & (size * limit < Self::MOST_SHIFT);
             if !in_range {
                 return None;
             }
             let scale = _mm_min_ps(_mm_max_ps(inverse, _mm_set1_ps(-limit)), _mm_set1_ps(limit));
-            let margin = _mm_or_ps(_mm_set1_ps(size * Self::MARGIN), _mm_and_ps(sign, inverse));
+            let margin = _mm_or_ps(_mm_set1_ps(size * margin), _mm_and_ps(sign, inverse));
             let near_scale = _mm_mul_ps(scale, _mm_set1_ps(Self::NEAR));
             let far_scale = _mm_mul_ps(scale, _mm_set1_ps(Self::FAR));
             let tiny = _mm_set1_ps(Self::UNDERFLOW);
@@ -103,6 +110,69 @@ impl BoxRay {
                 far_scale: spread(far_scale),
                 far_shift: spread(far_shift),
             })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Aabb;
+    use crate::slabs::margin;
+    use glam::Vec3;
+
+    /// How many of many planes are nearer for [`Slabs`] than for a ray with this margin, where they are in front.
+    #[target_feature(enable = "avx2,fma")]
+    fn planes_too_far(own_margin: f32) -> usize {
+        let mut state = 1u32;
+        let mut random = || {
+            state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+            let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+            (word >> 8) as f32 / (1 << 23) as f32 - 1.0
+        };
+        let mut failures = 0;
+        for case in 0..400_000 {
+            let scale = pow2([0, -60, 40, -89][case % 4]);
+            let size = Vec3::new(random(), random(), random()) * scale;
+            // A plane close to the origin and others on the far side: the margins are largest, and nothing else helps.
+            let origin = Vec3::new(-random().abs() - 0.5, random(), random()) * scale;
+            let near_origin = origin * (1.0 + random() * 2.5e-6 * [1.0, 1e3][case / 4 % 2]);
+            let bounds = Aabb::around([near_origin, size * 0.001, -origin]);
+            let direction = Vec3::new(random(), random(), random()) * pow2([0, 30, -30][case % 3]);
+            let Ok(ray) = Ray::half_line(origin, direction) else { continue };
+            let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+            // SAFETY: this function has the features.
+            let Some(boxes) = (unsafe { BoxRay::with_margin(&ray, largest, own_margin) }) else { continue };
+            let margin = margin(&ray, &bounds);
+            for axis in 0..3 {
+                let inverse = ray.inverse_direction()[axis];
+                let side = 1.0f32.copysign(inverse);
+                for plane in [bounds.min[axis], bounds.max[axis], near_origin[axis]] {
+                    let (lower, upper) =
+                        (origin[axis] + side * margin[axis], origin[axis] - side * margin[axis]);
+                    let (near, far) = ((plane - lower) * inverse, (plane - upper) * inverse * Slabs::FAR);
+                    let first = |lanes: __m256| _mm256_cvtss_f32(lanes);
+                    let own_near = plane.mul_add(first(boxes.near_scale[axis]), first(boxes.near_shift[axis]));
+                    let own_far = plane.mul_add(first(boxes.far_scale[axis]), first(boxes.far_shift[axis]));
+                    // Distances beyond every hit need not be reached: step 4.
+                    let most = 4.0 * (largest + origin.abs().max_element()) * ray.least_inverse();
+                    failures +=
+                        usize::from(own_near > near.max(0.0) || (far >= 0.0 && own_far < far.min(most)));
+                }
+            }
+        }
+        failures
+    }
+
+    #[test]
+    fn the_margin_is_conservative_and_half_of_it_is_not() {
+        if !crate::Kernel::Avx2.is_available() {
+            return;
+        }
+        // SAFETY: the kernel's features include those of the function.
+        unsafe {
+            assert_eq!(planes_too_far(BoxRay::MARGIN), 0);
+            assert!(planes_too_far(BoxRay::MARGIN / 2.0) > 0);
         }
     }
 }

@@ -49,7 +49,8 @@ fn decide(tree: &Bvh) -> Vec<Decision> {
                     (decision.costs[slots - 1], decision.slots[slots - 1]) = (least, split as u8);
                 }
                 let (as_node, as_leaf) = (decision.costs[7] + area * NODE_COST, leaf_cost(objects));
-                decision.leaf = as_leaf < as_node || (as_leaf == as_node && objects <= TriangleBlock::LANES as u32);
+                decision.leaf =
+                    as_leaf < as_node || (as_leaf == as_node && objects <= TriangleBlock::LANES as u32);
                 decision.costs[0] = if decision.leaf { as_leaf } else { as_node };
                 // Fewer children where more are no better.
                 for slots in 1..7 {

@@ -6,16 +6,16 @@ mod avx2;
 mod avx512;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod box_ray;
-#[cfg(all(feature = "std", target_arch = "x86_64"))]
-mod packet;
-#[cfg(all(feature = "std", target_arch = "x86_64"))]
-mod x86;
 mod build;
 mod kernel;
 mod layout;
 mod node;
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+mod packet;
 mod portable;
 mod triangles;
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+mod x86;
 
 pub use kernel::Kernel;
 pub use layout::WideBvh;

@@ -60,7 +60,11 @@ impl Packet {
             let [ox, oy, oz, t_min] = transpose(rays, 0);
             let [dx, dy, dz, t_max] = transpose(rays, 1);
             let [ix, iy, iz, least] = transpose(rays, 2);
-            let backwards = [_mm512_movepi32_mask(cast(ix)), _mm512_movepi32_mask(cast(iy)), _mm512_movepi32_mask(cast(iz))];
+            let backwards = [
+                _mm512_movepi32_mask(cast(ix)),
+                _mm512_movepi32_mask(cast(iy)),
+                _mm512_movepi32_mask(cast(iz)),
+            ];
             let coherent = |mask: u16| mask == 0 || mask == u16::MAX;
             let (sx, sy, sz) = (_mm512_abs_ps(dx), _mm512_abs_ps(dy), _mm512_abs_ps(dz));
             let second = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(sy, sx);
@@ -76,7 +80,10 @@ impl Packet {
             let limit = _mm512_mul_ps(least, _mm512_set1_ps(BoxRay::CLAMP));
             let in_range = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(size, _mm512_set1_ps(BoxRay::MOST_SIZE))
                 & _mm512_cmp_ps_mask::<_CMP_GE_OQ>(size, _mm512_set1_ps(BoxRay::LEAST_SIZE))
-                & _mm512_cmp_ps_mask::<_CMP_LT_OQ>(_mm512_mul_ps(size, limit), _mm512_set1_ps(BoxRay::MOST_SHIFT));
+                & _mm512_cmp_ps_mask::<_CMP_LT_OQ>(
+                    _mm512_mul_ps(size, limit),
+                    _mm512_set1_ps(BoxRay::MOST_SHIFT),
+                );
             if in_range != u16::MAX {
                 return None;
             }
@@ -90,7 +97,12 @@ impl Packet {
                 near_shift: [zero; 3],
                 far_scale: [zero; 3],
                 far_shift: [zero; 3],
-                bounds: [AxisBounds { near_origin: 0.0, far_origin: 0.0, near_scale: [0.0; 2], far_scale: [0.0; 2] }; 3],
+                bounds: [AxisBounds {
+                    near_origin: 0.0,
+                    far_origin: 0.0,
+                    near_scale: [0.0; 2],
+                    far_scale: [0.0; 2],
+                }; 3],
                 axes: [0; 3],
                 origin: [zero; 3],
                 inverse: [zero; 3],
@@ -109,7 +121,8 @@ impl Packet {
                 );
                 let is_backwards = backwards[axis] != 0;
                 let margin = if is_backwards { _mm512_sub_ps(zero, margin) } else { margin };
-                let (near_origin, far_origin) = (_mm512_add_ps(origin[axis], margin), _mm512_sub_ps(origin[axis], margin));
+                let (near_origin, far_origin) =
+                    (_mm512_add_ps(origin[axis], margin), _mm512_sub_ps(origin[axis], margin));
                 packet.near_scale[axis] = near_scale;
                 packet.far_scale[axis] = far_scale;
                 packet.near_shift[axis] = _mm512_fnmsub_ps(near_origin, near_scale, tiny);
@@ -135,7 +148,8 @@ impl Packet {
             let [kx, ky, kz] = packet.axes;
             packet.origin = [origin[kx], origin[ky], origin[kz]];
             packet.inverse = [inverse[kx], inverse[ky], inverse[kz]];
-            packet.slope = [_mm512_div_ps(direction[kx], direction[kz]), _mm512_div_ps(direction[ky], direction[kz])];
+            packet.slope =
+                [_mm512_div_ps(direction[kx], direction[kz]), _mm512_div_ps(direction[ky], direction[kz])];
             packet.depth = direction[kz];
             Some(packet)
         }
@@ -251,7 +265,8 @@ impl Packet {
             let (mut entry, mut exit) = (self.t_min, self.t);
             for axis in 0..3 {
                 let near = _mm512_set1_ps(*planes.add(8 * self.near[axis]));
-                entry = _mm512_max_ps(entry, _mm512_fmadd_ps(near, self.near_scale[axis], self.near_shift[axis]));
+                entry =
+                    _mm512_max_ps(entry, _mm512_fmadd_ps(near, self.near_scale[axis], self.near_shift[axis]));
                 let far = _mm512_set1_ps(*planes.add(8 * self.far[axis]));
                 exit = _mm512_min_ps(exit, _mm512_fmadd_ps(far, self.far_scale[axis], self.far_shift[axis]));
             }
@@ -326,8 +341,10 @@ impl Packet {
             for (i, [min, max]) in corners.into_iter().enumerate() {
                 let own = _mm512_mul_ps(_mm512_abs_ps(self.origin[i]), _mm512_set1_ps(f32::EPSILON));
                 let margin = _mm512_add_ps(_mm512_add_ps(reach, own), _mm512_set1_ps(f32::MIN_POSITIVE));
-                let low = _mm512_mul_ps(_mm512_sub_ps(min, _mm512_add_ps(self.origin[i], margin)), self.inverse[i]);
-                let high = _mm512_mul_ps(_mm512_sub_ps(max, _mm512_sub_ps(self.origin[i], margin)), self.inverse[i]);
+                let low =
+                    _mm512_mul_ps(_mm512_sub_ps(min, _mm512_add_ps(self.origin[i], margin)), self.inverse[i]);
+                let high =
+                    _mm512_mul_ps(_mm512_sub_ps(max, _mm512_sub_ps(self.origin[i], margin)), self.inverse[i]);
                 entry = _mm512_max_ps(entry, _mm512_min_ps(low, high));
                 exit = _mm512_min_ps(exit, _mm512_max_ps(low, high));
             }
@@ -353,7 +370,12 @@ impl Packet {
 
     /// Eight of the rays against one triangle in f64: which have it in front of them and inside its edges, and where.
     #[inline(always)]
-    unsafe fn decide_half<const HALF: i32>(&self, a: &[__m512; 3], b: &[__m512; 3], c: &[__m512; 3]) -> (u8, __m256) {
+    unsafe fn decide_half<const HALF: i32>(
+        &self,
+        a: &[__m512; 3],
+        b: &[__m512; 3],
+        c: &[__m512; 3],
+    ) -> (u8, __m256) {
         // SAFETY: the caller's promises.
         unsafe {
             let (ax, ay, az) = (double::<HALF>(a[0]), double::<HALF>(a[1]), double::<HALF>(a[2]));
@@ -380,7 +402,12 @@ impl Packet {
     #[inline(always)]
     pub(crate) fn hits(&self) -> ([f32; RAYS], [u32; RAYS]) {
         // SAFETY: both are sixteen plain values of four bytes.
-        unsafe { (core::mem::transmute::<__m512, [f32; RAYS]>(self.t), core::mem::transmute::<__m512i, [u32; RAYS]>(self.object)) }
+        unsafe {
+            (
+                core::mem::transmute::<__m512, [f32; RAYS]>(self.t),
+                core::mem::transmute::<__m512i, [u32; RAYS]>(self.object),
+            )
+        }
     }
 }
 
@@ -395,7 +422,11 @@ unsafe fn cast(x: __m512) -> __m512i {
 unsafe fn double<const HALF: i32>(x: __m512) -> __m512d {
     // SAFETY: the caller has AVX-512 DQ.
     unsafe {
-        if HALF == 0 { _mm512_cvtps_pd(_mm512_castps512_ps256(x)) } else { _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(x)) }
+        if HALF == 0 {
+            _mm512_cvtps_pd(_mm512_castps512_ps256(x))
+        } else {
+            _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(x))
+        }
     }
 }
 
@@ -409,8 +440,12 @@ unsafe fn transpose(rays: &[Ray; RAYS], vector: usize) -> [__m512; 4] {
         for (i, row) in rows.iter_mut().enumerate() {
             // Rays i, i + 4, i + 8 and i + 12.
             let ray = lanes.add(12 * i);
-            let low = _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(_mm_load_ps(ray)), _mm_load_ps(ray.add(48)));
-            let high = _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(_mm_load_ps(ray.add(96))), _mm_load_ps(ray.add(144)));
+            let low =
+                _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(_mm_load_ps(ray)), _mm_load_ps(ray.add(48)));
+            let high = _mm256_insertf128_ps::<1>(
+                _mm256_castps128_ps256(_mm_load_ps(ray.add(96))),
+                _mm_load_ps(ray.add(144)),
+            );
             *row = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high);
         }
         let [a, b, c, d] = rows;

@@ -238,9 +238,12 @@ impl Shear4 {
             let mut sheared = [[_mm_setzero_ps(); 3]; 3];
             for (corner, sheared) in block.corners.iter().zip(&mut sheared) {
                 let lanes = corner.as_ptr().cast::<f32>().add(lane);
-                let x = _mm_sub_ps(_mm_load_ps(lanes.add(kx * TriangleBlock::LANES)), _mm_set1_ps(self.origin[0]));
-                let y = _mm_sub_ps(_mm_load_ps(lanes.add(ky * TriangleBlock::LANES)), _mm_set1_ps(self.origin[1]));
-                let z = _mm_sub_ps(_mm_load_ps(lanes.add(kz * TriangleBlock::LANES)), _mm_set1_ps(self.origin[2]));
+                let x =
+                    _mm_sub_ps(_mm_load_ps(lanes.add(kx * TriangleBlock::LANES)), _mm_set1_ps(self.origin[0]));
+                let y =
+                    _mm_sub_ps(_mm_load_ps(lanes.add(ky * TriangleBlock::LANES)), _mm_set1_ps(self.origin[1]));
+                let z =
+                    _mm_sub_ps(_mm_load_ps(lanes.add(kz * TriangleBlock::LANES)), _mm_set1_ps(self.origin[2]));
                 sheared[0] = _mm_sub_ps(x, _mm_mul_ps(_mm_set1_ps(self.slope[0]), z));
                 sheared[1] = _mm_sub_ps(y, _mm_mul_ps(_mm_set1_ps(self.slope[1]), z));
                 sheared[2] = z;
@@ -269,7 +272,13 @@ impl Shear4 {
     /// A bit per triangle that [`Triangle::intersect`](crate::Triangle::intersect) accepts up to `t_max`, and its
     /// distances, bit by bit. No triangle is degenerate.
     #[inline(always)]
-    pub(crate) unsafe fn decide(&self, block: &TriangleBlock, lane: usize, ray: &Ray, t_max: f32) -> (u32, __m128) {
+    pub(crate) unsafe fn decide(
+        &self,
+        block: &TriangleBlock,
+        lane: usize,
+        ray: &Ray,
+        t_max: f32,
+    ) -> (u32, __m128) {
         // SAFETY: as the caller's.
         unsafe {
             let [a, b, c] = self.apply(block, lane);

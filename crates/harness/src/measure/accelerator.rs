@@ -96,7 +96,7 @@ impl<'a> Accelerator<'a> {
     pub fn nearest_hit(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
         match (&self.structure, self.objects) {
             (Structure::Wide(wide), _) => wide.nearest_hit(ray),
-            (Structure::WidePortable(wide), _) => wide.view().nearest_hit_counted(ray, counter),
+            (Structure::WidePortable(wide), _) => wide.nearest_hit_counted(ray, counter),
             (structure, Primitives::Triangles(triangles)) => {
                 let shear = Shear::new(ray);
                 let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
@@ -114,7 +114,7 @@ impl<'a> Accelerator<'a> {
     pub fn any_hit(&self, ray: &Ray, counter: &mut impl Counter) -> bool {
         match &self.structure {
             Structure::Wide(wide) => wide.any_hit(ray),
-            Structure::WidePortable(wide) => wide.view().any_hit_counted(ray, counter),
+            Structure::WidePortable(wide) => wide.any_hit_counted(ray, counter),
             _ => self.visit(ray, true, counter),
         }
     }
@@ -125,9 +125,9 @@ impl<'a> Accelerator<'a> {
     pub fn count(&self, query: Query, ray: &Ray, counter: &mut impl Counter) -> bool {
         match (query, &self.structure) {
             (Query::All, _) => self.visit(ray, false, counter),
-            (Query::Nearest, Structure::Wide(wide)) => wide.view().nearest_hit_counted(ray, counter).is_some(),
+            (Query::Nearest, Structure::Wide(wide)) => wide.nearest_hit_counted(ray, counter).is_some(),
             (Query::Nearest, _) => self.nearest_hit(ray, counter).is_some(),
-            (Query::Any, Structure::Wide(wide)) => wide.view().any_hit_counted(ray, counter),
+            (Query::Any, Structure::Wide(wide)) => wide.any_hit_counted(ray, counter),
             (Query::Any, _) => self.any_hit(ray, counter),
         }
     }

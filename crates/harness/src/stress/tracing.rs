@@ -4,7 +4,7 @@ use super::promise::{Broken, Verdict, ensure};
 use crate::measure::{Accelerator, Structure};
 use crate::scenes::Primitives;
 use bvh_build::{Builder, goldsmith_salmon, kd_tree, median_cut, muller_fellner};
-use bvh_core::{Aabb, Bvh, Hit, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants};
+use bvh_core::{Aabb, Bvh, Hit, Kernel, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants};
 use bvh_search::Stream;
 use glam::Vec3;
 use rand::seq::IndexedRandom;
@@ -43,7 +43,7 @@ fn over_binary_trees(objects: &Primitives) -> Result<Vec<Accelerator<'_>>, Strin
     Ok(trees.map(|tree| Accelerator::new(objects, Structure::Tree(Cow::Owned(tree)))).into())
 }
 
-/// Of a binary tree and of one with many children per node.
+/// Of a binary tree and of one with many children per node, for every kernel that this processor has.
 fn over_wide_layouts(
     objects: &Primitives,
     structure: fn(WideBvh) -> Structure<'static>,
@@ -53,9 +53,11 @@ fn over_wide_layouts(
     };
     let layout = |builder: &dyn Builder| -> Result<_, String> {
         let wide = WideBvh::new(&build(objects, builder)?, triangles).map_err(|error| error.to_string())?;
-        Ok(Accelerator::new(objects, structure(wide)))
+        let kernels = Kernel::ALL.into_iter().filter_map(move |kernel| wide.clone().with_kernel(kernel));
+        Ok(kernels.map(|wide| Accelerator::new(objects, structure(wide))))
     };
-    Ok(vec![layout(&muller_fellner::Config::default())?, layout(&goldsmith_salmon::Config::default())?])
+    let binary = layout(&muller_fellner::Config::default())?;
+    Ok(binary.chain(layout(&goldsmith_salmon::Config::default())?).collect())
 }
 
 fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {

@@ -1,0 +1,181 @@
+//! Every kernel of the wide layout, ray by ray and in batches, gives the answer of testing every triangle, bit by bit.
+
+mod support;
+
+use bvh_core::{
+    Coherence, Hit, Kernel, Ray, Shear, Triangle, WideBvh, collapse_leaves, cost::SahConstants,
+    nearest_hit_of_all,
+};
+use glam::Vec3;
+use support::{Random, SHAPES, ball, boxes, chain, grid_box, rays, scaled, soup, tree};
+
+/// The answer of testing every triangle.
+fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
+    let shear = Shear::new(ray);
+    let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
+    nearest_hit_of_all(triangles.len() as u32, ray, test, &mut ())
+}
+
+fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
+    hit.map(|hit| (hit.t.to_bits(), hit.object))
+}
+
+/// The layouts of several trees over the triangles, for every kernel that this processor has.
+fn layouts(triangles: &[Triangle], random: &mut Random) -> Vec<(Kernel, WideBvh)> {
+    let boxes = boxes(triangles);
+    let mut trees: Vec<_> = SHAPES.iter().map(|&shape| tree(&boxes, shape, random)).collect();
+    trees.push(collapse_leaves(&trees[0], &SahConstants::default()));
+    let layouts = trees.iter().map(|tree| WideBvh::new(tree, triangles).unwrap());
+    let kernels = Kernel::ALL.into_iter().filter(|kernel| kernel.is_available());
+    let of_kernel = |wide: WideBvh| {
+        kernels
+            .clone()
+            .map(move |kernel| (kernel, wide.clone().with_kernel(kernel).unwrap()))
+            .collect::<Vec<_>>()
+    };
+    layouts.flat_map(of_kernel).collect()
+}
+
+/// Checks all rays by all layouts: one by one, and in a batch. The number of rays that hit.
+fn check(name: &str, triangles: &[Triangle], layouts: &[(Kernel, WideBvh)], rays: &[Ray]) -> usize {
+    let expected: Vec<Option<Hit>> = rays.iter().map(|ray| brute_force(triangles, ray)).collect();
+    for (kernel, wide) in layouts {
+        let (mut nearest, mut any) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+        wide.nearest_hits(rays, &mut nearest, Coherence::Coherent);
+        wide.any_hits(rays, &mut any, Coherence::Coherent);
+        for (i, (ray, &expected)) in rays.iter().zip(&expected).enumerate() {
+            let case = format!("{name}, {kernel:?}, {ray:?}");
+            assert_eq!(bits(wide.nearest_hit(ray)), bits(expected), "{case}");
+            assert_eq!(wide.any_hit(ray), expected.is_some(), "{case}");
+            assert_eq!(bits((!nearest[i].is_miss()).then_some(nearest[i])), bits(expected), "batch, {case}");
+            assert_eq!(any[i], expected.is_some(), "batch, {case}");
+        }
+    }
+    expected.iter().flatten().count()
+}
+
+/// Sixteen rays at a time that begin close to each other and run nearly the same way, towards and beyond an edge or a
+/// corner of some triangle: what packets are made for, where they are most easily wrong.
+fn bundles(triangles: &[Triangle], count: usize, random: &mut Random) -> Vec<Ray> {
+    let mut rays = Vec::new();
+    for _ in 0..count {
+        let Triangle([a, b, c]) = random.of(triangles);
+        let size = triangles.iter().flat_map(|t| t.0).fold(0.0f32, |size, p| size.max(p.abs().max_element()));
+        let target = random.of(&[a, (a + b) * 0.5, (a + b + c) / 3.0]);
+        let (far, inside, close) =
+            (random.point() * 3.0, random.point(), target + random.point() * size * 1e-3);
+        let origin = random.of(&[far * size, inside * size, close]);
+        let (spread, shift) = (random.of(&[0.0, 1e-7, 1e-3, 0.1]), random.of(&[0.0, 1e-7, 1e-2]));
+        for _ in 0..16 {
+            let from = origin + random.point() * (shift * size);
+            let mut to = target + random.point() * (spread * size) - from;
+            if random.below(8) == 0 {
+                to[random.below(3)] = 0.0;
+            }
+            let to = to / size.max(f32::MIN_POSITIVE);
+            let (t_min, t_max) =
+                random.of(&[(0.0, f32::MAX), (0.0, size), (size, size), (0.5 * size, f32::INFINITY)]);
+            rays.push(Ray::new(from, to, t_min, t_max).unwrap_or(Ray::half_line(from, Vec3::X).unwrap()));
+        }
+    }
+    rays
+}
+
+#[test]
+fn every_kernel_answers_as_brute_force_at_every_scale() {
+    let mut random = Random(1);
+    let mut hits = 0;
+    for (name, scene) in [("soup", soup(150, &mut random)), ("grid", grid_box(4)), ("ball", ball(2))] {
+        for exponent in [-120, -60, -20, 0, 20, 60, 120] {
+            let triangles = scaled(&scene, libm::exp2f(exponent as f32));
+            let layouts = layouts(&triangles, &mut random);
+            let name = format!("{name} * 2^{exponent}");
+            hits += check(&name, &triangles, &layouts, &rays(&triangles, 1500, &mut random));
+            hits += check(&name, &triangles, &layouts, &bundles(&triangles, 100, &mut random));
+        }
+    }
+    assert!(hits > 10_000, "the rays should hit something: {hits}");
+}
+
+/// Distances of which no f32 is close to the exact one: once answers were lost because corners beyond `t_max` times the
+/// direction's length, rounded, were taken for corners beyond every hit.
+#[test]
+fn distances_that_underflow_are_answered_alike() {
+    let mut random = Random(2);
+    let at = |z: f32| Triangle([Vec3::new(-1.0, -1.0, z), Vec3::new(3.0, -1.0, z), Vec3::new(-1.0, 3.0, z)]);
+    let depths = [1e-30, 2e-30, 0.0, 1e-45, -1e-30, 3e-38, 1.5e-20, 1e-30];
+    let triangles: Vec<Triangle> = depths.into_iter().map(at).collect();
+    let layouts = layouts(&triangles, &mut random);
+    let mut rays = Vec::new();
+    for length in [1e20, 1e25, 1e15, 1.0, 1e8, 1e-20] {
+        for (t_min, t_max) in
+            [(0.0, 0.0), (0.0, f32::MAX), (0.0, 1e-45), (1e-45, 1e-45), (0.0, 1e-40), (1e-44, 1e-38)]
+        {
+            for side in [1.0, -1.0] {
+                for z in [0.0, -1e-30, 1e-45, 2e-38, 1e-20] {
+                    for slope in [0.0, 0.1, 1e-30] {
+                        let direction = Vec3::new(slope, slope, side) * length;
+                        rays.push(Ray::new(Vec3::new(0.1, 0.2, -side * z), direction, t_min, t_max).unwrap());
+                    }
+                }
+            }
+        }
+    }
+    let hits = check("thin sheets", &triangles, &layouts, &rays);
+    assert!(hits > 300, "{hits} of {}", rays.len());
+}
+
+#[test]
+fn coordinates_down_to_denormal_ones_are_answered_alike() {
+    let mut random = Random(3);
+    for exponent in [-149, -140, -127, -110, -91, -88] {
+        let triangles = scaled(&soup(40, &mut random), libm::exp2f(exponent as f32 + 7.0) / 128.0);
+        let layouts = layouts(&triangles, &mut random);
+        let name = format!("soup * 2^{exponent}");
+        check(&name, &triangles, &layouts, &rays(&triangles, 600, &mut random));
+        check(&name, &triangles, &layouts, &bundles(&triangles, 40, &mut random));
+    }
+}
+
+#[test]
+fn triangles_without_area_are_left_out_and_never_hit() {
+    let mut random = Random(4);
+    let flat = |p: Vec3, q: Vec3| Triangle([p, q, (p + q) * 0.5]);
+    let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE];
+    let mut triangles: Vec<Triangle> =
+        corners.iter().flat_map(|&p| corners.iter().map(move |&q| flat(p, q))).collect();
+    let empty = layouts(&triangles, &mut random);
+    assert!(
+        empty
+            .iter()
+            .all(|(_, wide)| wide.nearest_hit(&Ray::half_line(-Vec3::ONE, Vec3::ONE).unwrap()).is_none())
+    );
+    triangles.push(Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]));
+    let layouts = layouts(&triangles, &mut random);
+    assert!(check("flat", &triangles, &layouts, &rays(&triangles, 500, &mut random)) > 0);
+}
+
+#[test]
+fn trees_too_deep_for_the_stack_of_a_vector_kernel_are_traced_all_the_same() {
+    let triangles: Vec<Triangle> = (0..20_000)
+        .map(|i| Triangle([Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p * (i + 1) as f32 + Vec3::Z * (i as f32))))
+        .collect();
+    let wide = WideBvh::new(&chain(&boxes(&triangles)), &triangles).unwrap();
+    for (z, direction, object) in [(-1.0, 1.0, 0), (30_000.0, -1.0, 19_999)] {
+        let ray = Ray::half_line(Vec3::new(0.1, 0.1, z), Vec3::Z * direction).unwrap();
+        assert_eq!(wide.nearest_hit(&ray).map(|hit| hit.object), Some(object));
+    }
+}
+
+#[test]
+fn packets_and_what_is_left_over_are_answered_in_their_order() {
+    let mut random = Random(5);
+    let triangles = ball(2);
+    let layouts = layouts(&triangles, &mut random);
+    for count in [0, 1, 15, 16, 17, 33, 100] {
+        let rays: Vec<Ray> = (0..count)
+            .map(|i| Ray::half_line(Vec3::new(i as f32 * 0.03 - 1.5, 0.1, -3.0), Vec3::Z).unwrap())
+            .collect();
+        check("in line", &triangles, &layouts, &rays);
+    }
+}
