@@ -1,4 +1,4 @@
-//! What can go wrong in the harness, and the exit code that says so.
+//! What can go wrong in the harness, and the exit code of each failure.
 
 use bvh_search::SearchError;
 use std::io;

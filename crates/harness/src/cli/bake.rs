@@ -86,7 +86,7 @@ impl FromStr for Effort {
 }
 
 /// Searches until the budget is spent or `interrupted` becomes true, writes the best tree found, and prints what it
-/// costs. An interruption is an error that says that the file was written all the same.
+/// costs. If it is interrupted, it writes the file all the same and returns [`Error::Stopped`].
 pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     if let Some(from) = &args.from {
         input_file("--from", from)?;
@@ -134,7 +134,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     Ok(())
 }
 
-/// The method by name, unless it could not do what is asked.
+/// The method that was named. Refuses one that cannot start from a tree if a tree is given.
 fn method(args: &BakeArgs) -> Result<Method, Error> {
     let found = Method::all().into_iter().find(|method| method.name() == args.method);
     match found {
@@ -143,7 +143,7 @@ fn method(args: &BakeArgs) -> Result<Method, Error> {
             Err(Error::Usage(format!("--method {}: no such method; accepted: {accepted}", args.method)))
         }
         Some(Method::Best(config)) => {
-            // The budget says when to end, whatever the method's own limit.
+            // The budget ends the search; the limit of the method itself does not count.
             Ok(Method::Best(best::Config { horizon: Some(Horizon::Known), ..config }))
         }
         Some(_) if args.from.is_some() => {
@@ -153,14 +153,14 @@ fn method(args: &BakeArgs) -> Result<Method, Error> {
     }
 }
 
-/// The tree to go on from, and its header.
+/// The tree to start from, and its header.
 fn start(path: &Path, scene: &Scene) -> Result<(bvh_core::Bvh, Header), Error> {
     let tree = load_tree(path, &scene.boxes)?;
     let header = files::open_tree(path, &files::read(path)?)?.header().clone();
     Ok((tree, header))
 }
 
-/// The size of the largest tree file over so many objects.
+/// The size of the largest tree file over `objects` objects, in bytes.
 fn most_bytes(objects: usize) -> usize {
     Header::BYTES + objects * (2 * size_of::<bvh_core::Node>() + size_of::<u32>())
 }
@@ -197,7 +197,7 @@ fn summary(
     lines.join("\n")
 }
 
-/// `cost` in relation to `base`, in words.
+/// By how much `cost` is below or above `base`, in words.
 fn gain(cost: f64, base: f64) -> String {
     let percent = if base > 0.0 { 100.0 * (1.0 - cost / base) } else { 0.0 };
     if percent >= 0.0 { format!("{percent:.2} % below") } else { format!("{:.2} % above", -percent) }

@@ -1,4 +1,4 @@
-//! `--explain`: what a scene does not need and is left out, and what was not asked for, said before the work.
+//! `--explain`: lists before the work what a scene does not need and what was not asked for, both of which are left out.
 
 use crate::Error;
 use crate::run::resolved::load_scenes;
@@ -6,7 +6,7 @@ use crate::scenes::{Primitives, Scene};
 use crate::spec::Experiment;
 use bvh_search::shortcuts::Facts;
 
-/// What is left out of an experiment, scene by scene, and what it will run.
+/// What is left out of an experiment, scene by scene, and what is going to run.
 pub fn experiment(experiment: &Experiment) -> Result<String, Error> {
     let (scenes, _) = if experiment.suite.is_some() { Default::default() } else { load_scenes(experiment)? };
     let mut text = format!("{}: {}\n", experiment.name, experiment.question);

@@ -49,7 +49,7 @@ struct NodeRow {
 struct Lines(String);
 
 impl Lines {
-    fn say(&mut self, what: &str, value: impl std::fmt::Display) {
+    fn add(&mut self, what: &str, value: impl std::fmt::Display) {
         self.0 += &format!("{what}: {value}\n");
     }
 }
@@ -74,13 +74,13 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     }
     match &scene {
         Some(scene) => against(&tree, file, scene, &mut lines).map_err(refused)?,
-        None => lines.say("valid", "as a tree; with a scene its objects are checked too"),
+        None => lines.add("valid", "as a tree; with a scene its objects are checked too"),
     }
     print_line(&lines.0);
     Ok(())
 }
 
-/// What the header says.
+/// The facts in the header.
 fn describe(header: &Header, bytes: usize, lines: &mut Lines) {
     let objective = match header.objective {
         Objective::InternalArea => "internal area".into(),
@@ -89,28 +89,28 @@ fn describe(header: &Header, bytes: usize, lines: &mut Lines) {
             format!("surface area heuristic, traversal {traversal}, intersection {intersection}")
         }
     };
-    lines.say("version", Header::VERSION);
-    lines.say("bytes", bytes);
-    lines.say("method", &header.method);
-    lines.say("seed", header.seed);
-    lines.say("work", header.work);
-    lines.say("objective", objective);
-    lines.say("cost when saved", header.cost);
-    lines.say("checksum of the scene", format_args!("{:08x}", header.scene));
-    lines.say("objects", header.objects);
-    lines.say("nodes", header.nodes);
+    lines.add("version", Header::VERSION);
+    lines.add("bytes", bytes);
+    lines.add("method", &header.method);
+    lines.add("seed", header.seed);
+    lines.add("work", header.work);
+    lines.add("objective", objective);
+    lines.add("cost when saved", header.cost);
+    lines.add("checksum of the scene", format_args!("{:08x}", header.scene));
+    lines.add("objects", header.objects);
+    lines.add("nodes", header.nodes);
 }
 
-/// What can be computed from the tree alone.
+/// The facts that follow from the tree alone.
 fn measure(tree: &Bvh, lines: &mut Lines) {
     let area = cost::internal_area(tree);
-    lines.say("inner nodes", tree.inner_count());
-    lines.say("leaves", tree.nodes.len() - tree.inner_count());
-    lines.say("depth", tree.depth());
-    lines.say("internal area", area);
-    lines.say("internal area over root area", cost::over_root_area(tree, area));
-    lines.say("Goldsmith–Salmon cost", cost::goldsmith_salmon(tree));
-    lines.say("surface area heuristic", cost::sah(tree, &SahConstants::default()));
+    lines.add("inner nodes", tree.inner_count());
+    lines.add("leaves", tree.nodes.len() - tree.inner_count());
+    lines.add("depth", tree.depth());
+    lines.add("internal area", area);
+    lines.add("internal area over root area", cost::over_root_area(tree, area));
+    lines.add("Goldsmith–Salmon cost", cost::goldsmith_salmon(tree));
+    lines.add("surface area heuristic", cost::sah(tree, &SahConstants::default()));
     let (mut arities, mut leaves) = (BTreeMap::new(), BTreeMap::new());
     for node in &tree.nodes {
         let (histogram, count) = match node.kind() {
@@ -119,8 +119,8 @@ fn measure(tree: &Bvh, lines: &mut Lines) {
         };
         *histogram.entry(count).or_insert(0usize) += 1;
     }
-    lines.say("inner nodes by children", histogram(&arities));
-    lines.say("leaves by objects", histogram(&leaves));
+    lines.add("inner nodes by children", histogram(&arities));
+    lines.add("leaves by objects", histogram(&leaves));
 }
 
 /// `2 × 100, 3 × 7`: sizes and how many have them.
@@ -129,25 +129,25 @@ fn histogram(counts: &BTreeMap<u32, usize>) -> String {
     if bins.is_empty() { "none".into() } else { bins.join(", ") }
 }
 
-/// What takes the scene to say.
+/// The facts that only the scene can tell.
 fn against(tree: &Bvh, file: TreeFile, scene: &Scene, lines: &mut Lines) -> Result<(), FileError> {
     file.for_boxes(&scene.boxes)?;
     validate(tree, &scene.boxes)?;
-    lines.say("scene", &scene.name);
-    lines.say("valid", "yes, over this scene's objects");
+    lines.add("scene", &scene.name);
+    lines.add("valid", "yes, over this scene's objects");
     // Boxes that the file's checksum has accepted are finite: a valid tree lies around them.
     if let Ok(greedy) = muller_fellner::Config::default().build(&scene.boxes) {
         let base = cost::internal_area(&greedy);
         if base > 0.0 {
-            lines.say("internal area over Müller–Fellner's", cost::internal_area(tree) / base);
+            lines.add("internal area over Müller–Fellner's", cost::internal_area(tree) / base);
         }
     }
     match scene.triangles() {
         Ok(triangles) => {
             let overlap = cost::end_point_overlap(tree, triangles, &SahConstants::default());
-            lines.say("end-point overlap", overlap);
+            lines.add("end-point overlap", overlap);
         }
-        Err(_) => lines.say("end-point overlap", "of triangles only"),
+        Err(_) => lines.add("end-point overlap", "of triangles only"),
     }
     Ok(())
 }

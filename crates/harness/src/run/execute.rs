@@ -108,7 +108,7 @@ fn jobs<'a>(experiment: &'a Experiment, scenes: &'a [Scene]) -> Result<Vec<Job<'
     Ok(scenes.iter().zip(bases).flat_map(of_scene).collect())
 }
 
-/// Performs those of the runs in `own` that the store does not have yet, and keeps each as soon as it is finished.
+/// Performs the runs in `own` that the store does not have yet, and keeps each as soon as it is finished.
 /// Returns the trees to be traced of the runs that were performed now.
 fn perform_all(
     experiment: &Experiment,

@@ -1,4 +1,4 @@
-//! One run of an experiment: a method on a scene, watched, and the rows of all that is measured of it.
+//! One run of an experiment: solves a scene by a method under observation, and makes the rows of its measurements.
 
 use crate::Error;
 use crate::measure::rays::Family;
@@ -27,7 +27,7 @@ pub(crate) struct Job<'a> {
     pub base: f64,
     pub labelled: &'a Labelled,
     pub repetition: u32,
-    /// Whether what is known of the scene alone is this run's to say.
+    /// Whether this run also measures what depends on the scene alone.
     pub first_of_scene: bool,
 }
 
@@ -37,8 +37,8 @@ pub(crate) fn base_cost(scene: &Scene, objective: &Objective) -> Result<f64, Err
     Ok(objective.cost(&tree.map_err(Error::search(&scene.name, "muller_fellner, the base"))?))
 }
 
-/// What is proven of the scene's internal area: the exact optimum where gaps are measured from it, else a lower bound
-/// if the experiment asks for one.
+/// A proven lower bound of the scene's internal area: the exact optimum where gaps are measured from it, else the bound
+/// that the experiment asks for, if it asks for one.
 fn bound(experiment: &Experiment, scene: &Scene) -> Result<Option<BoundRow>, Error> {
     let lower_bound = if experiment.needs_optimum(scene.boxes.len()) {
         let problem = Problem::new(&scene.boxes);
@@ -259,7 +259,7 @@ impl Stopwatch<'_> {
         self.events.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(seconds);
     }
 
-    /// The seconds of all events so far.
+    /// When each event so far happened, in seconds since the start.
     fn seconds(&self) -> Vec<f64> {
         self.events.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
     }

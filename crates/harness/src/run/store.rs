@@ -1,8 +1,9 @@
 //! The folder of one experiment's results: one writer at a time, finished runs kept one by one, files replaced whole.
 //!
-//! While runs go on, each finished one is a folder `.partial/NNNNNN/` with the rows of its own, written under
-//! another name, synced, and renamed: after a crash, a full disk or `kill -9` every finished run is there. When all
-//! are, their rows are joined in the order of the spec, so the bytes do not depend on the order of finishing.
+//! Until all runs are finished, each finished one is a folder `.partial/NNNNNN/` with its own rows. The folder is written
+//! under another name, synced, and renamed, so that every finished run survives a crash, a full disk or `kill -9`. At
+//! the end the rows of all runs are joined in the order of the spec, so that their bytes do not depend on the order in
+//! which runs finish.
 
 use crate::Error;
 use crate::files;
@@ -11,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-/// The rows of one finished run: for every kind that it has, the CSV file of its own.
+/// The rows of one finished run: one CSV file for every kind of rows that it has.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FinishedRun {
     files: BTreeMap<String, Vec<u8>>,
@@ -69,8 +70,8 @@ pub struct Store {
 }
 
 impl Store {
-    /// Creates and locks `folder`. Of an interrupted experiment whose finished runs are there, `existing` says whether
-    /// to resume it, which takes the same resolved spec, or to discard it; else it is refused.
+    /// Creates and locks `folder`. If the finished runs of an interrupted experiment are there, `existing` decides whether
+    /// they are resumed, which takes the same resolved spec, discarded, or the reason to refuse.
     pub fn open(folder: &Path, resolved: &str, existing: Existing) -> Result<Self, Error> {
         let (folder, partial) = (folder.to_owned(), folder.join(".partial"));
         fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
@@ -168,7 +169,7 @@ impl Store {
 
     /// Removes what only an interrupted experiment needs. The lock file stays: removing it would race.
     pub fn finish(self) -> Result<(), Error> {
-        // Renamed first: what is removed bit by bit must not look like finished runs if that is interrupted.
+        // Renamed first, so that an interrupted removal leaves nothing that looks like finished runs.
         let removed = self.folder.join(REMOVED);
         fs::rename(&self.partial, &removed).map_err(Error::io(&self.partial, "rename the folder"))?;
         fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))

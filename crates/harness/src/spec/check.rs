@@ -4,9 +4,9 @@ use super::fault::Fault;
 use super::{Contestant, Experiment, Labelled};
 use crate::{scenes::subset, stress};
 use bvh_build::config::Accepts;
-use bvh_build::{BuildError, OutOfRange};
+use bvh_build::{Check, OutOfRange};
 use bvh_core::cost::{Objective, SahConstants};
-use bvh_search::{Budget, Method, Problem, SearchError, solve};
+use bvh_search::Method;
 use std::collections::HashSet;
 
 /// Most runs of an experiment.
@@ -78,7 +78,11 @@ impl Experiment {
         match method {
             Contestant::Peer(peer) if self.suite.is_some() => {
                 let found = format!("{:?}, another library", peer.name());
-                Err(Fault::new("method", found, "in the suite: its key `peers`"))
+                Err(Fault::new(
+                    "method",
+                    found,
+                    "methods of ours; the suite runs the libraries that are compiled in by itself",
+                ))
             }
             Contestant::Peer(peer) => match peer.missing_feature() {
                 Some(feature) => {
@@ -90,18 +94,7 @@ impl Experiment {
                 }
                 None => Ok(peer.check()?),
             },
-            Contestant::Ours(method) => {
-                // A search checks its parameters before it looks at the scene, which is empty here.
-                let budget = Budget { max_evaluations: Some(1), max_work: None };
-                let nothing = Problem { objective: self.objective, ..Problem::new(&[]) };
-                match solve(method, &nothing, 0, budget, &()) {
-                    Err(SearchError::OutOfRange(error) | SearchError::Build(BuildError::OutOfRange(error))) => {
-                        Err(error.into())
-                    }
-                    Err(error) => Err(Fault::new("method", error, "parameters that it runs with")),
-                    Ok(_) => Ok(()),
-                }
-            }
+            Contestant::Ours(method) => Ok(method.check()?),
         }
     }
 
