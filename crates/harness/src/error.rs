@@ -55,6 +55,9 @@ pub enum Error {
         "{differences} difference(s) from the committed results; if they are meant, run again without --check"
     )]
     Differs { differences: usize },
+    /// A finished run whose files are not what was written.
+    #[error("{}: {file} is damaged or missing", .part.display())]
+    Damaged { part: PathBuf, file: String },
     /// Parts of an experiment that cannot be joined.
     #[error("{experiment}: {message}")]
     Merge { experiment: String, message: String },

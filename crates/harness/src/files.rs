@@ -8,13 +8,19 @@ use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// The bytes of the regular file at `path`.
+/// The bytes of the regular file at `path`. Anything else is refused unread: a pipe could keep the program waiting for
+/// ever, and a device need not end.
 pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
-    fs::read(path).map_err(|source| match source.kind() {
+    let failed = |source: io::Error| match source.kind() {
         io::ErrorKind::NotFound => Error::Usage(format!("{}: no such file", path.display())),
-        io::ErrorKind::IsADirectory => Error::Usage(format!("{}: a folder; accepted: a file", path.display())),
         _ => Error::Io { path: path.to_owned(), action: "read the file", source },
-    })
+    };
+    let found = fs::metadata(path).map_err(failed)?;
+    if !found.is_file() {
+        let found = if found.is_dir() { "a folder" } else { "not a regular file" };
+        return Err(Error::Usage(format!("{}: {found}; accepted: a file", path.display())));
+    }
+    fs::read(path).map_err(failed)
 }
 
 /// The text of the regular file at `path`.
@@ -72,8 +78,32 @@ pub fn wait_for_folder(folder: &Path) -> Result<File, Error> {
 
 fn lock_file(folder: &Path) -> Result<(PathBuf, File), Error> {
     let path = folder.join(".lock");
-    let lock = File::create(&path).map_err(Error::io(&path, "create the file"))?;
+    // Neither truncated nor opened through a link, which could lead to somebody's file.
+    if fs::symlink_metadata(&path).is_ok_and(|found| !found.is_file()) {
+        let source = io::Error::other("it is not a regular file; remove it");
+        return Err(Error::Io { path, action: "create the file", source });
+    }
+    let lock = File::options().write(true).create(true).truncate(false).open(&path);
+    let lock = lock.map_err(Error::io(&path, "create the file"))?;
     Ok((path, lock))
+}
+
+/// How the names of files end that are not finished yet. Such a file is locked by its writer.
+const UNFINISHED: &str = ".unfinished";
+
+/// Removes the unfinished files of writers that were killed: those that nobody has locked.
+fn remove_leftovers(folder: &Path, prefix: &str) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        if is_file
+            && name.starts_with(prefix)
+            && name.ends_with(UNFINISHED)
+            && File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok())
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// Bytes of a reserved file written at a time. In large pieces, because the kernel caches large writes in large pages,
@@ -100,13 +130,15 @@ impl Reserved {
         let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let prefix = format!("{}.", name.to_string_lossy());
         let mut builder = tempfile::Builder::new();
-        builder.prefix(&prefix).suffix(".unfinished");
+        builder.prefix(&prefix).suffix(UNFINISHED);
         // The permissions of any new file, within the user's mask.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let mut unfinished = builder
             .tempfile_in(folder)
             .map_err(Error::io(&path, "write the file: cannot create its new version"))?;
+        unfinished.as_file().try_lock().ok();
+        remove_leftovers(folder, &prefix);
         let zeros = vec![0; bytes.min(PIECE)];
         (0..bytes)
             .step_by(PIECE)
@@ -152,6 +184,32 @@ mod tests {
         assert_eq!((fs::read(&path).unwrap(), names()), (b"old".to_vec(), 1));
         Reserved::new(&path, 1000).unwrap().write(b"new").unwrap();
         assert_eq!((fs::read(&path).unwrap(), names()), (b"new".to_vec(), 1));
+    }
+
+    #[test]
+    fn the_leftovers_of_killed_writers_are_removed_and_no_other_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.bvh");
+        let reserved = Reserved::new(&path, 10).unwrap();
+        for name in ["x.bvh.abc.unfinished", "y.bvh.abc.unfinished", "x.bvh.txt"] {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        write(&path, b"first").unwrap();
+        assert!(!folder.path().join("x.bvh.abc.unfinished").exists());
+        reserved.write(b"second").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"second");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_is_never_taken_through_a_link() {
+        let folder = tempfile::tempdir().unwrap();
+        let precious = folder.path().join("precious");
+        fs::write(&precious, "kept").unwrap();
+        std::os::unix::fs::symlink(&precious, folder.path().join(".lock")).unwrap();
+        assert!(matches!(lock_folder(folder.path()), Err(Error::Io { .. })));
+        assert_eq!(fs::read(&precious).unwrap(), b"kept");
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! The command line: parses the arguments, dispatches to a command, and sets the exit code.
 
 use clap::{Parser, Subcommand};
+use harness::cli::interrupt::{self, INTERRUPTED};
 use harness::cli::output::{STDOUT_FAILED, print_error, print_line};
 use harness::cli::{bake, inspect, merge, render, report, run, scenes};
 use harness::{Error, stress::child};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 
 /// Experiments on bounding volume hierarchies: TOML specs in, CSV files and figures out.
 #[derive(Parser)]
@@ -35,19 +36,9 @@ enum Command {
     },
 }
 
-/// Set by Ctrl-C. A second one ends the program at once; finished runs are kept either way.
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let handler = ctrlc::set_handler(|| {
-        if INTERRUPTED.swap(true, Relaxed) {
-            std::process::exit(130);
-        }
-    });
-    if let Err(error) = handler {
-        print_error(&format!("warning: Ctrl-C will end the program at once: {error}"));
-    }
+    interrupt::listen();
     let result = match cli.command {
         None => run::run(&cli.run, &INTERRUPTED),
         Some(Command::Scenes) => scenes::scenes(),

@@ -174,12 +174,13 @@ fn what_cannot_be_baked_or_inspected_is_said_and_nothing_is_lost() {
 #[test]
 fn a_disk_without_room_is_noticed_before_the_search_and_the_old_file_stays() {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("a.bvh"), "old").unwrap();
+    let old = b"\x89BVH\r\n\x1a\nold";
+    fs::write(folder.path().join("a.bvh"), old).unwrap();
     let output = run_on_a_small_disk(folder.path(), "bake spheres75 --budget 1h --out a.bvh", 4);
     let said = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("a.bvh: cannot reserve the file's space"), "{said}");
-    assert_eq!(fs::read(folder.path().join("a.bvh")).unwrap(), b"old");
+    assert_eq!(fs::read(folder.path().join("a.bvh")).unwrap(), old);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 

@@ -1,6 +1,6 @@
 //! Specs of any bytes.
 
-use harness::spec::{Experiment, Overrides};
+use harness::spec::{Experiment, Name, Overrides};
 use std::path::Path;
 
 /// The bytes: a spec. It is refused with its file named, or read, and then its resolved form is read as itself.
@@ -11,10 +11,10 @@ pub fn spec(bytes: &[u8]) {
         let overrides = Overrides { quick, ..Default::default() };
         match Experiment::parse(path, text, &overrides) {
             Ok(experiment) => {
-                let mut expected = Experiment { name: String::new(), quick: false, ..experiment };
+                let mut expected = Experiment { name: Name::default(), quick: false, ..experiment };
                 let resolved = toml::to_string(&expected).unwrap();
                 let read = Experiment::parse(path, &resolved, &Overrides::default());
-                expected.name = "spec".into();
+                expected.name = Name::try_from("spec".to_owned()).unwrap();
                 assert_eq!(read.unwrap(), expected, "{resolved}");
             }
             Err(error) => {

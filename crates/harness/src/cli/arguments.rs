@@ -1,6 +1,9 @@
 //! Arguments that several commands have, and the refusal of paths of the wrong kind before any work.
 
 use crate::Error;
+use bvh_core::file::Header;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// How many threads the program uses.
@@ -26,17 +29,44 @@ fn refuse(flag: &str, path: &Path, found: &str, accepted: &str) -> Result<(), Er
     Err(Error::Usage(format!("{flag}: {} is {found}; accepted: {accepted}", path.display())))
 }
 
-/// A file to be written: a new one or an old one, but no folder and no device, in whose place the file would be put.
-pub fn output_file(flag: &str, path: &Path) -> Result<(), Error> {
+/// A kind of files that a command writes.
+#[derive(Clone, Copy, Debug)]
+pub struct FileKind {
+    name: &'static str,
+    /// The bytes with which every file of this kind begins.
+    beginning: &'static [u8],
+}
+
+/// Baked trees.
+pub const TREE: FileKind = FileKind { name: "a tree file", beginning: &Header::MAGIC };
+/// Pictures.
+pub const PICTURE: FileKind = FileKind { name: "a PNG file", beginning: b"\x89PNG" };
+/// The page of all results.
+pub const PAGE: FileKind = FileKind { name: "an HTML page", beginning: b"<!DOCTYPE html>" };
+/// The nodes of a tree.
+pub const NODES: FileKind = FileKind { name: "a CSV file of nodes", beginning: b"node,parent," };
+
+/// A file to be written: a new one, or one of the same kind to be replaced. Anything else stays: folders, devices, and
+/// files that somebody needs otherwise, such as the command's own input.
+pub fn output_file(flag: &str, path: &Path, kind: &FileKind) -> Result<(), Error> {
     let accepted = "the path of a file to write";
     if path.as_os_str().is_empty() {
-        refuse(flag, path, "empty", accepted)
-    } else if path.is_dir() {
-        refuse(flag, path, "a folder", accepted)
-    } else if path.exists() && !path.is_file() {
-        refuse(flag, path, "not a regular file", accepted)
-    } else {
-        Ok(())
+        return refuse(flag, path, "empty", accepted);
+    }
+    match std::fs::metadata(path) {
+        Err(_) => Ok(()),
+        Ok(found) if found.is_dir() => refuse(flag, path, "a folder", accepted),
+        Ok(found) if !found.is_file() => refuse(flag, path, "not a regular file", accepted),
+        Ok(_) => {
+            let mut beginning = Vec::new();
+            let length = kind.beginning.len() as u64;
+            let file = File::open(path).and_then(|file| file.take(length).read_to_end(&mut beginning));
+            file.map_err(Error::io(path, "read the file"))?;
+            if beginning.is_empty() || beginning == kind.beginning {
+                return Ok(());
+            }
+            refuse(flag, path, &format!("a file, but not {}", kind.name), "a new file, or one of that kind")
+        }
     }
 }
 

@@ -1,9 +1,9 @@
 //! `harness bake`: the best tree for a scene that a budget buys, kept in a file.
 
 use crate::Error;
-use crate::cli::arguments::{Jobs, input_file, output_file};
-use crate::cli::explain;
+use crate::cli::arguments::{Jobs, TREE, input_file, output_file};
 use crate::cli::output::{print_error, print_line};
+use crate::cli::{explain, interrupt};
 use crate::clock::Deadline;
 use crate::files::{self, Reserved, load_tree};
 use crate::scenes::Scene;
@@ -91,7 +91,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     if let Some(from) = &args.from {
         input_file("--from", from)?;
     }
-    output_file("--out", &args.out)?;
+    output_file("--out", &args.out, &TREE)?;
     args.jobs.apply()?;
     let scene = Scene::load(&args.scene)?;
     scene.remark.iter().for_each(|remark| print_error(remark));
@@ -105,6 +105,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let greedy = muller_fellner::Config::default().build(&scene.boxes);
     let base = cost::internal_area(&greedy.map_err(Error::search(&scene.name, &args.method))?);
     let watch = Watch::new(args.budget, base, interrupted);
+    interrupt::hold();
     let budget = match args.budget {
         Effort::Time(_) => Budget::default(),
         Effort::Work(work) => Budget { max_work: Some(work), ..Budget::default() },

@@ -1,6 +1,6 @@
 //! `harness inspect`: what a tree file is, what its tree costs, and what it looks like.
 
-use crate::cli::arguments::output_file;
+use crate::cli::arguments::{NODES, output_file};
 use crate::cli::output::{print_error, print_line};
 use crate::scenes::Scene;
 use crate::{Error, files, run::rows};
@@ -58,7 +58,7 @@ impl Lines {
 /// the one named.
 pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     if let Some(nodes) = &args.nodes {
-        output_file("--nodes", nodes)?;
+        output_file("--nodes", nodes, &NODES)?;
     }
     let bytes = files::read(&args.file)?;
     let file = files::open_tree(&args.file, &bytes)?;

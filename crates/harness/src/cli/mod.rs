@@ -4,6 +4,7 @@ pub mod arguments;
 pub mod bake;
 pub mod explain;
 pub mod inspect;
+pub mod interrupt;
 pub mod merge;
 pub mod output;
 pub mod render;

@@ -1,5 +1,6 @@
 //! Writes to the terminal, and remembers whether that failed.
 
+use std::borrow::Cow;
 use std::io::{ErrorKind, Write};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -10,7 +11,7 @@ pub static STDOUT_FAILED: AtomicBool = AtomicBool::new(false);
 /// because the results are in files.
 pub fn print_line(text: &str) {
     let mut out = std::io::stdout();
-    let written = writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush());
+    let written = writeln!(out, "{}", plain(text.trim_end())).and_then(|()| out.flush());
     if written.is_err_and(|error| error.kind() != ErrorKind::BrokenPipe) {
         STDOUT_FAILED.store(true, Relaxed);
     }
@@ -18,5 +19,25 @@ pub fn print_line(text: &str) {
 
 /// Prints a line to standard error.
 pub fn print_error(line: &str) {
-    let _ = writeln!(std::io::stderr(), "{line}");
+    let _ = writeln!(std::io::stderr(), "{}", plain(line));
+}
+
+/// The text with control characters spelled out, but for the ends of lines: names of files and keys of specs are the
+/// user's, and must not command the terminal.
+fn plain(text: &str) -> Cow<'_, str> {
+    let commands = |c: char| c.is_control() && c != '\n';
+    if !text.contains(commands) {
+        return text.into();
+    }
+    let spelled = |c: char| if commands(c) { c.escape_default().to_string() } else { c.to_string() };
+    text.chars().map(spelled).collect::<String>().into()
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn control_characters_are_spelled_out() {
+        assert_eq!(super::plain("key \u{1b}[2J\nis 1"), "key \\u{1b}[2J\nis 1");
+        assert_eq!(super::plain("Müller–Fellner\n"), "Müller–Fellner\n");
+    }
 }

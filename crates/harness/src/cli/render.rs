@@ -1,7 +1,7 @@
 //! `harness render`: arguments in, a PNG file and a line of numbers out.
 
 use crate::Error;
-use crate::cli::arguments::{Jobs, input_file, output_file};
+use crate::cli::arguments::{Jobs, PICTURE, input_file, output_file};
 use crate::cli::output::{print_error, print_line};
 use crate::measure::Accelerator;
 use crate::measure::camera::View;
@@ -116,7 +116,7 @@ pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> 
     if args.accel.ends_with(".bvh") {
         input_file("--accel", Path::new(&args.accel))?;
     }
-    output_file("--out", &args.out)?;
+    output_file("--out", &args.out, &PICTURE)?;
     args.jobs.apply()?;
     let scene = Scene::load(&args.scene)?;
     scene.remark.iter().for_each(|remark| print_error(remark));

@@ -1,7 +1,7 @@
 //! `harness report`: all results on one page.
 
 use crate::Error;
-use crate::cli::arguments::{input_folder, output_file};
+use crate::cli::arguments::{PAGE, input_folder, output_file};
 use crate::cli::output::print_line;
 use crate::report::page;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ pub struct ReportArgs {
 
 /// Writes the page, and prints how many experiments are on it.
 pub fn report(args: &ReportArgs) -> Result<(), Error> {
-    output_file("--out", &args.out)?;
+    output_file("--out", &args.out, &PAGE)?;
     input_folder("--results", &args.results)?;
     let experiments = page::write(&args.results, &args.out)?;
     print_line(&format!("{experiments} experiments: {}", args.out.display()));

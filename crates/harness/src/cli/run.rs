@@ -9,6 +9,7 @@ use crate::run::shard::Shard;
 use crate::run::store::Existing;
 use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
+use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
@@ -63,6 +64,11 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     // All specs are checked before the first one is run.
     let experiments =
         args.specs.iter().map(|path| Experiment::read(path, &overrides)).collect::<Result<Vec<_>, _>>()?;
+    let mut folders = HashSet::new();
+    if let Some(twice) = experiments.iter().find(|experiment| !folders.insert(experiment.folder())) {
+        let message = format!("two specs are called {}; run them one by one, each with an --out", twice.name);
+        return Err(Error::Usage(message));
+    }
     let existing = match (args.resume, args.force) {
         (true, _) => Existing::Resume,
         (_, true) => Existing::Replace,

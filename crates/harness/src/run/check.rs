@@ -1,23 +1,26 @@
-//! Compares fresh results with committed ones: every CSV file but the timing ones, row by row.
+//! Compares fresh results with committed ones: the resolved spec key by key, and every CSV file but the timing ones row by
+//! row.
 
 use crate::Error;
+use crate::files;
 use csv::StringRecord;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
+use toml::{Table, Value};
 
 /// Differences beyond this many per file are only counted.
 const SHOWN: usize = 5;
 
-/// Lists how the CSV files in `fresh` differ from those in `committed`, one line each. Rows of the scenes in
-/// `left_out` are not compared.
+/// Lists how the resolved spec and the CSV files in `fresh` differ from those in `committed`, one line each. Rows of the
+/// scenes in `left_out` are not compared.
 pub fn compare(fresh: &Path, committed: &Path, left_out: &[String]) -> Result<Vec<String>, Error> {
     let mut names = csv_names(fresh)?;
     if !committed.is_dir() {
         return Ok(vec![format!("{}: no committed results to compare with", committed.display())]);
     }
     names.extend(csv_names(committed)?);
-    let mut differences = Vec::new();
+    let mut differences = compare_specs(fresh, committed, left_out)?;
     for name in names {
         let paths = [fresh.join(&name), committed.join(&name)];
         match [paths[0].is_file(), paths[1].is_file()] {
@@ -27,6 +30,55 @@ pub fn compare(fresh: &Path, committed: &Path, left_out: &[String]) -> Result<Ve
         }
     }
     Ok(differences)
+}
+
+/// How the resolved specs differ.
+fn compare_specs(fresh: &Path, committed: &Path, left_out: &[String]) -> Result<Vec<String>, Error> {
+    let read = |folder: &Path| -> Result<Value, Error> {
+        let path = folder.join("resolved.toml");
+        let mut table: Table = toml::from_str(&files::read_text(&path)?).map_err(Error::toml(&path))?;
+        if let Some(Value::Array(scenes)) = table.get_mut("scenes") {
+            let name = |scene: &Value| scene.get("name").and_then(Value::as_str).unwrap_or_default().to_owned();
+            scenes.retain(|scene| !left_out.contains(&name(scene)));
+        }
+        Ok(Value::Table(table))
+    };
+    let mut differences = Vec::new();
+    compare_values("", &read(fresh)?, &read(committed)?, &mut differences);
+    Ok(shortened("resolved.toml", differences))
+}
+
+fn compare_values(key: &str, fresh: &Value, committed: &Value, differences: &mut Vec<String>) {
+    match (fresh, committed) {
+        (Value::Table(fresh), Value::Table(committed)) => {
+            let names: BTreeSet<&String> = fresh.keys().chain(committed.keys()).collect();
+            for name in names {
+                let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
+                match (fresh.get(name), committed.get(name)) {
+                    (Some(fresh), Some(committed)) => compare_values(&key, fresh, committed, differences),
+                    (Some(fresh), None) => differences.push(format!("{key} is {fresh}, not committed")),
+                    (None, _) => differences.push(format!("{key} is committed, but is no key any more")),
+                }
+            }
+        }
+        (Value::Array(fresh), Value::Array(committed)) if fresh.len() == committed.len() => {
+            for (at, (fresh, committed)) in fresh.iter().zip(committed).enumerate() {
+                compare_values(&format!("{key}[{at}]"), fresh, committed, differences);
+            }
+        }
+        _ if fresh == committed => {}
+        _ => differences.push(format!("{key} is {fresh}, committed {committed}")),
+    }
+}
+
+/// The first differences in a file, and how many more there are.
+fn shortened(file: &str, mut differences: Vec<String>) -> Vec<String> {
+    let more = differences.len().saturating_sub(SHOWN);
+    differences.truncate(SHOWN);
+    if more > 0 {
+        differences.push(format!("and {more} more"));
+    }
+    differences.into_iter().map(|difference| format!("{file}: {difference}")).collect()
 }
 
 /// The CSV files of a folder that do not hold seconds.
@@ -53,19 +105,14 @@ fn compare_files(
         .flat_map(|(fresh, committed)| {
             let columns = header.iter().zip(fresh.iter().zip(committed));
             columns.filter(|(_, (now, then))| now != then).map(|(column, (now, then))| {
-                format!("{name}: {}: {column} is {now}, committed {then}", identity(&header, committed))
+                format!("{}: {column} is {now}, committed {then}", identity(&header, committed))
             })
         })
         .collect();
     if fresh.len() != committed.len() {
-        differences.push(format!("{name}: {} rows, committed {}", fresh.len(), committed.len()));
+        differences.push(format!("{} rows, committed {}", fresh.len(), committed.len()));
     }
-    if differences.len() > SHOWN {
-        let more = differences.len() - SHOWN;
-        differences.truncate(SHOWN);
-        differences.push(format!("{name}: and {more} more"));
-    }
-    Ok(differences)
+    Ok(shortened(name, differences))
 }
 
 /// What a row is about: its scene, method and so on.
@@ -95,6 +142,9 @@ mod tests {
         fs::write(folders[0].path().join("runs.csv"), fresh).unwrap();
         fs::write(folders[1].path().join("runs.csv"), committed).unwrap();
         fs::write(folders[0].path().join("timing.csv"), "seconds\n1\n").unwrap();
+        for folder in &folders {
+            fs::write(folder.path().join("resolved.toml"), "").unwrap();
+        }
         compare(folders[0].path(), folders[1].path(), left_out).unwrap()
     }
 
@@ -120,5 +170,22 @@ mod tests {
         assert_eq!(differences(fewer, COMMITTED, &[]), ["runs.csv: 1 rows, committed 2"]);
         assert_eq!(differences(fewer, COMMITTED, &["b".into()]), Vec::<String>::new());
         assert!(differences("scene\na\n", COMMITTED, &[])[0].contains("columns"));
+    }
+
+    #[test]
+    fn a_stale_resolved_spec_is_named_by_its_keys() {
+        let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+        let write = |at: usize, text: &str| fs::write(folders[at].path().join("resolved.toml"), text).unwrap();
+        write(0, "[experiment]\nseed = 1\nm = [{ a = 1 }]\n[[scenes]]\nname = 'x'\n");
+        write(1, "[experiment]\nold = 1\nm = [{ a = 2 }]\n[[scenes]]\nname = 'x'\n[[scenes]]\nname = 'y'\n");
+        let found = compare(folders[0].path(), folders[1].path(), &["y".into()]).unwrap();
+        assert_eq!(
+            found,
+            [
+                "resolved.toml: experiment.m[0].a is 1, committed 2",
+                "resolved.toml: experiment.old is committed, but is no key any more",
+                "resolved.toml: experiment.seed is 1, not committed",
+            ]
+        );
     }
 }

@@ -76,8 +76,9 @@ fn run(
     let own: Vec<usize> =
         (0..jobs.len()).filter(|&index| extent.shard.is_none_or(|shard| shard.has(index))).collect();
     let watch = Watch { bar: progress(own.len() as u64), interrupted };
-    watch.bar.set_message(experiment.name.clone());
-    let trees = perform_all(experiment, &jobs, &own, &store, &watch)?;
+    watch.bar.set_message(experiment.name.to_string());
+    let (trees, redone) = perform_all(experiment, &jobs, &own, &store, &watch)?;
+    remarks.extend(redone);
     let provenance = Provenance::gather();
     if let Some(shard) = extent.shard {
         store.keep_shard(&to_toml(&provenance)?)?;
@@ -108,16 +109,24 @@ fn jobs<'a>(experiment: &'a Experiment, scenes: &'a [Scene]) -> Result<Vec<Job<'
     Ok(scenes.iter().zip(bases).flat_map(of_scene).collect())
 }
 
-/// Performs the runs in `own` that the store does not have yet, and keeps each as soon as it is finished.
-/// Returns the trees to be traced of the runs that were performed now.
+/// Performs the runs in `own` that the store does not have yet or has damaged, and keeps each as soon as it is finished.
+/// Returns the trees to be traced of the runs that were performed now, and what was damaged.
 fn perform_all(
     experiment: &Experiment,
     jobs: &[Job],
     own: &[usize],
     store: &Store,
     watch: &Watch,
-) -> Result<Trees, Error> {
-    let mut todo: Vec<usize> = own.iter().copied().filter(|&index| !store.has(index)).collect();
+) -> Result<(Trees, Vec<String>), Error> {
+    let (mut todo, mut redone) = (Vec::new(), Vec::new());
+    for &index in own {
+        match store.has(index) {
+            Ok(true) => continue,
+            Ok(false) => {}
+            Err(damaged) => redone.push(format!("done again: {damaged}")),
+        }
+        todo.push(index);
+    }
     if experiment.sequential {
         // Methods take turns, so that a disturbance of the machine does not hit all repetitions of one method.
         let scene = |index: usize| index / (experiment.methods.len() * experiment.repetitions as usize);
@@ -143,7 +152,7 @@ fn perform_all(
     watch.bar.finish_and_clear();
     result?;
     match finished.into_inner() {
-        all if all == own.len() => Ok(trees.into_inner().unwrap_or_else(PoisonError::into_inner)),
+        all if all == own.len() => Ok((trees.into_inner().unwrap_or_else(PoisonError::into_inner), redone)),
         finished => Err(Error::Interrupted { finished, runs: own.len() }),
     }
 }

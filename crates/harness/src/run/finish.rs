@@ -17,7 +17,7 @@ pub struct Summary {
     pub text: String,
     /// Optional scenes that are not there.
     pub left_out: Vec<String>,
-    /// What was noticed in scene files, one line each.
+    /// What was noticed in scene files, and damaged runs that were done again, one line each.
     pub remarks: Vec<String>,
     /// The folder of the results.
     pub folder: PathBuf,

@@ -107,7 +107,7 @@ fn common_spec(name: &Path, parts: &[Part]) -> Result<Resolved, String> {
     Ok(resolved)
 }
 
-/// For every run a kept folder of it. Refuses runs of which there is none, or of which two differ.
+/// For every run a kept folder of it. Refuses runs of which there is none, of which one is damaged, or two differ.
 fn owners(resolved: &Resolved, parts: &[Part], fail: impl Fn(String) -> Error) -> Result<Vec<PathBuf>, Error> {
     let of_scene: Vec<_> = resolved.experiment.runs().collect();
     let named = |index: usize| {
@@ -123,8 +123,9 @@ fn owners(resolved: &Resolved, parts: &[Part], fail: impl Fn(String) -> Error) -
             missing.push(index);
             continue;
         };
+        let run = FinishedRun::read(owner)?;
         for other in others {
-            if let Some(file) = FinishedRun::read(owner)?.difference(&FinishedRun::read(other)?) {
+            if let Some(file) = run.difference(&FinishedRun::read(other)?) {
                 let (owner, other) = (owner.display(), other.display());
                 return Err(fail(format!("{owner} and {other} have different {file} of {}", named(index))));
             }

@@ -30,8 +30,9 @@ impl Provenance {
     /// Gathers everything now.
     pub fn gather() -> Self {
         Self {
+            // Arguments need not be UTF-8.
             command: std::iter::once("harness".into())
-                .chain(std::env::args().skip(1))
+                .chain(std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()))
                 .collect::<Vec<_>>()
                 .join(" "),
             revision: revision().unwrap_or_else(|| "unknown".into()),

@@ -8,9 +8,13 @@
 use crate::Error;
 use crate::files;
 use crate::run::rows::{Row, to_bytes};
+use crate::scenes::fnv1a;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
+
+/// The file in which a kept run lists its other files, one a line: name, number of bytes and checksum.
+const CONTENTS: &str = "contents.txt";
 
 /// The rows of one finished run: one CSV file for every kind of rows that it has.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -27,14 +31,32 @@ impl FinishedRun {
         Ok(())
     }
 
-    /// Reads a kept run back.
+    /// Reads a kept run back. Refuses one whose files are not what was written.
     pub fn read(part: &Path) -> Result<Self, Error> {
+        let damaged = |file: &str| Error::Damaged { part: part.to_owned(), file: file.to_owned() };
+        let contents = fs::read_to_string(part.join(CONTENTS)).map_err(|_| damaged(CONTENTS))?;
         let mut files = BTreeMap::new();
-        for name in file_names(part)? {
+        for name in file_names(part)?.into_iter().filter(|name| name != CONTENTS) {
             let path = part.join(&name);
             files.insert(name, fs::read(&path).map_err(Error::io(&path, "read the file"))?);
         }
-        Ok(Self { files })
+        let run = Self { files };
+        let found = run.contents();
+        let [expected, found] = [&contents, &found].map(|text| text.lines().collect::<BTreeSet<&str>>());
+        match expected.symmetric_difference(&found).next() {
+            Some(line) => Err(damaged(line.split(' ').next().unwrap_or_default())),
+            // Every run has rows.
+            None if expected.is_empty() => Err(damaged(CONTENTS)),
+            None => Ok(run),
+        }
+    }
+
+    /// What [`CONTENTS`] has to say.
+    fn contents(&self) -> String {
+        let line = |(name, bytes): (&String, &Vec<u8>)| {
+            format!("{name} {} {:016x}\n", bytes.len(), fnv1a(bytes.iter().copied()))
+        };
+        self.files.iter().map(line).collect()
     }
 
     /// The first file, other than those with seconds, in which two runs differ.
@@ -117,22 +139,26 @@ impl Store {
         self.partial.join(part_name(index))
     }
 
-    /// Whether run `index` has been kept.
-    pub fn has(&self, index: usize) -> bool {
-        self.part(index).is_dir()
+    /// Whether run `index` has been kept; an error if it has, but is damaged.
+    pub fn has(&self, index: usize) -> Result<bool, Error> {
+        let part = self.part(index);
+        if part.is_dir() { FinishedRun::read(&part).map(|_| true) } else { Ok(false) }
     }
 
-    /// Keeps run `index`.
+    /// Keeps run `index`, in place of a damaged one.
     pub fn keep(&self, index: usize, run: &FinishedRun) -> Result<(), Error> {
         let part = self.part(index);
         let unfinished = part.with_extension("unfinished");
-        if unfinished.exists() {
-            fs::remove_dir_all(&unfinished).map_err(Error::io(&unfinished, "remove the folder"))?;
+        for old in [&unfinished, &part] {
+            if old.exists() {
+                fs::remove_dir_all(old).map_err(Error::io(old, "remove the folder"))?;
+            }
         }
         fs::create_dir(&unfinished).map_err(Error::io(&unfinished, "create the folder"))?;
         for (name, bytes) in &run.files {
             files::write_synced(&unfinished.join(name), bytes)?;
         }
+        files::write_synced(&unfinished.join(CONTENTS), run.contents().as_bytes())?;
         fs::rename(&unfinished, &part).map_err(Error::io(&part, "rename the folder"))
     }
 
@@ -143,6 +169,7 @@ impl Store {
             .map(|part| Ok((part.clone(), file_names(&part)?)))
             .collect::<Result<_, Error>>()?;
         let names: BTreeSet<&String> = parts.iter().flat_map(|(_, names)| names).collect();
+        let names = names.into_iter().filter(|name| *name != CONTENTS);
         for name in names {
             let mut joined = Vec::new();
             for (part, _) in parts.iter().filter(|(_, names)| names.contains(name)) {
@@ -201,6 +228,11 @@ fn file_names(folder: &Path) -> Result<BTreeSet<String>, Error> {
 mod tests {
     use super::*;
 
+    fn run() -> FinishedRun {
+        let file = |name: &str, text: &str| (name.to_owned(), text.as_bytes().to_vec());
+        FinishedRun { files: [file("runs.csv", "a,b\n1,2\n"), file("history.csv", "a\n1\n")].into() }
+    }
+
     #[test]
     fn a_second_writer_is_refused() {
         let out = tempfile::tempdir().unwrap();
@@ -215,11 +247,35 @@ mod tests {
     fn finished_runs_are_resumed_by_the_same_spec_only_and_discarded_only_if_asked() {
         let out = tempfile::tempdir().unwrap();
         let open = |resolved, existing| Store::open(&out.path().join("x"), resolved, existing);
-        open("a", Existing::Keep).unwrap().keep(0, &FinishedRun::default()).unwrap();
+        open("a", Existing::Keep).unwrap().keep(0, &run()).unwrap();
         assert!(matches!(open("b", Existing::Resume), Err(Error::Usage(_))));
         assert!(matches!(open("a", Existing::Keep), Err(Error::Usage(_))));
-        assert!(open("a", Existing::Resume).unwrap().has(0));
-        assert!(!open("a", Existing::Replace).unwrap().has(0));
+        assert!(open("a", Existing::Resume).unwrap().has(0).unwrap());
+        assert!(!open("a", Existing::Replace).unwrap().has(0).unwrap());
+    }
+
+    #[test]
+    fn a_kept_run_whose_files_are_missing_cut_emptied_or_edited_is_refused_by_name() {
+        let out = tempfile::tempdir().unwrap();
+        let store = Store::open(&out.path().join("x"), "", Existing::Keep).unwrap();
+        let damages: [(&str, fn(&Path)); 6] = [
+            ("runs.csv", |part| fs::remove_file(part.join("runs.csv")).unwrap()),
+            ("runs.csv", |part| fs::write(part.join("runs.csv"), "").unwrap()),
+            ("runs.csv", |part| fs::write(part.join("runs.csv"), "a,b\n").unwrap()),
+            ("history.csv", |part| fs::write(part.join("history.csv"), "a\n2\n").unwrap()),
+            ("rays.csv", |part| fs::write(part.join("rays.csv"), "a\n").unwrap()),
+            (CONTENTS, |part| fs::remove_file(part.join(CONTENTS)).unwrap()),
+        ];
+        for (file, damage) in damages {
+            store.keep(0, &run()).unwrap();
+            assert!(store.has(0).unwrap());
+            damage(&store.part(0));
+            let message = store.has(0).unwrap_err().to_string();
+            assert!(message.contains(file) && message.contains("000000"), "{message}");
+        }
+        // The run is done again, and what was damaged is replaced.
+        store.keep(0, &run()).unwrap();
+        assert!(store.has(0).unwrap());
     }
 
     #[test]

@@ -6,6 +6,7 @@
 mod check;
 mod fault;
 mod method;
+mod name;
 mod read;
 
 use crate::measure::{empirical_cost, speed};
@@ -17,6 +18,7 @@ use bvh_build::config::Itself;
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, exact};
 pub use method::{Contestant, Labelled};
+pub use name::Name;
 pub use read::Overrides;
 use std::path::{Path, PathBuf};
 
@@ -28,7 +30,7 @@ config! {
     /// `--quick`. Serialised, with every default spelled out, it is `resolved.toml`.
     pub struct Experiment {
         /// Name of the results folder, from the spec's file.
-        name: String;
+        name: Name;
         /// Whether this is the smaller variant of `--quick`.
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         quick: bool;
@@ -72,7 +74,7 @@ config! {
 impl Experiment {
     /// The folder of its results within that of all results.
     pub fn folder(&self) -> PathBuf {
-        if self.quick { Path::new("quick").join(&self.name) } else { self.name.clone().into() }
+        if self.quick { Path::new("quick").join(self.name.as_str()) } else { self.name.as_str().into() }
     }
 
     /// The runs on one scene in order: method, repetition, and whether it is the first.

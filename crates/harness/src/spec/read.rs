@@ -1,12 +1,13 @@
 //! From a spec's text to a checked [`Experiment`], with what the command line changes.
 
 use super::fault::{self, Fault, line_of};
-use super::{Experiment, Labelled};
+use super::{Experiment, Labelled, Name};
 use crate::Error;
 use crate::files;
 use crate::report::Report;
 use bvh_build::Check;
 use bvh_search::Method;
+use std::ffi::OsStr;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -31,8 +32,11 @@ impl Experiment {
     pub fn parse(path: &Path, text: &str, overrides: &Overrides) -> Result<Self, Error> {
         let refuse = |message: String| Error::Spec { file: path.to_owned(), message };
         let table: Table = text.parse().map_err(|error: toml::de::Error| refuse(error.to_string()))?;
-        let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        Self::from_table(table, &name, overrides).map_err(|fault| {
+        let name = path.file_stem().and_then(OsStr::to_str).ok_or("no UTF-8".to_owned());
+        let name = name.and_then(|name| Name::try_from(name.to_owned()));
+        let name =
+            name.map_err(|message| refuse(format!("the file's name without its extension: {message}")))?;
+        Self::from_table(table, name, overrides).map_err(|fault| {
             // A key that `quick` replaces stands there, not where it is read.
             let quick = overrides.quick.then(|| line_of(text, &format!("quick.{}", fault.key))).flatten();
             let line = quick.or_else(|| line_of(text, &fault.key));
@@ -40,7 +44,7 @@ impl Experiment {
         })
     }
 
-    fn from_table(mut table: Table, name: &str, overrides: &Overrides) -> Result<Self, Fault> {
+    fn from_table(mut table: Table, name: Name, overrides: &Overrides) -> Result<Self, Fault> {
         if let Some((key, value)) = never_right(&table) {
             return Err(Fault::new(key, value, "under any key finite numbers, and no dates"));
         }
@@ -55,10 +59,10 @@ impl Experiment {
             fault::tagged(table, "kind", |kind, config| Report::read(kind, config), || Report::NAMES.join(", "))
         })?;
         let mut experiment: Self = fault::deserialize(table)?;
-        if !experiment.name.is_empty() {
+        if experiment.name != Name::default() {
             return Err(Fault::new("name", experiment.name, "none, the file's name is used"));
         }
-        (experiment.name, experiment.quick) = (name.into(), overrides.quick);
+        (experiment.name, experiment.quick) = (name, overrides.quick);
         (experiment.methods, experiment.reports) = (methods, reports);
         if let Some(seed) = overrides.seed {
             experiment.seed = seed;

@@ -184,3 +184,15 @@ fn seeds_differ_between_runs_and_follow_the_spec_alone() {
     assert_eq!(distinct.len(), seeds.len());
     assert_eq!(seeds[0], read(GOOD, &Overrides::default()).unwrap().seed_of("escher", "grasp", 0));
 }
+
+#[test]
+fn naming_a_wrong_key_among_thousands_of_methods_takes_no_time() {
+    let methods = "[[methods]]\nmethod = 'grasp'\nlabel = 'NUMBER'\n";
+    let many: String = (0..3000).map(|number| methods.replace("NUMBER", &number.to_string())).collect();
+    let text =
+        format!("question = 'q'\nscenes = ['escher']\n{}", many.replacen("'2900'", "'2900'\nnoise = 'x'", 1));
+    let start = std::time::Instant::now();
+    let message = read(&text, &Overrides::default()).unwrap_err();
+    assert!(message.contains("methods[2900].noise"), "{message}");
+    assert!(start.elapsed().as_secs_f64() < 1.0, "{:?}", start.elapsed());
+}

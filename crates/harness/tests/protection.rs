@@ -1,0 +1,220 @@
+//! What the program does not do to its user's files, whatever it is called with: lead results elsewhere, lose finished
+//! runs, write through links, wait for ever on what is no file, or replace what it did not write.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+use support::{harness, reproducible, run, text};
+
+const SPEC: &str = "
+question = 'What stays?'
+scenes = ['spheres75']
+repetitions = 3
+methods = [{ method = 'muller_fellner' }, { method = 'grasp', trials = 3 }]
+";
+
+/// A folder with a spec of this name in it.
+fn folder(spec: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join(spec), SPEC).unwrap();
+    folder
+}
+
+fn succeed(folder: &Path, args: &[&str]) -> String {
+    let output = run(folder, args);
+    assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
+    text(&output.stdout)
+}
+
+/// Runs what must be refused, with parts of the message.
+fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
+    let output = run(folder, args);
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+    assert!(parts.iter().all(|part| said.contains(part)), "{args:?}: {said}");
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_spec_whose_name_would_lead_elsewhere_is_refused() {
+    for spec in ["...toml", "..toml", ".lock.toml", ".partial.toml", "quick.toml", "x.new.toml"] {
+        let folder = folder(spec);
+        refused(folder.path(), &[spec, "--out", "out/below"], &[spec, "do not begin with a dot"]);
+        assert_eq!(names(folder.path()), [spec]);
+    }
+}
+
+#[test]
+fn two_specs_of_one_name_in_one_command_are_refused_before_the_work() {
+    let folder = folder("spec.toml");
+    fs::create_dir(folder.path().join("other")).unwrap();
+    fs::write(folder.path().join("other/spec.toml"), SPEC).unwrap();
+    refused(folder.path(), &["spec.toml", "other/spec.toml"], &["two specs are called spec"]);
+    assert!(!folder.path().join("results").exists());
+}
+
+#[test]
+fn finished_results_are_replaced_by_force_only() {
+    let folder = folder("spec.toml");
+    let at = folder.path();
+    succeed(at, &["spec.toml"]);
+    let files =
+        || (reproducible(&at.join("results/spec")), fs::read(at.join("results/spec/timing.csv")).unwrap());
+    let first = files();
+    // A repetition goes beside them.
+    let said = succeed(at, &["spec.toml"]);
+    assert!(said.contains("results/spec is kept and has the same rows"), "{said}");
+    assert!(files() == first && reproducible(&at.join("results/spec.new")) == first.0);
+    // Other runs are refused.
+    for other in [&["--scene=spheres750"][..], &["--seed=2"], &["--shard=1/2"]] {
+        refused(at, &[&["spec.toml"], other].concat(), &["results/spec", "--force", "--out"]);
+    }
+    assert!(files() == first);
+    succeed(at, &["spec.toml", "--seed=2", "--force"]);
+    assert!(files().0 != first.0);
+}
+
+#[test]
+fn the_finished_runs_of_an_interrupted_experiment_are_discarded_by_force_only() {
+    let folder = folder("spec.toml");
+    let at = folder.path();
+    succeed(at, &["spec.toml", "--shard=1/2"]);
+    refused(at, &["spec.toml"], &["finished runs", "--resume", "--force"]);
+    assert!(at.join("results/spec/.partial/000000").is_dir());
+    succeed(at, &["spec.toml", "--resume"]);
+    succeed(at, &["spec.toml", "--out=whole"]);
+    assert!(reproducible(&at.join("results/spec")) == reproducible(&at.join("whole/spec")));
+}
+
+#[test]
+fn a_damaged_finished_run_is_named_and_done_again_or_refused() {
+    let folder = folder("spec.toml");
+    let at = folder.path();
+    succeed(at, &["spec.toml", "--out=whole"]);
+    let whole = reproducible(&at.join("whole/spec"));
+    let damages: [fn(&Path); 3] = [
+        |part| fs::remove_file(part.join("runs.csv")).unwrap(),
+        |part| fs::write(part.join("history.csv"), "").unwrap(),
+        |part| {
+            let rows = fs::read_to_string(part.join("runs.csv")).unwrap();
+            fs::write(part.join("runs.csv"), rows.split_once('\n').unwrap().0.to_owned() + "\n").unwrap();
+        },
+    ];
+    for (number, damage) in damages.into_iter().enumerate() {
+        let (one, two) = (format!("one{number}"), format!("two{number}"));
+        succeed(at, &["spec.toml", "--shard=1/2", "--out", &one]);
+        succeed(at, &["spec.toml", "--shard=2/2", "--out", &two]);
+        damage(&at.join(&one).join("spec/.partial/000002"));
+        let merge = run(at, &["merge", &one, &two, "--out=merged"]);
+        let said = text(&merge.stderr);
+        assert!(!merge.status.success() && said.contains("000002") && said.contains("damaged"), "{said}");
+        assert!(!at.join("merged").exists());
+        let resumed = run(at, &["spec.toml", "--resume", "--out", &one]);
+        let said = text(&resumed.stderr);
+        assert!(resumed.status.success(), "{said}");
+        assert!(said.contains("done again") && said.contains("000002"), "{said}");
+        assert!(reproducible(&at.join(&one).join("spec")) == whole);
+    }
+}
+
+#[test]
+fn no_command_replaces_a_file_of_another_kind() {
+    let folder = folder("spec.toml");
+    let at = folder.path();
+    let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    fs::write(at.join("mesh.obj"), mesh).unwrap();
+    succeed(at, &["bake", "mesh.obj", "--budget=0s", "--out=tree.bvh"]);
+    succeed(at, &["spec.toml"]);
+    refused(at, &["bake", "mesh.obj", "--budget=0s", "--out=mesh.obj"], &["--out", "mesh.obj", "tree file"]);
+    refused(at, &["render", "mesh.obj", "--size=8x8", "--out=mesh.obj"], &["--out", "mesh.obj", "PNG"]);
+    refused(at, &["render", "mesh.obj", "--accel=tree.bvh", "--out=tree.bvh"], &["--out", "tree.bvh", "PNG"]);
+    refused(at, &["inspect", "tree.bvh", "--nodes=tree.bvh"], &["--nodes", "tree.bvh", "CSV"]);
+    refused(at, &["report", "--out=spec.toml"], &["--out", "spec.toml", "HTML"]);
+    refused(at, &["report", "--out=results/spec/runs.csv"], &["--out", "runs.csv", "HTML"]);
+    assert_eq!(fs::read_to_string(at.join("mesh.obj")).unwrap(), mesh);
+    assert_eq!(fs::read_to_string(at.join("spec.toml")).unwrap(), SPEC);
+    // Files of the same kind are replaced.
+    succeed(at, &["bake", "mesh.obj", "--budget=0s", "--out=tree.bvh", "--from=tree.bvh"]);
+    for _ in 0..2 {
+        succeed(at, &["inspect", "tree.bvh", "--nodes=nodes.csv"]);
+        succeed(at, &["report", "--out=page.html"]);
+        succeed(at, &["render", "mesh.obj", "--size=8x8", "--out=x.png"]);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_are_refused_as_inputs_and_links_are_not_written_through() {
+    use std::os::unix::fs::symlink;
+    let folder = folder("spec.toml");
+    let at = folder.path();
+    let made = std::process::Command::new("mkfifo").args(["p.toml", "p.obj", "p.bvh"]).current_dir(at).status();
+    assert!(made.unwrap().success());
+    refused(at, &["p.toml"], &["p.toml", "not a regular file"]);
+    refused(at, &["spec.toml", "--scene=p.obj"], &["p.obj"]);
+    refused(at, &["inspect", "p.bvh"], &["p.bvh", "not a regular file"]);
+    refused(at, &["bake", "spheres75", "--budget=0s", "--from=p.bvh", "--out=x.bvh"], &["p.bvh"]);
+    refused(at, &["bake", "/dev/zero", "--budget=0s", "--out=x.bvh"], &["/dev/zero"]);
+    fs::write(at.join("precious"), "precious").unwrap();
+    fs::create_dir_all(at.join("results/spec")).unwrap();
+    for lock in ["results/.lock", "results/spec/.lock"] {
+        symlink(at.join("precious"), at.join(lock)).unwrap();
+        let output = run(at, &["spec.toml", "--force"]);
+        assert!(!output.status.success() && text(&output.stderr).contains(lock), "{}", text(&output.stderr));
+        fs::remove_file(at.join(lock)).unwrap();
+    }
+    assert_eq!(fs::read_to_string(at.join("precious")).unwrap(), "precious");
+}
+
+#[cfg(unix)]
+#[test]
+fn arguments_need_not_be_utf_8() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let folder = folder("spec.toml");
+    let out = OsStr::from_bytes(b"out\xff");
+    let output = harness(folder.path(), &["spec.toml", "--out"]).arg(out).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let provenance = fs::read_to_string(folder.path().join(out).join("spec/provenance.toml")).unwrap();
+    assert!(provenance.contains("harness spec.toml --out out"), "{provenance}");
+}
+
+#[cfg(unix)]
+#[test]
+fn the_first_signal_ends_even_a_program_that_waits_for_another() {
+    let folder = folder("spec.toml");
+    let at = folder.path();
+    fs::create_dir(at.join("results")).unwrap();
+    let lock = fs::File::create(at.join("results/.lock")).unwrap();
+    lock.lock().unwrap();
+    let mut child = harness(at, &["spec.toml"]).stderr(std::process::Stdio::null()).spawn().unwrap();
+    // All runs are finished, and the best known costs are in use by us.
+    while !at.join("results/spec/runs.csv").exists() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let start = Instant::now();
+    let signal = std::process::Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
+    assert!(signal.unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
+    // Nothing is lost.
+    drop(lock);
+    succeed(at, &["spec.toml", "--resume"]);
+}
+
+#[test]
+fn control_characters_of_a_spec_do_not_reach_the_terminal() {
+    let folder = folder("spec.toml");
+    fs::write(folder.path().join("wrong.toml"), format!("{SPEC}\"\\u001b[31mred\" = 1\n")).unwrap();
+    let output = run(folder.path(), &["wrong.toml"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!output.stderr.contains(&0x1b) && text(&output.stderr).contains("red"), "{}", text(&output.stderr));
+}
