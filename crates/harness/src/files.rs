@@ -136,7 +136,7 @@ impl Reserved {
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let mut unfinished = builder
             .tempfile_in(folder)
-            .map_err(Error::io(&path, "write the file: cannot create its new version"))?;
+            .map_err(Error::io(&path, "write the file: cannot create a file there"))?;
         unfinished.as_file().try_lock().ok();
         remove_leftovers(folder, &prefix);
         let zeros = vec![0; bytes.min(PIECE)];

@@ -166,6 +166,7 @@ fn pipes_and_devices_are_refused_as_inputs_and_links_are_not_written_through() {
     fs::write(at.join("precious"), "precious").unwrap();
     fs::create_dir_all(at.join("results/spec")).unwrap();
     for lock in ["results/.lock", "results/spec/.lock"] {
+        let _ = fs::remove_file(at.join(lock));
         symlink(at.join("precious"), at.join(lock)).unwrap();
         let output = run(at, &["spec.toml", "--force"]);
         assert!(!output.status.success() && text(&output.stderr).contains(lock), "{}", text(&output.stderr));
