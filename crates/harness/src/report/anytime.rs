@@ -100,7 +100,7 @@ impl Config {
             for method in &self.methods {
                 let runs = series(rows, scene, method, ProgressAxis::Seconds);
                 let cell = |&at: &f64| {
-                    let cost = median(&incumbents(&runs, at));
+                    let cost = median(&incumbents(&runs, at)).filter(|cost| cost.is_finite());
                     cost.map_or_else(String::new, |cost| percent(cost / rows.base_cost(scene)))
                 };
                 let name = [rows.shown(scene), method.clone()];
@@ -116,9 +116,10 @@ fn percent(ratio: f64) -> String {
     format!("{:+.2} %", 100.0 * (ratio - 1.0))
 }
 
-/// What the runs that have an incumbent by then have it cost.
+/// What the incumbents of all runs cost then, the worst where a run has none yet: so their median never rises.
 fn incumbents(runs: &[Series], at: f64) -> Vec<f64> {
-    runs.iter().filter_map(|run| Some(run.iter().take_while(|(x, _)| *x <= at).last()?.1)).collect()
+    let incumbent = |run: &Series| run.iter().take_while(|(x, _)| *x <= at).last().map(|point| point.1);
+    runs.iter().map(|run| incumbent(run).unwrap_or(Metric::WORST)).collect()
 }
 
 /// Median and quartiles of the gap from the first x at which every run has an incumbent to the last event.
@@ -147,4 +148,18 @@ fn draw(method: &str, points: &[Point]) -> Vec<Layer> {
     }
     let band = points.iter().map(|point| (point.x, point.gap_quartile_1, point.gap_quartile_3)).collect();
     vec![Layer::StepBand { name: name(), points: band }, Layer::Steps { name: name(), points: medians }]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_of_incumbents_never_rises() {
+        // One run is early and good, two are late and worse.
+        let runs: Vec<Series> = vec![vec![(1.0, 5.0)], vec![(3.0, 9.0)], vec![(4.0, 8.0), (6.0, 6.0)]];
+        let medians = [0.5, 1.0, 3.0, 4.0, 6.0].map(|at| median(&incumbents(&runs, at)).unwrap());
+        assert!(medians[0].is_infinite() && medians[1].is_infinite());
+        assert_eq!(medians[2..], [9.0, 8.0, 6.0]);
+    }
 }

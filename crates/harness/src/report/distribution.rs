@@ -5,7 +5,7 @@ use super::data::Rows;
 use super::output::{Output, each, panel};
 use crate::Error;
 use crate::figures::{Axis, Layer};
-use crate::statistics::quantile;
+use crate::statistics::{quantile, range};
 use serde::Serialize;
 
 /// One method's trials on one scene, pooled over repetitions, as written to `distribution.csv`.
@@ -41,7 +41,12 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
         }
         layers.push(Layer::VLine { x: base_cost, label: "Müller–Fellner".into() });
         let y = Axis::linear("fraction of trials at most as costly").range(0.0, 1.0);
-        panels.push(panel(rows.shown(scene), Axis::linear("cost"), y, layers));
+        let own = summaries.iter().filter(|row| row.scene == scene);
+        let ends = own.flat_map(|row| [row.lowest_cost, row.highest_cost]).chain([base_cost]);
+        let (low, high) = range(ends).unwrap_or((0.0, 1.0));
+        let margin = 0.05 * (high - low);
+        let x = Axis::linear("cost").range(low - margin, high + margin);
+        panels.push(panel(rows.shown(scene), x, y, layers));
     }
     let mut output = Output::new(&config.source, &config.title);
     output.add_csv("distribution", &summaries)?;

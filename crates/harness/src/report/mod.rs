@@ -28,6 +28,7 @@ mod run_times;
 pub mod significance;
 pub mod table;
 pub mod target;
+mod time_to_target;
 pub mod times;
 mod traversal;
 pub mod trials;
@@ -109,6 +110,8 @@ reports! {
     "ecdf" => Ecdf(config::Targets) by ecdf::write;
     /// Performance profiles.
     "profile" => Profile(config::Targets) by profile::write;
+    /// Time and work until targets are reached, one row per method, scene and target.
+    "time_to_target" => TimeToTarget(config::Targets) by time_to_target::write;
     /// Medians, quartiles and primal integrals.
     "numbers" => Numbers(numbers::Config) by numbers::Config::write;
     /// Whether methods really differ.
@@ -137,7 +140,8 @@ impl Report {
                 (&config.methods, vec![])
             }
             Self::Pareto(config) | Self::Traversal(config) => (&config.methods, vec![]),
-            Self::RunTimes(config) | Self::Ecdf(config) | Self::Profile(config) => (&config.methods, vec![]),
+            Self::RunTimes(config) | Self::Ecdf(config) => (&config.methods, vec![]),
+            Self::Profile(config) | Self::TimeToTarget(config) => (&config.methods, vec![]),
             Self::Trials(config) => (&config.methods, vec![]),
             Self::Times(config) => (&config.methods, vec![]),
             Self::RayTests(config) => (&config.methods, vec![]),
@@ -175,8 +179,8 @@ impl Report {
 
     /// Whether the report measures gaps.
     pub fn needs_references(&self) -> bool {
-        use Report::{Anytime, Ecdf, Numbers, Profile, RunTimes};
-        matches!(self, Anytime(_) | RunTimes(_) | Ecdf(_) | Profile(_) | Numbers(_))
+        use Report::{Anytime, Ecdf, Numbers, Profile, RunTimes, TimeToTarget};
+        matches!(self, Anytime(_) | RunTimes(_) | Ecdf(_) | Profile(_) | Numbers(_) | TimeToTarget(_))
     }
 }
 
@@ -219,22 +223,27 @@ fn looks(methods: &[&str], figure: &Figure) -> Vec<(String, Look)> {
     slots.map(|(slot, method)| ((*method).to_owned(), Look::Slot(slot))).collect()
 }
 
-/// The comparisons of all reports of an experiment with the paper.
+/// The comparisons of all reports of an experiment with the paper. A number of the paper that several of ours are
+/// compared with is one number.
 fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
-    let theirs = || rows.iter().filter(|row| !row.paper.is_empty()).map(|row| row.verdict);
-    let agree = theirs().filter(|verdict| *verdict == Verdict::Agrees).count();
-    let direction = theirs().filter(|verdict| verdict.is_same_direction()).count();
+    let numbers = rows.iter().filter(|row| row.paper_over_base.is_some());
+    let numbers: BTreeSet<_> = numbers.map(|row| (&row.source, &row.scene, &row.paper)).collect();
+    let compared = || rows.iter().filter(|row| row.verdict != Verdict::NotInPaper).map(|row| row.verdict);
+    let count = |wanted: fn(Verdict) -> bool| compared().filter(|verdict| wanted(*verdict)).count();
+    let (agree, direction) = (count(|verdict| verdict == Verdict::Agrees), count(Verdict::is_same_direction));
+    let untold = count(|verdict| verdict == Verdict::CannotBeTold);
     let reasons: BTreeSet<&str> = rows.iter().map(|row| row.reason.as_str()).collect();
     let mut output = Output::new("", "Ng & Trifonov 2003 beside our results");
     output.reading = format!(
-        "Numbers of the paper: {}. Ours agree with {agree}; {direction} more are on the same side of the base; {} \
-         differ. {}",
-        theirs().count(),
-        theirs().count() - agree - direction,
+        "Numbers of the paper: {}. Comparisons with ours: {}; {agree} agree, {direction} more are on the same side of \
+         the base, {} differ, and {untold} cannot be told. {}",
+        numbers.len(),
+        compared().count(),
+        compared().count() - agree - direction - untold,
         reasons.into_iter().collect::<Vec<_>>().join(" ")
     );
     output.add_csv("paper", rows)?;
-    let columns = ["scene", "quantity", "paper", "ours", "paper_over_base", "ours_over_base", "verdict"];
-    output.show("Every number of the paper beside ours:", rows, &columns)?;
+    let columns = ["scene", "quantity", "paper", "ours", "ours_low", "ours_high", "verdict"];
+    output.show("What the paper says beside ours, which lies between low and high:", rows, &columns)?;
     Ok(output)
 }

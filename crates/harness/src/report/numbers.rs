@@ -32,6 +32,9 @@ struct Numbers<'a> {
     /// `exact optimum` or `best known`.
     reference: &'static str,
     reference_cost: f64,
+    /// The method that found it; its own gaps are too small if it did so in this very experiment.
+    reference_method: String,
+    reference_of_this_experiment: bool,
     gap_quartile_1: f64,
     gap_median: f64,
     gap_quartile_3: f64,
@@ -127,6 +130,10 @@ fn of_costs<'a>(
         cost_over_base_quartile_3: over_base[2],
         reference: if reference.is_optimum() { "exact optimum" } else { "best known" },
         reference_cost: reference.cost,
+        reference_method: reference.method.clone(),
+        reference_of_this_experiment: rows
+            .runs_of(scene, &reference.method)
+            .any(|run| run.seed == reference.seed && run.cost <= reference.cost),
         gap_quartile_1: gaps[0],
         gap_median: gaps[1],
         gap_quartile_3: gaps[2],

@@ -68,7 +68,7 @@ impl Config {
         let mut output = Output::new("", &self.title);
         output.add_csv("omissions", &compared)?;
         output.add_csv("timing_omissions", &times)?;
-        let caption = "Median of the ratios repetition by repetition.";
+        let caption = "Ratios repetition by repetition: median, and from quartile to quartile.";
         output.add_figure("omissions", caption, 1, vec![self.draw(rows, &times)]);
         let columns = ["omission", "scene", "runs", "same_cost", "cost_ratio", "work_ratio"];
         output.show("Cost and work with it left out over those without:", &compared, &columns)?;
@@ -78,15 +78,18 @@ impl Config {
     }
 
     fn draw(&self, rows: &Rows, times: &[Times]) -> Panel {
-        let points = |pair: &Pair| {
+        let pairs = self.pairs.len() as f64;
+        // Pairs stand beside each other within the place of a scene.
+        let bars = |(index, pair): (usize, &Pair)| {
+            let offset = 0.8 * ((index as f64 + 0.5) / pairs - 0.5);
             let own = times.iter().filter(|times| times.omission == pair.name).enumerate();
-            let points = own.map(|(at, times)| (at as f64, times.ratio_median)).collect();
-            Layer::Points { name: pair.name.clone(), points }
+            let points = own.map(|(at, t)| (at as f64 + offset, t.ratio_low, t.ratio_median, t.ratio_high));
+            Layer::ErrorBars { name: pair.name.clone(), points: points.collect() }
         };
-        let mut layers: Vec<Layer> = self.pairs.iter().map(points).collect();
+        let mut layers: Vec<Layer> = self.pairs.iter().enumerate().map(bars).collect();
         layers.push(Layer::HLine { y: 1.0, label: "nothing left out".into() });
         let y = Axis::log("time / time without leaving it out");
-        panel("", Axis::categories("", rows.all_shown()), y, layers)
+        panel("", Axis::categories("", rows.scenes().into_iter().map(str::to_owned).collect()), y, layers)
     }
 }
 

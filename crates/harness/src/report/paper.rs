@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// One row of `paper.csv`: a number of the paper beside ours.
+/// One row of `paper.csv`: something that the paper says beside ours. Absolute costs are not compared, as the scenes are
+/// not the paper's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PaperRow {
     /// Where the paper has it.
@@ -11,17 +12,24 @@ pub struct PaperRow {
     pub scene: String,
     /// What is compared.
     pub quantity: String,
-    /// The paper's value; empty if it has none and the row only adds to the others.
+    /// What the paper says; empty if it says nothing and the row only adds to the others.
     pub paper: String,
     /// Ours.
     pub ours: String,
-    /// The paper's value as a ratio to its base; empty where that has no meaning.
+    /// The paper's value as a ratio to its base; empty where it has no number.
     pub paper_over_base: Option<f64>,
     /// Ours likewise.
     pub ours_over_base: Option<f64>,
+    /// Between which values ours lies in nine of ten repetitions, or in all where they are few; empty where ours is one
+    /// number without chance.
+    pub ours_low: Option<f64>,
+    /// The upper end.
+    pub ours_high: Option<f64>,
     /// Whether they agree, and if not, how they differ.
     pub verdict: Verdict,
-    /// Why, where known.
+    /// When they would agree.
+    pub rule: String,
+    /// Why they differ, where known.
     pub reason: String,
 }
 
@@ -36,21 +44,41 @@ impl PaperRow {
             ours: String::new(),
             paper_over_base: None,
             ours_over_base: None,
+            ours_low: None,
+            ours_high: None,
             verdict: Verdict::NotInPaper,
+            rule: String::new(),
             reason: reason.into(),
         }
     }
 
-    /// The same row with both sides as they are shown, and the verdict on them.
+    /// The same row with both sides as they are shown, the verdict on them, and its rule.
     #[must_use]
-    pub fn compare(self, paper: impl Into<String>, ours: impl Into<String>, verdict: Verdict) -> Self {
-        Self { paper: paper.into(), ours: ours.into(), verdict, ..self }
+    pub fn compare(
+        self,
+        paper: impl Into<String>,
+        ours: impl Into<String>,
+        verdict: Verdict,
+        rule: impl Into<String>,
+    ) -> Self {
+        Self { paper: paper.into(), ours: ours.into(), verdict, rule: rule.into(), ..self }
     }
 
-    /// The same row with both sides as ratios to base.
+    /// The same row with a ratio to base of the paper's and ours, which lies in an interval where it depends on chance.
+    /// They agree if the whole interval is within `tolerance` of the paper's, relatively, and on the same side of 1.
     #[must_use]
-    pub fn ratios(self, paper: Option<f64>, ours: f64) -> Self {
-        Self { paper_over_base: paper, ours_over_base: Some(ours), ..self }
+    pub fn compare_ratios(self, paper: f64, ours: f64, interval: Option<(f64, f64)>, tolerance: f64) -> Self {
+        let (low, high) = interval.unwrap_or((ours, ours));
+        let verdicts = [low, ours, high].map(|ours| Verdict::of_ratios(paper, ours, tolerance));
+        let same = verdicts.iter().all(|verdict| *verdict == verdicts[0]);
+        let row = self.compare(
+            format!("{paper:.4}"),
+            format!("{ours:.4}"),
+            if same { verdicts[0] } else { Verdict::CannotBeTold },
+            format!("within {} % of the paper's, and on the same side of 1", 100.0 * tolerance),
+        );
+        let [ours_low, ours_high] = [low, high].map(|end| interval.map(|_| end));
+        Self { paper_over_base: Some(paper), ours_over_base: Some(ours), ours_low, ours_high, ..row }
     }
 }
 
@@ -75,50 +103,37 @@ macro_rules! verdicts {
 }
 
 verdicts! {
-    /// Within the tolerance, and not across the base.
+    /// As the rule demands.
     Agrees = "agrees",
-    /// Within the tolerance, but above the base where the paper is below it.
-    CloseButHigher = "close, but higher, across the base",
-    /// Within the tolerance, but below the base where the paper is above it.
-    CloseButLower = "close, but lower, across the base",
-    /// Higher by more than the tolerance, on the same side of the base.
+    /// Higher than the rule allows, on the same side of the base.
     SameDirectionHigher = "same direction, higher",
-    /// Lower by more than the tolerance, on the same side of the base.
+    /// Lower than the rule allows, on the same side of the base.
     SameDirectionLower = "same direction, lower",
-    /// Higher by more than the tolerance, and across the base.
+    /// Higher, and above the base where the paper is below it.
     DiffersHigher = "differs, higher",
-    /// Lower by more than the tolerance, and across the base.
+    /// Lower, and below the base where the paper is above it.
     DiffersLower = "differs, lower",
-    /// Something that is not a number differs.
+    /// Not as the rule demands, and no matter of higher or lower.
     Differs = "differs",
-    /// Our range over scenes lies in the paper's.
-    InsideRange = "inside the paper's range",
-    /// Our range over scenes leaves the paper's.
-    OutsideRange = "outside the paper's range",
-    /// Our runs spread more.
-    Wider = "wider",
-    /// Our runs spread less.
-    Narrower = "narrower",
-    /// The paper has no such number.
-    NotInPaper = "not in the paper by cost",
+    /// Another repetition may have led to another verdict, or the paper has no number.
+    CannotBeTold = "cannot be told",
+    /// The paper does not speak of it.
+    NotInPaper = "not in the paper",
 }
 
 impl Verdict {
     /// How our ratio to base compares with the paper's: whether it is within `tolerance` of it, and on the same side of
     /// the base.
-    pub fn of_ratios(paper: f64, ours: f64, tolerance: f64) -> Self {
+    fn of_ratios(paper: f64, ours: f64, tolerance: f64) -> Self {
         // The paper prints four digits: closer to the base than this is on neither side.
         let side = |ratio: f64| if (ratio - 1.0).abs() < 5e-4 { 0.0 } else { (ratio - 1.0).signum() };
         let close = (ours / paper - 1.0).abs() <= tolerance;
-        let across = side(paper) * side(ours) < 0.0;
-        match (close, across, ours > paper) {
+        match (close, side(paper) * side(ours) < 0.0, ours > paper) {
             (true, false, _) => Self::Agrees,
-            (true, true, true) => Self::CloseButHigher,
-            (true, true, false) => Self::CloseButLower,
             (false, false, true) => Self::SameDirectionHigher,
             (false, false, false) => Self::SameDirectionLower,
-            (false, true, true) => Self::DiffersHigher,
-            (false, true, false) => Self::DiffersLower,
+            (_, true, true) => Self::DiffersHigher,
+            (_, true, false) => Self::DiffersLower,
         }
     }
 
@@ -130,14 +145,26 @@ impl Verdict {
 
 #[cfg(test)]
 mod tests {
-    use super::Verdict;
+    use super::*;
+
+    fn verdict(paper: f64, ours: f64, interval: Option<(f64, f64)>) -> Verdict {
+        PaperRow::new("", "", "", "").compare_ratios(paper, ours, interval, 0.02).verdict
+    }
 
     #[test]
     fn verdicts_tell_agreement_direction_and_contradiction_apart() {
-        assert_eq!(Verdict::of_ratios(1.0018, 1.003, 0.02), Verdict::Agrees);
-        assert_eq!(Verdict::of_ratios(1.1, 1.2, 0.02), Verdict::SameDirectionHigher);
-        assert_eq!(Verdict::of_ratios(2.0, 1.1, 0.02), Verdict::SameDirectionLower);
-        assert_eq!(Verdict::of_ratios(0.996, 1.01, 0.02), Verdict::CloseButHigher);
-        assert_eq!(Verdict::of_ratios(0.95, 1.2, 0.02), Verdict::DiffersHigher);
+        assert_eq!(verdict(1.0018, 1.003, None), Verdict::Agrees);
+        assert_eq!(verdict(1.1, 1.2, None), Verdict::SameDirectionHigher);
+        assert_eq!(verdict(2.0, 1.1, None), Verdict::SameDirectionLower);
+        assert_eq!(verdict(0.95, 1.2, None), Verdict::DiffersHigher);
+        // Close by, but the paper finds an improvement where ours finds none.
+        assert_eq!(verdict(0.996, 1.01, None), Verdict::DiffersHigher);
+    }
+
+    #[test]
+    fn what_another_repetition_could_turn_round_cannot_be_told() {
+        assert_eq!(verdict(0.99, 0.995, Some((0.992, 0.998))), Verdict::Agrees);
+        assert_eq!(verdict(0.99, 0.999, Some((0.996, 1.004))), Verdict::CannotBeTold);
+        assert_eq!(verdict(1.1, 1.3, Some((1.2, 1.4))), Verdict::SameDirectionHigher);
     }
 }

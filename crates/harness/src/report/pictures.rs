@@ -41,8 +41,6 @@ struct Tests<'a> {
     tests_per_ray: f64,
     /// How many times fewer tests than brute force.
     brute_force_over_tests: f64,
-    /// How many times faster than brute force the document's was.
-    document_speed_up: Option<f64>,
     /// Whether the picture is that of brute force, bit by bit.
     same_picture: bool,
 }
@@ -107,7 +105,6 @@ impl Config {
             objects_per_ray: own.objects_per_ray,
             tests_per_ray: tests_per_ray(own),
             brute_force_over_tests: tests_per_ray(brute) / tests_per_ray(own),
-            document_speed_up: self.document_speed_up(scene, method),
             same_picture: own.picture == brute.picture && own.rays == brute.rays,
         })
     }

@@ -4,7 +4,7 @@ use super::config::{OneOrMore, first, one_for_each};
 use super::data::Rows;
 use super::metric::Metric;
 use super::output::{Output, each, panel};
-use super::paper::{PaperRow, Verdict};
+use super::paper::PaperRow;
 use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::run::rows::RayRow;
@@ -46,13 +46,16 @@ struct Measured<'a> {
     objects_per_ray: f64,
     goldsmith_salmon: f64,
     boxes_over_first: f64,
+    /// Over all pairs of runs, of the method and of the first.
+    over_first_low: f64,
+    over_first_high: f64,
     paper_boxes_per_ray: Option<f64>,
 }
 
 /// The kind of rays that the paper sends: they start inside and end at any hit.
 const OF_PAPER: (&str, &str) = ("inside", "any");
 
-const PAPER: &str = "paper";
+const PAPER: &str = "inside, any: the paper's, on its own scene";
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
@@ -99,6 +102,12 @@ impl Config {
         let own = middle_run(rows, scene, method, kind)?;
         let run = rows.runs_of(scene, method).find(|run| run.repetition == own.repetition)?;
         let paper = self.paper.get(scene).filter(|_| kind == OF_PAPER);
+        let [own_range, first_range] = [method, first(&self.methods)].map(|method| {
+            let boxes = most_rays(rows, scene, method, kind).into_iter().map(|row| row.boxes_per_ray);
+            range(boxes).unwrap_or((f64::NAN, f64::NAN))
+        });
+        let over_first_low = own_range.0 / first_range.1;
+        let over_first_high = own_range.1 / first_range.0;
         Some(Measured {
             scene,
             method,
@@ -111,22 +120,22 @@ impl Config {
             objects_per_ray: own.objects_per_ray,
             goldsmith_salmon: run.goldsmith_salmon,
             boxes_over_first: own.boxes_per_ray / of_first.boxes_per_ray,
+            over_first_low,
+            over_first_high,
             paper_boxes_per_ray: paper.and_then(|paper| paper.get(index).copied()),
         })
     }
 
-    /// The paper's numbers beside ours, both over those of its first method.
+    /// The paper's numbers beside ours, both over those of the first method, which itself is not compared.
     fn compare(&self, rows: &Rows, table: &[Measured]) -> Vec<PaperRow> {
         let compare = |row: &Measured| {
-            let of_first = |first: &&Measured| first.scene == row.scene && first.paper_boxes_per_ray.is_some();
+            let of_first = |of: &&Measured| of.scene == row.scene && of.method == first(&self.methods);
             let base = table.iter().find(of_first)?.paper_boxes_per_ray?;
-            let paper = row.paper_boxes_per_ray?;
-            let quantity = format!("tests per ray, {}, over the first method's", row.method);
-            let (theirs, ours) = (paper / base, row.boxes_over_first);
-            let verdict = Verdict::of_ratios(theirs, ours, self.tolerance);
+            let paper = row.paper_boxes_per_ray.filter(|_| row.method != first(&self.methods))?;
+            let quantity = format!("tests per ray, {} over {}", row.method, first(&self.methods));
             let compared = PaperRow::new(&self.source, rows.shown(row.scene), quantity, &self.reason);
-            let shown = format!("{:.2}", row.boxes_per_ray);
-            Some(compared.compare(paper.to_string(), shown, verdict).ratios(Some(theirs), ours))
+            let interval = (row.over_first_low, row.over_first_high);
+            Some(compared.compare_ratios(paper / base, row.boxes_over_first, Some(interval), self.tolerance))
         };
         table.iter().filter_map(compare).collect()
     }
@@ -138,9 +147,14 @@ impl Config {
             let (values, spread) = own.map(bar).collect();
             Layer::Bars { name: format!("{family}, {query}"), values, spread, base: 0.0 }
         };
-        let mut layers: Vec<Layer> = rows.ray_kinds().into_iter().map(bars).collect();
-        let paper = self.paper.get(scene).into_iter().flatten().enumerate().map(|(at, &y)| (at as f64, y));
-        layers.push(Layer::Points { name: PAPER.into(), points: paper.collect() });
+        let paper = |kind: &(&str, &str)| {
+            let paper = self.paper.get(scene).filter(|_| *kind == OF_PAPER)?;
+            let values = (0..self.methods.len()).map(|at| paper.get(at).copied().unwrap_or(f64::NAN)).collect();
+            Some(Layer::Bars { name: PAPER.into(), values, spread: vec![], base: 0.0 })
+        };
+        // The paper's bars stand beside ours for the same kind of rays.
+        let with_paper = |kind: (&'_ str, &'_ str)| std::iter::once(bars(kind)).chain(paper(&kind));
+        let layers = rows.ray_kinds().into_iter().flat_map(with_paper).collect();
         let x = Axis::categories("", self.methods.clone());
         panel(rows.shown(scene), x, Metric::BoxesPerRay.axis(), layers)
     }
@@ -155,11 +169,17 @@ impl Config {
     }
 }
 
-/// Of a method's runs on a scene, with the most rays of the kind, the one of median tests per ray, the lower of two.
-fn middle_run<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) -> Option<&'a RayRow> {
+/// The measurements of a method's runs on a scene with the most rays of the kind.
+fn most_rays<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) -> Vec<&'a RayRow> {
     let mut own = rows.rays_of(scene, method, kind);
-    let most = own.iter().map(|row| row.rays).max()?;
-    own.retain(|row| row.rays == most);
+    let most = own.iter().map(|row| row.rays).max();
+    own.retain(|row| Some(row.rays) == most);
+    own
+}
+
+/// Of a method's runs on a scene, the one of median tests per ray, the lower of two.
+fn middle_run<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) -> Option<&'a RayRow> {
+    let own = most_rays(rows, scene, method, kind);
     let middle = median(&own.iter().map(|row| row.boxes_per_ray).collect::<Vec<_>>())?;
     own.into_iter().min_by(|a, b| (a.boxes_per_ray - middle).abs().total_cmp(&(b.boxes_per_ray - middle).abs()))
 }

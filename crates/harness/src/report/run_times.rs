@@ -49,13 +49,14 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
     let mut output = Output::new(&config.source, &config.title);
     let caption = format!(
         "{}. Fraction of runs with an incumbent at or below the target. A curve ends where the longest run did; a \
-         method without one never got there. Dashed black: time-to-target fits.",
+         method without one never got there, and a target that no method has reached has no panel. Dashed black: time-to-target fits.",
         rows.all_shown().join(", ")
     );
     for axis in ProgressAxis::ALL {
         let attempts = attempts(config, rows, axis);
         let problems = attempts.chunks(config.methods.len().max(1));
-        let panels = problems.map(|problem| draw(problem, axis)).collect();
+        let reached = problems.filter(|problem| problem.iter().any(|attempt| !attempt.solved.is_empty()));
+        let panels = reached.map(|problem| draw(problem, axis)).collect();
         output.add_figure(axis.file("run_times"), caption.as_str(), 2, panels);
         output.set_reference(FIT);
         axis.add_csv(&mut output, "run_times", &attempts.iter().flat_map(steps).collect::<Vec<_>>())?;

@@ -5,7 +5,9 @@ use super::data::Rows;
 use super::output::Output;
 use crate::Error;
 use crate::statistics::median;
-use crate::statistics::rank::{Test, a12, holm, mann_whitney, wilcoxon_signed_rank};
+use crate::statistics::rank::{
+    Test, a12, holm, least_rank_sum, least_signed_rank, mann_whitney, wilcoxon_signed_rank,
+};
 use serde::Serialize;
 use std::ops::Bound::Excluded;
 
@@ -37,6 +39,8 @@ struct Row<'a> {
     /// W⁺ or U.
     statistic: f64,
     p_value: f64,
+    /// What the corrected p-value would be if every test came out as clearly as its samples allow.
+    least_holm_p_value: f64,
     holm_p_value: f64,
     /// How likely a run of the method ends below one of the other, ties counting a half; across scenes, its mean over
     /// them.
@@ -69,6 +73,9 @@ enum Difference {
     /// The corrected p-value is not below the level.
     #[serde(rename = "not different")]
     None,
+    /// No result could have been below the level: there are too few samples for so many comparisons.
+    #[serde(rename = "cannot be told")]
+    CannotBeTold,
 }
 
 impl Config {
@@ -133,6 +140,7 @@ impl Config {
             samples_against,
             statistic,
             p_value,
+            least_holm_p_value: 1.0,
             holm_p_value: 1.0,
             a12: 0.5,
             verdict: Difference::None,
@@ -141,11 +149,18 @@ impl Config {
 
     /// The rows of one test with their p-values corrected.
     fn judged<'a>(&self, mut table: Vec<Row<'a>>) -> Vec<Row<'a>> {
-        let corrected = holm(&table.iter().map(|row| row.p_value).collect::<Vec<_>>());
-        for (row, p_value) in table.iter_mut().zip(corrected) {
-            row.holm_p_value = p_value;
-            if p_value >= self.level {
-                row.verdict = Difference::None;
+        let corrected = |p_value: fn(&Row) -> f64| holm(&table.iter().map(p_value).collect::<Vec<_>>());
+        // If every test came out as clearly as it can.
+        let least = corrected(|row| match row.test {
+            RankTest::Wilcoxon => least_signed_rank(row.samples),
+            RankTest::MannWhitney => least_rank_sum(row.samples, row.samples_against),
+        });
+        let found = corrected(|row| row.p_value);
+        for (row, (least, found)) in table.iter_mut().zip(least.into_iter().zip(found)) {
+            (row.least_holm_p_value, row.holm_p_value) = (least, found);
+            if found >= self.level {
+                let possible = least < self.level;
+                row.verdict = if possible { Difference::None } else { Difference::CannotBeTold };
             }
         }
         table
@@ -158,7 +173,11 @@ impl Config {
             let scenes = own().filter(|row| row.scene != ALL).count();
             let across = own().find(|row| row.scene == ALL).map_or("untested", |row| row.verdict.name());
             let (lower, higher) = (count(Difference::Lower), count(Difference::Higher));
-            format!("{against}: lower on {lower}, higher on {higher} of {scenes} scenes, across all {across}")
+            let untold = count(Difference::CannotBeTold);
+            format!(
+                "{against}: lower on {lower}, higher on {higher} of {scenes} scenes, on {untold} too few runs to tell; \
+                 across all {across}"
+            )
         };
         let all: Vec<String> = self.against.iter().map(of).collect();
         let (method, level, all) = (&self.method, self.level, all.join("; against "));
@@ -176,6 +195,7 @@ impl Difference {
             Self::Lower => "lower",
             Self::Higher => "higher",
             Self::None => "not different",
+            Self::CannotBeTold => "not told by so few",
         }
     }
 }

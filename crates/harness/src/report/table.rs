@@ -6,7 +6,7 @@ use super::output::{Output, panel, text_table};
 use super::paper::{PaperRow, Verdict};
 use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
-use crate::statistics::{expected_best_of, median, minimum, range};
+use crate::statistics::{expected_best_of, median, minimum, range, spread_of_best};
 use bvh_build::config::{Accepts, Itself, above};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -54,11 +54,18 @@ struct Cell<'a> {
     cost_over_base: f64,
     /// The expected best of so many trials, from all trials run.
     expected_over_base: Option<f64>,
+    /// Between these the best of so many trials lies in nine of ten repetitions; of runs as a whole, in all.
+    low_over_base: Option<f64>,
+    high_over_base: Option<f64>,
     paper_over_base: Option<f64>,
 }
 
+/// Bars that are higher than the paper's highest by more than this factor leave the panel.
+const MOST_OF_PAPER: f64 = 3.0;
+
 const CAPTION: &str = "Total area of inner nodes over that of the greedy Müller–Fellner tree. Ours on stand-in scenes, \
-                       the paper's on the originals: compare ratios within a column, not bar by bar.";
+                       the paper's on the originals: compare ratios within a column, not bar by bar. \
+                       Bars that reach the top go on beyond it.";
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
@@ -80,9 +87,14 @@ impl Config {
 
     fn cell<'a>(&'a self, rows: &'a Rows, scene: &'a str, column: &'a Column) -> Option<Cell<'a>> {
         let trials = rows.trials_over_base(scene, &column.method);
+        let pool = trials.concat();
         let results: Vec<f64> = match column.best_of {
             Some(m) => trials.iter().filter_map(|trials| minimum(trials.iter().copied().take(m))).collect(),
             None => rows.final_ratios(scene, &column.method),
+        };
+        let interval = match column.best_of {
+            Some(m) => spread_of_best(&pool, m),
+            None => range(results.iter().copied()).filter(|(low, high)| low < high),
         };
         Some(Cell {
             scene,
@@ -91,7 +103,9 @@ impl Config {
             method: &column.method,
             best_of: column.best_of,
             cost_over_base: median(&results)?,
-            expected_over_base: column.best_of.and_then(|m| expected_best_of(&trials.concat(), m)),
+            expected_over_base: column.best_of.and_then(|m| expected_best_of(&pool, m)),
+            low_over_base: interval.map(|(low, _)| low),
+            high_over_base: interval.map(|(_, high)| high),
             paper_over_base: self.paper_ratio(column, scene),
         })
     }
@@ -102,39 +116,40 @@ impl Config {
 
     /// A number of the paper beside ours.
     fn compare(&self, rows: &Rows, column: &Column, cell: &Cell) -> Option<PaperRow> {
-        let paper = cell.paper_over_base?;
-        let ours = cell.cost_over_base;
-        let row = PaperRow::new(
-            &self.source,
-            rows.shown(cell.scene),
-            format!("{} cost", column.name),
-            &column.reason,
-        );
-        let theirs = column.paper.get(cell.scene).map_or_else(String::new, |cost| format!("{cost:e}"));
-        let verdict = Verdict::of_ratios(paper, ours, self.tolerance);
-        let shown = format!("{:.5e}", ours * rows.base_cost(cell.scene));
-        Some(row.compare(theirs, shown, verdict).ratios(Some(paper), ours))
+        let (paper, ours) = (cell.paper_over_base?, cell.cost_over_base);
+        let quantity = format!("{}, cost over base", column.name);
+        let row = PaperRow::new(&self.source, rows.shown(cell.scene), quantity, &column.reason);
+        let interval = cell.low_over_base.zip(cell.high_over_base);
+        Some(row.compare_ratios(paper, ours, interval, self.tolerance))
     }
 
     /// The paper's range over scenes beside ours.
     fn compare_ranges(&self, column: &Column, own: &[&Cell]) -> Option<PaperRow> {
-        let both = || own.iter().filter_map(|cell| Some((cell.paper_over_base?, cell.cost_over_base)));
-        let (paper, ours) = (range(both().map(|pair| pair.0))?, range(both().map(|pair| pair.1))?);
-        let inside = ours.0 >= paper.0 * (1.0 - self.tolerance) && ours.1 <= paper.1 * (1.0 + self.tolerance);
+        let both = || own.iter().filter_map(|cell| Some((cell.paper_over_base?, *cell)));
+        let paper = range(both().map(|pair| pair.0))?;
+        let ours = range(both().map(|pair| pair.1.cost_over_base))?;
+        let ends = both().flat_map(|(_, cell)| {
+            [cell.low_over_base, cell.high_over_base].map(|end| end.unwrap_or(cell.cost_over_base))
+        });
+        let inside = |(low, high)| paper.0 <= low && high <= paper.1;
+        let verdict = match (inside(ours), inside(range(ends)?)) {
+            (true, true) => Verdict::Agrees,
+            (false, false) => Verdict::Differs,
+            _ => Verdict::CannotBeTold,
+        };
         let show = |(low, high): (f64, f64)| format!("{low:.3} to {high:.3}");
-        let quantity = format!("{} cost over base, range", column.name);
-        let verdict = if inside { Verdict::InsideRange } else { Verdict::OutsideRange };
+        let quantity = format!("{}, cost over base, lowest and highest of all scenes", column.name);
         let row = PaperRow::new(&self.source, "all of these", quantity, &column.reason);
-        Some(row.compare(show(paper), show(ours), verdict))
+        Some(row.compare(show(paper), show(ours), verdict, "all of ours in the paper's range"))
     }
 
     fn draw(&self, rows: &Rows, cells: &[Cell]) -> Panel {
         let columns = || self.columns.iter().skip(1);
-        let bars = |name: String, column: &Column, value: &dyn Fn(&Cell) -> Option<f64>| {
+        let bars = |name: String, column: &Column, value: &dyn Fn(&Cell) -> Option<f64>, spread| {
             let of = |scene| cells.iter().find(|cell| cell.scene == scene && cell.column == column.name);
             let scenes = rows.scenes().into_iter();
             let values = scenes.map(|scene| of(scene).and_then(value).unwrap_or(f64::NAN)).collect();
-            Layer::Bars { name, values, spread: vec![], base: 1.0 }
+            Layer::Bars { name, values, spread, base: 1.0 }
         };
         // Columns that are readings of one column of the paper share its bars.
         let readings = columns().all(|column| column.paper == self.columns[1].paper);
@@ -142,13 +157,22 @@ impl Config {
         for (index, column) in columns().enumerate() {
             if !column.paper.is_empty() && (index == 0 || !readings) {
                 let name = if readings { "paper".into() } else { format!("{}, paper", column.name) };
-                layers.push(bars(name, column, &|cell| cell.paper_over_base));
+                layers.push(bars(name, column, &|cell| cell.paper_over_base, vec![]));
             }
-            layers.push(bars(format!("{}, ours", column.name), column, &|cell| Some(cell.cost_over_base)));
+            let own = rows.scenes().into_iter().map(|scene| {
+                let cell = cells.iter().find(|cell| cell.scene == scene && cell.column == column.name);
+                cell.and_then(|cell| cell.low_over_base.zip(cell.high_over_base))
+                    .unwrap_or((f64::NAN, f64::NAN))
+            });
+            let name = format!("{}, ours", column.name);
+            layers.push(bars(name, column, &|cell| Some(cell.cost_over_base), own.collect()));
         }
         layers.push(Layer::HLine { y: 1.0, label: "greedy".into() });
-        let wide = cells.iter().any(|cell| cell.cost_over_base > 10.0);
-        let y = if wide { Axis::log("cost / base") } else { Axis::linear("cost / base") };
+        // Readings of a heuristic that peel off one object at a time would hide all differences between the others.
+        let theirs = cells.iter().filter_map(|cell| cell.paper_over_base).fold(1.0, f64::max);
+        let outlying = cells.iter().any(|cell| cell.cost_over_base > MOST_OF_PAPER * theirs);
+        let y = Axis::linear("cost / base");
+        let y = if outlying && theirs > 1.0 { y.range(0.9, 1.2 * theirs) } else { y };
         panel("", Axis::categories("", rows.all_shown()), y, layers)
     }
 

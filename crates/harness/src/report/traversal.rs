@@ -51,6 +51,9 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
                 let own = speeds_in(config, rows, setting);
                 let points: Vec<_> = own.iter().map(|speed| (speed.cost_over_base, speed.ns_per_ray)).collect();
                 timed_ranks.push(rank(setting, Metric::NsPerRay, &points));
+                let mut line = points.clone();
+                line.sort_by(|a, b| a.0.total_cmp(&b.0));
+                layers.push(Layer::Line { name: layout.into(), points: line });
                 layers.push(Layer::Points { name: layout.into(), points });
                 speeds.extend(own);
             }
@@ -62,7 +65,7 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
     output.add_csv("rank", &ranks)?;
     output.add_csv("timing_rank", &timed_ranks)?;
     output.add_csv("timing_speed", &speeds)?;
-    let caption = "One point per tree; one thread, the fastest of several turns. Cost is the total area of inner nodes \
+    let caption = "One point per tree, those of a layout joined; one thread, the fastest of several turns. Cost is the total area of inner nodes \
                    over that of the greedy tree.";
     output.add_figure("traversal", caption, 2, panels);
     let columns = ["scene", "method", "layout", "rays", "cost_over_base", "mrays_per_second"];

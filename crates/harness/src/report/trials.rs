@@ -94,6 +94,8 @@ impl Config {
         let quantity = format!("best of the compared, by the expected best of {}", self.best_of);
         let verdict = if paper == best.method { Verdict::Agrees } else { Verdict::Differs };
         let row = PaperRow::new(&self.source, scene, quantity, &self.reason);
-        output.paper.push(row.compare(paper, best.method, verdict).ratios(None, best.expected_over_base));
+        let rule = "the same method has the least expected cost";
+        let row = row.compare(paper, best.method, verdict, rule);
+        output.paper.push(PaperRow { ours_over_base: Some(best.expected_over_base), ..row });
     }
 }

@@ -9,7 +9,17 @@ pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
     sorted.sort_unstable_by(f64::total_cmp);
     let position = q * (sorted.len().checked_sub(1)? as f64);
     let (below, above) = (sorted[position.floor() as usize], sorted[position.ceil() as usize]);
-    Some(below + (above - below) * position.fract())
+    // Between two infinite values there is no number to interpolate by.
+    Some(if below == above { below } else { below + (above - below) * position.fract() })
+}
+
+/// The least of the values that at least the fraction `q` of all of them do not exceed, 0 < q ≤ 1; `None` of none.
+/// Values may be infinite, as the times of runs that never end are.
+pub fn order_quantile(values: &[f64], q: f64) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let rank = (q * sorted.len() as f64).ceil() as usize;
+    sorted.get(rank.saturating_sub(1)).copied()
 }
 
 /// The median of finite values.
@@ -54,6 +64,30 @@ pub fn expected_best_of(pool: &[f64], m: usize) -> Option<f64> {
         }
     }
     Some(expected)
+}
+
+/// Between which values the lowest of `m` values drawn without replacement from a pool of N lies in nine of ten draws. If
+/// `m` is N there is only one draw: then the interval of the lowest of N / 2 is laid to both sides of the pool's lowest,
+/// which is wider than it need be. `None` if the pool has fewer than `m` values, or only one. O(N log N).
+pub fn spread_of_best(pool: &[f64], m: usize) -> Option<(f64, f64)> {
+    let n = pool.len();
+    if n < m || n < 2 {
+        return None;
+    }
+    let drawn = if m < n { m } else { n / 2 };
+    let mut sorted = pool.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    // How likely none of the values so far is drawn, from before the i-th.
+    let mut none = 1.0;
+    let reached = sorted.iter().enumerate().map(|(i, value)| {
+        none *= (n - i).saturating_sub(drawn) as f64 / (n - i) as f64;
+        (1.0 - none, *value)
+    });
+    let reached: Vec<(f64, f64)> = reached.collect();
+    let at =
+        |probability: f64| reached.iter().find(|(found, _)| *found >= probability).map(|(_, value)| *value);
+    let (low, high) = (at(0.05)?, at(0.95)?);
+    Some(if m < n { (low, high) } else { (sorted[0] - (high - low), sorted[0] + (high - low)) })
 }
 
 /// The primal integral (Berthold 2013) up to `horizon`, divided by it: the mean over that time of the primal gap
@@ -126,6 +160,37 @@ mod tests {
             assert!((expected_best_of(&pool, m).unwrap() - mean).abs() < 1e-12, "m = {m}");
         }
         assert_eq!(expected_best_of(&pool, 8), None);
+    }
+
+    #[test]
+    fn nine_of_ten_draws_lie_in_the_spread_of_the_best() {
+        let pool: Vec<f64> = (0..12).map(|i| f64::from(i * i % 13)).collect();
+        for m in 1..pool.len() {
+            let (low, high) = spread_of_best(&pool, m).unwrap();
+            let sets = (0u32..1 << pool.len()).filter(|set| set.count_ones() as usize == m);
+            let best =
+                |set: u32| minimum((0..pool.len()).filter(|i| set >> i & 1 == 1).map(|i| pool[i])).unwrap();
+            let (mut below, mut above, mut all) = (0, 0, 0);
+            for best in sets.map(best) {
+                (below, above, all) =
+                    (below + usize::from(best < low), above + usize::from(best > high), all + 1);
+            }
+            assert!(20 * below <= all && 20 * above <= all, "m = {m}: {below} and {above} of {all}");
+        }
+        // With one draw only, to both sides of it.
+        let (low, high) = spread_of_best(&pool, pool.len()).unwrap();
+        assert!(low < 0.0 && high == -low && spread_of_best(&pool, 13).is_none());
+    }
+
+    #[test]
+    fn order_quantiles_are_values_even_beside_infinite_ones() {
+        let times = [3.0, f64::INFINITY, 1.0, 2.0];
+        assert_eq!(
+            [0.25, 0.5, 0.75, 0.9].map(|q| order_quantile(&times, q).unwrap()),
+            [1.0, 2.0, 3.0, f64::INFINITY]
+        );
+        assert_eq!(order_quantile(&[], 0.5), None);
+        assert_eq!(median(&[f64::INFINITY; 3]), Some(f64::INFINITY));
     }
 
     #[test]

@@ -69,6 +69,17 @@ pub fn a12(first: &[f64], second: &[f64]) -> Option<f64> {
     mann_whitney(first, second).map(|test| test.statistic / pairs)
 }
 
+/// The least p-value that the signed-rank test can give with so many differences, none of them 0.
+pub fn least_signed_rank(samples: usize) -> f64 {
+    (2.0 * 0.5f64.powi(samples as i32)).min(1.0)
+}
+
+/// The least p-value that the Mann–Whitney test can give with samples of these sizes: 2 / C(m + n, m).
+pub fn least_rank_sum(first: usize, second: usize) -> f64 {
+    let sets = (1..=first).map(|i| (second + i) as f64 / i as f64).product::<f64>();
+    (2.0 / sets).min(1.0)
+}
+
 /// P values of tests made together, corrected so that all of those below α are right with probability 1 − α (Holm
 /// 1979).
 pub fn holm(p_values: &[f64]) -> Vec<f64> {
@@ -198,6 +209,18 @@ mod tests {
             near([true, false].map(|exact| signed_ranks(&values(MOST_EXACT, shift), exact)));
             let half = MOST_EXACT / 2;
             near([true, false].map(|exact| rank_sum(&values(half, shift), &values(half, 0.0), exact)));
+        }
+    }
+
+    #[test]
+    fn the_least_p_values_are_those_of_samples_without_overlap() {
+        for n in 1..9 {
+            let differences: Vec<f64> = (1..=n).map(f64::from).collect();
+            let found = wilcoxon_signed_rank(&differences).unwrap().p_value;
+            assert!((found - least_signed_rank(differences.len())).abs() < 1e-12, "{n}");
+            let above: Vec<f64> = (0..7).map(|i| 100.0 + f64::from(i)).collect();
+            let found = mann_whitney(&differences, &above).unwrap().p_value;
+            assert!((found - least_rank_sum(differences.len(), above.len())).abs() < 1e-12, "{n}");
         }
     }
 

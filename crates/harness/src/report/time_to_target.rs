@@ -1,0 +1,71 @@
+//! Error against run time in one table: seconds and work until every method is within a distance of the best known.
+
+use super::attempt::{Attempt, attempts};
+use super::config::Targets;
+use super::data::Rows;
+use super::metric::Metric;
+use super::output::{Output, each};
+use super::progress::ProgressAxis;
+use crate::Error;
+use crate::statistics::order_quantile;
+use serde::Serialize;
+
+/// One method and target on one scene, as written to `timing_to_target.csv` and `to_target_work.csv`.
+#[derive(Serialize)]
+struct Reached<'a> {
+    scene: &'a str,
+    target: String,
+    method: &'a str,
+    runs: usize,
+    solved: usize,
+    /// Over all runs, of which those that never reach the target are the last; empty if that is the quantile's.
+    median: Option<f64>,
+    quantile_90: Option<f64>,
+}
+
+pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
+    let mut output = Output::new(&config.source, &config.title);
+    for axis in [ProgressAxis::Seconds, ProgressAxis::Work] {
+        let table: Vec<Reached> = attempts(config, rows, axis).iter().map(reached).collect();
+        axis.add_csv(&mut output, "to_target", &table)?;
+        let explanation = format!("{} until the target is reached, over all runs:", axis.label());
+        let columns = ["scene", "target", "method", "runs", "solved", "median", "quantile_90"];
+        output.show(&explanation, &table, &columns)?;
+        if axis == ProgressAxis::Seconds {
+            output.reading = reading(config, &table);
+        }
+    }
+    Ok(output)
+}
+
+fn reached<'a>(attempt: &Attempt<'a>) -> Reached<'a> {
+    let mut times = attempt.solved.clone();
+    times.resize(attempt.runs, Metric::WORST);
+    let at = |q| order_quantile(&times, q).filter(|time| time.is_finite());
+    Reached {
+        scene: attempt.scene,
+        target: attempt.target.to_string(),
+        method: attempt.method,
+        runs: attempt.runs,
+        solved: attempt.solved.len(),
+        median: at(0.5),
+        quantile_90: at(0.9),
+    }
+}
+
+/// Which method is the first to reach each target, by scene.
+fn reading(config: &Targets, table: &[Reached]) -> String {
+    let firsts = each(&config.targets, |target| {
+        let own = || table.iter().filter(|row| row.target == target.to_string());
+        let first = |scene: &[&Reached]| {
+            let timed = scene.iter().filter_map(|row| Some((row.median?, row.method)));
+            let (seconds, method) = timed.min_by(|a, b| a.0.total_cmp(&b.0))?;
+            Some(format!("{method} ({seconds:.2} s, {})", scene[0].scene))
+        };
+        let rows: Vec<&Reached> = own().collect();
+        let scenes = rows.chunk_by(|a, b| a.scene == b.scene);
+        let firsts: Vec<String> = scenes.filter_map(first).collect();
+        (!firsts.is_empty()).then(|| format!("{target} by {}", firsts.join(", ")))
+    });
+    format!("First in the median to reach {firsts}.")
+}
