@@ -55,17 +55,16 @@ fn reached<'a>(attempt: &Attempt<'a>) -> Reached<'a> {
 
 /// Which method is the first to reach each target, by scene.
 fn reading(config: &Targets, table: &[Reached]) -> String {
-    let firsts = each(&config.targets, |target| {
-        let own = || table.iter().filter(|row| row.target == target.to_string());
+    let firsts = config.targets.iter().filter_map(|target| {
+        let rows: Vec<&Reached> = table.iter().filter(|row| row.target == target.to_string()).collect();
         let first = |scene: &[&Reached]| {
             let timed = scene.iter().filter_map(|row| Some((row.median?, row.method)));
             let (seconds, method) = timed.min_by(|a, b| a.0.total_cmp(&b.0))?;
-            Some(format!("{method} ({seconds:.2} s, {})", scene[0].scene))
+            Some(format!("{method} on {} ({seconds:.2} s)", scene[0].scene))
         };
-        let rows: Vec<&Reached> = own().collect();
-        let scenes = rows.chunk_by(|a, b| a.scene == b.scene);
-        let firsts: Vec<String> = scenes.filter_map(first).collect();
-        (!firsts.is_empty()).then(|| format!("{target} by {}", firsts.join(", ")))
+        let firsts = each(rows.chunk_by(|a, b| a.scene == b.scene), first);
+        (!firsts.is_empty()).then(|| format!("{target}: {firsts}"))
     });
-    format!("First in the median to reach {firsts}.")
+    let firsts: Vec<String> = firsts.collect();
+    format!("The first method in the median to reach {}.", firsts.join("; "))
 }
