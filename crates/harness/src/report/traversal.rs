@@ -65,8 +65,9 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
     output.add_csv("rank", &ranks)?;
     output.add_csv("timing_rank", &timed_ranks)?;
     output.add_csv("timing_speed", &speeds)?;
-    let caption = "One point per tree, those of a layout joined; one thread, the fastest of several turns. Cost is the total area of inner nodes \
-                   over that of the greedy tree.";
+    let caption = "One point per tree, those of a layout joined; one thread, the fastest of several turns. Cost is the \
+                   total area of inner nodes over that of the greedy tree, which is too low for trees whose nodes have \
+                   more than two children, as Goldsmith–Salmon's.";
     output.add_figure("traversal", caption, 2, panels);
     let columns = ["scene", "method", "layout", "rays", "cost_over_base", "mrays_per_second"];
     output.show("Million rays per second on one thread:", &speeds, &columns)?;
