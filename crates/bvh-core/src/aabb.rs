@@ -17,9 +17,15 @@ impl Aabb {
     /// The neutral element of [`union`](Aabb::union): contains nothing, area 0 by definition.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// The smallest box around `points`, [`Aabb::EMPTY`] if there are none.
+    /// The smallest box around `points`, [`Aabb::EMPTY`] if there are none. A NaN coordinate of any point makes the box
+    /// NaN along that axis, so that [`check`](Self::check) refuses it.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
-        points.into_iter().fold(Self::EMPTY, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
+        points.into_iter().fold(Self::EMPTY, |b, p| {
+            // Minima and maxima of vectors may take either operand if one is NaN.
+            let nan = b.min.is_nan_mask() | p.is_nan_mask();
+            let [min, max] = [b.min.min(p), b.max.max(p)].map(|corner| Vec3::select(nan, Vec3::NAN, corner));
+            Self { min, max }
+        })
     }
 
     /// The smallest box around both.
@@ -157,6 +163,18 @@ mod tests {
                 let inside = inside || (plane < 3 && shifted == 1.5) || (plane >= 3 && shifted == -0.5);
                 assert_eq!(unit.contains(&other), inside, "{other:?}");
             }
+        }
+    }
+
+    #[test]
+    fn a_nan_coordinate_of_any_point_makes_the_box_one_that_is_refused() {
+        for (point, axis) in (0..3).flat_map(|point| [0, 1, 2].map(|axis| (point, axis))) {
+            let mut points = [Vec3::ZERO, Vec3::ONE, Vec3::new(-1.0, 2.0, 0.5)];
+            points[point][axis] = f32::NAN;
+            let aabb = Aabb::around(points);
+            assert_eq!(aabb.check(), Err(InvalidBoxReason::NotFinite), "{points:?}");
+            let others = [0, 1, 2].into_iter().filter(|&other| other != axis);
+            others.for_each(|other| assert!(aabb.min[other].is_finite() && aabb.max[other].is_finite()));
         }
     }
 

@@ -32,7 +32,8 @@ impl Objective {
     }
 }
 
-/// The constants of the surface area heuristic, in any common unit of time.
+/// The constants of the surface area heuristic, in any common unit of time. With those that [`new`](Self::new) accepts,
+/// every tree of finite boxes has a finite cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -41,9 +42,48 @@ impl Objective {
 )]
 pub struct SahConstants {
     /// Cost of visiting an inner node. Default 1.
-    pub traversal: f64,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "checked"))]
+    pub(crate) traversal: f64,
     /// Cost of testing one object. Default 1.
-    pub intersection: f64,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "checked"))]
+    pub(crate) intersection: f64,
+}
+
+/// A constant that was refused.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{found} is not a constant from 0 to {:e}", SahConstants::MAX)]
+pub struct InvalidConstant {
+    /// The value found.
+    pub found: f64,
+}
+
+impl SahConstants {
+    /// The largest constant: far from overflowing the sum over the largest tree of the largest boxes.
+    pub const MAX: f64 = 1e200;
+
+    /// The costs of visiting an inner node and of testing one object, each from 0 to [`MAX`](Self::MAX).
+    pub fn new(traversal: f64, intersection: f64) -> Result<Self, InvalidConstant> {
+        match [traversal, intersection].into_iter().find(|constant| !(0.0..=Self::MAX).contains(constant)) {
+            Some(found) => Err(InvalidConstant { found }),
+            None => Ok(Self { traversal, intersection }),
+        }
+    }
+
+    /// Cost of visiting an inner node.
+    pub fn traversal(&self) -> f64 {
+        self.traversal
+    }
+
+    /// Cost of testing one object.
+    pub fn intersection(&self) -> f64 {
+        self.intersection
+    }
+}
+
+#[cfg(feature = "serde")]
+fn checked<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    let constant = serde::Deserialize::deserialize(deserializer)?;
+    SahConstants::new(constant, constant).map(|_| constant).map_err(serde::de::Error::custom)
 }
 
 impl Default for SahConstants {
@@ -154,6 +194,19 @@ mod tests {
         assert_eq!(sah(&tree, &SahConstants { traversal: 2.0, intersection: 0.0 }), 2.0);
         assert_eq!(internal_area(&tree), 7.0);
         assert_eq!(goldsmith_salmon(&tree), 2.0);
+    }
+
+    #[test]
+    fn constants_that_could_make_a_cost_infinite_or_nan_are_refused() {
+        for wrong in [f64::NAN, f64::INFINITY, -1.0, 2e200] {
+            for refused in [SahConstants::new(wrong, 1.0), SahConstants::new(1.0, wrong)] {
+                let error = refused.unwrap_err().to_string();
+                assert_eq!(error, alloc::format!("{wrong} is not a constant from 0 to 1e200"));
+            }
+        }
+        let largest = Aabb { min: glam::Vec3::splat(f32::MIN), max: glam::Vec3::splat(f32::MAX) };
+        let tree = Bvh { nodes: vec![Node::leaf(largest, 0, u32::MAX >> 1); 100], prim_ids: vec![] };
+        assert!(sah(&tree, &SahConstants::new(SahConstants::MAX, SahConstants::MAX).unwrap()).is_finite());
     }
 
     #[test]

@@ -5,7 +5,9 @@
 //! in one block, which holds the two children, then the left child's block, then the right child's. So subtrees can be
 //! built in any order, or in parallel, into the same bytes.
 
-use super::presort::{PARALLEL_OBJECTS, Presorted, note_same_orders};
+#[cfg(feature = "rayon")]
+use super::presort::PARALLEL_OBJECTS;
+use super::presort::{Presorted, note_same_orders};
 use super::split_cost::SplitCost;
 use super::sweep::{Block, SplitRule, Sweep, union_of};
 use bvh_core::{Aabb, Bvh, Node, PackedAabb, with_vector_instructions};

@@ -8,7 +8,9 @@
 //! position.
 
 use super::divide::{self, Workspace};
-use super::presort::{PARALLEL_OBJECTS, Presorted};
+#[cfg(feature = "rayon")]
+use super::presort::PARALLEL_OBJECTS;
+use super::presort::Presorted;
 use super::split_cost::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, SplitCost};
 use super::sweep::{SplitRule, TakeBest};
 use crate::config::{Accepts, Itself};

@@ -40,6 +40,8 @@ impl Header {
     pub const VERSION: u32 = 2;
     /// Stored in the file's byte order, so that its bytes tell the order.
     const ENDIANNESS: u32 = 0x0102_0304;
+    /// The box of the root, as in the node.
+    pub(super) const BOUNDS: core::ops::Range<usize> = 80..104;
     /// The last field, which every other byte of the file is covered by.
     pub(super) const CHECKSUM: core::ops::Range<usize> = 188..192;
 
@@ -100,12 +102,20 @@ impl Header {
         let objects = Some(objects).filter(most(MAX_OBJECTS as u64)).ok_or(FileError::Field("objects"))?;
         let nodes = Some(nodes).filter(most(2 * objects)).ok_or(FileError::Field("nodes"))?;
         let [cost, traversal, intersection] = fields.words()?.map(f64::from_bits);
+        if !(cost.is_finite() && cost >= 0.0) {
+            return Err(FileError::Field("cost"));
+        }
+        let constants =
+            SahConstants::new(traversal, intersection).map_err(|_| FileError::Field("constants"))?;
         let objective = match objective {
             0 => Objective::InternalArea,
             1 => Objective::GoldsmithSalmon,
-            2 => Objective::Sah(SahConstants { traversal, intersection }),
+            2 => Objective::Sah(constants),
             _ => return Err(FileError::Field("objective")),
         };
+        if objective != Objective::Sah(constants) && [traversal, intersection].map(f64::to_bits) != [0; 2] {
+            return Err(FileError::Field("constants"));
+        }
         let mut corners = [[0.0; 3]; 2];
         for coordinate in corners.as_flattened_mut() {
             *coordinate = f32::from_le_bytes(fields.need()?);
@@ -113,7 +123,11 @@ impl Header {
         let name: [u8; 64] = fields.need()?;
         let end = name.iter().position(|&byte| byte == 0).unwrap_or(name.len());
         let method = core::str::from_utf8(&name[..end]).map_err(|_| FileError::Method)?.to_owned();
-        let _reserved_and_checksum: [u8; 24] = fields.need()?;
+        let reserved: [u8; 20] = fields.need()?;
+        let _checksum: [u8; 4] = fields.need()?;
+        if reserved != [0; 20] || name[end..].iter().any(|&byte| byte != 0) {
+            return Err(FileError::Field("padding"));
+        }
         let (nodes, objects, bounds) = (nodes as usize, objects as usize, Aabb::from(corners));
         Ok(Self { nodes, objects, objective, cost, seed, work, scene, bounds, method })
     }

@@ -254,6 +254,10 @@ impl<'a> TreeFile<'a> {
             return Err(FileError::Checksum);
         }
         file.is_sound = fast_path.is_some_and(FastPath::finish);
+        let bounds = file.nodes.get(..size_of::<Aabb>());
+        if bounds.map_or(file.header.bounds != Aabb::EMPTY, |root| *root != bytes[Header::BOUNDS]) {
+            return Err(FileError::Field("box of the root"));
+        }
         Ok(file)
     }
 
@@ -274,8 +278,8 @@ impl<'a> TreeFile<'a> {
         }
     }
 
-    /// A copy of the tree. Checks its structure, so that traversals end and stay in bounds; what the boxes contain is
-    /// left to the checksum, or to [`validate`](validate()). O(nodes + objects).
+    /// A copy of the tree. Checks its structure, so that traversals end and stay in bounds, and that its boxes are finite.
+    /// What the boxes contain is left to the checksum, or to [`validate`](validate()). O(nodes + objects).
     pub fn tree(&self) -> Result<Bvh, FileError> {
         let tree = Bvh { nodes: copied(self.nodes), prim_ids: copied(self.prim_ids) };
         self.check((&tree).into())?;

@@ -146,6 +146,34 @@ fn other_files_versions_byte_orders_and_scenes_are_named() {
 }
 
 #[test]
+fn fields_that_no_save_writes_are_refused_even_under_a_right_checksum() {
+    let (boxes, tree) = scene(5);
+    let (none, empty) = scene(0);
+    let files = [save(&tree, &boxes, &ORIGIN).unwrap(), save(&empty, &none, &Origin::default()).unwrap()];
+    let refusal = |file: usize, at: usize, field: &[u8]| {
+        let mut bytes = files[file].clone();
+        bytes[at..at + field.len()].copy_from_slice(field);
+        seal(&mut bytes);
+        TreeFile::open(&bytes).and_then(|file| file.tree()).unwrap_err()
+    };
+    for wrong in [f64::NAN, f64::INFINITY, -1.0] {
+        assert_eq!(refusal(0, 56, &wrong.to_le_bytes()), FileError::Field("cost"));
+        assert_eq!(refusal(0, 64, &wrong.to_le_bytes()), FileError::Field("constants"));
+    }
+    assert_eq!(refusal(1, 72, &1f64.to_le_bytes()), FileError::Field("constants"), "internal area has none");
+    for at in [80, 84, 100] {
+        for wrong in [f32::NAN, f32::INFINITY, 0.25] {
+            assert_eq!(refusal(0, at, &wrong.to_le_bytes()), FileError::Field("box of the root"));
+        }
+        assert_eq!(refusal(1, at, &0.25f32.to_le_bytes()), FileError::Field("box of the root"));
+    }
+    assert_eq!(refusal(0, 104, b"be\0t"), FileError::Field("padding"));
+    assert_eq!(refusal(0, 187, &[1]), FileError::Field("padding"));
+    let infinite = f32::INFINITY.to_le_bytes();
+    assert!(matches!(refusal(0, 192 + 32 + 12, &infinite), FileError::Tree(InvalidBvh::Box { node: 1, .. })));
+}
+
+#[test]
 fn what_cannot_be_saved_or_viewed_is_refused() {
     let (boxes, tree) = scene(7);
     let named = |method: &str| save(&tree, &boxes, &Origin { method, ..ORIGIN }).map(|_| ());

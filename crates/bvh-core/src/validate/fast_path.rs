@@ -7,6 +7,7 @@
 use crate::{Aabb, BvhView, MAX_OBJECTS, Node};
 use alloc::vec::Vec;
 use core::ops::Range;
+use glam::{BVec4A, Vec4};
 
 /// Nodes whose slots are bounds-checked together.
 const NODES: usize = 32;
@@ -20,6 +21,7 @@ pub(crate) struct FastPath<'a> {
     /// Marks of the pairs of siblings, then of the positions in `prim_ids`, then of the objects.
     marks: Vec<u8>,
     lanes: Lanes,
+    boxes: Boxes,
     in_bounds: bool,
 }
 
@@ -33,6 +35,7 @@ impl<'a> FastPath<'a> {
             tree,
             marks: alloc::vec![0; tree.nodes.len() + objects],
             lanes: Lanes { wrong: [0; 8], highest: [0; 8] },
+            boxes: Boxes::NONE,
             in_bounds: true,
         })
     }
@@ -75,8 +78,12 @@ impl<'a> FastPath<'a> {
     fn add_nodes_with(&mut self, range: Range<usize>, words: impl Fn(&[Node; 8]) -> [[u32; 8]; 2]) {
         let (all, pairs) = (self.tree.nodes.len(), self.tree.prim_ids.len() as u32 - 1);
         let (mut index, marks) = (range.start as u32, &mut self.marks[..all]);
-        let (blocks, rest) = self.tree.nodes[range].as_chunks::<NODES>();
+        let nodes = &self.tree.nodes[range];
         // Local copies stay in registers.
+        let mut boxes = self.boxes;
+        nodes.iter().for_each(|node| boxes.add(node));
+        self.boxes = boxes;
+        let (blocks, rest) = nodes.as_chunks::<NODES>();
         let (mut lanes, mut in_bounds) = (self.lanes, self.in_bounds);
         for block in blocks {
             let mut slots = [0; NODES];
@@ -98,13 +105,15 @@ impl<'a> FastPath<'a> {
     }
 
     /// Whether the tree, all of which has been added, is sound: every index is in bounds, children come after their
-    /// parents, every node but the root has one parent, and every object is in one leaf.
+    /// parents, every node but the root has one parent, every object is in one leaf, and every box is finite and not
+    /// inverted.
     pub(crate) fn finish(self) -> bool {
         let Lanes { wrong, highest } = self.lanes;
         let objects = self.tree.prim_ids.len() as u32;
         self.in_bounds
             && wrong == [0; 8]
             && highest.into_iter().all(|number| number < objects)
+            && self.boxes.are_right()
             && self.marks.iter().fold(1, |all, mark| all & mark) == 1
     }
 }
@@ -140,6 +149,34 @@ impl Lanes {
             slots[lane] = number.wrapping_add(pairs & leaf);
         }
         slots
+    }
+}
+
+/// Results for the boxes of all nodes so far. The first three lanes are the axes; the last one has no meaning.
+#[derive(Clone, Copy)]
+struct Boxes {
+    /// The box around all of them.
+    min: Vec4,
+    max: Vec4,
+    /// Whether each has its lower corner below its upper one, and neither is NaN.
+    ordered: BVec4A,
+}
+
+impl Boxes {
+    const NONE: Self = Self { min: Vec4::INFINITY, max: Vec4::NEG_INFINITY, ordered: BVec4A::TRUE };
+
+    #[inline(always)]
+    fn add(&mut self, node: &Node) {
+        let bytes = bytemuck::bytes_of(node);
+        let [min, max]: [Vec4; 2] = [0, 12].map(|at| bytemuck::pod_read_unaligned(&bytes[at..at + 16]));
+        self.ordered &= min.cmple(max);
+        (self.min, self.max) = (min.min(self.min), max.max(self.max));
+    }
+
+    /// Whether all are finite and none is inverted.
+    fn are_right(&self) -> bool {
+        let finite = self.min.cmpgt(Vec4::NEG_INFINITY) & self.max.cmplt(Vec4::INFINITY);
+        (self.ordered & finite).bitmask() & 0b111 == 0b111
     }
 }
 
@@ -187,17 +224,19 @@ fn mark(marks: &mut [u8], slots: &[u32]) -> bool {
 mod tests {
     use super::super::find_fault;
     use super::*;
-    use crate::Bvh;
+    use crate::{Bvh, InvalidBvh};
+
+    const UNIT: Aabb = Aabb { min: glam::Vec3::ZERO, max: glam::Vec3::ONE };
 
     /// A chain: each pair is a leaf and the parent of the next pair, on alternating sides.
     fn chain(objects: u32) -> Bvh {
-        let leaf = |object: u32| Node::leaf(Aabb::EMPTY, object, 1);
+        let leaf = |object: u32| Node::leaf(UNIT, object, 1);
         let mut nodes: Vec<Node> = alloc::vec![leaf(objects - 1)];
         let mut parent = 0;
         for object in 0..objects - 1 {
             let first = nodes.len();
             nodes.extend([leaf(object), leaf(objects - 1)]);
-            nodes[parent] = Node::inner(Aabb::EMPTY, first as u32, 2);
+            nodes[parent] = Node::inner(UNIT, first as u32, 2);
             parent = first + 1;
             if object % 2 == 0 {
                 nodes.swap(first, parent);
@@ -244,7 +283,7 @@ mod tests {
                         (0..4).flat_map(|count| [(count, Node::inner as fn(_, _, _) -> _), (count, Node::leaf)])
                     {
                         let mut damaged = tree.clone();
-                        damaged.nodes[at] = node(Aabb::EMPTY, first, count);
+                        damaged.nodes[at] = node(UNIT, first, count);
                         let sound = find_fault((&damaged).into(), objects as usize).is_ok();
                         assert_eq!(passes(&damaged), sound, "{:?}", damaged.nodes);
                         passed += usize::from(sound);
@@ -261,12 +300,38 @@ mod tests {
     }
 
     #[test]
+    fn no_tree_with_a_box_that_is_not_finite_or_is_inverted_passes() {
+        let tree = chain(20);
+        for (at, plane) in (0..tree.nodes.len()).flat_map(|at| (0..6).map(move |plane| (at, plane))) {
+            let mut damaged = tree.clone();
+            let inverted = if plane < 3 { 1.5 } else { -0.5 };
+            for wrong in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, inverted] {
+                let Aabb { min, max } = &mut damaged.nodes[at].aabb;
+                if plane < 3 {
+                    min[plane] = wrong
+                } else {
+                    max[plane - 3] = wrong
+                }
+                assert!(!passes(&damaged), "{wrong} in plane {plane} of node {at}");
+                assert!(matches!(find_fault((&damaged).into(), 20), Err(InvalidBvh::Box { .. })));
+            }
+            let Aabb { min, max } = &mut damaged.nodes[at].aabb;
+            if plane < 3 {
+                min[plane] = f32::MIN
+            } else {
+                max[plane - 3] = f32::MAX
+            }
+            assert!(passes(&damaged));
+        }
+    }
+
+    #[test]
     fn sound_trees_of_another_kind_do_not_pass() {
         let mut tree = chain(4);
         let of_objects = |objects| FastPath::passes((&tree).into(), objects);
         assert!(!of_objects(3) && !of_objects(5) && !of_objects(0));
         tree.nodes.truncate(5);
-        tree.nodes[4] = Node::leaf(Aabb::EMPTY, 2, 2);
+        tree.nodes[4] = Node::leaf(UNIT, 2, 2);
         assert_eq!(find_fault((&tree).into(), 4), Ok(()));
         assert!(!passes(&tree));
     }

@@ -4,7 +4,7 @@ mod fast_path;
 
 pub(crate) use fast_path::FastPath;
 
-use crate::{Aabb, Bvh, BvhView, MAX_OBJECTS, NodeKind};
+use crate::{Aabb, Bvh, BvhView, InvalidBoxReason, MAX_OBJECTS, NodeKind};
 use alloc::vec::Vec;
 
 /// Why a tree was refused. Nodes and objects are named by index.
@@ -20,6 +20,9 @@ pub enum InvalidBvh {
     /// Objects without nodes, or nodes without objects.
     #[error("the tree has {nodes} nodes over {objects} objects")]
     NodeCount { nodes: usize, objects: usize },
+    /// A node's box is not finite or is inverted.
+    #[error("the box of node {node} {reason}")]
+    Box { node: usize, reason: InvalidBoxReason },
     /// Children must follow their parent and lie inside the array, two at least.
     #[error("inner node {node} names children {first}..{first}+{count}, of {nodes} nodes")]
     BadChildren { node: usize, first: u32, count: u32, nodes: usize },
@@ -44,8 +47,8 @@ pub enum InvalidBvh {
 }
 
 /// Checks that `tree` is a tree over exactly the objects of `boxes`: every node is reached once, every object is in
-/// exactly one leaf, and every box lies inside its parent's, compared without tolerance. O(nodes + objects), no
-/// recursion; safe on any bits.
+/// exactly one leaf, and every box is finite and lies inside its parent's, compared without tolerance.
+/// O(nodes + objects), no recursion; safe on any bits.
 pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
     check_structure(tree.into(), boxes.len())?;
     for (node, at) in tree.nodes.iter().enumerate() {
@@ -60,7 +63,8 @@ pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
     Ok(())
 }
 
-/// [`validate`] without the boxes: the properties that make a traversal end and stay in bounds.
+/// [`validate`] without the nesting of the boxes: the properties that make a traversal end and stay in bounds, and boxes
+/// and costs finite.
 ///
 /// Loading a tree spends most of its time here, so the most common kind of tree is passed by a check without
 /// unpredictable branches. Any other tree, and any fault, goes to [`find_fault`].
@@ -85,6 +89,7 @@ fn find_fault(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
     let (mut children, mut prims) = (0, 0);
     let mut repeated = None;
     for (index, node) in tree.nodes.iter().enumerate() {
+        node.aabb.check().map_err(|reason| InvalidBvh::Box { node: index, reason })?;
         match node.kind() {
             NodeKind::Inner { first, count } => {
                 let range = node.children();
@@ -187,7 +192,7 @@ mod tests {
     #[test]
     fn every_kind_of_damage_is_named() {
         type Damage = fn(&mut Bvh);
-        let cases: [(Damage, InvalidBvh); 10] = [
+        let cases: [(Damage, InvalidBvh); 12] = [
             (|t| t.prim_ids.truncate(2), InvalidBvh::ObjectCount { named: 2, objects: 3 }),
             (|t| t.nodes.clear(), InvalidBvh::NodeCount { nodes: 0, objects: 3 }),
             (
@@ -203,6 +208,11 @@ mod tests {
                 InvalidBvh::BadLeaf { node: 4, first: 2, count: 2, objects: 3 },
             ),
             (|t| t.nodes[0] = Node::leaf(t.nodes[0].aabb, 0, 1), InvalidBvh::Parents { node: 1, parents: 0 }),
+            (
+                |t| t.nodes[0].aabb.min.x = f32::NEG_INFINITY,
+                InvalidBvh::Box { node: 0, reason: InvalidBoxReason::NotFinite },
+            ),
+            (|t| t.nodes[3].aabb.max.z = -1.0, InvalidBvh::Box { node: 3, reason: InvalidBoxReason::Inverted }),
             (|t| t.prim_ids[1] = 3, InvalidBvh::BadObject { node: 3, object: 3, objects: 3 }),
             (|t| t.nodes[4] = Node::leaf(cube(2.0), 1, 1), InvalidBvh::Leaves { object: 1, leaves: 2 }),
             (|t| t.nodes[0].aabb.max.x = 4.5, InvalidBvh::ChildOutside { node: 0, child: 2 }),

@@ -85,7 +85,8 @@ fn describe(header: &Header, bytes: usize, lines: &mut Lines) {
     let objective = match header.objective {
         Objective::InternalArea => "internal area".into(),
         Objective::GoldsmithSalmon => "Goldsmith–Salmon".into(),
-        Objective::Sah(SahConstants { traversal, intersection }) => {
+        Objective::Sah(constants) => {
+            let (traversal, intersection) = (constants.traversal(), constants.intersection());
             format!("surface area heuristic, traversal {traversal}, intersection {intersection}")
         }
     };

@@ -13,7 +13,7 @@ use crate::report::Report;
 use crate::run::resolved::{LoadedScene, Resolved};
 use crate::run::rows::{BoundRow, ROUNDING, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
 use crate::run::store::Store;
-use bvh_core::cost::{Objective, SahConstants};
+use bvh_core::cost::Objective;
 use bvh_search::exact;
 use std::fs;
 use std::path::Path;
@@ -93,9 +93,7 @@ fn name(objective: &Objective) -> String {
     match objective {
         Objective::InternalArea => "internal_area".into(),
         Objective::GoldsmithSalmon => "goldsmith_salmon".into(),
-        Objective::Sah(SahConstants { traversal, intersection }) => {
-            format!("SahConstants {{ traversal: {traversal:?}, intersection: {intersection:?} }}")
-        }
+        Objective::Sah(constants) => format!("{constants:?}"),
     }
 }
 

@@ -3,9 +3,7 @@
 use super::fault::Fault;
 use super::{Contestant, Experiment, Labelled};
 use crate::{scenes::subset, stress};
-use bvh_build::config::Accepts;
 use bvh_build::{Check, OutOfRange};
-use bvh_core::cost::{Objective, SahConstants};
 use bvh_search::Method;
 use std::collections::HashSet;
 
@@ -17,10 +15,6 @@ impl Experiment {
     pub(super) fn check_together(&self) -> Result<(), OutOfRange> {
         if self.question.trim().is_empty() {
             return Err(OutOfRange::new("question", "empty", "what the experiment asks, for its readers"));
-        }
-        if let Objective::Sah(SahConstants { traversal, intersection }) = &self.objective {
-            (0.0..).check("objective.sah.traversal", traversal)?;
-            (0.0..).check("objective.sah.intersection", intersection)?;
         }
         self.check_scenes()?;
         self.check_run_count()

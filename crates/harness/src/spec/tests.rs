@@ -33,7 +33,7 @@ fn wrong_keys_and_values_are_named_with_what_would_be_accepted() {
         ("scenes = ['a:0..9999:0..99999:0..4294967295']\n", &["scenes", "4294967296000000000 runs"]),
         ("scenes = ['a:5..4']\n", &["scenes", "a:5..4", "A up to B"]),
         ("tracing = { count = 4294967295 }\n", &["tracing.count", "1 to 100000000"]),
-        ("objective = { sah = { traversal = -1.0 } }\n", &["objective.sah.traversal is -1"]),
+        ("objective = { sah = { traversal = -1.0 } }\n", &["objective.sah.traversal: -1 is not"]),
         ("rays = [{ count = nan }]\n", &["rays[0].count is nan", "finite"]),
         ("rays = [{ family = 'curves', query = 'any', count = 1 }]\n", &["curves", "inside"]),
     ] {
@@ -142,7 +142,7 @@ fn another_library_is_accepted_exactly_with_its_feature() {
 fn quick_takes_no_infinity_either() {
     let text = format!("{GOOD}[quick]\nobjective = {{ sah = {{ traversal = inf }} }}\n");
     let error = read(&text, &Overrides { quick: true, ..Default::default() }).unwrap_err().to_string();
-    assert!(error.contains("quick.objective.sah.traversal is inf"), "{error}");
+    assert!(error.contains("quick.objective.sah.traversal: inf is not"), "{error}");
 }
 
 #[test]
