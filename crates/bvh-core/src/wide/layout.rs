@@ -8,8 +8,9 @@ use alloc::vec::Vec;
 
 /// An immutable copy of a [`Bvh`](crate::Bvh) and its triangles, for tracing only.
 ///
-/// Gives the answers of [`nearest_hit`](crate::nearest_hit) with [`Triangle::intersect`](crate::Triangle::intersect) over the same
-/// triangles, bit by bit, on every machine: with AVX2 where the processor has it and the feature `std` is on, else with portable code.
+/// Gives the answers of [`nearest_hit`](crate::nearest_hit) with [`Triangle::intersect`](crate::Triangle::intersect) over
+/// the same triangles, bit by bit, on every machine: with AVX2 where the processor has it and the feature `std` is on,
+/// else with portable code.
 ///
 /// ```
 /// use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};
