@@ -5,10 +5,11 @@ use plotters::style::RGBColor;
 
 use super::canvas::{Align, Fault, Frame, Layout, Picture, Sheet};
 use super::figure::{BORDER, Head, WIDTH};
-use super::model::{Cell, ColourBar, FigureError, HeatMap};
+use super::legend::Legend;
+use super::model::{ColourBar, FigureError, HeatMap};
 use super::raster::PNG_SCALE;
 use super::style::{GREY, INK, WHITE};
-use super::text::{BODY, Fonts, SMALL, Type};
+use super::text::{Fonts, SMALL, Type};
 
 /// Height of a row of cells.
 const ROW: f64 = 20.0;
@@ -16,10 +17,9 @@ const ROW: f64 = 20.0;
 const CELL: f64 = 110.0;
 /// Longest row or column name in pixels.
 const LONGEST: f64 = 190.0;
-/// Long row names.
-const SMALLER: Type = Type { size: 10.0, bold: false };
-/// Width of a class's sample in the key.
-const SAMPLE: f64 = 18.0;
+/// Font sizes of row names and of the texts in cells.
+const NAME_SIZES: [f64; 2] = [12.0, 10.0];
+const CELL_SIZES: [f64; 3] = [10.0, 9.0, 8.0];
 /// Cells without a class.
 const BLANK: RGBColor = RGBColor(232, 232, 232);
 /// From good to bad: pale where nothing is to be seen, darker the worse.
@@ -46,20 +46,17 @@ fn readable_on(RGBColor(red, green, blue): RGBColor) -> RGBColor {
 struct Table<'a> {
     map: &'a HeatMap,
     head: Head,
-    /// Left edges and rows of the key's entries.
-    key: Vec<(f64, f64)>,
+    key: Legend,
     left: f64,
     top: f64,
     cell: f64,
     row: f64,
-    /// The rows' names in lines, and their types.
-    rows: Vec<(Vec<String>, Type)>,
     columns: Vec<String>,
     /// The column names read upwards.
     upright: bool,
-    /// The cells' texts in lines, and their type.
-    texts: Vec<Vec<String>>,
-    text_type: Type,
+    /// The names of rows and the texts in cells, in lines, with their types.
+    rows: Vec<(Vec<String>, Type)>,
+    texts: Vec<(Vec<String>, Type)>,
 }
 
 impl Picture for HeatMap {
@@ -73,55 +70,23 @@ impl Picture for HeatMap {
             return Err(FigureError::CellCount { title: self.title.clone(), rows, columns, cells });
         }
         let head = Head::new(&self.title, &self.caption, fonts);
-        let mut key: Vec<(f64, f64)> = Vec::new();
-        let (mut x, mut y) = (BORDER, head.bottom);
-        for name in &self.classes {
-            let needed = SAMPLE + 6.0 + fonts.width(name, BODY);
-            if x > BORDER && x + needed > WIDTH - BORDER {
-                (x, y) = (BORDER, y + ROW);
-            }
-            key.push((x, y));
-            x += needed + 20.0;
-        }
-        let short = |name: &String| fonts.shorten(name, LONGEST, SMALL);
-        // A long name stands in two smaller lines.
-        let in_lines = |name: &String| match fonts.width(name, SMALL) <= LONGEST {
-            true => (vec![name.clone()], SMALL),
-            false => (fonts.wrap(name, LONGEST, SMALLER).into_iter().take(2).collect(), SMALLER),
-        };
-        let rows: Vec<(Vec<String>, Type)> = self.rows.iter().map(in_lines).collect();
-        let beside = rows.iter().map(|(lines, kind)| fonts.widest(lines, *kind)).fold(0.0, f64::max);
-        let columns: Vec<String> = self.columns.iter().map(short).collect();
-        let left = (BORDER + beside.max(fonts.width(&self.row_label, SMALL)) + 8.0).ceil();
+        let classes = self.classes.iter().cloned().zip((0..).map(|class| colour_of(Some(class))));
+        let key = Legend::of_areas(classes, WIDTH - 2.0 * BORDER, fonts);
+        let columns: Vec<String> =
+            self.columns.iter().map(|name| fonts.shorten(name, LONGEST, SMALL)).collect();
+        let rows: Vec<_> = self.rows.iter().map(|name| fonts.fit(name, LONGEST, &NAME_SIZES)).collect();
+        let beside = rows.iter().map(|(lines, kind)| fonts.widest(lines, *kind));
+        let left = BORDER + beside.fold(fonts.width(&self.row_label, SMALL), f64::max).ceil() + 8.0;
         let cell = ((WIDTH - left - BORDER) / columns.len().max(1) as f64).clamp(2.0, CELL);
         let widest = fonts.widest(&columns, SMALL);
         let upright = widest + 6.0 > cell;
-        let top = y + ROW + 10.0 + if upright { widest + 8.0 } else { SMALL.line() + 4.0 };
-
-        // The largest type in which every text fits its cell in two lines; the smallest is cut if it does not.
-        let lines = |cell: f64, text_type: Type, text: &str| {
-            if fonts.width(text, text_type) <= cell - 2.0 {
-                vec![text.to_owned()]
-            } else if text.split_whitespace().all(|word| fonts.width(word, text_type) <= cell - 2.0) {
-                fonts.wrap(text, cell - 2.0, text_type)
-            } else {
-                vec![fonts.shorten(text, cell - 2.0, text_type)]
-            }
-        };
-        let fits = |text_type: Type| {
-            let fit = |lines: Vec<String>, text: &str| lines.len() <= 2 && lines.join(" ") == text;
-            self.cells.iter().all(|Cell { text, .. }| fit(lines(cell, text_type, text), text))
-        };
-        let sizes = [12.0, 11.0, 10.0, 9.0].map(|size| Type { size, bold: false });
-        let text_type = sizes.into_iter().find(|&text_type| fits(text_type)).unwrap_or(sizes[3]);
-        let texts: Vec<Vec<String>> = self
-            .cells
-            .iter()
-            .map(|Cell { text, .. }| lines(cell, text_type, text).into_iter().take(2).collect())
-            .collect();
-        let two_lines = rows.iter().map(|(lines, _)| lines).chain(&texts).any(|lines| lines.len() > 1);
-        let row = if two_lines { 2.0 * SMALLER.line() } else { ROW };
-        Ok(Table { map: self, head, key, left, top, cell, row, rows, columns, upright, texts, text_type })
+        let above = if upright { widest + 8.0 } else { SMALL.line() + 4.0 };
+        let top = head.bottom + key.height() + 10.0 + above;
+        let texts: Vec<_> =
+            self.cells.iter().map(|each| fonts.fit(&each.text, cell - 2.0, &CELL_SIZES)).collect();
+        let height = |(lines, kind): &(Vec<String>, Type)| kind.line() * lines.len() as f64;
+        let row = rows.iter().chain(&texts).map(height).fold(ROW, f64::max);
+        Ok(Table { map: self, head, key, left, top, cell, row, columns, upright, rows, texts })
     }
 }
 
@@ -131,13 +96,8 @@ impl Layout for Table<'_> {
     }
 
     fn draw<B: DrawingBackend>(&self, sheet: &Sheet<B>) -> Result<(), Fault<B>> {
-        let classes = &self.map.classes;
         self.head.draw(sheet)?;
-        for ((class, name), &(left, top)) in classes.iter().enumerate().zip(&self.key) {
-            let sample = Frame { left, top: top + 3.0, width: SAMPLE, height: ROW - 6.0 };
-            sheet.rectangle(sample, colour_of(Some(class)))?;
-            sheet.text((left + SAMPLE + 6.0, top + ROW / 2.0), name, BODY, INK, Align::Left)?;
-        }
+        self.key.draw(sheet, (BORDER, self.head.bottom))?;
         let above = self.top - 4.0 - SMALL.line() / 2.0;
         sheet.text((self.left - 6.0, above), &self.map.row_label, SMALL, GREY, Align::Right)?;
         let align = if self.upright { Align::Up } else { Align::Center };
@@ -149,16 +109,16 @@ impl Layout for Table<'_> {
             let first = self.top + self.row * (index as f64 + 0.5) - kind.line() * lines.len() as f64 / 2.0;
             sheet.lines((self.left - 6.0, first), lines, *kind, INK, Align::Right)?;
         }
-        for (index, (cell, lines)) in self.map.cells.iter().zip(&self.texts).enumerate() {
+        for (index, (cell, (lines, kind))) in self.map.cells.iter().zip(&self.texts).enumerate() {
             let (row, column) = (index / self.columns.len(), index % self.columns.len());
             let (left, top) = (self.left + self.cell * column as f64, self.top + self.row * row as f64);
-            let colour = colour_of(cell.class.filter(|&class| class < classes.len()));
+            let colour = colour_of(cell.class.filter(|&class| class < self.map.classes.len()));
             let inner =
                 Frame { left: left + 0.5, top: top + 0.5, width: self.cell - 1.0, height: self.row - 1.0 };
             sheet.rectangle(inner, colour)?;
-            let first = top + (self.row - self.text_type.line() * lines.len() as f64) / 2.0;
+            let first = top + (self.row - kind.line() * lines.len() as f64) / 2.0;
             let middle = left + self.cell / 2.0;
-            sheet.lines((middle, first), lines, self.text_type, readable_on(colour), Align::Center)?;
+            sheet.lines((middle, first), lines, *kind, readable_on(colour), Align::Center)?;
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! The key to the series and reference lines of a figure, shared by all its panels.
 
 use plotters::element::{DashedPathElement, Polygon};
-use plotters::prelude::DrawingBackend;
+use plotters::prelude::{DrawingBackend, RGBColor};
 
 use super::canvas::{Align, Fault, Frame, Sheet, pen, steps};
 use super::model::{Figure, Layer};
@@ -58,6 +58,20 @@ impl Legend {
                 entries.push(Entry { name, stroke, line: true, marker: false, area: false });
             }
         }
+        Self::arrange(entries, width, fonts)
+    }
+
+    /// The key to areas of these names and colours.
+    pub fn of_areas(areas: impl Iterator<Item = (String, RGBColor)>, width: f64, fonts: &Fonts) -> Self {
+        let entry = |(name, colour)| {
+            let mut stroke = REFERENCE_LINE;
+            stroke.colour = colour;
+            Entry { name, stroke, line: false, marker: false, area: true }
+        };
+        Self::arrange(areas.map(entry).collect(), width, fonts)
+    }
+
+    fn arrange(mut entries: Vec<Entry>, width: f64, fonts: &Fonts) -> Self {
         let before = SAMPLE + GAPS.0;
         let room = width - before;
         entries.iter_mut().for_each(|entry| entry.name = fonts.shorten(&entry.name, room, BODY));
