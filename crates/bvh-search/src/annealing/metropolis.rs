@@ -1,7 +1,7 @@
 //! A series of Metropolis moves while the temperature falls.
 
 use super::node_sampler::NodeSampler;
-use crate::run::{Observer, Quota, Stream, Tally, WORK_PER_POLL};
+use crate::run::{Observer, Quota, Stream, Tally};
 use crate::tree::Working;
 use crate::tuning::MOVES_PER_TEMPERATURE;
 use bvh_core::with_vector_instructions;
@@ -15,6 +15,9 @@ pub(crate) trait Mover {
     /// Draws the nodes at which moves begin.
     fn sampler(&mut self) -> &mut NodeSampler;
 }
+
+/// Work of a move after which the observer is polled at once: all moves between two polls take less than a millisecond.
+const LONG_MOVE: u64 = 1 << 11;
 
 with_vector_instructions! {
     /// Moves until the quota is used up, while the temperature falls geometrically from `hot` to `cold`.
@@ -33,21 +36,21 @@ fn cool_plain<M: Mover>(
     observer: &dyn Observer,
 ) -> Tally {
     let (mut tally, before) = (Tally::default(), mover.work());
-    // Long moves ask the observer more often.
-    let (mut temperature, mut poll) = (hot, WORK_PER_POLL);
+    let mut temperature = hot;
     loop {
-        tally.work = mover.work() - before;
+        let work = mover.work() - before;
+        let long_move = work - tally.work > LONG_MOVE;
+        tally.work = work;
         if quota.is_reached(&tally) {
             return tally;
         }
-        if tally.moves % MOVES_PER_TEMPERATURE == 0 || tally.work >= poll {
+        if tally.moves % MOVES_PER_TEMPERATURE == 0 {
             if observer.cancelled() {
                 return tally;
             }
-            poll = tally.work + WORK_PER_POLL;
-        }
-        if tally.moves % MOVES_PER_TEMPERATURE == 0 {
             temperature = hot * libm::pow(cold / hot, tally.work as f64 / quota.work as f64);
+        } else if long_move && observer.cancelled() {
+            return tally;
         }
         tally.kept += u64::from(mover.step(tree, temperature, rng));
         tally.moves += 1;
