@@ -121,6 +121,7 @@ impl Ray {
     }
 
     /// The least size of the reciprocals of the direction's components.
+    #[cfg(all(feature = "std", target_arch = "x86_64"))]
     #[inline]
     pub(crate) fn least_inverse(&self) -> f32 {
         self.inverse.w

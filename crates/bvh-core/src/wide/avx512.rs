@@ -129,8 +129,7 @@ impl Instructions for Avx512 {
                 let n = mask.count_ones() as usize;
                 let keys: [u32; 8] = core::mem::transmute(keys);
                 let mut sorted = keys;
-                for i in 1..n {
-                    let key = keys[i];
+                for (i, key) in keys.into_iter().enumerate().take(n).skip(1) {
                     let mut at = i;
                     while at > 0 && sorted[at - 1] < key {
                         sorted[at] = sorted[at - 1];

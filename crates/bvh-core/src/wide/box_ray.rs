@@ -82,7 +82,7 @@ impl BoxRay {
             let size = _mm_cvtss_f32(size) + largest;
             let limit = ray.least_inverse() * Self::CLAMP;
             let in_range =
-                (size < Self::MOST_SIZE) & (size >= Self::LEAST_SIZE) & (size * limit < Self::MOST_SHIFT);
+                (Self::LEAST_SIZE..Self::MOST_SIZE).contains(&size) & (size * limit < Self::MOST_SHIFT);
             if !in_range {
                 return None;
             }

@@ -33,3 +33,6 @@ impl Kernel {
         Self::ALL.into_iter().find(|kernel| kernel.is_available()).unwrap_or(Self::Portable)
     }
 }
+
+/// Entries of the stack of a vector kernel's traversal; layouts that could need more are left to the portable kernel.
+pub(crate) const STACK: usize = 256;

@@ -8,9 +8,9 @@ use alloc::vec::Vec;
 
 /// An immutable copy of a [`Bvh`](crate::Bvh) and its triangles, for tracing only.
 ///
-/// Gives the answers of [`nearest_hit`](crate::nearest_hit) with [`Triangle::intersect`](crate::Triangle::intersect) over
-/// the same triangles, bit by bit, on every machine: with AVX2 where the processor has it and the feature `std` is on,
-/// else with portable code.
+/// Gives the answers of [`nearest_hit`](crate::nearest_hit) with [`Triangle::intersect`](crate::Triangle::intersect)
+/// over the same triangles, bit by bit, on every machine and with every [`Kernel`]; the fastest one that the processor
+/// has is chosen when the layout is made.
 ///
 /// ```
 /// use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};
@@ -35,7 +35,8 @@ pub struct WideBvh {
     pub(crate) root: Option<Child>,
     pub(crate) nodes: Vec<WideNode>,
     pub(crate) blocks: Vec<TriangleBlock>,
-    /// The largest size of a coordinate.
+    /// The largest size of a coordinate; for the vector kernels.
+    #[cfg_attr(not(all(feature = "std", target_arch = "x86_64")), allow(dead_code))]
     pub(crate) largest: f32,
     /// What traces it; the processor has its instructions.
     pub(crate) kernel: Kernel,

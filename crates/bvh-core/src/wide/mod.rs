@@ -12,6 +12,8 @@ mod layout;
 mod node;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod packet;
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+mod packet_triangles;
 mod portable;
 mod triangles;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
@@ -22,9 +24,8 @@ pub use layout::WideBvh;
 
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate};
 use alloc::vec::Vec;
+use kernel::STACK;
 use portable::walk;
-#[cfg(all(feature = "std", target_arch = "x86_64"))]
-use x86::STACK;
 
 /// What a caller expects of the rays of a batch. A hint: the answers are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,6 +2,7 @@
 //! of four triangles at once.
 
 use super::box_ray::BoxRay;
+use super::kernel::STACK;
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
 use super::portable::walk;
@@ -9,9 +10,6 @@ use super::triangles::TriangleBlock;
 use crate::{Hit, Ray, Shear, Slabs};
 use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
-
-/// Entries of a traversal's stack; layouts that could need more are left to the portable kernel.
-pub(crate) const STACK: usize = 256;
 
 /// A child to visit later: the bits of its entry, of which the last three are any, above those of the child. Entries
 /// are not negative, so that their bits are ordered as they are.
