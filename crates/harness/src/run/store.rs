@@ -258,7 +258,8 @@ mod tests {
     fn a_kept_run_whose_files_are_missing_cut_emptied_or_edited_is_refused_by_name() {
         let out = tempfile::tempdir().unwrap();
         let store = Store::open(&out.path().join("x"), "", Existing::Keep).unwrap();
-        let damages: [(&str, fn(&Path)); 6] = [
+        type Damage = fn(&Path);
+        let damages: [(&str, Damage); 6] = [
             ("runs.csv", |part| fs::remove_file(part.join("runs.csv")).unwrap()),
             ("runs.csv", |part| fs::write(part.join("runs.csv"), "").unwrap()),
             ("runs.csv", |part| fs::write(part.join("runs.csv"), "a,b\n").unwrap()),

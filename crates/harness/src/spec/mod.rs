@@ -1,7 +1,7 @@
 //! Experiment specs: TOML in, a checked [`Experiment`] out, or an error with file, key, found and accepted.
 //!
-//! [`read`] leads from text to values, [`check`] refuses what types alone do not, [`fault`] says where and what is wrong,
-//! and [`method`] is one entry of `methods`.
+//! `read` leads from text to values, `check` refuses what types alone do not, `fault` says where and what is wrong,
+//! and `method` is one entry of `methods`.
 
 mod check;
 mod fault;
