@@ -4,7 +4,7 @@
 //! compensated, so that the order of the nodes changes at most a cost's last bit or two. Costs that are divided by the
 //! root's area are 0 by definition if that area is 0.
 
-use crate::{Bvh, Node, NodeKind};
+use crate::{Bvh, Node, NodeKind, PackedAabb};
 
 pub use crate::overlap::end_point_overlap;
 
@@ -30,6 +30,20 @@ impl Objective {
             Self::Sah(constants) => sah(tree, constants),
         }
     }
+}
+
+/// A measure of boxes that a search may minimise the sum of, over all inner nodes, in place of their half areas: the expected
+/// number of rays that enter a box, for example.
+pub trait Measure: core::fmt::Debug + Sync {
+    /// The measure of a box that is not empty: finite, not negative, and *monotone*, no smaller than that of any box inside it.
+    /// Branch and bound is exact only for monotone measures.
+    fn of(&self, aabb: &PackedAabb) -> f64;
+}
+
+/// The total measure of the boxes of all inner nodes, root included, in the measure's unit. O(nodes).
+pub fn internal_measure(tree: &Bvh, measure: &dyn Measure) -> f64 {
+    let inner = tree.nodes.iter().filter(|node| !node.is_leaf());
+    inner.map(|node| measure.of(&PackedAabb::from(&node.aabb))).collect::<Sum>().value()
 }
 
 /// The constants of the surface area heuristic, in any common unit of time. With those that [`new`](Self::new) accepts,

@@ -7,7 +7,7 @@
 //! The recurrence is that of Karras & Aila 2013 for treelets (`Subsets`), here for the whole tree.
 
 use crate::run::{Problem, Run, Search, SearchError, Shortcut};
-use crate::tree::Subsets;
+use crate::tree::{Area, Subsets};
 use bvh_build::BuildError;
 use bvh_build::config::Accepts;
 use bvh_core::{Aabb, Bvh, Node, PackedAabb, check_boxes};
@@ -30,9 +30,13 @@ impl Search for Config {
         (..=MOST_OBJECTS).check("objects", &n)?;
         check_boxes(problem.boxes).map_err(BuildError::from)?;
         let mut subsets = Subsets::new(n as u32);
-        subsets.solve(problem.boxes.iter().map(PackedAabb::from));
+        let leaves = problem.boxes.iter().map(PackedAabb::from);
+        match problem.measure {
+            Some(measure) => subsets.solve(leaves, measure),
+            None => subsets.solve(leaves, Area),
+        };
         let tree = if n == 0 { Bvh::default() } else { tree(problem.boxes, &subsets) };
-        run.record(problem.objective.cost(&tree), 3u64.pow(n as u32).div_ceil(2) - (1 << n));
+        run.record(problem.cost(&tree), 3u64.pow(n as u32).div_ceil(2) - (1 << n));
         Ok(tree)
     }
 }

@@ -2,7 +2,8 @@
 
 use crate::best;
 use crate::local::incumbent::Incumbent;
-use crate::run::{Budget, Observer, Outcome, Problem, Run, Search, SearchError, solve};
+use crate::run::{Budget, Observer, Outcome, Problem, Run, SearchError, solve};
+use crate::tree::{Metric, search_by_metric};
 use bvh_build::{Check, OutOfRange};
 use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate};
 
@@ -58,10 +59,18 @@ impl Check for From<'_> {
     }
 }
 
-impl Search for From<'_> {
-    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+search_by_metric!(From<'_>);
+
+impl From<'_> {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Result<Bvh, SearchError> {
         let mut best = Incumbent::begin(self.tree.clone(), problem, run);
-        let mut tree = best.working()?;
+        let mut tree = best.working(metric)?;
         best::improve(self.config, &mut tree, seed, &mut best, run);
         Ok(best.tree)
     }

@@ -1,6 +1,6 @@
 //! A scene for the unit tests of searches, and trees over any.
 
-use crate::tree::Working;
+use crate::tree::{Area, Working};
 use bvh_build::Builder;
 use bvh_core::{Aabb, cost};
 
@@ -18,5 +18,5 @@ pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
 /// The working form of a binary tree over finite boxes.
 pub(crate) fn built(builder: &dyn Builder, boxes: &[Aabb]) -> Working {
     let tree = builder.build(boxes).unwrap();
-    Working::from_bvh(&tree, cost::internal_area(&tree)).unwrap()
+    Working::from_bvh(&tree, cost::internal_area(&tree), Area).unwrap()
 }

@@ -2,14 +2,14 @@
 
 use super::node_sampler::NodeSampler;
 use crate::run::{Observer, Quota, Stream, Tally};
-use crate::tree::Working;
+use crate::tree::{Metric, Working};
 use crate::tuning::MOVES_PER_TEMPERATURE;
 use bvh_core::with_vector_instructions;
 
 /// Makes moves of one kind.
 pub(crate) trait Mover {
     /// Changes the tree, and undoes the change unless Metropolis accepts it. Returns whether it was accepted.
-    fn step(&mut self, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool;
+    fn step(&mut self, tree: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream) -> bool;
     /// Nodes visited by all moves so far.
     fn work(&self) -> u64;
     /// Draws the nodes at which moves begin.
@@ -22,14 +22,14 @@ const LONG_MOVE: u64 = 1 << 11;
 with_vector_instructions! {
     /// Moves until the quota is used up, while the temperature falls geometrically from `hot` to `cold`.
     pub(crate) cool = cool_plain<M: Mover>(
-        mover: &mut M, tree: &mut Working, heat: [f64; 2], quota: Quota, rng: &mut Stream, observer: &dyn Observer)
+        mover: &mut M, tree: &mut Working<impl Metric>, heat: [f64; 2], quota: Quota, rng: &mut Stream, observer: &dyn Observer)
         -> Tally
 }
 
 #[inline(always)]
 fn cool_plain<M: Mover>(
     mover: &mut M,
-    tree: &mut Working,
+    tree: &mut Working<impl Metric>,
     [hot, cold]: [f64; 2],
     quota: Quota,
     rng: &mut Stream,

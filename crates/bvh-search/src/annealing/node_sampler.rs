@@ -1,7 +1,7 @@
 //! Where moves begin: most often below large nodes, where there is most to gain.
 
 use crate::run::Stream;
-use crate::tree::{ANCHOR, Working};
+use crate::tree::{ANCHOR, Metric, Working};
 use crate::tuning::{LEAST_WINDOWS, MOVES_PER_WINDOW, SHORT_RUN, WINDOW, WINDOW_OF_SHORT_RUNS};
 use rand::RngExt;
 use std::ops::Range;
@@ -44,7 +44,7 @@ impl NodeSampler {
 
     /// Draws a node of the tree, which must have the same nodes as at the first draw.
     #[inline(always)]
-    pub fn draw(&mut self, tree: &Working, rng: &mut Stream) -> u32 {
+    pub fn draw(&mut self, tree: &Working<impl Metric>, rng: &mut Stream) -> u32 {
         if self.draws == 0 {
             self.next_window(tree, rng);
         }
@@ -69,7 +69,7 @@ impl NodeSampler {
 
     /// Chooses the next window.
     #[inline(never)]
-    fn next_window(&mut self, tree: &Working, rng: &mut Stream) {
+    fn next_window(&mut self, tree: &Working<impl Metric>, rng: &mut Stream) {
         if self.sums.is_empty() {
             self.weigh(tree);
             self.middle = rng.random();
@@ -86,7 +86,7 @@ impl NodeSampler {
     }
 
     /// Sums up the weights. O(n).
-    fn weigh(&mut self, tree: &Working) {
+    fn weigh(&mut self, tree: &Working<impl Metric>) {
         let all = if self.only.is_empty() { tree.nodes.len() - 1 } else { self.only.len() };
         self.sums.reserve(all + 1);
         let mut sum = 0.0;
@@ -101,7 +101,7 @@ impl NodeSampler {
 /// The weight of a node: the square root of its parent's area, or of the root's own. The tiny summand makes all nodes equally
 /// likely where none has an area.
 #[inline(always)]
-pub(crate) fn weight(tree: &Working, at: u32) -> f64 {
+pub(crate) fn weight(tree: &Working<impl Metric>, at: u32) -> f64 {
     let parent = tree.nodes[at as usize].parent;
     tree.nodes[if parent == ANCHOR { at } else { parent } as usize].area.sqrt() + f64::MIN_POSITIVE
 }

@@ -9,8 +9,8 @@ use super::node_sampler::NodeSampler;
 use super::schedule::{AnnealingRun, check_fall};
 use super::side::Side;
 use crate::local::initial::Start;
-use crate::run::{Problem, Run, Search, SearchError, Stream};
-use crate::tree::{ANCHOR, Node, PositionSearch, Scope, Working};
+use crate::run::{Problem, Run, SearchError, Stream};
+use crate::tree::{ANCHOR, Metric, Node, PositionSearch, Scope, Working, search_by_metric};
 use bvh_build::config::{Itself, above};
 use bvh_core::Bvh;
 use rand::RngExt;
@@ -69,12 +69,20 @@ pub enum Scale {
     Top,
 }
 
-impl Search for Config {
-    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+search_by_metric!(Config);
+
+impl Config {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Result<Bvh, SearchError> {
         let Self { hot, cold, work_per_object, .. } = *self;
         let annealing = AnnealingRun { heat: [hot, cold], work_per_object, start: &self.start };
         let length = work_per_object.min(run.left().work / problem.boxes.len().max(1) as u64) as f64;
-        annealing.search(|| RuinMover::new(&self.ruin, length), problem, seed, run)
+        annealing.search(|| RuinMover::new(&self.ruin, length), metric, problem, seed, run)
     }
 }
 
@@ -109,7 +117,7 @@ impl Removed {
 
     /// Takes a subtree out. Returns the number of nodes visited.
     #[inline(always)]
-    fn take(&mut self, tree: &mut Working, node: u32) -> u64 {
+    fn take(&mut self, tree: &mut Working<impl Metric>, node: u32) -> u64 {
         let (saved, sibling, visits) = tree.detach(node);
         self.saved += saved;
         self.least += tree.nodes[node as usize].area;
@@ -128,7 +136,7 @@ impl<'a> RuinMover<'a> {
     /// Takes scattered subtrees out of the scope, up to one level further down than the move has climbed. The scope keeps
     /// a root.
     #[inline(always)]
-    fn scattered(&mut self, tree: &mut Working, scope: Scope, levels: u32, rng: &mut Stream) {
+    fn scattered(&mut self, tree: &mut Working<impl Metric>, scope: Scope, levels: u32, rng: &mut Stream) {
         for _ in 0..rng.random_range(1..=self.ruin.removed) {
             let mut node = scope.root(tree);
             if tree.nodes[node as usize].is_leaf() {
@@ -146,7 +154,7 @@ impl<'a> RuinMover<'a> {
 
     /// Takes a layer at one side of the scope's box out, but leaves the scope a root.
     #[inline(always)]
-    fn layer(&mut self, tree: &mut Working, scope: Scope, rng: &mut Stream) {
+    fn layer(&mut self, tree: &mut Working<impl Metric>, scope: Scope, rng: &mut Stream) {
         let Ruin { thickness, most, .. } = *self.ruin;
         let top = scope.root(tree);
         if tree.nodes[top as usize].is_leaf() {
@@ -171,7 +179,7 @@ impl Mover for RuinMover<'_> {
     }
 
     #[inline(always)]
-    fn step(&mut self, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
+    fn step(&mut self, tree: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream) -> bool {
         let ruin = self.ruin;
         let mut top = self.sampler.draw(tree, rng);
         let levels = rng.random_range(1..=ruin.climb);

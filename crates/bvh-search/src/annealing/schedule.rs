@@ -16,7 +16,7 @@ use super::subtrees;
 use crate::local::incumbent::Incumbent;
 use crate::local::initial::Start;
 use crate::run::{Observer, Problem, Quota, Run, SearchError, Tally};
-use crate::tree::Working;
+use crate::tree::{Metric, Working};
 use crate::tuning::{FINAL_PASSES_PART, FINAL_PASSES_WORK, LAST_ROUND, ROUNDS, WORK_PER_ROUND};
 use bvh_build::OutOfRange;
 use bvh_core::Bvh;
@@ -50,12 +50,13 @@ impl AnnealingRun<'_> {
     pub fn search<M: Mover>(
         &self,
         mover: impl Fn() -> M + Sync,
+        metric: impl Metric,
         problem: &Problem,
         seed: u64,
         run: &mut Run,
     ) -> Result<Bvh, SearchError> {
         let [hot, cold] = self.heat;
-        let (mut best, mut tree) = Incumbent::build(self.start, problem, run)?;
+        let (mut best, mut tree) = Incumbent::build(self.start, problem, metric, run)?;
         let quota = run.left().at_most(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
         let (schedule, observer) = (Schedule { hot, cold, quota, end: 1.0, subtrees: 1 }, run.observer());
         anneal(mover, &schedule, &mut tree, [seed, 0], observer, &mut |tree, tally| {
@@ -76,13 +77,13 @@ pub(crate) fn check_fall(hot: f64, cold: f64) -> Result<(), OutOfRange> {
 /// from stream `first` on.
 ///
 /// If the observer reports its progress, the temperature follows the work or the time, whichever is nearer to its end.
-pub(crate) fn anneal<M: Mover>(
+pub(crate) fn anneal<M: Mover, A: Metric>(
     mover: impl Fn() -> M + Sync,
     schedule: &Schedule,
-    tree: &mut Working,
+    tree: &mut Working<A>,
     [seed, first]: [u64; 2],
     observer: &dyn Observer,
-    round: &mut dyn FnMut(&Working, Tally),
+    round: &mut dyn FnMut(&Working<A>, Tally),
 ) {
     let (n, Quota { work, moves }) = (tree.objects() as u64, schedule.quota);
     if n < 3 {
@@ -148,7 +149,7 @@ mod tests {
     }
 
     impl<M: Mover> Mover for Checked<'_, M> {
-        fn step(&mut self, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
+        fn step(&mut self, tree: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream) -> bool {
             let before = tree.area();
             let kept = self.inner.step(tree, temperature, rng);
             let area = tree.internal_area();

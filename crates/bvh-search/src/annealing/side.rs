@@ -2,7 +2,7 @@
 //! which the removal of scattered subtrees seldom achieves.
 
 use crate::run::Stream;
-use crate::tree::Working;
+use crate::tree::{Metric, Working};
 use rand::RngExt;
 
 /// The largest subtrees in a layer at one side of a box.
@@ -17,7 +17,14 @@ impl Side {
     /// `thickness` of the box: the largest subtrees inside the layer, and the leaves that reach through it to the side.
     /// Finds nothing if they are more than `most`. Returns the number of nodes visited.
     #[inline(always)]
-    pub fn find(&mut self, tree: &Working, top: u32, thickness: f64, most: usize, rng: &mut Stream) -> u64 {
+    pub fn find(
+        &mut self,
+        tree: &Working<impl Metric>,
+        top: u32,
+        thickness: f64,
+        most: usize,
+        rng: &mut Stream,
+    ) -> u64 {
         self.roots.clear();
         self.stack.clear();
         let (side, axis) = (rng.random_range(0..2), rng.random_range(0..3));

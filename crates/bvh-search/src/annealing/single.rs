@@ -8,8 +8,8 @@ use super::metropolis::Mover;
 use super::node_sampler::NodeSampler;
 use super::schedule::{AnnealingRun, check_fall};
 use crate::local::initial::Start;
-use crate::run::{Problem, Run, Search, SearchError, Stream};
-use crate::tree::{ANCHOR, Working};
+use crate::run::{Problem, Run, SearchError, Stream};
+use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
 use bvh_build::config::{Itself, above};
 use bvh_build::{Check, OutOfRange};
 use bvh_core::{Bvh, PackedAabb};
@@ -61,11 +61,19 @@ pub enum Target {
     Best,
 }
 
-impl Search for Config {
-    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+search_by_metric!(Config);
+
+impl Config {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Result<Bvh, SearchError> {
         let Self { hot, cold, work_per_object, .. } = *self;
         let annealing = AnnealingRun { heat: [hot, cold], work_per_object, start: &self.start };
-        annealing.search(|| SingleMover::new(&self.step), problem, seed, run)
+        annealing.search(|| SingleMover::new(&self.step), metric, problem, seed, run)
     }
 }
 
@@ -93,7 +101,7 @@ impl<'a> SingleMover<'a> {
     #[inline(always)]
     fn best(
         &mut self,
-        tree: &Working,
+        tree: &Working<impl Metric>,
         (aabb, area): (&PackedAabb, f64),
         [top, sibling]: [u32; 2],
         limit: f64,
@@ -102,7 +110,7 @@ impl<'a> SingleMover<'a> {
         let mut visits = 1;
         let mut look = |at: u32, growth: f64, least: &mut f64, stack: &mut Vec<(u32, f64)>| {
             let node = &tree.nodes[at as usize];
-            let cost = growth + node.aabb.union(aabb).half_area();
+            let cost = growth + tree.metric().of(&node.aabb.union(aabb));
             if cost < *least && at != sibling {
                 *least = cost;
                 best = Some(at);
@@ -136,7 +144,7 @@ impl Mover for SingleMover<'_> {
     }
 
     #[inline(always)]
-    fn step(&mut self, tree: &mut Working, temperature: f64, rng: &mut Stream) -> bool {
+    fn step(&mut self, tree: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream) -> bool {
         self.work += 1;
         let node = self.sampler.draw(tree, rng);
         if tree.nodes[node as usize].parent == ANCHOR {

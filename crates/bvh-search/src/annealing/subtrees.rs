@@ -8,7 +8,7 @@ use super::node_sampler::{self, NodeSampler};
 use crate::local::reinsertion;
 use crate::parallel;
 use crate::run::{Observer, Quota, Tally, stream};
-use crate::tree::{ANCHOR, NONE, Node, Working};
+use crate::tree::{ANCHOR, Metric, NONE, Node, Working};
 use crate::tuning::{BELOW_SUBTREE_ROOTS, LEAST_SUBTREE, SMALLEST_SUBTREES, WHOLE_TREE};
 use rand::RngExt;
 
@@ -19,7 +19,7 @@ pub(crate) const STREAMS: u64 = 1 << 24;
 /// more than one, then on the whole tree, where moves begin near the nodes that are in no subtree.
 pub(crate) fn cool<M: Mover>(
     mover: &(impl Fn() -> M + Sync),
-    tree: &mut Working,
+    tree: &mut Working<impl Metric>,
     heat: [f64; 2],
     quota: Quota,
     count: u32,
@@ -52,7 +52,12 @@ pub(crate) fn cool<M: Mover>(
 }
 
 /// Improves a `tree` in preorder to a local optimum of reinsertion, first on about `count` subtrees, if more than one.
-pub(crate) fn to_local_optimum(tree: &mut Working, count: u32, quota: Quota, observer: &dyn Observer) -> Tally {
+pub(crate) fn to_local_optimum(
+    tree: &mut Working<impl Metric>,
+    count: u32,
+    quota: Quota,
+    observer: &dyn Observer,
+) -> Tally {
     let mut done = Tally::default();
     if count > 1 {
         let (subtrees, _) = cut(tree, 1.0 / f64::from(count), |_| 1.0);
@@ -81,7 +86,7 @@ struct Subtree {
 
 /// The largest subtrees of a tree in preorder that each have at most the fraction `most` of its weight, except the smallest
 /// ones; and the nodes that are in no subtree or near the root of one. O(n).
-fn cut(tree: &Working, most: f64, weight: impl Fn(u32) -> f64) -> (Vec<Subtree>, Vec<u32>) {
+fn cut(tree: &Working<impl Metric>, most: f64, weight: impl Fn(u32) -> f64) -> (Vec<Subtree>, Vec<u32>) {
     let mut totals = vec![(1u32, 0.0); tree.nodes.len()];
     for (at, node) in tree.nodes.iter().enumerate().skip(1).rev() {
         let mut total = (1, weight(at as u32));
@@ -116,13 +121,13 @@ fn cut(tree: &Working, most: f64, weight: impl Fn(u32) -> f64) -> (Vec<Subtree>,
 
 impl Subtree {
     /// A copy of the subtree as a tree of its own.
-    fn take(&self, tree: &Working) -> Working {
+    fn take<A: Metric>(&self, tree: &Working<A>) -> Working<A> {
         let range = self.root as usize..(self.root + self.nodes) as usize;
         let mut nodes = Vec::with_capacity(range.len() + 1);
         nodes.push(Node { children: [1, NONE], ..tree.nodes[ANCHOR as usize] });
         nodes.extend(tree.nodes[range].iter().map(|node| moved(node, |at| at.wrapping_sub(self.root - 1))));
         nodes[1].parent = ANCHOR;
-        Working::from_nodes(nodes)
+        Working::from_nodes(nodes, tree.metric())
     }
 }
 
@@ -134,9 +139,9 @@ fn moved(node: &Node, place: impl Fn(u32) -> u32) -> Node {
 }
 
 /// Puts trees in preorder back to where they were taken from. O(n).
-fn put_back(tree: &mut Working, subtrees: &[Subtree], found: Vec<(Working, Tally)>) -> Tally {
+fn put_back<A: Metric>(tree: &mut Working<A>, subtrees: &[Subtree], found: Vec<(Working<A>, Tally)>) -> Tally {
     let mut done = Tally::default();
-    let mut nodes = std::mem::take(tree).nodes;
+    let mut nodes = std::mem::take(&mut tree.nodes);
     for (subtree, (small, tally)) in subtrees.iter().zip(found) {
         done += tally;
         let to = subtree.root as usize;
@@ -146,7 +151,7 @@ fn put_back(tree: &mut Working, subtrees: &[Subtree], found: Vec<(Working, Tally
         }
         nodes[to].parent = parent;
     }
-    *tree = Working::from_nodes(nodes);
+    *tree = Working::from_nodes(nodes, tree.metric());
     done
 }
 

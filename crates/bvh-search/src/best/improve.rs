@@ -10,13 +10,19 @@ use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion;
 use crate::parallel::threads;
 use crate::run::{Observer, Quota, Run, Stream, Tally, stream};
-use crate::tree::Working;
+use crate::tree::{Metric, Working};
 use crate::tuning::{
     FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, SUBTREES_PER_THREAD, WORTH_AN_EVENT, WORTH_SUBTREES,
 };
 
 /// Improves the incumbent, whose working form is `tree`, until the work is done or the time is over.
-pub(crate) fn improve(config: &Config, tree: &mut Working, seed: u64, best: &mut Incumbent, run: &mut Run) {
+pub(crate) fn improve(
+    config: &Config,
+    tree: &mut Working<impl Metric>,
+    seed: u64,
+    best: &mut Incumbent,
+    run: &mut Run,
+) {
     let n = tree.objects() as u64;
     if n < 3 {
         return;
@@ -43,7 +49,7 @@ struct Improvement<'a, 'p, 'r> {
 
 impl Improvement<'_, '_, '_> {
     /// The plan of annealing runs, each due at a fraction of the work or of the time.
-    fn until_known_end(&mut self, tree: &mut Working) {
+    fn until_known_end(&mut self, tree: &mut Working<impl Metric>) {
         let (n, observer) = (self.n, self.run.observer());
         let timed = observer.progress().is_some();
         let mut length = self.left as f64 / n as f64;
@@ -74,7 +80,7 @@ impl Improvement<'_, '_, '_> {
     }
 
     /// A local optimum, then generations of growing length.
-    fn until_stopped(&mut self, tree: &mut Working) {
+    fn until_stopped(&mut self, tree: &mut Working<impl Metric>) {
         self.best.improve(tree, u32::MAX, self.run, |tree, _, quota, observer| {
             reinsertion::pass_by_area(tree, quota, observer)
         });
@@ -103,7 +109,13 @@ impl Improvement<'_, '_, '_> {
     /// One annealing run from `tree`, which is recombined with the result. The `first` run of a plan, though, replaces
     /// the tree if it ends better; and if it does not and there is a clock, there was no time for anything, nor is there
     /// any for recombination.
-    fn anneal(&mut self, tree: &mut Working, number: u64, (schedule, length): (&Schedule, f64), first: bool) {
+    fn anneal(
+        &mut self,
+        tree: &mut Working<impl Metric>,
+        number: u64,
+        (schedule, length): (&Schedule, f64),
+        first: bool,
+    ) {
         if self.run.stopped().is_some() || schedule.quota.work == 0 {
             return;
         }
@@ -137,7 +149,7 @@ impl Improvement<'_, '_, '_> {
     }
 
     /// Moves at the lowest temperature. Also returns the work that fits into the rest of the time at this rate.
-    fn probe(&self, tree: &mut Working, mut rng: Stream, quota: Quota) -> (Tally, f64) {
+    fn probe(&self, tree: &mut Working<impl Metric>, mut rng: Stream, quota: Quota) -> (Tally, f64) {
         let (observer, heat) = (self.run.observer(), [self.config.cold; 2]);
         let began = observer.progress();
         let mut mover = RuinMover::new(&self.config.ruin, PROBE as f64);

@@ -50,24 +50,37 @@ mod small_budget;
 
 use crate::exact;
 use crate::local::incumbent::Incumbent;
-use crate::run::{Problem, Run, Search, SearchError};
+use crate::run::{Problem, Run, SearchError};
+use crate::tree::{Metric, search_by_metric};
 use bvh_core::Bvh;
 pub use config::{Config, Horizon};
 pub(crate) use improve::improve;
 use small_budget::SmallBudget;
 
-impl Search for Config {
+search_by_metric!(Config);
+
+impl Config {
     /// Subtrees, if there are several, are annealed in parallel, each with a random stream of its own.
-    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Result<Bvh, SearchError> {
         let (_, work) = self.horizon(problem.boxes.len() as u64, run);
         if let Some(optimum) = exact::instead(problem, work, run)? {
             return Ok(optimum);
         }
-        let small = if self.start.is_none() { small_budget::search(problem, run)? } else { None };
+        // Small budgets go by area.
+        let small = match problem.measure {
+            None if self.start.is_none() => small_budget::search(problem, metric, run)?,
+            _ => None,
+        };
         let (mut best, mut tree) = match small {
             Some(SmallBudget::Tree(tree)) => return Ok(tree),
             Some(SmallBudget::LocalOptimum(best, tree)) => (best, tree),
-            None => Incumbent::build(&self.start.clone().unwrap_or_default(), problem, run)?,
+            None => Incumbent::build(&self.start.clone().unwrap_or_default(), problem, metric, run)?,
         };
         improve(self, &mut tree, seed, &mut best, run);
         Ok(best.tree)

@@ -5,14 +5,14 @@
 //! best of all combinations, which is never worse than the best of the trees. Compare the crossover by common partitions
 //! of Whitley, Hains & Howe 2009 and the clade-based search for species trees of Bryant 1996.
 
-use crate::tree::{ANCHOR, NONE, Node, Working};
+use crate::tree::{ANCHOR, Metric, NONE, Node, Working};
 use std::collections::HashMap;
 
 /// The best tree over the clades of `trees`, which are one tree or more over the same objects. O(total size).
 ///
 /// Clades are identified by 128-bit sums of scattered keys: among a billion clades, the probability that any two different
 /// ones are confused is below 10⁻²⁰.
-pub(super) fn recombine(trees: &[&Working]) -> Working {
+pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
     // Every node of every tree: number of objects, tree, index. Per tree and node: its clade.
     let mut by_size: Vec<(u32, u32, u32)> = Vec::new();
     let mut clade_of: Vec<Vec<u32>> = Vec::new();
@@ -67,7 +67,7 @@ pub(super) fn recombine(trees: &[&Working]) -> Working {
             stack.extend([1, 0].map(|side| (clades[node.children[side] as usize], to, side)));
         }
     }
-    Working::from_nodes(nodes)
+    Working::from_nodes(nodes, trees[0].metric())
 }
 
 /// A key for an object, scattered over 128 bits: SplitMix64 (Steele, Lea & Flood 2014) twice.
@@ -126,6 +126,6 @@ mod tests {
         assert!(a.area() > good.area() && b.area() > good.area());
         assert!(found.area() <= good.area() * (1.0 + 1e-12), "{} {}", found.area(), good.area());
         assert_eq!(recombine(&[&good]).to_bvh(), good.to_bvh());
-        assert_eq!(recombine(&[&Working::default()]).objects(), 0);
+        assert_eq!(recombine(&[&built(&muller_fellner::Config::default(), &[])]).objects(), 0);
     }
 }

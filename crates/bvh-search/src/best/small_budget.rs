@@ -10,7 +10,7 @@ use crate::local::initial::construction;
 use crate::local::reinsertion::pass;
 use crate::parallel::threads;
 use crate::run::{Observer, Problem, Run, SearchError, Tally};
-use crate::tree::{Linked, Siblings, Working};
+use crate::tree::{Linked, Metric, Siblings, Working};
 use crate::tuning::{
     ANNEAL_FROM_TIME, ANNEAL_FROM_WORK, BUILDS, CLUSTERING, COLD_MEMORY, FINISH_TIME, FIRST_PASS, FRONT,
     MOVES_PER_READING, SAMPLED_FROM, SAMPLED_PART, SAMPLES, SEVERAL_THREADS, TOP_DOWN_BELOW,
@@ -21,15 +21,19 @@ use bvh_build::ploc::MortonOrder;
 use bvh_core::{Aabb, Bvh, cost};
 
 /// The result of a small budget.
-pub(super) enum SmallBudget<'p> {
+pub(super) enum SmallBudget<'p, A> {
     /// The budget is used up.
     Tree(Bvh),
     /// A local optimum of reinsertion came before the end of the budget: the search can go on.
-    LocalOptimum(Incumbent<'p>, Working),
+    LocalOptimum(Incumbent<'p>, Working<A>),
 }
 
 /// The search for a small budget; `None` if the budget is not small.
-pub(super) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<SmallBudget<'p>>, SearchError> {
+pub(super) fn search<'p, A: Metric>(
+    problem: &Problem<'p>,
+    metric: A,
+    run: &mut Run,
+) -> Result<Option<SmallBudget<'p, A>>, SearchError> {
     let (observer, n) = (run.observer(), problem.boxes.len());
     let (began, work) = (observer.progress(), run.left().work / n.max(1) as u64);
     if n < 3 || began.is_none() && work >= ANNEAL_FROM_WORK {
@@ -88,7 +92,7 @@ pub(super) fn search<'p>(problem: &Problem<'p>, run: &mut Run) -> Result<Option<
     if began.is_some() {
         best.bound(run);
     }
-    let tree = best.working()?;
+    let tree = best.working(metric)?;
     Ok(Some(SmallBudget::LocalOptimum(best, tree)))
 }
 

@@ -3,7 +3,7 @@
 use super::pass::TOLERANCE;
 use crate::lower_bound;
 use crate::run::{Observer, Problem, Quota, Run, SearchError, Shortcut, Tally};
-use crate::tree::Working;
+use crate::tree::{Metric, Working};
 use bvh_build::Builder;
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective};
@@ -20,19 +20,20 @@ pub(crate) struct Incumbent<'p> {
 
 impl<'p> Incumbent<'p> {
     /// Builds the initial tree, the first evaluation of the run. Also returns its working form.
-    pub fn build(
+    pub fn build<A: Metric>(
         builder: &dyn Builder,
         problem: &Problem<'p>,
+        metric: A,
         run: &mut Run,
-    ) -> Result<(Self, Working), SearchError> {
+    ) -> Result<(Self, Working<A>), SearchError> {
         let incumbent = Self::begin(builder.build(problem.boxes)?, problem, run);
-        let working = incumbent.working()?;
+        let working = incumbent.working(metric)?;
         Ok((incumbent, working))
     }
 
     /// The working form of the best tree. Its boxes are tight, as builders and moves leave them.
-    pub fn working(&self) -> Result<Working, SearchError> {
-        Working::from_bvh(&self.tree, self.area)
+    pub fn working<A: Metric>(&self, metric: A) -> Result<Working<A>, SearchError> {
+        Working::from_bvh(&self.tree, self.area, metric)
     }
 
     /// Begins with a valid tree whose boxes are tight.
@@ -44,7 +45,8 @@ impl<'p> Incumbent<'p> {
 
     /// Ends the run now or later, as soon as the tree meets a lower bound.
     pub fn bound(&mut self, run: &mut Run) {
-        if self.problem.allows(Shortcut::BoundMet) {
+        // The bound is one of areas.
+        if self.problem.measure.is_none() && self.problem.allows(Shortcut::BoundMet) {
             self.lower_bound = lower_bound::of_largest(self.problem.boxes);
         }
         self.stop_if_optimal(run);
@@ -70,7 +72,7 @@ impl<'p> Incumbent<'p> {
     }
 
     /// Keeps `tree` if it is the best so far. O(n).
-    pub fn offer(&mut self, tree: &Working, run: &mut Run) -> bool {
+    pub fn offer(&mut self, tree: &Working<impl Metric>, run: &mut Run) -> bool {
         tree.area() < self.area && self.offer_tree(tree.to_bvh(), run)
     }
 
@@ -88,12 +90,12 @@ impl<'p> Incumbent<'p> {
 
     /// Repeats a pass over `tree` until it keeps no move, at most `passes` times, and keeps the best tree. `pass` is
     /// given the number of passes before it.
-    pub fn improve(
+    pub fn improve<A: Metric>(
         &mut self,
-        tree: &mut Working,
+        tree: &mut Working<A>,
         passes: u32,
         run: &mut Run,
-        mut pass: impl FnMut(&mut Working, u32, Quota, &dyn Observer) -> Tally,
+        mut pass: impl FnMut(&mut Working<A>, u32, Quota, &dyn Observer) -> Tally,
     ) {
         for number in 0..passes {
             if run.stopped().is_some() {
@@ -109,9 +111,12 @@ impl<'p> Incumbent<'p> {
     }
 }
 
-/// The tree's cost by the problem's objective, and its internal area.
+/// The tree's cost, and its internal area, which the measure replaces if the problem has one.
 fn costs(problem: &Problem, tree: &Bvh) -> (f64, f64) {
-    let cost = problem.objective.cost(tree);
+    let cost = problem.cost(tree);
+    if problem.measure.is_some() {
+        return (cost, cost);
+    }
     let area = if problem.objective == Objective::InternalArea { cost } else { cost::internal_area(tree) };
     (cost, area)
 }

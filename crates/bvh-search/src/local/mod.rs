@@ -8,7 +8,7 @@ pub mod rotation;
 pub mod treelet;
 
 use crate::run::{Observer, Quota, Tally};
-use crate::tree::Working;
+use crate::tree::{Metric, Working};
 
 /// A local search by name, with its default order of nodes: how other searches improve a tree they have made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,7 +32,12 @@ impl LocalSearch {
     }
 
     /// Improves the tree until it is a local optimum, the quota is used up, or the observer cancels.
-    pub(crate) fn improve(self, tree: &mut Working, quota: Quota, observer: &dyn Observer) -> Tally {
+    pub(crate) fn improve(
+        self,
+        tree: &mut Working<impl Metric>,
+        quota: Quota,
+        observer: &dyn Observer,
+    ) -> Tally {
         match self {
             Self::None => Tally::default(),
             Self::Rotation => rotation::to_local_optimum(tree, quota, observer),

@@ -1,14 +1,14 @@
 //! What all passes over a tree share: their repetition, an order of nodes, and what counts as an improvement.
 
 use crate::run::{Observer, Quota, Tally};
-use crate::tree::Working;
+use crate::tree::{Metric, Working};
 
 /// A move must save more than this fraction of its cost: more than rounding errors, so that no two moves undo each other
 /// for ever.
 pub(crate) const TOLERANCE: f64 = 1e-12;
 
 /// Sorts nodes by area, the largest first, and nodes of equal area in the order given.
-pub(super) fn sort_by_area(tree: &Working, order: &mut [u32]) {
+pub(super) fn sort_by_area(tree: &Working<impl Metric>, order: &mut [u32]) {
     order.sort_by(|&a, &b| tree.nodes[b as usize].area.total_cmp(&tree.nodes[a as usize].area));
 }
 

@@ -8,8 +8,8 @@
 use super::incumbent::Incumbent;
 use super::initial::Start;
 use super::pass::{TOLERANCE, repeat, sort_by_area};
-use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Tally, WORK_PER_POLL, stream};
-use crate::tree::{Linked, PositionSearch, Working};
+use crate::run::{Observer, Problem, Quota, Run, SearchError, Tally, WORK_PER_POLL, stream};
+use crate::tree::{Linked, Metric, PositionSearch, Working, search_by_metric};
 use bvh_build::config::Itself;
 use bvh_core::{Bvh, with_vector_instructions};
 use rand::seq::SliceRandom;
@@ -36,9 +36,17 @@ pub enum Order {
     Random,
 }
 
-impl Search for Config {
-    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
-        let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
+search_by_metric!(Config);
+
+impl Config {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Result<Bvh, SearchError> {
+        let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         best.improve(&mut tree, self.sweeps, run, |tree, number, quota, observer| {
             let mut order = tree.preorder();
             match self.order {
@@ -52,14 +60,18 @@ impl Search for Config {
 }
 
 /// Tries every node once, the largest first.
-pub(crate) fn pass_by_area(tree: &mut Working, quota: Quota, observer: &dyn Observer) -> Tally {
+pub(crate) fn pass_by_area(tree: &mut Working<impl Metric>, quota: Quota, observer: &dyn Observer) -> Tally {
     let mut order = tree.preorder();
     sort_by_area(tree, &mut order);
     pass(tree, &order, quota, observer)
 }
 
 /// Repeats passes by area until a local optimum.
-pub(crate) fn to_local_optimum(tree: &mut Working, quota: Quota, observer: &dyn Observer) -> Tally {
+pub(crate) fn to_local_optimum(
+    tree: &mut Working<impl Metric>,
+    quota: Quota,
+    observer: &dyn Observer,
+) -> Tally {
     repeat(quota, observer, |quota| pass_by_area(tree, quota, observer))
 }
 

@@ -9,8 +9,8 @@
 use super::incumbent::Incumbent;
 use super::initial::Start;
 use super::pass::{TOLERANCE, repeat, sort_by_area};
-use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Tally};
-use crate::tree::Working;
+use crate::run::{Observer, Problem, Quota, Run, SearchError, Tally};
+use crate::tree::{Metric, Working, search_by_metric};
 use bvh_build::config::Itself;
 use bvh_core::{Bvh, with_vector_instructions};
 
@@ -36,9 +36,17 @@ pub enum Order {
     ByArea,
 }
 
-impl Search for Config {
-    fn search(&self, problem: &Problem, _seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
-        let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
+search_by_metric!(Config);
+
+impl Config {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        _seed: u64,
+        run: &mut Run,
+    ) -> Result<Bvh, SearchError> {
+        let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         best.improve(&mut tree, self.sweeps, run, |tree, _, quota, observer| {
             pass(tree, &self.order.of(tree), quota, observer)
         });
@@ -48,7 +56,7 @@ impl Search for Config {
 
 impl Order {
     /// The nodes of a pass, in this order.
-    fn of(self, tree: &Working) -> Vec<u32> {
+    fn of(self, tree: &Working<impl Metric>) -> Vec<u32> {
         let mut order = tree.preorder();
         match self {
             Self::BottomUp => order.reverse(),
@@ -59,7 +67,11 @@ impl Order {
 }
 
 /// Repeats passes from the bottom up until a local optimum.
-pub(crate) fn to_local_optimum(tree: &mut Working, quota: Quota, observer: &dyn Observer) -> Tally {
+pub(crate) fn to_local_optimum(
+    tree: &mut Working<impl Metric>,
+    quota: Quota,
+    observer: &dyn Observer,
+) -> Tally {
     repeat(quota, observer, |quota| {
         let order = Order::BottomUp.of(tree);
         pass(tree, &order, quota, observer)
@@ -69,11 +81,11 @@ pub(crate) fn to_local_optimum(tree: &mut Working, quota: Quota, observer: &dyn 
 with_vector_instructions! {
     /// Makes the best rotation at every node of `order` where one pays. Stops early when the quota is used up or the
     /// observer cancels.
-    pass = pass_plain(tree: &mut Working, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally
+    pass = pass_plain(tree: &mut Working<impl Metric>, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally
 }
 
 #[inline(always)]
-fn pass_plain(tree: &mut Working, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally {
+fn pass_plain(tree: &mut Working<impl Metric>, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally {
     let mut done = Tally::default();
     for &node in order {
         if tree.nodes[node as usize].is_leaf() {
@@ -99,15 +111,15 @@ fn pass_plain(tree: &mut Working, order: &[u32], quota: Quota, observer: &dyn Ob
 struct Rotation([(u32, [u32; 2]); 2]);
 
 impl Rotation {
-    fn apply(self, tree: &mut Working) {
+    fn apply(self, tree: &mut Working<impl Metric>) {
         self.0.into_iter().for_each(|(node, children)| tree.join(node, children));
     }
 }
 
 /// The rotation at an inner node that saves most, if any saves area. None of them changes the node's own box.
 #[inline(always)]
-fn best(tree: &Working, top: u32) -> Option<Rotation> {
-    let area = |children| tree.union_of(children).half_area();
+fn best(tree: &Working<impl Metric>, top: u32) -> Option<Rotation> {
+    let area = |children| tree.metric().of(&tree.union_of(children));
     let node = |at: u32| &tree.nodes[at as usize];
     let sides = node(top).children;
     let (mut most, mut best) = (TOLERANCE * node(top).area, None);

@@ -10,8 +10,8 @@
 use super::incumbent::Incumbent;
 use super::initial::Start;
 use super::pass::{TOLERANCE, repeat};
-use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Tally};
-use crate::tree::{NONE, Subsets, Working};
+use crate::run::{Observer, Problem, Quota, Run, SearchError, Tally};
+use crate::tree::{Metric, NONE, Subsets, Working, search_by_metric};
 use bvh_build::config::Itself;
 use bvh_core::{Bvh, with_vector_instructions};
 
@@ -27,9 +27,17 @@ bvh_build::config! {
     }
 }
 
-impl Search for Config {
-    fn search(&self, problem: &Problem, _seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
-        let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
+search_by_metric!(Config);
+
+impl Config {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        _seed: u64,
+        run: &mut Run,
+    ) -> Result<Bvh, SearchError> {
+        let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         let mut solver = Solver::new(self.size, &tree);
         best.improve(&mut tree, self.sweeps, run, |tree, _, quota, observer| {
             pass(tree, &mut solver, quota, observer)
@@ -39,7 +47,11 @@ impl Search for Config {
 }
 
 /// Repeats passes with treelets of 7 leaves until a local optimum.
-pub(crate) fn to_local_optimum(tree: &mut Working, quota: Quota, observer: &dyn Observer) -> Tally {
+pub(crate) fn to_local_optimum(
+    tree: &mut Working<impl Metric>,
+    quota: Quota,
+    observer: &dyn Observer,
+) -> Tally {
     let mut solver = Solver::new(Config::default().size, tree);
     repeat(quota, observer, |quota| pass(tree, &mut solver, quota, observer))
 }
@@ -47,11 +59,16 @@ pub(crate) fn to_local_optimum(tree: &mut Working, quota: Quota, observer: &dyn 
 with_vector_instructions! {
     /// Restructures the treelet of every node, children before parents, where that pays. Stops early when the quota is
     /// used up or the observer cancels.
-    pass = pass_plain(tree: &mut Working, solver: &mut Solver, quota: Quota, observer: &dyn Observer) -> Tally
+    pass = pass_plain(tree: &mut Working<impl Metric>, solver: &mut Solver, quota: Quota, observer: &dyn Observer) -> Tally
 }
 
 #[inline(always)]
-fn pass_plain(tree: &mut Working, solver: &mut Solver, quota: Quota, observer: &dyn Observer) -> Tally {
+fn pass_plain(
+    tree: &mut Working<impl Metric>,
+    solver: &mut Solver,
+    quota: Quota,
+    observer: &dyn Observer,
+) -> Tally {
     let mut done = Tally::default();
     for root in tree.preorder().into_iter().rev() {
         if tree.nodes[root as usize].is_leaf() {
@@ -96,7 +113,7 @@ struct Solver {
 const NEVER: u64 = u64::MAX;
 
 impl Solver {
-    fn new(size: u32, tree: &Working) -> Self {
+    fn new(size: u32, tree: &Working<impl Metric>) -> Self {
         Self {
             size: size as usize,
             solved: vec![NEVER; tree.nodes.len()],
@@ -109,7 +126,7 @@ impl Solver {
     /// Opens the leaf of largest area until there are enough leaves. Returns whether anything in the treelet has changed
     /// since it was solved.
     #[inline(always)]
-    fn grow(&mut self, tree: &Working, root: u32) -> bool {
+    fn grow(&mut self, tree: &Working<impl Metric>, root: u32) -> bool {
         self.inner.clear();
         self.leaves.clear();
         self.leaves.push(root);
@@ -136,15 +153,16 @@ impl Solver {
 
     /// Finds the best shape. Returns whether it is better than the present one.
     #[inline(always)]
-    fn solve(&mut self, tree: &Working) -> bool {
-        let least = self.subsets.solve(self.leaves.iter().map(|&leaf| tree.nodes[leaf as usize].aabb));
+    fn solve(&mut self, tree: &Working<impl Metric>) -> bool {
+        let least =
+            self.subsets.solve(self.leaves.iter().map(|&leaf| tree.nodes[leaf as usize].aabb), tree.metric());
         let before: f64 = self.inner.iter().map(|&node| tree.nodes[node as usize].area).sum();
         least < before * (1.0 - TOLERANCE)
     }
 
     /// Gives the treelet the best shape.
     #[inline(always)]
-    fn restructure(&mut self, tree: &mut Working) {
+    fn restructure(&mut self, tree: &mut Working<impl Metric>) {
         let all = (1usize << self.leaves.len()) - 1;
         // Subsets and children of the inner nodes, from the root down.
         let mut joints: [(usize, [u32; 2]); 12] = [(0, [NONE; 2]); 12];

@@ -18,7 +18,7 @@
 use crate::local::LocalSearch;
 use crate::parallel::map_init;
 use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Stream, Tally, stream};
-use crate::tree::Working;
+use crate::tree::{Area, Metric, Working};
 use bvh_build::config::{Accepts, Itself};
 use bvh_build::top_down::{Split, SplitCost, SplitRule, Sweep, Workspace};
 use bvh_build::{Check, OutOfRange, Presorted, muller_fellner};
@@ -75,11 +75,29 @@ impl Config {
     }
 
     /// Improves a tree to a local optimum; leaves it as it was if the observer cancels before.
-    fn improve(&self, tree: &mut Bvh, observer: &dyn Observer) -> Result<Improved, SearchError> {
+    fn improve(
+        &self,
+        tree: &mut Bvh,
+        problem: &Problem,
+        observer: &dyn Observer,
+    ) -> Result<Improved, SearchError> {
         if self.local_search.is_none() {
             return Ok(Improved { finished: true, work: 0 });
         }
-        let mut working = Working::from_bvh(tree, cost::internal_area(tree))?;
+        match problem.measure {
+            Some(measure) => self.improve_by(measure, tree, problem.cost(tree), observer),
+            None => self.improve_by(Area, tree, cost::internal_area(tree), observer),
+        }
+    }
+
+    fn improve_by(
+        &self,
+        metric: impl Metric,
+        tree: &mut Bvh,
+        area: f64,
+        observer: &dyn Observer,
+    ) -> Result<Improved, SearchError> {
+        let mut working = Working::from_bvh(tree, area, metric)?;
         let Tally { work, .. } = self.local_search.improve(&mut working, Quota::ENDLESS, observer);
         let finished = !observer.cancelled();
         if finished {
@@ -110,8 +128,8 @@ impl Search for Config {
                 return Ok(None);
             }
             self.construct(&scene, seed, trial, workspace, tree);
-            let improved = self.improve(tree, observer)?;
-            Ok::<_, SearchError>(Some((problem.objective.cost(tree), improved)))
+            let improved = self.improve(tree, problem, observer)?;
+            Ok::<_, SearchError>(Some((problem.cost(tree), improved)))
         };
         // Trials whose work is not known in advance run in smaller batches, to waste less at the end of a budget.
         let most = if self.local_search.is_none() { BATCH } else { SMALL_BATCH };
@@ -136,7 +154,7 @@ impl Search for Config {
         let (mut tree, (trial, finished)) = (Bvh::default(), best);
         self.construct(&scene, seed, trial, &mut Workspace::default(), &mut tree);
         if finished {
-            self.improve(&mut tree, &())?;
+            self.improve(&mut tree, problem, &())?;
         }
         Ok(tree)
     }

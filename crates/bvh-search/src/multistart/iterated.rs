@@ -8,7 +8,8 @@ use crate::annealing::{Mover as _, SingleMove, SingleMover, Target};
 use crate::local::LocalSearch;
 use crate::local::incumbent::Incumbent;
 use crate::local::initial::Start;
-use crate::run::{Problem, Run, Search, SearchError, Tally, stream};
+use crate::run::{Problem, Run, SearchError, Tally, stream};
+use crate::tree::{Metric, search_by_metric};
 use bvh_build::config::Itself;
 use bvh_core::Bvh;
 use std::ops::Bound::{Excluded, Included};
@@ -29,9 +30,17 @@ bvh_build::config! {
     }
 }
 
-impl Search for Config {
-    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
-        let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
+search_by_metric!(Config);
+
+impl Config {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Result<Bvh, SearchError> {
+        let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         let n = problem.boxes.len() as u64;
         let quota = run.left().at_most(self.work_per_object.saturating_mul(n));
         let mut total = self.local_search.improve(&mut tree, quota, run.observer());

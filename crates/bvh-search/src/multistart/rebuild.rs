@@ -14,12 +14,12 @@ use crate::local::initial::{Start, construction};
 use crate::local::pass::TOLERANCE;
 use crate::local::{LocalSearch, reinsertion};
 use crate::parallel;
-use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Stream, Tally, stream};
-use crate::tree::{ANCHOR, Working};
+use crate::run::{Observer, Problem, Quota, Run, SearchError, Stream, Tally, stream};
+use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
 use bvh_build::config::Itself;
 use bvh_build::top_down::Workspace;
 use bvh_build::{Presorted, muller_fellner};
-use bvh_core::{Aabb, Bvh, cost};
+use bvh_core::{Aabb, Bvh};
 use rand::RngExt;
 
 bvh_build::config! {
@@ -48,10 +48,18 @@ bvh_build::config! {
     }
 }
 
-impl Search for Config {
+search_by_metric!(Config);
+
+impl Config {
     /// Rebuilds disjoint subtrees in parallel, each with a random stream of its own.
-    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
-        let (mut best, mut tree) = Incumbent::build(&self.start, problem, run)?;
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Result<Bvh, SearchError> {
+        let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         let n = tree.objects() as u64;
         if n < 3 {
             return Ok(best.tree);
@@ -108,7 +116,7 @@ struct Subtree {
 
 impl Subtree {
     /// The subtree below `root`, unless it has more than `most` leaves.
-    fn below(tree: &Working, root: u32, most: u32) -> Option<Self> {
+    fn below(tree: &Working<impl Metric>, root: u32, most: u32) -> Option<Self> {
         let mut subtree = Self::default();
         let mut stack = vec![root];
         while let Some(at) = stack.pop() {
@@ -131,7 +139,13 @@ impl Subtree {
 
 impl Config {
     /// Selects `picks` subtrees and returns the disjoint ones of suitable size.
-    fn select(&self, tree: &Working, rng: &mut Stream, picks: u64, tally: &mut Tally) -> Vec<Subtree> {
+    fn select(
+        &self,
+        tree: &Working<impl Metric>,
+        rng: &mut Stream,
+        picks: u64,
+        tally: &mut Tally,
+    ) -> Vec<Subtree> {
         let mut subtrees: Vec<Subtree> = Vec::new();
         for _ in 0..picks {
             tally.moves += 1;
@@ -166,21 +180,21 @@ impl Config {
     }
 
     /// Another tree over the leaves of a subtree, if it is better, and the work that it took.
-    fn construct(
+    fn construct<A: Metric>(
         &self,
-        tree: &Working,
+        tree: &Working<A>,
         subtree: &Subtree,
         quota: Quota,
         rng: Stream,
         observer: &dyn Observer,
-    ) -> Result<(Option<Working>, Tally), SearchError> {
+    ) -> Result<(Option<Working<A>>, Tally), SearchError> {
         let boxes: Vec<Aabb> =
             subtree.leaves.iter().map(|&leaf| Aabb::from(&tree.nodes[leaf as usize].aabb)).collect();
         let mut rule = Randomised::new(self.candidates, Some(self.noise), rng);
         let mut other = Bvh::default();
         let scene = Presorted::new(&boxes)?;
         self.construction.construct(&scene, &mut rule, &mut Workspace::default(), &mut other);
-        let mut other = Working::from_bvh(&other, cost::internal_area(&other))?;
+        let mut other = Working::from_bvh(&other, tree.metric().internal(&other), tree.metric())?;
         let mut tally = self.local_search.improve(&mut other, quota, observer);
         tally = Tally { moves: 0, kept: 0, work: tally.work + 2 * boxes.len() as u64 };
         let better = other.area() < subtree.area * (1.0 - TOLERANCE);
@@ -189,16 +203,16 @@ impl Config {
 }
 
 /// The area of a node's children, 0 for a leaf.
-fn contribution(tree: &Working, at: u32) -> f64 {
+fn contribution(tree: &Working<impl Metric>, at: u32) -> f64 {
     let node = &tree.nodes[at as usize];
     if node.is_leaf() { 0.0 } else { node.children.iter().map(|&child| tree.nodes[child as usize].area).sum() }
 }
 
 /// Replaces subtrees by the better ones, then tries all their nodes in all positions of the tree once.
-fn replace(
-    tree: &mut Working,
+fn replace<A: Metric>(
+    tree: &mut Working<A>,
     subtrees: &[Subtree],
-    found: &[(Option<Working>, Tally)],
+    found: &[(Option<Working<A>>, Tally)],
     quota: Quota,
     observer: &dyn Observer,
 ) -> Tally {
@@ -218,7 +232,7 @@ fn replace(
 }
 
 /// Gives a subtree the shape of another tree over its leaves.
-fn graft(tree: &mut Working, subtree: &Subtree, shape: &Working) {
+fn graft(tree: &mut Working<impl Metric>, subtree: &Subtree, shape: &Working<impl Metric>) {
     let order = shape.preorder();
     let mut new = vec![ANCHOR; shape.nodes.len()];
     let mut inner = subtree.inner.iter();

@@ -10,18 +10,18 @@ use bvh_core::{Bvh, cost::Objective};
 use rand::seq::SliceRandom;
 
 /// A scene ready to be built from any insertion order.
-struct Insertion {
+struct Insertion<'p> {
     scene: Scene,
     config: goldsmith_salmon::Config,
-    objective: Objective,
+    problem: Problem<'p>,
 }
 
 /// The buffers of one thread.
 type Buffers = (Workspace, Bvh);
 
-impl Insertion {
-    fn new(problem: &Problem, config: &goldsmith_salmon::Config) -> Result<Self, SearchError> {
-        Ok(Self { scene: Scene::new(problem.boxes)?, config: config.clone(), objective: problem.objective })
+impl<'p> Insertion<'p> {
+    fn new(problem: &Problem<'p>, config: &goldsmith_salmon::Config) -> Result<Self, SearchError> {
+        Ok(Self { scene: Scene::new(problem.boxes)?, config: config.clone(), problem: *problem })
     }
 
     /// Number of objects.
@@ -41,11 +41,11 @@ impl Insertion {
             debug_assert!(false, "orders are permutations");
             return f64::INFINITY;
         };
-        if self.objective == Objective::GoldsmithSalmon {
+        if self.problem.measure.is_none() && self.problem.objective == Objective::GoldsmithSalmon {
             goldsmith_salmon
         } else {
             workspace.write(tree);
-            self.objective.cost(tree)
+            self.problem.cost(tree)
         }
     }
 

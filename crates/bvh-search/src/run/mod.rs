@@ -28,7 +28,7 @@ pub trait Search: Check {
 impl<B: Builder> Search for B {
     fn search(&self, problem: &Problem, _seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         let tree = self.build(problem.boxes)?;
-        run.record(problem.objective.cost(&tree), tree.nodes.len() as u64);
+        run.record(problem.cost(&tree), tree.nodes.len() as u64);
         Ok(tree)
     }
 }

@@ -1,14 +1,18 @@
 //! What a search is asked for, and what it may skip on the way because the answer stays the same.
 
-use bvh_core::{Aabb, cost::Objective};
+use bvh_core::cost::{self, Measure, Objective};
+use bvh_core::{Aabb, Bvh};
 
 /// What is searched for: the tree over `boxes` of least cost.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a> {
     /// One box per object.
     pub boxes: &'a [Aabb],
-    /// The cost to minimise.
+    /// The cost to minimise, unless there is a measure.
     pub objective: Objective,
+    /// The measure of boxes to minimise the sum of, over all inner nodes, in place of the objective. Searches minimise it
+    /// directly; builders divide and cluster by area, and their trees are judged by it.
+    pub measure: Option<&'a dyn Measure>,
     /// Shortcuts that must not be taken, so that their savings can be measured. Empty in production.
     pub disabled: &'a [Shortcut],
 }
@@ -16,7 +20,15 @@ pub struct Problem<'a> {
 impl<'a> Problem<'a> {
     /// The paper's problem: least total area of inner nodes.
     pub fn new(boxes: &'a [Aabb]) -> Self {
-        Self { boxes, objective: Objective::default(), disabled: &[] }
+        Self { boxes, objective: Objective::default(), measure: None, disabled: &[] }
+    }
+
+    /// The cost of a tree. O(nodes).
+    pub fn cost(&self, tree: &Bvh) -> f64 {
+        match self.measure {
+            Some(measure) => cost::internal_measure(tree, measure),
+            None => self.objective.cost(tree),
+        }
     }
 
     /// Whether this shortcut may be taken where the scene allows it.

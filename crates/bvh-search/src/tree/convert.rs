@@ -1,13 +1,13 @@
 //! Conversion between flat trees and the working form.
 
-use super::{ANCHOR, NONE, Node, Working};
+use super::{ANCHOR, Metric, NONE, Node, Working};
 use crate::run::SearchError;
 use bvh_core::{Aabb, Bvh, Node as BvhNode, NodeKind, PackedAabb};
 
-impl Working {
+impl<M: Metric> Working<M> {
     /// The working form of a valid tree with one object per leaf, whose boxes are tight, as those of builders are, and whose
-    /// internal area is `area`. O(n). Refuses inner nodes with more than two children.
-    pub fn from_bvh(tree: &Bvh, area: f64) -> Result<Self, SearchError> {
+    /// internal area, by the metric, is `area`. O(n). Refuses inner nodes with more than two children.
+    pub fn from_bvh(tree: &Bvh, area: f64, metric: M) -> Result<Self, SearchError> {
         let mut nodes = Vec::with_capacity(tree.nodes.len() + 1);
         nodes.push(Node::ANCHOR);
         // Two dummy slots for leaves, so that the store is branch-free: which nodes are leaves is unpredictable.
@@ -25,13 +25,13 @@ impl Working {
             let object = tree.prim_ids[if leaf { first as usize } else { 0 }];
             let children = if leaf { [NONE, object] } else { [first + 1, first + 2] };
             let aabb = PackedAabb::from(&node.aabb);
-            let (area, parent) = (aabb.half_area(), parents[index]);
+            let (area, parent) = (metric.of(&aabb), parents[index]);
             nodes.push(Node { aabb, area, parent, children, ..Node::ANCHOR });
         }
         if nodes.len() > 1 {
             nodes[0].children[0] = 1;
         }
-        let mut working = Self { nodes, ..Self::default() };
+        let mut working = Self::new(nodes, metric);
         working.area.add(area);
         Ok(working)
     }

@@ -1,6 +1,6 @@
 //! What the search for a position asks of a tree, and how the working form answers.
 
-use super::{ANCHOR, Working};
+use super::{ANCHOR, Metric, Working};
 use bvh_core::PackedAabb;
 
 /// A binary tree in which a subtree can be moved to another position.
@@ -15,14 +15,16 @@ pub(crate) trait Linked {
     fn other(&self, at: u32, child: u32) -> u32;
     /// Exact union of all boxes below the node.
     fn aabb(&self, at: u32) -> PackedAabb;
-    /// Half area of the node's box.
+    /// Size of the node's box.
     fn area(&self, at: u32) -> f64;
+    /// Size of any box.
+    fn size(&self, aabb: &PackedAabb) -> f64;
     /// Moves the subtree of `node` beside `position`, which is neither inside it nor its parent nor its sibling. Boxes
     /// are made tight. Returns the number of nodes visited.
     fn reinsert(&mut self, node: u32, position: u32) -> u64;
 }
 
-impl Linked for Working {
+impl<M: Metric> Linked for Working<M> {
     const ABOVE: u32 = ANCHOR;
 
     #[inline(always)]
@@ -49,6 +51,11 @@ impl Linked for Working {
     #[inline(always)]
     fn area(&self, at: u32) -> f64 {
         self.nodes[at as usize].area
+    }
+
+    #[inline(always)]
+    fn size(&self, aabb: &PackedAabb) -> f64 {
+        self.metric.of(aabb)
     }
 
     #[inline(always)]

@@ -10,6 +10,7 @@
 
 mod convert;
 mod linked;
+mod metric;
 mod position;
 mod siblings;
 mod subsets;
@@ -17,6 +18,7 @@ mod subsets;
 use bvh_core::PackedAabb;
 use bvh_core::cost::Sum;
 pub(crate) use linked::Linked;
+pub(crate) use metric::{Area, Metric, search_by_metric};
 pub(crate) use position::{PositionSearch, Scope};
 pub(crate) use siblings::Siblings;
 pub(crate) use subsets::Subsets;
@@ -33,7 +35,7 @@ pub(crate) const ANCHOR: u32 = 0;
 pub(crate) struct Node {
     /// Exact union of all boxes below.
     pub aabb: PackedAabb,
-    /// Half area of `aabb`.
+    /// Half area of `aabb`, or its size by another metric.
     pub area: f64,
     /// Number of the change during which the node was last written to the journal.
     pub stamp: u64,
@@ -63,7 +65,8 @@ impl Node {
 
 /// A binary tree under change. Leaves hold one object each.
 #[derive(Clone, Debug)]
-pub(crate) struct Working {
+pub(crate) struct Working<M = Area> {
+    metric: M,
     pub nodes: Vec<Node>,
     /// Total area of the inner nodes when the current change began, and the area it has added since.
     area: Sum,
@@ -74,24 +77,21 @@ pub(crate) struct Working {
     spare: Vec<Node>,
 }
 
-impl Default for Working {
-    fn default() -> Self {
-        Self {
-            nodes: vec![Node::ANCHOR],
-            area: Sum::default(),
-            added: 0.0,
-            journal: Vec::new(),
-            change: 0,
-            spare: Vec::new(),
-        }
+impl<M: Metric> Working<M> {
+    fn new(nodes: Vec<Node>, metric: M) -> Self {
+        let (area, journal, spare) = Default::default();
+        Self { metric, nodes, area, added: 0.0, journal, change: 0, spare }
     }
-}
 
-impl Working {
+    /// The size of boxes by which the tree is judged.
+    pub fn metric(&self) -> M {
+        self.metric
+    }
+
     /// A tree of linked nodes, the anchor first.
-    pub fn from_nodes(mut nodes: Vec<Node>) -> Self {
+    pub fn from_nodes(mut nodes: Vec<Node>, metric: M) -> Self {
         nodes.iter_mut().for_each(|node| node.stamp = 0);
-        let mut tree = Self { nodes, ..Self::default() };
+        let mut tree = Self::new(nodes, metric);
         tree.area.add(tree.internal_area());
         tree
     }
@@ -170,7 +170,7 @@ impl Working {
             if aabb == self.nodes[at as usize].aabb {
                 break;
             }
-            let area = aabb.half_area();
+            let area = self.metric.of(&aabb);
             let node = self.write(at);
             saved += node.area - area;
             (node.aabb, node.area) = (aabb, area);
@@ -189,7 +189,7 @@ impl Working {
         self.replace_child(above, position, parent);
         self.write(position).parent = parent;
         let aabb = aabb.union(&added_box);
-        let area = aabb.half_area();
+        let area = self.metric.of(&aabb);
         let joint = self.write(parent);
         (joint.children, joint.aabb, joint.area) = ([position, node], aabb, area);
         let (mut added, mut at, mut visits) = (area, above, 2);
@@ -199,7 +199,7 @@ impl Working {
             if grown == self.nodes[at as usize].aabb {
                 break;
             }
-            let area = grown.half_area();
+            let area = self.metric.of(&grown);
             let node = self.write(at);
             added += area - node.area;
             (node.aabb, node.area) = (grown, area);
@@ -220,7 +220,7 @@ impl Working {
     #[inline(always)]
     pub fn join(&mut self, at: u32, children: [u32; 2]) {
         let aabb = self.union_of(children);
-        let area = aabb.half_area();
+        let area = self.metric.of(&aabb);
         children.into_iter().for_each(|child| self.write(child).parent = at);
         let node = self.write(at);
         let before = node.area;

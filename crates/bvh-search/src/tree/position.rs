@@ -1,7 +1,7 @@
 //! The best position for a subtree: an exact branch and bound over all nodes of the tree.
 //!
 //! Placing an item with the box B *beside* a node X puts a new node J in place of X, around X and B, and every ancestor
-//! of X has to reach B as well. A(·) is the half area of a box:
+//! of X has to reach B as well. A(·) is the half area of a box, or any other monotone measure:
 //!
 //! ```text
 //!            R
@@ -23,7 +23,7 @@
 //! good and looks near it first (Meister & Bittner 2018), so that the bound is tight from the start.
 
 use super::linked::Linked;
-use super::{ANCHOR, NONE, Working};
+use super::{ANCHOR, Metric, NONE, Working};
 use bvh_core::PackedAabb;
 
 /// Finds positions. Holds the buffers of a search, and counts the nodes it visits.
@@ -62,19 +62,19 @@ impl Scope {
 
     /// The subtree of `child`, a child of `above`.
     #[inline(always)]
-    pub fn of(tree: &Working, above: u32, child: u32) -> Self {
+    pub fn of(tree: &Working<impl Metric>, above: u32, child: u32) -> Self {
         Self { above, side: usize::from(tree.nodes[above as usize].children[0] != child) }
     }
 
     /// The root of the subtree.
     #[inline(always)]
-    pub fn root(self, tree: &Working) -> u32 {
+    pub fn root(self, tree: &Working<impl Metric>) -> u32 {
         tree.nodes[self.above as usize].children[self.side]
     }
 
     /// The smallest larger subtree that contains this one and whose box contains `aabb`, or else the whole tree.
     #[inline(always)]
-    pub fn around(self, tree: &Working, aabb: &PackedAabb) -> Self {
+    pub fn around(self, tree: &Working<impl Metric>, aabb: &PackedAabb) -> Self {
         let mut scope = self;
         while scope.above != ANCHOR {
             let root = scope.above;
@@ -105,7 +105,7 @@ impl PositionSearch {
     #[inline(always)]
     pub fn detached(
         &mut self,
-        tree: &Working,
+        tree: &Working<impl Metric>,
         scope: Scope,
         item: Item,
         first: u32,
@@ -119,7 +119,7 @@ impl PositionSearch {
                 (at, below) = (scope.root(tree), NONE);
             }
             let node = &tree.nodes[at as usize];
-            let joint = node.aabb.union(item.0).half_area();
+            let joint = tree.metric().of(&node.aabb.union(item.0));
             self.path.push(Step { node: at, below, joint, growth: joint - node.area });
             (below, at) = (at, node.parent);
         }
@@ -146,7 +146,7 @@ impl PositionSearch {
         while at != T::ABOVE {
             let area = tree.area(at);
             rest.grow(&tree.aabb(tree.other(at, below)));
-            self.path.push(Step { node: at, below, joint: area, growth: area - rest.half_area() });
+            self.path.push(Step { node: at, below, joint: area, growth: area - tree.size(&rest) });
             (below, at) = (at, tree.parent(at));
         }
         let mut best = Position { beside: NONE, cost: f64::INFINITY };
@@ -229,7 +229,7 @@ fn pop(stack: &mut Vec<(u32, f64)>, area: f64, limit: f64) -> Option<(u32, f64)>
 /// Tries the position beside a node. Returns the growth of the node and all its ancestors, infinite for a leaf.
 #[inline(always)]
 fn try_position(tree: &impl Linked, at: u32, aabb: &PackedAabb, growth: f64, best: &mut Position) -> f64 {
-    let cost = growth + tree.aabb(at).union(aabb).half_area();
+    let cost = growth + tree.size(&tree.aabb(at).union(aabb));
     if cost < best.cost {
         *best = Position { beside: at, cost };
     }

@@ -181,6 +181,11 @@ impl Linked for Siblings {
     }
 
     #[inline(always)]
+    fn size(&self, aabb: &PackedAabb) -> f64 {
+        aabb.half_area()
+    }
+
+    #[inline(always)]
     fn reinsert(&mut self, node: u32, position: u32) -> u64 {
         let (parent, sibling) = (self.parent(node), self.other(NONE, node));
         let (rest, displaced) = (*self.node(sibling), *self.node(position));

@@ -4,6 +4,7 @@
 //! best(S) = A(S) + min over the divisions of S in two of best(L) + best(S ∖ L), with best = 0 for single leaves
 //! (Karras & Aila 2013).
 
+use super::Metric;
 use bvh_core::PackedAabb;
 
 /// Per subset of the leaves, as a bit set: its box, its least internal area, and one side of its best division.
@@ -25,7 +26,7 @@ impl Subsets {
     ///
     /// Of equal divisions, the one is taken whose side with the lowest leaf is the least as a bit set.
     #[inline(always)]
-    pub fn solve(&mut self, leaves: impl ExactSizeIterator<Item = PackedAabb>) -> f64 {
+    pub fn solve(&mut self, leaves: impl ExactSizeIterator<Item = PackedAabb>, metric: impl Metric) -> f64 {
         let all = (1usize << leaves.len()) - 1;
         for (position, aabb) in leaves.enumerate() {
             self.boxes[1 << position] = aabb;
@@ -47,7 +48,7 @@ impl Subsets {
                 }
                 side = (side - 1) & rest;
             }
-            self.cost[set] = least + self.boxes[set].half_area();
+            self.cost[set] = least + metric.of(&self.boxes[set]);
             self.side[set] = best as u16;
         }
         self.cost[all]

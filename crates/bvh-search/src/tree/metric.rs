@@ -1,0 +1,60 @@
+//! The size of a box that a search minimises the sum of: its half area, or a measure from outside.
+//!
+//! Searches are generic over it, so that the area costs no indirection.
+
+use bvh_core::cost::{self, Measure};
+use bvh_core::{Bvh, PackedAabb};
+
+/// The size of a box: finite, not negative, and no smaller for a box that contains another.
+pub(crate) trait Metric: Copy + Send + Sync {
+    /// The size of a box that is not empty.
+    fn of(self, aabb: &PackedAabb) -> f64;
+    /// The total size of the boxes of all inner nodes.
+    fn internal(self, tree: &Bvh) -> f64;
+}
+
+/// The half area.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Area;
+
+impl Metric for Area {
+    #[inline(always)]
+    fn of(self, aabb: &PackedAabb) -> f64 {
+        aabb.half_area()
+    }
+
+    fn internal(self, tree: &Bvh) -> f64 {
+        cost::internal_area(tree)
+    }
+}
+
+impl Metric for &dyn Measure {
+    #[inline(always)]
+    fn of(self, aabb: &PackedAabb) -> f64 {
+        Measure::of(self, aabb)
+    }
+
+    fn internal(self, tree: &Bvh) -> f64 {
+        cost::internal_measure(tree, self)
+    }
+}
+
+/// Implements [`Search`](crate::Search) by the method `search_by`, which is generic over the metric.
+macro_rules! search_by_metric {
+    ($config:ty) => {
+        impl crate::run::Search for $config {
+            fn search(
+                &self,
+                problem: &crate::run::Problem,
+                seed: u64,
+                run: &mut crate::run::Run,
+            ) -> Result<bvh_core::Bvh, crate::run::SearchError> {
+                match problem.measure {
+                    Some(measure) => self.search_by(measure, problem, seed, run),
+                    None => self.search_by(crate::tree::Area, problem, seed, run),
+                }
+            }
+        }
+    };
+}
+pub(crate) use search_by_metric;

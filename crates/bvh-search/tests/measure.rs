@@ -1,0 +1,89 @@
+//! A measure of boxes in place of the area: every search minimises it, and the area as a measure is the area.
+
+use bvh_core::cost::{self, Measure};
+use bvh_core::{Aabb, PackedAabb, validate};
+use bvh_search::{Budget, Method, Outcome, Problem, Shortcut, Start, best, exact, solve};
+
+/// Rays that are nearly parallel to the x axis: the face across it counts most. Monotone, as every sum of products of
+/// extents is.
+#[derive(Debug)]
+struct AlongX;
+
+impl Measure for AlongX {
+    fn of(&self, aabb: &PackedAabb) -> f64 {
+        let [negated_min, max] = aabb.planes();
+        let [x, y, z] = [0, 1, 2].map(|axis| f64::from(max[axis]) + f64::from(negated_min[axis]));
+        x * y + 50.0 * y * z + z * x
+    }
+}
+
+#[derive(Debug)]
+struct HalfArea;
+
+impl Measure for HalfArea {
+    fn of(&self, aabb: &PackedAabb) -> f64 {
+        aabb.half_area()
+    }
+}
+
+fn boxes(n: u32) -> Vec<Aabb> {
+    let at = |i: u32, k: u32| (i.wrapping_mul(2_654_435_761).rotate_left(k) >> 16) as f32;
+    let low = |i| [at(i, 3), at(i, 11), at(i, 19)];
+    (0..n).map(|i| Aabb::from((low(i), low(i).map(|c| c + at(i, 25) / 16.0)))).collect()
+}
+
+/// All methods; `best` without its search by area within milliseconds.
+fn methods() -> impl Iterator<Item = Method> {
+    Method::all().into_iter().filter(|method| method.name() != "exact").map(|method| match method {
+        Method::Best(config) => Method::Best(best::Config { start: Some(Start::default()), ..config }),
+        other => other,
+    })
+}
+
+fn run(method: &Method, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Outcome {
+    let budget = Budget { max_work: Some(500_000), ..Budget::default() };
+    let disabled = &[Shortcut::BoundMet, Shortcut::Tiny];
+    let problem = Problem { measure, disabled, ..Problem::new(boxes) };
+    let outcome = solve(method, &problem, 1, budget, &()).unwrap();
+    validate(&outcome.tree, boxes).unwrap();
+    outcome
+}
+
+#[test]
+fn the_area_as_a_measure_gives_the_same_history_as_the_area() {
+    let boxes = boxes(700);
+    for method in methods() {
+        let (area, measure) = (run(&method, &boxes, None), run(&method, &boxes, Some(&HalfArea)));
+        assert_eq!(area.tree, measure.tree, "{}", method.name());
+        assert_eq!(area.history, measure.history, "{}", method.name());
+    }
+}
+
+#[test]
+fn searches_minimise_the_measure_and_report_it() {
+    let boxes = boxes(700);
+    for method in methods() {
+        let (by_area, found) = (run(&method, &boxes, None), run(&method, &boxes, Some(&AlongX)));
+        assert_eq!(found.cost, cost::internal_measure(&found.tree, &AlongX), "{}", method.name());
+        let before = cost::internal_measure(&by_area.tree, &AlongX);
+        let searches = ["reinsertion", "rotation", "treelet", "annealing", "rebuild", "ruin_recreate", "best"];
+        if searches.contains(&method.name()) {
+            assert!(found.cost < 0.99 * before, "{}: {} {before}", method.name(), found.cost);
+        }
+    }
+}
+
+#[test]
+fn no_search_goes_below_the_exact_optimum_of_the_measure_and_best_reaches_it() {
+    for n in 3..9 {
+        let boxes = boxes(10 * n)[9 * n as usize..].to_vec();
+        let optimum = run(&Method::Exact(exact::Config::default()), &boxes, Some(&AlongX)).cost;
+        for method in methods()
+            .filter(|method| !["goldsmith_salmon", "random_orders", "genetic"].contains(&method.name()))
+        {
+            let cost = run(&method, &boxes, Some(&AlongX)).cost;
+            assert!(cost >= optimum * (1.0 - 1e-12), "{} {n}: {cost} {optimum}", method.name());
+            assert!(method.name() != "best" || cost <= optimum * (1.0 + 1e-12), "{n}: {cost} {optimum}");
+        }
+    }
+}
