@@ -29,7 +29,8 @@
 
 mod crossings;
 
-use crate::Aabb;
+use crate::cost::Measure;
+use crate::{Aabb, PackedAabb};
 use alloc::vec::Vec;
 use crossings::{CELLS, Crossings, index};
 use glam::DVec3;
@@ -209,6 +210,13 @@ impl RayDensity {
             sum += z[0] * plane(0) + z[1] * plane(1);
         }
         sum
+    }
+}
+
+impl Measure for RayDensity {
+    #[inline]
+    fn of(&self, aabb: &PackedAabb) -> f64 {
+        self.measure(&Aabb::from(aabb))
     }
 }
 
