@@ -90,12 +90,14 @@ pub type Verdict = Result<String, Broken>;
 /// the case alone promises.
 macro_rules! ensure {
     ($holds:expr, $promise:ident: $($what:tt)+) => {
-        if !$holds {
+        let holds: bool = $holds;
+        if !holds {
             return Err($crate::stress::promise::Promise::$promise.broken(format!($($what)+)));
         }
     };
     ($holds:expr, $($what:tt)+) => {
-        if !$holds {
+        let holds: bool = $holds;
+        if !holds {
             return Err($crate::stress::promise::Broken::case(format!($($what)+)));
         }
     };
