@@ -34,7 +34,7 @@ mod first_count;
 mod overlap;
 mod packed;
 mod ray;
-mod ray_density;
+pub mod ray_density;
 mod slabs;
 mod sphere;
 mod stack;

@@ -87,7 +87,7 @@ pub struct RayDensity {
     scale: DVec3,
     /// `[corner of the box][cell]`: the signed counts at the cell's eight grid points.
     corners: Vec<[f32; 8]>,
-    /// `[cell]`: what a box within the cell needs; see [`within`].
+    /// `[cell]`: what a box within the cell needs; see `within`.
     cells: Vec<[f32; 16]>,
     /// Segments that meet the bounds.
     segments: u32,

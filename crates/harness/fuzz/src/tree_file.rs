@@ -52,7 +52,7 @@ fn mend_start(bytes: &mut [u8], counts: bool) {
 fn seal(file: &mut [u8]) {
     let covered = file[Header::BYTES..].iter().chain(&file[..188]);
     let sum = !covered.fold(u32::MAX, |sum, byte| {
-        (0..8).fold(sum ^ u32::from(*byte), |sum, _| sum >> 1 ^ 0xedb8_8320 * (sum & 1))
+        (0..8).fold(sum ^ u32::from(*byte), |sum, _| (sum >> 1) ^ (0xedb8_8320 * (sum & 1)))
     });
     file[188..192].copy_from_slice(&sum.to_le_bytes());
 }
