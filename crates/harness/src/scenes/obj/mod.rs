@@ -1,10 +1,10 @@
 //! Reads the triangles of a Wavefront OBJ file, or says in which line it is wrong.
 //!
 //! `tobj` parses the numbers, resolves relative indices and cuts polygons into triangle fans. It is given the `v` and
-//! `f` statements only, as [`Geometry`] finds them, because `tobj` 4.0.5 reads a polyline `l 1 2 3` as a triangle, skips
+//! `f` statements only, as `Geometry` finds them, because `tobj` 4.0.5 reads a polyline `l 1 2 3` as a triangle, skips
 //! the first vertex after a byte order mark, and refuses Latin-1 comments, comments at the end of a line, continued
 //! lines, and files in which only some vertices have a colour. It names no line in its errors and accepts `nan`: when it
-//! refuses a file, or a word is not plainly a finite number, [`explain`] reads the file again and names the line.
+//! refuses a file, or a word is not plainly a finite number, `explain` reads the file again and names the line.
 //!
 //! Points, lines, curves, names, groups, materials (whose files are never opened), normals and texture coordinates are
 //! ignored. Lines may end in LF, CRLF or CR, and a backslash at the end continues a statement on the next line.
