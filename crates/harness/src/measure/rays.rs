@@ -65,6 +65,8 @@ pub enum Kind {
     Incoherent,
     /// From a pinhole camera, row by row, its field of view 60 degrees wide; nearest hit.
     Primary,
+    /// From the hits of the primary rays, in turn, in random directions; nearest hit.
+    Bounce,
     /// From the hits of the primary rays, in turn, to a light under the middle of the box's upper side; any hit.
     Shadow,
 }
@@ -75,11 +77,17 @@ impl Kind {
         if self == Self::Shadow { Query::Any } else { Query::Nearest }
     }
 
+    /// Pixels per row of the picture that `count` rays of this kind go through, row by row; 0 if they go through none.
+    pub fn columns(self, count: u32) -> u32 {
+        if self == Self::Primary { columns(count) } else { 0 }
+    }
+
     /// The kind's name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Incoherent => "incoherent",
             Self::Primary => "primary",
+            Self::Bounce => "bounce",
             Self::Shadow => "shadow",
         }
     }
@@ -111,21 +119,38 @@ pub fn rays(kind: Kind, count: u32, scene: &Scene, tree: &Bvh, viewpoint: &Viewp
             (0..count).filter_map(|_| random_ray(Family::Inside, &root, &mut rng)).collect()
         }
         Kind::Primary => primary_rays(count, &root, viewpoint),
+        Kind::Bounce => {
+            let mut rng = Stream::seed_from_u64(seed);
+            // A library without a shortest distance would hit the surface that the ray starts from.
+            let points = hit_points(&primary_rays(count, &root, viewpoint), scene, tree, 1.0 - 1.0 / 2048.0);
+            let ray = |&origin: &Vec3| Ray::half_line(origin, on_sphere(&mut rng).as_vec3()).ok();
+            points.iter().cycle().take(count as usize).filter_map(ray).collect()
+        }
         Kind::Shadow => {
-            let accelerator = Accelerator::of_tree(&scene.primitives, tree);
-            let point = |ray: &Ray| accelerator.nearest_hit(ray, &mut ()).map(|hit| ray.at(hit.t));
-            let points: Vec<Vec3> = primary_rays(count, &root, viewpoint).iter().filter_map(point).collect();
+            let points = hit_points(&primary_rays(count, &root, viewpoint), scene, tree, 1.0);
             let light = root.min.as_dvec3() + DVec3::new(0.5, 0.95, 0.5) * root.extent();
             points.iter().cycle().take(count as usize).filter_map(|&point| shadow_ray(point, light)).collect()
         }
     }
 }
 
+/// The points at this fraction of the way to the nearest hits of rays.
+fn hit_points(rays: &[Ray], scene: &Scene, tree: &Bvh, fraction: f32) -> Vec<Vec3> {
+    let accelerator = Accelerator::of_tree(&scene.primitives, tree);
+    let point = |ray: &Ray| accelerator.nearest_hit(ray, &mut ()).map(|hit| ray.at(fraction * hit.t));
+    rays.iter().filter_map(point).collect()
+}
+
+/// Pixels per row of the picture that `count` primary rays go through: as many rows as columns.
+fn columns(count: u32) -> u32 {
+    (1..=count).find(|side| side.saturating_mul(*side) >= count).unwrap_or(count)
+}
+
 /// Rays through the centres of square pixels, row by row, with as many rows as columns.
 fn primary_rays(count: u32, root: &Aabb, viewpoint: &Viewpoint) -> Vec<Ray> {
     let place = |at: [f64; 3]| root.min.as_dvec3() + DVec3::from(at) * root.extent();
     let view = View { from: place(viewpoint.eye), at: place(viewpoint.target), fov: 60.0 };
-    let side = (1..=count).find(|side| side.saturating_mul(*side) >= count).unwrap_or(count);
+    let side = columns(count);
     let camera = Camera::new(&view, DVec3::Y, side, side);
     let centre = |pixel: u32| f64::from(pixel) + 0.5;
     let direction = |index: u32| camera.direction(centre(index % side), centre(index / side));

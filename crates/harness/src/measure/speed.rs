@@ -12,6 +12,7 @@ use bvh_core::{Bvh, Hit, Ray, TestCounts, WideBvh, collapse_leaves};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::time::Instant;
 
 config! {
@@ -23,11 +24,13 @@ config! {
         /// Turns in which every contender traces all rays of a kind, after one that is not timed.
         rounds: u32 = 5, in 1..=1_000_000;
         /// Kinds of rays.
-        rays: Vec<Kind> = vec![Kind::Incoherent, Kind::Primary, Kind::Shadow];
+        rays: Vec<Kind> = vec![Kind::Incoherent, Kind::Primary, Kind::Bounce, Kind::Shadow];
         /// Layouts of our trees.
         layouts: Vec<Layout> = vec![Layout::Binary, Layout::BinaryLeaves, Layout::Wide, Layout::WidePortable];
         /// Cameras of primary rays by scene; for other scenes one outside the root's box.
         cameras: BTreeMap<String, Viewpoint>;
+        /// The program of `scripts/ray-peers`, by which Embree and tinybvh trace too. All speeds go to `rays.csv`.
+        ray_peers: Option<PathBuf>;
     }
 }
 
@@ -44,13 +47,28 @@ pub enum Layout {
     BinaryLeaves,
     /// [`WideBvh`] with the best instructions of this machine.
     Wide,
+    /// [`WideBvh`] with the best instructions of this machine, laid out once more: only noise tells its times from those
+    /// of `Wide`.
+    WideAgain,
     /// [`WideBvh`] with portable code.
     WidePortable,
 }
 
+/// Rays that are traced together.
+#[derive(Clone, Copy, Debug)]
+pub struct Batch<'a> {
+    /// What they ask.
+    pub query: Query,
+    /// Pixels per row of the picture that the rays go through, row by row from its upper left corner; 0 if they go through
+    /// none.
+    pub columns: u32,
+    /// The rays.
+    pub rays: &'a [Ray],
+}
+
 /// Answers rays, the distance and the object of a hit for each (any of both for an any-hit query), and returns the
-/// seconds that each part of the rays took.
-pub type Trace<'a> = Box<dyn Fn(Query, &[Ray], &mut [Option<Hit>]) -> Vec<f64> + 'a>;
+/// seconds that each [`PART`] of the rays took. An error says why there are no answers.
+pub type Trace<'a> = Box<dyn Fn(&Batch, &mut [Option<Hit>]) -> Result<Vec<f64>, String> + 'a>;
 
 /// What traces the rays of a contender.
 pub enum Tracer<'a> {
@@ -62,13 +80,14 @@ pub enum Tracer<'a> {
 
 impl Tracer<'_> {
     /// Traces all rays; as [`Trace`].
-    pub fn trace(&self, query: Query, rays: &[Ray], hits: &mut [Option<Hit>]) -> Vec<f64> {
-        match (self, query) {
-            (Self::Other(trace), _) => trace(query, rays, hits),
+    pub fn trace(&self, batch: &Batch, hits: &mut [Option<Hit>]) -> Result<Vec<f64>, String> {
+        let rays = batch.rays;
+        match (self, batch.query) {
+            (Self::Other(trace), _) => trace(batch, hits),
             (Self::Own(own), Query::Any) => {
-                timed(rays, hits, |ray| own.any_hit(ray, &mut ()).then_some(SOME_HIT))
+                Ok(timed(rays, hits, |ray| own.any_hit(ray, &mut ()).then_some(SOME_HIT)))
             }
-            (Self::Own(own), _) => timed(rays, hits, |ray| own.nearest_hit(ray, &mut ())),
+            (Self::Own(own), _) => Ok(timed(rays, hits, |ray| own.nearest_hit(ray, &mut ()))),
         }
     }
 }
@@ -84,7 +103,7 @@ pub struct Contender<'a> {
 }
 
 /// Rays whose time is taken together. They are few, so that in some turn no other program interrupts them.
-const PART: usize = 4096;
+pub const PART: usize = 8192;
 
 /// Answers every ray and returns the seconds that each part of them took.
 #[inline(always)]
@@ -116,6 +135,7 @@ pub fn own_contenders<'a>(
                 ("binary, merged leaves", Structure::Tree(Cow::Owned(merged)))
             }
             Layout::Wide => ("wide", Structure::Wide(wide()?)),
+            Layout::WideAgain => ("wide, again", Structure::Wide(wide()?)),
             Layout::WidePortable => ("wide, portable", Structure::WidePortable(wide()?)),
         };
         Ok(Contender {
@@ -132,22 +152,23 @@ pub type Rows = (Vec<TraceRow>, Vec<TraceTimeRow>);
 
 /// Traces rays, the same for all, through the contenders of a scene, each with its method's label. `tree` is any valid
 /// tree over the scene: the right answers, which are the same for every tree, come from it. `seed` draws the rays.
-/// `None` as soon as `cancelled` says so.
+/// `None` as soon as `cancelled` says so. An error says which contender gave no answers.
 pub fn measure(
     config: &Config,
     scene: &Scene,
     tree: &Bvh,
-    contenders: &[(&str, Contender)],
+    contenders: &[(String, Contender)],
     seed: u64,
     cancelled: impl Fn() -> bool,
-) -> Option<Rows> {
+) -> Result<Option<Rows>, String> {
     let (mut rows, mut times) = Rows::default();
     let viewpoint = config.cameras.get(&scene.name).copied().unwrap_or_default();
     let reference = Tracer::Own(Accelerator::of_tree(&scene.primitives, tree));
     for &kind in &config.rays {
         let rays = rays(kind, config.count, scene, tree, &viewpoint, seed);
+        let batch = Batch { query: kind.query(), columns: kind.columns(config.count), rays: &rays };
         let mut right = vec![None; rays.len()];
-        reference.trace(kind.query(), &rays, &mut right);
+        reference.trace(&batch, &mut right)?;
         let of_kind = OfKind { scene, tree, kind, rays: &rays, right: &right };
         let mut hits = vec![None; rays.len()];
         // By contender, and by part of the rays, the seconds of each turn.
@@ -155,10 +176,10 @@ pub fn measure(
         for round in 0..=config.rounds {
             for ((method, contender), turns) in contenders.iter().zip(&mut turns) {
                 if cancelled() {
-                    return None;
+                    return Ok(None);
                 }
                 hits.fill(None);
-                let seconds = contender.tracer.trace(kind.query(), &rays, &mut hits);
+                let seconds = contender.tracer.trace(&batch, &mut hits)?;
                 if round == 0 {
                     rows.push(of_kind.row(method, contender, &hits));
                 } else {
@@ -170,7 +191,7 @@ pub fn measure(
             let sum = |of: fn(&[f64]) -> Option<f64>| parts.iter().filter_map(|turns| of(turns)).sum();
             times.push(TraceTimeRow {
                 scene: scene.name.clone(),
-                method: (*method).into(),
+                method: method.clone(),
                 layout: contender.layout.clone(),
                 rays: kind.name().into(),
                 count: rays.len() as u64,
@@ -181,7 +202,7 @@ pub fn measure(
             });
         }
     }
-    Some((rows, times))
+    Ok(Some((rows, times)))
 }
 
 /// The rays of one kind on one scene, and their right answers.
@@ -240,10 +261,10 @@ mod tests {
         let mut contenders = Vec::new();
         for (method, tree) in [("good", &good), ("bad", &bad)] {
             let own = own_contenders(&config.layouts, &scene, tree).unwrap();
-            contenders.extend(own.into_iter().map(|contender| (method, contender)));
+            contenders.extend(own.into_iter().map(|contender| (method.to_owned(), contender)));
         }
-        let (rows, times) = measure(&config, &scene, &good, &contenders, 1, || false).unwrap();
-        assert_eq!((rows.len(), times.len()), (24, 24));
+        let (rows, times) = measure(&config, &scene, &good, &contenders, 1, || false).unwrap().unwrap();
+        assert_eq!((rows.len(), times.len()), (32, 32));
         assert!(times.iter().all(|row| 0.0 < row.seconds && row.seconds <= row.median_seconds));
         for row in &rows {
             assert!(row.hits > 100 && row.hits < row.count, "{row:?}");

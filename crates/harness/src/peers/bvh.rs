@@ -2,7 +2,7 @@
 
 use super::{Built, Raw};
 use crate::measure::Query;
-use crate::measure::speed::{Contender, Tracer, timed};
+use crate::measure::speed::{Batch, Contender, Tracer, timed};
 use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
 use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh as TheirBvh, BvhNode};
@@ -120,11 +120,11 @@ pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
         let front = ray.intersects_triangle(a, b, c).distance;
         if front.is_finite() { front } else { ray.intersects_triangle(a, c, b).distance }
     };
-    let trace = move |query: Query, rays: &[Ray], hits: &mut [Option<Hit>]| {
+    let trace = move |batch: &Batch, hits: &mut [Option<Hit>]| {
         // Distances along unit vectors are converted.
         let theirs = |ray: &Ray| (self::ray(ray), ray.direction().length(), ray.t_min(), ray.t_max());
-        let rays: Vec<_> = rays.iter().map(theirs).collect();
-        timed(&rays, hits, |(ray, length, t_min, t_max)| {
+        let rays: Vec<_> = batch.rays.iter().map(theirs).collect();
+        Ok(timed(&rays, hits, |(ray, length, t_min, t_max)| {
             let mut nearest: Option<Hit> = None;
             let (low, mut high) = (t_min * length, t_max * length);
             for shape in tree.nearest_traverse_iterator(ray, &shapes) {
@@ -132,7 +132,7 @@ pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
                 if distance >= low && distance <= high {
                     nearest = Some(Hit { t: distance / length, object: shape.object });
                     high = distance;
-                    if query == Query::Any {
+                    if batch.query == Query::Any {
                         break;
                     }
                 } else if ray.intersection_slice_for_aabb(&shape.aabb).is_some_and(|(entry, _)| entry > high) {
@@ -140,7 +140,7 @@ pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
                 }
             }
             nearest
-        })
+        }))
     };
     Contender {
         layout: "binary, their own".into(),

@@ -5,6 +5,8 @@
 
 #[cfg(feature = "peers")]
 mod bvh;
+pub mod comparison;
+pub mod external;
 #[cfg(feature = "peers")]
 mod obvhs;
 
@@ -169,7 +171,7 @@ fn triangles(scene: &Scene) -> Result<&[bvh_core::Triangle], String> {
 mod tests {
     use super::*;
     use crate::measure::rays::{Kind, rays};
-    use crate::measure::speed::Tracer;
+    use crate::measure::speed::{Batch, Tracer};
     use crate::measure::{Accelerator, Query, disagreements};
     use bvh_core::validate;
 
@@ -203,12 +205,13 @@ mod tests {
         let scene = Scene::load("escher:2000").unwrap();
         let tree = Peer::Bvh(NoSettings {}).build(&scene).unwrap().tree;
         let rays = rays(Kind::Incoherent, 4000, &scene, &tree, &Default::default(), 1);
+        let batch = Batch { query: Query::Nearest, columns: 0, rays: &rays };
         let mut right = vec![None; rays.len()];
-        Tracer::Own(Accelerator::of_tree(&scene.primitives, &tree)).trace(Query::Nearest, &rays, &mut right);
+        Tracer::Own(Accelerator::of_tree(&scene.primitives, &tree)).trace(&batch, &mut right).unwrap();
         for peer in all() {
             for contender in peer.contenders(&scene).unwrap() {
                 let mut hits = vec![None; rays.len()];
-                contender.tracer.trace(Query::Nearest, &rays, &mut hits);
+                contender.tracer.trace(&batch, &mut hits).unwrap();
                 let found = disagreements(&right, &hits, &tree, &rays);
                 assert!(found.missed + found.false_hits + found.other < 20, "{peer:?}: {found:?}");
             }

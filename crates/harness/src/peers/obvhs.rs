@@ -2,7 +2,7 @@
 
 use super::{Built, Obvhs, Preset, Raw};
 use crate::measure::Query;
-use crate::measure::speed::{Contender, Tracer, timed};
+use crate::measure::speed::{Batch, Contender, Tracer, timed};
 use ::obvhs::bvh2::{Bvh2, builder as binary};
 use ::obvhs::cwbvh::builder as wide;
 use ::obvhs::ray::{Ray as TheirRay, RayHit};
@@ -82,12 +82,12 @@ pub(super) fn raw(config: &Obvhs, boxes: &[Aabb]) -> Raw {
 macro_rules! traced_by {
     ($tree:ident, $triangles:expr) => {{
         let triangles: Vec<RtTriangle> = $triangles;
-        move |query: Query, rays: &[Ray], hits: &mut [Option<Hit>]| {
+        move |batch: &Batch, hits: &mut [Option<Hit>]| {
             let traverse = |any, ray, hit: &mut RayHit| {
                 let test = |ray: &TheirRay, id: usize| triangles[id].intersect(ray);
                 if any { !$tree.ray_traverse_miss(ray, test) } else { $tree.ray_traverse(ray, hit, test) }
             };
-            trace(query, rays, hits, traverse, &$tree.primitive_indices)
+            Ok(trace(batch, hits, traverse, &$tree.primitive_indices))
         }
     }};
 }
@@ -120,14 +120,13 @@ pub(super) fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contende
 
 #[inline(always)]
 fn trace(
-    query: Query,
-    rays: &[Ray],
+    batch: &Batch,
     hits: &mut [Option<Hit>],
     traverse: impl Fn(bool, TheirRay, &mut RayHit) -> bool,
     ids: &[u32],
 ) -> Vec<f64> {
-    let rays: Vec<TheirRay> = rays.iter().map(|ray| self::ray(ray, ray.t_max())).collect();
-    if query == Query::Any {
+    let rays: Vec<TheirRay> = batch.rays.iter().map(|ray| self::ray(ray, ray.t_max())).collect();
+    if batch.query == Query::Any {
         return timed(&rays, hits, |&ray| {
             traverse(true, ray, &mut RayHit::none()).then_some(Hit { t: 0.0, object: 0 })
         });

@@ -3,6 +3,7 @@
 
 use crate::Error;
 use crate::files;
+use crate::run::rows::PeerRayRow;
 use csv::StringRecord;
 use std::collections::BTreeSet;
 use std::fs;
@@ -81,11 +82,14 @@ fn shortened(file: &str, mut differences: Vec<String>) -> Vec<String> {
     differences.into_iter().map(|difference| format!("{file}: {difference}")).collect()
 }
 
-/// The CSV files of a folder that do not hold seconds.
+/// The CSV files of a folder that do not hold seconds or speeds.
 fn csv_names(folder: &Path) -> Result<BTreeSet<String>, Error> {
     let entries = fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))?;
     let names = entries.filter_map(|entry| Some(entry.ok()?.file_name().to_string_lossy().into_owned()));
-    Ok(names.filter(|name| name.ends_with(".csv") && !name.starts_with("timing")).collect())
+    let compared = |name: &String| {
+        name.ends_with(".csv") && !name.starts_with("timing") && !PeerRayRow::are_in(&folder.join(name))
+    };
+    Ok(names.filter(compared).collect())
 }
 
 fn compare_files(

@@ -1,25 +1,20 @@
 //! Carries out the runs of an experiment: in parallel or one by one, with progress, until done or interrupted.
 
 use crate::Error;
-use crate::measure::speed;
 use crate::run::finish::{Summary, conclude};
 use crate::run::job::{Job, Watch, base_cost, perform};
 use crate::run::provenance::Provenance;
 use crate::run::reference::BestKnown;
 use crate::run::resolved::{Resolved, load_scenes, to_toml};
-use crate::run::rows::{Row, TraceRow, TraceTimeRow, to_bytes};
 use crate::run::shard::Shard;
 use crate::run::store::{Existing, Store};
 use crate::run::target::Target;
+use crate::run::trace::{Trees, trace};
 use crate::scenes::Scene;
-use crate::spec::{Contestant, Experiment};
+use crate::spec::Experiment;
 use crate::stress::Measure;
-use bvh_core::Bvh;
-use bvh_search::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
@@ -32,9 +27,6 @@ pub struct Extent {
     /// Do these runs only, and leave them to be [merged](crate::run::merge::merge).
     pub shard: Option<Shard>,
 }
-
-/// Trees that rays are traced through, by the number of their run.
-type Trees = BTreeMap<usize, Bvh>;
 
 /// Runs `experiment` into `out/NAME/`. As soon as `interrupted` becomes true, the unfinished runs are given up and the
 /// finished ones are kept.
@@ -85,11 +77,12 @@ fn run(
         let text = format!("{} runs, part {shard}; `harness merge` joins the parts.\n", own.len());
         return Ok(Summary { text, left_out, remarks, folder, beside });
     }
+    let mut traced = String::new();
     if let Some(config) = &experiment.tracing {
-        trace(experiment, config, &jobs, trees, &watch, &store)?;
+        traced = trace(experiment, config, &jobs, trees, &watch, &store)?;
     }
     let best_known = if beside.is_some() { BestKnown::Read(out) } else { BestKnown::Improve(out) };
-    let text = conclude(&resolved, best_known, &provenance, store)?;
+    let text = conclude(&resolved, best_known, &provenance, store)? + &traced;
     Ok(Summary { text, left_out, remarks, folder, beside })
 }
 
@@ -180,45 +173,6 @@ fn over_suite(
     store.write("provenance.toml", to_toml(&Provenance::gather())?.as_bytes())?;
     store.finish()?;
     Ok(Summary { text, left_out: vec![], remarks: vec![], folder, beside })
-}
-
-/// Traces rays through the trees of all first runs, scene by scene. Rebuilds the trees of runs that were kept from an
-/// interrupted experiment.
-fn trace(
-    experiment: &Experiment,
-    config: &speed::Config,
-    jobs: &[Job],
-    mut trees: Trees,
-    watch: &Watch,
-    store: &Store,
-) -> Result<(), Error> {
-    let interrupted = || Error::Interrupted { finished: jobs.len(), runs: jobs.len() };
-    for (index, job) in jobs.iter().enumerate().filter(|(_, job)| job.repetition == 0) {
-        if let Entry::Vacant(missing) = trees.entry(index) {
-            missing.insert(perform(experiment, job, watch)?.ok_or_else(interrupted)?.1);
-        }
-    }
-    let (mut rows, mut times) = (Vec::new(), Vec::new());
-    let first_runs: Vec<(&Job, &Bvh)> = trees.iter().map(|(&index, tree)| (&jobs[index], tree)).collect();
-    for of_scene in first_runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
-        let scene = of_scene[0].0.scene;
-        let mut contenders = Vec::new();
-        for &(job, tree) in of_scene {
-            let made = match &job.labelled.method {
-                Contestant::Ours(_) => speed::own_contenders(&config.layouts, scene, tree),
-                Contestant::Peer(peer) => peer.contenders(scene),
-            };
-            let made = made.map_err(|message| Error::Tracing { scene: scene.name.clone(), message })?;
-            contenders.extend(made.into_iter().map(|contender| (job.labelled.label.as_str(), contender)));
-        }
-        let seed = experiment.seed_of(&scene.name, "tracing", 0);
-        let measured = speed::measure(config, scene, of_scene[0].1, &contenders, seed, || watch.cancelled());
-        let (scene_rows, scene_times) = measured.ok_or_else(interrupted)?;
-        rows.extend(scene_rows);
-        times.extend(scene_times);
-    }
-    store.write(TraceRow::FILE, &to_bytes(&rows, Path::new(TraceRow::FILE))?)?;
-    store.write(TraceTimeRow::FILE, &to_bytes(&times, Path::new(TraceTimeRow::FILE))?)
 }
 
 /// A bar with the time left; hidden unless standard error is a terminal.

@@ -12,3 +12,4 @@ pub mod rows;
 pub mod shard;
 pub mod store;
 pub mod target;
+mod trace;

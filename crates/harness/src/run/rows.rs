@@ -10,6 +10,35 @@ use crate::Error;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::path::Path;
 
+/// One row of the `rays.csv` of a comparison with other libraries: the speed of rays of one kind. Like the timing files it
+/// differs from run to run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PeerRayRow {
+    /// Name of the scene, or that the row is a mean over all scenes.
+    pub scene: String,
+    /// The library, or ours.
+    pub library: String,
+    /// The library's settings and its structure for rays.
+    pub mode: String,
+    /// The kind of rays.
+    pub rays: String,
+    /// Million rays per second on one thread, each part of the rays by its fastest turn.
+    pub million_per_s: f64,
+    /// Rays that this contender answers otherwise than brute force.
+    pub disagreements: u64,
+}
+
+impl PeerRayRow {
+    /// The CSV file that holds these rows.
+    pub const FILE: &'static str = "rays.csv";
+
+    /// Whether a CSV file holds rows of this kind, and not the [`RayRow`]s of a file of the same name.
+    pub fn are_in(path: &Path) -> bool {
+        let columns = csv::Reader::from_path(path).and_then(|mut reader| reader.headers().cloned());
+        columns.is_ok_and(|columns| columns.iter().any(|column| column == "million_per_s"))
+    }
+}
+
 /// A kind of rows in a file of its own.
 pub trait Row: Serialize + DeserializeOwned {
     /// The CSV file that holds them; its name begins with `timing` if they hold seconds.
@@ -240,7 +269,7 @@ impl ReferenceRow {
 /// Reads all rows of a kind from an experiment's folder; none if no run left any.
 pub fn read_if_any<R: Row>(folder: &Path) -> Result<Vec<R>, Error> {
     let path = folder.join(R::FILE);
-    if path.is_file() { read(&path) } else { Ok(vec![]) }
+    if path.is_file() && !PeerRayRow::are_in(&path) { read(&path) } else { Ok(vec![]) }
 }
 
 /// Reads all rows of a CSV file.

@@ -1,0 +1,140 @@
+//! Embree and tinybvh, whose libraries need a C++ compiler: a program of their own traces with them, behind pipes.
+//!
+//! `scripts/ray-peers/build` makes the program; its source describes the bytes that go through the pipes. One process
+//! per mode holds the scene for as long as the contender lives, so that all contenders take turns in one run.
+
+use crate::measure::Query;
+use crate::measure::speed::{Batch, Contender, PART, Tracer};
+use crate::scenes::Scene;
+use bvh_core::{Hit, Triangle};
+use std::cell::RefCell;
+use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+/// A contender for every mode of the program, each with the name of its library. An error says what the program did not
+/// do.
+pub fn contenders(program: &Path, scene: &Scene) -> Result<Vec<(String, Contender<'static>)>, String> {
+    let triangles = scene.triangles().map_err(|error| error.to_string())?;
+    let failed = |error: io::Error| format!("{}: {error}", program.display());
+    let listed = Command::new(program).output().map_err(failed)?;
+    let modes = String::from_utf8_lossy(&listed.stdout).into_owned();
+    if modes.trim().is_empty() {
+        return Err(format!("{}: it names no mode; expected one per line", program.display()));
+    }
+    let contender = |line: &str| {
+        let (library, mode) = line.split_once(' ').unwrap_or((line, "default"));
+        let (process, preparation_seconds) = Process::start(program, line, triangles).map_err(failed)?;
+        let process = RefCell::new(process);
+        let command = format!("{} \"{line}\"", program.display());
+        let trace = move |batch: &Batch, hits: &mut [Option<Hit>]| {
+            process.borrow_mut().trace(batch, hits).map_err(|error| format!("{command}: {error}"))
+        };
+        let tracer = Tracer::Other(Box::new(trace));
+        Ok((library.to_owned(), Contender { layout: mode.to_owned(), preparation_seconds, tracer }))
+    };
+    modes.lines().map(contender).collect()
+}
+
+/// The program in one mode, with one scene.
+struct Process {
+    child: Child,
+    /// `None` once the process has been told to end.
+    rays: Option<BufWriter<ChildStdin>>,
+    answers: BufReader<ChildStdout>,
+}
+
+impl Process {
+    /// Starts the program and hands it the triangles. Returns the seconds that its build took, too.
+    fn start(program: &Path, mode: &str, triangles: &[Triangle]) -> io::Result<(Self, f64)> {
+        let mut child = Command::new(program).arg(mode).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
+        let (Some(rays), Some(answers)) = (child.stdin.take(), child.stdout.take()) else {
+            return Err(io::Error::other("the program has no pipes"));
+        };
+        let (mut rays, mut answers) = (BufWriter::new(rays), BufReader::new(answers));
+        rays.write_all(&(triangles.len() as u32).to_le_bytes())?;
+        rays.write_all(bytemuck::cast_slice(triangles))?;
+        rays.flush()?;
+        let [seconds] = read_f64s(&mut answers, 1)?[..] else { unreachable!("one number was asked for") };
+        Ok((Self { child, rays: Some(rays), answers }, seconds))
+    }
+
+    fn trace(&mut self, batch: &Batch, hits: &mut [Option<Hit>]) -> io::Result<Vec<f64>> {
+        let Some(rays) = &mut self.rays else { return Err(io::ErrorKind::BrokenPipe.into()) };
+        ask(rays, batch)?;
+        answer(&mut self.answers, hits)
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // The end of its input ends the program.
+        self.rays = None;
+        _ = self.child.wait();
+    }
+}
+
+/// Writes rays and what they ask.
+fn ask(program: &mut impl Write, batch: &Batch) -> io::Result<()> {
+    let any = u32::from(batch.query == Query::Any);
+    for number in [any, batch.columns, batch.rays.len() as u32, PART as u32] {
+        program.write_all(&number.to_le_bytes())?;
+    }
+    for ray in batch.rays {
+        let ([x, y, z], [dx, dy, dz]) = (ray.origin().to_array(), ray.direction().to_array());
+        for number in [x, y, z, ray.t_min(), dx, dy, dz, ray.t_max()] {
+            program.write_all(&number.to_le_bytes())?;
+        }
+    }
+    program.flush()
+}
+
+/// Reads the seconds of each part and the hits of all rays. Objects are not named: their distances tell hits apart.
+fn answer(program: &mut impl Read, hits: &mut [Option<Hit>]) -> io::Result<Vec<f64>> {
+    let seconds = read_f64s(program, hits.len().div_ceil(PART))?;
+    let mut bytes = vec![0; 4 * hits.len()];
+    program.read_exact(&mut bytes)?;
+    for (hit, bytes) in hits.iter_mut().zip(bytes.as_chunks().0) {
+        let t = f32::from_le_bytes(*bytes);
+        *hit = t.is_finite().then_some(Hit { t, object: 0 });
+    }
+    Ok(seconds)
+}
+
+fn read_f64s(from: &mut impl Read, count: usize) -> io::Result<Vec<f64>> {
+    let mut bytes = vec![0; 8 * count];
+    from.read_exact(&mut bytes)?;
+    Ok(bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_core::Ray;
+
+    #[test]
+    fn rays_go_out_as_described_and_answers_come_back_in_their_order() {
+        let rays = [Ray::new([1.0, 2.0, 3.0], [0.0, 0.0, -1.0], 0.0, 7.0).unwrap(); 3];
+        let mut sent = Vec::new();
+        ask(&mut sent, &Batch { query: Query::Any, columns: 3, rays: &rays }).unwrap();
+        assert_eq!(sent.len(), 4 * 4 + 3 * 8 * 4);
+        assert_eq!(bytemuck::pod_collect_to_vec::<u8, u32>(&sent[..16]), [1, 3, 3, PART as u32]);
+        let ray: Vec<f32> = bytemuck::pod_collect_to_vec(&sent[16..48]);
+        assert_eq!(ray, [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, -1.0, 7.0]);
+
+        let mut received = 0.25f64.to_le_bytes().to_vec();
+        received.extend([2.5, f32::INFINITY, 0.0].map(f32::to_le_bytes).as_flattened());
+        let mut hits = [None; 3];
+        assert_eq!(answer(&mut &received[..], &mut hits).unwrap(), [0.25]);
+        let hit = |t| Some(Hit { t, object: 0 });
+        assert_eq!(hits, [hit(2.5), None, hit(0.0)]);
+        assert!(answer(&mut &received[1..], &mut hits).is_err(), "an answer that is cut short");
+    }
+
+    #[test]
+    fn a_program_that_is_not_there_is_named() {
+        let scene = Scene::load("escher:20").unwrap();
+        let Err(message) = contenders(Path::new("no/ray_peers"), &scene) else { panic!("it ran") };
+        assert!(message.contains("no/ray_peers"), "{message}");
+    }
+}

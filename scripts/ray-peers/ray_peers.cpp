@@ -1,0 +1,289 @@
+// Traces rays with Embree and tinybvh for the harness: a mesh and rays in through standard input, seconds and distances
+// out through standard output. `ray_peers MODE` traces by one mode; `ray_peers` alone lists all of them.
+//
+// Everything is in the machine's byte order (little-endian on every supported one):
+//
+//   in:   u32 triangles, then 9 f32 for each
+//   out:  f64 seconds that the build took
+//   in:   u32 any hit (1) or nearest hit (0), u32 columns, u32 rays, u32 rays per part, then 8 f32 for each ray: origin,
+//         t_min, direction (a unit vector), t_max
+//   out:  f64 seconds for each part, then f32 for each ray: the distance of its hit, or infinity; for any hit 0 or infinity
+//
+// and so on until the input ends. `columns` is the width of a picture if the rays go from one point through its pixels, row
+// by row from the upper left corner in right-handed coordinates; otherwise 0. Only packets make use of it.
+
+#define TINYBVH_IMPLEMENTATION
+#include "tiny_bvh.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace {
+
+constexpr float MISS = std::numeric_limits<float>::infinity();
+
+struct Ray {
+    float origin[3], t_min, direction[3], t_max;
+};
+
+struct Query {
+    uint32_t any, columns, count, part;
+};
+
+double now() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// A structure over a mesh.
+struct Tracer {
+    virtual ~Tracer() = default;
+    /// Answers `count` consecutive rays of a query, of which `rays` is the first, and returns the seconds of tracing alone.
+    /// The harness makes its rays before its clock starts, so conversions to the library's rays are not timed either:
+    /// they are made in blocks that stay in the first cache.
+    virtual double trace(const Query &query, const Ray *rays, size_t count, float *distances) = 0;
+};
+
+constexpr size_t BLOCK = 256;
+
+// ---------------------------------------------------------------------------------------------------------- Embree
+// The part of Embree 4's interface that is used here, so that only its library is needed, not its headers.
+
+extern "C" {
+struct RTCDeviceTy;
+struct RTCSceneTy;
+struct RTCGeometryTy;
+struct alignas(16) RTCRay {
+    float org_x, org_y, org_z, tnear, dir_x, dir_y, dir_z, time, tfar;
+    unsigned mask, id, flags;
+};
+struct alignas(16) RTCHit {
+    float Ng_x, Ng_y, Ng_z, u, v;
+    unsigned primID, geomID, instID, instPrimID;
+};
+struct RTCRayHit {
+    RTCRay ray;
+    RTCHit hit;
+};
+RTCDeviceTy *rtcNewDevice(const char *config);
+RTCSceneTy *rtcNewScene(RTCDeviceTy *device);
+void rtcSetSceneFlags(RTCSceneTy *scene, int flags);
+void rtcSetSceneBuildQuality(RTCSceneTy *scene, int quality);
+RTCGeometryTy *rtcNewGeometry(RTCDeviceTy *device, int type);
+void *rtcSetNewGeometryBuffer(RTCGeometryTy *geometry, int type, unsigned slot, int format, size_t stride, size_t count);
+void rtcCommitGeometry(RTCGeometryTy *geometry);
+unsigned rtcAttachGeometry(RTCSceneTy *scene, RTCGeometryTy *geometry);
+void rtcCommitScene(RTCSceneTy *scene);
+void rtcIntersect1(RTCSceneTy *scene, RTCRayHit *ray, void *arguments);
+void rtcOccluded1(RTCSceneTy *scene, RTCRay *ray, void *arguments);
+}
+
+class Embree : public Tracer {
+    RTCSceneTy *scene;
+
+public:
+    Embree(const std::vector<float> &corners, bool high, bool robust) {
+        constexpr int TRIANGLE = 0, INDEX = 0, VERTEX = 1, UINT3 = 0x5003, FLOAT3 = 0x9003;
+        constexpr int ROBUST = 1 << 2, MEDIUM_QUALITY = 1, HIGH_QUALITY = 2;
+        RTCDeviceTy *device = rtcNewDevice("threads=1,set_affinity=0");
+        scene = rtcNewScene(device);
+        rtcSetSceneFlags(scene, robust ? ROBUST : 0);
+        rtcSetSceneBuildQuality(scene, high ? HIGH_QUALITY : MEDIUM_QUALITY);
+        RTCGeometryTy *mesh = rtcNewGeometry(device, TRIANGLE);
+        size_t vertices = corners.size() / 3;
+        memcpy(rtcSetNewGeometryBuffer(mesh, VERTEX, 0, FLOAT3, 12, vertices), corners.data(), 12 * vertices);
+        auto *indices = static_cast<unsigned *>(rtcSetNewGeometryBuffer(mesh, INDEX, 0, UINT3, 12, vertices / 3));
+        for (size_t i = 0; i < vertices; i++) indices[i] = unsigned(i);
+        rtcCommitGeometry(mesh);
+        rtcAttachGeometry(scene, mesh);
+        rtcCommitScene(scene);
+    }
+
+    double trace(const Query &query, const Ray *rays, size_t count, float *distances) override {
+        double seconds = 0;
+        RTCRayHit block[BLOCK];
+        for (size_t first = 0; first < count; first += BLOCK) {
+            size_t size = std::min(BLOCK, count - first);
+            for (size_t i = 0; i < size; i++) {
+                const auto &[origin, t_min, direction, t_max] = rays[first + i];
+                block[i].ray = {origin[0], origin[1], origin[2], t_min, direction[0], direction[1], direction[2], 0,
+                                t_max, ~0u, 0, 0};
+                block[i].hit.geomID = block[i].hit.instID = block[i].hit.instPrimID = ~0u;
+            }
+            double start = now();
+            if (query.any)
+                for (size_t i = 0; i < size; i++) rtcOccluded1(scene, &block[i].ray, nullptr);
+            else
+                for (size_t i = 0; i < size; i++) rtcIntersect1(scene, &block[i], nullptr);
+            seconds += now() - start;
+            for (size_t i = 0; i < size; i++) {
+                bool hit = query.any ? block[i].ray.tfar < 0 : block[i].hit.geomID != ~0u;
+                distances[first + i] = !hit ? MISS : query.any ? 0 : block[i].ray.tfar;
+            }
+        }
+        return seconds;
+    }
+};
+
+// --------------------------------------------------------------------------------------------------------- tinybvh
+
+std::vector<tinybvh::bvhvec4> padded(const std::vector<float> &corners) {
+    std::vector<tinybvh::bvhvec4> vertices;
+    for (size_t i = 0; i < corners.size(); i += 3) vertices.emplace_back(corners[i], corners[i + 1], corners[i + 2], 0.f);
+    return vertices;
+}
+
+float far_end(const Ray &ray) { return std::fmin(ray.t_max, BVH_FAR); }
+
+/// tinybvh's rays begin at distance 0.
+tinybvh::Ray to_tinybvh(const Ray &ray) {
+    const float *o = ray.origin, *d = ray.direction;
+    return {{o[0], o[1], o[2]}, {d[0], d[1], d[2]}, far_end(ray)};
+}
+
+/// One of tinybvh's layouts, ray by ray.
+template <class Layout> class TinyBvh : public Tracer {
+    std::vector<tinybvh::bvhvec4> vertices;
+
+protected:
+    Layout layout;
+
+public:
+    TinyBvh(const std::vector<float> &corners, bool splits) : vertices(padded(corners)) {
+        uint32_t triangles = uint32_t(vertices.size() / 3);
+        if (splits) layout.BuildHQ(vertices.data(), triangles);
+        else layout.Build(vertices.data(), triangles);
+    }
+
+    double trace(const Query &query, const Ray *rays, size_t count, float *distances) override {
+        double seconds = 0;
+        tinybvh::Ray block[BLOCK];
+        bool occluded[BLOCK];
+        for (size_t first = 0; first < count; first += BLOCK) {
+            size_t size = std::min(BLOCK, count - first);
+            for (size_t i = 0; i < size; i++) block[i] = to_tinybvh(rays[first + i]);
+            double start = now();
+            if (query.any)
+                for (size_t i = 0; i < size; i++) occluded[i] = layout.IsOccluded(block[i]);
+            else
+                for (size_t i = 0; i < size; i++) layout.Intersect(block[i]);
+            seconds += now() - start;
+            for (size_t i = 0; i < size; i++) {
+                bool hit = query.any ? occluded[i] : block[i].hit.t < far_end(rays[first + i]);
+                distances[first + i] = !hit ? MISS : query.any ? 0 : block[i].hit.t;
+            }
+        }
+        return seconds;
+    }
+};
+
+/// tinybvh's packets of 16 × 16 primary rays through its binary tree; other rays go through the same tree one by one.
+class TinyBvhPackets : public TinyBvh<tinybvh::BVH> {
+    static constexpr uint32_t SIDE = 16;
+    static_assert(SIDE * SIDE == BLOCK);
+
+public:
+    using TinyBvh::TinyBvh;
+
+    double trace(const Query &query, const Ray *rays, size_t count, float *distances) override {
+        uint32_t columns = query.columns;
+        // Packets are cut out of bands of 16 whole rows of the picture.
+        if (query.any || columns == 0 || columns % SIDE != 0 || count % (SIDE * columns) != 0)
+            return TinyBvh::trace(query, rays, count, distances);
+        double seconds = 0;
+        tinybvh::Ray packet[BLOCK];
+        for (size_t top = 0; top < count / columns; top += SIDE) {
+            for (size_t left = 0; left < columns; left += SIDE) {
+                // The order that tinybvh expects: 4 × 4 blocks of 4 × 4 pixels, mirrored, as its pictures are left-handed.
+                auto pixel = [&](uint32_t i) {
+                    uint32_t x = SIDE - 1 - (i / 16 % 4 * 4 + i % 4), y = i / 64 * 4 + i / 4 % 4;
+                    return (top + y) * columns + left + x;
+                };
+                for (uint32_t i = 0; i < BLOCK; i++) packet[i] = to_tinybvh(rays[pixel(i)]);
+                double start = now();
+                layout.Intersect256RaysSSE(packet);
+                seconds += now() - start;
+                for (uint32_t i = 0; i < BLOCK; i++)
+                    distances[pixel(i)] = packet[i].hit.t < far_end(rays[pixel(i)]) ? packet[i].hit.t : MISS;
+            }
+        }
+        return seconds;
+    }
+};
+
+// ------------------------------------------------------------------------------------------------------------ modes
+
+struct Mode {
+    const char *name;
+    std::unique_ptr<Tracer> (*make)(const std::vector<float> &corners);
+};
+
+template <class T, bool... Settings> std::unique_ptr<Tracer> make(const std::vector<float> &corners) {
+    return std::make_unique<T>(corners, Settings...);
+}
+
+constexpr Mode MODES[] = {
+    {"embree medium", make<Embree, false, false>},
+    {"embree high", make<Embree, true, false>},
+    {"embree medium robust", make<Embree, false, true>},
+    {"embree high robust", make<Embree, true, true>},
+    {"tinybvh BVH4", make<TinyBvh<tinybvh::BVH4_CPU>, false>},
+    {"tinybvh BVH4 splits", make<TinyBvh<tinybvh::BVH4_CPU>, true>},
+    {"tinybvh BVH8", make<TinyBvh<tinybvh::BVH8_CPU>, false>},
+    {"tinybvh BVH8 splits", make<TinyBvh<tinybvh::BVH8_CPU>, true>},
+    {"tinybvh packets", make<TinyBvhPackets, false>},
+    {"tinybvh packets splits", make<TinyBvhPackets, true>},
+};
+
+template <class T> bool read(std::vector<T> &values) {
+    return fread(values.data(), sizeof(T), values.size(), stdin) == values.size();
+}
+
+template <class T> void write(const std::vector<T> &values) {
+    fwrite(values.data(), sizeof(T), values.size(), stdout);
+}
+
+int serve(const Mode &mode) {
+    std::vector<uint32_t> triangles(1);
+    if (!read(triangles)) return 1;
+    std::vector<float> corners(9 * size_t(triangles[0]));
+    if (!read(corners)) return 1;
+    double start = now();
+    std::unique_ptr<Tracer> tracer = mode.make(corners);
+    write(std::vector<double>{now() - start});
+    fflush(stdout);
+    std::vector<Query> query(1);
+    while (read(query)) {
+        std::vector<Ray> rays(query[0].count);
+        if (!read(rays) || query[0].part == 0) return 1;
+        std::vector<float> distances(rays.size());
+        std::vector<double> seconds;
+        for (size_t first = 0; first < rays.size(); first += query[0].part) {
+            size_t count = std::min<size_t>(query[0].part, rays.size() - first);
+            seconds.push_back(tracer->trace(query[0], &rays[first], count, &distances[first]));
+        }
+        write(seconds);
+        write(distances);
+        fflush(stdout);
+    }
+    return 0;
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+    for (const Mode &mode : MODES) {
+        if (argc < 2) puts(mode.name);
+        else if (!strcmp(argv[1], mode.name)) return serve(mode);
+    }
+    if (argc < 2) return 0;
+    fprintf(stderr, "ray_peers: %s is no mode; accepted: one of those that ray_peers alone lists\n", argv[1]);
+    return 2;
+}
