@@ -21,7 +21,7 @@ pub fn rows(
         let mode = if library == trace.method {
             trace.layout.clone()
         } else {
-            format!("{}, {}", trace.method, trace.layout)
+            format!("{}: {}", trace.method, trace.layout)
         };
         PeerRayRow {
             scene: trace.scene.clone(),
