@@ -8,7 +8,7 @@ use crate::scenes::Scene;
 use crate::statistics::{median, minimum};
 use bvh_build::config;
 use bvh_core::cost::SahConstants;
-use bvh_core::{Bvh, Hit, Ray, TestCounts, WideBvh, collapse_leaves};
+use bvh_core::{Bvh, Coherence, Hit, Ray, TestCounts, WideBvh, collapse_leaves};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -50,6 +50,8 @@ pub enum Layout {
     /// [`WideBvh`] with the best instructions of this machine, laid out once more: only noise tells its times from those
     /// of `Wide`.
     WideAgain,
+    /// [`WideBvh`] that is handed batches of rays, which it traces in packets where they cohere.
+    WideBatches,
     /// [`WideBvh`] with portable code.
     WidePortable,
 }
@@ -74,6 +76,8 @@ pub type Trace<'a> = Box<dyn Fn(&Batch, &mut [Option<Hit>]) -> Result<Vec<f64>, 
 pub enum Tracer<'a> {
     /// One of ours. Its answers must be right bit by bit, and its tests are counted.
     Own(Accelerator<'a>),
+    /// One of ours, batch by batch: packets share tests, which are not counted.
+    Batches(WideBvh),
     /// Another library's.
     Other(Trace<'a>),
 }
@@ -88,6 +92,7 @@ impl Tracer<'_> {
                 Ok(timed(rays, hits, |ray| own.any_hit(ray, &mut ()).then_some(SOME_HIT)))
             }
             (Self::Own(own), _) => Ok(timed(rays, hits, |ray| own.nearest_hit(ray, &mut ()))),
+            (Self::Batches(wide), query) => Ok(in_batches(wide, query, rays, hits)),
         }
     }
 }
@@ -118,6 +123,33 @@ pub fn timed<R>(rays: &[R], hits: &mut [Option<Hit>], mut answer: impl FnMut(&R)
     rays.chunks(PART).zip(hits.chunks_mut(PART)).map(part).collect()
 }
 
+/// Rays that the wide layout is handed at once: their answers stay in the first cache.
+const BATCH: usize = 256;
+
+/// Answers every ray by batches and returns the seconds that each part of them took.
+fn in_batches(wide: &WideBvh, query: Query, rays: &[Ray], hits: &mut [Option<Hit>]) -> Vec<f64> {
+    let (mut nearest, mut any) = ([Hit::MISS; BATCH], [false; BATCH]);
+    let mut batch = |(rays, hits): (&[Ray], &mut [Option<Hit>])| {
+        let (nearest, any) = (&mut nearest[..rays.len()], &mut any[..rays.len()]);
+        let start = Instant::now();
+        if query == Query::Any {
+            wide.any_hits(rays, any, Coherence::Coherent);
+        } else {
+            wide.nearest_hits(rays, nearest, Coherence::Coherent);
+        }
+        let seconds = start.elapsed().as_secs_f64();
+        for ((hit, nearest), any) in hits.iter_mut().zip(nearest).zip(any) {
+            let found = if query == Query::Any { any.then_some(SOME_HIT) } else { Some(*nearest) };
+            *hit = found.filter(|hit| !hit.is_miss());
+        }
+        seconds
+    };
+    let part = |(rays, hits): (&[Ray], &mut [Option<Hit>])| {
+        rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)).map(&mut batch).sum()
+    };
+    rays.chunks(PART).zip(hits.chunks_mut(PART)).map(part).collect()
+}
+
 /// One of our trees, valid over the scene, in each of these layouts. An error says why there is no such layout.
 pub fn own_contenders<'a>(
     layouts: &[Layout],
@@ -126,23 +158,21 @@ pub fn own_contenders<'a>(
 ) -> Result<Vec<Contender<'a>>, String> {
     let contender = |&layout: &Layout| {
         let triangles = scene.triangles().map_err(|error| error.to_string())?;
+        let accelerator = |structure| Tracer::Own(Accelerator::new(&scene.primitives, structure));
         let start = Instant::now();
         let wide = || WideBvh::new(tree, triangles).map_err(|error| error.to_string());
-        let (name, structure) = match layout {
-            Layout::Binary => ("binary", Structure::Tree(Cow::Borrowed(tree))),
+        let (name, tracer) = match layout {
+            Layout::Binary => ("binary", accelerator(Structure::Tree(Cow::Borrowed(tree)))),
             Layout::BinaryLeaves => {
                 let merged = collapse_leaves(tree, &SahConstants::default());
-                ("binary, merged leaves", Structure::Tree(Cow::Owned(merged)))
+                ("binary, merged leaves", accelerator(Structure::Tree(Cow::Owned(merged))))
             }
-            Layout::Wide => ("wide", Structure::Wide(wide()?)),
-            Layout::WideAgain => ("wide, again", Structure::Wide(wide()?)),
-            Layout::WidePortable => ("wide, portable", Structure::WidePortable(wide()?)),
+            Layout::Wide => ("wide", accelerator(Structure::Wide(wide()?))),
+            Layout::WideAgain => ("wide, again", accelerator(Structure::Wide(wide()?))),
+            Layout::WideBatches => ("wide, batches", Tracer::Batches(wide()?)),
+            Layout::WidePortable => ("wide, portable", accelerator(Structure::WidePortable(wide()?))),
         };
-        Ok(Contender {
-            layout: name.into(),
-            preparation_seconds: start.elapsed().as_secs_f64(),
-            tracer: Tracer::Own(Accelerator::new(&scene.primitives, structure)),
-        })
+        Ok(Contender { layout: name.into(), preparation_seconds: start.elapsed().as_secs_f64(), tracer })
     };
     layouts.iter().map(contender).collect()
 }
@@ -219,7 +249,9 @@ impl OfKind<'_> {
     fn row(&self, method: &str, contender: &Contender, hits: &[Option<Hit>]) -> TraceRow {
         let query = self.kind.query();
         let found = match (&contender.tracer, query) {
-            (Tracer::Own(_), Query::Nearest) => answers::exact_disagreements(self.right, hits),
+            (Tracer::Own(_) | Tracer::Batches(_), Query::Nearest) => {
+                answers::exact_disagreements(self.right, hits)
+            }
             _ => answers::disagreements(self.right, hits, self.tree, self.rays),
         };
         let counts = match &contender.tracer {
@@ -228,7 +260,7 @@ impl OfKind<'_> {
                 self.rays.iter().for_each(|ray| _ = own.count(query, ray, &mut counts));
                 Some(counts)
             }
-            Tracer::Other(_) => None,
+            Tracer::Batches(_) | Tracer::Other(_) => None,
         };
         let per_ray = |tests: u64| tests as f64 / self.rays.len().max(1) as f64;
         TraceRow {
@@ -257,14 +289,15 @@ mod tests {
         let scene = Scene::load("escher:3000").unwrap();
         let good = muller_fellner::Config::default().build(&scene.boxes).unwrap();
         let bad = median_cut::Config::default().build(&scene.boxes).unwrap();
-        let config: Config = toml::from_str("count = 5000\nrounds = 2").unwrap();
+        let mut config: Config = toml::from_str("count = 5000\nrounds = 2").unwrap();
+        config.layouts.push(Layout::WideBatches);
         let mut contenders = Vec::new();
         for (method, tree) in [("good", &good), ("bad", &bad)] {
             let own = own_contenders(&config.layouts, &scene, tree).unwrap();
             contenders.extend(own.into_iter().map(|contender| (method.to_owned(), contender)));
         }
         let (rows, times) = measure(&config, &scene, &good, &contenders, 1, || false).unwrap().unwrap();
-        assert_eq!((rows.len(), times.len()), (32, 32));
+        assert_eq!((rows.len(), times.len()), (40, 40));
         assert!(times.iter().all(|row| 0.0 < row.seconds && row.seconds <= row.median_seconds));
         for row in &rows {
             assert!(row.hits > 100 && row.hits < row.count, "{row:?}");
