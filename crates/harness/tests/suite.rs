@@ -6,7 +6,7 @@ use harness::measure::{Accelerator, Structure};
 use harness::scenes::stiff::{self, STIFF};
 use harness::scenes::{Primitives, Scene};
 use harness::stress::{
-    self, CASES, Case, Cell, Check, EXACT_OBJECTS, Part, Size, examine, is_builder,
+    self, CASES, Case, Cell, Check, EXACT_OBJECTS, Effort, LargerScenes, Part, Size, examine, is_builder,
     tracing::{self, TRAVERSALS},
 };
 use rayon::prelude::*;
@@ -14,6 +14,9 @@ use std::collections::BTreeSet;
 
 /// Nodes per object that a search may make or visit here.
 const WORK: u64 = 150;
+
+/// What is asked of every method in the quick tier.
+const QUICK: Effort = Effort { builders: Size::Few, work_per_object: WORK, larger: None };
 
 /// Panics with all broken promises at once.
 fn assert_kept(broken: Vec<String>) {
@@ -57,11 +60,11 @@ fn every_scene_has_the_size_it_is_asked_for() {
 }
 
 /// The methods of one half, so that two threads share them.
-fn check_methods(half: usize) {
+fn check_methods(half: usize, effort: Effort) {
     let mut found = Vec::new();
     for (label, method) in stress::methods().into_iter().skip(half).step_by(2) {
         for case in &CASES {
-            found.extend(broken(case, &label, case.of_method(&method, Size::Few, WORK)));
+            found.extend(broken(case, &label, case.of_method(&method, &effort)));
         }
     }
     assert_kept(found);
@@ -69,35 +72,44 @@ fn check_methods(half: usize) {
 
 #[test]
 fn every_case_holds_for_every_method() {
-    check_methods(0);
+    check_methods(0, QUICK);
 }
 
 #[test]
 fn every_case_holds_for_every_other_method() {
-    check_methods(1);
+    check_methods(1, QUICK);
 }
 
-fn check_builders(size: Size) {
-    let mut found = Vec::new();
-    for method in Method::all().iter().filter(|method| is_builder(method)) {
-        for case in &CASES {
-            let examined = case.scene().map(|scene| examine::examine(case, scene, method, size, WORK));
-            found.extend(broken(case, method.name(), examined.and_then(Result::err).map(Cell::Broken)));
-        }
-    }
-    assert_kept(found);
+/// What is asked in the slow tier: thousands of objects for builders and searches alike.
+const LARGE: Effort = Effort {
+    builders: Size::Many,
+    work_per_object: WORK,
+    larger: Some(LargerScenes { objects: 2000, work_per_object: 60 }),
+};
+
+#[test]
+#[ignore = "slow: thousands of objects"]
+fn every_case_holds_for_every_method_at_a_larger_size() {
+    check_methods(0, LARGE);
 }
 
 #[test]
-#[ignore = "slow: every builder on every scene of thousands of objects"]
-fn every_scene_holds_for_every_builder_at_a_larger_size() {
-    check_builders(Size::Many);
+#[ignore = "slow: thousands of objects"]
+fn every_case_holds_for_every_other_method_at_a_larger_size() {
+    check_methods(1, LARGE);
 }
 
 #[test]
 #[ignore = "by hand: minutes and gigabytes, S36 has ten million triangles"]
 fn every_scene_holds_for_every_builder_at_its_full_size() {
-    check_builders(Size::All);
+    let full = Effort { builders: Size::All, ..QUICK };
+    let mut found = Vec::new();
+    for method in Method::all().iter().filter(|method| is_builder(method)) {
+        for case in &CASES {
+            found.extend(broken(case, method.name(), case.of_method(method, &full)));
+        }
+    }
+    assert_kept(found);
 }
 
 #[test]

@@ -110,15 +110,40 @@ pub fn is_builder(method: &Method) -> bool {
 /// Objects of the scenes for the exact optimum.
 pub const EXACT_OBJECTS: usize = 12;
 
+/// How much is asked of the methods on every scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Size of the scenes that builders get.
+    pub builders: Size,
+    /// Nodes per object that a search may make or visit on a scene of few objects.
+    pub work_per_object: u64,
+    /// What searches get besides, if anything.
+    pub larger: Option<LargerScenes>,
+}
+
+/// Scenes for searches beyond those of few objects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LargerScenes {
+    /// Objects per scene; less where [`Size::Many`] is less.
+    pub objects: usize,
+    /// Nodes per object that a search may make or visit there.
+    pub work_per_object: u64,
+}
+
 impl SceneCase {
-    /// Number of objects that a method gets: searches few, the exact optimum [`EXACT_OBJECTS`] at most.
-    pub fn objects(&self, method: &Method, size: Size) -> usize {
-        let few = self.sizes[Size::Few as usize];
-        match method {
-            Method::Exact(_) => few.min(EXACT_OBJECTS),
-            builder if is_builder(builder) => self.sizes[size as usize],
-            _ => few,
-        }
+    /// The numbers of objects that a method gets, each with its work per object, in ascending order. The exact optimum
+    /// gets [`EXACT_OBJECTS`] at most.
+    pub fn extents(&self, method: &Method, effort: &Effort) -> Vec<(usize, u64)> {
+        let few = (self.sizes[Size::Few as usize], effort.work_per_object);
+        let further = match method {
+            Method::Exact(_) => return vec![(few.0.min(EXACT_OBJECTS), few.1)],
+            builder if is_builder(builder) => Some((self.sizes[effort.builders as usize], few.1)),
+            _ => effort
+                .larger
+                .map(|larger| (larger.objects.min(self.sizes[Size::Many as usize]), larger.work_per_object)),
+        };
+        [few].into_iter().chain(further.filter(|further| further.0 > few.0)).collect()
     }
 }
 

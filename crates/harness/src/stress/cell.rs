@@ -1,6 +1,6 @@
 //! Carries out the checks of one case for one method, traversal or part: a cell of the suite's table.
 
-use super::case::{Case, Check, EXACT_OBJECTS, Part, Size};
+use super::case::{Case, Check, EXACT_OBJECTS, Effort, Part, Size};
 use super::examine::{self, Examined};
 use super::promise::{Broken, Promise, Verdict};
 use super::tracing;
@@ -43,14 +43,15 @@ impl Cell {
 }
 
 impl Case {
-    /// All that is asked of a method; `None` if nothing is. A scene is checked at [`Size::Few`] and then at `size`.
-    pub fn of_method(&self, method: &Method, size: Size, work_per_object: u64) -> Option<Cell> {
+    /// All that is asked of a method; `None` if nothing is. Of a scene at several sizes the largest is reported.
+    pub fn of_method(&self, method: &Method, effort: &Effort) -> Option<Cell> {
         let cells = self.checks.iter().filter_map(|check| match check {
             Check::Scene(scene) => {
-                let examine = |size| examine::examine(self, scene, method, size, work_per_object);
-                let grows = scene.objects(method, size) > scene.objects(method, Size::Few);
-                let first = if grows { examine(Size::Few).map(drop) } else { Ok(()) };
-                Some(first.and_then(|()| examine(size)).map_or_else(Cell::Broken, Cell::Kept))
+                let extents = scene.extents(method, effort).into_iter();
+                let examined =
+                    extents.map(|(objects, work)| examine::examine(self, scene, method, objects, work));
+                let all: Result<Vec<Examined>, Broken> = examined.collect();
+                Some(all.map_or_else(Cell::Broken, |mut all| Cell::Kept(all.pop().unwrap_or_default())))
             }
             Check::Refused { boxes, object } => {
                 let objects = if let Method::Exact(_) = method { EXACT_OBJECTS } else { 100 };

@@ -1,6 +1,6 @@
 //! One method on one scene: whether the promises P1, P2 and P4 to P7 are kept, and the numbers to report.
 
-use super::case::{Case, SceneCase, Size, is_builder};
+use super::case::{Case, SceneCase, is_builder};
 use super::exact_area::{internal_area, relative_error};
 use super::promise::Promise::{P1, P2};
 use super::promise::{Broken, Verdict, ensure};
@@ -58,15 +58,15 @@ fn panicked(panic: &(dyn std::any::Any + Send)) -> Broken {
     P1.broken(format!("panicked: {}", text.unwrap_or_default()))
 }
 
-/// Checks a method on the scene of a case at a size.
+/// Checks a method on the scene of a case with so many objects.
 pub fn examine(
     case: &Case,
     scene: &SceneCase,
     method: &Method,
-    size: Size,
+    objects: usize,
     work_per_object: u64,
 ) -> Result<Examined, Broken> {
-    let boxes = stiff::boxes(&case.triangles(scene.objects(method, size)));
+    let boxes = stiff::boxes(&case.triangles(objects));
     let start = Instant::now();
     let outcome = run(method, &boxes, work_per_object)?;
     let seconds = start.elapsed().as_secs_f64();

@@ -18,7 +18,7 @@ pub mod tracing;
 pub mod transform;
 
 use bvh_build::OutOfRange;
-pub use case::{Case, Check, EXACT_OBJECTS, Part, Size, is_builder, methods};
+pub use case::{Case, Check, EXACT_OBJECTS, Effort, LargerScenes, Part, Size, is_builder, methods};
 pub use cell::Cell;
 pub use promise::{Broken, Promise, Verdict};
 pub use table::{CASES, by_id};

@@ -1,6 +1,6 @@
 //! The experiment `stability`: every case with every method, traversal and part, as rows and a heat map.
 
-use super::case::{Case, Part, SceneCase, Size, is_builder};
+use super::case::{Case, Effort, LargerScenes, Part, SceneCase, Size, is_builder};
 use super::cell::Cell;
 use super::examine::Examined;
 use super::peers::{self, Found};
@@ -26,6 +26,8 @@ config! {
         builders: Size = Size::Many;
         /// Budget of a search: nodes per object that it may make or visit.
         work_per_object: u64 = 1000, in 1..;
+        /// Scenes for searches beyond those of few objects, each built once more. Default none.
+        larger_searches: Option<LargerScenes>;
         /// Rays per scene and traversal.
         rays: usize = 5000, in 1..=100_000_000;
         /// Seconds after which the build of another library, if any is compiled in, counts as hanging.
@@ -155,6 +157,11 @@ impl Config {
     ) -> Result<String, Error> {
         let chosen = |case: &&Case| cases.is_empty() || cases.iter().any(|id| id == case.id);
         let cases: Vec<&Case> = CASES.iter().filter(chosen).collect();
+        let effort = Effort {
+            builders: self.builders,
+            work_per_object: self.work_per_object,
+            larger: self.larger_searches,
+        };
         let (mut rows, mut times, mut peers) = (Vec::new(), Vec::new(), Vec::<Row>::new());
         for (done, case) in cases.iter().enumerate() {
             if interrupted() {
@@ -162,7 +169,7 @@ impl Config {
             }
             for Labelled { label, method, .. } in methods {
                 let Contestant::Ours(method) = method else { continue };
-                let cell = case.of_method(method, self.builders, self.work_per_object);
+                let cell = case.of_method(method, &effort);
                 let Some((row, examined)) = cell.map(|cell| Row::new(case, label, cell)) else { continue };
                 times.extend(examined.map(|Examined { objects, seconds, .. }| {
                     Timing {

@@ -1,6 +1,6 @@
 //! What the cases ask of rays, their ranges, and the estimator that traces random ones.
 
-use crate::measure::{Query, empirical_cost, rays::Family};
+use crate::measure::{Accelerator, Query, Structure, empirical_cost, rays::Family};
 use crate::run::rows::RayRow;
 use crate::scenes::{Primitives, Scene, SceneKind, stiff};
 use crate::stress::promise::{Broken, Verdict, ensure};
@@ -51,6 +51,37 @@ pub fn ranges_are_defined() -> Verdict {
         ensure!(Ray::new(origin, Vec3::Z, t_min, t_max).is_err(), "range {t_min}..={t_max} is accepted");
     }
     Ok(String::new())
+}
+
+/// S22: distances so small that they are denormal, or round to 0, are the same in every traversal.
+///
+/// Coordinates from 2^-100 on and directions up to 1e30 make distances from far below the smallest number up to 1.
+pub fn denormal_distances() -> Verdict {
+    let mut hits = 0;
+    let mut check = |objects: &Primitives, rays: &[Ray]| {
+        hits +=
+            rays.iter().filter(|ray| Accelerator::new(objects, Structure::Brute).any_hit(ray, &mut ())).count();
+        tracing::TRAVERSALS.iter().try_for_each(|(name, traversal)| {
+            tracing::check(*traversal, objects, rays).map(drop).map_err(|broken| broken.within(name))
+        })
+    };
+    let facing = Triangle([[-1.0, -1.0, 1e-30], [3.0, -1.0, 1e-30], [-1.0, 3.0, 1e-30]].map(Vec3::from));
+    let ray = Ray::new(Vec3::ZERO, Vec3::Z * 1e20, 0.0, 0.0).map_err(Broken::case)?;
+    check(&Primitives::Triangles(vec![facing]), &[ray])?;
+    for k in [-100, -60, -40, -20] {
+        let scale = 2f32.powi(k);
+        let triangles: Vec<Triangle> =
+            stiff::uniform(60).into_iter().map(|triangle| Triangle(triangle.0.map(|p| p * scale))).collect();
+        let mut rays = Vec::new();
+        for (ray, attempt) in tracing::rays(&triangles, 400, 22).iter().zip(0usize..) {
+            let length = [1.0, 1e20, 1e25, 1e30][attempt % 4] / ray.direction().abs().max_element();
+            let t_max = [0.0, f32::from_bits(1), 1e-40, 1e-38, f32::INFINITY][attempt % 5];
+            rays.extend(Ray::new(ray.origin(), ray.direction() * length, 0.0, t_max));
+        }
+        check(&Primitives::Triangles(triangles), &rays)?;
+    }
+    ensure!(hits > 100, "only {hits} rays hit");
+    Ok(format!("{hits} rays hit"))
 }
 
 /// S44: four times the rays halve the standard error, and the 95 % intervals cover what many more rays find.
