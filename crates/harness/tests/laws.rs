@@ -110,8 +110,13 @@ fn close(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * a.max(b)
 }
 
+/// Scenes per law: few in the quick tier, as many as `PROPTEST_CASES` says in the slow one.
+fn cases() -> u32 {
+    std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(60)
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(ProptestConfig::with_cases(cases()))]
 
     #[test]
     fn every_method_builds_a_tight_tree_of_exact_cost_over_any_finite_bits(boxes in any_boxes()) {
