@@ -118,8 +118,10 @@ mod tests {
         let mut sent = Vec::new();
         ask(&mut sent, &Batch { query: Query::Any, columns: 3, rays: &rays }).unwrap();
         assert_eq!(sent.len(), 4 * 4 + 3 * 8 * 4);
-        assert_eq!(bytemuck::pod_collect_to_vec::<u8, u32>(&sent[..16]), [1, 3, 3, PART as u32]);
-        let ray: Vec<f32> = bytemuck::pod_collect_to_vec(&sent[16..48]);
+        let words = sent.as_chunks::<4>().0;
+        let counts: Vec<u32> = words[..4].iter().map(|word| u32::from_le_bytes(*word)).collect();
+        assert_eq!(counts, [1, 3, 3, PART as u32]);
+        let ray: Vec<f32> = words[4..12].iter().map(|word| f32::from_le_bytes(*word)).collect();
         assert_eq!(ray, [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, -1.0, 7.0]);
 
         let mut received = 0.25f64.to_le_bytes().to_vec();
