@@ -3,21 +3,11 @@
 use super::box_ray::BoxRay;
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
-use super::packet::{Packet, RAYS};
 use super::x86::{Instructions, Pending, any, nearest};
-use crate::{Hit, Ray};
+use crate::Ray;
 use core::arch::x86_64::*;
 
 pub(crate) struct Avx512;
-
-/// Whether the processor has what the kernel needs.
-pub(crate) fn is_available() -> bool {
-    super::avx2::is_available()
-        && is_x86_feature_detected!("avx512f")
-        && is_x86_feature_detected!("avx512vl")
-        && is_x86_feature_detected!("avx512dq")
-        && is_x86_feature_detected!("avx512bw")
-}
 
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
 pub(crate) unsafe fn nearest_hit(wide: &WideBvh, ray: &Ray) -> (f32, u32) {
@@ -29,60 +19,6 @@ pub(crate) unsafe fn nearest_hit(wide: &WideBvh, ray: &Ray) -> (f32, u32) {
 pub(crate) unsafe fn any_hit(wide: &WideBvh, ray: &Ray) -> bool {
     // SAFETY: the caller's promises.
     unsafe { any::<Avx512>(wide, ray) }
-}
-
-/// The nearest hits of all rays, in packets where the rays are coherent.
-///
-/// # Safety
-/// As [`nearest`]; `rays` are as many as `hits`.
-#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-pub(crate) unsafe fn nearest_hits(wide: &WideBvh, rays: &[Ray], hits: &mut [Hit]) {
-    // SAFETY: the caller's promises.
-    unsafe {
-        let (packets, rest) = rays.as_chunks::<RAYS>();
-        for (rays, hits) in packets.iter().zip(hits.chunks_exact_mut(RAYS)) {
-            if let Some(mut packet) = Packet::new(rays, wide.largest) {
-                packet.trace::<false>(wide);
-                let (t, object) = packet.hits();
-                for (i, hit) in hits.iter_mut().enumerate() {
-                    *hit = if object[i] == u32::MAX { Hit::MISS } else { Hit { t: t[i], object: object[i] } };
-                }
-            } else {
-                for (ray, hit) in rays.iter().zip(hits) {
-                    let (t, object) = nearest_hit(wide, ray);
-                    *hit = if object == u32::MAX { Hit::MISS } else { Hit { t, object } };
-                }
-            }
-        }
-        for (ray, hit) in rest.iter().zip(&mut hits[rays.len() - rest.len()..]) {
-            let (t, object) = nearest_hit(wide, ray);
-            *hit = if object == u32::MAX { Hit::MISS } else { Hit { t, object } };
-        }
-    }
-}
-
-/// Whether each ray meets anything, in packets where the rays are coherent.
-///
-/// # Safety
-/// As [`nearest_hits`].
-#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-pub(crate) unsafe fn any_hits(wide: &WideBvh, rays: &[Ray], hits: &mut [bool]) {
-    // SAFETY: the caller's promises.
-    unsafe {
-        let (packets, rest) = rays.as_chunks::<RAYS>();
-        for (rays, hits) in packets.iter().zip(hits.chunks_exact_mut(RAYS)) {
-            if let Some(mut packet) = Packet::new(rays, wide.largest) {
-                packet.trace::<true>(wide);
-                let (_, object) = packet.hits();
-                (0..RAYS).for_each(|i| hits[i] = object[i] != u32::MAX);
-            } else {
-                rays.iter().zip(hits).for_each(|(ray, hit)| *hit = any_hit(wide, ray));
-            }
-        }
-        for (ray, hit) in rest.iter().zip(&mut hits[rays.len() - rest.len()..]) {
-            *hit = any_hit(wide, ray);
-        }
-    }
 }
 
 impl Instructions for Avx512 {

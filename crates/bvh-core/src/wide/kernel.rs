@@ -20,9 +20,9 @@ impl Kernel {
         match self {
             Self::Portable => true,
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
-            Self::Avx2 => super::avx2::is_available(),
+            Self::Avx2 => has_avx2(),
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
-            Self::Avx512 => super::avx512::is_available(),
+            Self::Avx512 => has_avx512(),
             #[allow(unreachable_patterns)]
             _ => false,
         }
@@ -32,6 +32,27 @@ impl Kernel {
     pub fn best() -> Self {
         Self::ALL.into_iter().find(|kernel| kernel.is_available()).unwrap_or(Self::Portable)
     }
+}
+
+/// Whether the processor has what the AVX2 kernel is compiled for.
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+fn has_avx2() -> bool {
+    is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("fma")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+        && is_x86_feature_detected!("popcnt")
+        && is_x86_feature_detected!("lzcnt")
+}
+
+/// Whether the processor has what the AVX-512 kernel is compiled for.
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+fn has_avx512() -> bool {
+    has_avx2()
+        && is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512vl")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512bw")
 }
 
 /// Entries of the stack of a vector kernel's traversal; layouts that could need more are left to the portable kernel.

@@ -5,6 +5,8 @@ mod avx2;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod avx512;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
+mod batch;
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod box_ray;
 mod build;
 mod kernel;
@@ -96,7 +98,7 @@ impl WideBvh {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
         if self.kernel == Kernel::Avx512 && coherence == Coherence::Coherent {
             // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
-            return unsafe { avx512::nearest_hits(self, rays, hits) };
+            return unsafe { batch::nearest_hits(self, rays, hits) };
         }
         let _ = coherence;
         for (ray, hit) in rays.iter().zip(hits) {
@@ -113,7 +115,7 @@ impl WideBvh {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
         if self.kernel == Kernel::Avx512 && coherence == Coherence::Coherent {
             // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
-            return unsafe { avx512::any_hits(self, rays, hits) };
+            return unsafe { batch::any_hits(self, rays, hits) };
         }
         let _ = coherence;
         for (ray, hit) in rays.iter().zip(hits) {
