@@ -38,6 +38,8 @@ use glam::DVec3;
 /// Fractions of a cell that box corners are rounded to, as a power of two.
 const FRACTION_BITS: u32 = 9;
 const FRACTIONS: u32 = 1 << FRACTION_BITS;
+/// What one entry counts as in the arithmetic with whole fractions, which are of all three axes.
+const FRACTIONS_OF_ENTRY: f64 = (1u64 << (3 * FRACTION_BITS)) as f64;
 /// Most segments, so that all arithmetic is exact: 4 · 2²⁰ · 2²⁷ · 8 < 2⁵³.
 const MOST_SEGMENTS: usize = 1 << 20;
 
@@ -137,14 +139,13 @@ impl RayDensity {
             return Err(DensityError::NoneMeets);
         }
         let root = bounds.half_area();
-        let fractional = f64::from(FRACTIONS) * f64::from(FRACTIONS) * f64::from(FRACTIONS);
         Ok(Self {
             low,
             scale: cells_per_unit * f64::from(FRACTIONS),
             corners: crossings.corner_tables(),
             cells: crossings.cell_table(),
             segments: crossings.segments,
-            entry_weight: (1.0 - area_weight) * root / (fractional * f64::from(crossings.segments)),
+            entry_weight: (1.0 - area_weight) * root / (FRACTIONS_OF_ENTRY * f64::from(crossings.segments)),
             area_weight,
         })
     }
@@ -156,8 +157,7 @@ impl RayDensity {
 
     /// The expected number of segments that enter the box; 0 for the empty box. Constant time.
     pub fn entries(&self, bounds: &Aabb) -> f64 {
-        let fractional = f64::from(FRACTIONS) * f64::from(FRACTIONS) * f64::from(FRACTIONS);
-        self.fractional_entries(bounds) / fractional
+        self.fractional_entries(bounds) / FRACTIONS_OF_ENTRY
     }
 
     /// The box's measure in units of half area: that of the scene's bounds is their half area, whatever the segments.
