@@ -2,12 +2,12 @@
 //!
 //! Ng & Trifonov 2003, section 4; operators after Cassen, Michalewicz & Subramanian 1995. An individual is a
 //! permutation of the objects, its fitness the cost of the tree from inserting them in that order. A generation consists
-//! of tournaments of two, one-point order crossover whose children replace the parents, mutation by swaps.
+//! of as many tournaments of two as the population has individuals, one-point order crossover whose children replace the
+//! parents, mutation by swaps.
 //!
-//! Differs from the paper: there is one tournament fewer than the population has individuals, because the best individual
-//! so far takes the place of one winner; the paper says that it 'is always kept' besides as many winners as the population
-//! has individuals, and that the size of the population is constant. Where the paper is silent: neither crossover nor
-//! mutation touches that individual; the number of swaps is uniform between 0 and twice its mean;
+//! Differs from the paper: nothing known. Where the paper is silent: 'the most fit is always kept' means that the best
+//! individual so far takes the place of the least fit of a generation whose individuals are all less fit, so that the
+//! size of the population is constant; the number of swaps is uniform between 0 and twice its mean;
 //! an individual that a generation leaves unchanged is not evaluated again, though it counts as evaluated.
 //!
 //! *Not done*: resuming an insertion where a child's order first differs from its parent's. Of 2n/500 swapped positions
@@ -63,15 +63,16 @@ impl Search for Config {
             if run.stopped().is_some() {
                 break;
             }
-            population = select(&population, &best, &mut rng);
-            // The first individual is the best so far, which stays as it is.
-            cross(&mut population[1..], self.crossover, &mut marks, &mut rng);
-            for individual in &mut population[1..] {
+            population = select(&population, &mut rng);
+            cross(&mut population, self.crossover, &mut marks, &mut rng);
+            for individual in &mut population {
                 mutate(individual, self.mutation, &mut rng);
             }
             let fittest = evaluate(&insertion, &mut population, run);
-            if fittest.cost < best.cost {
+            if fittest.cost <= best.cost {
                 best = fittest;
+            } else {
+                keep(&best, &mut population);
             }
         }
         Ok(insertion.tree(&best.order))
@@ -102,16 +103,22 @@ fn evaluate(insertion: &Insertion, population: &mut [Individual], run: &mut Run)
     fittest.clone()
 }
 
-/// The next population: the best so far, then the winners of tournaments of two, which may draw the same individual twice.
-fn select(population: &[Individual], best: &Individual, rng: &mut Stream) -> Vec<Individual> {
+/// The winners of as many tournaments of two as there are individuals. A tournament may draw the same individual twice.
+fn select(population: &[Individual], rng: &mut Stream) -> Vec<Individual> {
     let count = population.len() as u32;
-    let mut next = vec![best.clone()];
-    next.extend((1..count).map(|_| {
+    let mut tournament = |_| {
         let (a, b) = (rng.random_range(0..count) as usize, rng.random_range(0..count) as usize);
         let (a, b) = (&population[a], &population[b]);
         if b.cost < a.cost { b } else { a }.clone()
-    }));
-    next
+    };
+    (0..count).map(&mut tournament).collect()
+}
+
+/// Puts the best individual so far in the place of the least fit, the last of equals.
+fn keep(best: &Individual, population: &mut [Individual]) {
+    if let Some(least_fit) = population.iter_mut().max_by(|a, b| a.cost.total_cmp(&b.cost)) {
+        least_fit.clone_from(best);
+    }
 }
 
 /// Pairs the parents at random and replaces each pair by its two children with the given probability. Of an odd number,
@@ -209,11 +216,34 @@ mod tests {
                 let outcome = solve(&config, &problem, 3, Budget::default(), &()).unwrap();
                 assert_eq!(outcome.history.len(), 16);
                 assert!(outcome.history.iter().all(|event| event.incumbent <= event.cost));
-                assert!(outcome.history.windows(2).all(|pair| pair[1].cost <= pair[0].incumbent), "{config:?}");
+                assert!(outcome.history.windows(2).all(|pair| pair[1].incumbent <= pair[0].incumbent), "{config:?}");
                 let cost = problem.objective.cost(&outcome.tree);
                 assert!((outcome.cost - cost).abs() <= 1e-12 * cost, "{config:?}: {} and {cost}", outcome.cost);
             }
         }
+    }
+
+    #[test]
+    fn as_many_tournaments_are_held_as_there_are_individuals() {
+        // One individual has one tournament, which it wins, and then its mutant is evaluated.
+        let boxes = scatter(80);
+        let problem = Problem { objective: Objective::GoldsmithSalmon, ..Problem::new(&boxes) };
+        let config = Config { population: 1, generations: 50, mutation: 0.05, ..Config::default() };
+        let history = solve(&config, &problem, 3, Budget::default(), &()).unwrap().history;
+        assert!(history.last().unwrap().incumbent < history[0].cost);
+        for count in [1, 2, 7] {
+            let individual = |at: usize| Individual { order: vec![], cost: at as f64, evaluated: true };
+            let population: Vec<Individual> = (0..count).map(individual).collect();
+            assert_eq!(select(&population, &mut stream(1, 0)).len(), count);
+        }
+    }
+
+    #[test]
+    fn the_best_takes_the_place_of_the_least_fit() {
+        let individual = |cost| Individual { order: vec![], cost, evaluated: true };
+        let mut population = [3.0, 5.0, 4.0].map(individual);
+        keep(&individual(2.0), &mut population);
+        assert_eq!(population.map(|individual| individual.cost), [3.0, 2.0, 4.0]);
     }
 
     #[test]
