@@ -69,7 +69,7 @@ impl Config {
         output.add_csv("omissions", &compared)?;
         output.add_csv("timing_omissions", &times)?;
         let caption = "Ratios repetition by repetition: median, and from quartile to quartile.";
-        output.add_figure("omissions", caption, 1, vec![self.draw(rows, &times)]);
+        output.add_figure("timing_omissions", caption, 1, vec![self.draw(rows, &times)]);
         let columns = ["omission", "scene", "runs", "same_cost", "cost_ratio", "work_ratio"];
         output.show("Cost and work with it left out over those without:", &compared, &columns)?;
         let columns = ["omission", "scene", "ratio_low", "ratio_median", "ratio_high"];

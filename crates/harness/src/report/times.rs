@@ -51,7 +51,7 @@ impl Config {
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("timing_ratios", &ratios)?;
         let caption = "Median of the ratios repetition by repetition, whiskers from quartile to quartile.";
-        output.add_figure("times", caption, 1, vec![self.draw(rows, &ratios)]);
+        output.add_figure("timing_times", caption, 1, vec![self.draw(rows, &ratios)]);
         let explanation = format!("Time over that of '{}', median and quartiles:", first(&self.methods));
         let columns =
             ["scene", "method", "median_seconds", "ratio_low", "ratio_median", "ratio_high", "paper_ratio"];

@@ -68,7 +68,7 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
     let caption = "One point per tree, those of a layout joined; one thread, the fastest of several turns. Cost is the \
                    total area of inner nodes over that of the greedy tree, which is too low for trees whose nodes have \
                    more than two children, as Goldsmith–Salmon's.";
-    output.add_figure("traversal", caption, 2, panels);
+    output.add_figure("timing_traversal", caption, 2, panels);
     let columns = ["scene", "method", "layout", "rays", "cost_over_base", "mrays_per_second"];
     output.show("Million rays per second on one thread:", &speeds, &columns)?;
     let columns = ["scene", "layout", "rays", "trees", "spearman"];

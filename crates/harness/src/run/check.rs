@@ -1,5 +1,5 @@
-//! Compares fresh results with committed ones: the resolved spec key by key, and every CSV file but the timing ones row by
-//! row.
+//! Compares fresh results with committed ones: the resolved spec key by key, every CSV file but the timing ones row by row,
+//! and every figure but the timing ones byte by byte.
 
 use crate::Error;
 use crate::files;
@@ -13,8 +13,9 @@ use toml::{Table, Value};
 /// Differences beyond this many per file are only counted.
 const SHOWN: usize = 5;
 
-/// Lists how the resolved spec and the CSV files in `fresh` differ from those in `committed`, one line each. Rows of the
-/// scenes in `left_out` are not compared.
+/// Lists how the resolved spec, the CSV files and the figures in `fresh` differ from those in `committed`, one line each.
+/// Rows of the scenes in `left_out` are not compared, nor are figures if any scene is left out. Neither are figures if there
+/// are no fresh ones, as of quick variants.
 pub fn compare(fresh: &Path, committed: &Path, left_out: &[String]) -> Result<Vec<String>, Error> {
     let mut names = csv_names(fresh)?;
     if !committed.is_dir() {
@@ -30,7 +31,29 @@ pub fn compare(fresh: &Path, committed: &Path, left_out: &[String]) -> Result<Ve
             _ => differences.push(format!("{name} is committed but is no longer written")),
         }
     }
+    if left_out.is_empty() {
+        differences.extend(compare_figures(fresh, committed)?);
+    }
     Ok(differences)
+}
+
+/// How the figures differ: those of the committed results that hold no seconds are to have the same bytes.
+fn compare_figures(fresh: &Path, committed: &Path) -> Result<Vec<String>, Error> {
+    let drawn = names(fresh, ".svg")?;
+    let mut all = drawn.clone();
+    if !drawn.is_empty() {
+        all.extend(names(committed, ".svg")?);
+    }
+    let difference = |name: String| {
+        let read = |folder: &Path| fs::read(folder.join(&name)).ok();
+        match (read(fresh), read(committed)) {
+            (Some(now), Some(then)) if now == then => None,
+            (Some(_), Some(_)) => Some(format!("{name} is drawn otherwise than the committed figure")),
+            (Some(_), None) => Some(format!("{name} is not among the committed results")),
+            (None, _) => Some(format!("{name} is committed but is no longer drawn")),
+        }
+    };
+    Ok(all.into_iter().filter_map(difference).collect())
 }
 
 /// How the resolved specs differ.
@@ -84,12 +107,16 @@ fn shortened(file: &str, mut differences: Vec<String>) -> Vec<String> {
 
 /// The CSV files of a folder that do not hold seconds or speeds.
 fn csv_names(folder: &Path) -> Result<BTreeSet<String>, Error> {
+    let mut names = names(folder, ".csv")?;
+    names.retain(|name| !PeerRayRow::are_in(&folder.join(name)));
+    Ok(names)
+}
+
+/// The files of a folder whose names end so, without those that hold seconds, as their names say.
+fn names(folder: &Path, end: &str) -> Result<BTreeSet<String>, Error> {
     let entries = fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))?;
     let names = entries.filter_map(|entry| Some(entry.ok()?.file_name().to_string_lossy().into_owned()));
-    let compared = |name: &String| {
-        name.ends_with(".csv") && !name.starts_with("timing") && !PeerRayRow::are_in(&folder.join(name))
-    };
-    Ok(names.filter(compared).collect())
+    Ok(names.filter(|name| name.ends_with(end) && !name.starts_with("timing")).collect())
 }
 
 fn compare_files(
@@ -174,6 +201,24 @@ mod tests {
         assert_eq!(differences(fewer, COMMITTED, &[]), ["runs.csv: 1 rows, committed 2"]);
         assert_eq!(differences(fewer, COMMITTED, &["b".into()]), Vec::<String>::new());
         assert!(differences("scene\na\n", COMMITTED, &[])[0].contains("columns"));
+    }
+
+    #[test]
+    fn a_figure_that_is_drawn_otherwise_is_named_unless_it_shows_seconds_or_lacks_a_scene() {
+        let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+        for (folder, text) in folders.iter().zip(["<svg/>", "<svg></svg>"]) {
+            fs::write(folder.path().join("resolved.toml"), "").unwrap();
+            for name in ["trials.svg", "timing_trials.svg"] {
+                fs::write(folder.path().join(name), text).unwrap();
+            }
+        }
+        let found = |left_out: &[String]| compare(folders[0].path(), folders[1].path(), left_out).unwrap();
+        assert_eq!(found(&[]), ["trials.svg is drawn otherwise than the committed figure"]);
+        assert!(found(&["sponza".into()]).is_empty());
+        fs::write(folders[1].path().join("trials.svg"), "<svg/>").unwrap();
+        assert!(found(&[]).is_empty());
+        fs::remove_file(folders[0].path().join("trials.svg")).unwrap();
+        assert!(found(&[]).is_empty(), "nothing was drawn");
     }
 
     #[test]

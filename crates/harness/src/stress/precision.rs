@@ -253,8 +253,8 @@ impl Config {
         store.write("precision.csv", &to_bytes(&rows, Path::new("precision.csv"))?)?;
         store.write("timing_precision.csv", &to_bytes(&timing, Path::new("timing_precision.csv"))?)?;
         let figure = figure(&rows, &timing);
-        store.write("precision.svg", figures::svg(&figure)?.as_bytes())?;
-        store.write("precision.png", &figures::png(&figure)?)?;
+        store.write("timing_precision.svg", figures::svg(&figure)?.as_bytes())?;
+        store.write("timing_precision.png", &figures::png(&figure)?)?;
         Ok(text(&rows))
     }
 
