@@ -1,6 +1,6 @@
 //! Müller–Fellner against an O(n²) transcription of the paper, and the laws it must obey.
 
-use bvh_build::muller_fellner::{Config, Heuristic};
+use bvh_build::muller_fellner::{Config, Heuristic, MadeUpCosts};
 use bvh_build::top_down::AreaOnly;
 use bvh_build::{BuildError, Builder};
 use bvh_core::{Aabb, Bvh, validate};
@@ -106,6 +106,16 @@ proptest! {
     }
 
     #[test]
+    fn made_up_costs_are_weights(boxes in scene(60), every in 1u32..5, cost in 0u8..9) {
+        let dear = |object: u32| object.is_multiple_of(every);
+        let weights = (0..boxes.len() as u32).map(|object| if dear(object) { f32::from(cost) } else { 1.0 });
+        let weights: Vec<f32> = weights.collect();
+        let costs = MadeUpCosts { every, cost: cost.into() };
+        let config = Config { heuristic: Heuristic::AreaTimesCost(costs), ..Config::default() };
+        prop_assert_eq!(config.build(&boxes).unwrap(), Config::default().build_weighted(&boxes, &weights).unwrap());
+    }
+
+    #[test]
     fn every_reading_of_table_2_is_the_brute_force_one(boxes in scene(70)) {
         type Formula = fn([f64; 2], [f64; 2]) -> f64;
         let readings: [(AreaOnly, Formula); 6] = [
@@ -184,6 +194,10 @@ fn what_cannot_be_built_is_refused_by_name() {
         config.build(&boxes).unwrap_err().to_string(),
         "heuristic.area_times_power is 1.5; accepted: 0 to 1"
     );
+    let costs = MadeUpCosts { every: 0, cost: 2.0 };
+    let config = Config { heuristic: Heuristic::AreaTimesCost(costs), ..Config::default() };
+    let message = config.build(&boxes).unwrap_err().to_string();
+    assert_eq!(message, "heuristic.area_times_cost.every is 0; accepted: 1 or more");
 }
 
 proptest! {

@@ -42,12 +42,41 @@ pub enum Heuristic {
     AreaTimesPower(f64),
     /// Areas alone: the heuristic of Table 2, in one of its readings.
     AreaOnly(AreaOnly),
+    /// S(L)·ΣC_obj(L) + S(R)·ΣC_obj(R) with made-up costs, to see what costs of objects change. Costs that are known are
+    /// given to [`Config::build_weighted`].
+    AreaTimesCost(MadeUpCosts),
+}
+
+/// Costs C_obj for scenes whose objects have none of their own: one object in so many is dearer than the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case", deny_unknown_fields)
+)]
+pub struct MadeUpCosts {
+    /// The objects 0, `every`, 2 · `every` and so on are dear, `every` ≥ 1.
+    pub every: u32,
+    /// What they cost, 0 to 10⁶; the others cost 1.
+    pub cost: f64,
+}
+
+impl MadeUpCosts {
+    fn of(self, objects: usize) -> Vec<f32> {
+        let cost =
+            |object: usize| if object.is_multiple_of(self.every as usize) { self.cost as f32 } else { 1.0 };
+        (0..objects).map(cost).collect()
+    }
 }
 
 impl Check for Heuristic {
     fn check(&self) -> Result<(), OutOfRange> {
         match self {
             Self::AreaTimesPower(power) => (0.0..=1.0).check("area_times_power", power),
+            Self::AreaTimesCost(MadeUpCosts { every, cost }) => {
+                (1..).check("area_times_cost.every", every)?;
+                (0.0..=1e6).check("area_times_cost.cost", cost)
+            }
             _ => Ok(()),
         }
     }
@@ -64,6 +93,9 @@ impl Builder for Config {
                 self.greedy(&scene, &AreaTimesPower::new(scene.len(), p), &mut tree)
             }
             Heuristic::AreaOnly(reading) => self.greedy(&scene, &reading, &mut tree),
+            Heuristic::AreaTimesCost(costs) => {
+                self.greedy(&scene, &AreaTimesWeight(&costs.of(scene.len())), &mut tree);
+            }
         }
         Ok(tree)
     }
@@ -111,6 +143,10 @@ impl Config {
                 divide::divide(scene, &powers, rule, skip, workspace, tree);
             }
             Heuristic::AreaOnly(reading) => divide::divide(scene, &reading, rule, skip, workspace, tree),
+            Heuristic::AreaTimesCost(costs) => {
+                let costs = costs.of(scene.len());
+                divide::divide(scene, &AreaTimesWeight(&costs), rule, skip, workspace, tree);
+            }
         }
     }
 }
