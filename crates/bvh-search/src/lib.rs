@@ -50,6 +50,6 @@ pub use orders::{genetic, random_orders};
 #[cfg(feature = "serde")]
 pub use registry::Method;
 pub use run::{
-    Budget, Event, Observer, Outcome, Problem, Quota, Run, Search, SearchError, Shortcut, StopReason, Stream,
-    Tally, solve,
+    Budget, Event, Judge, Observer, Outcome, Problem, Quota, Run, Search, SearchError, Shortcut, StopReason,
+    Stream, Tally, solve,
 };

@@ -45,7 +45,7 @@ fn no_method_goes_below_the_optimum_the_bound_neither_above_and_the_best_reaches
     for (number, boxes) in instances.iter().enumerate() {
         let problem = Problem::new(boxes);
         let optimum = solve(&exact::Config::default(), &problem, 1, Budget::default(), &()).unwrap().cost;
-        assert!(lower_bound::internal_area(boxes, 8).unwrap() <= optimum, "instance {number}");
+        assert!(lower_bound::internal_area(boxes, 8, &()).unwrap() <= optimum, "instance {number}");
         for method in Method::all() {
             let outcome = solve(&method, &problem, 1, budget, &()).unwrap();
             let name = format!("instance {number}, {}", method.name());

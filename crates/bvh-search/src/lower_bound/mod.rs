@@ -39,6 +39,7 @@
 mod smallest_box;
 
 use crate::parallel::map_init;
+use crate::run::Observer;
 use bvh_build::BuildError;
 use bvh_core::{Aabb, PackedAabb, cost::Sum};
 use smallest_box::{Clusters, Grouped};
@@ -55,21 +56,24 @@ pub const DEFAULT_EFFORT: u32 = 16;
 ///
 /// The result is reduced by the fraction 10⁻¹², more than all rounding errors together. Areas are rounded as in the cost of
 /// a tree and are monotone in the box; only the sums of a few hundred terms and over all objects add errors.
-pub fn internal_area(boxes: &[Aabb], effort: u32) -> Result<f64, BuildError> {
+pub fn internal_area(boxes: &[Aabb], effort: u32, observer: &dyn Observer) -> Result<f64, BuildError> {
     let mut clusters = Clusters::new(boxes)?;
     let n = boxes.len();
     if n < 2 {
         return Ok(0.0);
     }
-    let nearest = map_init(n, || (), |(), at| clusters.smallest_box(clusters.leaf(at), 2, effort));
+    let nearest = map_init(n, || (), |(), at| clusters.smallest_box(clusters.leaf(at), 2, effort, observer));
     let weights = weights(&nearest);
     clusters.set_weights(&weights);
     let classes = Classes::new(clusters.weight());
     let bands: Vec<Grouped> = bands(clusters.weight())
         .map(|from| {
             let groups = clusters.groups(from / SEEDS_PER_SIZE);
-            let areas =
-                map_init(groups.len(), || (), |(), group| clusters.smallest_box(groups[group], from, effort));
+            let areas = map_init(
+                groups.len(),
+                || (),
+                |(), group| clusters.smallest_box(groups[group], from, effort, observer),
+            );
             clusters.grouped(from, &groups, &areas)
         })
         .collect();
@@ -77,6 +81,9 @@ pub fn internal_area(boxes: &[Aabb], effort: u32) -> Result<f64, BuildError> {
         n,
         || (),
         |(), at| {
+            if observer.cancelled() {
+                return 0.0;
+            }
             let mut areas = vec![nearest[at]; classes.first.len()];
             for band in &bands {
                 let class = classes.first.partition_point(|&first| first < band.from);
@@ -87,6 +94,9 @@ pub fn internal_area(boxes: &[Aabb], effort: u32) -> Result<f64, BuildError> {
             weights[at] as f64 * classes.least_path(weights[at], &areas)
         },
     );
+    if observer.cancelled() {
+        return Ok(of_largest(boxes));
+    }
     Ok(shares.into_iter().collect::<Sum>().value() * (1.0 - 1e-12))
 }
 
@@ -221,7 +231,7 @@ mod tests {
             boxes in (0usize..=9, 0usize..3).prop_flat_map(|(n, flat)| scene(n, flat)),
             effort in 0u32..40,
         ) {
-            let (bound, optimum) = (internal_area(&boxes, effort).unwrap(), optimum(&boxes));
+            let (bound, optimum) = (internal_area(&boxes, effort, &()).unwrap(), optimum(&boxes));
             prop_assert!((0.0..=optimum).contains(&bound), "{bound} {optimum}");
         }
     }
@@ -234,7 +244,7 @@ mod tests {
             let corner = |i| [at(i, 1), at(i, 2), at(i, 3)];
             let boxes: Vec<Aabb> =
                 (0..12).map(|i| Aabb::from((corner(i), corner(i).map(|c| c + at(i, 4) / 10.0)))).collect();
-            let tightness = internal_area(&boxes, DEFAULT_EFFORT).unwrap() / optimum(&boxes);
+            let tightness = internal_area(&boxes, DEFAULT_EFFORT, &()).unwrap() / optimum(&boxes);
             assert!(tightness > 0.8, "{tightness}");
         }
     }
@@ -242,18 +252,36 @@ mod tests {
     #[test]
     fn two_objects_have_only_one_tree() {
         let boxes = [Aabb::from(([0.0; 3], [1.0; 3])), Aabb::from(([2.0; 3], [7.0; 3]))];
-        let bound = internal_area(&boxes, 1).unwrap();
+        let bound = internal_area(&boxes, 1, &()).unwrap();
         assert!((1.0 - 1e-11..1.0).contains(&(bound / boxes[0].union(&boxes[1]).half_area())));
     }
 
     #[test]
     fn more_effort_never_hurts_and_shares_add_up() {
         let boxes = crate::scatter::scatter(300);
-        let bounds = [0, 4, 16, 64].map(|effort| internal_area(&boxes, effort).unwrap());
+        let bounds = [0, 4, 16, 64].map(|effort| internal_area(&boxes, effort, &()).unwrap());
         assert!(bounds[0] > 0.0 && bounds.is_sorted(), "{bounds:?}");
         for part in [0.001, 0.2, 0.5, 0.93] {
             assert!((share(part) + share(1.0 - part) - 1.0).abs() < 1e-15);
             assert!(share(part) > share(part + 0.01));
+        }
+    }
+
+    #[test]
+    fn a_cancellation_ends_any_effort_and_leaves_a_bound() {
+        use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+        struct After(AtomicU64);
+        impl Observer for After {
+            fn cancelled(&self) -> bool {
+                self.0.fetch_update(Relaxed, Relaxed, |left| Some(left.saturating_sub(1))) == Ok(0)
+            }
+        }
+        let boxes = crate::scatter::scatter(3000);
+        let whole = internal_area(&boxes, 1, &()).unwrap();
+        for polls in [0, 1, 10_000] {
+            // This effort would take hours.
+            let bound = internal_area(&boxes, u32::MAX, &After(AtomicU64::new(polls))).unwrap();
+            assert!(bound > 0.0 && bound < whole, "{bound} {whole}");
         }
     }
 
@@ -263,10 +291,10 @@ mod tests {
         for factor in [2f32.powi(-140), 2f32.powi(100)] {
             let scaled: Vec<Aabb> =
                 boxes.iter().map(|b| Aabb { min: b.min * factor, max: b.max * factor }).collect();
-            let bound = internal_area(&scaled, 4).unwrap();
+            let bound = internal_area(&scaled, 4, &()).unwrap();
             assert!(bound > 0.0 && bound.is_finite());
         }
         boxes[7].min.y = f32::NAN;
-        assert!(internal_area(&boxes, 4).unwrap_err().to_string().contains("object 7"));
+        assert!(internal_area(&boxes, 4, &()).unwrap_err().to_string().contains("object 7"));
     }
 }

@@ -1,5 +1,6 @@
 //! The smallest box around an object and enough others: branch and bound over its six faces, which may end at any time.
 
+use crate::run::Observer;
 use bvh_build::median_cut::{Config, CutAxis};
 use bvh_build::{BuildError, Builder};
 use bvh_core::{Aabb, Bvh, NodeKind, with_vector_instructions};
@@ -149,8 +150,9 @@ impl Clusters {
 
     /// A lower bound of the half area of every box that contains an object of the cluster `seed` and weighs at least `weight`,
     /// which must not be more than all objects do; the exact minimum for a single object and enough effort.
-    pub fn smallest_box(&self, seed: usize, weight: u64, effort: u32) -> f64 {
-        search(self, seed, weight, effort)
+    /// 0 once the observer cancels.
+    pub fn smallest_box(&self, seed: usize, weight: u64, effort: u32, observer: &dyn Observer) -> f64 {
+        if observer.cancelled() { 0.0 } else { search(self, seed, weight, effort, observer) }
     }
 }
 
@@ -275,11 +277,13 @@ impl Region {
 }
 
 with_vector_instructions! {
-    search = search_plain(clusters: &Clusters, seed: usize, weight: u64, effort: u32) -> f64
+    search = search_plain(
+        clusters: &Clusters, seed: usize, weight: u64, effort: u32, observer: &dyn Observer,
+    ) -> f64
 }
 
 #[inline(always)]
-fn search_plain(clusters: &Clusters, seed: usize, weight: u64, effort: u32) -> f64 {
+fn search_plain(clusters: &Clusters, seed: usize, weight: u64, effort: u32, observer: &dyn Observer) -> f64 {
     let mut around = seed;
     while around != 0 && clusters.weight_of(&clusters.nodes[around].objects) < weight {
         around = clusters.nodes[around].parent;
@@ -294,7 +298,7 @@ fn search_plain(clusters: &Clusters, seed: usize, weight: u64, effort: u32) -> f
     loop {
         let least = (0..regions.len()).min_by(|&a, &b| regions[a].bound.total_cmp(&regions[b].bound));
         let Some(least) = least.filter(|&least| regions[least].bound < known) else { return known };
-        if left == 0 {
+        if left == 0 || observer.cancelled() {
             return regions[least].bound;
         }
         let region = regions.swap_remove(least);

@@ -216,7 +216,10 @@ mod tests {
                 let outcome = solve(&config, &problem, 3, Budget::default(), &()).unwrap();
                 assert_eq!(outcome.history.len(), 16);
                 assert!(outcome.history.iter().all(|event| event.incumbent <= event.cost));
-                assert!(outcome.history.windows(2).all(|pair| pair[1].incumbent <= pair[0].incumbent), "{config:?}");
+                assert!(
+                    outcome.history.windows(2).all(|pair| pair[1].incumbent <= pair[0].incumbent),
+                    "{config:?}"
+                );
                 let cost = problem.objective.cost(&outcome.tree);
                 assert!((outcome.cost - cost).abs() <= 1e-12 * cost, "{config:?}: {} and {cost}", outcome.cost);
             }

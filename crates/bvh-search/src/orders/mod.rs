@@ -41,7 +41,8 @@ impl<'p> Insertion<'p> {
             debug_assert!(false, "orders are permutations");
             return f64::INFINITY;
         };
-        if self.problem.measure.is_none() && self.problem.objective == Objective::GoldsmithSalmon {
+        let Problem { measure, judge, objective, .. } = self.problem;
+        if measure.is_none() && judge.is_none() && objective == Objective::GoldsmithSalmon {
             goldsmith_salmon
         } else {
             workspace.write(tree);

@@ -13,7 +13,7 @@ use bvh_core::Bvh;
 pub use error::SearchError;
 pub(crate) use observer::WORK_PER_POLL;
 pub use observer::{Event, Observer};
-pub use problem::{Problem, Shortcut};
+pub use problem::{Judge, Problem, Shortcut};
 pub use stream::Stream;
 pub(crate) use stream::stream;
 

@@ -2,6 +2,13 @@
 
 use bvh_core::cost::{self, Measure, Objective};
 use bvh_core::{Aabb, Bvh};
+use std::fmt::Debug;
+
+/// What judges whole trees in place of the cost, such as rays that are sent through them.
+pub trait Judge: Sync + Debug {
+    /// Lower is better: finite and not negative, and always the same for the same tree.
+    fn judge(&self, tree: &Bvh) -> f64;
+}
 
 /// What is searched for: the tree over `boxes` of least cost.
 #[derive(Clone, Copy, Debug)]
@@ -13,6 +20,9 @@ pub struct Problem<'a> {
     /// The measure of boxes to minimise the sum of, over all inner nodes, in place of the objective. Searches minimise it
     /// directly; builders divide and cluster by area, and their trees are judged by it.
     pub measure: Option<&'a dyn Measure>,
+    /// What judges trees in place of both, for searches that make every tree anew: builders, GRASP without local search,
+    /// insertion orders. The others change trees by the parts of a cost, and take no notice.
+    pub judge: Option<&'a dyn Judge>,
     /// Shortcuts that must not be taken, so that their savings can be measured. Empty in production.
     pub disabled: &'a [Shortcut],
 }
@@ -20,14 +30,15 @@ pub struct Problem<'a> {
 impl<'a> Problem<'a> {
     /// The paper's problem: least total area of inner nodes.
     pub fn new(boxes: &'a [Aabb]) -> Self {
-        Self { boxes, objective: Objective::default(), measure: None, disabled: &[] }
+        Self { boxes, objective: Objective::default(), measure: None, judge: None, disabled: &[] }
     }
 
-    /// The cost of a tree. O(nodes).
+    /// The cost of a tree. O(nodes), unless there is a judge.
     pub fn cost(&self, tree: &Bvh) -> f64 {
-        match self.measure {
-            Some(measure) => cost::internal_measure(tree, measure),
-            None => self.objective.cost(tree),
+        match (self.judge, self.measure) {
+            (Some(judge), _) => judge.judge(tree),
+            (None, Some(measure)) => cost::internal_measure(tree, measure),
+            (None, None) => self.objective.cost(tree),
         }
     }
 

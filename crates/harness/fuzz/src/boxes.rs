@@ -53,7 +53,7 @@ fn refused(boxes: &[Aabb], bad: usize, seed: u64, budget: Budget) {
     }
     named("check", check_boxes(boxes).unwrap_err().to_string());
     named("KD-tree", kd_tree::Config::default().build(boxes).unwrap_err().to_string());
-    named("bound", lower_bound::internal_area(boxes, 1).unwrap_err().to_string());
+    named("bound", lower_bound::internal_area(boxes, 1, &()).unwrap_err().to_string());
     let config = best::Config::default();
     let tree = Bvh::default();
     named("optimize", optimize(&tree, boxes, &config, seed, budget, &()).unwrap_err().to_string());
@@ -61,7 +61,7 @@ fn refused(boxes: &[Aabb], bad: usize, seed: u64, budget: Budget) {
 
 /// Every method gives a tight tree of exact cost, the same one again, and what is made of trees holds too.
 fn built(boxes: &[Aabb], seed: u64, budget: Budget) {
-    let bound = lower_bound::internal_area(boxes, lower_bound::DEFAULT_EFFORT).unwrap();
+    let bound = lower_bound::internal_area(boxes, lower_bound::DEFAULT_EFFORT, &()).unwrap();
     assert!(bound.is_finite() && bound >= 0.0);
     for method in Method::all() {
         let boxes = match method {

@@ -5,6 +5,7 @@ use crate::measure::rays::Family;
 use crate::measure::{Query, empirical_cost};
 use crate::peers::{Built, Peer};
 use crate::report::Report;
+use crate::run::judge::RayJudge;
 use crate::run::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow};
 use crate::run::store::FinishedRun;
 use crate::scenes::Scene;
@@ -13,7 +14,7 @@ use bvh_build::{Builder, muller_fellner};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_search::{
-    Budget, Event, Observer, Outcome, Problem, SearchError, StopReason, exact, lower_bound, solve,
+    Budget, Event, Judge, Observer, Outcome, Problem, SearchError, StopReason, exact, lower_bound, solve,
 };
 use indicatif::ProgressBar;
 use std::sync::Mutex;
@@ -39,12 +40,12 @@ pub(crate) fn base_cost(scene: &Scene, objective: &Objective) -> Result<f64, Err
 
 /// A proven lower bound of the scene's internal area: the exact optimum where gaps are measured from it, else the bound
 /// that the experiment asks for, if it asks for one.
-fn bound(experiment: &Experiment, scene: &Scene) -> Result<Option<BoundRow>, Error> {
+fn bound(experiment: &Experiment, scene: &Scene, watch: &Watch) -> Result<Option<BoundRow>, Error> {
     let lower_bound = if experiment.needs_optimum(scene.boxes.len()) {
         let problem = Problem::new(&scene.boxes);
         solve(&exact::Config {}, &problem, 0, Budget::default(), &()).map(|outcome| outcome.cost)
     } else if let Some(effort) = experiment.lower_bound {
-        lower_bound::internal_area(&scene.boxes, effort).map_err(SearchError::Build)
+        lower_bound::internal_area(&scene.boxes, effort, watch).map_err(SearchError::Build)
     } else {
         return Ok(None);
     };
@@ -76,11 +77,15 @@ pub(crate) fn perform(
     })?;
     let solved = Solved { experiment, job, seed, outcome: &outcome, seconds };
     let run = solved.run_row();
-    let bounds = if job.first_of_scene { bound(experiment, scene)? } else { None };
+    let bounds = if job.first_of_scene { bound(experiment, scene, watch)? } else { None };
     let (renders, render_times) = match &experiment.render {
         Some(config) => config.measure(scene, &outcome.tree, &run, seconds, job.first_of_scene)?,
         None => Default::default(),
     };
+    // A bound that was cut short is no result.
+    if watch.cancelled() {
+        return Ok(None);
+    }
     let mut finished = FinishedRun::default();
     finished.add(&[run])?;
     finished.add(&solved.history_rows())?;
@@ -103,14 +108,21 @@ fn solve_or_build(
     let Job { scene, labelled, .. } = *job;
     match &labelled.method {
         Contestant::Ours(method) => {
+            let ray_seed = experiment.seed_of(&scene.name, "rays of the judge", job.repetition);
+            let judge = labelled.judge.as_ref().map(|rays| RayJudge { rays, scene, seed: ray_seed });
             let problem = Problem {
                 objective: experiment.objective,
+                judge: judge.as_ref().map(|judge| judge as &dyn Judge),
                 disabled: &labelled.keep,
                 ..Problem::new(&scene.boxes)
             };
             let outcome = solve(method, &problem, seed, experiment.budget_of(labelled), stopwatch);
             let seconds = stopwatch.start.elapsed().as_secs_f64();
-            Ok((outcome.map_err(Error::search(&scene.name, &labelled.label))?, seconds))
+            let mut outcome = outcome.map_err(Error::search(&scene.name, &labelled.label))?;
+            if judge.is_some() {
+                outcome.cost = experiment.objective.cost(&outcome.tree);
+            }
+            Ok((outcome, seconds))
         }
         Contestant::Peer(peer) => build_by(peer, scene, &experiment.objective, stopwatch),
     }

@@ -4,6 +4,7 @@ pub mod check;
 pub mod execute;
 pub mod finish;
 mod job;
+mod judge;
 pub mod merge;
 pub mod provenance;
 pub mod reference;

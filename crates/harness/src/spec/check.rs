@@ -68,7 +68,14 @@ impl Experiment {
         Ok(())
     }
 
-    fn check_method(&self, Labelled { method, .. }: &Labelled) -> Result<(), Fault> {
+    fn check_method(&self, Labelled { method, judge, .. }: &Labelled) -> Result<(), Fault> {
+        if let Some(judge) = judge {
+            judge.check()?;
+            if !Labelled::JUDGED.contains(&method.name()) {
+                let found = format!("set for {}", method.name());
+                return Err(Fault::new("judge", found, format!("with {}", Labelled::JUDGED.join(", "))));
+            }
+        }
         match method {
             Contestant::Peer(peer) if self.suite.is_some() => {
                 let found = format!("{:?}, another library", peer.name());

@@ -1,6 +1,7 @@
 //! One entry of a spec's `methods`: what is run, with its label, limits and seeds.
 
 use super::fault::{self, Fault};
+use crate::measure::empirical_cost;
 use crate::peers::Peer;
 use bvh_search::{Budget, Method, Shortcut};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -20,6 +21,9 @@ pub struct Labelled {
     pub keep: Vec<Shortcut>,
     /// Label whose seeds its runs have, for methods that are to differ in nothing else. Default its own.
     pub seed_as: Option<String>,
+    /// Random rays whose mean number of box tests judges the trees of its runs in place of the objective; the costs in
+    /// `history.csv` are then such numbers. Default none.
+    pub judge: Option<empirical_cost::Config>,
 }
 
 /// A method of ours, or another library.
@@ -58,25 +62,29 @@ struct Frame {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     keep: Vec<Shortcut>,
     seed_as: Option<String>,
+    judge: Option<empirical_cost::Config>,
 }
 
 impl Labelled {
+    /// Methods that make every tree anew, so that it can be judged as a whole.
+    pub(super) const JUDGED: [&str; 3] = ["genetic", "random_orders", "grasp"];
+
     /// A method under its own name, without limits.
     pub fn new(method: Method) -> Self {
         let label = method.name().into();
-        Self { label, method: Contestant::Ours(method), budget: None, keep: vec![], seed_as: None }
+        Self { label, method: Contestant::Ours(method), budget: None, keep: vec![], seed_as: None, judge: None }
     }
 
     /// Reads an entry, and names the key that an error is about.
     pub(super) fn read(mut table: Table) -> Result<Self, Fault> {
-        let frame = ["label", "budget", "keep", "seed_as"];
+        let frame = ["label", "budget", "keep", "seed_as", "judge"];
         let frame = frame.into_iter().filter_map(|key| table.remove_entry(key)).collect();
-        let Frame { label, budget, keep, seed_as } = fault::deserialize(frame)?;
+        let Frame { label, budget, keep, seed_as, judge } = fault::deserialize(frame)?;
         let accepted = || format!("{}, or the libraries {}", Method::NAMES.join(", "), Peer::NAMES.join(", "));
         let method =
             fault::tagged(table, "method", |name, parameters| Contestant::read(name, parameters), accepted)?;
         let label = label.unwrap_or_else(|| method.name().into());
-        Ok(Self { label, method, budget, keep, seed_as })
+        Ok(Self { label, method, budget, keep, seed_as, judge })
     }
 }
 
@@ -87,9 +95,9 @@ impl<'de> Deserialize<'de> for Labelled {
 }
 
 impl From<Labelled> for Table {
-    fn from(Labelled { label, method, budget, keep, seed_as }: Labelled) -> Self {
+    fn from(Labelled { label, method, budget, keep, seed_as, judge }: Labelled) -> Self {
         let mut table = Self::try_from(&method).unwrap_or_default();
-        let frame = Frame { label: Some(label), budget, keep, seed_as };
+        let frame = Frame { label: Some(label), budget, keep, seed_as, judge };
         table.extend(Self::try_from(&frame).unwrap_or_default());
         table
     }
