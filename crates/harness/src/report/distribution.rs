@@ -1,12 +1,31 @@
 //! How the costs of independent trials are distributed.
 
-use super::config::Methods;
+use super::config::OneOrMore;
 use super::data::Rows;
 use super::output::{Output, each, panel};
+use super::paper::{PaperRow, Verdict};
 use crate::Error;
 use crate::figures::{Axis, Layer};
 use crate::statistics::{quantile, range};
+use bvh_build::config::above;
 use serde::Serialize;
+
+bvh_build::config! { serde;
+    /// The distribution of costs over trials.
+    pub struct Config {
+        /// What it belongs to, such as a section of the paper.
+        source: String;
+        /// Heading.
+        title: String;
+        /// Labels of the methods.
+        methods: Vec<String>, in OneOrMore;
+        /// Within which fraction of the greedy tree's cost the paper finds the majority of trials.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        paper_majority_within: Option<f64>, in above(0.0);
+        /// Why ours differs, where it does.
+        reason: String;
+    }
+}
 
 /// One method's trials on one scene, pooled over repetitions, as written to `distribution.csv`.
 #[derive(Serialize)]
@@ -24,9 +43,14 @@ struct Summary<'a> {
     relative_deviation: f64,
     /// The greedy Müller–Fellner tree's, under the same objective.
     base_cost: f64,
+    /// Fraction of trials that cost less than it.
+    fraction_below_base: f64,
+    /// Fraction of trials that cost less than 1.05 times as much.
+    fraction_within_5_percent: f64,
 }
 
-pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
+pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
+    let mut output = Output::new(&config.source, &config.title);
     let (mut summaries, mut panels) = (Vec::new(), Vec::new());
     for scene in rows.scenes() {
         let base_cost = rows.base_cost(scene);
@@ -35,6 +59,7 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
             let mut costs = rows.trial_costs(scene, method);
             costs.sort_by(f64::total_cmp);
             summaries.push(summarise(scene, method, &costs, base_cost));
+            output.paper.extend(config.majority(&rows.shown(scene), method, &costs, base_cost));
             let fraction = |rank: u32| f64::from(rank) / costs.len() as f64;
             let steps = costs.iter().zip(1..).map(|(&cost, rank)| (cost, fraction(rank))).collect();
             layers.push(Layer::Steps { name: method.clone(), points: steps });
@@ -48,7 +73,6 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
         let x = Axis::linear("cost").range(low - margin, high + margin);
         panels.push(panel(rows.shown(scene), x, y, layers));
     }
-    let mut output = Output::new(&config.source, &config.title);
     output.add_csv("distribution", &summaries)?;
     output.add_figure("distribution", "Every trial of every repetition.", 2, panels);
     let columns =
@@ -60,6 +84,23 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
     });
     output.reading = format!("Median and lowest cost of all trials over Müller–Fellner's: {reading}.");
     Ok(output)
+}
+
+impl Config {
+    /// Whether the majority of trials is where the paper finds it.
+    fn majority(&self, scene: &str, method: &str, costs: &[f64], base_cost: f64) -> Option<PaperRow> {
+        let within = self.paper_majority_within?;
+        let fraction = fraction_below(costs, (1.0 + within) * base_cost);
+        let quantity = format!("{method}, fraction of trials within {} % of base", 100.0 * within);
+        let row = PaperRow::new(&self.source, scene, quantity, &self.reason);
+        let verdict = if fraction > 0.5 { Verdict::Agrees } else { Verdict::Differs };
+        Some(row.compare("the majority", format!("{fraction:.3}"), verdict, "above one half"))
+    }
+}
+
+/// The fraction of costs that are less than `limit`.
+fn fraction_below(costs: &[f64], limit: f64) -> f64 {
+    costs.iter().filter(|&&cost| cost < limit).count() as f64 / costs.len() as f64
 }
 
 fn summarise<'a>(scene: &'a str, method: &'a str, costs: &[f64], base_cost: f64) -> Summary<'a> {
@@ -78,5 +119,7 @@ fn summarise<'a>(scene: &'a str, method: &'a str, costs: &[f64], base_cost: f64)
         mean_cost,
         relative_deviation: variance.sqrt() / mean_cost,
         base_cost,
+        fraction_below_base: fraction_below(costs, base_cost),
+        fraction_within_5_percent: fraction_below(costs, 1.05 * base_cost),
     }
 }

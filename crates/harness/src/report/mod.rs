@@ -7,7 +7,7 @@ mod attempt;
 pub mod config;
 mod correlation;
 pub mod data;
-mod distribution;
+pub mod distribution;
 mod ecdf;
 mod estimator;
 pub mod gaps;
@@ -32,6 +32,7 @@ mod time_to_target;
 pub mod times;
 mod traversal;
 pub mod trials;
+pub mod variations;
 
 use crate::Error;
 use crate::figures::{self, Figure, Layer, Look};
@@ -93,7 +94,9 @@ reports! {
     /// Cost against generation.
     "generations" => Generations(generations::Config) by generations::Config::write;
     /// The distribution of costs over trials.
-    "distribution" => Distribution(config::Methods) by distribution::write;
+    "distribution" => Distribution(distribution::Config) by distribution::write;
+    /// Final costs of variations of one method over those of the method itself.
+    "variations" => Variations(variations::Config) by variations::Config::write;
     /// Tests per random ray, methods by scenes.
     "ray_tests" => RayTests(ray_tests::Config) by ray_tests::Config::write;
     /// The error of the ray estimator against the number of rays, for the first repetition.
@@ -136,9 +139,9 @@ impl Report {
             labels.iter().enumerate().map(keyed).collect()
         }
         let (methods, others): (&[String], Vec<(String, &str)>) = match self {
-            Self::Distribution(config) | Self::Estimator(config) | Self::Correlation(config) => {
-                (&config.methods, vec![])
-            }
+            Self::Estimator(config) | Self::Correlation(config) => (&config.methods, vec![]),
+            Self::Distribution(config) => (&config.methods, vec![]),
+            Self::Variations(config) => (&config.methods, vec![]),
             Self::Pareto(config) | Self::Traversal(config) => (&config.methods, vec![]),
             Self::RunTimes(config) | Self::Ecdf(config) => (&config.methods, vec![]),
             Self::Profile(config) | Self::TimeToTarget(config) => (&config.methods, vec![]),

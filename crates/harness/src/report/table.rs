@@ -78,7 +78,7 @@ impl Config {
         for column in self.columns.iter().skip(1) {
             let own: Vec<&Cell> = cells.iter().filter(|cell| cell.column == column.name).collect();
             output.paper.extend(own.iter().filter_map(|cell| self.compare(rows, column, cell)));
-            output.paper.extend(self.compare_ranges(column, &own));
+            output.paper.extend(self.compare_ranges(rows, column, &own));
         }
         self.add_table(&mut output, rows, &cells);
         output.reading = self.reading(&cells);
@@ -123,24 +123,34 @@ impl Config {
         Some(row.compare_ratios(paper, ours, interval, self.tolerance))
     }
 
-    /// The paper's range over scenes beside ours.
-    fn compare_ranges(&self, column: &Column, own: &[&Cell]) -> Option<PaperRow> {
-        let both = || own.iter().filter_map(|cell| Some((cell.paper_over_base?, *cell)));
-        let paper = range(both().map(|pair| pair.0))?;
-        let ours = range(both().map(|pair| pair.1.cost_over_base))?;
-        let ends = both().flat_map(|(_, cell)| {
-            [cell.low_over_base, cell.high_over_base].map(|end| end.unwrap_or(cell.cost_over_base))
-        });
-        let inside = |(low, high)| paper.0 <= low && high <= paper.1;
-        let verdict = match (inside(ours), inside(range(ends)?)) {
-            (true, true) => Verdict::Agrees,
-            (false, false) => Verdict::Differs,
-            _ => Verdict::CannotBeTold,
-        };
+    /// The paper's range over its scenes beside ours over the same, and beside every scene that the paper does not have.
+    fn compare_ranges(&self, rows: &Rows, column: &Column, own: &[&Cell]) -> Vec<PaperRow> {
+        let Some(paper) = range(own.iter().filter_map(|cell| cell.paper_over_base)) else { return vec![] };
         let show = |(low, high): (f64, f64)| format!("{low:.3} to {high:.3}");
-        let quantity = format!("{}, cost over base, lowest and highest of all scenes", column.name);
-        let row = PaperRow::new(&self.source, "all of these", quantity, &column.reason);
-        Some(row.compare(show(paper), show(ours), verdict, "all of ours in the paper's range"))
+        let compare = |scene: String, what: &str, cells: &[&Cell]| {
+            let ours = range(cells.iter().map(|cell| cell.cost_over_base))?;
+            let ends = cells.iter().flat_map(|cell| {
+                [cell.low_over_base, cell.high_over_base].map(|end| end.unwrap_or(cell.cost_over_base))
+            });
+            let inside = |(low, high)| paper.0 <= low && high <= paper.1;
+            let outside = |(low, high)| high < paper.0 || paper.1 < low;
+            let ends = range(ends)?;
+            let verdict = match (inside(ours), inside(ends), cells.len()) {
+                (true, true, _) => Verdict::Agrees,
+                (false, _, 1) if outside(ends) => Verdict::Differs,
+                (false, false, 2..) => Verdict::Differs,
+                _ => Verdict::CannotBeTold,
+            };
+            let ours = if ours.0 < ours.1 { show(ours) } else { format!("{:.3}", ours.0) };
+            let quantity = format!("{}, cost over base, {what}", column.name);
+            let row = PaperRow::new(&self.source, scene, quantity, &column.reason);
+            Some(row.compare(show(paper), ours, verdict, "all of ours in the paper's range"))
+        };
+        let (of_paper, others): (Vec<&Cell>, _) = own.iter().partition(|cell| cell.paper_over_base.is_some());
+        let all = compare("all of these".into(), "lowest and highest of all scenes", &of_paper);
+        let what = "in the range over the paper's scenes";
+        let each = others.into_iter().filter_map(|cell| compare(rows.shown(cell.scene), what, &[cell]));
+        all.into_iter().chain(each).collect()
     }
 
     fn draw(&self, rows: &Rows, cells: &[Cell]) -> Panel {

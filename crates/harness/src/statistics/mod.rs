@@ -90,6 +90,27 @@ pub fn spread_of_best(pool: &[f64], m: usize) -> Option<(f64, f64)> {
     Some(if m < n { (low, high) } else { (sorted[0] - (high - low), sorted[0] + (high - low)) })
 }
 
+/// The mean of values and the 95 % interval of the mean that they were drawn around, by Student's t; no interval of fewer
+/// than two. `None` of none.
+pub fn mean_interval(values: &[f64]) -> Option<(f64, Option<(f64, f64)>)> {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let freedom = values.len().checked_sub(1)?;
+    let Some(&factor) = STUDENT.get(freedom.wrapping_sub(1)).or(STUDENT.last().filter(|_| freedom > 0)) else {
+        return Some((mean, None));
+    };
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / freedom as f64;
+    let half = factor * (variance / n).sqrt();
+    Some((mean, Some((mean - half, mean + half))))
+}
+
+/// The 97.5 % quantiles of Student's t for 1 to 20 degrees of freedom. With more, intervals by the last are somewhat
+/// wider than they need be.
+const STUDENT: [f64; 20] = [
+    12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131,
+    2.120, 2.110, 2.101, 2.093, 2.086,
+];
+
 /// The primal integral (Berthold 2013) up to `horizon`, divided by it: the mean over that time of the primal gap
 /// |cost − reference| / max(cost, reference), which is 1 before the first incumbent. `incumbents` are times and costs,
 /// both ascending in time. 0 is the reference at once, 1 is nothing at all. `None` unless the horizon is above 0.
@@ -180,6 +201,18 @@ mod tests {
         // With one draw only, to both sides of it.
         let (low, high) = spread_of_best(&pool, pool.len()).unwrap();
         assert!(low < 0.0 && high == -low && spread_of_best(&pool, 13).is_none());
+    }
+
+    #[test]
+    fn the_interval_of_a_mean_is_students() {
+        assert_eq!(mean_interval(&[]), None);
+        assert_eq!(mean_interval(&[2.5]), Some((2.5, None)));
+        // Mean 3, standard deviation √2.5, over √5.
+        let (mean, interval) = mean_interval(&[1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
+        let (low, high) = interval.unwrap();
+        assert!(mean == 3.0 && (low - 1.037).abs() < 1e-3 && (high - 4.963).abs() < 1e-3);
+        let (_, interval) = mean_interval(&[7.0; 40]).unwrap();
+        assert_eq!(interval, Some((7.0, 7.0)));
     }
 
     #[test]
