@@ -3,6 +3,7 @@
 //! Every builder is a module with a `Config` and sees the objects' boxes only. All are deterministic, use no recursion
 //! on data, and refuse boxes that are not finite by naming the object.
 
+pub mod accelerator;
 pub mod config;
 mod error;
 pub mod goldsmith_salmon;
@@ -10,6 +11,7 @@ pub mod kd_tree;
 pub mod ploc;
 pub mod top_down;
 
+pub use accelerator::{Accelerator, Query, Structure};
 pub use config::{Check, OutOfRange};
 pub use error::BuildError;
 pub use top_down::{Presorted, median_cut, muller_fellner};

@@ -2,9 +2,10 @@
 
 use super::bytes::Bytes;
 use bvh_build::{Builder, goldsmith_salmon, kd_tree, muller_fellner};
-use bvh_core::{Aabb, Hit, Ray, Sphere, Triangle, any_hit, clip_to_box, nearest_hit, nearest_hit_of_all};
+use bvh_core::{
+    Aabb, Hit, Primitives, Ray, Sphere, Triangle, any_hit, clip_to_box, nearest_hit, nearest_hit_of_all,
+};
 use glam::Vec3;
-use harness::scenes::Primitives;
 use harness::stress::tracing::{TRAVERSALS, check};
 
 /// The bytes: how to read the rest, the number of triangles, an exponent, then triangles, then rays.

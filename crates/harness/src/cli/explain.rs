@@ -2,8 +2,9 @@
 
 use crate::Error;
 use crate::run::resolved::load_scenes;
-use crate::scenes::{Primitives, Scene};
+use crate::scenes::Scene;
 use crate::spec::Experiment;
+use bvh_core::Primitives;
 use bvh_search::shortcuts::Facts;
 
 /// What is left out of an experiment, scene by scene, and what is going to run.

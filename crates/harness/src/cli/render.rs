@@ -3,10 +3,10 @@
 use crate::Error;
 use crate::cli::arguments::{Jobs, PICTURE, input_file, output_file};
 use crate::cli::output::{print_error, print_line};
-use crate::measure::Accelerator;
 use crate::measure::camera::View;
 use crate::render::{Film, Options, framing, heat, image, render as draw, structure, tiles};
 use crate::scenes::Scene;
+use bvh_build::Accelerator;
 use bvh_core::Aabb;
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};

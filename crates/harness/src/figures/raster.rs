@@ -46,6 +46,10 @@ impl Raster<'_> {
         if (0..self.width).contains(&x) && (0..self.height).contains(&y) {
             let pixel = &mut self.colours[y as usize * self.width as usize + x as usize];
             let (red, green, blue) = colour.rgb;
+            if colour.alpha >= 1.0 {
+                *pixel = [red, green, blue];
+                return;
+            }
             for (old, new) in pixel.iter_mut().zip([red, green, blue]) {
                 let old_part = f64::from(*old);
                 *old = (old_part + (f64::from(new) - old_part) * colour.alpha.max(0.0)).round() as u8;
@@ -142,20 +146,26 @@ pub fn pixels(picture: &impl Picture) -> Result<Pixels, FigureError> {
     if width as u64 * height as u64 > LARGEST {
         return Err(FigureError::TooLarge { width, height });
     }
-    let mut fine = vec![[255; 3]; across * down];
-    let raster = Raster { width: across as i32, height: down as i32, colours: &mut fine, fonts: &fonts };
+    let mut white = vec![255; across * down * 3];
+    let (fine, _) = white.as_chunks_mut();
+    let raster = Raster { width: across as i32, height: down as i32, colours: fine, fonts: &fonts };
     layout
         .draw(&Sheet(raster.into_drawing_area()))
         .map_err(|fault| FigureError::Draw { title: picture.title().to_owned(), reason: fault.to_string() })?;
-    let colour = |index: usize| {
-        let corner = index / width * SAMPLES * across + index % width * SAMPLES;
-        let samples =
-            (0..SAMPLES * SAMPLES).map(|sample| fine[corner + sample / SAMPLES * across + sample % SAMPLES]);
-        let sum =
-            samples.fold([0; 3], |sum: [usize; 3], sample| [0, 1, 2].map(|c| sum[c] + usize::from(sample[c])));
-        sum.map(|part| (part / (SAMPLES * SAMPLES)) as u8)
-    };
-    Ok(Pixels { width, height, colours: (0..width * height).map(colour).collect() })
+    let mut sums = vec![[0_usize; 3]; width * height];
+    for (y, row) in fine.chunks(across).take(height * SAMPLES).enumerate() {
+        let sums = &mut sums[y / SAMPLES * width..][..width];
+        for (sum, samples) in sums.iter_mut().zip(row.chunks(SAMPLES)) {
+            for &[red, green, blue] in samples {
+                sum[0] += usize::from(red);
+                sum[1] += usize::from(green);
+                sum[2] += usize::from(blue);
+            }
+        }
+    }
+    let mean = |sum: usize| (sum / (SAMPLES * SAMPLES)) as u8;
+    let colours = sums.into_iter().map(|[red, green, blue]| [mean(red), mean(green), mean(blue)]).collect();
+    Ok(Pixels { width, height, colours })
 }
 
 /// Draws a picture as a PNG, [`PNG_SCALE`] times as large as its SVG.

@@ -1,8 +1,8 @@
 //! The rays of every measurement: random ones, and those that a renderer sends. The same on every machine.
 
-use super::accelerator::{Accelerator, Query};
 use super::camera::{Camera, View};
 use crate::scenes::Scene;
+use bvh_build::{Accelerator, Query};
 use bvh_core::{Aabb, Bvh, Ray};
 use bvh_search::Stream;
 use glam::{DVec3, Vec3};
@@ -137,7 +137,7 @@ pub fn rays(kind: Kind, count: u32, scene: &Scene, tree: &Bvh, viewpoint: &Viewp
 /// The points at this fraction of the way to the nearest hits of rays.
 fn hit_points(rays: &[Ray], scene: &Scene, tree: &Bvh, fraction: f32) -> Vec<Vec3> {
     let accelerator = Accelerator::of_tree(&scene.primitives, tree);
-    let point = |ray: &Ray| accelerator.nearest_hit(ray, &mut ()).map(|hit| ray.at(fraction * hit.t));
+    let point = |ray: &Ray| accelerator.nearest_hit(ray).map(|hit| ray.at(fraction * hit.t));
     rays.iter().filter_map(point).collect()
 }
 

@@ -1,12 +1,11 @@
 //! Rays per second, and tests per ray: every contender in turns, on one thread, with all answers compared.
 
-use super::accelerator::{Accelerator, Query, Structure};
 use super::answers::{self, SOME_HIT};
 use super::rays::{Kind, Viewpoint, rays};
 use crate::run::rows::{TraceRow, TraceTimeRow};
 use crate::scenes::Scene;
 use crate::statistics::{median, minimum};
-use bvh_build::config;
+use bvh_build::{Accelerator, Query, Structure, config};
 use bvh_core::cost::SahConstants;
 use bvh_core::{Bvh, Coherence, Hit, Ray, TestCounts, WideBvh, collapse_leaves};
 use serde::{Deserialize, Serialize};
@@ -88,10 +87,8 @@ impl Tracer<'_> {
         let rays = batch.rays;
         match (self, batch.query) {
             (Self::Other(trace), _) => trace(batch, hits),
-            (Self::Own(own), Query::Any) => {
-                Ok(timed(rays, hits, |ray| own.any_hit(ray, &mut ()).then_some(SOME_HIT)))
-            }
-            (Self::Own(own), _) => Ok(timed(rays, hits, |ray| own.nearest_hit(ray, &mut ()))),
+            (Self::Own(own), Query::Any) => Ok(timed(rays, hits, |ray| own.any_hit(ray).then_some(SOME_HIT))),
+            (Self::Own(own), _) => Ok(timed(rays, hits, |ray| own.nearest_hit(ray))),
             (Self::Batches(wide), query) => Ok(in_batches(wide, query, rays, hits)),
         }
     }

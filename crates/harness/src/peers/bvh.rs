@@ -1,12 +1,12 @@
 //! The crate `bvh`.
 
 use super::{Built, Raw};
-use crate::measure::Query;
 use crate::measure::speed::{Batch, Contender, Tracer, timed};
 use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
 use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh as TheirBvh, BvhNode};
 use ::bvh::ray::Ray as TheirRay;
+use bvh_build::Query;
 use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle};
 use glam::Vec3;
 use nalgebra::{Point3, Vector3};

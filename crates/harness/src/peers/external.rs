@@ -3,9 +3,9 @@
 //! `scripts/ray-peers/build` makes the program; its source describes the bytes that go through the pipes. One process
 //! per mode holds the scene for as long as the contender lives, so that all contenders take turns in one run.
 
-use crate::measure::Query;
 use crate::measure::speed::{Batch, Contender, PART, Tracer};
 use crate::scenes::Scene;
+use bvh_build::Query;
 use bvh_core::{Hit, Triangle};
 use std::cell::RefCell;
 use std::io::{self, BufReader, BufWriter, Read, Write};

@@ -170,9 +170,10 @@ fn triangles(scene: &Scene) -> Result<&[bvh_core::Triangle], String> {
 #[cfg(all(test, feature = "peers"))]
 mod tests {
     use super::*;
+    use crate::measure::disagreements;
     use crate::measure::rays::{Kind, rays};
     use crate::measure::speed::{Batch, Tracer};
-    use crate::measure::{Accelerator, Query, disagreements};
+    use bvh_build::{Accelerator, Query};
     use bvh_core::validate;
 
     fn all() -> Vec<Peer> {

@@ -1,7 +1,6 @@
 //! The crate `obvhs`.
 
 use super::{Built, Obvhs, Preset, Raw};
-use crate::measure::Query;
 use crate::measure::speed::{Batch, Contender, Tracer, timed};
 use ::obvhs::bvh2::{Bvh2, builder as binary};
 use ::obvhs::cwbvh::builder as wide;
@@ -9,6 +8,7 @@ use ::obvhs::ray::{Ray as TheirRay, RayHit};
 use ::obvhs::rt_triangle::RtTriangle;
 use ::obvhs::triangle::Triangle as TheirTriangle;
 use ::obvhs::{BvhBuildParams, aabb};
+use bvh_build::Query;
 use bvh_core::{Aabb, Bvh, FirstCountNode, Hit, Ray, Triangle};
 use glam::{Vec3, Vec3A};
 use std::time::Duration;

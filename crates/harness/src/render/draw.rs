@@ -3,9 +3,9 @@
 use super::film::{Film, Tile};
 use super::framing;
 use super::light::{self, Light, World};
-use crate::measure::Accelerator;
 use crate::measure::camera::{Camera, View};
 use crate::scenes::Scene;
+use bvh_build::Accelerator;
 use bvh_core::Aabb;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -80,7 +80,7 @@ pub fn render(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::Structure;
+    use bvh_build::Structure;
 
     fn picture(scene: &Scene, options: &Options) -> Film {
         let brute = Accelerator::new(&scene.primitives, Structure::Brute);

@@ -4,11 +4,10 @@
 use super::draw::{Options, render};
 use super::film::Film;
 use super::structure;
-use crate::measure::{Accelerator, Structure};
 use crate::run::rows::{RenderRow, RenderTimeRow};
 use crate::scenes::{Scene, fnv1a};
 use crate::{Error, run::rows::RunRow};
-use bvh_build::config;
+use bvh_build::{Accelerator, Structure, config};
 use bvh_core::Bvh;
 use std::borrow::Cow;
 use std::time::Instant;

@@ -1,8 +1,8 @@
 //! Finds a view that shows a whole scene.
 
 use crate::measure::camera::{View, frame};
-use crate::scenes::{Primitives, Scene};
-use bvh_core::Aabb;
+use crate::scenes::Scene;
+use bvh_core::{Aabb, Primitives};
 use glam::DVec3;
 
 /// Views of scenes that should be seen from inside: name, eye, middle of the picture, angle.

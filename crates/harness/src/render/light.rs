@@ -3,8 +3,8 @@
 use super::film::Tile;
 use super::image;
 use super::surface::{Ground, Surface};
-use crate::measure::Accelerator;
 use crate::measure::camera::{Camera, View};
+use bvh_build::Accelerator;
 use bvh_core::{Aabb, Ray, TestCounts};
 use glam::DVec3;
 use std::ops::Range;
@@ -157,7 +157,7 @@ impl<'a> World<'a> {
     fn meet(&self, origin: DVec3, direction: DVec3, tally: &mut Tally) -> Option<Surface> {
         tally.rays += 1;
         let ray = Ray::half_line(origin.as_vec3(), direction.as_vec3());
-        let hit = ray.ok().and_then(|ray| self.accelerator.nearest_hit(&ray, &mut tally.counts));
+        let hit = ray.ok().and_then(|ray| self.accelerator.nearest_hit_counted(&ray, &mut tally.counts));
         let ground = self.ground.as_ref().and_then(|ground| Some((ground, ground.meet(origin, direction)?)));
         match (hit, ground) {
             (Some(hit), ground) if ground.is_none_or(|(_, distance)| f64::from(hit.t) <= distance) => {
@@ -216,7 +216,7 @@ impl<'a> World<'a> {
     fn is_shadowed(&self, start: DVec3, towards: DVec3, distance: f64, tally: &mut Tally) -> bool {
         tally.rays += 1;
         let ray = Ray::new(start.as_vec3(), towards.as_vec3(), 0.0, distance as f32);
-        ray.is_ok_and(|ray| self.accelerator.any_hit(&ray, &mut tally.counts))
+        ray.is_ok_and(|ray| self.accelerator.any_hit_counted(&ray, &mut tally.counts))
     }
 
     /// The light from a direction in which there is nothing.

@@ -5,7 +5,7 @@
 //! refraction; a hemisphere of ambient light, and a ground where the scene is seen from outside.
 //!
 //! Data flows one way: [`View`](crate::measure::camera::View) → [`Camera`](crate::measure::camera::Camera) → rays →
-//! [`Accelerator`](crate::measure::Accelerator) → `Surface` → light → [`Film`]. Everything but ray tests is in f64,
+//! [`Accelerator`](bvh_build::Accelerator) → `Surface` → light → [`Film`]. Everything but ray tests is in f64,
 //! with `libm` where the platform's functions may differ, so the same scene gives the same bytes on every machine.
 
 mod draw;

@@ -2,9 +2,8 @@
 
 use crate::Error;
 use crate::files::load_tree;
-use crate::measure::Structure;
 use crate::scenes::Scene;
-use bvh_build::{BuildError, Builder, kd_tree, muller_fellner};
+use bvh_build::{BuildError, Builder, Structure, kd_tree, muller_fellner};
 use bvh_core::WideBvh;
 use std::borrow::Cow;
 use std::path::Path;

@@ -1,7 +1,6 @@
 //! The surface at the end of a ray: its place, its orientation and its looks.
 
-use crate::scenes::Primitives;
-use bvh_core::{Aabb, Hit};
+use bvh_core::{Aabb, Hit, Primitives};
 use glam::DVec3;
 
 /// A point of a surface, seen from one side. Colours are linear red, green and blue.

@@ -1,8 +1,8 @@
 //! One run of an experiment: solves a scene by a method under observation, and makes the rows of its measurements.
 
 use crate::Error;
+use crate::measure::empirical_cost;
 use crate::measure::rays::Family;
-use crate::measure::{Query, empirical_cost};
 use crate::peers::{Built, Peer};
 use crate::report::Report;
 use crate::run::judge::RayJudge;
@@ -10,7 +10,7 @@ use crate::run::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow
 use crate::run::store::FinishedRun;
 use crate::scenes::Scene;
 use crate::spec::{Contestant, Experiment, Labelled};
-use bvh_build::{Builder, muller_fellner};
+use bvh_build::{Builder, Query, muller_fellner};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_search::{

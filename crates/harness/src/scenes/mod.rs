@@ -9,4 +9,4 @@ pub mod stiff;
 pub mod subset;
 
 pub use fnv::fnv1a;
-pub use scene::{FETCHED, NoTriangles, Primitives, SPHERES, Scene, SceneKind, fetched_path};
+pub use scene::{FETCHED, NoTriangles, SPHERES, Scene, SceneKind, fetched_path};

@@ -3,37 +3,10 @@
 use super::subset::Subset;
 use super::{fnv1a, obj, spheres, stand_ins, stiff};
 use crate::Error;
-use bvh_core::{Aabb, Sphere, Triangle};
+use bvh_core::{Aabb, Primitives, Triangle};
 use glam::DVec3;
 use std::fmt;
 use std::path::{Path, PathBuf};
-
-/// The objects of a scene.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Primitives {
-    /// Triangles in world units.
-    Triangles(Vec<Triangle>),
-    /// Spheres in world units.
-    Spheres(Vec<Sphere>),
-}
-
-impl Primitives {
-    /// The objects' boxes, one each.
-    pub fn boxes(&self) -> Vec<Aabb> {
-        match self {
-            Self::Triangles(triangles) => triangles.iter().map(Triangle::aabb).collect(),
-            Self::Spheres(spheres) => spheres.iter().map(Sphere::aabb).collect(),
-        }
-    }
-
-    /// The objects with these indices.
-    fn select(&self, indices: &[usize]) -> Self {
-        match self {
-            Self::Triangles(all) => Self::Triangles(indices.iter().map(|&index| all[index]).collect()),
-            Self::Spheres(all) => Self::Spheres(indices.iter().map(|&index| all[index]).collect()),
-        }
-    }
-}
 
 /// Where a scene comes from. Tables name it beside every scene that is not from a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]

@@ -4,7 +4,7 @@ use super::case::{Case, Check, EXACT_OBJECTS, Effort, Part, Size};
 use super::examine::{self, Examined};
 use super::promise::{Broken, Promise, Verdict};
 use super::tracing;
-use crate::scenes::Primitives;
+use bvh_core::Primitives;
 use bvh_search::Method;
 
 /// The outcome of one case for one method, traversal or part.

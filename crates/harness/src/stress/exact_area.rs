@@ -29,7 +29,8 @@ pub fn internal_area(tree: &Bvh) -> BigUint {
 
 /// The half area of a box that is not empty, exact, in units of 2^-298.
 pub fn half_area(aabb: &bvh_core::Aabb) -> BigInt {
-    let [x, y, z] = [0, 1, 2].map(|axis| whole(aabb.max[axis]) - whole(aabb.min[axis]));
+    let side = |axis: usize| whole(aabb.max[axis]) - whole(aabb.min[axis]);
+    let (x, y, z) = (side(0), side(1), side(2));
     &x * &y + &y * &z + &z * &x
 }
 

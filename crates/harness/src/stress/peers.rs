@@ -30,15 +30,15 @@ pub fn examine(_: &str, _: &[bvh_core::Triangle]) -> Option<Found> {
 #[cfg(feature = "peers")]
 mod compiled_in {
     use super::Found;
-    use crate::measure::{Accelerator, Structure};
     use crate::peers::{NoSettings, Obvhs, Peer, Preset, Raw};
-    use crate::scenes::{Primitives, stiff};
+    use crate::scenes::stiff;
     use crate::stress::exact_area;
     use crate::stress::examine::ROUNDING;
     use crate::stress::promise::Promise::{P2, P3, P5, P7};
     use crate::stress::tracing::rays;
     use crate::stress::transform::{same_topology, scale_range, scaled};
-    use bvh_core::{Ray, Shear, Triangle, cost, validate};
+    use bvh_build::{Accelerator, Structure};
+    use bvh_core::{Primitives, Ray, Shear, Triangle, cost, validate};
 
     /// The libraries by name. A further one is one line, here and in [`peer`].
     pub const NAMES: &[&str] = &["bvh 0.13", "obvhs 0.4 fast", "obvhs 0.4 slow"];
@@ -81,7 +81,7 @@ mod compiled_in {
             let differs = |ray: &&Ray| {
                 let shear = Shear::new(ray);
                 let found = nearest(ray, &|id| triangles[id as usize].intersect(&shear, ray.t_max()));
-                found != brute_force.nearest_hit(ray, &mut ()).map(|hit| hit.t)
+                found != brute_force.nearest_hit(ray).map(|hit| hit.t)
             };
             let misses = rays(triangles, RAYS, 1).iter().filter(differs).count();
             if misses > 0 {

@@ -1,10 +1,10 @@
 //! Every traversal against testing every triangle, and the rays that make it hard.
 
 use super::promise::{Broken, Verdict, ensure};
-use crate::measure::{Accelerator, Structure};
-use crate::scenes::Primitives;
-use bvh_build::{Builder, goldsmith_salmon, kd_tree, median_cut, muller_fellner};
-use bvh_core::{Aabb, Bvh, Hit, Kernel, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants};
+use bvh_build::{Accelerator, Builder, Structure, goldsmith_salmon, kd_tree, median_cut, muller_fellner};
+use bvh_core::{
+    Aabb, Bvh, Hit, Kernel, Primitives, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants,
+};
 use bvh_search::Stream;
 use glam::Vec3;
 use rand::seq::IndexedRandom;
@@ -70,10 +70,10 @@ pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Verdic
     let brute_force = Accelerator::new(objects, Structure::Brute);
     let mut hits = 0;
     for ray in rays {
-        let expected = brute_force.nearest_hit(ray, &mut ());
+        let expected = brute_force.nearest_hit(ray);
         hits += usize::from(expected.is_some());
         for accelerator in &accelerators {
-            let (nearest, any) = (accelerator.nearest_hit(ray, &mut ()), accelerator.any_hit(ray, &mut ()));
+            let (nearest, any) = (accelerator.nearest_hit(ray), accelerator.any_hit(ray));
             let same = bits(nearest) == bits(expected) && any == expected.is_some();
             ensure!(same, P3: "{ray:?} gives {nearest:?} and {any}, testing every object {expected:?}");
         }

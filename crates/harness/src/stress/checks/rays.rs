@@ -1,12 +1,12 @@
 //! What the cases ask of rays, their ranges, and the estimator that traces random ones.
 
-use crate::measure::{Accelerator, Query, Structure, empirical_cost, rays::Family};
+use crate::measure::{empirical_cost, rays::Family};
 use crate::run::rows::RayRow;
-use crate::scenes::{Primitives, Scene, SceneKind, stiff};
+use crate::scenes::{Scene, SceneKind, stiff};
 use crate::stress::promise::{Broken, Verdict, ensure};
 use crate::stress::tracing;
-use bvh_build::{Builder, muller_fellner};
-use bvh_core::{Ray, Triangle, validate};
+use bvh_build::{Accelerator, Builder, Query, Structure, muller_fellner};
+use bvh_core::{Primitives, Ray, Triangle, validate};
 use glam::Vec3;
 
 /// S15: zero, NaN and infinite directions and origins are refused before any traversal.
@@ -40,8 +40,7 @@ pub fn ranges_are_defined() -> Verdict {
         let ray = Ray::new(origin, Vec3::Z, t_min, t_max).map_err(Broken::case)?;
         for (name, traversal) in tracing::TRAVERSALS {
             for accelerator in traversal(&triangle).map_err(Broken::case)? {
-                let (nearest, any) =
-                    (accelerator.nearest_hit(&ray, &mut ()), accelerator.any_hit(&ray, &mut ()));
+                let (nearest, any) = (accelerator.nearest_hit(&ray), accelerator.any_hit(&ray));
                 let agree = nearest.is_some() == expected && any == expected;
                 ensure!(agree, "{name}: range {t_min}..={t_max} gives {nearest:?} and {any}");
             }
@@ -59,8 +58,7 @@ pub fn ranges_are_defined() -> Verdict {
 pub fn denormal_distances() -> Verdict {
     let mut hits = 0;
     let mut check = |objects: &Primitives, rays: &[Ray]| {
-        hits +=
-            rays.iter().filter(|ray| Accelerator::new(objects, Structure::Brute).any_hit(ray, &mut ())).count();
+        hits += rays.iter().filter(|ray| Accelerator::new(objects, Structure::Brute).any_hit(ray)).count();
         tracing::TRAVERSALS.iter().try_for_each(|(name, traversal)| {
             tracing::check(*traversal, objects, rays).map(drop).map_err(|broken| broken.within(name))
         })

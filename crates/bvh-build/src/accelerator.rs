@@ -1,16 +1,15 @@
 //! Finds the objects on a ray: one interface over every structure, with and without counting tests.
 
-use crate::scenes::Primitives;
-use bvh_build::kd_tree::KdTree;
+use crate::kd_tree::KdTree;
 use bvh_core::{
-    Bvh, Counter, Hit, Ray, Shear, WideBvh, any_hit, any_hit_of_all, nearest_hit, nearest_hit_of_all,
+    Bvh, Counter, Hit, Primitives, Ray, Shear, TestCounts, WideBvh, any_hit, any_hit_of_all, nearest_hit,
+    nearest_hit_of_all,
 };
-use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
 /// What a ray asks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Query {
     /// Whether it hits anything: the paper's shadow rays.
     Any,
@@ -93,10 +92,65 @@ impl<'a> Accelerator<'a> {
 
     /// The nearest object in the ray's range; of several at the same distance the one of the lowest id.
     #[inline]
-    pub fn nearest_hit(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
+    pub fn nearest_hit(&self, ray: &Ray) -> Option<Hit> {
+        match &self.structure {
+            Structure::Wide(wide) => wide.nearest_hit(ray),
+            _ => self.nearest_hit_uncounted(ray),
+        }
+    }
+
+    /// Whether anything is in the ray's range. The first hit ends the traversal.
+    #[inline]
+    pub fn any_hit(&self, ray: &Ray) -> bool {
+        match &self.structure {
+            Structure::Wide(wide) => wide.any_hit(ray),
+            _ => self.any_hit_uncounted(ray),
+        }
+    }
+
+    // What follows is not generic, so that it is compiled here, optimised, however its callers are compiled.
+
+    fn nearest_hit_uncounted(&self, ray: &Ray) -> Option<Hit> {
+        self.find(ray, &mut ())
+    }
+
+    fn any_hit_uncounted(&self, ray: &Ray) -> bool {
+        self.meets(ray, &mut ())
+    }
+
+    /// [`nearest_hit`](Self::nearest_hit) with its tests counted, but for those of [`Structure::Wide`].
+    pub fn nearest_hit_counted(&self, ray: &Ray, counts: &mut TestCounts) -> Option<Hit> {
+        match &self.structure {
+            Structure::Wide(wide) => wide.nearest_hit(ray),
+            _ => self.find(ray, counts),
+        }
+    }
+
+    /// [`any_hit`](Self::any_hit) with its tests counted likewise.
+    pub fn any_hit_counted(&self, ray: &Ray, counts: &mut TestCounts) -> bool {
+        match &self.structure {
+            Structure::Wide(wide) => wide.any_hit(ray),
+            _ => self.meets(ray, counts),
+        }
+    }
+
+    /// Asks as `query` says and counts the tests, the same number on every machine: the wide layout's by portable code.
+    /// Returns whether the ray hits. [`Query::All`] through a wide layout tests every object.
+    pub fn count(&self, query: Query, ray: &Ray, counts: &mut TestCounts) -> bool {
+        match query {
+            Query::All => self.visit(ray, false, counts),
+            Query::Nearest => self.find(ray, counts).is_some(),
+            Query::Any => self.meets(ray, counts),
+        }
+    }
+
+    /// The nearest object; the wide layouts' by portable code.
+    #[inline(always)]
+    fn find(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
         match (&self.structure, self.objects) {
-            (Structure::Wide(wide), _) => wide.nearest_hit(ray),
-            (Structure::WidePortable(wide), _) => wide.nearest_hit_counted(ray, counter),
+            (Structure::Wide(wide) | Structure::WidePortable(wide), _) => {
+                wide.nearest_hit_counted(ray, counter)
+            }
             (structure, Primitives::Triangles(triangles)) => {
                 let shear = Shear::new(ray);
                 let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
@@ -109,26 +163,12 @@ impl<'a> Accelerator<'a> {
         }
     }
 
-    /// Whether anything is in the ray's range. The first hit ends the traversal.
-    #[inline]
-    pub fn any_hit(&self, ray: &Ray, counter: &mut impl Counter) -> bool {
+    /// Whether there is any object; by portable code too.
+    #[inline(always)]
+    fn meets(&self, ray: &Ray, counter: &mut impl Counter) -> bool {
         match &self.structure {
-            Structure::Wide(wide) => wide.any_hit(ray),
-            Structure::WidePortable(wide) => wide.any_hit_counted(ray, counter),
+            Structure::Wide(wide) | Structure::WidePortable(wide) => wide.any_hit_counted(ray, counter),
             _ => self.visit(ray, true, counter),
-        }
-    }
-
-    /// Asks as `query` says and counts the tests, the same number on every machine: the wide layout's by portable code.
-    /// Returns whether the ray hits. [`Query::All`] through a wide layout tests every object.
-    #[inline]
-    pub fn count(&self, query: Query, ray: &Ray, counter: &mut impl Counter) -> bool {
-        match (query, &self.structure) {
-            (Query::All, _) => self.visit(ray, false, counter),
-            (Query::Nearest, Structure::Wide(wide)) => wide.nearest_hit_counted(ray, counter).is_some(),
-            (Query::Nearest, _) => self.nearest_hit(ray, counter).is_some(),
-            (Query::Any, Structure::Wide(wide)) => wide.any_hit_counted(ray, counter),
-            (Query::Any, _) => self.any_hit(ray, counter),
         }
     }
 
