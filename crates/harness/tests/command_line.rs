@@ -96,6 +96,23 @@ fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
     assert!(folder.path().join("results/spec/.partial/000000").is_dir());
 }
 
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_a_lower_bound_of_any_effort() {
+    let folder = folder();
+    let spec = "question = 'q'\nscenes = ['escher']\nlower_bound = 4000000000\nmethods = [{ method = 'median_cut' }]\n";
+    fs::write(folder.path().join("spec.toml"), spec).unwrap();
+    let child =
+        harness(folder.path(), &["spec.toml"]).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_for(&folder.path().join("results/spec/.partial"));
+    // The tree takes milliseconds; then it is the bound that the signal meets.
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("0 of 1 runs are kept"), "a bound that was cut short is no result");
+}
+
 #[test]
 fn check_passes_on_equal_results_and_names_an_altered_number() {
     let folder = folder();

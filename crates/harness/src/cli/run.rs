@@ -96,7 +96,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         }
         print_line(&format!("\n{}Results: {}", summary.text, summary.folder.display()));
         if let Some(kept) = &summary.beside {
-            let same = check::compare(&summary.folder, kept, &summary.left_out)?.is_empty();
+            let same = check::compare(&summary.folder, kept, &summary.left_out, !experiment.quick)?.is_empty();
             let same = if same { "the same" } else { "other" };
             let kept = kept.display();
             print_line(&format!("({kept} is kept and has {same} rows; --force would replace it)"));
@@ -112,7 +112,7 @@ fn compare(args: &RunArgs, experiment: &Experiment, interrupted: &AtomicBool) ->
     let (fresh, committed) = (temporary.path().join(experiment.folder()), args.out.join(experiment.folder()));
     reference::adopt(&committed, temporary.path())?;
     let summary = execute(experiment, temporary.path(), Extent::default(), interrupted)?;
-    let found = check::compare(&fresh, &committed, &summary.left_out)?;
+    let found = check::compare(&fresh, &committed, &summary.left_out, !experiment.quick)?;
     let name = &experiment.name;
     for scene in &summary.left_out {
         print_line(&format!("{name}: scene {scene} is not fetched; its rows are not compared"));

@@ -13,10 +13,14 @@ use toml::{Table, Value};
 /// Differences beyond this many per file are only counted.
 const SHOWN: usize = 5;
 
-/// Lists how the resolved spec, the CSV files and the figures in `fresh` differ from those in `committed`, one line each.
-/// Rows of the scenes in `left_out` are not compared, nor are figures if any scene is left out. Neither are figures if there
-/// are no fresh ones, as of quick variants.
-pub fn compare(fresh: &Path, committed: &Path, left_out: &[String]) -> Result<Vec<String>, Error> {
+/// Lists how the resolved spec, the CSV files and, if they are kept, the figures in `fresh` differ from those in `committed`,
+/// one line each. Rows of the scenes in `left_out` are not compared, nor are figures if any scene is left out.
+pub fn compare(
+    fresh: &Path,
+    committed: &Path,
+    left_out: &[String],
+    has_figures: bool,
+) -> Result<Vec<String>, Error> {
     let mut names = csv_names(fresh)?;
     if !committed.is_dir() {
         return Ok(vec![format!("{}: no committed results to compare with", committed.display())]);
@@ -31,7 +35,7 @@ pub fn compare(fresh: &Path, committed: &Path, left_out: &[String]) -> Result<Ve
             _ => differences.push(format!("{name} is committed but is no longer written")),
         }
     }
-    if left_out.is_empty() {
+    if has_figures && left_out.is_empty() {
         differences.extend(compare_figures(fresh, committed)?);
     }
     Ok(differences)
@@ -39,11 +43,8 @@ pub fn compare(fresh: &Path, committed: &Path, left_out: &[String]) -> Result<Ve
 
 /// How the figures differ: those of the committed results that hold no seconds are to have the same bytes.
 fn compare_figures(fresh: &Path, committed: &Path) -> Result<Vec<String>, Error> {
-    let drawn = names(fresh, ".svg")?;
-    let mut all = drawn.clone();
-    if !drawn.is_empty() {
-        all.extend(names(committed, ".svg")?);
-    }
+    let mut all = names(fresh, ".svg")?;
+    all.extend(names(committed, ".svg")?);
     let difference = |name: String| {
         let read = |folder: &Path| fs::read(folder.join(&name)).ok();
         match (read(fresh), read(committed)) {
@@ -176,7 +177,7 @@ mod tests {
         for folder in &folders {
             fs::write(folder.path().join("resolved.toml"), "").unwrap();
         }
-        compare(folders[0].path(), folders[1].path(), left_out).unwrap()
+        compare(folders[0].path(), folders[1].path(), left_out, true).unwrap()
     }
 
     const COMMITTED: &str = "scene,method,cost\na,m,1.5\nb,m,2.5\n";
@@ -212,13 +213,15 @@ mod tests {
                 fs::write(folder.path().join(name), text).unwrap();
             }
         }
-        let found = |left_out: &[String]| compare(folders[0].path(), folders[1].path(), left_out).unwrap();
-        assert_eq!(found(&[]), ["trials.svg is drawn otherwise than the committed figure"]);
-        assert!(found(&["sponza".into()]).is_empty());
+        let found = |left_out: &[String], has_figures| {
+            compare(folders[0].path(), folders[1].path(), left_out, has_figures).unwrap()
+        };
+        assert_eq!(found(&[], true), ["trials.svg is drawn otherwise than the committed figure"]);
+        assert!(found(&["sponza".into()], true).is_empty() && found(&[], false).is_empty());
         fs::write(folders[1].path().join("trials.svg"), "<svg/>").unwrap();
-        assert!(found(&[]).is_empty());
+        assert!(found(&[], true).is_empty());
         fs::remove_file(folders[0].path().join("trials.svg")).unwrap();
-        assert!(found(&[]).is_empty(), "nothing was drawn");
+        assert_eq!(found(&[], true), ["trials.svg is committed but is no longer drawn"]);
     }
 
     #[test]
@@ -227,7 +230,7 @@ mod tests {
         let write = |at: usize, text: &str| fs::write(folders[at].path().join("resolved.toml"), text).unwrap();
         write(0, "[experiment]\nseed = 1\nm = [{ a = 1 }]\n[[scenes]]\nname = 'x'\n");
         write(1, "[experiment]\nold = 1\nm = [{ a = 2 }]\n[[scenes]]\nname = 'x'\n[[scenes]]\nname = 'y'\n");
-        let found = compare(folders[0].path(), folders[1].path(), &["y".into()]).unwrap();
+        let found = compare(folders[0].path(), folders[1].path(), &["y".into()], true).unwrap();
         assert_eq!(
             found,
             [
