@@ -7,13 +7,17 @@
 //! (a Markdown table; the column in parentheses is shown behind each value)
 //! <!-- end -->
 //! ```
-//! An aggregate is `only` (all rows agree), `min`, `max`, `median` or `count`; a format is a number of decimals, with
+//! `[LOW, HIGH]` after the column shows an interval behind each value. With the format `text`, all rows have one text in the
+//! column, which is shown as it is, and the column in parentheses likewise. An aggregate is `only` (all rows agree), `min`, `max`, `median` or `count`; a format is a number of decimals, with
 //! `below` behind it for percent below one, `above` for percent above one, `percent` for a fraction. Conditions compare
-//! whole cells; `COLUMN!=TEXT` excludes, `*` stands for no condition.
+//! whole cells, a comma in which is written `\,`; `COLUMN!=TEXT` excludes, `*` stands for no condition.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+
+/// Stands for a comma within a cell while conditions are divided.
+const COMMA: &str = "\u{0}";
 
 type Row = BTreeMap<String, String>;
 
@@ -27,7 +31,8 @@ fn rows(file: &str, conditions: &str) -> Vec<Row> {
     let mut reader = csv::Reader::from_path(&path).unwrap_or_else(|error| panic!("{file}: {error}"));
     let meets = |row: &Row| {
         conditions == "*"
-            || conditions.split(", ").all(|condition| {
+            || conditions.replace("\\, ", COMMA).split(", ").all(|condition| {
+                let condition = condition.replace(COMMA, ", ");
                 let (column, text, wanted) = match condition.split_once("!=") {
                     Some((column, text)) => (column, text, false),
                     None => {
@@ -89,12 +94,39 @@ fn distinct(rows: &[Row], column: &str) -> Vec<String> {
     found
 }
 
-fn pivot(rows: &[Row], axes: &str, what: &str, format: &str) -> String {
-    let (down, across) = axes.split_once(" × ").expect(axes);
+/// What `AGGREGATE COLUMN [LOW, HIGH] (COLUMN)` shows of some rows, in the format; empty if they have nothing.
+fn show(rows: &[&Row], what: &str, format: &str) -> String {
+    let one = |what: &str| {
+        if format == "text" {
+            let column = what.strip_prefix("only ").expect("texts are not aggregated");
+            let texts: BTreeSet<&String> = rows.iter().map(|row| &row[column]).collect();
+            assert!(texts.len() <= 1, "{column} is not one text: {texts:?}");
+            return texts.first().filter(|text| !text.is_empty()).map(|text| (*text).clone());
+        }
+        aggregate(rows, what).map(|value| write(value, format))
+    };
     let (what, beside) = match what.split_once(" (") {
-        Some((what, beside)) => (what, Some(format!("only {}", beside.trim_end_matches(')')))),
+        Some((what, beside)) => (what, one(&format!("only {}", beside.trim_end_matches(')')))),
         None => (what, None),
     };
+    let (what, ends) = match what.split_once(" [") {
+        Some((what, ends)) => (what, ends.trim_end_matches(']').split_once(", ")),
+        None => (what, None),
+    };
+    let mut text = one(what).unwrap_or_default();
+    if let Some((low, high)) =
+        ends.and_then(|(low, high)| Some((one(&format!("min {low}"))?, one(&format!("max {high}"))?)))
+    {
+        text += &format!(" [{low}, {high}]");
+    }
+    match beside {
+        Some(beside) => format!("{text} ({beside})"),
+        None => text,
+    }
+}
+
+fn pivot(rows: &[Row], axes: &str, what: &str, format: &str) -> String {
+    let (down, across) = axes.split_once(" × ").expect(axes);
     let escape = |text: &str| text.replace('|', "\\|");
     let columns = distinct(rows, across);
     let mut lines =
@@ -104,11 +136,7 @@ fn pivot(rows: &[Row], axes: &str, what: &str, format: &str) -> String {
         let cell = |column: &String| {
             let here: Vec<&Row> =
                 rows.iter().filter(|row| row[down] == name && row[across] == *column).collect();
-            let text = aggregate(&here, what).map_or_else(String::new, |value| write(value, format));
-            match beside.as_ref().and_then(|what| aggregate(&here, what)) {
-                Some(value) => format!("{text} ({})", write(value, format)),
-                None => text,
-            }
+            show(&here, what, format)
         };
         let kind = rows.iter().find(|row| row[down] == name).and_then(|row| row.get("scene_kind"));
         let note = match kind {
@@ -134,8 +162,9 @@ fn renewed(text: &str) -> String {
         match fields[..] {
             [file, conditions, what, format] => {
                 let rows = rows(file, conditions);
-                let value = aggregate(&rows.iter().collect::<Vec<_>>(), what).expect(directive);
-                out.push_str(&write(value, format));
+                let text = show(&rows.iter().collect::<Vec<_>>(), what, format);
+                assert!(!text.is_empty(), "{directive}");
+                out.push_str(&text);
             }
             [file, conditions, axes, what, format] => {
                 out.push_str(&format!("\n{}\n", pivot(&rows(file, conditions), axes, what, format)));
@@ -199,5 +228,17 @@ fn the_index_of_results_has_every_experiment_with_its_question() {
         let question = spec["question"].as_str().unwrap();
         let line = format!("| [{name}]({name}) | {question} |");
         assert!(index.contains(&line), "results/README.md lacks: {line}");
+    }
+}
+
+#[test]
+fn every_experiment_is_checked_on_every_commit() {
+    let run = fs::read_to_string(top().join(".ci/run")).unwrap();
+    let words: BTreeSet<&str> = run.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+    for entry in fs::read_dir(top().join("experiments")).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_stem().unwrap().to_str().unwrap();
+        // The peers are other libraries, which CI does not build.
+        assert!(words.contains(name) || name == "peers", ".ci/run does not check {name}");
     }
 }
