@@ -43,9 +43,9 @@ int main(int argc, char** argv) {
     std::vector<char> bytes((std::istreambuf_iterator<char>(file)), {});
     Header header{};
     if (bytes.size() >= sizeof header) std::memcpy(&header, bytes.data(), sizeof header);
-    if (std::memcmp(header.magic, "\x89" "BVH\r\n\x1a\n", 8) || header.version != 2 || header.endianness != 0x01020304 ||
-        bytes.size() != sizeof header + 32 * header.nodes + 4 * header.objects) {
-        return std::fprintf(stderr, "not a tree file of version 2, or cut\n"), 1;
+    if (std::memcmp(header.magic, "\x89" "BVH\r\n\x1a\n", 8) || header.version < 2 || header.version > 3 || header.endianness != 0x01020304 ||
+        bytes.size() != sizeof header + (header.version == 3 ? 36 : 32) * header.nodes + 4 * header.objects) {
+        return std::fprintf(stderr, "not a tree file of version 2 or 3, or cut\n"), 1;
     }
     const uint32_t body = crc32(bytes.data() + sizeof header, bytes.size() - sizeof header);
     if (crc32(bytes.data(), 188, body) != header.checksum) return std::fprintf(stderr, "damaged\n"), 1;

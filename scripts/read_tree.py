@@ -5,10 +5,11 @@ import sys
 import zlib
 
 data = open(sys.argv[1], "rb").read()
-if len(data) < 192 or data[:8] != b"\x89BVH\r\n\x1a\n" or struct.unpack_from("<2I", data, 8) != (2, 0x01020304):
-    sys.exit("not a tree file of version 2")
+if len(data) < 192 or data[:8] != b"\x89BVH\r\n\x1a\n" or struct.unpack_from("<2I", data, 8) not in [(2, 0x01020304), (3, 0x01020304)]:
+    sys.exit("not a tree file of version 2 or 3")
 objective, scene, count, objects, seed, work, cost = struct.unpack_from("<2I4Qd", data, 16)
-if len(data) != 192 + 32 * count + 4 * objects:
+visits = count if data[8] == 3 else 0
+if len(data) != 192 + 32 * count + 4 * objects + 4 * visits:
     sys.exit("cut or extended")
 if zlib.crc32(data[:188], zlib.crc32(data[192:])) != struct.unpack_from("<I", data, 188)[0]:
     sys.exit("damaged")

@@ -57,13 +57,21 @@ pub(crate) fn collect(tree: &Bvh, subtree: usize, ids: &mut Vec<u32>) {
 
 /// The same tree with two children per inner node: further ones are halved, in their order.
 pub(crate) fn binary(tree: &Bvh) -> Cow<'_, Bvh> {
+    binary_visited(tree, &mut vec![0.0; tree.nodes.len()])
+}
+
+/// As [`binary`]. `visits` has a number for every node, and gets one for every new node: the sum of its parts, but no more than
+/// that of the whole.
+pub(crate) fn binary_visited<'t>(tree: &'t Bvh, visits: &mut Vec<f32>) -> Cow<'t, Bvh> {
     if tree.nodes.iter().all(|node| node.is_leaf() || node.children().len() == 2) {
         return Cow::Borrowed(tree);
     }
     let root = tree.nodes[0];
     let mut split = Bvh { nodes: vec![root], prim_ids: tree.prim_ids.clone() };
+    let before = core::mem::replace(visits, vec![visits[0]]);
     let mut open = vec![(0, 0..1)];
     while let Some((to, siblings)) = open.pop() {
+        visits[to] = before[siblings.clone()].iter().sum::<f32>().min(visits[to]);
         let (aabb, below) = match &tree.nodes[siblings.clone()] {
             [leaf] if leaf.is_leaf() => {
                 split.nodes[to] = *leaf;
@@ -75,6 +83,7 @@ pub(crate) fn binary(tree: &Bvh) -> Cow<'_, Bvh> {
         let (first, middle) = (split.nodes.len(), below.start + below.len() / 2);
         split.nodes[to] = Node::inner(aabb, first as u32, 2);
         split.nodes.extend([root; 2]);
+        visits.extend([visits[to]; 2]);
         open.extend([(first + 1, middle..below.end), (first, below.start..middle)]);
     }
     Cow::Owned(split)

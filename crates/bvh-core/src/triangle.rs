@@ -68,6 +68,12 @@ impl Triangle {
         Aabb::around(self.0)
     }
 
+    /// The triangle's area in world units squared.
+    pub(crate) fn area(&self) -> f64 {
+        let [a, b, c] = self.0.map(|corner| corner.as_dvec3());
+        0.5 * (b - a).cross(c - a).length()
+    }
+
     /// Whether the corners coincide or are collinear: such a triangle is never hit. Exact as long as the differences
     /// of its coordinates are exact in f64.
     pub fn is_degenerate(&self) -> bool {

@@ -148,3 +148,32 @@ fn nonsense_is_refused_by_name() {
     assert_eq!(RayDensity::new(&bounds(), &one, -0.1).unwrap_err(), DensityError::AreaWeight(-0.1));
     assert_eq!(RayDensity::new(&Aabb::EMPTY, &one, 0.1).unwrap_err(), DensityError::Bounds);
 }
+
+#[test]
+fn rays_that_end_on_a_wall_enter_the_flat_box_around_it() {
+    // Downwards onto a wall in the middle of the cells between 16 and 17.
+    let mut next = uniform(5);
+    let rays: Vec<Segment> = (0..1000)
+        .map(|_| {
+            let [x, z] = [GRID * next(), GRID * next()];
+            Segment { from: [x, 30.2, z], to: [x, 16.5, z] }
+        })
+        .collect();
+    let wall = Aabb::from([[0.0, 16.5, 0.0], [GRID, 16.5, GRID]]);
+    let entries = |density: RayDensity| density.entries(&wall);
+    assert_eq!(entries(RayDensity::new(&bounds(), &rays, 0.0).unwrap()), 500.0);
+    let longer: Vec<Segment> =
+        rays.iter().map(|ray| Segment { to: [ray.to[0], 15.9, ray.to[2]], ..*ray }).collect();
+    assert_eq!(entries(RayDensity::new(&bounds(), &longer, 0.0).unwrap()), 1000.0);
+    // On average over walls at all heights, half of the rays seem to enter, and three quarters of the lengthened ones.
+    let mean = (0..64).map(|i| {
+        let height = 16.0 + i as f32 / 64.0;
+        let rays: Vec<Segment> =
+            rays.iter().map(|ray| Segment { to: [ray.to[0], height, ray.to[2]], ..*ray }).collect();
+        let wall = Aabb::from([[0.0, height, 0.0], [GRID, height, GRID]]);
+        [RayDensity::new, RayDensity::of_rays].map(|made| made(&bounds(), &rays, 0.0).unwrap().entries(&wall))
+    });
+    let sums = mean.fold([0.0, 0.0], |sums, entries| [sums[0] + entries[0], sums[1] + entries[1]]);
+    let [plain, lengthened] = sums.map(|sum| sum / 64.0 / 1000.0);
+    assert!((0.45..0.55).contains(&plain) && (0.7..0.8).contains(&lengthened), "{plain} {lengthened}");
+}

@@ -28,6 +28,8 @@ pub struct Header {
     pub bounds: Aabb,
     /// The name of the method that built the tree.
     pub method: String,
+    /// Whether the file says how often rays visit each node; see [`TreeFile::visits`](super::TreeFile::visits).
+    pub has_visits: bool,
 }
 
 impl Header {
@@ -36,8 +38,10 @@ impl Header {
     /// The first eight bytes of every tree file, chosen after PNG's: a transfer that converts line ends or clears high
     /// bits changes them.
     pub const MAGIC: [u8; 8] = *b"\x89BVH\r\n\x1a\n";
-    /// The version of the format that this crate writes and reads.
-    pub const VERSION: u32 = 2;
+    /// The latest version of the format, that of files with [visits](Self::has_visits). This crate also reads version 2, and
+    /// writes it where there are none.
+    pub const VERSION: u32 = 3;
+    const WITHOUT_VISITS: u32 = 2;
     /// Stored in the file's byte order, so that its bytes tell the order.
     const ENDIANNESS: u32 = 0x0102_0304;
     /// The box of the root, as in the node.
@@ -58,7 +62,8 @@ impl Header {
         };
         let mut bytes = Vec::with_capacity(Self::BYTES);
         bytes.extend_from_slice(&Self::MAGIC);
-        for word in [Self::VERSION, Self::ENDIANNESS, objective, self.scene] {
+        let version = if self.has_visits { Self::VERSION } else { Self::WITHOUT_VISITS };
+        for word in [version, Self::ENDIANNESS, objective, self.scene] {
             bytes.extend_from_slice(&word.to_le_bytes());
         }
         for word in [self.nodes as u64, self.objects as u64, self.seed, self.work] {
@@ -87,11 +92,12 @@ impl Header {
         if mark == Self::ENDIANNESS.to_be_bytes() {
             return Err(FileError::Endianness);
         }
-        match u32::from_le_bytes(version) {
-            Self::VERSION => {}
-            found if found < Self::VERSION => return Err(FileError::OldVersion { found }),
+        let has_visits = match u32::from_le_bytes(version) {
+            Self::VERSION => true,
+            Self::WITHOUT_VISITS => false,
+            found if found < Self::WITHOUT_VISITS => return Err(FileError::OldVersion { found }),
             found => return Err(FileError::NewVersion { found }),
-        }
+        };
         if mark != Self::ENDIANNESS.to_le_bytes() {
             return Err(FileError::Field("endianness mark"));
         }
@@ -129,7 +135,7 @@ impl Header {
             return Err(FileError::Field("padding"));
         }
         let (nodes, objects, bounds) = (nodes as usize, objects as usize, Aabb::from(corners));
-        Ok(Self { nodes, objects, objective, cost, seed, work, scene, bounds, method })
+        Ok(Self { nodes, objects, objective, cost, seed, work, scene, bounds, method, has_visits })
     }
 }
 

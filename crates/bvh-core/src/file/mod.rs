@@ -16,12 +16,12 @@
 //!
 //! # Format
 //!
-//! Version 2. All numbers are little-endian, floats are IEEE 754, and sections follow each other without gaps.
+//! Versions 2 and 3. All numbers are little-endian, floats are IEEE 754, and sections follow each other without gaps.
 //!
 //! | bytes | type | field |
 //! |---|---|---|
 //! | 0..8 | `u8[8]` | magic number, `89 42 56 48 0d 0a 1a 0a` |
-//! | 8..12 | `u32` | version, 2 |
+//! | 8..12 | `u32` | version: 2, or 3 with visits |
 //! | 12..16 | `u32` | endianness mark, 0x01020304: the bytes `04 03 02 01` |
 //! | 16..20 | `u32` | objective: 0 internal area, 1 Goldsmith–Salmon, 2 surface area heuristic |
 //! | 20..24 | `u32` | checksum of the scene: of its boxes, each min x, y, z, max x, y, z as `f32` |
@@ -36,7 +36,7 @@
 //! | 104..168 | `u8[64]` | name of the method, UTF-8, padded with zeros |
 //! | 168..188 | | zeros |
 //! | 188..192 | `u32` | checksum of the file: of the bytes from 192 to the end, then of bytes 0..188 |
-//! | 192.. | | the nodes, 32 bytes each, then a `u32` object id per object |
+//! | 192.. | | the nodes, 32 bytes each, then a `u32` object id per object, then in version 3 an `f32` of visits per node |
 //!
 //! | bytes of a node | type | field |
 //! |---|---|---|
@@ -44,6 +44,9 @@
 //! | 12..24 | `f32[3]` | upper corner |
 //! | 24..28 | `u32` | first: index of the first child, or position of the leaf's first object id |
 //! | 28..32 | `u32` | number of children (two or more) or of object ids (one or more); 2^31 added marks a leaf |
+//!
+//! The visits of a node are 0 to 1: how many of the rays that enter the scene enter its box, as a part of the measure that the
+//! tree was searched by. No child has more than its parent.
 //!
 //! Node 0 is the root; siblings are adjacent and come after their parent; the object ids are a permutation.
 //!
@@ -140,6 +143,9 @@ pub enum FileError {
     /// The checksum is right, but the nodes and object ids that it covers are not a tree.
     #[error(transparent)]
     Tree(#[from] InvalidBvh),
+    /// The visits of a node are no number from 0 to those of its parent, or not as many as there are nodes.
+    #[error("the visits of node {0} are not from 0 to those of its parent")]
+    Visits(usize),
     /// Views need aligned bytes.
     #[error("the bytes do not lie at a multiple of {0}; load them instead")]
     Alignment(usize),
@@ -159,13 +165,19 @@ pub struct Origin<'a> {
     pub work: u64,
     /// What the method minimised; the header reports the tree's cost by it.
     pub objective: Objective,
+    /// How often rays visit each node, such as [`RayDensity::visits`](crate::RayDensity::visits), for
+    /// [`WideBvh::for_rays`](crate::WideBvh::for_rays). Empty if the tree was not searched for any rays.
+    pub visits: &'a [f32],
 }
 
 /// The file of a tree over `boxes`, in [this format](self). Refuses a tree that is not [valid](validate()) over them.
 /// O(nodes + objects).
 pub fn save(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, FileError> {
     validate(tree, boxes)?;
-    let Origin { method, seed, work, objective } = *origin;
+    let Origin { method, seed, work, objective, visits } = *origin;
+    if !visits.is_empty() {
+        check_visits(&tree.nodes, visits)?;
+    }
     let header = Header {
         nodes: tree.nodes.len(),
         objects: boxes.len(),
@@ -176,13 +188,30 @@ pub fn save(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, File
         scene: boxes_checksum(boxes),
         bounds: tree.root_aabb().unwrap_or(Aabb::EMPTY),
         method: method.into(),
+        has_visits: !visits.is_empty(),
     };
     let mut bytes = header.encode()?;
-    let sections = [le_bytes(&tree.nodes), le_bytes(&tree.prim_ids)];
+    let sections = [le_bytes(&tree.nodes), le_bytes(&tree.prim_ids), le_bytes(visits)];
     bytes.reserve_exact(sections.iter().map(|section| section.len()).sum());
     sections.iter().for_each(|section| bytes.extend_from_slice(section));
     seal(&mut bytes);
     Ok(bytes)
+}
+
+/// Refuses visits that no measure gives: a monotone one gives no child more than its parent.
+fn check_visits(nodes: &[Node], visits: &[f32]) -> Result<(), FileError> {
+    if visits.len() != nodes.len() {
+        return Err(FileError::Visits(visits.len().min(nodes.len())));
+    }
+    let accepts =
+        |most: f32, at: usize| (0.0..=most).contains(&visits[at]).then_some(()).ok_or(FileError::Visits(at));
+    if !visits.is_empty() {
+        accepts(1.0, 0)?;
+    }
+    for (parent, node) in nodes.iter().enumerate() {
+        node.children().try_for_each(|child| accepts(visits[parent], child))?;
+    }
+    Ok(())
 }
 
 /// The tree over `boxes` that `bytes` hold, copied out of them. O(bytes).
@@ -230,6 +259,7 @@ pub struct TreeFile<'a> {
     header: Header,
     nodes: &'a [u8],
     prim_ids: &'a [u8],
+    visits: &'a [u8],
     /// Whether the tree has passed the check of its structure where it lies.
     is_sound: bool,
 }
@@ -241,13 +271,16 @@ impl<'a> TreeFile<'a> {
         // No overflow in 64 bits: counts are below 2^32.
         let (nodes, objects) = (header.nodes as u64, header.objects as u64);
         let node_bytes = nodes * size_of::<Node>() as u64;
-        let expected = Header::BYTES as u64 + node_bytes + objects * size_of::<u32>() as u64;
+        let id_bytes = objects * size_of::<u32>() as u64;
+        let visit_bytes = if header.has_visits { nodes * size_of::<f32>() as u64 } else { 0 };
+        let expected = Header::BYTES as u64 + node_bytes + id_bytes + visit_bytes;
         let found = bytes.len() as u64;
         if found != expected {
             return Err(FileError::Length { found, expected });
         }
-        let (nodes, prim_ids) = bytes[Header::BYTES..].split_at(node_bytes as usize);
-        let mut file = Self { header, nodes, prim_ids, is_sound: false };
+        let (nodes, rest) = bytes[Header::BYTES..].split_at(node_bytes as usize);
+        let (prim_ids, visits) = rest.split_at(id_bytes as usize);
+        let mut file = Self { header, nodes, prim_ids, visits, is_sound: false };
         let mut fast_path = file.cast().ok().and_then(|tree| FastPath::new(tree, file.header.objects));
         let sum = checksum(bytes, |piece| fast_path.iter_mut().for_each(|check| check.add(piece.clone())));
         if sum.to_le_bytes() != bytes[Header::CHECKSUM] {
@@ -291,6 +324,16 @@ impl<'a> TreeFile<'a> {
         let tree = self.cast()?;
         self.check(tree)?;
         Ok(tree)
+    }
+
+    /// How often rays visit each node, if the file says so, for [`WideBvh::for_rays`](crate::WideBvh::for_rays). O(nodes).
+    pub fn visits(&self) -> Result<Option<Vec<f32>>, FileError> {
+        if !self.header.has_visits {
+            return Ok(None);
+        }
+        let visits = copied(self.visits);
+        check_visits(&self.tree()?.nodes, &visits)?;
+        Ok(Some(visits))
     }
 
     fn cast(&self) -> Result<BvhView<'a>, FileError> {

@@ -10,6 +10,7 @@ const ORIGIN: Origin = Origin {
     seed: 7,
     work: 1 << 40,
     objective: Objective::Sah(SahConstants { traversal: 1.5, intersection: 0.25 }),
+    visits: &[],
 };
 
 /// Boxes along a line and a tree over them whose root has three children and whose leaves have up to two objects.
@@ -82,8 +83,50 @@ fn what_is_saved_is_loaded_and_viewed() {
             scene: boxes_checksum(&boxes),
             bounds: tree.root_aabb().unwrap_or(Aabb::EMPTY),
             method: "best".into(),
+            has_visits: false,
         };
         assert_eq!(file.header(), &header);
+        assert_eq!((file.visits(), &bytes[8..12]), (Ok(None), &2u32.to_le_bytes()[..]));
+    }
+}
+
+/// Visits that halve from parent to child.
+fn halving(tree: &Bvh) -> Vec<f32> {
+    let mut visits = vec![1.0; tree.nodes.len()];
+    for (index, node) in tree.nodes.iter().enumerate() {
+        node.children().for_each(|child| visits[child] = visits[index] / 2.0);
+    }
+    visits
+}
+
+#[test]
+fn visits_come_back_and_only_those_of_a_monotone_measure_are_accepted() {
+    for n in [1, 2, 11, 3000] {
+        let (boxes, tree) = scene_of(n, 2, 1);
+        let visits = halving(&tree);
+        let origin = Origin { visits: &visits, ..ORIGIN };
+        let mut bytes = save(&tree, &boxes, &origin).unwrap();
+        let file = TreeFile::open(&bytes).unwrap();
+        assert_eq!((file.tree(), file.visits()), (Ok(tree.clone()), Ok(Some(visits.clone()))));
+        assert_eq!(&bytes[8..12], &3u32.to_le_bytes());
+        for cut in 1..=4 {
+            assert!(matches!(TreeFile::open(&bytes[..bytes.len() - cut]), Err(FileError::Length { .. })));
+        }
+        let last = visits.len() - 1;
+        for wrong in [-1.0, 1.5, f32::NAN, f32::INFINITY] {
+            let mut visits = visits.clone();
+            visits[last] = wrong;
+            let refused = Err(FileError::Visits(last));
+            assert_eq!(save(&tree, &boxes, &Origin { visits: &visits, ..ORIGIN }), refused);
+            let end = bytes.len();
+            bytes[end - 4..].copy_from_slice(&wrong.to_le_bytes());
+            seal(&mut bytes);
+            let forged = TreeFile::open(&bytes).unwrap();
+            assert_eq!(forged.visits().map(|_| ()), refused.map(|_: Vec<u8>| ()));
+            assert_eq!(forged.tree().as_ref(), Ok(&tree), "the tree itself is sound");
+        }
+        let too_few = Origin { visits: &visits[..last], ..ORIGIN };
+        assert_eq!(save(&tree, &boxes, &too_few).is_ok(), last == 0, "none at all are none");
     }
 }
 
@@ -130,7 +173,7 @@ fn other_files_versions_byte_orders_and_scenes_are_named() {
     let old = changed(8, &1u32.to_le_bytes());
     assert_eq!(old, FileError::OldVersion { found: 1 });
     assert!(old.to_string().contains("version 1") && old.to_string().contains("bake it again"), "{old}");
-    assert_eq!(changed(8, &3u32.to_le_bytes()), FileError::NewVersion { found: 3 });
+    assert_eq!(changed(8, &4u32.to_le_bytes()), FileError::NewVersion { found: 4 });
     assert_eq!(changed(8, &[0, 0, 0, 2, 1, 2, 3, 4]), FileError::Endianness);
     assert_eq!(changed(32, &u64::MAX.to_le_bytes()), FileError::Field("objects"));
     let short = FileError::Length { found: bytes.len() as u64, expected: 192 + 3 * 32 + 5 * 4 };

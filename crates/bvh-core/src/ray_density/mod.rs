@@ -30,7 +30,7 @@
 mod crossings;
 
 use crate::cost::Measure;
-use crate::{Aabb, PackedAabb};
+use crate::{Aabb, Bvh, PackedAabb};
 use alloc::vec::Vec;
 use crossings::{CELLS, Crossings, index};
 use glam::DVec3;
@@ -40,6 +40,11 @@ const FRACTION_BITS: u32 = 9;
 const FRACTIONS: u32 = 1 << FRACTION_BITS;
 /// What one entry counts as in the arithmetic with whole fractions, which are of all three axes.
 const FRACTIONS_OF_ENTRY: f64 = (1u64 << (3 * FRACTION_BITS)) as f64;
+/// How far the segments of [`RayDensity::of_rays`] are lengthened at both ends, in cells along their main axis.
+///
+/// Found on the kitchen, Sponza and smooth meshes: without it the number of inner nodes that rays enter is underestimated by up
+/// to a sixth, and trees for rays from a camera in the kitchen save half as many tests; twice as much overestimates it.
+const LENGTHENED: f64 = 0.25;
 /// Most segments, so that all arithmetic is exact: 4 · 2²⁰ · 2²⁷ · 8 < 2⁵³.
 const MOST_SEGMENTS: usize = 1 << 20;
 
@@ -111,6 +116,28 @@ impl RayDensity {
     /// # Errors
     /// [`DensityError`] if there are no segments, more than 2²⁰, none that meets the bounds, or one that is not finite.
     pub fn new(bounds: &Aabb, segments: &[Segment], area_weight: f64) -> Result<Self, DensityError> {
+        Self::lengthened(bounds, segments, area_weight, 0.0)
+    }
+
+    /// As [`new`](Self::new), for the segments of rays between surfaces, which are lengthened at both ends by a quarter of
+    /// a cell.
+    ///
+    /// Rays end, and most begin, on surfaces, and surfaces are where the boxes are: a flat box around a wall is entered by
+    /// every ray that ends on the wall. But within a cell the density is interpolated, so that between the last face that rays
+    /// cross and the first one that they do not, half of them would seem to be missing.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn of_rays(bounds: &Aabb, segments: &[Segment], area_weight: f64) -> Result<Self, DensityError> {
+        Self::lengthened(bounds, segments, area_weight, LENGTHENED)
+    }
+
+    fn lengthened(
+        bounds: &Aabb,
+        segments: &[Segment],
+        area_weight: f64,
+        by: f64,
+    ) -> Result<Self, DensityError> {
         if !(0.0..=1.0).contains(&area_weight) {
             return Err(DensityError::AreaWeight(area_weight));
         }
@@ -133,7 +160,9 @@ impl RayDensity {
                 return Err(DensityError::NotFinite { index });
             }
             let place = |corner: [f32; 3]| (DVec3::from(corner.map(f64::from)) - low) * cells_per_unit;
-            crossings.record(place(segment.from), place(segment.to));
+            let (from, to) = (place(segment.from), place(segment.to));
+            let along = (to - from) / (to - from).abs().max_element().max(f64::MIN_POSITIVE);
+            crossings.record(from - by * along, to + by * along);
         }
         if crossings.segments == 0 {
             return Err(DensityError::NoneMeets);
@@ -164,6 +193,14 @@ impl RayDensity {
     /// Monotone under inclusion, rounding included. 0 for the empty box.
     pub fn measure(&self, bounds: &Aabb) -> f64 {
         self.entry_weight * self.fractional_entries(bounds) + self.area_weight * bounds.half_area()
+    }
+
+    /// The measure of every node's box relative to that of the root, which is 1 unless it is 0: the number of visits that a node
+    /// gets for each ray that enters the scene. O(nodes).
+    pub fn visits(&self, tree: &Bvh) -> Vec<f32> {
+        let root = tree.root_aabb().map_or(0.0, |root| self.measure(&root));
+        let scale = if root > 0.0 { 1.0 / root } else { 0.0 };
+        tree.nodes.iter().map(|node| ((self.measure(&node.aabb) * scale) as f32).min(1.0)).collect()
     }
 
     /// Entries times 512³, an integer.

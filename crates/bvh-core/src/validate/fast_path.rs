@@ -49,11 +49,12 @@ impl<'a> FastPath<'a> {
     }
 
     /// Checks the nodes and object ids in a range of bytes, counted from the first node; the object ids follow the last
-    /// node. Every piece begins at a multiple of 256 and is added once.
+    /// node, and what comes after them is left out. Every piece begins at a multiple of 256 and is added once.
     pub(crate) fn add(&mut self, bytes: Range<usize>) {
         let nodes = size_of_val(self.tree.nodes);
         let node = |byte: usize| byte.min(nodes) / size_of::<Node>();
-        let id = |byte: usize| byte.saturating_sub(nodes) / size_of::<u32>();
+        let ids = self.tree.prim_ids.len();
+        let id = |byte: usize| (byte.saturating_sub(nodes) / size_of::<u32>()).min(ids);
         self.add_nodes(node(bytes.start)..node(bytes.end));
         let ids = &self.tree.prim_ids[id(bytes.start)..id(bytes.end)];
         self.in_bounds &= mark(&mut self.marks[self.tree.nodes.len()..], ids);

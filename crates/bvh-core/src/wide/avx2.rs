@@ -62,19 +62,21 @@ impl Instructions for Avx2 {
         };
         // SAFETY: the caller's promises; the stack has room for eight entries.
         unsafe {
-            // The lane in the last three bits makes keys distinct; lanes that are not entered get negative keys.
+            // The inverted lane in the last three bits makes keys distinct and prefers the higher of two lanes; lanes that
+            // are not entered get negative keys.
             let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let inverted = _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0);
             let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
             let entered = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(mask as i32), bits), bits);
             let cut = _mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(entry));
             let cut = _mm256_blendv_epi8(_mm256_set1_epi32(-8), cut, entered);
-            let keys = _mm256_or_si256(cut, lanes);
+            let keys = _mm256_or_si256(cut, inverted);
 
             // The nearest child first: the rest of the work is not on the way to it.
             let least = _mm_min_epu32(_mm256_castsi256_si128(keys), _mm256_extracti128_si256::<1>(keys));
             let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0x4e>(least));
             let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0xb1>(least));
-            let nearest = *node.children.get_unchecked((_mm_cvtsi128_si32(least) & 7) as usize);
+            let nearest = *node.children.get_unchecked((!_mm_cvtsi128_si32(least) & 7) as usize);
 
             // A child's place is the number of keys greater than its own.
             let mut places = _mm256_setzero_si256();

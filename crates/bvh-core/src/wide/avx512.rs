@@ -35,16 +35,17 @@ impl Instructions for Avx512 {
     unsafe fn sort(node: &WideNode, entry: __m256, mask: u32, stack: *mut Pending) -> Child {
         // SAFETY: the caller's promises; the stack has room for eight entries.
         unsafe {
-            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-            let keys =
-                _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(entry)), lanes);
+            // The inverted lane in the last three bits prefers the higher of two lanes.
+            let inverted = _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0);
+            let cut = _mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(entry));
+            let keys = _mm256_or_si256(cut, inverted);
             let children = _mm256_load_si256(node.children.as_ptr().cast());
             // The nearest child first: the rest of the work is not on the way to it.
             let least = _mm256_mask_mov_epi32(_mm256_set1_epi32(-1), mask as u8, keys);
             let least = _mm_min_epu32(_mm256_castsi256_si128(least), _mm256_extracti128_si256::<1>(least));
             let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0x4e>(least));
             let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0xb1>(least));
-            let nearest = *node.children.get_unchecked((_mm_cvtsi128_si32(least) & 7) as usize);
+            let nearest = *node.children.get_unchecked((!_mm_cvtsi128_si32(least) & 7) as usize);
 
             let keys = _mm256_maskz_compress_epi32(mask as u8, keys);
             if mask.count_ones() <= 4 {
@@ -56,7 +57,7 @@ impl Instructions for Avx512 {
                 let x = _mm_blend_epi32::<0b1100>(_mm_max_epu32(x, s), _mm_min_epu32(x, s));
                 let s = _mm_shuffle_epi32::<0b11_01_10_00>(x);
                 let x = _mm_blend_epi32::<0b0100>(_mm_max_epu32(x, s), _mm_min_epu32(x, s));
-                let order = _mm_and_si128(x, _mm_set1_epi32(7));
+                let order = _mm_andnot_si128(x, _mm_set1_epi32(7));
                 let sorted = _mm256_permutevar8x32_epi32(children, _mm256_castsi128_si256(order));
                 let sorted = _mm256_castsi256_si128(sorted);
                 _mm_storeu_si128(stack.cast(), _mm_unpacklo_epi32(sorted, x));
@@ -74,7 +75,7 @@ impl Instructions for Avx512 {
                     sorted[at] = key;
                 }
                 for (i, key) in sorted.into_iter().enumerate().take(n) {
-                    let child = node.children.get_unchecked((key & 7) as usize).bits();
+                    let child = node.children.get_unchecked((!key & 7) as usize).bits();
                     stack.add(i).write(u64::from(key) << 32 | u64::from(child));
                 }
             }

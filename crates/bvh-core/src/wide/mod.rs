@@ -1,4 +1,4 @@
-//! A tree of triangles laid out for speed: eight children per node and eight triangles per leaf block, tested at once.
+//! A tree of triangles laid out for speed: eight children per node and four triangles per leaf block, tested at once.
 
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod avx2;
@@ -47,11 +47,26 @@ impl WideBvh {
     /// the result has the least expected time for a random line among all that can be made by leaving nodes out.
     ///
     /// Source: Ylitie, Karras & Laine 2017, 'Efficient incoherent ray traversal on GPUs through compressed wide BVHs',
-    /// section 4.1. Differs from the paper: boxes in full precision; leaves of any size, paid per block of eight.
+    /// section 4.1. Differs from the paper: boxes in full precision; leaves of any size, paid per block of four.
     pub fn new(tree: &Bvh, triangles: &[Triangle]) -> Result<Self, InvalidBvh> {
+        Self::made(tree, triangles, None)
+    }
+
+    /// As [`new`](Self::new), but of least expected time for rays that enter every node of `tree` as often as `visits` says,
+    /// in place of random lines: in any unit, for example [`RayDensity::visits`](crate::RayDensity::visits), which tree
+    /// files keep. Inner nodes with many children are divided as if their parts had nothing in common.
+    ///
+    /// # Panics
+    /// If there are not as many `visits` as nodes.
+    pub fn for_rays(tree: &Bvh, triangles: &[Triangle], visits: &[f32]) -> Result<Self, InvalidBvh> {
+        assert_eq!(tree.nodes.len(), visits.len(), "a number of visits for every node");
+        Self::made(tree, triangles, Some(visits))
+    }
+
+    fn made(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) -> Result<Self, InvalidBvh> {
         let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
         validate(tree, &boxes)?;
-        let mut wide = build::widen(tree, triangles);
+        let mut wide = build::widen(tree, triangles, visits);
         wide.choose(Kernel::best());
         Ok(wide)
     }
@@ -138,7 +153,7 @@ impl WideBvh {
     }
 
     /// [`nearest_hit`](Self::nearest_hit) by [`Kernel::Portable`], with its tests counted: eight boxes for every node and
-    /// eight objects for every block of triangles, whether these have so many or not. The same counts on every machine.
+    /// four objects for every block of triangles, whether these have so many or not. The same counts on every machine.
     #[inline(never)]
     pub fn nearest_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
         walk::<false>(self, ray, counter)

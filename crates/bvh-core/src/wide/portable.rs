@@ -43,9 +43,15 @@ impl WideRay {
     }
 
     /// The nearest of the children that the ray enters before `t_max`, and the number of the others, which are written
-    /// to `others`, the nearest last. `None` if it enters none.
+    /// to `others`, the nearest last; with `ANY` the one in the last lane is taken for the nearest. `None` if the ray
+    /// enters none.
     #[inline(always)]
-    fn enter(&self, node: &WideNode, t_max: f32, others: &mut [Pending; 8]) -> Option<(Child, usize)> {
+    fn enter<const ANY: bool>(
+        &self,
+        node: &WideNode,
+        t_max: f32,
+        others: &mut [Pending; 8],
+    ) -> Option<(Child, usize)> {
         let (mut entry, mut exit) = ([self.t_min; 8], [f32::INFINITY; 8]);
         for axis in 0..3 {
             let (near, far) = (&node.planes[self.near[axis]], &node.planes[self.far[axis]]);
@@ -60,9 +66,9 @@ impl WideRay {
         let mut count = 0;
         for lane in 0..8 {
             if entry[lane] <= exit[lane] * Slabs::FAR && entry[lane] <= t_max {
-                // Insertion; the lower lane stays nearer on ties.
+                // Insertion; the higher lane is nearer on ties, for example where the ray begins in both boxes.
                 let mut at = count;
-                while at > 0 && others[at - 1].entry <= entry[lane] {
+                while !ANY && at > 0 && others[at - 1].entry < entry[lane] {
                     others[at] = others[at - 1];
                     at -= 1;
                 }
@@ -85,7 +91,9 @@ pub(crate) fn walk<const ANY: bool>(wide: &WideBvh, ray: &Ray, counter: &mut imp
     loop {
         if child.is_node() {
             counter.boxes(WideNode::LANES);
-            if let Some((nearest, others)) = wide_ray.enter(&wide.nodes[child.index()], t_max, stack.room()) {
+            if let Some((nearest, others)) =
+                wide_ray.enter::<ANY>(&wide.nodes[child.index()], t_max, stack.room())
+            {
                 stack.grow(others);
                 child = nearest;
                 continue;

@@ -4,7 +4,7 @@ use crate::{MAX_OBJECTS, Shear, Triangle};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// Up to eight triangles of a leaf.
+/// Up to four triangles of a leaf.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub(crate) struct TriangleBlock {

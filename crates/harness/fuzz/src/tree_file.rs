@@ -15,7 +15,7 @@ pub fn tree_file(bytes: &[u8]) {
     }
     let mut flat: Vec<u8> = held.iter().flat_map(|line| line.0).take(bytes.len()).collect();
     if mode & 1 == 1 && flat.len() >= Header::BYTES {
-        mend_start(&mut flat, mode & 2 == 2);
+        mend_start(&mut flat, mode & 2 == 2, mode & 4 == 4);
         seal(&mut flat);
         for (line, part) in held.iter_mut().zip(flat.chunks(64)) {
             line.0[..part.len()].copy_from_slice(part);
@@ -33,15 +33,15 @@ pub fn tree_file(bytes: &[u8]) {
 #[repr(align(64))]
 struct Line([u8; 64]);
 
-/// Gives a file the right first bytes and, if asked for, as many objects as its length has room for.
-fn mend_start(bytes: &mut [u8], counts: bool) {
+/// Gives a file the right first bytes and, if asked for, as many objects as its length has room for, and visits.
+fn mend_start(bytes: &mut [u8], counts: bool, visits: bool) {
     bytes[..8].copy_from_slice(&Header::MAGIC);
-    bytes[8..12].copy_from_slice(&Header::VERSION.to_le_bytes());
+    bytes[8..12].copy_from_slice(&(Header::VERSION - u32::from(!visits)).to_le_bytes());
     bytes[12..16].copy_from_slice(&[4, 3, 2, 1]);
     if counts {
         let nodes = u64::from(bytes[24]);
         let rest = (bytes.len() - Header::BYTES) as u64;
-        let objects = rest.saturating_sub(nodes * 32) / 4;
+        let objects = rest.saturating_sub(nodes * if visits { 36 } else { 32 }) / 4;
         for (at, count) in [(24, nodes), (32, objects)] {
             bytes[at..at + 8].copy_from_slice(&count.to_le_bytes());
         }
@@ -66,6 +66,9 @@ fn opened(bytes: &[u8]) {
         }
     };
     let objects = file.header().objects;
+    if let Ok(Some(visits)) = file.visits() {
+        assert!(visits.len() == file.header().nodes && visits.iter().all(|part| (0.0..=1.0).contains(part)));
+    }
     assert_eq!([file.tree().is_ok(), file.view().is_ok()], [file.tree().is_ok(); 2]);
     if let (Ok(tree), Ok(view)) = (file.tree(), file.view()) {
         assert!(bits(&tree.nodes) == bits(view.nodes) && tree.prim_ids == view.prim_ids);

@@ -4,6 +4,7 @@ mod answers;
 pub mod camera;
 pub mod empirical_cost;
 pub mod rays;
+pub mod segments;
 pub mod speed;
 
 pub use answers::disagreements;

@@ -46,7 +46,7 @@ pub fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> 
 
 /// A uniform point on the unit sphere. It is the direction of a uniform point of the unit ball, which needs no function
 /// that differs between machines.
-fn on_sphere(rng: &mut Stream) -> DVec3 {
+pub(super) fn on_sphere(rng: &mut Stream) -> DVec3 {
     loop {
         let mut coordinate = || rng.random::<f64>() * 2.0 - 1.0;
         let point = DVec3::new(coordinate(), coordinate(), coordinate());

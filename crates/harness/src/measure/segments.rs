@@ -1,0 +1,164 @@
+//! The rays that a tree is searched for: their parts up to the hit, from a path of cameras or from anywhere in a scene.
+
+use super::accelerator::Accelerator;
+use super::camera::{Camera, View};
+use super::rays::{Family, on_sphere, random_ray};
+use crate::scenes::Scene;
+use bvh_build::config::above;
+use bvh_build::{Check, OutOfRange, config};
+use bvh_core::{Aabb, Bvh, Ray, Segment};
+use bvh_search::Stream;
+use glam::{DVec3, Vec3};
+use rand::{RngExt, SeedableRng};
+use std::ops::Bound::Excluded;
+
+config! {
+    serde;
+    /// The rays of a renderer, as the file of `bake --rays FILE.toml` describes them. All coordinates are in world units.
+    pub struct RenderedRays {
+        /// The poses of the camera on its path, at least one; the camera moves straight from each to the next.
+        cameras: Vec<Pose>;
+        /// Angle of view from the lower edge of the picture to the upper one, degrees.
+        fov: f64 = 60.0, in (Excluded(0.0), Excluded(180.0));
+        /// Width of the picture over its height.
+        aspect: f64 = 1.0, in above(0.0);
+        /// Diffuse reflections that follow every primary ray, one after the other.
+        bounces: u32 = 1, in 0..=100;
+        /// Positions of lights: a shadow ray goes from every hit to each of them.
+        lights: Vec<[f64; 3]>;
+        /// Number of primary rays.
+        count: u32 = 50_000, in 1..=1_000_000;
+        /// Draws the pixels and the directions.
+        seed: u64 = 1;
+    }
+    check Self::check_cameras;
+}
+
+config! {
+    serde;
+    /// Where a camera is, and what it looks at, in world units.
+    pub struct Pose {
+        /// The eye.
+        eye: [f64; 3];
+        /// The point in the middle of the picture.
+        target: [f64; 3];
+    }
+}
+
+impl RenderedRays {
+    fn check_cameras(&self) -> Result<(), OutOfRange> {
+        let numbers = self.cameras.iter().flat_map(|pose| [pose.eye, pose.target]).chain(self.lights.clone());
+        if self.cameras.is_empty() {
+            return Err(OutOfRange::new("cameras", "empty", "at least one table with `eye` and `target`"));
+        }
+        match numbers.flatten().find(|number| !number.is_finite()) {
+            Some(wrong) => Err(OutOfRange::new("cameras and lights", wrong, "finite coordinates")),
+            None => Ok(()),
+        }
+    }
+
+    /// The camera at a place on its path, 0 at the first pose and 1 at the last; its picture is one unit high.
+    fn camera(&self, place: f64, up: DVec3) -> Camera {
+        let at = place * (self.cameras.len() - 1) as f64;
+        let first = (at as usize).min(self.cameras.len() - 1);
+        let (a, b) = (&self.cameras[first], &self.cameras[(first + 1).min(self.cameras.len() - 1)]);
+        let between = |a: [f64; 3], b: [f64; 3]| DVec3::from(a).lerp(b.into(), at - first as f64);
+        let view = View { from: between(a.eye, b.eye), at: between(a.target, b.target), fov: self.fov };
+        Camera::new(&view, up, 1, 1)
+    }
+}
+
+/// The segments of a renderer's rays through `scene`, of which `tree` is any valid tree.
+pub fn of_renderer(config: &RenderedRays, scene: &Scene, tree: &Bvh) -> Vec<Segment> {
+    let mut tracing = Tracing::new(scene, tree, config.seed);
+    let up = scene.up();
+    for index in 0..config.count {
+        let place = (f64::from(index) + tracing.rng.random::<f64>()) / f64::from(config.count);
+        let camera = config.camera(place, up);
+        let x = 0.5 + (tracing.rng.random::<f64>() - 0.5) * config.aspect;
+        let direction = camera.direction(x, tracing.rng.random());
+        let mut hit = tracing.nearest(camera.origin.as_vec3(), direction);
+        for bounce in 0..=config.bounces {
+            let Some(point) = hit else { break };
+            for &light in &config.lights {
+                tracing.shadow(point, light.into());
+            }
+            if bounce < config.bounces {
+                let direction = on_sphere(&mut tracing.rng);
+                hit = tracing.nearest(point, direction);
+            }
+        }
+    }
+    tracing.segments
+}
+
+/// The number of rays of each of the four kinds of [`of_anything`].
+const OF_EACH_KIND: u32 = 50_000;
+
+/// The segments of rays that need no camera: from anywhere in the scene and through it from outside, up to their hits; and from
+/// these hits in all directions and to points anywhere in the scene.
+pub fn of_anything(scene: &Scene, tree: &Bvh, seed: u64) -> Vec<Segment> {
+    let mut tracing = Tracing::new(scene, tree, seed);
+    let Some(root) = tree.root_aabb() else { return Vec::new() };
+    for family in [Family::Inside, Family::Lines] {
+        for _ in 0..OF_EACH_KIND {
+            let Some(ray) = random_ray(family, &root, &mut tracing.rng) else { continue };
+            let Some(point) = tracing.nearest(ray.origin(), ray.direction().as_dvec3()) else { continue };
+            let direction = on_sphere(&mut tracing.rng);
+            tracing.nearest(point, direction);
+            let place = DVec3::new(tracing.rng.random(), tracing.rng.random(), tracing.rng.random());
+            tracing.shadow(point, root.min.as_dvec3() + place * root.extent());
+        }
+    }
+    tracing.segments
+}
+
+/// Traces rays and keeps their segments.
+struct Tracing<'a> {
+    accelerator: Accelerator<'a>,
+    bounds: Aabb,
+    rng: Stream,
+    segments: Vec<Segment>,
+}
+
+impl<'a> Tracing<'a> {
+    fn new(scene: &'a Scene, tree: &'a Bvh, seed: u64) -> Self {
+        let accelerator = Accelerator::of_tree(&scene.primitives, tree);
+        let bounds = tree.root_aabb().unwrap_or(Aabb::EMPTY);
+        Self { accelerator, bounds, rng: Stream::seed_from_u64(seed), segments: Vec::new() }
+    }
+
+    /// Keeps the segment of a ray that looks for its nearest hit. Returns a point just before the hit, from which further
+    /// rays may begin.
+    fn nearest(&mut self, origin: Vec3, direction: DVec3) -> Option<Vec3> {
+        let ray = Ray::half_line(origin, direction.as_vec3()).ok()?;
+        let hit = self.accelerator.nearest_hit(&ray, &mut ());
+        // A ray that hits nothing ends where it has left the scene.
+        let length = hit.map_or_else(|| self.beyond(&ray), |hit| hit.t);
+        self.keep(origin, ray.at(length));
+        hit.map(|hit| ray.at(hit.t * JUST_BEFORE))
+    }
+
+    /// Keeps the segment of a ray from a point to a light, up to what is in its way.
+    fn shadow(&mut self, point: Vec3, light: DVec3) {
+        let way = light - point.as_dvec3();
+        let Ok(ray) = Ray::new(point, way.as_vec3(), 0.0, JUST_BEFORE) else { return };
+        let end = self.accelerator.nearest_hit(&ray, &mut ()).map_or(JUST_BEFORE, |hit| hit.t);
+        self.keep(point, ray.at(end));
+    }
+
+    fn keep(&mut self, from: Vec3, to: Vec3) {
+        if from.is_finite() && to.is_finite() {
+            self.segments.push(Segment { from: from.to_array(), to: to.to_array() });
+        }
+    }
+
+    /// A distance at which the ray is outside the scene.
+    fn beyond(&self, ray: &Ray) -> f32 {
+        let reach = (self.bounds.min - ray.origin()).abs().max((self.bounds.max - ray.origin()).abs());
+        2.0 * reach.length() / ray.direction().length()
+    }
+}
+
+/// The part of the way to a hit at which the next ray begins, so that it does not hit the same surface at once.
+const JUST_BEFORE: f32 = 1.0 - 1.0 / 2048.0;
