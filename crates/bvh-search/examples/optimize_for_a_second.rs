@@ -4,7 +4,7 @@
 
 use bvh_build::{Builder, median_cut};
 use bvh_core::{Aabb, Bvh, cost, validate};
-use bvh_search::{Budget, Event, Observer, best, optimize};
+use bvh_search::{Budget, Event, Observer, Problem, best, optimize};
 use std::error::Error;
 use std::time::{Duration, Instant};
 
@@ -46,7 +46,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Any binary tree: from another library by `Bvh::from_first_count`, from a file, or as here.
     let tree: Bvh = median_cut::Config { leaf_fraction: 0.001, ..Default::default() }.build(&boxes)?;
     let second = Second { start: Instant::now(), before: cost::internal_area(&tree) };
-    let found = optimize(&tree, &boxes, &best::Config::default(), 1, Budget::default(), &second)?;
+    let found =
+        optimize(&tree, &Problem::new(&boxes), &best::Config::default(), 1, Budget::default(), &second)?;
     validate(&found.tree, &boxes)?;
     println!("{:?}: {:.4} of the original", found.stop, found.cost / second.before);
     assert!(found.cost < second.before);

@@ -5,22 +5,24 @@ use crate::local::incumbent::Incumbent;
 use crate::run::{Budget, Observer, Outcome, Problem, Run, SearchError, solve};
 use crate::tree::{Metric, search_by_metric};
 use bvh_build::{Check, OutOfRange};
+use bvh_core::cost::Objective;
 use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate};
 
-/// Improves `tree`, over the objects of `boxes`, by [`best`](crate::best) without its builder, until the
+/// Improves `tree`, over the objects of the problem, by [`best`](crate::best) without its builder, until the
 /// budget is spent or the observer cancels. The result has the same leaves with the same objects; leaves of several
-/// objects are moved as a whole. The cost is the [internal area](bvh_core::cost::internal_area), with boxes
-/// made tight, and never above that of `tree`.
+/// objects are moved as a whole. The cost is the [internal area](bvh_core::cost::internal_area), or the problem's measure in
+/// its place, with boxes made tight, and never above that of `tree`.
 ///
 /// Refuses trees that are not [valid](validate), and inner nodes with more than two children.
 pub fn optimize(
     tree: &Bvh,
-    boxes: &[Aabb],
+    problem: &Problem,
     config: &best::Config,
     seed: u64,
     budget: Budget,
     observer: &dyn Observer,
 ) -> Result<Outcome, SearchError> {
+    let boxes = problem.boxes;
     check_boxes(boxes).map_err(bvh_build::BuildError::from)?;
     validate(tree, boxes)?;
     // To the search, every leaf is one object with the box of the leaf.
@@ -34,7 +36,10 @@ pub fn optimize(
     }
     tight.prim_ids = (0..leaves.len() as u32).collect();
     let leaf_boxes: Vec<Aabb> = leaves.iter().map(|(aabb, _)| *aabb).collect();
-    let mut outcome = solve(&From { tree: tight, config }, &Problem::new(&leaf_boxes), seed, budget, observer)?;
+    let mut outcome = {
+        let problem = Problem { boxes: &leaf_boxes, objective: Objective::InternalArea, ..*problem };
+        solve(&From { tree: tight, config }, &problem, seed, budget, observer)?
+    };
     let mut prim_ids = Vec::with_capacity(boxes.len());
     for node in &mut outcome.tree.nodes {
         if let NodeKind::Leaf { first, .. } = node.kind() {

@@ -181,7 +181,8 @@ fn chain(boxes: &[Aabb]) -> Bvh {
 fn the_deepest_tree_can_be_optimised() {
     let boxes = scatter(3000, 5);
     let tree = chain(&boxes);
-    let outcome = optimize(&tree, &boxes, &best::Config::default(), 1, work(20_000_000), &()).unwrap();
+    let outcome =
+        optimize(&tree, &Problem::new(&boxes), &best::Config::default(), 1, work(20_000_000), &()).unwrap();
     validate(&outcome.tree, &boxes).unwrap();
     assert!(outcome.cost < cost::internal_area(&tree) / 4.0);
 }
@@ -198,13 +199,15 @@ fn leaves_of_several_objects_are_kept_and_other_trees_refused_by_name() {
     }
     tree.prim_ids = tree.prim_ids.iter().flat_map(|&pair| [2 * pair, 2 * pair + 1]).collect();
     let config = best::Config::default();
-    let outcome = optimize(&tree, &boxes, &config, 1, work(1_000_000), &()).unwrap();
+    let outcome = optimize(&tree, &Problem::new(&boxes), &config, 1, work(1_000_000), &()).unwrap();
     validate(&outcome.tree, &boxes).unwrap();
     assert_eq!(outcome.tree.inner_count(), tree.inner_count());
     assert_eq!(outcome.cost, cost::internal_area(&outcome.tree));
     assert!(outcome.cost < cost::internal_area(&tree));
 
-    let refused = |tree: &Bvh, boxes: &[Aabb]| optimize(tree, boxes, &config, 1, work(0), &()).unwrap_err();
+    let refused = |tree: &Bvh, boxes: &[Aabb]| {
+        optimize(tree, &Problem::new(boxes), &config, 1, work(0), &()).unwrap_err()
+    };
     let mut flat = Bvh { nodes: vec![Node::inner(Aabb::EMPTY, 1, 3)], prim_ids: vec![0, 1, 2] };
     flat.nodes.extend((0..3).map(|i| Node::leaf(Aabb::EMPTY, i, 1)));
     flat.refit(&boxes[..3]);

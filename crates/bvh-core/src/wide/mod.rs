@@ -40,6 +40,11 @@ pub enum Coherence {
 }
 
 impl WideBvh {
+    /// Boxes that are tested, and counted, at every node.
+    pub const BOXES_OF_NODE: u64 = node::WideNode::LANES as u64;
+    /// Objects that are tested, and counted, at every block of triangles of a leaf.
+    pub const OBJECTS_OF_BLOCK: u64 = triangles::TriangleBlock::LANES as u64;
+
     /// Lays out `tree`, valid over the boxes of `triangles`, with any number of children per node. O(n) time and
     /// memory.
     ///

@@ -56,7 +56,10 @@ fn refused(boxes: &[Aabb], bad: usize, seed: u64, budget: Budget) {
     named("bound", lower_bound::internal_area(boxes, 1, &()).unwrap_err().to_string());
     let config = best::Config::default();
     let tree = Bvh::default();
-    named("optimize", optimize(&tree, boxes, &config, seed, budget, &()).unwrap_err().to_string());
+    named(
+        "optimize",
+        optimize(&tree, &Problem::new(boxes), &config, seed, budget, &()).unwrap_err().to_string(),
+    );
 }
 
 /// Every method gives a tight tree of exact cost, the same one again, and what is made of trees holds too.
@@ -85,7 +88,7 @@ fn built(boxes: &[Aabb], seed: u64, budget: Budget) {
     let before = cost::internal_area(&greedy);
     let merged = collapse_leaves(&greedy, &SahConstants::default());
     for tree in [&greedy, &merged] {
-        let better = optimize(tree, boxes, &best::Config::default(), seed, budget, &()).unwrap();
+        let better = optimize(tree, &Problem::new(boxes), &best::Config::default(), seed, budget, &()).unwrap();
         validate(&better.tree, boxes).unwrap();
         assert!(better.cost <= before * (1.0 + ROUNDING));
     }
