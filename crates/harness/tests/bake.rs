@@ -55,6 +55,53 @@ fn a_bake_of_work_writes_the_same_bytes_on_any_number_of_threads() {
 }
 
 #[test]
+fn a_bake_for_rays_keeps_how_often_they_visit_each_node() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("walk.toml"), WALK).unwrap();
+    for (rays, name) in [("default", "best for rays of default"), ("walk.toml", "best for rays of walk.toml")] {
+        let bytes = ["1", "2"].map(|jobs| {
+            let args =
+                ["bake", "escher", "--budget", "2Mwork", "--out", "x.bvh", "--rays", rays, "--jobs", jobs];
+            let said = said(at, &args);
+            assert!(said.contains("visits of rays") && said.contains("below Müller–Fellner's"), "{said}");
+            fs::read(at.join("x.bvh")).unwrap()
+        });
+        assert!(bytes[0] == bytes[1], "{rays}: the same bytes on any number of threads");
+        let scene = Scene::load("escher").unwrap();
+        let file = bvh_core::file::TreeFile::open(&bytes[0]).unwrap().for_boxes(&scene.boxes).unwrap();
+        assert_eq!(file.header().method, name);
+        let (tree, visits) = (file.tree().unwrap(), file.visits().unwrap().unwrap());
+        assert_eq!(visits[0], 1.0);
+        bvh_core::WideBvh::for_rays(&tree, scene.triangles().unwrap(), &visits).unwrap();
+        assert_eq!(facts(&said(at, &["inspect", "x.bvh", "escher"]))["method"], name);
+    }
+    fs::write(at.join("wrong.toml"), WALK.replace("bounces = 2", "bounces = 2\nbouncy = 1")).unwrap();
+    fs::write(at.join("none.toml"), "bounces = 1").unwrap();
+    for (file, parts) in [
+        ("wrong.toml", &["wrong.toml", "line 3", "bouncy", "bounces"][..]),
+        ("none.toml", &["none.toml", "cameras is empty", "eye"]),
+        ("gone.toml", &["--rays", "gone.toml", "no such file"]),
+    ] {
+        let output = run(at, &["bake", "escher", "--budget", "1s", "--out", "y.bvh", "--rays", file]);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(parts.iter().all(|part| message.contains(part)), "{file}: {message}");
+        assert!(!at.join("y.bvh").exists());
+    }
+}
+
+/// A walk through escher's stairs.
+const WALK: &str = "count = 5000
+bounces = 2
+lights = [[0.0, 9.0, 0.0]]
+cameras = [
+    { eye = [9.0, 5.0, 8.0], target = [0.0, 0.0, 0.0] },
+    { eye = [-9.0, 6.0, 8.0], target = [0.0, 1.0, 0.0] },
+]
+";
+
+#[test]
 fn a_bake_goes_on_from_another_and_is_never_worse() {
     let folder = tempfile::tempdir().unwrap();
     let bake = |out: &str, more: &[&str]| {

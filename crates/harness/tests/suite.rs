@@ -1,8 +1,9 @@
 //! Every case of the suite holds for every method, every traversal and every other part.
 
-use bvh_build::{Accelerator, Structure};
-use bvh_core::{Primitives, cost::Objective, validate};
-use bvh_search::{Budget, Method, Problem, StopReason, solve};
+use bvh_build::{Accelerator, Builder, Structure, muller_fellner};
+use bvh_core::cost::Objective;
+use bvh_core::{Aabb, Primitives, RayDensity, Segment, WideBvh, file, validate};
+use bvh_search::{Budget, Method, Problem, StopReason, optimize, solve};
 use harness::scenes::Scene;
 use harness::scenes::stiff::{self, STIFF};
 use harness::stress::{
@@ -189,6 +190,49 @@ fn every_objective_is_what_its_method_reports() {
             }
         }
     }
+}
+
+#[test]
+fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
+    let method = Method::Best(bvh_search::best::Config::default());
+    let (mut searched, mut refused) = (0, 0);
+    for case in &CASES {
+        let Some(scene) = case.scene() else { continue };
+        let triangles = case.triangles(scene.sizes[0].min(2000));
+        let boxes = stiff::boxes(&triangles);
+        let bounds = boxes.iter().fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
+        let segments: Vec<Segment> = tracing::rays(&triangles, 3000, 1)
+            .iter()
+            .map(|ray| Segment { from: ray.origin().to_array(), to: ray.at(ray.t_max().min(1e30)).to_array() })
+            .filter(|segment| segment.from.iter().chain(&segment.to).all(|c| c.is_finite()))
+            .collect();
+        let Ok(density) = RayDensity::of_rays(&bounds, &segments, 0.1) else {
+            refused += 1;
+            continue;
+        };
+        searched += 1;
+        let problem = Problem { measure: Some(&density), ..Problem::new(&boxes) };
+        let start = muller_fellner::Config::default().build(&boxes).unwrap();
+        let budget = examine::budget(&method, boxes.len(), WORK);
+        let outcome = optimize(&start, &problem, &Default::default(), 1, budget, &()).unwrap();
+        validate(&outcome.tree, &boxes).unwrap();
+        let cost = problem.cost(&outcome.tree);
+        assert!(outcome.cost <= problem.cost(&start), "{}: a worse tree", case.id);
+        let close = (outcome.cost - cost).abs() <= examine::ROUNDING * cost;
+        assert!(close, "{}: {} reported, {cost}", case.id, outcome.cost);
+        // What is saved can be loaded, and every ray has its right answer in the layout for these rays.
+        let visits = density.visits(&outcome.tree);
+        let bytes = file::save(&outcome.tree, &boxes, &file::Origin { visits: &visits, ..Default::default() });
+        let bytes = bytes.unwrap_or_else(|error| panic!("{}: {error}", case.id));
+        assert_eq!(file::TreeFile::open(&bytes).unwrap().visits().unwrap().unwrap(), visits);
+        let wide = WideBvh::for_rays(&outcome.tree, &triangles, &visits).unwrap();
+        let plain = WideBvh::new(&start, &triangles).unwrap();
+        for ray in tracing::rays(&triangles, 300, 2) {
+            assert_eq!(wide.nearest_hit(&ray), plain.nearest_hit(&ray), "{}: {ray:?}", case.id);
+            assert_eq!(wide.any_hit(&ray), plain.any_hit(&ray), "{}: {ray:?}", case.id);
+        }
+    }
+    assert!(searched > 25 && refused < 10, "{searched} searched, {refused} without a density");
 }
 
 #[test]

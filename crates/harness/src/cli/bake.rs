@@ -6,10 +6,14 @@ use crate::cli::output::{print_error, print_line};
 use crate::cli::{explain, interrupt};
 use crate::clock::Deadline;
 use crate::files::{self, Reserved, load_tree};
+use crate::measure::ray_cost::{self, TrainedOn};
+use crate::measure::segments::{self, RenderedRays};
 use crate::scenes::Scene;
+use crate::spec::configuration;
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::cost;
+use bvh_core::cost::Measure;
 use bvh_core::file::{self, Header, Origin};
+use bvh_core::{Bvh, RayDensity};
 use bvh_search::best::{self, Horizon};
 use bvh_search::{Budget, Event, Method, Observer, Outcome, Problem, StopReason, optimize, solve};
 use clap::Args;
@@ -35,6 +39,10 @@ pub struct BakeArgs {
     /// Seed of the random numbers.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Search for the least cost of rays instead of area: `default`, rays that need no camera, or a file that describes those
+    /// of a renderer.
+    #[arg(long, value_name = "default|FILE.toml")]
+    pub rays: Option<String>,
     /// The method, with its default parameters.
     #[arg(long, value_name = "NAME", default_value = BEST)]
     pub method: String,
@@ -92,6 +100,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         input_file("--from", from)?;
     }
     output_file("--out", &args.out, &TREE)?;
+    let rays = args.rays.as_deref().map(read_rays).transpose()?;
     args.jobs.apply()?;
     let scene = Scene::load(&args.scene)?;
     scene.remark.iter().for_each(|remark| print_error(remark));
@@ -103,18 +112,23 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let reserved = Reserved::new(&args.out, most_bytes(scene.boxes.len()))?;
 
     let greedy = muller_fellner::Config::default().build(&scene.boxes);
-    let base = cost::internal_area(&greedy.map_err(Error::search(&scene.name, &args.method))?);
-    let watch = Watch::new(args.budget, base, interrupted);
+    let greedy = greedy.map_err(Error::search(&scene.name, &args.method))?;
+    let watch = Watch::new(args.budget, interrupted);
     interrupt::hold();
+    let density = rays.map(|rays| density(&rays, &scene, &greedy, args.seed)).transpose()?;
+    let problem = Problem {
+        measure: density.as_ref().map(|density| density as &dyn Measure),
+        ..Problem::new(&scene.boxes)
+    };
+    let base = problem.cost(&greedy);
+    watch.set_base(base);
     let budget = match args.budget {
         Effort::Time(_) => Budget::default(),
         Effort::Work(work) => Budget { max_work: Some(work), ..Budget::default() },
     };
     let outcome = match (&start, &method) {
-        (Some((tree, _)), Method::Best(config)) => {
-            optimize(tree, &scene.boxes, config, args.seed, budget, &watch)
-        }
-        _ => solve(&method, &Problem::new(&scene.boxes), args.seed, budget, &watch),
+        (Some((tree, _)), Method::Best(config)) => optimize(tree, &problem, config, args.seed, budget, &watch),
+        _ => solve(&method, &problem, args.seed, budget, &watch),
     };
     watch.bar.finish_and_clear();
     let outcome = outcome.map_err(Error::search(&scene.name, &args.method))?;
@@ -122,17 +136,70 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
 
     let spent = start.as_ref().map_or(0, |(_, header)| header.work);
     let work = spent.saturating_add(outcome.work);
-    let origin = Origin { method: &args.method, seed: args.seed, work, ..Default::default() };
+    let name = recorded(args);
+    let visits = density.as_ref().map_or_else(Vec::new, |density| density.visits(&outcome.tree));
+    let origin = Origin { method: &name, seed: args.seed, work, visits: &visits, ..Default::default() };
     let bytes = file::save(&outcome.tree, &scene.boxes, &origin)
         .map_err(|source| Error::TreeFile { path: args.out.clone(), source })?;
     reserved.write(&bytes)?;
     if interrupted.load(Relaxed) {
         return Err(Error::Stopped { path: args.out.clone(), cost: outcome.cost });
     }
-    let before = start.map(|(_, header)| header.cost);
+    let before = start.map(|(tree, _)| problem.cost(&tree));
     let summary = summary(args, &scene, &outcome, base, before, seconds);
     print_line(&format!("{summary}{} bytes", bytes.len()));
     Ok(())
+}
+
+/// The rays of `--rays`.
+enum Rays {
+    /// Any, without a camera.
+    Default,
+    /// A renderer's.
+    Rendered(RenderedRays),
+}
+
+fn read_rays(named: &str) -> Result<Rays, Error> {
+    if named == "default" {
+        return Ok(Rays::Default);
+    }
+    let path = Path::new(named);
+    input_file("--rays", path)?;
+    configuration(path).map(Rays::Rendered)
+}
+
+/// Rays of each family that a tree is trained on without a camera.
+const RAYS_OF_FAMILY: u32 = 100_000;
+
+/// The density of the rays through a scene, of which `tree` is any tree.
+fn density(rays: &Rays, scene: &Scene, tree: &Bvh, seed: u64) -> Result<RayDensity, Error> {
+    let made = match rays {
+        Rays::Default => {
+            let rays = segments::of_anything(RAYS_OF_FAMILY, scene, tree, seed);
+            ray_cost::density(&rays, TrainedOn::Default, tree)
+        }
+        Rays::Rendered(config) => {
+            ray_cost::density(&segments::of_renderer(config, scene, tree), TrainedOn::Camera, tree)
+        }
+    };
+    made.map_err(|error| Error::Tracing { scene: scene.name.clone(), message: error.to_string() })
+}
+
+/// What the file says of the method: its name, and the rays if there are any.
+fn recorded(args: &BakeArgs) -> String {
+    const MOST_BYTES: usize = 64;
+    let Some(rays) = &args.rays else { return args.method.clone() };
+    let file = Path::new(rays).file_name().map_or(rays.clone(), |name| name.to_string_lossy().into_owned());
+    let mut name = format!("{} for rays of {file}", args.method).replace('\0', "");
+    while name.len() > MOST_BYTES {
+        name.pop();
+    }
+    name
+}
+
+/// What the cost is.
+fn unit(args: &BakeArgs) -> &'static str {
+    if args.rays.is_some() { "visits of rays times root area" } else { "internal area" }
 }
 
 /// The method that was named. Refuses one that cannot start from a tree if a tree is given.
@@ -155,7 +222,7 @@ fn method(args: &BakeArgs) -> Result<Method, Error> {
 }
 
 /// The tree to start from, and its header.
-fn start(path: &Path, scene: &Scene) -> Result<(bvh_core::Bvh, Header), Error> {
+fn start(path: &Path, scene: &Scene) -> Result<(Bvh, Header), Error> {
     let tree = load_tree(path, &scene.boxes)?;
     let header = files::open_tree(path, &files::read(path)?)?.header().clone();
     Ok((tree, header))
@@ -163,7 +230,7 @@ fn start(path: &Path, scene: &Scene) -> Result<(bvh_core::Bvh, Header), Error> {
 
 /// The size of the largest tree file over `objects` objects, in bytes.
 fn most_bytes(objects: usize) -> usize {
-    Header::BYTES + objects * (2 * size_of::<bvh_core::Node>() + size_of::<u32>())
+    Header::BYTES + objects * (2 * (size_of::<bvh_core::Node>() + size_of::<f32>()) + size_of::<u32>())
 }
 
 fn summary(
@@ -183,7 +250,7 @@ fn summary(
             args.method,
             args.seed
         ),
-        format!("internal area {}, {} Müller–Fellner's {base}", outcome.cost, gain(outcome.cost, base)),
+        format!("{} {}, {} Müller–Fellner's {base}", unit(args), outcome.cost, gain(outcome.cost, base)),
     ];
     if let Some(before) = before {
         lines.push(format!("{} the tree it went on from, {before}", gain(outcome.cost, before)));
@@ -209,7 +276,8 @@ struct Watch<'a> {
     bar: ProgressBar,
     deadline: Deadline,
     effort: Effort,
-    base: f64,
+    /// The bits of the cost that gains are relative to.
+    base: AtomicU64,
     last: Mutex<Option<Event>>,
     /// When the bar was last brought up to date, in milliseconds since the beginning.
     shown: AtomicU64,
@@ -217,14 +285,19 @@ struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    fn new(effort: Effort, base: f64, interrupted: &'a AtomicBool) -> Self {
+    fn new(effort: Effort, interrupted: &'a AtomicBool) -> Self {
         // In thousandths of the budget; hidden unless standard error is a terminal.
         let bar = ProgressBar::new(1000);
         let style = ProgressStyle::with_template("{wide_bar} {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         let limit = if let Effort::Time(limit) = effort { limit } else { Duration::MAX };
+        let base = AtomicU64::default();
         let (deadline, last, shown) = (Deadline::after(limit), Mutex::default(), AtomicU64::default());
         Self { bar, deadline, effort, base, last, shown, interrupted }
+    }
+
+    fn set_base(&self, base: f64) {
+        self.base.store(base.to_bits(), Relaxed);
     }
 
     /// Shows incumbent, gain, rate and time left, ten times a second.
@@ -249,7 +322,7 @@ impl<'a> Watch<'a> {
         self.bar.set_message(format!(
             "{:.6e}, {} MF, {:.2} M moves/s, {:.0} s left",
             event.incumbent,
-            gain(event.incumbent, self.base),
+            gain(event.incumbent, f64::from_bits(self.base.load(Relaxed))),
             event.evaluations as f64 / seconds / 1e6,
             (seconds / done.max(1e-9) - seconds).max(0.0)
         ));

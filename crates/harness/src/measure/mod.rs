@@ -3,6 +3,7 @@
 mod answers;
 pub mod camera;
 pub mod empirical_cost;
+pub mod ray_cost;
 pub mod rays;
 pub mod segments;
 pub mod speed;

@@ -1,11 +1,10 @@
-//! The rays that a tree is searched for: their parts up to the hit, from a path of cameras or from anywhere in a scene.
+//! The rays that a tree is searched for, with their parts up to the hit: a renderer's, or any through a scene.
 
-use super::accelerator::Accelerator;
 use super::camera::{Camera, View};
-use super::rays::{Family, on_sphere, random_ray};
+use super::rays::{Family, Kind, on_sphere, random_ray};
 use crate::scenes::Scene;
 use bvh_build::config::above;
-use bvh_build::{Check, OutOfRange, config};
+use bvh_build::{Accelerator, OutOfRange, config};
 use bvh_core::{Aabb, Bvh, Ray, Segment};
 use bvh_search::Stream;
 use glam::{DVec3, Vec3};
@@ -24,7 +23,7 @@ config! {
         aspect: f64 = 1.0, in above(0.0);
         /// Diffuse reflections that follow every primary ray, one after the other.
         bounces: u32 = 1, in 0..=100;
-        /// Positions of lights: a shadow ray goes from every hit to each of them.
+        /// Positions of lights: a shadow ray goes from the hit of every primary ray to each of them.
         lights: Vec<[f64; 3]>;
         /// Number of primary rays.
         count: u32 = 50_000, in 1..=1_000_000;
@@ -68,8 +67,19 @@ impl RenderedRays {
     }
 }
 
-/// The segments of a renderer's rays through `scene`, of which `tree` is any valid tree.
-pub fn of_renderer(config: &RenderedRays, scene: &Scene, tree: &Bvh) -> Vec<Segment> {
+/// A ray as it is traced: its kind, and its part up to what it hits.
+pub struct TracedRay {
+    /// Why it is sent.
+    pub kind: Kind,
+    /// From a surface or a camera on.
+    pub ray: Ray,
+    /// Up to the nearest hit. All of a shadow ray, which may meet anything on its way before what is nearest.
+    pub segment: Segment,
+}
+
+/// The rays of a renderer through `scene`, of which `tree` is any valid tree: through random places of the pictures, from their
+/// hits in random directions as often as `bounces` says, and from the hits of primary rays to every light.
+pub fn of_renderer(config: &RenderedRays, scene: &Scene, tree: &Bvh) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, config.seed);
     let up = scene.up();
     for index in 0..config.count {
@@ -77,79 +87,75 @@ pub fn of_renderer(config: &RenderedRays, scene: &Scene, tree: &Bvh) -> Vec<Segm
         let camera = config.camera(place, up);
         let x = 0.5 + (tracing.rng.random::<f64>() - 0.5) * config.aspect;
         let direction = camera.direction(x, tracing.rng.random());
-        let mut hit = tracing.nearest(camera.origin.as_vec3(), direction);
-        for bounce in 0..=config.bounces {
+        let mut hit = tracing.nearest(Kind::Primary, camera.origin.as_vec3(), direction);
+        if let Some(point) = hit {
+            config.lights.iter().for_each(|&light| tracing.shadow(point, light.into()));
+        }
+        for _ in 0..config.bounces {
             let Some(point) = hit else { break };
-            for &light in &config.lights {
-                tracing.shadow(point, light.into());
-            }
-            if bounce < config.bounces {
-                let direction = on_sphere(&mut tracing.rng);
-                hit = tracing.nearest(point, direction);
-            }
+            let direction = on_sphere(&mut tracing.rng);
+            hit = tracing.nearest(Kind::Bounce, point, direction);
         }
     }
-    tracing.segments
+    tracing.rays
 }
 
-/// The number of rays of each of the four kinds of [`of_anything`].
-const OF_EACH_KIND: u32 = 50_000;
-
-/// The segments of rays that need no camera: from anywhere in the scene and through it from outside, up to their hits; and from
-/// these hits in all directions and to points anywhere in the scene.
-pub fn of_anything(scene: &Scene, tree: &Bvh, seed: u64) -> Vec<Segment> {
+/// Rays that need no camera: `count` from anywhere in the scene and as many through it from outside; and from the hits of both
+/// one in any direction and one to a point anywhere in the scene.
+pub fn of_anything(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, seed);
     let Some(root) = tree.root_aabb() else { return Vec::new() };
     for family in [Family::Inside, Family::Lines] {
-        for _ in 0..OF_EACH_KIND {
+        for _ in 0..count {
             let Some(ray) = random_ray(family, &root, &mut tracing.rng) else { continue };
-            let Some(point) = tracing.nearest(ray.origin(), ray.direction().as_dvec3()) else { continue };
+            let hit = tracing.nearest(Kind::Incoherent, ray.origin(), ray.direction().as_dvec3());
+            let Some(point) = hit else { continue };
             let direction = on_sphere(&mut tracing.rng);
-            tracing.nearest(point, direction);
+            tracing.nearest(Kind::Bounce, point, direction);
             let place = DVec3::new(tracing.rng.random(), tracing.rng.random(), tracing.rng.random());
             tracing.shadow(point, root.min.as_dvec3() + place * root.extent());
         }
     }
-    tracing.segments
+    tracing.rays
 }
 
-/// Traces rays and keeps their segments.
+/// Traces rays and keeps them.
 struct Tracing<'a> {
     accelerator: Accelerator<'a>,
     bounds: Aabb,
     rng: Stream,
-    segments: Vec<Segment>,
+    rays: Vec<TracedRay>,
 }
 
 impl<'a> Tracing<'a> {
     fn new(scene: &'a Scene, tree: &'a Bvh, seed: u64) -> Self {
         let accelerator = Accelerator::of_tree(&scene.primitives, tree);
         let bounds = tree.root_aabb().unwrap_or(Aabb::EMPTY);
-        Self { accelerator, bounds, rng: Stream::seed_from_u64(seed), segments: Vec::new() }
+        Self { accelerator, bounds, rng: Stream::seed_from_u64(seed), rays: Vec::new() }
     }
 
-    /// Keeps the segment of a ray that looks for its nearest hit. Returns a point just before the hit, from which further
-    /// rays may begin.
-    fn nearest(&mut self, origin: Vec3, direction: DVec3) -> Option<Vec3> {
+    /// Keeps a ray that looks for its nearest hit. Returns a point just before the hit, from which further rays may begin.
+    fn nearest(&mut self, kind: Kind, origin: Vec3, direction: DVec3) -> Option<Vec3> {
         let ray = Ray::half_line(origin, direction.as_vec3()).ok()?;
-        let hit = self.accelerator.nearest_hit(&ray, &mut ());
+        let hit = self.accelerator.nearest_hit(&ray);
         // A ray that hits nothing ends where it has left the scene.
         let length = hit.map_or_else(|| self.beyond(&ray), |hit| hit.t);
-        self.keep(origin, ray.at(length));
+        self.keep(kind, ray, length);
         hit.map(|hit| ray.at(hit.t * JUST_BEFORE))
     }
 
-    /// Keeps the segment of a ray from a point to a light, up to what is in its way.
+    /// Keeps the ray from a point to a light.
     fn shadow(&mut self, point: Vec3, light: DVec3) {
         let way = light - point.as_dvec3();
         let Ok(ray) = Ray::new(point, way.as_vec3(), 0.0, JUST_BEFORE) else { return };
-        let end = self.accelerator.nearest_hit(&ray, &mut ()).map_or(JUST_BEFORE, |hit| hit.t);
-        self.keep(point, ray.at(end));
+        self.keep(Kind::Shadow, ray, JUST_BEFORE);
     }
 
-    fn keep(&mut self, from: Vec3, to: Vec3) {
-        if from.is_finite() && to.is_finite() {
-            self.segments.push(Segment { from: from.to_array(), to: to.to_array() });
+    fn keep(&mut self, kind: Kind, ray: Ray, end: f32) {
+        let (from, to) = (ray.origin(), ray.at(end));
+        if to.is_finite() {
+            let segment = Segment { from: from.to_array(), to: to.to_array() };
+            self.rays.push(TracedRay { kind, ray, segment });
         }
     }
 

@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::run::rows::{
-    self, BoundRow, ClockRow, HistoryRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row, RunRow,
-    TimingRow, TraceRow, TraceTimeRow,
+    self, BoundRow, ClockRow, HistoryRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row, RunRow, TestRow,
+    TestTimeRow, TimingRow, TraceRow, TraceTimeRow,
 };
 use crate::scenes::SceneKind;
 use crate::statistics::minimum;
@@ -34,6 +34,10 @@ pub struct Rows {
     pub traces: Vec<TraceRow>,
     /// Of `timing_traversal.csv`, likewise.
     pub trace_times: Vec<TraceTimeRow>,
+    /// Of `tests.csv`; none if no rays judge the trees.
+    pub tests: Vec<TestRow>,
+    /// Of `timing_tests.csv`, likewise.
+    pub test_times: Vec<TestTimeRow>,
 }
 
 impl Rows {
@@ -51,6 +55,8 @@ impl Rows {
             render_times: rows::read_if_any(folder)?,
             traces: rows::read_if_any(folder)?,
             trace_times: rows::read_if_any(folder)?,
+            tests: rows::read_if_any(folder)?,
+            test_times: rows::read_if_any(folder)?,
         })
     }
 

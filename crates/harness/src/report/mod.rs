@@ -23,6 +23,7 @@ pub mod peers;
 pub mod pictures;
 mod profile;
 mod progress;
+mod ray_cost;
 pub mod ray_tests;
 mod run_times;
 pub mod significance;
@@ -121,6 +122,8 @@ reports! {
     "significance" => Significance(significance::Config) by significance::Config::write;
     /// One picture by brute force, KD-tree and trees.
     "pictures" => Pictures(pictures::Config) by pictures::Config::write;
+    /// Tests of rays in trees that are trained on rays.
+    "ray_cost" => RayCost(ray_cost::Config) by ray_cost::Config::write;
     /// Cost against build time and against time per ray.
     "pareto" => Pareto(config::Methods) by pareto::write;
     /// Other libraries beside ours.
@@ -145,6 +148,7 @@ impl Report {
             Self::Pareto(config) | Self::Traversal(config) => (&config.methods, vec![]),
             Self::RunTimes(config) | Self::Ecdf(config) => (&config.methods, vec![]),
             Self::Profile(config) | Self::TimeToTarget(config) => (&config.methods, vec![]),
+            Self::RayCost(config) => (&[], vec![("base".into(), &config.base)]),
             Self::Trials(config) => (&config.methods, vec![]),
             Self::Times(config) => (&config.methods, vec![]),
             Self::RayTests(config) => (&config.methods, vec![]),

@@ -4,6 +4,7 @@ use crate::Error;
 use crate::run::finish::{Summary, conclude};
 use crate::run::job::{Job, Watch, base_cost, perform};
 use crate::run::provenance::Provenance;
+use crate::run::ray_cost;
 use crate::run::reference::BestKnown;
 use crate::run::resolved::{Resolved, load_scenes, to_toml};
 use crate::run::shard::Shard;
@@ -39,6 +40,7 @@ pub fn execute(
     let whole_only = [
         (experiment.suite.is_some(), "the suite of cases is not done in parts"),
         (experiment.tracing.is_some(), "rays are timed against each other, not in parts"),
+        (experiment.ray_cost.is_some(), "trees are judged by rays beside each other, not in parts"),
     ];
     if let Some((_, why)) = whole_only.iter().find(|(whole, _)| *whole && extent.shard.is_some()) {
         return Err(Error::Usage(format!("{}: {why}", experiment.name)));
@@ -69,7 +71,7 @@ fn run(
         (0..jobs.len()).filter(|&index| extent.shard.is_none_or(|shard| shard.has(index))).collect();
     let watch = Watch { bar: progress(own.len() as u64), interrupted };
     watch.bar.set_message(experiment.name.to_string());
-    let (trees, redone) = perform_all(experiment, &jobs, &own, &store, &watch)?;
+    let (mut trees, redone) = perform_all(experiment, &jobs, &own, &store, &watch)?;
     remarks.extend(redone);
     let provenance = Provenance::gather();
     if let Some(shard) = extent.shard {
@@ -79,7 +81,10 @@ fn run(
     }
     let mut traced = String::new();
     if let Some(config) = &experiment.tracing {
-        traced = trace(experiment, config, &jobs, trees, &watch, &store)?;
+        traced = trace(experiment, config, &jobs, &mut trees, &watch, &store)?;
+    }
+    if let Some(config) = &experiment.ray_cost {
+        ray_cost::judge(experiment, config, &jobs, &mut trees, &watch, &store)?;
     }
     let best_known = if beside.is_some() { BestKnown::Read(out) } else { BestKnown::Improve(out) };
     let text = conclude(&resolved, best_known, &provenance, store)? + &traced;
@@ -132,7 +137,7 @@ fn perform_all(
     let work = |&index: &usize| -> Result<(), Error> {
         if let Some((run, tree)) = perform(experiment, &jobs[index], watch)? {
             store.keep(index, &run)?;
-            if experiment.tracing.is_some() && jobs[index].repetition == 0 {
+            if experiment.ray_cost.is_some() || experiment.tracing.is_some() && jobs[index].repetition == 0 {
                 trees.lock().unwrap_or_else(PoisonError::into_inner).insert(index, tree);
             }
             finished.fetch_add(1, Relaxed);

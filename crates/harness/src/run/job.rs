@@ -11,8 +11,8 @@ use crate::run::store::FinishedRun;
 use crate::scenes::Scene;
 use crate::spec::{Contestant, Experiment, Labelled};
 use bvh_build::{Builder, Query, muller_fellner};
-use bvh_core::Bvh;
-use bvh_core::cost::{self, Objective, SahConstants};
+use bvh_core::cost::{self, Measure, Objective, SahConstants};
+use bvh_core::{Bvh, RayDensity};
 use bvh_search::{
     Budget, Event, Judge, Observer, Outcome, Problem, SearchError, StopReason, exact, lower_bound, solve,
 };
@@ -110,8 +110,10 @@ fn solve_or_build(
         Contestant::Ours(method) => {
             let ray_seed = experiment.seed_of(&scene.name, "rays of the judge", job.repetition);
             let judge = labelled.judge.as_ref().map(|rays| RayJudge { rays, scene, seed: ray_seed });
+            let density = density(experiment, job)?;
             let problem = Problem {
                 objective: experiment.objective,
+                measure: density.as_ref().map(|density| density as &dyn Measure),
                 judge: judge.as_ref().map(|judge| judge as &dyn Judge),
                 disabled: &labelled.keep,
                 ..Problem::new(&scene.boxes)
@@ -119,13 +121,21 @@ fn solve_or_build(
             let outcome = solve(method, &problem, seed, experiment.budget_of(labelled), stopwatch);
             let seconds = stopwatch.start.elapsed().as_secs_f64();
             let mut outcome = outcome.map_err(Error::search(&scene.name, &labelled.label))?;
-            if judge.is_some() {
+            if judge.is_some() || density.is_some() {
                 outcome.cost = experiment.objective.cost(&outcome.tree);
             }
             Ok((outcome, seconds))
         }
         Contestant::Peer(peer) => build_by(peer, scene, &experiment.objective, stopwatch),
     }
+}
+
+/// The density of the rays that the job's method minimises the visits of, if it does; every repetition has its own rays.
+pub(crate) fn density(experiment: &Experiment, job: &Job) -> Result<Option<RayDensity>, Error> {
+    let (Some(config), Some(trained)) = (&experiment.ray_cost, job.labelled.for_rays) else { return Ok(None) };
+    let seed = experiment.seed_of(&job.scene.name, "rays that trees are trained on", job.repetition);
+    let failed = |message| Error::Tracing { scene: job.scene.name.clone(), message };
+    config.density(trained, job.scene, seed).map(Some).map_err(failed)
 }
 
 /// A tree by another library, as a search of one evaluation, and the seconds of the building alone.

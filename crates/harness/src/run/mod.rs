@@ -7,6 +7,7 @@ mod job;
 mod judge;
 pub mod merge;
 pub mod provenance;
+mod ray_cost;
 pub mod reference;
 pub mod resolved;
 pub mod rows;

@@ -226,6 +226,40 @@ rows! {
         median_seconds: f64,
     }
 
+    /// One row of `tests.csv`: the tests of rays that a tree was not trained on, in the wide layout.
+    TestRow in "tests.csv" {
+        scene: String,
+        /// The method's label, or `rays` if the tree was trained on rays.
+        tree: String,
+        /// `none`, `default` or `camera`.
+        trained_on: String,
+        /// Kind of the rays.
+        judged_on: String,
+        /// Whether they come from the training's path of cameras: `same`, `other`, or `none` without a camera.
+        camera: String,
+        /// Mean number of nodes tested per ray, eight boxes each: over all rays and repetitions.
+        node_tests: f64,
+        /// Mean number of blocks of four triangles tested per ray.
+        block_tests: f64,
+        /// Runs with other seeds and, if they are trained, other rays.
+        repetitions: usize,
+        /// Standard error of the sum of both tests over the repetitions; empty for one.
+        tests_standard_error: Option<f64>,
+        /// Number of rays.
+        rays: u64,
+    }
+
+    /// One row of `timing_tests.csv`: the speed of the same rays in the tree of the first run, on one thread.
+    TestTimeRow in "timing_tests.csv" {
+        scene: String,
+        tree: String,
+        trained_on: String,
+        judged_on: String,
+        camera: String,
+        /// Million rays per second, each part of the rays by its fastest turn; trees take turns.
+        million_per_s: f64,
+    }
+
     /// One row of `bounds.csv`: a proven lower bound of a scene.
     BoundRow in "bounds.csv" {
         scene: String,

@@ -22,16 +22,12 @@ pub(crate) fn trace(
     experiment: &Experiment,
     config: &speed::Config,
     jobs: &[Job],
-    mut trees: Trees,
+    trees: &mut Trees,
     watch: &Watch,
     store: &Store,
 ) -> Result<String, Error> {
     let interrupted = || Error::Interrupted { finished: jobs.len(), runs: jobs.len() };
-    for (index, job) in jobs.iter().enumerate().filter(|(_, job)| job.repetition == 0) {
-        if let Entry::Vacant(missing) = trees.entry(index) {
-            missing.insert(perform(experiment, job, watch)?.ok_or_else(interrupted)?.1);
-        }
-    }
+    complete(trees, experiment, jobs, watch, |job| job.repetition == 0)?;
     let mut text = String::new();
     let program = config.ray_peers.as_deref().filter(|program| {
         if !program.exists() {
@@ -43,7 +39,8 @@ pub(crate) fn trace(
         program.exists()
     });
     let (mut rows, mut times) = (Vec::new(), Vec::new());
-    let first_runs: Vec<(&Job, &Bvh)> = trees.iter().map(|(&index, tree)| (&jobs[index], tree)).collect();
+    let first_runs = trees.iter().map(|(&index, tree)| (&jobs[index], tree));
+    let first_runs: Vec<(&Job, &Bvh)> = first_runs.filter(|(job, _)| job.repetition == 0).collect();
     for of_scene in first_runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
         let scene = of_scene[0].0.scene;
         let failed = |message| Error::Tracing { scene: scene.name.clone(), message };
@@ -75,6 +72,23 @@ pub(crate) fn trace(
     store.write(TraceRow::FILE, &to_bytes(&rows, Path::new(TraceRow::FILE))?)?;
     store.write(TraceTimeRow::FILE, &to_bytes(&times, Path::new(TraceTimeRow::FILE))?)?;
     Ok(text)
+}
+
+/// Rebuilds those of the wanted trees that are missing, because their runs were kept from an interrupted experiment.
+pub(crate) fn complete(
+    trees: &mut Trees,
+    experiment: &Experiment,
+    jobs: &[Job],
+    watch: &Watch,
+    wanted: impl Fn(&Job) -> bool,
+) -> Result<(), Error> {
+    let interrupted = || Error::Interrupted { finished: jobs.len(), runs: jobs.len() };
+    for (index, job) in jobs.iter().enumerate().filter(|(_, job)| wanted(job)) {
+        if let Entry::Vacant(missing) = trees.entry(index) {
+            missing.insert(perform(experiment, job, watch)?.ok_or_else(interrupted)?.1);
+        }
+    }
+    Ok(())
 }
 
 /// The library behind a label: ours, the library of a method, or else a library of the program.

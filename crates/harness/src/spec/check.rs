@@ -68,7 +68,21 @@ impl Experiment {
         Ok(())
     }
 
-    fn check_method(&self, Labelled { method, judge, .. }: &Labelled) -> Result<(), Fault> {
+    fn check_method(&self, Labelled { method, judge, for_rays, .. }: &Labelled) -> Result<(), Fault> {
+        if for_rays.is_some() {
+            let found = match method {
+                _ if self.ray_cost.is_none() => "set without `ray_cost`",
+                Contestant::Peer(_) => "set for another library",
+                Contestant::Ours(_) => "",
+            };
+            if !found.is_empty() {
+                return Err(Fault::new(
+                    "for_rays",
+                    found,
+                    "with a method of ours and the experiment's `ray_cost`",
+                ));
+            }
+        }
         if let Some(judge) = judge {
             judge.check()?;
             if !Labelled::JUDGED.contains(&method.name()) {

@@ -2,6 +2,7 @@
 
 use super::fault::{self, Fault};
 use crate::measure::empirical_cost;
+use crate::measure::ray_cost::TrainedOn;
 use crate::peers::Peer;
 use bvh_search::{Budget, Method, Shortcut};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -24,6 +25,9 @@ pub struct Labelled {
     /// Random rays whose mean number of box tests judges the trees of its runs in place of the objective; the costs in
     /// `history.csv` are then such numbers. Default none.
     pub judge: Option<empirical_cost::Config>,
+    /// Rays of the experiment's `ray_cost` whose visits its runs minimise in place of the objective; the costs in `history.csv`
+    /// are then such numbers. Default none.
+    pub for_rays: Option<TrainedOn>,
 }
 
 /// A method of ours, or another library.
@@ -63,6 +67,7 @@ struct Frame {
     keep: Vec<Shortcut>,
     seed_as: Option<String>,
     judge: Option<empirical_cost::Config>,
+    for_rays: Option<TrainedOn>,
 }
 
 impl Labelled {
@@ -72,19 +77,27 @@ impl Labelled {
     /// A method under its own name, without limits.
     pub fn new(method: Method) -> Self {
         let label = method.name().into();
-        Self { label, method: Contestant::Ours(method), budget: None, keep: vec![], seed_as: None, judge: None }
+        Self {
+            label,
+            method: Contestant::Ours(method),
+            budget: None,
+            keep: vec![],
+            seed_as: None,
+            judge: None,
+            for_rays: None,
+        }
     }
 
     /// Reads an entry, and names the key that an error is about.
     pub(super) fn read(mut table: Table) -> Result<Self, Fault> {
-        let frame = ["label", "budget", "keep", "seed_as", "judge"];
+        let frame = ["label", "budget", "keep", "seed_as", "judge", "for_rays"];
         let frame = frame.into_iter().filter_map(|key| table.remove_entry(key)).collect();
-        let Frame { label, budget, keep, seed_as, judge } = fault::deserialize(frame)?;
+        let Frame { label, budget, keep, seed_as, judge, for_rays } = fault::deserialize(frame)?;
         let accepted = || format!("{}, or the libraries {}", Method::NAMES.join(", "), Peer::NAMES.join(", "));
         let method =
             fault::tagged(table, "method", |name, parameters| Contestant::read(name, parameters), accepted)?;
         let label = label.unwrap_or_else(|| method.name().into());
-        Ok(Self { label, method, budget, keep, seed_as, judge })
+        Ok(Self { label, method, budget, keep, seed_as, judge, for_rays })
     }
 }
 
@@ -95,9 +108,9 @@ impl<'de> Deserialize<'de> for Labelled {
 }
 
 impl From<Labelled> for Table {
-    fn from(Labelled { label, method, budget, keep, seed_as, judge }: Labelled) -> Self {
+    fn from(Labelled { label, method, budget, keep, seed_as, judge, for_rays }: Labelled) -> Self {
         let mut table = Self::try_from(&method).unwrap_or_default();
-        let frame = Frame { label: Some(label), budget, keep, seed_as, judge };
+        let frame = Frame { label: Some(label), budget, keep, seed_as, judge, for_rays };
         table.extend(Self::try_from(&frame).unwrap_or_default());
         table
     }

@@ -9,7 +9,7 @@ mod method;
 mod name;
 mod read;
 
-use crate::measure::{empirical_cost, speed};
+use crate::measure::{empirical_cost, ray_cost, speed};
 use crate::report::Report;
 use crate::scenes::fnv1a;
 use crate::{render, stress};
@@ -19,7 +19,7 @@ use bvh_core::cost::Objective;
 use bvh_search::{Budget, exact};
 pub use method::{Contestant, Labelled};
 pub use name::Name;
-pub use read::Overrides;
+pub use read::{Overrides, configuration};
 use std::path::{Path, PathBuf};
 
 config! {
@@ -65,6 +65,8 @@ config! {
         render: Option<render::experiment::Config>, in Itself;
         /// Rays traced through the tree of every method's first run, in all layouts, in turns.
         tracing: Option<speed::Config>, in Itself;
+        /// Rays that methods with `for_rays` are trained on, and others that judge all trees by the tests that they take.
+        ray_cost: Option<ray_cost::Config>, in Itself;
         /// Tables and figures made from the rows.
         reports: Vec<Report>, in Itself;
     }

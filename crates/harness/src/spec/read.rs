@@ -7,6 +7,7 @@ use crate::files;
 use crate::report::Report;
 use bvh_build::Check;
 use bvh_search::Method;
+use serde::de::DeserializeOwned;
 use std::ffi::OsStr;
 use std::path::Path;
 use toml::{Table, Value};
@@ -20,6 +21,22 @@ pub struct Overrides {
     pub seed: Option<u64>,
     /// Applies the spec's `quick` table.
     pub quick: bool,
+}
+
+/// Reads and checks a file of one configuration.
+pub fn configuration<C: DeserializeOwned + Check>(path: &Path) -> Result<C, Error> {
+    let text = files::read_text(path)?;
+    let refuse = |message: String| Error::Spec { file: path.to_owned(), message };
+    let table: Table = text.parse().map_err(|error: toml::de::Error| refuse(error.to_string()))?;
+    let read = || {
+        let config: C = fault::deserialize(table)?;
+        config.check()?;
+        Ok(config)
+    };
+    read().map_err(|fault: Fault| {
+        let line = line_of(&text, &fault.key);
+        refuse(line.map_or_else(|| fault.to_string(), |line| format!("line {line}: {fault}")))
+    })
 }
 
 impl Experiment {

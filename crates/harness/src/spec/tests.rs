@@ -112,6 +112,8 @@ fn wrong_methods_are_named_with_what_would_be_accepted() {
         ("[{ method = 'grasp', budget = { max_seconds = 3 } }]", &["max_seconds", "max_work"]),
         ("[{ method = 'grasp', judge = { count = 0 } }]", &["methods[0].count is 0", "1 or more"]),
         ("[{ method = 'best', judge = { count = 9 } }]", &["methods[0].judge is set for best", "genetic"]),
+        ("[{ method = 'best', for_rays = 'camera' }]", &["methods[0].for_rays is set without `ray_cost`"]),
+        ("[{ method = 'best', for_rays = 'all' }]", &["methods[0].for_rays", "all", "default"]),
         ("[{ method = 'grasp' }, { method = 'grasp' }]", &["methods[1].label", "second time"]),
     ] {
         let text = format!("question = 'q'\nscenes = ['escher']\nmethods = {methods}\n");

@@ -1,0 +1,207 @@
+//! Tests of rays in trees that are trained on rays, over those in a tree that is searched for by area.
+
+use super::data::Rows;
+use super::output::{Output, each, panel};
+use crate::Error;
+use crate::figures::{Axis, Layer, Panel};
+use crate::run::rows::{TestRow, TestTimeRow};
+use serde::Serialize;
+
+bvh_build::config! { serde;
+    /// A comparison of trees by the tests of rays that they were not trained on.
+    pub struct Config {
+        /// What it belongs to.
+        source: String;
+        /// Heading.
+        title: String;
+        /// The tree that the others are compared with, by its name in `tests.csv`.
+        base: String;
+    }
+}
+
+/// A tree's tests over those of the base, as written to `ray_cost.csv`; rows for the geometric mean of all scenes come last.
+#[derive(Serialize)]
+struct Compared<'a> {
+    scene: &'a str,
+    tree: &'a str,
+    trained_on: &'a str,
+    judged_on: &'a str,
+    camera: &'a str,
+    /// Tests of nodes and of blocks of triangles together.
+    tests: Option<f64>,
+    tests_over_base: f64,
+    /// 95 % interval, from the standard errors of both over the repetitions.
+    over_base_low: Option<f64>,
+    over_base_high: Option<f64>,
+}
+
+/// The scene of rows that are geometric means.
+const ALL: &str = "geometric mean";
+/// Half the width of the normal distribution's central 95 %, in standard deviations.
+const NORMAL_95: f64 = 1.959_963_984_540_054;
+
+impl Config {
+    pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
+        let mut table: Vec<Compared> = rows.tests.iter().filter_map(|row| self.compared(rows, row)).collect();
+        let means = means(&table);
+        table.extend(means);
+        let mut output = Output::new(&self.source, &self.title);
+        output.add_csv("ray_cost", &table)?;
+        let caption = "Nodes and blocks of triangles that a ray is tested against in the wide layout, over those in the tree that \
+                       is the best by area, below which trees gain. The rays are not those that trees were trained on.";
+        let panels = rows.scenes().into_iter().map(|scene| self.draw(rows.shown(scene), scene, &table));
+        let panels = panels.chain([self.draw(ALL.into(), ALL, &table)]).collect();
+        output.add_figure("ray_cost", caption, 2, panels);
+        let columns = [
+            "scene",
+            "tree",
+            "trained_on",
+            "judged_on",
+            "camera",
+            "over_base_low",
+            "tests_over_base",
+            "over_base_high",
+        ];
+        output.show(&format!("Tests per ray over those of {}:", self.base), &table, &columns)?;
+        let speeds = self.speeds(rows);
+        if !speeds.is_empty() {
+            output.add_csv("timing_ray_cost", &speeds)?;
+        }
+        output.reading = format!(
+            "Tests per ray over those of {}, geometric means over scenes: {}.",
+            self.base,
+            reading(&table)
+        );
+        Ok(output)
+    }
+
+    fn compared<'a>(&self, rows: &'a Rows, row: &'a TestRow) -> Option<Compared<'a>> {
+        let same = |of: &&TestRow| {
+            of.scene == row.scene
+                && of.tree == self.base
+                && (&of.judged_on, &of.camera) == (&row.judged_on, &row.camera)
+        };
+        let base = rows.tests.iter().find(same)?;
+        let [own, other] = [row, base].map(|row| row.node_tests + row.block_tests);
+        let ratio = own / other;
+        // Of a ratio of means, by the relative errors of both.
+        let relative = row.tests_standard_error.zip(base.tests_standard_error);
+        let half = relative.map(|(a, b)| NORMAL_95 * ratio * (a / own).hypot(b / other));
+        Some(Compared {
+            scene: &row.scene,
+            tree: &row.tree,
+            trained_on: &row.trained_on,
+            judged_on: &row.judged_on,
+            camera: &row.camera,
+            tests: Some(own),
+            tests_over_base: ratio,
+            over_base_low: half.map(|half| ratio - half),
+            over_base_high: half.map(|half| ratio + half),
+        })
+    }
+
+    /// One line of markers per tree, over the kinds of rays.
+    fn draw(&self, title: String, scene: &str, table: &[Compared]) -> Panel {
+        let own: Vec<&Compared> = table.iter().filter(|row| row.scene == scene).collect();
+        let mut judged: Vec<(&str, &str)> = Vec::new();
+        let mut trees: Vec<(&str, &str)> = Vec::new();
+        for row in &own {
+            for (found, item) in
+                [(&mut judged, (row.judged_on, row.camera)), (&mut trees, (row.tree, row.trained_on))]
+            {
+                if !found.contains(&item) {
+                    found.push(item);
+                }
+            }
+        }
+        let bars = |&(tree, trained_on): &(&str, &str)| {
+            let of_tree = own.iter().filter(|row| (row.tree, row.trained_on) == (tree, trained_on));
+            let bar = |row: &&Compared| {
+                let ends = row.over_base_low.zip(row.over_base_high);
+                (row.tests_over_base, ends.unwrap_or((row.tests_over_base, row.tests_over_base)))
+            };
+            let (values, spread) = of_tree.map(bar).collect();
+            Layer::Bars { name: tree_name(tree, trained_on), values, spread, base: 1.0 }
+        };
+        let layers = trees.iter().filter(|(tree, _)| *tree != self.base).map(bars).collect();
+        let categories = judged.iter().map(|(kind, camera)| match *camera {
+            "none" => (*kind).to_owned(),
+            camera => format!("{kind}, {camera}"),
+        });
+        panel(
+            title,
+            Axis::categories("rays and camera", categories.collect()),
+            Axis::linear("tests over area"),
+            layers,
+        )
+    }
+
+    /// Speeds over those of the base.
+    fn speeds<'a>(&self, rows: &'a Rows) -> Vec<Speed<'a>> {
+        let speed = |row: &'a TestTimeRow| {
+            let same = |of: &&TestTimeRow| {
+                of.scene == row.scene
+                    && of.tree == self.base
+                    && (&of.judged_on, &of.camera) == (&row.judged_on, &row.camera)
+            };
+            let base = rows.test_times.iter().find(same)?;
+            Some(Speed {
+                scene: &row.scene,
+                tree: &row.tree,
+                trained_on: &row.trained_on,
+                judged_on: &row.judged_on,
+                camera: &row.camera,
+                speed_over_base: row.million_per_s / base.million_per_s,
+            })
+        };
+        rows.test_times.iter().filter_map(speed).collect()
+    }
+}
+
+/// A tree's rays per second over those of the base, as written to `timing_ray_cost.csv`.
+#[derive(Serialize)]
+struct Speed<'a> {
+    scene: &'a str,
+    tree: &'a str,
+    trained_on: &'a str,
+    judged_on: &'a str,
+    camera: &'a str,
+    speed_over_base: f64,
+}
+
+fn tree_name(tree: &str, trained_on: &str) -> String {
+    if trained_on == "none" { tree.into() } else { format!("{tree}, {trained_on}") }
+}
+
+/// The geometric means over scenes of rows that agree in all else.
+fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
+    let mut means: Vec<(Compared<'a>, f64)> = Vec::new();
+    for row in table {
+        let key = |row: &Compared<'a>| (row.tree, row.trained_on, row.judged_on, row.camera);
+        match means.iter_mut().find(|(mean, _)| key(mean) == key(row)) {
+            Some((mean, count)) => {
+                mean.tests_over_base += row.tests_over_base.ln();
+                *count += 1.0;
+            }
+            None => {
+                let sum = row.tests_over_base.ln();
+                let (tests, over_base_low, over_base_high) = (None, None, None);
+                let first =
+                    Compared { scene: ALL, tests, tests_over_base: sum, over_base_low, over_base_high, ..*row };
+                means.push((first, 1.0));
+            }
+        }
+    }
+    let finished = |(mean, count): (Compared<'a>, f64)| Compared {
+        tests_over_base: (mean.tests_over_base / count).exp(),
+        ..mean
+    };
+    means.into_iter().map(finished).collect()
+}
+
+fn reading(table: &[Compared]) -> String {
+    each(table.iter().filter(|row| row.scene == ALL && row.trained_on != "none"), |row| {
+        let camera = if row.camera == "none" { String::new() } else { format!(" ({} camera)", row.camera) };
+        Some(format!("{} on {}{camera} {:.3}", row.trained_on, row.judged_on, row.tests_over_base))
+    })
+}

@@ -1,0 +1,100 @@
+//! Judges the trees of all runs by rays that they were not trained on.
+
+use crate::Error;
+use crate::measure::ray_cost::{Config, TrainedOn, test_rays};
+use crate::run::job::{Job, Watch, density};
+use crate::run::rows::{Row, TestRow, TestTimeRow, to_bytes};
+use crate::run::store::Store;
+use crate::run::trace::{Trees, complete};
+use crate::spec::Experiment;
+use bvh_core::{Bvh, WideBvh};
+use bvh_search::Observer;
+use rayon::prelude::*;
+use std::path::Path;
+
+/// The name in results of the trees that are trained on rays, whatever the label of their method.
+const RAYS: &str = "rays";
+
+/// Counts the tests of the same rays in the trees of all runs on a scene, each in the layout for the rays that it was trained on, and
+/// takes the time of those in the trees of first runs.
+pub(crate) fn judge(
+    experiment: &Experiment,
+    config: &Config,
+    jobs: &[Job],
+    trees: &mut Trees,
+    watch: &Watch,
+    store: &Store,
+) -> Result<(), Error> {
+    complete(trees, experiment, jobs, watch, |_| true)?;
+    let (mut rows, mut times) = (Vec::new(), Vec::new());
+    let runs: Vec<(&Job, &Bvh)> = trees.iter().map(|(&index, tree)| (&jobs[index], tree)).collect();
+    for of_scene in runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
+        let scene = of_scene[0].0.scene;
+        let layouts = of_scene.par_iter().map(|(job, tree)| layout(experiment, job, tree));
+        let layouts = layouts.collect::<Result<Vec<WideBvh>, Error>>()?;
+        // By method, with all repetitions.
+        let methods: Vec<usize> = (0..of_scene.len()).step_by(experiment.repetitions as usize).collect();
+        let first: Vec<WideBvh> = methods.iter().map(|&at| layouts[at].clone()).collect();
+        let seed = experiment.seed_of(&scene.name, "rays that judge trees", 0);
+        for rays in test_rays(config, scene, of_scene[0].1, seed) {
+            if watch.cancelled() {
+                return Err(Error::Interrupted { finished: jobs.len(), runs: jobs.len() });
+            }
+            let tests: Vec<[f64; 2]> = layouts.par_iter().map(|wide| rays.tests(wide)).collect();
+            let speeds = rays.speeds(&first, config.rounds);
+            for (number, &at) in methods.iter().enumerate() {
+                let own = &tests[at..at + experiment.repetitions as usize];
+                let labelled = of_scene[at].0.labelled;
+                let tree = labelled.for_rays.map_or(labelled.label.as_str(), |_| RAYS);
+                let [node_tests, block_tests, tests] =
+                    [mean(own, |t| t[0]), mean(own, |t| t[1]), mean(own, |t| t[0] + t[1])];
+                rows.push(TestRow {
+                    scene: scene.name.clone(),
+                    tree: tree.into(),
+                    trained_on: TrainedOn::name(labelled.for_rays).into(),
+                    judged_on: rays.kind.name().into(),
+                    camera: rays.camera.into(),
+                    node_tests: node_tests.0,
+                    block_tests: block_tests.0,
+                    repetitions: own.len(),
+                    tests_standard_error: tests.1,
+                    rays: rays.count(),
+                });
+                if let Some(&million_per_s) = speeds.get(number).filter(|_| config.rounds > 0) {
+                    times.push(TestTimeRow {
+                        scene: scene.name.clone(),
+                        tree: tree.into(),
+                        trained_on: TrainedOn::name(labelled.for_rays).into(),
+                        judged_on: rays.kind.name().into(),
+                        camera: rays.camera.into(),
+                        million_per_s,
+                    });
+                }
+            }
+        }
+    }
+    store.write(TestRow::FILE, &to_bytes(&rows, Path::new(TestRow::FILE))?)?;
+    if !times.is_empty() {
+        store.write(TestTimeRow::FILE, &to_bytes(&times, Path::new(TestTimeRow::FILE))?)?;
+    }
+    Ok(())
+}
+
+/// The layout of a run's tree: for the rays that it was trained on, else for random lines.
+fn layout(experiment: &Experiment, job: &Job, tree: &Bvh) -> Result<WideBvh, Error> {
+    let failed = |message| Error::Tracing { scene: job.scene.name.clone(), message };
+    let triangles = job.scene.triangles().map_err(|error| failed(error.to_string()))?;
+    let made = match density(experiment, job)? {
+        Some(density) => WideBvh::for_rays(tree, triangles, &density.visits(tree)),
+        None => WideBvh::new(tree, triangles),
+    };
+    made.map_err(|error| failed(error.to_string()))
+}
+
+/// The mean of a number over repetitions, and its standard error if there are several.
+fn mean(tests: &[[f64; 2]], of: impl Fn(&[f64; 2]) -> f64) -> (f64, Option<f64>) {
+    let n = tests.len() as f64;
+    let mean = tests.iter().map(&of).sum::<f64>() / n;
+    let squares: f64 = tests.iter().map(|tests| (of(tests) - mean).powi(2)).sum();
+    (mean, (tests.len() > 1).then(|| (squares / (n - 1.0) / n).sqrt()))
+}
