@@ -25,6 +25,7 @@ mod profile;
 mod progress;
 mod ray_cost;
 pub mod ray_tests;
+mod ray_time;
 mod run_times;
 pub mod significance;
 pub mod table;
@@ -124,6 +125,8 @@ reports! {
     "pictures" => Pictures(pictures::Config) by pictures::Config::write;
     /// Tests of rays in trees that are trained on rays.
     "ray_cost" => RayCost(ray_cost::Config) by ray_cost::Config::write;
+    /// Tests of rays against the time in which trees are made.
+    "ray_time" => RayTime(ray_time::Config) by ray_time::Config::write;
     /// Cost against build time and against time per ray.
     "pareto" => Pareto(config::Methods) by pareto::write;
     /// Other libraries beside ours.
@@ -148,6 +151,7 @@ impl Report {
             Self::Pareto(config) | Self::Traversal(config) => (&config.methods, vec![]),
             Self::RunTimes(config) | Self::Ecdf(config) => (&config.methods, vec![]),
             Self::Profile(config) | Self::TimeToTarget(config) => (&config.methods, vec![]),
+            Self::RayTime(config) => (&[], config.labels()),
             Self::RayCost(config) => (&[], vec![("base".into(), &config.base)]),
             Self::Trials(config) => (&config.methods, vec![]),
             Self::Times(config) => (&config.methods, vec![]),

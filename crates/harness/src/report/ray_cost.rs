@@ -14,7 +14,7 @@ bvh_build::config! { serde;
         source: String;
         /// Heading.
         title: String;
-        /// The tree that the others are compared with, by its name in `tests.csv`.
+        /// Label of the method that the others are compared with.
         base: String;
     }
 }

@@ -50,6 +50,7 @@ pub(crate) fn judge(
                     [mean(own, |t| t[0]), mean(own, |t| t[1]), mean(own, |t| t[0] + t[1])];
                 rows.push(TestRow {
                     scene: scene.name.clone(),
+                    method: labelled.label.clone(),
                     tree: tree.into(),
                     trained_on: TrainedOn::name(labelled.for_rays).into(),
                     judged_on: rays.kind.name().into(),
@@ -63,6 +64,7 @@ pub(crate) fn judge(
                 if let Some(&million_per_s) = speeds.get(number).filter(|_| config.rounds > 0) {
                     times.push(TestTimeRow {
                         scene: scene.name.clone(),
+                        method: labelled.label.clone(),
                         tree: tree.into(),
                         trained_on: TrainedOn::name(labelled.for_rays).into(),
                         judged_on: rays.kind.name().into(),

@@ -229,6 +229,7 @@ rows! {
     /// One row of `tests.csv`: the tests of rays that a tree was not trained on, in the wide layout.
     TestRow in "tests.csv" {
         scene: String,
+        method: String,
         /// The method's label, or `rays` if the tree was trained on rays.
         tree: String,
         /// `none`, `default` or `camera`.
@@ -252,6 +253,7 @@ rows! {
     /// One row of `timing_tests.csv`: the speed of the same rays in the tree of the first run, on one thread.
     TestTimeRow in "timing_tests.csv" {
         scene: String,
+        method: String,
         tree: String,
         trained_on: String,
         judged_on: String,
