@@ -34,6 +34,7 @@ mod first_count;
 mod overlap;
 mod packed;
 mod primitives;
+pub mod query;
 mod ray;
 pub mod ray_density;
 mod slabs;

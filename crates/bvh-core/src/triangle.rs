@@ -74,6 +74,28 @@ impl Triangle {
         0.5 * (b - a).cross(c - a).length()
     }
 
+    /// The point of the triangle that is nearest to `point`, in f64; of a degenerate one, of the segment or point that it is.
+    ///
+    /// Source: Ericson 2005, *Real-Time Collision Detection*, section 5.1.5.
+    pub fn closest_point(&self, point: Vec3) -> DVec3 {
+        let [a, b, c] = self.0.map(Vec3::as_dvec3);
+        let p = point.as_dvec3();
+        let normal = (b - a).cross(c - a);
+        let inside = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from)) >= 0.0;
+        if normal != DVec3::ZERO && inside(a, b) && inside(b, c) && inside(c, a) {
+            return p - normal * (normal.dot(p - a) / normal.length_squared());
+        }
+        let on_edge = |from: DVec3, to: DVec3| {
+            let edge = to - from;
+            let length = edge.length_squared();
+            let along = if length > 0.0 { ((p - from).dot(edge) / length).clamp(0.0, 1.0) } else { 0.0 };
+            from + edge * along
+        };
+        let edges = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
+        let nearer = |x: DVec3, y: DVec3| if y.distance_squared(p) < x.distance_squared(p) { y } else { x };
+        nearer(nearer(edges[0], edges[1]), edges[2])
+    }
+
     /// Whether the corners coincide or are collinear: such a triangle is never hit. Exact as long as the differences
     /// of its coordinates are exact in f64.
     pub fn is_degenerate(&self) -> bool {
