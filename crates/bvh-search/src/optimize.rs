@@ -2,7 +2,7 @@
 
 use crate::best;
 use crate::local::incumbent::Incumbent;
-use crate::run::{Budget, Observer, Outcome, Problem, Run, SearchError, solve};
+use crate::run::{Budget, Found, Observer, Outcome, Problem, Run, SearchError, solve};
 use crate::tree::{Metric, search_by_metric};
 use bvh_build::{Check, OutOfRange};
 use bvh_core::cost::Objective;
@@ -67,13 +67,7 @@ impl Check for From<'_> {
 search_by_metric!(From<'_>);
 
 impl From<'_> {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Result<Bvh, SearchError> {
+    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let mut best = Incumbent::begin(self.tree.clone(), problem, run);
         let mut tree = best.working(metric)?;
         best::improve(self.config, &mut tree, seed, &mut best, run);

@@ -9,10 +9,9 @@ use super::node_sampler::NodeSampler;
 use super::schedule::{AnnealingRun, check_fall};
 use super::side::Side;
 use crate::local::initial::Start;
-use crate::run::{Problem, Run, SearchError, Stream};
+use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Node, PositionSearch, Scope, Working, search_by_metric};
 use bvh_build::config::{Itself, above};
-use bvh_core::Bvh;
 use rand::RngExt;
 use rand::seq::SliceRandom;
 
@@ -72,13 +71,7 @@ pub enum Scale {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Result<Bvh, SearchError> {
+    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let Self { hot, cold, work_per_object, .. } = *self;
         let annealing = AnnealingRun { heat: [hot, cold], work_per_object, start: &self.start };
         let length = work_per_object.min(run.left().work / problem.boxes.len().max(1) as u64) as f64;

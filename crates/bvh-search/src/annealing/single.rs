@@ -8,11 +8,11 @@ use super::metropolis::Mover;
 use super::node_sampler::NodeSampler;
 use super::schedule::{AnnealingRun, check_fall};
 use crate::local::initial::Start;
-use crate::run::{Problem, Run, SearchError, Stream};
+use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
 use bvh_build::config::{Itself, above};
 use bvh_build::{Check, OutOfRange};
-use bvh_core::{Bvh, PackedAabb};
+use bvh_core::PackedAabb;
 use rand::RngExt;
 
 bvh_build::config! {
@@ -64,13 +64,7 @@ pub enum Target {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Result<Bvh, SearchError> {
+    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let Self { hot, cold, work_per_object, .. } = *self;
         let annealing = AnnealingRun { heat: [hot, cold], work_per_object, start: &self.start };
         annealing.search(|| SingleMover::new(&self.step), metric, problem, seed, run)

@@ -50,9 +50,8 @@ mod small_budget;
 
 use crate::exact;
 use crate::local::incumbent::Incumbent;
-use crate::run::{Problem, Run, SearchError};
+use crate::run::{Found, Problem, Run};
 use crate::tree::{Metric, search_by_metric};
-use bvh_core::Bvh;
 pub use config::{Config, Horizon};
 pub(crate) use improve::improve;
 use small_budget::SmallBudget;
@@ -61,13 +60,7 @@ search_by_metric!(Config);
 
 impl Config {
     /// Subtrees, if there are several, are annealed in parallel, each with a random stream of its own.
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Result<Bvh, SearchError> {
+    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let (_, work) = self.horizon(problem.boxes.len() as u64, run);
         if let Some(optimum) = exact::instead(problem, work, run)? {
             return Ok(optimum);

@@ -8,10 +8,10 @@
 use super::incumbent::Incumbent;
 use super::initial::Start;
 use super::pass::{TOLERANCE, repeat, sort_by_area};
-use crate::run::{Observer, Problem, Quota, Run, SearchError, Tally, WORK_PER_POLL, stream};
+use crate::run::{Found, Observer, Problem, Quota, Run, Tally, WORK_PER_POLL, stream};
 use crate::tree::{Linked, Metric, PositionSearch, Working, search_by_metric};
 use bvh_build::config::Itself;
-use bvh_core::{Bvh, with_vector_instructions};
+use bvh_core::with_vector_instructions;
 use rand::seq::SliceRandom;
 
 bvh_build::config! {
@@ -39,13 +39,7 @@ pub enum Order {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Result<Bvh, SearchError> {
+    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         best.improve(&mut tree, self.sweeps, run, |tree, number, quota, observer| {
             let mut order = tree.preorder();

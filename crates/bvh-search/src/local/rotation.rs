@@ -9,10 +9,10 @@
 use super::incumbent::Incumbent;
 use super::initial::Start;
 use super::pass::{TOLERANCE, repeat, sort_by_area};
-use crate::run::{Observer, Problem, Quota, Run, SearchError, Tally};
+use crate::run::{Found, Observer, Problem, Quota, Run, Tally};
 use crate::tree::{Metric, Working, search_by_metric};
 use bvh_build::config::Itself;
-use bvh_core::{Bvh, with_vector_instructions};
+use bvh_core::with_vector_instructions;
 
 bvh_build::config! {
     /// In which order to try the nodes, how often, and from where.
@@ -39,13 +39,7 @@ pub enum Order {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        _seed: u64,
-        run: &mut Run,
-    ) -> Result<Bvh, SearchError> {
+    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, _seed: u64, run: &mut Run) -> Found {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         best.improve(&mut tree, self.sweeps, run, |tree, _, quota, observer| {
             pass(tree, &self.order.of(tree), quota, observer)

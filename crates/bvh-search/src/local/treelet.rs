@@ -10,10 +10,10 @@
 use super::incumbent::Incumbent;
 use super::initial::Start;
 use super::pass::{TOLERANCE, repeat};
-use crate::run::{Observer, Problem, Quota, Run, SearchError, Tally};
+use crate::run::{Found, Observer, Problem, Quota, Run, Tally};
 use crate::tree::{Metric, NONE, Subsets, Working, search_by_metric};
 use bvh_build::config::Itself;
-use bvh_core::{Bvh, with_vector_instructions};
+use bvh_core::with_vector_instructions;
 
 bvh_build::config! {
     /// How large treelets are, how often all are tried, and from where.
@@ -30,13 +30,7 @@ bvh_build::config! {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        _seed: u64,
-        run: &mut Run,
-    ) -> Result<Bvh, SearchError> {
+    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, _seed: u64, run: &mut Run) -> Found {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         let mut solver = Solver::new(self.size, &tree);
         best.improve(&mut tree, self.sweeps, run, |tree, _, quota, observer| {

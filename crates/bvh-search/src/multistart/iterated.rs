@@ -8,10 +8,9 @@ use crate::annealing::{Mover as _, SingleMove, SingleMover, Target};
 use crate::local::LocalSearch;
 use crate::local::incumbent::Incumbent;
 use crate::local::initial::Start;
-use crate::run::{Problem, Run, SearchError, Tally, stream};
+use crate::run::{Found, Problem, Run, Tally, stream};
 use crate::tree::{Metric, search_by_metric};
 use bvh_build::config::Itself;
-use bvh_core::Bvh;
 use std::ops::Bound::{Excluded, Included};
 
 bvh_build::config! {
@@ -33,13 +32,7 @@ bvh_build::config! {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Result<Bvh, SearchError> {
+    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         let n = problem.boxes.len() as u64;
         let quota = run.left().at_most(self.work_per_object.saturating_mul(n));

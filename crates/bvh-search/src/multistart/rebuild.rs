@@ -14,7 +14,7 @@ use crate::local::initial::{Start, construction};
 use crate::local::pass::TOLERANCE;
 use crate::local::{LocalSearch, reinsertion};
 use crate::parallel;
-use crate::run::{Observer, Problem, Quota, Run, SearchError, Stream, Tally, stream};
+use crate::run::{Found, Observer, Problem, Quota, Run, SearchError, Stream, Tally, stream};
 use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
 use bvh_build::config::Itself;
 use bvh_build::top_down::Workspace;
@@ -52,13 +52,7 @@ search_by_metric!(Config);
 
 impl Config {
     /// Rebuilds disjoint subtrees in parallel, each with a random stream of its own.
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Result<Bvh, SearchError> {
+    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         let n = tree.objects() as u64;
         if n < 3 {

@@ -1,7 +1,10 @@
 //! What a search can refuse.
 
 use bvh_build::{BuildError, OutOfRange};
-use bvh_core::InvalidBvh;
+use bvh_core::{Bvh, InvalidBvh};
+
+/// What a search returns.
+pub(crate) type Found = Result<Bvh, SearchError>;
 
 /// Why a search did not start. Once started, a search always returns a tree.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -10,6 +10,7 @@ mod stream;
 pub use budget::{Budget, Quota, StopReason, Tally};
 use bvh_build::{Builder, Check};
 use bvh_core::Bvh;
+pub(crate) use error::Found;
 pub use error::SearchError;
 pub(crate) use observer::WORK_PER_POLL;
 pub use observer::{Event, Observer};

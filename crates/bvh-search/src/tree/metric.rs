@@ -43,12 +43,7 @@ impl Metric for &dyn Measure {
 macro_rules! search_by_metric {
     ($config:ty) => {
         impl crate::run::Search for $config {
-            fn search(
-                &self,
-                problem: &crate::run::Problem,
-                seed: u64,
-                run: &mut crate::run::Run,
-            ) -> Result<bvh_core::Bvh, crate::run::SearchError> {
+            fn search(&self, problem: &crate::run::Problem, seed: u64, run: &mut Run) -> crate::run::Found {
                 match problem.measure {
                     Some(measure) => self.search_by(measure, problem, seed, run),
                     None => self.search_by(crate::tree::Area, problem, seed, run),

@@ -1,5 +1,7 @@
 //! Measures, wraps and rasterises text in the embedded fonts, so that no figure depends on the machine's fonts.
 
+use std::collections::HashMap;
+
 use ab_glyph::{Font, FontRef, PxScale, point};
 
 use super::model::FigureError;
@@ -39,27 +41,45 @@ pub(super) const SMALL: Type = Type { size: 12.0, bold: false };
 
 /// The embedded fonts.
 pub struct Fonts {
-    regular: FontRef<'static>,
-    bold: FontRef<'static>,
+    regular: Face,
+    bold: Face,
+}
+
+/// One of the fonts.
+struct Face {
+    font: FontRef<'static>,
+    /// By how much its characters advance, in font sizes: the font's own tables are slow to search.
+    advances: HashMap<char, f64>,
+}
+
+impl Face {
+    fn new(bytes: &'static [u8]) -> Result<Self, FigureError> {
+        let font =
+            FontRef::try_from_slice(bytes).map_err(|error| FigureError::Font { reason: error.to_string() })?;
+        let advances =
+            font.codepoint_ids().map(|(_, character)| (character, advance(&font, character))).collect();
+        Ok(Self { font, advances })
+    }
+}
+
+/// The advance of a character in font sizes, that of a box if the font lacks it.
+fn advance(font: &FontRef, character: char) -> f64 {
+    f64::from(font.h_advance_unscaled(font.glyph_id(character)) / font.units_per_em().unwrap_or(1.0))
 }
 
 impl Fonts {
     /// Parses the embedded fonts.
     pub fn new() -> Result<Self, FigureError> {
-        let font = |bytes| {
-            FontRef::try_from_slice(bytes).map_err(|error| FigureError::Font { reason: error.to_string() })
-        };
-        Ok(Self { regular: font(REGULAR)?, bold: font(BOLD)? })
+        Ok(Self { regular: Face::new(REGULAR)?, bold: Face::new(BOLD)? })
     }
 
-    fn font(&self, style: Type) -> &FontRef<'static> {
+    fn face(&self, style: Type) -> &Face {
         if style.bold { &self.bold } else { &self.regular }
     }
 
     fn advance(&self, character: char, style: Type) -> f64 {
-        let font = self.font(style);
-        let units = font.units_per_em().unwrap_or(1.0);
-        style.size * f64::from(font.h_advance_unscaled(font.glyph_id(character)) / units)
+        let Face { font, advances } = self.face(style);
+        style.size * advances.get(&character).copied().unwrap_or_else(|| advance(font, character))
     }
 
     /// Width of a line of text in pixels, without kerning.
@@ -135,7 +155,7 @@ impl Fonts {
         (mut x, y): (f64, f64),
         mut pixel: impl FnMut(i32, i32, f64),
     ) {
-        let font = self.font(style);
+        let font = &self.face(style).font;
         let scale =
             PxScale::from(style.size as f32 * font.height_unscaled() / font.units_per_em().unwrap_or(1.0));
         for character in text.chars() {
@@ -176,7 +196,7 @@ mod tests {
         let fonts = Fonts::new().unwrap();
         for character in "aZ09 äéñß αΩπσ ×÷±−≤≥≈∞√∑ ⁰¹²³⁴⁵⁶⁷⁸⁹⁻ ₀₁₉ ←→↑↓ …–—’“” °µ½ ✓✗ ●■▲".chars()
         {
-            assert_ne!(fonts.regular.glyph_id(character).0, 0, "no {character}");
+            assert_ne!(fonts.regular.font.glyph_id(character).0, 0, "no {character}");
         }
     }
 }

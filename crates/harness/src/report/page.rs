@@ -6,7 +6,6 @@ use crate::files;
 use crate::run::provenance::Provenance;
 use crate::run::resolved::Resolved;
 use crate::scenes::SceneKind;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde::de::DeserializeOwned;
 use std::fs;
 use std::path::Path;
@@ -61,7 +60,7 @@ pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
     }
     // What the paper has comes first.
     sections.sort_by(|a, b| (!a.of_paper, &a.name).cmp(&(!b.of_paper, &b.name)));
-    files::write(out, page(&sections).into_string().as_bytes())?;
+    files::write(out, page(&sections).as_bytes())?;
     Ok(sections.len())
 }
 
@@ -98,51 +97,52 @@ fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
     toml::from_str(&read(path)?).map_err(Error::toml(path))
 }
 
-fn page(sections: &[Section]) -> Markup {
-    html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "BVH by stochastic search: results" }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                h1 { "BVH by stochastic search: results" }
-                p {
-                    "Costs are ratios to the greedy Müller–Fellner tree of the same scene unless a table says \
-                     otherwise. The paper is Ng & Trifonov, Automatic Bounding Volume Hierarchy Generation Using \
-                     Stochastic Search Methods (2003); its scenes are gone, and stand-ins are called stand-ins."
-                }
-                nav { ul { @for section in sections { li { a href={ "#" (section.name) } { (section.name) } } } } }
-                @for section in sections { (experiment(section)) }
-                footer { p { "Made by harness " (env!("CARGO_PKG_VERSION")) " from the CSV files beside it." } }
-            }
-        }
-    }
+/// Text as it stands in HTML, between tags and in attributes.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-fn experiment(section: &Section) -> Markup {
-    let Section { name, question, provenance, .. } = section;
-    html! {
-        section id=(name) {
-            h2 { (name) }
-            p { strong { (question) } }
-            @if section.stand_ins { p { "Scenes named as stand-ins are procedural stand-ins for the paper's." } }
-            @for (stem, svg) in &section.figures {
-                figure id={ (name) "-" (stem) } { (PreEscaped(drawing(svg))) }
-            }
-            @for block in section.text.split("\n\n").filter(|block| !block.is_empty()) {
-                @if block.contains('\n') { pre { (block) } } @else { p.reading { (block) } }
-            }
-            p.provenance {
-                code { (provenance.command) } ", revision " (provenance.revision) ", " (provenance.rustc) ", "
-                (provenance.cpu) ", " (provenance.threads) " thread(s), " (provenance.date)
-                @if !provenance.parts.is_empty() { ", merged from " (provenance.parts.len()) " parts" }
-            }
-        }
+fn page(sections: &[Section]) -> String {
+    let link = |section: &Section| format!("<li><a href=\"#{0}\">{0}</a></li>", escaped(&section.name));
+    format!(
+        "<!DOCTYPE html>
+<html lang=\"en\"><head><meta charset=\"utf-8\">
+<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">
+<title>BVH by stochastic search: results</title><style>{STYLE}</style></head>
+<body><h1>BVH by stochastic search: results</h1>
+<p>Costs are ratios to the greedy Müller–Fellner tree of the same scene unless a table says otherwise. The paper is Ng &amp; \
+         Trifonov, Automatic Bounding Volume Hierarchy Generation Using Stochastic Search Methods (2003); its scenes are gone, and \
+         stand-ins are called stand-ins.</p>
+<nav><ul>{links}</ul></nav>{experiments}
+<footer><p>Made by harness {version} from the CSV files beside it.</p></footer></body></html>",
+        links = sections.iter().map(link).collect::<String>(),
+        experiments = sections.iter().map(experiment).collect::<String>(),
+        version = env!("CARGO_PKG_VERSION"),
+    )
+}
+
+fn experiment(section: &Section) -> String {
+    let name = escaped(&section.name);
+    let mut html = format!("\n<section id=\"{name}\"><h2>{name}</h2>");
+    html += &format!("<p><strong>{}</strong></p>", escaped(&section.question));
+    if section.stand_ins {
+        html += "<p>Scenes named as stand-ins are procedural stand-ins for the paper's.</p>";
     }
+    for (stem, svg) in &section.figures {
+        html += &format!("<figure id=\"{name}-{}\">{}</figure>", escaped(stem), drawing(svg));
+    }
+    for block in section.text.split("\n\n").filter(|block| !block.is_empty()) {
+        let (begin, end) =
+            if block.contains('\n') { ("<pre>", "</pre>") } else { ("<p class=\"reading\">", "</p>") };
+        html += &format!("{begin}{}{end}", escaped(block));
+    }
+    let Provenance { command, revision, rustc, cpu, threads, date, parts, .. } = &section.provenance;
+    let [command, revision, rustc, cpu, date] = [command, revision, rustc, cpu, date].map(|text| escaped(text));
+    let merged = if parts.is_empty() { String::new() } else { format!(", merged from {} parts", parts.len()) };
+    html + &format!(
+        "<p class=\"provenance\"><code>{command}</code>, revision {revision}, {rustc}, {cpu}, {threads} thread(s), \
+         {date}{merged}</p></section>"
+    )
 }
 
 /// The drawing without what may stand before it in a file of its own.
@@ -166,7 +166,7 @@ mod tests {
             figures: vec![("f".into(), "<?xml version=\"1.0\"?><svg width=\"1\"></svg>".into())],
             provenance,
         };
-        let page = page(&[section]).into_string();
+        let page = page(&[section]);
         for part in [
             "1 &lt; 2 &amp; so",
             "<pre>Table:\n&lt;pre&gt;</pre>",
