@@ -21,6 +21,7 @@ use bvh_build::ploc::MortonOrder;
 use bvh_core::{Aabb, Bvh, cost};
 
 /// The result of a small budget.
+#[allow(clippy::large_enum_variant, reason = "one is made per search, and taken apart at once")]
 pub(super) enum SmallBudget<'p, A> {
     /// The budget is used up.
     Tree(Bvh),
