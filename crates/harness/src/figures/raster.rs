@@ -19,6 +19,8 @@ pub const PNG_SCALE: u32 = 2;
 const LARGEST: u64 = 40_000_000;
 /// Steps per pixel of the result, each way.
 const SAMPLES: usize = STEPS as usize / PNG_SCALE as usize;
+/// Pixels that are compared with white at once.
+const RUN: usize = 16;
 
 /// A picture in RGB, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -152,19 +154,26 @@ pub fn pixels(picture: &impl Picture) -> Result<Pixels, FigureError> {
     layout
         .draw(&Sheet(raster.into_drawing_area()))
         .map_err(|fault| FigureError::Draw { title: picture.title().to_owned(), reason: fault.to_string() })?;
-    let mut sums = vec![[0_usize; 3]; width * height];
+    // By how much the samples of each pixel are darker than white, which most of a figure is: runs of it are only compared.
+    let mut dark = vec![[0; 3]; width * height];
+    let blank = [255; RUN * SAMPLES * 3];
     for (y, row) in fine.chunks(across).take(height * SAMPLES).enumerate() {
-        let sums = &mut sums[y / SAMPLES * width..][..width];
-        for (sum, samples) in sums.iter_mut().zip(row.chunks(SAMPLES)) {
-            for &[red, green, blue] in samples {
-                sum[0] += usize::from(red);
-                sum[1] += usize::from(green);
-                sum[2] += usize::from(blue);
+        let pixels = dark[y / SAMPLES * width..][..width].chunks_mut(RUN);
+        for (pixels, samples) in pixels.zip(row.chunks(RUN * SAMPLES)) {
+            if samples.as_flattened() == &blank[..samples.len() * 3] {
+                continue;
+            }
+            for (pixel, samples) in pixels.iter_mut().zip(samples.chunks(SAMPLES)) {
+                for &[red, green, blue] in samples {
+                    pixel[0] += usize::from(255 - red);
+                    pixel[1] += usize::from(255 - green);
+                    pixel[2] += usize::from(255 - blue);
+                }
             }
         }
     }
-    let mean = |sum: usize| (sum / (SAMPLES * SAMPLES)) as u8;
-    let colours = sums.into_iter().map(|[red, green, blue]| [mean(red), mean(green), mean(blue)]).collect();
+    let mean = |dark: usize| ((255 * SAMPLES * SAMPLES - dark) / (SAMPLES * SAMPLES)) as u8;
+    let colours = dark.into_iter().map(|[red, green, blue]| [mean(red), mean(green), mean(blue)]).collect();
     Ok(Pixels { width, height, colours })
 }
 

@@ -40,6 +40,7 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
         let y = Axis::linear("fraction solved").range(0.0, 1.02);
         let panels = vec![panel("", axis.axis(), y, layers)];
         output.add_figure(axis.file("ecdf"), caption.as_str(), 1, panels);
+        // What is solved at the end is the same along every axis, and is said once.
         if axis == ProgressAxis::Work {
             let reached = each(&config.methods, |method| {
                 let (solved, runs) = solved(&attempts, method);

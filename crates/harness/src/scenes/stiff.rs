@@ -12,7 +12,8 @@ use rand::{RngExt, SeedableRng};
 /// Makes a scene of so many triangles, or of about as many where no such scene exists.
 pub type Generator = fn(usize) -> Vec<Triangle>;
 
-/// Every stiff scene by the identifier of the case that builds and traces it.
+/// Every stiff scene by the identifier of the case that builds and traces it. Cases that ask different things may have the
+/// same scene, and those that are not listed ask about rays, refusals, files or threads.
 pub const STIFF: [(&str, Generator); 31] = [
     ("S01", uniform),
     ("S02", uniform),
