@@ -168,7 +168,7 @@ fn mutate(individual: &mut Individual, mean: f64, rng: &mut Stream) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::{Budget, solve};
+    use crate::run::{Budget, Judge, solve};
     use crate::scatter::scatter;
     use bvh_core::cost::Objective;
     use proptest::prelude::*;
@@ -247,6 +247,26 @@ mod tests {
         let mut population = [3.0, 5.0, 4.0].map(individual);
         keep(&individual(2.0), &mut population);
         assert_eq!(population.map(|individual| individual.cost), [3.0, 2.0, 4.0]);
+    }
+
+    #[test]
+    fn a_judge_takes_the_place_of_the_cost() {
+        #[derive(Debug)]
+        struct Depth;
+        impl Judge for Depth {
+            fn judge(&self, tree: &Bvh) -> f64 {
+                tree.depth() as f64
+            }
+        }
+        let boxes = scatter(200);
+        let config = Config { population: 10, generations: 20, ..Config::default() };
+        let depth = |judge: Option<&dyn Judge>| {
+            let problem = Problem { objective: Objective::GoldsmithSalmon, judge, ..Problem::new(&boxes) };
+            let outcome = solve(&config, &problem, 3, Budget::default(), &()).unwrap();
+            (outcome.tree.depth() as f64, outcome.cost)
+        };
+        let (judged, cost) = depth(Some(&Depth));
+        assert!(judged == cost && judged < depth(None).0);
     }
 
     #[test]
