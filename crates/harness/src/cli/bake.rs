@@ -6,7 +6,7 @@ use crate::cli::output::{print_error, print_line};
 use crate::cli::{explain, interrupt};
 use crate::clock::Deadline;
 use crate::files::{self, Reserved, load_tree};
-use crate::measure::ray_cost::{self, TrainedOn};
+use crate::measure::ray_cost;
 use crate::measure::segments::{self, RenderedRays};
 use crate::scenes::Scene;
 use crate::spec::configuration;
@@ -176,11 +176,9 @@ fn density(rays: &Rays, scene: &Scene, tree: &Bvh, seed: u64) -> Result<RayDensi
     let made = match rays {
         Rays::Default => {
             let rays = segments::of_anything(RAYS_OF_FAMILY, scene, tree, seed);
-            ray_cost::density(&rays, TrainedOn::Default, tree)
+            ray_cost::density(&rays, tree)
         }
-        Rays::Rendered(config) => {
-            ray_cost::density(&segments::of_renderer(config, scene, tree), TrainedOn::Camera, tree)
-        }
+        Rays::Rendered(config) => ray_cost::density(&segments::of_renderer(config, scene, tree), tree),
     };
     made.map_err(|error| Error::Tracing { scene: scene.name.clone(), message: error.to_string() })
 }
