@@ -141,14 +141,13 @@ impl Config {
         let speed = |row: &'a TestTimeRow| {
             let same = |of: &&TestTimeRow| {
                 of.scene == row.scene
-                    && of.tree == self.base
+                    && of.method == self.base
                     && (&of.judged_on, &of.camera) == (&row.judged_on, &row.camera)
             };
             let base = rows.test_times.iter().find(same)?;
             Some(Speed {
                 scene: &row.scene,
-                tree: &row.tree,
-                trained_on: &row.trained_on,
+                method: &row.method,
                 judged_on: &row.judged_on,
                 camera: &row.camera,
                 speed_over_base: row.million_per_s / base.million_per_s,
@@ -162,8 +161,7 @@ impl Config {
 #[derive(Serialize)]
 struct Speed<'a> {
     scene: &'a str,
-    tree: &'a str,
-    trained_on: &'a str,
+    method: &'a str,
     judged_on: &'a str,
     camera: &'a str,
     speed_over_base: f64,

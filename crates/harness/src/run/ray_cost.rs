@@ -65,8 +65,6 @@ pub(crate) fn judge(
                     times.push(TestTimeRow {
                         scene: scene.name.clone(),
                         method: labelled.label.clone(),
-                        tree: tree.into(),
-                        trained_on: TrainedOn::name(labelled.for_rays).into(),
                         judged_on: rays.kind.name().into(),
                         camera: rays.camera.into(),
                         million_per_s,

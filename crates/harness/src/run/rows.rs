@@ -254,8 +254,6 @@ rows! {
     TestTimeRow in "timing_tests.csv" {
         scene: String,
         method: String,
-        tree: String,
-        trained_on: String,
         judged_on: String,
         camera: String,
         /// Million rays per second, each part of the rays by its fastest turn; trees take turns.
