@@ -9,7 +9,11 @@ pub const OURS: &str = "ours";
 /// The name in the column `scene` of rows that are means over all scenes.
 pub const MEAN: &str = "geometric mean";
 
-/// The rows of `rays.csv`. `traces` and `times` are rows of the same contenders in the same order; `library_of` names the
+/// Most of a contender's answers that may be wrong: one in so many rays. What answers worse has failed, and so has its time:
+/// tinybvh's packets overflow their stack in deep trees.
+const WRONG_AT_MOST_ONE_IN: u64 = 100;
+
+/// The rows of `rays.csv`, without contenders that failed. `traces` and `times` are rows of the same contenders in the same order; `library_of` names the
 /// library of a method's label.
 pub fn rows(
     traces: &[TraceRow],
@@ -32,7 +36,10 @@ pub fn rows(
             disagreements: trace.missed_hits + trace.false_hits + trace.other_hits,
         }
     };
-    let mut rows: Vec<PeerRayRow> = traces.iter().zip(times).map(row).collect();
+    let answers = |(trace, _): &(&TraceRow, &TraceTimeRow)| {
+        (trace.missed_hits + trace.false_hits + trace.other_hits) * WRONG_AT_MOST_ONE_IN <= trace.count
+    };
+    let mut rows: Vec<PeerRayRow> = traces.iter().zip(times).filter(answers).map(row).collect();
     rows.extend(means(&rows));
     rows
 }
@@ -124,6 +131,36 @@ mod tests {
         assert_eq!(shown.len(), 2, "a mode that not all scenes have has no mean: {shown:?}");
         assert_eq!((shown[0].0, shown[1].0), (OURS, "embree"));
         assert!((shown[0].1 - 4.0).abs() < 1e-12 && (shown[1].1 - 2.0).abs() < 1e-12 && shown[1].2 == 7);
+    }
+
+    #[test]
+    fn a_contender_that_answers_wrongly_has_no_speed() {
+        let trace = |missed_hits| TraceRow {
+            scene: "a".into(),
+            method: "tinybvh".into(),
+            layout: "packets".into(),
+            rays: "primary".into(),
+            count: 1000,
+            hits: 900,
+            missed_hits,
+            false_hits: 0,
+            other_hits: 0,
+            boxes_per_ray: None,
+            objects_per_ray: None,
+        };
+        let time = TraceTimeRow {
+            scene: "a".into(),
+            method: "tinybvh".into(),
+            layout: "packets".into(),
+            rays: "primary".into(),
+            count: 1000,
+            rounds: 1,
+            preparation_seconds: 0.0,
+            seconds: 1.0,
+            median_seconds: 1.0,
+        };
+        let shown = |missed| rows(&[trace(missed)], &[time.clone()], str::to_owned).len();
+        assert_eq!((shown(10), shown(11)), (2, 0), "the row and its mean, or nothing");
     }
 
     #[test]
