@@ -82,7 +82,7 @@ proptest! {
     ) {
         let distance = |object: u32| {
             let distance = triangles[object as usize].closest_point(at).distance_squared(at.as_dvec3());
-            (object % left_out != 0).then_some(distance)
+            (!object.is_multiple_of(left_out)).then_some(distance)
         };
         let near = |object| Some(Near { object, distance_squared: distance(object)? });
         let mut all: Vec<Near> = (0..triangles.len() as u32).filter_map(near).collect();

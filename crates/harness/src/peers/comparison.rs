@@ -159,7 +159,7 @@ mod tests {
             seconds: 1.0,
             median_seconds: 1.0,
         };
-        let shown = |missed| rows(&[trace(missed)], &[time.clone()], str::to_owned).len();
+        let shown = |missed| rows(&[trace(missed)], std::slice::from_ref(&time), str::to_owned).len();
         assert_eq!((shown(10), shown(11)), (2, 0), "the row and its mean, or nothing");
     }
 
