@@ -26,7 +26,7 @@
 //! assert_eq!((found.object, found.distance_squared), (1, 1.0));
 //! ```
 
-use crate::{Aabb, BvhView, NodeKind, Ray, Slabs, Sphere};
+use crate::{Aabb, BvhView, NodeKind, Ray, Sphere, any_hit};
 use alloc::collections::BinaryHeap;
 use alloc::{vec, vec::Vec};
 use core::cmp::Ordering;
@@ -102,32 +102,13 @@ fn least_distance_squared(aabb: &Aabb, point: Vec3) -> f64 {
 pub fn overlapping<'t, B>(
     tree: impl Into<BvhView<'t>>,
     region: &impl Region,
-    visit: impl FnMut(u32) -> ControlFlow<B>,
-) -> Option<B> {
-    leaves(tree.into(), |aabb| region.may_meet(aabb), visit)
-}
-
-/// Shows `visit` the objects of every leaf whose box the ray meets in its range, in no order of distance, until it breaks: for all hits
-/// along a ray. Returns what it broke with.
-pub fn along<'t, B>(
-    tree: impl Into<BvhView<'t>>,
-    ray: &Ray,
-    visit: impl FnMut(u32) -> ControlFlow<B>,
-) -> Option<B> {
-    let tree = tree.into();
-    let slabs = Slabs::new(ray, &tree.nodes.first().map_or(Aabb::EMPTY, |root| root.aabb));
-    leaves(tree, |aabb| slabs.entry(aabb) <= ray.t_max(), visit)
-}
-
-fn leaves<B>(
-    tree: BvhView,
-    enters: impl Fn(&Aabb) -> bool,
     mut visit: impl FnMut(u32) -> ControlFlow<B>,
 ) -> Option<B> {
+    let tree = tree.into();
     let mut open: Vec<usize> = (0..tree.nodes.len().min(1)).collect();
     while let Some(index) = open.pop() {
         let node = &tree.nodes[index];
-        if !enters(&node.aabb) {
+        if !region.may_meet(&node.aabb) {
             continue;
         }
         match node.kind() {
@@ -142,6 +123,25 @@ fn leaves<B>(
         }
     }
     None
+}
+
+/// Shows `visit` the objects of every leaf whose box the ray meets in its range, in no order of distance, until it breaks: for all hits
+/// along a ray. Returns what it broke with.
+pub fn along<'t, B>(
+    tree: impl Into<BvhView<'t>>,
+    ray: &Ray,
+    mut visit: impl FnMut(u32) -> ControlFlow<B>,
+) -> Option<B> {
+    let mut broke_with = None;
+    let breaks = |object| match visit(object) {
+        ControlFlow::Continue(()) => false,
+        ControlFlow::Break(with) => {
+            broke_with = Some(with);
+            true
+        }
+    };
+    any_hit(tree, ray, breaks, &mut ());
+    broke_with
 }
 
 /// An object near a point.

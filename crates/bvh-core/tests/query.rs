@@ -1,11 +1,14 @@
 //! Every query answers as looking at every object does, whatever the tree.
 
+mod support;
+
 use bvh_core::query::{self, Frustum, Near, Region};
-use bvh_core::{Aabb, Bvh, Node, Ray, Shear, Sphere, Triangle, validate};
+use bvh_core::{Aabb, Bvh, Ray, Shear, Sphere, Triangle, validate};
 use glam::Vec3;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
+use support::{Random, SHAPES};
 
 fn point() -> impl Strategy<Value = Vec3> {
     let coordinate = || prop_oneof![-8.0f32..8.0, (-4i8..4).prop_map(f32::from)];
@@ -18,28 +21,10 @@ fn triangles() -> impl Strategy<Value = Vec<Triangle>> {
     prop::collection::vec(triangle, 0..40)
 }
 
-/// A tree with leaves of up to three objects and nodes of up to four children, in the order of the triangles.
+/// A tree of a shape that depends on the number of triangles.
 fn tree(triangles: &[Triangle]) -> Bvh {
-    let n = triangles.len() as u32;
-    let mut tree = Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, n)], prim_ids: (0..n).rev().collect() };
-    let mut at = 0;
-    while at < tree.nodes.len() {
-        let range = tree.nodes[at].prims();
-        if range.len() > 3 {
-            let parts = 2 + at % 3;
-            let first = tree.nodes.len() as u32;
-            let cut = |part: usize| (range.start + range.len() * part / parts) as u32;
-            tree.nodes
-                .extend((0..parts).map(|part| Node::leaf(Aabb::EMPTY, cut(part), cut(part + 1) - cut(part))));
-            tree.nodes[at] = Node::inner(Aabb::EMPTY, first, parts as u32);
-        }
-        at += 1;
-    }
-    if n == 0 {
-        tree.nodes.clear();
-    }
     let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
-    tree.refit(&boxes);
+    let tree = support::tree(&boxes, SHAPES[boxes.len() % SHAPES.len()], &mut Random(boxes.len() as u64));
     validate(&tree, &boxes).unwrap();
     tree
 }

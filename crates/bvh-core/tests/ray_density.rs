@@ -1,8 +1,11 @@
 //! The ray density counts what it says: segment by segment on the grid, monotone everywhere, area for uniform lines.
 
+mod support;
+
 use bvh_core::{Aabb, DensityError, RayDensity, Segment};
 use proptest::prelude::*;
 use std::sync::OnceLock;
+use support::Random;
 
 /// Bounds whose cells have a side of 1, so that boxes with whole coordinates lie on the grid.
 const GRID: f32 = 32.0;
@@ -11,16 +14,10 @@ fn bounds() -> Aabb {
     Aabb::from([[0.0; 3], [GRID; 3]])
 }
 
-/// Numbers in 0..1 from a seed: SplitMix64.
+/// Numbers in 0..1 from a seed.
 fn uniform(seed: u64) -> impl FnMut() -> f32 {
-    let mut state = seed;
-    move || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / 16_777_216.0
-    }
+    let mut random = Random(seed);
+    move || random.unit()
 }
 
 /// Segments inside, through and beside the bounds.

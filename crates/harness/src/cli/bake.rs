@@ -69,6 +69,13 @@ pub enum Effort {
     Work(u64),
 }
 
+impl Effort {
+    /// The time that there is, from now on.
+    fn deadline(self) -> Deadline {
+        Deadline::after(if let Self::Time(limit) = self { limit } else { Duration::MAX })
+    }
+}
+
 impl FromStr for Effort {
     type Err = String;
 
@@ -113,7 +120,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
 
     let greedy = muller_fellner::Config::default().build(&scene.boxes);
     let greedy = greedy.map_err(Error::search(&scene.name, &args.method))?;
-    let watch = Watch::new(args.budget, interrupted);
+    let deadline = args.budget.deadline();
     interrupt::hold();
     let density = rays.map(|rays| density(&rays, &scene, &greedy, args.seed)).transpose()?;
     let problem = Problem {
@@ -121,7 +128,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         ..Problem::new(&scene.boxes)
     };
     let base = problem.cost(&greedy);
-    watch.set_base(base);
+    let watch = Watch::new(args.budget, deadline, base, interrupted);
     let budget = match args.budget {
         Effort::Time(_) => Budget::default(),
         Effort::Work(work) => Budget { max_work: Some(work), ..Budget::default() },
@@ -168,14 +175,11 @@ fn read_rays(named: &str) -> Result<Rays, Error> {
     configuration(path).map(Rays::Rendered)
 }
 
-/// Rays of each family that a tree is trained on without a camera.
-const RAYS_OF_FAMILY: u32 = 100_000;
-
 /// The density of the rays through a scene, of which `tree` is any tree.
 fn density(rays: &Rays, scene: &Scene, tree: &Bvh, seed: u64) -> Result<RayDensity, Error> {
     let made = match rays {
         Rays::Default => {
-            let rays = segments::of_anything(RAYS_OF_FAMILY, scene, tree, seed);
+            let rays = segments::of_anything(ray_cost::Config::default().trained, scene, tree, seed);
             ray_cost::density(&rays, tree)
         }
         Rays::Rendered(config) => ray_cost::density(&segments::of_renderer(config, scene, tree), tree),
@@ -274,8 +278,8 @@ struct Watch<'a> {
     bar: ProgressBar,
     deadline: Deadline,
     effort: Effort,
-    /// The bits of the cost that gains are relative to.
-    base: AtomicU64,
+    /// The cost that gains are relative to.
+    base: f64,
     last: Mutex<Option<Event>>,
     /// When the bar was last brought up to date, in milliseconds since the beginning.
     shown: AtomicU64,
@@ -283,19 +287,13 @@ struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    fn new(effort: Effort, interrupted: &'a AtomicBool) -> Self {
+    fn new(effort: Effort, deadline: Deadline, base: f64, interrupted: &'a AtomicBool) -> Self {
         // In thousandths of the budget; hidden unless standard error is a terminal.
         let bar = ProgressBar::new(1000);
         let style = ProgressStyle::with_template("{wide_bar} {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        let limit = if let Effort::Time(limit) = effort { limit } else { Duration::MAX };
-        let base = AtomicU64::default();
-        let (deadline, last, shown) = (Deadline::after(limit), Mutex::default(), AtomicU64::default());
+        let (last, shown) = (Mutex::default(), AtomicU64::default());
         Self { bar, deadline, effort, base, last, shown, interrupted }
-    }
-
-    fn set_base(&self, base: f64) {
-        self.base.store(base.to_bits(), Relaxed);
     }
 
     /// Shows incumbent, gain, rate and time left, ten times a second.
@@ -320,7 +318,7 @@ impl<'a> Watch<'a> {
         self.bar.set_message(format!(
             "{:.6e}, {} MF, {:.2} M moves/s, {:.0} s left",
             event.incumbent,
-            gain(event.incumbent, f64::from_bits(self.base.load(Relaxed))),
+            gain(event.incumbent, self.base),
             event.evaluations as f64 / seconds / 1e6,
             (seconds / done.max(1e-9) - seconds).max(0.0)
         ));

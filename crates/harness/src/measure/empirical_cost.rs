@@ -6,6 +6,7 @@
 use super::rays::{Family, random_ray};
 use crate::run::rows::RayRow;
 use crate::scenes::Scene;
+use crate::statistics::NORMAL_95;
 use bvh_build::{Accelerator, Query, config};
 use bvh_core::{Bvh, TestCounts};
 use bvh_search::Stream;
@@ -98,9 +99,6 @@ pub fn measure(config: &Config, scene: &Scene, tree: &Bvh, seed: u64, row: RayRo
         ..row
     }
 }
-
-/// Half the width of the normal distribution's central 95 %, in standard deviations.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 #[cfg(test)]
 mod tests {

@@ -1,12 +1,12 @@
 //! Trees for the rays that are traced: the density of the rays that a tree is searched for, and the tests that other rays of the
 //! same kind, or of another camera, take in it.
 
-use super::rays::{Family, Kind, Viewpoint, random_ray};
+use super::rays::{Family, Kind, Viewpoint, in_box, random_ray};
 use super::segments::{Pose, RenderedRays, TracedRay, of_anything, of_renderer};
 use super::speed::timed;
 use crate::scenes::Scene;
 use crate::statistics::minimum;
-use bvh_build::{Builder, Check, OutOfRange, config, muller_fellner};
+use bvh_build::{Builder, OutOfRange, config, muller_fellner};
 use bvh_core::{Bvh, DensityError, Hit, Ray, RayDensity, Segment, TestCounts, WideBvh};
 use bvh_search::Stream;
 use rand::SeedableRng;
@@ -96,8 +96,7 @@ impl Config {
     fn rendered(&self, scene: &Scene, tree: &Bvh, other: bool, count: u32, seed: u64) -> Vec<TracedRay> {
         let cameras = self.cameras.get(&scene.name).cloned().unwrap_or_default();
         let Some(root) = tree.root_aabb() else { return Vec::new() };
-        let (low, size) = (root.min.as_dvec3(), root.extent());
-        let place = |at: [f64; 3]| (low + glam::DVec3::from(at) * size).to_array();
+        let place = |at: [f64; 3]| in_box(&root, at).to_array();
         let path = if other { &cameras.other } else { &cameras.same };
         let pose = |view: &Viewpoint| Pose { eye: place(view.eye), target: place(view.target) };
         let lights = cameras.lights.iter().map(|&light| place(light)).collect();
@@ -181,7 +180,7 @@ impl TestRays {
     }
 
     /// Million rays per second through each of the layouts, which take turns, each part of the rays by its fastest turn.
-    pub fn speeds(&self, layouts: &[WideBvh], rounds: u32) -> Vec<f64> {
+    pub fn speeds(&self, layouts: &[&WideBvh], rounds: u32) -> Vec<f64> {
         let mut hits: Vec<Option<Hit>> = vec![None; self.rays.len()];
         let mut turns: Vec<Vec<Vec<f64>>> = vec![Vec::new(); layouts.len()];
         for _ in 0..rounds {
@@ -201,8 +200,6 @@ impl TestRays {
         turns.iter().map(fastest).collect()
     }
 }
-
-impl Check for Cameras {}
 
 #[cfg(test)]
 mod tests {
@@ -224,6 +221,6 @@ mod tests {
             test_rays[..3].iter().map(|test_rays| test_rays.tests(wide).iter().sum::<f64>()).sum::<f64>()
         };
         assert!(sum(&trained) < sum(&plain), "{} {}", sum(&trained), sum(&plain));
-        assert!(test_rays[0].speeds(&[plain, trained], 2).into_iter().all(|speed| speed > 0.0));
+        assert!(test_rays[0].speeds(&[&plain, &trained], 2).into_iter().all(|speed| speed > 0.0));
     }
 }

@@ -121,17 +121,25 @@ pub fn rays(kind: Kind, count: u32, scene: &Scene, tree: &Bvh, viewpoint: &Viewp
         Kind::Primary => primary_rays(count, &root, viewpoint),
         Kind::Bounce => {
             let mut rng = Stream::seed_from_u64(seed);
-            // A library without a shortest distance would hit the surface that the ray starts from.
-            let points = hit_points(&primary_rays(count, &root, viewpoint), scene, tree, 1.0 - 1.0 / 2048.0);
+            let points = hit_points(&primary_rays(count, &root, viewpoint), scene, tree, JUST_BEFORE);
             let ray = |&origin: &Vec3| Ray::half_line(origin, on_sphere(&mut rng).as_vec3()).ok();
             points.iter().cycle().take(count as usize).filter_map(ray).collect()
         }
         Kind::Shadow => {
             let points = hit_points(&primary_rays(count, &root, viewpoint), scene, tree, 1.0);
-            let light = root.min.as_dvec3() + DVec3::new(0.5, 0.95, 0.5) * root.extent();
+            let light = in_box(&root, [0.5, 0.95, 0.5]);
             points.iter().cycle().take(count as usize).filter_map(|&point| shadow_ray(point, light)).collect()
         }
     }
+}
+
+/// The part of the way to a hit at which the next ray begins, because a library without a shortest distance would hit the surface
+/// that the ray starts from.
+pub(super) const JUST_BEFORE: f32 = 1.0 - 1.0 / 2048.0;
+
+/// A point given in fractions of the root's box.
+pub(super) fn in_box(root: &Aabb, at: [f64; 3]) -> DVec3 {
+    root.min.as_dvec3() + DVec3::from(at) * root.extent()
 }
 
 /// The points at this fraction of the way to the nearest hits of rays.
@@ -148,8 +156,7 @@ fn columns(count: u32) -> u32 {
 
 /// Rays through the centres of square pixels, row by row, with as many rows as columns.
 fn primary_rays(count: u32, root: &Aabb, viewpoint: &Viewpoint) -> Vec<Ray> {
-    let place = |at: [f64; 3]| root.min.as_dvec3() + DVec3::from(at) * root.extent();
-    let view = View { from: place(viewpoint.eye), at: place(viewpoint.target), fov: 60.0 };
+    let view = View { from: in_box(root, viewpoint.eye), at: in_box(root, viewpoint.target), fov: 60.0 };
     let side = columns(count);
     let camera = Camera::new(&view, DVec3::Y, side, side);
     let centre = |pixel: u32| f64::from(pixel) + 0.5;

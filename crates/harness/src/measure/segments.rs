@@ -1,7 +1,7 @@
 //! The rays that a tree is searched for, with their parts up to the hit: a renderer's, or any through a scene.
 
 use super::camera::{Camera, View};
-use super::rays::{Family, Kind, on_sphere, random_ray};
+use super::rays::{Family, JUST_BEFORE, Kind, in_box, on_sphere, random_ray};
 use crate::scenes::Scene;
 use bvh_build::config::above;
 use bvh_build::{Accelerator, OutOfRange, config};
@@ -112,8 +112,8 @@ pub fn of_anything(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<Trac
             let Some(point) = hit else { continue };
             let direction = on_sphere(&mut tracing.rng);
             tracing.nearest(Kind::Bounce, point, direction);
-            let place = DVec3::new(tracing.rng.random(), tracing.rng.random(), tracing.rng.random());
-            tracing.shadow(point, root.min.as_dvec3() + place * root.extent());
+            let place = [tracing.rng.random(), tracing.rng.random(), tracing.rng.random()];
+            tracing.shadow(point, in_box(&root, place));
         }
     }
     tracing.rays
@@ -165,6 +165,3 @@ impl<'a> Tracing<'a> {
         2.0 * reach.length() / ray.direction().length()
     }
 }
-
-/// The part of the way to a hit at which the next ray begins, so that it does not hit the same surface at once.
-const JUST_BEFORE: f32 = 1.0 - 1.0 / 2048.0;

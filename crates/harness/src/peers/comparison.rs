@@ -1,6 +1,7 @@
 //! Rays per second of all libraries side by side: every mode on every scene, and geometric means over the scenes.
 
 use crate::run::rows::{PeerRayRow, TraceRow, TraceTimeRow};
+use crate::statistics::geometric_mean;
 use std::collections::BTreeMap;
 
 /// The library of our own contenders.
@@ -56,16 +57,11 @@ fn means(rows: &[PeerRayRow]) -> Vec<PeerRayRow> {
     complete.sort_by_key(|(first, _)| *first);
     let mean = |(_, rows): (usize, Vec<&PeerRayRow>)| PeerRayRow {
         scene: MEAN.into(),
-        million_per_s: geometric_mean(rows.iter().map(|row| row.million_per_s)),
+        million_per_s: geometric_mean(&rows.iter().map(|row| row.million_per_s).collect::<Vec<_>>()),
         disagreements: rows.iter().map(|row| row.disagreements).sum(),
         ..rows[0].clone()
     };
     complete.into_iter().map(mean).collect()
-}
-
-fn geometric_mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let count = values.len() as f64;
-    (values.map(f64::ln).sum::<f64>() / count).exp()
 }
 
 /// Lines for the terminal: for every scene and kind of rays our fastest mode, the fastest of other libraries, and the
@@ -102,7 +98,7 @@ pub fn text(rows: &[PeerRayRow]) -> String {
     }
     for kind in kinds {
         let ratios = &ratios[kind];
-        text += &format!("  {MEAN} of the ratios, {kind}: {:.2}\n", geometric_mean(ratios.iter().copied()));
+        text += &format!("  {MEAN} of the ratios, {kind}: {:.2}\n", geometric_mean(ratios));
     }
     text
 }

@@ -182,7 +182,7 @@ pub fn ratio(cost: f64, base: f64) -> f64 {
 }
 
 /// The distinct items, in the order in which they first occur.
-fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
+pub(super) fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
     let mut found = Vec::new();
     for item in items {
         if !found.contains(&item) {

@@ -1,10 +1,11 @@
 //! Tests of rays in trees that are trained on rays, over those in a tree that is searched for by area.
 
-use super::data::Rows;
+use super::data::{Rows, distinct};
 use super::output::{Output, each, panel};
 use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::run::rows::{TestRow, TestTimeRow};
+use crate::statistics::{NORMAL_95, geometric_mean};
 use serde::Serialize;
 
 bvh_build::config! { serde;
@@ -37,8 +38,6 @@ struct Compared<'a> {
 
 /// The scene of rows that are geometric means.
 const ALL: &str = "geometric mean";
-/// Half the width of the normal distribution's central 95 %, in standard deviations.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
@@ -78,7 +77,7 @@ impl Config {
     fn compared<'a>(&self, rows: &'a Rows, row: &'a TestRow) -> Option<Compared<'a>> {
         let same = |of: &&TestRow| {
             of.scene == row.scene
-                && of.tree == self.base
+                && of.method == self.base
                 && (&of.judged_on, &of.camera) == (&row.judged_on, &row.camera)
         };
         let base = rows.tests.iter().find(same)?;
@@ -103,17 +102,8 @@ impl Config {
     /// One line of markers per tree, over the kinds of rays.
     fn draw(&self, title: String, scene: &str, table: &[Compared]) -> Panel {
         let own: Vec<&Compared> = table.iter().filter(|row| row.scene == scene).collect();
-        let mut judged: Vec<(&str, &str)> = Vec::new();
-        let mut trees: Vec<(&str, &str)> = Vec::new();
-        for row in &own {
-            for (found, item) in
-                [(&mut judged, (row.judged_on, row.camera)), (&mut trees, (row.tree, row.trained_on))]
-            {
-                if !found.contains(&item) {
-                    found.push(item);
-                }
-            }
-        }
+        let judged = distinct(own.iter().map(|row| (row.judged_on, row.camera)));
+        let trees = distinct(own.iter().map(|row| (row.tree, row.trained_on)));
         let bars = |&(tree, trained_on): &(&str, &str)| {
             let of_tree = own.iter().filter(|row| (row.tree, row.trained_on) == (tree, trained_on));
             let bar = |row: &&Compared| {
@@ -173,28 +163,21 @@ fn tree_name(tree: &str, trained_on: &str) -> String {
 
 /// The geometric means over scenes of rows that agree in all else.
 fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
-    let mut means: Vec<(Compared<'a>, f64)> = Vec::new();
-    for row in table {
-        let key = |row: &Compared<'a>| (row.tree, row.trained_on, row.judged_on, row.camera);
-        match means.iter_mut().find(|(mean, _)| key(mean) == key(row)) {
-            Some((mean, count)) => {
-                mean.tests_over_base += row.tests_over_base.ln();
-                *count += 1.0;
-            }
-            None => {
-                let sum = row.tests_over_base.ln();
-                let (tests, over_base_low, over_base_high) = (None, None, None);
-                let first =
-                    Compared { scene: ALL, tests, tests_over_base: sum, over_base_low, over_base_high, ..*row };
-                means.push((first, 1.0));
-            }
+    let key = |row: &Compared<'a>| (row.tree, row.trained_on, row.judged_on, row.camera);
+    let mean = |group| {
+        let own: Vec<&Compared> = table.iter().filter(|row| key(row) == group).collect();
+        let ratios: Vec<f64> = own.iter().map(|row| row.tests_over_base).collect();
+        let (tests, over_base_low, over_base_high) = (None, None, None);
+        Compared {
+            scene: ALL,
+            tests,
+            tests_over_base: geometric_mean(&ratios),
+            over_base_low,
+            over_base_high,
+            ..*own[0]
         }
-    }
-    let finished = |(mean, count): (Compared<'a>, f64)| Compared {
-        tests_over_base: (mean.tests_over_base / count).exp(),
-        ..mean
     };
-    means.into_iter().map(finished).collect()
+    distinct(table.iter().map(key)).into_iter().map(mean).collect()
 }
 
 fn reading(table: &[Compared]) -> String {

@@ -6,6 +6,7 @@ use super::metric::Metric;
 use super::output::{Output, panel};
 use crate::Error;
 use crate::figures::{Axis, Layer};
+use crate::statistics::geometric_mean;
 use bvh_build::config::Itself;
 use serde::Serialize;
 
@@ -89,13 +90,13 @@ impl Config {
         if own.is_empty() || own.len() != base.len() {
             return None;
         }
-        let logarithms: f64 = own.iter().zip(&base).map(|(own, base)| (own / base).ln()).sum();
+        let ratios: Vec<f64> = own.iter().zip(&base).map(|(own, base)| own / base).collect();
         Some(Point {
             scene,
             series: &series.name,
             method,
             build_seconds: rows.build_seconds(scene, method)?,
-            tests_over_base: (logarithms / own.len() as f64).exp(),
+            tests_over_base: geometric_mean(&ratios),
         })
     }
 

@@ -34,7 +34,7 @@ pub(crate) fn judge(
         let layouts = layouts.collect::<Result<Vec<WideBvh>, Error>>()?;
         // By method, with all repetitions.
         let methods: Vec<usize> = (0..of_scene.len()).step_by(experiment.repetitions as usize).collect();
-        let first: Vec<WideBvh> = methods.iter().map(|&at| layouts[at].clone()).collect();
+        let first: Vec<&WideBvh> = methods.iter().map(|&at| &layouts[at]).collect();
         let seed = experiment.seed_of(&scene.name, "rays that judge trees", 0);
         for rays in test_rays(config, scene, of_scene[0].1, seed) {
             if watch.cancelled() {

@@ -90,6 +90,14 @@ pub fn spread_of_best(pool: &[f64], m: usize) -> Option<(f64, f64)> {
     Some(if m < n { (low, high) } else { (sorted[0] - (high - low), sorted[0] + (high - low)) })
 }
 
+/// Half the width of the normal distribution's central 95 %, in standard deviations.
+pub const NORMAL_95: f64 = 1.959_963_984_540_054;
+
+/// The geometric mean of positive values; NaN of none.
+pub fn geometric_mean(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp()
+}
+
 /// The mean of values and the 95 % interval of the mean that they were drawn around, by Student's t; no interval of fewer
 /// than two. `None` of none.
 pub fn mean_interval(values: &[f64]) -> Option<(f64, Option<(f64, f64)>)> {
