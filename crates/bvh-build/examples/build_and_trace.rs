@@ -3,7 +3,7 @@
 //! `cargo run -p bvh-build --example build_and_trace`
 
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::{Aabb, Ray, Shear, TestCounts, Triangle, WideBvh, any_hit, cost, nearest_hit};
+use bvh_core::{Ray, Shear, TestCounts, Triangle, WideBvh, any_hit, boxes, cost, nearest_hit, nearest_hit_by};
 use std::error::Error;
 
 /// A bumpy ground of two triangles per square metre.
@@ -19,7 +19,7 @@ fn ground(size: u16) -> Vec<Triangle> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let triangles = ground(64);
-    let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+    let boxes = boxes(&triangles);
     let tree = muller_fellner::Config::default().build(&boxes)?;
     println!(
         "{} triangles, {} nodes, internal area {}",
@@ -30,10 +30,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // What lies under this point, and at what price?
     let down = Ray::half_line([20.3, 10.0, 41.8], [0.0, -1.0, 0.0])?;
+    let hit = nearest_hit(&tree, &triangles, &down).ok_or("nothing below")?;
     let (shear, mut counts) = (Shear::new(&down), TestCounts::default());
-    let hit =
-        nearest_hit(&tree, &down, |id, t_max| triangles[id as usize].intersect(&shear, t_max), &mut counts);
-    let hit = hit.ok_or("nothing below")?;
+    nearest_hit_by(&tree, &down, |id, t_max| triangles[id as usize].intersect(&shear, t_max), &mut counts);
     println!(
         "triangle {} at distance {}: {} boxes, {} triangles tested",
         hit.object, hit.t, counts.boxes, counts.objects
@@ -41,9 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // Is the sun visible from there? Shadow rays end at the first hit.
     let sun = Ray::new(down.at(hit.t), [0.3, 1.0, 0.2], 1e-3, f32::INFINITY)?;
-    let shear = Shear::new(&sun);
-    let shadow =
-        any_hit(&tree, &sun, |id| triangles[id as usize].intersect(&shear, f32::MAX).is_some(), &mut ());
+    let shadow = any_hit(&tree, &triangles, &sun);
     println!("{}", if shadow { "in shadow" } else { "in the sun" });
 
     // For many rays: eight children at a time, the same answers bit by bit.

@@ -3,7 +3,7 @@
 //! `cargo run -p bvh-build --example custom_primitives`
 
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::{Aabb, Ray, Sphere, clip_to_box, nearest_hit};
+use bvh_core::{Aabb, Primitive, Ray, Sphere, boxes, clip_to_box, nearest_hit};
 use std::error::Error;
 
 /// A horizontal disc, which no library knows.
@@ -12,12 +12,14 @@ struct Disc {
     radius: f32,
 }
 
-enum Primitive {
+enum Object {
     Disc(Disc),
     Sphere(Sphere),
 }
 
-impl Primitive {
+impl Primitive for Object {
+    type Prepared = Ray;
+
     fn aabb(&self) -> Aabb {
         match self {
             Self::Sphere(sphere) => sphere.aabb(),
@@ -25,6 +27,10 @@ impl Primitive {
                 Aabb::from([[x - r, *y, z - r], [x + r, *y, z + r]])
             }
         }
+    }
+
+    fn prepare(ray: &Ray) -> Ray {
+        *ray
     }
 
     fn intersect(&self, ray: &Ray, t_max: f32) -> Option<f32> {
@@ -43,22 +49,21 @@ impl Primitive {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let primitives: Vec<Primitive> = (0..1000u16)
+    let objects: Vec<Object> = (0..1000u16)
         .map(|i| {
             let center = [f32::from(i % 10) * 3.0, f32::from(i / 10 % 10) * 3.0, f32::from(i / 100) * 3.0];
             match i % 3 {
-                0 => Primitive::Sphere(Sphere::new(center, 1.0)),
-                _ => Primitive::Disc(Disc { center, radius: 1.25 }),
+                0 => Object::Sphere(Sphere::new(center, 1.0)),
+                _ => Object::Disc(Disc { center, radius: 1.25 }),
             }
         })
         .collect();
-    let boxes: Vec<Aabb> = primitives.iter().map(Primitive::aabb).collect();
-    let tree = muller_fellner::Config::default().build(&boxes)?;
+    let tree = muller_fellner::Config::default().build(&boxes(&objects))?;
     let (mut spheres, mut discs) = (0, 0);
     for i in 0..100u8 {
         let across = [f32::from(i % 10) - 4.5, -10.0, f32::from(i / 10) - 4.5];
         let ray = Ray::half_line([15.0, 40.0, 15.0], across)?;
-        match nearest_hit(&tree, &ray, |id, t_max| primitives[id as usize].intersect(&ray, t_max), &mut ()) {
+        match nearest_hit(&tree, &objects, &ray) {
             Some(hit) if hit.object % 3 == 0 => spheres += 1,
             Some(_) => discs += 1,
             None => {}

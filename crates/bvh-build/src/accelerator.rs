@@ -2,7 +2,7 @@
 
 use crate::kd_tree::KdTree;
 use bvh_core::{
-    Bvh, Counter, Hit, Primitives, Ray, Shear, TestCounts, WideBvh, any_hit, any_hit_of_all, nearest_hit,
+    Bvh, Counter, Hit, Primitives, Ray, Shear, TestCounts, WideBvh, any_hit_by, any_hit_of_all, nearest_hit_by,
     nearest_hit_of_all,
 };
 use std::borrow::Cow;
@@ -45,7 +45,7 @@ impl Structure<'_> {
         counter: &mut impl Counter,
     ) -> Option<Hit> {
         match self {
-            Self::Tree(tree) => nearest_hit(&**tree, ray, test, counter),
+            Self::Tree(tree) => nearest_hit_by(&**tree, ray, test, counter),
             Self::KdTree(tree) => tree.nearest_hit(ray, test, counter),
             _ => nearest_hit_of_all(objects as u32, ray, test, counter),
         }
@@ -60,7 +60,7 @@ impl Structure<'_> {
         counter: &mut impl Counter,
     ) -> bool {
         match self {
-            Self::Tree(tree) => any_hit(&**tree, ray, test, counter),
+            Self::Tree(tree) => any_hit_by(&**tree, ray, test, counter),
             Self::KdTree(tree) => tree.any_hit(ray, test, counter),
             _ => any_hit_of_all(objects as u32, test, counter),
         }

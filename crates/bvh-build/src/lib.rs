@@ -1,7 +1,5 @@
-//! Builders of bounding volume hierarchies: boxes in, one [`Bvh`](bvh_core::Bvh) out.
-//!
-//! Every builder is a module with a `Config` and sees the objects' boxes only. All are deterministic, use no recursion
-//! on data, and refuse boxes that are not finite by naming the object.
+// The root of the crate; its front page is its README.
+#![doc = include_str!("../README.md")]
 
 pub mod accelerator;
 pub mod config;

@@ -3,7 +3,7 @@
 //! `cargo run -p bvh-core --example save_and_load`
 
 use bvh_core::file::{self, FileError, Origin, TreeFile};
-use bvh_core::{Aabb, Bvh, FirstCountNode, Ray, TestCounts, Triangle, nearest_hit, validate};
+use bvh_core::{Aabb, Bvh, FirstCountNode, Ray, Triangle, boxes, nearest_hit, validate};
 use std::error::Error;
 
 /// A row of triangles; any scene will do.
@@ -33,7 +33,7 @@ fn halves(boxes: &[Aabb]) -> Vec<FirstCountNode> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let triangles = triangles();
-    let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+    let boxes = boxes(&triangles);
     let ids: Vec<u32> = (0..boxes.len() as u32).collect();
     let tree = Bvh::from_first_count(&halves(&boxes), &ids)?;
     validate(&tree, &boxes)?;
@@ -53,11 +53,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     match file.view() {
         Ok(view) => {
             let ray = Ray::half_line([10.25, 0.25, -5.0], [0.0, 0.0, 1.0])?;
-            let shear = bvh_core::Shear::new(&ray);
-            let mut counts = TestCounts::default();
-            let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
-            let hit = nearest_hit(view, &ray, test, &mut counts).ok_or("no hit")?;
-            println!("hit triangle {} at {} after {} boxes", hit.object, hit.t, counts.boxes);
+            let hit = nearest_hit(view, &triangles, &ray).ok_or("no hit")?;
+            println!("hit triangle {} at {}", hit.object, hit.t);
             assert_eq!(hit.object, 10);
         }
         // A `Vec<u8>` promises no alignment, a mapped file does.

@@ -26,7 +26,7 @@
 //! assert_eq!((found.object, found.distance_squared), (1, 1.0));
 //! ```
 
-use crate::{Aabb, BvhView, NodeKind, Ray, Sphere, any_hit};
+use crate::{Aabb, BvhView, NodeKind, Ray, Sphere, any_hit_by};
 use alloc::collections::BinaryHeap;
 use alloc::{vec, vec::Vec};
 use core::cmp::Ordering;
@@ -140,7 +140,7 @@ pub fn along<'t, B>(
             true
         }
     };
-    any_hit(tree, ray, breaks, &mut ());
+    any_hit_by(tree, ray, breaks, &mut ());
     broke_with
 }
 

@@ -1,13 +1,14 @@
 //! Which object a ray meets first, and whether it meets any: traversal of the one tree type.
 //!
-//! The objects may be anything: the caller passes a closure that tests one of them. Boxes are visited front to back,
-//! skipped when they begin behind the nearest hit, and tested conservatively ([`Slabs`](crate::Slabs)). With tests
+//! [`nearest_hit`] and [`any_hit`] take triangles, spheres, or objects of any kind that is a [`Primitive`]; [`nearest_hit_by`]
+//! and [`any_hit_by`] a closure that tests one object, which can also pass objects over, and a counter of tests. Boxes are
+//! visited front to back, skipped when they begin behind the nearest hit, and tested conservatively ([`Slabs`](crate::Slabs)). With tests
 //! whose distances lie inside their objects' boxes, as [`Triangle::intersect`](crate::Triangle::intersect),
 //! [`Sphere::intersect`](crate::Sphere::intersect) and [`clip_to_box`](crate::clip_to_box) give them, the answer is
 //! that of testing every object, bit by bit, whatever the tree.
 //!
 //! ```
-//! use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Shear, TestCounts, Triangle, nearest_hit};
+//! use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Shear, TestCounts, Triangle, nearest_hit, nearest_hit_by};
 //! use glam::Vec3;
 //! let corners = |z| [Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 0.0, z), Vec3::new(0.0, 1.0, z)];
 //! let triangles = [0.0, 1.0].map(|z| Triangle(corners(z)));
@@ -17,16 +18,16 @@
 //!     prim_ids: vec![0, 1],
 //! };
 //! let ray = Ray::half_line(Vec3::new(0.2, 0.2, 3.0), -Vec3::Z)?;
-//! let shear = Shear::new(&ray);
-//! let mut counts = TestCounts::default();
-//! let hit = nearest_hit(&tree, &ray, |id, t_max| triangles[id as usize].intersect(&shear, t_max), &mut counts);
+//! assert_eq!(nearest_hit(&tree, &triangles, &ray), Some(Hit { t: 2.0, object: 1 }));
+//! let (shear, mut counts) = (Shear::new(&ray), TestCounts::default());
+//! let hit = nearest_hit_by(&tree, &ray, |id, t_max| triangles[id as usize].intersect(&shear, t_max), &mut counts);
 //! assert_eq!(hit, Some(Hit { t: 2.0, object: 1 }));
 //! assert_eq!(counts, TestCounts { boxes: 3, objects: 1 });
 //! # Ok::<(), bvh_core::InvalidRay>(())
 //! ```
 
 use crate::stack::Stack;
-use crate::{BvhView, Hit, Node, NodeKind, Ray, Slabs};
+use crate::{BvhView, Hit, Node, NodeKind, Primitive, Ray, Slabs};
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
@@ -66,7 +67,26 @@ impl Counter for TestCounts {
     }
 }
 
-/// The nearest object that `ray` meets in its range; of several at the same distance the one of the lowest id.
+/// The nearest of `objects` that `ray` meets in its range; of several at the same distance the one of the lowest id.
+///
+/// `tree` is a [`&Bvh`](crate::Bvh) over their [boxes](crate::boxes), or a view of one.
+///
+/// # Panics
+/// May panic, or not return, for a tree that [`validate`](crate::validate()) refuses, or of more objects.
+#[inline]
+pub fn nearest_hit<'t, P: Primitive>(tree: impl Into<BvhView<'t>>, objects: &[P], ray: &Ray) -> Option<Hit> {
+    let prepared = P::prepare(ray);
+    nearest_hit_by(tree, ray, |id, t_max| objects[id as usize].intersect(&prepared, t_max), &mut ())
+}
+
+/// Whether `ray` meets any of `objects` in its range: the question of a shadow ray. Otherwise as [`nearest_hit`].
+#[inline]
+pub fn any_hit<'t, P: Primitive>(tree: impl Into<BvhView<'t>>, objects: &[P], ray: &Ray) -> bool {
+    let prepared = P::prepare(ray);
+    any_hit_by(tree, ray, |id| objects[id as usize].intersect(&prepared, ray.t_max()).is_some(), &mut ())
+}
+
+/// [`nearest_hit`] of objects that a closure tests, with the tests counted; `&mut ()` counts nothing.
 ///
 /// `tree` is a [`&Bvh`](crate::Bvh) or a view of one. `test(object, t_max)` gives the distance at which the ray meets
 /// the object, if that is in `ray.t_min()..=t_max`.
@@ -74,7 +94,7 @@ impl Counter for TestCounts {
 /// # Panics
 /// May panic, or not return, for a tree that [`validate`](crate::validate()) refuses.
 #[inline]
-pub fn nearest_hit<'t>(
+pub fn nearest_hit_by<'t>(
     tree: impl Into<BvhView<'t>>,
     ray: &Ray,
     mut test: impl FnMut(u32, f32) -> Option<f32>,
@@ -88,15 +108,15 @@ pub fn nearest_hit<'t>(
     nearest
 }
 
-/// Whether `ray` meets any object in its range: the question of a shadow ray.
+/// [`any_hit`] of objects that a closure tests, with the tests counted.
 ///
 /// `test(object)` says whether the ray meets the object. Boxes are visited front to back all the same: a hit ends the
 /// search, and near objects fill more of the view.
 ///
 /// # Panics
-/// As [`nearest_hit`].
+/// As [`nearest_hit_by`].
 #[inline]
-pub fn any_hit<'t>(
+pub fn any_hit_by<'t>(
     tree: impl Into<BvhView<'t>>,
     ray: &Ray,
     mut test: impl FnMut(u32) -> bool,
@@ -116,7 +136,7 @@ pub fn any_hit<'t>(
     found
 }
 
-/// [`nearest_hit`] without a tree: tests the objects `0..objects` one after the other.
+/// [`nearest_hit_by`] without a tree: tests the objects `0..objects` one after the other.
 pub fn nearest_hit_of_all(
     objects: u32,
     ray: &Ray,
@@ -128,7 +148,7 @@ pub fn nearest_hit_of_all(
     nearest
 }
 
-/// [`any_hit`] without a tree: tests the objects `0..objects` one after the other.
+/// [`any_hit_by`] without a tree: tests the objects `0..objects` one after the other.
 pub fn any_hit_of_all(objects: u32, mut test: impl FnMut(u32) -> bool, counter: &mut impl Counter) -> bool {
     (0..objects).any(|object| {
         counter.object();

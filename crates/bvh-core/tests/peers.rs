@@ -66,8 +66,7 @@ fn a_tree_of_obvhs_comes_here_and_goes_back() {
                     ([-3.0, f32::from(i % 14), f32::from(i / 14)], [1.0, 0.05, f32::from(i) * 0.01 - 1.0]);
                 let ray = Ray::half_line(origin, direction).unwrap();
                 let shear = bvh_core::Shear::new(&ray);
-                let ours =
-                    nearest_hit(&tree, &ray, |id, t| triangles[id as usize].intersect(&shear, t), &mut ());
+                let ours = nearest_hit(&tree, &triangles, &ray);
                 let mut hit = RayHit::none();
                 let their_ray = obvhs::ray::Ray::new_inf(origin.into(), direction.into());
                 let found = returned.ray_traverse(their_ray, &mut hit, |_, at| {

@@ -3,8 +3,9 @@
 mod support;
 
 use bvh_core::{
-    Aabb, Bvh, Hit, Ray, Shear, Sphere, TestCounts, Triangle, WideBvh, any_hit, any_hit_of_all, clip_to_box,
-    collapse_leaves, cost::SahConstants, nearest_hit, nearest_hit_of_all, validate,
+    Aabb, Bvh, Hit, Ray, Shear, Sphere, TestCounts, Triangle, WideBvh, any_hit, any_hit_by, any_hit_of_all,
+    clip_to_box, collapse_leaves, cost::SahConstants, nearest_hit, nearest_hit_by, nearest_hit_of_all,
+    validate,
 };
 use glam::Vec3;
 use support::{Random, SHAPES, ball, boxes, chain, grid_box, rays, scaled, soup, tree};
@@ -20,13 +21,10 @@ fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
 }
 
 fn check(name: &str, tree: &Bvh, triangles: &[Triangle], ray: &Ray, expected: Option<Hit>) {
-    let shear = Shear::new(ray);
-    let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
-    let hit = nearest_hit(tree, ray, test, &mut ());
+    let hit = nearest_hit(tree, triangles, ray);
     let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
     assert_eq!(bits(hit), bits(expected), "{name}: {ray:?}");
-    let any = any_hit(tree, ray, |id| test(id, ray.t_max()).is_some(), &mut ());
-    assert_eq!(any, expected.is_some(), "{name}: {ray:?}");
+    assert_eq!(any_hit(tree, triangles, ray), expected.is_some(), "{name}: {ray:?}");
 }
 
 #[test]
@@ -73,7 +71,7 @@ fn spheres_and_boxes_are_traced_by_the_same_functions() {
         let expected =
             (nearest_hit_of_all(n, &ray, sphere, &mut ()), nearest_hit_of_all(n, &ray, solid, &mut ()));
         for tree in &trees {
-            let found = (nearest_hit(tree, &ray, sphere, &mut ()), nearest_hit(tree, &ray, solid, &mut ()));
+            let found = (nearest_hit(tree, &spheres, &ray), nearest_hit_by(tree, &ray, solid, &mut ()));
             assert_eq!(found, expected, "{ray:?}");
         }
     }
@@ -88,17 +86,12 @@ fn a_chain_of_twenty_thousand_is_traced_from_both_ends() {
     assert_eq!(tree.depth(), triangles.len() - 1);
     for (z, direction, object) in [(-1.0, 1.0, 0), (30_000.0, -1.0, 19_999)] {
         let ray = Ray::half_line(Vec3::new(0.1, 0.1, z), Vec3::Z * direction).unwrap();
-        let hit = nearest_hit(
-            &tree,
-            &ray,
-            |id, t_max| triangles[id as usize].intersect(&Shear::new(&ray), t_max),
-            &mut (),
-        );
+        let hit = nearest_hit(&tree, &triangles, &ray);
         assert_eq!(hit.map(|hit| hit.object), Some(object));
         assert_eq!(WideBvh::new(&tree, &triangles).unwrap().nearest_hit(&ray), hit);
         // No object is hit: every node is visited.
         let mut counts = TestCounts::default();
-        assert!(!any_hit(&tree, &ray, |_| false, &mut counts));
+        assert!(!any_hit_by(&tree, &ray, |_| false, &mut counts));
         assert_eq!(counts, TestCounts { boxes: tree.nodes.len() as u64, objects: tree.prim_ids.len() as u64 });
     }
 }
@@ -119,7 +112,7 @@ fn no_ray_leaves_a_closed_mesh_through_an_edge_or_a_vertex() {
                 let ray = Ray::half_line(origin, direction).unwrap();
                 let shear = Shear::new(&ray);
                 let test = |id: u32| triangles[id as usize].intersect(&shear, ray.t_max()).is_some();
-                assert!(any_hit(&tree, &ray, test, &mut ()), "{name} leaks {ray:?}");
+                assert!(any_hit_by(&tree, &ray, test, &mut ()), "{name} leaks {ray:?}");
             }
         }
     }
@@ -150,7 +143,7 @@ fn no_ray_slips_between_the_boxes_beside_a_long_edge() {
             let ray = Ray::half_line(origin, place(aside, 1.0, rise)).unwrap();
             let shear = Shear::new(&ray);
             let test = |id: u32| triangles[id as usize].intersect(&shear, ray.t_max()).is_some();
-            assert!(any_hit(&tree, &ray, test, &mut ()), "axis {axis}: {ray:?}");
+            assert!(any_hit_by(&tree, &ray, test, &mut ()), "axis {axis}: {ray:?}");
             assert!(wide.any_hit(&ray) && wide.any_hit_counted(&ray, &mut ()), "axis {axis}: {ray:?}");
         }
     }
@@ -164,9 +157,14 @@ fn counts_include_the_root_and_stop_at_the_first_hit() {
     let count = |ray: &Ray, any: bool| {
         let mut counts = TestCounts::default();
         if any {
-            any_hit(&tree, ray, |_| true, &mut counts);
+            any_hit_by(&tree, ray, |_| true, &mut counts);
         } else {
-            nearest_hit(&tree, ray, |id, t_max| clip_to_box(ray, &boxes[id as usize], 0.0, t_max), &mut counts);
+            nearest_hit_by(
+                &tree,
+                ray,
+                |id, t_max| clip_to_box(ray, &boxes[id as usize], 0.0, t_max),
+                &mut counts,
+            );
         }
         (counts.boxes, counts.objects)
     };
@@ -178,7 +176,7 @@ fn counts_include_the_root_and_stop_at_the_first_hit() {
     assert_eq!(count(&backwards, true), (7, 1));
     let past = Ray::half_line(middle + Vec3::X * 9.0, Vec3::X).unwrap();
     assert_eq!(count(&past, false), (1, 0));
-    assert_eq!(nearest_hit(&Bvh::default(), &past, |_, _| Some(0.0), &mut ()), None);
+    assert_eq!(nearest_hit_by(&Bvh::default(), &past, |_, _| Some(0.0), &mut ()), None);
     let empty = Ray::new(middle - Vec3::X, Vec3::X, 2.0, 1.0).unwrap();
     assert_eq!(count(&empty, false), (1, 0));
 }

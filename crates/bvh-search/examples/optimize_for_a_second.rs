@@ -1,36 +1,12 @@
-//! Improves an existing tree for a second, with progress, on a clock that the search does not know.
+//! Improves an existing tree for a second, with progress.
 //!
 //! `cargo run -p bvh-search --example optimize_for_a_second`
 
-use bvh_build::{Builder, median_cut};
-use bvh_core::{Aabb, Bvh, cost, validate};
-use bvh_search::{Budget, Event, Observer, Problem, best, optimize};
+use bvh_search::prelude::*;
 use std::error::Error;
-use std::time::{Duration, Instant};
-
-/// Prints every improvement and cancels when the time is over. A button or a flag would do as well.
-struct Second {
-    start: Instant,
-    before: f64,
-}
-
-impl Observer for Second {
-    fn event(&self, event: &Event) {
-        println!(
-            "{:4} ms: {:.4} of the original after {} moves",
-            self.start.elapsed().as_millis(),
-            event.incumbent / self.before,
-            event.evaluations
-        );
-    }
-
-    fn cancelled(&self) -> bool {
-        self.start.elapsed() > Duration::from_secs(1)
-    }
-}
 
 /// Boxes along a spiral, of all sizes.
-fn boxes() -> Vec<Aabb> {
+fn spiral() -> Vec<Aabb> {
     (0..3000u16)
         .map(f32::from)
         .map(|i| {
@@ -42,14 +18,20 @@ fn boxes() -> Vec<Aabb> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let boxes = boxes();
+    let boxes = spiral();
     // Any binary tree: from another library by `Bvh::from_first_count`, from a file, or as here.
-    let tree: Bvh = median_cut::Config { leaf_fraction: 0.001, ..Default::default() }.build(&boxes)?;
-    let second = Second { start: Instant::now(), before: cost::internal_area(&tree) };
-    let found =
-        optimize(&tree, &Problem::new(&boxes), &best::Config::default(), 1, Budget::default(), &second)?;
+    let tree = median_cut::Config { leaf_fraction: 0.001, ..Default::default() }.build(&boxes)?;
+    let before = cost::internal_area(&tree);
+    // `improve(&tree, &boxes, Duration::from_secs(1))` does the same in silence.
+    let deadline = Deadline::after(Duration::from_secs(1));
+    let watched = deadline.watched(|event| {
+        let (ms, part) = (deadline.elapsed().as_millis(), event.incumbent / before);
+        println!("{ms:4} ms: {part:.4} of the original after {} moves", event.evaluations);
+    });
+    let problem = Problem::new(&boxes);
+    let found = optimize(&tree, &problem, &best::Config::default(), 1, Budget::UNLIMITED, &watched)?;
     validate(&found.tree, &boxes)?;
-    println!("{:?}: {:.4} of the original", found.stop, found.cost / second.before);
-    assert!(found.cost < second.before);
+    println!("{:?}: {:.4} of the original", found.stop, found.cost / before);
+    assert!(found.cost < before);
     Ok(())
 }

@@ -107,7 +107,7 @@ mod tests {
         for n in 0..=7 {
             for salt in 0..6 {
                 let boxes = scatter(100)[10 * salt..10 * salt + n].to_vec();
-                let found = solve(&Config {}, &Problem::new(&boxes), 1, Budget::default(), &()).unwrap();
+                let found = solve(&Config {}, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap();
                 validate(&found.tree, &boxes).unwrap();
                 let least = brute_force(&boxes);
                 assert!((found.cost - least).abs() <= 1e-14 * least, "{n} {salt}: {} {least}", found.cost);
@@ -118,7 +118,7 @@ mod tests {
     #[test]
     fn too_many_objects_and_bad_boxes_are_refused() {
         let refused = |boxes: &[Aabb]| {
-            solve(&Config {}, &Problem::new(boxes), 1, Budget::default(), &()).unwrap_err().to_string()
+            solve(&Config {}, &Problem::new(boxes), 1, Budget::UNLIMITED, &()).unwrap_err().to_string()
         };
         assert_eq!(refused(&scatter(17)), format!("objects is 17; accepted: at most {MOST_OBJECTS}"));
         let mut boxes = scatter(5);

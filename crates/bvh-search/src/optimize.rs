@@ -13,6 +13,8 @@ use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate};
 /// objects are moved as a whole. The cost is the [internal area](bvh_core::cost::internal_area), or the problem's measure in
 /// its place, with boxes made tight, and never above that of `tree`.
 ///
+/// [`improve`](crate::improve) is the same for a given time, with every parameter at its default.
+///
 /// Refuses trees that are not [valid](validate), and inner nodes with more than two children.
 pub fn optimize(
     tree: &Bvh,

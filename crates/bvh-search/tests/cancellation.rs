@@ -33,7 +33,7 @@ fn a_search_that_is_cancelled_at_once_evaluates_one_tree_only() {
         Method::Genetic(genetic::Config { population: 800_000, generations: u64::MAX, ..Default::default() }),
     ] {
         let polls = Polls { polled: 0.into(), until: 0 };
-        let outcome = solve(&method, &Problem::new(&boxes), 1, Budget::default(), &polls).unwrap();
+        let outcome = solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &polls).unwrap();
         validate(&outcome.tree, &boxes).unwrap();
         assert_eq!(outcome.evaluations, 1, "{}", method.name());
     }
@@ -44,7 +44,7 @@ fn the_observer_is_polled_between_moves_however_long_they_are() {
     let boxes = boxes(3000);
     let ruin = ruin_recreate::Ruin { climb: 1000, removed: 1000, ..Default::default() };
     let polls = Polls { polled: 0.into(), until: u64::MAX };
-    let budget = Budget { max_evaluations: Some(2000), ..Budget::default() };
+    let budget = Budget { max_evaluations: Some(2000), ..Budget::UNLIMITED };
     let config = ruin_recreate::Config { ruin, ..Default::default() };
     let outcome = solve(&config, &Problem::new(&boxes), 1, budget, &polls).unwrap();
     let polled = polls.polled.into_inner();
@@ -55,7 +55,7 @@ fn the_observer_is_polled_between_moves_however_long_they_are() {
 #[test]
 fn numbers_that_no_poll_could_interrupt_are_refused() {
     let refused = |method: Method, boxes: &[Aabb]| {
-        solve(&method, &Problem::new(boxes), 1, Budget::default(), &()).unwrap_err().to_string()
+        solve(&method, &Problem::new(boxes), 1, Budget::UNLIMITED, &()).unwrap_err().to_string()
     };
     let tournament = rebuild::Config { tournament: 1 << 31, ..Default::default() };
     assert_eq!(refused(Method::Rebuild(tournament), &[]), "tournament is 2147483648; accepted: 1 to 1000");

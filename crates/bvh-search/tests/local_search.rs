@@ -44,7 +44,7 @@ fn scatter(n: u32, salt: u32) -> Vec<Aabb> {
 }
 
 fn work(max_work: u64) -> Budget {
-    Budget { max_work: Some(max_work), ..Budget::default() }
+    Budget { max_work: Some(max_work), ..Budget::UNLIMITED }
 }
 
 fn run(method: &Method, boxes: &[Aabb], max_work: u64) -> Outcome {
@@ -98,7 +98,7 @@ fn budgets_end_a_search_where_they_say() {
             // One move more at most, or the start alone.
             assert!(outcome.work <= max_work.max(1999) + 2000, "{} {max_work} {}", method.name(), outcome.work);
         }
-        let budget = Budget { max_evaluations: Some(777), ..Budget::default() };
+        let budget = Budget { max_evaluations: Some(777), ..Budget::UNLIMITED };
         let outcome = solve(&method, &Problem::new(&boxes), 1, budget, &()).unwrap();
         assert!((777..=778).contains(&outcome.evaluations), "{} {}", method.name(), outcome.evaluations);
         assert_eq!(outcome.stop, StopReason::Evaluations);
@@ -131,7 +131,7 @@ fn a_cancelled_search_returns_what_it_has() {
     let boxes = scatter(1000, 4);
     for method in methods() {
         let observer = AfterTheStart(false.into());
-        let outcome = solve(&method, &Problem::new(&boxes), 1, Budget::default(), &observer).unwrap();
+        let outcome = solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &observer).unwrap();
         assert_eq!(outcome.stop, StopReason::Cancelled, "{}", method.name());
         validate(&outcome.tree, &boxes).unwrap();
     }
@@ -153,7 +153,7 @@ fn the_best_ends_when_the_time_does_and_its_pieces_are_a_valid_tree() {
     for pieces in [1, 8] {
         let config = Method::Best(best::Config { pieces, ..Default::default() });
         let clock = Clock(0.into());
-        let outcome = solve(&config, &Problem::new(&boxes), 1, Budget::default(), &clock).unwrap();
+        let outcome = solve(&config, &Problem::new(&boxes), 1, Budget::UNLIMITED, &clock).unwrap();
         validate(&outcome.tree, &boxes).unwrap();
         assert!((4000..5100).contains(&clock.0.into_inner()), "{pieces}");
         assert!(outcome.cost < run(&config, &boxes, 1_000_000).cost);
@@ -218,7 +218,7 @@ fn leaves_of_several_objects_are_kept_and_other_trees_refused_by_name() {
 #[test]
 fn parameters_outside_their_range_are_named() {
     let problem = Problem::new(&[]);
-    let refused = |method: Method| solve(&method, &problem, 1, Budget::default(), &()).unwrap_err().to_string();
+    let refused = |method: Method| solve(&method, &problem, 1, Budget::UNLIMITED, &()).unwrap_err().to_string();
     let cold = ruin_recreate::Config { cold: 1.0, ..Default::default() };
     assert_eq!(refused(Method::RuinRecreate(cold)), "cold is 1; accepted: above 0, not above hot");
     let sweeps = reinsertion::Config { sweeps: 0, ..Default::default() };

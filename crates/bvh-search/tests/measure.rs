@@ -41,7 +41,7 @@ fn methods() -> impl Iterator<Item = Method> {
 }
 
 fn run(method: &Method, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Outcome {
-    let budget = Budget { max_work: Some(500_000), ..Budget::default() };
+    let budget = Budget { max_work: Some(500_000), ..Budget::UNLIMITED };
     let disabled = &[Shortcut::BoundMet, Shortcut::Tiny];
     let problem = Problem { measure, disabled, ..Problem::new(boxes) };
     let outcome = solve(method, &problem, 1, budget, &()).unwrap();

@@ -55,7 +55,7 @@ fn builds_that_skip_nothing_give_the_same_trees() {
 
 fn best(boxes: &[Aabb], disabled: &[Shortcut]) -> Outcome {
     let config = best::Config { work_per_object: 20_000, ..Default::default() };
-    solve(&config, &Problem { disabled, ..Problem::new(boxes) }, 1, Budget::default(), &()).unwrap()
+    solve(&config, &Problem { disabled, ..Problem::new(boxes) }, 1, Budget::UNLIMITED, &()).unwrap()
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn a_tiny_scene_gets_the_optimum_in_place_of_a_search() {
     for n in 3..=10 {
         let boxes = scattered(n);
         let (optimum, searched) = (best(&boxes, &[]), best(&boxes, &[Shortcut::Tiny, Shortcut::BoundMet]));
-        let exact = solve(&exact::Config {}, &Problem::new(&boxes), 1, Budget::default(), &()).unwrap();
+        let exact = solve(&exact::Config {}, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap();
         assert_eq!(optimum.tree, exact.tree);
         assert_eq!((optimum.stop, optimum.evaluations), (StopReason::Optimal, 1));
         assert!(optimum.cost <= searched.cost * (1.0 + 1e-14), "{n}");
@@ -84,7 +84,7 @@ fn a_tiny_scene_gets_the_optimum_in_place_of_a_search() {
 fn no_tree_is_below_the_bound_and_stiff_scenes_meet_it() {
     for n in 2..=9 {
         for (boxes, met) in stiff(n).into_iter().map(|boxes| (boxes, true)).chain([(scattered(n), false)]) {
-            let exact = solve(&exact::Config {}, &Problem::new(&boxes), 1, Budget::default(), &()).unwrap();
+            let exact = solve(&exact::Config {}, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap();
             let bound = lower_bound::of_largest(&boxes);
             assert!(bound <= exact.cost * (1.0 + 1e-14), "{bound} {}", exact.cost);
             assert!(!met || bound >= exact.cost * (1.0 - 1e-14), "{bound} {}", exact.cost);

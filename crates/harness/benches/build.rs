@@ -69,7 +69,7 @@ fn one_thread(scene: &Scene) {
     };
     let trials = |candidates, noise| {
         let config = grasp::Config { trials: TRIALS, candidates, noise, ..Default::default() };
-        move || drop(solve(&config, &Problem::new(boxes), 1, Budget::default(), &()))
+        move || drop(solve(&config, &Problem::new(boxes), 1, Budget::UNLIMITED, &()))
     };
     let contenders: Vec<Contender> = vec![
         ("greedy", Box::new(greedy)),

@@ -4,7 +4,6 @@
 //! The commands are in [`cli`]. Everything that touches files, clocks, threads or the terminal lives in this crate.
 
 pub mod cli;
-pub mod clock;
 pub mod error;
 pub mod figures;
 pub mod files;

@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 
 impl KdTree {
     /// The nearest object that `ray` hits in its range; of several at the same distance, the one with the lowest id.
-    /// Takes the same `test` as [`bvh_core::nearest_hit`] and gives the same answer, bit by bit.
+    /// Takes the same `test` as [`bvh_core::nearest_hit_by`] and gives the same answer, bit by bit.
     ///
     /// `counter` counts the root's box and every visited split plane as one box each, and an object as often as it is
     /// tested: in each of the cells that it overlaps, at most.
@@ -41,7 +41,7 @@ impl KdTree {
         nearest
     }
 
-    /// Whether `ray` hits any object in its range; see [`bvh_core::any_hit`] and [`nearest_hit`](Self::nearest_hit).
+    /// Whether `ray` hits any object in its range; see [`bvh_core::any_hit_by`] and [`nearest_hit`](Self::nearest_hit).
     #[inline]
     pub fn any_hit(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool, counter: &mut impl Counter) -> bool {
         let mut found = false;

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::cost::SahConstants;
-use crate::{Ray, nearest_hit};
+use crate::{Ray, nearest_hit_by};
 use alloc::vec;
 
 const ORIGIN: Origin = Origin {
@@ -250,7 +250,7 @@ fn a_forged_file_is_refused_or_can_be_traced_to_the_end() {
                     assert!(id < 11);
                     None
                 };
-                rays().for_each(|ray| assert_eq!(nearest_hit(&tree, &ray, test, &mut ()), None));
+                rays().for_each(|ray| assert_eq!(nearest_hit_by(&tree, &ray, test, &mut ()), None));
                 accepted += 1;
             }
         }

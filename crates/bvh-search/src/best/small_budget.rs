@@ -195,7 +195,7 @@ mod tests {
         let boxes = scatter(300);
         let mut before = f64::INFINITY;
         for work in [1, 600, 1200, 2400, 4800, 5900] {
-            let budget = Budget { max_work: Some(work), ..Budget::default() };
+            let budget = Budget { max_work: Some(work), ..Budget::UNLIMITED };
             let found = solve(&best::Config::default(), &Problem::new(&boxes), 1, budget, &()).unwrap();
             validate(&found.tree, &boxes).unwrap();
             assert_eq!(cost::internal_area(&found.tree), found.cost);
@@ -209,7 +209,7 @@ mod tests {
         let boxes = scatter(300);
         for times in 1..100 {
             let clock = Asked { times, asked: AtomicU32::new(0) };
-            let found = solve(&best::Config::default(), &Problem::new(&boxes), 1, Budget::default(), &clock);
+            let found = solve(&best::Config::default(), &Problem::new(&boxes), 1, Budget::UNLIMITED, &clock);
             validate(&found.unwrap().tree, &boxes).unwrap();
         }
     }
@@ -219,7 +219,7 @@ mod tests {
         let boxes = scatter(300);
         let start = crate::local::initial::Start::MullerFellner(Default::default());
         let config = best::Config { start: Some(start), ..Default::default() };
-        let budget = Budget { max_work: Some(1), ..Budget::default() };
+        let budget = Budget { max_work: Some(1), ..Budget::UNLIMITED };
         let found = solve(&config, &Problem::new(&boxes), 1, budget, &()).unwrap();
         let named = bvh_build::muller_fellner::Config::default().build(&boxes).unwrap();
         assert_eq!(found.cost, cost::internal_area(&named));

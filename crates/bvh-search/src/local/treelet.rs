@@ -220,7 +220,7 @@ mod tests {
                 &Method::Best(crate::best::Config { work_per_object: 20_000, ..Default::default() }),
                 &Problem::new(&boxes),
                 1,
-                Budget::default(),
+                Budget::UNLIMITED,
                 &(),
             );
             let best = cost::internal_area(&outcome.unwrap().tree);

@@ -221,7 +221,7 @@ mod tests {
     }
 
     fn optimum(boxes: &[Aabb]) -> f64 {
-        solve(&exact::Config {}, &Problem::new(boxes), 1, Budget::default(), &()).unwrap().cost
+        solve(&exact::Config {}, &Problem::new(boxes), 1, Budget::UNLIMITED, &()).unwrap().cost
     }
 
     proptest! {

@@ -230,7 +230,7 @@ mod tests {
             (Candidates::Within(0.0), None),
         ]) {
             let config = Config { trials: 2, candidates, noise, ..Config::default() };
-            let outcome = solve(&config, &Problem::new(&boxes), 7, Budget::default(), &()).unwrap();
+            let outcome = solve(&config, &Problem::new(&boxes), 7, Budget::UNLIMITED, &()).unwrap();
             assert_eq!(outcome.tree, greedy, "{config:?}");
         }
     }
@@ -240,7 +240,7 @@ mod tests {
         for boxes in [scatter(300), scatter(1), scatter(2), scatter(3), vec![scatter(1)[0]; 100], vec![]] {
             for config in configs() {
                 let problem = Problem::new(&boxes);
-                let outcome = solve(&config, &problem, 1, Budget::default(), &()).unwrap();
+                let outcome = solve(&config, &problem, 1, Budget::UNLIMITED, &()).unwrap();
                 validate(&outcome.tree, &boxes).unwrap();
                 assert_eq!(outcome.cost, problem.objective.cost(&outcome.tree), "{config:?}");
                 assert_eq!(outcome.evaluations, 12);
@@ -254,7 +254,7 @@ mod tests {
         let run = |local_search, threads: usize, max_work| {
             let config = Config { trials: 20, local_search, ..Config::default() };
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let budget = Budget { max_work, ..Budget::default() };
+            let budget = Budget { max_work, ..Budget::UNLIMITED };
             pool.install(|| solve(&config, &Problem::new(&boxes), 3, budget, &()).unwrap())
         };
         let plain = run(LocalSearch::None, 1, None);
@@ -281,9 +281,9 @@ mod tests {
         }
         let boxes = scatter(500);
         let config = Config { local_search: LocalSearch::Reinsertion, ..Config::default() };
-        let outcome = solve(&config, &Problem::new(&boxes), 3, Budget::default(), &Cancelled).unwrap();
+        let outcome = solve(&config, &Problem::new(&boxes), 3, Budget::UNLIMITED, &Cancelled).unwrap();
         let plain = Config { trials: 1, ..Config::default() };
-        let plain = solve(&plain, &Problem::new(&boxes), 3, Budget::default(), &()).unwrap();
+        let plain = solve(&plain, &Problem::new(&boxes), 3, Budget::UNLIMITED, &()).unwrap();
         assert_eq!((outcome.tree, outcome.cost), (plain.tree, plain.cost));
     }
 
@@ -291,7 +291,7 @@ mod tests {
     fn noise_makes_trials_differ() {
         let boxes = scatter(500);
         for config in configs() {
-            let history = solve(&config, &Problem::new(&boxes), 3, Budget::default(), &()).unwrap().history;
+            let history = solve(&config, &Problem::new(&boxes), 3, Budget::UNLIMITED, &()).unwrap().history;
             assert!(history.iter().any(|event| event.cost != history[0].cost), "{config:?}");
         }
     }

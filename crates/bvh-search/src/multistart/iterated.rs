@@ -76,9 +76,9 @@ mod tests {
     fn perturbations_lead_below_the_first_local_optimum_and_never_above() {
         let boxes = crate::scatter::scatter(600);
         let problem = Problem::new(&boxes);
-        let first = solve(&reinsertion::Config::default(), &problem, 1, Budget::default(), &()).unwrap();
+        let first = solve(&reinsertion::Config::default(), &problem, 1, Budget::UNLIMITED, &()).unwrap();
         let config = Config { work_per_object: 3000, ..Config::default() };
-        let found = solve(&config, &problem, 1, Budget::default(), &()).unwrap();
+        let found = solve(&config, &problem, 1, Budget::UNLIMITED, &()).unwrap();
         assert!(found.cost < first.cost, "{} {}", found.cost, first.cost);
         assert!(found.history.windows(2).all(|pair| pair[1].incumbent <= pair[0].incumbent));
     }

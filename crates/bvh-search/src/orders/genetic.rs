@@ -213,7 +213,7 @@ mod tests {
         for population in [1, 2, 3, 20] {
             for (crossover, mutation) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.7, 0.05), (1.0, 1.0)] {
                 let config = Config { population, generations: 15, crossover, mutation, ..Config::default() };
-                let outcome = solve(&config, &problem, 3, Budget::default(), &()).unwrap();
+                let outcome = solve(&config, &problem, 3, Budget::UNLIMITED, &()).unwrap();
                 assert_eq!(outcome.history.len(), 16);
                 assert!(outcome.history.iter().all(|event| event.incumbent <= event.cost));
                 assert!(
@@ -232,7 +232,7 @@ mod tests {
         let boxes = scatter(80);
         let problem = Problem { objective: Objective::GoldsmithSalmon, ..Problem::new(&boxes) };
         let config = Config { population: 1, generations: 50, mutation: 0.05, ..Config::default() };
-        let history = solve(&config, &problem, 3, Budget::default(), &()).unwrap().history;
+        let history = solve(&config, &problem, 3, Budget::UNLIMITED, &()).unwrap().history;
         assert!(history.last().unwrap().incumbent < history[0].cost);
         for count in [1, 2, 7] {
             let individual = |at: usize| Individual { order: vec![], cost: at as f64, evaluated: true };
@@ -262,7 +262,7 @@ mod tests {
         let config = Config { population: 10, generations: 20, ..Config::default() };
         let depth = |judge: Option<&dyn Judge>| {
             let problem = Problem { objective: Objective::GoldsmithSalmon, judge, ..Problem::new(&boxes) };
-            let outcome = solve(&config, &problem, 3, Budget::default(), &()).unwrap();
+            let outcome = solve(&config, &problem, 3, Budget::UNLIMITED, &()).unwrap();
             (outcome.tree.depth() as f64, outcome.cost)
         };
         let (judged, cost) = depth(Some(&Depth));
@@ -274,7 +274,7 @@ mod tests {
         let boxes = scatter(300);
         let problem = Problem { objective: Objective::GoldsmithSalmon, ..Problem::new(&boxes) };
         let config = Config { population: 20, generations: 40, ..Config::default() };
-        let history = solve(&config, &problem, 3, Budget::default(), &()).unwrap().history;
+        let history = solve(&config, &problem, 3, Budget::UNLIMITED, &()).unwrap().history;
         assert!(history.last().unwrap().incumbent < history[0].incumbent);
     }
 }

@@ -2,14 +2,10 @@
 
 use std::ops::AddAssign;
 
-/// Limits in machine-independent units; `None` is no limit. For a limit in seconds, cancel through the
-/// [`Observer`](crate::Observer).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(deny_unknown_fields, default)
-)]
+/// Limits in machine-independent units; `None` is no limit. A limit in seconds is a [`Deadline`](crate::Deadline), or any other
+/// [`Observer`](crate::Observer) that cancels. There is no default: without any limit, [`best`](crate::best) takes hours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Budget {
     /// Maximum number of trees or moves to evaluate.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
@@ -17,6 +13,11 @@ pub struct Budget {
     /// Maximum work, in nodes created or visited.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub max_work: Option<u64>,
+}
+
+impl Budget {
+    /// No limit: for searches that end by themselves, and for observers that cancel.
+    pub const UNLIMITED: Self = Self { max_evaluations: None, max_work: None };
 }
 
 /// Why a search returned.

@@ -2,6 +2,8 @@
 //! and decides when to stop.
 
 mod budget;
+#[cfg(feature = "std")]
+mod deadline;
 mod error;
 mod observer;
 mod problem;
@@ -10,6 +12,8 @@ mod stream;
 pub use budget::{Budget, Quota, StopReason, Tally};
 use bvh_build::{Builder, Check};
 use bvh_core::Bvh;
+#[cfg(feature = "std")]
+pub use deadline::{Deadline, Watched};
 pub(crate) use error::Found;
 pub use error::SearchError;
 pub(crate) use observer::WORK_PER_POLL;

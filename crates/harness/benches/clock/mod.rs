@@ -1,8 +1,7 @@
 //! `best` against the clock, as the benchmarks of whole searches need it.
 
 use bvh_core::{cost, validate};
-use bvh_search::{Budget, Problem, solve};
-use harness::clock::Deadline;
+use bvh_search::{Budget, Deadline, Problem, solve};
 use harness::scenes::Scene;
 use std::time::Duration;
 
@@ -10,7 +9,7 @@ use std::time::Duration;
 pub fn best(scene: &Scene, seconds: f64, seed: u64) -> (f64, f64) {
     let deadline = Deadline::after(Duration::from_secs_f64(seconds));
     let (config, problem) = (bvh_search::best::Config::default(), Problem::new(&scene.boxes));
-    let outcome = solve(&config, &problem, seed, Budget::default(), &deadline);
+    let outcome = solve(&config, &problem, seed, Budget::UNLIMITED, &deadline);
     let taken = deadline.elapsed().as_secs_f64();
     let tree = outcome.expect("finite boxes").tree;
     validate(&tree, &scene.boxes).expect("a valid tree");

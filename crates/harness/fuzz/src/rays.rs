@@ -3,7 +3,7 @@
 use super::bytes::Bytes;
 use bvh_build::{Builder, goldsmith_salmon, kd_tree, muller_fellner};
 use bvh_core::{
-    Aabb, Hit, Primitives, Ray, Sphere, Triangle, any_hit, clip_to_box, nearest_hit, nearest_hit_of_all,
+    Aabb, Hit, Primitives, Ray, Sphere, Triangle, any_hit_by, clip_to_box, nearest_hit_by, nearest_hit_of_all,
 };
 use glam::Vec3;
 use harness::stress::tracing::{TRAVERSALS, check};
@@ -60,8 +60,8 @@ fn over(boxes: &[Aabb], ray: &Ray, test: impl Fn(u32, f32) -> Option<f32>) {
     let any = |id: u32| test(id, ray.t_max()).is_some();
     for builder in [&muller_fellner::Config::default() as &dyn Builder, &goldsmith_salmon::Config::default()] {
         let tree = builder.build(boxes).unwrap();
-        assert_eq!(bits(nearest_hit(&tree, ray, &test, &mut ())), bits(expected), "{ray:?}");
-        assert_eq!(any_hit(&tree, ray, any, &mut ()), expected.is_some(), "{ray:?}");
+        assert_eq!(bits(nearest_hit_by(&tree, ray, &test, &mut ())), bits(expected), "{ray:?}");
+        assert_eq!(any_hit_by(&tree, ray, any, &mut ()), expected.is_some(), "{ray:?}");
     }
     let cells = kd_tree::Config::default().build(boxes).unwrap();
     assert_eq!(bits(cells.nearest_hit(ray, &test, &mut ())), bits(expected), "KD-tree: {ray:?}");

@@ -2,7 +2,7 @@
 
 use bvh_core::cost::{self, SahConstants};
 use bvh_core::file::{Header, TreeFile, load};
-use bvh_core::{Aabb, Bvh, Ray, TestCounts, Triangle, any_hit, collapse_leaves, nearest_hit, validate};
+use bvh_core::{Aabb, Bvh, Ray, TestCounts, Triangle, any_hit_by, collapse_leaves, nearest_hit_by, validate};
 use glam::Vec3;
 
 /// The first byte says what is mended; the rest is a file.
@@ -96,8 +96,8 @@ fn traced(tree: &Bvh, objects: usize) {
             assert!((id as usize) < objects);
             None
         };
-        assert_eq!(nearest_hit(tree, &ray, seen, &mut counts), None);
-        assert!(!any_hit(tree, &ray, |id| seen(id, 0.0).is_some(), &mut ()));
+        assert_eq!(nearest_hit_by(tree, &ray, seen, &mut counts), None);
+        assert!(!any_hit_by(tree, &ray, |id| seen(id, 0.0).is_some(), &mut ()));
         assert!(counts.objects <= objects as u64 && counts.boxes <= tree.nodes.len() as u64);
     }
 }

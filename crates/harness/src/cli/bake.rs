@@ -4,7 +4,6 @@ use crate::Error;
 use crate::cli::arguments::{Jobs, TREE, input_file, output_file};
 use crate::cli::output::{print_error, print_line};
 use crate::cli::{explain, interrupt};
-use crate::clock::Deadline;
 use crate::files::{self, Reserved, load_tree};
 use crate::measure::ray_cost;
 use crate::measure::segments::{self, RenderedRays};
@@ -15,7 +14,7 @@ use bvh_core::cost::Measure;
 use bvh_core::file::{self, Header, Origin};
 use bvh_core::{Bvh, RayDensity};
 use bvh_search::best::{self, Horizon};
-use bvh_search::{Budget, Event, Method, Observer, Outcome, Problem, StopReason, optimize, solve};
+use bvh_search::{Budget, Deadline, Event, Method, Observer, Outcome, Problem, StopReason, optimize, solve};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
@@ -130,8 +129,8 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let base = problem.cost(&greedy);
     let watch = Watch::new(args.budget, deadline, base, interrupted);
     let budget = match args.budget {
-        Effort::Time(_) => Budget::default(),
-        Effort::Work(work) => Budget { max_work: Some(work), ..Budget::default() },
+        Effort::Time(_) => Budget::UNLIMITED,
+        Effort::Work(work) => Budget { max_work: Some(work), ..Budget::UNLIMITED },
     };
     let outcome = match (&start, &method) {
         (Some((tree, _)), Method::Best(config)) => optimize(tree, &problem, config, args.seed, budget, &watch),

@@ -43,7 +43,7 @@ pub(crate) fn base_cost(scene: &Scene, objective: &Objective) -> Result<f64, Err
 fn bound(experiment: &Experiment, scene: &Scene, watch: &Watch) -> Result<Option<BoundRow>, Error> {
     let lower_bound = if experiment.needs_optimum(scene.boxes.len()) {
         let problem = Problem::new(&scene.boxes);
-        solve(&exact::Config {}, &problem, 0, Budget::default(), &()).map(|outcome| outcome.cost)
+        solve(&exact::Config {}, &problem, 0, Budget::UNLIMITED, &()).map(|outcome| outcome.cost)
     } else if let Some(effort) = experiment.lower_bound {
         lower_bound::internal_area(&scene.boxes, effort, watch).map_err(SearchError::Build)
     } else {

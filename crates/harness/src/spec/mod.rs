@@ -54,7 +54,7 @@ config! {
         /// What `cost` means; by default the paper's objective.
         objective: Objective;
         /// Limits of every run; by default none.
-        budget: Budget;
+        budget: Budget = Budget::UNLIMITED;
         /// Effort of a lower bound of every scene's internal area; by default no bound is sought.
         lower_bound: Option<u32>;
         /// What is run, at least one; with `suite`, none for every method of the registry.
@@ -96,7 +96,7 @@ impl Experiment {
 
     /// The limits of a method's runs.
     pub fn budget_of(&self, labelled: &Labelled) -> Budget {
-        let own = labelled.budget.unwrap_or_default();
+        let own = labelled.budget.unwrap_or(Budget::UNLIMITED);
         let lower = |a: Option<u64>, b: Option<u64>| a.into_iter().chain(b).min();
         Budget {
             max_evaluations: lower(self.budget.max_evaluations, own.max_evaluations),

@@ -140,7 +140,7 @@ pub fn check_scale(
 /// The method refuses the boxes and names the object.
 pub fn refuses(method: &Method, boxes: &[Aabb], object: usize) -> Verdict {
     let solved =
-        catch_unwind(AssertUnwindSafe(|| solve(method, &Problem::new(boxes), 1, Budget::default(), &())));
+        catch_unwind(AssertUnwindSafe(|| solve(method, &Problem::new(boxes), 1, Budget::UNLIMITED, &())));
     match solved {
         Ok(Err(error @ SearchError::Build(_))) if error.to_string().contains(&format!("object {object} ")) => {
             Ok(error.to_string())

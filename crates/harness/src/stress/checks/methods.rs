@@ -84,7 +84,7 @@ pub fn budgets_end(method: &Method) -> Verdict {
     let nothing = Budget { max_evaluations: Some(0), max_work: Some(0) };
     let one = Budget { max_evaluations: Some(1), max_work: None };
     let soon = Deadline(Some(Instant::now() + Duration::from_millis(1)));
-    let free = Budget::default();
+    let free = Budget::UNLIMITED;
     let watchers: [(Budget, &dyn Observer); 4] =
         [(nothing, &()), (one, &()), (free, &Deadline(None)), (free, &soon)];
     for (budget, observer) in watchers {
@@ -100,7 +100,7 @@ pub fn genetic_edges(_: &Method) -> Verdict {
     let boxes = boxes(30);
     for (population, mutation, crossover) in (0..8).map(|i| (1 + i % 2, (i / 2 % 2) as f64, (i / 4) as f64)) {
         let config = genetic::Config { population, generations: 40, mutation, crossover, ..Default::default() };
-        let outcome = solved(&config, &boxes, 3, Budget::default())?;
+        let outcome = solved(&config, &boxes, 3, Budget::UNLIMITED)?;
         // The tree is valid only if its order was a permutation.
         check_outcome(&boxes, &outcome)?;
         let incumbents: Vec<f64> = outcome.history.iter().map(|event| event.incumbent).collect();
@@ -111,7 +111,7 @@ pub fn genetic_edges(_: &Method) -> Verdict {
     let config =
         genetic::Config { population: 2, generations: 40, crossover: 1.0, mutation: 1.0, ..Default::default() };
     for n in 0..3 {
-        check_outcome(&boxes[..n], &solved(&config, &boxes[..n], 3, Budget::default())?)?;
+        check_outcome(&boxes[..n], &solved(&config, &boxes[..n], 3, Budget::UNLIMITED)?)?;
     }
     Ok("8 settings, scenes of 0, 1, 2 and 30".into())
 }
@@ -130,7 +130,7 @@ pub fn grasp_edges(_: &Method) -> Verdict {
         (Candidates::KBest(100_000), None, false),
     ] {
         let config = grasp::Config { trials: 3, candidates, noise, ..Default::default() };
-        let outcome = solved(&config, &boxes, 5, Budget::default())?;
+        let outcome = solved(&config, &boxes, 5, Budget::UNLIMITED)?;
         check_outcome(&boxes, &outcome)?;
         ensure!(!equal || outcome.tree == greedy, "{candidates:?}, noise {noise:?} is not greedy");
     }
@@ -173,7 +173,7 @@ pub fn above_the_optimum(method: &Method) -> Verdict {
     for make in [stiff::uniform, stiff::overlapping, stiff::slivers, stiff::planar_grid, stiff::two_densities] {
         for n in [3, 7, 10] {
             let boxes = stiff::boxes(&make(n));
-            let optimum = solved(&exact, &boxes, 1, Budget::default())?.cost;
+            let optimum = solved(&exact, &boxes, 1, Budget::UNLIMITED)?.cost;
             let outcome = run(method, &boxes, 2000)?;
             check_outcome(&boxes, &outcome)?;
             if outcome.tree.nodes.iter().any(|node| node.children().len() > 2) {

@@ -1,6 +1,6 @@
 //! Time limits for searches: the only place where a wall clock and a search meet.
 
-use bvh_search::Observer;
+use super::observer::{Event, Observer};
 use std::time::{Duration, Instant};
 
 /// A limit on the time a search may take, counted from when this was made.
@@ -17,6 +17,11 @@ impl Deadline {
     /// A limit that begins now.
     pub fn after(limit: Duration) -> Self {
         Self { start: Instant::now(), limit }
+    }
+
+    /// The same limit, with a function that is shown every event of the search's history, in order.
+    pub fn watched<F: Fn(&Event) + Sync>(self, watch: F) -> Watched<F> {
+        Watched { deadline: self, watch }
     }
 
     /// The time since the limit began.
@@ -43,6 +48,27 @@ impl Observer for Deadline {
 
     fn progress(&self) -> Option<f64> {
         Some(self.fraction())
+    }
+}
+
+/// A [`Deadline`] with a function that follows the search; made by [`Deadline::watched`].
+#[derive(Clone, Copy, Debug)]
+pub struct Watched<F> {
+    deadline: Deadline,
+    watch: F,
+}
+
+impl<F: Fn(&Event) + Sync> Observer for Watched<F> {
+    fn event(&self, event: &Event) {
+        (self.watch)(event);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.deadline.cancelled()
+    }
+
+    fn progress(&self) -> Option<f64> {
+        self.deadline.progress()
     }
 }
 

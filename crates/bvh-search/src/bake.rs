@@ -1,0 +1,31 @@
+//! The everyday calls: the best tree that a given time buys, with every parameter at its default.
+
+use crate::{Budget, Deadline, Outcome, Problem, SearchError, best, optimize, solve};
+use bvh_core::{Aabb, Bvh};
+use std::time::Duration;
+
+/// The best tree over `boxes` that [`best`](crate::best) finds in about `time`, from the milliseconds of a build to the minutes
+/// of a bake. The search plans with the time, so that one call for a second finds a better tree than ten for a tenth. It ends
+/// earlier if the tree is proved optimal, and later if the time is not enough for the fastest build.
+///
+/// [`solve`] has everything that is left out here: progress, cancellation, seeds, other searches, and limits in work in place
+/// of time, under which a search has the same result on every machine.
+///
+/// ```
+/// use bvh_search::prelude::*;
+/// let boxes: Vec<Aabb> = (0..100u8).map(f32::from).map(|x| Aabb::from([[x; 3], [x + 1.5; 3]])).collect();
+/// let tree = bake(&boxes, Duration::from_millis(10))?.tree;
+/// validate(&tree, &boxes)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn bake(boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
+    let deadline = Deadline::after(time);
+    solve(&best::Config::default(), &Problem::new(boxes), 1, Budget::UNLIMITED, &deadline)
+}
+
+/// Improves a tree over `boxes` for about `time`: one from another library, or one that has been
+/// [refitted](Bvh::refit) to objects that moved. What [`optimize()`] says of trees holds here too.
+pub fn improve(tree: &Bvh, boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
+    let deadline = Deadline::after(time);
+    optimize(tree, &Problem::new(boxes), &best::Config::default(), 1, Budget::UNLIMITED, &deadline)
+}
