@@ -42,6 +42,6 @@ pub use traverse::{
 };
 pub use triangle::{Shear, Triangle};
 pub use validate::{InvalidBvh, validate};
-pub use wide::{Coherence, Kernel, WideBvh};
+pub use wide::{Coherence, Kernel, RefitError, WideBvh};
 
 pub use glam;

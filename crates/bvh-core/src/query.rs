@@ -6,9 +6,13 @@
 //! | question | function | boxes visited |
 //! |---|---|---|
 //! | what may overlap a box, a sphere, a frustum, or contain a point? | [`overlapping`] | those that do, and their siblings |
+//! | what does a ray hit, all of it? | [`all_hits`] | likewise |
 //! | what may a ray meet, hit or not? | [`along`] | likewise |
 //! | what is nearest to a point? | [`nearest`] | about O(log n) for objects that are spread out |
 //! | what are the k nearest? | [`k_nearest`] | about O(k + log n) likewise |
+//!
+//! All of them go over the tree and not over the [wide layout](crate::WideBvh), which has only what rays can hit: it leaves out triangles
+//! without area, which lie in regions and near to points as others do.
 //!
 //! ```
 //! use bvh_core::{Aabb, Bvh, Node, Triangle, query};
@@ -26,7 +30,7 @@
 //! assert_eq!((found.object, found.distance_squared), (1, 1.0));
 //! ```
 
-use crate::{Aabb, BvhView, NodeKind, Ray, Sphere, any_hit_by};
+use crate::{Aabb, BvhView, Hit, NodeKind, Primitive, Ray, Sphere, any_hit_by};
 use alloc::collections::BinaryHeap;
 use alloc::{vec, vec::Vec};
 use core::cmp::Ordering;
@@ -142,6 +146,30 @@ pub fn along<'t, B>(
     };
     any_hit_by(tree, ray, breaks, &mut ());
     broke_with
+}
+
+/// Every one of `objects` that the ray hits in its range and that `keep` does not pass over, the nearest first; of several at the same
+/// distance the one of the lowest id. `tree` is one over their [boxes](crate::boxes).
+pub fn all_hits<'t, P: Primitive>(
+    tree: impl Into<BvhView<'t>>,
+    objects: &[P],
+    ray: &Ray,
+    mut keep: impl FnMut(u32) -> bool,
+) -> Vec<Hit> {
+    let prepared = P::prepare(ray);
+    let mut hits = Vec::new();
+    along(tree, ray, |object| -> ControlFlow<()> {
+        if keep(object)
+            && let Some(t) = objects[object as usize].intersect(&prepared, ray.t_max())
+        {
+            hits.push(Hit { t, object });
+        }
+        ControlFlow::Continue(())
+    });
+    hits.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object)));
+    // A split object is met in several leaves.
+    hits.dedup();
+    hits
 }
 
 /// An object near a point.

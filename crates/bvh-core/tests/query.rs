@@ -3,7 +3,7 @@
 mod support;
 
 use bvh_core::query::{self, Frustum, Near, Region};
-use bvh_core::{Aabb, Bvh, Ray, Shear, Sphere, Triangle, validate};
+use bvh_core::{Aabb, Bvh, Hit, Ray, Shear, Sphere, Triangle, validate};
 use glam::Vec3;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
@@ -94,6 +94,13 @@ proptest! {
             ControlFlow::Continue(())
         });
         prop_assert_eq!(found, (0..triangles.len() as u32).filter(|&object| hit(object)).collect());
+        let kept = |object: u32| !object.is_multiple_of(3);
+        let mut expected: Vec<Hit> = (0..triangles.len() as u32)
+            .filter(|&object| kept(object))
+            .filter_map(|object| Some(Hit { t: triangles[object as usize].intersect(&shear, t_max)?, object }))
+            .collect();
+        expected.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object)));
+        prop_assert_eq!(query::all_hits(&tree(&triangles), &triangles, &ray, kept), expected);
     }
 
     #[test]

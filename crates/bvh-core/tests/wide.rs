@@ -3,7 +3,7 @@
 mod support;
 
 use bvh_core::{
-    Coherence, Hit, Kernel, Ray, Shear, Triangle, WideBvh, collapse_leaves, cost::SahConstants,
+    Coherence, Hit, Kernel, Ray, RefitError, Shear, Triangle, WideBvh, collapse_leaves, cost::SahConstants,
     nearest_hit_of_all,
 };
 use glam::Vec3;
@@ -135,6 +135,70 @@ fn coordinates_down_to_denormal_ones_are_answered_alike() {
         check(&name, &triangles, &layouts, &rays(&triangles, 600, &mut random));
         check(&name, &triangles, &layouts, &bundles(&triangles, 40, &mut random));
     }
+}
+
+#[test]
+fn a_refitted_layout_answers_as_brute_force_at_the_new_places() {
+    let mut random = Random(6);
+    let triangles = soup(150, &mut random);
+    let moved: Vec<Triangle> = (triangles.iter())
+        .map(|t| match t.is_degenerate() {
+            true => Triangle([Vec3::splat(9.0); 3]),
+            false => {
+                let by = random.point();
+                Triangle(t.0.map(|p| p * 1.5 + by))
+            }
+        })
+        .collect();
+    let mut layouts = layouts(&triangles, &mut random);
+    for (_, layout) in &mut layouts {
+        layout.refit(&moved).unwrap();
+        let after = layout.expected_visits();
+        // Back and forth changes nothing.
+        let mut again = layout.clone();
+        again.refit(&triangles).unwrap();
+        assert_ne!(again.expected_visits(), after);
+        again.refit(&moved).unwrap();
+        assert_eq!(again.expected_visits(), after);
+    }
+    assert!(check("moved", &moved, &layouts, &rays(&moved, 3000, &mut random)) > 500);
+}
+
+#[test]
+fn a_refitted_layout_costs_no_less_than_a_new_one_of_the_refitted_tree() {
+    let mut random = Random(8);
+    let triangles = ball(3);
+    let moved: Vec<Triangle> = (triangles.iter())
+        .map(|t| Triangle(t.0.map(|p| Vec3::new(p.x * 4.0, p.y + p.x * p.z, p.z * 0.1))))
+        .collect();
+    let mut tree = tree(&boxes(&triangles), SHAPES[0], &mut random);
+    let mut layout = WideBvh::new(&tree, &triangles).unwrap();
+    layout.refit(&moved).unwrap();
+    tree.refit(&boxes(&moved));
+    let new = WideBvh::new(&tree, &moved).unwrap();
+    let (refitted, new) = (layout.expected_visits(), new.expected_visits());
+    assert!(refitted > new && refitted < 2.0 * new, "{refitted} {new}");
+}
+
+#[test]
+fn a_layout_whose_triangles_cannot_be_followed_says_so_and_stays_as_it_was() {
+    let mut random = Random(7);
+    let triangles = soup(40, &mut random);
+    let mut layouts = layouts(&triangles, &mut random);
+    let with = |at: usize, triangle: Triangle| {
+        let mut changed = triangles.clone();
+        changed[at] = triangle;
+        changed
+    };
+    let (flat, new) = (Triangle([Vec3::ONE; 3]), Triangle([Vec3::X, Vec3::Y, Vec3::Z]));
+    let infinite = Triangle([Vec3::X, Vec3::Y, Vec3::INFINITY]);
+    for (_, layout) in &mut layouts {
+        assert_eq!(layout.refit(&with(3, flat)), Err(RefitError::Lost(3)));
+        assert_eq!(layout.refit(&with(7, new)), Err(RefitError::Gained(7)));
+        assert_eq!(layout.refit(&with(4, infinite)), Err(RefitError::NotFinite(4)));
+        assert!(matches!(layout.refit(&triangles[..20]), Err(RefitError::Lost(20..))));
+    }
+    check("refused", &triangles, &layouts, &rays(&triangles, 500, &mut random));
 }
 
 #[test]

@@ -190,18 +190,13 @@ mod tests {
 
     /// The box of every node, with 0, and of every leaf, with its number of blocks.
     fn boxes(wide: &WideBvh) -> impl Iterator<Item = (Aabb, usize)> {
-        let lane_box = |node: &WideNode, lane: usize| Aabb {
-            min: [0, 1, 2].map(|axis| node.planes[axis][lane]).into(),
-            max: [3, 4, 5].map(|axis| node.planes[axis][lane]).into(),
-        };
         let blocks = |child: Child| match child.is_node() {
             true => 0,
             false => 1 + wide.blocks[child.index()..].iter().take_while(|block| !block.is_last()).count(),
         };
         let root = wide.root.map(|root| (wide.bounds, blocks(root)));
         root.into_iter().chain(wide.nodes.iter().flat_map(move |node| {
-            let used = (0..8).filter(|&lane| !node.planes[0][lane].is_nan());
-            used.map(move |lane| (lane_box(node, lane), blocks(node.children[lane])))
+            (0..8).filter_map(move |lane| Some((node.lane_box(lane)?, blocks(node.children[lane]))))
         }))
     }
 

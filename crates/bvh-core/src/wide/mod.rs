@@ -17,12 +17,14 @@ mod packet;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod packet_triangles;
 mod portable;
+mod refit;
 mod triangles;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod x86;
 
 pub use kernel::Kernel;
 pub use layout::WideBvh;
+pub use refit::RefitError;
 
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate};
 use alloc::vec::Vec;

@@ -25,6 +25,12 @@ impl WideNode {
             self.planes[axis + 3][lane] = aabb.max[axis];
         }
     }
+
+    /// The box of a lane's child; `None` for an unused lane.
+    pub(crate) fn lane_box(&self, lane: usize) -> Option<Aabb> {
+        let corner = |from: usize| [from, from + 1, from + 2].map(|plane| self.planes[plane][lane]);
+        (!self.planes[0][lane].is_nan()).then(|| Aabb::from([corner(0), corner(3)]))
+    }
 }
 
 /// A node's index, or the index of a leaf's first block; the leaf's last block is marked as such.

@@ -26,16 +26,27 @@ impl TriangleBlock {
         (1..).zip(ids.chunks(Self::LANES)).map(move |(number, ids)| {
             let mut block = Self { ids: [Self::UNUSED; Self::LANES], ..Self::zeroed() };
             block.ids[..ids.len()].copy_from_slice(ids);
-            for lane in 0..Self::LANES {
-                // Unused lanes repeat the last triangle: what they find, that one finds too, and its id is less.
-                let Triangle(corners) = triangles[ids[lane.min(ids.len() - 1)] as usize];
-                for (lanes, corner) in block.corners.iter_mut().zip(corners) {
-                    (0..3).for_each(|axis| lanes[axis][lane] = corner[axis]);
-                }
-            }
             block.ids[0] |= if number == blocks { Self::LAST } else { 0 };
+            block.move_to(triangles);
             block
         })
+    }
+
+    /// Writes the corners of the triangles that the ids name.
+    pub(crate) fn move_to(&mut self, triangles: &[Triangle]) {
+        let mut last = self.id(0);
+        for lane in 0..Self::LANES {
+            // Unused lanes repeat the last triangle: what they find, that one finds too, and its id is less.
+            last = if self.id(lane) == Self::UNUSED { last } else { self.id(lane) };
+            for (lanes, corner) in self.corners.iter_mut().zip(triangles[last as usize].0) {
+                (0..3).for_each(|axis| lanes[axis][lane] = corner[axis]);
+            }
+        }
+    }
+
+    /// The triangles, each with its id.
+    pub(crate) fn triangles(&self) -> impl Iterator<Item = (u32, Triangle)> {
+        (0..Self::LANES).filter_map(|lane| self.triangle(lane))
     }
 
     /// The id in a lane; the greatest of all in an unused one.

@@ -1,0 +1,96 @@
+//! The wide layout over triangles that have moved, and what it then costs.
+
+use super::layout::WideBvh;
+use super::node::{Child, WideNode};
+use super::triangles::TriangleBlock;
+use crate::{Aabb, Triangle};
+use alloc::vec;
+
+/// Why a layout cannot follow its triangles, and has to be made anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RefitError {
+    /// A corner of a triangle is NaN or infinite.
+    #[error("triangle {0} has a corner that is not finite")]
+    NotFinite(u32),
+    /// The layout has a triangle that the new ones lack, or that has lost its area.
+    #[error("triangle {0} of the layout is missing or has lost its area: make the layout anew")]
+    Lost(u32),
+    /// A triangle has an area, and is not in the layout: it had none, or was not there.
+    #[error("triangle {0} has an area and is not in the layout: make the layout anew")]
+    Gained(u32),
+}
+
+impl WideBvh {
+    /// Moves the layout to the same triangles at other places: corners and boxes are those of `triangles`, nodes and leaves
+    /// remain. The answers are exact, as those of a new layout; the time to find them grows with the
+    /// [cost](Self::expected_visits). Of split references every part gets the box of its whole triangle. O(n), and much
+    /// faster than a new layout. A refused layout is unchanged.
+    pub fn refit(&mut self, triangles: &[Triangle]) -> Result<(), RefitError> {
+        let mut is_new = vec![true; triangles.len()];
+        for block in &self.blocks {
+            for (id, _) in block.triangles() {
+                let triangle = triangles.get(id as usize).filter(|triangle| !triangle.is_degenerate());
+                triangle.ok_or(RefitError::Lost(id))?;
+                is_new[id as usize] = false;
+            }
+        }
+        for (id, (triangle, is_new)) in (0..).zip(triangles.iter().zip(is_new)) {
+            if !triangle.0.iter().all(|corner| corner.is_finite()) {
+                return Err(RefitError::NotFinite(id));
+            }
+            if is_new && !triangle.is_degenerate() {
+                return Err(RefitError::Gained(id));
+            }
+        }
+        self.blocks.iter_mut().for_each(|block| block.move_to(triangles));
+        // Children come after their parents.
+        let mut around = vec![Aabb::EMPTY; self.nodes.len()];
+        for index in (0..self.nodes.len()).rev() {
+            for lane in 0..WideNode::LANES {
+                let child = self.nodes[index].children[lane];
+                if self.nodes[index].lane_box(lane).is_some() {
+                    let aabb = self.box_of(child, &around);
+                    self.nodes[index].set_box(lane, &aabb);
+                    around[index] = around[index].union(&aabb);
+                }
+            }
+        }
+        self.bounds = self.root.map_or(Aabb::EMPTY, |root| self.box_of(root, &around));
+        self.largest = self.bounds.min.abs().max(self.bounds.max.abs()).max_element();
+        Ok(())
+    }
+
+    /// The box of a child: of a node that `around` has, or of a leaf's triangles.
+    fn box_of(&self, child: Child, around: &[Aabb]) -> Aabb {
+        if child.is_node() {
+            return around[child.index()];
+        }
+        let corners =
+            self.leaf(child).iter().flat_map(TriangleBlock::triangles).flat_map(|(_, triangle)| triangle.0);
+        Aabb::around(corners)
+    }
+
+    /// The blocks of a leaf.
+    fn leaf(&self, leaf: Child) -> &[TriangleBlock] {
+        let blocks = &self.blocks[leaf.index()..];
+        let end = blocks.iter().position(TriangleBlock::is_last).map_or(blocks.len(), |last| last + 1);
+        &blocks[..end]
+    }
+
+    /// How many nodes and blocks of triangles a random line through the layout's box is expected to visit: what
+    /// [`new`](Self::new) makes least. Its growth by [`refit`](Self::refit) says when a new or
+    /// improved tree is worth its time. 0 for a scene without area. O(nodes + blocks).
+    pub fn expected_visits(&self) -> f64 {
+        let visits = |(aabb, child): (Aabb, Child)| {
+            aabb.half_area() * if child.is_node() { 1.0 } else { self.leaf(child).len() as f64 }
+        };
+        let lanes = |node: &WideNode| {
+            let of_lane = |lane| Some((node.lane_box(lane)?, node.children[lane]));
+            (0..WideNode::LANES).filter_map(of_lane).map(visits).sum::<f64>()
+        };
+        let total = self.root.map_or(0.0, |root| visits((self.bounds, root)))
+            + self.nodes.iter().map(lanes).sum::<f64>();
+        let area = self.bounds.half_area();
+        if area > 0.0 { total / area } else { 0.0 }
+    }
+}
