@@ -20,7 +20,7 @@ struct Scene {
     sha256: &'static str,
 }
 
-const SCENES: [Scene; 2] = [
+const SCENES: [Scene; 3] = [
     Scene {
         file: "sponza.obj",
         package: "bvh",
@@ -32,6 +32,13 @@ const SCENES: [Scene; 2] = [
         package: "obvhs",
         source: "assets/kitchen.obj.zst",
         sha256: "45ef80470157128c96a9e3521d0ecef2b52028df79a0c4271f07b40942de9ba3",
+    },
+    // The cow by Keenan Crane, in the public domain.
+    Scene {
+        file: "spot.obj",
+        package: "meshx",
+        source: "assets/spot.obj",
+        sha256: "2978aec87377f3aac185c18e1dd253d258c6074f3eeecf5f5a75a76e510bddd0",
     },
 ];
 

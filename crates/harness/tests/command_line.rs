@@ -66,6 +66,10 @@ fn a_run_writes_rows_figures_and_provenance_and_prints_the_table() {
     let runs = fs::read_to_string(results.join("runs.csv")).unwrap();
     assert_eq!(runs.lines().count(), 1 + 2 * 3 * 3);
     assert!(!reproducible(&results).iter().any(|(_, bytes)| text(bytes).contains("seconds")));
+    let provenance: toml::Table = fs::read_to_string(results.join("provenance.toml")).unwrap().parse().unwrap();
+    let (build, assertions) = (provenance["build"].as_str().unwrap(), cfg!(debug_assertions));
+    let (profile, on) = if assertions { ("debug, opt-level ", "on") } else { ("release, opt-level ", "off") };
+    assert!(build.starts_with(profile) && build.contains(&format!("debug assertions {on}")), "{build}");
 }
 
 #[test]

@@ -15,6 +15,10 @@ pub struct Provenance {
     pub version: String,
     /// The compiler that built it.
     pub rustc: String,
+    /// The harness's own profile (in the dev profile the libraries have a higher opt-level), the target features that the compiler
+    /// could take for granted, debug assertions, and whether other libraries are compiled in.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub build: String,
     /// Processor model and architecture.
     pub cpu: String,
     /// Threads used.
@@ -38,12 +42,22 @@ impl Provenance {
             revision: revision().unwrap_or_else(|| "unknown".into()),
             version: env!("CARGO_PKG_VERSION").into(),
             rustc: env!("HARNESS_RUSTC").into(),
+            build: format!(
+                "{}, debug assertions {}, peers {}",
+                env!("HARNESS_BUILD"),
+                on(cfg!(debug_assertions)),
+                on(cfg!(feature = "peers"))
+            ),
             cpu: cpu(),
             threads: rayon::current_num_threads(),
             date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
             parts: vec![],
         }
     }
+}
+
+fn on(set: bool) -> &'static str {
+    if set { "on" } else { "off" }
 }
 
 fn revision() -> Option<String> {

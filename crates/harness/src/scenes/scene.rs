@@ -53,7 +53,7 @@ pub struct Scene {
 pub struct NoTriangles(pub String);
 
 /// Meshes that `scripts/fetch-scenes` puts under `scenes/`: name, and the Rust package that ships it.
-pub const FETCHED: [(&str, &str); 2] = [("sponza", "bvh"), ("kitchen", "obvhs")];
+pub const FETCHED: [(&str, &str); 3] = [("sponza", "bvh"), ("kitchen", "obvhs"), ("spot", "meshx")];
 
 /// The second document's sphere scenes: name and number of spheres.
 pub const SPHERES: [(&str, usize); 3] = [("spheres75", 75), ("spheres750", 750), ("spheres7500", 7500)];
