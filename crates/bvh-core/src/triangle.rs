@@ -96,6 +96,16 @@ impl Triangle {
         nearer(nearer(edges[0], edges[1]), edges[2])
     }
 
+    /// The weights of the three corners at the point where the ray's line meets the triangle's plane; their sum is 1. They
+    /// interpolate what the corners have, such as normals, at a hit. `None` for a ray in the plane.
+    pub fn barycentrics(&self, ray: &Ray) -> Option<[f64; 3]> {
+        let shear = Shear::new(ray);
+        let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = self.0.map(|corner| shear.apply(&corner).map(f64::from));
+        let weights = [cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax];
+        let sum: f64 = weights.iter().sum();
+        (sum != 0.0).then(|| weights.map(|weight| weight / sum))
+    }
+
     /// Whether the corners coincide or are collinear: such a triangle is never hit. Exact as long as the differences
     /// of its coordinates are exact in f64.
     pub fn is_degenerate(&self) -> bool {
@@ -171,6 +181,21 @@ mod tests {
         }
         assert_eq!(hit(CORNER, Vec3::new(-1.0, 0.25, 0.0), Vec3::X), None);
         assert_eq!(hit(CORNER, Vec3::new(0.5f32.next_up(), 0.5, -1.0), Vec3::Z), None);
+    }
+
+    #[test]
+    fn the_weights_of_the_corners_are_those_of_the_point_that_is_hit() {
+        let triangle =
+            Triangle([Vec3::new(4.0, 0.0, 1.0), Vec3::new(0.0, 8.0, 2.0), Vec3::new(0.0, 0.0, -3.0)]);
+        for expected in [[0.25, 0.5, 0.25], [1.0, 0.0, 0.0], [0.0, 0.5, 0.5], [0.125, 0.125, 0.75]] {
+            let [a, b, c] = triangle.0.map(Vec3::as_dvec3);
+            let target = (a * expected[0] + b * expected[1] + c * expected[2]).as_vec3();
+            for direction in [Vec3::Z, -Vec3::Z, Vec3::new(0.5, -0.25, 1.0)] {
+                let ray = Ray::half_line(target - direction * 2.0, direction).unwrap();
+                assert_eq!(triangle.barycentrics(&ray), Some(expected));
+            }
+        }
+        assert_eq!(CORNER.barycentrics(&Ray::half_line(Vec3::ONE, Vec3::X).unwrap()), None);
     }
 
     #[test]
