@@ -1,7 +1,9 @@
 //! Trees go to another library and come back, and both libraries find the same hits in them.
 
+use bvh_core::export::{CompressedBvh, CompressedNode};
 use bvh_core::{Aabb, Bvh, FirstCountNode, Ray, Triangle, nearest_hit, validate};
 use obvhs::bvh2::{Bvh2, builder::build_bvh2, node::Bvh2Node};
+use obvhs::cwbvh::CwBvh;
 use obvhs::ray::RayHit;
 use obvhs::{BvhBuildParams, aabb};
 
@@ -27,6 +29,20 @@ fn from_theirs(bvh: &Bvh2) -> Vec<FirstCountNode> {
         count: node.prim_count,
     };
     bvh.nodes.iter().map(node).collect()
+}
+
+/// Their form of our compressed nodes, which have the planes in another order.
+fn to_their_compressed(tree: &Bvh, boxes: &[Aabb]) -> CwBvh {
+    let CompressedBvh { nodes, prim_ids } = CompressedBvh::new(tree, boxes).unwrap();
+    let node = |node: &CompressedNode| {
+        let mut theirs = *bytemuck::bytes_of(node).first_chunk::<80>().unwrap();
+        for plane in 0..6 {
+            let to = 32 + 8 * (2 * (plane % 3) + plane / 3);
+            theirs[to..to + 8].copy_from_slice(&bytemuck::bytes_of(node)[32 + 8 * plane..][..8]);
+        }
+        bytemuck::pod_read_unaligned(&theirs)
+    };
+    CwBvh { nodes: nodes.iter().map(node).collect(), primitive_indices: prim_ids, ..Default::default() }
 }
 
 /// Their form of our tree.
@@ -61,6 +77,8 @@ fn a_tree_of_obvhs_comes_here_and_goes_back() {
                 Bvh::from_first_count(&from_theirs(&returned), &returned.primitive_indices),
                 Ok(tree.clone())
             );
+            let compressed = to_their_compressed(&tree, &boxes);
+            compressed.validate(&theirs, false);
             for i in 0..200u8 {
                 let (origin, direction) =
                     ([-3.0, f32::from(i % 14), f32::from(i / 14)], [1.0, 0.05, f32::from(i) * 0.01 - 1.0]);
@@ -74,6 +92,12 @@ fn a_tree_of_obvhs_comes_here_and_goes_back() {
                     triangles[id].intersect(&shear, f32::MAX).unwrap_or(f32::INFINITY)
                 });
                 assert_eq!(ours.map(|hit| hit.t), found.then_some(hit.t), "{n} triangles, ray {i}");
+                let mut hit = RayHit::none();
+                let found = compressed.ray_traverse(their_ray, &mut hit, |_, at| {
+                    let id = compressed.primitive_indices[at] as usize;
+                    triangles[id].intersect(&shear, f32::MAX).unwrap_or(f32::INFINITY)
+                });
+                assert_eq!(ours.map(|hit| hit.t), found.then_some(hit.t), "compressed, {n} triangles, ray {i}");
             }
         }
     }

@@ -15,24 +15,24 @@ const BLOCK_COST: f32 = 1.0;
 
 /// How a subtree becomes children of a wide node.
 #[derive(Clone, Copy)]
-struct Decision {
+pub(crate) struct Decision {
     /// Least cost as at most 1 to 7 children, times the root's area; last, as the 8 children of a node of its own.
     costs: [f32; 8],
     /// How many of those slots go to the first child (low half) and to the second one; 0 to be one child.
     slots: [u8; 8],
     objects: u32,
     /// Whether, as one child, it is a leaf.
-    leaf: bool,
+    pub(crate) leaf: bool,
 }
 
-/// Decides by dynamic programming from the leaves up; every node of `tree` has two children or none.
-fn decide(tree: &Bvh, visits: &[f32]) -> Vec<Decision> {
+/// Decides by dynamic programming from the leaves up; every node of `tree` has two children or none. `leaf_cost` is the expected
+/// time of testing a leaf of so many objects, if there may be one.
+pub(crate) fn decide(tree: &Bvh, visits: &[f32], leaf_cost: impl Fn(u32) -> Option<f32>) -> Vec<Decision> {
     let nothing = Decision { costs: [0.0; 8], slots: [0; 8], objects: 0, leaf: true };
     let mut decisions = vec![nothing; tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate().rev() {
         let visits = visits[index];
-        let leaf_cost =
-            |objects: u32| visits * BLOCK_COST * objects.div_ceil(TriangleBlock::LANES as u32) as f32;
+        let leaf_cost = |objects: u32| leaf_cost(objects).map_or(f32::INFINITY, |cost| visits * cost);
         decisions[index] = match (node.kind(), &decisions[node.children()]) {
             (NodeKind::Inner { .. }, [a, b]) => {
                 let objects = a.objects + b.objects;
@@ -69,6 +69,29 @@ fn decide(tree: &Bvh, visits: &[f32]) -> Vec<Decision> {
     decisions
 }
 
+/// The roots of the subtrees that become the children of the wide node of `subtree`, which is no leaf, and how many there are.
+pub(crate) fn children(tree: &Bvh, decisions: &[Decision], subtree: usize) -> ([usize; 8], usize) {
+    // At most 8 slots are shared out: no more than 8 parts wait at any time.
+    let mut parts = [(subtree, decisions[subtree].slots[7]); 8];
+    let (mut count, mut lanes) = (1, 0);
+    let mut children = [0; 8];
+    while count > 0 {
+        count -= 1;
+        let (part, slots) = parts[count];
+        if slots == 0 {
+            children[lanes] = part;
+            lanes += 1;
+            continue;
+        }
+        let first = tree.nodes[part].children().start;
+        for (part, slots) in [(first + 1, slots >> 4), (first, slots & 15)] {
+            parts[count] = (part, decisions[part].slots[usize::from(slots) - 1]);
+            count += 1;
+        }
+    }
+    (children, lanes)
+}
+
 /// By how much each subtree promises to stop a ray, in relation to the expected time of tracing a ray through it. Rays that
 /// ask for any hit visit the child of most promise first, which is in the last lane.
 ///
@@ -94,7 +117,7 @@ fn promise(tree: &Bvh, triangles: &[Triangle], visits: &[f32], decisions: &[Deci
 }
 
 /// The part of the lines through the root's box that meet each node's.
-fn areas(tree: &Bvh) -> Vec<f32> {
+pub(crate) fn areas(tree: &Bvh) -> Vec<f32> {
     let root_area = tree.nodes[0].aabb.half_area();
     let scale = if root_area > 0.0 { 1.0 / root_area } else { 0.0 };
     tree.nodes.iter().map(|node| (node.aabb.half_area() * scale) as f32).collect()
@@ -128,7 +151,8 @@ pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) 
         }
     };
     let tree = &*tree;
-    let decisions = decide(tree, &visits);
+    let blocks = |objects: u32| Some(BLOCK_COST * objects.div_ceil(TriangleBlock::LANES as u32) as f32);
+    let decisions = decide(tree, &visits, blocks);
     let promise = promise(tree, triangles, &visits, &decisions);
     let mut ids = Vec::new();
     // Subtrees, and the lane that is to name each; none names the root.
@@ -147,24 +171,7 @@ pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) 
         } else {
             let index = wide.nodes.len();
             wide.nodes.push(WideNode::EMPTY);
-            // At most 8 slots are shared out: no more than 8 parts wait at any time.
-            let mut parts = [(subtree, decisions[subtree].slots[7]); 8];
-            let (mut count, mut lanes) = (1, 0);
-            let mut children = [0; 8];
-            while count > 0 {
-                count -= 1;
-                let (part, slots) = parts[count];
-                if slots == 0 {
-                    children[lanes] = part;
-                    lanes += 1;
-                    continue;
-                }
-                let first = tree.nodes[part].children().start;
-                for (part, slots) in [(first + 1, slots >> 4), (first, slots & 15)] {
-                    parts[count] = (part, decisions[part].slots[usize::from(slots) - 1]);
-                    count += 1;
-                }
-            }
+            let (mut children, lanes) = children(tree, &decisions, subtree);
             children[..lanes].sort_by(|&a, &b| promise[a].total_cmp(&promise[b]));
             let waiting = waiting + 7;
             open.extend((0..lanes).map(|lane| (children[lane], Some((index, lane)), waiting)));

@@ -22,6 +22,7 @@ mod triangles;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod x86;
 
+pub(crate) use build::{areas, children, decide};
 pub use kernel::Kernel;
 pub use layout::WideBvh;
 pub use refit::RefitError;

@@ -1,13 +1,20 @@
 //! Conversion from and to the arrays of other libraries: binary nodes with `first` and `count`.
 
+use super::unpack::{Part, unpack};
 use crate::collapse::binary;
-use crate::validate::Marks;
-use crate::{Aabb, Bvh, InvalidBvh, MAX_OBJECTS, Node, NodeKind};
+use crate::{Aabb, Bvh, InvalidBvh, NodeKind};
 use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 
 /// A binary node of 32 bytes, as in most libraries. The order of the fields is that of `tinybvh`'s `BVHNode` and of many
 /// GPU tracers; `obvhs` has the same fields in another order.
+///
+/// | bytes | type | field |
+/// |---|---|---|
+/// | 0..12 | `f32[3]` | lower corner of the box |
+/// | 12..16 | `u32` | index of the first of two adjacent children, or position of the leaf's first object id |
+/// | 16..28 | `f32[3]` | upper corner |
+/// | 28..32 | `u32` | number of object ids of a leaf; 0 for an inner node |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct FirstCountNode {
@@ -48,45 +55,18 @@ impl Bvh {
     /// Does not look at the boxes: [`validate`](crate::validate()) checks them, and [`refit`](Bvh::refit) makes padded
     /// ones tight.
     pub fn from_first_count(nodes: &[FirstCountNode], prim_ids: &[u32]) -> Result<Self, InvalidBvh> {
-        if nodes.len() > 2 * MAX_OBJECTS || prim_ids.len() > MAX_OBJECTS {
-            return Err(InvalidBvh::TooManyObjects { objects: prim_ids.len().max(nodes.len() / 2) });
-        }
-        let mut tree = Self::default();
-        let mut reached = Marks::new(nodes.len());
-        let mut open: Vec<(usize, usize)> = Vec::new();
-        if !nodes.is_empty() {
-            tree.nodes.push(Node::leaf(Aabb::EMPTY, 0, 0));
-            open.push((0, 0));
-        }
-        while let Some((from, to)) = open.pop() {
-            if !reached.set(from) {
-                return Err(InvalidBvh::Parents { node: from, parents: 2 });
+        let box_of = |node: &FirstCountNode| Aabb::from([node.min, node.max]);
+        unpack(nodes.len(), prim_ids, nodes.first().map(box_of), |from, parts| {
+            let FirstCountNode { first, count, .. } = nodes[from];
+            if count > 0 {
+                parts.push((box_of(&nodes[from]), Part::Leaf { first, count }));
+                return Ok(());
             }
-            let FirstCountNode { min, first, max, count } = nodes[from];
-            let aabb = Aabb::from([min, max]);
-            // No overflow: usize has 32 bits or more, and `first` is compared before it is added to.
-            let fits = |count: u32, len: usize| count as usize <= len && first as usize <= len - count as usize;
-            if count == 0 {
-                if !fits(2, nodes.len()) {
-                    return Err(InvalidBvh::BadChildren { node: from, first, count: 2, nodes: nodes.len() });
-                }
-                let below = tree.nodes.len();
-                tree.nodes[to] = Node::inner(aabb, below as u32, 2);
-                tree.nodes.extend([Node::leaf(aabb, 0, 0); 2]);
-                open.extend([(first as usize + 1, below + 1), (first as usize, below)]);
-            } else {
-                let (named, objects) = (tree.prim_ids.len() + count as usize, prim_ids.len());
-                if !fits(count, objects) {
-                    return Err(InvalidBvh::BadLeaf { node: from, first, count, objects });
-                }
-                if named > objects {
-                    return Err(InvalidBvh::ObjectCount { named, objects });
-                }
-                tree.nodes[to] = Node::leaf(aabb, tree.prim_ids.len() as u32, count);
-                tree.prim_ids.extend_from_slice(&prim_ids[first as usize..][..count as usize]);
-            }
-        }
-        Ok(tree)
+            let bad = InvalidBvh::BadChildren { node: from, first, count: 2, nodes: nodes.len() };
+            let (pair, _) = nodes.get(first as usize..).and_then(<[_]>::split_first_chunk::<2>).ok_or(bad)?;
+            parts.extend((first as usize..).zip(pair).map(|(child, node)| (box_of(node), Part::Node(child))));
+            Ok(())
+        })
     }
 }
 
@@ -112,7 +92,7 @@ fn first_count(tree: &Bvh, spare: usize) -> Vec<FirstCountNode> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::validate;
+    use crate::{Node, validate};
     use alloc::vec;
 
     /// A node of three children over seven boxes, with leaves of up to three.

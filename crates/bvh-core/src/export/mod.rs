@@ -1,0 +1,20 @@
+//! Layouts that other libraries and GPU tracers load, each with its bytes documented and with a way back to a [`Bvh`](crate::Bvh).
+//!
+//! | layout | bytes | to | from | used by |
+//! |---|---|---|---|---|
+//! | [binary](FirstCountNode) | 32 per node | [`to_first_count`](crate::Bvh::to_first_count) | [`from_first_count`](crate::Bvh::from_first_count) | `obvhs`, `tinybvh`, most GPU tracers |
+//! | [children's boxes](AilaLaineNode) | 64 per node | [`to_aila_laine`](crate::Bvh::to_aila_laine) | [`from_aila_laine`](crate::Bvh::from_aila_laine) | `tinybvh` (`BVH_GPU`), after Aila & Laine 2009 |
+//! | [compressed, eight-wide](CompressedNode) | 80 per node | [`CompressedBvh::new`] | [`CompressedBvh::decode`] | `obvhs`, `tinybvh`, after Ylitie et al. 2017 |
+//!
+//! Numbers are little-endian, and nodes are plain data: `bytemuck::cast_slice` gives their bytes on little-endian machines. The way back
+//! refuses indices that lead astray, and traces the same hits as the tree that went there, bit by bit: no box is ever smaller
+//! than in the tree.
+
+mod aila_laine;
+mod compressed;
+mod first_count;
+mod unpack;
+
+pub use aila_laine::AilaLaineNode;
+pub use compressed::{CompressedBvh, CompressedNode};
+pub use first_count::FirstCountNode;
