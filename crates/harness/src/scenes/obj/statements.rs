@@ -141,3 +141,17 @@ pub fn shown(word: &[u8]) -> String {
     let cut = if word.len() > LONGEST { "…" } else { "" };
     format!("{}{cut}", word[..word.len().min(LONGEST)].escape_ascii())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_an_endless_statement_only_so_many_words_take_memory() {
+        for text in ["f 1 2 3 4 5 6 7 8 9", "f 1 2 \\\n3 4 \\\n5 6 7 8 9"] {
+            let mut words = Vec::new();
+            let found = Statements::new(text.as_bytes()).next(&mut words, 4);
+            assert_eq!((found, words), (Some((Keyword::Face, 1)), vec![b"1", b"2", b"3", &b"4"[..]]), "{text}");
+        }
+    }
+}
