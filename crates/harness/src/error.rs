@@ -11,7 +11,7 @@ pub enum Error {
     /// A spec that cannot be run: file, key, what was found, what would be accepted.
     #[error("{}: {message}", .file.display())]
     Spec { file: PathBuf, message: String },
-    /// A scene that is neither built in, nor fetched, nor a readable OBJ file.
+    /// A scene that is neither built in, nor fetched, nor a readable mesh file.
     #[error("scene {name}: {message}")]
     Scene { name: String, message: String },
     /// A command line that asks for something contradictory.

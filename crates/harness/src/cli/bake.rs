@@ -26,7 +26,7 @@ use std::time::Duration;
 /// Search for the best tree of a scene within a budget, and save it.
 #[derive(Args, Clone, Debug)]
 pub struct BakeArgs {
-    /// Name of a scene, or path of an OBJ file.
+    /// Name of a scene, or path of a mesh file.
     pub scene: String,
     /// How long to search: a time (`10s`, `1m 30s`), or work (`50Mwork`: 50 million nodes visited), which gives the
     /// same bytes everywhere.

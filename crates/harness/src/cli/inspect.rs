@@ -19,7 +19,7 @@ pub struct InspectArgs {
     /// The tree file.
     #[arg(value_name = "FILE.bvh")]
     pub file: PathBuf,
-    /// The scene it is for, by name or path of an OBJ file: checks the tree against its objects, compares it with
+    /// The scene it is for, by name or path of a mesh file: checks the tree against its objects, compares it with
     /// Müller–Fellner's, and measures the end-point overlap.
     pub scene: Option<String>,
     /// Write the nodes to a CSV file, one row each, in full precision.

@@ -22,7 +22,7 @@ pub struct RunArgs {
     /// Folder for the results; each experiment has a folder of its own in it.
     #[arg(long, value_name = "DIR", default_value = "results")]
     pub out: PathBuf,
-    /// Scene to run on in place of the spec's, by name or path of an OBJ file; may be repeated.
+    /// Scene to run on in place of the spec's, by name or path of a mesh file; may be repeated.
     #[arg(long = "scene", value_name = "NAME|PATH")]
     pub scenes: Vec<String>,
     /// Limits the threads.

@@ -25,6 +25,6 @@ pub fn scenes() -> Result<(), Error> {
         let origin = format!("From the Rust package {package}, by scripts/fetch-scenes.");
         table.add_row([name, &objects, "file", &origin]);
     }
-    print_line(&format!("{table}\nAny OBJ file can be named by its path."));
+    print_line(&format!("{table}\nAny OBJ, PLY, STL or glTF file can be named by its path."));
     Ok(())
 }

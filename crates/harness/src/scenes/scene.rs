@@ -1,7 +1,7 @@
 //! One loaded scene, and how its name says where it comes from.
 
 use super::subset::Subset;
-use super::{fnv1a, obj, spheres, stand_ins, stiff};
+use super::{fnv1a, open, spheres, stand_ins, stiff};
 use crate::Error;
 use bvh_core::{Aabb, Primitives, Triangle};
 use glam::DVec3;
@@ -17,7 +17,7 @@ pub enum SceneKind {
     /// Made in code: spheres, and the stiff and extreme scenes.
     #[serde(rename = "procedural")]
     Procedural,
-    /// Read from an OBJ file.
+    /// Read from a mesh file.
     #[serde(rename = "file")]
     File,
 }
@@ -64,7 +64,7 @@ const MOST_STIFF: usize = 100_000_000;
 impl Scene {
     /// Loads a scene by name.
     ///
-    /// `name` is a stand-in, one of [`SPHERES`], one of [`FETCHED`] or the path of an OBJ file, and may end like a
+    /// `name` is a stand-in, one of [`SPHERES`], one of [`FETCHED`] or the path of a mesh file, and may end like a
     /// [`Subset`]; or it is a stiff scene with its number of objects, such as `S34:20000`.
     ///
     /// # Errors
@@ -95,10 +95,11 @@ impl Scene {
             })?,
             None => PathBuf::from(name),
         };
-        if !name.ends_with(".obj") && !path.exists() {
+        // A word is a scene's name; with an extension or a folder it is a path, and the reader says what is wrong with it.
+        if path.extension().is_none() && path.components().count() == 1 && !path.exists() {
             return Err(refused(format!("no such scene; {}", known_scenes())));
         }
-        let mesh = obj::load(&path).map_err(|error| refused(error.to_string()))?;
+        let mesh = open::load(&path).map_err(|error| refused(error.to_string()))?;
         let stem = path.file_stem().map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
         let remark = mesh.remark().map(|remark| format!("scene {stem}: {remark}"));
         Ok(Self { remark, ..Self::new(&stem, SceneKind::File, Primitives::Triangles(mesh.triangles)) })
@@ -167,7 +168,7 @@ fn known_scenes() -> String {
     let names = stand_ins::STAND_INS.iter().map(|scene| scene.name);
     let names = names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name));
     format!(
-        "accepted: {}, the path of an OBJ file, a case of the suite with a number of objects such as S34:20000, or \
+        "accepted: {}, the path of an OBJ, PLY, STL or glTF file, a case of the suite with a number of objects such as S34:20000, or \
          either of the others with `:COUNT`, `:random:COUNT:SEED` or `:cluster:COUNT:SEED` for a subset",
         names.collect::<Vec<_>>().join(", ")
     )

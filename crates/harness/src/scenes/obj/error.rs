@@ -1,7 +1,6 @@
 //! Why an OBJ file was refused.
 
 use super::geometry::MOST_CORNERS;
-use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -19,21 +18,6 @@ pub struct Place {
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "each message says what its fields are")]
 pub enum ObjError {
-    /// Nothing at this path.
-    #[error("{}: no such file", .path.display())]
-    NotFound { path: PathBuf },
-    /// A directory at this path.
-    #[error("{} is a directory; expected the path of one OBJ file", .path.display())]
-    Directory { path: PathBuf },
-    /// A device, pipe or socket at this path, which might never end.
-    #[error("{} is no regular file; expected the path of one OBJ file", .path.display())]
-    NotRegular { path: PathBuf },
-    /// The file exists and could not be read.
-    #[error("{} could not be read: {source}", .path.display())]
-    Read { path: PathBuf, source: io::Error },
-    /// No bytes, or only blanks.
-    #[error("{} is empty; expected a Wavefront OBJ file", .path.display())]
-    Empty { path: PathBuf },
     /// Nothing to build a hierarchy over.
     #[error(
         "{} has {vertices} vertices and no face of three or more; expected a Wavefront OBJ file \
@@ -77,24 +61,8 @@ pub enum ObjError {
 }
 
 impl ObjError {
-    /// What the system said of a path that was to be read.
-    pub(super) fn of_reading(path: &Path, source: io::Error) -> Self {
-        let path = path.to_path_buf();
-        match source.kind() {
-            io::ErrorKind::NotFound => Self::NotFound { path },
-            _ => Self::Read { path, source },
-        }
-    }
-
-    /// For what exists and is no regular file.
-    pub(super) fn not_a_file(path: &Path, directory: bool) -> Self {
-        let path = path.to_path_buf();
-        if directory { Self::Directory { path } } else { Self::NotRegular { path } }
-    }
-
-    /// For a file of these bytes in which no face has three vertices.
-    pub(super) fn without_faces(path: &Path, bytes: &[u8], vertices: usize) -> Self {
-        let path = path.to_path_buf();
-        if bytes.trim_ascii().is_empty() { Self::Empty { path } } else { Self::NoFaces { path, vertices } }
+    /// For a file in which no face has three vertices.
+    pub(super) fn without_faces(path: &Path, vertices: usize) -> Self {
+        Self::NoFaces { path: path.to_path_buf(), vertices }
     }
 }

@@ -1,5 +1,6 @@
 //! What the cases ask of the readers of OBJ files and tree files.
 
+use crate::scenes::mesh::Mesh;
 use crate::scenes::{obj, stiff};
 use crate::stress::promise::{Broken, Verdict, ensure};
 use crate::stress::tracing;
@@ -29,7 +30,7 @@ fn to_obj(triangles: &[Triangle]) -> String {
     triangles.iter().map(triangle).collect()
 }
 
-fn read(text: &str) -> Result<obj::Mesh, obj::ObjError> {
+fn read(text: &str) -> Result<Mesh, obj::ObjError> {
     obj::parse(text.as_bytes(), Path::new("scene.obj"))
 }
 

@@ -1,0 +1,225 @@
+//! Triangles from glTF 2.0 files, JSON or GLB, with the transforms of their nodes applied.
+//!
+//! `gltf-json` has the names and types of the format. References and ranges are checked here: its own check, and the readers of the
+//! crate `gltf`, panic on files made for it. Materials, cameras, animations and skins are ignored: meshes stand as their nodes put them.
+
+use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place};
+use super::read::read;
+use base64::Engine as _;
+use bvh_core::Triangle;
+use glam::{DMat4, DQuat, DVec3, Vec3};
+use gltf_json::accessor::{ComponentType, Type};
+use gltf_json::mesh::{Mode, Primitive, Semantic};
+use gltf_json::root::Get;
+use gltf_json::scene::Node;
+use gltf_json::validation::Checked::Valid;
+use gltf_json::{Accessor, Index, Root};
+use std::path::Path;
+
+/// Reads the bytes of a glTF or GLB file, and the buffers that it refers to, beside `path`.
+pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
+    let fault = |place, message: String| Fault::new(path, place, message);
+    let (json, binary) = match bytes.starts_with(b"glTF") {
+        true => chunks(bytes).ok_or_else(|| {
+            fault(Place::File, "no chunk of JSON in version 2; expected a GLB file, and whole".into())
+        })?,
+        false => (bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), None),
+    };
+    let root = Root::from_slice(json).map_err(|error| fault(Place::File, error.to_string()))?;
+    let mut buffers = Vec::new();
+    for (number, buffer) in root.buffers.iter().enumerate() {
+        let bytes = match (&buffer.uri, binary) {
+            (Some(uri), _) => bytes_of(uri, path),
+            (None, Some(binary)) => Ok(binary.to_vec()),
+            (None, None) => Err("no URI; expected one, or a GLB file with a binary chunk".into()),
+        };
+        let bytes = bytes.and_then(|bytes| match buffer.byte_length.0 > bytes.len() as u64 {
+            true => Err(format!("{} bytes; expected {}", bytes.len(), buffer.byte_length.0)),
+            false => Ok(bytes),
+        });
+        buffers.push(bytes.map_err(|message| fault(Place::Element(format!("buffers[{number}]")), message))?);
+    }
+    let mut scene = Scene { path, root: &root, buffers, triangles: Vec::new() };
+    scene.place_nodes()?;
+    match scene.triangles.is_empty() {
+        true => {
+            Err(fault(Place::File, "no triangle in its scene; expected a glTF file with at least one".into()))
+        }
+        false => Ok(Mesh::new(scene.triangles)),
+    }
+}
+
+/// The chunks of JSON and of binary data of a GLB file of version 2: each has its length and its kind before it.
+fn chunks(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
+    let chunk = |at: usize, kind: &[u8; 4]| {
+        let head = bytes.get(at..)?.first_chunk::<8>()?;
+        let length = u32::from_le_bytes(*head.first_chunk()?) as usize;
+        (head[4..] == *kind).then(|| bytes.get(at + 8..)?.get(..length)).flatten()
+    };
+    let json = (bytes.get(4..8)? == [2, 0, 0, 0]).then(|| chunk(12, b"JSON")).flatten()?;
+    Some((json, chunk(20 + json.len(), b"BIN\0")))
+}
+
+/// The bytes of a `data:` URI, or of a file beside the one that names it.
+fn bytes_of(uri: &str, path: &Path) -> Result<Vec<u8>, String> {
+    if let Some(data) = uri.strip_prefix("data:") {
+        let encoded = data.split_once(";base64,").ok_or("a data URI that is not base64")?.1;
+        return base64::engine::general_purpose::STANDARD.decode(encoded).map_err(|error| error.to_string());
+    }
+    if uri.contains("://") {
+        return Err(format!("`{uri}`; expected a file beside this one, or data in base64"));
+    }
+    let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
+    read(&path.with_file_name(&*name)).map_err(|error| error.to_string())
+}
+
+/// A file while its nodes are followed.
+struct Scene<'a> {
+    path: &'a Path,
+    root: &'a Root,
+    buffers: Vec<Vec<u8>>,
+    triangles: Vec<Triangle>,
+}
+
+/// The transform of a node into its parent's coordinates.
+fn transform(node: &Node) -> DMat4 {
+    if let Some(matrix) = node.matrix {
+        return DMat4::from_cols_array(&matrix.map(f64::from));
+    }
+    let vector = |of: Option<[f32; 3]>, or: DVec3| of.map_or(or, |v| DVec3::from(v.map(f64::from)));
+    let turn =
+        node.rotation.map_or(DQuat::IDENTITY, |turn| DQuat::from_array(turn.0.map(f64::from)).normalize());
+    DMat4::from_scale_rotation_translation(
+        vector(node.scale, DVec3::ONE),
+        turn,
+        vector(node.translation, DVec3::ZERO),
+    )
+}
+
+impl<'a> Scene<'a> {
+    /// What an index refers to.
+    fn get<T>(&self, index: Index<T>, name: &str) -> Result<&'a T, String>
+    where
+        Root: Get<T>,
+    {
+        self.root.get(index).ok_or_else(|| format!("no {name}[{}]; expected one that exists", index.value()))
+    }
+
+    /// Follows the default scene, or the first one, from its roots. A node has one parent, so that none is reached twice.
+    fn place_nodes(&mut self) -> Result<(), Fault> {
+        let path = self.path;
+        let fault = |place: String, message: String| Fault::new(path, Place::Element(place), message);
+        let scene = match self.root.scene {
+            Some(index) => Some(self.get(index, "scenes").map_err(|message| fault("scene".into(), message))?),
+            None => self.root.scenes.first(),
+        };
+        let mut reached = vec![false; self.root.nodes.len()];
+        let mut open: Vec<(Index<Node>, DMat4)> = Vec::new();
+        open.extend(scene.iter().flat_map(|scene| &scene.nodes).rev().map(|&node| (node, DMat4::IDENTITY)));
+        while let Some((index, parent)) = open.pop() {
+            let place = || format!("nodes[{}]", index.value());
+            let node = self.get(index, "nodes").map_err(|message| fault("scene".into(), message))?;
+            if std::mem::replace(&mut reached[index.value()], true) {
+                let message = "reached twice; expected a tree of nodes, each with one parent";
+                return Err(fault(place(), message.into()));
+            }
+            let transform = parent * transform(node);
+            if let Some(index) = node.mesh {
+                let mesh = self.get(index, "meshes").map_err(|message| fault(place(), message))?;
+                for (number, primitive) in mesh.primitives.iter().enumerate() {
+                    self.place(primitive, &transform).map_err(|message| {
+                        fault(format!("meshes[{}].primitives[{number}] at {}", index.value(), place()), message)
+                    })?;
+                }
+            }
+            open.extend(node.children.iter().flatten().rev().map(|&child| (child, transform)));
+        }
+        Ok(())
+    }
+
+    /// Adds the triangles of a primitive; points and lines have none.
+    fn place(&mut self, primitive: &Primitive, transform: &DMat4) -> Result<(), String> {
+        let Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) = primitive.mode else {
+            return Ok(());
+        };
+        let positions =
+            *primitive.attributes.get(&Valid(Semantic::Positions)).ok_or("no POSITION; expected one")?;
+        let mut points = Vec::new();
+        for bytes in self.items(positions, Type::Vec3, &[ComponentType::F32])? {
+            let point = bytes.as_chunks().0.first_chunk().map_or([f32::NAN; 3], |x| x.map(f32::from_le_bytes));
+            let point = Vec3::from(point);
+            let moved = transform.transform_point3(point.as_dvec3()).as_vec3();
+            if !moved.is_finite() {
+                return Err(format!(
+                    "position {} is {point}, moved {moved}; expected finite numbers",
+                    points.len()
+                ));
+            }
+            points.push(moved);
+        }
+        let types = [ComponentType::U8, ComponentType::U16, ComponentType::U32];
+        let indices: Vec<u32> = match primitive.indices {
+            None => (0..points.len() as u32).collect(),
+            Some(accessor) => {
+                let index =
+                    |bytes: &[u8]| bytes.iter().rev().fold(0, |index, &byte| index << 8 | u32::from(byte));
+                self.items(accessor, Type::Scalar, &types)?.map(index).collect()
+            }
+        };
+        if let Some(index) = indices.iter().find(|&&index| index as usize >= points.len()) {
+            return Err(format!("index {index}; expected 0 to below {}", points.len()));
+        }
+        let count = if mode == Mode::Triangles { indices.len() / 3 } else { indices.len().saturating_sub(2) };
+        if self.triangles.len() + count > MOST_TRIANGLES {
+            return Err(format!("more than {MOST_TRIANGLES} triangles in all; expected no more"));
+        }
+        self.triangles.extend((0..count).map(|at| {
+            let corners = match mode {
+                Mode::Triangles => [3 * at, 3 * at + 1, 3 * at + 2],
+                Mode::TriangleFan => [0, at + 1, at + 2],
+                // Every second triangle of a strip is turned.
+                _ => [at, at + 1 + at % 2, at + 2 - at % 2],
+            };
+            Triangle(corners.map(|corner| points[indices[corner] as usize]))
+        }));
+        Ok(())
+    }
+
+    /// The bytes of every item of an accessor.
+    fn items(
+        &self,
+        accessor: Index<Accessor>,
+        type_: Type,
+        components: &[ComponentType],
+    ) -> Result<impl Iterator<Item = &[u8]>, String> {
+        let place = format!("accessors[{}]", accessor.value());
+        let accessor = self.get(accessor, "accessors")?;
+        let component =
+            components.iter().find(|&&wanted| matches!(accessor.component_type, Valid(of) if of.0 == wanted));
+        let (Some(component), true, None) = (component, accessor.type_ == Valid(type_), &accessor.sparse)
+        else {
+            let found = format!("{:?} of {:?}", accessor.type_, accessor.component_type);
+            return Err(format!("{place} is {found}, or sparse; expected {type_:?} of {components:?}"));
+        };
+        let view = accessor.buffer_view.ok_or_else(|| {
+            format!("{place} has no buffer view; expected one (compressed meshes cannot be read)")
+        })?;
+        let view = self.get(view, "bufferViews")?;
+        let size = component.size() * type_.multiplicity();
+        let stride = view.byte_stride.map_or(size, |stride| stride.0);
+        let bytes = (|| {
+            let number = |number: u64| usize::try_from(number).ok();
+            let buffer = self.buffers.get(view.buffer.value())?;
+            let bytes = buffer.get(number(view.byte_offset.map_or(0, |offset| offset.0))?..)?;
+            let bytes = bytes.get(..number(view.byte_length.0)?)?;
+            let bytes = bytes.get(number(accessor.byte_offset.map_or(0, |offset| offset.0))?..)?;
+            let count = number(accessor.count.0)?;
+            let need = stride.checked_mul(count.checked_sub(1)?)?.checked_add(size)?;
+            (stride >= size).then(|| bytes.get(..need)).flatten()
+        })();
+        let count = accessor.count.0;
+        let bytes =
+            bytes.ok_or_else(|| format!("{place} reaches beyond its buffer; expected {count} items in it"))?;
+        Ok((0..count as usize).map(move |item| &bytes[item * stride..][..size]))
+    }
+}
