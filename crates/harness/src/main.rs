@@ -1,10 +1,12 @@
 //! The command line: parses the arguments, dispatches to a command, and sets the exit code.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
 use harness::cli::interrupt::{self, INTERRUPTED};
-use harness::cli::output::{STDOUT_FAILED, print_error, print_line};
-use harness::cli::{bake, inspect, merge, render, report, run, scenes};
+use harness::cli::output::{STDOUT_FAILED, print_bytes, print_error, print_line};
+use harness::cli::{bake, commands, inspect, merge, render, report, run, scenes};
 use harness::{Error, stress::child};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -27,6 +29,12 @@ enum Command {
     Render(render::RenderArgs),
     Bake(bake::BakeArgs),
     Inspect(inspect::InspectArgs),
+    /// Print the file by which a shell completes arguments.
+    Completions {
+        shell: Shell,
+    },
+    /// Print the manual page, for `man -l -`.
+    Man,
     /// One case of the suite, in a process of its own.
     #[command(name = child::COMMAND, hide = true)]
     SuiteChild {
@@ -37,6 +45,10 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    if let Some(message) = commands::mistyped(std::env::args_os().nth(1).as_deref(), &Cli::command()) {
+        print_error(&format!("error: {message}"));
+        return ExitCode::from(2);
+    }
     let cli = Cli::parse();
     interrupt::listen();
     let result = match cli.command {
@@ -47,6 +59,13 @@ fn main() -> ExitCode {
         Some(Command::Render(args)) => render::render(&args, &INTERRUPTED),
         Some(Command::Bake(args)) => bake::bake(&args, &INTERRUPTED),
         Some(Command::Inspect(args)) => inspect::inspect(&args),
+        Some(Command::Completions { shell }) => {
+            print_bytes(&commands::completions(shell, &mut Cli::command()));
+            Ok(())
+        }
+        Some(Command::Man) => commands::manual(Cli::command())
+            .map(|page| print_bytes(&page))
+            .map_err(Error::io(Path::new("the manual page"), "write")),
         Some(Command::SuiteChild { subject, case, objects }) => {
             child::main(&subject, &case, objects).map(|answer| print_line(&answer)).map_err(Error::Usage)
         }

@@ -232,6 +232,20 @@ fn a_disk_without_room_is_noticed_before_the_search_and_the_old_file_stays() {
 }
 
 #[test]
+fn the_facts_are_the_same_in_json() {
+    let folder = tempfile::tempdir().unwrap();
+    said(folder.path(), &["bake", "spheres75", "--budget=0s", "--out=x.bvh"]);
+    let plain = facts(&said(folder.path(), &["inspect", "x.bvh", "spheres75"]));
+    let json = said(folder.path(), &["inspect", "x.bvh", "spheres75", "--json"]);
+    let json: BTreeMap<String, serde_json::Value> = serde_json::from_str(&json).unwrap();
+    assert!(json["objects"] == 75 && json["method"] == "best" && json["depth"].is_u64(), "{json:?}");
+    assert!(json.keys().eq(plain.keys()));
+    for what in ["internal area", "surface area heuristic", "internal area over Müller–Fellner's"] {
+        assert_eq!(json[what].as_f64(), plain[what].parse().ok(), "{what}");
+    }
+}
+
+#[test]
 fn the_nodes_are_written_in_full_precision() {
     let folder = tempfile::tempdir().unwrap();
     said(folder.path(), &["bake", "spheres75", "--budget", "0s", "--out", "a.bvh"]);

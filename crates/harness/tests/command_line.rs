@@ -322,3 +322,37 @@ fn gaps_are_to_the_best_known_cost_and_stay_until_they_are_redrawn() {
     assert_eq!(refused.status.code(), Some(2));
     assert!(text(&refused.stderr).contains("another spec"), "{}", text(&refused.stderr));
 }
+
+#[test]
+fn every_shell_and_the_manual_get_all_commands() {
+    let folder = tempfile::tempdir().unwrap();
+    for args in [&["man"][..], &["completions", "bash"], &["completions", "zsh"], &["completions", "fish"]] {
+        let output = run(folder.path(), args);
+        let said = text(&output.stdout);
+        assert!(output.status.success(), "{args:?}");
+        for part in ["inspect", "budget", "Number of threads", "merge"] {
+            // Bash has no room for explanations.
+            assert!(said.contains(part) || (args[1..] == ["bash"] && part.contains(' ')), "{args:?}: {part}");
+        }
+    }
+}
+
+#[test]
+fn a_mistyped_command_is_answered_with_the_one_that_is_meant() {
+    let folder = folder();
+    for (args, meant) in [
+        (&["bakee", "escher", "--budget", "0s", "--out", "x.bvh"][..], "`bake`"),
+        (&["inspct", "x.bvh"], "`inspect`"),
+        (&["scene"], "`scenes`"),
+    ] {
+        let output = run(folder.path(), args);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(args[0]) && said.contains(meant), "{said}");
+    }
+    // A spec is none, though it be called alike.
+    let output = run(folder.path(), &["bake.toml"]);
+    assert!(text(&output.stderr).contains("bake.toml: no such file"), "{}", text(&output.stderr));
+    fs::rename(folder.path().join("spec.toml"), folder.path().join("bakee")).unwrap();
+    assert!(run(folder.path(), &["bakee"]).status.success());
+}

@@ -232,7 +232,7 @@ fn a_wrong_value_of_any_flag_is_refused_by_name() {
     let entries = || fs::read_dir(at).unwrap().count();
     let before = entries();
     // Every command with what it cannot do without.
-    let commands: [(&str, &[&str]); 7] = [
+    let commands: [(&str, &[&str]); 9] = [
         ("", &["spec.toml"]),
         ("bake", &["spheres75", "--budget=0s", "--out=x.bvh"]),
         ("inspect", &["good.bvh", "spheres75"]),
@@ -240,6 +240,8 @@ fn a_wrong_value_of_any_flag_is_refused_by_name() {
         ("report", &[]),
         ("merge", &["folder", "--out=x"]),
         ("scenes", &[]),
+        ("completions", &["bash"]),
+        ("man", &[]),
     ];
     let (_, help) = harness(at, &["--help"]);
     let listed =

@@ -91,6 +91,8 @@ impl FromStr for Effort {
                 };
                 unit.and_then(|unit| digits.trim_end().parse::<u64>().ok()?.checked_mul(unit)).map(Self::Work)
             }
+            // `5M` would be five months.
+            None if text.contains('M') => None,
             None => humantime::parse_duration(text).ok().map(Self::Time),
         };
         effort.ok_or_else(|| {
@@ -353,6 +355,7 @@ mod tests {
             ("50Mwork", Some(Effort::Work(50_000_000))),
             ("2 Gwork", Some(Effort::Work(2_000_000_000))),
             ("10", None),
+            ("5M", None),
             ("work", None),
             ("-5work", None),
             ("5kMwork", None),

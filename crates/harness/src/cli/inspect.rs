@@ -9,8 +9,10 @@ use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_core::file::{FileError, Header, TreeFile};
 use bvh_core::{Bvh, NodeKind, validate};
 use clap::Args;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
+use serde_json::json;
 use std::collections::BTreeMap;
+use std::fmt::{self, Display, Formatter};
 use std::path::{Path, PathBuf};
 
 /// Say what a tree file holds: its origin, costs, depth, arity, validity.
@@ -25,6 +27,9 @@ pub struct InspectArgs {
     /// Write the nodes to a CSV file, one row each, in full precision.
     #[arg(long, value_name = "NODES.csv")]
     pub nodes: Option<PathBuf>,
+    /// Print the facts as JSON, under the same names.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// One row of the nodes' CSV file.
@@ -44,17 +49,29 @@ struct NodeRow {
     max_z: f32,
 }
 
-/// Lines of `what: value`.
+/// Facts by name, in the order in which they are printed: as a text, and as JSON.
 #[derive(Default)]
-struct Lines(String);
+struct Facts(Vec<(String, String, serde_json::Value)>);
 
-impl Lines {
-    fn add(&mut self, what: &str, value: impl std::fmt::Display) {
-        self.0 += &format!("{what}: {value}\n");
+impl Facts {
+    fn add(&mut self, what: &str, value: impl Display + Serialize) {
+        self.0.push((what.into(), value.to_string(), json!(value)));
     }
 }
 
-/// Inspects a file, and prints a line per fact, `what: value`. Refuses a file that is damaged, or for another scene than
+impl Display for Facts {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|(what, text, _)| writeln!(f, "{what}: {text}"))
+    }
+}
+
+impl Serialize for Facts {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(what, _, value)| (what, value)))
+    }
+}
+
+/// Inspects a file, and prints a line per fact, `what: value`, or JSON. Refuses a file that is damaged, or for another scene than
 /// the one named.
 pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     if let Some(nodes) = &args.nodes {
@@ -64,54 +81,54 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     let file = files::open_tree(&args.file, &bytes)?;
     let scene = args.scene.as_deref().map(Scene::load).transpose()?;
     scene.iter().filter_map(|scene| scene.remark.as_ref()).for_each(|remark| print_error(remark));
-    let mut lines = Lines::default();
-    describe(file.header(), bytes.len(), &mut lines);
+    let mut facts = Facts::default();
+    describe(file.header(), bytes.len(), &mut facts);
     let refused = |source| Error::TreeFile { path: args.file.clone(), source };
     let tree = file.tree().map_err(refused)?;
-    measure(&tree, &mut lines);
+    measure(&tree, &mut facts);
     if let Some(path) = &args.nodes {
         write_nodes(&tree, path)?;
     }
     match &scene {
-        Some(scene) => against(&tree, file, scene, &mut lines).map_err(refused)?,
-        None => lines.add("valid", "as a tree; with a scene its objects are checked too"),
+        Some(scene) => against(&tree, file, scene, &mut facts).map_err(refused)?,
+        None => facts.add("valid", "as a tree; with a scene its objects are checked too"),
     }
-    print_line(&lines.0);
+    print_line(&if args.json { format!("{:#}", json!(facts)) } else { facts.to_string() });
     Ok(())
 }
 
 /// The facts in the header.
-fn describe(header: &Header, bytes: usize, lines: &mut Lines) {
+fn describe(header: &Header, bytes: usize, facts: &mut Facts) {
     let objective = match header.objective {
-        Objective::InternalArea => "internal area".into(),
-        Objective::GoldsmithSalmon => "Goldsmith–Salmon".into(),
+        Objective::InternalArea => "internal area".to_owned(),
+        Objective::GoldsmithSalmon => "Goldsmith–Salmon".to_owned(),
         Objective::Sah(constants) => {
             let (traversal, intersection) = (constants.traversal(), constants.intersection());
             format!("surface area heuristic, traversal {traversal}, intersection {intersection}")
         }
     };
-    lines.add("version", Header::VERSION);
-    lines.add("bytes", bytes);
-    lines.add("method", &header.method);
-    lines.add("seed", header.seed);
-    lines.add("work", header.work);
-    lines.add("objective", objective);
-    lines.add("cost when saved", header.cost);
-    lines.add("checksum of the scene", format_args!("{:08x}", header.scene));
-    lines.add("objects", header.objects);
-    lines.add("nodes", header.nodes);
+    facts.add("version", Header::VERSION);
+    facts.add("bytes", bytes);
+    facts.add("method", &header.method);
+    facts.add("seed", header.seed);
+    facts.add("work", header.work);
+    facts.add("objective", objective);
+    facts.add("cost when saved", header.cost);
+    facts.add("checksum of the scene", format!("{:08x}", header.scene));
+    facts.add("objects", header.objects);
+    facts.add("nodes", header.nodes);
 }
 
 /// The facts that follow from the tree alone.
-fn measure(tree: &Bvh, lines: &mut Lines) {
+fn measure(tree: &Bvh, facts: &mut Facts) {
     let area = cost::internal_area(tree);
-    lines.add("inner nodes", tree.inner_count());
-    lines.add("leaves", tree.nodes.len() - tree.inner_count());
-    lines.add("depth", tree.depth());
-    lines.add("internal area", area);
-    lines.add("internal area over root area", cost::over_root_area(tree, area));
-    lines.add("Goldsmith–Salmon cost", cost::goldsmith_salmon(tree));
-    lines.add("surface area heuristic", cost::sah(tree, &SahConstants::default()));
+    facts.add("inner nodes", tree.inner_count());
+    facts.add("leaves", tree.nodes.len() - tree.inner_count());
+    facts.add("depth", tree.depth());
+    facts.add("internal area", area);
+    facts.add("internal area over root area", cost::over_root_area(tree, area));
+    facts.add("Goldsmith–Salmon cost", cost::goldsmith_salmon(tree));
+    facts.add("surface area heuristic", cost::sah(tree, &SahConstants::default()));
     let (mut arities, mut leaves) = (BTreeMap::new(), BTreeMap::new());
     for node in &tree.nodes {
         let (histogram, count) = match node.kind() {
@@ -120,8 +137,8 @@ fn measure(tree: &Bvh, lines: &mut Lines) {
         };
         *histogram.entry(count).or_insert(0usize) += 1;
     }
-    lines.add("inner nodes by children", histogram(&arities));
-    lines.add("leaves by objects", histogram(&leaves));
+    facts.add("inner nodes by children", histogram(&arities));
+    facts.add("leaves by objects", histogram(&leaves));
 }
 
 /// `2 × 100, 3 × 7`: sizes and how many have them.
@@ -131,24 +148,24 @@ fn histogram(counts: &BTreeMap<u32, usize>) -> String {
 }
 
 /// The facts that only the scene can tell.
-fn against(tree: &Bvh, file: TreeFile, scene: &Scene, lines: &mut Lines) -> Result<(), FileError> {
+fn against(tree: &Bvh, file: TreeFile, scene: &Scene, facts: &mut Facts) -> Result<(), FileError> {
     file.for_boxes(&scene.boxes)?;
     validate(tree, &scene.boxes)?;
-    lines.add("scene", &scene.name);
-    lines.add("valid", "yes, over this scene's objects");
+    facts.add("scene", &scene.name);
+    facts.add("valid", "yes, over this scene's objects");
     // Boxes that the file's checksum has accepted are finite: a valid tree lies around them.
     if let Ok(greedy) = muller_fellner::Config::default().build(&scene.boxes) {
         let base = cost::internal_area(&greedy);
         if base > 0.0 {
-            lines.add("internal area over Müller–Fellner's", cost::internal_area(tree) / base);
+            facts.add("internal area over Müller–Fellner's", cost::internal_area(tree) / base);
         }
     }
     match scene.triangles() {
         Ok(triangles) => {
             let overlap = cost::end_point_overlap(tree, triangles, &SahConstants::default());
-            lines.add("end-point overlap", overlap);
+            facts.add("end-point overlap", overlap);
         }
-        Err(_) => lines.add("end-point overlap", "of triangles only"),
+        Err(_) => facts.add("end-point overlap", "of triangles only"),
     }
     Ok(())
 }

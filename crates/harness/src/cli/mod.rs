@@ -2,6 +2,7 @@
 
 pub mod arguments;
 pub mod bake;
+pub mod commands;
 pub mod explain;
 pub mod inspect;
 pub mod interrupt;

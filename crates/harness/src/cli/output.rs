@@ -10,8 +10,13 @@ pub static STDOUT_FAILED: AtomicBool = AtomicBool::new(false);
 /// Prints text to standard output, and ends the line. A reader that closes the pipe early, as `head` does, is no error,
 /// because the results are in files.
 pub fn print_line(text: &str) {
+    print_bytes(format!("{}\n", plain(text.trim_end())).as_bytes());
+}
+
+/// As [`print_line`], for a file of ours that another program is to read.
+pub fn print_bytes(bytes: &[u8]) {
     let mut out = std::io::stdout();
-    let written = writeln!(out, "{}", plain(text.trim_end())).and_then(|()| out.flush());
+    let written = out.write_all(bytes).and_then(|()| out.flush());
     if written.is_err_and(|error| error.kind() != ErrorKind::BrokenPipe) {
         STDOUT_FAILED.store(true, Relaxed);
     }
