@@ -200,7 +200,7 @@ impl Ord for Near {
 /// `distance_squared` gives that of an object, which must be no less than that of its box, or `None` to pass it over.
 pub fn nearest<'t>(
     tree: impl Into<BvhView<'t>>,
-    point: Vec3,
+    point: impl Into<Vec3>,
     limit: f64,
     distance_squared: impl FnMut(u32) -> Option<f64>,
 ) -> Option<Near> {
@@ -210,12 +210,12 @@ pub fn nearest<'t>(
 /// The `k` objects nearest to `point`, or fewer if there are fewer within `limit`, nearest first; otherwise as [`nearest`].
 pub fn k_nearest<'t>(
     tree: impl Into<BvhView<'t>>,
-    point: Vec3,
+    point: impl Into<Vec3>,
     k: usize,
     limit: f64,
     mut distance_squared: impl FnMut(u32) -> Option<f64>,
 ) -> Vec<Near> {
-    let tree = tree.into();
+    let (tree, point) = (tree.into(), point.into());
     // The farthest on top.
     let mut found: BinaryHeap<Near> = BinaryHeap::new();
     if k == 0 || limit.is_nan() {

@@ -77,9 +77,9 @@ impl Triangle {
     /// The point of the triangle that is nearest to `point`, in f64; of a degenerate one, of the segment or point that it is.
     ///
     /// Source: Ericson 2005, *Real-Time Collision Detection*, section 5.1.5.
-    pub fn closest_point(&self, point: Vec3) -> DVec3 {
+    pub fn closest_point(&self, point: impl Into<Vec3>) -> DVec3 {
         let [a, b, c] = self.0.map(Vec3::as_dvec3);
-        let p = point.as_dvec3();
+        let p = point.into().as_dvec3();
         let normal = (b - a).cross(c - a);
         let inside = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from)) >= 0.0;
         if normal != DVec3::ZERO && inside(a, b) && inside(b, c) && inside(c, a) {

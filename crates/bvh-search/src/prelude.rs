@@ -4,6 +4,7 @@ pub use crate::{Budget, Outcome, Problem, StopReason, best, optimize, solve};
 #[cfg(feature = "std")]
 pub use crate::{Deadline, bake, improve};
 pub use bvh_build::{Builder, median_cut, muller_fellner, ploc};
+pub use bvh_core::glam::Vec3;
 pub use bvh_core::{
     Aabb, Bvh, Coherence, Hit, Primitive, Ray, Sphere, Triangle, WideBvh, any_hit, boxes, cost, file,
     nearest_hit, query, validate,
