@@ -14,7 +14,12 @@ use gltf_json::root::Get;
 use gltf_json::scene::Node;
 use gltf_json::validation::Checked::Valid;
 use gltf_json::{Accessor, Index, Root};
+use std::borrow::Cow;
 use std::path::Path;
+
+/// The most bytes of all buffers, and the most positions and indices: what [`MOST_TRIANGLES`] take without sharing any.
+const MOST_BYTES: u64 = 48 * MOST_TRIANGLES as u64;
+const MOST_ITEMS: u64 = 6 * MOST_TRIANGLES as u64;
 
 /// Reads the bytes of a glTF or GLB file, and the buffers that it refers to, beside `path`.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
@@ -26,20 +31,26 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
         false => (bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), None),
     };
     let root = Root::from_slice(json).map_err(|error| fault(Place::File, error.to_string()))?;
-    let mut buffers = Vec::new();
+    let (mut buffers, mut total) = (Vec::new(), 0);
     for (number, buffer) in root.buffers.iter().enumerate() {
         let bytes = match (&buffer.uri, binary) {
-            (Some(uri), _) => bytes_of(uri, path),
-            (None, Some(binary)) => Ok(binary.to_vec()),
+            (Some(uri), _) => bytes_of(uri, path).map(Cow::Owned),
+            (None, Some(binary)) => Ok(Cow::Borrowed(binary)),
             (None, None) => Err("no URI; expected one, or a GLB file with a binary chunk".into()),
         };
         let bytes = bytes.and_then(|bytes| match buffer.byte_length.0 > bytes.len() as u64 {
             true => Err(format!("{} bytes; expected {}", bytes.len(), buffer.byte_length.0)),
             false => Ok(bytes),
         });
+        // A file may name another, or itself, any number of times.
+        total += bytes.as_ref().map_or(0, |bytes: &Cow<[u8]>| bytes.len() as u64);
+        let bytes = bytes.and_then(|bytes| match total > MOST_BYTES {
+            true => Err(format!("{total} bytes with those before it; expected at most {MOST_BYTES}")),
+            false => Ok(bytes),
+        });
         buffers.push(bytes.map_err(|message| fault(Place::Element(format!("buffers[{number}]")), message))?);
     }
-    let mut scene = Scene { path, root: &root, buffers, triangles: Vec::new() };
+    let mut scene = Scene { path, root: &root, buffers, triangles: Vec::new(), items: 0 };
     scene.place_nodes()?;
     match scene.triangles.is_empty() {
         true => {
@@ -77,8 +88,10 @@ fn bytes_of(uri: &str, path: &Path) -> Result<Vec<u8>, String> {
 struct Scene<'a> {
     path: &'a Path,
     root: &'a Root,
-    buffers: Vec<Vec<u8>>,
+    buffers: Vec<Cow<'a, [u8]>>,
     triangles: Vec<Triangle>,
+    /// Positions and indices read so far.
+    items: u64,
 }
 
 /// The transform of a node into its parent's coordinates.
@@ -187,7 +200,7 @@ impl<'a> Scene<'a> {
 
     /// The bytes of every item of an accessor.
     fn items(
-        &self,
+        &mut self,
         accessor: Index<Accessor>,
         type_: Type,
         components: &[ComponentType],
@@ -220,6 +233,13 @@ impl<'a> Scene<'a> {
         let count = accessor.count.0;
         let bytes =
             bytes.ok_or_else(|| format!("{place} reaches beyond its buffer; expected {count} items in it"))?;
+        self.items += count;
+        if self.items > MOST_ITEMS {
+            return Err(format!(
+                "{place} makes it {} positions and indices; expected at most {MOST_ITEMS}",
+                self.items
+            ));
+        }
         Ok((0..count as usize).map(move |item| &bytes[item * stride..][..size]))
     }
 }
