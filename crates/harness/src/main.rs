@@ -29,6 +29,7 @@ enum Command {
     Render(render::RenderArgs),
     Bake(bake::BakeArgs),
     Inspect(inspect::InspectArgs),
+    Verify(inspect::VerifyArgs),
     /// Print the file by which a shell completes arguments.
     Completions {
         shell: Shell,
@@ -59,6 +60,7 @@ fn main() -> ExitCode {
         Some(Command::Render(args)) => render::render(&args, &INTERRUPTED),
         Some(Command::Bake(args)) => bake::bake(&args, &INTERRUPTED),
         Some(Command::Inspect(args)) => inspect::inspect(&args),
+        Some(Command::Verify(args)) => inspect::verify(&args),
         Some(Command::Completions { shell }) => {
             print_bytes(&commands::completions(shell, &mut Cli::command()));
             Ok(())

@@ -246,6 +246,26 @@ fn the_facts_are_the_same_in_json() {
 }
 
 #[test]
+fn a_tree_from_elsewhere_is_verified_and_measured_against_the_best_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let spec = "question = 'q'\nscenes = ['spheres75']\nmethods = [{ method = 'median_cut' }]\n";
+    fs::write(at.join("spec.toml"), spec).unwrap();
+    said(at, &["spec.toml"]);
+    said(at, &["bake", "spheres75", "--budget=200kwork", "--out=x.bvh"]);
+    let found = facts(&said(at, &["verify", "x.bvh", "spheres75"]));
+    let number = |what: &str| found[what].parse::<f64>().unwrap();
+    assert_eq!(found["found by"], "median_cut");
+    let ratio = number("internal area") / number("best known internal area");
+    assert!(number("internal area over the best known") == ratio && ratio < 1.0, "{ratio}");
+    // Of another scene nothing is known, and a tree for it is none.
+    said(at, &["bake", "spheres750", "--budget=0s", "--out=y.bvh"]);
+    assert!(said(at, &["verify", "y.bvh", "spheres750"]).contains("none of this very scene"));
+    let output = run(at, &["verify", "y.bvh", "spheres75"]);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+}
+
+#[test]
 fn the_nodes_are_written_in_full_precision() {
     let folder = tempfile::tempdir().unwrap();
     said(folder.path(), &["bake", "spheres75", "--budget", "0s", "--out", "a.bvh"]);

@@ -324,6 +324,20 @@ fn gaps_are_to_the_best_known_cost_and_stay_until_they_are_redrawn() {
 }
 
 #[test]
+fn without_reports_there_is_a_table_and_without_a_terminal_a_line_for_the_last_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec =
+        "question = 'q'\nscenes = ['spheres75']\nrepetitions = 3\nmethods = [{ method = 'median_cut' }]\n";
+    fs::write(folder.path().join("plain.toml"), spec).unwrap();
+    let output = run(folder.path(), &["plain.toml"]);
+    let (out, err) = (text(&output.stdout), text(&output.stderr));
+    assert!(["spheres75", "median_cut", "least_over_base"].iter().all(|part| out.contains(part)), "{out}");
+    assert!(err.contains("plain: 3 of 3 runs") && err.contains("median_cut on spheres75"), "{err}");
+    let quiet = run(folder.path(), &["plain.toml", "--quiet", "--force"]);
+    assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty());
+}
+
+#[test]
 fn every_shell_and_the_manual_get_all_commands() {
     let folder = tempfile::tempdir().unwrap();
     for args in [&["man"][..], &["completions", "bash"], &["completions", "zsh"], &["completions", "fish"]] {

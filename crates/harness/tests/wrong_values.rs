@@ -232,10 +232,11 @@ fn a_wrong_value_of_any_flag_is_refused_by_name() {
     let entries = || fs::read_dir(at).unwrap().count();
     let before = entries();
     // Every command with what it cannot do without.
-    let commands: [(&str, &[&str]); 9] = [
+    let commands: [(&str, &[&str]); 10] = [
         ("", &["spec.toml"]),
         ("bake", &["spheres75", "--budget=0s", "--out=x.bvh"]),
         ("inspect", &["good.bvh", "spheres75"]),
+        ("verify", &["good.bvh", "spheres75"]),
         ("render", &["spheres75", "--out=x.png", "--size=8x8"]),
         ("report", &[]),
         ("merge", &["folder", "--out=x"]),

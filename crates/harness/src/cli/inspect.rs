@@ -1,9 +1,10 @@
-//! `harness inspect`: what a tree file is, what its tree costs, and what it looks like.
+//! `harness inspect` and `verify`: what a tree file is, what its tree costs, and what it looks like.
 
-use crate::cli::arguments::{NODES, output_file};
+use crate::cli::arguments::{NODES, input_folder, output_file};
 use crate::cli::output::{print_error, print_line};
+use crate::run::{reference, rows};
 use crate::scenes::Scene;
-use crate::{Error, files, run::rows};
+use crate::{Error, files};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_core::file::{FileError, Header, TreeFile};
@@ -77,24 +78,68 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     if let Some(nodes) = &args.nodes {
         output_file("--nodes", nodes, &NODES)?;
     }
-    let bytes = files::read(&args.file)?;
-    let file = files::open_tree(&args.file, &bytes)?;
     let scene = args.scene.as_deref().map(Scene::load).transpose()?;
-    scene.iter().filter_map(|scene| scene.remark.as_ref()).for_each(|remark| print_error(remark));
-    let mut facts = Facts::default();
-    describe(file.header(), bytes.len(), &mut facts);
-    let refused = |source| Error::TreeFile { path: args.file.clone(), source };
-    let tree = file.tree().map_err(refused)?;
-    measure(&tree, &mut facts);
+    let (tree, facts) = examine(&args.file, scene.as_ref())?;
     if let Some(path) = &args.nodes {
         write_nodes(&tree, path)?;
     }
-    match &scene {
+    print(&facts, args.json);
+    Ok(())
+}
+
+/// Prove that a tree file, whoever made it, holds a tree for a scene, and compare its cost with the best known.
+#[derive(Args, Clone, Debug)]
+pub struct VerifyArgs {
+    /// The tree file.
+    #[arg(value_name = "FILE.bvh")]
+    pub file: PathBuf,
+    /// The scene it is for, by name or path of an OBJ file.
+    pub scene: String,
+    /// Folder with the best known costs, by default `results`, if it is there.
+    #[arg(long, value_name = "DIR")]
+    pub results: Option<PathBuf>,
+    /// Print the facts as JSON, under the same names.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// As [`inspect`], and says what the best known tree costs, which is a binary one with one object per leaf.
+pub fn verify(args: &VerifyArgs) -> Result<(), Error> {
+    args.results.iter().try_for_each(|folder| input_folder("--results", folder))?;
+    let results = args.results.as_deref().unwrap_or(Path::new("results"));
+    let scene = Scene::load(&args.scene)?;
+    let (tree, mut facts) = examine(&args.file, Some(&scene))?;
+    match reference::best_known(results, &scene)? {
+        Some(best) => {
+            facts.add("best known internal area", best.cost);
+            facts.add("found by", best.method);
+            facts.add("internal area over the best known", cost::internal_area(&tree) / best.cost);
+        }
+        None => facts.add("best known internal area", "none of this very scene"),
+    }
+    print(&facts, args.json);
+    Ok(())
+}
+
+fn print(facts: &Facts, as_json: bool) {
+    print_line(&if as_json { format!("{:#}", json!(facts)) } else { facts.to_string() });
+}
+
+/// The tree in a file and the facts about it.
+fn examine(path: &Path, scene: Option<&Scene>) -> Result<(Bvh, Facts), Error> {
+    let bytes = files::read(path)?;
+    let file = files::open_tree(path, &bytes)?;
+    scene.iter().filter_map(|scene| scene.remark.as_ref()).for_each(|remark| print_error(remark));
+    let mut facts = Facts::default();
+    describe(file.header(), bytes.len(), &mut facts);
+    let refused = |source| Error::TreeFile { path: path.to_owned(), source };
+    let tree = file.tree().map_err(refused)?;
+    measure(&tree, &mut facts);
+    match scene {
         Some(scene) => against(&tree, file, scene, &mut facts).map_err(refused)?,
         None => facts.add("valid", "as a tree; with a scene its objects are checked too"),
     }
-    print_line(&if args.json { format!("{:#}", json!(facts)) } else { facts.to_string() });
-    Ok(())
+    Ok((tree, facts))
 }
 
 /// The facts in the header.

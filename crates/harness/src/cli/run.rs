@@ -51,6 +51,9 @@ pub struct RunArgs {
     /// of its own.
     #[arg(long, value_name = "I/N", conflicts_with = "check")]
     pub shard: Option<Shard>,
+    /// Say nothing but errors, and differences under --check.
+    #[arg(long)]
+    pub quiet: bool,
     /// Print first what each scene does not need and is left out, and why.
     #[arg(long)]
     pub explain: bool,
@@ -74,7 +77,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         (_, true) => Existing::Replace,
         _ => Existing::Keep,
     };
-    let extent = Extent { existing, shard: args.shard };
+    let extent = Extent { existing, shard: args.shard, quiet: args.quiet };
     let mut differences = 0;
     for experiment in &experiments {
         if args.explain {
@@ -90,6 +93,9 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
             execute(experiment, &args.out, extent, interrupted)?
         };
         summary.remarks.iter().for_each(|remark| print_error(remark));
+        if args.quiet {
+            continue;
+        }
         print_line(&experiment.question);
         for name in &summary.left_out {
             print_line(&format!("(without {name}: scripts/fetch-scenes brings it)"));
@@ -111,7 +117,8 @@ fn compare(args: &RunArgs, experiment: &Experiment, interrupted: &AtomicBool) ->
     let temporary = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
     let (fresh, committed) = (temporary.path().join(experiment.folder()), args.out.join(experiment.folder()));
     reference::adopt(&committed, temporary.path())?;
-    let summary = execute(experiment, temporary.path(), Extent::default(), interrupted)?;
+    let extent = Extent { quiet: args.quiet, ..Extent::default() };
+    let summary = execute(experiment, temporary.path(), extent, interrupted)?;
     let found = check::compare(&fresh, &committed, &summary.left_out, !experiment.quick)?;
     let name = &experiment.name;
     for scene in &summary.left_out {

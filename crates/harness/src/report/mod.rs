@@ -39,6 +39,7 @@ pub mod variations;
 use crate::Error;
 use crate::figures::{self, Figure, Layer, Look};
 use crate::run::store::Store;
+use crate::statistics::{median, minimum};
 use bvh_build::{Check, OutOfRange};
 use data::Rows;
 use output::Output;
@@ -204,6 +205,9 @@ pub fn write_all(reports: &[Report], store: &Store, drawn: bool) -> Result<Strin
     let rows = Rows::read(store.folder())?;
     let methods = rows.methods();
     let mut outputs = reports.iter().map(|report| report.write(&rows)).collect::<Result<Vec<_>, _>>()?;
+    if reports.is_empty() {
+        outputs.push(final_costs(&rows)?);
+    }
     let paper: Vec<PaperRow> =
         outputs.iter_mut().flat_map(|output| std::mem::take(&mut output.paper)).collect();
     if !paper.is_empty() {
@@ -224,6 +228,37 @@ pub fn write_all(reports: &[Report], store: &Store, drawn: bool) -> Result<Strin
         store.write(TEXT_FILE, text.as_bytes())?;
     }
     Ok(text)
+}
+
+/// What there is to say without a report: what every method came to.
+fn final_costs(rows: &Rows) -> Result<Output, Error> {
+    #[derive(serde::Serialize)]
+    struct Row<'a> {
+        scene: String,
+        method: &'a str,
+        runs: usize,
+        least_over_base: Option<f64>,
+        median_over_base: Option<f64>,
+        median_seconds: Option<f64>,
+    }
+    let row = |(scene, method)| {
+        let ratios = rows.final_ratios(scene, method);
+        Row {
+            scene: rows.shown(scene),
+            method,
+            runs: ratios.len(),
+            least_over_base: minimum(ratios.iter().copied()),
+            median_over_base: median(&ratios),
+            median_seconds: median(&rows.seconds_of(scene, method)),
+        }
+    };
+    let methods = rows.methods();
+    let pairs = rows.scenes().into_iter().flat_map(|scene| methods.iter().map(move |method| (scene, *method)));
+    let table: Vec<Row> = pairs.map(row).collect();
+    let mut output = Output::new("", "Final costs");
+    let columns = ["scene", "method", "runs", "least_over_base", "median_over_base", "median_seconds"];
+    output.show("Cost over that of the greedy tree:", &table, &columns)?;
+    Ok(output)
 }
 
 /// The looks of the methods that a figure shows: the same in all figures of an experiment.

@@ -16,9 +16,11 @@ use crate::spec::Experiment;
 use crate::stress::Measure;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
+use std::io::Write;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 /// How much of an experiment is to be done.
 #[derive(Clone, Copy, Debug, Default)]
@@ -27,6 +29,8 @@ pub struct Extent {
     pub existing: Existing,
     /// Do these runs only, and leave them to be [merged](crate::run::merge::merge).
     pub shard: Option<Shard>,
+    /// Do not say how far the runs are.
+    pub quiet: bool,
 }
 
 /// Runs `experiment` into `out/NAME/`. As soon as `interrupted` becomes true, the unfinished runs are given up and the
@@ -71,7 +75,7 @@ fn run(
         (0..jobs.len()).filter(|&index| extent.shard.is_none_or(|shard| shard.has(index))).collect();
     let watch = Watch { bar: progress(own.len() as u64), interrupted };
     watch.bar.set_message(experiment.name.to_string());
-    let (mut trees, redone) = perform_all(experiment, &jobs, &own, &store, &watch)?;
+    let (mut trees, redone) = perform_all(experiment, &jobs, &own, &store, &watch, extent.quiet)?;
     remarks.extend(redone);
     let provenance = Provenance::gather();
     if let Some(shard) = extent.shard {
@@ -115,6 +119,7 @@ fn perform_all(
     own: &[usize],
     store: &Store,
     watch: &Watch,
+    quiet: bool,
 ) -> Result<(Trees, Vec<String>), Error> {
     let (mut todo, mut redone) = (Vec::new(), Vec::new());
     for &index in own {
@@ -132,6 +137,7 @@ fn perform_all(
     }
     let trees = Mutex::new(Trees::new());
     let finished = AtomicUsize::new(own.len() - todo.len());
+    let lines = Lines { all: own.len(), start: Instant::now(), last: Mutex::new(Instant::now()) };
     watch.bar.set_position(finished.load(Relaxed) as u64);
     watch.bar.reset_eta();
     let work = |&index: &usize| -> Result<(), Error> {
@@ -140,8 +146,11 @@ fn perform_all(
             if experiment.ray_cost.is_some() || experiment.tracing.is_some() && jobs[index].repetition == 0 {
                 trees.lock().unwrap_or_else(PoisonError::into_inner).insert(index, tree);
             }
-            finished.fetch_add(1, Relaxed);
+            let finished = finished.fetch_add(1, Relaxed) + 1;
             watch.bar.inc(1);
+            if watch.bar.is_hidden() && !quiet {
+                lines.say(experiment, &jobs[index], finished);
+            }
         }
         Ok(())
     };
@@ -152,6 +161,28 @@ fn perform_all(
     match finished.into_inner() {
         all if all == own.len() => Ok((trees.into_inner().unwrap_or_else(PoisonError::into_inner), redone)),
         finished => Err(Error::Interrupted { finished, runs: own.len() }),
+    }
+}
+
+/// What is said of finished runs on standard error where no bar can be drawn: a line a second at most, and the last.
+struct Lines {
+    all: usize,
+    start: Instant,
+    last: Mutex<Instant>,
+}
+
+impl Lines {
+    fn say(&self, experiment: &Experiment, job: &Job, finished: usize) {
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        if finished < self.all && last.elapsed() < Duration::from_secs(1) {
+            return;
+        }
+        *last = Instant::now();
+        let (scene, label) = (job.scene.name.escape_debug(), job.labelled.label.escape_debug());
+        let (name, all, seconds) = (&experiment.name, self.all, self.start.elapsed().as_secs());
+        // Whoever reads this may have left.
+        let _ =
+            writeln!(std::io::stderr(), "{name}: {finished} of {all} runs, {seconds} s: {label} on {scene}");
     }
 }
 

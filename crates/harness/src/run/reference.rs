@@ -10,9 +10,10 @@
 use crate::Error;
 use crate::files;
 use crate::report::Report;
-use crate::run::resolved::{LoadedScene, Resolved};
+use crate::run::resolved::{LoadedScene, Resolved, checksum};
 use crate::run::rows::{BoundRow, ROUNDING, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
 use crate::run::store::Store;
+use crate::scenes::Scene;
 use bvh_core::cost::Objective;
 use bvh_search::exact;
 use std::fs;
@@ -81,6 +82,15 @@ pub fn adopt(folder: &Path, out: &Path) -> Result<(), Error> {
         fs::copy(&recorded, &path).map_err(Error::io(&path, "write the file"))?;
     }
     Ok(())
+}
+
+/// The tree of least internal area that is known of this very scene.
+pub fn best_known(results: &Path, scene: &Scene) -> Result<Option<ReferenceRow>, Error> {
+    let path = results.join(BEST_KNOWN);
+    let known: Vec<ReferenceRow> = if path.is_file() { read(&path)? } else { vec![] };
+    let (checksum, objective) = (checksum(scene), name(&Objective::InternalArea));
+    let key = (scene.name.as_str(), scene.boxes.len(), checksum.as_str(), objective.as_str());
+    Ok(known.into_iter().find(|row| key_of(row) == key))
 }
 
 /// What a reference is of: scene, number of its objects, checksum of its boxes, and objective.

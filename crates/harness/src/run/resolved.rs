@@ -23,6 +23,11 @@ pub(crate) struct LoadedScene {
     pub checksum: String,
 }
 
+/// As in [`LoadedScene::checksum`].
+pub(crate) fn checksum(scene: &Scene) -> String {
+    format!("{:016x}", scene.checksum())
+}
+
 impl Resolved {
     /// An experiment with the scenes that were loaded for it.
     pub fn new(experiment: &Experiment, scenes: &[Scene]) -> Self {
@@ -30,7 +35,7 @@ impl Resolved {
             name: scene.name.clone(),
             kind: scene.kind.to_string(),
             objects: scene.boxes.len(),
-            checksum: format!("{:016x}", scene.checksum()),
+            checksum: checksum(scene),
         };
         Self { experiment: experiment.clone(), scenes: scenes.iter().map(loaded).collect() }
     }

@@ -2,6 +2,7 @@
 
 use super::fault::Fault;
 use super::{Contestant, Experiment, Labelled};
+use crate::report::Report;
 use crate::{scenes::subset, stress};
 use bvh_build::{Check, OutOfRange};
 use bvh_search::Method;
@@ -54,18 +55,19 @@ impl Experiment {
         Ok(())
     }
 
-    /// Checks that labels are unique, and the parameters of every method.
-    pub(super) fn check_methods(&self) -> Result<(), Fault> {
+    /// What is wrong with methods, one fault each: labels that are not unique, and parameters.
+    pub(super) fn check_methods(&self) -> Vec<Fault> {
         let mut labels = HashSet::new();
-        for (index, labelled) in self.methods.iter().enumerate() {
-            let at = |fault: Fault| fault.below(&format!("methods[{index}]"));
-            if !labels.insert(&labelled.label) {
+        let check = |(index, labelled): (usize, &Labelled)| {
+            let checked = if labels.insert(labelled.label.clone()) {
+                self.check_method(labelled)
+            } else {
                 let found = format!("{:?} for the second time", labelled.label);
-                return Err(at(Fault::new("label", found, "unique labels")));
-            }
-            self.check_method(labelled).map_err(at)?;
-        }
-        Ok(())
+                Err(Fault::new("label", found, "unique labels"))
+            };
+            checked.err().map(|fault| fault.below(&format!("methods[{index}]")))
+        };
+        self.methods.iter().enumerate().filter_map(check).collect()
     }
 
     fn check_method(&self, Labelled { method, judge, for_rays, .. }: &Labelled) -> Result<(), Fault> {
@@ -113,17 +115,14 @@ impl Experiment {
         }
     }
 
-    /// Checks that reports name only methods that there are.
-    pub(super) fn check_reports(&self) -> Result<(), Fault> {
-        let known: HashSet<&str> = self.methods.iter().map(|method| method.label.as_str()).collect();
-        for (index, report) in self.reports.iter().enumerate() {
-            if let Some((key, unknown)) = report.labels().into_iter().find(|(_, label)| !known.contains(label))
-            {
-                let known: Vec<&str> = self.methods.iter().map(|method| method.label.as_str()).collect();
-                let found = format!("{unknown:?}, no label of a method");
-                return Err(Fault::new(format!("reports[{index}].{key}"), found, known.join(", ")));
-            }
-        }
-        Ok(())
+    /// The first label in each report that no method has.
+    pub(super) fn check_reports(&self) -> Vec<Fault> {
+        let known: Vec<&str> = self.methods.iter().map(|method| method.label.as_str()).collect();
+        let check = |(index, report): (usize, &Report)| {
+            let (key, unknown) = report.labels().into_iter().find(|(_, label)| !known.contains(label))?;
+            let found = format!("{unknown:?}, no label of a method");
+            Some(Fault::new(format!("reports[{index}].{key}"), found, known.join(", ")))
+        };
+        self.reports.iter().enumerate().filter_map(check).collect()
     }
 }

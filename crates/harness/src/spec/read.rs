@@ -53,31 +53,55 @@ impl Experiment {
         let name = name.and_then(|name| Name::try_from(name.to_owned()));
         let name =
             name.map_err(|message| refuse(format!("the file's name without its extension: {message}")))?;
-        Self::from_table(table, name, overrides).map_err(|fault| {
-            // A key that `quick` replaces stands there, not where it is read.
-            let quick = overrides.quick.then(|| line_of(text, &format!("quick.{}", fault.key))).flatten();
-            let line = quick.or_else(|| line_of(text, &fault.key));
-            refuse(line.map_or_else(|| fault.to_string(), |line| format!("line {line}: {fault}")))
-        })
+        let mut experiment = Self::from_table(table, name, overrides).map_err(|faults| {
+            let said = |fault: &Fault| {
+                // A key that `quick` replaces stands there, not where it is read.
+                let quick = overrides.quick.then(|| line_of(text, &format!("quick.{}", fault.key))).flatten();
+                let line = quick.or_else(|| line_of(text, &fault.key));
+                line.map_or_else(|| fault.to_string(), |line| format!("line {line}: {fault}"))
+            };
+            let all: Vec<String> = faults.iter().map(said).collect();
+            refuse(all.join(&format!("\n{}: ", path.display())))
+        })?;
+        if let Some(folder) = path.parent().and_then(Path::to_str).filter(|_| overrides.scenes.is_empty()) {
+            let scenes = experiment.scenes.iter_mut().chain(&mut experiment.optional_scenes);
+            // Words are names.
+            let is_path =
+                |scene: &str| scene.split(':').next().is_some_and(|file| file.contains(['.', '/', '\\']));
+            for scene in scenes.filter(|scene| is_path(scene)) {
+                *scene = Path::new(folder).join(&*scene).to_string_lossy().into_owned();
+            }
+        }
+        Ok(experiment)
     }
 
-    fn from_table(mut table: Table, name: Name, overrides: &Overrides) -> Result<Self, Fault> {
+    /// The first fault of every table, if there are any.
+    fn from_table(mut table: Table, name: Name, overrides: &Overrides) -> Result<Self, Vec<Fault>> {
         if let Some((key, value)) = never_right(&table) {
-            return Err(Fault::new(key, value, "under any key finite numbers, and no dates"));
+            return Err(vec![Fault::new(key, value, "under any key finite numbers, and no dates")]);
         }
         match table.remove("quick") {
             Some(Value::Table(quick)) if overrides.quick => replace(&mut table, quick),
+            None if overrides.quick => {
+                return Err(vec![Fault::new("quick", "missing", "with --quick, a table of keys to replace")]);
+            }
             None | Some(Value::Table(_)) => {}
-            Some(found) => return Err(Fault::new("quick", found, "a table of keys to replace")),
+            Some(found) => return Err(vec![Fault::new("quick", found, "a table of keys to replace")]),
         }
+        let mut faults = Vec::new();
         // Serde forgets the path to an error within a table that says itself of which type it is.
-        let methods = list(&mut table, "methods", Labelled::read)?;
-        let reports = list(&mut table, "reports", |table| {
+        let methods = list(&mut table, "methods", Labelled::read, &mut faults);
+        let read = |table| {
             fault::tagged(table, "kind", |kind, config| Report::read(kind, config), || Report::NAMES.join(", "))
-        })?;
-        let mut experiment: Self = fault::deserialize(table)?;
+        };
+        let reports = list(&mut table, "reports", read, &mut faults);
+        let mut experiment: Self = match fault::deserialize(table) {
+            Ok(experiment) if faults.is_empty() => experiment,
+            Ok(_) => return Err(faults),
+            Err(fault) => return Err([vec![fault], faults].concat()),
+        };
         if experiment.name != Name::default() {
-            return Err(Fault::new("name", experiment.name, "none, the file's name is used"));
+            return Err(vec![Fault::new("name", experiment.name, "none, the file's name is used")]);
         }
         (experiment.name, experiment.quick) = (name, overrides.quick);
         (experiment.methods, experiment.reports) = (methods, reports);
@@ -91,25 +115,36 @@ impl Experiment {
         if experiment.suite.is_some() && experiment.methods.is_empty() {
             experiment.methods = Method::all().into_iter().map(Labelled::new).collect();
         }
-        experiment.check()?;
-        experiment.check_methods()?;
-        experiment.check_reports()?;
-        Ok(experiment)
+        let faults: Vec<Fault> = experiment.check().err().map(Fault::from).into_iter().collect();
+        let faults = [faults, experiment.check_methods(), experiment.check_reports()].concat();
+        if faults.is_empty() { Ok(experiment) } else { Err(faults) }
     }
 }
 
-/// Takes the list of tables under `key` out of a spec, and reads each table by `read`.
-fn list<T>(table: &mut Table, key: &str, read: impl Fn(Table) -> Result<T, Fault>) -> Result<Vec<T>, Fault> {
+/// Takes the list of tables under `key` out of a spec, and reads each table by `read`; faults are added to `faults`.
+fn list<T>(
+    table: &mut Table,
+    key: &str,
+    read: impl Fn(Table) -> Result<T, Fault>,
+    faults: &mut Vec<Fault>,
+) -> Vec<T> {
     let entries = match table.remove(key) {
-        None => return Ok(vec![]),
+        None => vec![],
         Some(Value::Array(entries)) => entries,
-        Some(found) => return Err(Fault::new(key, found, "a list of tables")),
+        Some(found) => {
+            faults.push(Fault::new(key, found, "a list of tables"));
+            vec![]
+        }
     };
     let read = |(at, entry): (usize, Value)| match entry {
         Value::Table(entry) => read(entry).map_err(|fault| fault.below(&format!("{key}[{at}]"))),
         found => Err(Fault::new(format!("{key}[{at}]"), found, "a table")),
     };
-    entries.into_iter().enumerate().map(read).collect()
+    entries
+        .into_iter()
+        .enumerate()
+        .filter_map(|entry| read(entry).map_err(|fault| faults.push(fault)).ok())
+        .collect()
 }
 
 /// The first value that no key takes, with its key: a number that is infinite or NaN, or a date.

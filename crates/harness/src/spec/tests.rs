@@ -200,3 +200,53 @@ fn naming_a_wrong_key_among_thousands_of_methods_takes_no_time() {
     assert!(message.contains("methods[2900].noise"), "{message}");
     assert!(start.elapsed().as_secs_f64() < 1.0, "{:?}", start.elapsed());
 }
+
+#[test]
+fn the_first_error_of_every_table_is_named_at_once() {
+    let method = |parameters: &str| format!("[[methods]]\nmethod = 'grasp'\n{parameters}\n");
+    let text = |methods: &[&str], report: &str| {
+        let methods: String = methods.iter().map(|parameters| method(parameters)).collect();
+        format!("question = 'q'\nscenes = ['escher']\n{methods}[[reports]]\n{report}\n")
+    };
+    // What cannot be read, and then what is out of range.
+    for (text, parts) in [
+        (
+            text(&["noise = 'x'", "", "trails = 1"], "kind = 'numbrs'"),
+            ["methods[0].noise", "methods[2].trails", "reports[0].kind"],
+        ),
+        (
+            text(
+                &["noise = 2.0", "label = 'a'", "label = 'a'"],
+                "kind = 'numbers'\ntitle = 't'\nmethods = ['b']",
+            ),
+            ["methods[0].noise", "methods[2].label", "reports[0].methods[0]"],
+        ),
+    ] {
+        let message = read(&text, &Overrides::default()).unwrap_err();
+        let lines: Vec<&str> = message.lines().collect();
+        assert_eq!(lines.len(), parts.len(), "{message}");
+        for (line, part) in lines.into_iter().zip(parts) {
+            assert!(line.contains("spec.toml: line ") && line.contains(part), "{line}");
+        }
+    }
+}
+
+#[test]
+fn quick_is_refused_where_nothing_says_what_it_is() {
+    let text = "question = 'q'\nscenes = ['escher']\n[[methods]]\nmethod = 'median_cut'\n";
+    let message = read(text, &Overrides { quick: true, ..Default::default() }).unwrap_err();
+    assert!(message.contains("quick is missing") && message.contains("--quick"), "{message}");
+}
+
+#[test]
+fn scenes_of_a_spec_are_found_from_its_folder_and_those_of_the_command_line_are_not() {
+    let text = "question = 'q'\nscenes = ['escher:random:9:1..2', 'a/b:random:9:1', '/c.obj', 'd.ply']\n[[methods]]\nmethod = 'median_cut'\n";
+    let scenes =
+        |overrides: &Overrides| Experiment::parse("x/y/spec.toml".as_ref(), text, overrides).unwrap().scenes;
+    assert_eq!(
+        scenes(&Overrides::default()),
+        ["escher:random:9:1..2", "x/y/a/b:random:9:1", "/c.obj", "x/y/d.ply"]
+    );
+    let given = Overrides { scenes: vec!["a/b.obj".into()], ..Default::default() };
+    assert_eq!(scenes(&given), ["a/b.obj"]);
+}
