@@ -11,8 +11,9 @@
 //! | what is nearest to a point? | [`nearest`] | about O(log n) for objects that are spread out |
 //! | what are the k nearest? | [`k_nearest`] | about O(k + log n) likewise |
 //!
-//! All of them go over the tree and not over the [wide layout](crate::WideBvh), which has only what rays can hit: it leaves out triangles
-//! without area, which lie in regions and near to points as others do.
+//! All of them go over the tree. The [wide layout](crate::WideBvh) has only what rays can hit, and answers rays only, with a filter by
+//! [`nearest_hit_where`](crate::WideBvh::nearest_hit_where): it leaves out triangles without area, which lie in regions and near to points
+//! as others do.
 //!
 //! ```
 //! use bvh_core::{Aabb, Bvh, Node, Triangle, query};

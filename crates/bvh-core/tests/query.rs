@@ -58,6 +58,37 @@ proptest! {
     }
 
     #[test]
+    fn a_region_may_meet_every_box_that_has_one_of_its_points(
+        (a, b, at) in (point(), point(), point()),
+        radius in 0.0f32..6.0,
+        planes in prop::collection::vec((point(), -6.0f32..6.0), 0..6),
+    ) {
+        let aabb = Aabb { min: at.min(b), max: at.max(b) };
+        // A point of the box, exactly: one of its corners, or `at` between them.
+        let inside = [at, b, Vec3::new(at.x, b.y, at.z)];
+        let region = Aabb { min: a.min(at), max: a.max(at) };
+        prop_assert!(region.may_meet(&aabb) && at.may_meet(&aabb));
+        let far = Aabb { min: aabb.max + 1.0, max: aabb.max + 2.0 };
+        prop_assert!(!aabb.may_meet(&far) && !far.max.may_meet(&aabb));
+        for p in inside {
+            let distance = p.as_dvec3().distance(a.as_dvec3());
+            if distance <= f64::from(radius) {
+                prop_assert!(Sphere::new(a, radius).may_meet(&aabb));
+            }
+            let side = |(n, d): &(Vec3, f32)| n.as_dvec3().dot(p.as_dvec3()) + f64::from(*d);
+            if planes.iter().all(|plane| side(plane) >= 0.0) {
+                let frustum = Frustum { planes: planes.iter().map(|(n, d)| [n.x, n.y, n.z, *d]).collect() };
+                prop_assert!(frustum.may_meet(&aabb));
+            }
+        }
+        // A plane beyond which the whole box lies.
+        let beyond = Frustum { planes: vec![[1.0, 0.0, 0.0, -aabb.max.x - 1.0]] };
+        prop_assert!(!beyond.may_meet(&aabb));
+        let touching = Sphere::new(aabb.max + Vec3::X * (radius + 1.0), radius);
+        prop_assert!(!touching.may_meet(&aabb));
+    }
+
+    #[test]
     fn the_nearest_objects_are_those_that_sorting_all_distances_puts_first(
         triangles in triangles(),
         at in point(),

@@ -165,6 +165,38 @@ fn a_refitted_layout_answers_as_brute_force_at_the_new_places() {
 }
 
 #[test]
+fn a_filter_passes_over_hits_and_sees_all_of_them_if_it_accepts_none() {
+    let mut random = Random(9);
+    let triangles = soup(150, &mut random);
+    let layouts = layouts(&triangles, &mut random);
+    let (mut found, mut several) = (0, 0);
+    for ray in rays(&triangles, 2000, &mut random) {
+        let shear = Shear::new(&ray);
+        let hit = |id: u32| Some(Hit { t: triangles[id as usize].intersect(&shear, ray.t_max())?, object: id });
+        let all: Vec<Hit> = (0..150).filter_map(hit).collect();
+        let kept = all.iter().filter(|hit| hit.object % 3 > 0);
+        let nearest = kept.min_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object))).copied();
+        for (_, layout) in &layouts {
+            assert_eq!(layout.nearest_hit_where(&ray, |hit| hit.object % 3 > 0), nearest);
+            assert_eq!(layout.any_hit_where(&ray, |hit| hit.object % 3 > 0), nearest.is_some());
+            let mut seen = Vec::new();
+            assert_eq!(
+                layout.nearest_hit_where(&ray, |hit| {
+                    seen.push(hit);
+                    false
+                }),
+                None
+            );
+            seen.sort_by_key(|hit| hit.object);
+            assert_eq!(seen, all);
+        }
+        found += usize::from(nearest.is_some());
+        several += usize::from(all.len() > 1);
+    }
+    assert!(found > 300 && several > 100, "{found} {several}");
+}
+
+#[test]
 fn a_refitted_layout_costs_no_less_than_a_new_one_of_the_refitted_tree() {
     let mut random = Random(8);
     let triangles = ball(3);

@@ -164,13 +164,41 @@ impl WideBvh {
     /// four objects for every block of triangles, whether these have so many or not. The same counts on every machine.
     #[inline(never)]
     pub fn nearest_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
-        walk::<false>(self, ray, counter)
+        walk::<false>(self, ray, counter, |_| true)
     }
 
     /// [`any_hit`](Self::any_hit) by [`Kernel::Portable`], with its tests counted likewise.
     #[inline(never)]
     pub fn any_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> bool {
-        walk::<true>(self, ray, counter).is_some()
+        walk::<true>(self, ray, counter, |_| true).is_some()
+    }
+
+    /// [`nearest_hit`](Self::nearest_hit) of the hits that `accept` does not pass over, by [`Kernel::Portable`]. `accept` sees hits in no
+    /// order, and no more than it takes to know the answer: all of them if it accepts none.
+    ///
+    /// ```
+    /// # use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};
+    /// # let triangles = [0.0, 1.0].map(|z| Triangle::from([[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]]));
+    /// # let tree = Bvh { nodes: vec![Node::leaf(Aabb::from([[0.0; 3], [1.0; 3]]), 0, 2)], prim_ids: vec![0, 1] };
+    /// # let wide = WideBvh::new(&tree, &triangles)?;
+    /// let ray = Ray::half_line([0.2, 0.2, 3.0], [0.0, 0.0, -1.0]).unwrap();
+    /// let masked = wide.nearest_hit_where(&ray, |hit| hit.object != 1);
+    /// assert_eq!(masked, Some(Hit { t: 3.0, object: 0 }));
+    /// let mut all = vec![];
+    /// wide.nearest_hit_where(&ray, |hit| {
+    ///     all.push(hit);
+    ///     false
+    /// });
+    /// assert_eq!(all.len(), 2);
+    /// # Ok::<(), bvh_core::InvalidBvh>(())
+    /// ```
+    pub fn nearest_hit_where(&self, ray: &Ray, accept: impl FnMut(Hit) -> bool) -> Option<Hit> {
+        walk::<false>(self, ray, &mut (), accept)
+    }
+
+    /// [`any_hit`](Self::any_hit) of the hits that `accept` does not pass over, likewise: for shadows of what is cut out.
+    pub fn any_hit_where(&self, ray: &Ray, accept: impl FnMut(Hit) -> bool) -> bool {
+        walk::<true>(self, ray, &mut (), accept).is_some()
     }
 
     /// Bytes of memory that nodes and triangles take.

@@ -81,8 +81,14 @@ impl WideRay {
     }
 }
 
-/// The nearest hit, or with `ANY` the first one found.
-pub(crate) fn walk<const ANY: bool>(wide: &WideBvh, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
+/// The nearest hit, or with `ANY` the first one found, of those that `accept` does.
+#[inline(always)]
+pub(crate) fn walk<const ANY: bool>(
+    wide: &WideBvh,
+    ray: &Ray,
+    counter: &mut impl Counter,
+    mut accept: impl FnMut(Hit) -> bool,
+) -> Option<Hit> {
     let mut child = wide.root?;
     let (shear, wide_ray) = (Shear::new(ray), WideRay::new(ray, &wide.bounds));
     let mut nearest: Option<Hit> = None;
@@ -109,6 +115,9 @@ pub(crate) fn walk<const ANY: bool>(wide: &WideBvh, ray: &Ray, counter: &mut imp
                         && let Some(t) = triangle.decide(&shear, t_max)
                     {
                         let hit = Hit { t, object };
+                        if !accept(hit) {
+                            continue;
+                        }
                         if ANY {
                             return Some(hit);
                         }

@@ -129,13 +129,13 @@ pub(crate) unsafe fn nearest<K: Instructions>(wide: &WideBvh, ray: &Ray) -> (f32
 #[cold]
 #[inline(never)]
 fn nearest_portable(wide: &WideBvh, ray: &Ray) -> (f32, u32) {
-    walk::<false>(wide, ray, &mut ()).map_or((0.0, u32::MAX), |hit| (hit.t, hit.object))
+    walk::<false>(wide, ray, &mut (), |_| true).map_or((0.0, u32::MAX), |hit| (hit.t, hit.object))
 }
 
 #[cold]
 #[inline(never)]
 fn any_portable(wide: &WideBvh, ray: &Ray) -> bool {
-    walk::<true>(wide, ray, &mut ()).is_some()
+    walk::<true>(wide, ray, &mut (), |_| true).is_some()
 }
 
 /// Whether the ray meets any triangle.
