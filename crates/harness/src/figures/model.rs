@@ -29,6 +29,11 @@ pub enum Look {
     Reference,
 }
 
+impl Look {
+    /// So many slots, the first, differ in colour.
+    pub const COLOURS: usize = 12;
+}
+
 /// One pair of axes with the layers drawn over each other, the first at the bottom of its kind:
 /// bands, then bars, error bars, reference lines, lines and points.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -18,7 +18,7 @@ pub(super) const FAINT: RGBColor = RGBColor(240, 240, 240);
 
 /// Okabe and Ito's colours without yellow, which is lost on white, and black, which is the reference's; then darker
 /// ones of Paul Tol's, brown and grey.
-const COLOURS: [RGBColor; 12] = [
+const COLOURS: [RGBColor; Look::COLOURS] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),

@@ -213,12 +213,15 @@ pub fn write_all(reports: &[Report], store: &Store, drawn: bool) -> Result<Strin
     if !paper.is_empty() {
         outputs.push(beside_paper(&paper)?);
     }
+    let shown: Vec<_> =
+        outputs.iter().flat_map(|output| &output.figures).map(|(_, figure)| series(figure)).collect();
+    let looks = looks(&methods, &shown);
     for output in &mut outputs {
         for (name, bytes) in &output.csv {
             store.write(&format!("{name}.csv"), bytes)?;
         }
         for (name, figure) in output.figures.iter_mut().filter(|_| drawn) {
-            figure.looks.extend(looks(&methods, figure));
+            figure.looks.extend(looks.iter().cloned());
             store.write(&format!("{name}.svg"), figures::svg(figure)?.as_bytes())?;
             store.write(&format!("{name}.png"), &figures::png(figure)?)?;
         }
@@ -261,12 +264,23 @@ fn final_costs(rows: &Rows) -> Result<Output, Error> {
     Ok(output)
 }
 
-/// The looks of the methods that a figure shows: the same in all figures of an experiment.
-fn looks(methods: &[&str], figure: &Figure) -> Vec<(String, Look)> {
-    let names = figure.panels.iter().flat_map(|panel| &panel.layers).filter_map(Layer::name);
-    let shown: BTreeSet<&str> = names.collect();
-    let slots = methods.iter().enumerate().filter(|(_, method)| shown.contains(*method));
-    slots.map(|(slot, method)| ((*method).to_owned(), Look::Slot(slot))).collect()
+/// The names of the series that a figure shows.
+fn series(figure: &Figure) -> BTreeSet<String> {
+    let layers = figure.panels.iter().flat_map(|panel| &panel.layers);
+    layers.filter_map(Layer::name).map(str::to_owned).collect()
+}
+
+/// The looks of an experiment's methods, the same in all its figures. If there are more methods than colours, those that share
+/// no figure may share a look.
+fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, Look)> {
+    let mut slots: Vec<usize> = Vec::new();
+    for (index, method) in methods.iter().enumerate() {
+        let shared = |other: &str| figures.iter().any(|shown| shown.contains(*method) && shown.contains(other));
+        let taken = |slot: usize| methods.iter().zip(&slots).any(|(other, at)| *at == slot && shared(other));
+        let free = (0..Look::COLOURS).find(|&slot| !taken(slot)).filter(|_| methods.len() > Look::COLOURS);
+        slots.push(free.unwrap_or(index));
+    }
+    methods.iter().zip(slots).map(|(method, slot)| ((*method).to_owned(), Look::Slot(slot))).collect()
 }
 
 /// The comparisons of all reports of an experiment with the paper. A number of the paper that several of ours are
@@ -292,4 +306,32 @@ fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
     let columns = ["scene", "quantity", "paper", "ours", "ours_low", "ours_high", "verdict"];
     output.show("What the paper says beside ours, which lies between low and high:", rows, &columns)?;
     Ok(output)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn methods_of_one_figure_share_no_colour_while_there_are_enough() {
+        let methods: Vec<String> = (0..16).map(|index| format!("method {index}")).collect();
+        let methods: Vec<&str> = methods.iter().map(String::as_str).collect();
+        let figure = |shown: &[usize]| shown.iter().map(|&index| methods[index].to_owned()).collect();
+        let figures: [BTreeSet<String>; 2] =
+            [figure(&[0, 1, 2, 3, 4, 7, 11, 12, 13, 14, 15]), figure(&[3, 4, 5, 6, 7, 8, 9, 10, 11, 14, 15])];
+        let few = looks(&methods[..12], &figures);
+        assert!(few.iter().enumerate().all(|(index, (_, look))| *look == Look::Slot(index)));
+        let looks = looks(&methods, &figures);
+        for shown in &figures {
+            let colours: BTreeSet<usize> = looks
+                .iter()
+                .filter(|(method, _)| shown.contains(method))
+                .map(|(_, look)| match look {
+                    Look::Slot(slot) => slot % Look::COLOURS,
+                    Look::Reference => panic!("no method is the reference"),
+                })
+                .collect();
+            assert_eq!(colours.len(), shown.len());
+        }
+    }
 }
