@@ -9,11 +9,23 @@
 //! Numbers are little-endian, and nodes are plain data: `bytemuck::cast_slice` gives their bytes on little-endian machines. The way back
 //! refuses indices that lead astray, and traces the same hits as the tree that went there, bit by bit: no box is ever smaller
 //! than in the tree.
+//!
+//! [`wgsl`] has compute shaders that trace rays through two of them; `examples/gpu` of the repository runs both.
 
 mod aila_laine;
 mod compressed;
 mod first_count;
 mod unpack;
+
+/// Compute shaders, each whole: buffers of nodes, object ids, corners and rays in, one of hits out, as its declarations say.
+pub mod wgsl {
+    /// Traces [`FirstCountNode`](super::FirstCountNode)s.
+    pub const BINARY: &str =
+        concat!(include_str!("../../shaders/trace.wgsl"), include_str!("../../shaders/binary.wgsl"));
+    /// Traces [`CompressedNode`](super::CompressedNode)s.
+    pub const COMPRESSED: &str =
+        concat!(include_str!("../../shaders/trace.wgsl"), include_str!("../../shaders/compressed.wgsl"));
+}
 
 pub use aila_laine::AilaLaineNode;
 pub use compressed::{CompressedBvh, CompressedNode};
