@@ -24,7 +24,9 @@ pub fn bake(boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
 }
 
 /// Improves a tree over `boxes` for about `time`: one from another library, or one that has been
-/// [refitted](Bvh::refit) to objects that moved. What [`optimize()`] says of trees holds here too.
+/// [refitted](Bvh::refit) to objects that moved. How far refitting has let it drift is the growth of its
+/// [internal area](bvh_core::cost::internal_area) over the root's, or of
+/// [`WideBvh::expected_visits`](bvh_core::WideBvh::expected_visits). What [`optimize()`] says of trees holds here too.
 pub fn improve(tree: &Bvh, boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
     let deadline = Deadline::after(time);
     optimize(tree, &Problem::new(boxes), &best::Config::default(), 1, Budget::UNLIMITED, &deadline)
