@@ -3,10 +3,10 @@
 //!
 //! `cargo run --release --manifest-path examples/gpu/Cargo.toml`
 
-use bvh_search::bvh_core::export::{CompressedBvh, wgsl};
+use bvh_search::bvh_core::export::{CompressedBvh, shaders};
 use bvh_search::prelude::*;
 use std::error::Error;
-use wgpu::{BindGroupEntry, BufferUsages, PollType};
+use wgpu::{BindGroupEntry, BufferUsages, PollType, ShaderSource};
 
 /// Hills of triangles, and a sheet above one half of them.
 fn scene() -> Result<Vec<Triangle>, Box<dyn Error>> {
@@ -32,11 +32,10 @@ fn rays() -> Result<Vec<Ray>, Box<dyn Error>> {
 /// The hits of `rays` by a shader, as distances and objects.
 fn trace(
     (device, queue): &(wgpu::Device, wgpu::Queue),
-    shader: &str,
+    source: ShaderSource,
     data: [&[u8]; 4],
     count: usize,
 ) -> Result<Vec<(f32, u32)>, Box<dyn Error>> {
-    let source = wgpu::ShaderSource::Wgsl(shader.into());
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
     let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: None,
@@ -100,14 +99,24 @@ fn main() -> Result<(), Box<dyn Error>> {
     let of_rays: Vec<f32> = rays.iter().flat_map(of_ray).flat_map(|v| v.to_array()).collect();
 
     let (nodes, compressed) = (tree.to_first_count(), CompressedBvh::new(&tree, &boxes)?);
+    let pairs = tree.to_aila_laine();
+    let wgsl = |text: &'static str| ShaderSource::Wgsl(text.into());
+    let glsl = ShaderSource::Glsl {
+        shader: shaders::AILA_LAINE.into(),
+        stage: wgpu::naga::ShaderStage::Compute,
+        defines: &[],
+    };
+    let boxes_of: (&[u8], &[u32]) = (bytemuck::cast_slice(&pairs), &tree.prim_ids);
     let binary: (&[u8], &[u32]) = (bytemuck::cast_slice(&nodes), &tree.prim_ids);
     let wide: (&[u8], &[u32]) = (bytemuck::cast_slice(&compressed.nodes), &compressed.prim_ids);
-    for (name, shader, (nodes, ids)) in
-        [("binary", wgsl::BINARY, binary), ("compressed", wgsl::COMPRESSED, wide)]
-    {
+    for (name, source, (nodes, ids)) in [
+        ("binary", wgsl(shaders::BINARY), binary),
+        ("children's boxes", glsl, boxes_of),
+        ("compressed", wgsl(shaders::COMPRESSED), wide),
+    ] {
         let data =
             [nodes, bytemuck::cast_slice(ids), bytemuck::cast_slice(&corners), bytemuck::cast_slice(&of_rays)];
-        let found = trace(&device, shader, data, rays.len())?;
+        let found = trace(&device, source, data, rays.len())?;
         // Of two triangles at an edge, or of almost the same distance, either will do.
         let same = |((t, object), expected): (&(f32, u32), &Option<Hit>)| match expected {
             Some(hit) => (t - hit.t).abs() <= 1e-5 * hit.t,

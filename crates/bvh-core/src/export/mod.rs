@@ -10,7 +10,7 @@
 //! refuses indices that lead astray, and traces the same hits as the tree that went there, bit by bit: no box is ever smaller
 //! than in the tree.
 //!
-//! [`wgsl`] has compute shaders that trace rays through two of them; `examples/gpu` of the repository runs both.
+//! [`shaders`] trace rays through them on a GPU; `examples/gpu` of the repository runs them all.
 
 mod aila_laine;
 mod compressed;
@@ -18,11 +18,13 @@ mod first_count;
 mod unpack;
 
 /// Compute shaders, each whole: buffers of nodes, object ids, corners and rays in, one of hits out, as its declarations say.
-pub mod wgsl {
-    /// Traces [`FirstCountNode`](super::FirstCountNode)s.
+pub mod shaders {
+    /// Traces [`AilaLaineNode`](super::AilaLaineNode)s; GLSL for Vulkan.
+    pub const AILA_LAINE: &str = include_str!("../../shaders/aila_laine.comp");
+    /// Traces [`FirstCountNode`](super::FirstCountNode)s; WGSL.
     pub const BINARY: &str =
         concat!(include_str!("../../shaders/trace.wgsl"), include_str!("../../shaders/binary.wgsl"));
-    /// Traces [`CompressedNode`](super::CompressedNode)s.
+    /// Traces [`CompressedNode`](super::CompressedNode)s; WGSL.
     pub const COMPRESSED: &str =
         concat!(include_str!("../../shaders/trace.wgsl"), include_str!("../../shaders/compressed.wgsl"));
 }
