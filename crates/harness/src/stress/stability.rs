@@ -264,8 +264,9 @@ fn report(store: &Store) -> Result<String, Error> {
         cells,
         classes: CLASSES.map(String::from).into(),
     };
-    store.write("stability.svg", figures::svg(&map)?.as_bytes())?;
-    store.write("stability.png", &figures::png(&map)?)?;
+    // Like the file of the other libraries: what is drawn depends on which are compiled in.
+    store.write("timing_stability.svg", figures::svg(&map)?.as_bytes())?;
+    store.write("timing_stability.png", &figures::png(&map)?)?;
     let count = |class| own.iter().filter(|row| row.outcome == class).count();
     let worst = own.iter().filter_map(|row| row.relative_error).fold(0.0, f64::max);
     let mut text = format!(
