@@ -12,7 +12,7 @@ pub mod top_down;
 pub use accelerator::{Accelerator, Query, Structure};
 pub use config::{Check, OutOfRange};
 pub use error::BuildError;
-pub use top_down::{Presorted, median_cut, muller_fellner};
+pub use top_down::{Presorted, median_cut, muller_fellner, spatial};
 
 /// A builder: a configuration that turns boxes into a tree, after it has been [checked](Check).
 pub trait Builder: Check {

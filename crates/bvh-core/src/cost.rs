@@ -46,6 +46,18 @@ pub fn internal_measure(tree: &Bvh, measure: &dyn Measure) -> f64 {
     inner.map(|node| measure.of(&PackedAabb::from(&node.aabb))).collect::<Sum>().value()
 }
 
+/// The total measure of the boxes of all nodes, leaves included. O(nodes).
+pub fn total_measure(tree: &Bvh, measure: &dyn Measure) -> f64 {
+    tree.nodes.iter().map(|node| measure.of(&PackedAabb::from(&node.aabb))).collect::<Sum>().value()
+}
+
+/// The total half area of the boxes of all nodes, leaves included, in world units squared: what remains of the surface area
+/// heuristic with equal constants where every leaf has one reference. Trees with [split references](crate::Clip) are searched
+/// by it. O(nodes).
+pub fn total_area(tree: &Bvh) -> f64 {
+    tree.nodes.iter().map(|node| node.aabb.half_area()).collect::<Sum>().value()
+}
+
 /// The constants of the surface area heuristic, in any common unit of time. With those that [`new`](Self::new) accepts,
 /// every tree of finite boxes has a finite cost.
 #[derive(Clone, Copy, Debug, PartialEq)]

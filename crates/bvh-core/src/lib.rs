@@ -6,6 +6,7 @@ extern crate alloc;
 
 mod aabb;
 mod bvh;
+mod clip;
 mod collapse;
 pub mod cost;
 mod dispatch;
@@ -29,6 +30,7 @@ mod wide;
 
 pub use aabb::{Aabb, InvalidBox, InvalidBoxReason, check_boxes};
 pub use bvh::{Bvh, BvhView, MAX_OBJECTS, Node, NodeKind};
+pub use clip::Clip;
 pub use collapse::collapse_leaves;
 pub use export::FirstCountNode;
 pub use instances::{Instance, InstanceHit, Instances, InvalidInstances};
@@ -43,7 +45,7 @@ pub use traverse::{
     Counter, TestCounts, any_hit, any_hit_by, any_hit_of_all, nearest_hit, nearest_hit_by, nearest_hit_of_all,
 };
 pub use triangle::{Shear, Triangle};
-pub use validate::{InvalidBvh, validate};
+pub use validate::{InvalidBvh, validate, validate_references};
 pub use wide::{Coherence, Kernel, RefitError, WideBvh};
 
 pub use glam;

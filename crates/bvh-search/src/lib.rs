@@ -35,8 +35,8 @@ pub use orders::{genetic, random_orders};
 #[cfg(feature = "serde")]
 pub use registry::Method;
 pub use run::{
-    Budget, Event, Judge, Observer, Outcome, Problem, Quota, Run, Search, SearchError, Shortcut, StopReason,
-    Stream, Tally, solve,
+    Budget, Event, Judge, Observer, Outcome, Problem, Quota, Run, Search, SearchError, Shortcut, Splits,
+    StopReason, Stream, Tally, solve,
 };
 #[cfg(feature = "std")]
 pub use run::{Deadline, Watched};

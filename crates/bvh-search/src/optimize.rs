@@ -72,7 +72,7 @@ impl From<'_> {
     fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let mut best = Incumbent::begin(self.tree.clone(), problem, run);
         let mut tree = best.working(metric)?;
-        best::improve(self.config, &mut tree, seed, &mut best, run);
+        best::improve(self.config, &mut tree, seed, None, &mut best, run);
         Ok(best.tree)
     }
 }

@@ -54,6 +54,14 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 1,10,60 SCENE..." {
     SMALLEST_SUBTREES: f64 = 0.5, "fraction of the size";
 }}
 
+// Split references.
+tuned! { "cargo bench -p harness --bench search -- --references 1.2 SCENE..." {
+    /// Ancestors whose boxes suggest planes at which to divide a leaf.
+    LEVELS_OF_PLANES: u32 = 12, "levels";
+    /// Part of the work that goes into dividing and reuniting, between the rounds of annealing.
+    WORK_ON_REFERENCES: f64 = 0.2, "fraction of the work of a round";
+}}
+
 // `best`, from a second on.
 tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 --threads 1,2 SCENE..." {
     /// Gain for which the incumbent is converted and reported before the end of an annealing run.

@@ -4,6 +4,7 @@ mod divide;
 pub mod median_cut;
 pub mod muller_fellner;
 mod presort;
+pub mod spatial;
 mod split_cost;
 mod sweep;
 

@@ -223,9 +223,13 @@ fn mark(marks: &mut [u8], slots: &[u32]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::find_fault;
+    use super::super::{Leaves, find_fault as fault};
     use super::*;
     use crate::{Bvh, InvalidBvh};
+
+    fn find_fault(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
+        fault(tree, objects, Leaves::One)
+    }
 
     const UNIT: Aabb = Aabb { min: glam::Vec3::ZERO, max: glam::Vec3::ONE };
 

@@ -1,10 +1,11 @@
 //! The one validator: whether nodes and object ids form a tree over exactly the given objects.
 
+mod covering;
 mod fast_path;
 
 pub(crate) use fast_path::FastPath;
 
-use crate::{Aabb, Bvh, BvhView, InvalidBoxReason, MAX_OBJECTS, NodeKind};
+use crate::{Aabb, Bvh, BvhView, Clip, InvalidBoxReason, MAX_OBJECTS, NodeKind};
 use alloc::vec::Vec;
 
 /// Why a tree was refused. Nodes and objects are named by index.
@@ -44,6 +45,9 @@ pub enum InvalidBvh {
     /// An object's box that is not inside its leaf's.
     #[error("object {object} is not inside its leaf {node}")]
     ObjectOutside { node: usize, object: usize },
+    /// A part of an object that is in none of its leaves.
+    #[error("the leaves of object {object} do not cover it")]
+    Uncovered { object: usize },
 }
 
 /// Checks that `tree` is a tree over exactly the objects of `boxes`: every node is reached once, every object is in
@@ -51,13 +55,54 @@ pub enum InvalidBvh {
 /// O(nodes + objects), no recursion; safe on any bits.
 pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
     check_structure(tree.into(), boxes.len())?;
+    check_nesting(tree)?;
     for (node, at) in tree.nodes.iter().enumerate() {
-        if let Some(child) = at.children().find(|&child| !at.aabb.contains(&tree.nodes[child].aabb)) {
-            return Err(InvalidBvh::ChildOutside { node, child });
-        }
         let mut objects = tree.prim_ids[at.prims()].iter().map(|&object| object as usize);
         if let Some(object) = objects.find(|&object| !at.aabb.contains(&boxes[object])) {
             return Err(InvalidBvh::ObjectOutside { node, object });
+        }
+    }
+    Ok(())
+}
+
+/// As [`validate`], for trees in which an object may be in several leaves: their boxes together must cover it. `objects` are
+/// those whose boxes are `boxes`. O(nodes + references), and O(k²) for an object that k leaves share.
+pub fn validate_references(tree: &Bvh, boxes: &[Aabb], objects: &dyn Clip) -> Result<(), InvalidBvh> {
+    if tree.prim_ids.len() == boxes.len() {
+        return validate(tree, boxes);
+    }
+    find_fault(tree.into(), boxes.len(), Leaves::OneOrMore)?;
+    check_nesting(tree)?;
+    let mut leaves_of = alloc::vec![0u32; boxes.len()];
+    tree.prim_ids.iter().for_each(|&object| leaves_of[object as usize] += 1);
+    let mut parts: Vec<(u32, u32)> = Vec::new();
+    for (node, at) in tree.nodes.iter().enumerate() {
+        for &object in &tree.prim_ids[at.prims()] {
+            if leaves_of[object as usize] > 1 {
+                parts.push((object, node as u32));
+            } else if !at.aabb.contains(&boxes[object as usize]) {
+                return Err(InvalidBvh::ObjectOutside { node, object: object as usize });
+            }
+        }
+    }
+    parts.sort_unstable();
+    let mut leaves = Vec::new();
+    for parts in parts.chunk_by(|a, b| a.0 == b.0) {
+        let object = parts[0].0;
+        leaves.clear();
+        leaves.extend(parts.iter().map(|&(_, node)| tree.nodes[node as usize].aabb));
+        if !covering::is_covered(objects, object, &boxes[object as usize], &leaves) {
+            return Err(InvalidBvh::Uncovered { object: object as usize });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a child's box that is not inside its parent's.
+fn check_nesting(tree: &Bvh) -> Result<(), InvalidBvh> {
+    for (node, at) in tree.nodes.iter().enumerate() {
+        if let Some(child) = at.children().find(|&child| !at.aabb.contains(&tree.nodes[child].aabb)) {
+            return Err(InvalidBvh::ChildOutside { node, child });
         }
     }
     Ok(())
@@ -69,24 +114,34 @@ pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
 /// Loading a tree spends most of its time here, so the most common kind of tree is passed by a check without
 /// unpredictable branches. Any other tree, and any fault, goes to [`find_fault`].
 pub(crate) fn check_structure(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
-    if FastPath::passes(tree, objects) { Ok(()) } else { find_fault(tree, objects) }
+    if FastPath::passes(tree, objects) { Ok(()) } else { find_fault(tree, objects, Leaves::One) }
+}
+
+/// How many leaves an object may be in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Leaves {
+    One,
+    OneOrMore,
 }
 
 /// The first fault in a tree's structure, if it has any.
-fn find_fault(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
-    let nodes = tree.nodes.len();
-    if objects > MAX_OBJECTS {
-        return Err(InvalidBvh::TooManyObjects { objects });
+pub(crate) fn find_fault(tree: BvhView, objects: usize, leaves: Leaves) -> Result<(), InvalidBvh> {
+    let (nodes, references) = (tree.nodes.len(), tree.prim_ids.len());
+    if objects.max(references) > MAX_OBJECTS {
+        return Err(InvalidBvh::TooManyObjects { objects: objects.max(references) });
     }
-    if tree.prim_ids.len() != objects {
-        return Err(InvalidBvh::ObjectCount { named: tree.prim_ids.len(), objects });
+    let split = leaves == Leaves::OneOrMore;
+    if references < objects || references > objects && (!split || objects == 0) {
+        return Err(InvalidBvh::ObjectCount { named: references, objects });
     }
-    if (nodes == 0) != (objects == 0) || nodes > 2 * objects {
+    if (nodes == 0) != (objects == 0) || nodes > 2 * references {
         return Err(InvalidBvh::NodeCount { nodes, objects });
     }
     let (mut reached, mut placed) = (Marks::new(nodes), Marks::new(objects));
+    // Positions in `prim_ids`. Without splits, each is in one leaf if each object is.
+    let mut positions = Marks::new(if split { references } else { 0 });
     // Every node but the root is a child once, every object in a leaf once, if none is repeated and the sums are right.
-    let (mut children, mut prims) = (0, 0);
+    let (mut children, mut prims, mut distinct) = (0, 0, 0);
     let mut repeated = None;
     for (index, node) in tree.nodes.iter().enumerate() {
         node.aabb.check().map_err(|reason| InvalidBvh::Box { node: index, reason })?;
@@ -106,15 +161,18 @@ fn find_fault(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
             }
             NodeKind::Leaf { first, count } => {
                 let range = node.prims();
-                if count < 1 || range.end > objects {
-                    return Err(InvalidBvh::BadLeaf { node: index, first, count, objects });
+                if count < 1 || range.end > references {
+                    return Err(InvalidBvh::BadLeaf { node: index, first, count, objects: references });
                 }
                 prims += range.len();
-                for &object in &tree.prim_ids[range] {
+                for position in range {
+                    let object = tree.prim_ids[position];
                     if object as usize >= objects {
                         return Err(InvalidBvh::BadObject { node: index, object, objects });
                     }
-                    if !placed.set(object as usize) {
+                    let is_new = placed.set(object as usize);
+                    distinct += usize::from(is_new);
+                    if split && !positions.set(position) || !split && !is_new {
                         repeated = Some(object as usize);
                     }
                 }
@@ -129,10 +187,14 @@ fn find_fault(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
     if let Some(object) = repeated {
         return Err(InvalidBvh::Leaves { object, leaves: 2 });
     }
-    if prims < objects
+    if distinct < objects
         && let Some(object) = (0..objects).find(|&object| !placed.get(object))
     {
         return Err(InvalidBvh::Leaves { object, leaves: 0 });
+    }
+    // Nothing is named in vain.
+    if prims < references {
+        return Err(InvalidBvh::ObjectCount { named: references, objects: prims });
     }
     Ok(())
 }

@@ -102,8 +102,11 @@ pub(crate) fn children(tree: &Bvh, decisions: &[Decision], subtree: usize) -> ([
 /// no rays are sampled.
 fn promise(tree: &Bvh, triangles: &[Triangle], visits: &[f32], decisions: &[Decision]) -> Vec<f32> {
     let mut areas = vec![0.0f64; tree.nodes.len()];
+    // Of a triangle in several leaves, each is taken to have the same part.
+    let mut leaves = vec![0u32; triangles.len()];
+    tree.prim_ids.iter().for_each(|&id| leaves[id as usize] += 1);
     for (index, node) in tree.nodes.iter().enumerate().rev() {
-        let own = |&id: &u32| triangles[id as usize].area();
+        let own = |&id: &u32| triangles[id as usize].area() / f64::from(leaves[id as usize]);
         areas[index] = tree.prim_ids[node.prims()].iter().map(own).sum::<f64>()
             + areas[node.children()].iter().sum::<f64>();
     }
@@ -151,6 +154,7 @@ pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) 
         }
     };
     let tree = &*tree;
+    let split = tree.prim_ids.len() > triangles.len();
     let blocks = |objects: u32| Some(BLOCK_COST * objects.div_ceil(TriangleBlock::LANES as u32) as f32);
     let decisions = decide(tree, &visits, blocks);
     let promise = promise(tree, triangles, &visits, &decisions);
@@ -162,6 +166,11 @@ pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) 
             let child = Child::leaf(wide.blocks.len() as u32);
             ids.clear();
             collect(tree, subtree, &mut ids);
+            if split {
+                // Several parts of one triangle in one leaf are the triangle.
+                ids.sort_unstable();
+                ids.dedup();
+            }
             ids.retain(|&id| !triangles[id as usize].is_degenerate());
             if ids.is_empty() {
                 continue;

@@ -27,7 +27,7 @@ pub use kernel::Kernel;
 pub use layout::WideBvh;
 pub use refit::RefitError;
 
-use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate};
+use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_references};
 use alloc::vec::Vec;
 use kernel::STACK;
 use portable::walk;
@@ -73,7 +73,7 @@ impl WideBvh {
 
     fn made(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) -> Result<Self, InvalidBvh> {
         let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
-        validate(tree, &boxes)?;
+        validate_references(tree, &boxes, &triangles)?;
         let mut wide = build::widen(tree, triangles, visits);
         wide.choose(Kernel::best());
         Ok(wide)

@@ -6,6 +6,7 @@
 
 mod metropolis;
 mod node_sampler;
+pub(crate) mod references;
 pub mod ruin_recreate;
 pub(crate) mod schedule;
 mod side;

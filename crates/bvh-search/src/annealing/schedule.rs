@@ -83,7 +83,7 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     tree: &mut Working<A>,
     [seed, first]: [u64; 2],
     observer: &dyn Observer,
-    round: &mut dyn FnMut(&Working<A>, Tally),
+    round: &mut dyn FnMut(&mut Working<A>, Tally),
 ) {
     let (n, Quota { work, moves }) = (tree.objects() as u64, schedule.quota);
     if n < 3 {

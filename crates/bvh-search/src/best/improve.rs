@@ -4,22 +4,25 @@ use super::config::{Config, Horizon};
 use super::plan::{Planned, plan};
 use super::recombine::recombine;
 use crate::annealing::cool;
+use crate::annealing::references::Divider;
 use crate::annealing::ruin_recreate::RuinMover;
 use crate::annealing::schedule::{Schedule, anneal};
 use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion;
 use crate::parallel::threads;
-use crate::run::{Observer, Quota, Run, Stream, Tally, stream};
+use crate::run::{Observer, Quota, Run, Splits, Stream, Tally, stream};
 use crate::tree::{Metric, Working};
 use crate::tuning::{
-    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, SUBTREES_PER_THREAD, WORTH_AN_EVENT, WORTH_SUBTREES,
+    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, SUBTREES_PER_THREAD, WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_SUBTREES,
 };
 
-/// Improves the incumbent, whose working form is `tree`, until the work is done or the time is over.
+/// Improves the incumbent, whose working form is `tree`, until the work is done or the time is over; with `splits`, its references
+/// as well.
 pub(crate) fn improve(
     config: &Config,
     tree: &mut Working<impl Metric>,
     seed: u64,
+    splits: Option<Splits>,
     best: &mut Incumbent,
     run: &mut Run,
 ) {
@@ -28,7 +31,8 @@ pub(crate) fn improve(
         return;
     }
     let (horizon, work) = config.horizon(n, run);
-    let mut search = Improvement { config, seed, n, left: work, best, run };
+    let divider = splits.map(Divider::new);
+    let mut search = Improvement { config, seed, n, left: work, divider, best, run };
     match horizon {
         Horizon::Known => search.until_known_end(tree),
         Horizon::Open => search.until_stopped(tree),
@@ -36,18 +40,20 @@ pub(crate) fn improve(
 }
 
 /// A search under way.
-struct Improvement<'a, 'p, 'r> {
+struct Improvement<'a, 'p, 'r, 's> {
     config: &'a Config,
     seed: u64,
     /// Number of objects.
     n: u64,
     /// The work that is left.
     left: u64,
+    /// What changes the references, if they may change.
+    divider: Option<Divider<'s>>,
     best: &'a mut Incumbent<'p>,
     run: &'a mut Run<'r>,
 }
 
-impl Improvement<'_, '_, '_> {
+impl Improvement<'_, '_, '_, '_> {
     /// The plan of annealing runs, each due at a fraction of the work or of the time.
     fn until_known_end(&mut self, tree: &mut Working<impl Metric>) {
         let (n, observer) = (self.n, self.run.observer());
@@ -120,11 +126,24 @@ impl Improvement<'_, '_, '_> {
             return;
         }
         let observer: &dyn Observer = &Until { observer: self.run.observer(), end: schedule.end };
-        let (mut annealed, mut done) = (tree.clone(), Tally::default());
-        // Every run has room for 2⁴⁰ random streams: those of 2¹⁶ rounds. Stream 0 is the probe's.
+        let mut done = Tally::default();
+        // Every run has room for 2⁴⁰ random streams: those of 2¹⁶ rounds. Stream 0 is the probe's, the last are the divider's.
         let streams = [self.seed, 1 + (number << 40)];
+        let mut division = stream(self.seed, (1 << 63) + number);
         let ruin = self.config.ruin(length);
         let (best, run) = (&mut *self.best, &mut *self.run);
+        // Trees with different references cannot be recombined. So only the first run, which is not recombined, changes them as it
+        // goes; the others do so before they begin.
+        if let Some(divider) = self.divider.as_mut().filter(|_| !first) {
+            tree.sort_in_preorder();
+            let work = (schedule.quota.work as f64 * WORK_ON_REFERENCES) as u64;
+            let tally = divider.pass(tree, run.left().at_most(work), &mut division, observer);
+            run.count(tally);
+            done += tally;
+            best.offer(tree, run);
+        }
+        let mut annealed = tree.clone();
+        let mut divider = self.divider.as_mut().filter(|_| first);
         anneal(
             || RuinMover::new(&ruin, length),
             schedule,
@@ -134,6 +153,12 @@ impl Improvement<'_, '_, '_> {
             &mut |tree, tally| {
                 done += tally;
                 run.count(tally);
+                if let Some(divider) = &mut divider {
+                    let work = (tally.work as f64 * WORK_ON_REFERENCES) as u64;
+                    let tally = divider.pass(tree, run.left().at_most(work), &mut division, observer);
+                    done += tally;
+                    run.count(tally);
+                }
                 if tree.area() < best.area() * (1.0 - WORTH_AN_EVENT) {
                     best.offer(tree, run);
                 }

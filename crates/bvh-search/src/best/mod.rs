@@ -50,8 +50,10 @@ mod small_budget;
 
 use crate::exact;
 use crate::local::incumbent::Incumbent;
-use crate::run::{Found, Problem, Run};
-use crate::tree::{Metric, search_by_metric};
+use crate::run::{Found, Problem, Run, Splits};
+use crate::tree::{Metric, WithLeaves, search_by_metric};
+use bvh_build::spatial;
+use bvh_core::Bvh;
 pub use config::{Config, Horizon};
 pub(crate) use improve::improve;
 use small_budget::SmallBudget;
@@ -61,6 +63,10 @@ search_by_metric!(Config);
 impl Config {
     /// Subtrees, if there are several, are annealed in parallel, each with a random stream of its own.
     fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
+        if let Some(splits) = problem.splits {
+            let tree = spatial::Config::default().build_at_most(splits.most, problem.boxes, splits.objects)?;
+            return self.with_splits(tree, splits, metric, problem, seed, run);
+        }
         let (_, work) = self.horizon(problem.boxes.len() as u64, run);
         if let Some(optimum) = exact::instead(problem, work, run)? {
             return Ok(optimum);
@@ -75,7 +81,23 @@ impl Config {
             Some(SmallBudget::LocalOptimum(best, tree)) => (best, tree),
             None => Incumbent::build(&self.start.clone().unwrap_or_default(), problem, metric, run)?,
         };
-        improve(self, &mut tree, seed, &mut best, run);
+        improve(self, &mut tree, seed, None, &mut best, run);
+        Ok(best.tree)
+    }
+
+    /// Improves a tree with one reference per leaf, and changes its references.
+    pub(crate) fn with_splits<A: Metric>(
+        &self,
+        tree: Bvh,
+        splits: Splits,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Found {
+        let mut best = Incumbent::begin(tree, problem, run);
+        let mut tree = best.working(WithLeaves(metric))?;
+        improve(self, &mut tree, seed, Some(splits), &mut best, run);
         Ok(best.tree)
     }
 }

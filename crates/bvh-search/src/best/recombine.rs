@@ -25,7 +25,7 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
             let node = &tree.nodes[at as usize];
             let [left, right] = node.children.map(|child| child as usize);
             keys[at as usize] = if node.is_leaf() {
-                (key(node.children[1]), 1)
+                (key_of_leaf::<A>(node), 1)
             } else {
                 (keys[left].0.wrapping_add(keys[right].0), keys[left].1 + keys[right].1)
             };
@@ -43,7 +43,7 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
         let node = &trees[which as usize].nodes[at as usize];
         let clades = &clade_of[which as usize];
         let cost = if node.is_leaf() {
-            0.0
+            A::LEAF * node.area
         } else {
             let [left, right] = node.children.map(|child| best[clades[child as usize] as usize].0);
             node.area + left + right
@@ -68,6 +68,18 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
         }
     }
     Working::from_nodes(nodes, trees[0].metric())
+}
+
+/// A key for what a leaf holds: its object, and where there are several leaves of one object, the part of it.
+fn key_of_leaf<A: Metric>(node: &Node) -> u128 {
+    let object = key(node.children[1]);
+    if A::LEAF == 0.0 {
+        return object;
+    }
+    let [low, high] = node.aabb.planes();
+    [low[0], low[1], low[2], high[0], high[1], high[2]]
+        .into_iter()
+        .fold(object, |sum, plane| sum.rotate_left(21).wrapping_mul(0x2d99_787926d46932a4c1f32680f70c55) ^ key(plane.to_bits()))
 }
 
 /// A key for an object, scattered over 128 bits: SplitMix64 (Steele, Lea & Flood 2014) twice.

@@ -45,8 +45,9 @@ impl<'p> Incumbent<'p> {
 
     /// Ends the run now or later, as soon as the tree meets a lower bound.
     pub fn bound(&mut self, run: &mut Run) {
-        // The bound is one of areas.
-        if self.problem.measure.is_none() && self.problem.allows(Shortcut::BoundMet) {
+        // The bound is one of areas of whole objects.
+        let of_areas = self.problem.measure.is_none() && self.problem.splits.is_none();
+        if of_areas && self.problem.allows(Shortcut::BoundMet) {
             self.lower_bound = lower_bound::of_largest(self.problem.boxes);
         }
         self.stop_if_optimal(run);
@@ -111,10 +112,10 @@ impl<'p> Incumbent<'p> {
     }
 }
 
-/// The tree's cost, and its internal area, which the measure replaces if the problem has one.
+/// The tree's cost, and its internal area, which the cost replaces if the problem has a measure or splits.
 fn costs(problem: &Problem, tree: &Bvh) -> (f64, f64) {
     let cost = problem.cost(tree);
-    if problem.measure.is_some() {
+    if problem.measure.is_some() || problem.splits.is_some() {
         return (cost, cost);
     }
     let area = if problem.objective == Objective::InternalArea { cost } else { cost::internal_area(tree) };

@@ -18,7 +18,7 @@ pub(crate) use error::Found;
 pub use error::SearchError;
 pub(crate) use observer::WORK_PER_POLL;
 pub use observer::{Event, Observer};
-pub use problem::{Judge, Problem, Shortcut};
+pub use problem::{Judge, Problem, Shortcut, Splits};
 pub use stream::Stream;
 pub(crate) use stream::stream;
 

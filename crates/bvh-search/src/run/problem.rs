@@ -1,13 +1,22 @@
 //! What a search is asked for, and what it may skip on the way because the answer stays the same.
 
 use bvh_core::cost::{self, Measure, Objective};
-use bvh_core::{Aabb, Bvh};
+use bvh_core::{Aabb, Bvh, Clip};
 use std::fmt::Debug;
 
 /// What judges whole trees in place of the cost, such as rays that are sent through them.
 pub trait Judge: Sync + Debug {
     /// Lower is better: finite and not negative, and always the same for the same tree.
     fn judge(&self, tree: &Bvh) -> f64;
+}
+
+/// Leave to divide objects among several leaves, each with the part of the object in its box.
+#[derive(Clone, Copy, Debug)]
+pub struct Splits<'a> {
+    /// The objects whose boxes the problem has.
+    pub objects: &'a dyn Clip,
+    /// Maximum number of references: leaves, for trees with one reference per leaf. At least the number of objects.
+    pub most: usize,
 }
 
 /// What is searched for: the tree over `boxes` of least cost.
@@ -20,6 +29,10 @@ pub struct Problem<'a> {
     /// The measure of boxes to minimise the sum of, over all inner nodes, in place of the objective. Searches minimise it
     /// directly; builders divide and cluster by area, and their trees are judged by it.
     pub measure: Option<&'a dyn Measure>,
+    /// Whether and how objects may be divided among leaves. [`best`](crate::best) and [`optimize`](crate::optimize()) do so; the
+    /// others take no notice. The cost is then the total size of *all* nodes, leaves included, by area or by the measure: what
+    /// leaves cost is no longer the same for all trees.
+    pub splits: Option<Splits<'a>>,
     /// What judges trees in place of both, for searches that make every tree anew: builders, GRASP without local search,
     /// insertion orders. The others change trees by the parts of a cost, and take no notice.
     pub judge: Option<&'a dyn Judge>,
@@ -30,15 +43,17 @@ pub struct Problem<'a> {
 impl<'a> Problem<'a> {
     /// The paper's problem: least total area of inner nodes.
     pub fn new(boxes: &'a [Aabb]) -> Self {
-        Self { boxes, objective: Objective::default(), measure: None, judge: None, disabled: &[] }
+        Self { boxes, objective: Objective::default(), measure: None, splits: None, judge: None, disabled: &[] }
     }
 
     /// The cost of a tree. O(nodes), unless there is a judge.
     pub fn cost(&self, tree: &Bvh) -> f64 {
-        match (self.judge, self.measure) {
-            (Some(judge), _) => judge.judge(tree),
-            (None, Some(measure)) => cost::internal_measure(tree, measure),
-            (None, None) => self.objective.cost(tree),
+        match (self.judge, self.splits, self.measure) {
+            (Some(judge), ..) => judge.judge(tree),
+            (None, Some(_), Some(measure)) => cost::total_measure(tree, measure),
+            (None, Some(_), None) => cost::total_area(tree),
+            (None, None, Some(measure)) => cost::internal_measure(tree, measure),
+            (None, None, None) => self.objective.cost(tree),
         }
     }
 

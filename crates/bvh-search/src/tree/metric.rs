@@ -2,14 +2,16 @@
 //!
 //! Searches are generic over it, so that the area costs no indirection.
 
-use bvh_core::cost::{self, Measure};
+use bvh_core::cost::{self, Measure, Sum};
 use bvh_core::{Bvh, PackedAabb};
 
 /// The size of a box: finite, not negative, and no smaller for a box that contains another.
 pub(crate) trait Metric: Copy + Send + Sync {
+    /// What a unit of a leaf's size costs beside one of an inner node's: 0 where every tree has the same leaves.
+    const LEAF: f64 = 0.0;
     /// The size of a box that is not empty.
     fn of(self, aabb: &PackedAabb) -> f64;
-    /// The total size of the boxes of all inner nodes.
+    /// The total size of the boxes of all inner nodes, and of the leaves as far as they count.
     fn internal(self, tree: &Bvh) -> f64;
 }
 
@@ -36,6 +38,24 @@ impl Metric for &dyn Measure {
 
     fn internal(self, tree: &Bvh) -> f64 {
         cost::internal_measure(tree, self)
+    }
+}
+
+/// As another metric, for trees whose leaves change because objects are divided among them: both kinds of nodes count, as in the
+/// surface area heuristic with equal constants.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct WithLeaves<A>(pub A);
+
+impl<A: Metric> Metric for WithLeaves<A> {
+    const LEAF: f64 = 1.0;
+
+    #[inline(always)]
+    fn of(self, aabb: &PackedAabb) -> f64 {
+        self.0.of(aabb)
+    }
+
+    fn internal(self, tree: &Bvh) -> f64 {
+        tree.nodes.iter().map(|node| self.0.of(&PackedAabb::from(&node.aabb))).collect::<Sum>().value()
     }
 }
 

@@ -18,7 +18,7 @@ mod subsets;
 use bvh_core::PackedAabb;
 use bvh_core::cost::Sum;
 pub(crate) use linked::Linked;
-pub(crate) use metric::{Area, Metric, search_by_metric};
+pub(crate) use metric::{Area, Metric, WithLeaves, search_by_metric};
 pub(crate) use position::{PositionSearch, Scope};
 pub(crate) use siblings::Siblings;
 pub(crate) use subsets::Subsets;
@@ -68,7 +68,7 @@ impl Node {
 pub(crate) struct Working<M = Area> {
     metric: M,
     pub nodes: Vec<Node>,
-    /// Total area of the inner nodes when the current change began, and the area it has added since.
+    /// [`area`](Self::area) when the current change began, and what the change has added since.
     area: Sum,
     added: f64,
     journal: Vec<Node>,
@@ -106,15 +106,25 @@ impl<M: Metric> Working<M> {
         self.nodes.len() / 2
     }
 
-    /// The total area of all inner nodes, kept incrementally by a compensated sum: every change adds one rounding error,
+    /// The total area of all inner nodes, and of the leaves as far as they count, kept incrementally by a compensated sum: every change adds one rounding error,
     /// and nothing else.
     pub fn area(&self) -> f64 {
         self.area.value() + self.added
     }
 
-    /// The total area of all inner nodes, recomputed. O(n).
+    /// [`area`](Self::area), recomputed. O(n).
     pub fn internal_area(&self) -> f64 {
-        self.nodes.iter().filter(|node| !node.is_leaf()).map(|node| node.area).collect::<Sum>().value()
+        self.nodes.iter().filter_map(|node| Self::part(node)).collect::<Sum>().value()
+    }
+
+    /// What a node adds to the area of the tree, if its kind adds anything.
+    #[inline(always)]
+    fn part(node: &Node) -> Option<f64> {
+        match node.is_leaf() {
+            false => Some(node.area),
+            true if M::LEAF > 0.0 => Some(M::LEAF * node.area),
+            true => None,
+        }
     }
 
     /// Begins a change, which can be undone as a whole until the next one begins.
@@ -209,6 +219,23 @@ impl<M: Metric> Working<M> {
         (added, visits)
     }
 
+    /// Adds a leaf that is not in the tree, with a parent of its own, so that it can be attached. The boxes are empty.
+    pub fn push_spare(&mut self, object: u32) -> u32 {
+        let leaf = self.nodes.len() as u32;
+        self.nodes.push(Node { parent: leaf + 1, children: [NONE, object], ..Node::ANCHOR });
+        self.nodes.push(Node { children: [leaf; 2], ..Node::ANCHOR });
+        leaf
+    }
+
+    /// Gives a detached leaf another box, of this area. What leaves cost changes with it.
+    #[inline(always)]
+    pub fn resize_leaf(&mut self, leaf: u32, object: u32, aabb: PackedAabb, area: f64) {
+        let node = self.write(leaf);
+        let before = node.area;
+        (node.children, node.aabb, node.area) = ([NONE, object], aabb, area);
+        self.added += M::LEAF * (area - before);
+    }
+
     /// The box around two nodes.
     #[inline(always)]
     pub fn union_of(&self, [left, right]: [u32; 2]) -> PackedAabb {
@@ -259,8 +286,10 @@ impl<M: Metric> Working<M> {
             let (at, node) = (nodes.len() as u32, self.nodes[old as usize]);
             nodes.push(Node { parent, stamp: 0, ..node });
             nodes[parent as usize].children[side] = at;
+            if let Some(part) = Self::part(&node) {
+                area.add(part);
+            }
             if !node.is_leaf() {
-                area.add(node.area);
                 stack.extend([(node.children[1], at, 1), (node.children[0], at, 0)]);
             }
         }

@@ -1,0 +1,272 @@
+//! Moves that change which references there are: an object is divided between two leaves, or two leaves of it are reunited.
+//!
+//! ```text
+//!     P ⊇ L ∪ T                        P' ⊇ L ∪ T₁      Q' ⊇ R ∪ T₂
+//!     ├── L       T sticks far   ⇒     ├── L            ├── R
+//!     └── T       out of L             └── T₁           └── T₂
+//! ```
+//!
+//! A leaf that makes its ancestors large is cut where one of them would end without it; each part then gets the best position.
+//! A move is kept if the tree's cost, leaves included, falls. Reuniting is the same
+//! backwards. So a split that does not pay is undone, whoever made it.
+//!
+//! Spatial splits: Stich, Friedrich & Dietrich 2009. Search over them is ours.
+
+use crate::run::{Observer, Quota, Splits, Stream, Tally, WORK_PER_POLL};
+use crate::tree::{ANCHOR, Metric, NONE, Node, PositionSearch, Scope, Working};
+use crate::tuning::LEVELS_OF_PLANES;
+use bvh_core::{Aabb, PackedAabb, with_vector_instructions};
+use rand::RngExt;
+
+/// Changes the references of a tree.
+#[derive(Debug)]
+pub(crate) struct Divider<'a> {
+    splits: Splits<'a>,
+    search: PositionSearch,
+    /// Per leaf, another one of the same object: the leaves of an object form a ring.
+    ring: Vec<u32>,
+    /// Leaves out of the tree, each with its spare parent.
+    spares: Vec<u32>,
+    /// References in the tree.
+    count: usize,
+    planes: Vec<(usize, f32)>,
+    /// Nodes visited outside of the position search.
+    visits: u64,
+}
+
+impl<'a> Divider<'a> {
+    pub fn new(splits: Splits<'a>) -> Self {
+        let (search, ring, spares, planes) = Default::default();
+        Self { splits, search, ring, spares, count: 0, planes, visits: 0 }
+    }
+
+    /// Tries to reunite the leaves of every object, and to divide leaves until `quota` is used up. The tree is in preorder before
+    /// and after.
+    pub fn pass<A: Metric>(
+        &mut self,
+        tree: &mut Working<A>,
+        quota: Quota,
+        rng: &mut Stream,
+        observer: &dyn Observer,
+    ) -> Tally {
+        self.tie(tree);
+        let tally = change(self, tree, quota, rng, observer);
+        tree.sort_in_preorder();
+        tally
+    }
+
+    /// Ties the leaves of every object to a ring. O(nodes).
+    fn tie(&mut self, tree: &Working<impl Metric>) {
+        self.ring.clear();
+        self.ring.resize(tree.nodes.len(), NONE);
+        self.spares.clear();
+        self.count = tree.objects();
+        let leaves = || (0..).zip(&tree.nodes).skip(1).filter(|(_, node)| node.is_leaf());
+        let objects = leaves().map(|(_, node)| node.children[1] as usize + 1).max().unwrap_or(0);
+        let mut last = vec![NONE; objects];
+        for (at, node) in leaves() {
+            let last = &mut last[node.children[1] as usize];
+            self.ring[at as usize] = at;
+            if *last != NONE {
+                self.ring[at as usize] = self.ring[*last as usize];
+                self.ring[*last as usize] = at;
+            }
+            *last = at;
+        }
+    }
+
+    /// Reunites `leaf` with `other`, another leaf of its object, if that costs less.
+    #[inline(always)]
+    fn reunite(&mut self, tree: &mut Working<impl Metric>, leaf: u32, other: u32) -> bool {
+        let [a, b] = [leaf, other].map(|leaf| tree.nodes[leaf as usize]);
+        if b.parent == ANCHOR {
+            return false;
+        }
+        let object = a.children[1];
+        let whole = self.splits.objects.clip(object, &Aabb::from(&a.aabb.union(&b.aabb)));
+        if whole == Aabb::EMPTY {
+            return false;
+        }
+        let whole = PackedAabb::from(&whole);
+        let area = tree.metric().of(&whole);
+        tree.begin();
+        let (saved_other, _, visits) = tree.detach(other);
+        self.visits += visits;
+        if tree.nodes[leaf as usize].parent == ANCHOR {
+            tree.undo();
+            return false;
+        }
+        let (saved, sibling, visits) = tree.detach(leaf);
+        self.visits += visits;
+        let limit = saved + saved_other + leaf_cost(tree, a.area + b.area - area);
+        tree.resize_leaf(other, object, PackedAabb::EMPTY, 0.0);
+        tree.resize_leaf(leaf, object, whole, area);
+        let position = (area < limit)
+            .then(|| self.search.detached(tree, Scope::ALL, (&whole, area), sibling, limit))
+            .flatten();
+        let Some(position) = position else {
+            tree.undo();
+            return false;
+        };
+        self.visits += tree.attach(leaf, position.beside).1;
+        let mut before = leaf;
+        while self.ring[before as usize] != other {
+            before = self.ring[before as usize];
+        }
+        self.ring[before as usize] = self.ring[other as usize];
+        self.spares.push(other);
+        self.count -= 1;
+        true
+    }
+
+    /// Divides `leaf` at a random plane of those that suggest themselves, if that costs less.
+    #[inline(always)]
+    fn divide(&mut self, tree: &mut Working<impl Metric>, leaf: u32, rng: &mut Stream) -> bool {
+        let Node { aabb, area, children: [_, object], parent, .. } = tree.nodes[leaf as usize];
+        if parent == ANCHOR || self.count >= self.splits.most {
+            return false;
+        }
+        self.find_planes(tree, leaf);
+        if self.planes.is_empty() {
+            return false;
+        }
+        let (axis, at) = self.planes[rng.random_range(0..self.planes.len())];
+        let [mut low, mut high] = [Aabb::from(&aabb); 2];
+        low.max[axis] = at;
+        high.min[axis] = at;
+        let parts = [low, high].map(|region| self.splits.objects.clip(object, &region));
+        if parts.contains(&Aabb::EMPTY) {
+            return false;
+        }
+        let parts = parts.map(|part| PackedAabb::from(&part));
+        let areas = parts.map(|part| tree.metric().of(&part));
+        tree.begin();
+        let (saved, sibling, visits) = tree.detach(leaf);
+        self.visits += visits;
+        let mut limit = saved + leaf_cost(tree, area - areas[0] - areas[1]);
+        if limit <= areas[0] + areas[1] {
+            tree.undo();
+            return false;
+        }
+        let spare = self.spares.last().copied().unwrap_or_else(|| {
+            let spare = tree.push_spare(object);
+            self.ring.resize(tree.nodes.len(), NONE);
+            self.spares.push(spare);
+            spare
+        });
+        for (side, leaf) in [leaf, spare].into_iter().enumerate() {
+            let (part, area) = (parts[side], areas[side]);
+            tree.resize_leaf(leaf, object, part, area);
+            // The other part costs its own area at least.
+            let rest = if side == 0 { areas[1] } else { 0.0 };
+            let Some(position) = self.search.detached(tree, Scope::ALL, (&part, area), sibling, limit - rest) else {
+                tree.undo();
+                return false;
+            };
+            self.visits += tree.attach(leaf, position.beside).1;
+            limit -= position.cost;
+        }
+        self.spares.pop();
+        self.ring[spare as usize] = self.ring[leaf as usize];
+        self.ring[leaf as usize] = spare;
+        self.count += 1;
+        true
+    }
+
+    /// Finds the planes at which to cut a leaf: those where an ancestor would end without it, and the middle of its longest side.
+    #[inline(always)]
+    fn find_planes(&mut self, tree: &Working<impl Metric>, leaf: u32) {
+        let item = tree.nodes[leaf as usize].aabb;
+        let [negated_low, high] = item.planes();
+        self.planes.clear();
+        let (mut below, mut at) = (leaf, tree.nodes[leaf as usize].parent);
+        let mut rest = PackedAabb::EMPTY;
+        for _ in 0..LEVELS_OF_PLANES {
+            if at == ANCHOR || rest.union(&item) == rest {
+                break;
+            }
+            rest.grow(&tree.nodes[tree.nodes[at as usize].other(below) as usize].aabb);
+            let [negated_rest_low, rest_high] = rest.planes();
+            for axis in 0..3 {
+                for plane in [-negated_rest_low[axis], rest_high[axis]] {
+                    if -negated_low[axis] < plane && plane < high[axis] {
+                        self.planes.push((axis, plane));
+                    }
+                }
+            }
+            self.visits += 1;
+            (below, at) = (at, tree.nodes[at as usize].parent);
+        }
+        let aabb = Aabb::from(&item);
+        let axis = aabb.longest_axis();
+        let middle = (0.5 * aabb.doubled_centroid()[axis]) as f32;
+        if aabb.min[axis] < middle && middle < aabb.max[axis] {
+            self.planes.push((axis, middle));
+        }
+    }
+}
+
+/// What leaves of this size cost.
+fn leaf_cost<A: Metric>(_: &Working<A>, area: f64) -> f64 {
+    A::LEAF * area
+}
+
+with_vector_instructions! {
+    /// The moves of [`Divider::pass`].
+    change = change_plain<A: Metric>(
+        divider: &mut Divider<'_>, tree: &mut Working<A>, quota: Quota, rng: &mut Stream, observer: &dyn Observer)
+        -> Tally
+}
+
+#[inline(always)]
+fn change_plain<A: Metric>(
+    divider: &mut Divider<'_>,
+    tree: &mut Working<A>,
+    quota: Quota,
+    rng: &mut Stream,
+    observer: &dyn Observer,
+) -> Tally {
+    let (mut done, before) = (Tally::default(), divider.visits + divider.search.visits);
+    let mut poll = WORK_PER_POLL;
+    let mut is_over = |divider: &Divider, done: &mut Tally| {
+        done.work = divider.visits + divider.search.visits - before;
+        let polled = done.work >= poll;
+        if polled {
+            poll = done.work + WORK_PER_POLL;
+        }
+        quota.is_reached(done) || polled && observer.cancelled()
+    };
+    let mut sums = Vec::with_capacity(tree.nodes.len());
+    let mut sum = 0.0;
+    let leaves: Vec<u32> = (1..tree.nodes.len() as u32).filter(|&at| tree.nodes[at as usize].is_leaf()).collect();
+    for &leaf in &leaves {
+        // Of two leaves, the one that comes later in the ring is the one that goes.
+        loop {
+            let other = divider.ring[leaf as usize];
+            if other == NONE || other <= leaf || is_over(divider, &mut done) {
+                break;
+            }
+            done.moves += 1;
+            if !divider.reunite(tree, leaf, other) {
+                break;
+            }
+            divider.ring[other as usize] = NONE;
+            done.kept += 1;
+        }
+    }
+    for &leaf in &leaves {
+        let out = divider.ring[leaf as usize] == NONE;
+        sum += if out { 0.0 } else { tree.nodes[leaf as usize].area.sqrt() + f64::MIN_POSITIVE };
+        sums.push(sum);
+    }
+    while !leaves.is_empty() && divider.count < divider.splits.most && !is_over(divider, &mut done) {
+        let drawn = rng.random::<f64>() * sum;
+        let leaf = leaves[sums.partition_point(|&sum| sum <= drawn).min(leaves.len() - 1)];
+        done.moves += 1;
+        divider.visits += 1;
+        if divider.ring[leaf as usize] != NONE {
+            done.kept += u64::from(divider.divide(tree, leaf, rng));
+        }
+    }
+    done
+}
