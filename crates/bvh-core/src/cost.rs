@@ -6,6 +6,7 @@
 
 use crate::{Bvh, Node, NodeKind, PackedAabb};
 
+pub use crate::layout_cost::{LayoutCost, layout_area, layout_measure};
 pub use crate::overlap::end_point_overlap;
 
 /// The cost that a search minimises and that results report as `cost`.
@@ -19,6 +20,8 @@ pub enum Objective {
     GoldsmithSalmon,
     /// [`sah`] with the given constants.
     Sah(SahConstants),
+    /// [`layout_area`]: what is traced through, once the tree becomes a [`WideBvh`](crate::WideBvh).
+    Layout,
 }
 
 impl Objective {
@@ -28,6 +31,7 @@ impl Objective {
             Self::InternalArea => internal_area(tree),
             Self::GoldsmithSalmon => goldsmith_salmon(tree),
             Self::Sah(constants) => sah(tree, constants),
+            Self::Layout => layout_area(tree),
         }
     }
 }
@@ -244,9 +248,12 @@ mod tests {
         };
         let single = Bvh { nodes: vec![Node::leaf(point, 0, 1)], prim_ids: vec![0] };
         for tree in [Bvh::default(), single, flat] {
-            for objective in
-                [Objective::InternalArea, Objective::GoldsmithSalmon, Objective::Sah(SahConstants::default())]
-            {
+            for objective in [
+                Objective::InternalArea,
+                Objective::GoldsmithSalmon,
+                Objective::Sah(SahConstants::default()),
+                Objective::Layout,
+            ] {
                 assert_eq!(objective.cost(&tree), 0.0, "{objective:?} of {tree:?}");
             }
         }

@@ -13,6 +13,7 @@ mod dispatch;
 pub mod export;
 pub mod file;
 mod instances;
+mod layout_cost;
 mod mesh;
 mod overlap;
 mod packed;

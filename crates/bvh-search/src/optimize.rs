@@ -1,12 +1,11 @@
 //! Any binary tree in, a better one out: for callers with a builder of their own.
 
 use crate::best;
-use crate::local::incumbent::Incumbent;
 use crate::run::{Budget, Found, Observer, Outcome, Problem, Run, SearchError, solve};
 use crate::tree::{Metric, search_by_metric};
 use bvh_build::{Check, OutOfRange};
 use bvh_core::cost::Objective;
-use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate};
+use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate, validate_references};
 
 /// Improves `tree`, over the objects of the problem, by [`best`](crate::best) without its builder, until the
 /// budget is spent or the observer cancels. The result has the same leaves with the same objects; leaves of several
@@ -14,6 +13,9 @@ use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate};
 /// its place, with boxes made tight, and never above that of `tree`.
 ///
 /// [`improve`](crate::improve) is the same for a given time, with every parameter at its default.
+///
+/// If objects may be divided among leaves, or if the cost is that of the [layout](Objective::Layout), which makes leaves of its own,
+/// every leaf of several objects is first divided into leaves of one; boxes are then those of the objects, or of their parts.
 ///
 /// Refuses trees that are not [valid](validate), and inner nodes with more than two children.
 pub fn optimize(
@@ -26,7 +28,14 @@ pub fn optimize(
 ) -> Result<Outcome, SearchError> {
     let boxes = problem.boxes;
     check_boxes(boxes).map_err(bvh_build::BuildError::from)?;
-    validate(tree, boxes)?;
+    match problem.splits {
+        Some(splits) => validate_references(tree, boxes, splits.objects)?,
+        None => validate(tree, boxes)?,
+    }
+    if problem.splits.is_some() || problem.objective == Objective::Layout {
+        let tree = one_reference_per_leaf(tree, problem);
+        return solve(&From { tree, config }, problem, seed, budget, observer);
+    }
     // To the search, every leaf is one object with the box of the leaf.
     let (mut tight, mut leaves) = (tree.clone(), Vec::new());
     tight.refit(boxes);
@@ -54,6 +63,42 @@ pub fn optimize(
     Ok(outcome)
 }
 
+/// The same tree with tight boxes and one reference per leaf: leaves of several are halved in their order.
+fn one_reference_per_leaf(tree: &Bvh, problem: &Problem) -> Bvh {
+    let mut single = tree.clone();
+    let mut at = 0;
+    while at < single.nodes.len() {
+        let node = single.nodes[at];
+        let range = node.prims();
+        if range.len() > 1 {
+            let middle = range.start + range.len() / 2;
+            single.nodes[at] = Node::inner(node.aabb, single.nodes.len() as u32, 2);
+            let halves = [range.start..middle, middle..range.end];
+            single.nodes.extend(halves.map(|half| Node::leaf(node.aabb, half.start as u32, half.len() as u32)));
+        }
+        at += 1;
+    }
+    let split = problem.splits.filter(|_| tree.prim_ids.len() > problem.boxes.len());
+    for at in (0..single.nodes.len()).rev() {
+        let node = single.nodes[at];
+        let below = single.nodes[node.children()].iter();
+        let aabb = match (node.kind(), split) {
+            (NodeKind::Inner { .. }, _) => below.fold(Aabb::EMPTY, |aabb, child| aabb.union(&child.aabb)),
+            (NodeKind::Leaf { first, .. }, None) => problem.boxes[single.prim_ids[first as usize] as usize],
+            (NodeKind::Leaf { first, .. }, Some(splits)) => {
+                let part = splits.objects.clip(single.prim_ids[first as usize], &node.aabb);
+                // A reference to nothing does no harm.
+                if part == Aabb::EMPTY { node.aabb } else { part }
+            }
+        };
+        single.nodes[at] = match node.kind() {
+            NodeKind::Inner { first, count } => Node::inner(aabb, first, count),
+            NodeKind::Leaf { first, count } => Node::leaf(aabb, first, count),
+        };
+    }
+    single
+}
+
 /// `best`, from a given tree.
 struct From<'a> {
     tree: Bvh,
@@ -70,9 +115,6 @@ search_by_metric!(From<'_>);
 
 impl From<'_> {
     fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
-        let mut best = Incumbent::begin(self.tree.clone(), problem, run);
-        let mut tree = best.working(metric)?;
-        best::improve(self.config, &mut tree, seed, None, &mut best, run);
-        Ok(best.tree)
+        self.config.improved(self.tree.clone(), metric, problem, seed, run)
     }
 }

@@ -54,10 +54,22 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 1,10,60 SCENE..." {
     SMALLEST_SUBTREES: f64 = 0.5, "fraction of the size";
 }}
 
+// The cost of the wide layout.
+tuned! { "cargo bench -p harness --bench search -- --objective layout SCENE..." {
+    /// How much more a move may add to the area than a temperature would allow, before the layout judges it.
+    DEARER_BY_AREA: f64 = 10.0, "factor";
+    /// Temperatures for the cost of the layout, which is about a third of the tree's area and falls by small moves.
+    LAYOUT_HEAT: f64 = 0.05, "factor";
+    /// Rounds of annealing between two looks at the cost of the layout, which take as long as ten moves per object.
+    ROUNDS_PER_LOOK: u64 = 8, "rounds";
+}}
+
 // Split references.
 tuned! { "cargo bench -p harness --bench search -- --references 1.2 SCENE..." {
     /// Ancestors whose boxes suggest planes at which to divide a leaf.
     LEVELS_OF_PLANES: u32 = 12, "levels";
+    /// As `DEARER_BY_AREA`, for moves that divide or reunite.
+    DIVISION_DEARER_BY_AREA: f64 = 2.0, "factor";
     /// Part of the work that goes into dividing and reuniting, between the rounds of annealing.
     WORK_ON_REFERENCES: f64 = 0.2, "fraction of the work of a round";
 }}

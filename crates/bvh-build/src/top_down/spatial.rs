@@ -247,7 +247,12 @@ impl Build<'_> {
                 let (behind, left) = &after[bin];
                 // A side with all references divides nothing.
                 let all = references.len();
-                if entered == 0 || *left == 0 || entered >= all || *left >= all || entered + left - all > self.extra {
+                if entered == 0
+                    || *left == 0
+                    || entered >= all
+                    || *left >= all
+                    || entered + left - all > self.extra
+                {
                     continue;
                 }
                 let cost = self.cost(&before, entered) + self.cost(behind, *left);

@@ -59,6 +59,7 @@ impl Header {
             Objective::InternalArea => (0u32, [0.0; 2]),
             Objective::GoldsmithSalmon => (1, [0.0; 2]),
             Objective::Sah(constants) => (2, [constants.traversal, constants.intersection]),
+            Objective::Layout => (3, [0.0; 2]),
         };
         let mut bytes = Vec::with_capacity(Self::BYTES);
         bytes.extend_from_slice(&Self::MAGIC);
@@ -117,6 +118,7 @@ impl Header {
             0 => Objective::InternalArea,
             1 => Objective::GoldsmithSalmon,
             2 => Objective::Sah(constants),
+            3 => Objective::Layout,
             _ => return Err(FileError::Field("objective")),
         };
         if objective != Objective::Sah(constants) && [traversal, intersection].map(f64::to_bits) != [0; 2] {

@@ -87,7 +87,10 @@ mod tests {
                 let mut smaller = leaves.clone();
                 let extent = smaller[at].extent()[axis] as f32;
                 smaller[at].min[axis] += 0.01 * extent;
-                assert!(extent == 0.0 || !is_covered(&objects, 0, &whole, &smaller), "{at} smaller along {axis}");
+                assert!(
+                    extent == 0.0 || !is_covered(&objects, 0, &whole, &smaller),
+                    "{at} smaller along {axis}"
+                );
             }
         }
     }

@@ -9,9 +9,9 @@ use crate::{Aabb, Bvh, NodeKind, Triangle};
 use alloc::{vec, vec::Vec};
 
 /// Expected time of visiting a wide node, in any unit. With a block's, measured; the layout depends little on them.
-const NODE_COST: f32 = 1.0;
+pub(crate) const NODE_COST: f32 = 1.0;
 /// Expected time of testing a block.
-const BLOCK_COST: f32 = 1.0;
+pub(crate) const BLOCK_COST: f32 = 1.0;
 
 /// How a subtree becomes children of a wide node.
 #[derive(Clone, Copy)]

@@ -22,10 +22,11 @@ mod triangles;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod x86;
 
-pub(crate) use build::{areas, children, decide};
+pub(crate) use build::{BLOCK_COST, NODE_COST, areas, children, decide};
 pub use kernel::Kernel;
 pub use layout::WideBvh;
 pub use refit::RefitError;
+pub(crate) use triangles::TriangleBlock;
 
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_references};
 use alloc::vec::Vec;
@@ -46,7 +47,7 @@ impl WideBvh {
     /// Boxes that are tested, and counted, at every node.
     pub const BOXES_OF_NODE: u64 = node::WideNode::LANES as u64;
     /// Objects that are tested, and counted, at every block of triangles of a leaf.
-    pub const OBJECTS_OF_BLOCK: u64 = triangles::TriangleBlock::LANES as u64;
+    pub const OBJECTS_OF_BLOCK: u64 = TriangleBlock::LANES as u64;
 
     /// Lays out `tree`, valid over the boxes of `triangles`, with any number of children per node. O(n) time and
     /// memory.

@@ -4,6 +4,7 @@
 //! `subtrees` cuts the tree, so that several threads can move at once; `schedule` lowers the temperature. There are two
 //! kinds of moves, each a method of its own: single reinsertions, here, and [`ruin_recreate`].
 
+pub(crate) mod layout;
 mod metropolis;
 mod node_sampler;
 pub(crate) mod references;

@@ -12,9 +12,10 @@
 //!
 //! Spatial splits: Stich, Friedrich & Dietrich 2009. Search over them is ours.
 
+use super::layout::Layout;
 use crate::run::{Observer, Quota, Splits, Stream, Tally, WORK_PER_POLL};
 use crate::tree::{ANCHOR, Metric, NONE, Node, PositionSearch, Scope, Working};
-use crate::tuning::LEVELS_OF_PLANES;
+use crate::tuning::{DIVISION_DEARER_BY_AREA, LEVELS_OF_PLANES};
 use bvh_core::{Aabb, PackedAabb, with_vector_instructions};
 use rand::RngExt;
 
@@ -23,6 +24,8 @@ use rand::RngExt;
 pub(crate) struct Divider<'a> {
     splits: Splits<'a>,
     search: PositionSearch,
+    /// The layout whose cost judges the moves, unless the tree's area does.
+    layout: Option<Layout>,
     /// Per leaf, another one of the same object: the leaves of an object form a ring.
     ring: Vec<u32>,
     /// Leaves out of the tree, each with its spare parent.
@@ -35,9 +38,10 @@ pub(crate) struct Divider<'a> {
 }
 
 impl<'a> Divider<'a> {
-    pub fn new(splits: Splits<'a>) -> Self {
+    pub fn new(splits: Splits<'a>, by_layout: bool) -> Self {
         let (search, ring, spares, planes) = Default::default();
-        Self { splits, search, ring, spares, count: 0, planes, visits: 0 }
+        let layout = by_layout.then(Layout::default);
+        Self { splits, search, layout, ring, spares, count: 0, planes, visits: 0 }
     }
 
     /// Tries to reunite the leaves of every object, and to divide leaves until `quota` is used up. The tree is in preorder before
@@ -50,9 +54,15 @@ impl<'a> Divider<'a> {
         observer: &dyn Observer,
     ) -> Tally {
         self.tie(tree);
+        self.layout.iter_mut().for_each(|layout| layout.fill(tree));
         let tally = change(self, tree, quota, rng, observer);
         tree.sort_in_preorder();
         tally
+    }
+
+    /// Nodes visited so far.
+    fn work(&self) -> u64 {
+        self.visits + self.search.visits + self.layout.as_ref().map_or(0, |layout| layout.visits)
     }
 
     /// Ties the leaves of every object to a ring. O(nodes).
@@ -98,7 +108,7 @@ impl<'a> Divider<'a> {
         }
         let (saved, sibling, visits) = tree.detach(leaf);
         self.visits += visits;
-        let limit = saved + saved_other + leaf_cost(tree, a.area + b.area - area);
+        let limit = self.limit(saved + saved_other + leaf_cost(tree, a.area + b.area - area));
         tree.resize_leaf(other, object, PackedAabb::EMPTY, 0.0);
         tree.resize_leaf(leaf, object, whole, area);
         let position = (area < limit)
@@ -109,6 +119,9 @@ impl<'a> Divider<'a> {
             return false;
         };
         self.visits += tree.attach(leaf, position.beside).1;
+        if !self.accepts(tree) {
+            return false;
+        }
         let mut before = leaf;
         while self.ring[before as usize] != other {
             before = self.ring[before as usize];
@@ -143,7 +156,7 @@ impl<'a> Divider<'a> {
         tree.begin();
         let (saved, sibling, visits) = tree.detach(leaf);
         self.visits += visits;
-        let mut limit = saved + leaf_cost(tree, area - areas[0] - areas[1]);
+        let mut limit = self.limit(saved + leaf_cost(tree, area - areas[0] - areas[1]));
         if limit <= areas[0] + areas[1] {
             tree.undo();
             return false;
@@ -159,18 +172,38 @@ impl<'a> Divider<'a> {
             tree.resize_leaf(leaf, object, part, area);
             // The other part costs its own area at least.
             let rest = if side == 0 { areas[1] } else { 0.0 };
-            let Some(position) = self.search.detached(tree, Scope::ALL, (&part, area), sibling, limit - rest) else {
+            let Some(position) = self.search.detached(tree, Scope::ALL, (&part, area), sibling, limit - rest)
+            else {
                 tree.undo();
                 return false;
             };
             self.visits += tree.attach(leaf, position.beside).1;
             limit -= position.cost;
         }
+        if !self.accepts(tree) {
+            return false;
+        }
         self.spares.pop();
         self.ring[spare as usize] = self.ring[leaf as usize];
         self.ring[leaf as usize] = spare;
         self.count += 1;
         true
+    }
+
+    /// The most that the new positions may cost, if the old ones saved so much: without a layout, no more.
+    #[inline(always)]
+    fn limit(&self, saved: f64) -> f64 {
+        if self.layout.is_some() { DIVISION_DEARER_BY_AREA * saved } else { saved }
+    }
+
+    /// Whether the layout, if there is one, gets no dearer; undoes the change if it does.
+    #[inline(always)]
+    fn accepts(&mut self, tree: &mut Working<impl Metric>) -> bool {
+        let accepted = self.layout.as_mut().is_none_or(|layout| layout.accepts(tree, 0.0));
+        if !accepted {
+            tree.undo();
+        }
+        accepted
     }
 
     /// Finds the planes at which to cut a leaf: those where an ancestor would end without it, and the middle of its longest side.
@@ -226,10 +259,10 @@ fn change_plain<A: Metric>(
     rng: &mut Stream,
     observer: &dyn Observer,
 ) -> Tally {
-    let (mut done, before) = (Tally::default(), divider.visits + divider.search.visits);
+    let (mut done, before) = (Tally::default(), divider.work());
     let mut poll = WORK_PER_POLL;
     let mut is_over = |divider: &Divider, done: &mut Tally| {
-        done.work = divider.visits + divider.search.visits - before;
+        done.work = divider.work() - before;
         let polled = done.work >= poll;
         if polled {
             poll = done.work + WORK_PER_POLL;
@@ -238,7 +271,8 @@ fn change_plain<A: Metric>(
     };
     let mut sums = Vec::with_capacity(tree.nodes.len());
     let mut sum = 0.0;
-    let leaves: Vec<u32> = (1..tree.nodes.len() as u32).filter(|&at| tree.nodes[at as usize].is_leaf()).collect();
+    let leaves: Vec<u32> =
+        (1..tree.nodes.len() as u32).filter(|&at| tree.nodes[at as usize].is_leaf()).collect();
     for &leaf in &leaves {
         // Of two leaves, the one that comes later in the ring is the one that goes.
         loop {

@@ -4,6 +4,7 @@
 //! Schrimpf et al. 2000 (ruin and recreate); Kirkpatrick, Gelatt & Vecchi 1983; Shaw 1998 (related removal).
 //! Temperatures are relative to an area of the move, so that one schedule suits nodes of all sizes.
 
+use super::layout::Layout;
 use super::metropolis::Mover;
 use super::node_sampler::NodeSampler;
 use super::schedule::{AnnealingRun, check_fall};
@@ -11,6 +12,7 @@ use super::side::Side;
 use crate::local::initial::Start;
 use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Node, PositionSearch, Scope, Working, search_by_metric};
+use crate::tuning::{DEARER_BY_AREA, LAYOUT_HEAT};
 use bvh_build::config::{Itself, above};
 use rand::RngExt;
 use rand::seq::SliceRandom;
@@ -75,7 +77,7 @@ impl Config {
         let Self { hot, cold, work_per_object, .. } = *self;
         let annealing = AnnealingRun { heat: [hot, cold], work_per_object, start: &self.start };
         let length = work_per_object.min(run.left().work / problem.boxes.len().max(1) as u64) as f64;
-        annealing.search(|| RuinMover::new(&self.ruin, length), metric, problem, seed, run)
+        annealing.search(|| RuinMover::new(&self.ruin, length, false), metric, problem, seed, run)
     }
 }
 
@@ -87,6 +89,8 @@ pub(crate) struct RuinMover<'a> {
     search: PositionSearch,
     side: Side,
     removed: Removed,
+    /// The layout whose cost judges the moves, unless the tree's area does.
+    layout: Option<Layout>,
     /// Nodes visited outside of the position search.
     work: u64,
 }
@@ -120,10 +124,11 @@ impl Removed {
 }
 
 impl<'a> RuinMover<'a> {
-    /// For an annealing run of this much work per object.
-    pub fn new(ruin: &'a Ruin, length: f64) -> Self {
+    /// For an annealing run of this much work per object, judged by the cost of the wide layout or by the tree's area.
+    pub fn new(ruin: &'a Ruin, length: f64, by_layout: bool) -> Self {
         let (search, side, removed) = Default::default();
-        Self { ruin, sampler: NodeSampler::for_work(length), search, side, removed, work: 0 }
+        let layout = by_layout.then(Layout::default);
+        Self { ruin, sampler: NodeSampler::for_work(length), search, side, removed, layout, work: 0 }
     }
 
     /// Takes scattered subtrees out of the scope, up to one level further down than the move has climbed. The scope keeps
@@ -164,7 +169,7 @@ impl<'a> RuinMover<'a> {
 
 impl Mover for RuinMover<'_> {
     fn work(&self) -> u64 {
-        self.work + self.search.visits
+        self.work + self.search.visits + self.layout.as_ref().map_or(0, |layout| layout.visits)
     }
 
     fn sampler(&mut self) -> &mut NodeSampler {
@@ -186,6 +191,9 @@ impl Mover for RuinMover<'_> {
         }
         let scope = Scope::of(tree, above, top);
         let Node { aabb: top_box, area: top_area, .. } = tree.nodes[top as usize];
+        if let Some(layout) = &mut self.layout {
+            layout.prepare(tree);
+        }
         tree.begin();
         self.removed.clear();
         if rng.random::<f64>() < ruin.slabs {
@@ -203,7 +211,9 @@ impl Mover for RuinMover<'_> {
             Scale::Saved => *saved,
             Scale::Top => top_area,
         };
-        let mut limit = *saved - temperature * scale * libm::log(chance) - *least;
+        let worse = -temperature * scale * libm::log(chance);
+        // What costs more area may make a better layout.
+        let mut limit = *saved + if self.layout.is_some() { DEARER_BY_AREA * worse } else { worse } - *least;
         for &(node, first) in &*roots {
             let item = &tree.nodes[node as usize];
             let (aabb, area) = (item.aabb, item.area);
@@ -214,6 +224,11 @@ impl Mover for RuinMover<'_> {
             };
             self.work += tree.attach(node, position.beside).1;
             limit -= position.cost;
+        }
+        let most = LAYOUT_HEAT * worse;
+        if self.layout.as_mut().is_some_and(|layout| !layout.accepts(tree, most)) {
+            tree.undo();
+            return false;
         }
         true
     }

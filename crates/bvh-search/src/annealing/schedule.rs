@@ -35,6 +35,8 @@ pub(crate) struct Schedule {
     pub end: f64,
     /// Number of subtrees that are annealed at once, at least 1.
     pub subtrees: u32,
+    /// Whether passes of reinsertion follow: they lower the area, which is not always the goal.
+    pub to_local_optimum: bool,
 }
 
 /// A search that consists of one annealing run.
@@ -58,7 +60,8 @@ impl AnnealingRun<'_> {
         let [hot, cold] = self.heat;
         let (mut best, mut tree) = Incumbent::build(self.start, problem, metric, run)?;
         let quota = run.left().at_most(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
-        let (schedule, observer) = (Schedule { hot, cold, quota, end: 1.0, subtrees: 1 }, run.observer());
+        let (schedule, observer) =
+            (Schedule { hot, cold, quota, end: 1.0, subtrees: 1, to_local_optimum: true }, run.observer());
         anneal(mover, &schedule, &mut tree, [seed, 0], observer, &mut |tree, tally| {
             run.count(tally);
             best.offer(tree, run);
@@ -90,7 +93,8 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
         return;
     }
     let final_passes = FINAL_PASSES_WORK.saturating_mul(n);
-    let work = work - (work / FINAL_PASSES_PART).min(final_passes);
+    let final_passes = if schedule.to_local_optimum { (work / FINAL_PASSES_PART).min(final_passes) } else { 0 };
+    let work = work - final_passes;
     let (mut done, mut streams) = (Tally::default(), first);
     let factor = schedule.cold / schedule.hot;
     let temperature = |fraction: f64| schedule.hot * libm::pow(factor, fraction.min(1.0));
@@ -128,8 +132,10 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
             }
         }
     }
-    let tally = subtrees::to_local_optimum(tree, schedule.subtrees, schedule.quota.less(&done), observer);
-    round(tree, tally);
+    if schedule.to_local_optimum {
+        let tally = subtrees::to_local_optimum(tree, schedule.subtrees, schedule.quota.less(&done), observer);
+        round(tree, tally);
+    }
 }
 
 #[cfg(test)]
@@ -170,7 +176,7 @@ mod tests {
         let boxes = scatter(60);
         let mut tree = built(&muller_fellner::Config::default(), &boxes);
         let quota = Quota { moves: 300_000, work: u64::MAX / 1024 };
-        let schedule = Schedule { hot: 0.5, cold: 0.4, quota, end: 1.0, subtrees: 1 };
+        let schedule = Schedule { hot: 0.5, cold: 0.4, quota, end: 1.0, subtrees: 1, to_local_optimum: true };
         let moves = AtomicU64::new(0);
         let mover = || Checked { inner: inner(), moves: &moves };
         anneal(mover, &schedule, &mut tree, [1, 0], &(), &mut |_, _| ());

@@ -4,25 +4,28 @@ use super::config::{Config, Horizon};
 use super::plan::{Planned, plan};
 use super::recombine::recombine;
 use crate::annealing::cool;
+use crate::annealing::layout::Layout;
 use crate::annealing::references::Divider;
 use crate::annealing::ruin_recreate::RuinMover;
 use crate::annealing::schedule::{Schedule, anneal};
 use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion;
 use crate::parallel::threads;
-use crate::run::{Observer, Quota, Run, Splits, Stream, Tally, stream};
+use crate::run::{Observer, Problem, Quota, Run, Stream, Tally, stream};
 use crate::tree::{Metric, Working};
 use crate::tuning::{
-    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, SUBTREES_PER_THREAD, WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_SUBTREES,
+    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, ROUNDS_PER_LOOK, SUBTREES_PER_THREAD,
+    WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_SUBTREES,
 };
+use bvh_core::cost::Objective;
 
-/// Improves the incumbent, whose working form is `tree`, until the work is done or the time is over; with `splits`, its references
-/// as well.
+/// Improves the incumbent, whose working form is `tree`, until the work is done or the time is over; its
+/// references too, if the problem has splits.
 pub(crate) fn improve(
     config: &Config,
     tree: &mut Working<impl Metric>,
     seed: u64,
-    splits: Option<Splits>,
+    problem: &Problem,
     best: &mut Incumbent,
     run: &mut Run,
 ) {
@@ -31,8 +34,9 @@ pub(crate) fn improve(
         return;
     }
     let (horizon, work) = config.horizon(n, run);
-    let divider = splits.map(Divider::new);
-    let mut search = Improvement { config, seed, n, left: work, divider, best, run };
+    let by_layout = problem.objective == Objective::Layout;
+    let divider = problem.splits.map(|splits| Divider::new(splits, by_layout));
+    let mut search = Improvement { config, seed, n, left: work, by_layout, divider, best, run };
     match horizon {
         Horizon::Known => search.until_known_end(tree),
         Horizon::Open => search.until_stopped(tree),
@@ -47,6 +51,8 @@ struct Improvement<'a, 'p, 'r, 's> {
     n: u64,
     /// The work that is left.
     left: u64,
+    /// Whether the cost of the wide layout is the goal, not the area.
+    by_layout: bool,
     /// What changes the references, if they may change.
     divider: Option<Divider<'s>>,
     best: &'a mut Incumbent<'p>,
@@ -71,7 +77,9 @@ impl Improvement<'_, '_, '_, '_> {
             length = length.min(in_time / n as f64);
         }
         let (all, began) = (self.left, observer.progress().unwrap_or(0.0));
-        let (plan, each) = plan(self.config, length, n);
+        // Short runs are worth their work where they can be recombined, which layouts cannot.
+        let config = if self.by_layout { &Config { reheats: 0, ..self.config.clone() } } else { self.config };
+        let (plan, each) = plan(config, length, n);
         for (number, Planned { hot, until }) in (0..).zip(plan) {
             let due = (until * all as f64) as u64;
             let work = if timed { self.left } else { self.left.min(due.saturating_sub(all - self.left)) };
@@ -109,7 +117,8 @@ impl Improvement<'_, '_, '_, '_> {
             self.config.pieces.max(1)
         };
         let Config { cold, .. } = *self.config;
-        Schedule { hot: hot.max(cold), cold, quota: self.run.left().at_most(work), end, subtrees }
+        let quota = self.run.left().at_most(work);
+        Schedule { hot: hot.max(cold), cold, quota, end, subtrees, to_local_optimum: !self.by_layout }
     }
 
     /// One annealing run from `tree`, which is recombined with the result. The `first` run of a plan, though, replaces
@@ -126,12 +135,12 @@ impl Improvement<'_, '_, '_, '_> {
             return;
         }
         let observer: &dyn Observer = &Until { observer: self.run.observer(), end: schedule.end };
-        let mut done = Tally::default();
+        let (mut done, mut rounds) = (Tally::default(), 0);
         // Every run has room for 2⁴⁰ random streams: those of 2¹⁶ rounds. Stream 0 is the probe's, the last are the divider's.
         let streams = [self.seed, 1 + (number << 40)];
         let mut division = stream(self.seed, (1 << 63) + number);
         let ruin = self.config.ruin(length);
-        let (best, run) = (&mut *self.best, &mut *self.run);
+        let (best, run, by_layout) = (&mut *self.best, &mut *self.run, self.by_layout);
         // Trees with different references cannot be recombined. So only the first run, which is not recombined, changes them as it
         // goes; the others do so before they begin.
         if let Some(divider) = self.divider.as_mut().filter(|_| !first) {
@@ -145,7 +154,7 @@ impl Improvement<'_, '_, '_, '_> {
         let mut annealed = tree.clone();
         let mut divider = self.divider.as_mut().filter(|_| first);
         anneal(
-            || RuinMover::new(&ruin, length),
+            || RuinMover::new(&ruin, length, by_layout),
             schedule,
             &mut annealed,
             streams,
@@ -159,12 +168,20 @@ impl Improvement<'_, '_, '_, '_> {
                     done += tally;
                     run.count(tally);
                 }
-                if tree.area() < best.area() * (1.0 - WORTH_AN_EVENT) {
+                rounds += 1;
+                if by_layout && rounds % ROUNDS_PER_LOOK == 0
+                    || !by_layout && tree.area() < best.area() * (1.0 - WORTH_AN_EVENT)
+                {
                     best.offer(tree, run);
                 }
             },
         );
-        if first && annealed.area() < tree.area() {
+        if by_layout {
+            let [after, before] = [&annealed, tree].map(|tree| Layout::default().cost(tree));
+            if after < before {
+                *tree = annealed;
+            }
+        } else if first && annealed.area() < tree.area() {
             *tree = annealed;
         } else if !first || observer.progress().is_none() {
             *tree = recombine(&[tree, &annealed]);
@@ -177,7 +194,7 @@ impl Improvement<'_, '_, '_, '_> {
     fn probe(&self, tree: &mut Working<impl Metric>, mut rng: Stream, quota: Quota) -> (Tally, f64) {
         let (observer, heat) = (self.run.observer(), [self.config.cold; 2]);
         let began = observer.progress();
-        let mut mover = RuinMover::new(&self.config.ruin, PROBE as f64);
+        let mut mover = RuinMover::new(&self.config.ruin, PROBE as f64, self.by_layout);
         let tally = cool(&mut mover, tree, heat, quota, &mut rng, observer);
         let in_time = match (began, observer.progress()) {
             (Some(began), Some(now)) => tally.work as f64 * (1.0 - now).max(0.0) / (now - began).max(1e-9),

@@ -50,10 +50,11 @@ mod small_budget;
 
 use crate::exact;
 use crate::local::incumbent::Incumbent;
-use crate::run::{Found, Problem, Run, Splits};
+use crate::run::{Found, Problem, Run};
 use crate::tree::{Metric, WithLeaves, search_by_metric};
-use bvh_build::spatial;
+use bvh_build::{Builder, spatial};
 use bvh_core::Bvh;
+use bvh_core::cost::Objective;
 pub use config::{Config, Horizon};
 pub(crate) use improve::improve;
 use small_budget::SmallBudget;
@@ -65,7 +66,11 @@ impl Config {
     fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         if let Some(splits) = problem.splits {
             let tree = spatial::Config::default().build_at_most(splits.most, problem.boxes, splits.objects)?;
-            return self.with_splits(tree, splits, metric, problem, seed, run);
+            return self.improved(tree, metric, problem, seed, run);
+        }
+        if problem.objective == Objective::Layout {
+            let tree = self.start.clone().unwrap_or_default().build(problem.boxes)?;
+            return self.improved(tree, metric, problem, seed, run);
         }
         let (_, work) = self.horizon(problem.boxes.len() as u64, run);
         if let Some(optimum) = exact::instead(problem, work, run)? {
@@ -81,23 +86,27 @@ impl Config {
             Some(SmallBudget::LocalOptimum(best, tree)) => (best, tree),
             None => Incumbent::build(&self.start.clone().unwrap_or_default(), problem, metric, run)?,
         };
-        improve(self, &mut tree, seed, None, &mut best, run);
+        improve(self, &mut tree, seed, problem, &mut best, run);
         Ok(best.tree)
     }
 
-    /// Improves a tree with one reference per leaf, and changes its references.
-    pub(crate) fn with_splits<A: Metric>(
+    /// Improves a tree with one reference per leaf, and its references if they may change.
+    pub(crate) fn improved<A: Metric>(
         &self,
         tree: Bvh,
-        splits: Splits,
         metric: A,
         problem: &Problem,
         seed: u64,
         run: &mut Run,
     ) -> Found {
         let mut best = Incumbent::begin(tree, problem, run);
-        let mut tree = best.working(WithLeaves(metric))?;
-        improve(self, &mut tree, seed, Some(splits), &mut best, run);
+        if problem.splits.is_some() {
+            let mut tree = best.working(WithLeaves(metric))?;
+            improve(self, &mut tree, seed, problem, &mut best, run);
+        } else {
+            let mut tree = best.working(metric)?;
+            improve(self, &mut tree, seed, problem, &mut best, run);
+        }
         Ok(best.tree)
     }
 }

@@ -77,9 +77,9 @@ fn key_of_leaf<A: Metric>(node: &Node) -> u128 {
         return object;
     }
     let [low, high] = node.aabb.planes();
-    [low[0], low[1], low[2], high[0], high[1], high[2]]
-        .into_iter()
-        .fold(object, |sum, plane| sum.rotate_left(21).wrapping_mul(0x2d99_787926d46932a4c1f32680f70c55) ^ key(plane.to_bits()))
+    [low[0], low[1], low[2], high[0], high[1], high[2]].into_iter().fold(object, |sum, plane| {
+        sum.rotate_left(21).wrapping_mul(0x2d99_787926d46932a4c1f32680f70c55) ^ key(plane.to_bits())
+    })
 }
 
 /// A key for an object, scattered over 128 bits: SplitMix64 (Steele, Lea & Flood 2014) twice.

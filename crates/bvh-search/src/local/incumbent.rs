@@ -46,7 +46,8 @@ impl<'p> Incumbent<'p> {
     /// Ends the run now or later, as soon as the tree meets a lower bound.
     pub fn bound(&mut self, run: &mut Run) {
         // The bound is one of areas of whole objects.
-        let of_areas = self.problem.measure.is_none() && self.problem.splits.is_none();
+        let Problem { measure, splits, objective, .. } = self.problem;
+        let of_areas = measure.is_none() && splits.is_none() && objective != Objective::Layout;
         if of_areas && self.problem.allows(Shortcut::BoundMet) {
             self.lower_bound = lower_bound::of_largest(self.problem.boxes);
         }
@@ -74,7 +75,8 @@ impl<'p> Incumbent<'p> {
 
     /// Keeps `tree` if it is the best so far. O(n).
     pub fn offer(&mut self, tree: &Working<impl Metric>, run: &mut Run) -> bool {
-        tree.area() < self.area && self.offer_tree(tree.to_bvh(), run)
+        let may_be_better = tree.area() < self.area || self.problem.objective == Objective::Layout;
+        may_be_better && self.offer_tree(tree.to_bvh(), run)
     }
 
     /// As [`offer`](Self::offer), for a valid tree that needs no conversion.
@@ -112,12 +114,18 @@ impl<'p> Incumbent<'p> {
     }
 }
 
-/// The tree's cost, and its internal area, which the cost replaces if the problem has a measure or splits.
+/// The tree's cost, and what its working form calls its area.
 fn costs(problem: &Problem, tree: &Bvh) -> (f64, f64) {
     let cost = problem.cost(tree);
-    if problem.measure.is_some() || problem.splits.is_some() {
-        return (cost, cost);
-    }
-    let area = if problem.objective == Objective::InternalArea { cost } else { cost::internal_area(tree) };
+    let area = match *problem {
+        Problem { splits: Some(_), measure, .. } => {
+            measure.map_or_else(|| cost::total_area(tree), |measure| cost::total_measure(tree, measure))
+        }
+        Problem { measure: Some(measure), objective: Objective::Layout, .. } => {
+            cost::internal_measure(tree, measure)
+        }
+        Problem { measure: Some(_), .. } | Problem { objective: Objective::InternalArea, .. } => cost,
+        _ => cost::internal_area(tree),
+    };
     (cost, area)
 }

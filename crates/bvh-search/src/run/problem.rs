@@ -50,6 +50,10 @@ impl<'a> Problem<'a> {
     pub fn cost(&self, tree: &Bvh) -> f64 {
         match (self.judge, self.splits, self.measure) {
             (Some(judge), ..) => judge.judge(tree),
+            (None, _, Some(measure)) if self.objective == Objective::Layout => {
+                cost::layout_measure(tree, measure)
+            }
+            (None, _, None) if self.objective == Objective::Layout => cost::layout_area(tree),
             (None, Some(_), Some(measure)) => cost::total_measure(tree, measure),
             (None, Some(_), None) => cost::total_area(tree),
             (None, None, Some(measure)) => cost::internal_measure(tree, measure),

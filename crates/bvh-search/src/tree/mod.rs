@@ -136,6 +136,12 @@ impl<M: Metric> Working<M> {
         self.added = 0.0;
     }
 
+    /// The nodes that the current change has written.
+    #[inline(always)]
+    pub fn changed(&self) -> impl Iterator<Item = u32> + '_ {
+        self.journal.iter().map(|node| node.index)
+    }
+
     /// Undoes the current change exactly, to the last bit.
     #[inline(always)]
     pub fn undo(&mut self) {

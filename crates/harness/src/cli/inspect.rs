@@ -147,6 +147,7 @@ fn describe(header: &Header, bytes: usize, facts: &mut Facts) {
     let objective = match header.objective {
         Objective::InternalArea => "internal area".to_owned(),
         Objective::GoldsmithSalmon => "Goldsmith–Salmon".to_owned(),
+        Objective::Layout => "cost of the wide layout, by area".to_owned(),
         Objective::Sah(constants) => {
             let (traversal, intersection) = (constants.traversal(), constants.intersection());
             format!("surface area heuristic, traversal {traversal}, intersection {intersection}")

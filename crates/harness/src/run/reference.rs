@@ -103,6 +103,7 @@ fn name(objective: &Objective) -> String {
     match objective {
         Objective::InternalArea => "internal_area".into(),
         Objective::GoldsmithSalmon => "goldsmith_salmon".into(),
+        Objective::Layout => "layout".into(),
         Objective::Sah(constants) => format!("{constants:?}"),
     }
 }
