@@ -7,6 +7,7 @@
 #include <iterator>
 #include <vector>
 
+#pragma pack(push, 4)
 struct Header {
     char magic[8];
     uint32_t version, endianness, objective, scene;
@@ -14,13 +15,14 @@ struct Header {
     double cost, traversal, intersection;
     float bounds[6];
     char method[64];
-    char zeros[20];
-    uint32_t checksum;
+    uint64_t references;  // version 4
+    uint32_t flags, zeros[2], checksum;
 };
 struct Node {
     float min[3], max[3];
     uint32_t first, tagged_count;
 };
+#pragma pack(pop)
 static_assert(sizeof(Header) == 192 && sizeof(Node) == 32);
 
 // CRC-32 of zlib; `sum` is that of the bytes before.
@@ -43,9 +45,11 @@ int main(int argc, char** argv) {
     std::vector<char> bytes((std::istreambuf_iterator<char>(file)), {});
     Header header{};
     if (bytes.size() >= sizeof header) std::memcpy(&header, bytes.data(), sizeof header);
-    if (std::memcmp(header.magic, "\x89" "BVH\r\n\x1a\n", 8) || header.version < 2 || header.version > 3 || header.endianness != 0x01020304 ||
-        bytes.size() != sizeof header + (header.version == 3 ? 36 : 32) * header.nodes + 4 * header.objects) {
-        return std::fprintf(stderr, "not a tree file of version 2 or 3, or cut\n"), 1;
+    const uint64_t references = header.version == 4 ? header.references : header.objects;
+    const bool visits = header.version == 3 || (header.version == 4 && header.flags & 1);
+    if (std::memcmp(header.magic, "\x89" "BVH\r\n\x1a\n", 8) || header.version < 2 || header.version > 4 || header.endianness != 0x01020304 ||
+        bytes.size() != sizeof header + (visits ? 36 : 32) * header.nodes + 4 * references) {
+        return std::fprintf(stderr, "not a tree file of version 2 to 4, or cut\n"), 1;
     }
     const uint32_t body = crc32(bytes.data() + sizeof header, bytes.size() - sizeof header);
     if (crc32(bytes.data(), 188, body) != header.checksum) return std::fprintf(stderr, "damaged\n"), 1;

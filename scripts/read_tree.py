@@ -5,16 +5,17 @@ import sys
 import zlib
 
 data = open(sys.argv[1], "rb").read()
-if len(data) < 192 or data[:8] != b"\x89BVH\r\n\x1a\n" or struct.unpack_from("<2I", data, 8) not in [(2, 0x01020304), (3, 0x01020304)]:
-    sys.exit("not a tree file of version 2 or 3")
+if len(data) < 192 or data[:8] != b"\x89BVH\r\n\x1a\n" or struct.unpack_from("<2I", data, 8) not in [(version, 0x01020304) for version in (2, 3, 4)]:
+    sys.exit("not a tree file of version 2 to 4")
 objective, scene, count, objects, seed, work, cost = struct.unpack_from("<2I4Qd", data, 16)
-visits = count if data[8] == 3 else 0
-if len(data) != 192 + 32 * count + 4 * objects + 4 * visits:
+references, flags = struct.unpack_from("<QI", data, 168) if data[8] == 4 else (objects, data[8] == 3)
+visits = count if flags else 0
+if len(data) != 192 + 32 * count + 4 * references + 4 * visits:
     sys.exit("cut or extended")
 if zlib.crc32(data[:188], zlib.crc32(data[192:])) != struct.unpack_from("<I", data, 188)[0]:
     sys.exit("damaged")
 nodes = list(struct.iter_unpack("<6f2I", data[192:192 + 32 * count]))
-ids = struct.unpack_from("<%dI" % objects, data, 192 + 32 * count)
+ids = struct.unpack_from("<%dI" % references, data, 192 + 32 * count)
 
 LEAF = 1 << 31
 depth, area, leaves = [0] * count, 0.0, 0
@@ -32,5 +33,5 @@ else:
     method = data[104:168].rstrip(b"\0").decode()
     facts = {"method": method, "seed": seed, "work": work, "objects": objects, "nodes": count}
     facts |= {"inner nodes": count - leaves, "leaves": leaves, "depth": max(depth, default=0)}
-    facts |= {"cost when saved": cost, "internal area": area, "ids": sorted(ids) == list(range(objects))}
+    facts |= {"cost when saved": cost, "internal area": area, "ids": sorted(set(ids)) == list(range(objects))}
     print(*(f"{what}: {value}" for what, value in facts.items()), sep="\n")

@@ -115,6 +115,6 @@ search_by_metric!(From<'_>);
 
 impl From<'_> {
     fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
-        self.config.improved(self.tree.clone(), metric, problem, seed, run)
+        self.config.improved((self.tree.clone(), None), metric, problem, seed, run)
     }
 }

@@ -70,6 +70,8 @@ tuned! { "cargo bench -p harness --bench search -- --references 1.2 SCENE..." {
     LEVELS_OF_PLANES: u32 = 12, "levels";
     /// As `DEARER_BY_AREA`, for moves that divide or reunite.
     DIVISION_DEARER_BY_AREA: f64 = 2.0, "factor";
+    /// Part of the work or time for each of the trials that decide between whole objects and spatial splits as the start.
+    TRIAL: f64 = 0.12, "fraction";
     /// Part of the work that goes into dividing and reuniting, between the rounds of annealing.
     WORK_ON_REFERENCES: f64 = 0.2, "fraction of the work of a round";
 }}

@@ -14,6 +14,8 @@ pub struct Header {
     pub nodes: usize,
     /// Number of objects.
     pub objects: usize,
+    /// Number of object ids in all leaves: more than there are objects if objects are divided among leaves.
+    pub references: usize,
     /// The objective that `cost` is a value of.
     pub objective: Objective,
     /// The tree's cost when it was saved.
@@ -38,14 +40,19 @@ impl Header {
     /// The first eight bytes of every tree file, chosen after PNG's: a transfer that converts line ends or clears high
     /// bits changes them.
     pub const MAGIC: [u8; 8] = *b"\x89BVH\r\n\x1a\n";
-    /// The latest version of the format, that of files with [visits](Self::has_visits). This crate also reads version 2, and
-    /// writes it where there are none.
-    pub const VERSION: u32 = 3;
-    const WITHOUT_VISITS: u32 = 2;
+    /// The latest version of the format, that of trees whose objects are divided among leaves, or whose cost is that of the wide
+    /// layout. This crate also reads versions 2 and 3, and writes them where they suffice, so that older programs read them.
+    pub const VERSION: u32 = 4;
+    const WITH_VISITS: u32 = 3;
+    const PLAIN: u32 = 2;
+    /// The flag of files of version 4 that have visits.
+    const VISITS: u32 = 1;
     /// Stored in the file's byte order, so that its bytes tell the order.
     const ENDIANNESS: u32 = 0x0102_0304;
     /// The box of the root, as in the node.
     pub(super) const BOUNDS: core::ops::Range<usize> = 80..104;
+    /// Where the fields of version 4 begin.
+    const REFERENCES: usize = 168;
     /// The last field, which every other byte of the file is covered by.
     pub(super) const CHECKSUM: core::ops::Range<usize> = 188..192;
 
@@ -63,7 +70,7 @@ impl Header {
         };
         let mut bytes = Vec::with_capacity(Self::BYTES);
         bytes.extend_from_slice(&Self::MAGIC);
-        let version = if self.has_visits { Self::VERSION } else { Self::WITHOUT_VISITS };
+        let version = self.version();
         for word in [version, Self::ENDIANNESS, objective, self.scene] {
             bytes.extend_from_slice(&word.to_le_bytes());
         }
@@ -77,8 +84,24 @@ impl Header {
             bytes.extend_from_slice(&coordinate.to_le_bytes());
         }
         bytes.extend_from_slice(name);
+        bytes.resize(Self::REFERENCES, 0);
+        if version == Self::VERSION {
+            bytes.extend_from_slice(&(self.references as u64).to_le_bytes());
+            bytes.extend_from_slice(&(if self.has_visits { Self::VISITS } else { 0 }).to_le_bytes());
+        }
         bytes.resize(Self::BYTES, 0);
         Ok(bytes)
+    }
+
+    /// The first version that has all that the file says.
+    fn version(&self) -> u32 {
+        if self.references != self.objects || self.objective == Objective::Layout {
+            Self::VERSION
+        } else if self.has_visits {
+            Self::WITH_VISITS
+        } else {
+            Self::PLAIN
+        }
     }
 
     /// Reads all fields but the checksum. Of several faults it reports the one that says most about the file: that it
@@ -93,12 +116,12 @@ impl Header {
         if mark == Self::ENDIANNESS.to_be_bytes() {
             return Err(FileError::Endianness);
         }
-        let has_visits = match u32::from_le_bytes(version) {
-            Self::VERSION => true,
-            Self::WITHOUT_VISITS => false,
-            found if found < Self::WITHOUT_VISITS => return Err(FileError::OldVersion { found }),
+        let version = u32::from_le_bytes(version);
+        match version {
+            Self::PLAIN..=Self::VERSION => {}
+            found if found < Self::PLAIN => return Err(FileError::OldVersion { found }),
             found => return Err(FileError::NewVersion { found }),
-        };
+        }
         if mark != Self::ENDIANNESS.to_le_bytes() {
             return Err(FileError::Field("endianness mark"));
         }
@@ -107,7 +130,6 @@ impl Header {
         // A binary tree with one object per leaf has the most nodes.
         let most = |limit: u64| move |count: &u64| *count <= limit;
         let objects = Some(objects).filter(most(MAX_OBJECTS as u64)).ok_or(FileError::Field("objects"))?;
-        let nodes = Some(nodes).filter(most(2 * objects)).ok_or(FileError::Field("nodes"))?;
         let [cost, traversal, intersection] = fields.words()?.map(f64::from_bits);
         if !(cost.is_finite() && cost >= 0.0) {
             return Err(FileError::Field("cost"));
@@ -118,7 +140,7 @@ impl Header {
             0 => Objective::InternalArea,
             1 => Objective::GoldsmithSalmon,
             2 => Objective::Sah(constants),
-            3 => Objective::Layout,
+            3 if version == Self::VERSION => Objective::Layout,
             _ => return Err(FileError::Field("objective")),
         };
         if objective != Objective::Sah(constants) && [traversal, intersection].map(f64::to_bits) != [0; 2] {
@@ -131,13 +153,24 @@ impl Header {
         let name: [u8; 64] = fields.need()?;
         let end = name.iter().position(|&byte| byte == 0).unwrap_or(name.len());
         let method = core::str::from_utf8(&name[..end]).map_err(|_| FileError::Method)?.to_owned();
-        let reserved: [u8; 20] = fields.need()?;
+        let (references, flags): ([u8; 8], [u8; 4]) = (fields.need()?, fields.need()?);
+        let (references, flags) = (u64::from_le_bytes(references), u32::from_le_bytes(flags));
+        let (references, has_visits, unused) = match version {
+            Self::VERSION => (references, flags & Self::VISITS != 0, u64::from(flags & !Self::VISITS)),
+            _ => (objects, version == Self::WITH_VISITS, references | u64::from(flags)),
+        };
+        let possible =
+            |&count: &u64| (objects..=MAX_OBJECTS as u64).contains(&count) && (objects > 0 || count == 0);
+        let references = Some(references).filter(possible).ok_or(FileError::Field("references"))?;
+        let nodes = Some(nodes).filter(most(2 * references)).ok_or(FileError::Field("nodes"))?;
+        let reserved: [u8; 8] = fields.need()?;
         let _checksum: [u8; 4] = fields.need()?;
-        if reserved != [0; 20] || name[end..].iter().any(|&byte| byte != 0) {
+        if reserved != [0; 8] || unused != 0 || name[end..].iter().any(|&byte| byte != 0) {
             return Err(FileError::Field("padding"));
         }
-        let (nodes, objects, bounds) = (nodes as usize, objects as usize, Aabb::from(corners));
-        Ok(Self { nodes, objects, objective, cost, seed, work, scene, bounds, method, has_visits })
+        let [nodes, objects, references] = [nodes, objects, references].map(|count| count as usize);
+        let bounds = Aabb::from(corners);
+        Ok(Self { nodes, objects, references, objective, cost, seed, work, scene, bounds, method, has_visits })
     }
 }
 

@@ -16,14 +16,14 @@
 //!
 //! # Format
 //!
-//! Versions 2 and 3. All numbers are little-endian, floats are IEEE 754, and sections follow each other without gaps.
+//! Versions 2 to 4; each file has the first that suffices. All numbers are little-endian, floats are IEEE 754, and sections follow each other without gaps.
 //!
 //! | bytes | type | field |
 //! |---|---|---|
 //! | 0..8 | `u8[8]` | magic number, `89 42 56 48 0d 0a 1a 0a` |
-//! | 8..12 | `u32` | version: 2, or 3 with visits |
+//! | 8..12 | `u32` | version: 2; 3 with visits; 4 with more references than objects, or the cost of the layout |
 //! | 12..16 | `u32` | endianness mark, 0x01020304: the bytes `04 03 02 01` |
-//! | 16..20 | `u32` | objective: 0 internal area, 1 Goldsmith–Salmon, 2 surface area heuristic |
+//! | 16..20 | `u32` | objective: 0 internal area, 1 Goldsmith–Salmon, 2 surface area heuristic, 3 (version 4) wide layout |
 //! | 20..24 | `u32` | checksum of the scene: of its boxes, each min x, y, z, max x, y, z as `f32` |
 //! | 24..32 | `u64` | number of nodes |
 //! | 32..40 | `u64` | number of objects |
@@ -34,9 +34,11 @@
 //! | 72..80 | `f64` | its intersection constant, else 0 |
 //! | 80..104 | `f32[6]` | the root's box, min then max; min +∞ and max −∞ without objects |
 //! | 104..168 | `u8[64]` | name of the method, UTF-8, padded with zeros |
-//! | 168..188 | | zeros |
+//! | 168..176 | `u64` | version 4: number of references, the object ids in all leaves; else 0 |
+//! | 176..180 | `u32` | version 4: 1 if there are visits, else 0; in other versions 0 |
+//! | 180..188 | | zeros |
 //! | 188..192 | `u32` | checksum of the file: of the bytes from 192 to the end, then of bytes 0..188 |
-//! | 192.. | | the nodes, 32 bytes each, then a `u32` object id per object, then in version 3 an `f32` of visits per node |
+//! | 192.. | | the nodes, 32 bytes each, then a `u32` object id per reference, then the visits if there are any, an `f32` per node |
 //!
 //! | bytes of a node | type | field |
 //! |---|---|---|
@@ -48,7 +50,8 @@
 //! The visits of a node are 0 to 1: how many of the rays that enter the scene enter its box, as a part of the measure that the
 //! tree was searched by. No child has more than its parent.
 //!
-//! Node 0 is the root; siblings are adjacent and come after their parent; the object ids are a permutation.
+//! Node 0 is the root; siblings are adjacent and come after their parent; the object ids are a permutation, or in version 4
+//! name every object once or more.
 //!
 //! Both checksums are the CRC-32 of zlib, gzip and PNG (reversed polynomial 0xedb88320), which standard libraries have:
 //! `zlib.crc32` in Python. It detects every change confined to 32 consecutive bits, and any other change but for one in
@@ -62,97 +65,20 @@
 //! On little-endian machines [`TreeFile::view`] borrows the bytes, which must lie at a multiple of 4, as mapped files
 //! do. [`load`] copies, and works everywhere.
 
+mod error;
 mod header;
 
+pub use error::FileError;
 pub use header::Header;
 
 use crate::cost::Objective;
-use crate::validate::{FastPath, check_structure};
-use crate::{Aabb, Bvh, BvhView, InvalidBvh, Node, validate};
+use crate::validate::{FastPath, Leaves, check_structure, find_fault};
+use crate::{Aabb, Bvh, BvhView, Clip, InvalidBvh, Node, validate, validate_references};
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
 use bytemuck::Pod;
 use core::ops::Range;
 use crc32fast::Hasher;
-
-/// Why bytes were not accepted as a tree, or a tree was not written.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FileError {
-    /// The first eight bytes are not those of a tree file.
-    #[error("not a tree file")]
-    Magic,
-    /// Fewer bytes than a header has.
-    #[error("the file ends within its header")]
-    Header,
-    /// Written by an earlier version of this program.
-    #[error(
-        "the tree was written by version {found} of the format; this program reads version {}: bake it again",
-        Header::VERSION
-    )]
-    OldVersion {
-        /// The version found.
-        found: u32,
-    },
-    /// Written by a later version of this program.
-    #[error(
-        "the tree was written by version {found} of the format; this program reads version {}: update the program",
-        Header::VERSION
-    )]
-    NewVersion {
-        /// The version found.
-        found: u32,
-    },
-    /// Written most significant byte first.
-    #[error("the file is big-endian; the format is little-endian")]
-    Endianness,
-    /// A field of the header has a value that no tree can give it.
-    #[error("the header's {0} is out of range; the file is damaged")]
-    Field(&'static str),
-    /// A method's name has at most 64 bytes of UTF-8, none of them zero.
-    #[error("the method's name is not at most 64 bytes of UTF-8 without zeros")]
-    Method,
-    /// The file was cut or extended.
-    #[error("the file has {found} bytes where its header asks for {expected}; it was cut or extended")]
-    Length {
-        /// Bytes in the file.
-        found: u64,
-        /// Bytes that the header asks for.
-        expected: u64,
-    },
-    /// Some byte is not the one that was written.
-    #[error("the file's checksum is wrong; it is damaged")]
-    Checksum,
-    /// Saved for a scene of another size.
-    #[error("the file is for a scene of {expected} objects; this one has {found}")]
-    ObjectCount {
-        /// Objects in the scene.
-        found: usize,
-        /// Objects in the file.
-        expected: usize,
-    },
-    /// Saved for another scene, or for the same objects in another order.
-    #[error(
-        "the file is for another scene: its objects' checksum is {expected:08x}, this scene's is {found:08x}"
-    )]
-    OtherScene {
-        /// The scene's checksum.
-        found: u32,
-        /// The checksum in the file.
-        expected: u32,
-    },
-    /// The checksum is right, but the nodes and object ids that it covers are not a tree.
-    #[error(transparent)]
-    Tree(#[from] InvalidBvh),
-    /// The visits of a node are no number from 0 to those of its parent, or not as many as there are nodes.
-    #[error("the visits of node {0} are not from 0 to those of its parent")]
-    Visits(usize),
-    /// Views need aligned bytes.
-    #[error("the bytes do not lie at a multiple of {0}; load them instead")]
-    Alignment(usize),
-    /// Views need a little-endian machine.
-    #[error("this machine is big-endian; load the bytes instead of viewing them")]
-    Machine,
-}
 
 /// Where a tree comes from, as its file's header records it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -174,6 +100,23 @@ pub struct Origin<'a> {
 /// O(nodes + objects).
 pub fn save(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, FileError> {
     validate(tree, boxes)?;
+    saved(tree, boxes, origin)
+}
+
+/// As [`save`], for trees whose `objects` may be divided among leaves: refuses those that are not
+/// [valid](validate_references()).
+pub fn save_references(
+    tree: &Bvh,
+    boxes: &[Aabb],
+    objects: &dyn Clip,
+    origin: &Origin,
+) -> Result<Vec<u8>, FileError> {
+    validate_references(tree, boxes, objects)?;
+    saved(tree, boxes, origin)
+}
+
+/// The file of a valid tree.
+fn saved(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, FileError> {
     let Origin { method, seed, work, objective, visits } = *origin;
     if !visits.is_empty() {
         check_visits(&tree.nodes, visits)?;
@@ -181,6 +124,7 @@ pub fn save(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, File
     let header = Header {
         nodes: tree.nodes.len(),
         objects: boxes.len(),
+        references: tree.prim_ids.len(),
         objective,
         cost: objective.cost(tree),
         seed,
@@ -269,9 +213,9 @@ impl<'a> TreeFile<'a> {
     pub fn open(bytes: &'a [u8]) -> Result<Self, FileError> {
         let header = Header::decode(bytes)?;
         // No overflow in 64 bits: counts are below 2^32.
-        let (nodes, objects) = (header.nodes as u64, header.objects as u64);
+        let (nodes, references) = (header.nodes as u64, header.references as u64);
         let node_bytes = nodes * size_of::<Node>() as u64;
-        let id_bytes = objects * size_of::<u32>() as u64;
+        let id_bytes = references * size_of::<u32>() as u64;
         let visit_bytes = if header.has_visits { nodes * size_of::<f32>() as u64 } else { 0 };
         let expected = Header::BYTES as u64 + node_bytes + id_bytes + visit_bytes;
         let found = bytes.len() as u64;
@@ -342,7 +286,13 @@ impl<'a> TreeFile<'a> {
 
     /// Checks the structure of the file's tree unless that was done with the checksum.
     fn check(&self, tree: BvhView) -> Result<(), InvalidBvh> {
-        if self.is_sound { Ok(()) } else { check_structure(tree, self.header.objects) }
+        match self.header {
+            _ if self.is_sound => Ok(()),
+            Header { objects, references, .. } if references > objects => {
+                find_fault(tree, objects, Leaves::OneOrMore)
+            }
+            Header { objects, .. } => check_structure(tree, objects),
+        }
     }
 }
 

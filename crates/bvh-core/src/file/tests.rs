@@ -46,6 +46,61 @@ fn scene_of(n: u32, children: usize, leaf: usize) -> (Vec<Aabb>, Bvh) {
     (boxes, tree)
 }
 
+/// Objects that fill their boxes.
+#[derive(Debug)]
+struct Filled<'a>(&'a [Aabb]);
+
+impl Clip for Filled<'_> {
+    fn clip(&self, object: u32, region: &Aabb) -> Aabb {
+        let whole = &self.0[object as usize];
+        let part = Aabb { min: whole.min.max(region.min), max: whole.max.min(region.max) };
+        if part.min.cmpgt(part.max).any() { Aabb::EMPTY } else { part }
+    }
+}
+
+/// As [`scene_of`] with single objects in leaves, but every third leaf is divided at the middle of its box.
+fn split_scene(n: u32) -> (Vec<Aabb>, Bvh) {
+    let (boxes, mut tree) = scene_of(n, 2, 1);
+    for at in 0..tree.nodes.len() {
+        if let crate::NodeKind::Leaf { first, .. } = tree.nodes[at].kind()
+            && first % 3 == 0
+        {
+            let Node { aabb, .. } = tree.nodes[at];
+            let middle = 0.5 * (aabb.min.x + aabb.max.x);
+            let (mut low, mut high) = (aabb, aabb);
+            (low.max.x, high.min.x) = (middle, middle);
+            tree.nodes[at] = Node::inner(aabb, tree.nodes.len() as u32, 2);
+            tree.nodes.extend([Node::leaf(low, first, 1), Node::leaf(high, tree.prim_ids.len() as u32, 1)]);
+            tree.prim_ids.push(tree.prim_ids[first as usize]);
+        }
+    }
+    (boxes, tree)
+}
+
+#[test]
+fn a_tree_with_divided_objects_comes_back_and_is_refused_where_a_part_is_missing() {
+    let (boxes, tree) = split_scene(11);
+    assert_eq!(tree.prim_ids.len(), 15);
+    let origin = Origin { objective: Objective::Layout, ..ORIGIN };
+    let bytes = save_references(&tree, &boxes, &Filled(&boxes), &origin).unwrap();
+    assert_eq!((bytes[8], load(&bytes, &boxes)), (4, Ok(tree.clone())));
+    assert_eq!(TreeFile::open(&bytes).unwrap().header().references, 15);
+    let whole = FileError::Tree(InvalidBvh::ObjectCount { named: 15, objects: 11 });
+    assert_eq!(save(&tree, &boxes, &origin), Err(whole), "objects that may not be divided");
+    for at in (0..tree.nodes.len()).filter(|&at| tree.nodes[at].is_leaf()) {
+        let mut smaller = tree.clone();
+        smaller.nodes[at].aabb.max.y -= 0.25;
+        let refused = save_references(&smaller, &boxes, &Filled(&boxes), &origin);
+        assert!(
+            matches!(
+                refused,
+                Err(FileError::Tree(InvalidBvh::Uncovered { .. } | InvalidBvh::ObjectOutside { .. }))
+            ),
+            "{at}"
+        );
+    }
+}
+
 /// A copy of some bytes, aligned as a mapped file.
 fn aligned(bytes: &[u8]) -> Vec<u64> {
     let mut copy = vec![0; bytes.len().div_ceil(8)];
@@ -76,6 +131,7 @@ fn what_is_saved_is_loaded_and_viewed() {
         let header = Header {
             nodes: tree.nodes.len(),
             objects: boxes.len(),
+            references: boxes.len(),
             objective: ORIGIN.objective,
             cost: ORIGIN.objective.cost(&tree),
             seed: 7,
@@ -173,7 +229,7 @@ fn other_files_versions_byte_orders_and_scenes_are_named() {
     let old = changed(8, &1u32.to_le_bytes());
     assert_eq!(old, FileError::OldVersion { found: 1 });
     assert!(old.to_string().contains("version 1") && old.to_string().contains("bake it again"), "{old}");
-    assert_eq!(changed(8, &4u32.to_le_bytes()), FileError::NewVersion { found: 4 });
+    assert_eq!(changed(8, &5u32.to_le_bytes()), FileError::NewVersion { found: 5 });
     assert_eq!(changed(8, &[0, 0, 0, 2, 1, 2, 3, 4]), FileError::Endianness);
     assert_eq!(changed(32, &u64::MAX.to_le_bytes()), FileError::Field("objects"));
     let short = FileError::Length { found: bytes.len() as u64, expected: 192 + 3 * 32 + 5 * 4 };
@@ -238,8 +294,8 @@ fn a_forged_file_is_refused_or_can_be_traced_to_the_end() {
         .chain(floats)
         .collect();
     let mut accepted = 0;
-    for (boxes, tree) in [scene(11), scene_of(11, 2, 1)] {
-        let whole = save(&tree, &boxes, &ORIGIN).unwrap();
+    for (boxes, tree) in [scene(11), scene_of(11, 2, 1), split_scene(11)] {
+        let whole = save_references(&tree, &boxes, &Filled(&boxes), &ORIGIN).unwrap();
         for at in (16..whole.len()).step_by(4).filter(|at| !Header::CHECKSUM.contains(at)) {
             for word in &words {
                 let mut bytes = whole.clone();

@@ -14,16 +14,16 @@ use crate::parallel::threads;
 use crate::run::{Observer, Problem, Quota, Run, Stream, Tally, stream};
 use crate::tree::{Metric, Working};
 use crate::tuning::{
-    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, ROUNDS_PER_LOOK, SUBTREES_PER_THREAD,
+    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, ROUNDS_PER_LOOK, SUBTREES_PER_THREAD, TRIAL,
     WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_SUBTREES,
 };
 use bvh_core::cost::Objective;
 
 /// Improves the incumbent, whose working form is `tree`, until the work is done or the time is over; its
-/// references too, if the problem has splits.
-pub(crate) fn improve(
+/// references too, if the problem has splits. If there is an `other` start, a trial decides which of the two is improved.
+pub(crate) fn improve<A: Metric>(
     config: &Config,
-    tree: &mut Working<impl Metric>,
+    (tree, other): (&mut Working<A>, Option<Working<A>>),
     seed: u64,
     problem: &Problem,
     best: &mut Incumbent,
@@ -37,11 +37,17 @@ pub(crate) fn improve(
     let by_layout = problem.objective == Objective::Layout;
     let divider = problem.splits.map(|splits| Divider::new(splits, by_layout));
     let mut search = Improvement { config, seed, n, left: work, by_layout, divider, best, run };
+    if let Some(other) = other {
+        search.choose(tree, other, horizon);
+    }
     match horizon {
         Horizon::Known => search.until_known_end(tree),
         Horizon::Open => search.until_stopped(tree),
     }
 }
+
+/// The numbers of the runs that decide between two starts, after those of all others.
+const TRIALS: u64 = 1 << 20;
 
 /// A search under way.
 struct Improvement<'a, 'p, 'r, 's> {
@@ -104,6 +110,31 @@ impl Improvement<'_, '_, '_, '_> {
             let schedule = self.schedule(self.config.hot(length), work, 1.0, length);
             self.anneal(tree, number, (&schedule, length), false);
             length *= self.config.growth;
+        }
+    }
+
+    /// Anneals both trees for a short time, and goes on with the one that ends better.
+    fn choose<A: Metric>(&mut self, tree: &mut Working<A>, mut other: Working<A>, horizon: Horizon) {
+        let (n, observer) = (self.n as f64, self.run.observer());
+        let began = observer.progress().unwrap_or(0.0);
+        let work = match horizon {
+            Horizon::Known if observer.progress().is_some() => {
+                let quota = self.run.left().at_most(self.left.min(PROBE * self.n));
+                let (tally, in_time) = self.probe(tree, stream(self.seed, 0), quota);
+                self.run.count(tally);
+                TRIAL * in_time.min(self.left as f64)
+            }
+            Horizon::Known => TRIAL * self.left as f64,
+            Horizon::Open => self.config.first * n,
+        };
+        let length = work / n;
+        for (number, tree) in [&mut *tree, &mut other].into_iter().enumerate() {
+            let end = began + (1.0 - began) * TRIAL * (number + 1) as f64;
+            let schedule = self.schedule(self.config.hot(length), work as u64, end, length);
+            self.anneal(tree, TRIALS + number as u64, (&schedule, length), true);
+        }
+        if cost(&other, self.by_layout) < cost(tree, self.by_layout) {
+            *tree = other;
         }
     }
 
@@ -177,8 +208,7 @@ impl Improvement<'_, '_, '_, '_> {
             },
         );
         if by_layout {
-            let [after, before] = [&annealed, tree].map(|tree| Layout::default().cost(tree));
-            if after < before {
+            if cost(&annealed, by_layout) < cost(tree, by_layout) {
                 *tree = annealed;
             }
         } else if first && annealed.area() < tree.area() {
@@ -202,6 +232,11 @@ impl Improvement<'_, '_, '_, '_> {
         };
         (tally, in_time)
     }
+}
+
+/// What a tree costs. O(n).
+fn cost(tree: &Working<impl Metric>, by_layout: bool) -> f64 {
+    if by_layout { Layout::default().cost(tree) } else { tree.area() }
 }
 
 /// An observer that also cancels at `end`, if that is before all the time has passed.

@@ -50,8 +50,8 @@ mod small_budget;
 
 use crate::exact;
 use crate::local::incumbent::Incumbent;
-use crate::run::{Found, Problem, Run};
-use crate::tree::{Metric, WithLeaves, search_by_metric};
+use crate::run::{Found, Problem, Run, Splits};
+use crate::tree::{Metric, WithLeaves, Working, search_by_metric};
 use bvh_build::{Builder, spatial};
 use bvh_core::Bvh;
 use bvh_core::cost::Objective;
@@ -64,13 +64,13 @@ search_by_metric!(Config);
 impl Config {
     /// Subtrees, if there are several, are annealed in parallel, each with a random stream of its own.
     fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
-        if let Some(splits) = problem.splits {
-            let tree = spatial::Config::default().build_at_most(splits.most, problem.boxes, splits.objects)?;
-            return self.improved(tree, metric, problem, seed, run);
-        }
-        if problem.objective == Objective::Layout {
+        if problem.splits.is_some() || problem.objective == Objective::Layout {
             let tree = self.start.clone().unwrap_or_default().build(problem.boxes)?;
-            return self.improved(tree, metric, problem, seed, run);
+            let other = problem.splits.filter(|splits| splits.most > problem.boxes.len());
+            let other = other.map(|Splits { objects, most }| {
+                spatial::Config::default().build_at_most(most, problem.boxes, objects)
+            });
+            return self.improved((tree, other.transpose()?), metric, problem, seed, run);
         }
         let (_, work) = self.horizon(problem.boxes.len() as u64, run);
         if let Some(optimum) = exact::instead(problem, work, run)? {
@@ -86,14 +86,15 @@ impl Config {
             Some(SmallBudget::LocalOptimum(best, tree)) => (best, tree),
             None => Incumbent::build(&self.start.clone().unwrap_or_default(), problem, metric, run)?,
         };
-        improve(self, &mut tree, seed, problem, &mut best, run);
+        improve(self, (&mut tree, None), seed, problem, &mut best, run);
         Ok(best.tree)
     }
 
-    /// Improves a tree with one reference per leaf, and its references if they may change.
+    /// Improves a tree with one reference per leaf, and its references if they may change; or another one, where a trial shows that
+    /// to be better.
     pub(crate) fn improved<A: Metric>(
         &self,
-        tree: Bvh,
+        (tree, other): (Bvh, Option<Bvh>),
         metric: A,
         problem: &Problem,
         seed: u64,
@@ -101,11 +102,13 @@ impl Config {
     ) -> Found {
         let mut best = Incumbent::begin(tree, problem, run);
         if problem.splits.is_some() {
-            let mut tree = best.working(WithLeaves(metric))?;
-            improve(self, &mut tree, seed, problem, &mut best, run);
-        } else {
+            let metric = WithLeaves(metric);
             let mut tree = best.working(metric)?;
-            improve(self, &mut tree, seed, problem, &mut best, run);
+            let other =
+                other.map(|tree| Working::from_bvh(&tree, metric.internal(&tree), metric)).transpose()?;
+            improve(self, (&mut tree, other), seed, problem, &mut best, run);
+        } else {
+            improve(self, (&mut best.working(metric)?, None), seed, problem, &mut best, run);
         }
         Ok(best.tree)
     }
