@@ -1,8 +1,9 @@
 //! Files and folders: inputs are regular files, outputs are replaced whole, one harness writes to a folder at a time.
 
 use crate::Error;
+use crate::scenes::Scene;
 use bvh_core::file::{FileError, TreeFile};
-use bvh_core::{Aabb, Bvh, validate};
+use bvh_core::{Bvh, validate_references};
 use std::fs::{self, File};
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -29,13 +30,14 @@ pub fn read_text(path: &Path) -> Result<String, Error> {
         .map_err(|error| Error::Usage(format!("{}: {}; accepted: UTF-8", path.display(), error.utf8_error())))
 }
 
-/// The tree over `boxes` in the file at `path`: refuses one that is damaged, or saved for another scene, and one that
-/// is not [valid](validate) over these boxes.
-pub fn load_tree(path: &Path, boxes: &[Aabb]) -> Result<Bvh, Error> {
+/// The tree over a scene's objects in the file at `path`: refuses one that is damaged, or saved for another scene, and one
+/// that is not [valid](validate_references) over these objects.
+pub fn load_tree(path: &Path, scene: &Scene) -> Result<Bvh, Error> {
     let bytes = read(path)?;
     let refused = |source| Error::TreeFile { path: path.to_owned(), source };
-    let tree = bvh_core::file::load(&bytes, boxes).map_err(refused)?;
-    validate(&tree, boxes).map_err(|invalid| refused(FileError::Tree(invalid)))?;
+    let tree = bvh_core::file::load(&bytes, &scene.boxes).map_err(refused)?;
+    validate_references(&tree, &scene.boxes, &scene.primitives)
+        .map_err(|invalid| refused(FileError::Tree(invalid)))?;
     Ok(tree)
 }
 

@@ -41,8 +41,8 @@ fn a_bake_of_work_writes_the_same_bytes_on_any_number_of_threads() {
     });
     assert!(bytes[0] == bytes[1]);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "no other file is left");
-    let boxes = Scene::load("escher").unwrap().boxes;
-    let tree = load_tree(&folder.path().join("1.bvh"), &boxes).unwrap();
+    let scene = Scene::load("escher").unwrap();
+    let tree = load_tree(&folder.path().join("1.bvh"), &scene).unwrap();
     let facts = facts(&said(folder.path(), &["inspect", "1.bvh", "escher"]));
     assert_eq!(facts["internal area"], bvh_core::cost::internal_area(&tree).to_string());
     assert_eq!(
@@ -52,6 +52,48 @@ fn a_bake_of_work_writes_the_same_bytes_on_any_number_of_threads() {
     assert!(facts["internal area over Müller–Fellner's"].parse::<f64>().unwrap() < 0.9);
     assert!(facts["end-point overlap"].parse::<f64>().unwrap() > 0.0);
     assert!(facts["valid"].starts_with("yes"));
+}
+
+#[test]
+fn a_bake_divides_objects_where_that_pays_and_searches_by_the_cost_of_the_layout() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let bake = |out: &str, more: &[&str]| {
+        let args = ["bake", "pinecon2", "--budget", "1Mwork", "--out", out];
+        let said = said(at, &[&args, more].concat());
+        (said, facts(&self::said(at, &["inspect", out, "pinecon2"])))
+    };
+    let number = |facts: &BTreeMap<String, String>, what: &str| facts[what].parse::<f64>().unwrap();
+    let (_, whole) = bake("whole.bvh", &[]);
+    let (said_split, split) = bake("split.bvh", &["--references", "1.3"]);
+    assert!(said_split.contains("area of all nodes"), "{said_split}");
+    let (objects, references) = (number(&split, "objects"), number(&split, "references"));
+    assert_eq!(number(&whole, "references"), objects);
+    assert!(references > objects && references <= 1.3 * objects, "{references} of {objects}");
+    assert!(number(&split, "surface area heuristic") < number(&whole, "surface area heuristic"));
+    let (said_layout, layout) = bake("layout.bvh", &["--cost", "layout"]);
+    assert!(said_layout.contains("cost of the wide layout"), "{said_layout}");
+    assert_eq!(layout["objective"], "cost of the wide layout, by area");
+    let scene = Scene::load("pinecon2").unwrap();
+    let costs = ["layout.bvh", "whole.bvh"]
+        .map(|file| bvh_core::cost::layout_area(&load_tree(&at.join(file), &scene).unwrap()));
+    assert!(costs[0] < costs[1], "{costs:?}");
+    bake("further.bvh", &["--references", "1.3", "--from", "split.bvh"]);
+    let rendered =
+        said(at, &["render", "pinecon2", "--accel", "split.bvh", "--out", "a.png", "--size", "16x16"]);
+    assert!(!rendered.is_empty());
+    for (more, expected) in [
+        (["--references", "0.5"], "--references 0.5; accepted: 1 to 16"),
+        (["--references", "nan"], "--references NaN; accepted: 1 to 16"),
+    ] {
+        let args = [&["bake", "pinecon2", "--budget", "1Mwork", "--out", "no.bvh"][..], &more].concat();
+        let output = harness(at, &args).output().unwrap();
+        assert!(
+            !output.status.success() && text(&output.stderr).contains(expected),
+            "{}",
+            text(&output.stderr)
+        );
+    }
 }
 
 #[test]
@@ -131,7 +173,7 @@ fn a_bake_takes_the_time_it_was_given() {
 fn a_kill_leaves_the_old_file_or_a_whole_new_one() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bvh");
-    let boxes = Scene::load("spheres750").unwrap().boxes;
+    let scene = Scene::load("spheres750").unwrap();
     said(
         folder.path(),
         &["bake", "spheres750", "--method", "muller_fellner", "--budget", "0s", "--out", "a.bvh"],
@@ -146,7 +188,7 @@ fn a_kill_leaves_the_old_file_or_a_whole_new_one() {
         std::thread::sleep(Duration::from_millis(milliseconds));
         child.kill().unwrap();
         child.wait().unwrap();
-        load_tree(&path, &boxes).unwrap();
+        load_tree(&path, &scene).unwrap();
         replaced += usize::from(fs::read(&path).unwrap() != old);
     }
     eprintln!("{replaced} of 12 were killed too late");
@@ -169,7 +211,7 @@ fn ctrl_c_keeps_the_best_tree_so_far() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
     assert!(text(&output.stderr).contains("`--from a.bvh` goes on"), "{}", text(&output.stderr));
-    load_tree(&folder.path().join("a.bvh"), &Scene::load("escher").unwrap().boxes).unwrap();
+    load_tree(&folder.path().join("a.bvh"), &Scene::load("escher").unwrap()).unwrap();
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
@@ -270,7 +312,7 @@ fn the_nodes_are_written_in_full_precision() {
     let folder = tempfile::tempdir().unwrap();
     said(folder.path(), &["bake", "spheres75", "--budget", "0s", "--out", "a.bvh"]);
     said(folder.path(), &["inspect", "a.bvh", "--nodes", "nodes.csv"]);
-    let tree = load_tree(&folder.path().join("a.bvh"), &Scene::load("spheres75").unwrap().boxes).unwrap();
+    let tree = load_tree(&folder.path().join("a.bvh"), &Scene::load("spheres75").unwrap()).unwrap();
     let mut reader = csv::Reader::from_path(folder.path().join("nodes.csv")).unwrap();
     let columns = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
     assert_eq!(reader.headers().unwrap().iter().collect::<Vec<_>>().join(","), columns);

@@ -2,8 +2,8 @@
 
 use bvh_build::{Accelerator, Builder, Structure, muller_fellner};
 use bvh_core::cost::Objective;
-use bvh_core::{Aabb, Primitives, RayDensity, Segment, WideBvh, file, validate};
-use bvh_search::{Budget, Method, Problem, StopReason, optimize, solve};
+use bvh_core::{Aabb, Primitives, RayDensity, Segment, WideBvh, file, validate, validate_references};
+use bvh_search::{Budget, Method, Problem, Splits, StopReason, optimize, solve};
 use harness::scenes::Scene;
 use harness::scenes::stiff::{self, STIFF};
 use harness::stress::{
@@ -233,6 +233,45 @@ fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
         }
     }
     assert!(searched > 25 && refused < 10, "{searched} searched, {refused} without a density");
+}
+
+#[test]
+fn every_case_holds_with_divided_objects_and_with_the_cost_of_the_layout() {
+    let method = Method::Best(bvh_search::best::Config::default());
+    let mut divided = 0;
+    for case in &CASES {
+        let Some(scene) = case.scene() else { continue };
+        let triangles = case.triangles(scene.sizes[0].min(2000));
+        let (boxes, objects) = (stiff::boxes(&triangles), Primitives::Triangles(triangles.clone()));
+        let budget = examine::budget(&method, boxes.len(), WORK);
+        for objective in [Objective::Layout, Objective::InternalArea] {
+            for references in [1.0, 1.5] {
+                let most = (references * boxes.len() as f64) as usize;
+                let splits = Splits::at_most(most, &boxes, &objects);
+                let problem = Problem { objective, splits, ..Problem::new(&boxes) };
+                let solved = || solve(&method, &problem, 1, budget, &()).unwrap();
+                let outcome = solved();
+                assert_eq!(outcome.tree, solved().tree, "{}: another tree for the same seed", case.id);
+                validate_references(&outcome.tree, &boxes, &objects)
+                    .unwrap_or_else(|fault| panic!("{}, {objective:?}, {references}: {fault}", case.id));
+                assert!(outcome.tree.prim_ids.len() <= most.max(boxes.len()), "{}", case.id);
+                divided += usize::from(outcome.tree.prim_ids.len() > boxes.len());
+                let cost = problem.cost(&outcome.tree);
+                let close = (outcome.cost - cost).abs() <= examine::ROUNDING * cost;
+                assert!(close, "{}: {} reported, {cost}", case.id, outcome.cost);
+                let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
+                let bytes = file::save_references(&outcome.tree, &boxes, &objects, &file::Origin::default());
+                assert_eq!(file::load(&bytes.unwrap(), &boxes), Ok(outcome.tree.clone()), "{}", case.id);
+                let wide = WideBvh::new(&outcome.tree, &triangles).unwrap();
+                let plain = WideBvh::new(&greedy, &triangles).unwrap();
+                for ray in tracing::rays(&triangles, 300, 2) {
+                    assert_eq!(wide.nearest_hit(&ray), plain.nearest_hit(&ray), "{}: {ray:?}", case.id);
+                    assert_eq!(wide.any_hit(&ray), plain.any_hit(&ray), "{}: {ray:?}", case.id);
+                }
+            }
+        }
+    }
+    assert!(divided > 20, "{divided}");
 }
 
 #[test]

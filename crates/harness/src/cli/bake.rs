@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::cli::arguments::{Jobs, TREE, input_file, output_file};
+use crate::cli::effort::Effort;
 use crate::cli::output::{print_error, print_line};
 use crate::cli::{explain, interrupt};
 use crate::files::{self, Reserved, load_tree};
@@ -10,18 +11,18 @@ use crate::measure::segments::{self, RenderedRays};
 use crate::scenes::Scene;
 use crate::spec::configuration;
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::cost::Measure;
+use bvh_core::cost::{Measure, Objective};
 use bvh_core::file::{self, Header, Origin};
 use bvh_core::{Bvh, RayDensity};
 use bvh_search::best::{self, Horizon};
-use bvh_search::{Budget, Deadline, Event, Method, Observer, Outcome, Problem, StopReason, optimize, solve};
+use bvh_search::{
+    Budget, Deadline, Event, Method, Observer, Outcome, Problem, Splits, StopReason, optimize, solve,
+};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
 
 /// Search for the best tree of a scene within a budget, and save it.
 #[derive(Args, Clone, Debug)]
@@ -42,6 +43,14 @@ pub struct BakeArgs {
     /// of a renderer.
     #[arg(long, value_name = "default|FILE.toml")]
     pub rays: Option<String>,
+    /// What the search minimises: `area`, the internal area, which suits every tracer; or `layout`, the nodes and blocks of triangles
+    /// that are tested in this project's own wide layout.
+    #[arg(long, value_name = "area|layout", default_value = "area", value_enum)]
+    pub cost: BakeCost,
+    /// Let objects be divided among leaves where that pays, up to so many references per object, 1 to 16. Leaves count in the cost
+    /// then.
+    #[arg(long, value_name = "N", default_value_t = 1.0)]
+    pub references: f64,
     /// The method, with its default parameters.
     #[arg(long, value_name = "NAME", default_value = BEST)]
     pub method: String,
@@ -56,50 +65,17 @@ pub struct BakeArgs {
     pub explain: bool,
 }
 
+/// What a bake minimises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum BakeCost {
+    /// The internal area.
+    Area,
+    /// The cost of the wide layout.
+    Layout,
+}
+
 /// The method that goes on from a given tree.
 const BEST: &str = "best";
-
-/// A budget: of time, or of work in nodes made or visited.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Effort {
-    /// Elapsed, from the search's beginning.
-    Time(Duration),
-    /// As [`Budget::max_work`].
-    Work(u64),
-}
-
-impl Effort {
-    /// The time that there is, from now on.
-    fn deadline(self) -> Deadline {
-        Deadline::after(if let Self::Time(limit) = self { limit } else { Duration::MAX })
-    }
-}
-
-impl FromStr for Effort {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let effort = match text.strip_suffix("work") {
-            Some(amount) => {
-                let digits = amount.trim_end_matches(['k', 'M', 'G']);
-                let unit = match &amount[digits.len()..] {
-                    "" => Some(1),
-                    "k" => Some(1_000),
-                    "M" => Some(1_000_000),
-                    "G" => Some(1_000_000_000),
-                    _ => None,
-                };
-                unit.and_then(|unit| digits.trim_end().parse::<u64>().ok()?.checked_mul(unit)).map(Self::Work)
-            }
-            // `5M` would be five months.
-            None if text.contains('M') => None,
-            None => humantime::parse_duration(text).ok().map(Self::Time),
-        };
-        effort.ok_or_else(|| {
-            "expected a time such as 10s, 500ms or 1h30m, or work such as 50Mwork (units k, M, G)".into()
-        })
-    }
-}
 
 /// Searches until the budget is spent or `interrupted` becomes true, writes the best tree found, and prints what it
 /// costs. If it is interrupted, it writes the file all the same and returns [`Error::Stopped`].
@@ -116,15 +92,23 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         print_line(&explain::scene(&scene)?);
     }
     let method = method(args)?;
+    check_references(args, &method)?;
     let start = args.from.as_deref().map(|path| start(path, &scene)).transpose()?;
-    let reserved = Reserved::new(&args.out, most_bytes(scene.boxes.len()))?;
+    let most = (args.references * scene.boxes.len() as f64) as usize;
+    let reserved = Reserved::new(&args.out, most_bytes(most))?;
 
     let greedy = muller_fellner::Config::default().build(&scene.boxes);
     let greedy = greedy.map_err(Error::search(&scene.name, &args.method))?;
     let deadline = args.budget.deadline();
     interrupt::hold();
     let density = rays.map(|rays| density(&rays, &scene, &greedy, args.seed)).transpose()?;
+    let objective = match args.cost {
+        BakeCost::Area => Objective::InternalArea,
+        BakeCost::Layout => Objective::Layout,
+    };
     let problem = Problem {
+        objective,
+        splits: Splits::at_most(most, &scene.boxes, &scene.primitives),
         measure: density.as_ref().map(|density| density as &dyn Measure),
         ..Problem::new(&scene.boxes)
     };
@@ -146,8 +130,8 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let work = spent.saturating_add(outcome.work);
     let name = recorded(args);
     let visits = density.as_ref().map_or_else(Vec::new, |density| density.visits(&outcome.tree));
-    let origin = Origin { method: &name, seed: args.seed, work, visits: &visits, ..Default::default() };
-    let bytes = file::save(&outcome.tree, &scene.boxes, &origin)
+    let origin = Origin { method: &name, seed: args.seed, work, visits: &visits, objective };
+    let bytes = file::save_references(&outcome.tree, &scene.boxes, &scene.primitives, &origin)
         .map_err(|source| Error::TreeFile { path: args.out.clone(), source })?;
     reserved.write(&bytes)?;
     if interrupted.load(Relaxed) {
@@ -202,7 +186,13 @@ fn recorded(args: &BakeArgs) -> String {
 
 /// What the cost is.
 fn unit(args: &BakeArgs) -> &'static str {
-    if args.rays.is_some() { "visits of rays times root area" } else { "internal area" }
+    match (args.cost, &args.rays) {
+        (BakeCost::Layout, Some(_)) => "cost of the wide layout for rays, times root area,",
+        (BakeCost::Layout, None) => "cost of the wide layout, times root area,",
+        (BakeCost::Area, Some(_)) => "visits of rays times root area",
+        (BakeCost::Area, None) if args.references > 1.0 => "area of all nodes",
+        (BakeCost::Area, None) => "internal area",
+    }
 }
 
 /// The method that was named. Refuses one that cannot start from a tree if a tree is given.
@@ -224,9 +214,23 @@ fn method(args: &BakeArgs) -> Result<Method, Error> {
     }
 }
 
+/// Refuses numbers of references that are out of range, and methods that would take no notice of them.
+fn check_references(args: &BakeArgs, method: &Method) -> Result<(), Error> {
+    let refused = |found: String, accepted: &str| {
+        Err(Error::Usage(format!("--references {found}; accepted: {accepted}")))
+    };
+    if !(1.0..=16.0).contains(&args.references) {
+        return refused(args.references.to_string(), "1 to 16");
+    }
+    if args.references > 1.0 && !matches!(method, Method::Best(_)) {
+        return refused(format!("{} with --method {}", args.references, args.method), BEST);
+    }
+    Ok(())
+}
+
 /// The tree to start from, and its header.
 fn start(path: &Path, scene: &Scene) -> Result<(Bvh, Header), Error> {
-    let tree = load_tree(path, &scene.boxes)?;
+    let tree = load_tree(path, scene)?;
     let header = files::open_tree(path, &files::read(path)?)?.header().clone();
     Ok((tree, header))
 }

@@ -8,7 +8,7 @@ use crate::{Error, files};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_core::file::{FileError, Header, TreeFile};
-use bvh_core::{Bvh, NodeKind, validate};
+use bvh_core::{Bvh, NodeKind, validate_references};
 use clap::Args;
 use serde::{Serialize, Serializer};
 use serde_json::json;
@@ -162,6 +162,7 @@ fn describe(header: &Header, bytes: usize, facts: &mut Facts) {
     facts.add("cost when saved", header.cost);
     facts.add("checksum of the scene", format!("{:08x}", header.scene));
     facts.add("objects", header.objects);
+    facts.add("references", header.references);
     facts.add("nodes", header.nodes);
 }
 
@@ -196,7 +197,7 @@ fn histogram(counts: &BTreeMap<u32, usize>) -> String {
 /// The facts that only the scene can tell.
 fn against(tree: &Bvh, file: TreeFile, scene: &Scene, facts: &mut Facts) -> Result<(), FileError> {
     file.for_boxes(&scene.boxes)?;
-    validate(tree, &scene.boxes)?;
+    validate_references(tree, &scene.boxes, &scene.primitives)?;
     facts.add("scene", &scene.name);
     facts.add("valid", "yes, over this scene's objects");
     // Boxes that the file's checksum has accepted are finite: a valid tree lies around them.

@@ -3,6 +3,7 @@
 pub mod arguments;
 pub mod bake;
 pub mod commands;
+pub mod effort;
 pub mod explain;
 pub mod inspect;
 pub mod interrupt;

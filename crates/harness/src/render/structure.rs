@@ -30,9 +30,7 @@ pub fn by_name(name: &str, scene: &Scene) -> Result<Structure<'static>, Error> {
             })?;
             Ok(Structure::Wide(wide))
         }
-        _ if name.ends_with(".bvh") => {
-            Ok(Structure::Tree(Cow::Owned(load_tree(Path::new(name), &scene.boxes)?)))
-        }
+        _ if name.ends_with(".bvh") => Ok(Structure::Tree(Cow::Owned(load_tree(Path::new(name), scene)?))),
         _ => Err(Error::Usage(format!("--accel is {name:?}; accepted: {ACCEPTED}"))),
     }
 }

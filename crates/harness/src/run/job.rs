@@ -12,9 +12,10 @@ use crate::scenes::Scene;
 use crate::spec::{Contestant, Experiment, Labelled};
 use bvh_build::{Builder, Query, muller_fellner};
 use bvh_core::cost::{self, Measure, Objective, SahConstants};
-use bvh_core::{Bvh, RayDensity};
+use bvh_core::{Bvh, RayDensity, validate_references};
 use bvh_search::{
-    Budget, Event, Judge, Observer, Outcome, Problem, SearchError, StopReason, exact, lower_bound, solve,
+    Budget, Event, Judge, Observer, Outcome, Problem, SearchError, Splits, StopReason, exact, lower_bound,
+    solve,
 };
 use indicatif::ProgressBar;
 use std::sync::Mutex;
@@ -70,7 +71,8 @@ pub(crate) fn perform(
     if watch.cancelled() {
         return Ok(None);
     }
-    bvh_core::validate(&outcome.tree, &scene.boxes).map_err(|source| Error::InvalidTree {
+    let valid = validate_references(&outcome.tree, &scene.boxes, &scene.primitives);
+    valid.map_err(|source| Error::InvalidTree {
         scene: scene.name.clone(),
         method: labelled.label.clone(),
         source,
@@ -112,7 +114,8 @@ fn solve_or_build(
             let judge = labelled.judge.as_ref().map(|rays| RayJudge { rays, scene, seed: ray_seed });
             let density = density(experiment, job)?;
             let problem = Problem {
-                objective: experiment.objective,
+                objective: labelled.objective.unwrap_or(experiment.objective),
+                splits: splits(labelled, scene),
                 measure: density.as_ref().map(|density| density as &dyn Measure),
                 judge: judge.as_ref().map(|judge| judge as &dyn Judge),
                 disabled: &labelled.keep,
@@ -121,13 +124,20 @@ fn solve_or_build(
             let outcome = solve(method, &problem, seed, experiment.budget_of(labelled), stopwatch);
             let seconds = stopwatch.start.elapsed().as_secs_f64();
             let mut outcome = outcome.map_err(Error::search(&scene.name, &labelled.label))?;
-            if judge.is_some() || density.is_some() {
+            let own = judge.is_some() || density.is_some() || problem.splits.is_some();
+            if own || labelled.objective.is_some() {
                 outcome.cost = experiment.objective.cost(&outcome.tree);
             }
             Ok((outcome, seconds))
         }
         Contestant::Peer(peer) => build_by(peer, scene, &experiment.objective, stopwatch),
     }
+}
+
+/// Whether and how the method may divide the scene's objects.
+fn splits<'a>(labelled: &Labelled, scene: &'a Scene) -> Option<Splits<'a>> {
+    let references = labelled.references? * scene.boxes.len() as f64;
+    Splits::at_most(references as usize, &scene.boxes, &scene.primitives)
 }
 
 /// The density of the rays that the job's method minimises the visits of, if it does; every repetition has its own rays.

@@ -3,11 +3,12 @@
 use crate::Error;
 use crate::measure::ray_cost::{Config, TrainedOn, test_rays};
 use crate::run::job::{Job, Watch, density};
-use crate::run::rows::{Row, TestRow, TestTimeRow, to_bytes};
+use crate::run::rows::{LayoutRow, Row, TestRow, TestTimeRow, to_bytes};
 use crate::run::store::Store;
 use crate::run::trace::{Trees, complete};
 use crate::spec::Experiment;
-use bvh_core::{Bvh, WideBvh};
+use bvh_core::cost::{self, SahConstants};
+use bvh_core::{Bvh, WideBvh, collapse_leaves};
 use bvh_search::Observer;
 use rayon::prelude::*;
 use std::path::Path;
@@ -26,7 +27,7 @@ pub(crate) fn judge(
     store: &Store,
 ) -> Result<(), Error> {
     complete(trees, experiment, jobs, watch, |_| true)?;
-    let (mut rows, mut times) = (Vec::new(), Vec::new());
+    let (mut rows, mut times, mut sizes) = (Vec::new(), Vec::new(), Vec::new());
     let runs: Vec<(&Job, &Bvh)> = trees.iter().map(|(&index, tree)| (&jobs[index], tree)).collect();
     for of_scene in runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
         let scene = of_scene[0].0.scene;
@@ -35,6 +36,10 @@ pub(crate) fn judge(
         // By method, with all repetitions.
         let methods: Vec<usize> = (0..of_scene.len()).step_by(experiment.repetitions as usize).collect();
         let first: Vec<&WideBvh> = methods.iter().map(|&at| &layouts[at]).collect();
+        for &at in &methods {
+            let range = at..at + experiment.repetitions as usize;
+            sizes.push(size(&of_scene[range.clone()], &layouts[range]));
+        }
         let seed = experiment.seed_of(&scene.name, "rays that judge trees", 0);
         for rays in test_rays(config, scene, of_scene[0].1, seed) {
             if watch.cancelled() {
@@ -45,7 +50,8 @@ pub(crate) fn judge(
             for (number, &at) in methods.iter().enumerate() {
                 let own = &tests[at..at + experiment.repetitions as usize];
                 let labelled = of_scene[at].0.labelled;
-                let tree = labelled.for_rays.map_or(labelled.label.as_str(), |_| RAYS);
+                let plain = labelled.objective.is_none() && labelled.references.is_none();
+                let tree = if labelled.for_rays.is_some() && plain { RAYS } else { &labelled.label };
                 let [node_tests, block_tests, tests] =
                     [mean(own, |t| t[0]), mean(own, |t| t[1]), mean(own, |t| t[0] + t[1])];
                 rows.push(TestRow {
@@ -74,6 +80,7 @@ pub(crate) fn judge(
         }
     }
     store.write(TestRow::FILE, &to_bytes(&rows, Path::new(TestRow::FILE))?)?;
+    store.write(LayoutRow::FILE, &to_bytes(&sizes, Path::new(LayoutRow::FILE))?)?;
     if !times.is_empty() {
         store.write(TestTimeRow::FILE, &to_bytes(&times, Path::new(TestTimeRow::FILE))?)?;
     }
@@ -89,6 +96,25 @@ fn layout(experiment: &Experiment, job: &Job, tree: &Bvh) -> Result<WideBvh, Err
         None => WideBvh::new(tree, triangles),
     };
     made.map_err(|error| failed(error.to_string()))
+}
+
+/// The sizes and costs of a method's trees and their layouts, means over repetitions.
+fn size(runs: &[(&Job, &Bvh)], layouts: &[WideBvh]) -> LayoutRow {
+    let constants = SahConstants::default();
+    let job = runs[0].0;
+    let objects = job.scene.boxes.len() as f64;
+    let mean =
+        |of: &dyn Fn(&Bvh) -> f64| runs.iter().map(|(_, tree)| of(tree)).sum::<f64>() / runs.len() as f64;
+    let bytes: usize = layouts.iter().map(WideBvh::bytes).sum();
+    LayoutRow {
+        scene: job.scene.name.clone(),
+        method: job.labelled.label.clone(),
+        repetitions: runs.len(),
+        references_per_object: mean(&|tree| tree.prim_ids.len() as f64 / objects),
+        bytes_per_object: bytes as f64 / (objects * layouts.len() as f64),
+        collapsed_sah: mean(&|tree| cost::sah(&collapse_leaves(tree, &constants), &constants)),
+        layout_over_root: mean(&|tree| cost::over_root_area(tree, cost::layout_area(tree))),
+    }
 }
 
 /// The mean of a number over repetitions, and its standard error if there are several.

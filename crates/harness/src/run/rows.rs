@@ -260,6 +260,22 @@ rows! {
         million_per_s: f64,
     }
 
+    /// One row of `layouts.csv`: the size and the cost of a method's trees and of the wide layouts that rays are traced through.
+    LayoutRow in "layouts.csv" {
+        scene: String,
+        method: String,
+        /// Trees that the numbers are means over.
+        repetitions: usize,
+        /// Leaves that name an object, per object: more than 1 where objects are divided.
+        references_per_object: f64,
+        /// Of the wide layout.
+        bytes_per_object: f64,
+        /// The surface area heuristic with both constants 1, after the best collapse of leaves.
+        collapsed_sah: f64,
+        /// Nodes and blocks of triangles that a random line through the root's box is expected to visit.
+        layout_over_root: f64,
+    }
+
     /// One row of `bounds.csv`: a proven lower bound of a scene.
     BoundRow in "bounds.csv" {
         scene: String,

@@ -4,6 +4,7 @@ use super::fault::Fault;
 use super::{Contestant, Experiment, Labelled};
 use crate::report::Report;
 use crate::{scenes::subset, stress};
+use bvh_build::config::Accepts;
 use bvh_build::{Check, OutOfRange};
 use bvh_search::Method;
 use std::collections::HashSet;
@@ -70,7 +71,17 @@ impl Experiment {
         self.methods.iter().enumerate().filter_map(check).collect()
     }
 
-    fn check_method(&self, Labelled { method, judge, for_rays, .. }: &Labelled) -> Result<(), Fault> {
+    fn check_method(&self, labelled: &Labelled) -> Result<(), Fault> {
+        let Labelled { method, judge, for_rays, objective, references, .. } = labelled;
+        if let Some(references) = references {
+            (1.0..=16.0).check("references", references)?;
+            if !matches!(method, Contestant::Ours(Method::Best(_))) {
+                return Err(Fault::new("references", format!("set for {}", method.name()), "with best"));
+            }
+        }
+        if objective.is_some() && matches!(method, Contestant::Peer(_)) {
+            return Err(Fault::new("objective", "set for another library", "with a method of ours"));
+        }
         if for_rays.is_some() {
             let found = match method {
                 _ if self.ray_cost.is_none() => "set without `ray_cost`",

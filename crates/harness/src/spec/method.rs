@@ -4,6 +4,7 @@ use super::fault::{self, Fault};
 use crate::measure::empirical_cost;
 use crate::measure::ray_cost::TrainedOn;
 use crate::peers::Peer;
+use bvh_core::cost::Objective;
 use bvh_search::{Budget, Method, Shortcut};
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Table;
@@ -28,6 +29,11 @@ pub struct Labelled {
     /// Rays of the experiment's `ray_cost` whose visits its runs minimise in place of the objective; the costs in `history.csv`
     /// are then such numbers. Default none.
     pub for_rays: Option<TrainedOn>,
+    /// The cost that its runs minimise in place of the experiment's. Default none.
+    pub objective: Option<Objective>,
+    /// Maximum number of references per object, 1 to 16, where objects may be divided among leaves: for `best`. Default none: they
+    /// may not.
+    pub references: Option<f64>,
 }
 
 /// A method of ours, or another library.
@@ -68,6 +74,8 @@ struct Frame {
     seed_as: Option<String>,
     judge: Option<empirical_cost::Config>,
     for_rays: Option<TrainedOn>,
+    objective: Option<Objective>,
+    references: Option<f64>,
 }
 
 impl Labelled {
@@ -85,19 +93,22 @@ impl Labelled {
             seed_as: None,
             judge: None,
             for_rays: None,
+            objective: None,
+            references: None,
         }
     }
 
     /// Reads an entry, and names the key that an error is about.
     pub(super) fn read(mut table: Table) -> Result<Self, Fault> {
-        let frame = ["label", "budget", "keep", "seed_as", "judge", "for_rays"];
+        let frame = ["label", "budget", "keep", "seed_as", "judge", "for_rays", "objective", "references"];
         let frame = frame.into_iter().filter_map(|key| table.remove_entry(key)).collect();
-        let Frame { label, budget, keep, seed_as, judge, for_rays } = fault::deserialize(frame)?;
+        let Frame { label, budget, keep, seed_as, judge, for_rays, objective, references } =
+            fault::deserialize(frame)?;
         let accepted = || format!("{}, or the libraries {}", Method::NAMES.join(", "), Peer::NAMES.join(", "));
         let method =
             fault::tagged(table, "method", |name, parameters| Contestant::read(name, parameters), accepted)?;
         let label = label.unwrap_or_else(|| method.name().into());
-        Ok(Self { label, method, budget, keep, seed_as, judge, for_rays })
+        Ok(Self { label, method, budget, keep, seed_as, judge, for_rays, objective, references })
     }
 }
 
@@ -108,9 +119,11 @@ impl<'de> Deserialize<'de> for Labelled {
 }
 
 impl From<Labelled> for Table {
-    fn from(Labelled { label, method, budget, keep, seed_as, judge, for_rays }: Labelled) -> Self {
+    fn from(labelled: Labelled) -> Self {
+        let Labelled { label, method, budget, keep, seed_as, judge, for_rays, objective, references } =
+            labelled;
         let mut table = Self::try_from(&method).unwrap_or_default();
-        let frame = Frame { label: Some(label), budget, keep, seed_as, judge, for_rays };
+        let frame = Frame { label: Some(label), budget, keep, seed_as, judge, for_rays, objective, references };
         table.extend(Self::try_from(&frame).unwrap_or_default());
         table
     }
