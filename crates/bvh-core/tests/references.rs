@@ -33,7 +33,8 @@ fn divided(tree: &Bvh, triangles: &[Triangle], random: &mut Random) -> (Bvh, Vec
                 let first = tree.nodes.len() as u32;
                 tree.nodes[at] = Node::inner(aabb, first, 2);
                 let added = tree.prim_ids.len() as u32;
-                tree.nodes.extend([Node::leaf(parts[0], range.start as u32, 1), Node::leaf(parts[1], added, 1)]);
+                tree.nodes
+                    .extend([Node::leaf(parts[0], range.start as u32, 1), Node::leaf(parts[1], added, 1)]);
                 tree.prim_ids.push(object);
                 planes.push((object, axis, plane));
             }
@@ -169,7 +170,8 @@ fn a_tree_that_leaves_out_a_part_or_an_object_is_refused() {
 fn the_cost_of_a_layout_is_known_before_it_is_made() {
     let mut random = Random(10);
     for n in [1, 2, 7, 60, 200] {
-        let triangles: Vec<Triangle> = soup(n, &mut random).into_iter().filter(|t| !t.is_degenerate()).collect();
+        let triangles: Vec<Triangle> =
+            soup(n, &mut random).into_iter().filter(|t| !t.is_degenerate()).collect();
         for shape in SHAPES {
             let tree = tree(&boxes(&triangles), shape, &mut random);
             let Some(root) = tree.root_aabb().filter(|root| root.half_area() > 0.0) else { continue };

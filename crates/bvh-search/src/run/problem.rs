@@ -19,6 +19,14 @@ pub struct Splits<'a> {
     pub most: usize,
 }
 
+impl<'a> Splits<'a> {
+    /// Leave for so many references, if they are more than the objects of these `boxes`: with no more, nothing can be divided, and
+    /// the problem without splits is the same, with more ways to solve it.
+    pub fn at_most(most: usize, boxes: &[Aabb], objects: &'a dyn Clip) -> Option<Self> {
+        (most > boxes.len()).then_some(Self { objects, most })
+    }
+}
+
 /// What is searched for: the tree over `boxes` of least cost.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a> {

@@ -45,3 +45,29 @@ impl FromStr for Effort {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn budgets_are_times_or_work() {
+        for (text, expected) in [
+            ("10s", Some(Effort::Time(Duration::from_secs(10)))),
+            ("1m 30s", Some(Effort::Time(Duration::from_secs(90)))),
+            ("0s", Some(Effort::Time(Duration::ZERO))),
+            ("50000000work", Some(Effort::Work(50_000_000))),
+            ("50Mwork", Some(Effort::Work(50_000_000))),
+            ("2 Gwork", Some(Effort::Work(2_000_000_000))),
+            ("10", None),
+            ("5M", None),
+            ("work", None),
+            ("-5work", None),
+            ("5kMwork", None),
+            ("99999999999Gwork", None),
+            ("soon", None),
+        ] {
+            assert_eq!(text.parse().ok(), expected, "{text}");
+        }
+    }
+}

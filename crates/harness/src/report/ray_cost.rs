@@ -5,7 +5,7 @@ use super::output::{Output, each, panel};
 use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::run::rows::{TestRow, TestTimeRow};
-use crate::statistics::{NORMAL_95, geometric_mean};
+use crate::statistics::{geometric_mean, student};
 use serde::Serialize;
 
 bvh_build::config! { serde;
@@ -85,7 +85,9 @@ impl Config {
         let ratio = own / other;
         // Of a ratio of means, by the relative errors of both.
         let relative = row.tests_standard_error.zip(base.tests_standard_error);
-        let half = relative.map(|(a, b)| NORMAL_95 * ratio * (a / own).hypot(b / other));
+        // The degrees of freedom of one mean: with those of both, intervals would be somewhat narrower.
+        let factor = student(row.repetitions.min(base.repetitions));
+        let half = relative.zip(factor).map(|((a, b), factor)| factor * ratio * (a / own).hypot(b / other));
         Some(Compared {
             scene: &row.scene,
             tree: &row.tree,
@@ -183,6 +185,7 @@ fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
 fn reading(table: &[Compared]) -> String {
     each(table.iter().filter(|row| row.scene == ALL && row.trained_on != "none"), |row| {
         let camera = if row.camera == "none" { String::new() } else { format!(" ({} camera)", row.camera) };
-        Some(format!("{} on {}{camera} {:.3}", row.trained_on, row.judged_on, row.tests_over_base))
+        let tree = tree_name(row.tree, row.trained_on);
+        Some(format!("{tree} on {}{camera} {:.3}", row.judged_on, row.tests_over_base))
     })
 }

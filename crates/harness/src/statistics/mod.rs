@@ -104,12 +104,16 @@ pub fn mean_interval(values: &[f64]) -> Option<(f64, Option<(f64, f64)>)> {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let freedom = values.len().checked_sub(1)?;
-    let Some(&factor) = STUDENT.get(freedom.wrapping_sub(1)).or(STUDENT.last().filter(|_| freedom > 0)) else {
-        return Some((mean, None));
-    };
+    let Some(factor) = student(values.len()) else { return Some((mean, None)) };
     let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / freedom as f64;
     let half = factor * (variance / n).sqrt();
     Some((mean, Some((mean - half, mean + half))))
+}
+
+/// Half the width of the 95 % interval of a mean of so many values, in standard errors; `None` of fewer than two.
+pub fn student(values: usize) -> Option<f64> {
+    let freedom = values.checked_sub(1).filter(|&freedom| freedom > 0)?;
+    STUDENT.get(freedom - 1).or(STUDENT.last()).copied()
 }
 
 /// The 97.5 % quantiles of Student's t for 1 to 20 degrees of freedom. With more, intervals by the last are somewhat
