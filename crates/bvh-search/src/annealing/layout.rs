@@ -111,3 +111,48 @@ impl Layout {
         false
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::stream;
+    use crate::scatter::{built, scatter};
+    use bvh_build::muller_fellner;
+    use bvh_core::cost::layout_area;
+    use rand::RngExt;
+
+    #[test]
+    fn rows_that_follow_moves_are_those_that_are_made_anew() {
+        let mut tree = built(&muller_fellner::Config::default(), &scatter(120));
+        let (mut rng, mut layout) = (stream(3, 0), Layout::default());
+        layout.prepare(&tree);
+        let (mut accepted, mut refused) = (0, 0);
+        for _ in 0..4000 {
+            let draw = |rng: &mut crate::run::Stream| rng.random_range(1..tree.nodes.len() as u32);
+            let (node, beside) = (draw(&mut rng), draw(&mut rng));
+            let mut above = beside;
+            while above != ANCHOR && above != node {
+                above = tree.nodes[above as usize].parent;
+            }
+            let parent = tree.nodes[node as usize].parent;
+            if above == node || parent == ANCHOR || beside == parent {
+                continue;
+            }
+            let before = (layout.cost, tree.to_bvh());
+            tree.begin();
+            tree.detach(node);
+            tree.attach(node, beside);
+            if layout.accepts(&tree, 0.05 * before.0 * rng.random::<f64>().powi(4)) {
+                accepted += 1;
+            } else {
+                tree.undo();
+                refused += 1;
+                assert_eq!((layout.cost, tree.to_bvh()), before);
+            }
+            let (followed, anew) = (layout.cost, Layout::default().cost(&tree));
+            assert_eq!(followed, anew);
+            assert!((anew - layout_area(&tree.to_bvh())).abs() <= 1e-12 * anew);
+        }
+        assert!(accepted > 100 && refused > 1000, "{accepted} {refused}");
+    }
+}

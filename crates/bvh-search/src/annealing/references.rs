@@ -304,3 +304,55 @@ fn change_plain<A: Metric>(
     }
     done
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::stream;
+    use crate::scatter::scatter;
+    use crate::tree::{Area, WithLeaves};
+    use bvh_build::{Builder, muller_fellner};
+    use bvh_core::cost::{layout_area, total_area};
+    use bvh_core::{Triangle, validate_references};
+
+    /// Long diagonal triangles, of which boxes say little.
+    fn diagonals(n: u32) -> Vec<Triangle> {
+        let diagonal = |aabb: &Aabb| {
+            let far = aabb.min + (aabb.max - aabb.min) * 40.0;
+            Triangle([aabb.min, far, aabb.max])
+        };
+        scatter(n).iter().map(diagonal).collect()
+    }
+
+    #[test]
+    fn passes_divide_and_reunite_within_the_limit_and_the_cost_falls_every_time() {
+        let triangles = diagonals(150);
+        let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+        let objects = &triangles.as_slice();
+        let quota = Quota { work: 40_000, moves: u64::MAX };
+        for by_layout in [false, true] {
+            let cost = |tree: &bvh_core::Bvh| if by_layout { layout_area(tree) } else { total_area(tree) };
+            let start = muller_fellner::Config::default().build(&boxes).unwrap();
+            let mut before = cost(&start);
+            let mut tree = Working::from_bvh(&start, total_area(&start), WithLeaves(Area)).unwrap();
+            let mut most_seen = 0;
+            // With less leave than there are references, nothing is divided, and leaves that pay little are still reunited.
+            for most in [180, 200, 160, 150] {
+                let mut divider = Divider::new(Splits { objects, most }, by_layout);
+                let references = tree.objects();
+                for round in 0..4 {
+                    let tally = divider.pass(&mut tree, quota, &mut stream(7, round), &());
+                    assert!(tally.work > 0);
+                    let flat = tree.to_bvh();
+                    validate_references(&flat, &boxes, objects).unwrap();
+                    assert!(flat.prim_ids.len() <= most.max(references), "{} {most}", flat.prim_ids.len());
+                    assert!((tree.area() - total_area(&flat)).abs() <= 1e-9 * tree.area());
+                    let after = cost(&flat);
+                    assert!(after <= before * (1.0 + 1e-9), "{after} {before}");
+                    (before, most_seen) = (after, most_seen.max(flat.prim_ids.len()));
+                }
+            }
+            assert!(most_seen > 160, "{most_seen}");
+        }
+    }
+}

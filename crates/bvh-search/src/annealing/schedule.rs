@@ -187,7 +187,9 @@ mod tests {
     #[test]
     fn areas_stay_exact_after_each_of_a_million_annealed_moves() {
         let ruin = ruin_recreate::Ruin::default();
-        check(|| ruin_recreate::RuinMover::new(&ruin, 1000.0));
+        for by_layout in [false, true] {
+            check(|| ruin_recreate::RuinMover::new(&ruin, 1000.0, by_layout));
+        }
         for target in [single::Target::Random, single::Target::Best] {
             let step = single::SingleMove { target, ..Default::default() };
             check(|| single::SingleMover::new(&step));
