@@ -86,16 +86,16 @@ fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
     }
     let largest = whole.min.abs().max(whole.max.abs()).max_element();
     let error = DVec3::splat(f64::from(largest) * (slack * (64.0 * f64::EPSILON)));
-    let planes = [region.min.as_dvec3() - error, region.max.as_dvec3() + error];
+    let [low, high] = [region.min.as_dvec3() - error, region.max.as_dvec3() + error];
     // Every cut adds one corner at most.
     let (mut corners, mut len) = ([DVec3::ZERO; 9], 3);
     corners[..3].copy_from_slice(&triangle.0.map(Vec3::as_dvec3));
     for axis in 0..3 {
         if whole.min[axis] < region.min[axis] {
-            len = cut(&mut corners, len, axis, planes[0][axis], 1.0);
+            len = cut(&mut corners, len, axis, low[axis], 1.0);
         }
         if whole.max[axis] > region.max[axis] {
-            len = cut(&mut corners, len, axis, planes[1][axis], -1.0);
+            len = cut(&mut corners, len, axis, high[axis], -1.0);
         }
     }
     if len == 0 {

@@ -117,7 +117,8 @@ impl Build<'_> {
             return tree;
         }
         self.powers = (0..=boxes.len()).map(|n| libm::pow(n as f64, self.config.power)).collect();
-        let references = boxes.iter().zip(0..).map(|(&aabb, object)| Reference { aabb, object }).collect();
+        let references: Vec<Reference> =
+            boxes.iter().zip(0..).map(|(&aabb, object)| Reference { aabb, object }).collect();
         let root = union(&references);
         self.least_overlap = self.config.overlap * root.half_area();
         tree.nodes.push(Node::leaf(root, 0, 1));
@@ -192,7 +193,7 @@ impl Build<'_> {
         references.clear();
         references.extend_from_slice(&ordered[left..]);
         let sides = [ordered[..left].to_vec(), references];
-        Sides { cost: least, boxes: sides.each_ref().map(union), references: sides }
+        Sides { cost: least, boxes: sides.each_ref().map(|side| union(side)), references: sides }
     }
 
     /// Fills `keys` with the centres along an axis and the references' positions, in order.
@@ -281,7 +282,7 @@ impl Build<'_> {
                 }
             }
         }
-        let mut boxes = sides.each_ref().map(union);
+        let mut boxes = sides.each_ref().map(|side| union(side));
         let mut counts = sides.each_ref().map(|side| side.len() + cut.len());
         for (_, parts) in &cut {
             boxes = [boxes[0].union(&parts[0]), boxes[1].union(&parts[1])];
@@ -309,7 +310,7 @@ impl Build<'_> {
             return None;
         }
         // Unsplitting may have left a side smaller than it was when the others were decided on.
-        let boxes = sides.each_ref().map(union);
+        let boxes = sides.each_ref().map(|side| union(side));
         Some(Sides { cost: self.cost(&boxes[0], left) + self.cost(&boxes[1], right), boxes, references: sides })
     }
 }
@@ -330,6 +331,55 @@ fn halves(objects: &dyn Clip, object: u32, aabb: &Aabb, axis: usize, at: f32) ->
     [low, high].map(|region| objects.clip(object, &region))
 }
 
-fn union(references: &Vec<Reference>) -> Aabb {
+fn union(references: &[Reference]) -> Aabb {
     references.iter().fold(Aabb::EMPTY, |aabb, reference| aabb.union(&reference.aabb))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Builder, muller_fellner};
+    use bvh_core::{Triangle, cost, validate_references};
+    use glam::Vec3;
+
+    /// Long triangles in many directions, which cross each other.
+    fn needles(n: u32) -> Vec<Triangle> {
+        let coordinate =
+            |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 4093) as f32 / 41.0;
+        let point = |i, salt| Vec3::new(coordinate(i, salt), coordinate(i, salt + 7), coordinate(i, salt + 13));
+        (0..n).map(|i| Triangle([point(i, 3), point(i, 5), point(i, 3) + Vec3::splat(0.5)])).collect()
+    }
+
+    #[test]
+    fn every_limit_of_references_gives_a_valid_tree_and_more_leave_a_cheaper_one() {
+        let triangles = needles(400);
+        let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+        let objects = &triangles.as_slice();
+        let mut before = f64::INFINITY;
+        for references in [1.0, 1.1, 1.5, 3.0] {
+            let tree = Config { references, ..Config::default() }.build(&boxes, objects).unwrap();
+            validate_references(&tree, &boxes, objects).unwrap();
+            let count = tree.prim_ids.len();
+            assert!(count <= (references * 400.0) as usize && (count > 400) == (references > 1.0), "{count}");
+            let cost = cost::total_area(&tree);
+            assert!(cost <= before, "{cost} {before}");
+            before = cost;
+        }
+        let whole = muller_fellner::Config::default().build(&boxes).unwrap();
+        let whole = cost::total_area(&whole);
+        assert!(before < 0.97 * whole, "{before} of {whole}");
+    }
+
+    #[test]
+    fn scenes_of_points_of_one_object_and_of_none_are_built_and_bad_boxes_refused() {
+        for triangles in [vec![], needles(1), vec![Triangle([Vec3::ONE; 3]); 30]] {
+            let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+            let tree = Config::default().build(&boxes, &triangles.as_slice()).unwrap();
+            validate_references(&tree, &boxes, &triangles.as_slice()).unwrap();
+            assert_eq!(tree.prim_ids.len(), triangles.len(), "there is nothing to split");
+        }
+        let wrong = [Aabb::from([[f32::NAN; 3], [1.0; 3]])];
+        assert!(Config::default().build(&wrong, &needles(1).as_slice()).is_err());
+        assert!(Config { references: 0.5, ..Config::default() }.build(&[], &needles(1).as_slice()).is_err());
+    }
 }

@@ -1,7 +1,9 @@
 //! Why bytes are not accepted as a tree, or a tree is not written.
 
-use super::Header;
 use crate::InvalidBvh;
+
+/// The latest version of the format.
+pub(super) const LATEST: u32 = 4;
 
 /// Why bytes were not accepted as a tree, or a tree was not written.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -15,7 +17,7 @@ pub enum FileError {
     /// Written by an earlier version of this program.
     #[error(
         "the tree was written by version {found} of the format; this program reads version {}: bake it again",
-        Header::VERSION
+        LATEST
     )]
     OldVersion {
         /// The version found.
@@ -24,7 +26,7 @@ pub enum FileError {
     /// Written by a later version of this program.
     #[error(
         "the tree was written by version {found} of the format; this program reads version {}: update the program",
-        Header::VERSION
+        LATEST
     )]
     NewVersion {
         /// The version found.

@@ -1,6 +1,6 @@
 //! The first 192 bytes of a tree file: format, sizes, cost, origin, and the checksum of the scene.
 
-use super::FileError;
+use super::error::{FileError, LATEST};
 use crate::cost::{Objective, SahConstants};
 use crate::{Aabb, MAX_OBJECTS};
 use alloc::borrow::ToOwned;
@@ -42,7 +42,7 @@ impl Header {
     pub const MAGIC: [u8; 8] = *b"\x89BVH\r\n\x1a\n";
     /// The latest version of the format, that of trees whose objects are divided among leaves, or whose cost is that of the wide
     /// layout. This crate also reads versions 2 and 3, and writes them where they suffice, so that older programs read them.
-    pub const VERSION: u32 = 4;
+    pub const VERSION: u32 = LATEST;
     const WITH_VISITS: u32 = 3;
     const PLAIN: u32 = 2;
     /// The flag of files of version 4 that have visits.
