@@ -66,7 +66,10 @@ fn a_bake_divides_objects_where_that_pays_and_searches_by_the_cost_of_the_layout
     let number = |facts: &BTreeMap<String, String>, what: &str| facts[what].parse::<f64>().unwrap();
     let (_, whole) = bake("whole.bvh", &[]);
     let (said_split, split) = bake("split.bvh", &["--references", "1.3"]);
-    assert!(said_split.contains("area of all nodes"), "{said_split}");
+    assert!(said_split.contains("area of all nodes") && said_split.contains(" references to "), "{said_split}");
+    let boxes_only =
+        said(at, &["bake", "spheres75", "--budget", "1Mwork", "--out", "none.bvh", "--references", "1.5"]);
+    assert!(boxes_only.contains("no object is divided"), "{boxes_only}");
     let (objects, references) = (number(&split, "objects"), number(&split, "references"));
     assert_eq!(number(&whole, "references"), objects);
     assert!(references > objects && references <= 1.3 * objects, "{references} of {objects}");

@@ -262,6 +262,17 @@ fn summary(
     if let Some(before) = before {
         lines.push(format!("{} the tree it went on from, {before}", gain(outcome.cost, before)));
     }
+    if args.references > 1.0 {
+        let (references, objects) = (outcome.tree.prim_ids.len(), scene.boxes.len());
+        lines.push(if references > objects {
+            format!(
+                "{references} references to {objects} objects, where no more than {} were allowed",
+                args.references
+            )
+        } else {
+            "no object is divided, because that does not pay here".into()
+        });
+    }
     let why = match outcome.stop {
         StopReason::Completed => ", and nothing more that this method does",
         StopReason::Optimal => ", and no tree is better",

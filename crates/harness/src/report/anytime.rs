@@ -49,7 +49,7 @@ impl Config {
         let mut output = Output::new(&self.source, &self.title);
         let caption = "Cost of the incumbent over the best known cost of the scene, minus 1: median and quartiles over \
                        repetitions. Points are builders. A curve falls through the floor where it is the best known.";
-        for axis in ProgressAxis::ALL {
+        for axis in ProgressAxis::of(rows, &self.methods) {
             let (mut points, mut panels) = (Vec::new(), Vec::new());
             for scene in rows.scenes() {
                 let Some(reference) = rows.reference(scene) else { continue };

@@ -26,7 +26,7 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
     let targets = each(&config.targets, |target| Some(target.to_string()));
     let scenes = rows.all_shown().join(", ");
     let caption = format!("Fraction of all runs and targets solved. Scenes: {scenes}. Targets: {targets}.");
-    for axis in ProgressAxis::ALL {
+    for axis in ProgressAxis::of(rows, &config.methods) {
         let attempts = attempts(config, rows, axis);
         let ends = rows.scenes().into_iter().map(|scene| longest_of_all(rows, scene, &config.methods, axis));
         let end = ends.fold(0.0, f64::max);

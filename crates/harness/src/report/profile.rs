@@ -23,7 +23,7 @@ struct Row<'a> {
 
 pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
     let mut output = Output::new(&config.source, &config.title);
-    for axis in ProgressAxis::ALL {
+    for axis in ProgressAxis::of(rows, &config.methods) {
         let table = ratios(config, rows, axis);
         let problems = table.len() / config.methods.len().max(1);
         axis.add_csv(&mut output, "profile", &table)?;

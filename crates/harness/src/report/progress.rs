@@ -23,6 +23,16 @@ impl ProgressAxis {
     /// Every axis.
     pub const ALL: [Self; 3] = [Self::Seconds, Self::Evaluations, Self::Work];
 
+    /// The axes along which these methods can be compared. Where some count whole trees and others single moves, evaluations
+    /// are not among them: a run that builds a tree with every evaluation visits at least as many nodes as there are objects.
+    pub fn of(rows: &Rows, methods: &[String]) -> Vec<Self> {
+        let own = rows.runs.iter().filter(|run| methods.contains(&run.method));
+        let mut trees = own.map(|run| run.work >= run.evaluations * run.objects as u64);
+        let first = trees.next();
+        let alike = trees.all(|of_run| Some(of_run) == first);
+        Self::ALL.into_iter().filter(|&axis| axis != Self::Evaluations || alike).collect()
+    }
+
     /// What stands along an axis of a figure.
     pub fn label(self) -> &'static str {
         match self {
@@ -137,6 +147,26 @@ mod tests {
         assert_eq!(output.csv, [("a_work".to_owned(), b"scene,work\nx,2.0\n".to_vec())]);
         let files = ProgressAxis::ALL.map(|axis| axis.file("a"));
         assert_eq!(files, ["timing_a", "a_evaluations", "a_work"]);
+    }
+
+    #[test]
+    fn evaluations_are_no_axis_where_some_count_trees_and_others_moves() {
+        let header = "scene,scene_kind,method,seed,repetition,objects,evaluations,work,stop,cost,base_cost,cost_over_base,\
+                      cost_over_root_area,internal_area,goldsmith_salmon,sah,nodes,depth";
+        let run = |method: &str, evaluations: u64, work: u64| {
+            format!("s,file,{method},1,0,100,{evaluations},{work},completed,1,1,1,1,1,1,1,199,9")
+        };
+        let text = [header.to_owned(), run("trees", 5, 995), run("tree", 1, 199), run("moves", 9000, 90_000)]
+            .join("\n");
+        let runs =
+            csv::Reader::from_reader(text.as_bytes()).deserialize().collect::<Result<Vec<_>, _>>().unwrap();
+        let rows = Rows { runs, ..Rows::default() };
+        let axes = |methods: &[&str]| {
+            ProgressAxis::of(&rows, &methods.iter().map(|&m| m.to_owned()).collect::<Vec<_>>())
+        };
+        assert_eq!(axes(&["trees", "tree"]), ProgressAxis::ALL);
+        assert_eq!(axes(&["moves"]), ProgressAxis::ALL);
+        assert_eq!(axes(&["trees", "moves"]), [ProgressAxis::Seconds, ProgressAxis::Work]);
     }
 
     #[test]

@@ -52,7 +52,7 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
          method without one never got there, and a target that no method has reached has no panel. Dashed black: time-to-target fits.",
         rows.all_shown().join(", ")
     );
-    for axis in ProgressAxis::ALL {
+    for axis in ProgressAxis::of(rows, &config.methods) {
         let attempts = attempts(config, rows, axis);
         let problems = attempts.chunks(config.methods.len().max(1));
         let reached = problems.filter(|problem| problem.iter().any(|attempt| !attempt.solved.is_empty()));
