@@ -9,7 +9,7 @@ use std::time::Duration;
 pub enum Effort {
     /// Elapsed, from the search's beginning.
     Time(Duration),
-    /// As [`Budget::max_work`].
+    /// As [`Budget::max_work`](bvh_search::Budget::max_work).
     Work(u64),
 }
 
