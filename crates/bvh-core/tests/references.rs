@@ -4,12 +4,12 @@
 mod support;
 
 use bvh_core::{
-    Aabb, Bvh, Clip, Hit, InvalidBvh, Kernel, Node, Ray, Shear, Triangle, WideBvh, any_hit_by, collapse_leaves,
+    Aabb, Bvh, Clip, InvalidBvh, Kernel, Node, Ray, Shear, Triangle, WideBvh, any_hit_by, collapse_leaves,
     cost::{SahConstants, layout_area},
-    nearest_hit_by, nearest_hit_of_all, validate, validate_references,
+    nearest_hit_by, validate, validate_references,
 };
 use glam::Vec3;
-use support::{Random, SHAPES, ball, boxes, grid_box, rays, scaled, soup, tree};
+use support::{Random, SHAPES, ball, bits, boxes, brute_force, grid_box, rays, scaled, soup, tree};
 
 /// Divides leaves of `tree` at random planes, parts of leaves again, and returns the tree with the planes.
 fn divided(tree: &Bvh, triangles: &[Triangle], random: &mut Random) -> (Bvh, Vec<(u32, usize, f32)>) {
@@ -42,16 +42,6 @@ fn divided(tree: &Bvh, triangles: &[Triangle], random: &mut Random) -> (Bvh, Vec
         at += 1;
     }
     (tree, planes)
-}
-
-fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
-    let shear = Shear::new(ray);
-    let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
-    nearest_hit_of_all(triangles.len() as u32, ray, test, &mut ())
-}
-
-fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
-    hit.map(|hit| (hit.t.to_bits(), hit.object))
 }
 
 /// Rays through points of triangles on the planes at which they are divided: across the plane, and within it.

@@ -4,21 +4,9 @@ mod support;
 
 use bvh_core::{
     Coherence, Hit, Kernel, Ray, RefitError, Shear, Triangle, WideBvh, collapse_leaves, cost::SahConstants,
-    nearest_hit_of_all,
 };
 use glam::Vec3;
-use support::{Random, SHAPES, ball, boxes, chain, grid_box, rays, scaled, soup, tree};
-
-/// The answer of testing every triangle.
-fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
-    let shear = Shear::new(ray);
-    let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
-    nearest_hit_of_all(triangles.len() as u32, ray, test, &mut ())
-}
-
-fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
-    hit.map(|hit| (hit.t.to_bits(), hit.object))
-}
+use support::{Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree};
 
 /// The layouts of several trees over the triangles, for every kernel that this processor has.
 fn layouts(triangles: &[Triangle], random: &mut Random) -> Vec<(Kernel, WideBvh)> {

@@ -1,7 +1,7 @@
 //! Scenes, trees and rays for the tests of traversals.
 #![allow(dead_code)] // each test file uses some of it
 
-use bvh_core::{Aabb, Bvh, Node, Ray, Triangle};
+use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Shear, Triangle, nearest_hit_of_all};
 use glam::Vec3;
 use std::collections::VecDeque;
 
@@ -221,4 +221,16 @@ pub fn rays(triangles: &[Triangle], n: usize, random: &mut Random) -> Vec<Ray> {
         rays.extend(Ray::new(origin, direction, t_min, t_max));
     }
     rays
+}
+
+/// The answer of testing every triangle.
+pub fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
+    let shear = Shear::new(ray);
+    let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
+    nearest_hit_of_all(triangles.len() as u32, ray, test, &mut ())
+}
+
+/// An answer, to be compared bit by bit.
+pub fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
+    hit.map(|hit| (hit.t.to_bits(), hit.object))
 }
