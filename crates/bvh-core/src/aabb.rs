@@ -35,6 +35,23 @@ impl Aabb {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
+    /// What both have in common; [`Aabb::EMPTY`] if that is nothing.
+    #[inline]
+    #[must_use]
+    pub fn intersection(&self, other: &Self) -> Self {
+        let common = Self { min: self.min.max(other.min), max: self.max.min(other.max) };
+        if common.min.cmpgt(common.max).any() { Self::EMPTY } else { common }
+    }
+
+    /// The parts on the lower and on the upper side of the plane at `at` along an axis, 0 to 2, which cuts the box.
+    #[inline]
+    #[must_use]
+    pub fn halves(&self, axis: usize, at: f32) -> [Self; 2] {
+        let [mut low, mut high] = [*self; 2];
+        (low.max[axis], high.min[axis]) = (at, at);
+        [low, high]
+    }
+
     /// Half of the surface area, xy + yz + zx, in world units squared; 0 for an empty box.
     ///
     /// Coordinates are promoted to f64 *before* they are subtracted. So finite f32 coordinates always give a finite area,

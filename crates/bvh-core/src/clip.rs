@@ -49,7 +49,7 @@ impl Clip for Primitives {
     fn clip(&self, object: u32, region: &Aabb) -> Aabb {
         match self {
             Self::Triangles(triangles) => triangles.as_slice().clip(object, region),
-            Self::Spheres(spheres) => intersection(&spheres[object as usize].aabb(), region),
+            Self::Spheres(spheres) => spheres[object as usize].aabb().intersection(region),
         }
     }
 
@@ -59,12 +59,6 @@ impl Clip for Primitives {
             Self::Spheres(_) => self.clip(object, region),
         }
     }
-}
-
-/// What two boxes have in common; [`Aabb::EMPTY`] if that is nothing.
-fn intersection(a: &Aabb, b: &Aabb) -> Aabb {
-    let common = Aabb { min: a.min.max(b.min), max: a.max.min(b.max) };
-    if common.min.cmpgt(common.max).any() { Aabb::EMPTY } else { common }
 }
 
 /// Multiples of the error bound by which a triangle's part is widened: more for builders than for validation.
@@ -80,7 +74,7 @@ const VALIDATION: f64 = 1.0;
 /// rounding errors, where six cuts make 4 each.
 fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
     let whole = triangle.aabb();
-    let common = intersection(&whole, region);
+    let common = whole.intersection(region);
     if common == whole || common == Aabb::EMPTY {
         return common;
     }
@@ -108,7 +102,7 @@ fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
         min: Vec3::from_array(low.to_array().map(down)),
         max: Vec3::from_array((-high).to_array().map(|x| -down(x))),
     };
-    intersection(&part, &common)
+    part.intersection(&common)
 }
 
 /// Keeps the part of a convex polygon on one side of a plane. Returns its number of corners.

@@ -26,9 +26,7 @@ fn divided(tree: &Bvh, triangles: &[Triangle], random: &mut Random) -> (Bvh, Vec
             let corner = random.of(&triangles[object as usize].0)[axis];
             let somewhere = aabb.min[axis] + random.unit() * aabb.extent()[axis] as f32;
             let plane = random.of(&[somewhere, corner]);
-            let [mut low, mut high] = [aabb; 2];
-            (low.max[axis], high.min[axis]) = (plane, plane);
-            let parts = [low, high].map(|region| objects.clip(object, &region));
+            let parts = aabb.halves(axis, plane).map(|region| objects.clip(object, &region));
             if aabb.min[axis] < plane && plane < aabb.max[axis] && !parts.contains(&Aabb::EMPTY) {
                 let first = tree.nodes.len() as u32;
                 tree.nodes[at] = Node::inner(aabb, first, 2);

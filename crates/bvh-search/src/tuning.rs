@@ -55,7 +55,7 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 1,10,60 SCENE..." {
 }}
 
 // The cost of the wide layout.
-tuned! { "cargo bench -p harness --bench search -- --objective layout SCENE..." {
+tuned! { "harness bake SCENE --cost layout --budget 100Mwork --out FILE" {
     /// How much more a move may add to the area than a temperature would allow, before the layout judges it.
     DEARER_BY_AREA: f64 = 10.0, "factor";
     /// Temperatures for the cost of the layout, which is about a third of the tree's area and falls by small moves.
@@ -65,7 +65,7 @@ tuned! { "cargo bench -p harness --bench search -- --objective layout SCENE..." 
 }}
 
 // Split references.
-tuned! { "cargo bench -p harness --bench search -- --references 1.2 SCENE..." {
+tuned! { "harness bake SCENE --references 1.2 --budget 100Mwork --out FILE" {
     /// Ancestors whose boxes suggest planes at which to divide a leaf.
     LEVELS_OF_PLANES: u32 = 12, "levels";
     /// As `DEARER_BY_AREA`, for moves that divide or reunite.

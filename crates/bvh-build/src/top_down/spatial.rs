@@ -150,8 +150,7 @@ impl Build<'_> {
     fn split(&mut self, aabb: &Aabb, references: Vec<Reference>) -> Sides {
         let by_objects = self.object_split(references.clone());
         let [left, right] = &by_objects.boxes;
-        let common = Aabb { min: left.min.max(right.min), max: left.max.min(right.max) };
-        if self.extra == 0 || common.half_area() <= self.least_overlap {
+        if self.extra == 0 || left.intersection(right).half_area() <= self.least_overlap {
             return by_objects;
         }
         let spatial = self.best_plane(aabb, &references).filter(|plane| plane.cost < by_objects.cost);
@@ -275,7 +274,8 @@ impl Build<'_> {
             } else if reference.aabb.min[axis] >= at {
                 sides[1].push(*reference);
             } else {
-                let parts = halves(self.objects, reference.object, &reference.aabb, axis, at);
+                let halves = reference.aabb.halves(axis, at);
+                let parts = halves.map(|region| self.objects.clip(reference.object, &region));
                 match parts.map(|part| part != Aabb::EMPTY) {
                     [true, true] => cut.push((*reference, parts)),
                     [left, _] => sides[usize::from(!left)].push(*reference),
@@ -321,14 +321,6 @@ struct Plane {
     cost: f64,
     axis: usize,
     at: f32,
-}
-
-/// The parts of a reference on both sides of a plane.
-fn halves(objects: &dyn Clip, object: u32, aabb: &Aabb, axis: usize, at: f32) -> [Aabb; 2] {
-    let [mut low, mut high] = [*aabb; 2];
-    low.max[axis] = at;
-    high.min[axis] = at;
-    [low, high].map(|region| objects.clip(object, &region))
 }
 
 fn union(references: &[Reference]) -> Aabb {

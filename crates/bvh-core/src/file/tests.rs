@@ -52,9 +52,7 @@ struct Filled<'a>(&'a [Aabb]);
 
 impl Clip for Filled<'_> {
     fn clip(&self, object: u32, region: &Aabb) -> Aabb {
-        let whole = &self.0[object as usize];
-        let part = Aabb { min: whole.min.max(region.min), max: whole.max.min(region.max) };
-        if part.min.cmpgt(part.max).any() { Aabb::EMPTY } else { part }
+        self.0[object as usize].intersection(region)
     }
 }
 
@@ -67,8 +65,7 @@ fn split_scene(n: u32) -> (Vec<Aabb>, Bvh) {
         {
             let Node { aabb, .. } = tree.nodes[at];
             let middle = 0.5 * (aabb.min.x + aabb.max.x);
-            let (mut low, mut high) = (aabb, aabb);
-            (low.max.x, high.min.x) = (middle, middle);
+            let [low, high] = aabb.halves(0, middle);
             tree.nodes[at] = Node::inner(aabb, tree.nodes.len() as u32, 2);
             tree.nodes.extend([Node::leaf(low, first, 1), Node::leaf(high, tree.prim_ids.len() as u32, 1)]);
             tree.prim_ids.push(tree.prim_ids[first as usize]);

@@ -24,10 +24,7 @@ pub(super) fn is_covered(objects: &dyn Clip, object: u32, whole: &Aabb, leaves: 
             return false;
         }
         left -= 1;
-        let [mut low, mut high] = [part; 2];
-        low.max[axis] = plane;
-        high.min[axis] = plane;
-        open.extend([low, high]);
+        open.extend(part.halves(axis, plane));
     }
     true
 }
@@ -37,8 +34,8 @@ fn face_through(part: &Aabb, leaves: &[Aabb]) -> Option<(usize, f32)> {
     let mut best = None;
     let mut largest = -1.0;
     for leaf in leaves {
-        let common = Aabb { min: part.min.max(leaf.min), max: part.max.min(leaf.max) };
-        if common.min.cmpgt(common.max).any() {
+        let common = part.intersection(leaf);
+        if common == Aabb::EMPTY {
             continue;
         }
         let extent = common.extent();
@@ -71,9 +68,7 @@ mod tests {
         for axis in [0, 1, 2, 0] {
             let halves = |part: &Aabb| {
                 let at = 0.5 * (part.min[axis] + part.max[axis]);
-                let [mut low, mut high] = [*part; 2];
-                (low.max[axis], high.min[axis]) = (at, at);
-                [low, high].map(|region| objects.clip(0, &region))
+                part.halves(axis, at).map(|region| objects.clip(0, &region))
             };
             leaves = leaves.iter().flat_map(halves).filter(|part| *part != Aabb::EMPTY).collect();
         }

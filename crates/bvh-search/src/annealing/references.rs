@@ -144,10 +144,7 @@ impl<'a> Divider<'a> {
             return false;
         }
         let (axis, at) = self.planes[rng.random_range(0..self.planes.len())];
-        let [mut low, mut high] = [Aabb::from(&aabb); 2];
-        low.max[axis] = at;
-        high.min[axis] = at;
-        let parts = [low, high].map(|region| self.splits.objects.clip(object, &region));
+        let parts = Aabb::from(&aabb).halves(axis, at).map(|region| self.splits.objects.clip(object, &region));
         if parts.contains(&Aabb::EMPTY) {
             return false;
         }
