@@ -1,5 +1,6 @@
 //! What can go wrong in the harness, and the exit code of each failure.
 
+use crate::peers::command;
 use bvh_search::SearchError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -35,6 +36,9 @@ pub enum Error {
     /// Another library refused a scene.
     #[error("scene {scene}, library {library}: {message}")]
     Library { scene: String, library: &'static str, message: String },
+    /// An external program did not do its part.
+    #[error("scene {scene}, method {method}, command `{command}`: {source}")]
+    External { scene: String, method: String, command: String, source: command::Fault },
     /// Rays cannot be traced through this scene.
     #[error("scene {scene}, tracing: {message}")]
     Tracing { scene: String, message: String },

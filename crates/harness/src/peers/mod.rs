@@ -1,10 +1,11 @@
-//! Other libraries as methods of experiments: their trees by our cost, their traversals beside ours.
+//! Other libraries and programs as methods of experiments: their trees by our cost, their traversals beside ours.
 //!
 //! A library is one file and one line in [`Peer`]. Specs that name one are understood without the cargo feature
 //! `peers`, so that the message can say what is missing.
 
 #[cfg(feature = "peers")]
 mod bvh;
+pub mod command;
 pub mod comparison;
 pub mod external;
 #[cfg(feature = "peers")]

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::measure::empirical_cost;
 use crate::measure::rays::Family;
-use crate::peers::{Built, Peer};
+use crate::peers::Built;
 use crate::report::Report;
 use crate::run::judge::RayJudge;
 use crate::run::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow};
@@ -67,10 +67,12 @@ pub(crate) fn perform(
     let seeds = labelled.seed_as.as_ref().unwrap_or(&labelled.label);
     let seed = experiment.seed_of(&scene.name, seeds, job.repetition);
     let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
-    let (outcome, seconds) = solve_or_build(experiment, job, seed, &stopwatch)?;
+    let solved = solve_or_build(experiment, job, seed, &stopwatch);
+    // That an external program was ended is no failure then.
     if watch.cancelled() {
         return Ok(None);
     }
+    let (outcome, seconds) = solved?;
     let valid = validate_references(&outcome.tree, &scene.boxes, &scene.primitives);
     valid.map_err(|source| Error::InvalidTree {
         scene: scene.name.clone(),
@@ -130,7 +132,25 @@ fn solve_or_build(
             }
             Ok((outcome, seconds))
         }
-        Contestant::Peer(peer) => build_by(peer, scene, &experiment.objective, stopwatch),
+        Contestant::Peer(peer) => {
+            let (scene_name, library) = (scene.name.clone(), peer.name());
+            let refused = |message| Error::Library { scene: scene_name, library, message };
+            let Built { tree, seconds } = peer.build(scene).map_err(refused)?;
+            Ok(built(tree, seconds, &experiment.objective, stopwatch))
+        }
+        Contestant::External(program) => {
+            let cancelled = || stopwatch.watch.cancelled();
+            let (tree, seconds) =
+                program.build(&scene.boxes, &scene.primitives, seed, &cancelled).map_err(|source| {
+                    Error::External {
+                        scene: scene.name.clone(),
+                        method: labelled.label.clone(),
+                        command: program.command.join(" "),
+                        source,
+                    }
+                })?;
+            Ok(built(tree, seconds, &experiment.objective, stopwatch))
+        }
     }
 }
 
@@ -148,20 +168,13 @@ pub(crate) fn density(experiment: &Experiment, job: &Job) -> Result<Option<RayDe
     config.density(trained, job.scene, seed).map(Some).map_err(failed)
 }
 
-/// A tree by another library, as a search of one evaluation, and the seconds of the building alone.
-fn build_by(
-    peer: &Peer,
-    scene: &Scene,
-    objective: &Objective,
-    stopwatch: &Stopwatch,
-) -> Result<(Outcome, f64), Error> {
-    let refused = |message| Error::Library { scene: scene.name.clone(), library: peer.name(), message };
-    let Built { tree, seconds } = peer.build(scene).map_err(refused)?;
+/// A tree by others, as a search of one evaluation, and the seconds of the building alone.
+fn built(tree: Bvh, seconds: f64, objective: &Objective, stopwatch: &Stopwatch) -> (Outcome, f64) {
     let (cost, work) = (objective.cost(&tree), tree.nodes.len() as u64);
     let event = Event { evaluations: 1, work, cost, incumbent: cost };
     stopwatch.note(seconds);
     let stop = StopReason::Completed;
-    Ok((Outcome { tree, cost, evaluations: 1, work, stop, proof: None, history: vec![event] }, seconds))
+    (Outcome { tree, cost, evaluations: 1, work, stop, proof: None, history: vec![event] }, seconds)
 }
 
 /// A job whose tree is found: makes the rows.

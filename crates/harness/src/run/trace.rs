@@ -47,8 +47,10 @@ pub(crate) fn trace(
         let mut contenders = Vec::new();
         for &(job, tree) in of_scene {
             let made = match &job.labelled.method {
-                Contestant::Ours(_) => speed::own_contenders(&config.layouts, scene, tree),
                 Contestant::Peer(peer) => peer.contenders(scene),
+                Contestant::Ours(_) | Contestant::External(_) => {
+                    speed::own_contenders(&config.layouts, scene, tree)
+                }
             };
             let made = made.map_err(failed)?;
             contenders.extend(made.into_iter().map(|contender| (job.labelled.label.clone(), contender)));
@@ -96,6 +98,6 @@ fn library(experiment: &Experiment, label: &str) -> String {
     match experiment.methods.iter().find(|method| method.label == label).map(|found| &found.method) {
         Some(Contestant::Ours(_)) => comparison::OURS.into(),
         Some(Contestant::Peer(peer)) => peer.name().into(),
-        None => label.into(),
+        Some(Contestant::External(_)) | None => label.into(),
     }
 }

@@ -79,22 +79,14 @@ impl Experiment {
                 return Err(Fault::new("references", format!("set for {}", method.name()), "with best"));
             }
         }
-        if objective.is_some() && matches!(method, Contestant::Peer(_)) {
-            return Err(Fault::new("objective", "set for another library", "with a method of ours"));
+        let is_ours = matches!(method, Contestant::Ours(_));
+        if objective.is_some() && !is_ours {
+            return Err(Fault::new("objective", format!("set for {}", method.name()), "with a method of ours"));
         }
-        if for_rays.is_some() {
-            let found = match method {
-                _ if self.ray_cost.is_none() => "set without `ray_cost`",
-                Contestant::Peer(_) => "set for another library",
-                Contestant::Ours(_) => "",
-            };
-            if !found.is_empty() {
-                return Err(Fault::new(
-                    "for_rays",
-                    found,
-                    "with a method of ours and the experiment's `ray_cost`",
-                ));
-            }
+        if for_rays.is_some() && (self.ray_cost.is_none() || !is_ours) {
+            let found =
+                if is_ours { "set without `ray_cost`".into() } else { format!("set for {}", method.name()) };
+            return Err(Fault::new("for_rays", found, "with a method of ours and the experiment's `ray_cost`"));
         }
         if let Some(judge) = judge {
             judge.check()?;
@@ -104,8 +96,8 @@ impl Experiment {
             }
         }
         match method {
-            Contestant::Peer(peer) if self.suite.is_some() => {
-                let found = format!("{:?}, another library", peer.name());
+            Contestant::Peer(_) | Contestant::External(_) if self.suite.is_some() => {
+                let found = format!("{:?}, none of ours", method.name());
                 Err(Fault::new(
                     "method",
                     found,
@@ -123,6 +115,7 @@ impl Experiment {
                 None => Ok(peer.check()?),
             },
             Contestant::Ours(method) => Ok(method.check()?),
+            Contestant::External(program) => Ok(program.check()?),
         }
     }
 

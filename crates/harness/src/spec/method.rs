@@ -3,7 +3,7 @@
 use super::fault::{self, Fault};
 use crate::measure::empirical_cost;
 use crate::measure::ray_cost::TrainedOn;
-use crate::peers::Peer;
+use crate::peers::{Peer, command};
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, Method, Shortcut};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -36,13 +36,14 @@ pub struct Labelled {
     pub references: Option<f64>,
 }
 
-/// A method of ours, or another library.
+/// A method of ours, another library, or a program.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 #[allow(missing_docs, reason = "said above")]
 pub enum Contestant {
     Ours(Method),
     Peer(Peer),
+    External(command::Config),
 }
 
 impl Contestant {
@@ -51,14 +52,19 @@ impl Contestant {
         match self {
             Self::Ours(method) => method.name(),
             Self::Peer(peer) => peer.name(),
+            Self::External(_) => command::Config::NAME,
         }
     }
 
     fn read<'de, D: Deserializer<'de>>(name: &str, parameters: D) -> Result<Option<Self>, D::Error> {
-        if Method::NAMES.contains(&name) {
-            Method::read(name, parameters).map(|method| method.map(Self::Ours))
-        } else {
-            Peer::read(name, parameters).map(|peer| peer.map(Self::Peer))
+        match name {
+            command::Config::NAME => {
+                command::Config::deserialize(parameters).map(|program| Some(Self::External(program)))
+            }
+            _ if Method::NAMES.contains(&name) => {
+                Method::read(name, parameters).map(|method| method.map(Self::Ours))
+            }
+            _ => Peer::read(name, parameters).map(|peer| peer.map(Self::Peer)),
         }
     }
 }
@@ -104,7 +110,8 @@ impl Labelled {
         let frame = frame.into_iter().filter_map(|key| table.remove_entry(key)).collect();
         let Frame { label, budget, keep, seed_as, judge, for_rays, objective, references } =
             fault::deserialize(frame)?;
-        let accepted = || format!("{}, or the libraries {}", Method::NAMES.join(", "), Peer::NAMES.join(", "));
+        let (ours, libraries) = (Method::NAMES.join(", "), Peer::NAMES.join(", "));
+        let accepted = || format!("{ours}, the libraries {libraries}, or {}", command::Config::NAME);
         let method =
             fault::tagged(table, "method", |name, parameters| Contestant::read(name, parameters), accepted)?;
         let label = label.unwrap_or_else(|| method.name().into());
