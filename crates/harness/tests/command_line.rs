@@ -335,6 +335,15 @@ fn without_reports_there_is_a_table_and_without_a_terminal_a_line_for_the_last_r
     assert!(err.contains("plain: 3 of 3 runs") && err.contains("median_cut on spheres75"), "{err}");
     let quiet = run(folder.path(), &["plain.toml", "--quiet", "--force"]);
     assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty());
+    let verbose = run(folder.path(), &["plain.toml", "--verbose", "--force"]);
+    let said = text(&verbose.stderr);
+    assert_eq!(said.lines().count(), 3, "a line for every run: {said}");
+    let rows = fs::read_to_string(folder.path().join("results/plain/runs.csv")).unwrap();
+    for (repetition, row) in rows.lines().skip(1).enumerate() {
+        let seed = row.split(',').nth(3).unwrap();
+        let part = format!("median_cut on spheres75, repetition {repetition}, seed {seed}, took 0.");
+        assert!(said.contains(&part), "{part} in {said}");
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::cli::arguments::{Jobs, output_folder};
 use crate::cli::explain;
 use crate::cli::output::{print_error, print_line};
-use crate::run::execute::{Extent, execute};
+use crate::run::execute::{Extent, Said, execute};
 use crate::run::shard::Shard;
 use crate::run::store::Existing;
 use crate::run::{check, finish, reference};
@@ -54,6 +54,9 @@ pub struct RunArgs {
     /// Say nothing but errors, and differences under --check.
     #[arg(long)]
     pub quiet: bool,
+    /// Say of every run, on standard error, what was done: method, scene, repetition, seed, seconds.
+    #[arg(long, conflicts_with = "quiet")]
+    pub verbose: bool,
     /// Print first what each scene does not need and is left out, and why.
     #[arg(long)]
     pub explain: bool,
@@ -77,7 +80,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         (_, true) => Existing::Replace,
         _ => Existing::Keep,
     };
-    let extent = Extent { existing, shard: args.shard, quiet: args.quiet };
+    let extent = Extent { existing, shard: args.shard, said: said(args) };
     let mut differences = 0;
     for experiment in &experiments {
         if args.explain {
@@ -111,13 +114,22 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     if differences > 0 { Err(Error::Differs { differences }) } else { Ok(()) }
 }
 
+/// What is said while the runs are carried out.
+fn said(args: &RunArgs) -> Said {
+    match (args.quiet, args.verbose) {
+        (true, _) => Said::Bar,
+        (_, true) => Said::EveryRun,
+        _ => Said::Progress,
+    }
+}
+
 /// Runs into a temporary folder and prints how the rows differ from the committed ones. Returns the number of
 /// differences.
 fn compare(args: &RunArgs, experiment: &Experiment, interrupted: &AtomicBool) -> Result<usize, Error> {
     let temporary = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
     let (fresh, committed) = (temporary.path().join(experiment.folder()), args.out.join(experiment.folder()));
     reference::adopt(&committed, temporary.path())?;
-    let extent = Extent { quiet: args.quiet, ..Extent::default() };
+    let extent = Extent { said: said(args), ..Extent::default() };
     let summary = execute(experiment, temporary.path(), extent, interrupted)?;
     let found = check::compare(&fresh, &committed, &summary.left_out, !experiment.quick)?;
     let name = &experiment.name;

@@ -29,8 +29,20 @@ pub struct Extent {
     pub existing: Existing,
     /// Do these runs only, and leave them to be [merged](crate::run::merge::merge).
     pub shard: Option<Shard>,
-    /// Do not say how far the runs are.
-    pub quiet: bool,
+    /// What is said of the runs on standard error.
+    pub said: Said,
+}
+
+/// What is said of runs on standard error while they are carried out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Said {
+    /// Nothing but a bar where there is a terminal.
+    Bar,
+    /// A bar where there is a terminal, elsewhere a line a second at most, and the last.
+    #[default]
+    Progress,
+    /// A line for every run.
+    EveryRun,
 }
 
 /// Runs `experiment` into `out/NAME/`. As soon as `interrupted` becomes true, the unfinished runs are given up and the
@@ -75,7 +87,7 @@ fn run(
         (0..jobs.len()).filter(|&index| extent.shard.is_none_or(|shard| shard.has(index))).collect();
     let watch = Watch { bar: progress(own.len() as u64), interrupted };
     watch.bar.set_message(experiment.name.to_string());
-    let (mut trees, redone) = perform_all(experiment, &jobs, &own, &store, &watch, extent.quiet)?;
+    let (mut trees, redone) = perform_all(experiment, &jobs, &own, &store, &watch, extent.said)?;
     remarks.extend(redone);
     let provenance = Provenance::gather();
     if let Some(shard) = extent.shard {
@@ -119,7 +131,7 @@ fn perform_all(
     own: &[usize],
     store: &Store,
     watch: &Watch,
-    quiet: bool,
+    said: Said,
 ) -> Result<(Trees, Vec<String>), Error> {
     let (mut todo, mut redone) = (Vec::new(), Vec::new());
     for &index in own {
@@ -137,10 +149,11 @@ fn perform_all(
     }
     let trees = Mutex::new(Trees::new());
     let finished = AtomicUsize::new(own.len() - todo.len());
-    let lines = Lines { all: own.len(), start: Instant::now(), last: Mutex::new(Instant::now()) };
+    let lines = Lines { said, all: own.len(), start: Instant::now(), last: Mutex::new(Instant::now()) };
     watch.bar.set_position(finished.load(Relaxed) as u64);
     watch.bar.reset_eta();
     let work = |&index: &usize| -> Result<(), Error> {
+        let start = Instant::now();
         if let Some((run, tree)) = perform(experiment, &jobs[index], watch)? {
             store.keep(index, &run)?;
             if experiment.ray_cost.is_some() || experiment.tracing.is_some() && jobs[index].repetition == 0 {
@@ -148,9 +161,7 @@ fn perform_all(
             }
             let finished = finished.fetch_add(1, Relaxed) + 1;
             watch.bar.inc(1);
-            if watch.bar.is_hidden() && !quiet {
-                lines.say(experiment, &jobs[index], finished);
-            }
+            lines.say(experiment, &jobs[index], finished, start.elapsed(), &watch.bar);
         }
         Ok(())
     };
@@ -164,25 +175,37 @@ fn perform_all(
     }
 }
 
-/// What is said of finished runs on standard error where no bar can be drawn: a line a second at most, and the last.
+/// What is said of finished runs, line by line.
 struct Lines {
+    said: Said,
     all: usize,
     start: Instant,
     last: Mutex<Instant>,
 }
 
 impl Lines {
-    fn say(&self, experiment: &Experiment, job: &Job, finished: usize) {
+    fn say(&self, experiment: &Experiment, job: &Job, finished: usize, took: Duration, bar: &ProgressBar) {
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        if finished < self.all && last.elapsed() < Duration::from_secs(1) {
+        let due = match self.said {
+            Said::Bar => false,
+            Said::Progress => {
+                bar.is_hidden() && (finished == self.all || last.elapsed() >= Duration::from_secs(1))
+            }
+            Said::EveryRun => true,
+        };
+        if !due {
             return;
         }
         *last = Instant::now();
         let (scene, label) = (job.scene.name.escape_debug(), job.labelled.label.escape_debug());
         let (name, all, seconds) = (&experiment.name, self.all, self.start.elapsed().as_secs());
+        let mut line = format!("{name}: {finished} of {all} runs, {seconds} s: {label} on {scene}");
+        if self.said == Said::EveryRun {
+            let (repetition, seed) = (job.repetition, job.seed(experiment));
+            line += &format!(", repetition {repetition}, seed {seed}, took {:.3} s", took.as_secs_f64());
+        }
         // Whoever reads this may have left.
-        let _ =
-            writeln!(std::io::stderr(), "{name}: {finished} of {all} runs, {seconds} s: {label} on {scene}");
+        let _ = bar.suspend(|| writeln!(std::io::stderr(), "{line}"));
     }
 }
 

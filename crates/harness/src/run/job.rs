@@ -33,6 +33,14 @@ pub(crate) struct Job<'a> {
     pub first_of_scene: bool,
 }
 
+impl Job<'_> {
+    /// The seed of the run.
+    pub fn seed(&self, experiment: &Experiment) -> u64 {
+        let seeds = self.labelled.seed_as.as_ref().unwrap_or(&self.labelled.label);
+        experiment.seed_of(&self.scene.name, seeds, self.repetition)
+    }
+}
+
 /// The cost of the scene's greedy Müller–Fellner tree, the base of all ratios.
 pub(crate) fn base_cost(scene: &Scene, objective: &Objective) -> Result<f64, Error> {
     let tree = muller_fellner::Config::default().build(&scene.boxes);
@@ -64,8 +72,7 @@ pub(crate) fn perform(
         return Ok(None);
     }
     let Job { scene, labelled, .. } = *job;
-    let seeds = labelled.seed_as.as_ref().unwrap_or(&labelled.label);
-    let seed = experiment.seed_of(&scene.name, seeds, job.repetition);
+    let seed = job.seed(experiment);
     let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
     let solved = solve_or_build(experiment, job, seed, &stopwatch);
     // That an external program was ended is no failure then.
