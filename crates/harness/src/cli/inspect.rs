@@ -2,7 +2,7 @@
 
 use crate::cli::arguments::{NODES, input_folder, output_file};
 use crate::cli::output::{print_error, print_line};
-use crate::run::{reference, rows};
+use crate::run::{archive, reference, rows};
 use crate::scenes::Scene;
 use crate::{Error, files};
 use bvh_build::{Builder, muller_fellner};
@@ -98,6 +98,9 @@ pub struct VerifyArgs {
     /// Folder with the best known costs, by default `results`, if it is there.
     #[arg(long, value_name = "DIR")]
     pub results: Option<PathBuf>,
+    /// If the tree is the best known, keep it in the archive among the results, with the command that made it.
+    #[arg(long, value_name = "COMMAND")]
+    pub keep: Option<String>,
     /// Print the facts as JSON, under the same names.
     #[arg(long)]
     pub json: bool,
@@ -116,6 +119,9 @@ pub fn verify(args: &VerifyArgs) -> Result<(), Error> {
             facts.add("internal area over the best known", cost::internal_area(&tree) / best.cost);
         }
         None => facts.add("best known internal area", "none of this very scene"),
+    }
+    if let Some(command) = &args.keep {
+        facts.add("kept in", archive::keep(results, &scene, &args.file, command)?.display().to_string());
     }
     print(&facts, args.json);
     Ok(())

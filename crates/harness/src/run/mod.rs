@@ -1,5 +1,6 @@
 //! Runs an experiment: jobs in, rows out, none of them lost.
 
+pub mod archive;
 pub mod check;
 pub mod execute;
 pub mod finish;

@@ -10,11 +10,14 @@
 use crate::Error;
 use crate::files;
 use crate::report::Report;
+use crate::run::provenance::Provenance;
 use crate::run::resolved::{LoadedScene, Resolved, checksum};
 use crate::run::rows::{BoundRow, ROUNDING, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
 use crate::run::store::Store;
 use crate::scenes::Scene;
+use bvh_core::Bvh;
 use bvh_core::cost::Objective;
+use bvh_core::file::Header;
 use bvh_search::exact;
 use std::fs;
 use std::path::Path;
@@ -45,8 +48,7 @@ pub(crate) fn update(
     let runs: Vec<RunRow> = read_if_any(store.folder())?;
     let bounds: Vec<BoundRow> = read_if_any(store.folder())?;
     let _lock = files::wait_for_folder(out)?;
-    let path = out.join(BEST_KNOWN);
-    let before: Vec<ReferenceRow> = if path.is_file() { read(&path)? } else { vec![] };
+    let before = all_known(out)?;
     let mut known = before.clone();
     let experiment = &resolved.experiment;
     let objective = name(&experiment.objective);
@@ -64,14 +66,47 @@ pub(crate) fn update(
         let key = (scene.name.as_str(), scene.objects, scene.checksum.as_str(), objective.as_str());
         references.extend(known.iter().find(|row| key_of(row) == key).cloned());
     }
-    known.sort_by(|a, b| key_of(a).cmp(&key_of(b)));
-    if known != before && matches!(best_known, BestKnown::Improve(_)) {
-        files::write(&path, &to_bytes(&known, &path)?)?;
+    if matches!(best_known, BestKnown::Improve(_)) {
+        write_all_known(out, known, &before)?;
     }
     if experiment.reports.iter().any(Report::needs_references) {
         store.write(REFERENCES, &to_bytes(&references, Path::new(REFERENCES))?)?;
     }
     Ok(())
+}
+
+fn all_known(results: &Path) -> Result<Vec<ReferenceRow>, Error> {
+    let path = results.join(BEST_KNOWN);
+    if path.is_file() { read(&path) } else { Ok(vec![]) }
+}
+
+/// Writes the best known costs if they are others than `before`.
+fn write_all_known(results: &Path, mut known: Vec<ReferenceRow>, before: &[ReferenceRow]) -> Result<(), Error> {
+    known.sort_by(|a, b| key_of(a).cmp(&key_of(b)));
+    let path = results.join(BEST_KNOWN);
+    if known == before { Ok(()) } else { files::write(&path, &to_bytes(&known, &path)?) }
+}
+
+/// Improves the best known costs of a scene by those of a binary tree with one object per leaf. The caller has locked the folder.
+pub(crate) fn improve(results: &Path, scene: &Scene, tree: &Bvh, header: &Header) -> Result<(), Error> {
+    let before = all_known(results)?;
+    let mut known = before.clone();
+    let revision = Provenance::gather().revision;
+    for objective in [Objective::InternalArea, Objective::GoldsmithSalmon] {
+        let found = ReferenceRow {
+            scene: scene.name.clone(),
+            objects: scene.boxes.len(),
+            checksum: checksum(scene),
+            objective: name(&objective),
+            cost: objective.cost(tree),
+            method: header.method.clone(),
+            seed: header.seed,
+            revision: revision.clone(),
+            lower_bound: None,
+        };
+        offer(&mut known, found, false);
+    }
+    write_all_known(results, known, &before)
 }
 
 /// Makes the references recorded in `folder`, if any, the best known ones in `out`.
@@ -86,11 +121,9 @@ pub fn adopt(folder: &Path, out: &Path) -> Result<(), Error> {
 
 /// The tree of least internal area that is known of this very scene.
 pub fn best_known(results: &Path, scene: &Scene) -> Result<Option<ReferenceRow>, Error> {
-    let path = results.join(BEST_KNOWN);
-    let known: Vec<ReferenceRow> = if path.is_file() { read(&path)? } else { vec![] };
     let (checksum, objective) = (checksum(scene), name(&Objective::InternalArea));
     let key = (scene.name.as_str(), scene.boxes.len(), checksum.as_str(), objective.as_str());
-    Ok(known.into_iter().find(|row| key_of(row) == key))
+    Ok(all_known(results)?.into_iter().find(|row| key_of(row) == key))
 }
 
 /// What a reference is of: scene, number of its objects, checksum of its boxes, and objective.

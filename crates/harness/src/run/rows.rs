@@ -284,6 +284,19 @@ rows! {
         lower_bound: f64,
     }
 
+    /// One row of `trees.csv`: a file of the archive of best known trees.
+    TreeRow in "trees.csv" {
+        scene: String,
+        objects: usize,
+        /// Of the boxes, hexadecimal.
+        checksum: String,
+        internal_area: f64,
+        /// The greatest proven lower bound known of `internal_area`.
+        lower_bound: Option<f64>,
+        /// What made the tree.
+        command: String,
+    }
+
     /// One row of `best_known.csv` and `references.csv`: what gaps are measured from, for one scene and objective. Only
     /// binary trees with one object per leaf count.
     ReferenceRow in "references.csv" {
