@@ -11,6 +11,7 @@ pub mod lower_bound;
 mod multistart;
 mod optimize;
 mod orders;
+mod owned;
 mod parallel;
 pub mod prelude;
 #[cfg(feature = "serde")]
@@ -32,6 +33,7 @@ pub use local::{LocalSearch, reinsertion, rotation, treelet};
 pub use multistart::{grasp, iterated, rebuild};
 pub use optimize::optimize;
 pub use orders::{genetic, random_orders};
+pub use owned::{Objects, OwnedTree};
 #[cfg(feature = "serde")]
 pub use registry::Method;
 pub use run::{

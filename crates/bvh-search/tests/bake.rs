@@ -1,6 +1,7 @@
 //! The everyday calls keep to their time, use all of it, and end with trees worth having.
 
-use bvh_search::prelude::*;
+use bvh_search::bvh_core::Primitives;
+use bvh_search::{Objects, OwnedTree, prelude::*};
 use std::time::Instant;
 
 fn scene() -> Vec<Aabb> {
@@ -35,4 +36,29 @@ fn a_time_of_zero_still_gives_a_tree() {
     let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
     assert!(improve(&greedy, &boxes, Duration::ZERO).unwrap().cost <= cost::internal_area(&greedy));
     assert!(bake(&[], Duration::ZERO).unwrap().tree.nodes.is_empty());
+}
+
+#[test]
+fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
+    // Long and thin, so that dividing them pays.
+    let shifted = |corner: Vec3, by: f32| (corner + Vec3::splat(by)).to_array();
+    let thin = scene().into_iter().take(300).map(|aabb| {
+        Triangle::from([aabb.min.to_array(), shifted(aabb.min, 20_000.0), shifted(aabb.max, 20_000.0)])
+    });
+    let triangles: Vec<Triangle> = thin.collect();
+    let boxes = boxes(&triangles);
+    let shapes = || Objects::Shapes(Primitives::Triangles(triangles.clone()));
+    for (objects, references) in [(shapes(), 1.0), (shapes(), 2.0), (Objects::Boxes(boxes.clone()), 2.0)] {
+        let deadline = || Deadline::after(Duration::from_millis(50));
+        let mut owned = OwnedTree::find(objects.clone(), references, &deadline()).unwrap();
+        let first = cost::total_area(owned.tree());
+        owned.improve(&deadline()).unwrap();
+        assert!(cost::total_area(owned.tree()) <= first * (1.0 + 1e-12));
+        let divided = owned.tree().prim_ids.len() > boxes.len();
+        assert_eq!(divided, references > 1.0 && owned.triangles().is_some());
+        let mut loaded = OwnedTree::load(objects, &owned.save().unwrap()).unwrap();
+        assert_eq!((loaded.tree(), loaded.objects()), (owned.tree(), boxes.len()));
+        loaded.improve(&deadline()).unwrap();
+        assert!(cost::total_area(loaded.tree()) <= first * (1.0 + 1e-12));
+    }
 }

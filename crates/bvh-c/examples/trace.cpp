@@ -1,0 +1,180 @@
+// Finds a tree in a moment, traces its nodes as tinybvh does, and compares every hit with the library's own tracer.
+//
+// With -DTINYBVH and tiny_bvh.h on the include path, tinybvh itself traces the same arrays too.
+
+#include "bvh.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <random>
+#include <utility>
+#include <vector>
+
+#ifdef TINYBVH
+#define TINYBVH_IMPLEMENTATION
+#include "tiny_bvh.h"
+#endif
+
+namespace {
+
+/// tinybvh's BVH::BVHNode, field by field: 32 bytes, after Ingo Wald.
+struct WaldNode {
+    float aabbMin[3];
+    uint32_t leftFirst;
+    float aabbMax[3];
+    uint32_t triCount;
+};
+static_assert(sizeof(WaldNode) == sizeof(BvhNode) && offsetof(WaldNode, leftFirst) == offsetof(BvhNode, first) &&
+                  offsetof(WaldNode, aabbMax) == offsetof(BvhNode, max) && offsetof(WaldNode, triCount) == offsetof(BvhNode, count),
+              "what the library lends is traced where it lies");
+
+template <class T> T *checked(T *made) {
+    if (made) return made;
+    std::fprintf(stderr, "%s\n", bvh_last_error());
+    std::exit(1);
+}
+
+void check(BvhStatus status) {
+    if (status == BVH_STATUS_OK) return;
+    std::fprintf(stderr, "%s\n", bvh_last_error());
+    std::exit(1);
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// The distance at which a ray meets a triangle, infinity if it does not (Möller & Trumbore 1997).
+float triangle(const BvhRay &ray, const float *corner) {
+    double edge[2][3], from[3], across[3], around[3], det = 0, u = 0, v = 0, t = 0;
+    for (int i = 0; i < 3; i++) {
+        edge[0][i] = double(corner[3 + i]) - corner[i], edge[1][i] = double(corner[6 + i]) - corner[i];
+        from[i] = double(ray.origin[i]) - corner[i];
+    }
+    for (int i = 0; i < 3; i++) {
+        int j = (i + 1) % 3, k = (i + 2) % 3;
+        across[i] = ray.direction[j] * edge[1][k] - ray.direction[k] * edge[1][j];
+        around[i] = from[j] * edge[0][k] - from[k] * edge[0][j];
+    }
+    for (int i = 0; i < 3; i++) {
+        det += edge[0][i] * across[i], u += from[i] * across[i];
+        v += ray.direction[i] * around[i], t += edge[1][i] * around[i];
+    }
+    u /= det, v /= det, t /= det;
+    bool hit = det != 0 && u >= 0 && v >= 0 && u + v <= 1 && t >= ray.t_min && t <= ray.t_max;
+    return hit ? float(t) : INFINITY;
+}
+
+/// Where a ray enters a box before `nearest`, infinity if it does not.
+float enters(const WaldNode &node, const BvhRay &ray, float nearest) {
+    float low = ray.t_min, high = std::min(ray.t_max, nearest);
+    for (int i = 0; i < 3; i++) {
+        float a = (node.aabbMin[i] - ray.origin[i]) / ray.direction[i], b = (node.aabbMax[i] - ray.origin[i]) / ray.direction[i];
+        low = std::fmax(low, std::fmin(a, b)), high = std::fmin(high, std::fmax(a, b) * 1.000001f);
+    }
+    return low <= high ? low : INFINITY;
+}
+
+BvhHit trace(const WaldNode *nodes, const uint32_t *ids, const float *corners, const BvhRay &ray) {
+    BvhHit hit = {INFINITY, UINT32_MAX};
+    std::vector<uint32_t> open(1, 0);
+    while (!open.empty()) {
+        const WaldNode &node = nodes[open.back()];
+        open.pop_back();
+        if (enters(node, ray, hit.t) == INFINITY) continue;
+        for (uint32_t i = 0; i < node.triCount; i++) {
+            uint32_t id = ids[node.leftFirst + i];
+            float t = triangle(ray, corners + 9 * id);
+            if (t < hit.t || (t == hit.t && id < hit.object)) hit = {t, id};
+        }
+        if (node.triCount > 0) continue;
+        // The nearer child is traced first.
+        uint32_t near = node.leftFirst, far = node.leftFirst + 1;
+        if (enters(nodes[far], ray, hit.t) < enters(nodes[near], ray, hit.t)) std::swap(near, far);
+        open.push_back(far), open.push_back(near);
+    }
+    return hit;
+}
+
+/// Compares distances with those of the library, from which rounding errors may differ, and on edges `allowed` answers.
+template <class Distance> void compare(const char *who, size_t allowed, const std::vector<BvhHit> &hits, Distance distance) {
+    auto start = std::chrono::steady_clock::now();
+    size_t met = 0, wrong = 0;
+    for (size_t i = 0; i < hits.size(); i++) {
+        float t = distance(i), ours = hits[i].t;
+        met += ours < INFINITY;
+        wrong += std::isinf(t) != std::isinf(ours) || (!std::isinf(t) && std::fabs(t - ours) > 1e-4f * ours);
+    }
+    std::printf("%s: %zu of %zu rays hit, %zu unlike the library's, %.2f s\n", who, met, hits.size(), wrong, seconds_since(start));
+    if (wrong > allowed || met == 0) std::exit(1);
+}
+
+} // namespace
+
+int main() {
+    std::mt19937 random(1);
+    auto within = [&](float size) { return size * float(random()) / float(std::mt19937::max()); };
+    std::vector<float> corners;
+    for (int i = 0; i < 20000; i++) {
+        float at[3] = {within(100), within(100), within(100)};
+        for (int corner = 0; corner < 3; corner++)
+            for (float c : at) corners.push_back(c + within(3));
+    }
+    size_t triangles = corners.size() / 9;
+
+    BvhTree *tree = checked(bvh_tree_from_triangles(corners.data(), triangles, 0.0, 1.0));
+    double first = 0, cost = 0;
+    check(bvh_tree_cost(tree, BVH_COST_SAH, &first));
+    check(bvh_tree_improve(tree, 1.0));
+    check(bvh_tree_cost(tree, BVH_COST_SAH, &cost));
+    std::printf("%zu triangles: surface area heuristic %.2f, after a second %.2f\n", triangles, first, cost);
+
+    std::vector<BvhRay> rays(100000);
+    for (BvhRay &ray : rays) {
+        ray.t_min = 0, ray.t_max = INFINITY;
+        float length = 0;
+        for (int i = 0; i < 3; i++) {
+            ray.origin[i] = within(100), ray.direction[i] = within(2) - 1;
+            length += ray.direction[i] * ray.direction[i];
+        }
+        for (float &component : ray.direction) component /= std::sqrt(length);
+    }
+    BvhTracer *tracer = checked(bvh_tracer_new(tree));
+    std::vector<BvhHit> hits(rays.size());
+    auto start = std::chrono::steady_clock::now();
+    check(bvh_tracer_nearest_hits(tracer, rays.data(), rays.size(), 0, hits.data()));
+    std::printf("the library: %zu rays, %.2f s\n", rays.size(), seconds_since(start));
+
+    size_t node_count = 0, id_count = 0;
+    const BvhNode *nodes = checked(bvh_tree_nodes(tree, &node_count));
+    const uint32_t *ids = checked(bvh_tree_object_ids(tree, &id_count));
+    std::vector<WaldNode> wald(node_count);
+    std::memcpy(wald.data(), nodes, node_count * sizeof(WaldNode));
+    compare("tinybvh's nodes", 0, hits, [&](size_t i) { return trace(wald.data(), ids, corners.data(), rays[i]).t; });
+
+#ifdef TINYBVH
+    std::vector<tinybvh::bvhvec4> vertices;
+    for (size_t i = 0; i < corners.size(); i += 3) vertices.emplace_back(corners[i], corners[i + 1], corners[i + 2], 0.f);
+    tinybvh::BVH theirs;
+    theirs.Build(vertices.data(), uint32_t(triangles));
+    // Its own tree is replaced by ours, which it frees.
+    theirs.AlignedFree(theirs.bvhNode), theirs.AlignedFree(theirs.primIdx);
+    theirs.bvhNode = (tinybvh::BVH::BVHNode *)theirs.AlignedAlloc(node_count * sizeof(BvhNode));
+    theirs.primIdx = (uint32_t *)theirs.AlignedAlloc(id_count * sizeof(uint32_t));
+    std::memcpy((void *)theirs.bvhNode, nodes, node_count * sizeof(BvhNode));
+    std::memcpy(theirs.primIdx, ids, id_count * sizeof(uint32_t));
+    theirs.usedNodes = theirs.allocatedNodes = uint32_t(node_count), theirs.idxCount = uint32_t(id_count);
+    compare("tinybvh", 10, hits, [&](size_t i) {
+        const float *o = rays[i].origin, *d = rays[i].direction;
+        tinybvh::Ray ray({o[0], o[1], o[2]}, {d[0], d[1], d[2]});
+        theirs.Intersect(ray);
+        return ray.hit.t < BVH_FAR ? ray.hit.t : INFINITY;
+    });
+#endif
+    bvh_tracer_free(tracer);
+    bvh_tree_free(tree);
+}

@@ -1,0 +1,164 @@
+//! What C callers can do wrong is refused by name, and what they do right agrees with the Rust crates.
+
+use crate::failure::{BvhStatus, bvh_last_error, status};
+use crate::{tracer::*, tree::*};
+use bvh_search::prelude::*;
+use std::ffi::{CStr, CString};
+use std::ptr::{null, null_mut};
+
+/// A staircase of right triangles.
+fn corners(count: usize) -> Vec<f32> {
+    let corner = |i: usize| {
+        let x = i as f32;
+        [x, 0.0, x, x + 1.5, 0.0, x, x, 1.5, x]
+    };
+    (0..count).flat_map(corner).collect()
+}
+
+fn last_error() -> String {
+    // SAFETY: a string that is valid until the next failure.
+    unsafe { CStr::from_ptr(bvh_last_error()) }.to_str().unwrap().to_owned()
+}
+
+/// The tree over such triangles.
+fn tree(corners: &[f32]) -> *mut BvhTree {
+    // SAFETY: nine floats per triangle.
+    unsafe { bvh_tree_from_triangles(corners.as_ptr(), corners.len() / 9, 0.02, 1.0) }
+}
+
+#[test]
+fn trees_and_hits_are_those_of_the_rust_crates() {
+    let corners = corners(40);
+    let triangles: Vec<Triangle> = bytes_as_triangles(&corners);
+    let tree = tree(&corners);
+    let ray = |x: f32| BvhRay {
+        origin: [x, 0.2, -1.0],
+        t_min: 0.0,
+        direction: [0.0, 0.0, 1.0],
+        t_max: f32::INFINITY,
+    };
+    let rays: Vec<BvhRay> = (0..1500).map(|i| ray(i as f32 * 0.03)).collect();
+    let (mut count, mut ids, mut cost) = (0, 0, 0.0);
+    let mut hits = vec![BvhHit { t: 0.0, object: 0 }; rays.len()];
+    let mut any = vec![9u8; rays.len()];
+    // SAFETY: the arrays have the lengths that are given, and the nodes are used before the tree is improved.
+    unsafe {
+        let nodes = std::slice::from_raw_parts(bvh_tree_nodes(tree, &mut count), count).to_vec();
+        let ids = std::slice::from_raw_parts(bvh_tree_object_ids(tree, &mut ids), ids);
+        assert_eq!((nodes.len(), ids.len(), nodes[0].first, nodes[0].min), (80, 40, 2, [0.0; 3]));
+        assert_eq!(bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut cost), BvhStatus::Ok);
+        assert_eq!(cost, cost::internal_area((*tree).owned.tree()));
+        let before = cost;
+        assert_eq!(bvh_tree_improve(tree, 0.02), BvhStatus::Ok);
+        assert_eq!(bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut cost), BvhStatus::Ok);
+        assert!(cost <= before);
+        let tracer = bvh_tracer_new(tree);
+        for coherent in [0, 1] {
+            let (rays, count) = (rays.as_ptr(), rays.len());
+            assert_eq!(
+                bvh_tracer_nearest_hits(tracer, rays, count, coherent, hits.as_mut_ptr()),
+                BvhStatus::Ok
+            );
+            assert_eq!(bvh_tracer_any_hits(tracer, rays, count, coherent, any.as_mut_ptr()), BvhStatus::Ok);
+            for (index, (hit, any)) in hits.iter().zip(&any).enumerate() {
+                let ray = Ray::half_line((*rays.add(index)).origin, [0.0, 0.0, 1.0]).unwrap();
+                let expected = nearest_hit((*tree).owned.tree(), &triangles, &ray);
+                let Hit { t, object } = expected.unwrap_or(Hit::MISS);
+                assert_eq!((*hit, *any), (BvhHit { t, object }, u8::from(expected.is_some())));
+            }
+        }
+        assert!(any.contains(&0) && any.contains(&1));
+        bvh_tracer_free(tracer);
+        bvh_tree_free(tree);
+    }
+}
+
+fn bytes_as_triangles(corners: &[f32]) -> Vec<Triangle> {
+    let (points, _) = corners.as_chunks::<3>();
+    points.as_chunks::<3>().0.iter().map(|&corners| Triangle::from(corners)).collect()
+}
+
+#[test]
+fn files_come_back_and_what_is_wrong_with_one_is_named() {
+    let corners = corners(9);
+    let tree = tree(&corners);
+    let path = std::env::temp_dir().join(format!("bvh-c.{}.bvh", std::process::id()));
+    let named = CString::new(path.to_str().unwrap()).unwrap();
+    // SAFETY: nine floats per triangle, and strings that end with a zero.
+    unsafe {
+        assert_eq!(bvh_tree_save(tree, named.as_ptr()), BvhStatus::Ok, "{}", last_error());
+        let loaded = bvh_tree_load_triangles(named.as_ptr(), corners.as_ptr(), 9);
+        assert_eq!((*loaded).owned.tree(), (*tree).owned.tree());
+        assert!(bvh_tree_load_triangles(named.as_ptr(), corners.as_ptr(), 8).is_null());
+        assert!(last_error().contains("9 objects; this one has 8"), "{}", last_error());
+        std::fs::remove_file(&path).unwrap();
+        assert!(bvh_tree_load_triangles(named.as_ptr(), corners.as_ptr(), 9).is_null());
+        assert!(last_error().contains(path.to_str().unwrap()), "{}", last_error());
+        assert_eq!(bvh_tree_save(tree, c"/nowhere/at/all".as_ptr()), BvhStatus::File);
+        assert_eq!(bvh_tree_save(tree, c"\xff".as_ptr()), BvhStatus::Invalid);
+        bvh_tree_free(loaded);
+        bvh_tree_free(tree);
+    }
+}
+
+#[test]
+fn what_no_call_can_take_is_refused_by_name() {
+    let mut wrong = corners(5);
+    let tree = tree(&wrong);
+    wrong[9 * 3] = f32::NAN;
+    let boxes = [0.0f32, 0.0, 0.0, 1.0, 1.0, 1.0];
+    let ray = BvhRay { origin: [0.0; 3], t_min: 0.0, direction: [0.0; 3], t_max: 1.0 };
+    let refused = |parts: &str| assert!(last_error().contains(parts), "{}", last_error());
+    // SAFETY: what is not null has the lengths that are given.
+    unsafe {
+        assert!(bvh_tree_from_triangles(wrong.as_ptr(), 5, 0.0, 1.0).is_null());
+        refused("3");
+        assert!(bvh_tree_from_triangles(null(), 5, 0.0, 1.0).is_null());
+        refused("corners is null");
+        assert!(bvh_tree_from_triangles(wrong.as_ptr().byte_add(1), 5, 0.0, 1.0).is_null());
+        refused("corners does not lie at a multiple of 4");
+        assert!(bvh_tree_from_triangles(wrong.as_ptr(), usize::MAX, 0.0, 1.0).is_null());
+        refused("more than memory can");
+        assert!(bvh_tree_from_triangles(wrong.as_ptr(), 5, 0.0, f64::NAN).is_null());
+        refused("references is NaN; accepted: 1 to 16");
+        assert!(bvh_tree_from_boxes(boxes.as_ptr(), 1, -1.0).is_null());
+        refused("seconds is -1; accepted");
+        assert!(bvh_tree_from_boxes(boxes.as_ptr().add(1), 0, f64::INFINITY).is_null());
+        refused("seconds is inf");
+        let boxed = bvh_tree_from_boxes(boxes.as_ptr(), 1, 0.0);
+        assert!(bvh_tracer_new(boxed).is_null());
+        refused("tree is over boxes");
+        assert!(bvh_tree_load_boxes(null(), boxes.as_ptr(), 1).is_null());
+        refused("path is null");
+        let mut cost = 7.0;
+        assert_eq!(bvh_tree_cost(tree, 4, &mut cost), BvhStatus::Invalid);
+        refused("kind is 4; accepted: 0 to 3");
+        assert_eq!((bvh_tree_cost(null(), 0, &mut cost), cost), (BvhStatus::Invalid, 7.0));
+        refused("tree is null");
+        assert_eq!(bvh_tree_cost(tree, 0, null_mut()), BvhStatus::Invalid);
+        assert!(bvh_tree_nodes(tree, null_mut()).is_null() && bvh_tree_nodes(null(), &mut 0).is_null());
+        assert_eq!(bvh_tree_improve(null_mut(), 1.0), BvhStatus::Invalid);
+        let tracer = bvh_tracer_new(tree);
+        let mut hit = BvhHit { t: 5.0, object: 5 };
+        assert_eq!(bvh_tracer_nearest_hits(tracer, &ray, 1, 0, &mut hit), BvhStatus::Invalid);
+        refused("rays[0]: the ray's direction");
+        assert_eq!(bvh_tracer_nearest_hits(tracer, null(), 0, 0, null_mut()), BvhStatus::Ok);
+        assert_eq!(bvh_tracer_any_hits(tracer, null(), 1, 0, null_mut()), BvhStatus::Invalid);
+        assert_eq!(hit.object, 5);
+        for freed in [tree, boxed, null_mut()] {
+            bvh_tree_free(freed);
+        }
+        bvh_tracer_free(tracer);
+        bvh_tracer_free(null_mut());
+    }
+}
+
+#[test]
+fn a_panic_becomes_a_status_and_a_message_of_its_own_thread() {
+    assert_eq!(status(|| panic!("node {} is missing", 3)), BvhStatus::Fault);
+    assert_eq!(last_error(), "a fault of the library: node 3 is missing");
+    assert_eq!(std::thread::spawn(last_error).join().unwrap(), "");
+    // What succeeds leaves the message.
+    assert_eq!(status(|| Ok(())), BvhStatus::Ok);
+    assert_eq!(last_error(), "a fault of the library: node 3 is missing");
+}
