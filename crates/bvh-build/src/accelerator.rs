@@ -10,6 +10,7 @@ use std::borrow::Cow;
 /// What a ray asks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Query {
     /// Whether it hits anything: the paper's shadow rays.
     Any,

@@ -74,6 +74,32 @@ impl<C: Check> Check for Vec<C> {
 pub trait Accepts<V: ?Sized> {
     /// Refuses the value `found` of the parameter `key` unless it is accepted.
     fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange>;
+
+    /// The accepted values in words, if there is more to say than their type does.
+    fn accepted(&self) -> Option<String> {
+        None
+    }
+}
+
+/// The fields of a configuration, as [`config!`](crate::config!) declares them.
+pub trait Keys {
+    /// Their names, in order.
+    const KEYS: &[&str];
+
+    /// What each accepts, in words, if there is more to say than its type does.
+    fn accepted() -> Vec<Option<String>>;
+}
+
+/// Adds what each field accepts to its description in the JSON schema of the configuration.
+#[cfg(feature = "schema")]
+pub fn describe_accepted<C: Keys>(schema: &mut schemars::Schema) {
+    let Some(fields) = schema.get_mut("properties").and_then(|fields| fields.as_object_mut()) else { return };
+    for (key, accepted) in C::KEYS.iter().zip(C::accepted()) {
+        let description = fields.get_mut(*key).and_then(|field| field.get_mut("description"));
+        if let (Some(words), Some(text)) = (accepted, description) {
+            *text = format!("{}\nAccepted: {words}.", text.as_str().unwrap_or_default()).into();
+        }
+    }
 }
 
 /// Accepts the values that pass their own [`Check`]: inner configurations.
@@ -97,6 +123,10 @@ macro_rules! ranges {
                     }
                     Err(OutOfRange::new(key, number, in_words(self)))
                 })
+            }
+
+            fn accepted(&self) -> Option<String> {
+                Some(in_words(self))
             }
         }
     )* };
@@ -202,7 +232,8 @@ impl<V: Numbers> Numbers for BTreeMap<String, V> {
 /// From the declaration follow the struct with `Clone`, `Debug`, `PartialEq` and [`Default`]; a sentence in the
 /// documentation of every field that states its default and the accepted values; [`Check`](crate::Check); and serde's
 /// traits, under the feature `serde` of the crate that calls the macro, with unknown keys refused and missing ones
-/// replaced by their defaults. A crate that always depends on serde writes `serde;` first.
+/// replaced by their defaults; and a JSON schema by `schemars`, under its feature `schema`. A crate that always depends on both
+/// writes `serde;` first.
 ///
 /// Without `= default` a field has the default of its type, unsaid; without `in` every value is accepted. The right side
 /// of `in` is anything that [`Accepts`](crate::config::Accepts) the field's type. What several fields have to be
@@ -211,6 +242,8 @@ impl<V: Numbers> Numbers for BTreeMap<String, V> {
 macro_rules! config {
     (@default) => { ::core::default::Default::default() };
     (@default $default:expr) => { $default };
+    (@accepted $type:ty) => { ::core::option::Option::None };
+    (@accepted $type:ty, $range:expr) => { $crate::config::Accepts::<$type>::accepted(&($range)) };
     (@doc [] []) => { "" };
     (@doc [] [$range:expr]) => { concat!("Accepted: `", stringify!($range), "`.") };
     (@doc [$default:expr] []) => { concat!("Default `", stringify!($default), "`.") };
@@ -235,6 +268,14 @@ macro_rules! config {
             )*
         }
 
+        impl $crate::config::Keys for $name {
+            const KEYS: &[&str] = &[$(stringify!($field)),*];
+
+            fn accepted() -> ::std::vec::Vec<::core::option::Option<::std::string::String>> {
+                ::std::vec![$($crate::config!(@accepted $type $(, $range)?)),*]
+            }
+        }
+
         impl ::core::default::Default for $name {
             fn default() -> Self {
                 Self { $($field: $crate::config!(@default $($default)?)),* }
@@ -252,8 +293,9 @@ macro_rules! config {
     (serde; $($tokens:tt)*) => {
         $crate::config! {
             @struct {
-                #[derive(::serde::Serialize, ::serde::Deserialize)]
+                #[derive(::serde::Serialize, ::serde::Deserialize, ::schemars::JsonSchema)]
                 #[serde(deny_unknown_fields, default)]
+                #[schemars(transform = $crate::config::describe_accepted::<Self>)]
             }
             $($tokens)*
         }
@@ -265,6 +307,11 @@ macro_rules! config {
                     feature = "serde",
                     derive(::serde::Serialize, ::serde::Deserialize),
                     serde(deny_unknown_fields, default)
+                )]
+                #[cfg_attr(
+                    feature = "schema",
+                    derive(::schemars::JsonSchema),
+                    schemars(transform = $crate::config::describe_accepted::<Self>)
                 )]
             }
             $($tokens)*
@@ -302,6 +349,20 @@ mod tests {
             /// May be infinite.
             limit: f64 = f64::INFINITY, in 1.0..=f64::INFINITY;
         }
+    }
+
+    #[test]
+    fn every_field_says_in_words_what_it_accepts_beyond_its_type() {
+        let said =
+            Outer::KEYS.iter().zip(Outer::accepted()).map(|(key, words)| (*key, words.unwrap_or_default()));
+        let expected = [
+            ("part", "above 0, up to 1"),
+            ("factor", "above 0"),
+            ("sizes", "1 or more"),
+            ("by_name", "at most 9"),
+            ("inner", ""),
+        ];
+        assert!(said.eq(expected.map(|(key, words)| (key, words.to_owned()))));
     }
 
     #[test]

@@ -12,6 +12,7 @@ pub use crate::overlap::end_point_overlap;
 /// The cost that a search minimises and that results report as `cost`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Objective {
     /// [`internal_area`], the paper's objective.
     #[default]
@@ -70,6 +71,7 @@ pub fn total_area(tree: &Bvh) -> f64 {
     derive(serde::Serialize, serde::Deserialize),
     serde(deny_unknown_fields, default)
 )]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SahConstants {
     /// Cost of visiting an inner node. Default 1.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "checked"))]

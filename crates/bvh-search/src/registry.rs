@@ -11,6 +11,7 @@ macro_rules! methods {
         /// A builder or a search with its parameters, as a spec names it: a table whose `method` is the name and
         /// whose other keys are the configuration's fields. Unknown names and keys are refused.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
         #[serde(tag = "method")]
         pub enum Method {
             $($(#[$doc])* #[serde(rename = $name)] $variant($config),)*

@@ -4,7 +4,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use harness::cli::interrupt::{self, INTERRUPTED};
 use harness::cli::output::{STDOUT_FAILED, print_bytes, print_error, print_line};
-use harness::cli::{bake, commands, inspect, merge, render, report, run, scenes};
+use harness::cli::{bake, commands, inspect, merge, new, render, report, run, scenes};
 use harness::{Error, stress::child};
 use std::path::Path;
 use std::process::ExitCode;
@@ -30,6 +30,9 @@ enum Command {
     Bake(bake::BakeArgs),
     Inspect(inspect::InspectArgs),
     Verify(inspect::VerifyArgs),
+    New(new::NewArgs),
+    /// Print the JSON schema of specs, by which editors complete and check them.
+    Schema,
     /// Print the file by which a shell completes arguments.
     Completions {
         shell: Shell,
@@ -61,6 +64,11 @@ fn main() -> ExitCode {
         Some(Command::Bake(args)) => bake::bake(&args, &INTERRUPTED),
         Some(Command::Inspect(args)) => inspect::inspect(&args),
         Some(Command::Verify(args)) => inspect::verify(&args),
+        Some(Command::New(args)) => new::new(&args),
+        Some(Command::Schema) => {
+            new::schema();
+            Ok(())
+        }
         Some(Command::Completions { shell }) => {
             print_bytes(&commands::completions(shell, &mut Cli::command()));
             Ok(())

@@ -232,7 +232,7 @@ fn a_wrong_value_of_any_flag_is_refused_by_name() {
     let entries = || fs::read_dir(at).unwrap().count();
     let before = entries();
     // Every command with what it cannot do without.
-    let commands: [(&str, &[&str]); 10] = [
+    let commands: [(&str, &[&str]); 12] = [
         ("", &["spec.toml"]),
         ("bake", &["spheres75", "--budget=0s", "--out=x.bvh"]),
         ("inspect", &["good.bvh", "spheres75"]),
@@ -241,6 +241,8 @@ fn a_wrong_value_of_any_flag_is_refused_by_name() {
         ("report", &[]),
         ("merge", &["folder", "--out=x"]),
         ("scenes", &[]),
+        ("new", &["x.toml"]),
+        ("schema", &[]),
         ("completions", &["bash"]),
         ("man", &[]),
     ];

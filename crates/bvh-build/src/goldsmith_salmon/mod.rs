@@ -46,6 +46,7 @@ crate::config! {
 /// The choice of the next node on the path among children that do not contain the object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Descent {
     /// The child whose cost grows least: by children · growth of S for an inner node, and by 2 · S(pair) for a leaf,
     /// which cost nothing before. Ng & Trifonov's 'minimal increase in cost'.

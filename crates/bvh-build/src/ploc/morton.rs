@@ -73,7 +73,7 @@ mod tests {
         for bit in 0..21 {
             assert_eq!(spread([0, 1, 1 << bit, 0]), [0, 1, 1 << (3 * bit), 0]);
         }
-        assert_eq!(spread([u64::MAX; 4]), [(0..21).map(|bit| 1 << (3 * bit)).sum(); 4]);
+        assert_eq!(spread([u64::MAX; 4]), [(0..21).map(|bit| 1 << (3 * bit)).sum::<u64>(); 4]);
     }
 
     proptest! {

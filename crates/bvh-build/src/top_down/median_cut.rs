@@ -23,6 +23,7 @@ crate::config! {
 /// Which axis a node is cut along.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum CutAxis {
     /// x at the root, then y, z, x and so on by level (Kay & Kajiya).
     Alternating,

@@ -34,6 +34,7 @@ crate::config! {
 /// The cost of a split.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Heuristic {
     /// S(L)·|L| + S(R)·|R|.
     #[default]
@@ -54,6 +55,7 @@ pub enum Heuristic {
     derive(serde::Serialize, serde::Deserialize),
     serde(rename_all = "snake_case", deny_unknown_fields)
 )]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MadeUpCosts {
     /// The objects 0, `every`, 2 · `every` and so on are dear, `every` ≥ 1.
     pub every: u32,

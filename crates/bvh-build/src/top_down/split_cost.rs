@@ -94,6 +94,7 @@ impl SplitCost for AreaTimesPower {
 /// these are the readings we know of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum AreaOnly {
     /// S(L) + S(R), the literal reading.
     Sum,

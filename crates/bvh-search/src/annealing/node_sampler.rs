@@ -132,7 +132,7 @@ mod tests {
             };
             let (total, times) = (nodes.iter().map(weight).sum::<f64>(), 400_000);
             let counts = drawn(&mut NodeSampler::among(only), &tree, times);
-            assert_eq!(counts.iter().sum::<u32>(), nodes.iter().map(|&at| counts[at as usize]).sum());
+            assert_eq!(counts.iter().sum::<u32>(), nodes.iter().map(|&at| counts[at as usize]).sum::<u32>());
             for at in nodes {
                 let expected = f64::from(times) * weight(&at) / total;
                 let off = (f64::from(counts[at as usize]) - expected).abs();

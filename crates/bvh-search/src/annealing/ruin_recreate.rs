@@ -62,6 +62,7 @@ bvh_build::config! {
 /// The area that temperatures are relative to, so that one schedule suits nodes of all sizes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Scale {
     /// The area that the removal saves.
     #[default]

@@ -54,6 +54,7 @@ impl Config {
 /// Which position a subtree gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Target {
     /// The end of a random descent from the top, of at most one level more than the climb.
     Random,

@@ -47,6 +47,7 @@ bvh_build::config! {
 /// The restricted candidate list of a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Candidates {
     /// The best split of each of the three axes.
     AxisBest,

@@ -6,6 +6,7 @@ use std::ops::AddAssign;
 /// [`Observer`](crate::Observer) that cancels. There is no default: without any limit, [`best`](crate::best) takes hours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Budget {
     /// Maximum number of trees or moves to evaluate.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]

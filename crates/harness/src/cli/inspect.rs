@@ -110,6 +110,7 @@ pub struct VerifyArgs {
 pub fn verify(args: &VerifyArgs) -> Result<(), Error> {
     args.results.iter().try_for_each(|folder| input_folder("--results", folder))?;
     let results = args.results.as_deref().unwrap_or(Path::new("results"));
+    args.keep.iter().try_for_each(|_| input_folder("--keep", results))?;
     let scene = Scene::load(&args.scene)?;
     let (tree, mut facts) = examine(&args.file, Some(&scene))?;
     match reference::best_known(results, &scene)? {

@@ -8,6 +8,7 @@ pub mod explain;
 pub mod inspect;
 pub mod interrupt;
 pub mod merge;
+pub mod new;
 pub mod output;
 pub mod render;
 pub mod report;

@@ -10,7 +10,7 @@ use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
 
 /// A distribution of random rays over the root's box.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Family {
     /// Origin uniform in the box, direction uniform: the paper's.
@@ -58,7 +58,7 @@ pub(super) fn on_sphere(rng: &mut Stream) -> DVec3 {
 }
 
 /// A kind of rays that a renderer sends. All directions are unit vectors and all rays begin at distance 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// Origins uniform in the root's box, directions uniform; nearest hit.
@@ -94,7 +94,7 @@ impl Kind {
 }
 
 /// Where the primary rays of a scene come from, in fractions of the root's box: 0 is its lower corner, 1 the upper one.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Viewpoint {
     /// The camera's position.

@@ -37,7 +37,7 @@ config! {
 const MOST_RAYS: u32 = 100_000_000;
 
 /// A way to lay out one of our trees.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Layout {
     /// The tree as it is.

@@ -24,7 +24,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 ///
 /// For costs and build times it builds a tree with one object per leaf, as ours have. For rays it builds its own
 /// structures by the same settings: with its own leaves, and with split triangles where it splits them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(tag = "method", rename_all = "snake_case")]
 pub enum Peer {
     /// The crate `bvh`: binned surface area heuristic. It has no settings.
@@ -34,12 +34,12 @@ pub enum Peer {
 }
 
 /// The settings of a library that has none.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NoSettings {}
 
 /// Settings of `obvhs`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Obvhs {
     /// The library's preset. Default medium.
@@ -51,7 +51,7 @@ pub struct Obvhs {
 }
 
 /// The presets of `obvhs`, by the names of its functions without `_build`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[allow(missing_docs, reason = "the library's names")]
 pub enum Preset {

@@ -51,7 +51,7 @@ use std::collections::BTreeSet;
 macro_rules! reports {
     ($($(#[$doc:meta])* $name:literal => $kind:ident($config:ty) by $write:path;)*) => {
         /// One report of a spec.
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
         #[serde(tag = "kind")]
         pub enum Report {
             $($(#[$doc])* #[serde(rename = $name)] $kind($config),)*

@@ -36,7 +36,7 @@ pub(crate) struct Job<'a> {
 impl Job<'_> {
     /// The seed of the run.
     pub fn seed(&self, experiment: &Experiment) -> u64 {
-        let seeds = self.labelled.seed_as.as_ref().unwrap_or(&self.labelled.label);
+        let seeds = self.labelled.own.seed_as.as_ref().unwrap_or(&self.labelled.label);
         experiment.seed_of(&self.scene.name, seeds, self.repetition)
     }
 }
@@ -120,21 +120,21 @@ fn solve_or_build(
     match &labelled.method {
         Contestant::Ours(method) => {
             let ray_seed = experiment.seed_of(&scene.name, "rays of the judge", job.repetition);
-            let judge = labelled.judge.as_ref().map(|rays| RayJudge { rays, scene, seed: ray_seed });
+            let judge = labelled.own.judge.as_ref().map(|rays| RayJudge { rays, scene, seed: ray_seed });
             let density = density(experiment, job)?;
             let problem = Problem {
-                objective: labelled.objective.unwrap_or(experiment.objective),
+                objective: labelled.own.objective.unwrap_or(experiment.objective),
                 splits: splits(labelled, scene),
                 measure: density.as_ref().map(|density| density as &dyn Measure),
                 judge: judge.as_ref().map(|judge| judge as &dyn Judge),
-                disabled: &labelled.keep,
+                disabled: &labelled.own.keep,
                 ..Problem::new(&scene.boxes)
             };
             let outcome = solve(method, &problem, seed, experiment.budget_of(labelled), stopwatch);
             let seconds = stopwatch.start.elapsed().as_secs_f64();
             let mut outcome = outcome.map_err(Error::search(&scene.name, &labelled.label))?;
             let own = judge.is_some() || density.is_some() || problem.splits.is_some();
-            if own || labelled.objective.is_some() {
+            if own || labelled.own.objective.is_some() {
                 outcome.cost = experiment.objective.cost(&outcome.tree);
             }
             Ok((outcome, seconds))
@@ -163,13 +163,15 @@ fn solve_or_build(
 
 /// Whether and how the method may divide the scene's objects.
 fn splits<'a>(labelled: &Labelled, scene: &'a Scene) -> Option<Splits<'a>> {
-    let references = labelled.references? * scene.boxes.len() as f64;
+    let references = labelled.own.references? * scene.boxes.len() as f64;
     Splits::at_most(references as usize, &scene.boxes, &scene.primitives)
 }
 
 /// The density of the rays that the job's method minimises the visits of, if it does; every repetition has its own rays.
 pub(crate) fn density(experiment: &Experiment, job: &Job) -> Result<Option<RayDensity>, Error> {
-    let (Some(config), Some(trained)) = (&experiment.ray_cost, job.labelled.for_rays) else { return Ok(None) };
+    let (Some(config), Some(trained)) = (&experiment.ray_cost, job.labelled.own.for_rays) else {
+        return Ok(None);
+    };
     let seed = experiment.seed_of(&job.scene.name, "rays that trees are trained on", job.repetition);
     let failed = |message| Error::Tracing { scene: job.scene.name.clone(), message };
     config.density(trained, job.scene, seed).map(Some).map_err(failed)

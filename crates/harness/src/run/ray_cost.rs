@@ -50,15 +50,15 @@ pub(crate) fn judge(
             for (number, &at) in methods.iter().enumerate() {
                 let own = &tests[at..at + experiment.repetitions as usize];
                 let labelled = of_scene[at].0.labelled;
-                let plain = labelled.objective.is_none() && labelled.references.is_none();
-                let tree = if labelled.for_rays.is_some() && plain { RAYS } else { &labelled.label };
+                let plain = labelled.own.objective.is_none() && labelled.own.references.is_none();
+                let tree = if labelled.own.for_rays.is_some() && plain { RAYS } else { &labelled.label };
                 let [node_tests, block_tests, tests] =
                     [mean(own, |t| t[0]), mean(own, |t| t[1]), mean(own, |t| t[0] + t[1])];
                 rows.push(TestRow {
                     scene: scene.name.clone(),
                     method: labelled.label.clone(),
                     tree: tree.into(),
-                    trained_on: TrainedOn::name(labelled.for_rays).into(),
+                    trained_on: TrainedOn::name(labelled.own.for_rays).into(),
                     judged_on: rays.kind.name().into(),
                     camera: rays.camera.into(),
                     node_tests: node_tests.0,

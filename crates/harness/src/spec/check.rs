@@ -1,10 +1,10 @@
 //! What types alone do not say of a spec, part by part. Messages name the key, what was found, what would be accepted.
 
 use super::fault::Fault;
+use super::method::Own;
 use super::{Contestant, Experiment, Labelled};
 use crate::report::Report;
 use crate::{scenes::subset, stress};
-use bvh_build::config::Accepts;
 use bvh_build::{Check, OutOfRange};
 use bvh_search::Method;
 use std::collections::HashSet;
@@ -72,12 +72,10 @@ impl Experiment {
     }
 
     fn check_method(&self, labelled: &Labelled) -> Result<(), Fault> {
-        let Labelled { method, judge, for_rays, objective, references, .. } = labelled;
-        if let Some(references) = references {
-            (1.0..=16.0).check("references", references)?;
-            if !matches!(method, Contestant::Ours(Method::Best(_))) {
-                return Err(Fault::new("references", format!("set for {}", method.name()), "with best"));
-            }
+        let Labelled { method, own: Own { judge, for_rays, objective, references, .. }, .. } = labelled;
+        labelled.own.check()?;
+        if references.is_some() && !matches!(method, Contestant::Ours(Method::Best(_))) {
+            return Err(Fault::new("references", format!("set for {}", method.name()), "with best"));
         }
         let is_ours = matches!(method, Contestant::Ours(_));
         if objective.is_some() && !is_ours {
@@ -88,12 +86,9 @@ impl Experiment {
                 if is_ours { "set without `ray_cost`".into() } else { format!("set for {}", method.name()) };
             return Err(Fault::new("for_rays", found, "with a method of ours and the experiment's `ray_cost`"));
         }
-        if let Some(judge) = judge {
-            judge.check()?;
-            if !Labelled::JUDGED.contains(&method.name()) {
-                let found = format!("set for {}", method.name());
-                return Err(Fault::new("judge", found, format!("with {}", Labelled::JUDGED.join(", "))));
-            }
+        if judge.is_some() && !Labelled::JUDGED.contains(&method.name()) {
+            let found = format!("set for {}", method.name());
+            return Err(Fault::new("judge", found, format!("with {}", Labelled::JUDGED.join(", "))));
         }
         match method {
             Contestant::Peer(_) | Contestant::External(_) if self.suite.is_some() => {

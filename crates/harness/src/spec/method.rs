@@ -4,12 +4,13 @@ use super::fault::{self, Fault};
 use crate::measure::empirical_cost;
 use crate::measure::ray_cost::TrainedOn;
 use crate::peers::{Peer, command};
+use bvh_build::config::{Itself, Keys};
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, Method, Shortcut};
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Table;
 
-/// A method with the label that tables and figures show, by default its name, and limits of its own, if it has any.
+/// A method with the label that tables and figures show, and what its entry says besides.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(into = "Table")]
 pub struct Labelled {
@@ -17,27 +18,12 @@ pub struct Labelled {
     pub label: String,
     /// What is run.
     pub method: Contestant,
-    /// Limits of its runs besides the experiment's: the lower of both counts. Default none.
-    pub budget: Option<Budget>,
-    /// What its runs do although the scene does not need it, to measure what leaving it out saves. Default nothing.
-    pub keep: Vec<Shortcut>,
-    /// Label whose seeds its runs have, for methods that are to differ in nothing else. Default its own.
-    pub seed_as: Option<String>,
-    /// Random rays whose mean number of box tests judges the trees of its runs in place of the objective; the costs in
-    /// `history.csv` are then such numbers. Default none.
-    pub judge: Option<empirical_cost::Config>,
-    /// Rays of the experiment's `ray_cost` whose visits its runs minimise in place of the objective; the costs in `history.csv`
-    /// are then such numbers. Default none.
-    pub for_rays: Option<TrainedOn>,
-    /// The cost that its runs minimise in place of the experiment's. Default none.
-    pub objective: Option<Objective>,
-    /// Maximum number of references per object, 1 to 16, where objects may be divided among leaves: for `best`. Default none: they
-    /// may not.
-    pub references: Option<f64>,
+    /// The keys of the entry that are no parameters of the method; without the label.
+    pub own: Own,
 }
 
 /// A method of ours, another library, or a program.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(untagged)]
 #[allow(missing_docs, reason = "said above")]
 pub enum Contestant {
@@ -69,19 +55,29 @@ impl Contestant {
     }
 }
 
-/// The keys of an entry besides those of its method.
-#[derive(Default, Serialize, Deserialize)]
-#[serde(default)]
-struct Frame {
-    label: Option<String>,
-    budget: Option<Budget>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    keep: Vec<Shortcut>,
-    seed_as: Option<String>,
-    judge: Option<empirical_cost::Config>,
-    for_rays: Option<TrainedOn>,
-    objective: Option<Objective>,
-    references: Option<f64>,
+bvh_build::config! { serde;
+    /// The keys of an entry besides those of its method.
+    pub struct Own {
+        /// What tables and figures call the method: unique within the experiment. Default the method's name.
+        label: Option<String>;
+        /// Limits of its runs besides the experiment's: the lower of both counts. Default none.
+        budget: Option<Budget>;
+        /// What its runs do although the scene does not need it, to measure what leaving it out saves. Default nothing.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        keep: Vec<Shortcut>;
+        /// Label whose seeds its runs have, for methods that are to differ in nothing else. Default its own.
+        seed_as: Option<String>;
+        /// Random rays whose mean number of box tests judges the trees of its runs in place of the objective; the costs in
+        /// `history.csv` are then such numbers. Default none.
+        judge: Option<empirical_cost::Config>, in Itself;
+        /// Rays of the experiment's `ray_cost` whose visits its runs minimise in place of the objective; the costs in
+        /// `history.csv` are then such numbers. Default none.
+        for_rays: Option<TrainedOn>;
+        /// The cost that its runs minimise in place of the experiment's. Default none.
+        objective: Option<Objective>;
+        /// Maximum number of references per object where objects may be divided among leaves: for `best`. Default none: they may not.
+        references: Option<f64>, in 1.0..=16.0;
+    }
 }
 
 impl Labelled {
@@ -90,32 +86,19 @@ impl Labelled {
 
     /// A method under its own name, without limits.
     pub fn new(method: Method) -> Self {
-        let label = method.name().into();
-        Self {
-            label,
-            method: Contestant::Ours(method),
-            budget: None,
-            keep: vec![],
-            seed_as: None,
-            judge: None,
-            for_rays: None,
-            objective: None,
-            references: None,
-        }
+        Self { label: method.name().into(), method: Contestant::Ours(method), own: Own::default() }
     }
 
     /// Reads an entry, and names the key that an error is about.
     pub(super) fn read(mut table: Table) -> Result<Self, Fault> {
-        let frame = ["label", "budget", "keep", "seed_as", "judge", "for_rays", "objective", "references"];
-        let frame = frame.into_iter().filter_map(|key| table.remove_entry(key)).collect();
-        let Frame { label, budget, keep, seed_as, judge, for_rays, objective, references } =
-            fault::deserialize(frame)?;
+        let own = Own::KEYS.iter().filter_map(|key| table.remove_entry(*key)).collect();
+        let mut own: Own = fault::deserialize(own)?;
         let (ours, libraries) = (Method::NAMES.join(", "), Peer::NAMES.join(", "));
         let accepted = || format!("{ours}, the libraries {libraries}, or {}", command::Config::NAME);
         let method =
             fault::tagged(table, "method", |name, parameters| Contestant::read(name, parameters), accepted)?;
-        let label = label.unwrap_or_else(|| method.name().into());
-        Ok(Self { label, method, budget, keep, seed_as, judge, for_rays, objective, references })
+        let label = own.label.take().unwrap_or_else(|| method.name().into());
+        Ok(Self { label, method, own })
     }
 }
 
@@ -126,12 +109,9 @@ impl<'de> Deserialize<'de> for Labelled {
 }
 
 impl From<Labelled> for Table {
-    fn from(labelled: Labelled) -> Self {
-        let Labelled { label, method, budget, keep, seed_as, judge, for_rays, objective, references } =
-            labelled;
+    fn from(Labelled { label, method, own }: Labelled) -> Self {
         let mut table = Self::try_from(&method).unwrap_or_default();
-        let frame = Frame { label: Some(label), budget, keep, seed_as, judge, for_rays, objective, references };
-        table.extend(Self::try_from(&frame).unwrap_or_default());
+        table.extend(Self::try_from(&Own { label: Some(label), ..own }).unwrap_or_default());
         table
     }
 }

@@ -8,6 +8,7 @@ mod fault;
 mod method;
 mod name;
 mod read;
+mod schema;
 
 use crate::measure::{empirical_cost, ray_cost, speed};
 use crate::report::Report;
@@ -20,6 +21,7 @@ use bvh_search::{Budget, exact};
 pub use method::{Contestant, Labelled};
 pub use name::Name;
 pub use read::{Overrides, configuration};
+pub use schema::{page, schema};
 use std::path::{Path, PathBuf};
 
 config! {
@@ -96,7 +98,7 @@ impl Experiment {
 
     /// The limits of a method's runs.
     pub fn budget_of(&self, labelled: &Labelled) -> Budget {
-        let own = labelled.budget.unwrap_or(Budget::UNLIMITED);
+        let own = labelled.own.budget.unwrap_or(Budget::UNLIMITED);
         let lower = |a: Option<u64>, b: Option<u64>| a.into_iter().chain(b).min();
         Budget {
             max_evaluations: lower(self.budget.max_evaluations, own.max_evaluations),

@@ -5,7 +5,9 @@ use std::fmt;
 
 /// A name that is safe as that of a folder among the results: it cannot lead elsewhere, and it is none of the names that
 /// the harness gives to files of its own there. Empty by default, in a spec that has not been given its file's name.
-#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(try_from = "String")]
 pub struct Name(String);
 

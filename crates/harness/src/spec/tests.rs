@@ -110,7 +110,7 @@ fn wrong_methods_are_named_with_what_would_be_accepted() {
         ("[{ method = 'grasp', noise = 1.5 }]", &["methods[0].noise is 1.5", "0 to 1"]),
         ("[{ method = 'grasp', label = 3 }]", &["methods[0].label", "3", "string"]),
         ("[{ method = 'grasp', budget = { max_seconds = 3 } }]", &["max_seconds", "max_work"]),
-        ("[{ method = 'grasp', judge = { count = 0 } }]", &["methods[0].count is 0", "1 or more"]),
+        ("[{ method = 'grasp', judge = { count = 0 } }]", &["methods[0].judge.count is 0", "1 or more"]),
         ("[{ method = 'best', judge = { count = 9 } }]", &["methods[0].judge is set for best", "genetic"]),
         ("[{ method = 'best', for_rays = 'camera' }]", &["methods[0].for_rays is set without `ray_cost`"]),
         ("[{ method = 'best', for_rays = 'all' }]", &["methods[0].for_rays", "all", "default"]),

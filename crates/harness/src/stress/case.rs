@@ -75,7 +75,7 @@ pub struct SceneCase {
 pub type Also = fn(&Method, &[Aabb], &Outcome) -> Verdict;
 
 /// How large a scene is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Size {
     /// For every method and every ray.
@@ -122,7 +122,7 @@ pub struct Effort {
 }
 
 /// Scenes for searches beyond those of few objects.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LargerScenes {
     /// Objects per scene; less where [`Size::Many`] is less.

@@ -24,7 +24,7 @@ pub use promise::{Broken, Promise, Verdict};
 pub use table::{CASES, by_id};
 
 /// A measurement over the suite, as a spec asks for it.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
     /// Every case with every method.

@@ -1,0 +1,130 @@
+//! The schema of specs and what is made from it: it accepts what the harness accepts, refuses what it refuses, and the page of
+//! keys and the spec to begin with are true.
+
+mod support;
+
+use serde_json::{Map, Value};
+use std::fs;
+use std::path::{Path, PathBuf};
+use support::{run, text};
+
+fn top() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The first place where a value is not what the schema accepts: as far as schemas of specs go, of draft 7.
+fn fault(root: &Value, schema: &Value, value: &Value, at: &str) -> Option<String> {
+    if let Some(path) = schema.get("$ref") {
+        return fault(root, root.pointer(&path.as_str().unwrap()[1..]).unwrap(), value, at);
+    }
+    let refused = |is_right: bool, why: &str| (!is_right).then(|| format!("{at}: {value} {why}"));
+    let list = |key: &str| schema.get(key).and_then(Value::as_array);
+    if let Some(choices) = list("oneOf").or(list("anyOf")) {
+        let faults: Vec<_> = choices.iter().map(|choice| fault(root, choice, value, at)).collect();
+        let right = faults.iter().filter(|fault| fault.is_none()).count();
+        let exact = right == 1 || schema.get("anyOf").is_some() && right > 1;
+        return (!exact).then(|| format!("{at}: {right} choices accept it: {faults:?}"));
+    }
+    let of_type = |kind: &str| match kind {
+        "object" => value.is_object(),
+        "array" => value.is_array(),
+        "string" => value.is_string(),
+        "boolean" => value.is_boolean(),
+        "integer" => value.is_i64() || value.is_u64(),
+        "number" => value.is_number(),
+        _ => panic!("{kind}"),
+    };
+    let kind = schema.get("type").and_then(Value::as_str);
+    let is_right = kind.is_none_or(of_type)
+        && schema.get("const").is_none_or(|one| one == value)
+        && list("enum").is_none_or(|all| all.contains(value));
+    if !is_right {
+        return refused(false, &format!("is not {schema:.80}"));
+    }
+    let none = Map::new();
+    let properties = schema.get("properties").and_then(Value::as_object).unwrap_or(&none);
+    let (fields, items) = (value.as_object().unwrap_or(&none), schema.get("items"));
+    let missing =
+        list("required").into_iter().flatten().find(|key| !fields.contains_key(key.as_str().unwrap()));
+    missing.map(|key| format!("{at}: {key} is missing")).or_else(|| {
+        let field =
+            |(key, value): (&String, &Value)| match (properties.get(key), schema.get("additionalProperties")) {
+                (Some(schema), _) => fault(root, schema, value, &format!("{at}.{key}")),
+                (None, Some(Value::Bool(false))) => Some(format!("{at}.{key} is no key")),
+                (None, Some(schema)) => fault(root, schema, value, &format!("{at}.{key}")),
+                (None, None) => None,
+            };
+        let elements = value.as_array().into_iter().flatten();
+        fields
+            .iter()
+            .find_map(field)
+            .or_else(|| elements.zip(items.into_iter().cycle()).find_map(|(v, s)| fault(root, s, v, at)))
+    })
+}
+
+#[test]
+fn the_schema_accepts_every_committed_spec_and_refuses_a_mistyped_key_anywhere() {
+    let printed = run(Path::new("."), &["schema"]);
+    let schema: Value = serde_json::from_slice(&printed.stdout).unwrap();
+    let parsed = |text: &str| serde_json::to_value(toml::from_str::<toml::Table>(text).unwrap()).unwrap();
+    for entry in fs::read_dir(top().join("experiments")).unwrap() {
+        let path = entry.unwrap().path();
+        let spec = parsed(&fs::read_to_string(&path).unwrap());
+        assert_eq!(fault(&schema, &schema, &spec, ""), None, "{}", path.display());
+        // The same spec with one more letter in any key that is not a name.
+        for key in ["question", "methods", "trials", "kind", "title", "max_work", "quick", "label"] {
+            let mistyped = spec.to_string().replace(&format!("\"{key}\":"), &format!("\"{key}z\":"));
+            let mistyped: Value = serde_json::from_str(&mistyped).unwrap();
+            assert!(
+                mistyped == spec || fault(&schema, &schema, &mistyped, "").is_some(),
+                "{}: {key}",
+                path.display()
+            );
+        }
+    }
+    for (wrong, part) in [
+        ("repetitions = 'x'", ".repetitions"),
+        ("name = 'x'", ".name is no key"),
+        ("quick = { quick = true }", ".quick.quick is no key"),
+        ("quick = { repetitions = true }", ".quick.repetitions"),
+        ("methods = [{ method = 'grep' }]", "grep"),
+        ("methods = [{ method = 'grasp', candidates = 'all' }]", "candidates"),
+        ("methods = [{ method = 'external' , command = 'sh' }]", "command"),
+    ] {
+        let found =
+            fault(&schema, &schema, &parsed(wrong), "").unwrap_or_else(|| panic!("{wrong} is accepted"));
+        assert!(found.contains(part), "{wrong}: {found}");
+    }
+}
+
+#[test]
+fn the_page_of_keys_is_what_the_declarations_say() {
+    let (path, page) = (top().join("docs/KEYS.md"), harness::spec::page());
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        fs::write(&path, &page).unwrap();
+    }
+    assert!(
+        fs::read_to_string(&path).is_ok_and(|text| text == page),
+        "docs/KEYS.md is stale; UPDATE_DOCS=1 cargo test -p harness --test schema rewrites it"
+    );
+}
+
+#[test]
+fn a_new_spec_runs_as_it_is_and_replaces_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let made = run(at, &["new", "mine.toml"]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    let quick = run(at, &["mine.toml", "--quick"]);
+    assert!(quick.status.success() && text(&quick.stdout).contains("best"), "{}", text(&quick.stderr));
+    // Whole, too, as far as the scenes go.
+    let whole = run(at, &["mine.toml", "--explain", "--scene", "spheres75"]);
+    assert!(whole.status.success(), "{}", text(&whole.stderr));
+    fs::write(at.join("mine.toml"), "mine").unwrap();
+    for (file, part) in [("mine.toml", "is there already"), ("mine", "ends with .toml")] {
+        let refused = run(at, &["new", file]);
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(text(&refused.stderr).contains(part), "{}", text(&refused.stderr));
+    }
+    assert_eq!(fs::read(at.join("mine.toml")).unwrap(), b"mine");
+}
