@@ -99,7 +99,7 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "DIR")]
     pub results: Option<PathBuf>,
     /// If the tree is the best known, keep it in the archive among the results, with the command that made it.
-    #[arg(long, value_name = "COMMAND")]
+    #[arg(long, value_name = "COMMAND", value_parser = clap::builder::NonEmptyStringValueParser::new())]
     pub keep: Option<String>,
     /// Print the facts as JSON, under the same names.
     #[arg(long)]
