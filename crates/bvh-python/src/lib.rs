@@ -1,0 +1,13 @@
+#![doc = include_str!("../README.md")]
+
+mod arrays;
+mod search;
+mod tracer;
+mod tree;
+
+/// Better bounding volume hierarchies by stochastic search: trees from numpy arrays, searched for seconds, saved, loaded and traced.
+#[pyo3::pymodule(name = "bvh_search")]
+mod module {
+    #[pymodule_export]
+    use crate::{tracer::Tracer, tree::Tree};
+}

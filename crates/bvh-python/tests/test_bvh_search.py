@@ -1,0 +1,159 @@
+"""Trees and hits are those of brute force and of the Rust crates; what is not accepted is refused by name."""
+
+import os
+import signal
+import struct
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bvh_search import Tracer, Tree
+
+RANDOM = np.random.default_rng(7)
+TRIANGLES = (RANDOM.uniform(0, 10, (500, 1, 3)) + RANDOM.uniform(-1, 1, (500, 3, 3))).astype(np.float32)
+
+
+def boxes_of(triangles):
+    return np.stack([triangles.min(axis=1), triangles.max(axis=1)], axis=1)
+
+
+def brute_force(triangles, origins, directions, t_min=0.0, t_max=np.inf):
+    """Distances by Möller & Trumbore's test of every triangle, in float64: (rays, triangles)."""
+    a, b, c = np.moveaxis(triangles.astype(np.float64), 1, 0)
+    rays = origins.astype(np.float64)[:, None], directions.astype(np.float64)[:, None]
+    across = np.cross(rays[1], c - a)
+    det = ((b - a) * across).sum(axis=-1)
+    from_a = rays[0] - a
+    around = np.cross(from_a, b - a)
+    u = (from_a * across).sum(axis=-1) / det
+    v = (rays[1] * around).sum(axis=-1) / det
+    t = ((c - a) * around).sum(axis=-1) / det
+    return np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (t >= t_min) & (t <= t_max), t, np.inf)
+
+
+@pytest.mark.parametrize("references", [1.0, 1.5])
+@pytest.mark.parametrize("coherent", [False, True])
+def test_hits_are_those_of_brute_force(references, coherent):
+    tracer = Tracer(Tree.from_triangles(TRIANGLES, 0.05, references=references))
+    random = np.random.default_rng(8)
+    origins = random.uniform(0, 10, (3000, 3)).astype(np.float32)
+    directions = random.normal(size=(3000, 3)).astype(np.float32)
+    t_max = random.uniform(0, 20, 3000).astype(np.float32)
+    for limits in [{}, {"t_min": 0.5, "t_max": t_max}, {"t_max": 3}]:
+        columns = {name: np.reshape(value, (-1, 1)) for name, value in limits.items()}
+        all_t = brute_force(TRIANGLES, origins, directions, **columns)
+        t, triangle = tracer.nearest(origins, directions, **limits, coherent=coherent)
+        assert (t.dtype, triangle.dtype) == (np.float32, np.int32)
+        hit = np.isfinite(all_t.min(axis=1))
+        assert 100 < hit.sum() < 3000
+        np.testing.assert_array_equal(np.isfinite(t), hit)
+        np.testing.assert_array_equal(triangle >= 0, hit)
+        np.testing.assert_array_equal(triangle[hit], all_t.argmin(axis=1)[hit])
+        np.testing.assert_allclose(t[hit], all_t.min(axis=1)[hit], rtol=1e-4, atol=1e-5)
+        np.testing.assert_array_equal(tracer.any(origins, directions, **limits, coherent=coherent), hit)
+
+
+def test_costs_are_those_of_the_nodes_and_of_the_file(tmp_path):
+    tree = Tree.from_boxes(boxes_of(TRIANGLES).reshape(-1, 6), seconds=0.05)
+    nodes = tree.nodes()
+    assert nodes.dtype.names == ("min", "first", "max", "count") and len(nodes) == 2 * len(tree) - 1
+    x, y, z = (nodes["max"].astype(np.float64) - nodes["min"]).T
+    area, inner = x * y + y * z + z * x, nodes["count"] == 0
+    assert tree.cost() == pytest.approx(area[inner].sum(), rel=1e-12)
+    assert tree.cost("sah") == pytest.approx(area.sum() / area[0], rel=1e-12)
+    tree.save(tmp_path / "tree.bvh")
+    assert struct.unpack_from("<d", (tmp_path / "tree.bvh").read_bytes(), 56) == (tree.cost(),)
+    # Leaves hold every object once, and each inner node is the union of its children.
+    assert sorted(tree.object_ids()) == list(range(len(tree)))
+    first = nodes["first"][inner]
+    np.testing.assert_array_equal(nodes["min"][inner], np.minimum(nodes["min"][first], nodes["min"][first + 1]))
+    before = tree.cost()
+    tree.improve(0.2)
+    assert tree.cost() <= before
+    assert all(tree.cost(kind) > 0 for kind in ("goldsmith_salmon", "layout"))
+
+
+@pytest.mark.parametrize("references", [1.0, 2.0])
+def test_trees_come_back_from_files(tmp_path, references):
+    tree, path = Tree.from_triangles(TRIANGLES, 0.05, references=references), tmp_path / "tree.bvh"
+    tree.save(path)
+    loaded = Tree.load(str(path), triangles=TRIANGLES)
+    np.testing.assert_array_equal(loaded.nodes(), tree.nodes())
+    np.testing.assert_array_equal(loaded.object_ids(), tree.object_ids())
+    with pytest.raises(ValueError, match="path: the file is for a scene of 500 objects; this one has 499"):
+        Tree.load(path, triangles=TRIANGLES[1:])
+    with pytest.raises(ValueError, match="triangles or boxes"):
+        Tree.load(path)
+    with pytest.raises(FileNotFoundError, match="nothing.bvh"):
+        Tree.load(tmp_path / "nothing.bvh", triangles=TRIANGLES)
+    with pytest.raises(OSError, match="nowhere"):
+        tree.save(tmp_path / "nowhere" / "tree.bvh")
+
+
+def test_whatever_numpy_makes_an_array_of_is_taken():
+    tree = Tree.from_triangles(TRIANGLES[::2].astype(np.float64).tolist(), 0)
+    reference = Tree.from_triangles(TRIANGLES[::2], 0)
+    np.testing.assert_array_equal(tree.nodes(), reference.nodes())
+    assert repr(tree) == "<Tree of 499 nodes over 250 objects>"
+    empty = Tree.from_triangles(np.empty((0, 3, 3)), 0)
+    assert (len(empty), len(empty.nodes())) == (0, 0)
+    t, triangle = Tracer(empty).nearest([[0, 0, 0]], [[0, 0, 1]])
+    assert (t[0], triangle[0]) == (np.inf, -1)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: Tree.from_triangles(TRIANGLES[0]), r"triangles has shape \(3, 3\); accepted: \(n, 3, 3\)"),
+        (lambda: Tree.from_boxes(TRIANGLES), r"boxes has shape \(500, 3, 3\); accepted: \(n, 2, 3\) or \(n, 6\)"),
+        (lambda: Tree.from_triangles([["a"]]), "triangles: could not convert .* accepted"),
+        (lambda: Tree.from_triangles(np.where(np.arange(500)[:, None, None] == 4, np.nan, TRIANGLES)), "triangles: .*4"),
+        (lambda: Tree.from_boxes(boxes_of(TRIANGLES)[:, ::-1]), "boxes: "),
+        (lambda: Tree.from_triangles(TRIANGLES, -1), "seconds is -1; accepted: 0 or more, finite"),
+        (lambda: Tree.from_triangles(TRIANGLES, references=17), "references is 17; accepted: 1 to 16"),
+        (lambda: Tree.from_triangles(TRIANGLES, 0).cost("area"), 'kind is "area"; accepted: internal_area'),
+        (lambda: Tracer(Tree.from_boxes(boxes_of(TRIANGLES), 0)), "tree is over boxes; accepted"),
+    ],
+)
+def test_what_is_not_accepted_is_named(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+@pytest.mark.parametrize(
+    ("rays", "message"),
+    [
+        (([[0, 0]], [[0, 0, 1]]), r"origins has shape \(1, 2\); accepted: \(m, 3\)"),
+        (([[0, 0, 0]], [[0, 0, 1]] * 2), r"directions has shape \(2, 3\); accepted: \(1, 3\), as origins"),
+        (([[0, 0, 0]] * 2, [[0, 0, 1]] * 2, [0]), r"t_min has shape \(1\); accepted: a number or \(2,\), as origins"),
+        (([[0, 0, 0]] * 2, [[0, 0, 1], [0, 0, 0]]), "ray 1: the ray's direction"),
+    ],
+)
+def test_rays_that_are_not_accepted_are_named(rays, message):
+    tracer = Tracer(Tree.from_triangles(TRIANGLES, 0))
+    for ask in (tracer.nearest, tracer.any):
+        with pytest.raises(ValueError, match=message):
+            ask(*rays)
+
+
+def test_the_lines_of_the_readme_run(tmp_path, monkeypatch, capsys):
+    readme = (Path(__file__).parents[1] / "README.md").read_text()
+    monkeypatch.chdir(tmp_path)
+    exec(readme.split("```python\n")[1].split("```")[0], {})
+    assert capsys.readouterr().out == "0.0 [3.] [0]\n"
+    assert (tmp_path / "scene.bvh").is_file()
+
+
+def test_an_interrupt_ends_a_search_which_keeps_what_it_gained():
+    tree = Tree.from_triangles(TRIANGLES, 0)
+    before, start = tree.cost(), time.monotonic()
+    # The timer's thread runs only because the search lets it.
+    for search in (lambda: tree.improve(60), lambda: Tree.from_triangles(TRIANGLES, 60)):
+        threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+        with pytest.raises(KeyboardInterrupt):
+            search()
+    assert time.monotonic() - start < 20
+    assert tree.cost() < before
