@@ -88,6 +88,9 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 --threa
     FINISH_AT_MOST: f64 = 0.5, "fraction of the time left";
     /// Length of the run at the lowest temperature that measures the rate of work under a clock.
     PROBE: u64 = 4, "work per object";
+    /// Length under a clock from which on a local optimum of reinsertion is kept before the first annealing run, for searches that
+    /// are stopped early: it takes 300 to 900 work per object.
+    SECURED_FROM: f64 = 20_000.0, "work per object";
     /// Length from which on several threads anneal disjoint subtrees: shorter runs have too few rounds to cut them.
     WORTH_SUBTREES: f64 = 256.0, "work per object";
     /// Subtrees per thread, so that unequal ones fill the threads.

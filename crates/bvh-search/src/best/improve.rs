@@ -14,8 +14,8 @@ use crate::parallel::threads;
 use crate::run::{Observer, Problem, Quota, Run, Stream, Tally, stream};
 use crate::tree::{Metric, Working};
 use crate::tuning::{
-    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, ROUNDS_PER_LOOK, SUBTREES_PER_THREAD, TRIAL,
-    WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_SUBTREES,
+    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, ROUNDS_PER_LOOK, SECURED_FROM, SUBTREES_PER_THREAD,
+    TRIAL, WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_SUBTREES,
 };
 use bvh_core::cost::Objective;
 
@@ -81,6 +81,13 @@ impl Improvement<'_, '_, '_, '_> {
             let now = observer.progress().unwrap_or(1.0);
             end_of_all = 1.0 - (1.0 - now) * (FINISH_WORK * n as f64 / in_time).min(FINISH_AT_MOST);
             length = length.min(in_time / n as f64);
+            // Long before the heat has paid, whoever stops the search is to get no less than plain reinsertion gives. The plan goes on
+            // from the tree as it was.
+            if length >= SECURED_FROM
+                && let Ok(mut aside) = self.best.working(tree.metric())
+            {
+                self.reinsert(&mut aside);
+            }
         }
         let (all, began) = (self.left, observer.progress().unwrap_or(0.0));
         // Short runs are worth their work where they can be recombined, which layouts cannot.
@@ -101,9 +108,7 @@ impl Improvement<'_, '_, '_, '_> {
 
     /// A local optimum, then generations of growing length.
     fn until_stopped(&mut self, tree: &mut Working<impl Metric>) {
-        self.best.improve(tree, u32::MAX, self.run, |tree, _, quota, observer| {
-            reinsertion::pass_by_area(tree, quota, observer)
-        });
+        self.reinsert(tree);
         let mut length = self.config.first;
         for number in 0..MOST_GENERATIONS {
             let work = self.left.min((length * self.n as f64) as u64);
@@ -111,6 +116,13 @@ impl Improvement<'_, '_, '_, '_> {
             self.anneal(tree, number, (&schedule, length), false);
             length *= self.config.growth;
         }
+    }
+
+    /// Reinsertion to a local optimum, which is offered to the incumbent.
+    fn reinsert(&mut self, tree: &mut Working<impl Metric>) {
+        self.best.improve(tree, u32::MAX, self.run, |tree, _, quota, observer| {
+            reinsertion::pass_by_area(tree, quota, observer)
+        });
     }
 
     /// Anneals both trees for a short time, and goes on with the one that ends better.
@@ -252,5 +264,36 @@ impl Observer for Until<'_> {
 
     fn progress(&self) -> Option<f64> {
         self.observer.progress()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::run::{Budget, Observer, Problem, solve};
+    use crate::scatter::scatter;
+    use crate::{best, reinsertion};
+    use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+    /// A clock of a long search that is stopped when it has been asked so often.
+    struct StoppedEarly(AtomicU32);
+
+    impl Observer for StoppedEarly {
+        fn progress(&self) -> Option<f64> {
+            Some(f64::from(self.0.fetch_add(1, Relaxed)) * 1e-9)
+        }
+        fn cancelled(&self) -> bool {
+            self.0.load(Relaxed) > 5000
+        }
+    }
+
+    #[test]
+    fn a_long_search_under_a_clock_that_is_stopped_early_is_not_behind_reinsertion() {
+        let boxes = scatter(300);
+        let problem = Problem::new(&boxes);
+        let config = reinsertion::Config::default();
+        let plain = solve(&config, &problem, 1, Budget::UNLIMITED, &()).unwrap();
+        let clock = StoppedEarly(AtomicU32::new(0));
+        let found = solve(&best::Config::default(), &problem, 1, Budget::UNLIMITED, &clock).unwrap();
+        assert!(found.cost <= plain.cost, "{} is above {}", found.cost, plain.cost);
     }
 }
