@@ -16,6 +16,9 @@ impl From<[[f32; 3]; 3]> for Triangle {
     }
 }
 
+/// The axes of the shear, by the axis of the direction's largest component.
+pub(crate) static AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+
 /// A ray prepared for tests against triangles: the shear that turns its direction into the axis `z`.
 #[derive(Clone, Copy, Debug)]
 pub struct Shear {
@@ -39,7 +42,6 @@ impl Shear {
         // The lowest axis on ties; without a branch, which could not be predicted.
         let z = usize::from(size[1] > size[0]);
         let z = if size[2] > size[0].max(size[1]) { 2 } else { z };
-        const AXES: &[[usize; 3]; 3] = &[[1, 2, 0], [2, 0, 1], [0, 1, 2]];
         let axes @ [kx, ky, kz] = AXES[z];
         Self {
             ray: *ray,

@@ -28,15 +28,20 @@ fn layouts(triangles: &[Triangle], random: &mut Random) -> Vec<(Kernel, WideBvh)
 fn check(name: &str, triangles: &[Triangle], layouts: &[(Kernel, WideBvh)], rays: &[Ray]) -> usize {
     let expected: Vec<Option<Hit>> = rays.iter().map(|ray| brute_force(triangles, ray)).collect();
     for (kernel, wide) in layouts {
-        let (mut nearest, mut any) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-        wide.nearest_hits(rays, &mut nearest, Coherence::Coherent);
-        wide.any_hits(rays, &mut any, Coherence::Coherent);
-        for (i, (ray, &expected)) in rays.iter().zip(&expected).enumerate() {
+        for (ray, &expected) in rays.iter().zip(&expected) {
             let case = format!("{name}, {kernel:?}, {ray:?}");
             assert_eq!(bits(wide.nearest_hit(ray)), bits(expected), "{case}");
             assert_eq!(wide.any_hit(ray), expected.is_some(), "{case}");
-            assert_eq!(bits((!nearest[i].is_miss()).then_some(nearest[i])), bits(expected), "batch, {case}");
-            assert_eq!(any[i], expected.is_some(), "batch, {case}");
+        }
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let (mut nearest, mut any) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+            wide.nearest_hits(rays, &mut nearest, coherence);
+            wide.any_hits(rays, &mut any, coherence);
+            for (i, (ray, &expected)) in rays.iter().zip(&expected).enumerate() {
+                let case = format!("{name}, {kernel:?}, {coherence:?}, {ray:?}");
+                assert_eq!(bits((!nearest[i].is_miss()).then_some(nearest[i])), bits(expected), "{case}");
+                assert_eq!(any[i], expected.is_some(), "{case}");
+            }
         }
     }
     expected.iter().flatten().count()
@@ -83,6 +88,28 @@ fn every_kernel_answers_as_brute_force_at_every_scale() {
         }
     }
     assert!(hits > 10_000, "the rays should hit something: {hits}");
+}
+
+#[test]
+fn batches_of_any_length_answer_as_their_rays_do() {
+    let mut random = Random(9);
+    let triangles = soup(60, &mut random);
+    for (kernel, wide) in layouts(&triangles, &mut random) {
+        for count in (0..50).chain([63, 64, 65, 100, 257]) {
+            let mut batch = rays(&triangles, count, &mut random);
+            batch.truncate(count);
+            for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+                let (mut nearest, mut any) = (vec![Hit::MISS; batch.len()], vec![false; batch.len()]);
+                wide.nearest_hits(&batch, &mut nearest, coherence);
+                wide.any_hits(&batch, &mut any, coherence);
+                let alone: Vec<Hit> =
+                    batch.iter().map(|ray| wide.nearest_hit(ray).unwrap_or(Hit::MISS)).collect();
+                assert_eq!(nearest, alone, "{kernel:?}, {coherence:?}, {count}");
+                let alone: Vec<bool> = batch.iter().map(|ray| wide.any_hit(ray)).collect();
+                assert_eq!(any, alone, "{kernel:?}, {coherence:?}, {count}");
+            }
+        }
+    }
 }
 
 /// Distances of which no f32 is close to the exact one: once answers were lost because corners beyond `t_max` times the

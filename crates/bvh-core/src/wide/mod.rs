@@ -1,21 +1,9 @@
 //! A tree of triangles laid out for speed: eight children per node and four triangles per leaf block, tested at once.
 
-#[cfg(all(feature = "std", target_arch = "x86_64"))]
-mod avx2;
-#[cfg(all(feature = "std", target_arch = "x86_64"))]
-mod avx512;
-#[cfg(all(feature = "std", target_arch = "x86_64"))]
-mod batch;
-#[cfg(all(feature = "std", target_arch = "x86_64"))]
-mod box_ray;
 mod build;
 mod kernel;
 mod layout;
 mod node;
-#[cfg(all(feature = "std", target_arch = "x86_64"))]
-mod packet;
-#[cfg(all(feature = "std", target_arch = "x86_64"))]
-mod packet_triangles;
 mod portable;
 mod refit;
 mod triangles;
@@ -33,13 +21,16 @@ use alloc::vec::Vec;
 use kernel::STACK;
 use portable::walk;
 
-/// What a caller expects of the rays of a batch. A hint: the answers are the same.
+/// What a caller expects of the rays of a batch. A hint: the answers are the same. What follows is of [`Kernel::Avx512`];
+/// the others trace one ray after the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coherence {
     /// Consecutive rays begin close to each other and run the same way, as those through neighbouring pixels or from
-    /// neighbouring points to a light. They are traced in packets of sixteen where they do, and else one by one.
+    /// neighbouring points to a light. They are traced in packets of sixteen where they do, and else as
+    /// incoherent ones.
     Coherent,
-    /// Consecutive rays have little in common. They are traced one by one.
+    /// Consecutive rays have little in common. Two dozen are on their way at a time, a step of each in turn, which hides
+    /// what one alone would wait for: from a hundred rays on it pays.
     Incoherent,
 }
 
@@ -88,8 +79,8 @@ impl WideBvh {
             // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
             let (t, object) = unsafe {
                 match self.kernel {
-                    Kernel::Avx512 => avx512::nearest_hit(self, ray),
-                    _ => avx2::nearest_hit(self, ray),
+                    Kernel::Avx512 => x86::avx512::nearest_hit(self, ray),
+                    _ => x86::avx2::nearest_hit(self, ray),
                 }
             };
             return (object != u32::MAX).then_some(Hit { t, object });
@@ -105,8 +96,8 @@ impl WideBvh {
             // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
             return unsafe {
                 match self.kernel {
-                    Kernel::Avx512 => avx512::any_hit(self, ray),
-                    _ => avx2::any_hit(self, ray),
+                    Kernel::Avx512 => x86::avx512::any_hit(self, ray),
+                    _ => x86::avx2::any_hit(self, ray),
                 }
             };
         }
@@ -120,9 +111,9 @@ impl WideBvh {
     pub fn nearest_hits(&self, rays: &[Ray], hits: &mut [Hit], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "a hit for every ray");
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
-        if self.kernel == Kernel::Avx512 && coherence == Coherence::Coherent {
+        if self.kernel == Kernel::Avx512 {
             // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
-            return unsafe { batch::nearest_hits(self, rays, hits) };
+            return unsafe { x86::batch::trace(self, rays, hits, coherence) };
         }
         let _ = coherence;
         for (ray, hit) in rays.iter().zip(hits) {
@@ -137,9 +128,9 @@ impl WideBvh {
     pub fn any_hits(&self, rays: &[Ray], hits: &mut [bool], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
-        if self.kernel == Kernel::Avx512 && coherence == Coherence::Coherent {
+        if self.kernel == Kernel::Avx512 {
             // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
-            return unsafe { batch::any_hits(self, rays, hits) };
+            return unsafe { x86::batch::trace(self, rays, hits, coherence) };
         }
         let _ = coherence;
         for (ray, hit) in rays.iter().zip(hits) {

@@ -18,7 +18,7 @@ impl TriangleBlock {
     pub(crate) const LANES: usize = 4;
     const UNUSED: u32 = u32::MAX;
     /// Added to the first id of a leaf's last block; ids themselves are below [`MAX_OBJECTS`].
-    const LAST: u32 = MAX_OBJECTS as u32;
+    pub(crate) const LAST: u32 = MAX_OBJECTS as u32;
 
     /// The blocks of one leaf of at least one triangle, none degenerate.
     pub(crate) fn chain(ids: &[u32], triangles: &[Triangle]) -> impl Iterator<Item = Self> {
@@ -54,6 +54,13 @@ impl TriangleBlock {
     pub(crate) fn id(&self, lane: usize) -> u32 {
         let id = self.ids[lane];
         if lane == 0 { id & !Self::LAST } else { id }
+    }
+
+    /// All four ids, the first with its mark, as [`LAST`](Self::LAST) says.
+    #[cfg(all(feature = "std", target_arch = "x86_64"))]
+    #[inline(always)]
+    pub(crate) fn ids(&self) -> *const u32 {
+        self.ids.as_ptr()
     }
 
     /// Whether this is a leaf's last block.

@@ -49,7 +49,8 @@ pub enum Layout {
     /// [`WideBvh`] with the best instructions of this machine, laid out once more: only noise tells its times from those
     /// of `Wide`.
     WideAgain,
-    /// [`WideBvh`] that is handed batches of rays, which it traces in packets where they cohere.
+    /// [`WideBvh`] that is handed batches of rays, which it traces in packets where they cohere, and else with
+    /// many in flight.
     WideBatches,
     /// [`WideBvh`] with portable code.
     WidePortable,
@@ -121,7 +122,7 @@ pub fn timed<R>(rays: &[R], hits: &mut [Option<Hit>], mut answer: impl FnMut(&R)
 }
 
 /// Rays that the wide layout is handed at once: their answers stay in the first cache.
-const BATCH: usize = 256;
+const BATCH: usize = 1024;
 
 /// Answers every ray by batches and returns the seconds that each part of them took.
 fn in_batches(wide: &WideBvh, query: Query, rays: &[Ray], hits: &mut [Option<Hit>]) -> Vec<f64> {

@@ -2,11 +2,11 @@
 //! of four triangles at once.
 
 use super::box_ray::BoxRay;
-use super::kernel::STACK;
-use super::layout::WideBvh;
-use super::node::{Child, WideNode};
-use super::portable::walk;
-use super::triangles::TriangleBlock;
+use crate::wide::kernel::STACK;
+use crate::wide::layout::WideBvh;
+use crate::wide::node::{Child, WideNode};
+use crate::wide::portable::walk;
+use crate::wide::triangles::TriangleBlock;
 use crate::{Hit, Ray, Shear, Slabs};
 use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
@@ -92,7 +92,7 @@ pub(crate) unsafe fn nearest<K: Instructions>(wide: &WideBvh, ray: &Ray) -> (f32
                     while candidates != 0 {
                         // Four lanes at a time, those without candidates left out.
                         let first = candidates.trailing_zeros() as usize & !3;
-                        let (mut hits, t) = shear.assume_init_ref().decide(&*block, first, ray, t_max);
+                        let (mut hits, t) = shear.assume_init_ref().decide(&*block, first, ray.t_min(), t_max);
                         candidates &= !(0b1111 << first);
                         if hits != 0 {
                             let t: [f32; 4] = core::mem::transmute(t);
@@ -181,7 +181,7 @@ pub(crate) unsafe fn any<K: Instructions>(wide: &WideBvh, ray: &Ray) -> bool {
                     let mut candidates = shear.assume_init_ref().candidates(&*block);
                     while candidates != 0 {
                         let first = candidates.trailing_zeros() as usize & !3;
-                        if shear.assume_init_ref().decide(&*block, first, ray, t_max).0 != 0 {
+                        if shear.assume_init_ref().decide(&*block, first, ray.t_min(), t_max).0 != 0 {
                             return true;
                         }
                         candidates &= !(0b1111 << first);
@@ -274,7 +274,7 @@ impl Shear4 {
         &self,
         block: &TriangleBlock,
         lane: usize,
-        ray: &Ray,
+        t_min: f32,
         t_max: f32,
     ) -> (u32, __m128) {
         // SAFETY: as the caller's.
@@ -297,7 +297,7 @@ impl Shear4 {
             let (u, v, w) = (_mm256_mul_pd(u, az), _mm256_mul_pd(v, bz), _mm256_mul_pd(w, cz));
             let sum = _mm256_add_pd(_mm256_add_pd(u, v), w);
             let t = _mm256_div_pd(sum, _mm256_mul_pd(determinant, _mm256_set1_pd(self.depth)));
-            let after = _mm256_cmp_pd::<_CMP_GE_OQ>(t, _mm256_set1_pd(f64::from(ray.t_min())));
+            let after = _mm256_cmp_pd::<_CMP_GE_OQ>(t, _mm256_set1_pd(f64::from(t_min)));
             let inside = _mm256_movemask_pd(_mm256_andnot_pd(outside, after)) as u32;
             let t = _mm256_cvtpd_ps(t);
 
@@ -317,7 +317,7 @@ impl Shear4 {
                 relative[i] = [min, max];
             }
             let margin = _mm_mul_ps(reach, _mm_set1_ps(Slabs::MARGIN));
-            let (mut entry, mut exit) = (_mm_set1_ps(ray.t_min()), _mm_set1_ps(f32::INFINITY));
+            let (mut entry, mut exit) = (_mm_set1_ps(t_min), _mm_set1_ps(f32::INFINITY));
             for (i, [min, max]) in relative.into_iter().enumerate() {
                 let margin = _mm_add_ps(margin, _mm_set1_ps(self.origin_margin[i]));
                 let margin = _mm_add_ps(margin, _mm_set1_ps(f32::MIN_POSITIVE));

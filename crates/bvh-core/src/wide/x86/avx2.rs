@@ -1,10 +1,10 @@
 //! The AVX2 kernel: eight boxes at once with fused multiply-add, entered children sorted without a branch.
 
 use super::box_ray::BoxRay;
-use super::layout::WideBvh;
-use super::node::{Child, WideNode};
-use super::x86::{Instructions, Pending, any, nearest};
+use super::one_ray::{Instructions, Pending, any, nearest};
 use crate::Ray;
+use crate::wide::layout::WideBvh;
+use crate::wide::node::{Child, WideNode};
 use core::arch::x86_64::*;
 
 pub(crate) struct Avx2;
@@ -44,7 +44,7 @@ impl Instructions for Avx2 {
     unsafe fn boxes(node: &WideNode, ray: &BoxRay, t_min: f32, t_max: f32) -> (__m256, u32) {
         // SAFETY: the caller's promises; loads are of whole arrays of 32 bytes.
         unsafe {
-            let (entry, exit) = super::x86::interval(node, ray, t_min, t_max);
+            let (entry, exit) = super::one_ray::interval(node, ray, t_min, t_max);
             (entry, _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(entry, exit)) as u32)
         }
     }

@@ -1,8 +1,9 @@
 //! Sixteen rays against one triangle, exactly.
 
+use super::answer::Answer;
 use super::packet::Packet;
-use super::triangles::TriangleBlock;
 use crate::Slabs;
+use crate::wide::triangles::TriangleBlock;
 use core::arch::x86_64::*;
 
 impl Packet {
@@ -42,7 +43,7 @@ impl Packet {
     /// Decides exactly, as [`Triangle::intersect`](crate::Triangle::intersect), which rays hit the triangle in a lane, and
     /// keeps those hits that precede the rays' nearest; whether there are any.
     #[inline(always)]
-    pub(super) unsafe fn decide<const ANY: bool>(
+    pub(super) unsafe fn decide<A: Answer>(
         &mut self,
         block: &TriangleBlock,
         lane: usize,
@@ -88,7 +89,7 @@ impl Packet {
             let exit = _mm512_mul_ps(exit, _mm512_set1_ps(Slabs::FAR));
             let moved = _mm512_add_ps(_mm512_max_ps(_mm512_min_ps(t, exit), entry), _mm512_setzero_ps());
             let inside = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(inside, entry, exit);
-            if ANY {
+            if A::ANY {
                 let hits = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(inside, moved, self.t);
                 // A ray that has its answer ends before it begins.
                 self.t = _mm512_mask_mov_ps(self.t, hits, _mm512_set1_ps(-1.0));

@@ -1,19 +1,20 @@
 //! Packets of sixteen coherent rays, one per lane of AVX-512: nodes are culled for all rays at once by interval
 //! arithmetic, boxes and triangles tested against sixteen rays each.
 
+use super::answer::Answer;
 use super::avx512::Avx512;
-use super::kernel::STACK;
-use super::layout::WideBvh;
-use super::node::WideNode;
-use super::triangles::TriangleBlock;
-use super::x86::{Instructions, Pending};
-use super::{box_ray::BoxRay, node::Child};
+use super::box_ray::BoxRay;
+use super::one_ray::{Instructions, Pending};
+use super::prepared::{RAYS, Sixteen};
 use crate::Ray;
+use crate::triangle::AXES;
+use crate::wide::kernel::STACK;
+use crate::wide::layout::WideBvh;
+use crate::wide::node::Child;
+use crate::wide::node::WideNode;
+use crate::wide::triangles::TriangleBlock;
 use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
-
-/// Rays of a packet.
-pub(crate) const RAYS: usize = 16;
 
 /// Sixteen rays with the same signs of direction and the same largest component of it.
 pub(crate) struct Packet {
@@ -50,84 +51,54 @@ struct AxisBounds {
 }
 
 impl Packet {
-    /// Prepares sixteen rays; `None` if they are not coherent, or not all fit the bounds of [`BoxRay`].
+    /// A packet of sixteen rays; `None` if they are not coherent, or not all fit the bounds of [`BoxRay`].
     ///
     /// # Safety
     /// The caller is compiled with AVX-512 F, VL, DQ and BW and with FMA.
     #[inline(always)]
     pub(crate) unsafe fn new(rays: &[Ray; RAYS], largest: f32) -> Option<Self> {
-        // SAFETY: rays are three vectors of four lanes; the rest is the caller's promise.
+        // SAFETY: the caller's promise.
         unsafe {
-            let [ox, oy, oz, t_min] = transpose(rays, 0);
-            let [dx, dy, dz, t_max] = transpose(rays, 1);
-            let [ix, iy, iz, least] = transpose(rays, 2);
-            let backwards = [
-                _mm512_movepi32_mask(cast(ix)),
-                _mm512_movepi32_mask(cast(iy)),
-                _mm512_movepi32_mask(cast(iz)),
-            ];
-            let coherent = |mask: u16| mask == 0 || mask == u16::MAX;
-            let (sx, sy, sz) = (_mm512_abs_ps(dx), _mm512_abs_ps(dy), _mm512_abs_ps(dz));
-            let second = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(sy, sx);
-            let third = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(sz, _mm512_max_ps(sx, sy));
-            let (origin, inverse, direction) = ([ox, oy, oz], [ix, iy, iz], [dx, dy, dz]);
-            let one_axis = coherent(third) && (third != 0 || coherent(second));
-            if !(coherent(backwards[0]) && coherent(backwards[1]) && coherent(backwards[2]) && one_axis) {
+            let sixteen = Sixteen::new(rays, largest);
+            let Sixteen { origin, direction, inverse, t_min, t_max, backwards, second, third, .. } = sixteen;
+            let same = |mask: u16| mask == 0 || mask == u16::MAX;
+            let one_axis = same(third) && same(second);
+            if !(same(backwards[0]) && same(backwards[1]) && same(backwards[2]) && one_axis)
+                || sixteen.in_range != u16::MAX
+            {
                 return None;
             }
-
-            let size = _mm512_max_ps(_mm512_max_ps(_mm512_abs_ps(ox), _mm512_abs_ps(oy)), _mm512_abs_ps(oz));
-            let size = _mm512_add_ps(size, _mm512_set1_ps(largest));
-            let limit = _mm512_mul_ps(least, _mm512_set1_ps(BoxRay::CLAMP));
-            let in_range = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(size, _mm512_set1_ps(BoxRay::MOST_SIZE))
-                & _mm512_cmp_ps_mask::<_CMP_GE_OQ>(size, _mm512_set1_ps(BoxRay::LEAST_SIZE))
-                & _mm512_cmp_ps_mask::<_CMP_LT_OQ>(
-                    _mm512_mul_ps(size, limit),
-                    _mm512_set1_ps(BoxRay::MOST_SHIFT),
-                );
-            if in_range != u16::MAX {
-                return None;
-            }
-            let margin = _mm512_mul_ps(size, _mm512_set1_ps(BoxRay::MARGIN));
-            let zero = _mm512_setzero_ps();
-            let tiny = _mm512_set1_ps(BoxRay::UNDERFLOW);
+            let axes @ [kx, ky, kz] = AXES[if third != 0 { 2 } else { usize::from(second != 0) }];
             let mut packet = Self {
                 near: [0; 3],
                 far: [0; 3],
-                near_scale: [zero; 3],
-                near_shift: [zero; 3],
-                far_scale: [zero; 3],
-                far_shift: [zero; 3],
+                near_scale: sixteen.near_scale,
+                near_shift: sixteen.near_shift,
+                far_scale: sixteen.far_scale,
+                far_shift: sixteen.far_shift,
                 bounds: [AxisBounds {
                     near_origin: 0.0,
                     far_origin: 0.0,
                     near_scale: [0.0; 2],
                     far_scale: [0.0; 2],
                 }; 3],
-                axes: [0; 3],
-                origin: [zero; 3],
-                inverse: [zero; 3],
-                slope: [zero; 2],
-                depth: zero,
+                axes,
+                origin: [origin[kx], origin[ky], origin[kz]],
+                inverse: [inverse[kx], inverse[ky], inverse[kz]],
+                slope: [
+                    _mm512_div_ps(direction[kx], direction[kz]),
+                    _mm512_div_ps(direction[ky], direction[kz]),
+                ],
+                depth: direction[kz],
                 t_min,
                 least_t_min: _mm512_reduce_min_ps(t_min),
                 t: t_max,
                 object: _mm512_set1_epi32(-1),
             };
-            for axis in 0..3 {
-                let scale = _mm512_min_ps(_mm512_max_ps(inverse[axis], _mm512_sub_ps(zero, limit)), limit);
-                let (near_scale, far_scale) = (
-                    _mm512_mul_ps(scale, _mm512_set1_ps(BoxRay::NEAR)),
-                    _mm512_mul_ps(scale, _mm512_set1_ps(BoxRay::FAR)),
-                );
-                let is_backwards = backwards[axis] != 0;
-                let margin = if is_backwards { _mm512_sub_ps(zero, margin) } else { margin };
-                let (near_origin, far_origin) =
-                    (_mm512_add_ps(origin[axis], margin), _mm512_sub_ps(origin[axis], margin));
-                packet.near_scale[axis] = near_scale;
-                packet.far_scale[axis] = far_scale;
-                packet.near_shift[axis] = _mm512_fnmsub_ps(near_origin, near_scale, tiny);
-                packet.far_shift[axis] = _mm512_fnmadd_ps(far_origin, far_scale, tiny);
+            for (axis, &backwards) in backwards.iter().enumerate() {
+                let (near_scale, far_scale) = (sixteen.near_scale[axis], sixteen.far_scale[axis]);
+                let (near_origin, far_origin) = (sixteen.near_origin[axis], sixteen.far_origin[axis]);
+                let is_backwards = backwards != 0;
                 let plane = axis + 3 * usize::from(is_backwards);
                 packet.near[axis] = plane;
                 packet.far[axis] = 2 * axis + 3 - plane;
@@ -144,24 +115,16 @@ impl Packet {
                     far_scale: [_mm512_reduce_min_ps(far_scale), _mm512_reduce_max_ps(far_scale)],
                 };
             }
-            let kz = if third != 0 { 2 } else { usize::from(second != 0) };
-            packet.axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][kz];
-            let [kx, ky, kz] = packet.axes;
-            packet.origin = [origin[kx], origin[ky], origin[kz]];
-            packet.inverse = [inverse[kx], inverse[ky], inverse[kz]];
-            packet.slope =
-                [_mm512_div_ps(direction[kx], direction[kz]), _mm512_div_ps(direction[ky], direction[kz])];
-            packet.depth = direction[kz];
             Some(packet)
         }
     }
 
-    /// Traces the packet. With `ANY` a ray ends at its first hit, which need not be the nearest.
+    /// Traces the packet. Where [`Answer::ANY`] a ray ends at its first hit, which need not be the nearest.
     ///
     /// # Safety
-    /// As [`nearest`](super::x86::nearest), with AVX-512.
+    /// As [`nearest`](super::one_ray::nearest), with AVX-512.
     #[inline(always)]
-    pub(crate) unsafe fn trace<const ANY: bool>(&mut self, wide: &WideBvh) {
+    pub(crate) unsafe fn trace<A: Answer>(&mut self, wide: &WideBvh) {
         let Some(root) = wide.root else { return };
         // SAFETY: the caller's promises.
         unsafe {
@@ -200,7 +163,7 @@ impl Packet {
                         for lane in 0..TriangleBlock::LANES {
                             let candidates = self.candidates(&*block, lane);
                             if candidates != 0 {
-                                is_hit |= self.decide::<ANY>(&*block, lane, candidates);
+                                is_hit |= self.decide::<A>(&*block, lane, candidates);
                             }
                         }
                         if (*block).is_last() {
@@ -210,7 +173,7 @@ impl Packet {
                     }
                     if is_hit {
                         farthest = _mm512_reduce_max_ps(self.t);
-                        if ANY && farthest < 0.0 {
+                        if A::ANY && farthest < 0.0 {
                             return;
                         }
                     }
@@ -285,41 +248,5 @@ impl Packet {
                 core::mem::transmute::<__m512i, [u32; RAYS]>(self.object),
             )
         }
-    }
-}
-
-#[inline(always)]
-unsafe fn cast(x: __m512) -> __m512i {
-    // SAFETY: the caller has AVX-512.
-    unsafe { _mm512_castps_si512(x) }
-}
-
-/// One of the three vectors of sixteen rays, by component.
-#[inline(always)]
-unsafe fn transpose(rays: &[Ray; RAYS], vector: usize) -> [__m512; 4] {
-    // SAFETY: a ray is three vectors of four lanes, aligned to sixteen bytes.
-    unsafe {
-        let lanes = rays.as_ptr().cast::<f32>().add(4 * vector);
-        let mut rows = [_mm512_setzero_ps(); 4];
-        for (i, row) in rows.iter_mut().enumerate() {
-            // Rays i, i + 4, i + 8 and i + 12.
-            let ray = lanes.add(12 * i);
-            let low =
-                _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(_mm_load_ps(ray)), _mm_load_ps(ray.add(48)));
-            let high = _mm256_insertf128_ps::<1>(
-                _mm256_castps128_ps256(_mm_load_ps(ray.add(96))),
-                _mm_load_ps(ray.add(144)),
-            );
-            *row = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high);
-        }
-        let [a, b, c, d] = rows;
-        let (ab, cd) = (_mm512_unpacklo_ps(a, b), _mm512_unpacklo_ps(c, d));
-        let (ab_high, cd_high) = (_mm512_unpackhi_ps(a, b), _mm512_unpackhi_ps(c, d));
-        [
-            _mm512_shuffle_ps::<0b01_00_01_00>(ab, cd),
-            _mm512_shuffle_ps::<0b11_10_11_10>(ab, cd),
-            _mm512_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high),
-            _mm512_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high),
-        ]
     }
 }

@@ -1,10 +1,10 @@
 //! The AVX-512 kernel: eight boxes at once, entered children compressed into place.
 
 use super::box_ray::BoxRay;
-use super::layout::WideBvh;
-use super::node::{Child, WideNode};
-use super::x86::{Instructions, Pending, any, nearest};
+use super::one_ray::{Instructions, Pending, any, nearest};
 use crate::Ray;
+use crate::wide::layout::WideBvh;
+use crate::wide::node::{Child, WideNode};
 use core::arch::x86_64::*;
 
 pub(crate) struct Avx512;
@@ -26,7 +26,7 @@ impl Instructions for Avx512 {
     unsafe fn boxes(node: &WideNode, ray: &BoxRay, t_min: f32, t_max: f32) -> (__m256, u32) {
         // SAFETY: the caller's promises; loads are of whole arrays of 32 bytes.
         unsafe {
-            let (entry, exit) = super::x86::interval(node, ray, t_min, t_max);
+            let (entry, exit) = super::one_ray::interval(node, ray, t_min, t_max);
             (entry, u32::from(_mm256_cmp_ps_mask::<_CMP_LE_OQ>(entry, exit)))
         }
     }
