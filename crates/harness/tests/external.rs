@@ -82,6 +82,11 @@ fn commands_that_cannot_be_started_or_are_none_are_refused() {
         ("['']", 2, "methods[1].command is empty"),
         ("['a'], timeout_seconds = 0", 2, "methods[1].timeout_seconds is 0; accepted: above 0"),
         ("['a'], objective = 'layout'", 2, "methods[1].objective is set for external"),
+        (
+            "['a'], budget = { max_work = 1 }",
+            2,
+            "methods[1].budget is set for external; accepted: with a method of ours",
+        ),
         ("['a'], comand = 'b'", 2, "comand"),
     ] {
         fs::write(folder.path().join("spec.toml"), spec.replace("['sh', 'peer.sh']", command)).unwrap();

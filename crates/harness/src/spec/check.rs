@@ -72,23 +72,26 @@ impl Experiment {
     }
 
     fn check_method(&self, labelled: &Labelled) -> Result<(), Fault> {
-        let Labelled { method, own: Own { judge, for_rays, objective, references, .. }, .. } = labelled;
-        labelled.own.check()?;
-        if references.is_some() && !matches!(method, Contestant::Ours(Method::Best(_))) {
-            return Err(Fault::new("references", format!("set for {}", method.name()), "with best"));
+        let Labelled { method, own, .. } = labelled;
+        let Own { budget, keep, judge, for_rays, objective, references, .. } = own;
+        own.check()?;
+        let (is_ours, is_best) =
+            (matches!(method, Contestant::Ours(_)), matches!(method, Contestant::Ours(Method::Best(_))));
+        let judged = Labelled::JUDGED;
+        let (ours, with_judged) = ("with a method of ours", format!("with {}", judged.join(", ")));
+        let of_some_methods = [
+            ("budget", budget.is_some(), is_ours, ours),
+            ("keep", !keep.is_empty(), is_ours, ours),
+            ("objective", objective.is_some(), is_ours, ours),
+            ("for_rays", for_rays.is_some(), is_ours, ours),
+            ("references", references.is_some(), is_best, "with best"),
+            ("judge", judge.is_some(), judged.contains(&method.name()), &with_judged),
+        ];
+        if let Some((key, .., accepted)) = of_some_methods.iter().find(|(_, set, takes, _)| *set && !takes) {
+            return Err(Fault::new(key, format!("set for {}", method.name()), accepted));
         }
-        let is_ours = matches!(method, Contestant::Ours(_));
-        if objective.is_some() && !is_ours {
-            return Err(Fault::new("objective", format!("set for {}", method.name()), "with a method of ours"));
-        }
-        if for_rays.is_some() && (self.ray_cost.is_none() || !is_ours) {
-            let found =
-                if is_ours { "set without `ray_cost`".into() } else { format!("set for {}", method.name()) };
-            return Err(Fault::new("for_rays", found, "with a method of ours and the experiment's `ray_cost`"));
-        }
-        if judge.is_some() && !Labelled::JUDGED.contains(&method.name()) {
-            let found = format!("set for {}", method.name());
-            return Err(Fault::new("judge", found, format!("with {}", Labelled::JUDGED.join(", "))));
+        if for_rays.is_some() && self.ray_cost.is_none() {
+            return Err(Fault::new("for_rays", "set without `ray_cost`", "with the experiment's `ray_cost`"));
         }
         match method {
             Contestant::Peer(_) | Contestant::External(_) if self.suite.is_some() => {
