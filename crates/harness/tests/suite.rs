@@ -2,12 +2,13 @@
 
 use bvh_build::{Accelerator, Builder, Structure, muller_fellner};
 use bvh_core::cost::Objective;
-use bvh_core::{Aabb, Primitives, RayDensity, Segment, WideBvh, file, validate, validate_references};
+use bvh_core::{Aabb, Primitives, RayDensity, Segment, Triangle, WideBvh, file, validate, validate_references};
 use bvh_search::{Budget, Method, Problem, Splits, StopReason, optimize, solve};
 use harness::scenes::Scene;
 use harness::scenes::stiff::{self, STIFF};
 use harness::stress::{
     self, CASES, Case, Cell, Check, EXACT_OBJECTS, Effort, LargerScenes, Part, Size, examine, is_builder,
+    kernels,
     tracing::{self, TRAVERSALS},
 };
 use rayon::prelude::*;
@@ -147,6 +148,56 @@ fn every_traversal_answers_a_million_rays_as_brute_force() {
         })
         .collect();
     assert_kept(broken);
+}
+
+/// Powers of two by which scenes are scaled, each for an equal part of the rays: most of them where vector kernels take no detours,
+/// the others to nearly the largest, nearly the smallest and to denormal coordinates.
+const SCALES: [i32; 8] = [0, 0, 1, 20, -20, 120, -120, -140];
+
+/// Rays that are answered at once, so that their answers take little memory.
+const PIECE: usize = 25_000;
+
+/// Most triangles of a scene of which all are tested by a million rays: enough for a few nodes.
+const TESTED: usize = 40;
+
+/// The scene of a case, times two to this power.
+type Scaled = (&'static Case, i32, Vec<Triangle>);
+
+/// So many rays of both sorts, or a few more, through the scene of every case, at every scale at which it is finite.
+fn check_kernels(random: usize, adversarial: usize) {
+    let mut jobs = Vec::new();
+    for case in &CASES {
+        let Some(scene) = case.scene() else { continue };
+        let triangles = case.triangles(scene.sizes[Size::Few as usize].min(TESTED));
+        let scaled = SCALES.into_iter().filter_map(|by| Some((case, by, kernels::scaled(&triangles, by)?)));
+        let scaled: Vec<Scaled> = scaled.collect();
+        let pieces = random.div_ceil(PIECE * scaled.len()) * scaled.len();
+        jobs.extend((0..pieces).map(|piece| (pieces, scaled[piece % scaled.len()].clone())));
+    }
+    let check = |(seed, (pieces, (case, scale, triangles))): (usize, (usize, Scaled))| {
+        let (random, adversarial) = (random.div_ceil(pieces), adversarial.div_ceil(pieces));
+        let mut rays = kernels::random(&triangles, random, seed as u64);
+        rays.extend(kernels::adversarial(&triangles, adversarial, seed as u64));
+        let name = format!("{} ({}) * 2^{scale}, seed {seed}", case.id, case.name);
+        assert_eq!(rays.len(), random + adversarial, "{name}");
+        kernels::check(&triangles, &rays).map_err(|broken| format!("{name}, {broken}"))
+    };
+    let checked: Vec<Result<usize, String>> = jobs.into_par_iter().enumerate().map(check).collect();
+    let hits: usize = checked.iter().flatten().sum();
+    assert_kept(checked.into_iter().filter_map(Result::err).collect());
+    let rays = CASES.iter().filter(|case| case.scene().is_some()).count() * (random + adversarial);
+    assert!(hits > rays / 10, "{hits} of {rays} rays hit");
+}
+
+#[test]
+fn every_kernel_answers_as_brute_force_on_every_scene_at_every_scale() {
+    check_kernels(10_000, 1_000);
+}
+
+#[test]
+#[ignore = "nightly: minutes, a million rays per scene"]
+fn every_kernel_answers_a_million_rays_of_every_scene_as_brute_force() {
+    check_kernels(1_000_000, 100_000);
 }
 
 #[test]

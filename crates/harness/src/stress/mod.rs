@@ -9,6 +9,7 @@ pub mod checks;
 pub mod child;
 pub mod exact_area;
 pub mod examine;
+pub mod kernels;
 mod peers;
 pub mod precision;
 pub mod promise;

@@ -43,7 +43,6 @@ fn over_binary_trees(objects: &Primitives) -> Result<Vec<Accelerator<'_>>, Strin
     Ok(trees.map(|tree| Accelerator::new(objects, Structure::Tree(Cow::Owned(tree)))).into())
 }
 
-/// Of a binary tree and of one with many children per node, for every kernel that this processor has.
 fn over_wide_layouts(
     objects: &Primitives,
     structure: fn(WideBvh) -> Structure<'static>,
@@ -51,16 +50,27 @@ fn over_wide_layouts(
     let Primitives::Triangles(triangles) = objects else {
         return Err("only triangles have a wide layout".into());
     };
-    let layout = |builder: &dyn Builder| -> Result<_, String> {
-        let wide = WideBvh::new(&build(objects, builder)?, triangles).map_err(|error| error.to_string())?;
-        let kernels = Kernel::ALL.into_iter().filter_map(move |kernel| wide.clone().with_kernel(kernel));
-        Ok(kernels.map(|wide| Accelerator::new(objects, structure(wide))))
-    };
-    let binary = layout(&muller_fellner::Config::default())?;
-    Ok(binary.chain(layout(&goldsmith_salmon::Config::default())?).collect())
+    let layouts = wide_layouts(triangles)?.into_iter();
+    Ok(layouts.map(|(_, wide)| Accelerator::new(objects, structure(wide))).collect())
 }
 
-fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
+/// Of a binary tree and of one with many children per node, for every kernel that this processor has.
+pub fn wide_layouts(triangles: &[Triangle]) -> Result<Vec<(Kernel, WideBvh)>, String> {
+    let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+    let builders: [&dyn Builder; 2] =
+        [&muller_fellner::Config::default(), &goldsmith_salmon::Config::default()];
+    let mut layouts = Vec::new();
+    for builder in builders {
+        let tree = builder.build(&boxes).map_err(|error| error.to_string())?;
+        let wide = WideBvh::new(&tree, triangles).map_err(|error| error.to_string())?;
+        let of_kernel = |kernel| Some((kernel, wide.clone().with_kernel(kernel)?));
+        layouts.extend(Kernel::ALL.into_iter().filter_map(of_kernel));
+    }
+    Ok(layouts)
+}
+
+/// An answer, to be compared bit by bit.
+pub fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
     hit.map(|hit| (hit.t.to_bits(), hit.object))
 }
 

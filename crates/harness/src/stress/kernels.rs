@@ -1,0 +1,149 @@
+//! Every kernel of the wide layout, ray by ray and in batches of both hints, against testing every triangle; and rays where rounding
+//! decides.
+
+use super::promise::{Broken, ensure};
+use super::tracing::{self, bits, wide_layouts};
+use bvh_build::{Accelerator, Structure};
+use bvh_core::{Coherence, Hit, Primitives, Ray, Triangle};
+use bvh_search::Stream;
+use glam::Vec3;
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+
+/// Lengths of batches, in turn: one ray, less and more than kernels take at once, and far more.
+const LENGTHS: [usize; 12] = [1, 3, 16, 15, 17, 33, 7, 23, 25, 65, 257, 1023];
+
+/// P3, bit by bit, for the layouts of two trees and every kernel that this processor has. Returns how many rays hit.
+pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
+    let objects = Primitives::Triangles(triangles.to_vec());
+    let brute_force = Accelerator::new(&objects, Structure::Brute);
+    let expected: Vec<_> = rays.iter().map(|ray| brute_force.nearest_hit(ray)).collect();
+    let answers = |how: &str, nearest: &[Option<Hit>], any: &[bool]| {
+        for (i, expected) in expected.iter().enumerate() {
+            let same = bits(nearest[i]) == bits(*expected) && any[i] == expected.is_some();
+            ensure!(same, P3: "{how}: {:?} gives {:?} and {}, testing every triangle {expected:?}", rays[i], nearest[i], any[i]);
+        }
+        Ok(())
+    };
+    for (kernel, wide) in wide_layouts(triangles).map_err(Broken::case)? {
+        let nearest: Vec<_> = rays.iter().map(|ray| wide.nearest_hit(ray)).collect();
+        let any: Vec<_> = rays.iter().map(|ray| wide.any_hit(ray)).collect();
+        answers(&format!("{kernel:?}"), &nearest, &any)?;
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let (mut nearest, mut any) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+            let mut done = 0;
+            for length in LENGTHS.into_iter().cycle() {
+                let batch = done..rays.len().min(done + length);
+                wide.nearest_hits(&rays[batch.clone()], &mut nearest[batch.clone()], coherence);
+                wide.any_hits(&rays[batch.clone()], &mut any[batch.clone()], coherence);
+                done = batch.end;
+                if done == rays.len() {
+                    break;
+                }
+            }
+            let nearest: Vec<_> = nearest.iter().map(|hit| (!hit.is_miss()).then_some(*hit)).collect();
+            answers(&format!("{kernel:?}, {coherence:?}"), &nearest, &any)?;
+        }
+    }
+    Ok(expected.iter().flatten().count())
+}
+
+/// Rays of [`tracing::rays`]: half of them one by one, half in bundles.
+pub fn random(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
+    half_in_bundles(count, seed, |count| tracing::rays(triangles, count, seed))
+}
+
+/// Rays where rounding decides, half of them one by one, half in bundles: in planes of triangles and along edges, from and through
+/// their corners, edges and centres, along axes or all but along them, of directions of any length, so that distances underflow;
+/// over half lines, single points and ranges that end at a hit or just beside it.
+pub fn adversarial(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
+    let objects = Primitives::Triangles(triangles.to_vec());
+    let brute_force = Accelerator::new(&objects, Structure::Brute);
+    let mut rng = Stream::seed_from_u64(seed);
+    half_in_bundles(count, seed, |count| {
+        let draws = (0..20 * count).filter_map(|_| one_adversarial(triangles, &brute_force, &mut rng));
+        draws.take(count).collect()
+    })
+}
+
+fn one_adversarial(triangles: &[Triangle], brute_force: &Accelerator, rng: &mut Stream) -> Option<Ray> {
+    let nowhere = Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]);
+    let triangle = triangles.choose(rng).unwrap_or(&nowhere);
+    let (target, other) = (in_plane(triangle, rng), in_plane(triangle, rng));
+    let mut along = Vec3::from([(); 3].map(|()| if rng.random() { 0.0 } else { -0.0 }));
+    along[rng.random_range(0..3)] = if rng.random() { 1.0 } else { -1.0 };
+    if rng.random() {
+        along[rng.random_range(0..3)] += pick(&[1e-7, -1e-30, 1e-42, 1.0], rng);
+    }
+    let size = triangle.aabb().extent().max_element() as f32;
+    let direction = match rng.random_range(0..4) {
+        0 => triangle.0[1] - triangle.0[0],
+        1 => other - target,
+        2 => along,
+        _ => Vec3::from([(); 3].map(|()| rng.random_range(-1.0..1.0))),
+    };
+    // Of any length that is accepted.
+    let direction = direction / direction.abs().max_element();
+    let back = pick(&[0.0, 0.0, 1.0, -1.0, 0.3, 100.0, 1e-7], rng);
+    let origin = target - direction * (size * back).min(f32::MAX / 4.0);
+    let direction = direction * 2f32.powi(pick(&[0, 0, 1, -99, 99, 60, -60], rng));
+    let t = Ray::half_line(origin, direction)
+        .ok()
+        .map(|ray| brute_force.nearest_hit(&ray))?
+        .map_or(1.0, |hit| hit.t);
+    let (t_min, t_max) = match rng.random_range(0..12) {
+        0 | 1 => (t, t),
+        2 => (0.0, t),
+        3 => (t, f32::INFINITY),
+        4 => (0.0, t.next_down().max(0.0)),
+        5 => (t.next_up(), f32::MAX),
+        6 => (t.next_up(), t),
+        _ => (0.0, f32::INFINITY),
+    };
+    Ray::new(origin, direction, t_min, t_max).ok()
+}
+
+/// A corner, a point of an edge, the centre, or any point in the plane, not far from the triangle.
+fn in_plane(Triangle([a, b, c]): &Triangle, rng: &mut Stream) -> Vec3 {
+    let (u, v) = match rng.random_range(0..5) {
+        0 => (0.0, 0.0),
+        1 => (0.5, 0.0),
+        2 => (rng.random(), 0.0),
+        3 => (1.0 / 3.0, 1.0 / 3.0),
+        _ => (rng.random_range(-1.0..2.0), rng.random_range(-1.0..2.0)),
+    };
+    a * (1.0 - u - v) + b * u + c * v
+}
+
+fn pick<T: Copy>(of: &[T], rng: &mut Stream) -> T {
+    *of.choose(rng).expect("some")
+}
+
+/// Rays in a bundle: those of a packet.
+const BUNDLE: usize = 16;
+
+/// The rays that `make` makes, a half of `count`, and bundles around further ones: equal, all but equal, or close to each other.
+fn half_in_bundles(count: usize, seed: u64, mut make: impl FnMut(usize) -> Vec<Ray>) -> Vec<Ray> {
+    let mut rng = Stream::seed_from_u64(!seed);
+    let mut rays = make(count / 2);
+    let first = rays.len();
+    for ray in make((count - first).div_ceil(BUNDLE)) {
+        let spread = pick(&[0.0, 1e-7, 1e-3, 0.1], &mut rng);
+        let mut near = || Vec3::from([(); 3].map(|()| 1.0 + spread * rng.random_range(-1.0..1.0f32)));
+        for _ in 0..BUNDLE {
+            // Factors, so that zeros stay what they are at every scale.
+            let (origin, direction) = (ray.origin() * near(), ray.direction() * near());
+            rays.push(Ray::new(origin, direction, ray.t_min(), ray.t_max()).unwrap_or(ray));
+        }
+    }
+    rays.truncate(count);
+    rays
+}
+
+/// The triangles times 2^`exponent`, a part of them denormal if that is far below zero; `None` if they would not be finite.
+pub fn scaled(triangles: &[Triangle], exponent: i32) -> Option<Vec<Triangle>> {
+    // In two steps, as 2^-140 itself has few bits.
+    let step = 2f32.powi(exponent / 2);
+    let scaled: Vec<_> = triangles.iter().map(|t| Triangle(t.0.map(|p| p * step * step))).collect();
+    scaled.iter().all(|t| t.aabb().check().is_ok()).then_some(scaled)
+}
