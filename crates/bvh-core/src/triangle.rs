@@ -99,13 +99,23 @@ impl Triangle {
     }
 
     /// The weights of the three corners at the point where the ray's line meets the triangle's plane; their sum is 1. They
-    /// interpolate what the corners have, such as normals, at a hit. `None` for a ray in the plane.
+    /// interpolate what the corners have, such as normals, at a hit, and cost nothing to who does not ask. `None` for a ray in
+    /// the plane.
     pub fn barycentrics(&self, ray: &Ray) -> Option<[f64; 3]> {
         let shear = Shear::new(ray);
         let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = self.0.map(|corner| shear.apply(&corner).map(f64::from));
         let weights = [cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax];
         let sum: f64 = weights.iter().sum();
         (sum != 0.0).then(|| weights.map(|weight| weight / sum))
+    }
+
+    /// The unit vector that is perpendicular to the triangle, on the side from which its corners run counterclockwise, computed
+    /// in f64; `None` of a degenerate triangle.
+    pub fn normal(&self) -> Option<Vec3> {
+        let [a, b, c] = self.0.map(Vec3::as_dvec3);
+        // Edges of length about one: their product neither overflows nor vanishes.
+        let scale = (b - a).abs().max((c - a).abs()).max_element();
+        ((b - a) / scale).cross((c - a) / scale).try_normalize().map(|normal| normal.as_vec3())
     }
 
     /// Whether the corners coincide or are collinear: such a triangle is never hit. Exact as long as the differences
@@ -198,6 +208,19 @@ mod tests {
             }
         }
         assert_eq!(CORNER.barycentrics(&Ray::half_line(Vec3::ONE, Vec3::X).unwrap()), None);
+    }
+
+    #[test]
+    fn the_normal_is_on_the_side_from_which_the_corners_run_counterclockwise_at_every_size() {
+        for exponent in [-126, -60, 0, 60, 120] {
+            let scale = libm::exp2f(exponent as f32);
+            let triangle = Triangle([Vec3::ZERO, Vec3::new(2.0 * scale, 0.0, 0.0), Vec3::new(0.0, scale, 0.0)]);
+            assert_eq!(triangle.normal(), Some(Vec3::Z), "2^{exponent}");
+            let [a, b, c] = triangle.0;
+            assert_eq!(Triangle([a, c, b]).normal(), Some(-Vec3::Z), "2^{exponent}");
+        }
+        assert_eq!(Triangle([Vec3::ONE; 3]).normal(), None);
+        assert_eq!(Triangle([Vec3::ZERO, Vec3::ONE, 2.0 * Vec3::ONE]).normal(), None);
     }
 
     #[test]

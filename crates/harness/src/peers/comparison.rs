@@ -1,6 +1,6 @@
 //! Rays per second of all libraries side by side: every mode on every scene, and geometric means over the scenes.
 
-use crate::run::rows::{PeerRayRow, TraceRow, TraceTimeRow};
+use crate::run::rows::{PeerRayRow, RayRatioRow, TraceRow, TraceTimeRow};
 use crate::statistics::geometric_mean;
 use std::collections::BTreeMap;
 
@@ -64,41 +64,53 @@ fn means(rows: &[PeerRayRow]) -> Vec<PeerRayRow> {
     complete.into_iter().map(mean).collect()
 }
 
-/// Lines for the terminal: for every scene and kind of rays our fastest mode, the fastest of other libraries, and the
-/// ratio of their speeds; then the geometric means of these ratios.
-pub fn text(rows: &[PeerRayRow]) -> String {
-    let mut kinds: Vec<&str> = Vec::new();
-    let mut ratios: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-    let mut text = String::from("Million rays per second, ours and the fastest other library:\n");
-    for own in rows.iter().filter(|row| row.library == OURS && row.scene != MEAN) {
-        let same = |row: &&PeerRayRow| row.scene == own.scene && row.rays == own.rays;
-        let fastest = |ours: bool| {
-            let of = rows.iter().filter(same).filter(|row| (row.library == OURS) == ours);
-            of.max_by(|a, b| a.million_per_s.total_cmp(&b.million_per_s))
-        };
-        let (Some(ours), Some(theirs)) = (fastest(true), fastest(false)) else { continue };
-        if ours != own {
-            continue;
+/// Which modes of other libraries one of ours is compared with.
+const AGAINST: [(&str, fn(&PeerRayRow) -> bool); 3] = [
+    ("any mode", |_| true),
+    ("whole triangles", |row| row.mode != "high" && !row.mode.contains("splits")),
+    ("robust", |row| row.library == "embree" && row.mode.contains("robust")),
+];
+
+/// For each of our modes and kind of rays, its speed over that of the fastest mode of other libraries, scene by scene: the
+/// geometric mean and the least.
+pub fn ratios(rows: &[PeerRayRow]) -> Vec<RayRatioRow> {
+    let mut ratios = Vec::new();
+    for mean in rows.iter().filter(|row| row.library == OURS && row.scene == MEAN) {
+        let of_scenes = |row: &&PeerRayRow| row.scene != MEAN && row.rays == mean.rays;
+        let own = rows.iter().filter(of_scenes).filter(|row| row.library == OURS && row.mode == mean.mode);
+        for (against, is_rival) in AGAINST {
+            let of_scene = |own: &PeerRayRow| {
+                let rivals = rows.iter().filter(of_scenes).filter(|row| row.scene == own.scene);
+                let rivals = rivals.filter(|row| row.library != OURS && is_rival(row));
+                let fastest = rivals.map(|row| row.million_per_s).reduce(f64::max)?;
+                Some((own.million_per_s / fastest, own.scene.clone()))
+            };
+            let found: Vec<_> = own.clone().filter_map(of_scene).collect();
+            let Some((least, scene)) = found.iter().min_by(|a, b| a.0.total_cmp(&b.0)).cloned() else {
+                continue;
+            };
+            let ratio = geometric_mean(&found.iter().map(|(ratio, _)| *ratio).collect::<Vec<_>>());
+            let (mode, rays) = (mean.mode.clone(), mean.rays.clone());
+            ratios.push(RayRatioRow { mode, against: against.into(), rays, ratio, least, scene });
         }
-        let ratio = ours.million_per_s / theirs.million_per_s;
-        text += &format!(
-            "  {} {}: {:.2} ({}), {} {:.2} ({}), ratio {ratio:.2}\n",
-            ours.scene,
-            ours.rays,
-            ours.million_per_s,
-            ours.mode,
-            theirs.library,
-            theirs.million_per_s,
-            theirs.mode
-        );
-        if !kinds.contains(&ours.rays.as_str()) {
-            kinds.push(&ours.rays);
-        }
-        ratios.entry(&ours.rays).or_default().push(ratio);
     }
+    ratios
+}
+
+/// Lines for the terminal: for every kind of rays our fastest mode, over the fastest of other libraries.
+pub fn text(ratios: &[RayRatioRow]) -> String {
+    let mut text = String::from("Speeds over those of the fastest mode of any other library:\n");
+    let mut kinds: Vec<&str> = ratios.iter().map(|row| row.rays.as_str()).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
     for kind in kinds {
-        let ratios = &ratios[kind];
-        text += &format!("  {MEAN} of the ratios, {kind}: {:.2}\n", geometric_mean(ratios));
+        let of = ratios.iter().filter(|row| row.rays == kind && row.against == AGAINST[0].0);
+        if let Some(row) = of.max_by(|a, b| a.ratio.total_cmp(&b.ratio)) {
+            text += &format!(
+                "  {kind}: {:.2} ({}), least {:.2} on {}\n",
+                row.ratio, row.mode, row.least, row.scene
+            );
+        }
     }
     text
 }
@@ -127,6 +139,32 @@ mod tests {
         assert_eq!(shown.len(), 2, "a mode that not all scenes have has no mean: {shown:?}");
         assert_eq!((shown[0].0, shown[1].0), (OURS, "embree"));
         assert!((shown[0].1 - 4.0).abs() < 1e-12 && (shown[1].1 - 2.0).abs() < 1e-12 && shown[1].2 == 7);
+    }
+
+    #[test]
+    fn ratios_are_to_the_fastest_rival_of_each_scene_and_kind() {
+        let mut measured = vec![
+            row("a", OURS, "wide", 2.0, 0),
+            row("a", "embree", "high", 4.0, 0),
+            row("a", "embree", "high robust", 1.0, 0),
+            row("b", OURS, "wide", 9.0, 0),
+            row("b", "embree", "high robust", 1.0, 0),
+            row("b", "tinybvh", "BVH8 splits", 4.5, 0),
+            row("b", "tinybvh", "BVH8", 3.0, 0),
+        ];
+        measured.extend(means(&measured));
+        let ratios = ratios(&measured);
+        let shown: Vec<_> = ratios.iter().map(|row| (row.against.as_str(), row.ratio, row.least)).collect();
+        let expected =
+            [("any mode", 1.0, 0.5), ("whole triangles", 6f64.sqrt(), 2.0), ("robust", 18f64.sqrt(), 2.0)];
+        assert_eq!(shown.len(), expected.len());
+        for (shown, expected) in shown.iter().zip(expected) {
+            assert!(
+                shown.0 == expected.0 && (shown.1 - expected.1).abs() < 1e-12 && shown.2 == expected.2,
+                "{shown:?}"
+            );
+        }
+        assert!(text(&ratios).contains("primary: 1.00 (wide), least 0.50 on a"), "{}", text(&ratios));
     }
 
     #[test]

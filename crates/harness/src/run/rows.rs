@@ -250,6 +250,20 @@ rows! {
         rays: u64,
     }
 
+    /// One row of `timing_ratios.csv`: the speed of rays of one kind in one of our modes, over the fastest mode of other
+    /// libraries on the same scene.
+    RayRatioRow in "timing_ratios.csv" {
+        mode: String,
+        /// The modes compared with: `any mode`, those of `whole triangles`, or Embree's `robust` ones.
+        against: String,
+        rays: String,
+        /// The geometric mean over the scenes.
+        ratio: f64,
+        /// The least of any scene, and which scene that is.
+        least: f64,
+        scene: String,
+    }
+
     /// One row of `timing_tests.csv`: the speed of the same rays in the tree of the first run, on one thread.
     TestTimeRow in "timing_tests.csv" {
         scene: String,

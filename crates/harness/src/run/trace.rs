@@ -4,7 +4,7 @@ use crate::Error;
 use crate::measure::speed;
 use crate::peers::{comparison, external};
 use crate::run::job::{Job, Watch, perform};
-use crate::run::rows::{PeerRayRow, Row, TraceRow, TraceTimeRow, to_bytes};
+use crate::run::rows::{PeerRayRow, RayRatioRow, Row, TraceRow, TraceTimeRow, to_bytes};
 use crate::run::store::Store;
 use crate::spec::{Contestant, Experiment};
 use bvh_core::Bvh;
@@ -67,7 +67,9 @@ pub(crate) fn trace(
     if config.ray_peers.is_some() {
         let compared = comparison::rows(&rows, &times, |label| library(experiment, label));
         store.write(PeerRayRow::FILE, &to_bytes(&compared, Path::new(PeerRayRow::FILE))?)?;
-        text += &comparison::text(&compared);
+        let ratios = comparison::ratios(&compared);
+        store.write(RayRatioRow::FILE, &to_bytes(&ratios, Path::new(RayRatioRow::FILE))?)?;
+        text += &comparison::text(&ratios);
     }
     // The other rows are compared with committed ones, so they must not depend on a program that may be missing.
     rows.retain(|row| experiment.methods.iter().any(|method| method.label == row.method));

@@ -63,20 +63,26 @@ impl Instructions for Avx512 {
                 _mm_storeu_si128(stack.cast(), _mm_unpacklo_epi32(sorted, x));
                 _mm_storeu_si128(stack.add(2).cast(), _mm_unpackhi_epi32(sorted, x));
             } else {
+                // Loops without iterators, whose calls are not always inlined here.
                 let n = mask.count_ones() as usize;
                 let keys: [u32; 8] = core::mem::transmute(keys);
                 let mut sorted = keys;
-                for (i, key) in keys.into_iter().enumerate().take(n).skip(1) {
-                    let mut at = i;
-                    while at > 0 && sorted[at - 1] < key {
-                        sorted[at] = sorted[at - 1];
+                let mut i = 1;
+                while i < n {
+                    let (key, mut at) = (keys[i & 7], i);
+                    while at > 0 && sorted[(at - 1) & 7] < key {
+                        sorted[at & 7] = sorted[(at - 1) & 7];
                         at -= 1;
                     }
-                    sorted[at] = key;
+                    sorted[at & 7] = key;
+                    i += 1;
                 }
-                for (i, key) in sorted.into_iter().enumerate().take(n) {
+                let mut i = 0;
+                while i < n {
+                    let key = sorted[i & 7];
                     let child = node.children.get_unchecked((!key & 7) as usize).bits();
                     stack.add(i).write(u64::from(key) << 32 | u64::from(child));
+                    i += 1;
                 }
             }
             nearest

@@ -3,9 +3,12 @@
 use super::answer::Answer;
 use super::interleaved;
 use super::packet::Packet;
-use super::prepared::RAYS;
+use super::prepared::{RAYS, Sixteen};
 use crate::wide::layout::WideBvh;
 use crate::{Coherence, Ray};
+
+/// So many rays between packets are traced together.
+const MANY: usize = 8 * RAYS;
 
 /// The answers of all rays.
 ///
@@ -18,12 +21,14 @@ pub(crate) unsafe fn trace<A: Answer>(wide: &WideBvh, rays: &[Ray], answers: &mu
         if coherence == Coherence::Incoherent {
             return interleaved::trace(wide, rays, answers);
         }
-        // Rays from here on wait to be traced as incoherent ones.
+        // Rays from here on wait to be traced otherwise.
         let mut from = 0;
         for (i, sixteen) in rays.as_chunks::<RAYS>().0.iter().enumerate() {
-            if let Some(mut packet) = Packet::new(sixteen, wide.largest) {
-                interleaved::trace(wide, &rays[from..i * RAYS], &mut answers[from..i * RAYS]);
+            let sixteen = Sixteen::new(sixteen, wide.largest);
+            if sixteen.cohere() {
+                rest(wide, &rays[from..i * RAYS], &mut answers[from..i * RAYS]);
                 from = (i + 1) * RAYS;
+                let mut packet = Packet::new(&sixteen);
                 packet.trace::<A>(wide);
                 let (t, object) = packet.hits();
                 for (i, answer) in answers[from - RAYS..from].iter_mut().enumerate() {
@@ -31,6 +36,21 @@ pub(crate) unsafe fn trace<A: Answer>(wide: &WideBvh, rays: &[Ray], answers: &mu
                 }
             }
         }
-        interleaved::trace(wide, &rays[from..], &mut answers[from..]);
+        rest(wide, &rays[from..], &mut answers[from..]);
+    }
+}
+
+/// Between packets: a few rays at the edge of something cohere nearly, and are traced one by one; many do not.
+#[inline(always)]
+unsafe fn rest<A: Answer>(wide: &WideBvh, rays: &[Ray], answers: &mut [A]) {
+    // SAFETY: the caller's promises.
+    unsafe {
+        if rays.len() >= MANY {
+            interleaved::trace(wide, rays, answers);
+        } else {
+            for (ray, answer) in rays.iter().zip(answers) {
+                *answer = A::alone(wide, ray);
+            }
+        }
     }
 }

@@ -5,8 +5,7 @@ use super::answer::Answer;
 use super::avx512::Avx512;
 use super::box_ray::BoxRay;
 use super::one_ray::{Instructions, Pending};
-use super::prepared::{RAYS, Sixteen};
-use crate::Ray;
+use super::prepared::{Axis, RAYS, Sixteen};
 use crate::triangle::AXES;
 use crate::wide::kernel::STACK;
 use crate::wide::layout::WideBvh;
@@ -17,15 +16,11 @@ use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
 
 /// Sixteen rays with the same signs of direction and the same largest component of it.
-pub(crate) struct Packet {
+pub(crate) struct Packet<'a> {
+    pub(super) sixteen: &'a Sixteen,
     /// Indices of the planes that the rays meet first, by axis, and of those opposite.
     near: [usize; 3],
     far: [usize; 3],
-    /// As in [`BoxRay`], a ray per lane.
-    near_scale: [__m512; 3],
-    near_shift: [__m512; 3],
-    far_scale: [__m512; 3],
-    far_shift: [__m512; 3],
     bounds: [AxisBounds; 3],
     /// The axes of the shear; what follows is in their order.
     pub(super) axes: [usize; 3],
@@ -33,7 +28,6 @@ pub(crate) struct Packet {
     pub(super) inverse: [__m512; 3],
     pub(super) slope: [__m512; 2],
     pub(super) depth: __m512,
-    pub(super) t_min: __m512,
     least_t_min: f32,
     /// The nearest hits so far, or the ends of the rays.
     pub(super) t: __m512,
@@ -50,38 +44,47 @@ struct AxisBounds {
     far_scale: [f32; 2],
 }
 
-impl Packet {
-    /// A packet of sixteen rays; `None` if they are not coherent, or not all fit the bounds of [`BoxRay`].
+impl AxisBounds {
+    #[inline(always)]
+    unsafe fn new(axis: &Axis) -> Self {
+        // SAFETY: the caller has AVX-512.
+        unsafe {
+            let Axis { near_origin, far_origin, near_scale, far_scale, .. } = *axis;
+            // Distances grow with the plane minus the origin if the scale is positive, else the other way.
+            let (far_origin, near_origin) = if axis.backwards != 0 {
+                (_mm512_reduce_max_ps(far_origin), _mm512_reduce_min_ps(near_origin))
+            } else {
+                (_mm512_reduce_min_ps(far_origin), _mm512_reduce_max_ps(near_origin))
+            };
+            Self {
+                near_origin,
+                far_origin,
+                near_scale: [_mm512_reduce_min_ps(near_scale), _mm512_reduce_max_ps(near_scale)],
+                far_scale: [_mm512_reduce_min_ps(far_scale), _mm512_reduce_max_ps(far_scale)],
+            }
+        }
+    }
+}
+
+impl<'a> Packet<'a> {
+    /// A packet of rays that [cohere](Sixteen::cohere).
     ///
     /// # Safety
     /// The caller is compiled with AVX-512 F, VL, DQ and BW and with FMA.
     #[inline(always)]
-    pub(crate) unsafe fn new(rays: &[Ray; RAYS], largest: f32) -> Option<Self> {
+    pub(crate) unsafe fn new(sixteen: &'a Sixteen) -> Self {
         // SAFETY: the caller's promise.
         unsafe {
-            let sixteen = Sixteen::new(rays, largest);
-            let Sixteen { origin, direction, inverse, t_min, t_max, backwards, second, third, .. } = sixteen;
-            let same = |mask: u16| mask == 0 || mask == u16::MAX;
-            let one_axis = same(third) && same(second);
-            if !(same(backwards[0]) && same(backwards[1]) && same(backwards[2]) && one_axis)
-                || sixteen.in_range != u16::MAX
-            {
-                return None;
-            }
-            let axes @ [kx, ky, kz] = AXES[if third != 0 { 2 } else { usize::from(second != 0) }];
-            let mut packet = Self {
-                near: [0; 3],
-                far: [0; 3],
-                near_scale: sixteen.near_scale,
-                near_shift: sixteen.near_shift,
-                far_scale: sixteen.far_scale,
-                far_shift: sixteen.far_shift,
-                bounds: [AxisBounds {
-                    near_origin: 0.0,
-                    far_origin: 0.0,
-                    near_scale: [0.0; 2],
-                    far_scale: [0.0; 2],
-                }; 3],
+            let Sixteen { origin, direction, inverse, t_min, t_max, second, third, .. } = sixteen;
+            let axes @ [kx, ky, kz] = AXES[if *third != 0 { 2 } else { usize::from(*second != 0) }];
+            let [x, y, z] = &sixteen.axes;
+            let plane = |axis: usize, of: &Axis| axis + 3 * usize::from(of.backwards != 0);
+            let near = [plane(0, x), plane(1, y), plane(2, z)];
+            Self {
+                sixteen,
+                near,
+                far: [3 - near[0], 5 - near[1], 7 - near[2]],
+                bounds: [AxisBounds::new(x), AxisBounds::new(y), AxisBounds::new(z)],
                 axes,
                 origin: [origin[kx], origin[ky], origin[kz]],
                 inverse: [inverse[kx], inverse[ky], inverse[kz]],
@@ -90,32 +93,10 @@ impl Packet {
                     _mm512_div_ps(direction[ky], direction[kz]),
                 ],
                 depth: direction[kz],
-                t_min,
-                least_t_min: _mm512_reduce_min_ps(t_min),
-                t: t_max,
+                least_t_min: _mm512_reduce_min_ps(*t_min),
+                t: *t_max,
                 object: _mm512_set1_epi32(-1),
-            };
-            for (axis, &backwards) in backwards.iter().enumerate() {
-                let (near_scale, far_scale) = (sixteen.near_scale[axis], sixteen.far_scale[axis]);
-                let (near_origin, far_origin) = (sixteen.near_origin[axis], sixteen.far_origin[axis]);
-                let is_backwards = backwards != 0;
-                let plane = axis + 3 * usize::from(is_backwards);
-                packet.near[axis] = plane;
-                packet.far[axis] = 2 * axis + 3 - plane;
-                // Distances grow with the plane minus the origin if the scale is positive, else the other way.
-                let (least_far, greatest_near) = if is_backwards {
-                    (_mm512_reduce_max_ps(far_origin), _mm512_reduce_min_ps(near_origin))
-                } else {
-                    (_mm512_reduce_min_ps(far_origin), _mm512_reduce_max_ps(near_origin))
-                };
-                packet.bounds[axis] = AxisBounds {
-                    near_origin: greatest_near,
-                    far_origin: least_far,
-                    near_scale: [_mm512_reduce_min_ps(near_scale), _mm512_reduce_max_ps(near_scale)],
-                    far_scale: [_mm512_reduce_min_ps(far_scale), _mm512_reduce_max_ps(far_scale)],
-                };
             }
-            Some(packet)
         }
     }
 
@@ -226,13 +207,22 @@ impl Packet {
         // SAFETY: the caller's promises; planes are six, lanes eight.
         unsafe {
             let planes = node.planes.as_ptr().cast::<f32>().add(lane);
-            let (mut entry, mut exit) = (self.t_min, self.t);
+            let (mut entry, mut exit) = (self.sixteen.t_min, self.t);
             for axis in 0..3 {
                 let near = _mm512_set1_ps(*planes.add(8 * self.near[axis]));
-                entry =
-                    _mm512_max_ps(entry, _mm512_fmadd_ps(near, self.near_scale[axis], self.near_shift[axis]));
+                entry = _mm512_max_ps(
+                    entry,
+                    _mm512_fmadd_ps(
+                        near,
+                        self.sixteen.axes[axis].near_scale,
+                        self.sixteen.axes[axis].near_shift,
+                    ),
+                );
                 let far = _mm512_set1_ps(*planes.add(8 * self.far[axis]));
-                exit = _mm512_min_ps(exit, _mm512_fmadd_ps(far, self.far_scale[axis], self.far_shift[axis]));
+                exit = _mm512_min_ps(
+                    exit,
+                    _mm512_fmadd_ps(far, self.sixteen.axes[axis].far_scale, self.sixteen.axes[axis].far_shift),
+                );
             }
             _mm512_cmp_ps_mask::<_CMP_LE_OQ>(entry, exit) != 0
         }

@@ -6,7 +6,7 @@ use crate::Slabs;
 use crate::wide::triangles::TriangleBlock;
 use core::arch::x86_64::*;
 
-impl Packet {
+impl Packet<'_> {
     /// One corner relative to the rays: along x, y and z of the shear.
     #[inline(always)]
     unsafe fn apply(&self, corner: &[[f32; TriangleBlock::LANES]; 3], lane: usize) -> [__m512; 3] {
@@ -75,7 +75,7 @@ impl Packet {
                 corners[i] = [min, max];
             }
             let reach = _mm512_mul_ps(reach, _mm512_set1_ps(Slabs::MARGIN));
-            let (mut entry, mut exit) = (self.t_min, _mm512_set1_ps(f32::INFINITY));
+            let (mut entry, mut exit) = (self.sixteen.t_min, _mm512_set1_ps(f32::INFINITY));
             for (i, [min, max]) in corners.into_iter().enumerate() {
                 let own = _mm512_mul_ps(_mm512_abs_ps(self.origin[i]), _mm512_set1_ps(f32::EPSILON));
                 let margin = _mm512_add_ps(_mm512_add_ps(reach, own), _mm512_set1_ps(f32::MIN_POSITIVE));
@@ -131,7 +131,7 @@ impl Packet {
             let (u, v, w) = (_mm512_mul_pd(u, az), _mm512_mul_pd(v, bz), _mm512_mul_pd(w, cz));
             let sum = _mm512_add_pd(_mm512_add_pd(u, v), w);
             let t = _mm512_div_pd(sum, _mm512_mul_pd(determinant, double::<HALF>(self.depth)));
-            let after = _mm512_cmp_pd_mask::<_CMP_GE_OQ>(t, double::<HALF>(self.t_min));
+            let after = _mm512_cmp_pd_mask::<_CMP_GE_OQ>(t, double::<HALF>(self.sixteen.t_min));
             (after & !(negative & positive | flat), _mm512_cvtpd_ps(t))
         }
     }

@@ -14,21 +14,51 @@ pub(crate) struct Sixteen {
     pub(crate) inverse: [__m512; 3],
     pub(crate) t_min: __m512,
     pub(crate) t_max: __m512,
-    /// A bit per ray that runs backwards along each axis.
-    pub(crate) backwards: [u16; 3],
     /// A bit per ray whose direction is largest along y, and along z.
     pub(crate) second: u16,
     pub(crate) third: u16,
     /// A bit per ray within the bounds of [`BoxRay`]; the others are left to the portable kernel.
     pub(crate) in_range: u16,
+    pub(crate) axes: [Axis; 3],
+}
+
+/// Sixteen rays along one axis.
+pub(crate) struct Axis {
+    /// A bit per ray that runs backwards.
+    pub(crate) backwards: u16,
     /// The origins, moved by the margin of near and of far planes.
-    pub(crate) near_origin: [__m512; 3],
-    pub(crate) far_origin: [__m512; 3],
+    pub(crate) near_origin: __m512,
+    pub(crate) far_origin: __m512,
     /// As in [`BoxRay`].
-    pub(crate) near_scale: [__m512; 3],
-    pub(crate) near_shift: [__m512; 3],
-    pub(crate) far_scale: [__m512; 3],
-    pub(crate) far_shift: [__m512; 3],
+    pub(crate) near_scale: __m512,
+    pub(crate) near_shift: __m512,
+    pub(crate) far_scale: __m512,
+    pub(crate) far_shift: __m512,
+}
+
+impl Axis {
+    #[inline(always)]
+    unsafe fn new(origin: __m512, inverse: __m512, limit: __m512, margin: __m512) -> Self {
+        // SAFETY: the caller's promise.
+        unsafe {
+            let (tiny, sign) = (_mm512_set1_ps(BoxRay::UNDERFLOW), _mm512_set1_ps(-0.0));
+            let scale = _mm512_max_ps(inverse, _mm512_sub_ps(_mm512_setzero_ps(), limit));
+            let scale = _mm512_min_ps(scale, limit);
+            let near_scale = _mm512_mul_ps(scale, _mm512_set1_ps(BoxRay::NEAR));
+            let far_scale = _mm512_mul_ps(scale, _mm512_set1_ps(BoxRay::FAR));
+            let margin = _mm512_or_ps(margin, _mm512_and_ps(sign, inverse));
+            let (near_origin, far_origin) = (_mm512_add_ps(origin, margin), _mm512_sub_ps(origin, margin));
+            Self {
+                backwards: _mm512_movepi32_mask(_mm512_castps_si512(inverse)),
+                near_origin,
+                far_origin,
+                near_scale,
+                near_shift: _mm512_fnmsub_ps(near_origin, near_scale, tiny),
+                far_scale,
+                far_shift: _mm512_fnmadd_ps(far_origin, far_scale, tiny),
+            }
+        }
+    }
 }
 
 impl Sixteen {
@@ -54,41 +84,35 @@ impl Sixteen {
                 & _mm512_cmp_ps_mask::<_CMP_GE_OQ>(size, _mm512_set1_ps(BoxRay::LEAST_SIZE))
                 & _mm512_cmp_ps_mask::<_CMP_LT_OQ>(shift, _mm512_set1_ps(BoxRay::MOST_SHIFT));
             let margin = _mm512_mul_ps(size, _mm512_set1_ps(BoxRay::MARGIN));
-            let zero = _mm512_setzero_ps();
-            let mut sixteen = Self {
+            Self {
                 origin: [ox, oy, oz],
                 direction: [dx, dy, dz],
                 inverse: [ix, iy, iz],
                 t_min,
                 t_max,
-                backwards: [0; 3],
                 second,
                 third,
                 in_range,
-                near_origin: [zero; 3],
-                far_origin: [zero; 3],
-                near_scale: [zero; 3],
-                near_shift: [zero; 3],
-                far_scale: [zero; 3],
-                far_shift: [zero; 3],
-            };
-            let (tiny, sign) = (_mm512_set1_ps(BoxRay::UNDERFLOW), _mm512_set1_ps(-0.0));
-            for axis in 0..3 {
-                let (origin, inverse) = (sixteen.origin[axis], sixteen.inverse[axis]);
-                let scale = _mm512_min_ps(_mm512_max_ps(inverse, _mm512_sub_ps(zero, limit)), limit);
-                let margin = _mm512_or_ps(margin, _mm512_and_ps(sign, inverse));
-                sixteen.backwards[axis] = _mm512_movepi32_mask(_mm512_castps_si512(inverse));
-                sixteen.near_origin[axis] = _mm512_add_ps(origin, margin);
-                sixteen.far_origin[axis] = _mm512_sub_ps(origin, margin);
-                sixteen.near_scale[axis] = _mm512_mul_ps(scale, _mm512_set1_ps(BoxRay::NEAR));
-                sixteen.far_scale[axis] = _mm512_mul_ps(scale, _mm512_set1_ps(BoxRay::FAR));
-                sixteen.near_shift[axis] =
-                    _mm512_fnmsub_ps(sixteen.near_origin[axis], sixteen.near_scale[axis], tiny);
-                sixteen.far_shift[axis] =
-                    _mm512_fnmadd_ps(sixteen.far_origin[axis], sixteen.far_scale[axis], tiny);
+                axes: [
+                    Axis::new(ox, ix, limit, margin),
+                    Axis::new(oy, iy, limit, margin),
+                    Axis::new(oz, iz, limit, margin),
+                ],
             }
-            sixteen
         }
+    }
+
+    /// Whether the rays run to the same sides, mostly along the same axis, and none is left to the portable kernel.
+    #[inline(always)]
+    pub(crate) fn cohere(&self) -> bool {
+        let same = |mask: u16| mask == 0 || mask == u16::MAX;
+        let [x, y, z] = &self.axes;
+        same(x.backwards)
+            & same(y.backwards)
+            & same(z.backwards)
+            & same(self.second)
+            & same(self.third)
+            & (self.in_range == u16::MAX)
     }
 
     /// Writes the rays one after the other; the first is number `first` of its batch.
@@ -110,14 +134,23 @@ impl Sixteen {
             let mut far = near;
             for i in 0..3 {
                 let (lower, upper) = (_mm512_set1_epi32(32 * i as i32), _mm512_set1_epi32(32 * (i as i32 + 3)));
-                near[i] = _mm512_castsi512_ps(_mm512_mask_mov_epi32(lower, self.backwards[i], upper));
-                far[i] = _mm512_castsi512_ps(_mm512_mask_mov_epi32(upper, self.backwards[i], lower));
+                near[i] = _mm512_castsi512_ps(_mm512_mask_mov_epi32(lower, self.axes[i].backwards, upper));
+                far[i] = _mm512_castsi512_ps(_mm512_mask_mov_epi32(upper, self.axes[i].backwards, lower));
             }
+            let [first_axis, second_axis, third_axis] = &self.axes;
             let to = to.cast::<f32>();
-            write_row(to, self.near_scale, self.t_min);
-            write_row(to.add(4), self.near_shift, self.t_max);
-            write_row(to.add(8), self.far_scale, depth);
-            write_row(to.add(12), self.far_shift, _mm512_div_ps(dx, depth));
+            write_row(to, [first_axis.near_scale, second_axis.near_scale, third_axis.near_scale], self.t_min);
+            write_row(
+                to.add(4),
+                [first_axis.near_shift, second_axis.near_shift, third_axis.near_shift],
+                self.t_max,
+            );
+            write_row(to.add(8), [first_axis.far_scale, second_axis.far_scale, third_axis.far_scale], depth);
+            write_row(
+                to.add(12),
+                [first_axis.far_shift, second_axis.far_shift, third_axis.far_shift],
+                _mm512_div_ps(dx, depth),
+            );
             write_row(to.add(16), [x, y, z], _mm512_div_ps(dy, depth));
             write_row(to.add(20), [x_inverse, y_inverse, z_inverse], _mm512_castsi512_ps(axis));
             write_row(to.add(24), near, _mm512_castsi512_ps(number));
