@@ -79,7 +79,7 @@ float enters(const WaldNode &node, const BvhRay &ray, float nearest) {
     return low <= high ? low : INFINITY;
 }
 
-BvhHit trace(const WaldNode *nodes, const uint32_t *ids, const float *corners, const BvhRay &ray) {
+BvhHit nearest_in(const WaldNode *nodes, const uint32_t *ids, const float *corners, const BvhRay &ray) {
     BvhHit hit = {INFINITY, UINT32_MAX};
     std::vector<uint32_t> open(1, 0);
     while (!open.empty()) {
@@ -154,7 +154,7 @@ int main() {
     const uint32_t *ids = checked(bvh_tree_object_ids(tree, &id_count));
     std::vector<WaldNode> wald(node_count);
     std::memcpy(wald.data(), nodes, node_count * sizeof(WaldNode));
-    compare("tinybvh's nodes", 0, hits, [&](size_t i) { return trace(wald.data(), ids, corners.data(), rays[i]).t; });
+    compare("tinybvh's nodes", 0, hits, [&](size_t i) { return nearest_in(wald.data(), ids, corners.data(), rays[i]).t; });
 
 #ifdef TINYBVH
     std::vector<tinybvh::bvhvec4> vertices;
