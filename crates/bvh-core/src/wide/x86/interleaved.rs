@@ -28,6 +28,9 @@ use core::mem::MaybeUninit;
 /// Rays in flight. Measured on Zen 4 with 8 to 32: fewer wait for each other, more gain nothing.
 const FLIGHT: usize = 24;
 
+/// Rays of a batch that are numbered together.
+const MOST: usize = 1 << 31;
+
 /// Leaves are visited when so many rays are at one, or none is at a node.
 const AT_LEAVES: usize = FLIGHT / 2;
 
@@ -42,6 +45,14 @@ const END: Child = Child::leaf(u32::MAX);
 pub(crate) unsafe fn trace<A: Answer>(wide: &WideBvh, rays: &[Ray], answers: &mut [A]) {
     let Some(root) = wide.root else { return answers.fill(A::MISS) };
     if rays.is_empty() {
+        return;
+    }
+    // Rays are numbered by 32 bits.
+    if rays.len() > MOST {
+        for (rays, answers) in rays.chunks(MOST).zip(answers.chunks_mut(MOST)) {
+            // SAFETY: the caller's promises.
+            unsafe { trace(wide, rays, answers) };
+        }
         return;
     }
     // SAFETY: the caller's promises.
