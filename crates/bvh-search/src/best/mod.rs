@@ -29,9 +29,9 @@
 //! division is followed at once by one long run of [annealed ruin and recreate](crate::ruin_recreate): a local search
 //! before it would be forgotten at its first temperature, and at equal work one long run ends lower than several short
 //! ones, one after another or side by side. If there is much to be done, several short runs from a lower temperature
-//! follow. A search of a minute or more by a clock, which somebody may stop early, first keeps the local optimum of reinsertion
-//! aside. Each loosens everything except the top of the tree and finds other optima, better in some places and worse in
-//! others.
+//! follow. Each loosens everything except the top of the tree and finds other optima, better in some places and worse in
+//! others. A search of a minute or more by a clock, which somebody may stop early, first keeps the local optimum of
+//! reinsertion aside.
 //!
 //! *The end is open.* Reinsertion to a local optimum, then generations, each annealed from the incumbent and longer than
 //! the one before, so that whenever the search is stopped, a constant fraction of the work has gone into the last

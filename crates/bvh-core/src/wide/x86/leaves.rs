@@ -3,6 +3,7 @@
 //! No closure here is handed to a function that might not be inlined, such as `map` of arrays: it would be compiled without
 //! the instructions of its caller.
 
+use super::edges;
 use super::prepared::Prepared;
 use crate::Slabs;
 use crate::triangle::AXES;
@@ -77,16 +78,11 @@ pub(crate) unsafe fn candidates(rays: [&Prepared; 4], blocks: [*const TriangleBl
         ];
         let slope =
             [spread!(_mm512_permute_ps, row(Prepared::X_SLOPE), 3), spread!(_mm512_permute_ps, origins, 3)];
-        let (ax, ay) = sheared(blocks, rays, 0, origin, slope);
-        let (bx, by) = sheared(blocks, rays, 1, origin, slope);
-        let (cx, cy) = sheared(blocks, rays, 2, origin, slope);
-        let u = _mm512_sub_ps(_mm512_mul_ps(cx, by), _mm512_mul_ps(cy, bx));
-        let v = _mm512_sub_ps(_mm512_mul_ps(ax, cy), _mm512_mul_ps(ay, cx));
-        let w = _mm512_sub_ps(_mm512_mul_ps(bx, ay), _mm512_mul_ps(by, ax));
-        let zero = _mm512_setzero_ps();
-        let negative = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(_mm512_min_ps(_mm512_min_ps(u, v), w), zero);
-        let positive = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(_mm512_max_ps(_mm512_max_ps(u, v), w), zero);
-        !(negative & positive)
+        edges::candidates(
+            sheared(blocks, rays, 0, origin, slope),
+            sheared(blocks, rays, 1, origin, slope),
+            sheared(blocks, rays, 2, origin, slope),
+        )
     }
 }
 
@@ -160,25 +156,13 @@ unsafe fn decide(rays: [&Prepared; 2], blocks: [*const TriangleBlock; 2], t_max:
         let coordinate = |corner: usize, axis: usize| load_two([of(0, corner, axis), of(1, corner, axis)]);
         let corner = |corner: usize| [coordinate(corner, 0), coordinate(corner, 1), coordinate(corner, 2)];
         let corners = [corner(0), corner(1), corner(2)];
-        let [ax, ay, az] = relative(corners[0], origin, slope);
-        let [bx, by, bz] = relative(corners[1], origin, slope);
-        let [cx, cy, cz] = relative(corners[2], origin, slope);
-        // Products of two f32 are exact in f64: fused or not, the difference is the same.
-        let u = _mm512_fmsub_pd(cx, by, _mm512_mul_pd(cy, bx));
-        let v = _mm512_fmsub_pd(ax, cy, _mm512_mul_pd(ay, cx));
-        let w = _mm512_fmsub_pd(bx, ay, _mm512_mul_pd(by, ax));
-        let zero = _mm512_setzero_pd();
-        let least = _mm512_min_pd(_mm512_min_pd(u, v), w);
-        let most = _mm512_max_pd(_mm512_max_pd(u, v), w);
-        let determinant = _mm512_add_pd(_mm512_add_pd(u, v), w);
-        let outside =
-            _mm512_mask_cmp_pd_mask::<_CMP_GT_OQ>(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(least, zero), most, zero);
-        let outside = outside | _mm512_cmp_pd_mask::<_CMP_EQ_OQ>(determinant, zero);
-        let (u, v, w) = (_mm512_mul_pd(u, az), _mm512_mul_pd(v, bz), _mm512_mul_pd(w, cz));
-        let sum = _mm512_add_pd(_mm512_add_pd(u, v), w);
-        let t = _mm512_div_pd(sum, _mm512_mul_pd(determinant, _mm512_cvtps_pd(depth)));
-        let inside = _mm512_mask_cmp_pd_mask::<_CMP_GE_OQ>(!outside, t, _mm512_cvtps_pd(t_min));
-        let t = _mm512_cvtpd_ps(t);
+        let (inside, t) = edges::decide(
+            relative(corners[0], origin, slope),
+            relative(corners[1], origin, slope),
+            relative(corners[2], origin, slope),
+            _mm512_cvtps_pd(depth),
+            _mm512_cvtps_pd(t_min),
+        );
 
         // The interval of each triangle's own box: the operations of `Slabs`.
         let mut reach = _mm256_setzero_ps();

@@ -5,6 +5,7 @@ pub(super) mod avx2;
 pub(super) mod avx512;
 pub(super) mod batch;
 mod box_ray;
+mod edges;
 mod interleaved;
 mod leaves;
 mod one_ray;

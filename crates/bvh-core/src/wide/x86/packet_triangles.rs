@@ -1,6 +1,7 @@
 //! Sixteen rays against one triangle, exactly.
 
 use super::answer::Answer;
+use super::edges;
 use super::packet::Packet;
 use crate::Slabs;
 use crate::wide::triangles::TriangleBlock;
@@ -30,13 +31,7 @@ impl Packet<'_> {
             let [ax, ay, _] = self.apply(&block.corners[0], lane);
             let [bx, by, _] = self.apply(&block.corners[1], lane);
             let [cx, cy, _] = self.apply(&block.corners[2], lane);
-            let u = _mm512_sub_ps(_mm512_mul_ps(cx, by), _mm512_mul_ps(cy, bx));
-            let v = _mm512_sub_ps(_mm512_mul_ps(ax, cy), _mm512_mul_ps(ay, cx));
-            let w = _mm512_sub_ps(_mm512_mul_ps(bx, ay), _mm512_mul_ps(by, ax));
-            let zero = _mm512_setzero_ps();
-            let negative = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(_mm512_min_ps(_mm512_min_ps(u, v), w), zero);
-            let positive = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(_mm512_max_ps(_mm512_max_ps(u, v), w), zero);
-            !(negative & positive)
+            edges::candidates((ax, ay), (bx, by), (cx, cy))
         }
     }
 
@@ -116,23 +111,13 @@ impl Packet<'_> {
     ) -> (u8, __m256) {
         // SAFETY: the caller's promises.
         unsafe {
-            let (ax, ay, az) = (double::<HALF>(a[0]), double::<HALF>(a[1]), double::<HALF>(a[2]));
-            let (bx, by, bz) = (double::<HALF>(b[0]), double::<HALF>(b[1]), double::<HALF>(b[2]));
-            let (cx, cy, cz) = (double::<HALF>(c[0]), double::<HALF>(c[1]), double::<HALF>(c[2]));
-            // Products of two f32 are exact in f64: fused or not, the difference is the same.
-            let u = _mm512_fmsub_pd(cx, by, _mm512_mul_pd(cy, bx));
-            let v = _mm512_fmsub_pd(ax, cy, _mm512_mul_pd(ay, cx));
-            let w = _mm512_fmsub_pd(bx, ay, _mm512_mul_pd(by, ax));
-            let zero = _mm512_setzero_pd();
-            let negative = _mm512_cmp_pd_mask::<_CMP_LT_OQ>(_mm512_min_pd(_mm512_min_pd(u, v), w), zero);
-            let positive = _mm512_cmp_pd_mask::<_CMP_GT_OQ>(_mm512_max_pd(_mm512_max_pd(u, v), w), zero);
-            let determinant = _mm512_add_pd(_mm512_add_pd(u, v), w);
-            let flat = _mm512_cmp_pd_mask::<_CMP_EQ_OQ>(determinant, zero);
-            let (u, v, w) = (_mm512_mul_pd(u, az), _mm512_mul_pd(v, bz), _mm512_mul_pd(w, cz));
-            let sum = _mm512_add_pd(_mm512_add_pd(u, v), w);
-            let t = _mm512_div_pd(sum, _mm512_mul_pd(determinant, double::<HALF>(self.depth)));
-            let after = _mm512_cmp_pd_mask::<_CMP_GE_OQ>(t, double::<HALF>(self.sixteen.t_min));
-            (after & !(negative & positive | flat), _mm512_cvtpd_ps(t))
+            edges::decide(
+                [double::<HALF>(a[0]), double::<HALF>(a[1]), double::<HALF>(a[2])],
+                [double::<HALF>(b[0]), double::<HALF>(b[1]), double::<HALF>(b[2])],
+                [double::<HALF>(c[0]), double::<HALF>(c[1]), double::<HALF>(c[2])],
+                double::<HALF>(self.depth),
+                double::<HALF>(self.sixteen.t_min),
+            )
         }
     }
 }
