@@ -379,3 +379,39 @@ fn a_mistyped_command_is_answered_with_the_one_that_is_meant() {
     fs::rename(folder.path().join("spec.toml"), folder.path().join("bakee")).unwrap();
     assert!(run(folder.path(), &["bakee"]).status.success());
 }
+
+#[test]
+fn runs_that_the_clock_ends_leave_rows_among_the_timings_alone_and_checks_do_not_compare_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = "question = 'How low in a moment?'\nscenes = ['escher']\nsequential = true\nmax_seconds = 0.05\n\
+                methods = [{ method = 'best', references = 1.2 }]\ntinybvh = 'nowhere/ray_peers'\n";
+    fs::write(folder.path().join("clock.toml"), spec).unwrap();
+    let first = run(folder.path(), &["clock.toml"]);
+    assert!(first.status.success(), "{}", text(&first.stderr));
+    let said = text(&first.stdout);
+    assert!(said.contains("collapsed_sah") && said.contains("Without tinybvh: nowhere/ray_peers"), "{said}");
+    let results = folder.path().join("results/clock");
+    let mut names: Vec<String> = fs::read_dir(&results)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.retain(|name| !name.starts_with('.'));
+    names.sort();
+    assert_eq!(names, ["provenance.toml", "resolved.toml", "timing_report.txt", "timing_runs.csv"]);
+    let rows = fs::read_to_string(results.join("timing_runs.csv")).unwrap();
+    let mut reader = csv::Reader::from_reader(rows.as_bytes());
+    let column = reader.headers().unwrap().iter().position(|name| name == "seconds").unwrap();
+    let seconds: f64 = reader.records().next().unwrap().unwrap()[column].parse().unwrap();
+    // However busy the machine is: without the limit, `best` takes hours.
+    assert!((0.05..20.0).contains(&seconds), "{seconds}");
+
+    // Other costs are no difference, another spec is.
+    fs::write(results.join("timing_runs.csv"), rows.replace('1', "2")).unwrap();
+    let check = run(folder.path(), &["--check", "clock.toml"]);
+    assert!(check.status.success(), "{}", text(&check.stdout));
+    assert!(text(&check.stdout).contains("cannot be compared"), "{}", text(&check.stdout));
+    fs::write(folder.path().join("clock.toml"), spec.replace("1.2", "1.3")).unwrap();
+    let check = run(folder.path(), &["--check", "clock.toml"]);
+    assert_eq!(check.status.code(), Some(1));
+    assert!(text(&check.stdout).contains("references is 1.3, committed 1.2"), "{}", text(&check.stdout));
+}

@@ -6,7 +6,7 @@
 use crate::measure::speed::{Batch, Contender, PART, Tracer};
 use crate::scenes::Scene;
 use bvh_build::Query;
-use bvh_core::{Hit, Triangle};
+use bvh_core::{Bvh, FirstCountNode, Hit, Triangle};
 use std::cell::RefCell;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::Path;
@@ -34,6 +34,34 @@ pub fn contenders(program: &Path, scene: &Scene) -> Result<Vec<(String, Contende
         Ok((library.to_owned(), Contender { layout: mode.to_owned(), preparation_seconds, tracer }))
     };
     modes.lines().map(contender).collect()
+}
+
+/// tinybvh's tree with spatial splits over the scene's triangles, with its own leaves and boxes, and the seconds that its build took.
+/// An error says what the program did not do.
+pub fn split_tree(program: &Path, scene: &Scene) -> Result<(Bvh, f64), String> {
+    let triangles = scene.triangles().map_err(|error| error.to_string())?;
+    let failed = |error: &dyn std::fmt::Display| {
+        format!("{} \"{SPLIT_TREE}\": {error}; scripts/ray-peers/build makes it anew", program.display())
+    };
+    let (mut process, seconds) =
+        Process::start(program, SPLIT_TREE, triangles).map_err(|error| failed(&error))?;
+    let (nodes, ids) = nodes(&mut process.answers).map_err(|error| failed(&error))?;
+    let tree = Bvh::from_first_count(&nodes, &ids).map_err(|error| failed(&error))?;
+    Ok((tree, seconds))
+}
+
+/// What hands out a tree, and is no mode because it traces nothing.
+const SPLIT_TREE: &str = "tinybvh tree splits";
+
+/// Reads a tree's nodes and the triangles of its leaves, behind the number of each.
+fn nodes(from: &mut impl Read) -> io::Result<(Vec<FirstCountNode>, Vec<u32>)> {
+    let mut counts = [0u32; 2];
+    from.read_exact(bytemuck::cast_slice_mut(&mut counts))?;
+    let [nodes, ids] = counts.map(|count| count as usize);
+    let (mut nodes, mut ids) = (vec![FirstCountNode::default(); nodes], vec![0u32; ids]);
+    from.read_exact(bytemuck::cast_slice_mut(&mut nodes))?;
+    from.read_exact(bytemuck::cast_slice_mut(&mut ids))?;
+    Ok((nodes, ids))
 }
 
 /// The program in one mode, with one scene.
@@ -131,6 +159,24 @@ mod tests {
         let hit = |t| Some(Hit { t, object: 0 });
         assert_eq!(hits, [hit(2.5), None, hit(0.0)]);
         assert!(answer(&mut &received[1..], &mut hits).is_err(), "an answer that is cut short");
+    }
+
+    #[test]
+    fn a_tree_is_read_from_its_nodes_and_one_that_is_cut_short_is_refused() {
+        let aabb = bvh_core::Aabb::from([[0.0; 3], [1.0; 3]]);
+        let nodes = vec![
+            bvh_core::Node::inner(aabb, 1, 2),
+            bvh_core::Node::leaf(aabb, 0, 2),
+            bvh_core::Node::leaf(aabb, 2, 1),
+        ];
+        let tree = Bvh { nodes, prim_ids: vec![1, 0, 1] };
+        let (nodes, ids) = (tree.to_first_count_aligned(), &tree.prim_ids);
+        let mut sent = [nodes.len() as u32, ids.len() as u32].map(u32::to_le_bytes).concat();
+        sent.extend_from_slice(bytemuck::cast_slice(&nodes));
+        sent.extend_from_slice(bytemuck::cast_slice(ids));
+        let (nodes, ids) = super::nodes(&mut &sent[..]).unwrap();
+        assert_eq!(Bvh::from_first_count(&nodes, &ids), Ok(tree));
+        assert!(super::nodes(&mut &sent[..sent.len() - 1]).is_err());
     }
 
     #[test]

@@ -4,6 +4,7 @@
 
 pub mod anytime;
 mod attempt;
+pub mod clocked;
 pub mod config;
 mod correlation;
 pub mod data;

@@ -1,6 +1,7 @@
 //! Carries out the runs of an experiment: in parallel or one by one, with progress, until done or interrupted.
 
 use crate::Error;
+use crate::run::clocked;
 use crate::run::finish::{Summary, conclude};
 use crate::run::job::{Job, Watch, base_cost, perform};
 use crate::run::provenance::Provenance;
@@ -101,6 +102,9 @@ fn run(
     }
     if let Some(config) = &experiment.ray_cost {
         ray_cost::judge(experiment, config, &jobs, &mut trees, &watch, &store)?;
+    }
+    if let Some(program) = &experiment.tinybvh {
+        traced = clocked::cost_peers(program, &scenes, &store)?;
     }
     let best_known = if beside.is_some() { BestKnown::Read(out) } else { BestKnown::Improve(out) };
     let text = conclude(&resolved, best_known, &provenance, store)? + &traced;

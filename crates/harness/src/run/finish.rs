@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::files;
-use crate::report;
+use crate::report::{self, clocked};
 use crate::run::provenance::Provenance;
 use crate::run::reference::{self, BestKnown};
 use crate::run::resolved::{Resolved, to_toml};
@@ -49,6 +49,9 @@ fn report(
 ) -> Result<String, Error> {
     store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
     reference::update(resolved, best_known, &provenance.revision, store)?;
+    if resolved.experiment.is_by_the_clock() {
+        return clocked::write(store);
+    }
     // Of quick variants, nothing but the rows is compared or shown.
     report::write_all(&resolved.experiment.reports, store, !resolved.experiment.quick)
 }

@@ -6,21 +6,21 @@ use crate::measure::rays::Family;
 use crate::peers::Built;
 use crate::report::Report;
 use crate::run::judge::RayJudge;
-use crate::run::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow};
+use crate::run::rows::{BoundRow, ClockRow, ClockedRow, HistoryRow, RayRow, RunRow, TimingRow};
 use crate::run::store::FinishedRun;
 use crate::scenes::Scene;
 use crate::spec::{Contestant, Experiment, Labelled};
 use bvh_build::{Builder, Query, muller_fellner};
 use bvh_core::cost::{self, Measure, Objective, SahConstants};
-use bvh_core::{Bvh, RayDensity, validate_references};
+use bvh_core::{Bvh, RayDensity, collapse_leaves, validate_references};
 use bvh_search::{
-    Budget, Event, Judge, Observer, Outcome, Problem, SearchError, Splits, StopReason, exact, lower_bound,
-    solve,
+    Budget, Deadline, Event, Judge, Observer, Outcome, Problem, SearchError, Splits, StopReason, exact,
+    lower_bound, solve,
 };
 use indicatif::ProgressBar;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// One run of an experiment.
 pub(crate) struct Job<'a> {
@@ -73,7 +73,13 @@ pub(crate) fn perform(
     }
     let Job { scene, labelled, .. } = *job;
     let seed = job.seed(experiment);
-    let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
+    let limit = experiment.max_seconds_of(labelled).map(Duration::from_secs_f64);
+    let stopwatch = Stopwatch {
+        watch,
+        start: Instant::now(),
+        deadline: limit.map(Deadline::after),
+        events: Mutex::default(),
+    };
     let solved = solve_or_build(experiment, job, seed, &stopwatch);
     // That an external program was ended is no failure then.
     if watch.cancelled() {
@@ -88,6 +94,11 @@ pub(crate) fn perform(
     })?;
     let solved = Solved { experiment, job, seed, outcome: &outcome, seconds };
     let run = solved.run_row();
+    let mut finished = FinishedRun::default();
+    if experiment.is_by_the_clock() {
+        finished.add(&[solved.clocked_row(run)])?;
+        return Ok(Some((finished, outcome.tree)));
+    }
     let bounds = if job.first_of_scene { bound(experiment, scene, watch)? } else { None };
     let (renders, render_times) = match &experiment.render {
         Some(config) => config.measure(scene, &outcome.tree, &run, seconds, job.first_of_scene)?,
@@ -97,7 +108,6 @@ pub(crate) fn perform(
     if watch.cancelled() {
         return Ok(None);
     }
-    let mut finished = FinishedRun::default();
     finished.add(&[run])?;
     finished.add(&solved.history_rows())?;
     finished.add(&[solved.timing_row()])?;
@@ -177,6 +187,12 @@ pub(crate) fn density(experiment: &Experiment, job: &Job) -> Result<Option<RayDe
     config.density(trained, job.scene, seed).map(Some).map_err(failed)
 }
 
+/// The surface area heuristic with both constants 1, after the best collapse of leaves.
+pub(crate) fn collapsed_sah(tree: &Bvh) -> f64 {
+    let constants = SahConstants::default();
+    cost::sah(&collapse_leaves(tree, &constants), &constants)
+}
+
 /// A tree by others, as a search of one evaluation, and the seconds of the building alone.
 fn built(tree: Bvh, seconds: f64, objective: &Objective, stopwatch: &Stopwatch) -> (Outcome, f64) {
     let (cost, work) = (objective.cost(&tree), tree.nodes.len() as u64);
@@ -243,6 +259,24 @@ impl Solved<'_> {
         TimingRow { scene, method, seed: self.seed, repetition, threads, seconds: self.seconds }
     }
 
+    fn clocked_row(&self, run: RunRow) -> ClockedRow {
+        let tree = &self.outcome.tree;
+        ClockedRow {
+            scene: run.scene,
+            method: run.method,
+            seed: run.seed,
+            repetition: run.repetition,
+            threads: rayon::current_num_threads(),
+            seconds: self.seconds,
+            evaluations: run.evaluations,
+            work: run.work,
+            cost: run.cost,
+            cost_over_base: run.cost_over_base,
+            references_per_object: tree.prim_ids.len() as f64 / run.objects as f64,
+            collapsed_sah: collapsed_sah(tree),
+        }
+    }
+
     /// When each event happened, if a report asks for it.
     fn clock_rows(&self, stopwatch: &Stopwatch) -> Vec<ClockRow> {
         if !self.experiment.reports.iter().any(Report::needs_clock) {
@@ -301,10 +335,11 @@ impl Observer for Watch<'_> {
     }
 }
 
-/// Notes when the events of one run happen.
+/// Notes when the events of one run happen, and ends it after its seconds, if it has a limit.
 struct Stopwatch<'a> {
     watch: &'a Watch<'a>,
     start: Instant,
+    deadline: Option<Deadline>,
     events: Mutex<Vec<f64>>,
 }
 
@@ -326,6 +361,10 @@ impl Observer for Stopwatch<'_> {
     }
 
     fn cancelled(&self) -> bool {
-        self.watch.cancelled()
+        self.watch.cancelled() || self.deadline.is_some_and(|deadline| deadline.has_passed())
+    }
+
+    fn progress(&self) -> Option<f64> {
+        self.deadline.map(|deadline| deadline.fraction())
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod archive;
 pub mod check;
+mod clocked;
 pub mod execute;
 pub mod finish;
 mod job;

@@ -2,13 +2,12 @@
 
 use crate::Error;
 use crate::measure::ray_cost::{Config, TrainedOn, test_rays};
-use crate::run::job::{Job, Watch, density};
+use crate::run::job::{Job, Watch, collapsed_sah, density};
 use crate::run::rows::{LayoutRow, Row, TestRow, TestTimeRow, to_bytes};
 use crate::run::store::Store;
 use crate::run::trace::{Trees, complete};
 use crate::spec::Experiment;
-use bvh_core::cost::{self, SahConstants};
-use bvh_core::{Bvh, WideBvh, collapse_leaves};
+use bvh_core::{Bvh, WideBvh, cost};
 use bvh_search::Observer;
 use rayon::prelude::*;
 use std::path::Path;
@@ -100,7 +99,6 @@ fn layout(experiment: &Experiment, job: &Job, tree: &Bvh) -> Result<WideBvh, Err
 
 /// The sizes and costs of a method's trees and their layouts, means over repetitions.
 fn size(runs: &[(&Job, &Bvh)], layouts: &[WideBvh]) -> LayoutRow {
-    let constants = SahConstants::default();
     let job = runs[0].0;
     let objects = job.scene.boxes.len() as f64;
     let mean =
@@ -112,7 +110,7 @@ fn size(runs: &[(&Job, &Bvh)], layouts: &[WideBvh]) -> LayoutRow {
         repetitions: runs.len(),
         references_per_object: mean(&|tree| tree.prim_ids.len() as f64 / objects),
         bytes_per_object: bytes as f64 / (objects * layouts.len() as f64),
-        collapsed_sah: mean(&|tree| cost::sah(&collapse_leaves(tree, &constants), &constants)),
+        collapsed_sah: mean(&collapsed_sah),
         layout_over_root: mean(&|tree| cost::over_root_area(tree, cost::layout_area(tree))),
     }
 }

@@ -121,6 +121,36 @@ rows! {
         seconds: f64,
     }
 
+    /// One row of `timing_runs.csv`: what a run found that the clock ended.
+    ClockedRow in "timing_runs.csv" {
+        scene: String,
+        method: String,
+        seed: u64,
+        repetition: u32,
+        /// Threads at its disposal.
+        threads: usize,
+        /// Wall time of the whole run.
+        seconds: f64,
+        evaluations: u64,
+        work: u64,
+        /// As in `runs.csv`.
+        cost: f64,
+        cost_over_base: f64,
+        /// As in `layouts.csv`.
+        references_per_object: f64,
+        collapsed_sah: f64,
+    }
+
+    /// One row of `timing_peers.csv`: another library's tree beside such runs.
+    ClockedPeerRow in "timing_peers.csv" {
+        scene: String,
+        method: String,
+        /// Wall time of its build, on one thread.
+        seconds: f64,
+        references_per_object: f64,
+        collapsed_sah: f64,
+    }
+
     /// One row of `timing_history.csv`: when the event of the same row of `history.csv` happened.
     ClockRow in "timing_history.csv" {
         scene: String,

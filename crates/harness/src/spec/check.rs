@@ -73,7 +73,7 @@ impl Experiment {
 
     fn check_method(&self, labelled: &Labelled) -> Result<(), Fault> {
         let Labelled { method, own, .. } = labelled;
-        let Own { budget, keep, judge, for_rays, objective, references, .. } = own;
+        let Own { budget, max_seconds, keep, judge, for_rays, objective, references, .. } = own;
         own.check()?;
         let (is_ours, is_best) =
             (matches!(method, Contestant::Ours(_)), matches!(method, Contestant::Ours(Method::Best(_))));
@@ -81,6 +81,7 @@ impl Experiment {
         let (ours, with_judged) = ("with a method of ours", format!("with {}", judged.join(", ")));
         let of_some_methods = [
             ("budget", budget.is_some(), is_ours, ours),
+            ("max_seconds", max_seconds.is_some(), is_ours, ours),
             ("keep", !keep.is_empty(), is_ours, ours),
             ("objective", objective.is_some(), is_ours, ours),
             ("for_rays", for_rays.is_some(), is_ours, ours),
@@ -115,6 +116,42 @@ impl Experiment {
             Contestant::Ours(method) => Ok(method.check()?),
             Contestant::External(program) => Ok(program.check()?),
         }
+    }
+
+    /// What is asked for that runs which the clock ends cannot have: everything that is to be the same whenever it is made again.
+    pub(super) fn check_clock(&self) -> Vec<Fault> {
+        if !self.is_by_the_clock() {
+            let alone = self.tinybvh.as_ref().map(|_| {
+                Fault::new(
+                    "tinybvh",
+                    "set without `max_seconds`",
+                    "with a budget in seconds, beside which its trees are costed",
+                )
+            });
+            return alone.into_iter().collect();
+        }
+        let beside = |key: &str| format!("{key} beside `max_seconds`");
+        let accepted =
+            "none, or a budget of `max_work`: runs of so many seconds have rows in timing_runs.csv alone";
+        let repeatable = [
+            ("suite", self.suite.is_some()),
+            ("lower_bound", self.lower_bound.is_some()),
+            ("rays", !self.rays.is_empty()),
+            ("render", self.render.is_some()),
+            ("tracing", self.tracing.is_some()),
+            ("ray_cost", self.ray_cost.is_some()),
+            ("reports", !self.reports.is_empty()),
+        ];
+        let refused = repeatable.iter().filter(|(_, is_set)| *is_set);
+        let refused = refused.map(|(key, _)| Fault::new(key, beside("set"), accepted));
+        let in_parallel = (!self.sequential).then(|| {
+            Fault::new(
+                "sequential",
+                beside("false"),
+                "true: runs at the same time take seconds from each other",
+            )
+        });
+        refused.chain(in_parallel).collect()
     }
 
     /// The first label in each report that no method has.

@@ -62,6 +62,8 @@ bvh_build::config! { serde;
         label: Option<String>;
         /// Limits of its runs besides the experiment's: the lower of both counts. Default none.
         budget: Option<Budget>;
+        /// Seconds that each of its runs may take, besides the experiment's `max_seconds`: the lower of both counts. Default none.
+        max_seconds: Option<f64>, in 0.001..=1e6;
         /// What its runs do although the scene does not need it, to measure what leaving it out saves. Default nothing.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         keep: Vec<Shortcut>;

@@ -57,6 +57,11 @@ config! {
         objective: Objective;
         /// Limits of every run; by default none.
         budget: Budget = Budget::UNLIMITED;
+        /// Seconds that every run of a method of ours may take, besides its `budget`. Such rows differ from run to run: they are in
+        /// `timing_runs.csv` in place of `runs.csv`, with the trees' costs after the best collapse of leaves. Default none.
+        max_seconds: Option<f64>, in 0.001..=1e6;
+        /// The program of `scripts/ray-peers`, by which tinybvh's trees with spatial splits are costed beside such rows, if it is there.
+        tinybvh: Option<PathBuf>;
         /// Effort of a lower bound of every scene's internal area; by default no bound is sought.
         lower_bound: Option<u32>;
         /// What is run, at least one; with `suite`, none for every method of the registry.
@@ -104,6 +109,18 @@ impl Experiment {
             max_evaluations: lower(self.budget.max_evaluations, own.max_evaluations),
             max_work: lower(self.budget.max_work, own.max_work),
         }
+    }
+
+    /// The seconds that a method's runs may take.
+    pub fn max_seconds_of(&self, labelled: &Labelled) -> Option<f64> {
+        let is_ours = matches!(labelled.method, Contestant::Ours(_));
+        let limits = self.max_seconds.into_iter().filter(|_| is_ours).chain(labelled.own.max_seconds);
+        limits.reduce(f64::min)
+    }
+
+    /// Whether the clock ends some of the runs, so that nothing but `timing*.csv` may have rows of them.
+    pub fn is_by_the_clock(&self) -> bool {
+        self.methods.iter().any(|labelled| self.max_seconds_of(labelled).is_some())
     }
 
     /// The seed of one run, within 32 bits so that every spreadsheet keeps it exactly.

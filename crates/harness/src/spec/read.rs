@@ -116,7 +116,8 @@ impl Experiment {
             experiment.methods = Method::all().into_iter().map(Labelled::new).collect();
         }
         let faults: Vec<Fault> = experiment.check().err().map(Fault::from).into_iter().collect();
-        let faults = [faults, experiment.check_methods(), experiment.check_reports()].concat();
+        let together = [experiment.check_methods(), experiment.check_clock(), experiment.check_reports()];
+        let faults = [faults, together.concat()].concat();
         if faults.is_empty() { Ok(experiment) } else { Err(faults) }
     }
 }

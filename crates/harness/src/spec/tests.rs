@@ -26,6 +26,7 @@ fn wrong_keys_and_values_are_named_with_what_would_be_accepted() {
         ("[[reports]]\nkind = 'pie'\n", &["pie", "table"]),
         ("rays = [{ family = 'lines', query = 'any', count = 0 }]\n", &["rays[0].count is 0"]),
         ("tracing = { rounds = 0 }\n", &["tracing.rounds is 0", "1 to 1000000"]),
+        ("max_seconds = 0\n", &["max_seconds is 0", "0.001 to 1000000"]),
         ("threads = 0\n", &["threads is 0", "1 to 1024"]),
         ("threads = 65535\n", &["threads is 65535", "1 to 1024"]),
         ("repetitions = 4294967295\n", &["repetitions", "4294967295 runs"]),
@@ -45,6 +46,43 @@ fn wrong_keys_and_values_are_named_with_what_would_be_accepted() {
         let message = read(&format!("{good}{wrong}"), &Overrides::default()).unwrap_err();
         assert!(parts.iter().all(|part| message.contains(part)), "{wrong}: {message}");
     }
+}
+
+#[test]
+fn nothing_that_repeats_stands_beside_a_budget_in_seconds() {
+    let clocked = format!("{GOOD}sequential = true\nmax_seconds = 0.5\n");
+    let of_one = GOOD.replace("noise = 0.1", "max_seconds = 2.0");
+    assert!(read(&clocked, &Overrides::default()).unwrap().is_by_the_clock());
+    assert!(!read(GOOD, &Overrides::default()).unwrap().is_by_the_clock());
+    let report = "[[reports]]\nkind = 'numbers'\ntitle = 't'\nmethods = ['grasp']\n";
+    for (spec, key) in [
+        (format!("{clocked}{report}"), "line 6: reports is set"),
+        (format!("{clocked}rays = [{{}}]\n"), "line 6: rays is set"),
+        (format!("{clocked}lower_bound = 3\n"), "lower_bound is set"),
+        (format!("{clocked}[ray_cost]\ncount = 10\n"), "ray_cost is set"),
+        (format!("{clocked}[tracing]\ncount = 10\n"), "tracing is set"),
+        (format!("{clocked}[render]\nwidth = 10\n"), "render is set"),
+        (of_one, "sequential is false"),
+    ] {
+        let message = read(&spec, &Overrides::default()).unwrap_err();
+        let parts = ["spec.toml", key, "beside `max_seconds`; accepted: "];
+        assert!(parts.iter().all(|part| message.contains(part)), "{spec}: {message}");
+        assert_eq!(message.lines().count(), 1, "{message}");
+    }
+    let alone = read(&format!("{GOOD}tinybvh = 'x'\n"), &Overrides::default()).unwrap_err();
+    assert!(alone.contains("tinybvh is set without `max_seconds`"), "{alone}");
+}
+
+#[test]
+fn the_lower_of_both_budgets_in_seconds_holds_and_only_for_methods_of_ours() {
+    let methods = "[{ method = 'grasp', max_seconds = 0.2 }, { method = 'best', max_seconds = 9.0 }, \
+                   { method = 'external', command = ['x'] }]";
+    let spec = format!(
+        "question = 'q'\nscenes = ['escher']\nsequential = true\nmax_seconds = 1.0\nmethods = {methods}\n"
+    );
+    let spec = read(&spec, &Overrides::default()).unwrap();
+    let limits: Vec<_> = spec.methods.iter().map(|method| spec.max_seconds_of(method)).collect();
+    assert_eq!(limits, [Some(0.2), Some(1.0), None]);
 }
 
 #[test]
