@@ -74,6 +74,9 @@ pub enum Error {
     /// Ctrl-C during a bake.
     #[error("interrupted; the best tree so far, of cost {cost}, is in {0}; `--from {0}` goes on", .path.display())]
     Stopped { path: PathBuf, cost: f64 },
+    /// Ctrl-C during a bake of instances.
+    #[error("interrupted; the best trees so far, of all meshes and over the instances, are in {}", .path.display())]
+    StoppedInstances { path: PathBuf },
 }
 
 impl Error {
@@ -81,7 +84,10 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Spec { .. } | Self::Scene { .. } | Self::Usage(_) | Self::TreeFile { .. } => 2,
-            Self::Interrupted { .. } | Self::Stopped { .. } | Self::Abandoned => 130,
+            Self::Interrupted { .. }
+            | Self::Stopped { .. }
+            | Self::StoppedInstances { .. }
+            | Self::Abandoned => 130,
             _ => 1,
         }
     }

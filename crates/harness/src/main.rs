@@ -4,7 +4,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use harness::cli::interrupt::{self, INTERRUPTED};
 use harness::cli::output::{STDOUT_FAILED, print_bytes, print_error, print_line};
-use harness::cli::{bake, commands, inspect, merge, new, render, report, run, scenes};
+use harness::cli::{bake, bake_instances, commands, inspect, merge, new, render, report, run, scenes};
 use harness::{Error, stress::child};
 use std::path::Path;
 use std::process::ExitCode;
@@ -61,6 +61,7 @@ fn main() -> ExitCode {
         Some(Command::Report(args)) => report::report(&args),
         Some(Command::Merge(args)) => merge::merge(&args),
         Some(Command::Render(args)) => render::render(&args, &INTERRUPTED),
+        Some(Command::Bake(args)) if args.instances => bake_instances::bake(&args, &INTERRUPTED),
         Some(Command::Bake(args)) => bake::bake(&args, &INTERRUPTED),
         Some(Command::Inspect(args)) => inspect::inspect(&args),
         Some(Command::Verify(args)) => inspect::verify(&args),

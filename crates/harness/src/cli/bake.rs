@@ -33,9 +33,12 @@ pub struct BakeArgs {
     /// same bytes everywhere.
     #[arg(long, value_name = "TIME|WORK")]
     pub budget: Effort,
-    /// The file to write; an old one is replaced when the new one is complete.
-    #[arg(long, value_name = "FILE.bvh")]
+    /// The file to write; an old one is replaced when the new one is complete. With --instances a new or empty folder.
+    #[arg(long, value_name = "FILE.bvh|DIR")]
     pub out: PathBuf,
+    /// Bake a tree for every mesh of a glTF file, each once, and one over the places where its nodes put them.
+    #[arg(long, conflicts_with_all = ["rays", "from", "explain"])]
+    pub instances: bool,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -94,57 +97,85 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let method = method(args)?;
     check_references(args, &method)?;
     let start = args.from.as_deref().map(|path| start(path, &scene)).transpose()?;
-    let most = (args.references * scene.boxes.len() as f64) as usize;
-    let reserved = Reserved::new(&args.out, most_bytes(most))?;
+    let reserved = Reserved::new(&args.out, most_bytes(most_references(args, &scene)))?;
+    let baked = search(args, &method, &scene, args.budget, rays.as_ref(), start.as_ref(), interrupted)?;
+    reserved.write(&baked.bytes)?;
+    if interrupted.load(Relaxed) {
+        return Err(Error::Stopped { path: args.out.clone(), cost: baked.outcome.cost });
+    }
+    print_line(&format!("{}{} bytes", summary(args, &scene, &baked), baked.bytes.len()));
+    Ok(())
+}
 
+/// What a search found.
+pub(super) struct Baked {
+    pub outcome: Outcome,
+    /// Of the tree file.
+    pub bytes: Vec<u8>,
+    /// The cost of the greedy tree.
+    pub base: f64,
+    /// The cost of the tree that it went on from.
+    before: Option<f64>,
+    seconds: f64,
+}
+
+/// Searches until the budget is spent or `interrupted` becomes true.
+pub(super) fn search(
+    args: &BakeArgs,
+    method: &Method,
+    scene: &Scene,
+    effort: Effort,
+    rays: Option<&Rays>,
+    start: Option<&(Bvh, Header)>,
+    interrupted: &AtomicBool,
+) -> Result<Baked, Error> {
     let greedy = muller_fellner::Config::default().build(&scene.boxes);
     let greedy = greedy.map_err(Error::search(&scene.name, &args.method))?;
-    let deadline = args.budget.deadline();
+    let deadline = effort.deadline();
     interrupt::hold();
-    let density = rays.map(|rays| density(&rays, &scene, &greedy, args.seed)).transpose()?;
+    let density = rays.map(|rays| density(rays, scene, &greedy, args.seed)).transpose()?;
     let objective = match args.cost {
         BakeCost::Area => Objective::InternalArea,
         BakeCost::Layout => Objective::Layout,
     };
     let problem = Problem {
         objective,
-        splits: Splits::at_most(most, &scene.boxes, &scene.primitives),
+        splits: Splits::at_most(most_references(args, scene), &scene.boxes, &scene.primitives),
         measure: density.as_ref().map(|density| density as &dyn Measure),
         ..Problem::new(&scene.boxes)
     };
     let base = problem.cost(&greedy);
-    let watch = Watch::new(args.budget, deadline, base, interrupted);
-    let budget = match args.budget {
+    let watch = Watch::new(effort, deadline, base, interrupted);
+    let budget = match effort {
         Effort::Time(_) => Budget::UNLIMITED,
         Effort::Work(work) => Budget { max_work: Some(work), ..Budget::UNLIMITED },
     };
-    let outcome = match (&start, &method) {
+    let outcome = match (start, method) {
         (Some((tree, _)), Method::Best(config)) => optimize(tree, &problem, config, args.seed, budget, &watch),
-        _ => solve(&method, &problem, args.seed, budget, &watch),
+        _ => solve(method, &problem, args.seed, budget, &watch),
     };
     watch.bar.finish_and_clear();
     let outcome = outcome.map_err(Error::search(&scene.name, &args.method))?;
     let seconds = watch.deadline.elapsed().as_secs_f64();
 
-    let spent = start.as_ref().map_or(0, |(_, header)| header.work);
+    let spent = start.map_or(0, |(_, header)| header.work);
     let work = spent.saturating_add(outcome.work);
     let name = recorded(args);
     let visits = density.as_ref().map_or_else(Vec::new, |density| density.visits(&outcome.tree));
     let origin = Origin { method: &name, seed: args.seed, work, visits: &visits, objective };
     let bytes = file::save_references(&outcome.tree, &scene.boxes, &scene.primitives, &origin)
         .map_err(|source| Error::TreeFile { path: args.out.clone(), source })?;
-    reserved.write(&bytes)?;
-    if interrupted.load(Relaxed) {
-        return Err(Error::Stopped { path: args.out.clone(), cost: outcome.cost });
-    }
-    let before = start.map(|(tree, _)| problem.cost(&tree));
-    let summary = summary(args, &scene, &outcome, base, before, seconds);
-    print_line(&format!("{summary}{} bytes", bytes.len()));
-    Ok(())
+    let before = start.map(|(tree, _)| problem.cost(tree));
+    Ok(Baked { outcome, bytes, base, before, seconds })
+}
+
+/// The most references to a scene's objects that leaves may have.
+fn most_references(args: &BakeArgs, scene: &Scene) -> usize {
+    (args.references * scene.boxes.len() as f64) as usize
 }
 
 /// The rays of `--rays`.
-enum Rays {
+pub(super) enum Rays {
     /// Any, without a camera.
     Default,
     /// A renderer's.
@@ -196,7 +227,7 @@ fn unit(args: &BakeArgs) -> &'static str {
 }
 
 /// The method that was named. Refuses one that cannot start from a tree if a tree is given.
-fn method(args: &BakeArgs) -> Result<Method, Error> {
+pub(super) fn method(args: &BakeArgs) -> Result<Method, Error> {
     let found = Method::all().into_iter().find(|method| method.name() == args.method);
     match found {
         None => {
@@ -215,7 +246,7 @@ fn method(args: &BakeArgs) -> Result<Method, Error> {
 }
 
 /// Refuses numbers of references that are out of range, and methods that would take no notice of them.
-fn check_references(args: &BakeArgs, method: &Method) -> Result<(), Error> {
+pub(super) fn check_references(args: &BakeArgs, method: &Method) -> Result<(), Error> {
     let refused = |found: String, accepted: &str| {
         Err(Error::Usage(format!("--references {found}; accepted: {accepted}")))
     };
@@ -240,14 +271,8 @@ fn most_bytes(objects: usize) -> usize {
     Header::BYTES + objects * (2 * (size_of::<bvh_core::Node>() + size_of::<f32>()) + size_of::<u32>())
 }
 
-fn summary(
-    args: &BakeArgs,
-    scene: &Scene,
-    outcome: &Outcome,
-    base: f64,
-    before: Option<f64>,
-    seconds: f64,
-) -> String {
+fn summary(args: &BakeArgs, scene: &Scene, baked: &Baked) -> String {
+    let &Baked { ref outcome, base, before, seconds, .. } = baked;
     let mut lines = vec![
         format!(
             "{} ({}), {} objects, {}, seed {}",
@@ -284,7 +309,7 @@ fn summary(
 }
 
 /// By how much `cost` is below or above `base`, in words.
-fn gain(cost: f64, base: f64) -> String {
+pub(super) fn gain(cost: f64, base: f64) -> String {
     let percent = if base > 0.0 { 100.0 * (1.0 - cost / base) } else { 0.0 };
     if percent >= 0.0 { format!("{percent:.2} % below") } else { format!("{:.2} % above", -percent) }
 }

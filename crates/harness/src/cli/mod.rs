@@ -2,6 +2,7 @@
 
 pub mod arguments;
 pub mod bake;
+pub mod bake_instances;
 pub mod commands;
 pub mod effort;
 pub mod explain;

@@ -15,6 +15,8 @@ use gltf_json::scene::Node;
 use gltf_json::validation::Checked::Valid;
 use gltf_json::{Accessor, Index, Root};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 
 /// The most bytes of all buffers, and the most positions and indices: what [`MOST_TRIANGLES`] take without sharing any.
@@ -23,6 +25,62 @@ const MOST_ITEMS: u64 = 6 * MOST_TRIANGLES as u64;
 
 /// Reads the bytes of a glTF or GLB file, and the buffers that it refers to, beside `path`.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
+    let (root, buffers) = document(bytes, path)?;
+    let mut scene = Scene { path, root: &root, buffers, triangles: Vec::new(), items: 0 };
+    for place in scene.places()? {
+        scene.place(&place, &place.transform)?;
+    }
+    match scene.triangles.is_empty() {
+        true => Err(no_triangle(path)),
+        false => Ok(Mesh::new(scene.triangles)),
+    }
+}
+
+/// The meshes of a file, each once, and where its nodes put them. In the order of both, with all transforms applied, they are what
+/// [`parse`] gives.
+#[derive(Clone, Debug)]
+pub struct Parts {
+    /// Triangles in the mesh's own coordinates, by the mesh's number in the file: those meshes that have any and are placed.
+    pub meshes: BTreeMap<usize, Vec<Triangle>>,
+    /// Where they stand.
+    pub places: Vec<Placed>,
+}
+
+/// A mesh, put somewhere by a node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placed {
+    /// The node's number in the file.
+    pub node: usize,
+    /// The mesh's number in the file.
+    pub mesh: usize,
+    /// From the mesh's coordinates to the scene's.
+    pub transform: DMat4,
+}
+
+/// As [`parse`], with every mesh once.
+pub fn parts(bytes: &[u8], path: &Path) -> Result<Parts, Fault> {
+    let (root, buffers) = document(bytes, path)?;
+    let mut scene = Scene { path, root: &root, buffers, triangles: Vec::new(), items: 0 };
+    let (mut places, mut meshes) = (scene.places()?, BTreeMap::new());
+    for place in &places {
+        if let Entry::Vacant(first) = meshes.entry(place.mesh) {
+            scene.place(place, &DMat4::IDENTITY)?;
+            first.insert(std::mem::take(&mut scene.triangles));
+        }
+    }
+    meshes.retain(|_, triangles| !triangles.is_empty());
+    places.retain(|place| meshes.contains_key(&place.mesh));
+    if places.is_empty() { Err(no_triangle(path)) } else { Ok(Parts { meshes, places }) }
+}
+
+fn no_triangle(path: &Path) -> Fault {
+    Fault::new(path, Place::File, "no triangle in its scene; expected a glTF file with at least one")
+}
+
+/// What a file says, and the bytes of its buffers.
+type Document<'a> = (Root, Vec<Cow<'a, [u8]>>);
+
+fn document<'a>(bytes: &'a [u8], path: &Path) -> Result<Document<'a>, Fault> {
     let fault = |place, message: String| Fault::new(path, place, message);
     let (json, binary) = match bytes.starts_with(b"glTF") {
         true => chunks(bytes).ok_or_else(|| {
@@ -50,14 +108,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
         });
         buffers.push(bytes.map_err(|message| fault(Place::Element(format!("buffers[{number}]")), message))?);
     }
-    let mut scene = Scene { path, root: &root, buffers, triangles: Vec::new(), items: 0 };
-    scene.place_nodes()?;
-    match scene.triangles.is_empty() {
-        true => {
-            Err(fault(Place::File, "no triangle in its scene; expected a glTF file with at least one".into()))
-        }
-        false => Ok(Mesh::new(scene.triangles)),
-    }
+    Ok((root, buffers))
 }
 
 /// The chunks of JSON and of binary data of a GLB file of version 2: each has its length and its kind before it.
@@ -119,18 +170,20 @@ impl<'a> Scene<'a> {
     }
 
     /// Follows the default scene, or the first one, from its roots. A node has one parent, so that none is reached twice.
-    fn place_nodes(&mut self) -> Result<(), Fault> {
+    fn places(&self) -> Result<Vec<Placed>, Fault> {
         let path = self.path;
         let fault = |place: String, message: String| Fault::new(path, Place::Element(place), message);
         let scene = match self.root.scene {
             Some(index) => Some(self.get(index, "scenes").map_err(|message| fault("scene".into(), message))?),
             None => self.root.scenes.first(),
         };
+        let mut places = Vec::new();
         let mut reached = vec![false; self.root.nodes.len()];
         let mut open: Vec<(Index<Node>, DMat4)> = Vec::new();
         open.extend(scene.iter().flat_map(|scene| &scene.nodes).rev().map(|&node| (node, DMat4::IDENTITY)));
         while let Some((index, parent)) = open.pop() {
             let place = || format!("nodes[{}]", index.value());
+            let number = index.value();
             let node = self.get(index, "nodes").map_err(|message| fault("scene".into(), message))?;
             if std::mem::replace(&mut reached[index.value()], true) {
                 let message = "reached twice; expected a tree of nodes, each with one parent";
@@ -138,20 +191,28 @@ impl<'a> Scene<'a> {
             }
             let transform = parent * transform(node);
             if let Some(index) = node.mesh {
-                let mesh = self.get(index, "meshes").map_err(|message| fault(place(), message))?;
-                for (number, primitive) in mesh.primitives.iter().enumerate() {
-                    self.place(primitive, &transform).map_err(|message| {
-                        fault(format!("meshes[{}].primitives[{number}] at {}", index.value(), place()), message)
-                    })?;
-                }
+                self.get(index, "meshes").map_err(|message| fault(place(), message))?;
+                places.push(Placed { node: number, mesh: index.value(), transform });
             }
             open.extend(node.children.iter().flatten().rev().map(|&child| (child, transform)));
+        }
+        Ok(places)
+    }
+
+    /// Adds the triangles of a node's mesh, moved.
+    fn place(&mut self, place: &Placed, transform: &DMat4) -> Result<(), Fault> {
+        let Placed { node, mesh, .. } = *place;
+        for (number, primitive) in self.root.meshes[mesh].primitives.iter().enumerate() {
+            self.add(primitive, transform).map_err(|message| {
+                let place = format!("meshes[{mesh}].primitives[{number}] at nodes[{node}]");
+                Fault::new(self.path, Place::Element(place), message)
+            })?;
         }
         Ok(())
     }
 
     /// Adds the triangles of a primitive; points and lines have none.
-    fn place(&mut self, primitive: &Primitive, transform: &DMat4) -> Result<(), String> {
+    fn add(&mut self, primitive: &Primitive, transform: &DMat4) -> Result<(), String> {
         let Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) = primitive.mode else {
             return Ok(());
         };

@@ -1,7 +1,7 @@
 //! Scenes by name: procedural ones, meshes from OBJ, PLY, STL and glTF files, and subsets of all of them.
 
 mod fnv;
-mod gltf;
+pub(crate) mod gltf;
 pub mod mesh;
 pub mod obj;
 pub mod open;
