@@ -5,12 +5,14 @@
 #include "bvh.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <random>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -130,6 +132,12 @@ int main() {
     double first = 0, cost = 0;
     check(bvh_tree_cost(tree, BVH_COST_SAH, &first));
     check(bvh_tree_improve(tree, 1.0));
+    // Another thread may end a search of any length.
+    std::atomic<bool> enough = false;
+    std::thread user([&] { std::this_thread::sleep_for(std::chrono::milliseconds(100)), enough = true; });
+    auto is_enough = [](void *flag) { return uint8_t(static_cast<std::atomic<bool> *>(flag)->load()); };
+    check(bvh_tree_improve_until(tree, 3600.0, is_enough, &enough));
+    user.join();
     check(bvh_tree_cost(tree, BVH_COST_SAH, &cost));
     std::printf("%zu triangles: surface area heuristic %.2f, after a second %.2f\n", triangles, first, cost);
 

@@ -94,6 +94,13 @@ BvhTree *bvh_tree_from_triangles(const float *corners, size_t count, double seco
 // `tree` is a tree that no other thread uses.
 BvhStatus bvh_tree_improve(BvhTree *tree, double seconds);
 
+// As `bvh_tree_improve`, and ends soon after `cancelled(context)` is not 0, with the best tree until then, which is no failure. To
+// cancel a search from its beginning, make the tree in 0 seconds first.
+//
+// `tree` is a tree that no other thread uses; `cancelled` is null, or a function that throws nothing, and that any threads may call, several
+// at once, until this returns.
+BvhStatus bvh_tree_improve_until(BvhTree *tree, double seconds, uint8_t (*cancelled)(void *context), void *context);
+
 // Writes a cost of the tree, one of `BvhCost`, to `cost`.
 //
 // `tree` is a tree; `cost` points to a double.

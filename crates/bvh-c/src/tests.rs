@@ -3,8 +3,9 @@
 use crate::failure::{BvhStatus, bvh_last_error, status};
 use crate::{tracer::*, tree::*};
 use bvh_search::prelude::*;
-use std::ffi::{CStr, CString};
+use std::ffi::{CStr, CString, c_void};
 use std::ptr::{null, null_mut};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// A staircase of right triangles.
 fn corners(count: usize) -> Vec<f32> {
@@ -76,6 +77,33 @@ fn trees_and_hits_are_those_of_the_rust_crates() {
 fn bytes_as_triangles(corners: &[f32]) -> Vec<Triangle> {
     let (points, _) = corners.as_chunks::<3>();
     points.as_chunks::<3>().0.iter().map(|&corners| Triangle::from(corners)).collect()
+}
+
+/// Whether it has been asked a thousand times.
+unsafe extern "C" fn asked_enough(context: *mut c_void) -> u8 {
+    // SAFETY: the test's counter.
+    let asked = unsafe { &*context.cast::<AtomicU64>() };
+    u8::from(asked.fetch_add(1, Relaxed) >= 1000)
+}
+
+#[test]
+fn a_search_of_hours_ends_when_the_caller_says_so_and_keeps_what_it_found() {
+    let number = |i: u32| (i.wrapping_mul(2_654_435_761) >> 16) as f32;
+    let corners: Vec<f32> = (0..9 * 3000).map(number).collect();
+    // SAFETY: nine floats per triangle.
+    let tree = unsafe { bvh_tree_from_triangles(corners.as_ptr(), 3000, 0.0, 1.0) };
+    let (mut asked, mut before, mut after) = (AtomicU64::new(0), 0.0, 0.0);
+    let start = std::time::Instant::now();
+    // SAFETY: a tree, numbers, and a function that counts atomically.
+    unsafe {
+        bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut before);
+        let context = (&raw mut asked).cast();
+        assert_eq!(bvh_tree_improve_until(tree, 36_000.0, Some(asked_enough), context), BvhStatus::Ok);
+        bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut after);
+        bvh_tree_free(tree);
+    }
+    assert!(asked.into_inner() > 1000 && start.elapsed().as_secs() < 600);
+    assert!(after < before, "{after} of {before}");
 }
 
 #[test]

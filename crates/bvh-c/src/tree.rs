@@ -3,8 +3,8 @@
 use crate::failure::{BvhStatus, Failure, array, given, given_mut, made, slice, status};
 use bvh_search::bvh_core::{FirstCountNode, Primitives, cost::Objective, cost::SahConstants};
 use bvh_search::prelude::*;
-use bvh_search::{Objects, OwnedTree};
-use std::ffi::{CStr, c_char};
+use bvh_search::{Objects, Observer, OwnedTree};
+use std::ffi::{CStr, c_char, c_void};
 
 /// A tree with its objects. Any number of threads may read one at the same time; whoever improves or frees it must be alone.
 pub struct BvhTree {
@@ -79,13 +79,52 @@ pub unsafe extern "C" fn bvh_tree_from_triangles(
 /// `tree` is a tree that no other thread uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvh_tree_improve(tree: *mut BvhTree, seconds: f64) -> BvhStatus {
+    // SAFETY: promised by the caller.
+    unsafe { bvh_tree_improve_until(tree, seconds, None, std::ptr::null_mut()) }
+}
+
+/// As `bvh_tree_improve`, and ends soon after `cancelled(context)` is not 0, with the best tree until then, which is no failure. To
+/// cancel a search from its beginning, make the tree in 0 seconds first.
+///
+/// `tree` is a tree that no other thread uses; `cancelled` is null, or a function that throws nothing, and that any threads may call, several
+/// at once, until this returns.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvh_tree_improve_until(
+    tree: *mut BvhTree,
+    seconds: f64,
+    cancelled: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
+    context: *mut c_void,
+) -> BvhStatus {
     status(|| {
         // SAFETY: promised by the caller.
         let tree = unsafe { given_mut("tree", tree) }?;
-        tree.owned.improve(&deadline(seconds)?).map_err(Failure::invalid)?;
+        let until = Until { deadline: deadline(seconds)?, cancelled, context };
+        tree.owned.improve(&until).map_err(Failure::invalid)?;
         tree.nodes = nodes(&tree.owned);
         Ok(())
     })
+}
+
+/// Ends a search at its deadline, or when the caller says so.
+struct Until {
+    deadline: Deadline,
+    cancelled: Option<unsafe extern "C" fn(*mut c_void) -> u8>,
+    context: *mut c_void,
+}
+
+// SAFETY: the context goes to nothing but the caller's function, which any threads may call.
+unsafe impl Sync for Until {}
+
+impl Observer for Until {
+    fn cancelled(&self) -> bool {
+        // SAFETY: promised by the caller.
+        self.deadline.has_passed()
+            || self.cancelled.is_some_and(|cancelled| unsafe { cancelled(self.context) } != 0)
+    }
+
+    fn progress(&self) -> Option<f64> {
+        Some(self.deadline.fraction())
+    }
 }
 
 /// Writes a cost of the tree, one of `BvhCost`, to `cost`.
