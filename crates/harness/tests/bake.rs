@@ -49,6 +49,7 @@ fn a_bake_of_work_writes_the_same_bytes_on_any_number_of_threads() {
         (facts["method"].as_str(), facts["cost when saved"].as_str()),
         ("best", facts["internal area"].as_str())
     );
+    assert_eq!(facts["version"], "2", "what older programs read");
     assert!(facts["internal area over Müller–Fellner's"].parse::<f64>().unwrap() < 0.9);
     assert!(facts["end-point overlap"].parse::<f64>().unwrap() > 0.0);
     assert!(facts["valid"].starts_with("yes"));

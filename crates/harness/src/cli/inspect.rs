@@ -138,7 +138,7 @@ fn examine(path: &Path, scene: Option<&Scene>) -> Result<(Bvh, Facts), Error> {
     let file = files::open_tree(path, &bytes)?;
     scene.iter().filter_map(|scene| scene.remark.as_ref()).for_each(|remark| print_error(remark));
     let mut facts = Facts::default();
-    describe(file.header(), bytes.len(), &mut facts);
+    describe(file.header(), &bytes, &mut facts);
     let refused = |source| Error::TreeFile { path: path.to_owned(), source };
     let tree = file.tree().map_err(refused)?;
     measure(&tree, &mut facts);
@@ -150,7 +150,7 @@ fn examine(path: &Path, scene: Option<&Scene>) -> Result<(Bvh, Facts), Error> {
 }
 
 /// The facts in the header.
-fn describe(header: &Header, bytes: usize, facts: &mut Facts) {
+fn describe(header: &Header, bytes: &[u8], facts: &mut Facts) {
     let objective = match header.objective {
         Objective::InternalArea => "internal area".to_owned(),
         Objective::GoldsmithSalmon => "Goldsmith–Salmon".to_owned(),
@@ -160,8 +160,10 @@ fn describe(header: &Header, bytes: usize, facts: &mut Facts) {
             format!("surface area heuristic, traversal {traversal}, intersection {intersection}")
         }
     };
-    facts.add("version", Header::VERSION);
-    facts.add("bytes", bytes);
+    // The magic comes first, then the version.
+    let version = bytes[Header::MAGIC.len()..].first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+    facts.add("version", version);
+    facts.add("bytes", bytes.len());
     facts.add("method", &header.method);
     facts.add("seed", header.seed);
     facts.add("work", header.work);
