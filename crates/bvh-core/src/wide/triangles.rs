@@ -63,6 +63,13 @@ impl TriangleBlock {
         self.ids.as_ptr()
     }
 
+    /// How many lanes are used; they are the first.
+    #[cfg(all(feature = "std", target_arch = "x86_64"))]
+    #[inline(always)]
+    pub(crate) fn len(&self) -> usize {
+        1 + (1..Self::LANES).map(|lane| usize::from(self.ids[lane] != Self::UNUSED)).sum::<usize>()
+    }
+
     /// Whether this is a leaf's last block.
     #[inline(always)]
     pub(crate) fn is_last(&self) -> bool {

@@ -5,13 +5,12 @@ use super::answer::Answer;
 use super::avx512::Avx512;
 use super::box_ray::BoxRay;
 use super::one_ray::{Instructions, Pending};
+use super::packet_triangles::Shears;
 use super::prepared::{Axis, RAYS, Sixteen};
-use crate::triangle::AXES;
 use crate::wide::kernel::STACK;
 use crate::wide::layout::WideBvh;
 use crate::wide::node::Child;
 use crate::wide::node::WideNode;
-use crate::wide::triangles::TriangleBlock;
 use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
 
@@ -21,48 +20,106 @@ pub(crate) struct Packet<'a> {
     /// Indices of the planes that the rays meet first, by axis, and of those opposite.
     near: [usize; 3],
     far: [usize; 3],
-    bounds: [AxisBounds; 3],
-    /// The axes of the shear; what follows is in their order.
-    pub(super) axes: [usize; 3],
-    pub(super) origin: [__m512; 3],
-    pub(super) inverse: [__m512; 3],
-    pub(super) slope: [__m512; 2],
-    pub(super) depth: __m512,
-    least_t_min: f32,
+    bounds: Bounds,
     /// The nearest hits so far, or the ends of the rays.
     pub(super) t: __m512,
     pub(super) object: __m512i,
 }
 
-/// What interval arithmetic knows of sixteen rays along one axis: the origins with the margin of near and of far planes
-/// that make the distance least and greatest, and the least and the greatest scale.
-#[derive(Clone, Copy)]
-struct AxisBounds {
-    near_origin: f32,
-    far_origin: f32,
-    near_scale: [f32; 2],
-    far_scale: [f32; 2],
+/// What interval arithmetic knows of sixteen rays. Lane `4 · axis` is the origin with the margin of near planes that makes
+/// the distance least, the next the one of far planes that makes it greatest; two more are the greatest and the least
+/// scale. Behind the axes are the least distance at which a ray begins and the greatest at which one ends.
+struct Bounds {
+    of: [f32; RAYS],
+    /// The same, scaled as near planes and as far ones are: the least product is that of the least factor.
+    near: [f32; RAYS],
+    far: [f32; RAYS],
 }
 
-impl AxisBounds {
+impl Bounds {
+    const NEAR_ORIGIN: usize = 0;
+    const FAR_ORIGIN: usize = 1;
+    const MOST: usize = 2;
+    const LEAST: usize = 3;
+    const BEGIN: usize = 12;
+    const END: usize = 13;
+
+    /// Of all sixteen vectors the greatest lanes are found together, in a third of the instructions that they take one by
+    /// one. What is wanted least is negated before and after, and so are origins where rays run backwards: distances grow
+    /// with the plane minus the origin if the scale is positive, else the other way.
     #[inline(always)]
-    unsafe fn new(axis: &Axis) -> Self {
-        // SAFETY: the caller has AVX-512.
+    unsafe fn new(sixteen: &Sixteen) -> Self {
+        let Sixteen { axes: [x, y, z], t_min, t_max, .. } = sixteen;
+        let signs = [Self::signs(x), Self::signs(y), Self::signs(z), [MINUS, 0, 0, 0]];
+        // SAFETY: the caller has AVX-512; all are sixteen plain values of four bytes.
         unsafe {
-            let Axis { near_origin, far_origin, near_scale, far_scale, .. } = *axis;
-            // Distances grow with the plane minus the origin if the scale is positive, else the other way.
-            let (far_origin, near_origin) = if axis.backwards != 0 {
-                (_mm512_reduce_max_ps(far_origin), _mm512_reduce_min_ps(near_origin))
-            } else {
-                (_mm512_reduce_min_ps(far_origin), _mm512_reduce_max_ps(near_origin))
-            };
+            let ends = pair(flip(*t_min, MINUS), *t_max);
+            let of =
+                quarters(quarters(Self::along(x), Self::along(y)), quarters(Self::along(z), four(ends, ends)));
+            let of = _mm512_xor_ps(of, core::mem::transmute::<[[u32; 4]; 4], __m512>(signs));
+            let near = _mm512_mul_ps(of, _mm512_set1_ps(BoxRay::NEAR));
+            let far = _mm512_mul_ps(of, _mm512_set1_ps(BoxRay::FAR));
             Self {
-                near_origin,
-                far_origin,
-                near_scale: [_mm512_reduce_min_ps(near_scale), _mm512_reduce_max_ps(near_scale)],
-                far_scale: [_mm512_reduce_min_ps(far_scale), _mm512_reduce_max_ps(far_scale)],
+                of: core::mem::transmute::<__m512, [f32; RAYS]>(of),
+                near: core::mem::transmute::<__m512, [f32; RAYS]>(near),
+                far: core::mem::transmute::<__m512, [f32; RAYS]>(far),
             }
         }
+    }
+
+    /// What is negated along an axis.
+    #[inline(always)]
+    fn signs(axis: &Axis) -> [u32; 4] {
+        let backwards = u32::from(axis.backwards) << 31;
+        [backwards, backwards ^ MINUS, 0, MINUS]
+    }
+
+    #[inline(always)]
+    unsafe fn along(axis: &Axis) -> __m512 {
+        let [near, far, most, least] = Self::signs(axis);
+        // SAFETY: the caller has AVX-512.
+        unsafe {
+            let origins = pair(flip(axis.near_origin, near), flip(axis.far_origin, far));
+            four(origins, pair(flip(axis.scale, most), flip(axis.scale, least)))
+        }
+    }
+}
+
+/// The bit of the sign.
+const MINUS: u32 = 1 << 31;
+
+/// Negated, if `sign` is [`MINUS`].
+#[inline(always)]
+unsafe fn flip(x: __m512, sign: u32) -> __m512 {
+    // SAFETY: the caller has AVX-512.
+    unsafe { _mm512_xor_ps(x, _mm512_castsi512_ps(_mm512_set1_epi32(sign as i32))) }
+}
+
+/// In each quarter the greater of lanes 0 and 2 of both, then of lanes 1 and 3.
+#[inline(always)]
+unsafe fn pair(a: __m512, b: __m512) -> __m512 {
+    // SAFETY: the caller has AVX-512.
+    unsafe { _mm512_max_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b)) }
+}
+
+/// The greatest lanes of the quarters of two pairs.
+#[inline(always)]
+unsafe fn four(ab: __m512, cd: __m512) -> __m512 {
+    // SAFETY: the caller has AVX-512.
+    unsafe {
+        let (ab, cd) = (_mm512_castps_pd(ab), _mm512_castps_pd(cd));
+        let (even, odd) = (_mm512_unpacklo_pd(ab, cd), _mm512_unpackhi_pd(ab, cd));
+        _mm512_max_ps(_mm512_castpd_ps(even), _mm512_castpd_ps(odd))
+    }
+}
+
+/// The greater of the first two quarters of both and of the last two.
+#[inline(always)]
+unsafe fn quarters(a: __m512, b: __m512) -> __m512 {
+    // SAFETY: the caller has AVX-512.
+    unsafe {
+        let even = _mm512_shuffle_f32x4::<0b10_00_10_00>(a, b);
+        _mm512_max_ps(even, _mm512_shuffle_f32x4::<0b11_01_11_01>(a, b))
     }
 }
 
@@ -75,26 +132,14 @@ impl<'a> Packet<'a> {
     pub(crate) unsafe fn new(sixteen: &'a Sixteen) -> Self {
         // SAFETY: the caller's promise.
         unsafe {
-            let Sixteen { origin, direction, inverse, t_min, t_max, second, third, .. } = sixteen;
-            let axes @ [kx, ky, kz] = AXES[if *third != 0 { 2 } else { usize::from(*second != 0) }];
-            let [x, y, z] = &sixteen.axes;
-            let plane = |axis: usize, of: &Axis| axis + 3 * usize::from(of.backwards != 0);
-            let near = [plane(0, x), plane(1, y), plane(2, z)];
+            let [x, y, z] = [0, 1, 2].map(|axis| 3 * usize::from(sixteen.axes[axis].backwards != 0));
+            let near = [x, 1 + y, 2 + z];
             Self {
                 sixteen,
                 near,
                 far: [3 - near[0], 5 - near[1], 7 - near[2]],
-                bounds: [AxisBounds::new(x), AxisBounds::new(y), AxisBounds::new(z)],
-                axes,
-                origin: [origin[kx], origin[ky], origin[kz]],
-                inverse: [inverse[kx], inverse[ky], inverse[kz]],
-                slope: [
-                    _mm512_div_ps(direction[kx], direction[kz]),
-                    _mm512_div_ps(direction[ky], direction[kz]),
-                ],
-                depth: direction[kz],
-                least_t_min: _mm512_reduce_min_ps(*t_min),
-                t: *t_max,
+                bounds: Bounds::new(sixteen),
+                t: sixteen.t_max,
                 object: _mm512_set1_epi32(-1),
             }
         }
@@ -113,8 +158,9 @@ impl<'a> Packet<'a> {
             let mut stack = MaybeUninit::<[Pending; STACK + 8]>::uninit();
             let base = stack.as_mut_ptr().cast::<Pending>();
             let mut top = base;
-            let mut farthest = _mm512_reduce_max_ps(self.t);
+            let mut farthest = self.bounds.of[Bounds::END];
             let mut child = root;
+            let mut shears = None;
             loop {
                 while child.is_node() {
                     let node = &*nodes.add(child.index());
@@ -134,17 +180,28 @@ impl<'a> Packet<'a> {
                         child = *node.children.get_unchecked(mask.trailing_zeros() as usize);
                         continue;
                     }
-                    child = Avx512::sort(node, entry, mask, top);
+                    child = if A::ANY {
+                        let children = _mm256_load_si256(node.children.as_ptr().cast());
+                        let entered = _mm256_maskz_compress_epi32(mask as u8, children);
+                        _mm512_storeu_si512(top.cast(), _mm512_cvtepu32_epi64(entered));
+                        *node.children.get_unchecked(mask.ilog2() as usize)
+                    } else {
+                        Avx512::sort(node, entry, mask, top)
+                    };
                     top = top.add(mask.count_ones() as usize - 1);
                 }
                 if !child.is_node() {
+                    let shears = match &shears {
+                        Some(shears) => shears,
+                        None => shears.insert(Shears::new(self.sixteen)),
+                    };
                     let mut block = blocks.add(child.index());
                     let mut is_hit = false;
                     loop {
-                        for lane in 0..TriangleBlock::LANES {
-                            let candidates = self.candidates(&*block, lane);
+                        for lane in 0..(*block).len() {
+                            let candidates = shears.candidates(&*block, lane) & self.live::<A>();
                             if candidates != 0 {
-                                is_hit |= self.decide::<A>(&*block, lane, candidates);
+                                is_hit |= self.decide::<A>(shears, &*block, lane, candidates);
                             }
                         }
                         if (*block).is_last() {
@@ -173,6 +230,13 @@ impl<'a> Packet<'a> {
         }
     }
 
+    /// A bit per ray that still looks for its answer.
+    #[inline(always)]
+    unsafe fn live<A: Answer>(&self) -> u16 {
+        // SAFETY: the caller's promises.
+        unsafe { if A::ANY { _mm512_cmp_ps_mask::<_CMP_GE_OQ>(self.t, _mm512_setzero_ps()) } else { u16::MAX } }
+    }
+
     /// The least distance at which any ray may enter each child, and a bit per child that some ray may enter before
     /// `farthest`: the bounds of `(plane − origin) · scale` over all rays. Conservative by the proof of [`BoxRay`], whose
     /// first step is not needed here, since nothing is shifted.
@@ -181,19 +245,21 @@ impl<'a> Packet<'a> {
         // SAFETY: the caller's promises; loads are of whole, aligned planes of 32 bytes.
         unsafe {
             let tiny = _mm256_set1_ps(BoxRay::UNDERFLOW);
-            let (mut entry, mut exit) = (_mm256_set1_ps(self.least_t_min), _mm256_set1_ps(farthest));
+            let (mut entry, mut exit) =
+                (_mm256_set1_ps(self.bounds.of[Bounds::BEGIN]), _mm256_set1_ps(farthest));
             for axis in 0..3 {
-                let bounds = &self.bounds[axis];
+                let Bounds { of, near: near_scale, far: far_scale } = &self.bounds;
+                let at = |bound: usize| 4 * axis + bound;
                 let near = _mm256_load_ps(node.planes.as_ptr().add(self.near[axis]).cast());
-                let near = _mm256_sub_ps(near, _mm256_set1_ps(bounds.near_origin));
-                let one = _mm256_fmsub_ps(near, _mm256_set1_ps(bounds.near_scale[0]), tiny);
-                let two = _mm256_fmsub_ps(near, _mm256_set1_ps(bounds.near_scale[1]), tiny);
+                let near = _mm256_sub_ps(near, _mm256_set1_ps(of[at(Bounds::NEAR_ORIGIN)]));
+                let one = _mm256_fmsub_ps(near, _mm256_set1_ps(near_scale[at(Bounds::LEAST)]), tiny);
+                let two = _mm256_fmsub_ps(near, _mm256_set1_ps(near_scale[at(Bounds::MOST)]), tiny);
                 // Of two zeros the instruction gives the second operand: entries are never −0.
                 entry = _mm256_max_ps(_mm256_min_ps(one, two), entry);
                 let far = _mm256_load_ps(node.planes.as_ptr().add(self.far[axis]).cast());
-                let far = _mm256_sub_ps(far, _mm256_set1_ps(bounds.far_origin));
-                let one = _mm256_fmadd_ps(far, _mm256_set1_ps(bounds.far_scale[0]), tiny);
-                let two = _mm256_fmadd_ps(far, _mm256_set1_ps(bounds.far_scale[1]), tiny);
+                let far = _mm256_sub_ps(far, _mm256_set1_ps(of[at(Bounds::FAR_ORIGIN)]));
+                let one = _mm256_fmadd_ps(far, _mm256_set1_ps(far_scale[at(Bounds::LEAST)]), tiny);
+                let two = _mm256_fmadd_ps(far, _mm256_set1_ps(far_scale[at(Bounds::MOST)]), tiny);
                 // Of a NaN and a number the instruction gives the second operand: unused lanes stay NaN.
                 exit = _mm256_min_ps(exit, _mm256_max_ps(one, two));
             }

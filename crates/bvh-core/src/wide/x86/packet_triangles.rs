@@ -3,11 +3,34 @@
 use super::answer::Answer;
 use super::edges;
 use super::packet::Packet;
+use super::prepared::Sixteen;
 use crate::Slabs;
+use crate::triangle::AXES;
 use crate::wide::triangles::TriangleBlock;
 use core::arch::x86_64::*;
 
-impl Packet<'_> {
+/// The shears of sixteen rays, along x, y and z of the shear. Made at the first leaf: many packets come to none.
+pub(super) struct Shears {
+    axes: [usize; 3],
+    origin: [__m512; 3],
+    inverse: [__m512; 3],
+    slope: [__m512; 2],
+    depth: __m512,
+}
+
+impl Shears {
+    #[inline(always)]
+    pub(super) unsafe fn new(sixteen: &Sixteen) -> Self {
+        let Sixteen { origin, direction, inverse, second, third, .. } = sixteen;
+        let axes @ [kx, ky, kz] = AXES[if *third != 0 { 2 } else { usize::from(*second != 0) }];
+        // SAFETY: the caller has AVX-512.
+        let slope = unsafe {
+            [_mm512_div_ps(direction[kx], direction[kz]), _mm512_div_ps(direction[ky], direction[kz])]
+        };
+        let [origin, inverse] = [origin, inverse].map(|by_axis| [by_axis[kx], by_axis[ky], by_axis[kz]]);
+        Self { axes, origin, inverse, slope, depth: direction[kz] }
+    }
+
     /// One corner relative to the rays: along x, y and z of the shear.
     #[inline(always)]
     unsafe fn apply(&self, corner: &[[f32; TriangleBlock::LANES]; 3], lane: usize) -> [__m512; 3] {
@@ -34,23 +57,26 @@ impl Packet<'_> {
             edges::candidates((ax, ay), (bx, by), (cx, cy))
         }
     }
+}
 
+impl Packet<'_> {
     /// Decides exactly, as [`Triangle::intersect`](crate::Triangle::intersect), which rays hit the triangle in a lane, and
     /// keeps those hits that precede the rays' nearest; whether there are any.
     #[inline(always)]
     pub(super) unsafe fn decide<A: Answer>(
         &mut self,
+        shears: &Shears,
         block: &TriangleBlock,
         lane: usize,
         candidates: u16,
     ) -> bool {
         // SAFETY: the caller's promises.
         unsafe {
-            let a = self.apply(&block.corners[0], lane);
-            let b = self.apply(&block.corners[1], lane);
-            let c = self.apply(&block.corners[2], lane);
-            let (low, low_t) = self.decide_half::<0>(&a, &b, &c);
-            let (high, high_t) = self.decide_half::<1>(&a, &b, &c);
+            let a = shears.apply(&block.corners[0], lane);
+            let b = shears.apply(&block.corners[1], lane);
+            let c = shears.apply(&block.corners[2], lane);
+            let (low, low_t) = self.decide_half::<0>(shears.depth, &a, &b, &c);
+            let (high, high_t) = self.decide_half::<1>(shears.depth, &a, &b, &c);
             let inside = candidates & (u16::from(low) | u16::from(high) << 8);
             if inside == 0 {
                 return false;
@@ -60,24 +86,28 @@ impl Packet<'_> {
             // The interval of the triangle's own box: the operations of `Slabs`.
             let mut reach = _mm512_setzero_ps();
             let mut corners = [[_mm512_setzero_ps(); 2]; 3];
-            for (i, &axis) in self.axes.iter().enumerate() {
+            for (i, &axis) in shears.axes.iter().enumerate() {
                 let (a, b) = (block.corners[0][axis][lane], block.corners[1][axis][lane]);
                 let c = block.corners[2][axis][lane];
                 let (min, max) = (_mm512_set1_ps(a.min(b).min(c)), _mm512_set1_ps(a.max(b).max(c)));
-                let low = _mm512_abs_ps(_mm512_sub_ps(min, self.origin[i]));
-                let high = _mm512_abs_ps(_mm512_sub_ps(max, self.origin[i]));
+                let low = _mm512_abs_ps(_mm512_sub_ps(min, shears.origin[i]));
+                let high = _mm512_abs_ps(_mm512_sub_ps(max, shears.origin[i]));
                 reach = _mm512_max_ps(reach, _mm512_max_ps(low, high));
                 corners[i] = [min, max];
             }
             let reach = _mm512_mul_ps(reach, _mm512_set1_ps(Slabs::MARGIN));
             let (mut entry, mut exit) = (self.sixteen.t_min, _mm512_set1_ps(f32::INFINITY));
             for (i, [min, max]) in corners.into_iter().enumerate() {
-                let own = _mm512_mul_ps(_mm512_abs_ps(self.origin[i]), _mm512_set1_ps(f32::EPSILON));
+                let own = _mm512_mul_ps(_mm512_abs_ps(shears.origin[i]), _mm512_set1_ps(f32::EPSILON));
                 let margin = _mm512_add_ps(_mm512_add_ps(reach, own), _mm512_set1_ps(f32::MIN_POSITIVE));
-                let low =
-                    _mm512_mul_ps(_mm512_sub_ps(min, _mm512_add_ps(self.origin[i], margin)), self.inverse[i]);
-                let high =
-                    _mm512_mul_ps(_mm512_sub_ps(max, _mm512_sub_ps(self.origin[i], margin)), self.inverse[i]);
+                let low = _mm512_mul_ps(
+                    _mm512_sub_ps(min, _mm512_add_ps(shears.origin[i], margin)),
+                    shears.inverse[i],
+                );
+                let high = _mm512_mul_ps(
+                    _mm512_sub_ps(max, _mm512_sub_ps(shears.origin[i], margin)),
+                    shears.inverse[i],
+                );
                 entry = _mm512_max_ps(entry, _mm512_min_ps(low, high));
                 exit = _mm512_min_ps(exit, _mm512_max_ps(low, high));
             }
@@ -105,6 +135,7 @@ impl Packet<'_> {
     #[inline(always)]
     unsafe fn decide_half<const HALF: i32>(
         &self,
+        depth: __m512,
         a: &[__m512; 3],
         b: &[__m512; 3],
         c: &[__m512; 3],
@@ -115,7 +146,7 @@ impl Packet<'_> {
                 [double::<HALF>(a[0]), double::<HALF>(a[1]), double::<HALF>(a[2])],
                 [double::<HALF>(b[0]), double::<HALF>(b[1]), double::<HALF>(b[2])],
                 [double::<HALF>(c[0]), double::<HALF>(c[1]), double::<HALF>(c[2])],
-                double::<HALF>(self.depth),
+                double::<HALF>(depth),
                 double::<HALF>(self.sixteen.t_min),
             )
         }

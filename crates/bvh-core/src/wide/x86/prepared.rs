@@ -29,7 +29,8 @@ pub(crate) struct Axis {
     /// The origins, moved by the margin of near and of far planes.
     pub(crate) near_origin: __m512,
     pub(crate) far_origin: __m512,
-    /// As in [`BoxRay`].
+    /// As in [`BoxRay`]; `scale` before it is made smaller for near and larger for far planes.
+    pub(crate) scale: __m512,
     pub(crate) near_scale: __m512,
     pub(crate) near_shift: __m512,
     pub(crate) far_scale: __m512,
@@ -52,6 +53,7 @@ impl Axis {
                 backwards: _mm512_movepi32_mask(_mm512_castps_si512(inverse)),
                 near_origin,
                 far_origin,
+                scale,
                 near_scale,
                 near_shift: _mm512_fnmsub_ps(near_origin, near_scale, tiny),
                 far_scale,
