@@ -8,6 +8,7 @@ pub mod error;
 pub mod figures;
 pub mod files;
 pub mod measure;
+pub mod page;
 pub mod peers;
 pub mod render;
 pub mod report;

@@ -246,26 +246,6 @@ fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_di
     refused(&["merge", "one", "--out", "merged"], 1, &["one/spec/.partial/resolved.toml: ", "runs; accepted"]);
 }
 
-#[test]
-fn the_page_of_all_results_has_each_experiment_with_table_and_figure_and_needs_no_other_file() {
-    let folder = folder();
-    assert!(run(folder.path(), &["spec.toml"]).status.success());
-    assert!(run(folder.path(), &["spec.toml", "--quick"]).status.success());
-    let output = run(folder.path(), &["report"]);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("1 experiments"), "{}", text(&output.stdout));
-    let page = fs::read_to_string(folder.path().join("results/report.html")).unwrap();
-    for part in ["Do results survive?", "Numbers of the paper: ", "<svg", "best of 5: ", "provenance"] {
-        assert!(page.contains(part), "{part}");
-    }
-    for other in ["<script", "<img", "<link", "src=", "url(http"] {
-        assert!(!page.contains(other), "{other}");
-    }
-    let nothing = run(folder.path(), &["report", "--results", "."]);
-    assert_eq!(nothing.status.code(), Some(2));
-    assert!(text(&nothing.stderr).contains("no finished experiment"), "{}", text(&nothing.stderr));
-}
-
 const GAPS: &str = "
 question = 'What are gaps measured from?'
 scenes = ['escher:300', 'spheres75:12']

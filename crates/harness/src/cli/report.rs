@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::cli::arguments::{PAGE, input_folder, output_file};
 use crate::cli::output::print_line;
-use crate::report::page;
+use crate::page;
 use std::path::PathBuf;
 
 /// Write all results on one HTML page.

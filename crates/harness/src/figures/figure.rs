@@ -4,13 +4,15 @@ use plotters::prelude::DrawingBackend;
 
 use super::canvas::{Align, Fault, Frame, Layout, Picture, Sheet};
 use super::legend::Legend;
-use super::model::{Figure, FigureError};
+use super::model::{Axis, Figure, FigureError, Panel, Scale};
 use super::panel::Plot;
 use super::style::{GREY, INK, Strokes};
 use super::text::{BODY, Fonts, TITLE};
 
 /// Width of every figure in pixels.
 pub(super) const WIDTH: f64 = 800.0;
+/// Width of a miniature, and the height of its plot.
+const MINIATURE: (f64, f64) = (240.0, 110.0);
 /// Blank border.
 pub(super) const BORDER: f64 = 14.0;
 /// Heights of plots in 1, 2, 3 and 4 columns.
@@ -48,6 +50,7 @@ struct Plan<'a> {
     legend: Legend,
     /// Each panel with the place of its plot.
     panels: Vec<(Plot<'a>, Frame)>,
+    width: f64,
     height: f64,
 }
 
@@ -58,14 +61,62 @@ impl Picture for Figure {
 
     fn lay_out<'a>(&'a self, fonts: &'a Fonts) -> Result<impl Layout + 'a, FigureError> {
         let strokes = Strokes::new(self);
-        let room = WIDTH - 2.0 * BORDER;
-        let legend = Legend::new(self, &strokes, room, fonts);
+        let legend = Legend::new(self, &strokes, WIDTH - 2.0 * BORDER, fonts);
         let head = Head::new(&self.title, &self.caption, fonts);
         let columns = self.columns.clamp(1, HEIGHTS.len()).min(self.panels.len().max(1));
-        let height = HEIGHTS[columns - 1];
+        Ok(Plan::new(head, strokes, legend, &self.panels, columns, (WIDTH, HEIGHTS[columns - 1]), fonts))
+    }
+}
 
+/// The first panel of a figure without any words, small enough for a list of figures.
+pub struct Miniature(Figure);
+
+impl From<&Figure> for Miniature {
+    fn from(figure: &Figure) -> Self {
+        let wordless = |axis: &Axis| Axis {
+            label: String::new(),
+            scale: match &axis.scale {
+                Scale::Category(names) => Scale::Category(vec![String::new(); names.len()]),
+                other => other.clone(),
+            },
+            ..axis.clone()
+        };
+        let panel = |panel: &Panel| Panel {
+            title: String::new(),
+            x: wordless(&panel.x),
+            y: wordless(&panel.y),
+            layers: panel.layers.clone(),
+        };
+        Self(Figure { panels: figure.panels.first().map(panel).into_iter().collect(), ..figure.clone() })
+    }
+}
+
+impl Picture for Miniature {
+    fn title(&self) -> &str {
+        &self.0.title
+    }
+
+    fn lay_out<'a>(&'a self, fonts: &'a Fonts) -> Result<impl Layout + 'a, FigureError> {
+        let legend = Legend::of_areas(std::iter::empty(), 0.0, fonts);
+        let head = Head { title: vec![], caption: vec![], bottom: 0.0 };
+        Ok(Plan::new(head, Strokes::new(&self.0), legend, &self.0.panels, 1, MINIATURE, fonts))
+    }
+}
+
+impl<'a> Plan<'a> {
+    /// Finds places for panels in columns, in a figure of this width with plots of this height.
+    fn new(
+        head: Head,
+        strokes: Strokes,
+        legend: Legend,
+        panels: &'a [Panel],
+        columns: usize,
+        (whole, height): (f64, f64),
+        fonts: &Fonts,
+    ) -> Self {
+        let room = whole - 2.0 * BORDER;
         // What stands beside the plots leaves their width, and that decides on what stands below them.
-        let mut plots: Vec<Plot> = self.panels.iter().map(|panel| Plot::new(panel, height, fonts)).collect();
+        let mut plots: Vec<Plot> = panels.iter().map(|panel| Plot::new(panel, height, fonts)).collect();
         let beside = plots.iter().map(|plot| plot.left).fold(0.0, f64::max);
         let width = (room / columns as f64 - beside - GUTTER.0).max(60.0);
         plots.iter_mut().for_each(|plot| plot.fit_width(width, fonts));
@@ -87,13 +138,13 @@ impl Picture for Figure {
             }
             top += height + below + GUTTER.1;
         }
-        Ok(Plan { head, strokes, legend, panels, height: top })
+        Self { head, strokes, legend, panels, width: whole, height: top }
     }
 }
 
 impl Layout for Plan<'_> {
     fn size(&self) -> (f64, f64) {
-        (WIDTH, self.height)
+        (self.width, self.height)
     }
 
     fn draw<B: DrawingBackend>(&self, sheet: &Sheet<B>) -> Result<(), Fault<B>> {

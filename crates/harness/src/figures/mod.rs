@@ -20,6 +20,7 @@ mod style;
 mod text;
 
 pub use canvas::Picture;
+pub use figure::Miniature;
 pub use model::{Axis, Cell, ColourBar, Figure, FigureError, HeatMap, Layer, Look, Panel, Scale};
 pub use raster::{PNG_SCALE, Pixels, pixels, png};
 
@@ -113,6 +114,8 @@ mod tests {
                 if points.len() > 1 && kind == 0 {
                     png(&figure).unwrap();
                 }
+                let miniature = svg(&Miniature::from(&figure)).unwrap();
+                assert!(!miniature.contains("category") && !miniature.contains("<&>"), "{points:?} on {x:?}");
             }
         }
         png(&Figure::default()).unwrap();

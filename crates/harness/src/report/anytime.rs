@@ -3,11 +3,11 @@
 use super::config::OneOrMore;
 use super::data::{Rows, ratio};
 use super::metric::Metric;
-use super::output::{Output, panel, text_table};
+use super::output::{Output, panel, tally, text_table};
 use super::progress::{ProgressAxis, Series, series};
 use crate::Error;
 use crate::figures::Layer;
-use crate::statistics::{median, quartiles};
+use crate::statistics::{median, quartiles, range};
 use bvh_build::OutOfRange;
 use bvh_build::config::above;
 use serde::Serialize;
@@ -80,16 +80,22 @@ impl Config {
         Ok(())
     }
 
-    /// Which method ends lowest where, and how far below the greedy tree.
+    /// Which methods end lowest, on how many scenes, and how far below the greedy tree.
     fn reading(&self, rows: &Rows) -> String {
-        let lowest = |scene: &str| {
-            let end = |method: &String| Some((median(&rows.final_ratios(scene, method))?, method.clone()));
-            let (cost, method) = self.methods.iter().filter_map(end).min_by(|a, b| a.0.total_cmp(&b.0))?;
-            Some(format!("{scene}: {method}, {}", percent(cost)))
+        let lowest = |scene: &&str| {
+            let ends = self.methods.iter().map(|method| (median(&rows.final_ratios(scene, method)), method));
+            ends.filter_map(|(cost, method)| Some((cost?, method))).min_by(|a, b| a.0.total_cmp(&b.0))
         };
-        let lowest: Vec<String> = rows.scenes().into_iter().filter_map(lowest).collect();
-        let lowest = lowest.join("; ");
-        format!("The lowest median cost against the greedy tree's at the end of the runs, {lowest}.")
+        let lowest: Vec<(f64, &String)> = rows.scenes().iter().filter_map(lowest).collect();
+        let Some((low, high)) = range(lowest.iter().map(|(cost, _)| *cost)) else { return String::new() };
+        let count = |method| lowest.iter().filter(|(_, best)| *best == method).count();
+        let counts = self.methods.iter().map(|method| (method.as_str(), count(method)));
+        let counts: Vec<_> = counts.filter(|(_, count)| *count > 0).collect();
+        let counts = tally(&counts, lowest.len(), "scenes");
+        let (low, high) = (percent(low), percent(high));
+        format!(
+            "Lowest median cost at the end of the runs: {counts}; against the greedy tree's {low} to {high}."
+        )
     }
 
     fn add_table(&self, output: &mut Output, rows: &Rows) {
@@ -107,7 +113,7 @@ impl Config {
                 table.add_row(name.into_iter().chain(self.at_seconds.iter().map(cell)));
             }
         }
-        output.add_table("Median cost against the greedy tree's, after so many seconds:", &table);
+        output.add_table("Median cost against the greedy tree's, after so many seconds:", table);
     }
 }
 

@@ -78,11 +78,13 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     let columns =
         ["scene", "method", "lowest_cost", "median_cost", "highest_cost", "relative_deviation", "base_cost"];
     output.show("Costs of all trials:", &summaries, &columns)?;
-    let reading = each(&summaries, |row| {
-        let (median, lowest) = (row.median_cost / row.base_cost, row.lowest_cost / row.base_cost);
-        Some(format!("{}, {}: {median:.3} and {lowest:.3}", row.scene, row.method))
+    let reading = each(&config.methods, |method| {
+        let own = || summaries.iter().filter(|row| row.method == method);
+        let of = |cost: fn(&Summary) -> f64| range(own().map(|row| cost(row) / row.base_cost));
+        let ((median, most), (lowest, least)) = (of(|row| row.median_cost)?, of(|row| row.lowest_cost)?);
+        Some(format!("‘{method}’ {median:.3} to {most:.3}, lowest {lowest:.3} to {least:.3}"))
     });
-    output.reading = format!("Median and lowest cost of all trials over Müller–Fellner's: {reading}.");
+    output.reading = format!("Costs of trials over Müller–Fellner's, over scenes: median of {reading}.");
     Ok(output)
 }
 

@@ -141,12 +141,16 @@ impl Config {
 
     /// What every method reaches over all scenes, and how tight the lower bound is.
     fn reading(&self, found: &Found) -> String {
-        let methods = each(&self.methods, |method| {
-            let own = found.gaps.iter().filter(|((of, ..), _)| of == method);
-            let all: Vec<f64> = own.flat_map(|(_, gaps)| gaps.iter().copied()).collect();
-            let [solved, greatest] = [solved(&all), at(&all, 1.0).max(0.0)].map(|part| 100.0 * part);
-            Some(format!("{method} {solved:.1} % ({greatest:.3} %)"))
-        });
+        let gaps_of = |method: &str| -> Vec<f64> {
+            let own = found.gaps.iter().filter(|((of, ..), _)| *of == method);
+            own.flat_map(|(_, gaps)| gaps.iter().copied()).collect()
+        };
+        let solved_by = self.methods.iter().map(|method| (method, solved(&gaps_of(method))));
+        let (all, some): (Vec<_>, Vec<_>) = solved_by.partition(|(_, part)| *part == 1.0);
+        let all = each(all, |(method, _)| Some(format!("‘{method}’")));
+        let all = if all.is_empty() { "no method".into() } else { all };
+        let some = each(some, |(method, part)| Some(format!("‘{method}’ {:.1} %", 100.0 * part)));
+        let some = if some.is_empty() { some } else { format!("; of some runs: {some}") };
         let bounds: Vec<f64> = found.bounds.values().flatten().copied().collect();
         let bound = median(&bounds).map_or_else(String::new, |median| {
             format!(
@@ -154,7 +158,7 @@ impl Config {
                 at(&bounds, 0.0)
             )
         });
-        format!("Runs that end at the exact optimum (and the greatest gap of the others): {methods}.{bound}")
+        format!("All runs end at the exact optimum: {all}{some}.{bound}")
     }
 }
 

@@ -17,7 +17,6 @@ mod metric;
 pub mod numbers;
 pub mod omissions;
 pub mod output;
-pub mod page;
 pub mod paper;
 mod pareto;
 pub mod peers;
@@ -44,9 +43,10 @@ use crate::statistics::{median, minimum};
 use bvh_build::{Check, OutOfRange};
 use data::Rows;
 use output::Output;
-use paper::{PaperRow, Verdict};
+use paper::{Outcome, PaperRow};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeSet;
+use std::path::Path;
 
 /// Declares the kinds of reports: name in specs (in snake case), configuration, and the function that makes it.
 macro_rules! reports {
@@ -200,11 +200,9 @@ impl Report {
 /// The file that keeps what the reports printed. Its tables may have seconds, as its name says.
 pub const TEXT_FILE: &str = "timing_report.txt";
 
-/// Makes all reports from the CSV files in the store's folder. Returns the text for the terminal, which
-/// [`TEXT_FILE`] keeps. Figures are written only if they are `drawn`.
-pub fn write_all(reports: &[Report], store: &Store, drawn: bool) -> Result<String, Error> {
-    let rows = Rows::read(store.folder())?;
-    let methods = rows.methods();
+/// Makes all reports from the CSV files in a folder, the paper's numbers beside ours last. Writes nothing.
+pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> {
+    let rows = Rows::read(folder)?;
     let mut outputs = reports.iter().map(|report| report.write(&rows)).collect::<Result<Vec<_>, _>>()?;
     if reports.is_empty() {
         outputs.push(final_costs(&rows)?);
@@ -216,13 +214,22 @@ pub fn write_all(reports: &[Report], store: &Store, drawn: bool) -> Result<Strin
     }
     let shown: Vec<_> =
         outputs.iter().flat_map(|output| &output.figures).map(|(_, figure)| series(figure)).collect();
-    let looks = looks(&methods, &shown);
-    for output in &mut outputs {
+    let looks = looks(&rows.methods(), &shown);
+    for (_, figure) in outputs.iter_mut().flat_map(|output| &mut output.figures) {
+        figure.looks.extend(looks.iter().cloned());
+    }
+    Ok(outputs)
+}
+
+/// Writes what the reports make from the CSV files in the store's folder. Returns the text for the terminal, which
+/// [`TEXT_FILE`] keeps. Figures are written only if they are `drawn`.
+pub fn write_all(reports: &[Report], store: &Store, drawn: bool) -> Result<String, Error> {
+    let outputs = outputs(reports, store.folder())?;
+    for output in &outputs {
         for (name, bytes) in &output.csv {
             store.write(&format!("{name}.csv"), bytes)?;
         }
-        for (name, figure) in output.figures.iter_mut().filter(|_| drawn) {
-            figure.looks.extend(looks.iter().cloned());
+        for (name, figure) in output.figures.iter().filter(|_| drawn) {
             store.write(&format!("{name}.svg"), figures::svg(figure)?.as_bytes())?;
             store.write(&format!("{name}.png"), &figures::png(figure)?)?;
         }
@@ -289,20 +296,12 @@ fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, Look)> 
 fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
     let numbers = rows.iter().filter(|row| row.paper_over_base.is_some());
     let numbers: BTreeSet<_> = numbers.map(|row| (&row.source, &row.scene, &row.paper)).collect();
-    let compared = || rows.iter().filter(|row| row.verdict != Verdict::NotInPaper).map(|row| row.verdict);
-    let count = |wanted: fn(Verdict) -> bool| compared().filter(|verdict| wanted(*verdict)).count();
-    let (agree, direction) = (count(|verdict| verdict == Verdict::Agrees), count(Verdict::is_same_direction));
-    let untold = count(|verdict| verdict == Verdict::CannotBeTold);
     let reasons: BTreeSet<&str> = rows.iter().map(|row| row.reason.as_str()).collect();
     let mut output = Output::new("", "Ng & Trifonov 2003 beside our results");
-    output.reading = format!(
-        "Numbers of the paper: {}. Comparisons with ours: {}; {agree} agree, {direction} more are on the same side of \
-         the base, {} differ, and {untold} cannot be told. {}",
-        numbers.len(),
-        compared().count(),
-        compared().count() - agree - direction - untold,
-        reasons.into_iter().collect::<Vec<_>>().join(" ")
-    );
+    let outcome = Outcome::of(rows);
+    let reasons = reasons.into_iter().collect::<Vec<_>>().join(" ");
+    output.reading = format!("Numbers of the paper: {}. {outcome} {reasons}", numbers.len());
+    output.outcome = Some(outcome);
     output.add_csv("paper", rows)?;
     let columns = ["scene", "quantity", "paper", "ours", "ours_low", "ours_high", "verdict"];
     output.show("What the paper says beside ours, which lies between low and high:", rows, &columns)?;

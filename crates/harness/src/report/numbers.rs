@@ -3,11 +3,12 @@
 
 use super::config::OneOrMore;
 use super::data::{Rows, ratio};
-use super::output::Output;
+use super::output::{Output, panel};
 use super::progress::{ProgressAxis, Series, longest_of_all, series};
 use crate::Error;
+use crate::figures::{Axis, Layer, Panel};
 use crate::run::rows::ReferenceRow;
-use crate::statistics::{median, primal_integral, quartiles};
+use crate::statistics::{median, primal_integral, quartiles, range};
 use serde::Serialize;
 
 bvh_build::config! { serde;
@@ -105,7 +106,39 @@ impl Config {
         output.show(explanation, &numbers, &columns)?;
         let explanation = "The primal integral is the mean gap over the longest run's time:";
         output.show(explanation, &timing, &["scene", "method", "seconds_median", "primal_integral"])?;
+        if !rows.bounds.is_empty() {
+            let caption = "Over the least known cost of the scene: the proven lower bound, below which no tree is, and the median \
+                           cost of every method's runs.";
+            output.add_figure("numbers", caption, 1, vec![self.draw(rows, &numbers)]);
+        }
+        let proven = rows.scenes().into_iter().filter_map(|scene| {
+            let reference = rows.reference(scene)?;
+            Some(100.0 * (ratio(reference.cost, reference.lower_bound?) - 1.0))
+        });
+        output.reading = range(proven).map_or_else(String::new, |(low, high)| {
+            format!(
+                "The best known trees cost at most {low:.0} to {high:.0} % more than the optimum, by scene."
+            )
+        });
         Ok(output)
+    }
+}
+
+impl Config {
+    /// The lower bound and every method's cost on every scene, over the least known cost.
+    fn draw(&self, rows: &Rows, numbers: &[Numbers]) -> Panel {
+        let bars =
+            |name: &str, values: Vec<f64>| Layer::Bars { name: name.into(), values, spread: vec![], base: 0.0 };
+        let bound = |scene: &str| rows.reference(scene).and_then(|row| Some(ratio(row.lower_bound?, row.cost)));
+        let bounds = rows.scenes().into_iter().map(|scene| bound(scene).unwrap_or(f64::NAN)).collect();
+        let cost = |method: &String| {
+            let own = |scene: &str| numbers.iter().find(|row| row.scene == scene && row.method == method);
+            let scenes = rows.scenes().into_iter();
+            bars(method, scenes.map(|scene| own(scene).map_or(f64::NAN, |row| 1.0 + row.gap_median)).collect())
+        };
+        let layers =
+            std::iter::once(bars("lower bound", bounds)).chain(self.methods.iter().map(cost)).collect();
+        panel("", Axis::categories("", rows.all_shown()), Axis::linear("cost / least known"), layers)
     }
 }
 

@@ -2,11 +2,11 @@
 
 use super::config::OneOrMore;
 use super::data::{Rows, ratio};
-use super::output::{Output, panel};
+use super::output::{Output, each, panel};
 use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::run::rows::RunRow;
-use crate::statistics::quartiles;
+use crate::statistics::{quartiles, range};
 use serde::Serialize;
 
 bvh_build::config! { serde;
@@ -74,6 +74,19 @@ impl Config {
         output.show("Cost and work with it left out over those without:", &compared, &columns)?;
         let columns = ["omission", "scene", "ratio_low", "ratio_median", "ratio_high"];
         output.show("Time with it left out over time without, median and quartiles:", &times, &columns)?;
+        let other = compared.iter().filter(|row| !row.same_cost).count();
+        let saved = each(&self.pairs, |pair| {
+            let own = times.iter().filter(|row| row.omission == pair.name).map(|row| row.ratio_median);
+            let (low, high) = range(own)?;
+            Some(format!("{} {low:.2} to {high:.2}", pair.name))
+        });
+        let cost = match other {
+            0 => "No cost changes".into(),
+            other => {
+                format!("Costs are lower in {other} of {} comparisons, otherwise the same", compared.len())
+            }
+        };
+        output.reading = format!("{cost}. Time over that without leaving out, medians over scenes: {saved}.");
         Ok(output)
     }
 

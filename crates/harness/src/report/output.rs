@@ -1,18 +1,19 @@
 //! What a report makes: CSV files, figures, comparisons with the paper, and text for the terminal.
 
-use super::paper::PaperRow;
+use super::paper::{Outcome, PaperRow};
 use crate::Error;
 use crate::figures::{Axis, Figure, Layer, Look, Panel};
 use crate::run::rows::to_bytes;
 use comfy_table::{Table, presets};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// What a report makes.
 #[derive(Clone, Debug, Default)]
 pub struct Output {
     /// Source and title of the report; the title of its figures and the first line of its text.
-    heading: String,
+    pub heading: String,
     /// CSV files: name without extension, and bytes. Names that begin with `timing` hold seconds.
     pub csv: Vec<(String, Vec<u8>)>,
     /// Figures: name without extension, and what they show.
@@ -21,8 +22,10 @@ pub struct Output {
     pub paper: Vec<PaperRow>,
     /// The sentence that reads the result, made from its numbers; empty if the tables say it all.
     pub reading: String,
-    /// The tables.
-    tables: String,
+    /// What the paper's numbers beside ours come to; only where they are compared.
+    pub outcome: Option<Outcome>,
+    /// The tables, each under a line that explains it.
+    pub tables: Vec<(String, Table)>,
 }
 
 impl Output {
@@ -60,8 +63,8 @@ impl Output {
     }
 
     /// Adds a table under a line that explains it.
-    pub fn add_table(&mut self, explanation: &str, table: &Table) {
-        self.tables += &format!("{explanation}\n{table}\n");
+    pub fn add_table(&mut self, explanation: &str, table: Table) {
+        self.tables.push((explanation.into(), table));
     }
 
     /// Adds a table of some columns of a CSV file's rows, under the columns' names, numbers with four digits.
@@ -77,15 +80,15 @@ impl Output {
             let record = record.map_err(Error::csv(path))?;
             table.add_row(shown.iter().map(|&at| four_digits(&record[at])));
         }
-        self.add_table(explanation, &table);
+        self.add_table(explanation, table);
         Ok(())
     }
 
-    /// Heading, reading and tables, for the terminal and for the page of all results. Blocks are separated by empty
-    /// lines.
+    /// Heading, reading and tables, for the terminal. Blocks are separated by empty lines.
     pub fn text(&self) -> String {
-        let reading = self.reading.trim_end();
-        let blocks = [self.heading.as_str(), reading, &self.tables];
+        let table = |(explanation, table): &(String, Table)| format!("{explanation}\n{table}\n");
+        let tables: String = self.tables.iter().map(table).collect();
+        let blocks = [&self.heading, self.reading.trim_end(), &tables];
         let some = blocks.into_iter().filter(|block| !block.is_empty());
         some.map(|block| format!("{}\n\n", block.trim_end())).collect()
     }
@@ -122,6 +125,22 @@ pub fn each<T>(items: impl IntoIterator<Item = T>, say: impl FnMut(T) -> Option<
     items.into_iter().filter_map(say).collect::<Vec<_>>().join(", ")
 }
 
+/// For how many of `total` cases something holds, by name: `‘a’, ‘b’ for all 7 scenes; ‘c’ for 3 of 7 scenes; ‘d’ for
+/// none`.
+pub fn tally(counts: &[(&str, usize)], total: usize, cases: &str) -> String {
+    let numbers: BTreeSet<usize> = counts.iter().map(|(_, count)| *count).collect();
+    let same = |number: usize| {
+        let own = counts.iter().filter(|(_, count)| *count == number);
+        let names = own.map(|(name, _)| format!("‘{name}’")).collect::<Vec<_>>().join(", ");
+        match number {
+            0 => format!("{names} for none"),
+            all if all == total => format!("{names} for all {total} {cases}"),
+            some => format!("{names} for {some} of {total} {cases}"),
+        }
+    };
+    numbers.into_iter().rev().map(same).collect::<Vec<_>>().join("; ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -131,6 +150,12 @@ mod tests {
         let shown =
             ["1.23456", "0.0123456", "12345.6", "1.5e-9", "0.0", "123456", "best", "-1.0"].map(four_digits);
         assert_eq!(shown, ["1.235", "0.01235", "12346", "1.500e-9", "0", "123456", "best", "-1.000"]);
+    }
+
+    #[test]
+    fn names_are_grouped_by_the_cases_for_which_they_hold() {
+        let said = tally(&[("a", 0), ("b", 7), ("c", 3), ("d", 7)], 7, "scenes");
+        assert_eq!(said, "‘b’, ‘d’ for all 7 scenes; ‘c’ for 3 of 7 scenes; ‘a’ for none");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The paper's numbers beside ours, and the verdicts on them.
 
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// One row of `paper.csv`: something that the paper says beside ours. Absolute costs are not compared, as the scenes are
 /// not the paper's.
@@ -143,6 +144,54 @@ impl Verdict {
     }
 }
 
+/// What comparisons with the paper come to: so many of each kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Outcome {
+    agree: usize,
+    /// Not the paper's number, but on its side of the base.
+    same_side: usize,
+    differ: usize,
+    untold: usize,
+}
+
+impl Outcome {
+    /// Of all rows but those that only add to the others.
+    pub fn of(rows: &[PaperRow]) -> Self {
+        let count = |wanted: fn(Verdict) -> bool| rows.iter().filter(|row| wanted(row.verdict)).count();
+        let compared = count(|verdict| verdict != Verdict::NotInPaper);
+        let agree = count(|verdict| verdict == Verdict::Agrees);
+        let same_side = count(Verdict::is_same_direction);
+        let untold = count(|verdict| verdict == Verdict::CannotBeTold);
+        Self { agree, same_side, untold, differ: compared - agree - same_side - untold }
+    }
+
+    /// The verdict on all of them together: what all that can be told have in common.
+    pub fn name(&self) -> &'static str {
+        match (self.agree, self.same_side, self.differ) {
+            (0, 0, 0) => "cannot be told",
+            (_, 0, 0) => "agrees",
+            (_, _, 0) => "same direction",
+            (0, 0, _) => "differs",
+            _ => "in part",
+        }
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { agree, same_side, differ, untold } = *self;
+        let kinds = [
+            ("agree", agree),
+            ("same side of the base only", same_side),
+            ("differ", differ),
+            ("cannot be told", untold),
+        ];
+        let some = kinds.iter().filter(|(_, count)| *count > 0);
+        let some: Vec<String> = some.map(|(kind, count)| format!("{kind}: {count}")).collect();
+        write!(f, "Comparisons with the paper: {} ({}).", agree + same_side + differ + untold, some.join("; "))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -159,6 +208,20 @@ mod tests {
         assert_eq!(verdict(0.95, 1.2, None), Verdict::DiffersHigher);
         // Close by, but the paper finds an improvement where ours finds none.
         assert_eq!(verdict(0.996, 1.01, None), Verdict::DiffersHigher);
+    }
+
+    #[test]
+    fn the_verdict_on_all_is_what_those_that_can_be_told_have_in_common() {
+        use Verdict::{Agrees, CannotBeTold, Differs, DiffersLower, NotInPaper, SameDirectionLower};
+        let of = |verdicts: &[Verdict]| {
+            let row = |&verdict: &Verdict| PaperRow { verdict, ..PaperRow::new("", "", "", "") };
+            Outcome::of(&verdicts.iter().map(row).collect::<Vec<_>>()).name()
+        };
+        assert_eq!(of(&[Agrees, CannotBeTold, NotInPaper]), "agrees");
+        assert_eq!(of(&[Agrees, SameDirectionLower]), "same direction");
+        assert_eq!(of(&[Differs, DiffersLower, CannotBeTold]), "differs");
+        assert_eq!(of(&[Differs, SameDirectionLower]), "in part");
+        assert_eq!(of(&[CannotBeTold, NotInPaper]), "cannot be told");
     }
 
     #[test]

@@ -3,9 +3,8 @@
 use super::config::OneOrMore;
 use super::data::Rows;
 use super::metric::Metric;
-use super::output::{Output, each};
+use super::output::{Output, tally};
 use crate::Error;
-use crate::statistics::range;
 use serde::Serialize;
 
 bvh_build::config! { serde;
@@ -62,6 +61,9 @@ impl Config {
             "layout",
             "mrays_per_second",
             "ours_over_this",
+            "missed_hits",
+            "false_hits",
+            "other_hits",
         ];
         output.show("Each method by its fastest layout, on one thread:", &comparisons, &columns)?;
         output.reading = self.reading(&comparisons);
@@ -96,13 +98,16 @@ impl Config {
         })
     }
 
+    /// In how many comparisons ours is the faster one.
     fn reading(&self, comparisons: &[Comparison]) -> String {
-        let ratios = each(self.methods.iter().filter(|method| **method != self.ours), |method| {
-            let own = || comparisons.iter().filter(|row| row.method == method);
-            let (low, high) = range(own().map(|row| row.ours_over_this))?;
-            let wrong: u64 = own().map(|row| row.missed_hits + row.false_hits + row.other_hits).sum();
-            Some(format!("{method} {low:.2} to {high:.2} ({wrong} rays answered otherwise)"))
-        });
-        format!("Our rays per second over those of {ratios}.")
+        let others = self.methods.iter().filter(|method| **method != self.ours);
+        let own = |method: &String| -> Vec<&Comparison> {
+            comparisons.iter().filter(|row| row.method == *method).collect()
+        };
+        let total = others.clone().map(|method| own(method).len()).max().unwrap_or(0);
+        let faster = |method| own(method).iter().filter(|row| row.ours_over_this > 1.0).count();
+        let counts: Vec<_> = others.map(|method| (method.as_str(), faster(method))).collect();
+        let counts = tally(&counts, total, "settings");
+        format!("Ours, ‘{}’, each by its fastest layout, traces more rays per second than {counts}.", self.ours)
     }
 }

@@ -1,7 +1,7 @@
 //! Tests of rays in trees that are trained on rays, over those in a tree that is searched for by area.
 
 use super::data::{Rows, distinct};
-use super::output::{Output, each, panel};
+use super::output::{Output, panel, tally};
 use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::run::rows::{TestRow, TestTimeRow};
@@ -66,11 +66,7 @@ impl Config {
         if !speeds.is_empty() {
             output.add_csv("timing_ray_cost", &speeds)?;
         }
-        output.reading = format!(
-            "Tests per ray over those of {}, geometric means over scenes: {}.",
-            self.base,
-            reading(&table)
-        );
+        output.reading = reading(&table, &self.base);
         Ok(output)
     }
 
@@ -182,10 +178,24 @@ fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
     distinct(table.iter().map(key)).into_iter().map(mean).collect()
 }
 
-fn reading(table: &[Compared]) -> String {
-    each(table.iter().filter(|row| row.scene == ALL && row.trained_on != "none"), |row| {
-        let camera = if row.camera == "none" { String::new() } else { format!(" ({} camera)", row.camera) };
-        let tree = tree_name(row.tree, row.trained_on);
-        Some(format!("{tree} on {}{camera} {:.3}", row.judged_on, row.tests_over_base))
-    })
+/// With how many kinds of rays each trained tree takes fewer tests than the base, and the least of all.
+fn reading(table: &[Compared], base: &str) -> String {
+    let own = || table.iter().filter(|row| row.scene == ALL && row.trained_on != "none");
+    let Some(least) = own().min_by(|a, b| a.tests_over_base.total_cmp(&b.tests_over_base)) else {
+        return String::new();
+    };
+    let trees = distinct(own().map(|row| tree_name(row.tree, row.trained_on)));
+    let of = |tree: &str| own().filter(|row| tree_name(row.tree, row.trained_on) == tree).collect::<Vec<_>>();
+    let fewer = |tree: &str| of(tree).iter().filter(|row| row.tests_over_base < 1.0).count();
+    let counts: Vec<_> = trees.iter().map(|tree| (tree.as_str(), fewer(tree))).collect();
+    let total = trees.iter().map(|tree| of(tree).len()).max().unwrap_or(0);
+    let counts = tally(&counts, total, "kinds of rays");
+    format!(
+        "Fewer tests per ray than ‘{base}’, geometric means over scenes: {counts}. The least is {:.3} of its tests, ‘{}’ on \
+         {} rays ({} camera).",
+        least.tests_over_base,
+        tree_name(least.tree, least.trained_on),
+        least.judged_on,
+        least.camera
+    )
 }

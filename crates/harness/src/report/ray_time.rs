@@ -3,10 +3,10 @@
 use super::config::OneOrMore;
 use super::data::Rows;
 use super::metric::Metric;
-use super::output::{Output, panel};
+use super::output::{Output, each, panel};
 use crate::Error;
 use crate::figures::{Axis, Layer};
-use crate::statistics::geometric_mean;
+use crate::statistics::{geometric_mean, minimum};
 use bvh_build::config::Itself;
 use serde::Serialize;
 
@@ -71,6 +71,16 @@ impl Config {
         output.add_figure("timing_ray_time", caption, 2, panels);
         let columns = ["scene", "series", "method", "build_seconds", "tests_over_base"];
         output.show("Tests per ray against time:", &points, &columns)?;
+        let best = each(&self.series, |series| {
+            let own = |scene: &&str| {
+                let own = points.iter().filter(|point| point.scene == *scene && point.series == series.name);
+                minimum(own.map(|point| point.tests_over_base))
+            };
+            let least: Vec<f64> = rows.scenes().iter().filter_map(own).collect();
+            (!least.is_empty()).then(|| format!("{:.3} ({})", geometric_mean(&least), series.name))
+        });
+        output.reading =
+            format!("Tests per ray over ‘{}’ at best, geometric means over scenes: {best}.", self.base);
         Ok(output)
     }
 

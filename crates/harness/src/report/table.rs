@@ -2,7 +2,7 @@
 
 use super::config::OneOrMore;
 use super::data::Rows;
-use super::output::{Output, panel, text_table};
+use super::output::{Output, panel, tally, text_table};
 use super::paper::{PaperRow, Verdict};
 use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
@@ -198,17 +198,24 @@ impl Config {
             let shown = self.columns.iter().map(|column| show(column).unwrap_or_default());
             table.add_row(std::iter::once(rows.shown(scene)).chain(shown));
         }
-        output.add_table("Cost over base, ours (and the paper's, on its own scenes):", &table);
+        output.add_table("Cost over base, ours (and the paper's, on its own scenes):", table);
     }
 
+    /// On how many scenes each column but the base is below the base, and the least ratio of all.
     fn reading(&self, cells: &[Cell]) -> String {
-        let of = |column: &Column| {
-            let own = || cells.iter().filter(|cell| cell.column == column.name).map(|cell| cell.cost_over_base);
-            let ((low, high), scenes) = (range(own())?, own().count());
-            let below = own().filter(|&ratio| ratio < 1.0).count();
-            let name = &column.name;
-            Some(format!("{name}: {low:.3} to {high:.3} of base, below it on {below} of {scenes} scenes"))
+        let of = |column: &Column| -> Vec<&Cell> {
+            cells.iter().filter(|cell| cell.column == column.name).collect()
         };
-        self.columns.iter().filter_map(of).collect::<Vec<_>>().join("; ") + "."
+        let below = |column: &Column| of(column).iter().filter(|cell| cell.cost_over_base < 1.0).count();
+        let others = || self.columns.iter().skip(1);
+        let counts: Vec<_> = others().map(|column| (column.name.as_str(), below(column))).collect();
+        let compared = others().flat_map(of);
+        let Some(least) = compared.min_by(|a, b| a.cost_over_base.total_cmp(&b.cost_over_base)) else {
+            return String::new();
+        };
+        let scenes = self.columns.first().map_or(0, |base| of(base).len());
+        let Cell { column, scene, cost_over_base, .. } = least;
+        let counts = tally(&counts, scenes, "scenes");
+        format!("Below base: {counts}. The least is {cost_over_base:.3} of base, ‘{column}’ on {scene}.")
     }
 }

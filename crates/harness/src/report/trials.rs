@@ -2,7 +2,7 @@
 
 use super::config::OneOrMore;
 use super::data::Rows;
-use super::output::{Output, each, panel};
+use super::output::{Output, panel, tally};
 use super::paper::{PaperRow, Verdict};
 use crate::Error;
 use crate::figures::{Axis, Layer};
@@ -91,6 +91,10 @@ impl Config {
         let caption = "Lowest cost among so many trials, over that of the greedy tree. Left, one run, as in the paper; \
                        right, what is expected, with the 95 % interval of the mean over repetitions.";
         output.add_figure("trials", caption, 2, panels);
+        let last: Vec<&Point> = points.iter().filter(|point| point.trials == self.best_of).collect();
+        let columns = ["scene", "method", "expected_over_base", "expected_low", "expected_high"];
+        output.show(&format!("Expected best of {} trials over base:", self.best_of), &last, &columns)?;
+        output.reading = self.reading(&last);
         output.add_csv("trials", &points)?;
         Ok(output)
     }
@@ -117,20 +121,28 @@ impl Config {
         (1..=self.best_of.min(first.len())).map_while(point).collect()
     }
 
+    /// On how many scenes each method is best, or cannot be told from the best.
+    fn reading(&self, last: &[&Point]) -> String {
+        let scenes: Vec<&[&Point]> = last.chunk_by(|a, b| a.scene == b.scene).collect();
+        let is_best = |scene: &[&Point], method: &str| {
+            let own = scene.iter().find(|point| point.method == method);
+            own.is_some_and(|own| !scene.iter().any(|other| other.is_below(own)))
+        };
+        let count = |method: &str| scenes.iter().filter(|scene| is_best(scene, method)).count();
+        let counts = self.methods.iter().map(|method| (method.as_str(), count(method)));
+        let counts: Vec<_> = counts.filter(|(_, count)| *count > 0).collect();
+        let counts = tally(&counts, scenes.len(), "scenes");
+        format!("No other has a lower expected best of {}, as far as can be told: {counts}.", self.best_of)
+    }
+
     /// Ranks the methods by the expected best of as many trials as are compared. Best is what no other is below; where
     /// that leaves several, which of them is best cannot be told.
     fn compare(&self, scene: &str, curves: &[Vec<Point>], output: &mut Output) {
         let mut ranking: Vec<&Point> = curves.iter().filter_map(|curve| curve.last()).collect();
         ranking.sort_by(|a, b| a.expected_over_base.total_cmp(&b.expected_over_base));
         let Some(least) = ranking.first() else { return };
-        let order = each(&ranking, |point| {
-            let (low, high) = point.interval();
-            Some(format!("{}: {:.4} ({low:.4} to {high:.4})", point.method, point.expected_over_base))
-        });
         let best: Vec<&Point> = ranking.iter().copied().filter(|point| !least.is_below(point)).collect();
         let names = best.iter().map(|point| point.method).collect::<Vec<_>>().join(" or ");
-        output.reading +=
-            &format!("{scene}, expected best of {} over base: {order}; best: {names}. ", self.best_of);
         let Some(paper) = &self.paper_best else { return };
         let verdict = match (best.iter().any(|point| point.method == paper), best.len()) {
             (true, 1) => Verdict::Agrees,

@@ -18,10 +18,13 @@ mod table;
 pub mod tracing;
 pub mod transform;
 
+use crate::Error;
+use crate::report::output::Output;
 use bvh_build::OutOfRange;
 pub use case::{Case, Check, EXACT_OBJECTS, Effort, LargerScenes, Part, Size, is_builder, methods};
 pub use cell::Cell;
 pub use promise::{Broken, Promise, Verdict};
+use std::path::Path;
 pub use table::{CASES, by_id};
 
 /// A measurement over the suite, as a spec asks for it.
@@ -32,6 +35,16 @@ pub enum Measure {
     Stability(stability::Config),
     /// Areas in f32 and f64 against exact ones.
     Precision(precision::Config),
+}
+
+impl Measure {
+    /// What it says about the CSV files in the folder.
+    pub fn output(&self, folder: &Path) -> Result<Output, Error> {
+        match self {
+            Self::Stability(_) => stability::output(folder),
+            Self::Precision(_) => precision::output(folder),
+        }
+    }
 }
 
 impl bvh_build::Check for Measure {

@@ -7,7 +7,8 @@ use super::table::by_id;
 use super::transform::scaled;
 use crate::Error;
 use crate::figures::{self, Axis, Figure, Layer, Panel};
-use crate::run::rows::to_bytes;
+use crate::report::output::Output;
+use crate::run::rows::{read, to_bytes};
 use crate::run::store::Store;
 use crate::scenes::stiff;
 use bvh_build::config;
@@ -252,10 +253,12 @@ impl Config {
         }
         store.write("precision.csv", &to_bytes(&rows, Path::new("precision.csv"))?)?;
         store.write("timing_precision.csv", &to_bytes(&timing, Path::new("timing_precision.csv"))?)?;
-        let figure = figure(&rows, &timing);
-        store.write("timing_precision.svg", figures::svg(&figure)?.as_bytes())?;
-        store.write("timing_precision.png", &figures::png(&figure)?)?;
-        Ok(text(&rows))
+        let output = output(store.folder())?;
+        for (name, figure) in &output.figures {
+            store.write(&format!("{name}.svg"), figures::svg(figure)?.as_bytes())?;
+            store.write(&format!("{name}.png"), &figures::png(figure)?)?;
+        }
+        Ok(output.text())
     }
 
     /// The tree by one kind of number, and the seconds of the fastest build.
@@ -301,16 +304,33 @@ fn figure(rows: &[Row], timing: &[Timing]) -> Figure {
     }
 }
 
-fn text(rows: &[Row]) -> String {
-    let mut table = comfy_table::Table::new();
-    table.load_preset(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header(["scene", "areas", "wrong", "undecided", "cost over exact"]);
-    for row in rows {
-        let wrong = format!("{} of {}", row.wrong, row.decisions);
-        let cost = format!("{:.6}", row.cost_over_exact);
-        table.add_row([&row.scene, &row.method, &wrong, &row.undecided.to_string(), &cost]);
-    }
-    format!("{table}\n")
+/// What is made from the CSV files in the folder.
+pub fn output(folder: &Path) -> Result<Output, Error> {
+    let rows: Vec<Row> = read(&folder.join("precision.csv"))?;
+    let timing: Vec<Timing> = read(&folder.join("timing_precision.csv"))?;
+    let mut output = Output::new("", "Areas in f32 and f64 against exact ones");
+    let scenes = rows.iter().filter(|row| row.method == "f32").count();
+    let of = |kind: &str| {
+        let wrong: Vec<&Row> = rows.iter().filter(|row| row.method == kind && row.wrong > 0).collect();
+        let worst = wrong.iter().map(|row| 100.0 * row.wrong_fraction).fold(0.0, f64::max);
+        match wrong.len() {
+            0 => format!("areas in {kind} on none"),
+            some => format!("areas in {kind} on {some} of {scenes} scenes, at up to {worst:.1} % of nodes"),
+        }
+    };
+    let seconds = |kind: &str| -> f64 {
+        timing.iter().filter(|row| row.method == kind).map(|row| row.nanoseconds_per_object).sum()
+    };
+    let saved = 100.0 * (1.0 - seconds("f32") / seconds("f64"));
+    output.reading = format!(
+        "Splits worse than by exact arithmetic: by {}; by {}. f32 takes {saved:.0} % less time.",
+        of("f32"),
+        of("f64")
+    );
+    let columns = ["scene", "method", "decisions", "wrong", "undecided", "cost_over_exact"];
+    output.show("Decisions at the nodes of the exact tree:", &rows, &columns)?;
+    output.figures.push(("timing_precision".into(), figure(&rows, &timing)));
+    Ok(output)
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use super::table::CASES;
 use super::{child, tracing};
 use crate::Error;
 use crate::figures::{self, HeatMap};
+use crate::report::output::Output;
 use crate::run::rows::{read, to_bytes};
 use crate::run::store::Store;
 use crate::spec::{Contestant, Labelled};
@@ -202,7 +203,11 @@ impl Config {
         if !peers.is_empty() {
             store.write("timing_peers.csv", &to_bytes(&peers, Path::new("timing_peers.csv"))?)?;
         }
-        report(store)
+        // Like the file of the other libraries: what is drawn depends on which are compiled in.
+        let map = heat_map(&self::rows(store.folder())?.concat());
+        store.write("timing_stability.svg", figures::svg(&map)?.as_bytes())?;
+        store.write("timing_stability.png", &figures::png(&map)?)?;
+        Ok(output(store.folder())?.text())
     }
 
     /// Another library on a case: few objects with all checks, then many.
@@ -227,18 +232,18 @@ impl Config {
     }
 }
 
-/// The heat map and the summary, from the CSV files. The other libraries' rows may be those of an earlier run: without
-/// the feature `peers` none are written.
-fn report(store: &Store) -> Result<String, Error> {
-    let own: Vec<Row> = read(&store.folder().join("cells.csv"))?;
-    let mut rows = own.clone();
-    let peers = store.folder().join("timing_peers.csv");
-    if peers.is_file() {
-        rows.extend(read::<Row>(&peers)?);
-    }
+/// The rows of the CSV files in the folder, our own and the other libraries'. The latter may be those of an earlier run:
+/// without the feature `peers` none are written.
+fn rows(folder: &Path) -> Result<[Vec<Row>; 2], Error> {
+    let peers = folder.join("timing_peers.csv");
+    Ok([read(&folder.join("cells.csv"))?, if peers.is_file() { read(&peers)? } else { vec![] }])
+}
+
+/// Every case by everything that was asked of it.
+fn heat_map(rows: &[Row]) -> HeatMap {
     let names = |name: fn(&Row) -> &String| {
         let mut names: Vec<String> = Vec::new();
-        for row in &rows {
+        for row in rows {
             if !names.contains(name(row)) {
                 names.push(name(row).clone());
             }
@@ -252,8 +257,8 @@ fn report(store: &Store) -> Result<String, Error> {
         row.map(shown).unwrap_or_default()
     };
     let cells = scenes.iter().flat_map(|scene| columns.iter().map(move |column| cell(scene, column))).collect();
-    let map = HeatMap {
-        title: "Stiff and extreme cases".into(),
+    HeatMap {
+        title: HEADING.into(),
         caption:
             "Every case with all that can be asked: methods, traversals, readers, and other libraries. Numbers \
              are depths of trees; where a promise was broken, which. Grey: not asked."
@@ -263,22 +268,31 @@ fn report(store: &Store) -> Result<String, Error> {
         columns,
         cells,
         classes: CLASSES.map(String::from).into(),
-    };
-    // Like the file of the other libraries: what is drawn depends on which are compiled in.
-    store.write("timing_stability.svg", figures::svg(&map)?.as_bytes())?;
-    store.write("timing_stability.png", &figures::png(&map)?)?;
+    }
+}
+
+const HEADING: &str = "Stiff and extreme cases";
+
+/// The summary and the broken promises, from the CSV files in the folder.
+pub fn output(folder: &Path) -> Result<Output, Error> {
+    let [own, peers] = rows(folder)?;
+    let is_bad = |row: &&Row| matches!(row.outcome, Class::Broken | Class::Dead);
     let count = |class| own.iter().filter(|row| row.outcome == class).count();
     let worst = own.iter().filter_map(|row| row.relative_error).fold(0.0, f64::max);
-    let mut text = format!(
-        "{} cells: {} as promised, {} with the error promised, {} broken. Largest error of a cost: \
-         {worst:.1e}.\n",
+    let mut output = Output::new("", HEADING);
+    output.reading = format!(
+        "{} cells: {} as promised, {} with the error promised, {} broken. Largest error of a cost: {worst:.1e}. Other \
+         libraries: {} of {} cells break a promise, crash or hang.",
         own.len(),
         count(Class::Kept),
         count(Class::Refused),
-        count(Class::Broken),
+        own.iter().filter(is_bad).count(),
+        peers.iter().filter(is_bad).count(),
+        peers.len(),
     );
-    for row in rows.iter().filter(|row| matches!(row.outcome, Class::Broken | Class::Dead)) {
-        text += &format!("{}, {}: {}\n", row.scene, row.method, row.note);
+    let bad: Vec<&Row> = own.iter().chain(&peers).filter(is_bad).collect();
+    if !bad.is_empty() {
+        output.show("Broken promises:", &bad, &["scene", "method", "outcome", "note"])?;
     }
-    Ok(text)
+    Ok(output)
 }

@@ -1,0 +1,170 @@
+//! All results on one page: what each experiment answers first, then its tables, figures and files.
+
+mod html;
+
+use crate::Error;
+use crate::figures::{self, Miniature};
+use crate::files;
+use crate::report::output::Output;
+use crate::report::{self, paper::Outcome};
+use crate::run::provenance::Provenance;
+use crate::run::resolved::Resolved;
+use crate::scenes::SceneKind;
+use serde::de::DeserializeOwned;
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+/// One experiment's folder, as read.
+struct Section {
+    name: String,
+    question: String,
+    /// What its rows come to.
+    verdict: Verdict,
+    stand_ins: bool,
+    /// Whether it reproduces something of the paper's.
+    of_paper: bool,
+    /// What the reports make of the rows.
+    outputs: Vec<Output>,
+    /// The figures in the folder, those of the first report first.
+    figures: Vec<Drawing>,
+    /// The first figure's first panel, small; of a figure without panels nothing.
+    miniature: Option<String>,
+    /// Spec, resolved spec and provenance: what it is called, and where it is as seen from the page.
+    specs: Vec<Link>,
+    /// The rows.
+    tables: Vec<Link>,
+    provenance: Provenance,
+}
+
+/// What an experiment comes to, by a rule that the page states.
+enum Verdict {
+    Paper(Outcome),
+    Reading(String),
+    None,
+}
+
+/// A figure of the folder.
+struct Drawing {
+    name: String,
+    svg: String,
+    files: Vec<Link>,
+}
+
+/// The name of a file, and the way to it from the page.
+struct Link {
+    name: String,
+    to: String,
+}
+
+/// Writes a page of all finished experiments in `results` to `out`, without quick variants and the repetitions that lie
+/// beside others. Returns the number of experiments.
+pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(results).map_err(Error::io(results, "read the folder"))? {
+        let entry = entry.map_err(Error::io(results, "read the folder"))?;
+        if entry.path().join("resolved.toml").is_file() {
+            names.push(entry.file_name().to_string_lossy().into_owned());
+        }
+    }
+    let repeats =
+        |name: &String| name.strip_suffix(".new").is_some_and(|kept| names.iter().any(|name| name == kept));
+    let kept = names.iter().filter(|name| !repeats(name));
+    let mut sections = kept.map(|name| section(results, name, out)).collect::<Result<Vec<_>, _>>()?;
+    if sections.is_empty() {
+        return Err(Error::Usage(format!(
+            "{} holds no finished experiment; accepted: the --out of one",
+            results.display()
+        )));
+    }
+    // What the paper has comes first.
+    sections.sort_by(|a, b| (!a.of_paper, &a.name).cmp(&(!b.of_paper, &b.name)));
+    files::write(out, html::page(&sections).as_bytes())?;
+    Ok(sections.len())
+}
+
+/// Reads what an experiment has written, and makes its reports again, which read CSV files only. Runs nothing.
+fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
+    let folder = results.join(name);
+    let Resolved { experiment, scenes } = read_toml(&folder.join("resolved.toml"))?;
+    let provenance: Provenance = read_toml(&folder.join("provenance.toml"))?;
+    let outputs = match &experiment.suite {
+        Some(measure) => vec![measure.output(&folder)?],
+        None => report::outputs(&experiment.reports, &folder)?,
+    };
+    let mut found = Vec::new();
+    for entry in fs::read_dir(&folder).map_err(Error::io(&folder, "read the folder"))?.flatten() {
+        found.push(entry.file_name().to_string_lossy().into_owned());
+    }
+    found.sort();
+    let link = |file: &str| Link { name: file.into(), to: way(out, &folder.join(file)) };
+    let ending = |suffix: &'static str| {
+        found.iter().filter_map(move |file| Some((file, file.strip_suffix(suffix)?.to_owned())))
+    };
+    let drawn: Vec<&String> = outputs.iter().flat_map(|output| &output.figures).map(|(name, _)| name).collect();
+    let mut figures = Vec::new();
+    for (file, name) in ending(".svg") {
+        let files = ["svg", "png", "csv"].map(|kind| format!("{name}.{kind}"));
+        let files = files.iter().filter(|file| found.contains(file)).map(|file| link(file)).collect();
+        figures.push(Drawing { svg: read(&folder.join(file))?, name, files });
+    }
+    figures.sort_by_key(|figure| drawn.iter().position(|name| **name == figure.name).unwrap_or(drawn.len()));
+    let first = outputs.iter().flat_map(|output| &output.figures).next();
+    let specs = spec_file(name, &provenance).map(|path| Link { name: "spec".into(), to: way(out, &path) });
+    let resolved = Link { name: "spec with all defaults".into(), ..link("resolved.toml") };
+    Ok(Section {
+        name: name.into(),
+        question: experiment.question,
+        verdict: verdict(&outputs),
+        stand_ins: scenes.iter().any(|scene| scene.kind == SceneKind::StandIn.to_string()),
+        of_paper: outputs.iter().any(|output| output.outcome.is_some()),
+        miniature: first.map(|(_, figure)| figures::svg(&Miniature::from(figure))).transpose()?,
+        outputs,
+        figures,
+        specs: specs
+            .into_iter()
+            .chain([resolved, Link { name: "provenance".into(), ..link("provenance.toml") }])
+            .collect(),
+        tables: ending(".csv").map(|(file, _)| link(file)).collect(),
+        provenance,
+    })
+}
+
+/// Where numbers are beside the paper's, what they come to; elsewhere how the first report that does reads its own.
+fn verdict(outputs: &[Output]) -> Verdict {
+    if let Some(outcome) = outputs.iter().find_map(|output| output.outcome) {
+        return Verdict::Paper(outcome);
+    }
+    let reading = outputs.iter().map(|output| output.reading.trim()).find(|reading| !reading.is_empty());
+    reading.map_or(Verdict::None, |reading| Verdict::Reading(reading.into()))
+}
+
+/// The spec that was run, if it still is where it was.
+fn spec_file(name: &str, provenance: &Provenance) -> Option<PathBuf> {
+    let command = provenance.parts.first().map_or(&provenance.command, |part| &part.command);
+    let is_spec = |path: &PathBuf| {
+        path.file_name().is_some_and(|file| *file == *format!("{name}.toml")) && path.is_file()
+    };
+    command.split_whitespace().map(PathBuf::from).find(is_spec)
+}
+
+/// The way from the page to a file, as a relative reference of a URL.
+fn way(page: &Path, file: &Path) -> String {
+    let whole = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or_default();
+    let from = whole(page.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")));
+    let to = whole(file);
+    let common = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
+    let up = from.components().skip(common).map(|_| "..".into());
+    let down = to.components().skip(common).filter_map(|part| match part {
+        Component::Normal(name) => Some(html::reference(&name.to_string_lossy())),
+        _ => None,
+    });
+    up.chain(down).collect::<Vec<String>>().join("/")
+}
+
+fn read(path: &Path) -> Result<String, Error> {
+    fs::read_to_string(path).map_err(Error::io(path, "read the file"))
+}
+
+fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
+    toml::from_str(&read(path)?).map_err(Error::toml(path))
+}
