@@ -6,7 +6,7 @@ use crate::Error;
 use crate::figures::{self, Miniature};
 use crate::files;
 use crate::report::output::Output;
-use crate::report::{self, paper::Outcome};
+use crate::report::{self, clocked, paper::Outcome};
 use crate::run::provenance::Provenance;
 use crate::run::resolved::Resolved;
 use crate::scenes::SceneKind;
@@ -89,6 +89,7 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
     let provenance: Provenance = read_toml(&folder.join("provenance.toml"))?;
     let outputs = match &experiment.suite {
         Some(measure) => vec![measure.output(&folder)?],
+        None if experiment.is_by_the_clock() => vec![clocked::output(&folder)?],
         None => report::outputs(&experiment.reports, &folder)?,
     };
     let mut found = Vec::new();

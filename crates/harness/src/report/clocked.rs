@@ -1,12 +1,15 @@
-//! What runs that the clock ends came to, beside another library: a table for the terminal, as nothing else repeats.
+//! What runs that the clock ends came to, beside another library: a table and a figure.
 
 use super::TEXT_FILE;
-use super::output::Output;
+use super::data::distinct;
+use super::output::{Output, panel, tally};
 use crate::Error;
+use crate::figures::{self, Axis, Layer};
 use crate::run::rows::{self, ClockedPeerRow, ClockedRow};
 use crate::run::store::Store;
 use crate::statistics::{median, minimum};
 use std::collections::BTreeSet;
+use std::path::Path;
 
 #[derive(serde::Serialize)]
 struct Line {
@@ -20,10 +23,10 @@ struct Line {
     least_collapsed_sah: Option<f64>,
 }
 
-/// Makes the table from the CSV files in the store's folder. Returns its text, which [`TEXT_FILE`] keeps.
-pub fn write(store: &Store) -> Result<String, Error> {
-    let runs: Vec<ClockedRow> = rows::read_if_any(store.folder())?;
-    let peers: Vec<ClockedPeerRow> = rows::read_if_any(store.folder())?;
+/// Makes the table and the figure from the CSV files in a folder.
+pub fn output(folder: &Path) -> Result<Output, Error> {
+    let runs: Vec<ClockedRow> = rows::read_if_any(folder)?;
+    let peers: Vec<ClockedPeerRow> = rows::read_if_any(folder)?;
     let mut seen = BTreeSet::new();
     let first = runs.iter().filter(|run| seen.insert((&run.scene, &run.method)));
     let mut lines: Vec<Line> = first.map(|run| line(run, &runs)).collect();
@@ -55,9 +58,40 @@ pub fn write(store: &Store) -> Result<String, Error> {
             "least_collapsed_sah",
         ],
     )?;
-    let text = output.text();
-    store.write(TEXT_FILE, text.as_bytes())?;
-    Ok(text)
+    let (scenes, methods) =
+        (distinct(order.into_iter()), distinct(lines.iter().map(|line| line.method.as_str())));
+    let of = |scene: &str, method: &str| {
+        let own = lines.iter().find(|line| line.scene == scene && line.method == method);
+        own.and_then(|line| line.collapsed_sah).unwrap_or(f64::NAN)
+    };
+    let least = |scene: &str| minimum(methods.iter().map(|method| of(scene, method))).unwrap_or(f64::NAN);
+    let wins = |method: &str| scenes.iter().filter(|scene| of(scene, method) == least(scene)).count();
+    let counts: Vec<_> = methods.iter().map(|method| (*method, wins(method))).collect();
+    output.reading =
+        format!("Lowest median by the surface area heuristic: {}.", tally(&counts, scenes.len(), "scenes"));
+    let bars = |method: &&str| {
+        let values = scenes.iter().map(|scene| of(scene, method) / least(scene)).collect();
+        Layer::Bars { name: (*method).to_owned(), values, spread: vec![], base: 1.0 }
+    };
+    let layers = methods.iter().map(bars).collect();
+    let x = Axis::categories("", scenes.iter().map(|scene| (*scene).to_owned()).collect());
+    let caption =
+        "Medians of runs that the clock ended, by the surface area heuristic, over the least of the scene.";
+    let y = Axis::linear("cost / least of the scene");
+    output.add_figure("timing_runs", caption, 1, vec![panel("", x, y, layers)]);
+    Ok(output)
+}
+
+/// Writes what is made from the CSV files in the store's folder; the figure only if it is `drawn`. Returns the text for
+/// the terminal, which [`TEXT_FILE`] keeps.
+pub fn write(store: &Store, drawn: bool) -> Result<String, Error> {
+    let output = output(store.folder())?;
+    for (name, figure) in output.figures.iter().filter(|_| drawn) {
+        store.write(&format!("{name}.svg"), figures::svg(figure)?.as_bytes())?;
+        store.write(&format!("{name}.png"), &figures::png(figure)?)?;
+    }
+    store.write(TEXT_FILE, output.text().as_bytes())?;
+    Ok(output.text())
 }
 
 /// All runs of the scene and the method of `first`.

@@ -50,7 +50,7 @@ fn report(
     store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
     reference::update(resolved, best_known, &provenance.revision, store)?;
     if resolved.experiment.is_by_the_clock() {
-        return clocked::write(store);
+        return clocked::write(store, !resolved.experiment.quick);
     }
     // Of quick variants, nothing but the rows is compared or shown.
     report::write_all(&resolved.experiment.reports, store, !resolved.experiment.quick)
