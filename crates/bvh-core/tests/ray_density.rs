@@ -2,7 +2,8 @@
 
 mod support;
 
-use bvh_core::{Aabb, DensityError, RayDensity, Segment};
+use bvh_core::cost::Measure;
+use bvh_core::{Aabb, DensityError, PackedAabb, RayDensity, Segment};
 use proptest::prelude::*;
 use std::sync::OnceLock;
 use support::Random;
@@ -102,6 +103,10 @@ proptest! {
         let outer = inner.union(&around(c, d));
         prop_assert!(density.measure(&inner) <= density.measure(&outer), "{inner:?} in {outer:?}");
         prop_assert!(density.entries(&inner) <= density.entries(&outer));
+        for aabb in [inner, outer] {
+            let packed = density.of(&PackedAabb::from(&aabb));
+            prop_assert_eq!(packed.to_bits(), density.measure(&aabb).to_bits(), "{:?}: vectors differ", aabb);
+        }
         prop_assert!(density.entries(&inner) >= 0.0 && density.entries(&outer) <= f64::from(density.segments()));
     }
 }

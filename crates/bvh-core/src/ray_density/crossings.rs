@@ -1,5 +1,6 @@
 //! Counts where segments start and which faces of grid cells they cross, and sums the counts into tables.
 
+use super::{Cell, Corner};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
@@ -94,57 +95,52 @@ impl Crossings {
         self.faces[axis][usize::from(downward)][face(axis, plane, into)] += 1;
     }
 
-    /// The eight tables of signed counts; see [the measure](super).
-    pub fn corner_tables(&self) -> Vec<[f32; 8]> {
+    /// The tables of signed counts, one per corner of a box; see [the measure](super).
+    pub fn corner_tables(&self) -> Vec<Corner> {
         let starts = summed_starts(&self.starts);
         let faces = [0, 1, 2].map(|axis| [0, 1].map(|way| summed_faces(&self.faces[axis][way])));
-        let mut tables = Vec::with_capacity(8 * CELLS * CELLS * CELLS);
         let point = |at: [usize; 3]| (at[2] * POINTS + at[1]) * POINTS + at[0];
-        for corner in 0..8usize {
+        let value = |corner: usize, at: [usize; 3]| -> f32 {
             let high = [0, 1, 2].map(|axis| corner >> axis & 1);
             let sign = high.map(|high| if high == 1 { 1.0 } else { -1.0 });
-            let value = |at: [usize; 3]| -> f32 {
-                let mut sum = sign[0] * sign[1] * sign[2] * starts[point(at)] as f64;
-                for axis in 0..3 {
-                    let [u, v] = OTHERS[axis];
-                    // The lower face is entered upward, the upper one downward.
-                    let flux = faces[axis][high[axis]][(at[axis] * POINTS + at[v]) * POINTS + at[u]];
-                    sum += sign[u] * sign[v] * flux as f64;
-                }
-                sum as f32
-            };
-            for z in 0..CELLS {
-                for y in 0..CELLS {
-                    for x in 0..CELLS {
-                        tables.push(core::array::from_fn(|i| {
-                            value([x + (i & 1), y + (i >> 1 & 1), z + (i >> 2)])
-                        }));
-                    }
-                }
+            let mut sum = sign[0] * sign[1] * sign[2] * starts[point(at)] as f64;
+            for axis in 0..3 {
+                let [u, v] = OTHERS[axis];
+                // The lower face is entered upward, the upper one downward.
+                let flux = faces[axis][high[axis]][(at[axis] * POINTS + at[v]) * POINTS + at[u]];
+                sum += sign[u] * sign[v] * flux as f64;
             }
-        }
-        tables
+            sum as f32
+        };
+        let around = |cell: [usize; 3], corner| {
+            Corner(core::array::from_fn(|i| {
+                value(corner, [cell[0] + (i & 1), cell[1] + (i >> 1 & 1), cell[2] + (i >> 2)])
+            }))
+        };
+        cells().flat_map(|cell| (0..8).map(move |corner| around(cell, corner))).collect()
     }
 
-    /// For each cell the flux through its faces, upward at both planes and then downward, per axis; then its starts.
-    pub fn cell_table(&self) -> Vec<[f32; 16]> {
-        let mut table = Vec::with_capacity(CELLS * CELLS * CELLS);
-        for z in 0..CELLS {
-            for y in 0..CELLS {
-                for x in 0..CELLS {
-                    let cell = [x, y, z];
-                    let mut values = [0.0; 16];
-                    for (at, value) in values[..12].iter_mut().enumerate() {
-                        let (axis, way, upper) = (at / 4, at / 2 % 2, at % 2);
-                        *value = self.faces[axis][way][face(axis, cell[axis] + upper, cell)] as f32;
-                    }
-                    values[12] = self.starts[index(cell)] as f32;
-                    table.push(values);
-                }
+    /// For each cell, the flux through its faces and its starts as linear functions of a box's ends.
+    pub fn cell_table(&self) -> Vec<Cell> {
+        let of_cell = |cell: [usize; 3]| {
+            let mut rows = [0.0; 16];
+            for axis in 0..3 {
+                let flux =
+                    |way: usize, upper| self.faces[axis][way][face(axis, cell[axis] + upper, cell)] as f32;
+                rows[axis] = (flux(0, 0) + flux(1, 0)) * super::FRACTIONS as f32;
+                rows[4 + axis] = flux(0, 1) - flux(0, 0);
+                rows[8 + axis] = flux(1, 1) - flux(1, 0);
             }
-        }
-        table
+            rows[12] = self.starts[index(cell)] as f32;
+            Cell(rows)
+        };
+        cells().map(of_cell).collect()
     }
+}
+
+/// All cells in the order of tables.
+fn cells() -> impl Iterator<Item = [usize; 3]> {
+    (0..CELLS * CELLS * CELLS).map(|i| [i % CELLS, i / CELLS % CELLS, i / (CELLS * CELLS)])
 }
 
 /// Index of the face of a cell that lies in a plane.

@@ -22,12 +22,14 @@
 //! no smaller count. The interpolated value is the mean count over all shifts of a grid-rounded box, each axis rounded by a shift of its own that is the same for both
 //! of its ends; rounding preserves inclusion, so the mean is monotone too. Box corners are first rounded outward to
 //! 1/512 of a cell; all counts and weights are then integers whose products and sums stay below 2⁵³, so that
-//! the arithmetic is exact, and neither the order of summation nor the shortcut for boxes within one cell changes a bit.
+//! the arithmetic is exact, and neither the order of summation, nor vector registers, nor the shortcut for boxes within one cell change a bit.
 //!
 //! The idea of counting the rays that meet a box is that of Bittner & Havran 2009 (ray distribution heuristic, for kd-trees) and of
 //! Ng & Trifonov's empirical ray cost, section 4, which tested every box with every ray.
 
 mod crossings;
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+mod x86;
 
 use crate::cost::Measure;
 use crate::{Aabb, Bvh, PackedAabb};
@@ -92,16 +94,28 @@ pub struct RayDensity {
     low: DVec3,
     /// Fractions of cells per world unit.
     scale: DVec3,
-    /// `[corner of the box][cell]`: the signed counts at the cell's eight grid points.
-    corners: Vec<[f32; 8]>,
-    /// `[cell]`: what a box within the cell needs; see `within`.
-    cells: Vec<[f32; 16]>,
+    /// `[cell][corner of the box]`: the signed counts at the cell's eight grid points.
+    corners: Vec<Corner>,
+    /// `[cell]`: what a box within the cell needs.
+    cells: Vec<Cell>,
     /// Segments that meet the bounds.
     segments: u32,
     /// Half area per fractional entry.
     entry_weight: f64,
     area_weight: f64,
 }
+
+/// The signed counts at the eight grid points of a cell, in half a cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+struct Corner([f32; 8]);
+
+/// What a box within one cell needs, in one cache line: four rows of one number per axis and a zero. With the box's `low` and `high` ends
+/// within the cell and its size, the flux through its faces across an axis, and in the first axis what starts in it as well, is
+/// `[0] + [1] · low + [2] · high + [3] · size` per unit of those faces.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Cell([f32; 16]);
 
 /// Corners of a box in fractions of cells.
 struct Rounded {
@@ -204,7 +218,6 @@ impl RayDensity {
     }
 
     /// Entries times 512³, an integer.
-    #[inline]
     fn fractional_entries(&self, bounds: &Aabb) -> f64 {
         if bounds.min.cmpgt(bounds.max).any() {
             return 0.0;
@@ -239,7 +252,7 @@ impl RayDensity {
         for corner in 0..8 {
             let at = [0, 1, 2].map(|axis| ends[corner >> axis & 1][axis]);
             let cell = at.map(cell_of);
-            let values = &self.corners[corner * CELLS * CELLS * CELLS + index(cell)];
+            let values = &self.corners[8 * index(cell) + corner].0;
             let part = [0, 1, 2].map(|axis| at[axis] - ((cell[axis] as u32) << FRACTION_BITS));
             let [x, y, z] = part.map(|part| [f64::from(FRACTIONS - part), f64::from(part)]);
             let xy = [x[0] * y[0], x[1] * y[0], x[0] * y[1], x[1] * y[1]];
@@ -251,8 +264,15 @@ impl RayDensity {
 }
 
 impl Measure for RayDensity {
-    #[inline]
+    // Searches call it through a reference to the trait. Inlined, it would be compiled as the crate is that makes the reference.
+    #[inline(never)]
     fn of(&self, aabb: &PackedAabb) -> f64 {
+        #[cfg(all(feature = "std", target_arch = "x86_64"))]
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            // SAFETY: the processor has AVX2 and FMA, checked on the line above.
+            let entries = unsafe { x86::fractional_entries(self, aabb) };
+            return self.entry_weight * entries + self.area_weight * aabb.half_area();
+        }
         self.measure(&Aabb::from(aabb))
     }
 }
@@ -266,16 +286,15 @@ fn cell_of(corner: u32) -> usize {
 /// The fractional entries of a box within one cell: the flux through each face of the cell, interpolated to the box's
 /// face, times that face's part of it; and the starts, times the box's part of the cell.
 #[inline]
-fn within(table: &[f32; 16], rounded: &Rounded, cell: [usize; 3]) -> f64 {
+fn within(cell_table: &Cell, rounded: &Rounded, cell: [usize; 3]) -> f64 {
     let begin = cell.map(|c| (c as u32) << FRACTION_BITS);
     let low = [0, 1, 2].map(|axis| f64::from(rounded.low[axis] - begin[axis]));
     let high = [0, 1, 2].map(|axis| f64::from(rounded.high[axis] - begin[axis]));
     let size = [0, 1, 2].map(|axis| high[axis] - low[axis]);
-    let value = |at: usize| f64::from(table[at]);
-    let between = |at: usize, part: f64| value(at) * (f64::from(FRACTIONS) - part) + value(at + 1) * part;
-    let flux = |axis: usize| between(4 * axis, low[axis]) + between(4 * axis + 2, high[axis]);
-    let faces = flux(0) * (size[1] * size[2]) + flux(1) * (size[0] * size[2]) + flux(2) * (size[0] * size[1]);
-    faces + value(12) * (size[0] * size[1] * size[2])
+    let row = |k: usize, axis: usize| f64::from(cell_table.0[4 * k + axis]);
+    let flux =
+        |axis| row(0, axis) + row(1, axis) * low[axis] + row(2, axis) * high[axis] + row(3, axis) * size[axis];
+    flux(0) * (size[1] * size[2]) + flux(1) * (size[0] * size[2]) + flux(2) * (size[0] * size[1])
 }
 
 #[cfg(test)]
