@@ -128,7 +128,10 @@ fn report(section: &Section, output: &Output) -> String {
     let figures: String = drawn.map(|drawn| figure(section, drawn)).collect();
     let tables: String = output.tables.iter().map(|(explanation, rows)| table(explanation, rows)).collect();
     let reading = output.reading.trim();
-    let reading = if reading.is_empty() { String::new() } else { format!("\n<p>{}</p>", escaped(reading)) };
+    // The verdict above has said it already.
+    let said = matches!(&section.verdict, Verdict::Reading(verdict) if verdict == reading);
+    let reading =
+        if reading.is_empty() || said { String::new() } else { format!("\n<p>{}</p>", escaped(reading)) };
     format!("\n<h3>{}</h3>{reading}{figures}{tables}", escaped(&output.heading))
 }
 
