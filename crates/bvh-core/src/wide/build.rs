@@ -8,9 +8,9 @@ use crate::collapse::{binary, binary_visited, collect};
 use crate::{Aabb, Bvh, NodeKind, Triangle};
 use alloc::{vec, vec::Vec};
 
-/// Expected time of visiting a wide node, in any unit. With a block's, measured; the layout depends little on them.
+/// Expected time of visiting a wide node: the unit.
 pub(crate) const NODE_COST: f32 = 1.0;
-/// Expected time of testing a block.
+/// Expected time of testing a block. Half of it and twice of it make no rays faster: `experiments/block_cost.toml`.
 pub(crate) const BLOCK_COST: f32 = 1.0;
 
 /// How a subtree becomes children of a wide node.
@@ -127,8 +127,8 @@ pub(crate) fn areas(tree: &Bvh) -> Vec<f32> {
 }
 
 /// The wide layout of least expected cost for rays that enter the nodes of `tree` as often as `visits` says, by default for
-/// random lines. `tree` must be valid over the triangles' boxes.
-pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) -> WideBvh {
+/// random lines, where testing a block takes `block_cost`. `tree` must be valid over the triangles' boxes.
+pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>, block_cost: f32) -> WideBvh {
     let bounds = tree.root_aabb().unwrap_or(Aabb::EMPTY);
     let mut wide = WideBvh {
         bounds,
@@ -155,7 +155,7 @@ pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) 
     };
     let tree = &*tree;
     let split = tree.prim_ids.len() > triangles.len();
-    let blocks = |objects: u32| Some(BLOCK_COST * objects.div_ceil(TriangleBlock::LANES as u32) as f32);
+    let blocks = |objects: u32| Some(block_cost * objects.div_ceil(TriangleBlock::LANES as u32) as f32);
     let decisions = decide(tree, &visits, blocks);
     let promise = promise(tree, triangles, &visits, &decisions);
     let mut ids = Vec::new();

@@ -7,7 +7,7 @@ use crate::scenes::Scene;
 use crate::statistics::{median, minimum};
 use bvh_build::{Accelerator, Query, Structure, config};
 use bvh_core::cost::SahConstants;
-use bvh_core::{Bvh, Coherence, Hit, Ray, TestCounts, WideBvh, collapse_leaves};
+use bvh_core::{Bvh, Coherence, Hit, InvalidBvh, Ray, TestCounts, WideBvh, collapse_leaves};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -52,6 +52,10 @@ pub enum Layout {
     /// [`WideBvh`] that is handed batches of rays, which it traces in packets where they cohere, and else with
     /// many in flight.
     WideBatches,
+    /// As `WideBatches`, laid out as if a block of triangles took half the time of a node.
+    WideCheapBlocks,
+    /// As `WideBatches`, laid out as if a block of triangles took twice the time of a node.
+    WideDearBlocks,
     /// [`WideBvh`] with portable code.
     WidePortable,
 }
@@ -158,7 +162,10 @@ pub fn own_contenders<'a>(
         let triangles = scene.triangles().map_err(|error| error.to_string())?;
         let accelerator = |structure| Tracer::Own(Accelerator::new(&scene.primitives, structure));
         let start = Instant::now();
-        let wide = || WideBvh::new(tree, triangles).map_err(|error| error.to_string());
+        let made = |wide: Result<_, InvalidBvh>| wide.map_err(|error| error.to_string());
+        let wide = || made(WideBvh::new(tree, triangles));
+        let blocks =
+            |cost| Ok::<_, String>(Tracer::Batches(made(WideBvh::with_block_cost(tree, triangles, cost))?));
         let (name, tracer) = match layout {
             Layout::Binary => ("binary", accelerator(Structure::Tree(Cow::Borrowed(tree)))),
             Layout::BinaryLeaves => {
@@ -168,6 +175,8 @@ pub fn own_contenders<'a>(
             Layout::Wide => ("wide", accelerator(Structure::Wide(wide()?))),
             Layout::WideAgain => ("wide, again", accelerator(Structure::Wide(wide()?))),
             Layout::WideBatches => ("wide, batches", Tracer::Batches(wide()?)),
+            Layout::WideCheapBlocks => ("wide, cheap blocks", blocks(0.5)?),
+            Layout::WideDearBlocks => ("wide, dear blocks", blocks(2.0)?),
             Layout::WidePortable => ("wide, portable", accelerator(Structure::WidePortable(wide()?))),
         };
         Ok(Contender { layout: name.into(), preparation_seconds: start.elapsed().as_secs_f64(), tracer })
