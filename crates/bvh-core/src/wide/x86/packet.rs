@@ -5,7 +5,7 @@ use super::answer::Answer;
 use super::avx512::Avx512;
 use super::box_ray::BoxRay;
 use super::one_ray::{Instructions, Pending};
-use super::packet_triangles::Shears;
+use super::packet_triangles::{Nearest, Shears};
 use super::prepared::{Axis, RAYS, Sixteen};
 use crate::wide::kernel::STACK;
 use crate::wide::layout::WideBvh;
@@ -16,14 +16,12 @@ use core::mem::MaybeUninit;
 
 /// Sixteen rays with the same signs of direction and the same largest component of it.
 pub(crate) struct Packet<'a> {
-    pub(super) sixteen: &'a Sixteen,
+    sixteen: &'a Sixteen,
     /// Indices of the planes that the rays meet first, by axis, and of those opposite.
     near: [usize; 3],
     far: [usize; 3],
     bounds: Bounds,
-    /// The nearest hits so far, or the ends of the rays.
-    pub(super) t: __m512,
-    pub(super) object: __m512i,
+    nearest: Nearest,
 }
 
 /// What interval arithmetic knows of sixteen rays. Lane `4 · axis` is the origin with the margin of near planes that makes
@@ -139,8 +137,7 @@ impl<'a> Packet<'a> {
                 near,
                 far: [3 - near[0], 5 - near[1], 7 - near[2]],
                 bounds: Bounds::new(sixteen),
-                t: sixteen.t_max,
-                object: _mm512_set1_epi32(-1),
+                nearest: Nearest { t: sixteen.t_max, object: _mm512_set1_epi32(-1) },
             }
         }
     }
@@ -201,7 +198,7 @@ impl<'a> Packet<'a> {
                         for lane in 0..(*block).len() {
                             let candidates = shears.candidates(&*block, lane) & self.live::<A>();
                             if candidates != 0 {
-                                is_hit |= self.decide::<A>(shears, &*block, lane, candidates);
+                                is_hit |= shears.decide::<A>(&*block, lane, candidates, &mut self.nearest);
                             }
                         }
                         if (*block).is_last() {
@@ -210,7 +207,7 @@ impl<'a> Packet<'a> {
                         block = block.add(1);
                     }
                     if is_hit {
-                        farthest = _mm512_reduce_max_ps(self.t);
+                        farthest = _mm512_reduce_max_ps(self.nearest.t);
                         if A::ANY && farthest < 0.0 {
                             return;
                         }
@@ -234,7 +231,13 @@ impl<'a> Packet<'a> {
     #[inline(always)]
     unsafe fn live<A: Answer>(&self) -> u16 {
         // SAFETY: the caller's promises.
-        unsafe { if A::ANY { _mm512_cmp_ps_mask::<_CMP_GE_OQ>(self.t, _mm512_setzero_ps()) } else { u16::MAX } }
+        unsafe {
+            if A::ANY {
+                _mm512_cmp_ps_mask::<_CMP_GE_OQ>(self.nearest.t, _mm512_setzero_ps())
+            } else {
+                u16::MAX
+            }
+        }
     }
 
     /// The least distance at which any ray may enter each child, and a bit per child that some ray may enter before
@@ -273,7 +276,7 @@ impl<'a> Packet<'a> {
         // SAFETY: the caller's promises; planes are six, lanes eight.
         unsafe {
             let planes = node.planes.as_ptr().cast::<f32>().add(lane);
-            let (mut entry, mut exit) = (self.sixteen.t_min, self.t);
+            let (mut entry, mut exit) = (self.sixteen.t_min, self.nearest.t);
             for axis in 0..3 {
                 let near = _mm512_set1_ps(*planes.add(8 * self.near[axis]));
                 entry = _mm512_max_ps(
@@ -300,8 +303,8 @@ impl<'a> Packet<'a> {
         // SAFETY: both are sixteen plain values of four bytes.
         unsafe {
             (
-                core::mem::transmute::<__m512, [f32; RAYS]>(self.t),
-                core::mem::transmute::<__m512i, [u32; RAYS]>(self.object),
+                core::mem::transmute::<__m512, [f32; RAYS]>(self.nearest.t),
+                core::mem::transmute::<__m512i, [u32; RAYS]>(self.nearest.object),
             )
         }
     }

@@ -2,7 +2,6 @@
 
 use super::answer::Answer;
 use super::edges;
-use super::packet::Packet;
 use super::prepared::Sixteen;
 use crate::Slabs;
 use crate::triangle::AXES;
@@ -16,19 +15,26 @@ pub(super) struct Shears {
     inverse: [__m512; 3],
     slope: [__m512; 2],
     depth: __m512,
+    t_min: __m512,
+}
+
+/// The nearest hits of sixteen rays so far, or the ends of the rays and `u32::MAX`.
+pub(super) struct Nearest {
+    pub(super) t: __m512,
+    pub(super) object: __m512i,
 }
 
 impl Shears {
     #[inline(always)]
     pub(super) unsafe fn new(sixteen: &Sixteen) -> Self {
-        let Sixteen { origin, direction, inverse, second, third, .. } = sixteen;
+        let Sixteen { origin, direction, inverse, t_min, second, third, .. } = sixteen;
         let axes @ [kx, ky, kz] = AXES[if *third != 0 { 2 } else { usize::from(*second != 0) }];
         // SAFETY: the caller has AVX-512.
         let slope = unsafe {
             [_mm512_div_ps(direction[kx], direction[kz]), _mm512_div_ps(direction[ky], direction[kz])]
         };
         let [origin, inverse] = [origin, inverse].map(|by_axis| [by_axis[kx], by_axis[ky], by_axis[kz]]);
-        Self { axes, origin, inverse, slope, depth: direction[kz] }
+        Self { axes, origin, inverse, slope, depth: direction[kz], t_min: *t_min }
     }
 
     /// One corner relative to the rays: along x, y and z of the shear.
@@ -57,26 +63,23 @@ impl Shears {
             edges::candidates((ax, ay), (bx, by), (cx, cy))
         }
     }
-}
-
-impl Packet<'_> {
     /// Decides exactly, as [`Triangle::intersect`](crate::Triangle::intersect), which rays hit the triangle in a lane, and
     /// keeps those hits that precede the rays' nearest; whether there are any.
     #[inline(always)]
     pub(super) unsafe fn decide<A: Answer>(
-        &mut self,
-        shears: &Shears,
+        &self,
         block: &TriangleBlock,
         lane: usize,
         candidates: u16,
+        nearest: &mut Nearest,
     ) -> bool {
         // SAFETY: the caller's promises.
         unsafe {
-            let a = shears.apply(&block.corners[0], lane);
-            let b = shears.apply(&block.corners[1], lane);
-            let c = shears.apply(&block.corners[2], lane);
-            let (low, low_t) = self.decide_half::<0>(shears.depth, &a, &b, &c);
-            let (high, high_t) = self.decide_half::<1>(shears.depth, &a, &b, &c);
+            let a = self.apply(&block.corners[0], lane);
+            let b = self.apply(&block.corners[1], lane);
+            let c = self.apply(&block.corners[2], lane);
+            let (low, low_t) = self.decide_half::<0>(&a, &b, &c);
+            let (high, high_t) = self.decide_half::<1>(&a, &b, &c);
             let inside = candidates & (u16::from(low) | u16::from(high) << 8);
             if inside == 0 {
                 return false;
@@ -86,28 +89,24 @@ impl Packet<'_> {
             // The interval of the triangle's own box: the operations of `Slabs`.
             let mut reach = _mm512_setzero_ps();
             let mut corners = [[_mm512_setzero_ps(); 2]; 3];
-            for (i, &axis) in shears.axes.iter().enumerate() {
+            for (i, &axis) in self.axes.iter().enumerate() {
                 let (a, b) = (block.corners[0][axis][lane], block.corners[1][axis][lane]);
                 let c = block.corners[2][axis][lane];
                 let (min, max) = (_mm512_set1_ps(a.min(b).min(c)), _mm512_set1_ps(a.max(b).max(c)));
-                let low = _mm512_abs_ps(_mm512_sub_ps(min, shears.origin[i]));
-                let high = _mm512_abs_ps(_mm512_sub_ps(max, shears.origin[i]));
+                let low = _mm512_abs_ps(_mm512_sub_ps(min, self.origin[i]));
+                let high = _mm512_abs_ps(_mm512_sub_ps(max, self.origin[i]));
                 reach = _mm512_max_ps(reach, _mm512_max_ps(low, high));
                 corners[i] = [min, max];
             }
             let reach = _mm512_mul_ps(reach, _mm512_set1_ps(Slabs::MARGIN));
-            let (mut entry, mut exit) = (self.sixteen.t_min, _mm512_set1_ps(f32::INFINITY));
+            let (mut entry, mut exit) = (self.t_min, _mm512_set1_ps(f32::INFINITY));
             for (i, [min, max]) in corners.into_iter().enumerate() {
-                let own = _mm512_mul_ps(_mm512_abs_ps(shears.origin[i]), _mm512_set1_ps(f32::EPSILON));
+                let own = _mm512_mul_ps(_mm512_abs_ps(self.origin[i]), _mm512_set1_ps(f32::EPSILON));
                 let margin = _mm512_add_ps(_mm512_add_ps(reach, own), _mm512_set1_ps(f32::MIN_POSITIVE));
-                let low = _mm512_mul_ps(
-                    _mm512_sub_ps(min, _mm512_add_ps(shears.origin[i], margin)),
-                    shears.inverse[i],
-                );
-                let high = _mm512_mul_ps(
-                    _mm512_sub_ps(max, _mm512_sub_ps(shears.origin[i], margin)),
-                    shears.inverse[i],
-                );
+                let low =
+                    _mm512_mul_ps(_mm512_sub_ps(min, _mm512_add_ps(self.origin[i], margin)), self.inverse[i]);
+                let high =
+                    _mm512_mul_ps(_mm512_sub_ps(max, _mm512_sub_ps(self.origin[i], margin)), self.inverse[i]);
                 entry = _mm512_max_ps(entry, _mm512_min_ps(low, high));
                 exit = _mm512_min_ps(exit, _mm512_max_ps(low, high));
             }
@@ -115,18 +114,18 @@ impl Packet<'_> {
             let moved = _mm512_add_ps(_mm512_max_ps(_mm512_min_ps(t, exit), entry), _mm512_setzero_ps());
             let inside = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(inside, entry, exit);
             if A::ANY {
-                let hits = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(inside, moved, self.t);
+                let hits = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(inside, moved, nearest.t);
                 // A ray that has its answer ends before it begins.
-                self.t = _mm512_mask_mov_ps(self.t, hits, _mm512_set1_ps(-1.0));
-                self.object = _mm512_mask_mov_epi32(self.object, hits, _mm512_setzero_si512());
+                nearest.t = _mm512_mask_mov_ps(nearest.t, hits, _mm512_set1_ps(-1.0));
+                nearest.object = _mm512_mask_mov_epi32(nearest.object, hits, _mm512_setzero_si512());
                 return hits != 0;
             }
             let object = _mm512_set1_epi32(block.id(lane) as i32);
-            let nearer = _mm512_mask_cmp_ps_mask::<_CMP_LT_OQ>(inside, moved, self.t);
-            let equal = _mm512_mask_cmp_ps_mask::<_CMP_EQ_OQ>(inside, moved, self.t);
-            let hits = nearer | _mm512_mask_cmplt_epu32_mask(equal, object, self.object);
-            self.t = _mm512_mask_mov_ps(self.t, hits, moved);
-            self.object = _mm512_mask_mov_epi32(self.object, hits, object);
+            let nearer = _mm512_mask_cmp_ps_mask::<_CMP_LT_OQ>(inside, moved, nearest.t);
+            let equal = _mm512_mask_cmp_ps_mask::<_CMP_EQ_OQ>(inside, moved, nearest.t);
+            let hits = nearer | _mm512_mask_cmplt_epu32_mask(equal, object, nearest.object);
+            nearest.t = _mm512_mask_mov_ps(nearest.t, hits, moved);
+            nearest.object = _mm512_mask_mov_epi32(nearest.object, hits, object);
             hits != 0
         }
     }
@@ -135,7 +134,6 @@ impl Packet<'_> {
     #[inline(always)]
     unsafe fn decide_half<const HALF: i32>(
         &self,
-        depth: __m512,
         a: &[__m512; 3],
         b: &[__m512; 3],
         c: &[__m512; 3],
@@ -146,8 +144,8 @@ impl Packet<'_> {
                 [double::<HALF>(a[0]), double::<HALF>(a[1]), double::<HALF>(a[2])],
                 [double::<HALF>(b[0]), double::<HALF>(b[1]), double::<HALF>(b[2])],
                 [double::<HALF>(c[0]), double::<HALF>(c[1]), double::<HALF>(c[2])],
-                double::<HALF>(depth),
-                double::<HALF>(self.sixteen.t_min),
+                double::<HALF>(self.depth),
+                double::<HALF>(self.t_min),
             )
         }
     }
