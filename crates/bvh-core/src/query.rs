@@ -32,7 +32,7 @@
 //! ```
 
 use crate::{Aabb, BvhView, Hit, NodeKind, Primitive, Ray, Sphere, any_hit_by};
-use alloc::collections::BinaryHeap;
+use alloc::collections::BTreeSet;
 use alloc::{vec, vec::Vec};
 use core::cmp::Ordering;
 use core::ops::ControlFlow;
@@ -100,7 +100,8 @@ fn least_distance_squared(aabb: &Aabb, point: Vec3) -> f64 {
     outside.max(DVec3::ZERO).length_squared() * (1.0 - ROUNDING)
 }
 
-/// Shows `visit` the objects of every leaf whose box the region may meet, until it breaks. Returns what it broke with.
+/// Shows `visit` the objects of every leaf whose box the region may meet, until it breaks. Returns what it broke with. A divided
+/// object is shown once for each of its leaves.
 ///
 /// # Panics
 /// May panic, or not return, for a tree that [`validate`](crate::validate()) refuses; so may the other queries.
@@ -198,7 +199,8 @@ impl Ord for Near {
 }
 
 /// The object nearest to `point`, of equally near ones the one of the lowest id, if its squared distance is at most `limit`.
-/// `distance_squared` gives that of an object, which must be no less than that of its box, or `None` to pass it over.
+/// `distance_squared` gives that of an object, the whole of one that is divided, which must be no less than that of its box, or `None`
+/// to pass it over.
 pub fn nearest<'t>(
     tree: impl Into<BvhView<'t>>,
     point: impl Into<Vec3>,
@@ -217,8 +219,8 @@ pub fn k_nearest<'t>(
     mut distance_squared: impl FnMut(u32) -> Option<f64>,
 ) -> Vec<Near> {
     let (tree, point) = (tree.into(), point.into());
-    // The farthest on top.
-    let mut found: BinaryHeap<Near> = BinaryHeap::new();
+    // A set, because a divided object is met in several leaves.
+    let mut found: BTreeSet<Near> = BTreeSet::new();
     if k == 0 || limit.is_nan() {
         return vec![];
     }
@@ -226,7 +228,7 @@ pub fn k_nearest<'t>(
     let mut open: Vec<(f64, usize)> = (0..tree.nodes.len().min(1)).map(|root| (least(root), root)).collect();
     while let Some((distance, index)) = open.pop() {
         let most =
-            if found.len() == k { found.peek().map_or(limit, |near| near.distance_squared) } else { limit };
+            if found.len() == k { found.last().map_or(limit, |near| near.distance_squared) } else { limit };
         if distance > most {
             continue;
         }
@@ -242,11 +244,11 @@ pub fn k_nearest<'t>(
             let Some(distance_squared) = distance_squared(object).filter(|&distance| distance <= limit) else {
                 continue;
             };
-            found.push(Near { object, distance_squared });
+            found.insert(Near { object, distance_squared });
             if found.len() > k {
-                found.pop();
+                found.pop_last();
             }
         }
     }
-    found.into_sorted_vec()
+    found.into_iter().collect()
 }

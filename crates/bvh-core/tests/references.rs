@@ -6,7 +6,7 @@ mod support;
 use bvh_core::{
     Aabb, Bvh, Clip, InvalidBvh, Kernel, Node, Ray, Shear, Triangle, WideBvh, any_hit_by, collapse_leaves,
     cost::{SahConstants, layout_area},
-    nearest_hit_by, validate, validate_references,
+    nearest_hit_by, query, validate, validate_references,
 };
 use glam::Vec3;
 use support::{Random, SHAPES, ball, bits, boxes, brute_force, grid_box, rays, scaled, soup, tree};
@@ -40,6 +40,25 @@ fn divided(tree: &Bvh, triangles: &[Triangle], random: &mut Random) -> (Bvh, Vec
         at += 1;
     }
     (tree, planes)
+}
+
+#[test]
+fn a_divided_object_is_near_once() {
+    let mut random = Random(9);
+    let triangles = soup(60, &mut random);
+    let (split, planes) = divided(&tree(&boxes(&triangles), SHAPES[0], &mut random), &triangles, &mut random);
+    assert!(planes.len() > 10, "{}", planes.len());
+    for _ in 0..200 {
+        let point = random.point() * 2.0;
+        let distance = |id: u32| triangles[id as usize].closest_point(point).distance_squared(point.as_dvec3());
+        let mut expected: Vec<(f64, u32)> = (0..60).map(|id| (distance(id), id)).collect();
+        expected.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        for k in [1, 7, 100] {
+            let found = query::k_nearest(&split, point, k, f64::INFINITY, |id| Some(distance(id)));
+            let found: Vec<_> = found.iter().map(|near| (near.distance_squared, near.object)).collect();
+            assert_eq!(found, expected[..k.min(60)], "{point}");
+        }
+    }
 }
 
 /// Rays through points of triangles on the planes at which they are divided: across the plane, and within it.
