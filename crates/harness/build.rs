@@ -1,4 +1,4 @@
-//! Tells the harness which compiler built it and how, for the provenance of results.
+//! Tells the harness which sources and which compiler built it and how, for the provenance of results.
 
 use std::process::Command;
 
@@ -10,5 +10,26 @@ fn main() {
     let set = |name| std::env::var(name).unwrap_or_else(|_| "unknown".into());
     let (profile, level, features) = (set("PROFILE"), set("OPT_LEVEL"), set("CARGO_CFG_TARGET_FEATURE"));
     println!("cargo:rustc-env=HARNESS_BUILD={profile}, opt-level {level}, target features {features}");
-    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rustc-env=HARNESS_REVISION={}", revision().as_deref().unwrap_or("unknown"));
+    for source in SOURCES {
+        println!("cargo:rerun-if-changed={source}");
+    }
+}
+
+/// What the program is made of, from this folder.
+const SOURCES: [&str; 5] = ["build.rs", "src", "../bvh-core/src", "../bvh-build/src", "../bvh-search/src"];
+
+/// The commit of the sources, with a `+` where they differ from it. Found here and not when the program runs: then the current folder
+/// may belong to another repository, and the sources may have moved on.
+fn revision() -> Option<String> {
+    let git = |args: &[&str]| {
+        let output = Command::new("git").args(args).output().ok().filter(|output| output.status.success())?;
+        Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    // Sources in a folder of somebody else's repository are not of its commit.
+    git(&["ls-files", "--error-unmatch", "build.rs"])?;
+    // The log of HEAD changes with every commit and checkout.
+    println!("cargo:rerun-if-changed={}", git(&["rev-parse", "--git-path", "logs/HEAD"])?);
+    let dirty = git(&[&["status", "--porcelain", "--untracked-files=no", "--"], &SOURCES[..]].concat())?;
+    Some(git(&["rev-parse", "HEAD"])? + if dirty.is_empty() { "" } else { "+" })
 }

@@ -2,7 +2,8 @@
 
 use bvh_core::{Aabb, validate};
 use bvh_search::{
-    Budget, Method, Observer, Problem, genetic, grasp, random_orders, rebuild, ruin_recreate, solve,
+    Budget, Event, Method, Observer, Problem, best, genetic, grasp, random_orders, rebuild, ruin_recreate,
+    solve,
 };
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -37,6 +38,31 @@ fn a_search_that_is_cancelled_at_once_evaluates_one_tree_only() {
         validate(&outcome.tree, &boxes).unwrap();
         assert_eq!(outcome.evaluations, 1, "{}", method.name());
     }
+}
+
+#[test]
+fn the_observer_hears_of_moves_that_improve_nothing() {
+    #[derive(Default)]
+    struct Counts {
+        evaluations: AtomicU64,
+        calls: AtomicU64,
+        events: AtomicU64,
+    }
+    impl Observer for Counts {
+        fn event(&self, _: &Event) {
+            self.events.fetch_add(1, Relaxed);
+        }
+        fn counted(&self, evaluations: u64, _: u64) {
+            assert!(self.evaluations.swap(evaluations, Relaxed) <= evaluations);
+            self.calls.fetch_add(1, Relaxed);
+        }
+    }
+    let (boxes, counts) = (boxes(300), Counts::default());
+    let budget = Budget { max_work: Some(10_000_000), ..Budget::UNLIMITED };
+    let outcome = solve(&best::Config::default(), &Problem::new(&boxes), 1, budget, &counts).unwrap();
+    assert_eq!(counts.evaluations.into_inner(), outcome.evaluations);
+    let (calls, events) = (counts.calls.into_inner(), counts.events.into_inner());
+    assert!(calls > 2 * events, "{calls} calls, {events} events");
 }
 
 #[test]

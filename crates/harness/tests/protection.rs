@@ -150,6 +150,41 @@ fn no_command_replaces_a_file_of_another_kind() {
     }
 }
 
+#[test]
+fn a_file_whose_name_says_another_kind_is_not_begun() {
+    let folder = folder("spec.toml");
+    let at = folder.path();
+    for (args, accepted) in [
+        (&["bake", "spheres75", "--budget=0s", "--out=x.obj"][..], ".bvh"),
+        (&["render", "spheres75", "--size=8x8", "--out=x.jpg"], ".png"),
+        (&["inspect", "x.bvh", "--nodes=x.bvh"], ".csv"),
+        (&["report", "--out=x.csv"], ".html"),
+    ] {
+        refused(at, args, &["a name that ends with", accepted, "accepted"]);
+    }
+    succeed(at, &["bake", "spheres75", "--budget=0s", "--out=tree"]);
+    assert_eq!(names(at), ["spec.toml", "tree"]);
+}
+
+#[test]
+fn results_come_from_the_programs_repository_and_not_from_the_current_folders() {
+    let folder = folder("spec.toml");
+    let git = |args: &[&str]| {
+        let by = ["-c", "user.name=x", "-c", "user.email=x", "-c", "init.defaultBranch=x"];
+        std::process::Command::new("git").args(by).args(args).current_dir(folder.path()).output().ok()
+    };
+    git(&["init"]);
+    git(&["commit", "--allow-empty", "--no-gpg-sign", "--message=x"]);
+    let Some(elsewhere) = git(&["rev-parse", "HEAD"]).filter(|output| output.status.success()) else {
+        return eprintln!("left out: there is no git");
+    };
+    succeed(folder.path(), &["spec.toml"]);
+    let provenance = fs::read_to_string(folder.path().join("results/spec/provenance.toml")).unwrap();
+    let provenance: toml::Table = provenance.parse().unwrap();
+    assert_eq!(provenance["revision"].as_str(), Some(env!("HARNESS_REVISION")));
+    assert!(!env!("HARNESS_REVISION").starts_with(text(&elsewhere.stdout).trim()));
+}
+
 #[cfg(unix)]
 #[test]
 fn pipes_and_devices_are_refused_as_inputs_and_links_are_not_written_through() {

@@ -74,6 +74,7 @@ impl<'a> Run<'a> {
     pub fn count(&mut self, tally: Tally) {
         self.evaluations = self.evaluations.saturating_add(tally.moves);
         self.work = self.work.saturating_add(tally.work);
+        self.observer.counted(self.evaluations, self.work);
     }
 
     /// Records an event if moves that were already counted led to a new incumbent of this cost. Returns whether they

@@ -20,6 +20,9 @@ pub(crate) const WORK_PER_POLL: u64 = 1 << 14;
 pub trait Observer: Sync {
     /// Called after every event of the history, in order.
     fn event(&self, _event: &Event) {}
+    /// Called whenever moves or trees have been counted, with all evaluations and all work so far: a search may go on for long
+    /// without an event.
+    fn counted(&self, _evaluations: u64, _work: u64) {}
     /// Polled often; the search returns its incumbent soon after this becomes true.
     fn cancelled(&self) -> bool {
         false

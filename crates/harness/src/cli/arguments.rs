@@ -35,16 +35,19 @@ pub struct FileKind {
     name: &'static str,
     /// The bytes with which every file of this kind begins.
     beginning: &'static [u8],
+    /// How their names end.
+    extension: &'static str,
 }
 
 /// Baked trees.
-pub const TREE: FileKind = FileKind { name: "a tree file", beginning: &Header::MAGIC };
+pub const TREE: FileKind = FileKind { name: "a tree file", beginning: &Header::MAGIC, extension: "bvh" };
 /// Pictures.
-pub const PICTURE: FileKind = FileKind { name: "a PNG file", beginning: b"\x89PNG" };
+pub const PICTURE: FileKind = FileKind { name: "a PNG file", beginning: b"\x89PNG", extension: "png" };
 /// The page of all results.
-pub const PAGE: FileKind = FileKind { name: "an HTML page", beginning: b"<!DOCTYPE html>" };
+pub const PAGE: FileKind = FileKind { name: "an HTML page", beginning: b"<!DOCTYPE html>", extension: "html" };
 /// The nodes of a tree.
-pub const NODES: FileKind = FileKind { name: "a CSV file of nodes", beginning: b"node,parent," };
+pub const NODES: FileKind =
+    FileKind { name: "a CSV file of nodes", beginning: b"node,parent,", extension: "csv" };
 
 /// A file to be written: a new one, or one of the same kind to be replaced. Anything else stays: folders, devices, and
 /// files that somebody needs otherwise, such as the command's own input.
@@ -54,7 +57,15 @@ pub fn output_file(flag: &str, path: &Path, kind: &FileKind) -> Result<(), Error
         return refuse(flag, path, "empty", accepted);
     }
     match std::fs::metadata(path) {
-        Err(_) => Ok(()),
+        Err(_) => match path.extension() {
+            // A file under the name of another kind would be taken for one.
+            Some(found) if !found.eq_ignore_ascii_case(kind.extension) => {
+                let accepted =
+                    format!("{}, by a name that ends with `.{}` or has no ending", kind.name, kind.extension);
+                refuse(flag, path, &format!("a name that ends with `.{}`", found.display()), &accepted)
+            }
+            _ => Ok(()),
+        },
         Ok(found) if found.is_dir() => refuse(flag, path, "a folder", accepted),
         Ok(found) if !found.is_file() => refuse(flag, path, "not a regular file", accepted),
         Ok(_) => {

@@ -298,7 +298,10 @@ fn summary(args: &BakeArgs, scene: &Scene, baked: &Baked) -> String {
             "no object is divided, because that does not pay here".into()
         });
     }
+    // Of a method that plans with the clock, the plan is done when the time is over.
+    let in_time = matches!(args.budget, Effort::Time(limit) if seconds >= 0.5 * limit.as_secs_f64());
     let why = match outcome.stop {
+        StopReason::Completed if in_time => "",
         StopReason::Completed => ", and nothing more that this method does",
         StopReason::Optimal => ", and no tree is better",
         _ => "",
@@ -322,6 +325,9 @@ struct Watch<'a> {
     /// The cost that gains are relative to.
     base: f64,
     last: Mutex<Option<Event>>,
+    /// Moves and work so far, which events are far behind while it is hot.
+    moves: AtomicU64,
+    work: AtomicU64,
     /// When the bar was last brought up to date, in milliseconds since the beginning.
     shown: AtomicU64,
     interrupted: &'a AtomicBool,
@@ -331,10 +337,10 @@ impl<'a> Watch<'a> {
     fn new(effort: Effort, deadline: Deadline, base: f64, interrupted: &'a AtomicBool) -> Self {
         // In thousandths of the budget; hidden unless standard error is a terminal.
         let bar = ProgressBar::new(1000);
-        let style = ProgressStyle::with_template("{wide_bar} {msg}");
+        let style = ProgressStyle::with_template("{bar:10} {wide_msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        let (last, shown) = (Mutex::default(), AtomicU64::default());
-        Self { bar, deadline, effort, base, last, shown, interrupted }
+        let [moves, work, shown] = [0, 0, 0].map(AtomicU64::new);
+        Self { bar, deadline, effort, base, last: Mutex::default(), moves, work, shown, interrupted }
     }
 
     /// Shows incumbent, gain, rate and time left, ten times a second.
@@ -353,14 +359,14 @@ impl<'a> Watch<'a> {
         let seconds = elapsed.as_secs_f64().max(1e-9);
         let done = match self.effort {
             Effort::Time(_) => self.deadline.fraction(),
-            Effort::Work(work) => event.work as f64 / work.max(1) as f64,
+            Effort::Work(work) => self.work.load(Relaxed) as f64 / work.max(1) as f64,
         };
         self.bar.set_position((1000.0 * done.min(1.0)) as u64);
         self.bar.set_message(format!(
             "{:.6e}, {} MF, {:.2} M moves/s, {:.0} s left",
             event.incumbent,
             gain(event.incumbent, self.base),
-            event.evaluations as f64 / seconds / 1e6,
+            self.moves.load(Relaxed) as f64 / seconds / 1e6,
             (seconds / done.max(1e-9) - seconds).max(0.0)
         ));
     }
@@ -369,6 +375,11 @@ impl<'a> Watch<'a> {
 impl Observer for Watch<'_> {
     fn event(&self, event: &Event) {
         *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(*event);
+    }
+
+    fn counted(&self, evaluations: u64, work: u64) {
+        self.moves.store(evaluations, Relaxed);
+        self.work.store(work, Relaxed);
     }
 
     fn cancelled(&self) -> bool {

@@ -1,7 +1,6 @@
 //! Where results come from: revision, compiler, processor, threads, date. In a file apart from the reproducible ones.
 
 use serde::{Deserialize, Serialize};
-use std::process::Command;
 use std::time::SystemTime;
 
 /// Contents of `provenance.toml`.
@@ -9,7 +8,7 @@ use std::time::SystemTime;
 pub struct Provenance {
     /// The command line, the program's own path left out.
     pub command: String,
-    /// Git revision of the working folder, `+` when it has uncommitted changes, or `unknown`.
+    /// Git revision of the sources that the program was built from, `+` when they had uncommitted changes, or `unknown`.
     pub revision: String,
     /// Version of this program.
     pub version: String,
@@ -39,7 +38,7 @@ impl Provenance {
                 .chain(std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()))
                 .collect::<Vec<_>>()
                 .join(" "),
-            revision: revision().unwrap_or_else(|| "unknown".into()),
+            revision: env!("HARNESS_REVISION").into(),
             version: env!("CARGO_PKG_VERSION").into(),
             rustc: env!("HARNESS_RUSTC").into(),
             build: format!(
@@ -58,15 +57,6 @@ impl Provenance {
 
 fn on(set: bool) -> &'static str {
     if set { "on" } else { "off" }
-}
-
-fn revision() -> Option<String> {
-    let git = |args: &[&str]| {
-        let output = Command::new("git").args(args).output().ok().filter(|output| output.status.success())?;
-        Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
-    };
-    let dirty = git(&["status", "--porcelain", "--untracked-files=no"])?;
-    Some(git(&["rev-parse", "HEAD"])? + if dirty.is_empty() { "" } else { "+" })
 }
 
 /// The model as Linux names it; elsewhere the architecture alone.
