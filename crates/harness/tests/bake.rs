@@ -315,10 +315,8 @@ fn the_nodes_are_written_in_full_precision() {
         let node = &tree.nodes[index];
         let corners = [node.aabb.min.to_array(), node.aabb.max.to_array()].concat();
         assert_eq!((5..11).map(|at| row[at].parse::<f32>().unwrap()).collect::<Vec<_>>(), corners);
-        assert_eq!(
-            (&row[0], &row[2]),
-            (index.to_string().as_str(), if node.is_leaf() { "leaf" } else { "inner" })
-        );
+        let kind = if node.is_leaf() { "leaf" } else { "inner" };
+        assert_eq!((&row[0], &row[2]), (index.to_string().as_str(), kind));
         match row[1].parse::<usize>() {
             Ok(parent) => assert!(tree.nodes[parent].children().contains(&index)),
             Err(_) => assert_eq!((&row[1], index), ("", 0)),
