@@ -4,7 +4,7 @@ use super::TEXT_FILE;
 use super::data::distinct;
 use super::output::{Output, panel, tally};
 use crate::Error;
-use crate::figures::{self, Axis, Layer};
+use crate::figures::{Axis, Layer};
 use crate::run::rows::{self, ClockedPeerRow, ClockedRow};
 use crate::run::store::Store;
 use crate::statistics::{median, minimum};
@@ -86,9 +86,8 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
 /// the terminal, which [`TEXT_FILE`] keeps.
 pub fn write(store: &Store, drawn: bool) -> Result<String, Error> {
     let output = output(store.folder())?;
-    for (name, figure) in output.figures.iter().filter(|_| drawn) {
-        store.write(&format!("{name}.svg"), figures::svg(figure)?.as_bytes())?;
-        store.write(&format!("{name}.png"), &figures::png(figure)?)?;
+    if drawn {
+        output.draw(store)?;
     }
     store.write(TEXT_FILE, output.text().as_bytes())?;
     Ok(output.text())

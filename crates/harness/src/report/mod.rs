@@ -37,7 +37,7 @@ pub mod trials;
 pub mod variations;
 
 use crate::Error;
-use crate::figures::{self, Figure, Layer, Look};
+use crate::figures::{Figure, Layer, Look};
 use crate::run::store::Store;
 use crate::statistics::{median, minimum};
 use bvh_build::{Check, OutOfRange};
@@ -229,9 +229,8 @@ pub fn write_all(reports: &[Report], store: &Store, drawn: bool) -> Result<Strin
         for (name, bytes) in &output.csv {
             store.write(&format!("{name}.csv"), bytes)?;
         }
-        for (name, figure) in output.figures.iter().filter(|_| drawn) {
-            store.write(&format!("{name}.svg"), figures::svg(figure)?.as_bytes())?;
-            store.write(&format!("{name}.png"), &figures::png(figure)?)?;
+        if drawn {
+            output.draw(store)?;
         }
     }
     let text: String = outputs.iter().map(Output::text).collect();

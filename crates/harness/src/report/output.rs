@@ -2,8 +2,9 @@
 
 use super::paper::{Outcome, PaperRow};
 use crate::Error;
-use crate::figures::{Axis, Figure, Layer, Look, Panel};
+use crate::figures::{self, Axis, Figure, Layer, Look, Panel};
 use crate::run::rows::to_bytes;
+use crate::run::store::Store;
 use comfy_table::{Table, presets};
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -33,6 +34,15 @@ impl Output {
     pub fn new(source: &str, title: &str) -> Self {
         let heading = if source.is_empty() { title.to_owned() } else { format!("{source}: {title}") };
         Self { heading, ..Self::default() }
+    }
+
+    /// Writes the figures into the store's folder, as SVG and as PNG.
+    pub fn draw(&self, store: &Store) -> Result<(), Error> {
+        for (name, figure) in &self.figures {
+            store.write(&format!("{name}.svg"), figures::svg(figure)?.as_bytes())?;
+            store.write(&format!("{name}.png"), &figures::png(figure)?)?;
+        }
+        Ok(())
     }
 
     /// Adds the CSV file `name`, without its extension.

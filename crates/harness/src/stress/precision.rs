@@ -6,7 +6,7 @@ use super::exact_area::{half_area, internal_area, ratio};
 use super::table::by_id;
 use super::transform::scaled;
 use crate::Error;
-use crate::figures::{self, Axis, Figure, Layer, Panel};
+use crate::figures::{Axis, Figure, Layer, Panel};
 use crate::report::output::Output;
 use crate::run::rows::{read, to_bytes};
 use crate::run::store::Store;
@@ -254,10 +254,7 @@ impl Config {
         store.write("precision.csv", &to_bytes(&rows, Path::new("precision.csv"))?)?;
         store.write("timing_precision.csv", &to_bytes(&timing, Path::new("timing_precision.csv"))?)?;
         let output = output(store.folder())?;
-        for (name, figure) in &output.figures {
-            store.write(&format!("{name}.svg"), figures::svg(figure)?.as_bytes())?;
-            store.write(&format!("{name}.png"), &figures::png(figure)?)?;
-        }
+        output.draw(store)?;
         Ok(output.text())
     }
 
