@@ -15,6 +15,12 @@ use core::mem::MaybeUninit;
 /// are not negative, so that their bits are ordered as they are.
 pub(crate) type Pending = u64;
 
+/// What aligns the frame of the function that holds it: otherwise the compiler keeps vectors of 32 bytes at odd multiples of
+/// 16, by where its caller's frame happens to end, and then every other one crosses a line of the cache. That costs a ray
+/// which misses everything 5 of 14 ns.
+#[repr(align(32))]
+struct Aligned<T>(T);
+
 /// The instruction set of a kernel.
 pub(crate) trait Instructions {
     /// Tests the eight boxes of a node: the distances at which the ray enters them, and a bit for each box entered
@@ -60,7 +66,7 @@ pub(crate) unsafe fn nearest<K: Instructions>(wide: &WideBvh, ray: &Ray) -> (f32
         };
         let boxes = &boxes;
         let (nodes, blocks) = (wide.nodes.as_ptr(), wide.blocks.as_ptr());
-        let mut stack = MaybeUninit::<[Pending; STACK + 8]>::uninit();
+        let mut stack = MaybeUninit::<Aligned<[Pending; STACK + 8]>>::uninit();
         let base = stack.as_mut_ptr().cast::<Pending>();
         let mut top = base;
         let mut shear = MaybeUninit::<Shear4>::uninit();
@@ -151,7 +157,7 @@ pub(crate) unsafe fn any<K: Instructions>(wide: &WideBvh, ray: &Ray) -> bool {
         };
         let boxes = &boxes;
         let (nodes, blocks) = (wide.nodes.as_ptr(), wide.blocks.as_ptr());
-        let mut stack = MaybeUninit::<[Child; STACK + 8]>::uninit();
+        let mut stack = MaybeUninit::<Aligned<[Child; STACK + 8]>>::uninit();
         let base = stack.as_mut_ptr().cast::<Child>();
         let mut top = base;
         let mut shear = MaybeUninit::<Shear4>::uninit();
