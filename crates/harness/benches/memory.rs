@@ -6,26 +6,15 @@
 //! no padding, and not the program itself; a buffer that grows counts twice while it is copied.
 
 use bvh_search::{Problem, solve};
-use harness::run::rows::to_bytes;
+use harness::run::rows::{MemoryRow, to_bytes};
 use harness::scenes::Scene;
 use harness::spec::{Contestant, Experiment, Overrides};
 use peak_alloc::PeakAlloc;
-use serde::Serialize;
 use std::fs;
 use std::path::Path;
 
 #[global_allocator]
 static ALLOCATED: PeakAlloc = PeakAlloc;
-
-#[derive(Serialize)]
-struct Row {
-    scene: String,
-    objects: usize,
-    method: String,
-    /// Trees, working memory and history; not the scene's boxes.
-    peak_bytes: usize,
-    bytes_per_object: f64,
-}
 
 fn main() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -46,7 +35,7 @@ fn main() {
 }
 
 /// The first run of every method, as the experiment does it.
-fn measure(experiment: &Experiment, scene: &Scene, rows: &mut Vec<Row>) {
+fn measure(experiment: &Experiment, scene: &Scene, rows: &mut Vec<MemoryRow>) {
     for labelled in &experiment.methods {
         let Contestant::Ours(method) = &labelled.method else { continue };
         let problem = Problem { objective: experiment.objective, ..Problem::new(&scene.boxes) };
@@ -58,6 +47,6 @@ fn measure(experiment: &Experiment, scene: &Scene, rows: &mut Vec<Row>) {
         let bytes_per_object = peak_bytes as f64 / objects as f64;
         println!("{:<10} {:<24} {bytes_per_object:>9.1} bytes per object", scene.name, labelled.label);
         let (scene, method) = (scene.name.clone(), labelled.label.clone());
-        rows.push(Row { scene, objects, method, peak_bytes, bytes_per_object });
+        rows.push(MemoryRow { scene, objects, method, peak_bytes, bytes_per_object });
     }
 }

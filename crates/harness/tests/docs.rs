@@ -243,3 +243,35 @@ fn every_experiment_is_checked_on_every_commit() {
         assert!(words.contains(name) || needs_libraries, ".ci/run does not check {name}");
     }
 }
+
+#[test]
+fn every_column_of_every_committed_table_is_on_the_page_of_columns() {
+    let declared = harness::cli::columns::all();
+    let unsaid: Vec<_> =
+        declared.iter().filter_map(|file| Some((file.to_string(), file.unsaid()?.to_owned()))).collect();
+    assert!(unsaid.is_empty(), "without a meaning: {unsaid:#?}");
+    let (path, page) = (top().join("docs/COLUMNS.md"), harness::cli::columns::page());
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        fs::write(&path, &page).unwrap();
+    }
+    assert!(
+        fs::read_to_string(&path).is_ok_and(|text| text == page),
+        "docs/COLUMNS.md is stale; UPDATE_DOCS=1 cargo test -p harness --test docs rewrites it"
+    );
+    let (mut folders, mut found) = (vec![top().join("results")], 0);
+    while let Some(folder) = folders.pop() {
+        for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "csv") {
+                let name = path.file_name().unwrap().to_str().unwrap();
+                let header = csv::Reader::from_path(&path).unwrap().headers().unwrap().clone();
+                let header: Vec<&str> = header.iter().collect();
+                let of = declared.iter().filter(|file| file.are_of(name, &header)).count();
+                assert_eq!(of, 1, "{}: docs/COLUMNS.md lacks {header:?}", path.display());
+                found += 1;
+            }
+        }
+    }
+    assert!(found > 100, "{found} tables");
+}

@@ -6,17 +6,20 @@ use crate::cli::bake::{BakeArgs, BakeCost, Baked, check_references, gain, method
 use crate::cli::effort::Effort;
 use crate::cli::output::print_line;
 use crate::files;
+use crate::run::columns::{Columns, to_bytes};
 use crate::scenes::{Scene, SceneKind, gltf, open::Format};
 use bvh_build::{Builder, median_cut};
 use bvh_core::{Instance, InvalidInstances, Primitives, Triangle, WideBvh};
 use glam::Affine3A;
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The tree over the instances, whose ids are rows of [`INSTANCES`]. It is written last: where it is, the folder is complete.
 const TOP: &str = "top.bvh";
-/// The instances: node and mesh by their numbers in the file, and the columns of the transform.
+/// The instances, an [`InstanceRow`] each.
 const INSTANCES: &str = "instances.csv";
 
 /// Searches for one tree after the other until the budget is spent or `interrupted` becomes true, and keeps each as soon as it is
@@ -37,8 +40,8 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let instances = instances(&parts);
     let top = top(&stem, &scenes, &instances, &parts)?;
     fs::create_dir_all(&args.out).map_err(Error::io(&args.out, "create the folder"))?;
-    let rows = rows(&instances, &parts).map_err(Error::csv(&args.out.join(INSTANCES)))?;
-    files::write(&args.out.join(INSTANCES), &rows)?;
+    let table = args.out.join(INSTANCES);
+    files::write(&table, &to_bytes(&rows(&instances, &parts), &table)?)?;
 
     let objects = |scene: &Scene| scene.boxes.len();
     let all = (scenes.iter().map(objects).sum::<usize>() + objects(&top)) as f64;
@@ -126,15 +129,50 @@ fn top(stem: &str, scenes: &[Scene], instances: &[Instance], parts: &gltf::Parts
     Ok(Scene::new(&name, SceneKind::File, Primitives::Triangles(triangles)))
 }
 
-fn rows(instances: &[Instance], parts: &gltf::Parts) -> Result<Vec<u8>, csv::Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record([
-        "node", "mesh", "xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz", "tx", "ty", "tz",
-    ])?;
-    for (place, instance) in parts.places.iter().zip(instances) {
-        writer.serialize((place.node, place.mesh, instance.transform.to_cols_array()))?;
-    }
-    writer.into_inner().map_err(|error| error.into_error().into())
+/// One row of `instances.csv` of `harness bake --instances`: where a node of the scene places a mesh.
+#[derive(Serialize, JsonSchema)]
+struct InstanceRow {
+    /// Number of the node in the file.
+    node: usize,
+    /// Number of the mesh in the file, whose tree is in `mesh_NUMBER.bvh`.
+    mesh: usize,
+    /// Where the transform takes the mesh's x axis, in world units: x.
+    xx: f32,
+    /// Likewise y.
+    xy: f32,
+    /// Likewise z.
+    xz: f32,
+    /// Where it takes the y axis: x.
+    yx: f32,
+    /// Likewise y.
+    yy: f32,
+    /// Likewise z.
+    yz: f32,
+    /// Where it takes the z axis: x.
+    zx: f32,
+    /// Likewise y.
+    zy: f32,
+    /// Likewise z.
+    zz: f32,
+    /// Where it takes the mesh's origin: x.
+    tx: f32,
+    /// Likewise y.
+    ty: f32,
+    /// Likewise z.
+    tz: f32,
+}
+
+/// The columns of [`INSTANCES`].
+pub fn columns() -> Columns {
+    Columns::of::<InstanceRow>()
+}
+
+fn rows(instances: &[Instance], parts: &gltf::Parts) -> Vec<InstanceRow> {
+    let row = |(place, instance): (&gltf::Placed, &Instance)| {
+        let [xx, xy, xz, yx, yy, yz, zx, zy, zz, tx, ty, tz] = instance.transform.to_cols_array();
+        InstanceRow { node: place.node, mesh: place.mesh, xx, xy, xz, yx, yy, yz, zx, zy, zz, tx, ty, tz }
+    };
+    parts.places.iter().zip(instances).map(row).collect()
 }
 
 /// A part of a budget.

@@ -2,6 +2,7 @@
 
 use crate::cli::arguments::{NODES, input_folder, output_file};
 use crate::cli::output::{print_error, print_line};
+use crate::run::columns::Columns;
 use crate::run::{archive, reference, rows};
 use crate::scenes::Scene;
 use crate::{Error, files};
@@ -10,6 +11,7 @@ use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_core::file::{FileError, Header, TreeFile};
 use bvh_core::{Bvh, NodeKind, validate_references};
 use clap::Args;
+use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -33,21 +35,36 @@ pub struct InspectArgs {
     pub json: bool,
 }
 
-/// One row of the nodes' CSV file.
-#[derive(Serialize)]
+/// One row of `FILE.csv` of `harness inspect --nodes FILE.csv`: a node of a tree.
+#[derive(Serialize, JsonSchema)]
 struct NodeRow {
+    /// Its number, 0 for the root.
     node: usize,
     /// Empty for the root.
     parent: Option<usize>,
+    /// `inner` or `leaf`.
     kind: &'static str,
+    /// Of an inner node the first child, of a leaf its first place in the list of objects.
     first: u32,
+    /// Number of children, or of objects.
     count: u32,
+    /// Lower corner of its box, in world units.
     min_x: f32,
+    /// Likewise.
     min_y: f32,
+    /// Likewise.
     min_z: f32,
+    /// Upper corner.
     max_x: f32,
+    /// Likewise.
     max_y: f32,
+    /// Likewise.
     max_z: f32,
+}
+
+/// The columns of the nodes' file.
+pub fn columns() -> Columns {
+    Columns::of::<NodeRow>()
 }
 
 /// Facts by name, in the order in which they are printed: as a text, and as JSON.

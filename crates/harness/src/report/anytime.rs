@@ -10,6 +10,7 @@ use crate::figures::Layer;
 use crate::statistics::{median, quartiles, range};
 use bvh_build::OutOfRange;
 use bvh_build::config::above;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 bvh_build::config! { serde;
@@ -29,13 +30,13 @@ bvh_build::config! { serde;
     check Self::check_names;
 }
 
-/// One point of a curve, as written to `timing_anytime.csv`, `anytime_evaluations.csv` and `anytime_work.csv`.
-#[derive(Serialize)]
-struct Point<'a> {
+/// One point of a curve, as written to `timing_FILE.csv`, `FILE_evaluations.csv` and
+/// `FILE_work.csv`, where FILE is `anytime` unless the report says otherwise.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Point<'a> {
     scene: &'a str,
     method: &'a str,
     x: f64,
-    /// The gap to the reference, over repetitions.
     gap_quartile_1: f64,
     gap_median: f64,
     gap_quartile_3: f64,

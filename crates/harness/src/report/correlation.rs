@@ -8,14 +8,16 @@ use crate::Error;
 use crate::figures::{Layer, Panel};
 use crate::run::rows::{RayRow, RunRow};
 use crate::statistics::{pearson, range, spearman};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// One cost against one kind of rays over the trees of one set, as written to `correlation.csv`.
-#[derive(Serialize)]
-struct Correlation<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Correlation<'a> {
     scene: &'a str,
     /// `all`, or the label of the method whose trees alone are compared.
     method: &'a str,
+    /// Which cost.
     cost: &'a str,
     family: &'a str,
     query: &'a str,

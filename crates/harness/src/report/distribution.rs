@@ -8,6 +8,7 @@ use crate::Error;
 use crate::figures::{Axis, Layer};
 use crate::statistics::{quantile, range};
 use bvh_build::config::above;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 bvh_build::config! { serde;
@@ -28,16 +29,19 @@ bvh_build::config! { serde;
 }
 
 /// One method's trials on one scene, pooled over repetitions, as written to `distribution.csv`.
-#[derive(Serialize)]
-struct Summary<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Summary<'a> {
     scene: &'a str,
     method: &'a str,
     trials: usize,
     lowest_cost: f64,
+    /// The lower quartile of the costs.
     quartile_1_cost: f64,
     median_cost: f64,
+    /// The upper quartile of the costs.
     quartile_3_cost: f64,
     highest_cost: f64,
+    /// The mean cost.
     mean_cost: f64,
     /// Standard deviation over mean.
     relative_deviation: f64,

@@ -10,11 +10,12 @@ use super::output::{Output, each, panel};
 use super::progress::{ProgressAxis, longest_of_all};
 use crate::Error;
 use crate::figures::{Axis, Layer};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// One step, as written to `timing_ecdf.csv`, `ecdf_evaluations.csv` and `ecdf_work.csv`.
-#[derive(Serialize)]
-struct Step<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Step<'a> {
     method: &'a str,
     x: f64,
     /// Of all runs, on all scenes, for all targets.

@@ -6,15 +6,17 @@ use super::output::{Output, panel};
 use crate::Error;
 use crate::figures::{Axis, Layer};
 use crate::statistics::range;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// One measurement of a method's first repetition, as written to `estimator.csv`.
-#[derive(Serialize)]
-struct Point<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Point<'a> {
     scene: &'a str,
     method: &'a str,
     family: &'a str,
     query: &'a str,
+    /// Number of rays.
     rays: u64,
     /// Standard error of the tests per ray over their mean.
     relative_error: f64,

@@ -7,6 +7,7 @@ use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::scenes::subset::Subset;
 use crate::statistics::{median, quantile};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,27 +27,36 @@ bvh_build::config! { serde;
 const SOLVED: f64 = 1e-12;
 
 /// One method on all scenes of one kind and size, as written to `gaps.csv`; gap = (cost − optimum) / optimum.
-#[derive(Serialize)]
-struct Gaps<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Gaps<'a> {
     method: &'a str,
     /// `random`, `cluster`, or `whole` for scenes that are no such part.
     part: &'static str,
     objects: usize,
     runs: usize,
+    /// Fraction of the runs that found the optimum.
     solved_fraction: f64,
+    /// The median gap.
     median_gap: f64,
+    /// The gap that nine of ten runs do not exceed.
     quantile_90_gap: f64,
+    /// The greatest gap.
     maximum_gap: f64,
 }
 
 /// The lower bound over the optimum, on all scenes of one kind and size, as written to `tightness.csv`.
-#[derive(Serialize)]
-struct Tightness {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Tightness {
+    /// `random` or `cluster`.
     part: &'static str,
     objects: usize,
+    /// Number of scenes.
     scenes: usize,
+    /// The least of all scenes.
     minimum_bound_over_optimum: f64,
+    /// The median.
     median_bound_over_optimum: f64,
+    /// The greatest.
     maximum_bound_over_optimum: f64,
 }
 

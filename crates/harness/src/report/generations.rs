@@ -9,6 +9,7 @@ use crate::run::rows::HistoryRow;
 use crate::statistics::{expected_best_of, median, range};
 use bvh_build::OutOfRange;
 use bvh_build::config::above;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -41,14 +42,16 @@ bvh_build::config! { serde;
 }
 
 /// One generation, as written to `generations.csv`.
-#[derive(Serialize)]
-struct Generation<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Generation<'a> {
     scene: &'a str,
+    /// Number of the generation, from 0.
     generation: usize,
     /// Lowest cost so far in the run whose final cost is the median.
     median_run_cost: f64,
-    /// Over all runs.
+    /// Lowest cost so far of the best run.
     lowest_cost: f64,
+    /// Lowest cost so far of the worst run.
     highest_cost: f64,
     /// Expected lowest cost of as many random orders as one run has evaluated.
     random_picking_cost: Option<f64>,

@@ -38,6 +38,7 @@ pub mod variations;
 
 use crate::Error;
 use crate::figures::{Figure, Layer, Look};
+use crate::run::columns::Columns;
 use crate::run::store::Store;
 use crate::statistics::{median, minimum};
 use bvh_build::{Check, OutOfRange};
@@ -48,9 +49,10 @@ use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Declares the kinds of reports: name in specs (in snake case), configuration, and the function that makes it.
+/// Declares the kinds of reports: name in specs (in snake case), configuration, the function that makes it,
+/// and the rows of its CSV files.
 macro_rules! reports {
-    ($($(#[$doc:meta])* $name:literal => $kind:ident($config:ty) by $write:path;)*) => {
+    ($($(#[$doc:meta])* $name:literal => $kind:ident($config:ty) by $write:path => [$($row:ty),*];)*) => {
         /// One report of a spec.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
         #[serde(tag = "kind")]
@@ -79,6 +81,11 @@ macro_rules! reports {
                 }
             }
 
+            /// The columns of the CSV files that reports make.
+            pub fn columns() -> Vec<Columns> {
+                vec![$($(Columns::of::<$row>()),*),*, Columns::of::<PaperRow>()]
+            }
+
             fn write(&self, rows: &Rows) -> Result<Output, Error> {
                 match self {
                     $(Self::$kind(config) => $write(config, rows),)*
@@ -90,53 +97,53 @@ macro_rules! reports {
 
 reports! {
     /// Ratios to base, scenes by columns, beside the paper's.
-    "table" => Table(table::Config) by table::Config::write;
+    "table" => Table(table::Config) by table::Config::write => [table::Cell];
     /// Cost against number of trials.
-    "trials" => Trials(trials::Config) by trials::Config::write;
+    "trials" => Trials(trials::Config) by trials::Config::write => [trials::Point];
     /// Times of runs against each other.
-    "times" => Times(times::Config) by times::Config::write;
+    "times" => Times(times::Config) by times::Config::write => [times::Ratio];
     /// Cost against generation.
-    "generations" => Generations(generations::Config) by generations::Config::write;
+    "generations" => Generations(generations::Config) by generations::Config::write => [generations::Generation];
     /// The distribution of costs over trials.
-    "distribution" => Distribution(distribution::Config) by distribution::write;
+    "distribution" => Distribution(distribution::Config) by distribution::write => [distribution::Summary];
     /// Final costs of variations of one method over those of the method itself.
-    "variations" => Variations(variations::Config) by variations::Config::write;
+    "variations" => Variations(variations::Config) by variations::Config::write => [variations::Variation];
     /// Tests per random ray, methods by scenes.
-    "ray_tests" => RayTests(ray_tests::Config) by ray_tests::Config::write;
+    "ray_tests" => RayTests(ray_tests::Config) by ray_tests::Config::write => [ray_tests::Measured];
     /// The error of the ray estimator against the number of rays, for the first repetition.
-    "estimator" => Estimator(config::Methods) by estimator::write;
+    "estimator" => Estimator(config::Methods) by estimator::write => [estimator::Point];
     /// Costs against tests per ray over many trees; every repetition is one tree.
-    "correlation" => Correlation(config::Methods) by correlation::write;
+    "correlation" => Correlation(config::Methods) by correlation::write => [correlation::Correlation];
     /// Error against run time and against work.
-    "anytime" => Anytime(anytime::Config) by anytime::Config::write;
+    "anytime" => Anytime(anytime::Config) by anytime::Config::write => [anytime::Point];
     /// Gaps to the exact optimum of small scenes.
-    "gaps" => Gaps(gaps::Config) by gaps::Config::write;
+    "gaps" => Gaps(gaps::Config) by gaps::Config::write => [gaps::Gaps, gaps::Tightness];
     /// Run-time distributions.
-    "run_times" => RunTimes(config::Targets) by run_times::write;
+    "run_times" => RunTimes(config::Targets) by run_times::write => [run_times::Step, run_times::Fit];
     /// The aggregate distribution of run times over scenes and targets.
-    "ecdf" => Ecdf(config::Targets) by ecdf::write;
+    "ecdf" => Ecdf(config::Targets) by ecdf::write => [ecdf::Step];
     /// Performance profiles.
-    "profile" => Profile(config::Targets) by profile::write;
+    "profile" => Profile(config::Targets) by profile::write => [profile::Row];
     /// Time and work until targets are reached, one row per method, scene and target.
-    "time_to_target" => TimeToTarget(config::Targets) by time_to_target::write;
+    "time_to_target" => TimeToTarget(config::Targets) by time_to_target::write => [time_to_target::Reached];
     /// Medians, quartiles and primal integrals.
-    "numbers" => Numbers(numbers::Config) by numbers::Config::write;
+    "numbers" => Numbers(numbers::Config) by numbers::Config::write => [numbers::Numbers, numbers::Timing];
     /// Whether methods really differ.
-    "significance" => Significance(significance::Config) by significance::Config::write;
+    "significance" => Significance(significance::Config) by significance::Config::write => [significance::Row];
     /// One picture by brute force, KD-tree and trees.
-    "pictures" => Pictures(pictures::Config) by pictures::Config::write;
+    "pictures" => Pictures(pictures::Config) by pictures::Config::write => [pictures::Tests, pictures::Times];
     /// Tests of rays in trees that are trained on rays.
-    "ray_cost" => RayCost(ray_cost::Config) by ray_cost::Config::write;
+    "ray_cost" => RayCost(ray_cost::Config) by ray_cost::Config::write => [ray_cost::Compared, ray_cost::Speed];
     /// Tests of rays against the time in which trees are made.
-    "ray_time" => RayTime(ray_time::Config) by ray_time::Config::write;
+    "ray_time" => RayTime(ray_time::Config) by ray_time::Config::write => [ray_time::Point];
     /// Cost against build time and against time per ray.
-    "pareto" => Pareto(config::Methods) by pareto::write;
+    "pareto" => Pareto(config::Methods) by pareto::write => [pareto::Point];
     /// Other libraries beside ours.
-    "peers" => Peers(peers::Config) by peers::Config::write;
+    "peers" => Peers(peers::Config) by peers::Config::write => [peers::Comparison];
     /// Speed of rays by tree, layout and kind of rays, and how well the cost predicts it.
-    "traversal" => Traversal(config::Methods) by traversal::write;
+    "traversal" => Traversal(config::Methods) by traversal::write => [traversal::Rank, traversal::Speed];
     /// What leaving something out saves.
-    "omissions" => Omissions(omissions::Config) by omissions::Config::write;
+    "omissions" => Omissions(omissions::Config) by omissions::Config::write => [omissions::Compared, omissions::Times];
 }
 
 impl Report {

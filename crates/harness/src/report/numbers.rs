@@ -9,6 +9,7 @@ use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::run::rows::ReferenceRow;
 use crate::statistics::{median, primal_integral, quartiles, range};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 bvh_build::config! { serde;
@@ -22,42 +23,51 @@ bvh_build::config! { serde;
 }
 
 /// One method on one scene, as written to `numbers.csv`.
-#[derive(Serialize)]
-struct Numbers<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Numbers<'a> {
     scene: &'a str,
     method: &'a str,
     runs: usize,
+    /// Lower quartile of cost over base, over repetitions.
     cost_over_base_quartile_1: f64,
+    /// Its median.
     cost_over_base_median: f64,
+    /// Its upper quartile.
     cost_over_base_quartile_3: f64,
     /// `exact optimum` or `best known`.
     reference: &'static str,
+    /// What gaps are measured from.
     reference_cost: f64,
     /// The method that found it; its own gaps are too small if it did so in this very experiment.
     reference_method: String,
+    /// Whether it did.
     reference_of_this_experiment: bool,
     gap_quartile_1: f64,
     gap_median: f64,
     gap_quartile_3: f64,
     /// No binary tree costs less; empty where none is proven.
     lower_bound: Option<f64>,
+    /// The bound over the reference.
     lower_bound_over_reference: Option<f64>,
     /// Median cost over the lower bound, minus 1: no tree is farther from the optimum.
     proven_gap_median: Option<f64>,
-    /// Medians over runs, up to the end of the longest run of any method on the scene.
+    /// The mean gap over the evaluations of the longest run of any method on the scene, the median over runs.
     primal_integral_evaluations: f64,
+    /// Likewise over work.
     primal_integral_work: f64,
 }
 
 /// Its seconds, as written to `timing_numbers.csv`.
-#[derive(Serialize)]
-struct Timing<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Timing<'a> {
     scene: &'a str,
     method: &'a str,
     seconds_quartile_1: f64,
     seconds_median: f64,
     seconds_quartile_3: f64,
+    /// The end of the longest run of any method on the scene.
     horizon_seconds: f64,
+    /// The mean gap up to then, the median over runs.
     primal_integral: f64,
 }
 

@@ -7,6 +7,7 @@ use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::run::rows::RunRow;
 use crate::statistics::{quartiles, range};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 bvh_build::config! { serde;
@@ -34,8 +35,8 @@ bvh_build::config! { serde;
 }
 
 /// One comparison, as written to `omissions.csv`.
-#[derive(Debug, Serialize)]
-struct Compared<'a> {
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct Compared<'a> {
     scene: &'a str,
     omission: &'a str,
     runs: usize,
@@ -48,13 +49,15 @@ struct Compared<'a> {
 }
 
 /// Times of one comparison, as written to `timing_omissions.csv`.
-#[derive(Debug, Serialize)]
-struct Times<'a> {
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct Times<'a> {
     scene: &'a str,
     omission: &'a str,
-    /// Quartiles and median of the ratios of seconds, left out / not, repetition by repetition.
+    /// Lower quartile of the ratios of seconds, left out / not, repetition by repetition.
     ratio_low: f64,
+    /// Their median.
     ratio_median: f64,
+    /// The upper quartile.
     ratio_high: f64,
 }
 

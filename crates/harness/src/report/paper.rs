@@ -1,11 +1,12 @@
 //! The paper's numbers beside ours, and the verdicts on them.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// One row of `paper.csv`: something that the paper says beside ours. Absolute costs are not compared, as the scenes are
 /// not the paper's.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PaperRow {
     /// Where the paper has it.
     pub source: String,
@@ -26,7 +27,7 @@ pub struct PaperRow {
     pub ours_low: Option<f64>,
     /// The upper end.
     pub ours_high: Option<f64>,
-    /// Whether they agree, and if not, how they differ.
+    /// Whether they agree, and if not, how they differ:
     pub verdict: Verdict,
     /// When they would agree.
     pub rule: String,
@@ -87,7 +88,7 @@ impl PaperRow {
 macro_rules! verdicts {
     ($($(#[$doc:meta])* $verdict:ident = $name:literal,)*) => {
         /// How a number of ours compares with the paper's.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
         pub enum Verdict {
             $($(#[$doc])* #[serde(rename = $name)] $verdict,)*
         }

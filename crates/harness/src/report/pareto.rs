@@ -6,11 +6,12 @@ use super::metric::Metric;
 use super::output::{Output, panel};
 use crate::Error;
 use crate::figures::Layer;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// A method on a scene, as written to `timing_pareto.csv`.
-#[derive(Serialize)]
-struct Point<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Point<'a> {
     scene: &'a str,
     method: &'a str,
     /// The fastest repetition.

@@ -5,6 +5,7 @@ use super::data::Rows;
 use super::metric::Metric;
 use super::output::{Output, tally};
 use crate::Error;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 bvh_build::config! { serde;
@@ -22,8 +23,8 @@ bvh_build::config! { serde;
 }
 
 /// A method on a scene with rays of one kind, as written to `timing_peers.csv`.
-#[derive(Serialize)]
-struct Comparison<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Comparison<'a> {
     scene: &'a str,
     method: &'a str,
     rays: &'a str,
@@ -35,6 +36,7 @@ struct Comparison<'a> {
     mrays_per_second: f64,
     /// Our speed over this method's.
     ours_over_this: f64,
+    /// Number of rays.
     rays_traced: u64,
     missed_hits: u64,
     false_hits: u64,

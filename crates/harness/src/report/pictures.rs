@@ -10,6 +10,7 @@ use crate::render::experiment::BASELINES;
 use crate::run::rows::RenderRow;
 use crate::statistics::median;
 use bvh_build::config::above;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -30,14 +31,16 @@ bvh_build::config! { serde;
 }
 
 /// One structure on one scene, as written to `pictures.csv`: the run of median tests.
-#[derive(Serialize)]
-struct Tests<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Tests<'a> {
     scene: &'a str,
     method: &'a str,
     objects: usize,
+    /// Number of rays: through pixels, to lights, and mirrored.
     rays: u64,
     boxes_per_ray: f64,
     objects_per_ray: f64,
+    /// Both together.
     tests_per_ray: f64,
     /// How many times fewer tests than brute force.
     brute_force_over_tests: f64,
@@ -46,15 +49,20 @@ struct Tests<'a> {
 }
 
 /// The same, as written to `timing_pictures.csv`: the fastest run.
-#[derive(Serialize)]
-struct Times<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Times<'a> {
     scene: &'a str,
     method: &'a str,
     build_seconds: f64,
+    /// Wall time of drawing on one thread.
     render_seconds: f64,
+    /// Million rays per second.
     million_rays_per_second: f64,
+    /// Brute force's seconds over these.
     speed_up: f64,
+    /// The document's seconds, where it has some.
     document_seconds: Option<f64>,
+    /// Its speed-up over brute force.
     document_speed_up: Option<f64>,
 }
 

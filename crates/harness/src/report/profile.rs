@@ -8,16 +8,18 @@ use super::output::{Output, each, panel};
 use super::progress::ProgressAxis;
 use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// One method on one problem, as written to `timing_profile.csv`, `profile_evaluations.csv` and `profile_work.csv`.
-#[derive(Serialize)]
-struct Row<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Row<'a> {
     scene: &'a str,
     target: String,
     method: &'a str,
     /// Median over repetitions; empty if the median run never reached the target.
     x: Option<f64>,
+    /// Over the fastest method's.
     ratio_to_fastest: Option<f64>,
 }
 

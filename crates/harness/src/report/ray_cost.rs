@@ -6,6 +6,7 @@ use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::run::rows::{TestRow, TestTimeRow};
 use crate::statistics::{geometric_mean, student};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 bvh_build::config! { serde;
@@ -21,18 +22,21 @@ bvh_build::config! { serde;
 }
 
 /// A tree's tests over those of the base, as written to `ray_cost.csv`; rows for the geometric mean of all scenes come last.
-#[derive(Serialize)]
-struct Compared<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Compared<'a> {
     scene: &'a str,
+    /// The method's label, or `rays` if the tree was trained on rays.
     tree: &'a str,
     trained_on: &'a str,
     judged_on: &'a str,
     camera: &'a str,
     /// Tests of nodes and of blocks of triangles together.
     tests: Option<f64>,
+    /// Over the base's.
     tests_over_base: f64,
-    /// 95 % interval, from the standard errors of both over the repetitions.
+    /// Lower end of the 95 % interval, from the standard errors of both over the repetitions.
     over_base_low: Option<f64>,
+    /// The upper end.
     over_base_high: Option<f64>,
 }
 
@@ -146,12 +150,13 @@ impl Config {
 }
 
 /// A tree's rays per second over those of the base, as written to `timing_ray_cost.csv`.
-#[derive(Serialize)]
-struct Speed<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Speed<'a> {
     scene: &'a str,
     method: &'a str,
     judged_on: &'a str,
     camera: &'a str,
+    /// Rays per second over the base's.
     speed_over_base: f64,
 }
 

@@ -10,6 +10,7 @@ use crate::figures::{Axis, Layer, Panel};
 use crate::run::rows::RayRow;
 use crate::statistics::{median, range};
 use bvh_build::config::above;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -33,22 +34,28 @@ bvh_build::config! { serde;
 }
 
 /// One method on one scene by one measurement, as written to `ray_tests.csv`: the run of median cost.
-#[derive(Serialize)]
-struct Measured<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Measured<'a> {
     scene: &'a str,
     method: &'a str,
     family: &'a str,
     query: &'a str,
+    /// Number of rays.
     rays: u64,
     boxes_per_ray: f64,
+    /// Lower end of the mean's 95 % interval.
     boxes_low: f64,
+    /// Its upper end.
     boxes_high: f64,
     objects_per_ray: f64,
     goldsmith_salmon: f64,
+    /// Tests against boxes over the first method's.
     boxes_over_first: f64,
-    /// Over all pairs of runs, of the method and of the first.
+    /// The least over all pairs of runs, of the method and of the first.
     over_first_low: f64,
+    /// The greatest.
     over_first_high: f64,
+    /// The paper's number, where it has one.
     paper_boxes_per_ray: Option<f64>,
 }
 

@@ -8,6 +8,7 @@ use crate::Error;
 use crate::figures::{Axis, Layer};
 use crate::statistics::{geometric_mean, minimum};
 use bvh_build::config::Itself;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 bvh_build::config! { serde;
@@ -35,14 +36,15 @@ bvh_build::config! { serde;
 }
 
 /// A point, as written to `timing_ray_time.csv`.
-#[derive(Serialize)]
-struct Point<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Point<'a> {
     scene: &'a str,
+    /// Name of the line in the figure.
     series: &'a str,
     method: &'a str,
     /// The fastest repetition.
     build_seconds: f64,
-    /// Geometric mean over the kinds of rays.
+    /// Tests over those of the base, the geometric mean over the kinds of rays.
     tests_over_base: f64,
 }
 

@@ -11,12 +11,13 @@ use super::progress::ProgressAxis;
 use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::statistics::time_to_target::ShiftedExponential;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// One step of a distribution, as written to `timing_run_times.csv`, `run_times_evaluations.csv` and
 /// `run_times_work.csv`.
-#[derive(Serialize)]
-struct Step<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Step<'a> {
     scene: &'a str,
     target: String,
     target_cost: f64,
@@ -25,10 +26,11 @@ struct Step<'a> {
     solved_fraction: f64,
 }
 
-/// One fit, as written to `timing_run_times_fit.csv` and so on; shift, mean and median are in the unit of the file's
+/// One fit, as written to `timing_run_times_fit.csv`, `run_times_fit_evaluations.csv` and
+/// `run_times_fit_work.csv`; shift, mean and median are in the unit of the file's
 /// axis.
-#[derive(Serialize)]
-struct Fit<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Fit<'a> {
     scene: &'a str,
     target: String,
     method: &'a str,
@@ -38,6 +40,7 @@ struct Fit<'a> {
     median: Option<f64>,
     /// Of the shifted exponential distribution; empty if fewer than three quarters were solved, or all at once.
     shift: Option<f64>,
+    /// The mean time after the shift.
     mean: Option<f64>,
     /// The greatest difference between fit and distribution.
     kolmogorov_smirnov_distance: Option<f64>,

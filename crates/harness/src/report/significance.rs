@@ -8,6 +8,7 @@ use crate::statistics::median;
 use crate::statistics::rank::{
     Test, a12, holm, least_rank_sum, least_signed_rank, mann_whitney, wilcoxon_signed_rank,
 };
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::ops::Bound::Excluded;
 
@@ -26,25 +27,31 @@ bvh_build::config! { serde;
 }
 
 /// One comparison, as written to `significance.csv`. Holm's correction is over all rows of the same test.
-#[derive(Serialize)]
-struct Row<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Row<'a> {
     /// `all` for the comparison across scenes.
     scene: &'a str,
     method: &'a str,
+    /// Label of the other method.
     against: &'a str,
+    /// Of the medians paired by scene, or of the runs on one scene:
     test: RankTest,
-    /// Scenes, or runs of the method; and of the other.
+    /// Scenes, or runs of the method.
     samples: usize,
+    /// Of the other.
     samples_against: usize,
     /// W⁺ or U.
     statistic: f64,
+    /// Of the test alone.
     p_value: f64,
     /// What the corrected p-value would be if every test came out as clearly as its samples allow.
     least_holm_p_value: f64,
+    /// The corrected p-value.
     holm_p_value: f64,
     /// How likely a run of the method ends below one of the other, ties counting a half; across scenes, its mean over
     /// them.
     a12: f64,
+    /// How the method's cost compares with the other's:
     verdict: Difference,
 }
 
@@ -52,7 +59,7 @@ struct Row<'a> {
 const ALL: &str = "all";
 
 /// Which test a row is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 enum RankTest {
     /// Of the medians over base, paired by scene.
     #[serde(rename = "Wilcoxon signed-rank")]
@@ -63,7 +70,7 @@ enum RankTest {
 }
 
 /// How the method's cost compares with the other's.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 enum Difference {
     /// The corrected p-value is below the level, and the method's cost is lower.

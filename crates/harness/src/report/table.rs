@@ -8,6 +8,7 @@ use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::statistics::{expected_best_of, median, minimum, range, spread_of_best};
 use bvh_build::config::{Accepts, Itself, above};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -44,19 +45,23 @@ bvh_build::config! { serde;
 }
 
 /// One cell, as written to `table.csv`.
-#[derive(Serialize)]
-struct Cell<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Cell<'a> {
     scene: &'a str,
     scene_kind: &'a str,
+    /// Name of the table's column.
     column: &'a str,
     method: &'a str,
+    /// Trials of which the best counts; empty for runs as a whole.
     best_of: Option<usize>,
     cost_over_base: f64,
     /// The expected best of so many trials, from all trials run.
     expected_over_base: Option<f64>,
-    /// Between these the best of so many trials lies in nine of ten repetitions; of runs as a whole, in all.
+    /// The lower of two numbers between which the best of so many trials lies in nine of ten repetitions; of runs as a whole, in all.
     low_over_base: Option<f64>,
+    /// The upper one.
     high_over_base: Option<f64>,
+    /// The paper's ratio, where it has one.
     paper_over_base: Option<f64>,
 }
 

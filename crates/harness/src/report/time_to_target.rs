@@ -8,11 +8,13 @@ use super::output::{Output, each};
 use super::progress::ProgressAxis;
 use crate::Error;
 use crate::statistics::order_quantile;
+use schemars::JsonSchema;
 use serde::Serialize;
 
-/// One method and target on one scene, as written to `timing_to_target.csv` and `to_target_work.csv`.
-#[derive(Serialize)]
-struct Reached<'a> {
+/// One method and target on one scene, as written to `timing_to_target.csv`, `to_target_evaluations.csv`
+/// and `to_target_work.csv`.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Reached<'a> {
     scene: &'a str,
     target: String,
     method: &'a str,
@@ -20,6 +22,7 @@ struct Reached<'a> {
     solved: usize,
     /// Over all runs, of which those that never reach the target are the last; empty if that is the quantile's.
     median: Option<f64>,
+    /// When nine of ten runs have reached it.
     quantile_90: Option<f64>,
 }
 

@@ -7,6 +7,7 @@ use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::statistics::{median, quartiles, range};
 use bvh_build::config::above;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -26,16 +27,21 @@ bvh_build::config! { serde;
 }
 
 /// One comparison, as written to `timing_ratios.csv`.
-#[derive(Serialize)]
-struct Ratio<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Ratio<'a> {
     scene: &'a str,
     method: &'a str,
+    /// Number of repetitions.
     repetitions: usize,
+    /// The median wall time.
     median_seconds: f64,
-    /// Quartiles and median of the ratios to the first method, repetition by repetition.
+    /// Lower quartile of the ratios to the first method, repetition by repetition.
     ratio_low: f64,
+    /// Their median.
     ratio_median: f64,
+    /// The upper quartile.
     ratio_high: f64,
+    /// The paper's ratio, where it has one.
     paper_ratio: Option<f64>,
 }
 

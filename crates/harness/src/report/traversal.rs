@@ -8,12 +8,13 @@ use crate::Error;
 use crate::figures::Layer;
 use crate::run::rows::TraceRow;
 use crate::statistics::{median, pearson, range, spearman};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeSet;
 
 /// Cost against tests or time over the trees of a scene in one layout, as written to `rank.csv` and `timing_rank.csv`.
-#[derive(Serialize)]
-struct Rank<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Rank<'a> {
     scene: &'a str,
     layout: &'a str,
     rays: &'a str,
@@ -25,8 +26,8 @@ struct Rank<'a> {
 }
 
 /// A speed, as written to `timing_speed.csv`.
-#[derive(Serialize)]
-struct Speed<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Speed<'a> {
     scene: &'a str,
     method: &'a str,
     layout: &'a str,

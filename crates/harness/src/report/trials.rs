@@ -7,6 +7,7 @@ use super::paper::{PaperRow, Verdict};
 use crate::Error;
 use crate::figures::{Axis, Layer};
 use crate::statistics::{expected_best_of, mean_interval, minimum};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 bvh_build::config! { serde;
@@ -30,8 +31,8 @@ bvh_build::config! { serde;
 }
 
 /// One point, as written to `trials.csv`.
-#[derive(Serialize)]
-struct Point<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Point<'a> {
     scene: &'a str,
     method: &'a str,
     trials: usize,
@@ -39,8 +40,9 @@ struct Point<'a> {
     single_run_over_base: f64,
     /// Expected best of so many: the mean of what the trials of every repetition say exactly.
     expected_over_base: f64,
-    /// The 95 % interval of that mean over repetitions; empty if there is only one.
+    /// Lower end of the 95 % interval of that mean over repetitions; empty if there is only one.
     expected_low: Option<f64>,
+    /// The upper end.
     expected_high: Option<f64>,
 }
 

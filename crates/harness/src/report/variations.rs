@@ -8,6 +8,7 @@ use crate::Error;
 use crate::figures::{Axis, Layer, Panel};
 use crate::statistics::{median, range};
 use bvh_build::config::above;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -30,21 +31,22 @@ bvh_build::config! { serde;
 }
 
 /// One method on one scene, as written to `variations.csv`.
-#[derive(Serialize)]
-struct Variation<'a> {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Variation<'a> {
     scene: &'a str,
     method: &'a str,
     runs: usize,
-    /// Final costs over runs.
     lowest_cost: f64,
     median_cost: f64,
     highest_cost: f64,
     /// Median over the first method's.
     cost_over_first: f64,
-    /// Over all pairs of runs, of the method and of the first.
+    /// The least over all pairs of runs, of the method and of the first.
     over_first_low: f64,
+    /// The greatest.
     over_first_high: f64,
     cost_over_base: f64,
+    /// The paper's ratio, where it has one.
     paper_over_first: Option<f64>,
 }
 

@@ -3,6 +3,7 @@
 pub mod archive;
 pub mod check;
 mod clocked;
+pub mod columns;
 pub mod execute;
 pub mod finish;
 mod job;

@@ -1,37 +1,16 @@
 //! The rows of the CSV files: flat, units in the names, full precision.
 //!
-//! Columns that many files have: `scene` is the scene's name, `objects` the number of its objects, and `method` the label
-//! of the method in the spec, or in pictures the name of another structure; `seed` is the seed of the run, derived from
-//! the spec's, and `repetition` counts from 0; `rays` or `count` is a number of rays, and `layout` how a tree lies in
-//! memory. A `standard_error` belongs to the mean in the column before it.
+//! Columns that many files have are described in [`columns`](super::columns), and the page of all columns is made from both.
 #![allow(missing_docs, reason = "columns whose names say it all, and those above")]
 
+use super::columns::Columns;
+pub use super::columns::{Row, read, to_bytes};
 use crate::Error;
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// One row of the `rays.csv` of a comparison with other libraries: the speed of rays of one kind. Like the timing files it
-/// differs from run to run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PeerRayRow {
-    /// Name of the scene, or that the row is a mean over all scenes.
-    pub scene: String,
-    /// The library, or ours.
-    pub library: String,
-    /// The library's settings and its structure for rays.
-    pub mode: String,
-    /// The kind of rays.
-    pub rays: String,
-    /// Million rays per second on one thread, each part of the rays by its fastest turn.
-    pub million_per_s: f64,
-    /// Rays that this contender answers otherwise than brute force.
-    pub disagreements: u64,
-}
-
 impl PeerRayRow {
-    /// The CSV file that holds these rows.
-    pub const FILE: &'static str = "rays.csv";
-
     /// Whether a CSV file holds rows of this kind, and not the [`RayRow`]s of a file of the same name.
     pub fn are_in(path: &Path) -> bool {
         let columns = csv::Reader::from_path(path).and_then(|mut reader| reader.headers().cloned());
@@ -39,17 +18,11 @@ impl PeerRayRow {
     }
 }
 
-/// A kind of rows in a file of its own.
-pub trait Row: Serialize + DeserializeOwned {
-    /// The CSV file that holds them; its name begins with `timing` if they hold seconds.
-    const FILE: &'static str;
-}
-
 /// Declares kinds of rows with the names of their files.
 macro_rules! rows {
     ($($(#[$meta:meta])* $kind:ident in $file:literal { $($(#[$of:meta])* $column:ident: $type:ty,)* })*) => {$(
         $(#[$meta])*
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         pub struct $kind {
             $($(#[$of])* pub $column: $type,)*
         }
@@ -57,23 +30,26 @@ macro_rules! rows {
         impl Row for $kind {
             const FILE: &'static str = $file;
         }
-    )*};
+    )*
+        /// The columns of all these files.
+        pub fn columns() -> Vec<Columns> {
+            vec![$(Columns::of::<$kind>()),*]
+        }
+    };
 }
 
 rows! {
     /// One row of `runs.csv`: what one run of one method on one scene found.
     RunRow in "runs.csv" {
         scene: String,
-        /// `stand-in`, `procedural` or `file`.
         scene_kind: String,
         method: String,
         seed: u64,
         repetition: u32,
         objects: usize,
-        /// Trees or moves evaluated.
         evaluations: u64,
-        /// Nodes made or visited.
         work: u64,
+        /// Why it ended:
         stop: bvh_search::StopReason,
         /// The objective's value for the best tree found.
         cost: f64,
@@ -109,7 +85,7 @@ rows! {
         incumbent: f64,
     }
 
-    /// One row of `timing.csv`, the only CSV file with seconds.
+    /// One row of `timing.csv`: how long a run took.
     TimingRow in "timing.csv" {
         scene: String,
         method: String,
@@ -136,7 +112,6 @@ rows! {
         /// As in `runs.csv`.
         cost: f64,
         cost_over_base: f64,
-        /// As in `layouts.csv`.
         references_per_object: f64,
         collapsed_sah: f64,
     }
@@ -174,18 +149,38 @@ rows! {
         family: String,
         /// What they ask.
         query: String,
+        /// Number of rays.
         rays: u64,
         /// Fraction of them that hit something.
         hit_fraction: f64,
         /// Mean number of tests against boxes, the root's and the leaves' included.
         boxes_per_ray: f64,
+        /// Of that mean.
         boxes_standard_error: f64,
-        /// Lower and upper end of the mean's 95 % interval.
+        /// Lower end of the mean's 95 % interval.
         boxes_low: f64,
+        /// Its upper end.
         boxes_high: f64,
-        /// Mean number of tests against objects.
         objects_per_ray: f64,
+        /// Of that mean.
         objects_standard_error: f64,
+    }
+
+    /// One row of the `rays.csv` of a comparison with other libraries: the speed of rays of one kind. Like the timing files it
+    /// differs from run to run.
+    PeerRayRow in "rays.csv" {
+        /// Name of the scene, or that the row is a mean over all scenes.
+        scene: String,
+        /// The library, or ours.
+        library: String,
+        /// The library's settings and its structure for rays.
+        mode: String,
+        /// The kind of rays.
+        rays: String,
+        /// Million rays per second on one thread, each part of the rays by its fastest turn.
+        million_per_s: f64,
+        /// Rays that this contender answers otherwise than brute force.
+        disagreements: u64,
     }
 
     /// One row of `renders.csv`: the tests that one picture took.
@@ -198,7 +193,6 @@ rows! {
         rays: u64,
         /// Mean number of tests against boxes, or of cells of a KD-tree.
         boxes_per_ray: f64,
-        /// Mean number of tests against objects.
         objects_per_ray: f64,
         /// 64-bit FNV-1a of the pixels: the same for all structures.
         picture: String,
@@ -227,11 +221,8 @@ rows! {
         count: u64,
         /// How many hit something.
         hits: u64,
-        /// Rays that should hit and do not.
         missed_hits: u64,
-        /// Rays that should not hit and do.
         false_hits: u64,
-        /// Rays that hit elsewhere than they should.
         other_hits: u64,
         /// Mean number of tests against boxes, the root's included where it is tested; 8 for every wide node.
         boxes_per_ray: Option<f64>,
@@ -283,6 +274,7 @@ rows! {
     /// One row of `timing_ratios.csv`: the speed of rays of one kind in one of our modes, over the fastest mode of other
     /// libraries on the same scene.
     RayRatioRow in "timing_ratios.csv" {
+        /// Our mode.
         mode: String,
         /// The modes compared with: `any mode`, those of `whole triangles`, or Embree's `robust` ones.
         against: String,
@@ -310,14 +302,22 @@ rows! {
         method: String,
         /// Trees that the numbers are means over.
         repetitions: usize,
-        /// Leaves that name an object, per object: more than 1 where objects are divided.
         references_per_object: f64,
         /// Of the wide layout.
         bytes_per_object: f64,
-        /// The surface area heuristic with both constants 1, after the best collapse of leaves.
         collapsed_sah: f64,
         /// Nodes and blocks of triangles that a random line through the root's box is expected to visit.
         layout_over_root: f64,
+    }
+
+    /// One row of `memory.csv`: the most memory that a method had allocated at once, on one thread.
+    MemoryRow in "memory.csv" {
+        scene: String,
+        objects: usize,
+        method: String,
+        /// Trees, working memory and history; not the scene's boxes.
+        peak_bytes: usize,
+        bytes_per_object: f64,
     }
 
     /// One row of `bounds.csv`: a proven lower bound of a scene.
@@ -377,23 +377,4 @@ impl ReferenceRow {
 pub fn read_if_any<R: Row>(folder: &Path) -> Result<Vec<R>, Error> {
     let path = folder.join(R::FILE);
     if path.is_file() && !PeerRayRow::are_in(&path) { read(&path) } else { Ok(vec![]) }
-}
-
-/// Reads all rows of a CSV file.
-pub fn read<R: DeserializeOwned>(path: &Path) -> Result<Vec<R>, Error> {
-    let mut reader = csv::Reader::from_path(path).map_err(Error::csv(path))?;
-    reader.deserialize().collect::<Result<_, _>>().map_err(Error::csv(path))
-}
-
-/// The bytes of a CSV file with a header and these rows; the header alone needs at least one row.
-pub fn to_bytes<R: Serialize>(rows: &[R], path: &Path) -> Result<Vec<u8>, Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        writer.serialize(row).map_err(Error::csv(path))?;
-    }
-    writer.into_inner().map_err(|error| Error::Io {
-        path: path.to_owned(),
-        action: "write",
-        source: std::io::Error::other(error.to_string()),
-    })
 }

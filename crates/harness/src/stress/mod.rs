@@ -20,6 +20,7 @@ pub mod transform;
 
 use crate::Error;
 use crate::report::output::Output;
+use crate::run::columns::Columns;
 use bvh_build::OutOfRange;
 pub use case::{Case, Check, EXACT_OBJECTS, Effort, LargerScenes, Part, Size, is_builder, methods};
 pub use cell::Cell;
@@ -38,6 +39,11 @@ pub enum Measure {
 }
 
 impl Measure {
+    /// The columns of the CSV files that measurements leave.
+    pub fn columns() -> Vec<Columns> {
+        [stability::columns(), precision::columns()].concat()
+    }
+
     /// What it says about the CSV files in the folder.
     pub fn output(&self, folder: &Path) -> Result<Output, Error> {
         match self {

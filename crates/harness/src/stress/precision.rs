@@ -8,13 +8,14 @@ use super::transform::scaled;
 use crate::Error;
 use crate::figures::{Axis, Figure, Layer, Panel};
 use crate::report::output::Output;
-use crate::run::rows::{read, to_bytes};
+use crate::run::columns::{Columns, read, to_bytes};
 use crate::run::store::Store;
 use crate::scenes::stiff;
 use bvh_build::config;
 use bvh_core::{Aabb, Bvh, Node};
 use num_bigint::{BigInt, BigUint};
 use num_traits::Zero;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::Add;
 use std::path::Path;
@@ -32,7 +33,7 @@ config! {
 }
 
 /// One kind of number on one scene, as written to `precision.csv`.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 struct Row {
     scene: String,
     /// `f32` or `f64`.
@@ -42,6 +43,7 @@ struct Row {
     decisions: usize,
     /// Decisions for a split that costs more than the best one, in exact arithmetic.
     wrong: usize,
+    /// Their fraction of all decisions.
     wrong_fraction: f64,
     /// Decisions in which no candidate has a finite cost.
     undecided: usize,
@@ -49,12 +51,19 @@ struct Row {
     cost_over_exact: f64,
 }
 
-/// As written to `timing_precision.csv`.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+/// The time of one kind of number on one scene, as written to `timing_precision.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 struct Timing {
     scene: String,
+    /// `f32` or `f64`.
     method: String,
+    /// The shortest build.
     nanoseconds_per_object: f64,
+}
+
+/// The columns of the files that a measurement leaves.
+pub fn columns() -> Vec<Columns> {
+    vec![Columns::of::<Row>(), Columns::of::<Timing>()]
 }
 
 /// A kind of number for costs: the cost of a split is the sum over both sides of half area times number of objects.

@@ -10,10 +10,11 @@ use super::{child, tracing};
 use crate::Error;
 use crate::figures::{self, HeatMap};
 use crate::report::output::Output;
-use crate::run::rows::{read, to_bytes};
+use crate::run::columns::{Columns, read, to_bytes};
 use crate::run::store::Store;
 use crate::spec::{Contestant, Labelled};
 use bvh_build::config;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -37,7 +38,7 @@ config! {
 }
 
 /// How a cell ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 enum Class {
     #[serde(rename = "as promised")]
     Kept,
@@ -52,33 +53,43 @@ enum Class {
 const CLASSES: [&str; 4] = ["as promised", "typed error, as promised", "promise broken", "crash or hang"];
 
 /// One cell, as written to `cells.csv`, and for other libraries to `timing_peers.csv`.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 struct Row {
     /// The case.
     scene: String,
     /// The method, traversal, part or library.
     method: String,
+    /// What came of it:
     outcome: Class,
     /// 0 where nothing is built.
     objects: usize,
+    /// Edges from the root to the deepest leaf.
     depth: Option<usize>,
     /// Internal area, world units squared.
     cost: Option<f64>,
     /// Of the cost against exact arithmetic.
     relative_error: Option<f64>,
+    /// The error, or the promises that are broken.
     note: String,
 }
 
 /// The time of a method on a case's scene, as written to `timing_cells.csv`.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 struct Timing {
     scene: String,
     method: String,
     objects: usize,
+    /// Wall time.
     seconds: f64,
+    /// The same per object.
     nanoseconds_per_object: f64,
     /// Of builders on S36, beyond the boxes, where the system tells.
     peak_bytes_per_object: Option<f64>,
+}
+
+/// The columns of the files that a measurement leaves.
+pub fn columns() -> Vec<Columns> {
+    vec![Columns::of::<Row>(), Columns::of::<Timing>()]
 }
 
 /// The case whose memory is measured.
