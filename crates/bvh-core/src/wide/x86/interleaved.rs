@@ -210,7 +210,7 @@ impl<A: Answer> Flight<'_, A> {
         }
     }
 
-    /// Prepares the next sixteen rays, and traces those that cannot be.
+    /// Prepares the next sixteen rays, traces those that cannot be, and answers those that miss the box around everything.
     #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
     unsafe fn prepare(&mut self) {
         let first = self.prepared;
@@ -227,12 +227,18 @@ impl<A: Answer> Flight<'_, A> {
         self.prepared += count;
         let there = (u32::from(u16::MAX) >> (RAYS - count)) as u16;
         // SAFETY: this function has the instructions; `ready` has room for sixteen.
-        let in_range = unsafe {
+        let (in_range, waiting) = unsafe {
             let sixteen = Sixteen::new(sixteen, self.wide.largest);
-            sixteen.write(first as u32, self.ready.as_mut_ptr().cast());
-            sixteen.in_range
+            let waiting = there & sixteen.in_range & sixteen.enter(&self.wide.bounds);
+            if waiting != 0 {
+                sixteen.write(first as u32, self.ready.as_mut_ptr().cast());
+            }
+            (sixteen.in_range, waiting)
         };
-        self.waiting = there & in_range;
+        self.waiting = waiting;
+        if waiting != there {
+            self.answers[first..self.prepared].fill(A::MISS);
+        }
         let mut others = there & !in_range;
         while others != 0 {
             let number = first + others.trailing_zeros() as usize;

@@ -1,7 +1,7 @@
 //! Sixteen rays made ready for the tests of boxes and triangles at once: what packets and rays in flight begin with.
 
 use super::box_ray::BoxRay;
-use crate::Ray;
+use crate::{Aabb, Ray};
 use core::arch::x86_64::*;
 
 /// Rays that are prepared at once.
@@ -115,6 +115,28 @@ impl Sixteen {
             & same(self.second)
             & same(self.third)
             & (self.in_range == u16::MAX)
+    }
+
+    /// A bit per ray that may meet something within `bounds`: the test of [`BoxRay`] for the box around all others, which is
+    /// passed by every ray that passes one of theirs.
+    ///
+    /// # Safety
+    /// As [`new`](Self::new).
+    #[inline(always)]
+    pub(crate) unsafe fn enter(&self, bounds: &Aabb) -> u16 {
+        // SAFETY: the caller's promise.
+        unsafe {
+            let (mut entry, mut exit) = (self.t_min, self.t_max);
+            let (low, high) = (bounds.min.to_array(), bounds.max.to_array());
+            for (i, axis) in self.axes.iter().enumerate() {
+                let (low, high) = (_mm512_set1_ps(low[i]), _mm512_set1_ps(high[i]));
+                let near = _mm512_mask_blend_ps(axis.backwards, low, high);
+                let far = _mm512_mask_blend_ps(axis.backwards, high, low);
+                entry = _mm512_max_ps(entry, _mm512_fmadd_ps(near, axis.near_scale, axis.near_shift));
+                exit = _mm512_min_ps(exit, _mm512_fmadd_ps(far, axis.far_scale, axis.far_shift));
+            }
+            _mm512_cmp_ps_mask::<_CMP_LE_OQ>(entry, exit)
+        }
     }
 
     /// Writes the rays one after the other; the first is number `first` of its batch.
