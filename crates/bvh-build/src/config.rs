@@ -49,22 +49,27 @@ impl OutOfRange {
 
 /// A value that knows whether all its parameters are in range.
 pub trait Check {
+    /// All parameters that are out of their ranges, in order.
+    fn faults(&self) -> Vec<OutOfRange> {
+        Vec::new()
+    }
+
     /// Refuses the first parameter that is out of its range.
     fn check(&self) -> Result<(), OutOfRange> {
-        Ok(())
+        self.faults().into_iter().next().map_or(Ok(()), Err)
     }
 }
 
 impl<C: Check> Check for Option<C> {
-    fn check(&self) -> Result<(), OutOfRange> {
-        self.iter().try_for_each(C::check)
+    fn faults(&self) -> Vec<OutOfRange> {
+        self.iter().flat_map(C::faults).collect()
     }
 }
 
 impl<C: Check> Check for Vec<C> {
-    fn check(&self) -> Result<(), OutOfRange> {
-        let below = |(at, inner): (usize, &C)| inner.check().map_err(|error| error.below(format!("[{at}]")));
-        self.iter().enumerate().try_for_each(below)
+    fn faults(&self) -> Vec<OutOfRange> {
+        let below = |(at, inner): (usize, &C)| Itself.faults(&format!("[{at}]"), inner);
+        self.iter().enumerate().flat_map(below).collect()
     }
 }
 
@@ -72,8 +77,13 @@ impl<C: Check> Check for Vec<C> {
 ///
 /// Implemented by the ranges of the standard library for numbers and for collections of them, and by [`Itself`].
 pub trait Accepts<V: ?Sized> {
-    /// Refuses the value `found` of the parameter `key` unless it is accepted.
-    fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange>;
+    /// What is not accepted in the value `found` of the parameter `key`.
+    fn faults(&self, key: &str, found: &V) -> Vec<OutOfRange>;
+
+    /// Refuses the value unless it is accepted.
+    fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange> {
+        self.faults(key, found).into_iter().next().map_or(Ok(()), Err)
+    }
 
     /// The accepted values in words, if there is more to say than their type does.
     fn accepted(&self) -> Option<String> {
@@ -107,22 +117,23 @@ pub fn describe_accepted<C: Keys>(schema: &mut schemars::Schema) {
 pub struct Itself;
 
 impl<C: Check> Accepts<C> for Itself {
-    fn check(&self, key: &str, found: &C) -> Result<(), OutOfRange> {
-        found.check().map_err(|error| error.below(key))
+    fn faults(&self, key: &str, found: &C) -> Vec<OutOfRange> {
+        found.faults().into_iter().map(|fault| fault.below(key)).collect()
     }
 }
 
 macro_rules! ranges {
     ($($range:ty,)*) => { $(
         impl<V: Numbers + ?Sized> Accepts<V> for $range {
-            fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange> {
+            fn faults(&self, key: &str, found: &V) -> Vec<OutOfRange> {
                 let unlimited = matches!(self.end_bound(), Unbounded);
-                found.each(key, &|key, number| {
-                    if self.contains(number) && (number.is_finite() || !unlimited) {
-                        return Ok(());
+                let mut faults = Vec::new();
+                found.each(key, &mut |key, number| {
+                    if !self.contains(number) || unlimited && !number.is_finite() {
+                        faults.push(OutOfRange::new(key, number, in_words(self)));
                     }
-                    Err(OutOfRange::new(key, number, in_words(self)))
-                })
+                });
+                faults
             }
 
             fn accepted(&self) -> Option<String> {
@@ -169,12 +180,9 @@ pub trait Number: PartialOrd + Display {
 pub trait Numbers {
     /// The type of the numbers.
     type Number: Number;
-    /// Calls `check` with every number and its key, below `key` in a collection.
-    fn each(&self, key: &str, check: &CheckNumber<Self::Number>) -> Result<(), OutOfRange>;
+    /// Calls `visit` with every number and its key, below `key` in a collection.
+    fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &Self::Number));
 }
-
-/// What [`Numbers::each`] does to a key and its number.
-pub type CheckNumber<'a, N> = dyn Fn(&str, &N) -> Result<(), OutOfRange> + 'a;
 
 macro_rules! numbers {
     ($($number:ident $(by $is_finite:path)?,)*) => { $(
@@ -183,8 +191,8 @@ macro_rules! numbers {
         }
         impl Numbers for $number {
             type Number = Self;
-            fn each(&self, key: &str, check: &CheckNumber<Self>) -> Result<(), OutOfRange> {
-                check(key, self)
+            fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &Self)) {
+                visit(key, self);
             }
         }
     )* };
@@ -194,37 +202,44 @@ numbers!(u8, u16, u32, u64, usize, i32, i64, f32 by f32::is_finite, f64 by f64::
 
 impl<V: Numbers> Numbers for Option<V> {
     type Number = V::Number;
-    fn each(&self, key: &str, check: &CheckNumber<V::Number>) -> Result<(), OutOfRange> {
-        self.iter().try_for_each(|inner| inner.each(key, check))
+    fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &V::Number)) {
+        self.iter().for_each(|inner| inner.each(key, visit));
     }
 }
 
 impl<V: Numbers> Numbers for [V] {
     type Number = V::Number;
-    fn each(&self, key: &str, check: &CheckNumber<V::Number>) -> Result<(), OutOfRange> {
-        self.iter().enumerate().try_for_each(|(at, inner)| inner.each(&format!("{key}[{at}]"), check))
+    fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &V::Number)) {
+        self.iter().enumerate().for_each(|(at, inner)| inner.each(&format!("{key}[{at}]"), visit));
     }
 }
 
 impl<V: Numbers, const N: usize> Numbers for [V; N] {
     type Number = V::Number;
-    fn each(&self, key: &str, check: &CheckNumber<V::Number>) -> Result<(), OutOfRange> {
-        self.as_slice().each(key, check)
+    fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &V::Number)) {
+        self.as_slice().each(key, visit);
     }
 }
 
 impl<V: Numbers> Numbers for Vec<V> {
     type Number = V::Number;
-    fn each(&self, key: &str, check: &CheckNumber<V::Number>) -> Result<(), OutOfRange> {
-        self.as_slice().each(key, check)
+    fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &V::Number)) {
+        self.as_slice().each(key, visit);
     }
 }
 
 impl<V: Numbers> Numbers for BTreeMap<String, V> {
     type Number = V::Number;
-    fn each(&self, key: &str, check: &CheckNumber<V::Number>) -> Result<(), OutOfRange> {
-        self.iter().try_for_each(|(name, inner)| inner.each(&format!("{key}.{name}"), check))
+    fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &V::Number)) {
+        self.iter().for_each(|(name, inner)| inner.each(&format!("{key}.{name}"), visit));
     }
+}
+
+/// Adds what is wrong with several fields together, but for those fields that are out of their own range.
+#[doc(hidden)]
+pub fn add_together(faults: &mut Vec<OutOfRange>, together: impl IntoIterator<Item = OutOfRange>) {
+    let known: Vec<String> = faults.iter().map(|fault| fault.key.clone()).collect();
+    faults.extend(together.into_iter().filter(|late| !known.contains(&late.key)));
 }
 
 /// Declares a configuration: a struct with public fields, each `name: type = default, in accepted;`.
@@ -237,7 +252,7 @@ impl<V: Numbers> Numbers for BTreeMap<String, V> {
 ///
 /// Without `= default` a field has the default of its type, unsaid; without `in` every value is accepted. The right side
 /// of `in` is anything that [`Accepts`](crate::config::Accepts) the field's type. What several fields have to be
-/// together is checked by the function after the struct, as in `check Self::temperatures_fall;`.
+/// together is checked by the function after the struct, which returns all that is wrong, as in `check Self::temperatures_fall;`.
 #[macro_export]
 macro_rules! config {
     (@default) => { ::core::default::Default::default() };
@@ -283,10 +298,12 @@ macro_rules! config {
         }
 
         impl $crate::Check for $name {
-            fn check(&self) -> ::core::result::Result<(), $crate::OutOfRange> {
-                $($($crate::config::Accepts::check(&($range), stringify!($field), &self.$field)?;)?)*
-                $($together(self)?;)?
-                Ok(())
+            fn faults(&self) -> ::std::vec::Vec<$crate::OutOfRange> {
+                #[allow(unused_mut, reason = "of some configurations every value is accepted")]
+                let mut faults = ::std::vec::Vec::new();
+                $($(faults.extend($crate::config::Accepts::faults(&($range), stringify!($field), &self.$field));)?)*
+                $($crate::config::add_together(&mut faults, $together(self));)?
+                faults
             }
         }
     };
@@ -338,8 +355,8 @@ mod tests {
             inner: Vec<Inner>, in Itself;
         }
         check |outer: &Outer| match outer.sizes.is_sorted() {
-            true => Ok(()),
-            false => Err(OutOfRange::new("sizes", "not sorted", "ascending numbers")),
+            true => None,
+            false => Some(OutOfRange::new("sizes", "not sorted", "ascending numbers")),
         };
     }
 
@@ -384,5 +401,9 @@ mod tests {
         expect(name, "by_name.a[1] is 10; accepted: at most 9");
         let inner = |outer: &mut Outer| outer.inner = vec![Inner::default(), Inner { limit: 0.0 }];
         expect(inner, "inner[1].limit is 0; accepted: 1 to inf");
+        let outer =
+            Outer { part: 0.0, sizes: vec![0, 7, 0], inner: vec![Inner { limit: 0.0 }], ..Outer::default() };
+        let keys: Vec<String> = outer.faults().into_iter().map(|fault| fault.key).collect();
+        assert_eq!(keys, ["part", "sizes[0]", "sizes[2]", "inner[0].limit", "sizes"]);
     }
 }

@@ -106,8 +106,8 @@ struct From<'a> {
 }
 
 impl Check for From<'_> {
-    fn check(&self) -> Result<(), OutOfRange> {
-        self.config.check()
+    fn faults(&self) -> Vec<OutOfRange> {
+        self.config.faults()
     }
 }
 

@@ -42,8 +42,8 @@ macro_rules! methods {
         }
 
         impl Check for Method {
-            fn check(&self) -> Result<(), OutOfRange> {
-                match self { $(Self::$variant(config) => config.check()),* }
+            fn faults(&self) -> Vec<OutOfRange> {
+                match self { $(Self::$variant(config) => config.faults()),* }
             }
         }
 

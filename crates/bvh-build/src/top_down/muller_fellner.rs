@@ -72,14 +72,17 @@ impl MadeUpCosts {
 }
 
 impl Check for Heuristic {
-    fn check(&self) -> Result<(), OutOfRange> {
+    fn faults(&self) -> Vec<OutOfRange> {
         match self {
-            Self::AreaTimesPower(power) => (0.0..=1.0).check("area_times_power", power),
+            Self::AreaTimesPower(power) => (0.0..=1.0).faults("area_times_power", power),
             Self::AreaTimesCost(MadeUpCosts { every, cost }) => {
-                (1..).check("area_times_cost.every", every)?;
-                (0.0..=1e6).check("area_times_cost.cost", cost)
+                let [every, cost] = [
+                    (1..).faults("area_times_cost.every", every),
+                    (0.0..=1e6).faults("area_times_cost.cost", cost),
+                ];
+                [every, cost].concat()
             }
-            _ => Ok(()),
+            _ => vec![],
         }
     }
 }

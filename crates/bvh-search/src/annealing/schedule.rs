@@ -71,8 +71,9 @@ impl AnnealingRun<'_> {
 }
 
 /// Refuses a last temperature above the first.
-pub(crate) fn check_fall(hot: f64, cold: f64) -> Result<(), OutOfRange> {
-    if cold <= hot { Ok(()) } else { Err(OutOfRange::new("cold", cold, "above 0, not above hot")) }
+pub(crate) fn check_fall(hot: f64, cold: f64) -> Option<OutOfRange> {
+    let rises = hot > 0.0 && cold > hot;
+    rises.then(|| OutOfRange::new("cold", cold, "above 0, not above hot"))
 }
 
 /// Anneals `tree`, then improves it to a local optimum of reinsertion. After every round, `round` is shown the tree and the

@@ -10,8 +10,8 @@ use super::schedule::{AnnealingRun, check_fall};
 use crate::local::initial::Start;
 use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
-use bvh_build::config::{Itself, above};
-use bvh_build::{Check, OutOfRange};
+use bvh_build::OutOfRange;
+use bvh_build::config::{Accepts, Itself, above};
 use bvh_core::PackedAabb;
 use rand::RngExt;
 
@@ -45,9 +45,9 @@ bvh_build::config! {
 }
 
 impl Config {
-    fn check_together(&self) -> Result<(), OutOfRange> {
-        self.step.check().map_err(|error| error.below("move"))?;
-        check_fall(self.hot, self.cold)
+    fn check_together(&self) -> impl Iterator<Item = OutOfRange> {
+        // Specs call the step a move.
+        Itself.faults("move", &self.step).into_iter().chain(check_fall(self.hot, self.cold))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The builders of the initial tree of a local search.
 
+use bvh_build::config::{Accepts, Itself};
 use bvh_build::{BuildError, Builder, Check, OutOfRange, muller_fellner, ploc};
 use bvh_core::{Aabb, Bvh};
 
@@ -28,10 +29,10 @@ pub(crate) fn construction() -> muller_fellner::Config {
 }
 
 impl Check for Start {
-    fn check(&self) -> Result<(), OutOfRange> {
+    fn faults(&self) -> Vec<OutOfRange> {
         match self {
-            Self::MullerFellner(config) => config.check().map_err(|error| error.below("muller_fellner")),
-            Self::Agglomerative(config) => config.check().map_err(|error| error.below("agglomerative")),
+            Self::MullerFellner(config) => Itself.faults("muller_fellner", config),
+            Self::Agglomerative(config) => Itself.faults("agglomerative", config),
         }
     }
 }

@@ -59,11 +59,11 @@ pub enum Candidates {
 }
 
 impl Check for Candidates {
-    fn check(&self) -> Result<(), OutOfRange> {
+    fn faults(&self) -> Vec<OutOfRange> {
         match self {
-            Self::AxisBest => Ok(()),
-            Self::KBest(k) => (1..).check("k_best", k),
-            Self::Within(alpha) => (0.0..).check("within", alpha),
+            Self::AxisBest => vec![],
+            Self::KBest(k) => (1..).faults("k_best", k),
+            Self::Within(alpha) => (0.0..).faults("within", alpha),
         }
     }
 }

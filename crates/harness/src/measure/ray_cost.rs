@@ -79,17 +79,15 @@ impl Default for Cameras {
 }
 
 impl Config {
-    fn check_cameras(&self) -> Result<(), OutOfRange> {
+    fn check_cameras(&self) -> impl Iterator<Item = OutOfRange> {
         let paths = |(scene, cameras): (&String, &Cameras)| {
             [("same", &cameras.same), ("other", &cameras.other)]
                 .map(|(name, path)| (scene.clone(), name, path.is_empty()))
         };
-        match self.cameras.iter().flat_map(paths).find(|(.., is_empty)| *is_empty) {
-            Some((scene, name, _)) => {
-                Err(OutOfRange::new(format!("cameras.{scene}.{name}"), "empty", "at least one viewpoint"))
-            }
-            None => Ok(()),
-        }
+        let empty = self.cameras.iter().flat_map(paths).filter(|(.., is_empty)| *is_empty);
+        empty.map(|(scene, name, _)| {
+            OutOfRange::new(format!("cameras.{scene}.{name}"), "empty", "at least one viewpoint")
+        })
     }
 
     /// A renderer's rays from one of the paths through a scene.

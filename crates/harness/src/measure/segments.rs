@@ -45,15 +45,13 @@ config! {
 }
 
 impl RenderedRays {
-    fn check_cameras(&self) -> Result<(), OutOfRange> {
+    fn check_cameras(&self) -> Option<OutOfRange> {
         let numbers = self.cameras.iter().flat_map(|pose| [pose.eye, pose.target]).chain(self.lights.clone());
         if self.cameras.is_empty() {
-            return Err(OutOfRange::new("cameras", "empty", "at least one table with `eye` and `target`"));
+            return Some(OutOfRange::new("cameras", "empty", "at least one table with `eye` and `target`"));
         }
-        match numbers.flatten().find(|number| !number.is_finite()) {
-            Some(wrong) => Err(OutOfRange::new("cameras and lights", wrong, "finite coordinates")),
-            None => Ok(()),
-        }
+        let wrong = numbers.flatten().find(|number| !number.is_finite());
+        wrong.map(|wrong| OutOfRange::new("cameras and lights", wrong, "finite coordinates"))
     }
 
     /// The camera at a place on its path, 0 at the first pose and 1 at the last; its picture is one unit high.

@@ -63,11 +63,9 @@ impl Config {
     /// The method's name in specs.
     pub const NAME: &str = "external";
 
-    fn names_a_program(&self) -> Result<(), OutOfRange> {
-        match self.command.first() {
-            Some(program) if !program.is_empty() => Ok(()),
-            _ => Err(OutOfRange::new("command", "empty", "a list of a program and its arguments")),
-        }
+    fn names_a_program(&self) -> Option<OutOfRange> {
+        let is_empty = self.command.first().is_none_or(String::is_empty);
+        is_empty.then(|| OutOfRange::new("command", "empty", "a list of a program and its arguments"))
     }
 
     /// The program's tree over `boxes`, those of the `objects`, and the seconds that it took, its start and files included. Ends the

@@ -13,8 +13,8 @@ mod obvhs;
 
 use crate::measure::speed::Contender;
 use crate::scenes::Scene;
-use bvh_build::OutOfRange;
 use bvh_build::config::Accepts;
+use bvh_build::{Check, OutOfRange};
 use bvh_core::Bvh;
 #[cfg(feature = "peers")]
 use bvh_core::{Aabb, Ray};
@@ -93,6 +93,15 @@ pub(crate) struct Raw {
 #[cfg(feature = "peers")]
 pub(crate) type Nearest = Box<dyn Fn(&Ray, &dyn Fn(u32) -> Option<f32>) -> Option<f32>>;
 
+impl Check for Peer {
+    fn faults(&self) -> Vec<OutOfRange> {
+        match self {
+            Self::Obvhs(settings) => (0.0..=100.0).faults("reinsertion", &settings.reinsertion),
+            _ => vec![],
+        }
+    }
+}
+
 impl Peer {
     /// The names of all libraries.
     pub const NAMES: &[&str] = &["bvh", "obvhs"];
@@ -117,14 +126,6 @@ impl Peer {
     /// The cargo feature that the program lacks to use this library, if it does.
     pub fn missing_feature(&self) -> Option<&'static str> {
         (!cfg!(feature = "peers")).then_some("peers")
-    }
-
-    /// Checks the ranges of the settings.
-    pub fn check(&self) -> Result<(), OutOfRange> {
-        match self {
-            Self::Obvhs(settings) => (0.0..=100.0).check("reinsertion", &settings.reinsertion),
-            _ => Ok(()),
-        }
     }
 
     /// Builds the tree over the scene's objects. An error says what the library cannot do.

@@ -70,15 +70,15 @@ impl Config {
         Ok(output)
     }
 
-    fn check_names(&self) -> Result<(), OutOfRange> {
-        if !self.at_seconds.is_sorted_by(|a, b| a < b) {
-            return Err(OutOfRange::new("at_seconds", format!("{:?}", self.at_seconds), "ascending numbers"));
-        }
+    fn check_names(&self) -> impl Iterator<Item = OutOfRange> {
+        let falls = !self.at_seconds.is_sorted_by(|a, b| a < b);
+        let falls =
+            falls.then(|| OutOfRange::new("at_seconds", format!("{:?}", self.at_seconds), "ascending numbers"));
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        if self.file.is_empty() || !self.file.chars().all(plain) {
-            return Err(OutOfRange::new("file", format!("{:?}", self.file), "letters, digits, - and _"));
-        }
-        Ok(())
+        let is_odd = self.file.is_empty() || !self.file.chars().all(plain);
+        let is_odd =
+            is_odd.then(|| OutOfRange::new("file", format!("{:?}", self.file), "letters, digits, - and _"));
+        falls.into_iter().chain(is_odd)
     }
 
     /// Which methods end lowest, on how many scenes, and how far below the greedy tree.

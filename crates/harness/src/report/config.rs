@@ -29,7 +29,7 @@ bvh_build::config! { serde;
         /// Costs to be reached: base, base −1 %, best known +1 % and +0.1 % unless others are named.
         targets: Vec<Target> = Target::usual(), in Itself;
     }
-    check |config: &Self| OneOrMore.check("targets", &config.targets);
+    check |config: &Self| OneOrMore.faults("targets", &config.targets);
 }
 
 /// Accepts lists that are not empty.
@@ -37,18 +37,20 @@ bvh_build::config! { serde;
 pub struct OneOrMore;
 
 impl<T> Accepts<Vec<T>> for OneOrMore {
-    fn check(&self, key: &str, found: &Vec<T>) -> Result<(), OutOfRange> {
-        if found.is_empty() { Err(OutOfRange::new(key, "empty", "one or more")) } else { Ok(()) }
+    fn faults(&self, key: &str, found: &Vec<T>) -> Vec<OutOfRange> {
+        if found.is_empty() { vec![OutOfRange::new(key, "empty", "one or more")] } else { vec![] }
     }
 }
 
-/// Refuses a list of the paper's numbers for a scene that is longer than `methods`, which it follows.
-pub fn one_for_each(paper: &BTreeMap<String, Vec<f64>>, methods: &[String]) -> Result<(), OutOfRange> {
-    let Some((scene, numbers)) = paper.iter().find(|(_, numbers)| numbers.len() > methods.len()) else {
-        return Ok(());
-    };
+/// Refuses lists of the paper's numbers for a scene that are longer than `methods`, which they follow.
+pub fn one_for_each(paper: &BTreeMap<String, Vec<f64>>, methods: &[String]) -> Vec<OutOfRange> {
     let accepted = format!("up to {}, one for each of methods", methods.len());
-    Err(OutOfRange::new(format!("paper.{scene}"), format!("a list of {} numbers", numbers.len()), accepted))
+    let long = paper.iter().filter(|(_, numbers)| numbers.len() > methods.len());
+    let fault = |(scene, numbers): (&String, &Vec<f64>)| {
+        let found = format!("a list of {} numbers", numbers.len());
+        OutOfRange::new(format!("paper.{scene}"), found, &accepted)
+    };
+    long.map(fault).collect()
 }
 
 /// The label of the first method, which the others are compared with; empty if there is none.

@@ -104,10 +104,10 @@ impl Config {
         Ok(output)
     }
 
-    fn check_order(&self) -> Result<(), OutOfRange> {
-        let disordered = self.paper_final.iter().find(|(_, [low, high])| low > high);
-        disordered.map_or(Ok(()), |(scene, found)| {
-            Err(OutOfRange::new(format!("paper_final.{scene}"), format!("{found:?}"), "the lower number first"))
+    fn check_order(&self) -> impl Iterator<Item = OutOfRange> {
+        let disordered = self.paper_final.iter().filter(|(_, [low, high])| low > high);
+        disordered.map(|(scene, found)| {
+            OutOfRange::new(format!("paper_final.{scene}"), format!("{found:?}"), "the lower number first")
         })
     }
 

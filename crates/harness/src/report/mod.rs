@@ -61,9 +61,9 @@ macro_rules! reports {
         }
 
         impl Check for Report {
-            fn check(&self) -> Result<(), OutOfRange> {
+            fn faults(&self) -> Vec<OutOfRange> {
                 match self {
-                    $(Self::$kind(config) => config.check(),)*
+                    $(Self::$kind(config) => config.faults(),)*
                 }
             }
         }

@@ -24,7 +24,7 @@ bvh_build::config! { serde;
         /// The columns; the paper's ratios are to its values in the first.
         columns: Vec<Column>, in Itself;
     }
-    check |config: &Self| OneOrMore.check("columns", &config.columns);
+    check |config: &Self| OneOrMore.faults("columns", &config.columns);
 }
 
 bvh_build::config! { serde;

@@ -1,12 +1,12 @@
 //! What types alone do not say of a spec, part by part. Messages name the key, what was found, what would be accepted.
 
-use super::fault::Fault;
+use super::fault::{Fault, is_within};
 use super::method::Own;
 use super::{Contestant, Experiment, Labelled};
 use crate::report::Report;
 use crate::{scenes::subset, stress};
-use bvh_build::{Check, OutOfRange};
-use bvh_search::Method;
+use bvh_build::OutOfRange;
+use bvh_search::{Budget, Method, best};
 use std::collections::HashSet;
 
 /// Most runs of an experiment.
@@ -14,12 +14,12 @@ const MOST_RUNS: u64 = 10_000_000;
 
 impl Experiment {
     /// Checks everything that types and the ranges of single keys leave open, but methods and the names in reports.
-    pub(super) fn check_together(&self) -> Result<(), OutOfRange> {
-        if self.question.trim().is_empty() {
-            return Err(OutOfRange::new("question", "empty", "what the experiment asks, for its readers"));
-        }
-        self.check_scenes()?;
-        self.check_run_count()
+    pub(super) fn check_together(&self) -> Vec<Fault> {
+        let is_unsaid = self.question.trim().is_empty();
+        let unsaid = is_unsaid
+            .then(|| OutOfRange::new("question", "empty", "what the experiment asks, for its readers"));
+        let others = [self.check_scenes().err(), self.check_run_count().err()];
+        unsaid.into_iter().chain(others.into_iter().flatten()).map(Fault::from).collect()
     }
 
     /// Checks the scenes' names; whether the scenes are there is found when they are loaded.
@@ -56,25 +56,17 @@ impl Experiment {
         Ok(())
     }
 
-    /// What is wrong with methods, one fault each: labels that are not unique, and parameters.
-    pub(super) fn check_methods(&self) -> Vec<Fault> {
-        let mut labels = HashSet::new();
-        let check = |(index, labelled): (usize, &Labelled)| {
-            let checked = if labels.insert(labelled.label.clone()) {
-                self.check_method(labelled)
-            } else {
-                let found = format!("{:?} for the second time", labelled.label);
-                Err(Fault::new("label", found, "unique labels"))
-            };
-            checked.err().map(|fault| fault.below(&format!("methods[{index}]")))
-        };
-        self.methods.iter().enumerate().filter_map(check).collect()
+    /// What is wrong with methods beside the rest of the experiment; they stand at these places in the spec.
+    pub(super) fn check_methods(&self, at: &[usize]) -> Vec<Fault> {
+        let below = |at: &usize| format!("methods[{at}]");
+        let check =
+            |(at, labelled)| self.check_method(labelled).into_iter().map(move |fault| fault.below(&below(at)));
+        at.iter().zip(&self.methods).flat_map(check).collect()
     }
 
-    fn check_method(&self, labelled: &Labelled) -> Result<(), Fault> {
+    fn check_method(&self, labelled: &Labelled) -> Vec<Fault> {
         let Labelled { method, own, .. } = labelled;
         let Own { budget, max_seconds, keep, judge, for_rays, objective, references, .. } = own;
-        own.check()?;
         let (is_ours, is_best) =
             (matches!(method, Contestant::Ours(_)), matches!(method, Contestant::Ours(Method::Best(_))));
         let judged = Labelled::JUDGED;
@@ -88,34 +80,54 @@ impl Experiment {
             ("references", references.is_some(), is_best, "with best"),
             ("judge", judge.is_some(), judged.contains(&method.name()), &with_judged),
         ];
-        if let Some((key, .., accepted)) = of_some_methods.iter().find(|(_, set, takes, _)| *set && !takes) {
-            return Err(Fault::new(key, format!("set for {}", method.name()), accepted));
+        let misplaced = of_some_methods.iter().filter(|(_, is_set, takes, _)| *is_set && !takes);
+        let set_for = format!("set for {}", method.name());
+        let mut faults: Vec<Fault> =
+            misplaced.map(|(key, .., accepted)| Fault::new(key, &set_for, accepted)).collect();
+        if for_rays.is_some() && is_ours && self.ray_cost.is_none() {
+            let accepted = "with the experiment's `ray_cost`";
+            faults.push(Fault::new("for_rays", "set without `ray_cost`", accepted));
         }
-        if for_rays.is_some() && self.ray_cost.is_none() {
-            return Err(Fault::new("for_rays", "set without `ray_cost`", "with the experiment's `ray_cost`"));
+        let found = format!("{:?}", method.name());
+        if self.suite.is_some() && !is_ours {
+            let accepted = "methods of ours; the suite runs the libraries that are compiled in by itself";
+            faults.push(Fault::new("method", format!("{found}, none of ours"), accepted));
+        } else if let Contestant::Peer(peer) = method
+            && let Some(feature) = peer.missing_feature()
+        {
+            let needs =
+                format!("another library, which needs `cargo run --release -p harness --features {feature}`");
+            let accepted = format!("without it {}", Method::NAMES.join(", "));
+            faults.push(Fault::new("method", format!("{found}, {needs}"), accepted));
         }
-        match method {
-            Contestant::Peer(_) | Contestant::External(_) if self.suite.is_some() => {
-                let found = format!("{:?}, none of ours", method.name());
-                Err(Fault::new(
-                    "method",
-                    found,
-                    "methods of ours; the suite runs the libraries that are compiled in by itself",
-                ))
-            }
-            Contestant::Peer(peer) => match peer.missing_feature() {
-                Some(feature) => {
-                    let found = format!(
-                        "{:?}, another library, which needs `cargo run --release -p harness --features {feature}`",
-                        peer.name()
-                    );
-                    Err(Fault::new("method", found, format!("without it {}", Method::NAMES.join(", "))))
-                }
-                None => Ok(peer.check()?),
-            },
-            Contestant::Ours(method) => Ok(method.check()?),
-            Contestant::External(program) => Ok(program.check()?),
-        }
+        faults
+    }
+
+    /// Methods whose runs would go on for hours because nothing says when they end. What that would be is not judged where it has
+    /// `faults`.
+    pub(super) fn check_ends(&self, at: &[usize], faults: &[Fault]) -> Vec<Fault> {
+        let endless = best::Config::default().work_per_object;
+        let goes_on = |labelled: &&Labelled| match &labelled.method {
+            Contestant::Ours(Method::Best(config)) => config.work_per_object == endless,
+            _ => false,
+        };
+        let has_end = |labelled: &Labelled| {
+            let is_limited = self.budget_of(labelled) != Budget::UNLIMITED;
+            is_limited || self.max_seconds_of(labelled).is_some() || self.suite.is_some()
+        };
+        let is_doubtful = |entry: &str| {
+            let keys = ["budget", "max_seconds", "work_per_object"];
+            let keys = keys.iter().flat_map(|key| [(*key).to_owned(), format!("{entry}.{key}")]);
+            keys.into_iter().any(|key| faults.iter().any(|fault| is_within(&fault.key, &key)))
+        };
+        let found = format!(
+            "missing for best, which would take {endless} nodes of work per object: hours on a large scene"
+        );
+        let accepted = "`budget = { max_work = 300_000_000 }`, some seconds on one thread, or `max_seconds = 10`, here or for all \
+                        methods, or another `work_per_object`";
+        let own = at.iter().zip(&self.methods).filter(|(_, labelled)| goes_on(labelled) && !has_end(labelled));
+        let entries = own.map(|(at, _)| format!("methods[{at}]")).filter(|entry| !is_doubtful(entry));
+        entries.map(|entry| Fault::new(format!("{entry}.budget"), &found, accepted)).collect()
     }
 
     /// What is asked for that runs which the clock ends cannot have: everything that is to be the same whenever it is made again.
@@ -154,14 +166,35 @@ impl Experiment {
         refused.chain(in_parallel).collect()
     }
 
-    /// The first label in each report that no method has.
-    pub(super) fn check_reports(&self) -> Vec<Fault> {
-        let known: Vec<&str> = self.methods.iter().map(|method| method.label.as_str()).collect();
-        let check = |(index, report): (usize, &Report)| {
-            let (key, unknown) = report.labels().into_iter().find(|(_, label)| !known.contains(label))?;
-            let found = format!("{unknown:?}, no label of a method");
-            Some(Fault::new(format!("reports[{index}].{key}"), found, known.join(", ")))
+    /// The labels in reports, which stand at these places in the spec, that no method has.
+    pub(super) fn check_reports(&self, labels: &[Option<String>], at: &[usize]) -> Vec<Fault> {
+        // A label that cannot be told may be any.
+        let Some(known) = labels.iter().map(Option::as_deref).collect::<Option<Vec<&str>>>() else {
+            return vec![];
         };
-        self.reports.iter().enumerate().filter_map(check).collect()
+        let accepted = known.join(", ");
+        let fault = |(at, report): (&usize, &Report)| {
+            let unknown = report.labels().into_iter().filter(|(_, label)| !known.contains(label));
+            let fault = |(key, label): (String, &str)| {
+                Fault::new(
+                    format!("reports[{at}].{key}"),
+                    format!("{label:?}, no label of a method"),
+                    &accepted,
+                )
+            };
+            unknown.map(fault).collect::<Vec<Fault>>()
+        };
+        at.iter().zip(&self.reports).flat_map(fault).collect()
     }
+}
+
+/// Labels that another entry of `methods` has already.
+pub(super) fn unique(labels: &[Option<String>]) -> Vec<Fault> {
+    let mut known = HashSet::new();
+    let labels = labels.iter().enumerate().filter_map(|(at, label)| Some((at, label.as_ref()?)));
+    let second = labels.filter(|(_, label)| !known.insert(*label));
+    let fault = |(at, label)| {
+        Fault::new(format!("methods[{at}].label"), format!("{label:?} for the second time"), "unique labels")
+    };
+    second.map(fault).collect()
 }

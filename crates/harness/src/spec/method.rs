@@ -1,10 +1,11 @@
 //! One entry of a spec's `methods`: what is run, with its label, limits and seeds.
 
-use super::fault::{self, Fault};
+use super::fault::{self, Fault, Read};
 use crate::measure::empirical_cost;
 use crate::measure::ray_cost::TrainedOn;
 use crate::peers::{Peer, command};
 use bvh_build::config::{Itself, Keys};
+use bvh_build::{Check, OutOfRange};
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, Method, Shortcut};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -55,6 +56,16 @@ impl Contestant {
     }
 }
 
+impl Check for Contestant {
+    fn faults(&self) -> Vec<OutOfRange> {
+        match self {
+            Self::Ours(method) => method.faults(),
+            Self::Peer(peer) => peer.faults(),
+            Self::External(program) => program.faults(),
+        }
+    }
+}
+
 bvh_build::config! { serde;
     /// The keys of an entry besides those of its method.
     pub struct Own {
@@ -91,22 +102,28 @@ impl Labelled {
         Self { label: method.name().into(), method: Contestant::Ours(method), own: Own::default() }
     }
 
-    /// Reads an entry, and names the key that an error is about.
-    pub(super) fn read(mut table: Table) -> Result<Self, Fault> {
+    /// Reads an entry, and finds everything that is wrong with it by itself.
+    pub(super) fn read(mut table: Table) -> Read<Self> {
         let own = Own::KEYS.iter().filter_map(|key| table.remove_entry(*key)).collect();
-        let mut own: Own = fault::deserialize(own)?;
+        let (own, mut faults) = fault::deserialize::<Own>(own);
         let (ours, libraries) = (Method::NAMES.join(", "), Peer::NAMES.join(", "));
         let accepted = || format!("{ours}, the libraries {libraries}, or {}", command::Config::NAME);
-        let method =
-            fault::tagged(table, "method", |name, parameters| Contestant::read(name, parameters), accepted)?;
-        let label = own.label.take().unwrap_or_else(|| method.name().into());
-        Ok(Self { label, method, own })
+        let (method, of_method) =
+            fault::tagged(table, "method", |name, parameters| Contestant::read(name, parameters), accepted);
+        faults.extend(of_method);
+        let labelled = own.zip(method).map(|(mut own, method)| {
+            let label = own.label.take().unwrap_or_else(|| method.name().into());
+            Self { label, method, own }
+        });
+        (labelled, faults)
     }
 }
 
 impl<'de> Deserialize<'de> for Labelled {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Self::read(Table::deserialize(deserializer)?).map_err(serde::de::Error::custom)
+        let (read, faults) = Self::read(Table::deserialize(deserializer)?);
+        let wrong = || serde::de::Error::custom(faults.iter().map(Fault::to_string).collect::<String>());
+        read.filter(|_| faults.is_empty()).ok_or_else(wrong)
     }
 }
 

@@ -77,7 +77,6 @@ config! {
         /// Tables and figures made from the rows.
         reports: Vec<Report>, in Itself;
     }
-    check Self::check_together;
 }
 
 impl Experiment {

@@ -1,7 +1,7 @@
 //! From a spec's text to a checked [`Experiment`], with what the command line changes.
 
-use super::fault::{self, Fault, line_of};
-use super::{Experiment, Labelled, Name};
+use super::fault::{self, Fault, Read};
+use super::{Experiment, Labelled, Name, check};
 use crate::Error;
 use crate::files;
 use crate::report::Report;
@@ -28,15 +28,9 @@ pub fn configuration<C: DeserializeOwned + Check>(path: &Path) -> Result<C, Erro
     let text = files::read_text(path)?;
     let refuse = |message: String| Error::Spec { file: path.to_owned(), message };
     let table: Table = text.parse().map_err(|error: toml::de::Error| refuse(error.to_string()))?;
-    let read = || {
-        let config: C = fault::deserialize(table)?;
-        config.check()?;
-        Ok(config)
-    };
-    read().map_err(|fault: Fault| {
-        let line = line_of(&text, &fault.key);
-        refuse(line.map_or_else(|| fault.to_string(), |line| format!("line {line}: {fault}")))
-    })
+    let (config, faults) = fault::deserialize(table);
+    let all = || refuse(fault::say(&faults, &text, &path.to_string_lossy(), None));
+    config.filter(|_| faults.is_empty()).ok_or_else(all)
 }
 
 impl Experiment {
@@ -53,16 +47,10 @@ impl Experiment {
         let name = name.and_then(|name| Name::try_from(name.to_owned()));
         let name =
             name.map_err(|message| refuse(format!("the file's name without its extension: {message}")))?;
-        let mut experiment = Self::from_table(table, name, overrides).map_err(|faults| {
-            let said = |fault: &Fault| {
-                // A key that `quick` replaces stands there, not where it is read.
-                let quick = overrides.quick.then(|| line_of(text, &format!("quick.{}", fault.key))).flatten();
-                let line = quick.or_else(|| line_of(text, &fault.key));
-                line.map_or_else(|| fault.to_string(), |line| format!("line {line}: {fault}"))
-            };
-            let all: Vec<String> = faults.iter().map(said).collect();
-            refuse(all.join(&format!("\n{}: ", path.display())))
-        })?;
+        // A key that `quick` replaces stands there, not where it is read.
+        let above = overrides.quick.then_some("quick");
+        let mut experiment = Self::from_table(table, name, overrides)
+            .map_err(|faults| refuse(fault::say(&faults, text, &path.to_string_lossy(), above)))?;
         if let Some(folder) = path.parent().and_then(Path::to_str).filter(|_| overrides.scenes.is_empty()) {
             let scenes = experiment.scenes.iter_mut().chain(&mut experiment.optional_scenes);
             // Words are names.
@@ -75,33 +63,30 @@ impl Experiment {
         Ok(experiment)
     }
 
-    /// The first fault of every table, if there are any.
+    /// The experiment, or everything that is wrong with it.
     fn from_table(mut table: Table, name: Name, overrides: &Overrides) -> Result<Self, Vec<Fault>> {
-        if let Some((key, value)) = never_right(&table) {
-            return Err(vec![Fault::new(key, value, "under any key finite numbers, and no dates")]);
-        }
+        let mut faults = Vec::new();
+        leave_out_never_right(&mut table, "", &mut faults);
         match table.remove("quick") {
             Some(Value::Table(quick)) if overrides.quick => replace(&mut table, quick),
             None if overrides.quick => {
-                return Err(vec![Fault::new("quick", "missing", "with --quick, a table of keys to replace")]);
+                faults.push(Fault::new("quick", "missing", "with --quick, a table of keys to replace"));
             }
             None | Some(Value::Table(_)) => {}
-            Some(found) => return Err(vec![Fault::new("quick", found, "a table of keys to replace")]),
+            Some(found) => faults.push(Fault::new("quick", found, "a table of keys to replace")),
         }
-        let mut faults = Vec::new();
+        let mut labels = labels(table.get("methods"));
         // Serde forgets the path to an error within a table that says itself of which type it is.
-        let methods = list(&mut table, "methods", Labelled::read, &mut faults);
+        let (methods, methods_at) = list(&mut table, "methods", Labelled::read, &mut faults);
         let read = |table| {
             fault::tagged(table, "kind", |kind, config| Report::read(kind, config), || Report::NAMES.join(", "))
         };
-        let reports = list(&mut table, "reports", read, &mut faults);
-        let mut experiment: Self = match fault::deserialize(table) {
-            Ok(experiment) if faults.is_empty() => experiment,
-            Ok(_) => return Err(faults),
-            Err(fault) => return Err([vec![fault], faults].concat()),
-        };
+        let (reports, reports_at) = list(&mut table, "reports", read, &mut faults);
+        let (experiment, of_others) = fault::deserialize::<Self>(table);
+        faults.extend(of_others);
+        let Some(mut experiment) = experiment else { return Err(faults) };
         if experiment.name != Name::default() {
-            return Err(vec![Fault::new("name", experiment.name, "none, the file's name is used")]);
+            faults.push(Fault::new("name", experiment.name, "none, the file's name is used"));
         }
         (experiment.name, experiment.quick) = (name, overrides.quick);
         (experiment.methods, experiment.reports) = (methods, reports);
@@ -112,23 +97,39 @@ impl Experiment {
             experiment.scenes.clone_from(&overrides.scenes);
             experiment.optional_scenes.clear();
         }
-        if experiment.suite.is_some() && experiment.methods.is_empty() {
+        if experiment.suite.is_some() && labels.is_empty() {
             experiment.methods = Method::all().into_iter().map(Labelled::new).collect();
+            labels = experiment.methods.iter().map(|method| Some(method.label.clone())).collect();
         }
-        let faults: Vec<Fault> = experiment.check().err().map(Fault::from).into_iter().collect();
-        let together = [experiment.check_methods(), experiment.check_clock(), experiment.check_reports()];
+        // What is refused already is missing, and a list empty, for no other reason.
+        let apart = |late: &Fault| !faults.iter().any(|fault| fault::is_within(&fault.key, &late.key));
+        let together = [
+            experiment.check_together().into_iter().filter(apart).collect(),
+            check::unique(&labels),
+            experiment.check_methods(&methods_at),
+            experiment.check_ends(&methods_at, &faults),
+            experiment.check_reports(&labels, &reports_at),
+            experiment.check_clock(),
+        ];
         let faults = [faults, together.concat()].concat();
         if faults.is_empty() { Ok(experiment) } else { Err(faults) }
     }
 }
 
-/// Takes the list of tables under `key` out of a spec, and reads each table by `read`; faults are added to `faults`.
+/// The labels of the entries of `methods`, as far as they can be told.
+fn labels(methods: Option<&Value>) -> Vec<Option<String>> {
+    let label = |entry: &Value| Some(entry.get("label").or(entry.get("method"))?.as_str()?.to_owned());
+    methods.and_then(Value::as_array).into_iter().flatten().map(label).collect()
+}
+
+/// Takes the list of tables under `key` out of a spec, and reads each table by `read`. Returns what could be read with its place in
+/// the list; faults are added to `faults`.
 fn list<T>(
     table: &mut Table,
     key: &str,
-    read: impl Fn(Table) -> Result<T, Fault>,
+    read: impl Fn(Table) -> Read<T>,
     faults: &mut Vec<Fault>,
-) -> Vec<T> {
+) -> (Vec<T>, Vec<usize>) {
     let entries = match table.remove(key) {
         None => vec![],
         Some(Value::Array(entries)) => entries,
@@ -137,31 +138,39 @@ fn list<T>(
             vec![]
         }
     };
-    let read = |(at, entry): (usize, Value)| match entry {
-        Value::Table(entry) => read(entry).map_err(|fault| fault.below(&format!("{key}[{at}]"))),
-        found => Err(Fault::new(format!("{key}[{at}]"), found, "a table")),
+    let mut read = |(at, entry): (usize, Value)| {
+        let (value, of_entry) = match entry {
+            Value::Table(entry) => read(entry),
+            found => (None, vec![Fault::new("", found, "a table")]),
+        };
+        faults.extend(of_entry.into_iter().map(|fault| fault.below(&format!("{key}[{at}]"))));
+        Some((value?, at))
     };
-    entries
-        .into_iter()
-        .enumerate()
-        .filter_map(|entry| read(entry).map_err(|fault| faults.push(fault)).ok())
-        .collect()
+    entries.into_iter().enumerate().filter_map(&mut read).unzip()
 }
 
-/// The first value that no key takes, with its key: a number that is infinite or NaN, or a date.
-fn never_right(table: &Table) -> Option<(String, &Value)> {
-    fn within(key: String, value: &Value) -> Option<(String, &Value)> {
+/// Takes out what no key takes: numbers that are infinite or NaN, and dates.
+fn leave_out_never_right(table: &mut Table, above: &str, faults: &mut Vec<Fault>) {
+    fn is_right(key: &str, value: &mut Value, faults: &mut Vec<Fault>) -> bool {
         match value {
-            Value::Float(number) if !number.is_finite() => Some((key, value)),
-            Value::Datetime(_) => Some((key, value)),
-            Value::Table(table) => never_right(table).map(|(inner, value)| (format!("{key}.{inner}"), value)),
-            Value::Array(array) => {
-                array.iter().enumerate().find_map(|(index, value)| within(format!("{key}[{index}]"), value))
+            Value::Table(table) => leave_out_never_right(table, &format!("{key}."), faults),
+            Value::Array(list) => {
+                let mut right = true;
+                for (index, value) in list.iter_mut().enumerate() {
+                    right &= is_right(&format!("{key}[{index}]"), value, faults);
+                }
+                return right;
             }
-            _ => None,
+            Value::Float(number) if number.is_finite() => {}
+            Value::Float(_) | Value::Datetime(_) => {
+                faults.push(Fault::new(key, value, "under any key finite numbers, and no dates"));
+                return false;
+            }
+            _ => {}
         }
+        true
     }
-    table.iter().find_map(|(key, value)| within(key.clone(), value))
+    table.retain(|key, value| is_right(&format!("{above}{key}"), value, faults));
 }
 
 /// Replaces keys of `table` by those of `by`, tables key by key.

@@ -240,32 +240,108 @@ fn naming_a_wrong_key_among_thousands_of_methods_takes_no_time() {
 }
 
 #[test]
-fn the_first_error_of_every_table_is_named_at_once() {
-    let method = |parameters: &str| format!("[[methods]]\nmethod = 'grasp'\n{parameters}\n");
-    let text = |methods: &[&str], report: &str| {
-        let methods: String = methods.iter().map(|parameters| method(parameters)).collect();
-        format!("question = 'q'\nscenes = ['escher']\n{methods}[[reports]]\n{report}\n")
+fn all_errors_of_a_file_are_said_at_once_in_its_order_and_once_each() {
+    let text = "\
+question = ' '
+scenes = ['escher', 3]
+repetitions = 0
+sedd = 1
+seed = 1979-05-27
+budget = { max_work = 'x', max_wrok = 1 }
+rays = [{ count = 0, query = 'any' }, { family = 'curves', count = nan }]
+methods = [
+    { method = 'grasp', noise = 2.0, trials = 0, trails = 1, label = 3 },
+    { method = 'grep', noise = 2.0, label = 'a' },
+    7,
+    { method = 'annealing', label = 'a', hot = -1, cold = 0.2, move = { climb = 0 }, judge = { count = 0 }, for_rays = 'camera' },
+    { method = 'best', work_per_object = 'x', label = 'c' },
+    { method = 'best', label = 'd', references = 99.0, keep = ['nothing'] },
+]
+[[reports]]
+kind = 'ecdf'
+titel = 't'
+methods = ['a', 'b', 'e']
+targets = [{ of = 'bse', percent = 'x' }, { of = 'base', percent = -100 }]
+[[reports]]
+kind = 'pie'
+[[reports]]
+kind = 'anytime'
+methods = []
+at_seconds = [1, -1]
+file = '../x'
+";
+    let message = read(text, &Overrides::default()).unwrap_err();
+    let key = |line: &str| {
+        let (place, rest) = line.split_once("spec.toml: ")?.1.split_once(": ")?;
+        Some(format!("{} {}", place.strip_prefix("line ")?, rest.split([' ', ':']).next()?))
     };
-    // What cannot be read, and then what is out of range.
-    for (text, parts) in [
-        (
-            text(&["noise = 'x'", "", "trails = 1"], "kind = 'numbrs'"),
-            ["methods[0].noise", "methods[2].trails", "reports[0].kind"],
-        ),
-        (
-            text(
-                &["noise = 2.0", "label = 'a'", "label = 'a'"],
-                "kind = 'numbers'\ntitle = 't'\nmethods = ['b']",
-            ),
-            ["methods[0].noise", "methods[2].label", "reports[0].methods[0]"],
-        ),
+    let said: Vec<String> = message.lines().map(|line| key(line).unwrap_or_else(|| line.into())).collect();
+    let expected = [
+        "1 question",
+        "2 scenes[1]",
+        "3 repetitions",
+        "4 sedd",
+        "5 seed",
+        "6 budget.max_work",
+        "6 budget.max_wrok",
+        "7 rays[0].count",
+        "7 rays[1].family",
+        "7 rays[1].count",
+        "9 methods[0].noise",
+        "9 methods[0].trials",
+        "9 methods[0].trails",
+        "9 methods[0].label",
+        "10 methods[1].method",
+        "11 methods[2]",
+        "12 methods[3].label",
+        "12 methods[3].hot",
+        "12 methods[3].move.climb",
+        "12 methods[3].judge",
+        "12 methods[3].judge.count",
+        "12 methods[3].for_rays",
+        "13 methods[4].work_per_object",
+        "14 methods[5].references",
+        "14 methods[5].keep[0]",
+        "18 reports[0].titel",
+        "20 reports[0].targets[0].of",
+        "20 reports[0].targets[0].percent",
+        "20 reports[0].targets[1].percent",
+        "22 reports[1].kind",
+        "25 reports[2].methods",
+        "26 reports[2].at_seconds",
+        "26 reports[2].at_seconds[1]",
+        "27 reports[2].file",
+    ];
+    assert_eq!(said, expected, "{message}");
+    // Labels that can be told are.
+    let labels = "question = 'q'\nscenes = ['escher']\n[[methods]]\nmethod = 'grep'\n[[methods]]\nmethod = 'grasp'\n\
+                  [[methods]]\nmethod = 'grasp'\n[[reports]]\nkind = 'numbers'\nmethods = ['grep', 'grasp', 'a', 'b']\n";
+    let message = read(labels, &Overrides::default()).unwrap_err();
+    let said: Vec<String> = message.lines().filter_map(key).collect();
+    assert_eq!(
+        said,
+        ["4 methods[0].method", "7 methods[2].label", "11 reports[0].methods[2]", "11 reports[0].methods[3]"]
+    );
+}
+
+#[test]
+fn a_search_that_would_go_on_for_hours_is_refused_unless_the_spec_says_when_it_ends() {
+    let spec = |rest: &str, of_best: &str| {
+        let methods = format!("methods = [{{ method = 'grasp' }}, {{ method = 'best'{of_best} }}]");
+        read(&format!("question = 'q'\nscenes = ['escher']\n{rest}\n{methods}\n"), &Overrides::default())
+    };
+    let message = spec("", "").unwrap_err();
+    let parts =
+        ["line 4: methods[1].budget is missing", "budget = { max_work = ", "max_seconds = ", "work_per_object"];
+    assert!(parts.iter().all(|part| message.contains(part)) && message.lines().count() == 1, "{message}");
+    for (rest, of_best) in [
+        ("budget = { max_work = 9 }", ""),
+        ("sequential = true\nmax_seconds = 9.0", ""),
+        ("", ", budget = { max_evaluations = 9 }"),
+        ("sequential = true", ", max_seconds = 9.0"),
+        ("", ", work_per_object = 10_000"),
     ] {
-        let message = read(&text, &Overrides::default()).unwrap_err();
-        let lines: Vec<&str> = message.lines().collect();
-        assert_eq!(lines.len(), parts.len(), "{message}");
-        for (line, part) in lines.into_iter().zip(parts) {
-            assert!(line.contains("spec.toml: line ") && line.contains(part), "{line}");
-        }
+        assert_eq!(spec(rest, of_best).err(), None, "{rest}{of_best}");
     }
 }
 

@@ -22,6 +22,7 @@ use crate::Error;
 use crate::report::output::Output;
 use crate::run::columns::Columns;
 use bvh_build::OutOfRange;
+use bvh_build::config::{Accepts, Itself};
 pub use case::{Case, Check, EXACT_OBJECTS, Effort, LargerScenes, Part, Size, is_builder, methods};
 pub use cell::Cell;
 pub use promise::{Broken, Promise, Verdict};
@@ -54,10 +55,10 @@ impl Measure {
 }
 
 impl bvh_build::Check for Measure {
-    fn check(&self) -> Result<(), OutOfRange> {
+    fn faults(&self) -> Vec<OutOfRange> {
         match self {
-            Self::Stability(config) => config.check().map_err(|error| error.below("stability")),
-            Self::Precision(config) => config.check().map_err(|error| error.below("precision")),
+            Self::Stability(config) => Itself.faults("stability", config),
+            Self::Precision(config) => Itself.faults("precision", config),
         }
     }
 }
