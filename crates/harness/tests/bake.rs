@@ -9,22 +9,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
-use support::{harness, run, run_on_a_small_disk, text};
-
-/// Standard output of a command that must succeed.
-fn said(folder: &Path, args: &[&str]) -> String {
-    let output = run(folder, args);
-    assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
-    text(&output.stdout)
-}
-
-/// The facts that `inspect` and the readers print.
-fn facts(text: &str) -> BTreeMap<String, String> {
-    text.lines()
-        .filter_map(|line| line.split_once(": "))
-        .map(|(what, value)| (what.into(), value.into()))
-        .collect()
-}
+use support::{facts, harness, run, run_on_a_small_disk, said, text};
 
 fn cost(folder: &Path, file: &str) -> f64 {
     facts(&said(folder, &["inspect", file]))["internal area"].parse().unwrap()
@@ -53,40 +38,6 @@ fn a_bake_of_work_writes_the_same_bytes_on_any_number_of_threads() {
     assert!(facts["internal area over Müller–Fellner's"].parse::<f64>().unwrap() < 0.9);
     assert!(facts["end-point overlap"].parse::<f64>().unwrap() > 0.0);
     assert!(facts["valid"].starts_with("yes"));
-}
-
-#[test]
-fn a_bake_divides_objects_where_that_pays_and_searches_by_the_cost_of_the_layout() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let bake = |out: &str, more: &[&str]| {
-        let args = ["bake", "pinecon2", "--budget", "1Mwork", "--out", out];
-        let said = said(at, &[&args, more].concat());
-        (said, facts(&self::said(at, &["inspect", out, "pinecon2"])))
-    };
-    let number = |facts: &BTreeMap<String, String>, what: &str| facts[what].parse::<f64>().unwrap();
-    let (_, whole) = bake("whole.bvh", &[]);
-    let (said_split, split) = bake("split.bvh", &["--references", "1.3"]);
-    assert!(said_split.contains("area of all nodes") && said_split.contains(" references to "), "{said_split}");
-    let boxes_only =
-        said(at, &["bake", "spheres75", "--budget", "1Mwork", "--out", "none.bvh", "--references", "1.5"]);
-    assert!(boxes_only.contains("no object is divided"), "{boxes_only}");
-    let (objects, references) = (number(&split, "objects"), number(&split, "references"));
-    assert_eq!(number(&whole, "references"), objects);
-    assert!(references > objects && references <= 1.3 * objects, "{references} of {objects}");
-    assert!(number(&split, "surface area heuristic") < number(&whole, "surface area heuristic"));
-    let (said_layout, layout) = bake("layout.bvh", &["--cost", "layout"]);
-    assert!(said_layout.contains("cost of the wide layout"), "{said_layout}");
-    assert_eq!(layout["objective"], "cost of the wide layout, by area");
-    let scene = Scene::load("pinecon2").unwrap();
-    let costs = ["layout.bvh", "whole.bvh"]
-        .map(|file| bvh_core::cost::layout_area(&load_tree(&at.join(file), &scene).unwrap()));
-    assert!(costs[0] < costs[1], "{costs:?}");
-    bake("further.bvh", &["--references", "1.3", "--from", "split.bvh"]);
-    said(at, &["render", "pinecon2", "--accel", "split.bvh", "--out", "a.png", "--size", "16x16"]);
-    let args = ["bake", "pinecon2", "--budget", "1Mwork", "--out", "no.bvh", "--references", "nan"];
-    let refused = harness(at, &args).output().unwrap();
-    assert!(text(&refused.stderr).contains("--references NaN; accepted: 1 to 16"), "{}", text(&refused.stderr));
 }
 
 #[test]

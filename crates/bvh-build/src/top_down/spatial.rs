@@ -189,10 +189,19 @@ impl Build<'_> {
         }
         self.sort(&references, axis);
         let ordered: Vec<Reference> = self.keys.iter().map(|&(_, at)| references[at as usize]).collect();
+        if union(&ordered[..left]) == union(&ordered[left..]) {
+            // Nothing is gained, and the power would take off one reference after the other.
+            left = count / 2;
+        }
         references.clear();
         references.extend_from_slice(&ordered[left..]);
         let sides = [ordered[..left].to_vec(), references];
-        Sides { cost: least, boxes: sides.each_ref().map(|side| union(side)), references: sides }
+        let boxes = sides.each_ref().map(|side| union(side));
+        Sides {
+            cost: self.cost(&boxes[0], left) + self.cost(&boxes[1], count - left),
+            boxes,
+            references: sides,
+        }
     }
 
     /// Fills `keys` with the centres along an axis and the references' positions, in order.
@@ -204,7 +213,7 @@ impl Build<'_> {
 
     /// The border of bins where a spatial split costs least, by its cost before unsplitting.
     fn best_plane(&self, aabb: &Aabb, references: &[Reference]) -> Option<Plane> {
-        let bins = self.config.bins as usize;
+        let (bins, all) = (self.config.bins as usize, references.len());
         let mut best: Option<Plane> = None;
         for axis in 0..3 {
             let (low, extent) = (f64::from(aabb.min[axis]), aabb.extent()[axis]);
@@ -217,10 +226,23 @@ impl Build<'_> {
                 continue;
             }
             let mut parts = vec![(Aabb::EMPTY, 0usize, 0usize); bins];
-            for reference in references {
-                let (first, last) = (bin_of(reference.aabb.min[axis]), bin_of(reference.aabb.max[axis]));
+            let bins_of =
+                |reference: &Reference| [reference.aabb.min[axis], reference.aabb.max[axis]].map(bin_of);
+            for [first, last] in references.iter().map(bins_of) {
                 parts[first].1 += 1;
                 parts[last].2 += 1;
+            }
+            // Where every plane cuts all that is on one side of it, there are no parts to look at.
+            let (mut entered, mut gone) = (0, 0);
+            let divides = parts[..bins - 1].iter().any(|part| {
+                (entered, gone) = (entered + part.1, gone + part.2);
+                (1..all).contains(&entered) && (1..all).contains(&(all - gone))
+            });
+            if !divides {
+                continue;
+            }
+            for reference in references {
+                let [first, last] = bins_of(reference);
                 if first == last {
                     parts[first].0 = parts[first].0.union(&reference.aabb);
                     continue;
@@ -246,7 +268,6 @@ impl Build<'_> {
                 entered += parts[bin - 1].1;
                 let (behind, left) = &after[bin];
                 // A side with all references divides nothing.
-                let all = references.len();
                 if entered == 0
                     || *left == 0
                     || entered >= all
@@ -364,11 +385,12 @@ mod tests {
 
     #[test]
     fn scenes_of_points_of_one_object_and_of_none_are_built_and_bad_boxes_refused() {
-        for triangles in [vec![], needles(1), vec![Triangle([Vec3::ONE; 3]); 30]] {
+        for triangles in [vec![], needles(1), vec![Triangle([Vec3::ONE; 3]); 30], vec![needles(1)[0]; 3000]] {
             let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
             let tree = Config::default().build(&boxes, &triangles.as_slice()).unwrap();
             validate_references(&tree, &boxes, &triangles.as_slice()).unwrap();
             assert_eq!(tree.prim_ids.len(), triangles.len(), "there is nothing to split");
+            assert!(tree.depth() <= 12, "objects in one place are not halved: {}", tree.depth());
         }
         let wrong = [Aabb::from([[f32::NAN; 3], [1.0; 3]])];
         assert!(Config::default().build(&wrong, &needles(1).as_slice()).is_err());

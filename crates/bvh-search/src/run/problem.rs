@@ -1,5 +1,6 @@
 //! What a search is asked for, and what it may skip on the way because the answer stays the same.
 
+use bvh_build::{BuildError, spatial};
 use bvh_core::cost::{self, Measure, Objective};
 use bvh_core::{Aabb, Bvh, Clip};
 use std::fmt::Debug;
@@ -24,6 +25,14 @@ impl<'a> Splits<'a> {
     /// the problem without splits is the same, with more ways to solve it.
     pub fn at_most(most: usize, boxes: &[Aabb], objects: &'a dyn Clip) -> Option<Self> {
         (most > boxes.len()).then_some(Self { objects, most })
+    }
+
+    /// The same, if a top-down division of the objects of these `boxes` finds a plane at which dividing them saves something. Where
+    /// it finds none, a search is taken to find none either, and would pay for looking. Takes as long as
+    /// [`spatial::Config::build`].
+    pub fn if_they_pay(self, boxes: &[Aabb]) -> Result<Option<Self>, BuildError> {
+        let tree = spatial::Config::default().build_at_most(self.most, boxes, self.objects)?;
+        Ok((tree.prim_ids.len() > boxes.len()).then_some(self))
     }
 }
 

@@ -117,6 +117,8 @@ pub(super) struct Baked {
     /// The cost of the tree that it went on from.
     before: Option<f64>,
     seconds: f64,
+    /// What the cost is.
+    unit: &'static str,
 }
 
 /// Searches until the budget is spent or `interrupted` becomes true.
@@ -133,6 +135,8 @@ pub(super) fn search(
     let greedy = greedy.map_err(Error::search(&scene.name, &args.method))?;
     let deadline = effort.deadline();
     interrupt::hold();
+    let asked = Splits::at_most(most_references(args, scene), &scene.boxes, &scene.primitives);
+    let splits = explain::splits(asked, scene, start.map(|(tree, _)| tree), args.explain)?;
     let density = rays.map(|rays| density(rays, scene, &greedy, args.seed)).transpose()?;
     let objective = match args.cost {
         BakeCost::Area => Objective::InternalArea,
@@ -140,7 +144,7 @@ pub(super) fn search(
     };
     let problem = Problem {
         objective,
-        splits: Splits::at_most(most_references(args, scene), &scene.boxes, &scene.primitives),
+        splits,
         measure: density.as_ref().map(|density| density as &dyn Measure),
         ..Problem::new(&scene.boxes)
     };
@@ -166,7 +170,7 @@ pub(super) fn search(
     let bytes = file::save_references(&outcome.tree, &scene.boxes, &scene.primitives, &origin)
         .map_err(|source| Error::TreeFile { path: args.out.clone(), source })?;
     let before = start.map(|(tree, _)| problem.cost(tree));
-    Ok(Baked { outcome, bytes, base, before, seconds })
+    Ok(Baked { outcome, bytes, base, before, seconds, unit: unit(args, splits.is_some()) })
 }
 
 /// The most references to a scene's objects that leaves may have.
@@ -216,12 +220,12 @@ fn recorded(args: &BakeArgs) -> String {
 }
 
 /// What the cost is.
-fn unit(args: &BakeArgs) -> &'static str {
+fn unit(args: &BakeArgs, leaves_count: bool) -> &'static str {
     match (args.cost, &args.rays) {
         (BakeCost::Layout, Some(_)) => "cost of the wide layout for rays, times root area,",
         (BakeCost::Layout, None) => "cost of the wide layout, times root area,",
         (BakeCost::Area, Some(_)) => "visits of rays times root area",
-        (BakeCost::Area, None) if args.references > 1.0 => "area of all nodes",
+        (BakeCost::Area, None) if leaves_count => "area of all nodes",
         (BakeCost::Area, None) => "internal area",
     }
 }
@@ -272,7 +276,7 @@ fn most_bytes(objects: usize) -> usize {
 }
 
 fn summary(args: &BakeArgs, scene: &Scene, baked: &Baked) -> String {
-    let &Baked { ref outcome, base, before, seconds, .. } = baked;
+    let &Baked { ref outcome, base, before, seconds, unit, .. } = baked;
     let mut lines = vec![
         format!(
             "{} ({}), {} objects, {}, seed {}",
@@ -282,7 +286,7 @@ fn summary(args: &BakeArgs, scene: &Scene, baked: &Baked) -> String {
             args.method,
             args.seed
         ),
-        format!("{} {}, {} Müller–Fellner's {base}", unit(args), outcome.cost, gain(outcome.cost, base)),
+        format!("{unit} {}, {} Müller–Fellner's {base}", outcome.cost, gain(outcome.cost, base)),
     ];
     if let Some(before) = before {
         lines.push(format!("{} the tree it went on from, {before}", gain(outcome.cost, before)));

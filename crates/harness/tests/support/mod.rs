@@ -1,6 +1,7 @@
 //! The program as a child process, and what it leaves in a folder.
 #![allow(dead_code)] // each test file uses some of it
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -49,4 +50,19 @@ pub fn reproducible(folder: &Path) -> Vec<(String, Vec<u8>)> {
         .collect();
     files.sort();
     files
+}
+
+/// Standard output of a command that must succeed.
+pub fn said(folder: &Path, args: &[&str]) -> String {
+    let output = run(folder, args);
+    assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
+    text(&output.stdout)
+}
+
+/// The facts that `inspect` and the readers print.
+pub fn facts(text: &str) -> BTreeMap<String, String> {
+    text.lines()
+        .filter_map(|line| line.split_once(": "))
+        .map(|(what, value)| (what.into(), value.into()))
+        .collect()
 }
