@@ -68,6 +68,9 @@ tuned! { "harness bake SCENE --cost layout --budget 100Mwork --out FILE" {
 tuned! { "harness bake SCENE --references 1.2 --budget 100Mwork --out FILE" {
     /// Ancestors whose boxes suggest planes at which to divide a leaf.
     LEVELS_OF_PLANES: u32 = 12, "levels";
+    /// What a division has to save. Without a price, layouts cost more in the end, and leave is spent on divisions that save next to
+    /// nothing; twice as high, it forbids some that pay.
+    PRICE_OF_A_REFERENCE: f64 = 0.25, "cost of the tree per reference";
     /// As `DEARER_BY_AREA`, for moves that divide or reunite.
     DIVISION_DEARER_BY_AREA: f64 = 2.0, "factor";
     /// Part of the work or time for each of the trials that decide between whole objects and spatial splits as the start.

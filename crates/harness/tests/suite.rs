@@ -1,15 +1,17 @@
 //! Every case of the suite holds for every method, every traversal and every other part.
 
-use bvh_build::{Accelerator, Builder, Structure, muller_fellner};
-use bvh_core::cost::Objective;
+use bvh_build::{Accelerator, Builder, Structure, muller_fellner, spatial};
+use bvh_core::cost::{Objective, total_area};
 use bvh_core::{Aabb, Primitives, RayDensity, Segment, Triangle, WideBvh, file, validate, validate_references};
 use bvh_search::{Budget, Method, Problem, Splits, StopReason, optimize, solve};
+use glam::Vec3;
 use harness::scenes::Scene;
 use harness::scenes::stiff::{self, STIFF};
 use harness::stress::{
     self, CASES, Case, Cell, Check, EXACT_OBJECTS, Effort, LargerScenes, Part, Size, examine, is_builder,
     kernels,
     tracing::{self, TRAVERSALS},
+    transform::{same_topology, scale_range, scaled, scaled_area},
 };
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -319,6 +321,60 @@ fn every_case_holds_with_divided_objects_and_with_the_cost_of_the_layout() {
                     assert_eq!(wide.nearest_hit(&ray), plain.nearest_hit(&ray), "{}: {ray:?}", case.id);
                     assert_eq!(wide.any_hit(&ray), plain.any_hit(&ray), "{}: {ray:?}", case.id);
                 }
+            }
+        }
+    }
+    assert!(divided > 5, "{divided}");
+}
+
+#[test]
+fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
+    let method = Method::Best(bvh_search::best::Config::default());
+    let mut divided = 0;
+    for case in &CASES {
+        let Some(scene) = case.scene() else { continue };
+        let few = case.triangles(scene.sizes[0].min(300));
+        // Long ones, which are worth dividing, from one corner of the scene to another.
+        let others = few.iter().cycle().skip(few.len() / 2);
+        let long = |(near, far): (&Triangle, &Triangle)| Triangle([near.0[0], near.0[1], far.0[2]]);
+        let triangles: Vec<Triangle> = few.iter().zip(others).map(long).collect();
+        // The parts of triangles have coordinates of their own, up to 2^-100 times as large as the triangle's: they too are to be
+        // normal numbers.
+        let range = scale_range(&stiff::boxes(&triangles));
+        let range = range.start() + 100..=*range.end();
+        if triangles.is_empty() || !range.contains(&0) {
+            continue;
+        }
+        // By spatial splits, and searched by both costs.
+        let trees = |k: i32| {
+            let scale = |p: Vec3| (p.as_dvec3() * libm::exp2(k.into())).as_vec3();
+            let scaled: Vec<Triangle> = triangles.iter().map(|t| Triangle(t.0.map(scale))).collect();
+            let (boxes, objects) = (stiff::boxes(&scaled), Primitives::Triangles(scaled));
+            let most = boxes.len() * 3 / 2;
+            let built = spatial::Config::default().build_at_most(most, &boxes, &objects).unwrap();
+            let searched = [Objective::Layout, Objective::InternalArea].map(|objective| {
+                let splits = Splits::at_most(most, &boxes, &objects);
+                let problem = Problem { objective, splits, ..Problem::new(&boxes) };
+                let budget = examine::budget(&method, boxes.len(), WORK);
+                let outcome = solve(&method, &problem, 1, budget, &()).unwrap();
+                (outcome.cost, outcome.tree)
+            });
+            searched.into_iter().chain([(total_area(&built), built)]).collect::<Vec<_>>()
+        };
+        let expected = trees(0);
+        divided += expected.iter().filter(|(_, tree)| tree.prim_ids.len() > triangles.len()).count();
+        for threads in [1, 3] {
+            let others = examine::on_threads(threads, || Ok(trees(0))).unwrap();
+            assert!(others == expected, "{}: another tree on {threads} threads", case.id);
+        }
+        for k in [*range.start(), range.start() / 7, range.end() / 7, *range.end()] {
+            for ((expected_cost, expected), (cost, tree)) in expected.iter().zip(trees(k)) {
+                let same = same_topology(&tree, expected);
+                assert!(same, "{}: another tree at scale 2^{k}", case.id);
+                let [parts, others] = [expected, &tree]
+                    .map(|tree| tree.nodes.iter().map(|node| node.aabb).collect::<Vec<Aabb>>());
+                assert_eq!(others, scaled(&parts, k), "{}: other parts at scale 2^{k}", case.id);
+                assert_eq!(cost, scaled_area(*expected_cost, k), "{}: scale 2^{k}", case.id);
             }
         }
     }

@@ -59,6 +59,11 @@ impl Layout {
         tree.root().map_or(0.0, |root| self.rows[root as usize].value())
     }
 
+    /// The cost of the tree as it is now.
+    pub fn current(&self) -> f64 {
+        self.cost
+    }
+
     /// The cost of the tree's layout. O(nodes).
     pub fn cost(&mut self, tree: &Working<impl Metric>) -> f64 {
         self.fill(tree);
