@@ -133,7 +133,7 @@ reports! {
     /// One picture by brute force, KD-tree and trees.
     "pictures" => Pictures(pictures::Config) by pictures::Config::write => [pictures::Tests, pictures::Times];
     /// Tests of rays in trees that are trained on rays.
-    "ray_cost" => RayCost(ray_cost::Config) by ray_cost::Config::write => [ray_cost::Compared, ray_cost::Speed];
+    "ray_cost" => RayCost(ray_cost::Config) by ray_cost::Config::write => [ray_cost::Compared, ray_cost::Paired, ray_cost::Speed];
     /// Tests of rays against the time in which trees are made.
     "ray_time" => RayTime(ray_time::Config) by ray_time::Config::write => [ray_time::Point];
     /// Cost against build time and against time per ray.
@@ -161,7 +161,11 @@ impl Report {
             Self::RunTimes(config) | Self::Ecdf(config) => (&config.methods, vec![]),
             Self::Profile(config) | Self::TimeToTarget(config) => (&config.methods, vec![]),
             Self::RayTime(config) => (&[], config.labels()),
-            Self::RayCost(config) => (&[], vec![("base".into(), &config.base)]),
+            Self::RayCost(config) => {
+                let pairs = config.pairs.iter().enumerate();
+                let pairs = pairs.flat_map(|(at, pair)| list(&format!("pairs[{at}]"), pair));
+                (&[], [("base".into(), config.base.as_str())].into_iter().chain(pairs).collect())
+            }
             Self::Trials(config) => (&config.methods, vec![]),
             Self::Times(config) => (&config.methods, vec![]),
             Self::RayTests(config) => (&config.methods, vec![]),

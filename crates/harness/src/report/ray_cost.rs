@@ -18,6 +18,9 @@ bvh_build::config! { serde;
         title: String;
         /// Label of the method that the others are compared with.
         base: String;
+        /// Pairs of labels: whether trees of the second take more tests than those of the first. Default none.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pairs: Vec<[String; 2]>;
     }
 }
 
@@ -40,12 +43,45 @@ pub(super) struct Compared<'a> {
     over_base_high: Option<f64>,
 }
 
+/// A method's tests over those of another on one scene, as written to `ray_cost_pairs.csv`.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Paired<'a> {
+    scene: &'a str,
+    method: &'a str,
+    /// Label of the other method.
+    against: &'a str,
+    judged_on: &'a str,
+    camera: &'a str,
+    /// Tests of nodes and blocks over the other's.
+    tests_over_other: f64,
+    /// Lower end of the 95 % interval, from the standard errors of both over the repetitions.
+    low: Option<f64>,
+    /// The upper end.
+    high: Option<f64>,
+    /// What the interval says:
+    verdict: Verdict,
+}
+
+/// What an interval says of a ratio of tests.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+enum Verdict {
+    /// It lies below 1.
+    Fewer,
+    /// It lies above 1.
+    More,
+    /// It holds 1, or there is none.
+    #[serde(rename = "cannot be told")]
+    CannotBeTold,
+}
+
 /// The scene of rows that are geometric means.
 const ALL: &str = "geometric mean";
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let mut table: Vec<Compared> = rows.tests.iter().filter_map(|row| self.compared(rows, row)).collect();
+        let mut table: Vec<Compared> =
+            rows.tests.iter().filter_map(|row| compared(rows, row, &self.base)).collect();
         let means = means(&table);
         table.extend(means);
         let mut output = Output::new(&self.source, &self.title);
@@ -71,34 +107,26 @@ impl Config {
             output.add_csv("timing_ray_cost", &speeds)?;
         }
         output.reading = reading(&table, &self.base);
+        let paired: Vec<Paired> = self.pairs.iter().flat_map(|pair| paired(rows, pair)).collect();
+        if !paired.is_empty() {
+            output.add_csv("ray_cost_pairs", &paired)?;
+            let columns = [
+                "scene",
+                "method",
+                "against",
+                "judged_on",
+                "camera",
+                "low",
+                "tests_over_other",
+                "high",
+                "verdict",
+            ];
+            output.show("Tests per ray over those of another method:", &paired, &columns)?;
+            for pair in &self.pairs {
+                output.reading += &verdicts(&paired, pair);
+            }
+        }
         Ok(output)
-    }
-
-    fn compared<'a>(&self, rows: &'a Rows, row: &'a TestRow) -> Option<Compared<'a>> {
-        let same = |of: &&TestRow| {
-            of.scene == row.scene
-                && of.method == self.base
-                && (&of.judged_on, &of.camera) == (&row.judged_on, &row.camera)
-        };
-        let base = rows.tests.iter().find(same)?;
-        let [own, other] = [row, base].map(|row| row.node_tests + row.block_tests);
-        let ratio = own / other;
-        // Of a ratio of means, by the relative errors of both.
-        let relative = row.tests_standard_error.zip(base.tests_standard_error);
-        // The degrees of freedom of one mean: with those of both, intervals would be somewhat narrower.
-        let factor = student(row.repetitions.min(base.repetitions));
-        let half = relative.zip(factor).map(|((a, b), factor)| factor * ratio * (a / own).hypot(b / other));
-        Some(Compared {
-            scene: &row.scene,
-            tree: &row.tree,
-            trained_on: &row.trained_on,
-            judged_on: &row.judged_on,
-            camera: &row.camera,
-            tests: Some(own),
-            tests_over_base: ratio,
-            over_base_low: half.map(|half| ratio - half),
-            over_base_high: half.map(|half| ratio + half),
-        })
     }
 
     /// One line of markers per tree, over the kinds of rays.
@@ -162,6 +190,71 @@ pub(super) struct Speed<'a> {
 
 fn tree_name(tree: &str, trained_on: &str) -> String {
     if trained_on == "none" { tree.into() } else { format!("{tree}, {trained_on}") }
+}
+
+/// A tree's tests over those of the trees of the method `base`.
+fn compared<'a>(rows: &'a Rows, row: &'a TestRow, base: &str) -> Option<Compared<'a>> {
+    let same = |of: &&TestRow| {
+        of.scene == row.scene
+            && of.method == base
+            && (&of.judged_on, &of.camera) == (&row.judged_on, &row.camera)
+    };
+    let base = rows.tests.iter().find(same)?;
+    let [own, other] = [row, base].map(|row| row.node_tests + row.block_tests);
+    let ratio = own / other;
+    // Of a ratio of means, by the relative errors of both.
+    let relative = row.tests_standard_error.zip(base.tests_standard_error);
+    // The degrees of freedom of one mean: with those of both, intervals would be somewhat narrower.
+    let factor = student(row.repetitions.min(base.repetitions));
+    let half = relative.zip(factor).map(|((a, b), factor)| factor * ratio * (a / own).hypot(b / other));
+    Some(Compared {
+        scene: &row.scene,
+        tree: &row.tree,
+        trained_on: &row.trained_on,
+        judged_on: &row.judged_on,
+        camera: &row.camera,
+        tests: Some(own),
+        tests_over_base: ratio,
+        over_base_low: half.map(|half| ratio - half),
+        over_base_high: half.map(|half| ratio + half),
+    })
+}
+
+/// The second method of a pair against the first, on all scenes and for all rays.
+fn paired<'a>(rows: &'a Rows, [first, second]: &'a [String; 2]) -> Vec<Paired<'a>> {
+    let pair = |row: &'a TestRow| {
+        let Compared { tests_over_base, over_base_low: low, over_base_high: high, .. } =
+            compared(rows, row, first)?;
+        let verdict = match low.zip(high) {
+            Some((_, high)) if high < 1.0 => Verdict::Fewer,
+            Some((low, _)) if low > 1.0 => Verdict::More,
+            _ => Verdict::CannotBeTold,
+        };
+        let TestRow { scene, judged_on, camera, .. } = row;
+        let (method, against, tests_over_other) = (second.as_str(), first.as_str(), tests_over_base);
+        Some(Paired { scene, method, against, judged_on, camera, tests_over_other, low, high, verdict })
+    };
+    rows.tests.iter().filter(|row| row.method == *second).filter_map(pair).collect()
+}
+
+/// How often each verdict was reached on a pair, and where the second takes more tests.
+fn verdicts(paired: &[Paired], [first, second]: &[String; 2]) -> String {
+    let own = || paired.iter().filter(|row| row.against == *first && row.method == *second);
+    let count = |verdict| own().filter(|row| row.verdict == verdict).count();
+    let more = own().filter(|row| row.verdict == Verdict::More);
+    let more: Vec<String> = more
+        .map(|row| {
+            format!("{}, {} rays, {} camera, {:.3}", row.scene, row.judged_on, row.camera, row.tests_over_other)
+        })
+        .collect();
+    format!(
+        " Of {} comparisons of ‘{second}’ with ‘{first}’, {} say fewer tests, {} say more{}, and {} cannot tell.",
+        own().count(),
+        count(Verdict::Fewer),
+        more.len(),
+        if more.is_empty() { String::new() } else { format!(" ({})", more.join("; ")) },
+        count(Verdict::CannotBeTold)
+    )
 }
 
 /// The geometric means over scenes of rows that agree in all else.
