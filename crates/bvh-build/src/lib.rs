@@ -9,6 +9,9 @@ pub mod kd_tree;
 pub mod ploc;
 pub mod top_down;
 
+use bvh_core::cost::Measure;
+use bvh_core::{Aabb, Bvh};
+
 pub use accelerator::{Accelerator, Query, Structure};
 pub use config::{Check, OutOfRange};
 pub use error::BuildError;
@@ -16,6 +19,12 @@ pub use top_down::{Presorted, median_cut, muller_fellner, spatial};
 
 /// A builder: a configuration that turns boxes into a tree, after it has been [checked](Check).
 pub trait Builder: Check {
-    /// Builds a tree over `boxes`; `boxes[i]` bounds object `i`. No boxes give the tree without nodes.
-    fn build(&self, boxes: &[bvh_core::Aabb]) -> Result<bvh_core::Bvh, BuildError>;
+    /// Builds a tree over `boxes`; `boxes[i]` bounds object `i`. No boxes give the tree without nodes. Where boxes are compared by
+    /// size, their size is the `measure`, or the half area if there is none.
+    fn build_by(&self, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Result<Bvh, BuildError>;
+
+    /// [`build_by`](Self::build_by) half area.
+    fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
+        self.build_by(boxes, None)
+    }
 }

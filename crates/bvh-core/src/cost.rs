@@ -35,14 +35,39 @@ impl Objective {
             Self::Layout => layout_area(tree),
         }
     }
+
+    /// The same by a measure in place of half areas, in O(nodes).
+    pub fn cost_by(&self, tree: &Bvh, measure: &dyn Measure) -> f64 {
+        let size = |node: &Node| measure.of(&PackedAabb::from(&node.aabb));
+        let over_root = |total| over(tree.nodes.first().map_or(0.0, size), total);
+        match self {
+            Self::InternalArea => internal_measure(tree, measure),
+            Self::GoldsmithSalmon => {
+                over_root(by_children(tree, |node| if node.is_leaf() { 0.0 } else { size(node) }))
+            }
+            Self::Sah(constants) => over_root(by_tests(tree, constants, size)),
+            Self::Layout => layout_measure(tree, measure),
+        }
+    }
 }
 
-/// A measure of boxes that a search may minimise the sum of, over all inner nodes, in place of their half areas: the expected
-/// number of rays that enter a box, for example.
+/// A measure of boxes that builders and searches may go by in place of the half area: the expected number of rays that enter a
+/// box, for example.
 pub trait Measure: core::fmt::Debug + Sync {
     /// The measure of a box that is not empty: finite, not negative, and *monotone*, no smaller than that of any box inside it.
     /// Branch and bound is exact only for monotone measures.
     fn of(&self, aabb: &PackedAabb) -> f64;
+}
+
+/// The half area as a measure. What is generic over the measure is compiled for it as if there were no other.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Area;
+
+impl Measure for Area {
+    #[inline(always)]
+    fn of(&self, aabb: &PackedAabb) -> f64 {
+        aabb.half_area()
+    }
 }
 
 /// The total measure of the boxes of all inner nodes, root included, in the measure's unit. O(nodes).
@@ -141,9 +166,12 @@ pub fn internal_area(tree: &Bvh) -> f64 {
 ///
 /// Source: Goldsmith & Salmon 1987; Ng & Trifonov 2003, section 1.
 pub fn goldsmith_salmon(tree: &Bvh) -> f64 {
-    let total: Sum =
-        tree.nodes.iter().map(|node| node.aabb.half_area() * node.children().len() as f64).collect();
-    over_root_area(tree, total.value())
+    over_root_area(tree, by_children(tree, |node| node.aabb.half_area()))
+}
+
+/// Σ size(node) · number of children.
+fn by_children(tree: &Bvh, size: impl Fn(&Node) -> f64) -> f64 {
+    tree.nodes.iter().map(|node| size(node) * node.children().len() as f64).collect::<Sum>().value()
 }
 
 /// The surface area heuristic: traversal · Σ inner S/S(root) + intersection · Σ leaves S/S(root) · objects.
@@ -151,24 +179,28 @@ pub fn goldsmith_salmon(tree: &Bvh) -> f64 {
 ///
 /// Source: MacDonald & Booth 1990.
 pub fn sah(tree: &Bvh, constants: &SahConstants) -> f64 {
-    let total: Sum = tree
-        .nodes
-        .iter()
-        .map(|node| {
-            node.aabb.half_area()
-                * match node.kind() {
-                    NodeKind::Inner { .. } => constants.traversal,
-                    NodeKind::Leaf { count, .. } => constants.intersection * f64::from(count),
-                }
-        })
-        .collect();
-    over_root_area(tree, total.value())
+    over_root_area(tree, by_tests(tree, constants, |node| node.aabb.half_area()))
+}
+
+/// Σ size(node) · what visiting the node, or testing its objects, costs.
+fn by_tests(tree: &Bvh, constants: &SahConstants, size: impl Fn(&Node) -> f64) -> f64 {
+    let cost = |node: &Node| {
+        size(node)
+            * match node.kind() {
+                NodeKind::Inner { .. } => constants.traversal,
+                NodeKind::Leaf { count, .. } => constants.intersection * f64::from(count),
+            }
+    };
+    tree.nodes.iter().map(cost).collect::<Sum>().value()
 }
 
 /// `area` divided by the half area of the root's box; 0 when that area is 0 or the tree is empty.
 pub fn over_root_area(tree: &Bvh, area: f64) -> f64 {
-    let root = tree.root_aabb().map_or(0.0, |aabb| aabb.half_area());
-    if root > 0.0 { area / root } else { 0.0 }
+    over(tree.root_aabb().map_or(0.0, |aabb| aabb.half_area()), area)
+}
+
+fn over(root: f64, total: f64) -> f64 {
+    if root > 0.0 { total / root } else { 0.0 }
 }
 
 /// A compensated sum (Neumaier 1974): as accurate as if added in twice the precision.

@@ -84,11 +84,12 @@ fn tree(boxes: &[Aabb], subsets: &Subsets) -> Bvh {
 mod tests {
     use super::*;
     use crate::run::{Budget, solve};
-    use crate::scatter::scatter;
+    use crate::scatter::{density, scatter};
+    use bvh_core::cost::Measure;
     use bvh_core::validate;
 
-    /// The least internal area of all binary trees over these sets, by merging every two of them in turn.
-    fn brute_force(sets: &[Aabb]) -> f64 {
+    /// The least total size of inner nodes of all binary trees over these sets, by merging every two of them in turn.
+    fn brute_force(sets: &[Aabb], size: &dyn Measure) -> f64 {
         let mut least = if sets.len() < 2 { 0.0 } else { f64::INFINITY };
         for i in 0..sets.len() {
             for j in 0..i {
@@ -96,21 +97,25 @@ mod tests {
                 let mut merged: Vec<Aabb> = sets.to_vec();
                 merged.swap_remove(i);
                 merged[j] = union;
-                least = least.min(union.half_area() + brute_force(&merged));
+                least = least.min(size.of(&PackedAabb::from(&union)) + brute_force(&merged, size));
             }
         }
         least
     }
 
     #[test]
-    fn no_binary_tree_at_all_is_cheaper() {
+    fn no_binary_tree_at_all_is_cheaper_by_area_or_by_the_density_of_rays() {
         for n in 0..=7 {
             for salt in 0..6 {
                 let boxes = scatter(100)[10 * salt..10 * salt + n].to_vec();
-                let found = solve(&Config {}, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap();
-                validate(&found.tree, &boxes).unwrap();
-                let least = brute_force(&boxes);
-                assert!((found.cost - least).abs() <= 1e-14 * least, "{n} {salt}: {} {least}", found.cost);
+                let measures = [None, density(&boxes)];
+                for measure in measures.iter().map(|of| of.as_ref().map(|density| density as &dyn Measure)) {
+                    let problem = Problem { measure, ..Problem::new(&boxes) };
+                    let found = solve(&Config {}, &problem, 1, Budget::UNLIMITED, &()).unwrap();
+                    validate(&found.tree, &boxes).unwrap();
+                    let least = brute_force(&boxes, measure.unwrap_or(&Area));
+                    assert!((found.cost - least).abs() <= 1e-14 * least, "{n} {salt}: {} {least}", found.cost);
+                }
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::tree::{Area, Working};
 use bvh_build::Builder;
-use bvh_core::{Aabb, cost};
+use bvh_core::{Aabb, RayDensity, Segment, cost};
 
 /// A reproducible scatter of `n` small boxes.
 pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
@@ -19,4 +19,12 @@ pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
 pub(crate) fn built(builder: &dyn Builder, boxes: &[Aabb]) -> Working {
     let tree = builder.build(boxes).unwrap();
     Working::from_bvh(&tree, cost::internal_area(&tree), Area).unwrap()
+}
+
+/// The density of rays from a corner of the scene to the corners of all objects; none where nothing has a size.
+pub(crate) fn density(boxes: &[Aabb]) -> Option<RayDensity> {
+    let bounds = boxes.iter().fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
+    let to = boxes.iter().flat_map(|aabb| [aabb.min, aabb.max]);
+    let segments = to.map(|to| Segment { from: bounds.min.to_array(), to: to.to_array() });
+    RayDensity::of_rays(&bounds, &segments.collect::<Vec<_>>(), 0.1).ok()
 }

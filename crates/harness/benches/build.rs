@@ -63,7 +63,7 @@ fn one_thread(scene: &Scene) {
         let scene = Presorted::new(boxes).expect("finite boxes");
         let (mut workspace, mut tree) = (Workspace::default(), Bvh::default());
         for _ in 0..TRIALS {
-            config.construct(&scene, &mut bvh_build::top_down::TakeBest, &mut workspace, &mut tree);
+            config.construct(&scene, None, &mut bvh_build::top_down::TakeBest, &mut workspace, &mut tree);
             std::hint::black_box(bvh_core::cost::internal_area(&tree));
         }
     };

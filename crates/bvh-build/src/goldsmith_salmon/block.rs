@@ -2,6 +2,29 @@
 //! serve four boxes.
 
 use super::Object;
+use bvh_core::cost::{Area, Measure};
+use bvh_core::{Aabb, PackedAabb};
+
+/// The size of a box that is −min.xyz, max.xyz: its half area, or a measure.
+pub(super) trait Size: Copy {
+    fn of(self, bounds: [f32; 6]) -> f64;
+}
+
+impl Size for Area {
+    /// By the operations of [`PackedAabb::half_area`].
+    #[inline(always)]
+    fn of(self, bounds: [f32; 6]) -> f64 {
+        let bound = |i: usize| f64::from(bounds[i]);
+        let [x, y, z] = [bound(0) + bound(3), bound(1) + bound(4), bound(2) + bound(5)];
+        x * y + y * z + z * x
+    }
+}
+
+impl Size for &dyn Measure {
+    fn of(self, [x, y, z, far_x, far_y, far_z]: [f32; 6]) -> f64 {
+        Measure::of(self, &PackedAabb::from(&Aabb::from(([-x, -y, -z], [far_x, far_y, far_z]))))
+    }
+}
 
 /// Children per block.
 pub(super) const LANES: usize = 4;
@@ -22,8 +45,8 @@ pub(super) struct Block {
     pub(super) link: [u32; LANES],
     /// An inner child's number of children; 2 for a leaf, the children of the pair that it may become.
     pub(super) count: [u32; LANES],
-    /// An inner child's half area. For a leaf, the area from which its growth is counted: 0, or its half area if
-    /// children are chosen by area.
+    /// An inner child's size. For a leaf, the size from which its growth is counted: 0, or its own if children are
+    /// chosen by area.
     pub(super) area: [f64; LANES],
 }
 
@@ -74,12 +97,10 @@ impl Block {
         (0..LANES).map(|lane| u32::from(contains(lane)) << lane).sum()
     }
 
-    /// The half area of the union of a child and `b`, by the operations of [`bvh_core::PackedAabb::half_area`].
+    /// The size of the union of a child and `b`.
     #[inline(always)]
-    pub(super) fn union_area(&self, lane: usize, b: &[f32; 6]) -> f64 {
-        let bound = |i: usize| f64::from(larger(self.bounds[i][lane], b[i]));
-        let [x, y, z] = [bound(0) + bound(3), bound(1) + bound(4), bound(2) + bound(5)];
-        x * y + y * z + z * x
+    pub(super) fn union_size(&self, lane: usize, b: &[f32; 6], size: impl Size) -> f64 {
+        size.of(std::array::from_fn(|i| larger(self.bounds[i][lane], b[i])))
     }
 
     /// The first block of an inner child's children, and their number.

@@ -1,6 +1,6 @@
 //! The descent of an object, the choice of the node where it stops, and its insertion there.
 
-use super::block::{Block, LANES, NONE, family, place};
+use super::block::{Block, LANES, NONE, Size, family, place};
 use super::{Object, Scene, Workspace};
 use bvh_core::cost::Sum;
 use std::ops::Range;
@@ -95,7 +95,12 @@ struct Stop {
 /// Inserts the objects of a valid order and returns the tree's cost. The upper part of the path is found for a batch of
 /// objects at once, and again from the node below which an insertion of the same batch has changed the tree.
 #[inline(always)]
-pub(super) fn insert_each<R: Rule>(scene: &Scene, order: &[u32], workspace: &mut Workspace) -> f64 {
+pub(super) fn insert_each<R: Rule>(
+    scene: &Scene,
+    size: impl Size,
+    order: &[u32],
+    workspace: &mut Workspace,
+) -> f64 {
     let Workspace { blocks, walk, grown, .. } = workspace;
     blocks.clear();
     let Some((&first, rest)) = order.split_first() else { return 0.0 };
@@ -116,7 +121,7 @@ pub(super) fn insert_each<R: Rule>(scene: &Scene, order: &[u32], workspace: &mut
             }
             let row = walk.last[i];
             changes[i] = (row, walk.trail[row][i]);
-            let stop = find_stop::<R>(blocks, object, walk.trail[row][i], grown);
+            let stop = find_stop::<R>(blocks, size, object, walk.trail[row][i], grown);
             let attached_to = attach::<R>(blocks, &stop, object, id);
             grown.truncate(stop.grown);
             if let Some(last) = grown.last_mut() {
@@ -136,7 +141,13 @@ pub(super) fn insert_each<R: Rule>(scene: &Scene, order: &[u32], workspace: &mut
 /// The stop of least increase on the path whose last node to contain the object is `last`. Fills `grown` with the rest
 /// of the path.
 #[inline(always)]
-fn find_stop<R: Rule>(blocks: &[Block], object: &Object, last: u32, grown: &mut Vec<Grown>) -> Stop {
+fn find_stop<R: Rule>(
+    blocks: &[Block],
+    size: impl Size,
+    object: &Object,
+    last: u32,
+    grown: &mut Vec<Grown>,
+) -> Stop {
     grown.clear();
     // Stopping at a node that contains the object adds the node's area and nothing else. No node above adds less.
     let (block, lane) = place(last);
@@ -158,7 +169,7 @@ fn find_stop<R: Rule>(blocks: &[Block], object: &Object, last: u32, grown: &mut 
                 }
             }
             for lane in 0..LANES.min(count - (at - first) * LANES) {
-                let area = block.union_area(lane, &object.bounds);
+                let area = block.union_size(lane, &object.bounds, size);
                 let growth = area - block.area[lane];
                 let growth = if R::BY_AREA { growth } else { growth * f64::from(block.count[lane]) };
                 if growth < least {

@@ -27,8 +27,9 @@ mod insertion;
 
 use crate::error::check_scene;
 use crate::{BuildError, Builder};
-use block::{Block, LANES, LEAF, family, place};
-use bvh_core::{Aabb, Bvh, Node};
+use block::{Block, LANES, LEAF, Size, family, place};
+use bvh_core::cost::{Area, Measure};
+use bvh_core::{Aabb, Bvh, Node, PackedAabb};
 use insertion::{Rules, Walk, insert_each};
 
 crate::config! {
@@ -57,13 +58,14 @@ pub enum Descent {
     Area,
 }
 
-/// The objects of a scene, checked once for any number of builds.
+/// The objects of a scene, checked once for any number of builds by half area or by a measure.
 #[derive(Clone, Debug)]
-pub struct Scene {
+pub struct Scene<'a> {
     objects: Vec<Object>,
+    measure: Option<&'a dyn Measure>,
 }
 
-/// A box as in [`bvh_core::PackedAabb`], without padding, and its half area.
+/// A box as in [`bvh_core::PackedAabb`], without padding, and its size.
 #[derive(Clone, Copy, Debug)]
 struct Object {
     /// −min.xyz, max.xyz.
@@ -71,15 +73,21 @@ struct Object {
     area: f64,
 }
 
-impl Scene {
+impl<'a> Scene<'a> {
     /// Checks and packs the boxes, in O(n).
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
+        Self::by(boxes, None)
+    }
+
+    /// The same, with a measure in place of the half area.
+    pub fn by(boxes: &[Aabb], measure: Option<&'a dyn Measure>) -> Result<Self, BuildError> {
         check_scene(boxes)?;
         let pack = |b: &Aabb| {
             let (min, max) = (-b.min, b.max);
-            Object { bounds: [min.x, min.y, min.z, max.x, max.y, max.z], area: b.half_area() }
+            let area = measure.map_or_else(|| b.half_area(), |measure| measure.of(&PackedAabb::from(b)));
+            Object { bounds: [min.x, min.y, min.z, max.x, max.y, max.z], area }
         };
-        Ok(Self { objects: boxes.iter().map(pack).collect() })
+        Ok(Self { objects: boxes.iter().map(pack).collect(), measure })
     }
 
     /// Number of objects.
@@ -139,8 +147,8 @@ pub struct Workspace {
 
 impl Config {
     /// Inserts the scene's objects in the given order and returns the tree's cost by
-    /// [`goldsmith_salmon`](bvh_core::cost::goldsmith_salmon), which is maintained incrementally. Equal orders give equal
-    /// bits. [`Workspace::write`] then writes the tree. A refused order leaves the workspace's tree as it was.
+    /// [`goldsmith_salmon`](bvh_core::cost::goldsmith_salmon), by the scene's measure, which is maintained incrementally. Equal
+    /// orders give equal bits. [`Workspace::write`] then writes the tree. A refused order leaves the workspace's tree as it was.
     pub fn insert_all(
         &self,
         scene: &Scene,
@@ -152,18 +160,25 @@ impl Config {
     }
 
     fn insert_valid(&self, scene: &Scene, order: &[u32], workspace: &mut Workspace) -> f64 {
+        match scene.measure {
+            Some(measure) => self.insert_by(measure, scene, order, workspace),
+            None => self.insert_by(Area, scene, order, workspace),
+        }
+    }
+
+    fn insert_by(&self, size: impl Size, scene: &Scene, order: &[u32], workspace: &mut Workspace) -> f64 {
         match (self.descent, self.pair_inner) {
-            (Descent::Cost, false) => insert_each::<Rules<false, false>>(scene, order, workspace),
-            (Descent::Cost, true) => insert_each::<Rules<false, true>>(scene, order, workspace),
-            (Descent::Area, false) => insert_each::<Rules<true, false>>(scene, order, workspace),
-            (Descent::Area, true) => insert_each::<Rules<true, true>>(scene, order, workspace),
+            (Descent::Cost, false) => insert_each::<Rules<false, false>>(scene, size, order, workspace),
+            (Descent::Cost, true) => insert_each::<Rules<false, true>>(scene, size, order, workspace),
+            (Descent::Area, false) => insert_each::<Rules<true, false>>(scene, size, order, workspace),
+            (Descent::Area, true) => insert_each::<Rules<true, true>>(scene, size, order, workspace),
         }
     }
 }
 
 impl Builder for Config {
-    fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
-        let scene = Scene::new(boxes)?;
+    fn build_by(&self, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Result<Bvh, BuildError> {
+        let scene = Scene::by(boxes, measure)?;
         let order: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut workspace = Workspace::default();
         let mut tree = Bvh::default();

@@ -1,6 +1,7 @@
 //! The rounds of the clustering: clusters in Morton order, their nearest neighbours, and the nodes of joined ones.
 
 use super::neighbours::{self, CHUNK, Scratch};
+use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Node, PackedAabb};
 use std::mem::MaybeUninit;
 
@@ -61,8 +62,8 @@ impl Clusters {
         self.boxes.len()
     }
 
-    /// Finds every cluster's nearest neighbour up to `radius` positions away.
-    pub(super) fn find_nearest(&mut self, radius: usize) {
+    /// Finds every cluster's nearest neighbour up to `radius` positions away, by half area or by a measure.
+    pub(super) fn find_nearest(&mut self, radius: usize, measure: Option<&dyn Measure>) {
         let (scale, nearest) = (self.scale, &mut self.nearest[..self.boxes.len()]);
         #[cfg(feature = "rayon")]
         if nearest.len() * radius >= PARALLEL_PAIRS && rayon::current_num_threads() > 1 {
@@ -70,13 +71,13 @@ impl Clusters {
             nearest.par_chunks_mut(CHUNK).enumerate().for_each_init(
                 Scratch::default,
                 |scratch, (number, found)| {
-                    neighbours::find(&self.boxes, scale, radius, number * CHUNK, found, scratch);
+                    neighbours::find(&self.boxes, scale, measure, radius, number * CHUNK, found, scratch);
                 },
             );
             return;
         }
         for (number, found) in nearest.chunks_mut(CHUNK).enumerate() {
-            neighbours::find(&self.boxes, scale, radius, number * CHUNK, found, &mut self.scratch);
+            neighbours::find(&self.boxes, scale, measure, radius, number * CHUNK, found, &mut self.scratch);
         }
     }
 

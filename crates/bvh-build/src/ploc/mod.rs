@@ -16,6 +16,7 @@ mod neighbours;
 
 use crate::error::check_scene;
 use crate::{BuildError, Builder, Check};
+use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh, PackedAabb};
 use clusters::Clusters;
 
@@ -32,9 +33,9 @@ crate::config! {
 impl Builder for Config {
     /// O(radius · n), and a radix sort. The search for neighbours uses all threads of the current rayon pool; their
     /// number does not change the tree.
-    fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
+    fn build_by(&self, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Result<Bvh, BuildError> {
         self.check()?;
-        MortonOrder::new(boxes)?.build(self)
+        MortonOrder::new(boxes)?.build_by(self, measure)
     }
 }
 
@@ -64,8 +65,13 @@ impl MortonOrder {
         &self.order
     }
 
-    /// Clusters the sorted objects.
+    /// Clusters the sorted objects by half area.
     pub fn build(self, config: &Config) -> Result<Bvh, BuildError> {
+        self.build_by(config, None)
+    }
+
+    /// The same, with a measure in place of the half area.
+    pub fn build_by(self, config: &Config, measure: Option<&dyn Measure>) -> Result<Bvh, BuildError> {
         config.check()?;
         let Self { boxes, bounds, order } = self;
         if boxes.is_empty() {
@@ -76,7 +82,7 @@ impl MortonOrder {
         let mut round = 0;
         while clusters.count() > 1 {
             let radius = if round < config.near_rounds { 1 } else { config.radius as usize };
-            clusters.find_nearest(radius);
+            clusters.find_nearest(radius, measure);
             clusters.join();
             round += 1;
         }

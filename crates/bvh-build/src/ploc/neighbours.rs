@@ -1,5 +1,6 @@
 //! Every cluster's nearest neighbour in Morton order: vectorised over clusters, one distance after the other.
 
+use bvh_core::cost::Measure;
 use bvh_core::{PackedAabb, with_vector_instructions};
 
 /// Clusters whose neighbours are found in one call.
@@ -29,13 +30,14 @@ with_vector_instructions! {
     /// Areas are f32. Coordinates are first multiplied by `scale`, a power of two, so that no area overflows, and only
     /// clusters some 2^60 times smaller than the scene have area 0.
     pub(super) find = find_plain(
-        boxes: &[PackedAabb], scale: f64, radius: usize, start: usize, found: &mut [i32], scratch: &mut Scratch)
+        boxes: &[PackedAabb], scale: f64, measure: Option<&dyn Measure>, radius: usize, start: usize, found: &mut [i32], scratch: &mut Scratch)
 }
 
 #[inline(always)]
 fn find_plain(
     boxes: &[PackedAabb],
     scale: f64,
+    measure: Option<&dyn Measure>,
     radius: usize,
     start: usize,
     found: &mut [i32],
@@ -65,6 +67,13 @@ fn find_plain(
     for distance in 1..=radius {
         // All pairs at this distance of which at least one cluster is in the chunk.
         let pairs = len + distance;
+        before.copy_from_slice(found);
+        if let Some(measure) = measure {
+            let sizes = &mut sides[0][..pairs];
+            joint_sizes(measure, scale, boxes, start, distance, sizes);
+            take_nearer(sizes, start, distance, least, before, found);
+            continue;
+        }
         for (axis, side) in sides.iter_mut().enumerate() {
             let [low, high] =
                 [axis, axis + 3].map(|plane| &planes[plane][radius - distance..][..pairs + distance]);
@@ -74,8 +83,24 @@ fn find_plain(
         for ((x, y), z) in x.iter_mut().zip(y.iter()).zip(z.iter()) {
             *x = *x * *y + *y * *z + *z * *x;
         }
-        before.copy_from_slice(found);
         take_nearer(x, start, distance, least, before, found);
+    }
+}
+
+/// The measures of the joint boxes of the clusters at p − distance and p, from p = `start` on, scaled as areas are, rounded to f32;
+/// infinite only where there is no such cluster.
+fn joint_sizes(
+    measure: &dyn Measure,
+    scale: f64,
+    boxes: &[PackedAabb],
+    start: usize,
+    distance: usize,
+    sizes: &mut [f32],
+) {
+    for (size, second) in sizes.iter_mut().zip(start..) {
+        let pair = second.checked_sub(distance).and_then(|first| Some((&boxes[first], boxes.get(second)?)));
+        *size = pair
+            .map_or(f32::INFINITY, |(a, b)| ((measure.of(&a.union(b)) * scale * scale) as f32).min(f32::MAX));
     }
 }
 

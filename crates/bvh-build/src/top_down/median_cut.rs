@@ -7,6 +7,7 @@
 
 use crate::error::check_scene;
 use crate::{BuildError, Builder, Check};
+use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh, Node};
 
 crate::config! {
@@ -40,7 +41,11 @@ struct Frame {
 
 impl Builder for Config {
     /// O(n log n); depth at most ⌈log₂ n⌉.
-    fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
+    fn build_by(
+        &self,
+        boxes: &[Aabb],
+        _sizes_are_not_compared: Option<&dyn Measure>,
+    ) -> Result<Bvh, BuildError> {
         check_scene(boxes)?;
         self.check()?;
         let n = boxes.len();

@@ -11,10 +11,11 @@ use super::divide::{self, Workspace};
 #[cfg(feature = "rayon")]
 use super::presort::PARALLEL_OBJECTS;
 use super::presort::Presorted;
-use super::split_cost::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, SplitCost};
+use super::split_cost::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, ByMeasure, SplitCost};
 use super::sweep::{SplitRule, TakeBest};
 use crate::config::{Accepts, Itself};
 use crate::{BuildError, Builder, Check, OutOfRange};
+use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 
 crate::config! {
@@ -88,21 +89,54 @@ impl Check for Heuristic {
 }
 
 impl Builder for Config {
-    fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
-        let scene = Presorted::sort(boxes, self.skip_sorted, self.skip_flat)?;
+    fn build_by(&self, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Result<Bvh, BuildError> {
+        // Every tree over a scene without area has the same area, but not the same measure.
+        let scene = Presorted::sort(boxes, self.skip_sorted, self.skip_flat && measure.is_none())?;
         self.check()?;
         let mut tree = Bvh::default();
-        match self.heuristic {
-            Heuristic::AreaTimesCount => self.greedy(&scene, &AreaTimesCount, &mut tree),
-            Heuristic::AreaTimesPower(p) => {
-                self.greedy(&scene, &AreaTimesPower::new(scene.len(), p), &mut tree)
-            }
-            Heuristic::AreaOnly(reading) => self.greedy(&scene, &reading, &mut tree),
-            Heuristic::AreaTimesCost(costs) => {
-                self.greedy(&scene, &AreaTimesWeight(&costs.of(scene.len())), &mut tree);
-            }
-        }
+        self.by_heuristic(scene.len(), measure, Greedy { config: self, scene: &scene, tree: &mut tree });
         Ok(tree)
+    }
+}
+
+/// A division that waits for its split cost.
+trait Division {
+    fn by<C: SplitCost>(self, split_cost: &C);
+}
+
+struct Greedy<'a> {
+    config: &'a Config,
+    scene: &'a Presorted,
+    tree: &'a mut Bvh,
+}
+
+impl Division for Greedy<'_> {
+    fn by<C: SplitCost>(self, split_cost: &C) {
+        self.config.greedy(self.scene, split_cost, self.tree);
+    }
+}
+
+/// As [`Config::construct`] is called.
+struct ByRule<'a, R> {
+    scene: &'a Presorted,
+    rule: &'a mut R,
+    skip_same_order: bool,
+    workspace: &'a mut Workspace,
+    tree: &'a mut Bvh,
+}
+
+impl<R: SplitRule> Division for ByRule<'_, R> {
+    fn by<C: SplitCost>(self, split_cost: &C) {
+        let Self { scene, rule, skip_same_order, workspace, tree } = self;
+        divide::divide(scene, split_cost, rule, skip_same_order, workspace, tree);
+    }
+}
+
+/// Divides by this split cost, of a measure if there is one.
+fn by_cost(cost: &impl SplitCost, measure: Option<&dyn Measure>, division: impl Division) {
+    match measure {
+        Some(measure) => division.by(&ByMeasure { cost, measure }),
+        None => division.by(cost),
     }
 }
 
@@ -131,27 +165,26 @@ impl Config {
         divide::divide(scene, split_cost, &mut TakeBest, self.skip_same_order, workspace, tree);
     }
 
-    /// Divides by any rule, such as a randomised one, on one thread. Reuses the memory of `workspace` and `tree`. The
-    /// heuristic's parameter must be [in range](Check).
+    /// Divides by any rule, such as a randomised one, on one thread, by half area or by a measure. Reuses the memory of `workspace`
+    /// and `tree`. The heuristic's parameter must be [in range](Check).
     pub fn construct(
         &self,
         scene: &Presorted,
+        measure: Option<&dyn Measure>,
         rule: &mut impl SplitRule,
         workspace: &mut Workspace,
         tree: &mut Bvh,
     ) {
-        let skip = self.skip_same_order;
+        let skip_same_order = self.skip_same_order;
+        self.by_heuristic(scene.len(), measure, ByRule { scene, rule, skip_same_order, workspace, tree });
+    }
+
+    fn by_heuristic(&self, objects: usize, measure: Option<&dyn Measure>, division: impl Division) {
         match self.heuristic {
-            Heuristic::AreaTimesCount => divide::divide(scene, &AreaTimesCount, rule, skip, workspace, tree),
-            Heuristic::AreaTimesPower(p) => {
-                let powers = AreaTimesPower::new(scene.len(), p);
-                divide::divide(scene, &powers, rule, skip, workspace, tree);
-            }
-            Heuristic::AreaOnly(reading) => divide::divide(scene, &reading, rule, skip, workspace, tree),
-            Heuristic::AreaTimesCost(costs) => {
-                let costs = costs.of(scene.len());
-                divide::divide(scene, &AreaTimesWeight(&costs), rule, skip, workspace, tree);
-            }
+            Heuristic::AreaTimesCount => by_cost(&AreaTimesCount, measure, division),
+            Heuristic::AreaTimesPower(p) => by_cost(&AreaTimesPower::new(objects, p), measure, division),
+            Heuristic::AreaOnly(reading) => by_cost(&reading, measure, division),
+            Heuristic::AreaTimesCost(costs) => by_cost(&AreaTimesWeight(&costs.of(objects)), measure, division),
         }
     }
 }

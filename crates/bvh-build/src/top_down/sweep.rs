@@ -207,7 +207,7 @@ impl<C: SplitCost> Sweep<'_, C> {
         if boxes[order[0] as usize] == self.aabb && boxes[order[n - 1] as usize] == self.aabb {
             // The first and the last object fill the node's box, so every side of every candidate has that box, and all
             // candidates cost the same but for rounding. The node is halved.
-            let area = self.aabb.half_area();
+            let area = split_cost.size(&self.aabb);
             let (left, right) = order.split_at(n / 2);
             let [left, right] = [left, right].map(|side| split_cost.side(area, split_cost.total_load(side)));
             // Blocks of another node must not be taken for this one's in `side_boxes`.
@@ -272,7 +272,7 @@ fn gather_blocks<C: SplitCost>(boxes: &[PackedAabb], split_cost: &C, order: &[u3
     let (mut aabb, mut load) = (PackedAabb::EMPTY, 0.0);
     for (block, objects) in blocks.iter_mut().zip(order.chunks(BLOCK)).rev() {
         if aabb != PackedAabb::EMPTY {
-            block.right_value = split_cost.side(aabb.half_area(), load);
+            block.right_value = split_cost.side(split_cost.size(&aabb), load);
         }
         (block.right, block.right_load) = (aabb, load);
         aabb.grow(&block.left);
@@ -281,7 +281,7 @@ fn gather_blocks<C: SplitCost>(boxes: &[PackedAabb], split_cost: &C, order: &[u3
     let (mut aabb, mut load) = (PackedAabb::EMPTY, 0.0);
     for (block, objects) in blocks.iter_mut().zip(order.chunks(BLOCK)) {
         if aabb != PackedAabb::EMPTY {
-            block.left_value = split_cost.side(aabb.half_area(), load);
+            block.left_value = split_cost.side(split_cost.size(&aabb), load);
         }
         let own = std::mem::replace(&mut block.left, aabb);
         block.left_load = load;
@@ -304,14 +304,14 @@ fn value_block<C: SplitCost>(
     for (&object, value) in objects.iter().zip(costs.iter_mut()).skip(1).rev() {
         aabb.grow(&boxes[object as usize]);
         load += split_cost.load(object);
-        *value = split_cost.side(aabb.half_area(), load);
+        *value = split_cost.side(split_cost.size(&aabb), load);
     }
     let (mut aabb, mut load) = (block.left, block.left_load);
     let mut lowest = f64::INFINITY;
     for (&object, cost) in objects[..objects.len() - 1].iter().zip(&mut costs[1..]) {
         aabb.grow(&boxes[object as usize]);
         load += split_cost.load(object);
-        *cost = split_cost.join(split_cost.side(aabb.half_area(), load), *cost);
+        *cost = split_cost.join(split_cost.side(split_cost.size(&aabb), load), *cost);
         lowest = if *cost < lowest { *cost } else { lowest };
     }
     lowest

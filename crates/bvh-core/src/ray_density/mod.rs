@@ -47,9 +47,6 @@ const FRACTIONS_OF_ENTRY: f64 = (1u64 << (3 * FRACTION_BITS)) as f64;
 /// Found on the kitchen, Sponza and smooth meshes: without it the number of inner nodes that rays enter is underestimated by up
 /// to a sixth, and trees for rays from a camera in the kitchen save half as many tests; twice as much overestimates it.
 const LENGTHENED: f64 = 0.25;
-/// Most segments, so that all arithmetic is exact: 4 · 2²⁰ · 2²⁷ · 8 < 2⁵³.
-const MOST_SEGMENTS: usize = 1 << 20;
-
 /// A part of a ray: where it begins, and where it ends, in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
@@ -70,7 +67,7 @@ pub enum DensityError {
         index: usize,
     },
     /// Too many segments to count them exactly.
-    #[error("{segments} segments; accepted: 1 to {MOST_SEGMENTS}")]
+    #[error("{segments} segments; accepted: 1 to {most}", most = RayDensity::MOST_SEGMENTS)]
     Count {
         /// The number of segments.
         segments: usize,
@@ -124,11 +121,14 @@ struct Rounded {
 }
 
 impl RayDensity {
+    /// Most segments, so that all arithmetic is exact: 4 · 2²⁰ · 2²⁷ · 8 < 2⁵³.
+    pub const MOST_SEGMENTS: usize = 1 << 20;
+
     /// The density of `segments` over the scene with these bounds. `area_weight` is the part of a box's measure that is its
     /// area, 0 to 1, so that boxes which no sample enters are not free; a tenth serves well.
     ///
     /// # Errors
-    /// [`DensityError`] if there are no segments, more than 2²⁰, none that meets the bounds, or one that is not finite.
+    /// [`DensityError`] if there are no segments, too many, none that meets the bounds, or one that is not finite.
     pub fn new(bounds: &Aabb, segments: &[Segment], area_weight: f64) -> Result<Self, DensityError> {
         Self::lengthened(bounds, segments, area_weight, 0.0)
     }
@@ -155,7 +155,7 @@ impl RayDensity {
         if !(0.0..=1.0).contains(&area_weight) {
             return Err(DensityError::AreaWeight(area_weight));
         }
-        if segments.is_empty() || segments.len() > MOST_SEGMENTS {
+        if segments.is_empty() || segments.len() > Self::MOST_SEGMENTS {
             return Err(DensityError::Count { segments: segments.len() });
         }
         let (low, high) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());

@@ -121,10 +121,8 @@ fn costs(problem: &Problem, tree: &Bvh) -> (f64, f64) {
         Problem { splits: Some(_), measure, .. } => {
             measure.map_or_else(|| cost::total_area(tree), |measure| cost::total_measure(tree, measure))
         }
-        Problem { measure: Some(measure), objective: Objective::Layout, .. } => {
-            cost::internal_measure(tree, measure)
-        }
-        Problem { measure: Some(_), .. } | Problem { objective: Objective::InternalArea, .. } => cost,
+        Problem { objective: Objective::InternalArea, .. } => cost,
+        Problem { measure: Some(measure), .. } => cost::internal_measure(tree, measure),
         _ => cost::internal_area(tree),
     };
     (cost, area)

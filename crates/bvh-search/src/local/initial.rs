@@ -2,6 +2,7 @@
 
 use bvh_build::config::{Accepts, Itself};
 use bvh_build::{BuildError, Builder, Check, OutOfRange, muller_fellner, ploc};
+use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 
 /// A builder of a tree with one object per leaf. Different initial trees lead to different local optima.
@@ -38,10 +39,10 @@ impl Check for Start {
 }
 
 impl Builder for Start {
-    fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
+    fn build_by(&self, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Result<Bvh, BuildError> {
         match self {
-            Self::MullerFellner(config) => config.build(boxes),
-            Self::Agglomerative(config) => config.build(boxes),
+            Self::MullerFellner(config) => config.build_by(boxes, measure),
+            Self::Agglomerative(config) => config.build_by(boxes, measure),
         }
     }
 }

@@ -22,7 +22,8 @@ use crate::tree::{Area, Metric, Working};
 use bvh_build::config::{Accepts, Itself};
 use bvh_build::top_down::{Split, SplitCost, SplitRule, Sweep, Workspace};
 use bvh_build::{Check, OutOfRange, Presorted, muller_fellner};
-use bvh_core::{Bvh, cost};
+use bvh_core::Bvh;
+use bvh_core::cost::{self, Measure};
 use rand::RngExt;
 
 bvh_build::config! {
@@ -70,10 +71,17 @@ impl Check for Candidates {
 
 impl Config {
     /// Construction number `trial`, into `tree`.
-    fn construct(&self, scene: &Presorted, seed: u64, trial: u64, workspace: &mut Workspace, tree: &mut Bvh) {
+    fn construct(
+        &self,
+        scene: &Presorted,
+        measure: Option<&dyn Measure>,
+        (seed, trial): (u64, u64),
+        workspace: &mut Workspace,
+        tree: &mut Bvh,
+    ) {
         let Self { candidates, noise, .. } = *self;
         let mut rule = Randomised::new(candidates, noise, stream(seed, trial));
-        self.construction.construct(scene, &mut rule, workspace, tree);
+        self.construction.construct(scene, measure, &mut rule, workspace, tree);
     }
 
     /// Improves a tree to a local optimum; leaves it as it was if the observer cancels before.
@@ -87,7 +95,7 @@ impl Config {
             return Ok(Improved { finished: true, work: 0 });
         }
         match problem.measure {
-            Some(measure) => self.improve_by(measure, tree, problem.cost(tree), observer),
+            Some(measure) => self.improve_by(measure, tree, cost::internal_measure(tree, measure), observer),
             None => self.improve_by(Area, tree, cost::internal_area(tree), observer),
         }
     }
@@ -129,7 +137,7 @@ impl Search for Config {
             if trial > 0 && observer.cancelled() {
                 return Ok(None);
             }
-            self.construct(&scene, seed, trial, workspace, tree);
+            self.construct(&scene, problem.measure, (seed, trial), workspace, tree);
             let improved = self.improve(tree, problem, observer)?;
             Ok::<_, SearchError>(Some((problem.cost(tree), improved)))
         };
@@ -154,7 +162,7 @@ impl Search for Config {
         }
         // Trials keep only their costs: the incumbent is constructed once more, and improved to the end this time.
         let (mut tree, (trial, finished)) = (Bvh::default(), best);
-        self.construct(&scene, seed, trial, &mut Workspace::default(), &mut tree);
+        self.construct(&scene, problem.measure, (seed, trial), &mut Workspace::default(), &mut tree);
         if finished {
             self.improve(&mut tree, problem, &())?;
         }

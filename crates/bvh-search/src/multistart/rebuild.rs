@@ -19,6 +19,7 @@ use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
 use bvh_build::config::Itself;
 use bvh_build::top_down::Workspace;
 use bvh_build::{Presorted, muller_fellner};
+use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 use rand::RngExt;
 
@@ -78,7 +79,8 @@ impl Config {
                 let first = number + 1;
                 let share = Quota { work: quota.work / (2 * BATCH), ..Quota::ENDLESS };
                 let construct = |at: usize| {
-                    self.construct(&tree, &subtrees[at], share, stream(seed, first + at as u64), run.observer())
+                    let rng = stream(seed, first + at as u64);
+                    self.construct((&tree, problem.measure), &subtrees[at], share, rng, run.observer())
                 };
                 let found =
                     parallel::map(subtrees.len(), construct).into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -176,7 +178,7 @@ impl Config {
     /// Another tree over the leaves of a subtree, if it is better, and the work that it took.
     fn construct<A: Metric>(
         &self,
-        tree: &Working<A>,
+        (tree, measure): (&Working<A>, Option<&dyn Measure>),
         subtree: &Subtree,
         quota: Quota,
         rng: Stream,
@@ -187,7 +189,7 @@ impl Config {
         let mut rule = Randomised::new(self.candidates, Some(self.noise), rng);
         let mut other = Bvh::default();
         let scene = Presorted::new(&boxes)?;
-        self.construction.construct(&scene, &mut rule, &mut Workspace::default(), &mut other);
+        self.construction.construct(&scene, measure, &mut rule, &mut Workspace::default(), &mut other);
         let mut other = Working::from_bvh(&other, tree.metric().internal(&other), tree.metric())?;
         let mut tally = self.local_search.improve(&mut other, quota, observer);
         tally = Tally { moves: 0, kept: 0, work: tally.work + 2 * boxes.len() as u64 };
@@ -263,8 +265,9 @@ mod tests {
             let subtrees = config.select(&tree, &mut rng, 4, &mut Tally::default());
             let before = tree.area();
             for subtree in &subtrees {
-                let found =
-                    config.construct(&tree, subtree, Quota::ENDLESS, stream(1, number + 1), &()).unwrap();
+                let found = config
+                    .construct((&tree, None), subtree, Quota::ENDLESS, stream(1, number + 1), &())
+                    .unwrap();
                 let Some(other) = found.0 else { continue };
                 tree.begin();
                 graft(&mut tree, subtree, &other);

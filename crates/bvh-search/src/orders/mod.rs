@@ -11,7 +11,7 @@ use rand::seq::SliceRandom;
 
 /// A scene ready to be built from any insertion order.
 struct Insertion<'p> {
-    scene: Scene,
+    scene: Scene<'p>,
     config: goldsmith_salmon::Config,
     problem: Problem<'p>,
 }
@@ -21,7 +21,11 @@ type Buffers = (Workspace, Bvh);
 
 impl<'p> Insertion<'p> {
     fn new(problem: &Problem<'p>, config: &goldsmith_salmon::Config) -> Result<Self, SearchError> {
-        Ok(Self { scene: Scene::new(problem.boxes)?, config: config.clone(), problem: *problem })
+        Ok(Self {
+            scene: Scene::by(problem.boxes, problem.measure)?,
+            config: config.clone(),
+            problem: *problem,
+        })
     }
 
     /// Number of objects.
@@ -41,8 +45,8 @@ impl<'p> Insertion<'p> {
             debug_assert!(false, "orders are permutations");
             return f64::INFINITY;
         };
-        let Problem { measure, judge, objective, .. } = self.problem;
-        if measure.is_none() && judge.is_none() && objective == Objective::GoldsmithSalmon {
+        let Problem { judge, objective, .. } = self.problem;
+        if judge.is_none() && objective == Objective::GoldsmithSalmon {
             goldsmith_salmon
         } else {
             workspace.write(tree);

@@ -32,7 +32,7 @@ pub trait Search: Check {
 
 impl<B: Builder> Search for B {
     fn search(&self, problem: &Problem, _seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
-        let tree = self.build(problem.boxes)?;
+        let tree = self.build_by(problem.boxes, problem.measure)?;
         run.record(problem.cost(&tree), tree.nodes.len() as u64);
         Ok(tree)
     }

@@ -41,10 +41,10 @@ impl<'a> Splits<'a> {
 pub struct Problem<'a> {
     /// One box per object.
     pub boxes: &'a [Aabb],
-    /// The cost to minimise, unless there is a measure.
+    /// The cost to minimise.
     pub objective: Objective,
-    /// The measure of boxes to minimise the sum of, over all inner nodes, in place of the objective. Searches minimise it
-    /// directly; builders divide and cluster by area, and their trees are judged by it.
+    /// The measure of boxes that takes the place of the half area, in the objective as in every decision of builders and searches. Only
+    /// the initial trees of searches are by area, and by median cut boxes are not compared.
     pub measure: Option<&'a dyn Measure>,
     /// Whether and how objects may be divided among leaves. [`best`](crate::best) and [`optimize`](crate::optimize()) do so; the
     /// others take no notice. The cost is then the total size of *all* nodes, leaves included, by area or by the measure: what
@@ -67,14 +67,12 @@ impl<'a> Problem<'a> {
     pub fn cost(&self, tree: &Bvh) -> f64 {
         match (self.judge, self.splits, self.measure) {
             (Some(judge), ..) => judge.judge(tree),
-            (None, _, Some(measure)) if self.objective == Objective::Layout => {
-                cost::layout_measure(tree, measure)
+            (None, Some(_), Some(measure)) if self.objective != Objective::Layout => {
+                cost::total_measure(tree, measure)
             }
-            (None, _, None) if self.objective == Objective::Layout => cost::layout_area(tree),
-            (None, Some(_), Some(measure)) => cost::total_measure(tree, measure),
-            (None, Some(_), None) => cost::total_area(tree),
-            (None, None, Some(measure)) => cost::internal_measure(tree, measure),
-            (None, None, None) => self.objective.cost(tree),
+            (None, Some(_), None) if self.objective != Objective::Layout => cost::total_area(tree),
+            (None, _, Some(measure)) => self.objective.cost_by(tree, measure),
+            (None, _, None) => self.objective.cost(tree),
         }
     }
 

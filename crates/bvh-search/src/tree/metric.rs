@@ -2,6 +2,7 @@
 //!
 //! Searches are generic over it, so that the area costs no indirection.
 
+pub(crate) use bvh_core::cost::Area;
 use bvh_core::cost::{self, Measure, Sum};
 use bvh_core::{Bvh, PackedAabb};
 
@@ -14,10 +15,6 @@ pub(crate) trait Metric: Copy + Send + Sync {
     /// The total size of the boxes of all inner nodes, and of the leaves as far as they count.
     fn internal(self, tree: &Bvh) -> f64;
 }
-
-/// The half area.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Area;
 
 impl Metric for Area {
     #[inline(always)]

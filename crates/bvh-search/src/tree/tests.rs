@@ -2,8 +2,9 @@
 
 use super::*;
 use crate::run::stream;
-use crate::scatter::built;
+use crate::scatter::{built, density};
 use bvh_build::muller_fellner;
+use bvh_core::cost::Measure;
 use bvh_core::{Aabb, validate};
 use rand::RngExt;
 
@@ -36,7 +37,7 @@ fn assert_tight(tree: &Working, boxes: &[Aabb]) {
 }
 
 /// A random node that is not the root.
-fn any(tree: &Working, rng: &mut impl RngExt) -> u32 {
+fn any(tree: &Working<impl Metric>, rng: &mut impl RngExt) -> u32 {
     loop {
         let node = rng.random_range(1..tree.nodes.len() as u32);
         if tree.nodes[node as usize].parent != ANCHOR {
@@ -83,7 +84,15 @@ fn undoing_restores_every_bit() {
 
 #[test]
 fn the_best_place_is_the_best_of_all_whether_the_node_is_out_or_only_thought_to_be() {
-    let (_, mut tree) = scene(60);
+    let (boxes, tree) = scene(60);
+    let density = density(&boxes).unwrap();
+    let measure: &dyn Measure = &density;
+    let bvh = tree.to_bvh();
+    assert_best_places(Working::from_bvh(&bvh, measure.internal(&bvh), measure).unwrap());
+    assert_best_places(tree);
+}
+
+fn assert_best_places(mut tree: Working<impl Metric>) {
     let mut rng = stream(4, 0);
     let mut search = PositionSearch::default();
     for _ in 0..300 {

@@ -2,7 +2,9 @@
 //! same kind, or of another camera, take in it.
 
 use super::rays::{Family, Kind, Viewpoint, in_box, random_ray};
-use super::segments::{Pose, RenderedRays, TracedRay, of_anything, of_renderer};
+use super::segments::{
+    OF_ANYTHING, Pose, RenderedRays, TracedRay, check_count, of_anything, of_inside, of_renderer,
+};
 use super::speed::timed;
 use crate::scenes::Scene;
 use crate::statistics::minimum;
@@ -21,6 +23,8 @@ pub enum TrainedOn {
     Default,
     /// Rays from the scene's first path of cameras.
     Camera,
+    /// The paper's random rays: from anywhere inside.
+    Inside,
 }
 
 impl TrainedOn {
@@ -30,6 +34,7 @@ impl TrainedOn {
             None => "none",
             Some(Self::Default) => "default",
             Some(Self::Camera) => "camera",
+            Some(Self::Inside) => "inside",
         }
     }
 }
@@ -45,13 +50,16 @@ config! {
         /// Primary rays of each path that judge trees; without a camera, rays of each family.
         count: u32 = 50_000, in 1..=10_000_000;
         /// Primary rays that trees are trained on; without a camera, rays of each family.
-        trained: u32 = 100_000, in 1..=200_000;
+        trained: u32 = 100_000, in 1..;
         /// Turns in which rays are timed; 0 for counting only.
         rounds: u32 = 3;
         /// Cameras by scene; scenes without an entry are seen from outside.
         cameras: BTreeMap<String, Cameras>;
+        /// Rays by whose visits every tree is costed, and tested one by one, for reports of `correlation`. Default none.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        costs: Vec<TrainedOn>;
     }
-    check Self::check_cameras;
+    check Self::check_rays;
 }
 
 /// Two paths of a camera through a scene, and its lights, in fractions of the root's box.
@@ -79,15 +87,18 @@ impl Default for Cameras {
 }
 
 impl Config {
-    fn check_cameras(&self) -> impl Iterator<Item = OutOfRange> {
+    fn check_rays(&self) -> impl Iterator<Item = OutOfRange> {
+        // A primary ray, one that it reflects, and one to every light.
+        let rendered = self.cameras.values().map(|cameras| 2 + cameras.lights.len());
+        let too_many = check_count("trained", self.trained, rendered.fold(OF_ANYTHING, usize::max));
         let paths = |(scene, cameras): (&String, &Cameras)| {
             [("same", &cameras.same), ("other", &cameras.other)]
                 .map(|(name, path)| (scene.clone(), name, path.is_empty()))
         };
         let empty = self.cameras.iter().flat_map(paths).filter(|(.., is_empty)| *is_empty);
-        empty.map(|(scene, name, _)| {
+        too_many.into_iter().chain(empty.map(|(scene, name, _)| {
             OutOfRange::new(format!("cameras.{scene}.{name}"), "empty", "at least one viewpoint")
-        })
+        }))
     }
 
     /// A renderer's rays from one of the paths through a scene.
@@ -114,6 +125,7 @@ impl Config {
         let rays = match trained {
             TrainedOn::Default => of_anything(self.trained, scene, &tree, seed),
             TrainedOn::Camera => self.rendered(scene, &tree, false, self.trained, seed),
+            TrainedOn::Inside => of_inside(self.trained, scene, &tree, seed),
         };
         density(&rays, &tree).map_err(|error| error.to_string())
     }

@@ -5,7 +5,7 @@ use super::rays::{Family, JUST_BEFORE, Kind, in_box, on_sphere, random_ray};
 use crate::scenes::Scene;
 use bvh_build::config::above;
 use bvh_build::{Accelerator, OutOfRange, config};
-use bvh_core::{Aabb, Bvh, Ray, Segment};
+use bvh_core::{Aabb, Bvh, Ray, RayDensity, Segment};
 use bvh_search::Stream;
 use glam::{DVec3, Vec3};
 use rand::{RngExt, SeedableRng};
@@ -51,7 +51,8 @@ impl RenderedRays {
             return Some(OutOfRange::new("cameras", "empty", "at least one table with `eye` and `target`"));
         }
         let wrong = numbers.flatten().find(|number| !number.is_finite());
-        wrong.map(|wrong| OutOfRange::new("cameras and lights", wrong, "finite coordinates"))
+        let wrong = wrong.map(|wrong| OutOfRange::new("cameras and lights", wrong, "finite coordinates"));
+        wrong.or_else(|| check_count("count", self.count, 1 + self.bounces as usize + self.lights.len()))
     }
 
     /// The camera at a place on its path, 0 at the first pose and 1 at the last; its picture is one unit high.
@@ -63,6 +64,16 @@ impl RenderedRays {
         let view = View { from: between(a.eye, b.eye), at: between(a.target, b.target), fov: self.fov };
         Camera::new(&view, up, 1, 1)
     }
+}
+
+/// Rays without a camera that [`of_anything`] makes of each one counted, at most.
+pub const OF_ANYTHING: usize = 6;
+
+/// Refuses more rays than a density counts, where each of so many leads to `rays` in all.
+pub fn check_count(key: &str, count: u32, rays: usize) -> Option<OutOfRange> {
+    let most = RayDensity::MOST_SEGMENTS / rays;
+    let accepted = || format!("up to {most}, each with {rays} rays in all");
+    (count as usize > most).then(|| OutOfRange::new(key, count, accepted()))
 }
 
 /// A ray as it is traced: its kind, and its part up to what it hits.
@@ -117,6 +128,17 @@ pub fn of_anything(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<Trac
     tracing.rays
 }
 
+/// The paper's random rays, `count` of them, up to their nearest hits.
+pub fn of_inside(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TracedRay> {
+    let mut tracing = Tracing::new(scene, tree, seed);
+    for _ in 0..count {
+        let ray = tree.root_aabb().and_then(|root| random_ray(Family::Inside, &root, &mut tracing.rng));
+        let Some(ray) = ray else { continue };
+        tracing.nearest(Kind::Incoherent, ray.origin(), ray.direction().as_dvec3());
+    }
+    tracing.rays
+}
+
 /// Traces rays and keeps them.
 struct Tracing<'a> {
     accelerator: Accelerator<'a>,
@@ -161,5 +183,21 @@ impl<'a> Tracing<'a> {
     fn beyond(&self, ray: &Ray) -> f32 {
         let reach = (self.bounds.min - ray.origin()).abs().max((self.bounds.max - ray.origin()).abs());
         2.0 * reach.length() / ray.direction().length()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_build::Check;
+
+    #[test]
+    fn more_rays_than_a_density_counts_are_refused_before_they_are_traced() {
+        let pose = Pose { eye: [0.0; 3], target: [1.0; 3] };
+        let rays =
+            |count| RenderedRays { cameras: vec![pose.clone()], bounces: 2, count, ..Default::default() };
+        assert_eq!(rays(349_525).check(), Ok(()));
+        let refused = rays(349_526).check().unwrap_err().to_string();
+        assert_eq!(refused, "count is 349526; accepted: up to 349525, each with 3 rays in all");
     }
 }

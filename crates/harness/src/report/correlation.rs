@@ -1,12 +1,12 @@
-//! How well costs predict the tests that random rays take, over many trees of one scene.
+//! How well costs predict the tests that rays take, over many trees of one scene.
 
 use super::config::Methods;
-use super::data::Rows;
+use super::data::{Rows, distinct};
 use super::metric::Metric;
 use super::output::{Output, each, panel};
 use crate::Error;
 use crate::figures::{Layer, Panel};
-use crate::run::rows::{RayRow, RunRow};
+use crate::run::rows::{RunRow, RunTestRow, VisitRow};
 use crate::statistics::{pearson, range, spearman};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -28,22 +28,45 @@ pub(super) struct Correlation<'a> {
 
 const ALL: &str = "all";
 
-/// A tree's costs, and the tests that rays took in it.
-type Tree<'a> = (&'a RunRow, &'a RayRow);
+/// A tree, and the tests per ray of one kind in it.
+type Tree<'a> = (&'a RunRow, f64);
+
+/// A cost: its name in the table, and its value for the tree of a run.
+type Cost<'a> = (String, Box<dyn Fn(&RunRow) -> Option<f64> + 'a>);
+
+/// The costs by area, and the one by the density of each kind of rays.
+fn costs(rows: &Rows) -> Vec<Cost<'_>> {
+    let of_area =
+        Metric::COSTS.map(|cost| -> Cost { (cost.column().into(), Box::new(move |run| cost.of_run(run))) });
+    let of_rays = |rays| -> Cost {
+        let own = move |run: &RunRow, row: &VisitRow| {
+            (&row.scene, &row.method, row.repetition) == (&run.scene, &run.method, run.repetition)
+                && row.rays == rays
+        };
+        let of = move |run: &RunRow| Some(rows.visits.iter().find(|row| own(run, row))?.goldsmith_salmon);
+        (format!("goldsmith_salmon_{rays}"), Box::new(of))
+    };
+    let rays = distinct(rows.visits.iter().map(|row| row.rays.as_str()));
+    of_area.into_iter().chain(rays.into_iter().map(of_rays)).collect()
+}
 
 pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
-    let (mut correlations, mut panels) = (Vec::new(), Vec::new());
+    let (mut correlations, mut panels, costs) = (Vec::new(), Vec::new(), costs(rows));
+    let of_layouts = distinct(rows.run_tests.iter().map(|row| (row.judged_on.as_str(), row.camera.as_str())));
+    let random = rows.ray_kinds().len();
     for scene in rows.scenes() {
-        for kind in rows.ray_kinds() {
+        for (number, kind) in rows.ray_kinds().into_iter().chain(of_layouts.clone()).enumerate() {
             let methods =
                 config.methods.iter().map(|method| (method.as_str(), trees(rows, scene, method, kind)));
             let methods: Vec<(&str, Vec<Tree>)> = methods.collect();
             let all = methods.iter().flat_map(|(_, trees)| trees.iter().copied()).collect();
             let start = correlations.len();
             for (method, trees) in [(ALL, all)].iter().chain(&methods) {
-                correlations.extend(Metric::COSTS.map(|cost| correlate(scene, method, kind, cost, trees)));
+                correlations.extend(costs.iter().map(|cost| correlate(scene, method, kind, cost, trees)));
             }
-            panels.push(draw(&rows.shown(scene), kind, &methods, correlations[start].spearman));
+            if number < random {
+                panels.push(draw(&rows.shown(scene), kind, &methods, correlations[start].spearman));
+            }
         }
     }
     let mut output = Output::new(&config.source, &config.title);
@@ -52,40 +75,39 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
     output.add_figure("correlation", caption, 2, panels);
     let over_all: Vec<&Correlation> = correlations.iter().filter(|row| row.method == ALL).collect();
     let columns = ["scene", "trees", "cost", "family", "query", "pearson", "spearman"];
-    output.show(
-        "Correlation of costs and box tests per ray over all trees of a scene:",
-        &over_all,
-        &columns,
-    )?;
-    output.reading = reading(&over_all);
+    output.show("Correlation of costs and tests per ray over all trees of a scene:", &over_all, &columns)?;
+    output.reading = reading(&over_all, &costs);
     Ok(output)
 }
 
-/// The method's trees through which rays of the kind were sent.
+/// The method's trees through which rays of the kind were sent: random ones through the binary tree, others through its wide layout.
 fn trees<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) -> Vec<Tree<'a>> {
-    let run_of = |row: &'a RayRow| {
-        Some((rows.runs_of(scene, method).find(|run| run.repetition == row.repetition)?, row))
+    let random = rows.rays_of(scene, method, kind).into_iter().map(|row| (row.repetition, row.boxes_per_ray));
+    let own = |row: &&RunTestRow| {
+        row.scene == scene && row.method == method && (row.judged_on.as_str(), row.camera.as_str()) == kind
     };
-    rows.rays_of(scene, method, kind).into_iter().filter_map(run_of).collect()
+    let of_layouts = rows.run_tests.iter().filter(own).map(|row| (row.repetition, row.tests));
+    let run = |repetition| rows.runs_of(scene, method).find(|run| run.repetition == repetition);
+    random.chain(of_layouts).filter_map(|(repetition, tests)| Some((run(repetition)?, tests))).collect()
 }
 
 fn correlate<'a>(
     scene: &'a str,
     method: &'a str,
     (family, query): (&'a str, &'a str),
-    cost: Metric,
+    (cost, of): &'a Cost,
     trees: &[Tree],
 ) -> Correlation<'a> {
-    let pair = |(run, row): &Tree| Some((cost.of_run(run)?, row.boxes_per_ray));
+    let pair = |(run, tests): &Tree| Some((of(run)?, *tests));
     let pairs: Vec<(f64, f64)> = trees.iter().filter_map(pair).collect();
     let (pearson, spearman) = (pearson(&pairs), spearman(&pairs));
-    Correlation { scene, method, cost: cost.column(), family, query, trees: pairs.len(), pearson, spearman }
+    Correlation { scene, method, cost, family, query, trees: pairs.len(), pearson, spearman }
 }
 
 fn draw(scene: &str, (family, query): (&str, &str), methods: &[(&str, Vec<Tree>)], rank: Option<f64>) -> Panel {
     let points = |(method, trees): &(&str, Vec<Tree>)| Layer::Points {
         name: (*method).to_owned(),
-        points: trees.iter().map(|(run, row)| (run.goldsmith_salmon, row.boxes_per_ray)).collect(),
+        points: trees.iter().map(|(run, tests)| (run.goldsmith_salmon, *tests)).collect(),
     };
     let rank = rank.map_or_else(String::new, |rank| format!(", ρ = {rank:.3}"));
     let (x, y) = (Metric::GoldsmithSalmon.axis(), Metric::BoxesPerRay.axis());
@@ -93,11 +115,11 @@ fn draw(scene: &str, (family, query): (&str, &str), methods: &[(&str, Vec<Tree>)
 }
 
 /// How well every cost ranks the trees, over scenes and kinds of rays.
-fn reading(over_all: &[&Correlation]) -> String {
-    let costs = each(Metric::COSTS.map(Metric::column), |cost| {
+fn reading(over_all: &[&Correlation], costs: &[Cost]) -> String {
+    let costs = each(costs, |(cost, _)| {
         let own = over_all.iter().filter(|row| row.cost == cost);
         let (low, high) = range(own.filter_map(|row| row.spearman))?;
         Some(format!("{cost} {low:.3} to {high:.3}"))
     });
-    format!("Rank correlation of box tests per ray over all trees of a scene: with {costs}.")
+    format!("Rank correlation of tests per ray over all trees of a scene: with {costs}.")
 }

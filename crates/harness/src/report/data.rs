@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::run::rows::{
-    self, BoundRow, ClockRow, HistoryRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row, RunRow, TestRow,
-    TestTimeRow, TimingRow, TraceRow, TraceTimeRow,
+    self, BoundRow, ClockRow, HistoryRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row, RunRow,
+    RunTestRow, TestRow, TestTimeRow, TimingRow, TraceRow, TraceTimeRow, VisitRow,
 };
 use crate::scenes::SceneKind;
 use crate::statistics::minimum;
@@ -38,6 +38,10 @@ pub struct Rows {
     pub tests: Vec<TestRow>,
     /// Of `timing_tests.csv`, likewise.
     pub test_times: Vec<TestTimeRow>,
+    /// Of `run_tests.csv`; none if trees were not tested one by one.
+    pub run_tests: Vec<RunTestRow>,
+    /// Of `visits.csv`, likewise.
+    pub visits: Vec<VisitRow>,
 }
 
 impl Rows {
@@ -57,6 +61,8 @@ impl Rows {
             trace_times: rows::read_if_any(folder)?,
             tests: rows::read_if_any(folder)?,
             test_times: rows::read_if_any(folder)?,
+            run_tests: rows::read_if_any(folder)?,
+            visits: rows::read_if_any(folder)?,
         })
     }
 

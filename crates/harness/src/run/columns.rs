@@ -56,7 +56,7 @@ const COMMON: &[(&str, &str)] = &[
     ("nodes", "Nodes of the tree."),
     ("rays", "Kind of the rays."),
     ("judged_on", "Kind of the rays that judge the tree."),
-    ("trained_on", "Rays that the tree was trained on: `none`, `default` or `camera`."),
+    ("trained_on", "Rays that the tree was trained on: `none`, `default`, `camera` or `inside`."),
     (
         "camera",
         "Whether the rays come from the training's path of cameras: `same`, `other`, or `none` without a camera.",

@@ -3,11 +3,12 @@
 use crate::Error;
 use crate::measure::ray_cost::{Config, TrainedOn, test_rays};
 use crate::run::job::{Job, Watch, collapsed_sah, density};
-use crate::run::rows::{LayoutRow, Row, TestRow, TestTimeRow, to_bytes};
+use crate::run::rows::{LayoutRow, Row, RunTestRow, TestRow, TestTimeRow, VisitRow, to_bytes};
 use crate::run::store::Store;
 use crate::run::trace::{Trees, complete};
 use crate::spec::Experiment;
-use bvh_core::{Bvh, WideBvh, cost};
+use bvh_core::cost::{self, Objective};
+use bvh_core::{Bvh, WideBvh};
 use bvh_search::Observer;
 use rayon::prelude::*;
 use std::path::Path;
@@ -27,6 +28,7 @@ pub(crate) fn judge(
 ) -> Result<(), Error> {
     complete(trees, experiment, jobs, watch, |_| true)?;
     let (mut rows, mut times, mut sizes) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut visits, mut of_runs) = (Vec::new(), Vec::new());
     let runs: Vec<(&Job, &Bvh)> = trees.iter().map(|(&index, tree)| (&jobs[index], tree)).collect();
     for of_scene in runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
         let scene = of_scene[0].0.scene;
@@ -39,12 +41,26 @@ pub(crate) fn judge(
             let range = at..at + experiment.repetitions as usize;
             sizes.push(size(&of_scene[range.clone()], &layouts[range]));
         }
+        for &trained in &config.costs {
+            visits.extend(costs(experiment, config, trained, of_scene)?);
+        }
         let seed = experiment.seed_of(&scene.name, "rays that judge trees", 0);
         for rays in test_rays(config, scene, of_scene[0].1, seed) {
             if watch.cancelled() {
                 return Err(Error::Interrupted { finished: jobs.len(), runs: jobs.len() });
             }
             let tests: Vec<[f64; 2]> = layouts.par_iter().map(|wide| rays.tests(wide)).collect();
+            let of_run = |((job, _), tests): (&(&Job, &Bvh), &[f64; 2])| RunTestRow {
+                scene: scene.name.clone(),
+                method: job.labelled.label.clone(),
+                repetition: job.repetition,
+                judged_on: rays.kind.name().into(),
+                camera: rays.camera.into(),
+                tests: tests[0] + tests[1],
+            };
+            if !config.costs.is_empty() {
+                of_runs.extend(of_scene.iter().zip(&tests).map(of_run));
+            }
             let speeds = rays.speeds(&first, config.rounds);
             for (number, &at) in methods.iter().enumerate() {
                 let own = &tests[at..at + experiment.repetitions as usize];
@@ -80,10 +96,35 @@ pub(crate) fn judge(
     }
     store.write(TestRow::FILE, &to_bytes(&rows, Path::new(TestRow::FILE))?)?;
     store.write(LayoutRow::FILE, &to_bytes(&sizes, Path::new(LayoutRow::FILE))?)?;
+    if !config.costs.is_empty() {
+        store.write(VisitRow::FILE, &to_bytes(&visits, Path::new(VisitRow::FILE))?)?;
+        store.write(RunTestRow::FILE, &to_bytes(&of_runs, Path::new(RunTestRow::FILE))?)?;
+    }
     if !times.is_empty() {
         store.write(TestTimeRow::FILE, &to_bytes(&times, Path::new(TestTimeRow::FILE))?)?;
     }
     Ok(())
+}
+
+/// The costs of a scene's trees by the density of rays that none of them is tested by.
+fn costs(
+    experiment: &Experiment,
+    config: &Config,
+    trained: TrainedOn,
+    of_scene: &[(&Job, &Bvh)],
+) -> Result<Vec<VisitRow>, Error> {
+    let scene = of_scene[0].0.scene;
+    let seed = experiment.seed_of(&scene.name, "rays that costs are of", 0);
+    let density = config.density(trained, scene, seed);
+    let density = density.map_err(|message| Error::Tracing { scene: scene.name.clone(), message })?;
+    let row = |(job, tree): &(&Job, &Bvh)| VisitRow {
+        scene: scene.name.clone(),
+        method: job.labelled.label.clone(),
+        repetition: job.repetition,
+        rays: TrainedOn::name(Some(trained)).into(),
+        goldsmith_salmon: Objective::GoldsmithSalmon.cost_by(tree, &density),
+    };
+    Ok(of_scene.iter().map(row).collect())
 }
 
 /// The layout of a run's tree: for the rays that it was trained on, else for random lines.

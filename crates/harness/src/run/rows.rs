@@ -296,6 +296,27 @@ rows! {
         million_per_s: f64,
     }
 
+    /// One row of `visits.csv`: the cost of a run's tree for one kind of rays, others than those that are tested.
+    VisitRow in "visits.csv" {
+        scene: String,
+        method: String,
+        repetition: u32,
+        rays: String,
+        /// The Goldsmith–Salmon cost by the density of these rays.
+        goldsmith_salmon: f64,
+    }
+
+    /// One row of `run_tests.csv`: the tests that rays took in the wide layout of a run's tree.
+    RunTestRow in "run_tests.csv" {
+        scene: String,
+        method: String,
+        repetition: u32,
+        judged_on: String,
+        camera: String,
+        /// Tests of nodes and of blocks of triangles per ray.
+        tests: f64,
+    }
+
     /// One row of `layouts.csv`: the size and the cost of a method's trees and of the wide layouts that rays are traced through.
     LayoutRow in "layouts.csv" {
         scene: String,
@@ -341,8 +362,7 @@ rows! {
         command: String,
     }
 
-    /// One row of `best_known.csv` and `references.csv`: what gaps are measured from, for one scene and objective. Only
-    /// binary trees with one object per leaf count.
+    /// One row of `best_known.csv` and `references.csv`: what gaps are measured from. Trees are binary, with one object per leaf.
     ReferenceRow in "references.csv" {
         scene: String,
         objects: usize,

@@ -71,12 +71,13 @@ impl Experiment {
             (matches!(method, Contestant::Ours(_)), matches!(method, Contestant::Ours(Method::Best(_))));
         let judged = Labelled::JUDGED;
         let (ours, with_judged) = ("with a method of ours", format!("with {}", judged.join(", ")));
+        let sized = "with a method of ours but median_cut, which compares no sizes of boxes";
         let of_some_methods = [
             ("budget", budget.is_some(), is_ours, ours),
             ("max_seconds", max_seconds.is_some(), is_ours, ours),
             ("keep", !keep.is_empty(), is_ours, ours),
             ("objective", objective.is_some(), is_ours, ours),
-            ("for_rays", for_rays.is_some(), is_ours, ours),
+            ("for_rays", for_rays.is_some(), is_ours && method.name() != "median_cut", sized),
             ("references", references.is_some(), is_best, "with best"),
             ("judge", judge.is_some(), judged.contains(&method.name()), &with_judged),
         ];

@@ -83,8 +83,8 @@ bvh_build::config! { serde;
         /// Random rays whose mean number of box tests judges the trees of its runs in place of the objective; the costs in
         /// `history.csv` are then such numbers. Default none.
         judge: Option<empirical_cost::Config>, in Itself;
-        /// Rays of the experiment's `ray_cost` whose visits its runs minimise in place of the objective; the costs in
-        /// `history.csv` are then such numbers. Default none.
+        /// Rays of the experiment's `ray_cost` whose visits take the place of areas in its runs and in their objective; the costs in
+        /// `history.csv` are then such numbers. Not for `median_cut`, which compares no sizes of boxes. Default none.
         for_rays: Option<TrainedOn>;
         /// The cost that its runs minimise in place of the experiment's. Default none.
         objective: Option<Objective>;

@@ -124,6 +124,10 @@ fn finite_nonsense_in_reports_is_named_with_what_would_be_accepted() {
 
 #[test]
 fn nonsense_beside_reports_is_named_with_what_would_be_accepted() {
+    let view = "[{ eye = [0, 0, 0], target = [1, 1, 1] }]";
+    let lights = |count| {
+        format!("cameras.escher = {{ same = {view}, other = {view}, lights = {:?} }}", vec![[1; 3]; count])
+    };
     let suite = |measure: &str| format!("question = 'q'\n[suite]\n{measure}\n");
     for (text, parts) in [
         (
@@ -131,6 +135,14 @@ fn nonsense_beside_reports_is_named_with_what_would_be_accepted() {
             &["suite.stability.rays", "1 to 100000000"][..],
         ),
         (suite("precision = { objects = 2, repetitions = 1 }"), &["suite.precision.objects is 2", "3 to"]),
+        (
+            format!("{GOOD}[ray_cost]\ntrained = 200_000"),
+            &["ray_cost.trained is 200000", "up to 174762", "6 rays"],
+        ),
+        (
+            format!("{GOOD}[ray_cost]\ntrained = 100_000\n{}", lights(9)),
+            &["ray_cost.trained is 100000", "up to 95325", "11 rays"],
+        ),
     ] {
         let message = read(&text, &Overrides::default()).unwrap_err();
         assert!(parts.iter().all(|part| message.contains(part)), "{text}: {message}");
@@ -151,6 +163,11 @@ fn wrong_methods_are_named_with_what_would_be_accepted() {
         ("[{ method = 'grasp', judge = { count = 0 } }]", &["methods[0].judge.count is 0", "1 or more"]),
         ("[{ method = 'best', judge = { count = 9 } }]", &["methods[0].judge is set for best", "genetic"]),
         ("[{ method = 'best', for_rays = 'camera' }]", &["methods[0].for_rays is set without `ray_cost`"]),
+        (
+            "[{ method = 'median_cut', for_rays = 'inside' }]",
+            &["methods[0].for_rays", "median_cut, which compares"],
+        ),
+        ("[{ method = 'obvhs', for_rays = 'inside' }]", &["methods[0].for_rays is set for obvhs", "of ours"]),
         ("[{ method = 'best', for_rays = 'all' }]", &["methods[0].for_rays", "all", "default"]),
         ("[{ method = 'grasp' }, { method = 'grasp' }]", &["methods[1].label", "second time"]),
     ] {
