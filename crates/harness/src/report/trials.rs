@@ -102,14 +102,14 @@ impl Config {
     }
 
     fn curve<'a>(&self, rows: &Rows, scene: &'a str, method: &'a str) -> Vec<Point<'a>> {
-        let trials = rows.trials_over_base(scene, method);
-        let Some(first) = trials.first() else { return Vec::new() };
-        let point = |count: usize| {
-            let single_run_over_base = minimum(first.iter().copied().take(count))?;
-            let every: Vec<f64> = trials.iter().filter_map(|trials| expected_best_of(trials, count)).collect();
+        let repetitions = rows.trials_over_base(scene, method);
+        let Some(first) = repetitions.first() else { return Vec::new() };
+        let point = |trials: usize| {
+            let single_run_over_base = minimum(first.iter().copied().take(trials))?;
+            let every: Vec<f64> =
+                repetitions.iter().filter_map(|costs| expected_best_of(costs, trials)).collect();
             let (expected_over_base, interval) = mean_interval(&every)?;
             let (expected_low, expected_high) = (interval.map(|i| i.0), interval.map(|i| i.1));
-            let trials = count;
             Some(Point {
                 scene,
                 method,
