@@ -138,27 +138,6 @@ fn a_kill_leaves_the_old_file_or_a_whole_new_one() {
     eprintln!("{replaced} of 12 were killed too late");
 }
 
-#[cfg(unix)]
-#[test]
-fn ctrl_c_keeps_the_best_tree_so_far() {
-    let folder = tempfile::tempdir().unwrap();
-    let child = harness(folder.path(), &["bake", "escher", "--budget", "1h", "--out", "a.bvh"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    // The file is reserved before the search begins; the one-hour search is still running whenever the signal comes.
-    while fs::read_dir(folder.path()).unwrap().count() == 0 {
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
-    assert!(text(&output.stderr).contains("`--from a.bvh` goes on"), "{}", text(&output.stderr));
-    load_tree(&folder.path().join("a.bvh"), &Scene::load("escher").unwrap()).unwrap();
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-}
-
 #[test]
 fn what_cannot_be_baked_or_inspected_is_said_and_nothing_is_lost() {
     let folder = tempfile::tempdir().unwrap();

@@ -36,7 +36,8 @@ pub(crate) fn improve<A: Metric>(
     let (horizon, work) = config.horizon(n, run);
     let by_layout = problem.objective == Objective::Layout;
     let divider = problem.splits.map(|splits| Divider::new(splits, by_layout));
-    let mut search = Improvement { config, seed, n, left: work, by_layout, divider, best, run };
+    let mut search =
+        Improvement { config, seed, n, left: work, by_layout, divider, best, run, is_secured: false };
     if let Some(other) = other {
         search.choose(tree, other, horizon);
     }
@@ -63,6 +64,8 @@ struct Improvement<'a, 'p, 'r, 's> {
     divider: Option<Divider<'s>>,
     best: &'a mut Incumbent<'p>,
     run: &'a mut Run<'r>,
+    /// Whether a local optimum of reinsertion is kept.
+    is_secured: bool,
 }
 
 impl Improvement<'_, '_, '_, '_> {
@@ -81,13 +84,7 @@ impl Improvement<'_, '_, '_, '_> {
             let now = observer.progress().unwrap_or(1.0);
             end_of_all = 1.0 - (1.0 - now) * (FINISH_WORK * n as f64 / in_time).min(FINISH_AT_MOST);
             length = length.min(in_time / n as f64);
-            // Long before the heat has paid, whoever stops the search is to get no less than plain reinsertion gives. The plan goes on
-            // from the tree as it was.
-            if length >= SECURED_FROM
-                && let Ok(mut aside) = self.best.working(tree.metric())
-            {
-                self.reinsert(&mut aside);
-            }
+            self.secure(tree.metric(), length);
         }
         let (all, began) = (self.left, observer.progress().unwrap_or(0.0));
         // Short runs are worth their work where they can be recombined, which layouts cannot.
@@ -125,6 +122,18 @@ impl Improvement<'_, '_, '_, '_> {
         });
     }
 
+    /// Long before the heat has paid, whoever stops a search by the clock is to get no less than plain reinsertion gives. The plan goes
+    /// on from the tree as it was.
+    fn secure(&mut self, metric: impl Metric, length: f64) {
+        if length >= SECURED_FROM
+            && !self.is_secured
+            && let Ok(mut aside) = self.best.working(metric)
+        {
+            self.reinsert(&mut aside);
+            self.is_secured = true;
+        }
+    }
+
     /// Anneals both trees for a short time, and goes on with the one that ends better.
     fn choose<A: Metric>(&mut self, tree: &mut Working<A>, mut other: Working<A>, horizon: Horizon) {
         let (n, observer) = (self.n as f64, self.run.observer());
@@ -134,6 +143,7 @@ impl Improvement<'_, '_, '_, '_> {
                 let quota = self.run.left().at_most(self.left.min(PROBE * self.n));
                 let (tally, in_time) = self.probe(tree, stream(self.seed, 0), quota);
                 self.run.count(tally);
+                self.secure(tree.metric(), in_time / n);
                 TRIAL * in_time.min(self.left as f64)
             }
             Horizon::Known => TRIAL * self.left as f64,

@@ -51,8 +51,10 @@ mod small_budget;
 
 use crate::exact;
 use crate::local::incumbent::Incumbent;
-use crate::run::{Found, Problem, Run, Splits};
+use crate::local::reinsertion;
+use crate::run::{Budget, Found, Observer, Outcome, Problem, Run, SearchError, Splits, StopReason, solve};
 use crate::tree::{Metric, WithLeaves, Working, search_by_metric};
+use crate::tuning::SECURED_FROM;
 use bvh_build::{Builder, spatial};
 use bvh_core::Bvh;
 use bvh_core::cost::Objective;
@@ -61,6 +63,25 @@ pub(crate) use improve::improve;
 use small_budget::SmallBudget;
 
 search_by_metric!(Config);
+
+/// What whoever stops a search of this much work early can have in place of a worse tree: the outcome of plain reinsertion, before the
+/// search. It takes a twentieth of the work at most; none if there is too little. By the clock, a search keeps such a tree
+/// itself; by work it does not, because its bytes are to follow from its plan alone.
+pub fn fallback(problem: &Problem, work: u64, observer: &dyn Observer) -> Result<Option<Outcome>, SearchError> {
+    if (work as f64) < SECURED_FROM * problem.boxes.len() as f64 {
+        return Ok(None);
+    }
+    solve(&reinsertion::Config::default(), problem, 0, Budget::UNLIMITED, observer).map(Some)
+}
+
+/// What a search found; if it was stopped early, with the [`fallback`]'s tree where that costs less.
+pub fn unless_behind(found: Outcome, fallback: Option<Outcome>) -> Outcome {
+    let better = fallback.filter(|other| found.stop == StopReason::Cancelled && other.cost < found.cost);
+    match better {
+        Some(Outcome { tree, cost, .. }) => Outcome { tree, cost, ..found },
+        None => found,
+    }
+}
 
 impl Config {
     /// Subtrees, if there are several, are annealed in parallel, each with a random stream of its own.

@@ -3,8 +3,9 @@
 use crate::Error;
 use crate::cli::arguments::{Jobs, TREE, input_file, output_file};
 use crate::cli::effort::Effort;
+use crate::cli::explain;
+use crate::cli::interrupt::{self, Interrupted};
 use crate::cli::output::{print_error, print_line};
-use crate::cli::{explain, interrupt};
 use crate::files::{self, Reserved, load_tree};
 use crate::measure::ray_cost;
 use crate::measure::segments::{self, RenderedRays};
@@ -154,11 +155,16 @@ pub(super) fn search(
         Effort::Time(_) => Budget::UNLIMITED,
         Effort::Work(work) => Budget { max_work: Some(work), ..Budget::UNLIMITED },
     };
+    let fallback = match (effort, method) {
+        (Effort::Work(work), Method::Best(_)) => best::fallback(&problem, work, &Interrupted(interrupted)),
+        _ => Ok(None),
+    };
     let outcome = match (start, method) {
         (Some((tree, _)), Method::Best(config)) => optimize(tree, &problem, config, args.seed, budget, &watch),
         _ => solve(method, &problem, args.seed, budget, &watch),
     };
     watch.bar.finish_and_clear();
+    let outcome = outcome.and_then(|found| Ok(best::unless_behind(found, fallback?)));
     let outcome = outcome.map_err(Error::search(&scene.name, &args.method))?;
     let seconds = watch.deadline.elapsed().as_secs_f64();
 

@@ -1,6 +1,7 @@
 //! Ctrl-C and SIGTERM: the first one ends a command in order, soon; the second one at once.
 
 use crate::cli::output::print_error;
+use bvh_search::Observer;
 use std::process::exit;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
@@ -34,6 +35,15 @@ pub fn listen() {
     });
     if let Err(error) = handler {
         print_error(&format!("warning: Ctrl-C will end the program at once: {error}"));
+    }
+}
+
+/// Cancels a search once it is set.
+pub struct Interrupted<'a>(pub &'a AtomicBool);
+
+impl Observer for Interrupted<'_> {
+    fn cancelled(&self) -> bool {
+        self.0.load(Relaxed)
     }
 }
 
