@@ -1,4 +1,4 @@
-//! Times of the sizes of boxes that searches go by: half areas, and densities of rays, which are to take no more than five times as long.
+//! Times of the sizes of boxes that searches go by: half areas, and densities of rays, for which five times as long is aimed at.
 //!
 //! `cargo bench -p harness --bench density`
 
