@@ -2,19 +2,17 @@
 
 use crate::Error;
 use crate::cli::arguments::{Jobs, TREE, input_file, output_file};
+use crate::cli::bake_rays::Rays;
 use crate::cli::effort::Effort;
 use crate::cli::explain;
 use crate::cli::interrupt::{self, Interrupted};
 use crate::cli::output::{print_error, print_line};
 use crate::files::{self, Reserved, load_tree};
-use crate::measure::ray_cost;
-use crate::measure::segments::{self, RenderedRays};
 use crate::scenes::Scene;
-use crate::spec::configuration;
 use bvh_build::{Builder, muller_fellner};
+use bvh_core::Bvh;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::file::{self, Header, Origin};
-use bvh_core::{Bvh, RayDensity};
 use bvh_search::best::{self, Horizon};
 use bvh_search::{
     Budget, Deadline, Event, Method, Observer, Outcome, Problem, Splits, StopReason, optimize, solve,
@@ -88,7 +86,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         input_file("--from", from)?;
     }
     output_file("--out", &args.out, &TREE)?;
-    let rays = args.rays.as_deref().map(read_rays).transpose()?;
+    let rays = args.rays.as_deref().map(Rays::read).transpose()?;
     args.jobs.apply()?;
     let scene = Scene::load(&args.scene)?;
     scene.remark.iter().for_each(|remark| print_error(remark));
@@ -138,7 +136,7 @@ pub(super) fn search(
     interrupt::hold();
     let asked = Splits::at_most(most_references(args, scene), &scene.boxes, &scene.primitives);
     let splits = explain::splits(asked, scene, start.map(|(tree, _)| tree), args.explain)?;
-    let density = rays.map(|rays| density(rays, scene, &greedy, args.seed)).transpose()?;
+    let density = rays.map(|rays| rays.density(scene, &greedy, args.seed)).transpose()?;
     let objective = match args.cost {
         BakeCost::Area => Objective::InternalArea,
         BakeCost::Layout => Objective::Layout,
@@ -182,35 +180,6 @@ pub(super) fn search(
 /// The most references to a scene's objects that leaves may have.
 fn most_references(args: &BakeArgs, scene: &Scene) -> usize {
     (args.references * scene.boxes.len() as f64) as usize
-}
-
-/// The rays of `--rays`.
-pub(super) enum Rays {
-    /// Any, without a camera.
-    Default,
-    /// A renderer's.
-    Rendered(RenderedRays),
-}
-
-fn read_rays(named: &str) -> Result<Rays, Error> {
-    if named == "default" {
-        return Ok(Rays::Default);
-    }
-    let path = Path::new(named);
-    input_file("--rays", path)?;
-    configuration(path).map(Rays::Rendered)
-}
-
-/// The density of the rays through a scene, of which `tree` is any tree.
-fn density(rays: &Rays, scene: &Scene, tree: &Bvh, seed: u64) -> Result<RayDensity, Error> {
-    let made = match rays {
-        Rays::Default => {
-            let rays = segments::of_anything(ray_cost::Config::default().trained, scene, tree, seed);
-            ray_cost::density(&rays, tree)
-        }
-        Rays::Rendered(config) => ray_cost::density(&segments::of_renderer(config, scene, tree), tree),
-    };
-    made.map_err(|error| Error::Tracing { scene: scene.name.clone(), message: error.to_string() })
 }
 
 /// What the file says of the method: its name, and the rays if there are any.

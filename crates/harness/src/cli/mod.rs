@@ -3,6 +3,7 @@
 pub mod arguments;
 pub mod bake;
 pub mod bake_instances;
+mod bake_rays;
 pub mod columns;
 pub mod commands;
 pub mod effort;
