@@ -162,7 +162,7 @@ struct InstanceRow {
     tz: f32,
 }
 
-/// The columns of [`INSTANCES`].
+/// The columns of `instances.csv`.
 pub fn columns() -> Columns {
     Columns::of::<InstanceRow>()
 }
