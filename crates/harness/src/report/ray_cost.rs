@@ -237,24 +237,12 @@ fn paired<'a>(rows: &'a Rows, [first, second]: &'a [String; 2]) -> Vec<Paired<'a
     rows.tests.iter().filter(|row| row.method == *second).filter_map(pair).collect()
 }
 
-/// How often each verdict was reached on a pair, and where the second takes more tests.
+/// How often each verdict was reached on a pair.
 fn verdicts(paired: &[Paired], [first, second]: &[String; 2]) -> String {
     let own = || paired.iter().filter(|row| row.against == *first && row.method == *second);
     let count = |verdict| own().filter(|row| row.verdict == verdict).count();
-    let more = own().filter(|row| row.verdict == Verdict::More);
-    let more: Vec<String> = more
-        .map(|row| {
-            format!("{}, {} rays, {} camera, {:.3}", row.scene, row.judged_on, row.camera, row.tests_over_other)
-        })
-        .collect();
-    format!(
-        " Of {} comparisons of ‘{second}’ with ‘{first}’, {} say fewer tests, {} say more{}, and {} cannot tell.",
-        own().count(),
-        count(Verdict::Fewer),
-        more.len(),
-        if more.is_empty() { String::new() } else { format!(" ({})", more.join("; ")) },
-        count(Verdict::CannotBeTold)
-    )
+    let (fewer, more) = (count(Verdict::Fewer), count(Verdict::More));
+    format!(" ‘{second}’ beside ‘{first}’: fewer in {fewer} of {} cells, more in {more}.", own().count())
 }
 
 /// The geometric means over scenes of rows that agree in all else.
