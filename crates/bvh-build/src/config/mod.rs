@@ -19,6 +19,7 @@
 mod numbers;
 
 pub use numbers::{Number, Numbers};
+
 use std::fmt::Display;
 use std::ops::Bound::{self, Excluded, Included, Unbounded};
 use std::ops::{RangeBounds, RangeFrom, RangeInclusive, RangeToInclusive};

@@ -134,8 +134,7 @@ pub(super) fn search(
     let greedy = greedy.map_err(Error::search(&scene.name, &args.method))?;
     let deadline = effort.deadline();
     interrupt::hold();
-    let asked = Splits::at_most(most_references(args, scene), &scene.boxes, &scene.primitives);
-    let splits = explain::splits(asked, scene, start.map(|(tree, _)| tree), args.explain)?;
+    let splits = splits(args, scene, start.map(|(tree, _)| tree))?;
     let density = rays.map(|rays| rays.density(scene, &greedy, args.seed)).transpose()?;
     let objective = match args.cost {
         BakeCost::Area => Objective::InternalArea,
@@ -180,6 +179,19 @@ pub(super) fn search(
 /// The most references to a scene's objects that leaves may have.
 fn most_references(args: &BakeArgs, scene: &Scene) -> usize {
     (args.references * scene.boxes.len() as f64) as usize
+}
+
+/// The leave to divide objects that the scene needs, or the tree `from` which the search goes on: without one, the search is that for
+/// whole objects and gives the same tree.
+fn splits<'a>(args: &BakeArgs, scene: &'a Scene, from: Option<&Bvh>) -> Result<Option<Splits<'a>>, Error> {
+    let asked = Splits::at_most(most_references(args, scene), &scene.boxes, &scene.primitives);
+    let divided = from.is_some_and(|tree| tree.prim_ids.len() > scene.boxes.len());
+    let Some(splits) = asked.filter(|_| !divided) else { return Ok(asked) };
+    let needed = splits.if_they_pay(&scene.boxes).map_err(Error::search(&scene.name, "--references"))?;
+    if args.explain && needed.is_none() {
+        print_line("  left out: divided objects: no spatial split of a top-down division saves anything");
+    }
+    Ok(needed)
 }
 
 /// What the file says of the method: its name, and the rays if there are any.

@@ -1,12 +1,10 @@
 //! `--explain`: lists before the work what a scene does not need and what was not asked for, both of which are left out.
 
 use crate::Error;
-use crate::cli::output::print_line;
 use crate::run::resolved::load_scenes;
 use crate::scenes::Scene;
 use crate::spec::Experiment;
-use bvh_core::{Bvh, Primitives};
-use bvh_search::Splits;
+use bvh_core::Primitives;
 use bvh_search::shortcuts::Facts;
 
 /// What is left out of an experiment, scene by scene, and what is going to run.
@@ -63,23 +61,6 @@ pub fn scene(scene: &Scene) -> Result<String, Error> {
         );
     }
     Ok(text)
-}
-
-/// The leave to divide objects that the scene needs, or the tree that the search goes on from: without one, the search is that for
-/// whole objects and gives the same tree. What is left out is `said`, or not.
-pub fn splits<'a>(
-    asked: Option<Splits<'a>>,
-    scene: &Scene,
-    from: Option<&Bvh>,
-    said: bool,
-) -> Result<Option<Splits<'a>>, Error> {
-    let divided = from.is_some_and(|tree| tree.prim_ids.len() > scene.boxes.len());
-    let Some(splits) = asked.filter(|_| !divided) else { return Ok(asked) };
-    let needed = splits.if_they_pay(&scene.boxes).map_err(Error::search(&scene.name, "--references"))?;
-    if said && needed.is_none() {
-        print_line("  left out: divided objects: no spatial split of a top-down division saves anything");
-    }
-    Ok(needed)
 }
 
 #[cfg(test)]
