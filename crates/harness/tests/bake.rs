@@ -50,7 +50,7 @@ fn a_bake_for_rays_keeps_how_often_they_visit_each_node() {
             let args =
                 ["bake", "escher", "--budget", "2Mwork", "--out", "x.bvh", "--rays", rays, "--jobs", jobs];
             let said = said(at, &args);
-            assert!(said.contains("visits of rays") && said.contains("below Müller–Fellner's"), "{said}");
+            assert!(said.contains("wide layout for rays") && said.contains("below Müller–Fellner's"), "{said}");
             fs::read(at.join("x.bvh")).unwrap()
         });
         assert!(bytes[0] == bytes[1], "{rays}: the same bytes on any number of threads");
@@ -61,6 +61,10 @@ fn a_bake_for_rays_keeps_how_often_they_visit_each_node() {
         assert_eq!(visits[0], 1.0);
         bvh_core::WideBvh::for_rays(&tree, scene.triangles().unwrap(), &visits).unwrap();
         assert_eq!(facts(&said(at, &["inspect", "x.bvh", "escher"]))["method"], name);
+        let by_area =
+            ["bake", "escher", "--budget", "2Mwork", "--out", "x.bvh", "--rays", rays, "--cost", "area"];
+        assert!(said(at, &by_area).contains("visits of rays times root area"));
+        assert!(fs::read(at.join("x.bvh")).unwrap() != bytes[0], "{rays}: another cost, another tree");
     }
     fs::write(at.join("wrong.toml"), WALK.replace("bounces = 2", "bounces = 2\nbouncy = 1")).unwrap();
     fs::write(at.join("none.toml"), "bounces = 1").unwrap();

@@ -46,7 +46,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let objects = |scene: &Scene| scene.boxes.len();
     let all = (scenes.iter().map(objects).sum::<usize>() + objects(&top)) as f64;
     // Of the top tree every leaf is a box and whole, and it is not laid out.
-    let of_top = BakeArgs { references: 1.0, cost: BakeCost::Area, ..args.clone() };
+    let of_top = BakeArgs { references: 1.0, cost: Some(BakeCost::Area), ..args.clone() };
     let names = parts.meshes.keys().map(|mesh| format!("mesh_{mesh}.bvh")).chain([TOP.into()]);
     let given = scenes.iter().map(|scene| (scene, args)).chain([(&top, &of_top)]);
     for (name, (scene, args)) in names.zip(given) {
