@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
-use super::model::{Axis, Layer, Panel, Scale};
+use super::model::{Axis, Marks, Panel, Scale};
 
 /// Values above this size, in either direction, count as non-finite, so that no difference overflows.
 const LARGEST: f64 = 1e300;
@@ -39,24 +39,24 @@ pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
     };
     let (mut other_xs, mut other_ys, mut marked) = (Vec::new(), Vec::new(), false);
     for layer in &panel.layers {
-        marked |= matches!(layer, Layer::Points { .. } | Layer::ErrorBars { .. });
-        match layer {
-            Layer::Line { points, .. } | Layer::Steps { points, .. } | Layer::Points { points, .. } => {
+        marked |= layer.is_marked();
+        match &layer.marks {
+            Marks::Line(points) | Marks::Steps(points) | Marks::Points(points) => {
                 points.iter().for_each(|&(x, y)| add(x, &[y]));
             }
-            Layer::Band { points, .. } | Layer::StepBand { points, .. } => {
+            Marks::Band(points) | Marks::StepBand(points) => {
                 points.iter().for_each(|&(x, low, high)| add(x, &[low, high]));
             }
-            Layer::ErrorBars { points, .. } => {
+            Marks::ErrorBars(points) => {
                 points.iter().for_each(|&(x, low, middle, high)| add(x, &[low, middle, high]));
             }
-            Layer::Bars { values, spread, base, .. } => {
+            Marks::Bars { values, spread, base } => {
                 values.iter().zip(0..).for_each(|(&height, i)| add(f64::from(i), &[height]));
                 other_ys.extend(spread.iter().take(values.len()).flat_map(|&(low, high)| [low, high]));
                 other_ys.push(*base);
             }
-            Layer::HLine { y, .. } => other_ys.push(*y),
-            Layer::VLine { x, .. } => other_xs.push(*x),
+            Marks::HLine(y) => other_ys.push(*y),
+            Marks::VLine(x) => other_xs.push(*x),
         }
     }
     let has_data = !xs.is_empty();
@@ -229,6 +229,7 @@ fn superscript(number: i32) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::model::Layer;
     use super::*;
 
     fn labels(axis: &Axis, values: &[f64], most: usize) -> Vec<String> {
@@ -278,9 +279,9 @@ mod tests {
     #[test]
     fn a_reference_line_beside_the_data_is_inside_the_panel() {
         let layers = vec![
-            Layer::Line { name: String::new(), points: vec![(2.0, 1.0), (3.0, 2.0)] },
-            Layer::VLine { x: 1.0, label: String::new() },
-            Layer::HLine { y: 3.0, label: String::new() },
+            Layer::new("", Marks::Line(vec![(2.0, 1.0), (3.0, 2.0)])),
+            Layer::new("", Marks::VLine(1.0)),
+            Layer::new("", Marks::HLine(3.0)),
         ];
         let (x, y, has_data) = axes(&Panel { layers, ..Panel::default() });
         assert!(has_data && x.low < 1.0 && y.high > 3.0);

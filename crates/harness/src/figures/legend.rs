@@ -38,23 +38,17 @@ impl Legend {
         let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
         let entry = |(name, stroke): &(String, Stroke)| {
             let has =
-                |kind: fn(&Layer) -> bool| layers().any(|layer| layer.name() == Some(name) && kind(layer));
-            let line = has(|layer| matches!(layer, Layer::Line { .. } | Layer::Steps { .. }));
-            let marker = has(|layer| matches!(layer, Layer::Points { .. } | Layer::ErrorBars { .. }));
-            let area = !line && has(|layer| !matches!(layer, Layer::Points { .. } | Layer::ErrorBars { .. }));
-            Entry {
-                name: name.clone(),
-                stroke: *stroke,
-                line,
-                marker: marker || line && strokes.marks(*stroke),
-                area,
-            }
+                |kind: fn(&Layer) -> bool| layers().any(|layer| layer.series() == Some(name) && kind(layer));
+            let line = has(Layer::is_line);
+            let marker = has(Layer::is_marked) || line && strokes.marks(*stroke);
+            let area = !line && has(|layer| !layer.is_marked());
+            Entry { name: name.clone(), stroke: *stroke, line, marker, area }
         };
         let mut entries: Vec<Entry> = strokes.series.iter().map(entry).collect();
         for layer in layers() {
-            let (Layer::HLine { label, .. } | Layer::VLine { label, .. }) = layer else { continue };
-            if !label.trim().is_empty() && entries.iter().all(|entry| entry.name != *label) {
-                let (name, stroke) = (label.clone(), REFERENCE_LINE);
+            let is_new = entries.iter().all(|entry| entry.name != layer.name);
+            if layer.series().is_none() && !layer.name.trim().is_empty() && is_new {
+                let (name, stroke) = (layer.name.clone(), REFERENCE_LINE);
                 entries.push(Entry { name, stroke, line: true, marker: false, area: false });
             }
         }

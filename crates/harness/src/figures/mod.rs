@@ -21,7 +21,7 @@ mod text;
 
 pub use canvas::Picture;
 pub use figure::Miniature;
-pub use model::{Axis, Cell, ColourBar, Figure, FigureError, HeatMap, Layer, Look, Panel, Scale};
+pub use model::{Axis, Cell, ColourBar, Figure, FigureError, HeatMap, Layer, Look, Marks, Panel, Scale};
 pub use raster::{PNG_SCALE, Pixels, pixels, png};
 
 /// Draws a picture as an SVG document.
@@ -57,27 +57,19 @@ mod tests {
 
     /// One layer of each kind with all of `points`.
     fn all_layers(points: &[(f64, f64)]) -> Vec<Layer> {
-        let name = |text: &str| text.to_owned();
         let bands = || points.iter().map(|&(x, y)| (x, y, x)).collect();
         let (x, y) = points.first().copied().unwrap_or_default();
+        let values = points.iter().map(|point| point.1).collect();
         vec![
-            Layer::Line { name: name("line"), points: points.to_vec() },
-            Layer::Steps { name: name("steps"), points: points.to_vec() },
-            Layer::Points { name: name("points <&>"), points: points.to_vec() },
-            Layer::Band { name: name(""), points: bands() },
-            Layer::StepBand { name: name("steps"), points: bands() },
-            Layer::ErrorBars {
-                name: name("bars"),
-                points: points.iter().map(|&(x, y)| (x, y, y, x)).collect(),
-            },
-            Layer::Bars {
-                name: name("bars"),
-                values: points.iter().map(|point| point.1).collect(),
-                spread: points.to_vec(),
-                base: x,
-            },
-            Layer::HLine { y, label: name("level") },
-            Layer::VLine { x, label: name("upright") },
+            Layer::new("line", Marks::Line(points.to_vec())),
+            Layer::new("steps", Marks::Steps(points.to_vec())),
+            Layer::new("points <&>", Marks::Points(points.to_vec())),
+            Layer::new("", Marks::Band(bands())),
+            Layer::new("steps", Marks::StepBand(bands())),
+            Layer::new("bars", Marks::ErrorBars(points.iter().map(|&(x, y)| (x, y, y, x)).collect())),
+            Layer::new("bars", Marks::Bars { values, spread: points.to_vec(), base: x }),
+            Layer::new("level", Marks::HLine(y)),
+            Layer::new("upright", Marks::VLine(x)),
         ]
     }
 
@@ -127,7 +119,7 @@ mod tests {
             let panel = Panel { title: String::new(), x: Axis::log("x"), y: Axis::log("y"), layers };
             svg(&Figure { panels: vec![panel], ..Figure::default() }).unwrap().contains("no data")
         };
-        let line = |points| vec![Layer::Line { name: String::new(), points }];
+        let line = |points| vec![Layer::new("", Marks::Line(points))];
         assert!(says(Vec::new()) && says(line(Vec::new())) && says(line(vec![(1.0, 0.0), (-1.0, 2.0)])));
         assert!(!says(line(vec![(1.0, 2.0)])));
     }
@@ -149,7 +141,7 @@ mod tests {
     #[test]
     fn a_million_points_are_drawn_as_few() {
         let wave = (0..1_000_000).map(|i| (f64::from(i) * 1e-4, f64::from(i % 97)));
-        let layers = vec![Layer::Line { name: String::new(), points: wave.collect() }];
+        let layers = vec![Layer::new("", Marks::Line(wave.collect()))];
         let panel = Panel { layers, ..Panel::default() };
         let picture = svg(&Figure { panels: vec![panel], ..Figure::default() }).unwrap();
         assert!(picture.len() < 100_000, "{} bytes", picture.len());

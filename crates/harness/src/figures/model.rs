@@ -105,60 +105,37 @@ impl Axis {
     }
 }
 
-/// Marks of one kind. Coordinates are data units; points an axis cannot show (non-finite, or not
-/// positive on a logarithmic axis) are skipped and interrupt a line. An empty name has no legend
-/// entry.
+/// The marks of one kind of a series, or a reference line over the whole panel.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Layer {
-    /// Straight lines from point to point.
-    Line {
-        /// The series.
-        name: String,
-        /// `(x, y)`, in drawing order.
-        points: Vec<(f64, f64)>,
-    },
+pub struct Layer {
+    /// The series, or what the legend calls the reference line. An empty name has no legend entry.
+    pub name: String,
+    /// What is drawn.
+    pub marks: Marks,
+}
+
+/// What a layer draws. Coordinates are data units; points an axis cannot show (non-finite, or not
+/// positive on a logarithmic axis) are skipped and interrupt a line.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Marks {
+    /// Straight lines from point to point: `(x, y)`, in drawing order.
+    Line(Vec<(f64, f64)>),
     /// A staircase: y holds until the next x. On a logarithmic axis it falls through the floor at the
-    /// first y that is 0 or below.
-    Steps {
-        /// The series.
-        name: String,
-        /// `(x, y)`, x ascending; the last point ends the last step.
-        points: Vec<(f64, f64)>,
-    },
-    /// Markers.
-    Points {
-        /// The series.
-        name: String,
-        /// `(x, y)`.
-        points: Vec<(f64, f64)>,
-    },
-    /// A translucent area between two lines.
-    Band {
-        /// The series.
-        name: String,
-        /// `(x, lower, upper)`, x ascending; a lower value of 0 or below reaches the floor of a
-        /// logarithmic axis.
-        points: Vec<(f64, f64, f64)>,
-    },
-    /// A translucent area between two staircases.
-    StepBand {
-        /// The series.
-        name: String,
-        /// As for [`Layer::Band`]; both values hold until the next x.
-        points: Vec<(f64, f64, f64)>,
-    },
-    /// Markers with a vertical bar. On a category axis, offsets of x by less than a half keep several
-    /// series beside each other.
-    ErrorBars {
-        /// The series.
-        name: String,
-        /// `(x, lower, middle, upper)`; the marker is at `middle`.
-        points: Vec<(f64, f64, f64, f64)>,
-    },
+    /// first y that is 0 or below. `(x, y)`, x ascending; the last point ends the last step.
+    Steps(Vec<(f64, f64)>),
+    /// Markers at `(x, y)`.
+    Points(Vec<(f64, f64)>),
+    /// A translucent area between two lines: `(x, lower, upper)`, x ascending; a lower value of 0 or
+    /// below reaches the floor of a logarithmic axis.
+    Band(Vec<(f64, f64, f64)>),
+    /// A translucent area between two staircases, as for [`Marks::Band`]; both values hold until the
+    /// next x.
+    StepBand(Vec<(f64, f64, f64)>),
+    /// Markers with a vertical bar: `(x, lower, middle, upper)`, the marker at `middle`. On a category
+    /// axis, offsets of x by less than a half keep several series beside each other.
+    ErrorBars(Vec<(f64, f64, f64, f64)>),
     /// One bar per category of a category x axis; several such layers stand beside each other.
     Bars {
-        /// The series.
-        name: String,
         /// Height of each category's bar; skipped if not finite.
         values: Vec<f64>,
         /// Lower and upper end of the whisker on each bar; may be shorter than `values`, or empty.
@@ -166,35 +143,37 @@ pub enum Layer {
         /// Where bars begin: 0, or 1 for ratios. A logarithmic axis's floor if it cannot show this.
         base: f64,
     },
-    /// A horizontal reference line over the whole panel.
-    HLine {
-        /// Its height.
-        y: f64,
-        /// Its entry in the legend; may be empty.
-        label: String,
-    },
-    /// A vertical reference line over the whole panel.
-    VLine {
-        /// Its place.
-        x: f64,
-        /// Its entry in the legend; may be empty.
-        label: String,
-    },
+    /// A horizontal reference line at this height.
+    HLine(f64),
+    /// A vertical reference line at this place.
+    VLine(f64),
 }
 
 impl Layer {
+    /// A layer of these marks.
+    pub fn new(name: impl Into<String>, marks: Marks) -> Self {
+        Self { name: name.into(), marks }
+    }
+
+    /// Bars of these heights from `base` on, without whiskers.
+    pub fn bars(name: impl Into<String>, values: Vec<f64>, base: f64) -> Self {
+        Self::new(name, Marks::Bars { values, spread: vec![], base })
+    }
+
     /// The series, of layers that belong to one.
-    pub fn name(&self) -> Option<&str> {
-        match self {
-            Self::Line { name, .. }
-            | Self::Steps { name, .. }
-            | Self::Points { name, .. }
-            | Self::Band { name, .. }
-            | Self::StepBand { name, .. }
-            | Self::ErrorBars { name, .. }
-            | Self::Bars { name, .. } => Some(name),
-            Self::HLine { .. } | Self::VLine { .. } => None,
-        }
+    pub fn series(&self) -> Option<&str> {
+        let is_reference = matches!(self.marks, Marks::HLine(_) | Marks::VLine(_));
+        (!is_reference).then_some(&self.name)
+    }
+
+    /// Whether it is a line or a staircase.
+    pub(super) fn is_line(&self) -> bool {
+        matches!(self.marks, Marks::Line(_) | Marks::Steps(_))
+    }
+
+    /// Whether it has markers at its points.
+    pub(super) fn is_marked(&self) -> bool {
+        matches!(self.marks, Marks::Points(_) | Marks::ErrorBars(_))
     }
 }
 

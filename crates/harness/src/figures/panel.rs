@@ -8,7 +8,7 @@ use plotters::prelude::{Cartesian2d, Color, DrawingArea, DrawingBackend, RGBColo
 
 use super::axis::{Ruled, axes};
 use super::canvas::{Align, Fault, Frame, Sheet, font, pen, steps};
-use super::model::{Layer, Panel, Scale};
+use super::model::{Layer, Marks, Panel, Scale};
 use super::style::{FAINT, GREY, GRID, INK, REFERENCE_LINE, Stroke, Strokes, WHITE};
 use super::text::{BODY, Fonts, HEADING, SMALL};
 
@@ -127,7 +127,7 @@ impl<'a> Plot<'a> {
             .label_style(font(SMALL, INK))
             .set_all_tick_mark_size(steps(TICK))
             .draw()?;
-        Marks { plot: self, area: chart.plotting_area(), strokes, frame }.draw()?;
+        Layers { plot: self, area: chart.plotting_area(), strokes, frame }.draw()?;
 
         sheet.lines((left, top - self.above), &self.title, HEADING, INK, Align::Left)?;
         let (centre, middle, bottom) = (left + width / 2.0, top + height / 2.0, top + height);
@@ -153,14 +153,14 @@ impl<'a> Plot<'a> {
 }
 
 /// The layers of a panel being drawn.
-struct Marks<'a, B: DrawingBackend> {
+struct Layers<'a, B: DrawingBackend> {
     plot: &'a Plot<'a>,
     area: &'a Area<B>,
     strokes: &'a Strokes,
     frame: Frame,
 }
 
-impl<B: DrawingBackend> Marks<'_, B> {
+impl<B: DrawingBackend> Layers<'_, B> {
     fn draw(&self) -> Result<(), Fault<B>> {
         let layers = &self.plot.panel.layers;
         layers.iter().try_for_each(|layer| self.band(layer))?;
@@ -171,8 +171,8 @@ impl<B: DrawingBackend> Marks<'_, B> {
     }
 
     fn band(&self, layer: &Layer) -> Result<(), Fault<B>> {
-        let (Layer::Band { name, points } | Layer::StepBand { name, points }) = layer else { return Ok(()) };
-        let stairs = matches!(layer, Layer::StepBand { .. });
+        let (Marks::Band(points) | Marks::StepBand(points)) = &layer.marks else { return Ok(()) };
+        let stairs = matches!(layer.marks, Marks::StepBand(_));
         let (x, y) = (&self.plot.x, &self.plot.y);
         let at = |&(at, low, high): &(f64, f64, f64)| Some((x.nearest(at)?, y.nearest(low)?, y.nearest(high)?));
         for run in runs(points.iter().map(at)) {
@@ -181,7 +181,7 @@ impl<B: DrawingBackend> Marks<'_, B> {
             };
             let upper = side(|point| point.2).into_iter().rev();
             let outline: Vec<Point> = side(|point| point.1).into_iter().chain(upper).collect();
-            self.area.draw(&Polygon::new(outline, self.strokes.of(name).1.colour.mix(0.2)))?;
+            self.area.draw(&Polygon::new(outline, self.strokes.of(&layer.name).1.colour.mix(0.2)))?;
         }
         Ok(())
     }
@@ -189,18 +189,18 @@ impl<B: DrawingBackend> Marks<'_, B> {
     /// Draws the bars of all series beside each other, and then their whiskers.
     fn bars(&self) -> Result<(), Fault<B>> {
         let (x, y) = (&self.plot.x, &self.plot.y);
-        let layers = || self.plot.panel.layers.iter().filter(|layer| matches!(layer, Layer::Bars { .. }));
+        let layers = || self.plot.panel.layers.iter().filter(|layer| matches!(layer.marks, Marks::Bars { .. }));
         let width = 0.8 / layers().count().max(1) as f64;
         let mut whiskers = Vec::new();
         for (order, layer) in layers().enumerate() {
-            let Layer::Bars { name, values, spread, base } = layer else { continue };
+            let Marks::Bars { values, spread, base } = &layer.marks else { continue };
             let base = y.coordinate(*base).map_or(y.low, |base| base.clamp(y.low, y.high));
             for (index, &value) in values.iter().enumerate() {
                 let left = index as f64 - 0.4 + width * order as f64;
                 let Some((_, tip)) = x.shown(index as f64).zip(y.coordinate(value)) else { continue };
                 // A hair of white between neighbours.
                 let corners = [(left + 0.03 * width, base), (left + 0.97 * width, tip.clamp(y.low, y.high))];
-                self.area.draw(&Rectangle::new(corners, self.strokes.of(name).1.colour.filled()))?;
+                self.area.draw(&Rectangle::new(corners, self.strokes.of(&layer.name).1.colour.filled()))?;
                 whiskers.extend(spread.get(index).map(|&(low, high)| (left + width / 2.0, low, high)));
             }
         }
@@ -221,9 +221,9 @@ impl<B: DrawingBackend> Marks<'_, B> {
 
     fn reference(&self, layer: &Layer) -> Result<(), Fault<B>> {
         let (x, y) = (&self.plot.x, &self.plot.y);
-        let ends = match *layer {
-            Layer::HLine { y: at, .. } => y.shown(at).map(|at| vec![(x.low, at), (x.high, at)]),
-            Layer::VLine { x: at, .. } => x.shown(at).map(|at| vec![(at, y.low), (at, y.high)]),
+        let ends = match layer.marks {
+            Marks::HLine(at) => y.shown(at).map(|at| vec![(x.low, at), (x.high, at)]),
+            Marks::VLine(at) => x.shown(at).map(|at| vec![(at, y.low), (at, y.high)]),
             _ => None,
         };
         ends.map_or(Ok(()), |ends| self.stroke(ends, REFERENCE_LINE, THIN))
@@ -231,7 +231,7 @@ impl<B: DrawingBackend> Marks<'_, B> {
 
     /// Draws a line or staircase, with markers along it where lines carry them.
     fn line(&self, layer: &Layer) -> Result<(), Fault<B>> {
-        let (order, stroke) = self.strokes.of(layer.name().unwrap_or_default());
+        let (order, stroke) = self.strokes.of(&layer.name);
         for path in self.paths(layer) {
             let markers =
                 if self.strokes.marks(stroke) { self.along(&path, 37.0 * order as f64) } else { Vec::new() };
@@ -263,14 +263,14 @@ impl<B: DrawingBackend> Marks<'_, B> {
         let (x, y) = (&self.plot.x, &self.plot.y);
         let mut all: Vec<(&str, Point)> = Vec::new();
         for layer in &self.plot.panel.layers {
-            let name = layer.name().unwrap_or_default();
-            match layer {
-                Layer::Points { points, .. } => {
+            let name = layer.name.as_str();
+            match &layer.marks {
+                Marks::Points(points) => {
                     all.extend(
                         points.iter().filter_map(|point| Some((name, (x.shown(point.0)?, y.shown(point.1)?)))),
                     );
                 }
-                Layer::ErrorBars { points, .. } => {
+                Marks::ErrorBars(points) => {
                     for &(at, low, middle, high) in points {
                         let Some(at) = x.shown(at).zip(y.shown(middle)) else { continue };
                         self.whisker(at.0, low, high, self.strokes.of(name).1.colour)?;
@@ -298,8 +298,8 @@ impl<B: DrawingBackend> Marks<'_, B> {
 
     /// The unbroken parts of a line or staircase; what leaves the panel is moved to its edge.
     fn paths(&self, layer: &Layer) -> Vec<Vec<Point>> {
-        let (Layer::Line { points, .. } | Layer::Steps { points, .. }) = layer else { return Vec::new() };
-        let stairs = matches!(layer, Layer::Steps { .. });
+        let (Marks::Line(points) | Marks::Steps(points)) = &layer.marks else { return Vec::new() };
+        let stairs = matches!(layer.marks, Marks::Steps(_));
         let shown =
             |axis: &Ruled, value| axis.nearest(value).filter(|_| stairs || axis.coordinate(value).is_some());
         let at = |point: &Point| Some((shown(&self.plot.x, point.0)?, shown(&self.plot.y, point.1)?));

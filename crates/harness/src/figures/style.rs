@@ -3,7 +3,7 @@
 use plotters::style::RGBColor;
 
 use super::canvas::steps;
-use super::model::{Figure, Layer, Look};
+use super::model::{Figure, Look};
 
 /// The background.
 pub(super) const WHITE: RGBColor = RGBColor(255, 255, 255);
@@ -108,19 +108,18 @@ pub(super) struct Strokes {
 impl Strokes {
     pub fn new(figure: &Figure) -> Self {
         let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
-        let shown = |name: &str| layers().any(|layer| layer.name() == Some(name));
+        let shown = |name: &str| layers().any(|layer| layer.series() == Some(name));
         let set = |name: &str| figure.looks.iter().find(|(known, _)| known == name).map(|&(_, look)| look);
         let taken = |slot| figure.looks.iter().any(|(name, look)| *look == Look::Slot(slot) && shown(name));
         let mut free = (0..).filter(|&slot| !taken(slot)).map(Look::Slot);
         let (mut series, mut lines): (Vec<(String, Stroke)>, Vec<&str>) = (Vec::new(), Vec::new());
         for layer in layers() {
-            let Some(name) = layer.name().filter(|name| !name.is_empty()) else { continue };
+            let Some(name) = layer.series().filter(|name| !name.is_empty()) else { continue };
             if series.iter().all(|(known, _)| known != name) {
                 let look = set(name).or_else(|| free.next()).unwrap_or(Look::Reference);
                 series.push((name.to_owned(), Stroke::of(look)));
             }
-            let is_line = matches!(layer, Layer::Line { .. } | Layer::Steps { .. });
-            if is_line && set(name) != Some(Look::Reference) && !lines.contains(&name) {
+            if layer.is_line() && set(name) != Some(Look::Reference) && !lines.contains(&name) {
                 lines.push(name);
             }
         }
@@ -141,11 +140,11 @@ impl Strokes {
 
 #[cfg(test)]
 mod tests {
-    use super::super::model::Panel;
+    use super::super::model::{Layer, Marks, Panel};
     use super::*;
 
     fn strokes(names: &[String], looks: Vec<(String, Look)>) -> Strokes {
-        let line = |name: &String| Layer::Line { name: name.clone(), points: Vec::new() };
+        let line = |name: &String| Layer::new(name, Marks::Line(Vec::new()));
         let layers = names.iter().chain(names.iter().rev()).map(line).collect();
         let panel = Panel { layers, ..Panel::default() };
         Strokes::new(&Figure { panels: vec![panel], looks, ..Figure::default() })

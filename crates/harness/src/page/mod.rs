@@ -6,7 +6,8 @@ use crate::Error;
 use crate::figures::{self, Miniature};
 use crate::files;
 use crate::report::output::Output;
-use crate::report::{self, clocked, paper::Outcome};
+use crate::report::paper::Outcome;
+use crate::run::finish::outputs;
 use crate::run::provenance::Provenance;
 use crate::run::resolved::Resolved;
 use crate::scenes::SceneKind;
@@ -87,11 +88,7 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
     let folder = results.join(name);
     let Resolved { experiment, scenes } = read_toml(&folder.join("resolved.toml"))?;
     let provenance: Provenance = read_toml(&folder.join("provenance.toml"))?;
-    let outputs = match &experiment.suite {
-        Some(measure) => vec![measure.output(&folder)?],
-        None if experiment.is_by_the_clock() => vec![clocked::output(&folder)?],
-        None => report::outputs(&experiment.reports, &folder)?,
-    };
+    let outputs = outputs(&experiment, &folder)?;
     let mut found = Vec::new();
     for entry in fs::read_dir(&folder).map_err(Error::io(&folder, "read the folder"))?.flatten() {
         found.push(entry.file_name().to_string_lossy().into_owned());

@@ -6,7 +6,7 @@ use super::metric::Metric;
 use super::output::{Output, panel, tally, text_table};
 use super::progress::{ProgressAxis, Series, series};
 use crate::Error;
-use crate::figures::Layer;
+use crate::figures::{Layer, Marks};
 use crate::statistics::{median, quartiles, range};
 use bvh_build::OutOfRange;
 use bvh_build::config::above;
@@ -148,13 +148,12 @@ fn curve<'a>(scene: &'a str, method: &'a str, runs: &[Series], reference: f64) -
 
 /// A staircase with its band, or a marker for a single point.
 fn draw(method: &str, points: &[Point]) -> Vec<Layer> {
-    let name = || method.to_owned();
     let medians: Vec<(f64, f64)> = points.iter().map(|point| (point.x, point.gap_median)).collect();
     if points.len() == 1 {
-        return vec![Layer::Points { name: name(), points: medians }];
+        return vec![Layer::new(method, Marks::Points(medians))];
     }
     let band = points.iter().map(|point| (point.x, point.gap_quartile_1, point.gap_quartile_3)).collect();
-    vec![Layer::StepBand { name: name(), points: band }, Layer::Steps { name: name(), points: medians }]
+    vec![Layer::new(method, Marks::StepBand(band)), Layer::new(method, Marks::Steps(medians))]
 }
 
 #[cfg(test)]

@@ -1,12 +1,10 @@
 //! What runs that the clock ends came to, beside another library: a table and a figure.
 
-use super::TEXT_FILE;
 use super::data::distinct;
 use super::output::{Output, panel, tally};
 use crate::Error;
 use crate::figures::{Axis, Layer};
 use crate::run::rows::{self, ClockedPeerRow, ClockedRow};
-use crate::run::store::Store;
 use crate::statistics::{median, minimum};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -43,20 +41,12 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     let order: Vec<&str> = runs.iter().map(|run| run.scene.as_str()).collect();
     lines.sort_by_key(|line| order.iter().position(|scene| *scene == line.scene));
     let mut output = Output::new("", "After so many seconds");
-    let explanation = "Medians of runs that the clock ended; the surface area heuristic has both constants 1 and the best leaves:";
+    let explanation = "Medians of runs that the clock ended; the surface area heuristic has both constants 1 and the best \
+                       leaves:";
     output.show(
         explanation,
         &lines,
-        &[
-            "scene",
-            "method",
-            "runs",
-            "seconds",
-            "references_per_object",
-            "cost_over_base",
-            "collapsed_sah",
-            "least_collapsed_sah",
-        ],
+        "scene method runs seconds references_per_object cost_over_base collapsed_sah least_collapsed_sah",
     )?;
     let (scenes, methods) =
         (distinct(order.into_iter()), distinct(lines.iter().map(|line| line.method.as_str())));
@@ -71,7 +61,7 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
         format!("Lowest median by the surface area heuristic: {}.", tally(&counts, scenes.len(), "scenes"));
     let bars = |method: &&str| {
         let values = scenes.iter().map(|scene| of(scene, method) / least(scene)).collect();
-        Layer::Bars { name: (*method).to_owned(), values, spread: vec![], base: 1.0 }
+        Layer::bars(*method, values, 1.0)
     };
     let layers = methods.iter().map(bars).collect();
     let x = Axis::categories("", scenes.iter().map(|scene| (*scene).to_owned()).collect());
@@ -80,17 +70,6 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     let y = Axis::linear("cost / least of the scene");
     output.add_figure("timing_runs", caption, 1, vec![panel("", x, y, layers)]);
     Ok(output)
-}
-
-/// Writes what is made from the CSV files in the store's folder; the figure only if it is `drawn`. Returns the text for
-/// the terminal, which [`TEXT_FILE`] keeps.
-pub fn write(store: &Store, drawn: bool) -> Result<String, Error> {
-    let output = output(store.folder())?;
-    if drawn {
-        output.draw(store)?;
-    }
-    store.write(TEXT_FILE, output.text().as_bytes())?;
-    Ok(output.text())
 }
 
 /// All runs of the scene and the method of `first`.

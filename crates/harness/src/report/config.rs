@@ -42,6 +42,30 @@ impl<T> Accepts<Vec<T>> for OneOrMore {
     }
 }
 
+/// The labels of methods that a configuration names under `key`, each with the key of its own place.
+pub trait Labels {
+    /// All of them, in order.
+    fn labels(&self, key: &str) -> Vec<(String, &str)>;
+}
+
+impl Labels for String {
+    fn labels(&self, key: &str) -> Vec<(String, &str)> {
+        vec![(key.into(), self)]
+    }
+}
+
+impl<L: Labels> Labels for [L] {
+    fn labels(&self, key: &str) -> Vec<(String, &str)> {
+        self.iter().enumerate().flat_map(|(at, named)| named.labels(&format!("{key}[{at}]"))).collect()
+    }
+}
+
+impl Labels for [String; 2] {
+    fn labels(&self, key: &str) -> Vec<(String, &str)> {
+        self.as_slice().labels(key)
+    }
+}
+
 /// Refuses lists of the paper's numbers for a scene that are longer than `methods`, which they follow.
 pub fn one_for_each(paper: &BTreeMap<String, Vec<f64>>, methods: &[String]) -> Vec<OutOfRange> {
     let accepted = format!("up to {}, one for each of methods", methods.len());

@@ -5,7 +5,7 @@ use super::data::{Rows, distinct};
 use super::metric::Metric;
 use super::output::{Output, each, panel};
 use crate::Error;
-use crate::figures::{Layer, Panel};
+use crate::figures::{Layer, Marks, Panel};
 use crate::run::rows::{RunRow, RunTestRow, VisitRow};
 use crate::statistics::{pearson, range, spearman};
 use schemars::JsonSchema;
@@ -74,8 +74,8 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
     let caption = "One point per tree, the same rays for all. ρ is Spearman's rank correlation.";
     output.add_figure("correlation", caption, 2, panels);
     let over_all: Vec<&Correlation> = correlations.iter().filter(|row| row.method == ALL).collect();
-    let columns = ["scene", "trees", "cost", "family", "query", "pearson", "spearman"];
-    output.show("Correlation of costs and tests per ray over all trees of a scene:", &over_all, &columns)?;
+    let columns = "scene trees cost family query pearson spearman";
+    output.show("Correlation of costs and tests per ray over all trees of a scene:", &over_all, columns)?;
     output.reading = reading(&over_all, &costs);
     Ok(output)
 }
@@ -105,9 +105,9 @@ fn correlate<'a>(
 }
 
 fn draw(scene: &str, (family, query): (&str, &str), methods: &[(&str, Vec<Tree>)], rank: Option<f64>) -> Panel {
-    let points = |(method, trees): &(&str, Vec<Tree>)| Layer::Points {
-        name: (*method).to_owned(),
-        points: trees.iter().map(|(run, tests)| (run.goldsmith_salmon, *tests)).collect(),
+    let points = |(method, trees): &(&str, Vec<Tree>)| {
+        let points = trees.iter().map(|(run, tests)| (run.goldsmith_salmon, *tests));
+        Layer::new(*method, Marks::Points(points.collect()))
     };
     let rank = rank.map_or_else(String::new, |rank| format!(", ρ = {rank:.3}"));
     let (x, y) = (Metric::GoldsmithSalmon.axis(), Metric::BoxesPerRay.axis());

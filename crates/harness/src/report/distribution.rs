@@ -5,7 +5,7 @@ use super::data::Rows;
 use super::output::{Output, each, panel};
 use super::paper::{PaperRow, Verdict};
 use crate::Error;
-use crate::figures::{Axis, Layer};
+use crate::figures::{Axis, Layer, Marks};
 use crate::statistics::{quantile, range};
 use bvh_build::config::above;
 use schemars::JsonSchema;
@@ -66,9 +66,9 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
             output.paper.extend(config.majority(&rows.shown(scene), method, &costs, base_cost));
             let fraction = |rank: u32| f64::from(rank) / costs.len() as f64;
             let steps = costs.iter().zip(1..).map(|(&cost, rank)| (cost, fraction(rank))).collect();
-            layers.push(Layer::Steps { name: method.clone(), points: steps });
+            layers.push(Layer::new(method, Marks::Steps(steps)));
         }
-        layers.push(Layer::VLine { x: base_cost, label: "Müller–Fellner".into() });
+        layers.push(Layer::new("Müller–Fellner", Marks::VLine(base_cost)));
         let y = Axis::linear("fraction of trials at most as costly").range(0.0, 1.0);
         let own = summaries.iter().filter(|row| row.scene == scene);
         let ends = own.flat_map(|row| [row.lowest_cost, row.highest_cost]).chain([base_cost]);
@@ -79,9 +79,8 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     }
     output.add_csv("distribution", &summaries)?;
     output.add_figure("distribution", "Every trial of every repetition.", 2, panels);
-    let columns =
-        ["scene", "method", "lowest_cost", "median_cost", "highest_cost", "relative_deviation", "base_cost"];
-    output.show("Costs of all trials:", &summaries, &columns)?;
+    let columns = "scene method lowest_cost median_cost highest_cost relative_deviation base_cost";
+    output.show("Costs of all trials:", &summaries, columns)?;
     let reading = each(&config.methods, |method| {
         let own = || summaries.iter().filter(|row| row.method == method);
         let of = |cost: fn(&Summary) -> f64| range(own().map(|row| cost(row) / row.base_cost));

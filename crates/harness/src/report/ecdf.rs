@@ -9,7 +9,7 @@ use super::data::Rows;
 use super::output::{Output, each, panel};
 use super::progress::{ProgressAxis, longest_of_all};
 use crate::Error;
-use crate::figures::{Axis, Layer};
+use crate::figures::{Axis, Layer, Marks};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -35,7 +35,7 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
         for method in &config.methods {
             let points = curve(&attempts, method, end);
             steps.extend(points.iter().map(|&(x, solved_fraction)| Step { method, x, solved_fraction }));
-            layers.push(Layer::Steps { name: method.clone(), points });
+            layers.push(Layer::new(method, Marks::Steps(points)));
         }
         axis.add_csv(&mut output, "ecdf", &steps)?;
         let y = Axis::linear("fraction solved").range(0.0, 1.02);

@@ -4,7 +4,7 @@ use super::config::Methods;
 use super::data::Rows;
 use super::output::{Output, panel};
 use crate::Error;
-use crate::figures::{Axis, Layer};
+use crate::figures::{Axis, Layer, Marks};
 use crate::statistics::range;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -37,9 +37,9 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
             line.sort_by(|a, b| a.0.total_cmp(&b.0));
             if let (true, Some(&(x, y))) = (layers.is_empty(), line.first()) {
                 let slope = line.iter().map(|point| (point.0, y * (x / point.0).sqrt())).collect();
-                layers.push(Layer::Line { name: "slope −1/2".into(), points: slope });
+                layers.push(Layer::new("slope −1/2", Marks::Line(slope)));
             }
-            layers.push(Layer::Points { name: method.clone(), points: line });
+            layers.push(Layer::new(method, Marks::Points(line)));
         }
         let (x, y) = (Axis::log("number of rays"), Axis::log("standard error / mean"));
         panels.push(panel(rows.shown(scene), x, y, layers));

@@ -4,7 +4,7 @@ use super::config::OneOrMore;
 use super::data::Rows;
 use super::output::{Output, each, panel};
 use crate::Error;
-use crate::figures::{Axis, Layer, Panel};
+use crate::figures::{Axis, Layer, Marks, Panel};
 use crate::scenes::subset::Subset;
 use crate::statistics::{median, quantile};
 use schemars::JsonSchema;
@@ -86,8 +86,8 @@ impl Config {
         let mut panels = self.draw(&summaries);
         panels.extend(draw_bounds(&tightness));
         output.add_figure("gaps", caption, 2, panels);
-        let columns = ["method", "part", "objects", "runs", "solved_fraction", "median_gap", "maximum_gap"];
-        output.show("Gaps to the exact optimum:", &summaries, &columns)?;
+        let columns = "method part objects runs solved_fraction median_gap maximum_gap";
+        output.show("Gaps to the exact optimum:", &summaries, columns)?;
         output.reading = self.reading(&found);
         Ok(output)
     }
@@ -133,7 +133,7 @@ impl Config {
             let line = |method: &String| {
                 let own = summaries.iter().filter(|summary| summary.part == part && summary.method == method);
                 let points = own.map(|summary| (summary.objects as f64, value(summary))).collect();
-                Layer::Line { name: method.clone(), points }
+                Layer::new(method, Marks::Line(points))
             };
             let lines = self.methods.iter().map(line).collect();
             panel(format!("{part}, {title}"), Axis::linear("objects"), y, lines)
@@ -192,10 +192,9 @@ fn draw_bounds(tightness: &[Tightness]) -> Vec<Panel> {
             (row.objects as f64, row.minimum_bound_over_optimum, row.maximum_bound_over_optimum)
         };
         let median = |row: &Tightness| (row.objects as f64, row.median_bound_over_optimum);
-        let name = || "lower bound".to_owned();
         let layers = vec![
-            Layer::Band { name: name(), points: own().map(range).collect() },
-            Layer::Line { name: name(), points: own().map(median).collect() },
+            Layer::new("lower bound", Marks::Band(own().map(range).collect())),
+            Layer::new("lower bound", Marks::Line(own().map(median).collect())),
         ];
         let y = Axis::linear("bound / optimum").range(0.0, 1.02);
         panel(format!("{part}, lower bound"), Axis::linear("objects"), y, layers)

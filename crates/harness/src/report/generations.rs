@@ -4,7 +4,7 @@ use super::data::Rows;
 use super::output::{Output, panel};
 use super::paper::{PaperRow, Verdict};
 use crate::Error;
-use crate::figures::{Axis, Layer, Panel};
+use crate::figures::{Axis, Layer, Marks, Panel};
 use crate::run::rows::HistoryRow;
 use crate::statistics::{expected_best_of, median, range};
 use bvh_build::OutOfRange;
@@ -126,15 +126,15 @@ impl Config {
         let range = generations.iter().map(|g| (at(g), g.lowest_cost, g.highest_cost)).collect();
         let random = generations.iter().filter_map(|g| Some((at(g), g.random_picking_cost?))).collect();
         let mut layers = vec![
-            Layer::Band { name: "range over runs".into(), points: range },
-            Layer::Line { name: "median run".into(), points: median },
-            Layer::Line { name: "random picking".into(), points: random },
+            Layer::new("range over runs", Marks::Band(range)),
+            Layer::new("median run", Marks::Line(median)),
+            Layer::new("random picking", Marks::Line(random)),
         ];
         // The paper's costs are of other scenes: only how far its runs spread can be compared.
         if let (Some([low, high]), Some(last)) = (self.paper_final.get(scene), generations.last()) {
             let scale = 2.0 * last.median_run_cost / (low + high);
             let points = vec![(at(last), low * scale, last.median_run_cost, high * scale)];
-            layers.push(Layer::ErrorBars { name: PAPER.into(), points });
+            layers.push(Layer::new(PAPER, Marks::ErrorBars(points)));
         }
         panel(shown, Axis::linear("generation"), Axis::linear("cost (Goldsmith–Salmon)"), layers)
     }

@@ -1,6 +1,6 @@
 //! What is made from an experiment's CSV files: tables, figures, and the paper's numbers beside ours.
 //!
-//! A kind of report is one file, one line in [`Report`] and one in [`Report::labels`]. Reports read CSV files only.
+//! A kind of report is one file and one line in [`Report`]. Reports read CSV files only.
 
 pub mod anytime;
 mod attempt;
@@ -42,6 +42,7 @@ use crate::run::columns::Columns;
 use crate::run::store::Store;
 use crate::statistics::{median, minimum};
 use bvh_build::{Check, OutOfRange};
+use config::Labels as _;
 use data::Rows;
 use output::Output;
 use paper::{Outcome, PaperRow};
@@ -49,10 +50,10 @@ use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Declares the kinds of reports: name in specs (in snake case), configuration, the function that makes it,
-/// and the rows of its CSV files.
+/// Declares the kinds of reports: name in specs (in snake case), configuration and its keys that name methods, the function
+/// that makes it, and the rows of its CSV files.
 macro_rules! reports {
-    ($($(#[$doc:meta])* $name:literal => $kind:ident($config:ty) by $write:path => [$($row:ty),*];)*) => {
+    ($($(#[$doc:meta])* $name:literal => $kind:ident($config:ty: $($label:ident),*) by $write:path => [$($row:ty),*];)*) => {
         /// One report of a spec.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
         #[serde(tag = "kind")]
@@ -86,6 +87,13 @@ macro_rules! reports {
                 vec![$($(Columns::of::<$row>()),*),*, Columns::of::<PaperRow>()]
             }
 
+            /// The labels of the methods that the report names, each with its key.
+            pub fn labels(&self) -> Vec<(String, &str)> {
+                match self {
+                    $(Self::$kind(config) => [$(config.$label.labels(stringify!($label))),*].concat(),)*
+                }
+            }
+
             fn write(&self, rows: &Rows) -> Result<Output, Error> {
                 match self {
                     $(Self::$kind(config) => $write(config, rows),)*
@@ -97,105 +105,57 @@ macro_rules! reports {
 
 reports! {
     /// Ratios to base, scenes by columns, beside the paper's.
-    "table" => Table(table::Config) by table::Config::write => [table::Cell];
+    "table" => Table(table::Config: columns) by table::Config::write => [table::Cell];
     /// Cost against number of trials.
-    "trials" => Trials(trials::Config) by trials::Config::write => [trials::Point];
+    "trials" => Trials(trials::Config: methods) by trials::Config::write => [trials::Point];
     /// Times of runs against each other.
-    "times" => Times(times::Config) by times::Config::write => [times::Ratio];
+    "times" => Times(times::Config: methods) by times::Config::write => [times::Ratio];
     /// Cost against generation.
-    "generations" => Generations(generations::Config) by generations::Config::write => [generations::Generation];
+    "generations" => Generations(generations::Config: method, baseline) by generations::Config::write => [generations::Generation];
     /// The distribution of costs over trials.
-    "distribution" => Distribution(distribution::Config) by distribution::write => [distribution::Summary];
+    "distribution" => Distribution(distribution::Config: methods) by distribution::write => [distribution::Summary];
     /// Final costs of variations of one method over those of the method itself.
-    "variations" => Variations(variations::Config) by variations::Config::write => [variations::Variation];
+    "variations" => Variations(variations::Config: methods) by variations::Config::write => [variations::Variation];
     /// Tests per random ray, methods by scenes.
-    "ray_tests" => RayTests(ray_tests::Config) by ray_tests::Config::write => [ray_tests::Measured];
+    "ray_tests" => RayTests(ray_tests::Config: methods) by ray_tests::Config::write => [ray_tests::Measured];
     /// The error of the ray estimator against the number of rays, for the first repetition.
-    "estimator" => Estimator(config::Methods) by estimator::write => [estimator::Point];
+    "estimator" => Estimator(config::Methods: methods) by estimator::write => [estimator::Point];
     /// Costs against tests per ray over many trees; every repetition is one tree.
-    "correlation" => Correlation(config::Methods) by correlation::write => [correlation::Correlation];
+    "correlation" => Correlation(config::Methods: methods) by correlation::write => [correlation::Correlation];
     /// Error against run time and against work.
-    "anytime" => Anytime(anytime::Config) by anytime::Config::write => [anytime::Point];
+    "anytime" => Anytime(anytime::Config: methods) by anytime::Config::write => [anytime::Point];
     /// Gaps to the exact optimum of small scenes.
-    "gaps" => Gaps(gaps::Config) by gaps::Config::write => [gaps::Gaps, gaps::Tightness];
+    "gaps" => Gaps(gaps::Config: methods, optimum) by gaps::Config::write => [gaps::Gaps, gaps::Tightness];
     /// Run-time distributions.
-    "run_times" => RunTimes(config::Targets) by run_times::write => [run_times::Step, run_times::Fit];
+    "run_times" => RunTimes(config::Targets: methods) by run_times::write => [run_times::Step, run_times::Fit];
     /// The aggregate distribution of run times over scenes and targets.
-    "ecdf" => Ecdf(config::Targets) by ecdf::write => [ecdf::Step];
+    "ecdf" => Ecdf(config::Targets: methods) by ecdf::write => [ecdf::Step];
     /// Performance profiles.
-    "profile" => Profile(config::Targets) by profile::write => [profile::Row];
+    "profile" => Profile(config::Targets: methods) by profile::write => [profile::Row];
     /// Time and work until targets are reached, one row per method, scene and target.
-    "time_to_target" => TimeToTarget(config::Targets) by time_to_target::write => [time_to_target::Reached];
+    "time_to_target" => TimeToTarget(config::Targets: methods) by time_to_target::write => [time_to_target::Reached];
     /// Medians, quartiles and primal integrals.
-    "numbers" => Numbers(numbers::Config) by numbers::Config::write => [numbers::Numbers, numbers::Timing];
+    "numbers" => Numbers(numbers::Config: methods) by numbers::Config::write => [numbers::Numbers, numbers::Timing];
     /// Whether methods really differ.
-    "significance" => Significance(significance::Config) by significance::Config::write => [significance::Row];
+    "significance" => Significance(significance::Config: against, method) by significance::Config::write => [significance::Row];
     /// One picture by brute force, KD-tree and trees.
-    "pictures" => Pictures(pictures::Config) by pictures::Config::write => [pictures::Tests, pictures::Times];
+    "pictures" => Pictures(pictures::Config: methods) by pictures::Config::write => [pictures::Tests, pictures::Times];
     /// Tests of rays in trees that are trained on rays.
-    "ray_cost" => RayCost(ray_cost::Config) by ray_cost::Config::write => [ray_cost::Compared, ray_cost::Paired, ray_cost::Speed];
+    "ray_cost" => RayCost(ray_cost::Config: base, pairs) by ray_cost::Config::write
+        => [ray_cost::Compared, ray_cost::Paired, ray_cost::Speed];
     /// Tests of rays against the time in which trees are made.
-    "ray_time" => RayTime(ray_time::Config) by ray_time::Config::write => [ray_time::Point];
+    "ray_time" => RayTime(ray_time::Config: base, series) by ray_time::Config::write => [ray_time::Point];
     /// Cost against build time and against time per ray.
-    "pareto" => Pareto(config::Methods) by pareto::write => [pareto::Point];
+    "pareto" => Pareto(config::Methods: methods) by pareto::write => [pareto::Point];
     /// Other libraries beside ours.
-    "peers" => Peers(peers::Config) by peers::Config::write => [peers::Comparison];
+    "peers" => Peers(peers::Config: methods, ours) by peers::Config::write => [peers::Comparison];
     /// Speed of rays by tree, layout and kind of rays, and how well the cost predicts it.
-    "traversal" => Traversal(config::Methods) by traversal::write => [traversal::Rank, traversal::Speed];
+    "traversal" => Traversal(config::Methods: methods) by traversal::write => [traversal::Rank, traversal::Speed];
     /// What leaving something out saves.
-    "omissions" => Omissions(omissions::Config) by omissions::Config::write => [omissions::Compared, omissions::Times];
+    "omissions" => Omissions(omissions::Config: pairs) by omissions::Config::write => [omissions::Compared, omissions::Times];
 }
 
 impl Report {
-    /// The labels of the methods that the report names, each with its key.
-    pub fn labels(&self) -> Vec<(String, &str)> {
-        fn list<'a>(key: &str, labels: &'a [String]) -> Vec<(String, &'a str)> {
-            let keyed = |(at, label): (usize, &'a String)| (format!("{key}[{at}]"), label.as_str());
-            labels.iter().enumerate().map(keyed).collect()
-        }
-        let (methods, others): (&[String], Vec<(String, &str)>) = match self {
-            Self::Estimator(config) | Self::Correlation(config) => (&config.methods, vec![]),
-            Self::Distribution(config) => (&config.methods, vec![]),
-            Self::Variations(config) => (&config.methods, vec![]),
-            Self::Pareto(config) | Self::Traversal(config) => (&config.methods, vec![]),
-            Self::RunTimes(config) | Self::Ecdf(config) => (&config.methods, vec![]),
-            Self::Profile(config) | Self::TimeToTarget(config) => (&config.methods, vec![]),
-            Self::RayTime(config) => (&[], config.labels()),
-            Self::RayCost(config) => {
-                let pairs = config.pairs.iter().enumerate();
-                let pairs = pairs.flat_map(|(at, pair)| list(&format!("pairs[{at}]"), pair));
-                (&[], [("base".into(), config.base.as_str())].into_iter().chain(pairs).collect())
-            }
-            Self::Trials(config) => (&config.methods, vec![]),
-            Self::Times(config) => (&config.methods, vec![]),
-            Self::RayTests(config) => (&config.methods, vec![]),
-            Self::Anytime(config) => (&config.methods, vec![]),
-            Self::Numbers(config) => (&config.methods, vec![]),
-            Self::Pictures(config) => (&config.methods, vec![]),
-            Self::Gaps(config) => (&config.methods, vec![("optimum".into(), &config.optimum)]),
-            Self::Peers(config) => (&config.methods, vec![("ours".into(), &config.ours)]),
-            Self::Generations(config) => {
-                (&[], vec![("method".into(), &config.method), ("baseline".into(), &config.baseline)])
-            }
-            Self::Significance(config) => {
-                let against = list("against", &config.against);
-                (&[], against.into_iter().chain([("method".into(), config.method.as_str())]).collect())
-            }
-            Self::Table(config) => {
-                let column = |at: usize| (format!("columns[{at}].method"), config.columns[at].method.as_str());
-                (&[], (0..config.columns.len()).map(column).collect())
-            }
-            Self::Omissions(config) => {
-                let pair = |at: usize| {
-                    let pair = &config.pairs[at];
-                    [(format!("pairs[{at}].out"), pair.out.as_str()), (format!("pairs[{at}].kept"), &pair.kept)]
-                };
-                (&[], (0..config.pairs.len()).flat_map(pair).collect())
-            }
-        };
-        list("methods", methods).into_iter().chain(others).collect()
-    }
-
     /// Whether the report asks when events happened.
     pub fn needs_clock(&self) -> bool {
         self.needs_references()
@@ -232,11 +192,10 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
     Ok(outputs)
 }
 
-/// Writes what the reports make from the CSV files in the store's folder. Returns the text for the terminal, which
-/// [`TEXT_FILE`] keeps. Figures are written only if they are `drawn`.
-pub fn write_all(reports: &[Report], store: &Store, drawn: bool) -> Result<String, Error> {
-    let outputs = outputs(reports, store.folder())?;
-    for output in &outputs {
+/// Writes what reports have made into the store's folder. Returns the text for the terminal, which [`TEXT_FILE`] keeps.
+/// Figures are written only if they are `drawn`.
+pub fn write_all(outputs: &[Output], store: &Store, drawn: bool) -> Result<String, Error> {
+    for output in outputs {
         for (name, bytes) in &output.csv {
             store.write(&format!("{name}.csv"), bytes)?;
         }
@@ -277,15 +236,15 @@ fn final_costs(rows: &Rows) -> Result<Output, Error> {
     let pairs = rows.scenes().into_iter().flat_map(|scene| methods.iter().map(move |method| (scene, *method)));
     let table: Vec<Row> = pairs.map(row).collect();
     let mut output = Output::new("", "Final costs");
-    let columns = ["scene", "method", "runs", "least_over_base", "median_over_base", "median_seconds"];
-    output.show("Cost over that of the greedy tree:", &table, &columns)?;
+    let columns = "scene method runs least_over_base median_over_base median_seconds";
+    output.show("Cost over that of the greedy tree:", &table, columns)?;
     Ok(output)
 }
 
 /// The names of the series that a figure shows.
 fn series(figure: &Figure) -> BTreeSet<String> {
     let layers = figure.panels.iter().flat_map(|panel| &panel.layers);
-    layers.filter_map(Layer::name).map(str::to_owned).collect()
+    layers.filter_map(Layer::series).map(str::to_owned).collect()
 }
 
 /// The looks of an experiment's methods, the same in all its figures. If there are more methods than colours, those that share
@@ -313,8 +272,8 @@ fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
     output.reading = format!("Numbers of the paper: {}. {outcome} {reasons}", numbers.len());
     output.outcome = Some(outcome);
     output.add_csv("paper", rows)?;
-    let columns = ["scene", "quantity", "paper", "ours", "ours_low", "ours_high", "verdict"];
-    output.show("What the paper says beside ours, which lies between low and high:", rows, &columns)?;
+    let columns = "scene quantity paper ours ours_low ours_high verdict";
+    output.show("What the paper says beside ours, which lies between low and high:", rows, columns)?;
     Ok(output)
 }
 

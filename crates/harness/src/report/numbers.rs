@@ -103,19 +103,11 @@ impl Config {
         output.add_csv("timing_numbers", &timing)?;
         let explanation =
             "Gaps are to the exact optimum or the best known cost; the lower bound is relative to that:";
-        let columns = [
-            "scene",
-            "method",
-            "runs",
-            "cost_over_base_median",
-            "gap_quartile_1",
-            "gap_median",
-            "gap_quartile_3",
-            "lower_bound_over_reference",
-        ];
-        output.show(explanation, &numbers, &columns)?;
+        let columns = "scene method runs cost_over_base_median gap_quartile_1 gap_median gap_quartile_3 \
+                       lower_bound_over_reference";
+        output.show(explanation, &numbers, columns)?;
         let explanation = "The primal integral is the mean gap over the longest run's time:";
-        output.show(explanation, &timing, &["scene", "method", "seconds_median", "primal_integral"])?;
+        output.show(explanation, &timing, "scene method seconds_median primal_integral")?;
         if !rows.bounds.is_empty() {
             let caption = "Over the least known cost of the scene: the proven lower bound, below which no tree is, and the median \
                            cost of every method's runs.";
@@ -137,17 +129,16 @@ impl Config {
 impl Config {
     /// The lower bound and every method's cost on every scene, over the least known cost.
     fn draw(&self, rows: &Rows, numbers: &[Numbers]) -> Panel {
-        let bars =
-            |name: &str, values: Vec<f64>| Layer::Bars { name: name.into(), values, spread: vec![], base: 0.0 };
         let bound = |scene: &str| rows.reference(scene).and_then(|row| Some(ratio(row.lower_bound?, row.cost)));
         let bounds = rows.scenes().into_iter().map(|scene| bound(scene).unwrap_or(f64::NAN)).collect();
         let cost = |method: &String| {
             let own = |scene: &str| numbers.iter().find(|row| row.scene == scene && row.method == method);
             let scenes = rows.scenes().into_iter();
-            bars(method, scenes.map(|scene| own(scene).map_or(f64::NAN, |row| 1.0 + row.gap_median)).collect())
+            let values = scenes.map(|scene| own(scene).map_or(f64::NAN, |row| 1.0 + row.gap_median));
+            Layer::bars(method, values.collect(), 0.0)
         };
-        let layers =
-            std::iter::once(bars("lower bound", bounds)).chain(self.methods.iter().map(cost)).collect();
+        let bounds = Layer::bars("lower bound", bounds, 0.0);
+        let layers = std::iter::once(bounds).chain(self.methods.iter().map(cost)).collect();
         panel("", Axis::categories("", rows.all_shown()), Axis::linear("cost / least known"), layers)
     }
 }

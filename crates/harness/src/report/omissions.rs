@@ -1,10 +1,10 @@
 //! The ablation of what scenes do not need: that leaving it out changes no cost, and what it saves.
 
-use super::config::OneOrMore;
+use super::config::{Labels, OneOrMore};
 use super::data::{Rows, ratio};
 use super::output::{Output, each, panel};
 use crate::Error;
-use crate::figures::{Axis, Layer, Panel};
+use crate::figures::{Axis, Layer, Marks, Panel};
 use crate::run::rows::RunRow;
 use crate::statistics::{quartiles, range};
 use schemars::JsonSchema;
@@ -31,6 +31,12 @@ bvh_build::config! { serde;
         kept: String;
         /// Whether the cost may be lower with it left out, an optimum being in the place of a search.
         may_be_lower: bool = false;
+    }
+}
+
+impl Labels for Pair {
+    fn labels(&self, key: &str) -> Vec<(String, &str)> {
+        [self.out.labels(&format!("{key}.out")), self.kept.labels(&format!("{key}.kept"))].concat()
     }
 }
 
@@ -73,10 +79,10 @@ impl Config {
         output.add_csv("timing_omissions", &times)?;
         let caption = "Ratios repetition by repetition: median, and from quartile to quartile.";
         output.add_figure("timing_omissions", caption, 1, vec![self.draw(rows, &times)]);
-        let columns = ["omission", "scene", "runs", "same_cost", "cost_ratio", "work_ratio"];
-        output.show("Cost and work with it left out over those without:", &compared, &columns)?;
-        let columns = ["omission", "scene", "ratio_low", "ratio_median", "ratio_high"];
-        output.show("Time with it left out over time without, median and quartiles:", &times, &columns)?;
+        let columns = "omission scene runs same_cost cost_ratio work_ratio";
+        output.show("Cost and work with it left out over those without:", &compared, columns)?;
+        let columns = "omission scene ratio_low ratio_median ratio_high";
+        output.show("Time with it left out over time without, median and quartiles:", &times, columns)?;
         let other = compared.iter().filter(|row| !row.same_cost).count();
         let saved = each(&self.pairs, |pair| {
             let own = times.iter().filter(|row| row.omission == pair.name).map(|row| row.ratio_median);
@@ -100,10 +106,10 @@ impl Config {
             let offset = 0.8 * ((index as f64 + 0.5) / pairs - 0.5);
             let own = times.iter().filter(|times| times.omission == pair.name).enumerate();
             let points = own.map(|(at, t)| (at as f64 + offset, t.ratio_low, t.ratio_median, t.ratio_high));
-            Layer::ErrorBars { name: pair.name.clone(), points: points.collect() }
+            Layer::new(&pair.name, Marks::ErrorBars(points.collect()))
         };
         let mut layers: Vec<Layer> = self.pairs.iter().enumerate().map(bars).collect();
-        layers.push(Layer::HLine { y: 1.0, label: "nothing left out".into() });
+        layers.push(Layer::new("nothing left out", Marks::HLine(1.0)));
         let y = Axis::log("time / time without leaving it out");
         panel("", Axis::categories("", rows.scenes().into_iter().map(str::to_owned).collect()), y, layers)
     }

@@ -77,15 +77,16 @@ impl Output {
         self.tables.push((explanation.into(), table));
     }
 
-    /// Adds a table of some columns of a CSV file's rows, under the columns' names, numbers with four digits.
-    pub fn show(&mut self, explanation: &str, rows: &[impl Serialize], columns: &[&str]) -> Result<(), Error> {
+    /// Adds a table of some columns of a CSV file's rows, numbers with four digits. `columns` are their names with blanks
+    /// between them.
+    pub fn show(&mut self, explanation: &str, rows: &[impl Serialize], columns: &str) -> Result<(), Error> {
         let path = Path::new("table");
         let bytes = to_bytes(rows, path)?;
         let mut reader = csv::Reader::from_reader(bytes.as_slice());
         let header = reader.headers().map_err(Error::csv(path))?.clone();
         let shown: Vec<usize> =
-            columns.iter().filter_map(|column| header.iter().position(|name| name == *column)).collect();
-        let mut table = text_table(columns.iter().copied());
+            columns.split(' ').filter_map(|column| header.iter().position(|name| name == column)).collect();
+        let mut table = text_table(columns.split(' '));
         for record in reader.records() {
             let record = record.map_err(Error::csv(path))?;
             table.add_row(shown.iter().map(|&at| four_digits(&record[at])));
@@ -177,7 +178,7 @@ mod tests {
             gap: f64,
         }
         let mut output = Output::new("", "title");
-        output.show("Gaps:", &[Row { scene: "escher", hidden: 77, gap: 0.5 }], &["gap", "scene"]).unwrap();
+        output.show("Gaps:", &[Row { scene: "escher", hidden: 77, gap: 0.5 }], "gap scene").unwrap();
         let text = output.text();
         assert!(
             ["title\n\nGaps:\n", "gap", "0.5000", "escher"].iter().all(|part| text.contains(part)),

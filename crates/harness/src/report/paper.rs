@@ -79,7 +79,7 @@ impl PaperRow {
             if same { verdicts[0] } else { Verdict::CannotBeTold },
             format!("within {} % of the paper's, and on the same side of 1", 100.0 * tolerance),
         );
-        let [ours_low, ours_high] = [low, high].map(|end| interval.map(|_| end));
+        let (ours_low, ours_high) = interval.unzip();
         Self { paper_over_base: Some(paper), ours_over_base: Some(ours), ours_low, ours_high, ..row }
     }
 }

@@ -5,7 +5,7 @@ use super::data::Rows;
 use super::metric::Metric;
 use super::output::{Output, panel};
 use crate::Error;
-use crate::figures::Layer;
+use crate::figures::{Layer, Marks};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -33,12 +33,9 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
         for point in &mut own {
             point.on_front = front.contains(&(point.build_seconds, point.cost_over_base));
         }
-        let layer = |point: &Point, x| {
-            let points = vec![(x, point.cost_over_base)];
-            Layer::Points { name: point.method.to_owned(), points }
-        };
+        let layer = |point: &Point, x| Layer::new(point.method, Marks::Points(vec![(x, point.cost_over_base)]));
         let mut layers: Vec<Layer> = own.iter().map(|point| layer(point, point.build_seconds)).collect();
-        layers.push(Layer::Steps { name: "best so far".into(), points: front });
+        layers.push(Layer::new("best so far", Marks::Steps(front)));
         let cost = || Metric::CostOverBase.axis();
         builds.push(panel(rows.shown(scene), Metric::BuildSeconds.axis(), cost(), layers));
         let traced = own.iter().filter_map(|point| Some(layer(point, point.ns_per_ray?))).collect();

@@ -54,20 +54,9 @@ impl Config {
         }
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("timing_peers", &comparisons)?;
-        let columns = [
-            "scene",
-            "method",
-            "build_seconds",
-            "cost_over_base",
-            "rays",
-            "layout",
-            "mrays_per_second",
-            "ours_over_this",
-            "missed_hits",
-            "false_hits",
-            "other_hits",
-        ];
-        output.show("Each method by its fastest layout, on one thread:", &comparisons, &columns)?;
+        let columns = "scene method build_seconds cost_over_base rays layout mrays_per_second ours_over_this \
+                       missed_hits false_hits other_hits";
+        output.show("Each method by its fastest layout, on one thread:", &comparisons, columns)?;
         output.reading = self.reading(&comparisons);
         Ok(output)
     }

@@ -5,7 +5,7 @@ use super::config::OneOrMore;
 use super::data::Rows;
 use super::output::{Output, panel};
 use crate::Error;
-use crate::figures::{Axis, Layer, Panel};
+use crate::figures::{Axis, Layer, Marks, Panel};
 use crate::render::experiment::BASELINES;
 use crate::run::rows::RenderRow;
 use crate::statistics::median;
@@ -88,11 +88,10 @@ impl Config {
         let panels = scenes.iter().map(|scene| draw_times(rows, scene, &times)).collect();
         output.add_figure("timing_pictures", caption, 3, panels);
         output.set_reference(DOCUMENT);
-        let columns = ["scene", "method", "boxes_per_ray", "objects_per_ray", "brute_force_over_tests"];
-        output.show("Tests per ray:", &tests, &columns)?;
-        let columns =
-            ["scene", "method", "render_seconds", "speed_up", "document_seconds", "document_speed_up"];
-        output.show("Seconds of one picture on one thread:", &times, &columns)?;
+        let columns = "scene method boxes_per_ray objects_per_ray brute_force_over_tests";
+        output.show("Tests per ray:", &tests, columns)?;
+        let columns = "scene method render_seconds speed_up document_seconds document_speed_up";
+        output.show("Seconds of one picture on one thread:", &times, columns)?;
         output.reading = reading(&tests, &times);
         Ok(output)
     }
@@ -162,7 +161,7 @@ fn draw_tests(rows: &Rows, scene: &str, tests: &[Tests]) -> Panel {
     let own: Vec<&Tests> = tests.iter().filter(|row| row.scene == scene).collect();
     let bars = |name: &str, value: fn(&Tests) -> f64| {
         let values = own.iter().map(|row| value(row)).collect();
-        Layer::Bars { name: name.into(), spread: vec![], values, base: 0.1 }
+        Layer::bars(name, values, 0.1)
     };
     let layers =
         vec![bars("boxes or cells", |row| row.boxes_per_ray), bars("objects", |row| row.objects_per_ray)];
@@ -174,10 +173,7 @@ fn draw_times(rows: &Rows, scene: &str, times: &[Times]) -> Panel {
     let own: Vec<&Times> = times.iter().filter(|row| row.scene == scene).collect();
     let theirs = own.iter().enumerate().filter_map(|(at, row)| Some((at as f64, row.document_speed_up?)));
     let values = own.iter().map(|row| row.speed_up).collect();
-    let layers = vec![
-        Layer::Bars { name: "ours".into(), values, spread: vec![], base: 1.0 },
-        Layer::Points { name: DOCUMENT.into(), points: theirs.collect() },
-    ];
+    let layers = vec![Layer::bars("ours", values, 1.0), Layer::new(DOCUMENT, Marks::Points(theirs.collect()))];
     let x = Axis::categories("", own.iter().map(|row| row.method.to_owned()).collect());
     panel(rows.shown(scene), x, Axis::log("speed-up over brute force"), layers)
 }

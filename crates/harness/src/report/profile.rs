@@ -7,7 +7,7 @@ use super::data::Rows;
 use super::output::{Output, each, panel};
 use super::progress::ProgressAxis;
 use crate::Error;
-use crate::figures::{Axis, Layer, Panel};
+use crate::figures::{Axis, Layer, Marks, Panel};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -66,7 +66,7 @@ fn draw(config: &Targets, table: &[Row], problems: usize, axis: ProgressAxis) ->
         let own = table.iter().filter(|row| row.method == method);
         let mut ratios: Vec<f64> = own.filter_map(|row| row.ratio_to_fastest).collect();
         ratios.sort_by(f64::total_cmp);
-        Layer::Steps { name: method.clone(), points: profile(&ratios, problems, end) }
+        Layer::new(method, Marks::Steps(profile(&ratios, problems, end)))
     };
     let x = Axis::log(format!("{} over that of the fastest method", axis.label())).range(1.0, end);
     let y = Axis::linear("fraction of problems").range(0.0, 1.02);

@@ -3,7 +3,7 @@
 use super::data::{Rows, distinct};
 use super::output::{Output, panel, tally};
 use crate::Error;
-use crate::figures::{Axis, Layer, Panel};
+use crate::figures::{Axis, Layer, Marks, Panel};
 use crate::run::rows::{TestRow, TestTimeRow};
 use crate::statistics::{geometric_mean, student};
 use schemars::JsonSchema;
@@ -91,17 +91,8 @@ impl Config {
         let panels = rows.scenes().into_iter().map(|scene| self.draw(rows.shown(scene), scene, &table));
         let panels = panels.chain([self.draw(ALL.into(), ALL, &table)]).collect();
         output.add_figure("ray_cost", caption, 2, panels);
-        let columns = [
-            "scene",
-            "tree",
-            "trained_on",
-            "judged_on",
-            "camera",
-            "over_base_low",
-            "tests_over_base",
-            "over_base_high",
-        ];
-        output.show(&format!("Tests per ray over those of {}:", self.base), &table, &columns)?;
+        let columns = "scene tree trained_on judged_on camera over_base_low tests_over_base over_base_high";
+        output.show(&format!("Tests per ray over those of {}:", self.base), &table, columns)?;
         let speeds = self.speeds(rows);
         if !speeds.is_empty() {
             output.add_csv("timing_ray_cost", &speeds)?;
@@ -110,18 +101,8 @@ impl Config {
         let paired: Vec<Paired> = self.pairs.iter().flat_map(|pair| paired(rows, pair)).collect();
         if !paired.is_empty() {
             output.add_csv("ray_cost_pairs", &paired)?;
-            let columns = [
-                "scene",
-                "method",
-                "against",
-                "judged_on",
-                "camera",
-                "low",
-                "tests_over_other",
-                "high",
-                "verdict",
-            ];
-            output.show("Tests per ray over those of another method:", &paired, &columns)?;
+            let columns = "scene method against judged_on camera low tests_over_other high verdict";
+            output.show("Tests per ray over those of another method:", &paired, columns)?;
             for pair in &self.pairs {
                 output.reading += &verdicts(&paired, pair);
             }
@@ -141,7 +122,7 @@ impl Config {
                 (row.tests_over_base, ends.unwrap_or((row.tests_over_base, row.tests_over_base)))
             };
             let (values, spread) = of_tree.map(bar).collect();
-            Layer::Bars { name: tree_name(tree, trained_on), values, spread, base: 1.0 }
+            Layer::new(tree_name(tree, trained_on), Marks::Bars { values, spread, base: 1.0 })
         };
         let layers = trees.iter().filter(|(tree, _)| *tree != self.base).map(bars).collect();
         let categories = judged.iter().map(|(kind, camera)| match *camera {

@@ -6,7 +6,7 @@ use super::metric::Metric;
 use super::output::{Output, each, panel};
 use super::paper::PaperRow;
 use crate::Error;
-use crate::figures::{Axis, Layer, Panel};
+use crate::figures::{Axis, Layer, Marks, Panel};
 use crate::run::rows::RayRow;
 use crate::statistics::{median, range};
 use bvh_build::config::above;
@@ -81,18 +81,9 @@ impl Config {
         output.add_figure("ray_tests", caption, 2, panels);
         output.set_reference(PAPER);
         output.paper = self.compare(rows, &table);
-        let columns = [
-            "scene",
-            "method",
-            "family",
-            "query",
-            "boxes_low",
-            "boxes_per_ray",
-            "boxes_high",
-            "boxes_over_first",
-            "paper_boxes_per_ray",
-        ];
-        output.show("Box tests per ray with 95 % intervals:", &table, &columns)?;
+        let columns =
+            "scene method family query boxes_low boxes_per_ray boxes_high boxes_over_first paper_boxes_per_ray";
+        output.show("Box tests per ray with 95 % intervals:", &table, columns)?;
         output.reading = self.reading(&table);
         Ok(output)
     }
@@ -152,12 +143,12 @@ impl Config {
             let own = table.iter().filter(|row| (row.scene, row.family, row.query) == (scene, family, query));
             let bar = |row: &Measured| (row.boxes_per_ray, (row.boxes_low, row.boxes_high));
             let (values, spread) = own.map(bar).collect();
-            Layer::Bars { name: format!("{family}, {query}"), values, spread, base: 0.0 }
+            Layer::new(format!("{family}, {query}"), Marks::Bars { values, spread, base: 0.0 })
         };
         let paper = |kind: &(&str, &str)| {
             let paper = self.paper.get(scene).filter(|_| *kind == OF_PAPER)?;
             let values = (0..self.methods.len()).map(|at| paper.get(at).copied().unwrap_or(f64::NAN)).collect();
-            Some(Layer::Bars { name: PAPER.into(), values, spread: vec![], base: 0.0 })
+            Some(Layer::bars(PAPER, values, 0.0))
         };
         // The paper's bars stand beside ours for the same kind of rays.
         let with_paper = |kind: (&'_ str, &'_ str)| std::iter::once(bars(kind)).chain(paper(&kind));

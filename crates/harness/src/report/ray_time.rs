@@ -1,11 +1,11 @@
 //! What a tree's rays save for the time of its search: tests per ray against seconds.
 
-use super::config::OneOrMore;
+use super::config::{Labels, OneOrMore};
 use super::data::Rows;
 use super::metric::Metric;
 use super::output::{Output, each, panel};
 use crate::Error;
-use crate::figures::{Axis, Layer};
+use crate::figures::{Axis, Layer, Marks};
 use crate::statistics::{geometric_mean, minimum};
 use bvh_build::config::Itself;
 use schemars::JsonSchema;
@@ -35,6 +35,12 @@ bvh_build::config! { serde;
     }
 }
 
+impl Labels for Series {
+    fn labels(&self, key: &str) -> Vec<(String, &str)> {
+        self.methods.labels(&format!("{key}.methods"))
+    }
+}
+
 /// A point, as written to `timing_ray_time.csv`.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Point<'a> {
@@ -59,8 +65,8 @@ impl Config {
                 own.sort_by(|a, b| a.build_seconds.total_cmp(&b.build_seconds));
                 let line: Vec<_> =
                     own.iter().map(|point| (point.build_seconds, point.tests_over_base)).collect();
-                layers.push(Layer::Line { name: series.name.clone(), points: line.clone() });
-                layers.push(Layer::Points { name: series.name.clone(), points: line });
+                layers.push(Layer::new(&series.name, Marks::Line(line.clone())));
+                layers.push(Layer::new(&series.name, Marks::Points(line)));
                 points.extend(own);
             }
             let y = Axis::linear("tests per ray over greedy");
@@ -71,8 +77,8 @@ impl Config {
         let caption = "Primary, bounce and shadow rays of a path of cameras, none of which any tree was trained on; tests of nodes \
                        and blocks in the wide layout. One thread; the time for rays includes tracing those of the training.";
         output.add_figure("timing_ray_time", caption, 2, panels);
-        let columns = ["scene", "series", "method", "build_seconds", "tests_over_base"];
-        output.show("Tests per ray against time:", &points, &columns)?;
+        let columns = "scene series method build_seconds tests_over_base";
+        output.show("Tests per ray against time:", &points, columns)?;
         let best = each(&self.series, |series| {
             let own = |scene: &&str| {
                 let own = points.iter().filter(|point| point.scene == *scene && point.series == series.name);
@@ -110,15 +116,5 @@ impl Config {
             build_seconds: rows.build_seconds(scene, method)?,
             tests_over_base: geometric_mean(&ratios),
         })
-    }
-
-    /// The labels of the methods, each with its key.
-    pub(super) fn labels(&self) -> Vec<(String, &str)> {
-        let of = |at: usize| {
-            let methods = self.series[at].methods.iter().enumerate();
-            methods.map(move |(number, label)| (format!("series[{at}].methods[{number}]"), label.as_str()))
-        };
-        let base = [("base".into(), self.base.as_str())];
-        base.into_iter().chain((0..self.series.len()).flat_map(of)).collect()
     }
 }

@@ -9,7 +9,7 @@ use super::data::Rows;
 use super::output::{Output, each, panel};
 use super::progress::ProgressAxis;
 use crate::Error;
-use crate::figures::{Axis, Layer, Panel};
+use crate::figures::{Axis, Layer, Marks, Panel};
 use crate::statistics::time_to_target::ShiftedExponential;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -66,8 +66,8 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
         let fits: Vec<Fit> = attempts.iter().map(fit).collect();
         axis.add_csv(&mut output, "run_times_fit", &fits)?;
         if axis == ProgressAxis::Seconds {
-            let columns = ["scene", "target", "method", "runs", "solved", "median", "shift", "mean"];
-            output.show("Seconds until the target is reached:", &fits, &columns)?;
+            let columns = "scene target method runs solved median shift mean";
+            output.show("Seconds until the target is reached:", &fits, columns)?;
             output.reading = reading(config, &fits);
         }
     }
@@ -116,8 +116,7 @@ fn fit<'a>(attempt: &Attempt<'a>) -> Fit<'a> {
 
 /// All methods on one problem, with the fitted distributions on top.
 fn draw(problem: &[Attempt], axis: ProgressAxis) -> Panel {
-    let curve =
-        |attempt: &Attempt| Layer::Steps { name: attempt.method.to_owned(), points: distribution(attempt) };
+    let curve = |attempt: &Attempt| Layer::new(attempt.method, Marks::Steps(distribution(attempt)));
     let laws = problem.iter().filter_map(|Attempt { solved, runs, .. }| {
         Some(fitted_curve(&ShiftedExponential::fit(solved, *runs)?, *solved.first()?, *solved.last()?))
     });
@@ -131,7 +130,7 @@ fn fitted_curve(law: &ShiftedExponential, first: f64, last: f64) -> Layer {
     const POINTS: u32 = 60;
     let place = |step: u32| first * (last / first).powf(f64::from(step) / f64::from(POINTS));
     let points = (0..=POINTS).map(place).map(|x| (x, law.probability(x))).collect();
-    Layer::Line { name: FIT.into(), points }
+    Layer::new(FIT, Marks::Line(points))
 }
 
 /// How often each method reached the last target, which is the hardest in most specs.

@@ -98,8 +98,8 @@ impl Config {
         output.add_csv("significance", &table)?;
         let explanation =
             format!("Cost of '{}' against that of others, p-values by Holm's correction:", self.method);
-        let columns = ["scene", "against", "test", "p_value", "holm_p_value", "a12", "verdict"];
-        output.show(&explanation, &table, &columns)?;
+        let columns = "scene against test p_value holm_p_value a12 verdict";
+        output.show(&explanation, &table, columns)?;
         output.reading = self.reading(&table);
         Ok(output)
     }

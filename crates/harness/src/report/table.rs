@@ -1,11 +1,11 @@
 //! The paper's tables: ratios to base, scenes by columns, ours beside the paper's.
 
-use super::config::OneOrMore;
+use super::config::{Labels, OneOrMore};
 use super::data::Rows;
 use super::output::{Output, panel, tally, text_table};
 use super::paper::{PaperRow, Verdict};
 use crate::Error;
-use crate::figures::{Axis, Layer, Panel};
+use crate::figures::{Axis, Layer, Marks, Panel};
 use crate::statistics::{expected_best_of, median, minimum, range, spread_of_best};
 use bvh_build::config::{Accepts, Itself, above};
 use schemars::JsonSchema;
@@ -41,6 +41,12 @@ bvh_build::config! { serde;
         paper: BTreeMap<String, f64>, in above(0.0);
         /// Why ours differs, where it does.
         reason: String;
+    }
+}
+
+impl Labels for Column {
+    fn labels(&self, key: &str) -> Vec<(String, &str)> {
+        self.method.labels(&format!("{key}.method"))
     }
 }
 
@@ -101,6 +107,7 @@ impl Config {
             Some(m) => spread_of_best(&pool, m),
             None => range(results.iter().copied()).filter(|(low, high)| low < high),
         };
+        let (low_over_base, high_over_base) = interval.unzip();
         Some(Cell {
             scene,
             scene_kind: rows.kind(scene),
@@ -109,8 +116,8 @@ impl Config {
             best_of: column.best_of,
             cost_over_base: median(&results)?,
             expected_over_base: column.best_of.and_then(|m| expected_best_of(&pool, m)),
-            low_over_base: interval.map(|(low, _)| low),
-            high_over_base: interval.map(|(_, high)| high),
+            low_over_base,
+            high_over_base,
             paper_over_base: self.paper_ratio(column, scene),
         })
     }
@@ -164,7 +171,7 @@ impl Config {
             let of = |scene| cells.iter().find(|cell| cell.scene == scene && cell.column == column.name);
             let scenes = rows.scenes().into_iter();
             let values = scenes.map(|scene| of(scene).and_then(value).unwrap_or(f64::NAN)).collect();
-            Layer::Bars { name, values, spread, base: 1.0 }
+            Layer::new(name, Marks::Bars { values, spread, base: 1.0 })
         };
         // Columns that are readings of one column of the paper share its bars.
         let readings = columns().all(|column| column.paper == self.columns[1].paper);
@@ -182,7 +189,7 @@ impl Config {
             let name = format!("{}, ours", column.name);
             layers.push(bars(name, column, &|cell| Some(cell.cost_over_base), own.collect()));
         }
-        layers.push(Layer::HLine { y: 1.0, label: "greedy".into() });
+        layers.push(Layer::new("greedy", Marks::HLine(1.0)));
         // Readings of a heuristic that peel off one object at a time would hide all differences between the others.
         let theirs = cells.iter().filter_map(|cell| cell.paper_over_base).fold(1.0, f64::max);
         let outlying = cells.iter().any(|cell| cell.cost_over_base > MOST_OF_PAPER * theirs);

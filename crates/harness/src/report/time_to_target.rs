@@ -32,8 +32,8 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
         let table: Vec<Reached> = attempts(config, rows, axis).iter().map(reached).collect();
         axis.add_csv(&mut output, "to_target", &table)?;
         let explanation = format!("{} until the target is reached, over all runs:", axis.label());
-        let columns = ["scene", "target", "method", "runs", "solved", "median", "quantile_90"];
-        output.show(&explanation, &table, &columns)?;
+        let columns = "scene target method runs solved median quantile_90";
+        output.show(&explanation, &table, columns)?;
         if axis == ProgressAxis::Seconds {
             output.reading = reading(config, &table);
         }

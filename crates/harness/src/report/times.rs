@@ -4,7 +4,7 @@ use super::config::{OneOrMore, first, one_for_each};
 use super::data::Rows;
 use super::output::{Output, panel};
 use crate::Error;
-use crate::figures::{Axis, Layer, Panel};
+use crate::figures::{Axis, Layer, Marks, Panel};
 use crate::statistics::{median, quartiles, range};
 use bvh_build::config::above;
 use schemars::JsonSchema;
@@ -59,9 +59,8 @@ impl Config {
         let caption = "Median of the ratios repetition by repetition, whiskers from quartile to quartile.";
         output.add_figure("timing_times", caption, 1, vec![self.draw(rows, &ratios)]);
         let explanation = format!("Time over that of '{}', median and quartiles:", first(&self.methods));
-        let columns =
-            ["scene", "method", "median_seconds", "ratio_low", "ratio_median", "ratio_high", "paper_ratio"];
-        output.show(&explanation, &ratios, &columns)?;
+        let columns = "scene method median_seconds ratio_low ratio_median ratio_high paper_ratio";
+        output.show(&explanation, &ratios, columns)?;
         output.reading = self.reading(&ratios);
         Ok(output)
     }
@@ -97,17 +96,14 @@ impl Config {
         let mut layers = Vec::new();
         for method in self.methods.iter().skip(1) {
             let own: Vec<_> = ratios.iter().filter(|ratio| ratio.method == method).collect();
-            layers.push(Layer::Bars {
-                name: method.clone(),
-                values: own.iter().map(|ratio| ratio.ratio_median).collect(),
-                spread: own.iter().map(|ratio| (ratio.ratio_low, ratio.ratio_high)).collect(),
-                base: 1.0,
-            });
+            let values = own.iter().map(|ratio| ratio.ratio_median).collect();
+            let spread = own.iter().map(|ratio| (ratio.ratio_low, ratio.ratio_high)).collect();
+            layers.push(Layer::new(method, Marks::Bars { values, spread, base: 1.0 }));
             let paper = own.iter().enumerate().filter_map(|(at, ratio)| Some((at as f64, ratio.paper_ratio?)));
-            layers.push(Layer::Points { name: format!("{method}, paper"), points: paper.collect() });
+            layers.push(Layer::new(format!("{method}, paper"), Marks::Points(paper.collect())));
         }
         let first = first(&self.methods);
-        layers.push(Layer::HLine { y: 1.0, label: first.into() });
+        layers.push(Layer::new(first, Marks::HLine(1.0)));
         let y = Axis::linear(format!("time / time of '{first}'"));
         panel("", Axis::categories("", rows.all_shown()), y, layers)
     }

@@ -5,7 +5,7 @@ use super::data::Rows;
 use super::metric::Metric;
 use super::output::{Output, each, panel};
 use crate::Error;
-use crate::figures::Layer;
+use crate::figures::{Layer, Marks};
 use crate::run::rows::TraceRow;
 use crate::statistics::{median, pearson, range, spearman};
 use schemars::JsonSchema;
@@ -54,8 +54,8 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
                 timed_ranks.push(rank(setting, Metric::NsPerRay, &points));
                 let mut line = points.clone();
                 line.sort_by(|a, b| a.0.total_cmp(&b.0));
-                layers.push(Layer::Line { name: layout.into(), points: line });
-                layers.push(Layer::Points { name: layout.into(), points });
+                layers.push(Layer::new(layout, Marks::Line(line)));
+                layers.push(Layer::new(layout, Marks::Points(points)));
                 speeds.extend(own);
             }
             let title = format!("{}: {kind}", rows.shown(scene));
@@ -70,10 +70,10 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
                    total area of inner nodes over that of the greedy tree, which is too low for trees whose nodes have \
                    more than two children, as Goldsmith–Salmon's.";
     output.add_figure("timing_traversal", caption, 2, panels);
-    let columns = ["scene", "method", "layout", "rays", "cost_over_base", "mrays_per_second"];
-    output.show("Million rays per second on one thread:", &speeds, &columns)?;
-    let columns = ["scene", "layout", "rays", "trees", "spearman"];
-    output.show("Rank correlation of cost and time per ray over trees:", &timed_ranks, &columns)?;
+    let columns = "scene method layout rays cost_over_base mrays_per_second";
+    output.show("Million rays per second on one thread:", &speeds, columns)?;
+    let columns = "scene layout rays trees spearman";
+    output.show("Rank correlation of cost and time per ray over trees:", &timed_ranks, columns)?;
     output.reading = reading(&speeds, &timed_ranks);
     Ok(output)
 }

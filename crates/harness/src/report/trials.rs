@@ -5,7 +5,7 @@ use super::data::Rows;
 use super::output::{Output, panel, tally};
 use super::paper::{PaperRow, Verdict};
 use crate::Error;
-use crate::figures::{Axis, Layer};
+use crate::figures::{Axis, Layer, Marks};
 use crate::statistics::{expected_best_of, mean_interval, minimum};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -66,24 +66,21 @@ impl Config {
         for scene in rows.scenes() {
             let curves: Vec<Vec<Point>> =
                 self.methods.iter().map(|method| self.curve(rows, scene, method)).collect();
-            let values = |value: fn(&Point) -> f64| {
-                let line =
-                    move |curve: &Vec<Point>| curve.iter().map(|p| (p.trials as f64, value(p))).collect();
-                self.methods.iter().cloned().zip(curves.iter().map(line))
-            };
-            let single = values(|point| point.single_run_over_base);
-            let single: Vec<Layer> = single.map(|(name, points)| Layer::Steps { name, points }).collect();
-            let expected = values(|point| point.expected_over_base);
-            let mut expected: Vec<Layer> =
-                expected.map(|(name, points)| Layer::Line { name, points }).collect();
-            let has_interval = curves.iter().flatten().any(|point| point.expected_low.is_some());
-            for (name, curve) in self.methods.iter().zip(&curves).filter(|_| has_interval) {
-                let band = |point: &Point| (point.trials as f64, point.interval().0, point.interval().1);
-                let points = curve.iter().map(band).collect();
-                expected.push(Layer::Band { name: name.clone(), points });
+            let (mut single, mut expected, mut bands) = (Vec::new(), Vec::new(), Vec::new());
+            for (name, curve) in self.methods.iter().zip(&curves) {
+                let x = |point: &Point| point.trials as f64;
+                let steps = curve.iter().map(|point| (x(point), point.single_run_over_base)).collect();
+                single.push(Layer::new(name, Marks::Steps(steps)));
+                let line = curve.iter().map(|point| (x(point), point.expected_over_base)).collect();
+                expected.push(Layer::new(name, Marks::Line(line)));
+                let band = curve.iter().map(|point| (x(point), point.interval().0, point.interval().1));
+                bands.push(Layer::new(name, Marks::Band(band.collect())));
+            }
+            if curves.iter().flatten().any(|point| point.expected_low.is_some()) {
+                expected.extend(bands);
             }
             for (what, mut layers) in [("one run", single), ("expected", expected)] {
-                layers.push(Layer::HLine { y: 1.0, label: "greedy".into() });
+                layers.push(Layer::new("greedy", Marks::HLine(1.0)));
                 let (x, y) = (Axis::log("number of trials"), Axis::linear("best cost / base"));
                 panels.push(panel(format!("{}, {what}", rows.shown(scene)), x, y, layers));
             }
@@ -94,8 +91,8 @@ impl Config {
                        right, what is expected, with the 95 % interval of the mean over repetitions.";
         output.add_figure("trials", caption, 2, panels);
         let last: Vec<&Point> = points.iter().filter(|point| point.trials == self.best_of).collect();
-        let columns = ["scene", "method", "expected_over_base", "expected_low", "expected_high"];
-        output.show(&format!("Expected best of {} trials over base:", self.best_of), &last, &columns)?;
+        let columns = "scene method expected_over_base expected_low expected_high";
+        output.show(&format!("Expected best of {} trials over base:", self.best_of), &last, columns)?;
         output.reading = self.reading(&last);
         output.add_csv("trials", &points)?;
         Ok(output)
@@ -109,7 +106,7 @@ impl Config {
             let every: Vec<f64> =
                 repetitions.iter().filter_map(|costs| expected_best_of(costs, trials)).collect();
             let (expected_over_base, interval) = mean_interval(&every)?;
-            let (expected_low, expected_high) = (interval.map(|i| i.0), interval.map(|i| i.1));
+            let (expected_low, expected_high) = interval.unzip();
             Some(Point {
                 scene,
                 method,

@@ -5,7 +5,7 @@ use super::data::Rows;
 use super::output::{Output, each, panel};
 use super::paper::PaperRow;
 use crate::Error;
-use crate::figures::{Axis, Layer, Panel};
+use crate::figures::{Axis, Layer, Marks, Panel};
 use crate::statistics::{median, range};
 use bvh_build::config::above;
 use schemars::JsonSchema;
@@ -59,16 +59,8 @@ impl Config {
         let caption = "Median final cost over that of the first, whiskers over all pairs of runs.";
         output.add_figure("variations", caption, 1, vec![self.draw(rows, &table)]);
         output.paper = table.iter().filter_map(|row| self.compare(rows, row)).collect();
-        let columns = [
-            "scene",
-            "method",
-            "runs",
-            "over_first_low",
-            "cost_over_first",
-            "over_first_high",
-            "paper_over_first",
-        ];
-        output.show("Final costs over those of the first:", &table, &columns)?;
+        let columns = "scene method runs over_first_low cost_over_first over_first_high paper_over_first";
+        output.show("Final costs over those of the first:", &table, columns)?;
         output.reading = self.reading(&table);
         Ok(output)
     }
@@ -111,7 +103,7 @@ impl Config {
             let own = || table.iter().filter(move |row| row.scene == scene);
             let values = own().map(|row| row.cost_over_first).collect();
             let spread = own().map(|row| (row.over_first_low, row.over_first_high)).collect();
-            Layer::Bars { name: rows.shown(scene), values, spread, base: 1.0 }
+            Layer::new(rows.shown(scene), Marks::Bars { values, spread, base: 1.0 })
         };
         let layers = rows.scenes().into_iter().map(bars).collect();
         let y = Axis::linear(format!("final cost / {}", first(&self.methods)));

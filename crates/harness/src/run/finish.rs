@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::files;
+use crate::report::output::Output;
 use crate::report::{self, clocked};
 use crate::run::provenance::Provenance;
 use crate::run::reference::{self, BestKnown};
@@ -49,11 +50,18 @@ fn report(
 ) -> Result<String, Error> {
     store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
     reference::update(resolved, best_known, &provenance.revision, store)?;
-    if resolved.experiment.is_by_the_clock() {
-        return clocked::write(store, !resolved.experiment.quick);
-    }
+    let made = outputs(&resolved.experiment, store.folder())?;
     // Of quick variants, nothing but the rows is compared or shown.
-    report::write_all(&resolved.experiment.reports, store, !resolved.experiment.quick)
+    report::write_all(&made, store, !resolved.experiment.quick)
+}
+
+/// What is made of the CSV files in an experiment's folder. Writes nothing.
+pub fn outputs(experiment: &Experiment, folder: &Path) -> Result<Vec<Output>, Error> {
+    match &experiment.suite {
+        Some(measure) => Ok(vec![measure.output(folder)?]),
+        None if experiment.is_by_the_clock() => Ok(vec![clocked::output(folder)?]),
+        None => report::outputs(&experiment.reports, folder),
+    }
 }
 
 /// Makes the reports of finished runs again, with the best known costs of now. Runs nothing and loads no scene: the rows

@@ -282,13 +282,11 @@ impl Config {
 fn figure(rows: &[Row], timing: &[Timing]) -> Figure {
     let of = |kind: &'static str| rows.iter().filter(move |row| row.method == kind);
     let scenes: Vec<String> = of("f32").map(|row| row.scene.clone()).collect();
-    let bars =
-        |kind: &str, values: Vec<f64>| Layer::Bars { name: kind.into(), values, spread: vec![], base: 0.0 };
     let panel = |title: &str, label: &str, value: &dyn Fn(&'static str) -> Vec<f64>| Panel {
         title: title.into(),
         x: Axis::categories("", scenes.clone()),
         y: Axis::linear(label),
-        layers: ["f32", "f64"].map(|kind| bars(kind, value(kind))).into(),
+        layers: ["f32", "f64"].map(|kind| Layer::bars(kind, value(kind), 0.0)).into(),
     };
     let wrong = |kind| of(kind).map(|row| 100.0 * row.wrong_fraction).collect();
     let cost = |kind| of(kind).map(|row| 100.0 * (row.cost_over_exact - 1.0)).collect();
@@ -333,8 +331,8 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
         of("f32"),
         of("f64")
     );
-    let columns = ["scene", "method", "decisions", "wrong", "undecided", "cost_over_exact"];
-    output.show("Decisions at the nodes of the exact tree:", &rows, &columns)?;
+    let columns = "scene method decisions wrong undecided cost_over_exact";
+    output.show("Decisions at the nodes of the exact tree:", &rows, columns)?;
     output.figures.push(("timing_precision".into(), figure(&rows, &timing)));
     Ok(output)
 }

@@ -303,7 +303,7 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     );
     let bad: Vec<&Row> = own.iter().chain(&peers).filter(is_bad).collect();
     if !bad.is_empty() {
-        output.show("Broken promises:", &bad, &["scene", "method", "outcome", "note"])?;
+        output.show("Broken promises:", &bad, "scene method outcome note")?;
     }
     Ok(output)
 }
