@@ -102,11 +102,9 @@ pub(crate) fn children(tree: &Bvh, decisions: &[Decision], subtree: usize) -> ([
 /// no rays are sampled.
 fn promise(tree: &Bvh, triangles: &[Triangle], visits: &[f32], decisions: &[Decision]) -> Vec<f32> {
     let mut areas = vec![0.0f64; tree.nodes.len()];
-    // Of a triangle in several leaves, each is taken to have the same part.
-    let mut leaves = vec![0u32; triangles.len()];
-    tree.prim_ids.iter().for_each(|&id| leaves[id as usize] += 1);
     for (index, node) in tree.nodes.iter().enumerate().rev() {
-        let own = |&id: &u32| triangles[id as usize].area() / f64::from(leaves[id as usize]);
+        // A leaf tests all of a triangle, though only a part of it may be in its box.
+        let own = |&id: &u32| triangles[id as usize].area();
         areas[index] = tree.prim_ids[node.prims()].iter().map(own).sum::<f64>()
             + areas[node.children()].iter().sum::<f64>();
     }
@@ -276,6 +274,49 @@ mod tests {
             })
             .sum();
         assert!((found - least).abs() < 1e-5 * least, "{found} is not {least}");
+    }
+
+    #[test]
+    fn rays_that_ask_for_any_hit_come_to_a_wall_before_what_is_scattered_whether_the_wall_is_divided_or_not() {
+        let corner = |x: f32, y: f32| [x, y, 0.0];
+        let wall = Triangle::from([corner(0.0, 0.0), corner(2.0, 0.0), corner(0.0, 2.0)]);
+        let speck = |i: u8| {
+            let at = f32::from(i % 3);
+            Triangle::from([[at, at, 1.0 + at], [at + 0.1, at, 1.0 + at], [at, at + 0.1, 1.0 + at]])
+        };
+        let triangles: Vec<Triangle> = [wall].into_iter().chain((0..24).map(speck)).collect();
+        let halves = [[[0.0; 3], [1.1, 2.0, 0.0]], [[1.0, 0.0, 0.0], [2.0, 1.1, 0.0]]].map(Aabb::from);
+        let scattered = Aabb::from([[0.0, 0.0, 1.0], [2.1, 2.1, 3.0]]);
+        let whole = vec![Node::leaf(wall.aabb(), 0, 1), Node::leaf(scattered, 1, 24)];
+        let divided =
+            vec![Node::leaf(halves[0], 0, 1), Node::leaf(halves[1], 1, 1), Node::leaf(scattered, 2, 24)];
+        for (leaves, parts) in [(whole, 1), (divided, 2)] {
+            let root = Aabb::from([[0.0; 3], [2.1, 2.1, 3.0]]);
+            let prim_ids = core::iter::repeat_n(0, parts).chain(1..25).collect();
+            let mut tree = Bvh { nodes: vec![Node::inner(root, 1, leaves.len() as u32)], prim_ids };
+            tree.nodes.extend(leaves);
+            let wide = WideBvh::new(&tree, &triangles).unwrap();
+            let lanes = (0..8).filter_map(|lane| wide.nodes[0].lane_box(lane)).collect::<Vec<_>>();
+            assert_eq!(lanes[0], scattered, "the last of {}", lanes.len());
+            let ray = crate::Ray::half_line([0.1, 0.1, -1.0], [0.0, 0.0, 1.0]).unwrap();
+            let mut counts = crate::TestCounts::default();
+            assert!(wide.any_hit_counted(&ray, &mut counts));
+            assert_eq!(counts.objects, WideBvh::OBJECTS_OF_BLOCK);
+        }
+    }
+
+    #[test]
+    fn what_a_leaf_promises_to_stop_is_all_of_its_triangles_whoever_else_names_them() {
+        let (triangles, _) = scene(2, 1);
+        let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+        let leaves = [Node::leaf(boxes[0], 0, 1), Node::leaf(boxes[1], 1, 1)];
+        let root = Node::inner(boxes[0].union(&boxes[1]), 1, 2);
+        let promised = |ids: [u32; 2]| {
+            let tree = Bvh { nodes: vec![root, leaves[0], leaves[1]], prim_ids: ids.to_vec() };
+            let visits = areas(&tree);
+            promise(&tree, &triangles, &visits, &decide(&tree, &visits, |_| Some(BLOCK_COST)))[1]
+        };
+        assert_eq!(promised([0, 0]), promised([0, 1]));
     }
 
     #[test]
