@@ -28,7 +28,7 @@ config! {
         layouts: Vec<Layout> = vec![Layout::Binary, Layout::BinaryLeaves, Layout::Wide, Layout::WidePortable];
         /// Cameras of primary rays by scene; for other scenes one outside the root's box.
         cameras: BTreeMap<String, Viewpoint>;
-        /// The program of `scripts/ray-peers`, by which Embree and tinybvh trace too. All speeds go to `rays.csv`.
+        /// The program of `scripts/ray-peers`, by which Embree and tinybvh trace too. All speeds go to `timing_rays.csv`.
         ray_peers: Option<PathBuf>;
     }
 }

@@ -14,7 +14,7 @@ pub const MEAN: &str = "geometric mean";
 /// tinybvh's packets overflow their stack in deep trees.
 const WRONG_AT_MOST_ONE_IN: u64 = 100;
 
-/// The rows of `rays.csv`, without contenders that failed. `traces` and `times` are rows of the same contenders in the same order; `library_of` names the
+/// The rows of `timing_rays.csv`, without contenders that failed. `traces` and `times` are rows of the same contenders in the same order; `library_of` names the
 /// library of a method's label.
 pub fn rows(
     traces: &[TraceRow],

@@ -10,14 +10,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-impl PeerRayRow {
-    /// Whether a CSV file holds rows of this kind, and not the [`RayRow`]s of a file of the same name.
-    pub fn are_in(path: &Path) -> bool {
-        let columns = csv::Reader::from_path(path).and_then(|mut reader| reader.headers().cloned());
-        columns.is_ok_and(|columns| columns.iter().any(|column| column == "million_per_s"))
-    }
-}
-
 /// Declares kinds of rows with the names of their files.
 macro_rules! rows {
     ($($(#[$meta:meta])* $kind:ident in $file:literal { $($(#[$of:meta])* $column:ident: $type:ty,)* })*) => {$(
@@ -166,9 +158,8 @@ rows! {
         objects_standard_error: f64,
     }
 
-    /// One row of the `rays.csv` of a comparison with other libraries: the speed of rays of one kind. Like the timing files it
-    /// differs from run to run.
-    PeerRayRow in "rays.csv" {
+    /// One row of `timing_rays.csv`, of a comparison with other libraries: the speed of rays of one kind.
+    PeerRayRow in "timing_rays.csv" {
         /// Name of the scene, or that the row is a mean over all scenes.
         scene: String,
         /// The library, or ours.
@@ -396,5 +387,5 @@ impl ReferenceRow {
 /// Reads all rows of a kind from an experiment's folder; none if no run left any.
 pub fn read_if_any<R: Row>(folder: &Path) -> Result<Vec<R>, Error> {
     let path = folder.join(R::FILE);
-    if path.is_file() && !PeerRayRow::are_in(&path) { read(&path) } else { Ok(vec![]) }
+    if path.is_file() { read(&path) } else { Ok(vec![]) }
 }
