@@ -4,6 +4,7 @@ use crate::Error;
 use crate::scenes::Scene;
 use bvh_core::file::{FileError, TreeFile};
 use bvh_core::{Bvh, validate_references};
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -59,6 +60,13 @@ pub fn write_synced(path: &Path, bytes: &[u8]) -> Result<(), Error> {
         file.sync_all()
     };
     write(path).map_err(Error::io(path, "write the file"))
+}
+
+/// The names of what a folder holds.
+pub fn names(folder: &Path) -> Result<BTreeSet<String>, Error> {
+    let entries = fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))?;
+    let name = |entry: io::Result<fs::DirEntry>| Ok(entry?.file_name().to_string_lossy().into_owned());
+    entries.map(name).collect::<io::Result<_>>().map_err(Error::io(folder, "read the folder"))
 }
 
 /// Locks a folder of results against other harnesses until the file is dropped.

@@ -60,15 +60,9 @@ struct Link {
 /// Writes a page of all finished experiments in `results` to `out`, without quick variants and the repetitions that lie
 /// beside others. Returns the number of experiments.
 pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
-    let mut names = Vec::new();
-    for entry in fs::read_dir(results).map_err(Error::io(results, "read the folder"))? {
-        let entry = entry.map_err(Error::io(results, "read the folder"))?;
-        if entry.path().join("resolved.toml").is_file() {
-            names.push(entry.file_name().to_string_lossy().into_owned());
-        }
-    }
-    let repeats =
-        |name: &String| name.strip_suffix(".new").is_some_and(|kept| names.iter().any(|name| name == kept));
+    let mut names = files::names(results)?;
+    names.retain(|name| results.join(name).join("resolved.toml").is_file());
+    let repeats = |name: &String| name.strip_suffix(".new").is_some_and(|kept| names.contains(kept));
     let kept = names.iter().filter(|name| !repeats(name));
     let mut sections = kept.map(|name| section(results, name, out)).collect::<Result<Vec<_>, _>>()?;
     if sections.is_empty() {
@@ -89,11 +83,7 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
     let Resolved { experiment, scenes } = read_toml(&folder.join("resolved.toml"))?;
     let provenance: Provenance = read_toml(&folder.join("provenance.toml"))?;
     let outputs = outputs(&experiment, &folder)?;
-    let mut found = Vec::new();
-    for entry in fs::read_dir(&folder).map_err(Error::io(&folder, "read the folder"))?.flatten() {
-        found.push(entry.file_name().to_string_lossy().into_owned());
-    }
-    found.sort();
+    let found = files::names(&folder)?;
     let link = |file: &str| Link { name: file.into(), to: way(out, &folder.join(file)) };
     let ending = |suffix: &'static str| {
         found.iter().filter_map(move |file| Some((file, file.strip_suffix(suffix)?.to_owned())))
@@ -102,7 +92,7 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
     let mut figures = Vec::new();
     for (file, name) in ending(".svg") {
         let files = ["svg", "png", "csv"].map(|kind| format!("{name}.{kind}"));
-        let files = files.iter().filter(|file| found.contains(file)).map(|file| link(file)).collect();
+        let files = files.iter().filter(|file| found.contains(*file)).map(|file| link(file)).collect();
         figures.push(Drawing { svg: read(&folder.join(file))?, name, files });
     }
     figures.sort_by_key(|figure| drawn.iter().position(|name| **name == figure.name).unwrap_or(drawn.len()));

@@ -167,49 +167,16 @@ mod tests {
                 "{shown:?}"
             );
         }
-        assert!(text(&ratios).contains("primary: 1.00 (wide), least 0.50 on a"), "{}", text(&ratios));
+        let slower = RayRatioRow { mode: "binary".into(), ratio: 0.5, ..ratios[0].clone() };
+        let text = text(&[vec![slower], ratios].concat());
+        assert!(text.contains("primary: 1.00 (wide), least 0.50 on a"), "of our fastest mode: {text}");
     }
 
     #[test]
     fn a_contender_that_answers_wrongly_has_no_speed() {
-        let trace = |missed_hits| TraceRow {
-            scene: "a".into(),
-            method: "tinybvh".into(),
-            layout: "packets".into(),
-            rays: "primary".into(),
-            count: 1000,
-            hits: 900,
-            missed_hits,
-            false_hits: 0,
-            other_hits: 0,
-            boxes_per_ray: None,
-            objects_per_ray: None,
-        };
-        let time = TraceTimeRow {
-            scene: "a".into(),
-            method: "tinybvh".into(),
-            layout: "packets".into(),
-            rays: "primary".into(),
-            count: 1000,
-            rounds: 1,
-            preparation_seconds: 0.0,
-            seconds: 1.0,
-            median_seconds: 1.0,
-        };
+        let trace = |missed_hits| TraceRow { count: 1000, missed_hits, ..TraceRow::default() };
+        let time = TraceTimeRow { count: 1000, seconds: 1.0, ..TraceTimeRow::default() };
         let shown = |missed| rows(&[trace(missed)], std::slice::from_ref(&time), str::to_owned).len();
         assert_eq!((shown(10), shown(11)), (2, 0), "the row and its mean, or nothing");
-    }
-
-    #[test]
-    fn the_text_is_of_our_fastest_mode() {
-        let mut measured = vec![
-            row("a", OURS, "binary", 1.0, 0),
-            row("a", OURS, "wide", 3.0, 0),
-            row("a", "embree", "high", 2.0, 0),
-            row("a", "tinybvh", "BVH8", 1.5, 0),
-        ];
-        measured.extend(means(&measured));
-        let text = text(&ratios(&measured));
-        assert!(text.contains("primary: 1.50 (wide), least 1.50 on a"), "{text}");
     }
 }

@@ -83,8 +83,9 @@ impl Process {
         rays.write_all(&(triangles.len() as u32).to_le_bytes())?;
         rays.write_all(bytemuck::cast_slice(triangles))?;
         rays.flush()?;
-        let [seconds] = read_f64s(&mut answers, 1)?[..] else { unreachable!("one number was asked for") };
-        Ok((Self { child, rays: Some(rays), answers }, seconds))
+        let mut seconds = [0f64];
+        answers.read_exact(bytemuck::cast_slice_mut(&mut seconds))?;
+        Ok((Self { child, rays: Some(rays), answers }, seconds[0]))
     }
 
     fn trace(&mut self, batch: &Batch, hits: &mut [Option<Hit>]) -> io::Result<Vec<f64>> {
@@ -119,20 +120,14 @@ fn ask(program: &mut impl Write, batch: &Batch) -> io::Result<()> {
 
 /// Reads the seconds of each part and the hits of all rays. Objects are not named: their distances tell hits apart.
 fn answer(program: &mut impl Read, hits: &mut [Option<Hit>]) -> io::Result<Vec<f64>> {
-    let seconds = read_f64s(program, hits.len().div_ceil(PART))?;
-    let mut bytes = vec![0; 4 * hits.len()];
-    program.read_exact(&mut bytes)?;
-    for (hit, bytes) in hits.iter_mut().zip(bytes.as_chunks().0) {
-        let t = f32::from_le_bytes(*bytes);
+    let mut seconds = vec![0f64; hits.len().div_ceil(PART)];
+    let mut distances = vec![0f32; hits.len()];
+    program.read_exact(bytemuck::cast_slice_mut(&mut seconds))?;
+    program.read_exact(bytemuck::cast_slice_mut(&mut distances))?;
+    for (hit, t) in hits.iter_mut().zip(distances) {
         *hit = t.is_finite().then_some(Hit { t, object: 0 });
     }
     Ok(seconds)
-}
-
-fn read_f64s(from: &mut impl Read, count: usize) -> io::Result<Vec<f64>> {
-    let mut bytes = vec![0; 8 * count];
-    from.read_exact(&mut bytes)?;
-    Ok(bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
 }
 
 #[cfg(test)]

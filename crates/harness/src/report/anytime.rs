@@ -1,17 +1,13 @@
 //! Error against run time: the gap of the incumbent to the exact optimum or the best known cost, along all three axes.
 
-use super::config::OneOrMore;
-use super::data::{Rows, ratio};
+use super::data::ratio;
 use super::metric::Metric;
-use super::output::{Output, panel, tally, text_table};
+use super::output::text_table;
+use super::prelude::*;
 use super::progress::{ProgressAxis, Series, series};
-use crate::Error;
-use crate::figures::{Layer, Marks};
 use crate::statistics::{median, quartiles, range};
 use bvh_build::OutOfRange;
 use bvh_build::config::above;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 bvh_build::config! { serde;
     /// Error against run time.

@@ -4,18 +4,15 @@ use super::config::Targets;
 use super::data::Rows;
 use super::progress::{ProgressAxis, Series, longest, median_reached, reached, series};
 use super::target::Target;
+use crate::statistics::sorted;
 
 /// One method's runs on one problem.
 pub struct Attempt<'a> {
-    /// The problem's scene.
     pub scene: &'a str,
-    /// The problem's target.
     pub target: &'a Target,
     /// What the target costs on the scene.
     pub cost: f64,
-    /// Label of the method.
     pub method: &'a str,
-    /// How many runs there were.
     pub runs: usize,
     /// When those that reached the target did, ascending.
     pub solved: Vec<f64>,
@@ -36,9 +33,8 @@ pub fn attempts<'a>(config: &'a Targets, rows: &'a Rows, axis: ProgressAxis) -> 
         for target in &config.targets {
             let Some(cost) = target.cost(rows, scene) else { continue };
             attempts.extend(methods.iter().map(|(method, runs, end)| {
-                let mut solved: Vec<f64> = runs.iter().filter_map(|run| reached(run, cost)).collect();
-                solved.sort_by(f64::total_cmp);
-                let median = median_reached(runs, cost);
+                let solved: Vec<f64> = runs.iter().filter_map(|run| reached(run, cost)).collect();
+                let (solved, median) = (sorted(&solved), median_reached(runs, cost));
                 Attempt { scene, target, cost, method, runs: runs.len(), solved, median, end: *end }
             }));
         }

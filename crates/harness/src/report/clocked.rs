@@ -1,9 +1,7 @@
 //! What runs that the clock ends came to, beside another library: a table and a figure.
 
 use super::data::distinct;
-use super::output::{Output, panel, tally};
-use crate::Error;
-use crate::figures::{Axis, Layer};
+use super::prelude::*;
 use crate::run::rows::{self, ClockedPeerRow, ClockedRow};
 use crate::statistics::{median, minimum};
 use std::collections::BTreeSet;

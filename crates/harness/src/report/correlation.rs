@@ -1,15 +1,11 @@
 //! How well costs predict the tests that rays take, over many trees of one scene.
 
 use super::config::Methods;
-use super::data::{Rows, distinct};
+use super::data::distinct;
 use super::metric::Metric;
-use super::output::{Output, each, panel};
-use crate::Error;
-use crate::figures::{Layer, Marks, Panel};
+use super::prelude::*;
 use crate::run::rows::{RunRow, RunTestRow, VisitRow};
 use crate::statistics::{pearson, range, spearman};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 /// One cost against one kind of rays over the trees of one set, as written to `correlation.csv`.
 #[derive(Serialize, JsonSchema)]

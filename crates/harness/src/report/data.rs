@@ -6,7 +6,7 @@ use crate::run::rows::{
     RunTestRow, TestRow, TestTimeRow, TimingRow, TraceRow, TraceTimeRow, VisitRow,
 };
 use crate::scenes::SceneKind;
-use crate::statistics::minimum;
+use crate::statistics::{median, minimum};
 use std::path::Path;
 
 /// An experiment's rows.
@@ -182,9 +182,23 @@ impl Rows {
     }
 }
 
+/// A run on the scene `s` with nothing of note.
+#[cfg(test)]
+pub(super) fn run(method: &str, repetition: u32, evaluations: u64, work: u64) -> RunRow {
+    let row = format!("s,file,{method},0,{repetition},100,{evaluations},{work},completed,1,1,1,1,1,1,1,199,9");
+    csv::StringRecord::from_iter(row.split(',')).deserialize(None).unwrap()
+}
+
 /// A ratio of costs; 1 when the denominator is 0, as in `runs.csv`.
 pub fn ratio(cost: f64, base: f64) -> f64 {
     if base > 0.0 { cost / base } else { 1.0 }
+}
+
+/// The row whose value is the median, the lower of two.
+pub(super) fn middle<R>(rows: Vec<&R>, value: impl Fn(&R) -> f64) -> Option<&R> {
+    let median = median(&rows.iter().map(|row| value(row)).collect::<Vec<_>>())?;
+    let distance = |row: &R| (value(row) - median).abs();
+    rows.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// The distinct items, in the order in which they first occur.

@@ -1,15 +1,9 @@
 //! How the costs of independent trials are distributed.
 
-use super::config::OneOrMore;
-use super::data::Rows;
-use super::output::{Output, each, panel};
 use super::paper::{PaperRow, Verdict};
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks};
-use crate::statistics::{quantile, range};
+use super::prelude::*;
+use crate::statistics::{quantile, range, sorted};
 use bvh_build::config::above;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 bvh_build::config! { serde;
     /// The distribution of costs over trials.
@@ -60,8 +54,7 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
         let base_cost = rows.base_cost(scene);
         let mut layers = Vec::new();
         for method in &config.methods {
-            let mut costs = rows.trial_costs(scene, method);
-            costs.sort_by(f64::total_cmp);
+            let costs = sorted(&rows.trial_costs(scene, method));
             summaries.push(summarise(scene, method, &costs, base_cost));
             output.paper.extend(config.majority(&rows.shown(scene), method, &costs, base_cost));
             let fraction = |rank: u32| f64::from(rank) / costs.len() as f64;

@@ -5,13 +5,8 @@
 
 use super::attempt::{Attempt, attempts, staircase};
 use super::config::Targets;
-use super::data::Rows;
-use super::output::{Output, each, panel};
+use super::prelude::*;
 use super::progress::{ProgressAxis, longest_of_all};
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 /// One step, as written to `timing_ecdf.csv`, `ecdf_evaluations.csv` and `ecdf_work.csv`.
 #[derive(Serialize, JsonSchema)]

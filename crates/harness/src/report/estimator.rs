@@ -1,13 +1,8 @@
 //! The error of the ray estimator against the number of rays, beside the slope −1/2 that it must have.
 
 use super::config::Methods;
-use super::data::Rows;
-use super::output::{Output, panel};
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks};
+use super::prelude::*;
 use crate::statistics::range;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 /// One measurement of a method's first repetition, as written to `estimator.csv`.
 #[derive(Serialize, JsonSchema)]

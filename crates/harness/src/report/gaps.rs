@@ -1,14 +1,8 @@
 //! How far from the exact optimum every method ends on small scenes, and how tight the lower bound is there.
 
-use super::config::OneOrMore;
-use super::data::Rows;
-use super::output::{Output, each, panel};
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks, Panel};
+use super::prelude::*;
 use crate::scenes::subset::Subset;
 use crate::statistics::{median, quantile};
-use schemars::JsonSchema;
-use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
 bvh_build::config! { serde;

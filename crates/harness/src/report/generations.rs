@@ -1,16 +1,11 @@
 //! The paper's Figures 2 to 4: cost against generation, the median run and the range of all, with random picking.
 
-use super::data::Rows;
-use super::output::{Output, panel};
 use super::paper::{PaperRow, Verdict};
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks, Panel};
+use super::prelude::*;
 use crate::run::rows::HistoryRow;
 use crate::statistics::{expected_best_of, median, range};
 use bvh_build::OutOfRange;
 use bvh_build::config::above;
-use schemars::JsonSchema;
-use serde::Serialize;
 use std::collections::BTreeMap;
 
 bvh_build::config! { serde;

@@ -21,6 +21,7 @@ pub mod paper;
 mod pareto;
 pub mod peers;
 pub mod pictures;
+mod prelude;
 mod profile;
 mod progress;
 mod ray_cost;

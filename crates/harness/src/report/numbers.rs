@@ -1,16 +1,11 @@
 //! The numbers behind the figures: medians and quartiles of costs and gaps, primal integrals, and the lower bound
 //! beside them.
 
-use super::config::OneOrMore;
-use super::data::{Rows, ratio};
-use super::output::{Output, panel};
+use super::data::ratio;
+use super::prelude::*;
 use super::progress::{ProgressAxis, Series, longest_of_all, series};
-use crate::Error;
-use crate::figures::{Axis, Layer, Panel};
 use crate::run::rows::ReferenceRow;
 use crate::statistics::{median, primal_integral, quartiles, range};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 bvh_build::config! { serde;
     /// Numbers of every method on every scene.
@@ -124,9 +119,7 @@ impl Config {
         });
         Ok(output)
     }
-}
 
-impl Config {
     /// The lower bound and every method's cost on every scene, over the least known cost.
     fn draw(&self, rows: &Rows, numbers: &[Numbers]) -> Panel {
         let bound = |scene: &str| rows.reference(scene).and_then(|row| Some(ratio(row.lower_bound?, row.cost)));

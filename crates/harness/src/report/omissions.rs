@@ -1,14 +1,10 @@
 //! The ablation of what scenes do not need: that leaving it out changes no cost, and what it saves.
 
-use super::config::{Labels, OneOrMore};
-use super::data::{Rows, ratio};
-use super::output::{Output, each, panel};
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks, Panel};
+use super::config::Labels;
+use super::data::ratio;
+use super::prelude::*;
 use crate::run::rows::RunRow;
 use crate::statistics::{quartiles, range};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 bvh_build::config! { serde;
     /// An ablation. Fails if leaving something out has made a cost higher, or different where it must not.

@@ -1,13 +1,8 @@
 //! Which methods are worth their time: cost against build time, and against the time of a ray.
 
 use super::config::Methods;
-use super::data::Rows;
 use super::metric::Metric;
-use super::output::{Output, panel};
-use crate::Error;
-use crate::figures::{Layer, Marks};
-use schemars::JsonSchema;
-use serde::Serialize;
+use super::prelude::*;
 
 /// A method on a scene, as written to `timing_pareto.csv`.
 #[derive(Serialize, JsonSchema)]

@@ -1,12 +1,7 @@
 //! Other libraries beside ours: build time, cost by our module, speed by their fastest layout, disagreements.
 
-use super::config::OneOrMore;
-use super::data::Rows;
 use super::metric::Metric;
-use super::output::{Output, tally};
-use crate::Error;
-use schemars::JsonSchema;
-use serde::Serialize;
+use super::prelude::*;
 
 bvh_build::config! { serde;
     /// A comparison with other libraries.

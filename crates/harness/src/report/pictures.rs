@@ -1,17 +1,11 @@
 //! The second document's table: one picture by brute force, by a KD-tree and by trees; tests, and apart from them
 //! seconds.
 
-use super::config::OneOrMore;
-use super::data::Rows;
-use super::output::{Output, panel};
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks, Panel};
+use super::data::middle;
+use super::prelude::*;
 use crate::render::experiment::BASELINES;
 use crate::run::rows::RenderRow;
-use crate::statistics::median;
 use bvh_build::config::above;
-use schemars::JsonSchema;
-use serde::Serialize;
 use std::collections::BTreeMap;
 
 bvh_build::config! { serde;
@@ -145,9 +139,8 @@ fn tests_per_ray(row: &RenderRow) -> f64 {
 
 /// Of a structure's pictures of a scene, the one of median tests, the lower of two.
 fn middle_picture<'a>(rows: &'a Rows, scene: &str, method: &str) -> Option<&'a RenderRow> {
-    let own = || rows.renders.iter().filter(|row| row.scene == scene && row.method == method);
-    let middle = median(&own().map(tests_per_ray).collect::<Vec<_>>())?;
-    own().min_by(|a, b| (tests_per_ray(a) - middle).abs().total_cmp(&(tests_per_ray(b) - middle).abs()))
+    let own = rows.renders.iter().filter(|row| row.scene == scene && row.method == method);
+    middle(own.collect(), tests_per_ray)
 }
 
 /// Seconds to build and to draw, of the repetition that drew fastest.

@@ -3,13 +3,8 @@
 
 use super::attempt::attempts;
 use super::config::Targets;
-use super::data::Rows;
-use super::output::{Output, each, panel};
+use super::prelude::*;
 use super::progress::ProgressAxis;
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks, Panel};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 /// One method on one problem, as written to `timing_profile.csv`, `profile_evaluations.csv` and `profile_work.csv`.
 #[derive(Serialize, JsonSchema)]

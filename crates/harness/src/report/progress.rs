@@ -33,13 +33,18 @@ impl ProgressAxis {
         Self::ALL.into_iter().filter(|&axis| axis != Self::Evaluations || alike).collect()
     }
 
+    /// The name of a column of a CSV file, and what stands along an axis of a figure.
+    fn names(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Seconds => ("seconds", "time (s)"),
+            Self::Evaluations => ("evaluations", "evaluations (trees or moves)"),
+            Self::Work => ("work", "work (nodes made or visited)"),
+        }
+    }
+
     /// What stands along an axis of a figure.
     pub fn label(self) -> &'static str {
-        match self {
-            Self::Seconds => "time (s)",
-            Self::Evaluations => "evaluations (trees or moves)",
-            Self::Work => "work (nodes made or visited)",
-        }
+        self.names().1
     }
 
     /// An axis of a figure.
@@ -47,20 +52,11 @@ impl ProgressAxis {
         Axis::log(self.label())
     }
 
-    /// The name of a column of a CSV file.
-    fn column(self) -> &'static str {
-        match self {
-            Self::Seconds => "seconds",
-            Self::Evaluations => "evaluations",
-            Self::Work => "work",
-        }
-    }
-
     /// The name, without extension, of a file of this kind.
     pub fn file(self, kind: &str) -> String {
         match self {
             Self::Seconds => format!("timing_{kind}"),
-            Self::Evaluations | Self::Work => format!("{kind}_{}", self.column()),
+            Self::Evaluations | Self::Work => format!("{kind}_{}", self.names().0),
         }
     }
 
@@ -70,7 +66,7 @@ impl ProgressAxis {
         if let Some((_, bytes)) = output.csv.last_mut() {
             let end = bytes.iter().position(|&byte| byte == b'\n').unwrap_or(bytes.len());
             let header = String::from_utf8_lossy(&bytes[..end]).into_owned();
-            let named = |column| if column == "x" { self.column() } else { column };
+            let named = |column| if column == "x" { self.names().0 } else { column };
             let columns: Vec<&str> = header.split(',').map(named).collect();
             bytes.splice(..end, columns.join(",").into_bytes());
         }
@@ -125,6 +121,7 @@ pub fn median_reached(runs: &[Series], cost: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::data::run;
     use super::*;
 
     #[test]
@@ -151,15 +148,7 @@ mod tests {
 
     #[test]
     fn evaluations_are_no_axis_where_some_count_trees_and_others_moves() {
-        let header = "scene,scene_kind,method,seed,repetition,objects,evaluations,work,stop,cost,base_cost,cost_over_base,\
-                      cost_over_root_area,internal_area,goldsmith_salmon,sah,nodes,depth";
-        let run = |method: &str, evaluations: u64, work: u64| {
-            format!("s,file,{method},1,0,100,{evaluations},{work},completed,1,1,1,1,1,1,1,199,9")
-        };
-        let text = [header.to_owned(), run("trees", 5, 995), run("tree", 1, 199), run("moves", 9000, 90_000)]
-            .join("\n");
-        let runs =
-            csv::Reader::from_reader(text.as_bytes()).deserialize().collect::<Result<Vec<_>, _>>().unwrap();
+        let runs = vec![run("trees", 0, 5, 995), run("tree", 0, 1, 199), run("moves", 0, 9000, 90_000)];
         let rows = Rows { runs, ..Rows::default() };
         let axes = |methods: &[&str]| {
             ProgressAxis::of(&rows, &methods.iter().map(|&m| m.to_owned()).collect::<Vec<_>>())

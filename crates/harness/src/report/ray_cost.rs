@@ -1,13 +1,9 @@
 //! Tests of rays in trees that are trained on rays, over those in a tree that is searched for by area.
 
-use super::data::{Rows, distinct};
-use super::output::{Output, panel, tally};
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks, Panel};
+use super::data::distinct;
+use super::prelude::*;
 use crate::run::rows::{TestRow, TestTimeRow};
 use crate::statistics::{geometric_mean, student};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 bvh_build::config! { serde;
     /// A comparison of trees by the tests of rays that they were not trained on.

@@ -1,17 +1,13 @@
 //! Tests per random ray: what the paper calls the number of intersections, methods by scenes.
 
-use super::config::{OneOrMore, first, one_for_each};
-use super::data::Rows;
+use super::config::{first, one_for_each};
+use super::data::middle;
 use super::metric::Metric;
-use super::output::{Output, each, panel};
 use super::paper::PaperRow;
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks, Panel};
+use super::prelude::*;
 use crate::run::rows::RayRow;
-use crate::statistics::{median, range};
+use crate::statistics::range;
 use bvh_build::config::above;
-use schemars::JsonSchema;
-use serde::Serialize;
 use std::collections::BTreeMap;
 
 bvh_build::config! { serde;
@@ -43,17 +39,13 @@ pub(super) struct Measured<'a> {
     /// Number of rays.
     rays: u64,
     boxes_per_ray: f64,
-    /// Lower end of the mean's 95 % interval.
     boxes_low: f64,
-    /// Its upper end.
     boxes_high: f64,
     objects_per_ray: f64,
     goldsmith_salmon: f64,
     /// Tests against boxes over the first method's.
     boxes_over_first: f64,
-    /// The least over all pairs of runs, of the method and of the first.
     over_first_low: f64,
-    /// The greatest.
     over_first_high: f64,
     /// The paper's number, where it has one.
     paper_boxes_per_ray: Option<f64>,
@@ -177,7 +169,5 @@ fn most_rays<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) 
 
 /// Of a method's runs on a scene, the one of median tests per ray, the lower of two.
 fn middle_run<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) -> Option<&'a RayRow> {
-    let own = most_rays(rows, scene, method, kind);
-    let middle = median(&own.iter().map(|row| row.boxes_per_ray).collect::<Vec<_>>())?;
-    own.into_iter().min_by(|a, b| (a.boxes_per_ray - middle).abs().total_cmp(&(b.boxes_per_ray - middle).abs()))
+    middle(most_rays(rows, scene, method, kind), |row| row.boxes_per_ray)
 }

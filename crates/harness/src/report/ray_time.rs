@@ -1,15 +1,10 @@
 //! What a tree's rays save for the time of its search: tests per ray against seconds.
 
-use super::config::{Labels, OneOrMore};
-use super::data::Rows;
+use super::config::Labels;
 use super::metric::Metric;
-use super::output::{Output, each, panel};
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks};
+use super::prelude::*;
 use crate::statistics::{geometric_mean, minimum};
 use bvh_build::config::Itself;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 bvh_build::config! { serde;
     /// Tests of the rays of the trained path of cameras against the time in which a tree is made.

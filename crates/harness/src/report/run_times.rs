@@ -5,14 +5,9 @@
 
 use super::attempt::{Attempt, attempts, staircase};
 use super::config::Targets;
-use super::data::Rows;
-use super::output::{Output, each, panel};
+use super::prelude::*;
 use super::progress::ProgressAxis;
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks, Panel};
 use crate::statistics::time_to_target::ShiftedExponential;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 /// One step of a distribution, as written to `timing_run_times.csv`, `run_times_evaluations.csv` and
 /// `run_times_work.csv`.

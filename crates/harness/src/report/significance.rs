@@ -1,15 +1,10 @@
 //! Whether one method really differs from others: paired across scenes, and run against run within each.
 
-use super::config::OneOrMore;
-use super::data::Rows;
-use super::output::Output;
-use crate::Error;
+use super::prelude::*;
 use crate::statistics::median;
 use crate::statistics::rank::{
     Test, a12, holm, least_rank_sum, least_signed_rank, mann_whitney, wilcoxon_signed_rank,
 };
-use schemars::JsonSchema;
-use serde::Serialize;
 use std::ops::Bound::Excluded;
 
 bvh_build::config! { serde;

@@ -1,15 +1,11 @@
 //! The paper's tables: ratios to base, scenes by columns, ours beside the paper's.
 
-use super::config::{Labels, OneOrMore};
-use super::data::Rows;
-use super::output::{Output, panel, tally, text_table};
+use super::config::Labels;
+use super::output::text_table;
 use super::paper::{PaperRow, Verdict};
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks, Panel};
+use super::prelude::*;
 use crate::statistics::{expected_best_of, median, minimum, range, spread_of_best};
 use bvh_build::config::{Accepts, Itself, above};
-use schemars::JsonSchema;
-use serde::Serialize;
 use std::collections::BTreeMap;
 
 bvh_build::config! { serde;
@@ -168,9 +164,8 @@ impl Config {
     fn draw(&self, rows: &Rows, cells: &[Cell]) -> Panel {
         let columns = || self.columns.iter().skip(1);
         let bars = |name: String, column: &Column, value: &dyn Fn(&Cell) -> Option<f64>, spread| {
-            let of = |scene| cells.iter().find(|cell| cell.scene == scene && cell.column == column.name);
-            let scenes = rows.scenes().into_iter();
-            let values = scenes.map(|scene| of(scene).and_then(value).unwrap_or(f64::NAN)).collect();
+            let values = rows.scenes().into_iter().map(|scene| find(cells, scene, column).and_then(value));
+            let values = values.map(|value| value.unwrap_or(f64::NAN)).collect();
             Layer::new(name, Marks::Bars { values, spread, base: 1.0 })
         };
         // Columns that are readings of one column of the paper share its bars.
@@ -182,9 +177,9 @@ impl Config {
                 layers.push(bars(name, column, &|cell| cell.paper_over_base, vec![]));
             }
             let own = rows.scenes().into_iter().map(|scene| {
-                let cell = cells.iter().find(|cell| cell.scene == scene && cell.column == column.name);
-                cell.and_then(|cell| cell.low_over_base.zip(cell.high_over_base))
-                    .unwrap_or((f64::NAN, f64::NAN))
+                let cell = find(cells, scene, column);
+                let ends = cell.and_then(|cell| cell.low_over_base.zip(cell.high_over_base));
+                ends.unwrap_or((f64::NAN, f64::NAN))
             });
             let name = format!("{}, ours", column.name);
             layers.push(bars(name, column, &|cell| Some(cell.cost_over_base), own.collect()));
@@ -203,7 +198,7 @@ impl Config {
         let mut table = text_table(std::iter::once("scene").chain(names));
         for scene in rows.scenes() {
             let show = |column: &Column| {
-                let cell = cells.iter().find(|cell| cell.scene == scene && cell.column == column.name)?;
+                let cell = find(cells, scene, column)?;
                 let ours = format!("{:.4}", cell.cost_over_base);
                 Some(cell.paper_over_base.map_or(ours.clone(), |paper| format!("{ours}  (paper {paper:.4})")))
             };
@@ -230,4 +225,9 @@ impl Config {
         let counts = tally(&counts, scenes, "scenes");
         format!("Below base: {counts}. The least is {cost_over_base:.3} of base, ‘{column}’ on {scene}.")
     }
+}
+
+/// The cell of a column on a scene.
+fn find<'c, 'a>(cells: &'c [Cell<'a>], scene: &str, column: &Column) -> Option<&'c Cell<'a>> {
+    cells.iter().find(|cell| cell.scene == scene && cell.column == column.name)
 }

@@ -2,14 +2,10 @@
 
 use super::attempt::{Attempt, attempts};
 use super::config::Targets;
-use super::data::Rows;
 use super::metric::Metric;
-use super::output::{Output, each};
+use super::prelude::*;
 use super::progress::ProgressAxis;
-use crate::Error;
 use crate::statistics::order_quantile;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 /// One method and target on one scene, as written to `timing_to_target.csv`, `to_target_evaluations.csv`
 /// and `to_target_work.csv`.

@@ -1,14 +1,9 @@
 //! Times of methods against each other, pair by pair, in the same run.
 
-use super::config::{OneOrMore, first, one_for_each};
-use super::data::Rows;
-use super::output::{Output, panel};
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks, Panel};
+use super::config::{first, one_for_each};
+use super::prelude::*;
 use crate::statistics::{median, quartiles, range};
 use bvh_build::config::above;
-use schemars::JsonSchema;
-use serde::Serialize;
 use std::collections::BTreeMap;
 
 bvh_build::config! { serde;

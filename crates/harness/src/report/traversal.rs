@@ -1,15 +1,10 @@
 //! Speed of rays by tree, layout and kind of rays, and how well the trees' cost predicts it.
 
 use super::config::Methods;
-use super::data::Rows;
 use super::metric::Metric;
-use super::output::{Output, each, panel};
-use crate::Error;
-use crate::figures::{Layer, Marks};
+use super::prelude::*;
 use crate::run::rows::TraceRow;
 use crate::statistics::{median, pearson, range, spearman};
-use schemars::JsonSchema;
-use serde::Serialize;
 use std::collections::BTreeSet;
 
 /// Cost against tests or time over the trees of a scene in one layout, as written to `rank.csv` and `timing_rank.csv`.

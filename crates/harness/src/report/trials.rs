@@ -1,14 +1,8 @@
 //! The paper's Figure 1: cost against number of trials, one run's staircase and the exact expectation.
 
-use super::config::OneOrMore;
-use super::data::Rows;
-use super::output::{Output, panel, tally};
 use super::paper::{PaperRow, Verdict};
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks};
+use super::prelude::*;
 use crate::statistics::{expected_best_of, mean_interval, minimum};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 bvh_build::config! { serde;
     /// Cost against number of trials.
@@ -164,37 +158,18 @@ impl Config {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::rows::{HistoryRow, RunRow};
+    use crate::report::data::run;
+    use crate::run::rows::HistoryRow;
 
     /// Rows of two methods, each with the costs of its trials by repetition.
     fn rows(methods: [(&str, [[f64; 3]; 4]); 2]) -> Rows {
         let mut rows = Rows::default();
         for (method, repetitions) in methods {
             for (repetition, costs) in (0..).zip(repetitions) {
-                let (scene, method) = (String::from("s"), String::from(method));
-                rows.runs.push(RunRow {
-                    scene: scene.clone(),
-                    scene_kind: "file".into(),
-                    method: method.clone(),
-                    seed: 0,
-                    repetition,
-                    objects: 2,
-                    evaluations: 3,
-                    work: 0,
-                    stop: bvh_search::StopReason::Completed,
-                    cost: 1.0,
-                    base_cost: 1.0,
-                    cost_over_base: 1.0,
-                    cost_over_root_area: 1.0,
-                    internal_area: 1.0,
-                    goldsmith_salmon: 1.0,
-                    sah: 1.0,
-                    nodes: 3,
-                    depth: 1,
-                });
+                rows.runs.push(run(method, repetition, 3, 0));
                 rows.history.extend(costs.map(|cost| HistoryRow {
-                    scene: scene.clone(),
-                    method: method.clone(),
+                    scene: "s".into(),
+                    method: method.into(),
                     seed: 0,
                     repetition,
                     evaluations: 0,

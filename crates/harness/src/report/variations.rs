@@ -1,15 +1,10 @@
 //! Final costs of variations of one method over those of the method itself.
 
-use super::config::{OneOrMore, first};
-use super::data::Rows;
-use super::output::{Output, each, panel};
+use super::config::first;
 use super::paper::PaperRow;
-use crate::Error;
-use crate::figures::{Axis, Layer, Marks, Panel};
+use super::prelude::*;
 use crate::statistics::{median, range};
 use bvh_build::config::above;
-use schemars::JsonSchema;
-use serde::Serialize;
 use std::collections::BTreeMap;
 
 bvh_build::config! { serde;
@@ -41,9 +36,7 @@ pub(super) struct Variation<'a> {
     highest_cost: f64,
     /// Median over the first method's.
     cost_over_first: f64,
-    /// The least over all pairs of runs, of the method and of the first.
     over_first_low: f64,
-    /// The greatest.
     over_first_high: f64,
     cost_over_base: f64,
     /// The paper's ratio, where it has one.

@@ -20,11 +20,11 @@ pub fn compare(
     left_out: &[String],
     has_figures: bool,
 ) -> Result<Vec<String>, Error> {
-    let mut names = files(fresh, ".csv")?;
+    let mut names = results(fresh, ".csv")?;
     if !committed.is_dir() {
         return Ok(vec![format!("{}: no committed results to compare with", committed.display())]);
     }
-    names.extend(files(committed, ".csv")?);
+    names.extend(results(committed, ".csv")?);
     let mut differences = compare_specs(fresh, committed, left_out)?;
     for name in names {
         let paths = [fresh.join(&name), committed.join(&name)];
@@ -42,8 +42,8 @@ pub fn compare(
 
 /// How the figures differ: those of the committed results that hold no seconds are to have the same bytes.
 fn compare_figures(fresh: &Path, committed: &Path) -> Result<Vec<String>, Error> {
-    let mut all = files(fresh, ".svg")?;
-    all.extend(files(committed, ".svg")?);
+    let mut all = results(fresh, ".svg")?;
+    all.extend(results(committed, ".svg")?);
     let difference = |name: String| {
         let read = |folder: &Path| fs::read(folder.join(&name)).ok();
         match (read(fresh), read(committed)) {
@@ -106,10 +106,10 @@ fn shortened(file: &str, mut differences: Vec<String>) -> Vec<String> {
 }
 
 /// The files of a folder whose names end so, without those that hold seconds, as their names say.
-fn files(folder: &Path, end: &str) -> Result<BTreeSet<String>, Error> {
-    let entries = fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))?;
-    let names = entries.filter_map(|entry| Some(entry.ok()?.file_name().to_string_lossy().into_owned()));
-    Ok(names.filter(|name| name.ends_with(end) && !name.starts_with("timing")).collect())
+fn results(folder: &Path, end: &str) -> Result<BTreeSet<String>, Error> {
+    let mut names = files::names(folder)?;
+    names.retain(|name| name.ends_with(end) && !name.starts_with("timing"));
+    Ok(names)
 }
 
 fn compare_files(

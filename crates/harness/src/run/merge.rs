@@ -50,8 +50,7 @@ fn parts(out: &Path) -> Result<Vec<(PathBuf, Part)>, Error> {
     let quick = out.join("quick");
     let mut parts = Vec::new();
     for folder in [Some(out), quick.is_dir().then_some(quick.as_path())].into_iter().flatten() {
-        for entry in fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))? {
-            let path = entry.map_err(Error::io(folder, "read the folder"))?.path();
+        for path in files::names(folder)?.into_iter().map(|name| folder.join(name)) {
             let partial = path.join(".partial");
             let spec = partial.join("resolved.toml");
             if spec.is_file() {

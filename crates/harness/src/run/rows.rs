@@ -57,7 +57,6 @@ rows! {
         /// The surface area heuristic with both constants 1.
         sah: f64,
         nodes: usize,
-        /// Edges from the root to the deepest leaf.
         depth: usize,
     }
 
@@ -83,7 +82,6 @@ rows! {
         method: String,
         seed: u64,
         repetition: u32,
-        /// Threads at its disposal.
         threads: usize,
         /// Wall time of the whole run.
         seconds: f64,
@@ -95,7 +93,6 @@ rows! {
         method: String,
         seed: u64,
         repetition: u32,
-        /// Threads at its disposal.
         threads: usize,
         /// Wall time of the whole run.
         seconds: f64,
@@ -149,9 +146,7 @@ rows! {
         boxes_per_ray: f64,
         /// Of that mean.
         boxes_standard_error: f64,
-        /// Lower end of the mean's 95 % interval.
         boxes_low: f64,
-        /// Its upper end.
         boxes_high: f64,
         objects_per_ray: f64,
         /// Of that mean.
@@ -202,6 +197,7 @@ rows! {
         render_seconds: f64,
     }
 
+    #[derive(Default)]
     /// One row of `traversal.csv`: what rays of one kind found and took in one layout of a run's tree.
     TraceRow in "traversal.csv" {
         scene: String,
@@ -221,6 +217,7 @@ rows! {
         objects_per_ray: Option<f64>,
     }
 
+    #[derive(Default)]
     /// One row of `timing_traversal.csv`: the time of rays of one kind in one layout of a run's tree, on one thread.
     TraceTimeRow in "timing_traversal.csv" {
         scene: String,

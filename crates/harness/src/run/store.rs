@@ -36,7 +36,7 @@ impl FinishedRun {
         let damaged = |file: &str| Error::Damaged { part: part.to_owned(), file: file.to_owned() };
         let contents = fs::read_to_string(part.join(CONTENTS)).map_err(|_| damaged(CONTENTS))?;
         let mut files = BTreeMap::new();
-        for name in file_names(part)?.into_iter().filter(|name| name != CONTENTS) {
+        for name in files::names(part)?.into_iter().filter(|name| name != CONTENTS) {
             let path = part.join(&name);
             files.insert(name, fs::read(&path).map_err(Error::io(&path, "read the file"))?);
         }
@@ -166,7 +166,7 @@ impl Store {
     pub fn join(&self, runs: usize) -> Result<(), Error> {
         let parts: Vec<(PathBuf, BTreeSet<String>)> = (0..runs)
             .map(|index| self.part(index))
-            .map(|part| Ok((part.clone(), file_names(&part)?)))
+            .map(|part| Ok((part.clone(), files::names(&part)?)))
             .collect::<Result<_, Error>>()?;
         let names: BTreeSet<&String> = parts.iter().flat_map(|(_, names)| names).collect();
         let names = names.into_iter().filter(|name| *name != CONTENTS);
@@ -215,13 +215,7 @@ pub fn is_unfinished(folder: &Path) -> bool {
 
 fn has_finished_runs(partial: &Path) -> Result<bool, Error> {
     let is_run = |name: &String| !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_digit());
-    Ok(file_names(partial)?.iter().any(is_run))
-}
-
-fn file_names(folder: &Path) -> Result<BTreeSet<String>, Error> {
-    let entries = fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))?;
-    let name = |entry: std::io::Result<fs::DirEntry>| Ok(entry?.file_name().to_string_lossy().into_owned());
-    entries.map(name).collect::<std::io::Result<_>>().map_err(Error::io(folder, "read the folder"))
+    Ok(files::names(partial)?.iter().any(is_run))
 }
 
 #[cfg(test)]

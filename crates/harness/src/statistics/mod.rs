@@ -3,10 +3,16 @@
 pub mod rank;
 pub mod time_to_target;
 
-/// The `q`-quantile of finite values, 0 ≤ q ≤ 1, interpolated linearly between order statistics; `None` of none.
-pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
+/// The values in ascending order.
+pub fn sorted(values: &[f64]) -> Vec<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
+    sorted
+}
+
+/// The `q`-quantile of finite values, 0 ≤ q ≤ 1, interpolated linearly between order statistics; `None` of none.
+pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
+    let sorted = sorted(values);
     let position = q * (sorted.len().checked_sub(1)? as f64);
     let (below, above) = (sorted[position.floor() as usize], sorted[position.ceil() as usize]);
     // Between two infinite values there is no number to interpolate by.
@@ -16,8 +22,7 @@ pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
 /// The least of the values that at least the fraction `q` of all of them do not exceed, 0 < q ≤ 1; `None` of none.
 /// Values may be infinite, as the times of runs that never end are.
 pub fn order_quantile(values: &[f64], q: f64) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
+    let sorted = sorted(values);
     let rank = (q * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.saturating_sub(1)).copied()
 }
@@ -52,8 +57,7 @@ pub fn expected_best_of(pool: &[f64], m: usize) -> Option<f64> {
     if m == 0 || m > n {
         return None;
     }
-    let mut sorted = pool.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
+    let sorted = sorted(pool);
     // The weight of the i-th value, from that of the one before, so that no binomial is ever formed.
     let mut weight = m as f64 / n as f64;
     let mut expected = 0.0;
@@ -75,8 +79,7 @@ pub fn spread_of_best(pool: &[f64], m: usize) -> Option<(f64, f64)> {
         return None;
     }
     let drawn = if m < n { m } else { n / 2 };
-    let mut sorted = pool.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
+    let sorted = sorted(pool);
     // How likely none of the values so far is drawn, from before the i-th.
     let mut none = 1.0;
     let reached = sorted.iter().enumerate().map(|(i, value)| {

@@ -5,7 +5,7 @@
 //! sums. Larger samples use the normal approximation with the variance corrected for ties and the statistic for
 //! continuity.
 
-use super::ranks;
+use super::{ranks, sorted};
 
 /// The most values for which all assignments are counted.
 pub const MOST_EXACT: usize = 60;
@@ -123,9 +123,7 @@ fn two_sided(counts: &[f64], sum: f64) -> f64 {
 
 /// Σ t³ − t over groups of t equal ranks.
 fn ties(ranks: &[f64]) -> f64 {
-    let mut sorted = ranks.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.chunk_by(|a, b| a == b).map(|group| group.len() as f64).map(|t| t * t * t - t).sum()
+    sorted(ranks).chunk_by(|a, b| a == b).map(|group| group.len() as f64).map(|t| t * t * t - t).sum()
 }
 
 /// Twice the tail beyond `deviation` less a half, of a normal distribution of this variance.

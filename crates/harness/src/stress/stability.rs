@@ -63,7 +63,6 @@ struct Row {
     outcome: Class,
     /// 0 where nothing is built.
     objects: usize,
-    /// Edges from the root to the deepest leaf.
     depth: Option<usize>,
     /// Internal area, world units squared.
     cost: Option<f64>,

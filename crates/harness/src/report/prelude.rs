@@ -1,0 +1,9 @@
+//! What every kind of report is made of: an experiment's rows in, tables and figures out.
+
+pub(crate) use super::config::OneOrMore;
+pub(crate) use super::data::Rows;
+pub(crate) use super::output::{Output, each, panel, tally};
+pub(crate) use crate::Error;
+pub(crate) use crate::figures::{Axis, Layer, Marks, Panel};
+pub(crate) use schemars::JsonSchema;
+pub(crate) use serde::Serialize;
