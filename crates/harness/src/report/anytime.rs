@@ -87,8 +87,7 @@ impl Config {
         let Some((low, high)) = range(lowest.iter().map(|(cost, _)| *cost)) else { return String::new() };
         let count = |method| lowest.iter().filter(|(_, best)| *best == method).count();
         let counts = self.methods.iter().map(|method| (method.as_str(), count(method)));
-        let counts: Vec<_> = counts.filter(|(_, count)| *count > 0).collect();
-        let counts = tally(&counts, lowest.len(), "scenes");
+        let counts = tally(counts.filter(|(_, count)| *count > 0), lowest.len(), "scenes");
         let (low, high) = (percent(low), percent(high));
         format!(
             "Lowest median cost at the end of the runs: {counts}; against the greedy tree's {low} to {high}."

@@ -54,9 +54,8 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     };
     let least = |scene: &str| minimum(methods.iter().map(|method| of(scene, method))).unwrap_or(f64::NAN);
     let wins = |method: &str| scenes.iter().filter(|scene| of(scene, method) == least(scene)).count();
-    let counts: Vec<_> = methods.iter().map(|method| (*method, wins(method))).collect();
-    output.reading =
-        format!("Lowest median by the surface area heuristic: {}.", tally(&counts, scenes.len(), "scenes"));
+    let counts = tally(methods.iter().map(|method| (*method, wins(method))), scenes.len(), "scenes");
+    output.reading = format!("Lowest median by the surface area heuristic: {counts}.");
     let bars = |method: &&str| {
         let values = scenes.iter().map(|scene| of(scene, method) / least(scene)).collect();
         Layer::bars(*method, values, 1.0)

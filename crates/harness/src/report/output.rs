@@ -138,7 +138,8 @@ pub fn each<T>(items: impl IntoIterator<Item = T>, say: impl FnMut(T) -> Option<
 
 /// For how many of `total` cases something holds, by name: `‘a’, ‘b’ for all 7 scenes; ‘c’ for 3 of 7 scenes; ‘d’ for
 /// none`.
-pub fn tally(counts: &[(&str, usize)], total: usize, cases: &str) -> String {
+pub fn tally<'a>(counts: impl IntoIterator<Item = (&'a str, usize)>, total: usize, cases: &str) -> String {
+    let counts: Vec<_> = counts.into_iter().collect();
     let numbers: BTreeSet<usize> = counts.iter().map(|(_, count)| *count).collect();
     let same = |number: usize| {
         let own = counts.iter().filter(|(_, count)| *count == number);
@@ -165,7 +166,7 @@ mod tests {
 
     #[test]
     fn names_are_grouped_by_the_cases_for_which_they_hold() {
-        let said = tally(&[("a", 0), ("b", 7), ("c", 3), ("d", 7)], 7, "scenes");
+        let said = tally([("a", 0), ("b", 7), ("c", 3), ("d", 7)], 7, "scenes");
         assert_eq!(said, "‘b’, ‘d’ for all 7 scenes; ‘c’ for 3 of 7 scenes; ‘a’ for none");
     }
 

@@ -84,43 +84,33 @@ impl PaperRow {
     }
 }
 
-/// Declares the verdicts with the words that stand for them in `paper.csv`.
-macro_rules! verdicts {
-    ($($(#[$doc:meta])* $verdict:ident = $name:literal,)*) => {
-        /// How a number of ours compares with the paper's.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-        pub enum Verdict {
-            $($(#[$doc])* #[serde(rename = $name)] $verdict,)*
-        }
-
-        impl Verdict {
-            /// The words that stand for it in `paper.csv`.
-            pub fn name(self) -> &'static str {
-                match self {
-                    $(Self::$verdict => $name,)*
-                }
-            }
-        }
-    };
-}
-
-verdicts! {
+/// How a number of ours compares with the paper's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum Verdict {
     /// As the rule demands.
-    Agrees = "agrees",
+    #[serde(rename = "agrees")]
+    Agrees,
     /// Higher than the rule allows, on the same side of the base.
-    SameDirectionHigher = "same direction, higher",
+    #[serde(rename = "same direction, higher")]
+    SameDirectionHigher,
     /// Lower than the rule allows, on the same side of the base.
-    SameDirectionLower = "same direction, lower",
+    #[serde(rename = "same direction, lower")]
+    SameDirectionLower,
     /// Higher, and above the base where the paper is below it.
-    DiffersHigher = "differs, higher",
+    #[serde(rename = "differs, higher")]
+    DiffersHigher,
     /// Lower, and below the base where the paper is above it.
-    DiffersLower = "differs, lower",
+    #[serde(rename = "differs, lower")]
+    DiffersLower,
     /// Not as the rule demands, and no matter of higher or lower.
-    Differs = "differs",
+    #[serde(rename = "differs")]
+    Differs,
     /// Another repetition may have led to another verdict, or the paper has no number.
-    CannotBeTold = "cannot be told",
+    #[serde(rename = "cannot be told")]
+    CannotBeTold,
     /// The paper does not speak of it.
-    NotInPaper = "not in the paper",
+    #[serde(rename = "not in the paper")]
+    NotInPaper,
 }
 
 impl Verdict {

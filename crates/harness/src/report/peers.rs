@@ -92,8 +92,7 @@ impl Config {
         };
         let total = others.clone().map(|method| own(method).len()).max().unwrap_or(0);
         let faster = |method| own(method).iter().filter(|row| row.ours_over_this > 1.0).count();
-        let counts: Vec<_> = others.map(|method| (method.as_str(), faster(method))).collect();
-        let counts = tally(&counts, total, "settings");
+        let counts = tally(others.map(|method| (method.as_str(), faster(method))), total, "settings");
         format!("Ours, ‘{}’, each by its fastest layout, traces more rays per second than {counts}.", self.ours)
     }
 }

@@ -250,9 +250,8 @@ fn reading(table: &[Compared], base: &str) -> String {
     let trees = distinct(own().map(|row| tree_name(row.tree, row.trained_on)));
     let of = |tree: &str| own().filter(|row| tree_name(row.tree, row.trained_on) == tree).collect::<Vec<_>>();
     let fewer = |tree: &str| of(tree).iter().filter(|row| row.tests_over_base < 1.0).count();
-    let counts: Vec<_> = trees.iter().map(|tree| (tree.as_str(), fewer(tree))).collect();
     let total = trees.iter().map(|tree| of(tree).len()).max().unwrap_or(0);
-    let counts = tally(&counts, total, "kinds of rays");
+    let counts = tally(trees.iter().map(|tree| (tree.as_str(), fewer(tree))), total, "kinds of rays");
     format!(
         "Fewer tests per ray than ‘{base}’, geometric means over scenes: {counts}. The least is {:.3} of its tests, ‘{}’ on \
          {} rays ({} camera).",

@@ -215,14 +215,14 @@ impl Config {
         };
         let below = |column: &Column| of(column).iter().filter(|cell| cell.cost_over_base < 1.0).count();
         let others = || self.columns.iter().skip(1);
-        let counts: Vec<_> = others().map(|column| (column.name.as_str(), below(column))).collect();
+        let counts = others().map(|column| (column.name.as_str(), below(column)));
         let compared = others().flat_map(of);
         let Some(least) = compared.min_by(|a, b| a.cost_over_base.total_cmp(&b.cost_over_base)) else {
             return String::new();
         };
         let scenes = self.columns.first().map_or(0, |base| of(base).len());
         let Cell { column, scene, cost_over_base, .. } = least;
-        let counts = tally(&counts, scenes, "scenes");
+        let counts = tally(counts, scenes, "scenes");
         format!("Below base: {counts}. The least is {cost_over_base:.3} of base, ‘{column}’ on {scene}.")
     }
 }

@@ -123,8 +123,7 @@ impl Config {
         };
         let count = |method: &str| scenes.iter().filter(|scene| is_best(scene, method)).count();
         let counts = self.methods.iter().map(|method| (method.as_str(), count(method)));
-        let counts: Vec<_> = counts.filter(|(_, count)| *count > 0).collect();
-        let counts = tally(&counts, scenes.len(), "scenes");
+        let counts = tally(counts.filter(|(_, count)| *count > 0), scenes.len(), "scenes");
         format!("No other has a lower expected best of {}, as far as can be told: {counts}.", self.best_of)
     }
 

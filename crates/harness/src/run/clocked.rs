@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::peers::external;
 use crate::run::job::collapsed_sah;
-use crate::run::rows::{ClockedPeerRow, Row, to_bytes};
+use crate::run::rows::ClockedPeerRow;
 use crate::run::store::Store;
 use crate::scenes::Scene;
 use std::path::Path;
@@ -26,6 +26,6 @@ pub(crate) fn cost_peers(program: &Path, scenes: &[Scene], store: &Store) -> Res
         })
     };
     let rows = scenes.iter().map(row).collect::<Result<Vec<_>, Error>>()?;
-    store.write(ClockedPeerRow::FILE, &to_bytes(&rows, Path::new(ClockedPeerRow::FILE))?)?;
+    store.write_rows(&rows)?;
     Ok(String::new())
 }

@@ -70,7 +70,7 @@ pub(crate) fn update(
         write_all_known(out, known, &before)?;
     }
     if experiment.reports.iter().any(Report::needs_references) {
-        store.write(REFERENCES, &to_bytes(&references, Path::new(REFERENCES))?)?;
+        store.write_rows(&references)?;
     }
     Ok(())
 }

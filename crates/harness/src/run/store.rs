@@ -184,6 +184,11 @@ impl Store {
         Ok(())
     }
 
+    /// Writes the file of one kind of rows.
+    pub fn write_rows<R: Row>(&self, rows: &[R]) -> Result<(), Error> {
+        self.write(R::FILE, &to_bytes(rows, Path::new(R::FILE))?)
+    }
+
     /// Writes another file of the results.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
         files::write(&self.folder.join(name), bytes)

@@ -4,14 +4,12 @@ use crate::Error;
 use crate::measure::speed;
 use crate::peers::{comparison, external};
 use crate::run::job::{Job, Watch, perform};
-use crate::run::rows::{PeerRayRow, RayRatioRow, Row, TraceRow, TraceTimeRow, to_bytes};
 use crate::run::store::Store;
 use crate::spec::{Contestant, Experiment};
 use bvh_core::Bvh;
 use bvh_search::Observer;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use std::path::Path;
 
 /// The trees that rays are traced through, by the number of their run.
 pub(crate) type Trees = BTreeMap<usize, Bvh>;
@@ -66,15 +64,15 @@ pub(crate) fn trace(
     }
     if config.ray_peers.is_some() {
         let compared = comparison::rows(&rows, &times, |label| library(experiment, label));
-        store.write(PeerRayRow::FILE, &to_bytes(&compared, Path::new(PeerRayRow::FILE))?)?;
+        store.write_rows(&compared)?;
         let ratios = comparison::ratios(&compared);
-        store.write(RayRatioRow::FILE, &to_bytes(&ratios, Path::new(RayRatioRow::FILE))?)?;
+        store.write_rows(&ratios)?;
         text += &comparison::text(&ratios);
     }
     // The other rows are compared with committed ones, so they must not depend on a program that may be missing.
     rows.retain(|row| experiment.methods.iter().any(|method| method.label == row.method));
-    store.write(TraceRow::FILE, &to_bytes(&rows, Path::new(TraceRow::FILE))?)?;
-    store.write(TraceTimeRow::FILE, &to_bytes(&times, Path::new(TraceTimeRow::FILE))?)?;
+    store.write_rows(&rows)?;
+    store.write_rows(&times)?;
     Ok(text)
 }
 
