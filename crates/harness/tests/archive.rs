@@ -8,7 +8,7 @@ use harness::run::{archive, reference};
 use harness::scenes::Scene;
 use std::fs;
 use std::path::Path;
-use support::{run, text};
+use support::{refused, said, text};
 
 #[test]
 fn every_tree_of_the_archive_is_valid_costs_what_is_written_and_is_the_best_known() {
@@ -34,19 +34,13 @@ fn only_a_better_tree_comes_into_the_archive_and_becomes_the_best_known() {
     for (method, budget) in [("median_cut", "0s"), ("best", "200kwork")] {
         let out = format!("{budget}.bvh");
         let bake = ["bake", "spheres75:60", "--method", method, "--budget", budget, "--out", &out];
-        assert!(run(at, &bake).status.success());
+        said(at, &bake);
     }
-    let keep = |file: &str| run(at, &["verify", file, "spheres75:60", "--keep", &format!("made {file}")]);
     let files =
         || ["best_known.csv", "trees/trees.csv"].map(|file| fs::read(at.join("results").join(file)).unwrap());
     for file in ["0s.bvh", "200kwork.bvh"] {
-        let kept = keep(file);
-        assert!(kept.status.success(), "{}", text(&kept.stderr));
-        assert!(
-            text(&kept.stdout).contains("kept in: results/trees/spheres75-60.bvh"),
-            "{}",
-            text(&kept.stdout)
-        );
+        let kept = said(at, &["verify", file, "spheres75:60", "--keep", &format!("made {file}")]);
+        assert!(kept.contains("kept in: results/trees/spheres75-60.bvh"), "{kept}");
         assert!(
             fs::read(at.join("results/trees/spheres75-60.bvh")).unwrap() == fs::read(at.join(file)).unwrap()
         );
@@ -58,9 +52,7 @@ fn only_a_better_tree_comes_into_the_archive_and_becomes_the_best_known() {
     }
     let before = files();
     for worse in ["0s.bvh", "200kwork.bvh"] {
-        let refused = keep(worse);
-        assert_eq!(refused.status.code(), Some(2));
-        assert!(text(&refused.stderr).contains("its cost is"), "{}", text(&refused.stderr));
+        refused(at, &["verify", worse, "spheres75:60", "--keep", "worse"], 2, &["its cost is"]);
         assert!(files() == before);
     }
 }

@@ -7,13 +7,9 @@ use harness::scenes::Scene;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Output};
 use std::time::{Duration, Instant};
-use support::{facts, harness, run, run_on_a_small_disk, said, text};
-
-fn cost(folder: &Path, file: &str) -> f64 {
-    facts(&said(folder, &["inspect", file]))["internal area"].parse().unwrap()
-}
+use support::{begin, cost, ended, facts, folder_with, refused, run_on_a_small_disk, said, text};
 
 #[test]
 fn a_bake_of_work_writes_the_same_bytes_on_any_number_of_threads() {
@@ -73,10 +69,7 @@ fn a_bake_for_rays_keeps_how_often_they_visit_each_node() {
         ("none.toml", &["none.toml", "cameras is empty", "eye"]),
         ("gone.toml", &["--rays", "gone.toml", "no such file"]),
     ] {
-        let output = run(at, &["bake", "escher", "--budget", "1s", "--out", "y.bvh", "--rays", file]);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{message}");
-        assert!(parts.iter().all(|part| message.contains(part)), "{file}: {message}");
+        refused(at, &["bake", "escher", "--budget", "1s", "--out", "y.bvh", "--rays", file], 2, parts);
         assert!(!at.join("y.bvh").exists());
     }
 }
@@ -122,17 +115,14 @@ fn a_kill_leaves_the_old_file_or_a_whole_new_one() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bvh");
     let scene = Scene::load("spheres750").unwrap();
-    said(
-        folder.path(),
-        &["bake", "spheres750", "--method", "muller_fellner", "--budget", "0s", "--out", "a.bvh"],
-    );
+    let bake = ["bake", "spheres750", "--method", "muller_fellner", "--budget", "0s", "--out", "a.bvh"];
+    said(folder.path(), &bake);
     let old = fs::read(&path).unwrap();
     let mut replaced = 0;
     for milliseconds in [0, 5, 10, 20, 30, 40, 60, 80, 120, 160, 240, 320] {
         fs::write(&path, &old).unwrap();
         let args = ["bake", "spheres750", "--budget", "20ms", "--out", "a.bvh", "--seed", "2"];
-        let mut child =
-            harness(folder.path(), &args).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let mut child = begin(folder.path(), &args);
         std::thread::sleep(Duration::from_millis(milliseconds));
         child.kill().unwrap();
         child.wait().unwrap();
@@ -177,10 +167,7 @@ fn what_cannot_be_baked_or_inspected_is_said_and_nothing_is_lost() {
         (vec!["inspect", "good.bvh", "spheres750:75"], 2, &["good.bvh", "another scene"]),
         (vec!["inspect", "flipped.bvh"], 2, &["flipped.bvh", "checksum"]),
     ] {
-        let output = run(folder.path(), &args);
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{args:?}: {said}");
-        assert!(parts.iter().all(|part| said.contains(part)), "{args:?}: {said}");
+        refused(folder.path(), &args, code, parts);
     }
     assert_eq!(fs::read(path("good.bvh")).unwrap(), good);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 5, "nothing was left behind");
@@ -193,9 +180,7 @@ fn a_disk_without_room_is_noticed_before_the_search_and_the_old_file_stays() {
     let old = b"\x89BVH\r\n\x1a\nold";
     fs::write(folder.path().join("a.bvh"), old).unwrap();
     let output = run_on_a_small_disk(folder.path(), "bake spheres75 --budget 1h --out a.bvh", 4);
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("a.bvh: cannot reserve the file's space"), "{said}");
+    ended(&output, 1, &["a.bvh: cannot reserve the file's space"]);
     assert_eq!(fs::read(folder.path().join("a.bvh")).unwrap(), old);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
@@ -216,10 +201,9 @@ fn the_facts_are_the_same_in_json() {
 
 #[test]
 fn a_tree_from_elsewhere_is_verified_and_measured_against_the_best_known() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
     let spec = "question = 'q'\nscenes = ['spheres75']\nmethods = [{ method = 'median_cut' }]\n";
-    fs::write(at.join("spec.toml"), spec).unwrap();
+    let folder = folder_with("spec.toml", spec);
+    let at = folder.path();
     said(at, &["spec.toml"]);
     said(at, &["bake", "spheres75", "--budget=200kwork", "--out=x.bvh"]);
     let found = facts(&said(at, &["verify", "x.bvh", "spheres75"]));
@@ -230,8 +214,7 @@ fn a_tree_from_elsewhere_is_verified_and_measured_against_the_best_known() {
     // Of another scene nothing is known, and a tree for it is none.
     said(at, &["bake", "spheres750", "--budget=0s", "--out=y.bvh"]);
     assert!(said(at, &["verify", "y.bvh", "spheres750"]).contains("none of this very scene"));
-    let output = run(at, &["verify", "y.bvh", "spheres75"]);
-    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    refused(at, &["verify", "y.bvh", "spheres75"], 2, &[]);
 }
 
 #[test]
@@ -281,21 +264,8 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_refuse_damage() {
     let trees = [("best", "escher"), ("goldsmith_salmon", "spheres750"), ("best", "spheres75:1")];
     for (index, (method, scene)) in trees.iter().enumerate() {
         let out = format!("{index}.bvh");
-        said(
-            at,
-            &[
-                "bake",
-                scene,
-                "--budget",
-                "1Mwork",
-                "--method",
-                method,
-                "--seed",
-                "18446744073709551615",
-                "--out",
-                &out,
-            ],
-        );
+        let bake = ["bake", scene, "--budget=1Mwork", "--seed=18446744073709551615"];
+        said(at, &[&bake[..], &["--method", method, "--out", &out]].concat());
         let mut bytes = fs::read(at.join(&out)).unwrap();
         let middle = bytes.len() / 2;
         bytes[middle] ^= 1;
@@ -318,16 +288,11 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_refuse_damage() {
         let program = if args.is_empty() { at.join(name).into_os_string() } else { name.into() };
         let read = |file: String| Command::new(&program).args(args).arg(at.join(file)).output().unwrap();
         for index in 0..trees.len() {
-            agree(
-                name,
-                &read(format!("{index}.bvh")),
-                &facts(&said(at, &["inspect", &format!("{index}.bvh")])),
-            );
+            let inspected = facts(&said(at, &["inspect", &format!("{index}.bvh")]));
+            agree(name, &read(format!("{index}.bvh")), &inspected);
             assert!(!read(format!("{index}.damaged")).status.success(), "{name} took damage");
         }
     }
-    eprintln!(
-        "readers tried: {:?}; the others' programs are not here",
-        readers.iter().map(|r| r.0).collect::<Vec<_>>()
-    );
+    let tried: Vec<&str> = readers.iter().map(|reader| reader.0).collect();
+    eprintln!("readers tried: {tried:?}; the others' programs are not here");
 }

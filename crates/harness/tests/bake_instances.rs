@@ -7,7 +7,7 @@ use glam::{Affine3A, Vec3};
 use harness::scenes::Scene;
 use std::fs;
 use std::path::Path;
-use support::{run, text};
+use support::{names, refused, said};
 
 /// A GLB file of two meshes and one of points, under nodes that turn them by right angles and mirror them, so that nothing is rounded.
 fn forest() -> (Vec<u8>, [Vec<Triangle>; 2]) {
@@ -68,19 +68,9 @@ fn a_scene_of_instances_is_baked_mesh_by_mesh_and_answers_as_the_flat_one() {
     fs::write(at.join("forest.glb"), glb).unwrap();
     let bake =
         ["bake", "forest.glb", "--instances", "--budget", "2Mwork", "--references", "1.1", "--out", "baked"];
-    let output = run(at, &bake);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(
-        text(&output.stdout).contains("instances.csv: 5 instances of 2 meshes"),
-        "{}",
-        text(&output.stdout)
-    );
-    let mut names: Vec<_> = fs::read_dir(at.join("baked"))
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    assert_eq!(names, ["instances.csv", "mesh_0.bvh", "mesh_1.bvh", "top.bvh"]);
+    let said = said(at, &bake);
+    assert!(said.contains("instances.csv: 5 instances of 2 meshes"), "{said}");
+    assert_eq!(names(&at.join("baked")), ["instances.csv", "mesh_0.bvh", "mesh_1.bvh", "top.bvh"]);
     let scene = load_instances(&at.join("baked"), &meshes);
 
     let flat = Scene::load(at.join("forest.glb").to_str().unwrap()).unwrap();
@@ -130,10 +120,7 @@ fn a_bake_of_instances_replaces_nobodys_files_and_says_what_it_cannot_do() {
         ("nothing.glb", "new", &["nothing.glb", "no such file"]),
         ("flat.glb", "new", &["nodes[2] places meshes[0]", "no inverse"]),
     ] {
-        let output = run(at, &["bake", scene, "--instances", "--budget", "10kwork", "--out", out]);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{message}");
-        assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+        refused(at, &["bake", scene, "--instances", "--budget", "10kwork", "--out", out], 2, parts);
         assert!(!at.join("new").exists());
     }
     assert_eq!(fs::read_dir(at.join("full")).unwrap().count(), 1);

@@ -7,23 +7,22 @@ use harness::files::load_tree;
 use harness::scenes::Scene;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use support::{harness, run, text};
+use support::{begin, cost, ended, said, send, text};
 
 /// Bakes konistil into `a.bvh`, and interrupts it a while after it has begun, however long it would take.
 fn interrupted(folder: &Path, more: &[&str], after: Duration) -> String {
     let args = [&["bake", "konistil", "--out", "a.bvh"], more].concat();
     let before = fs::read_dir(folder).unwrap().count();
-    let child = harness(folder, &args).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let child = begin(folder, &args);
     // The file is reserved before the search begins.
     while fs::read_dir(folder).unwrap().count() == before {
         std::thread::sleep(Duration::from_millis(20));
     }
     std::thread::sleep(after);
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    send("-INT", &child);
     let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
+    ended(&output, 130, &[]);
     text(&output.stderr)
 }
 
@@ -39,14 +38,10 @@ fn ctrl_c_keeps_the_best_tree_so_far() {
 #[test]
 fn a_bake_that_is_interrupted_early_is_not_behind_plain_reinsertion() {
     let folder = tempfile::tempdir().unwrap();
-    let cost = |file: &str| -> f64 {
-        let facts = text(&run(folder.path(), &["inspect", file]).stdout);
-        let cost = facts.lines().find_map(|line| line.strip_prefix("internal area: "));
-        cost.unwrap_or_else(|| panic!("{facts}")).parse().unwrap()
-    };
+    let cost = |file: &str| cost(folder.path(), file);
     let begin = Instant::now();
     let args = ["bake", "konistil", "--method", "reinsertion", "--budget", "1000Gwork", "--out", "plain.bvh"];
-    assert!(run(folder.path(), &args).status.success());
+    said(folder.path(), &args);
     // Long enough for reinsertion and the starts that precede it, on a busy machine too; the heat of a long search has not paid by then.
     let (plain, after) = (cost("plain.bvh"), Duration::from_secs(1) + 8 * begin.elapsed());
     for more in

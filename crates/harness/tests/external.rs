@@ -5,32 +5,28 @@ mod support;
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use support::{harness, run, text, wait_for};
+use support::{folder_with, harness, refused, rows, said, send, wait_for};
 
 /// A folder with a spec whose second method is the shell script, and with the file of a good tree.
 fn folder(script: &str, more: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
     let spec = format!(
         "question = 'Is theirs better?'\nscenes = ['spheres75']\nrepetitions = 2\nmethods = [\n\
          {{ method = 'muller_fellner' }},\n\
          {{ label = 'theirs', method = 'external', command = ['sh', 'peer.sh'], {more} }},\n]\n"
     );
-    fs::write(at.join("spec.toml"), spec).unwrap();
-    fs::write(at.join("peer.sh"), script).unwrap();
-    let bake =
-        "bake spheres75 --method muller_fellner --budget 0s --out good.bvh".split(' ').collect::<Vec<_>>();
-    assert!(run(at, &bake).status.success());
+    let folder = folder_with("spec.toml", &spec);
+    fs::write(folder.path().join("peer.sh"), script).unwrap();
+    let bake = "bake spheres75 --method muller_fellner --budget 0s --out good.bvh";
+    said(folder.path(), &bake.split(' ').collect::<Vec<_>>());
     folder
 }
 
-/// The rows of a finished run by column names.
-fn rows(at: &Path, columns: [&str; 4]) -> Vec<[String; 4]> {
-    let mut reader = csv::Reader::from_path(at.join("results/spec/runs.csv")).unwrap();
-    let all = reader.deserialize::<std::collections::BTreeMap<String, String>>().map(Result::unwrap);
-    all.map(|row| columns.map(|column| row[column].clone())).collect()
+/// These columns of a finished run's rows.
+fn columns(at: &Path, columns: [&str; 4]) -> Vec<[String; 4]> {
+    let rows = rows(&at.join("results/spec/runs.csv"));
+    rows.iter().map(|row| columns.map(|column| row[column].clone())).collect()
 }
 
 #[test]
@@ -39,15 +35,15 @@ fn the_tree_of_a_program_is_costed_by_us_and_every_run_has_its_seed_and_the_boxe
     let script = "echo $BVH_SEED >> seeds; test $(wc -c < \"$1\") -eq 1800 && cp good.bvh \"$2\"";
     let folder = folder(script, "timeout_seconds = 60");
     let at = folder.path();
-    let output = run(at, &["spec.toml", "--jobs=1"]);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let rows = rows(at, ["method", "cost", "work", "seed"]);
+    said(at, &["spec.toml", "--jobs=1"]);
+    let rows = columns(at, ["method", "cost", "work", "seed"]);
     let (ours, theirs) = rows.split_at(2);
     assert!(theirs.iter().all(|row| row[0] == "theirs" && row[1..3] == ours[0][1..3]), "{rows:?}");
     assert!(theirs[0][3] != theirs[1][3]);
     let seeds = fs::read_to_string(at.join("seeds")).unwrap();
     assert!(seeds.lines().eq(theirs.iter().map(|row| &row[3])), "{seeds} for {theirs:?}");
-    assert!(run(at, &["spec.toml", "--check"]).status.success(), "a repetition has the same rows");
+    // A repetition has the same rows.
+    said(at, &["spec.toml", "--check"]);
 }
 
 #[test]
@@ -63,12 +59,8 @@ fn what_a_program_does_not_do_is_said_with_the_method_and_the_command() {
         ("sleep 60", "timeout_seconds = 0.1", &["did not end within 0.1 s"]),
     ] {
         let folder = folder(script, more);
-        let Output { status, stderr, .. } = run(folder.path(), &["spec.toml"]);
-        let said = text(&stderr);
-        assert_eq!(status.code(), Some(1), "{script}: {said}");
-        for part in [&["scene spheres75, method theirs, command `sh peer.sh`: "], parts].concat() {
-            assert!(said.contains(part), "{script}: {part} in {said}");
-        }
+        let place = "scene spheres75, method theirs, command `sh peer.sh`: ";
+        refused(folder.path(), &["spec.toml"], 1, &[&[place], parts].concat());
     }
 }
 
@@ -90,9 +82,7 @@ fn commands_that_cannot_be_started_or_are_none_are_refused() {
         ("['a'], comand = 'b'", 2, "comand"),
     ] {
         fs::write(folder.path().join("spec.toml"), spec.replace("['sh', 'peer.sh']", command)).unwrap();
-        let Output { status, stderr, .. } = run(folder.path(), &["spec.toml"]);
-        let said = text(&stderr);
-        assert!(status.code() == Some(code) && said.contains(part), "{command}: {said}");
+        refused(folder.path(), &["spec.toml"], code, &[part]);
     }
 }
 
@@ -102,15 +92,15 @@ fn a_signal_ends_a_program_and_what_it_has_started_within_a_second() {
     let at = folder.path();
     let mut child = harness(at, &["spec.toml", "--jobs=1"]).stderr(Stdio::null()).spawn().unwrap();
     wait_for(&at.join("pid"));
-    let signal =
-        |args: &[&str]| Command::new("kill").args(args).stderr(Stdio::null()).status().unwrap().success();
     let start = Instant::now();
-    assert!(signal(&["-TERM", &child.id().to_string()]));
+    send("-TERM", &child);
     assert_eq!(child.wait().unwrap().code(), Some(130));
     assert!(start.elapsed() < Duration::from_secs(1), "{:?}", start.elapsed());
     let pid = fs::read_to_string(at.join("pid")).unwrap();
     // Whoever inherits it reaps it in a moment.
-    while signal(&["-0", pid.trim()]) {
+    let lives =
+        || Command::new("kill").args(["-0", pid.trim()]).stderr(Stdio::null()).status().unwrap().success();
+    while lives() {
         assert!(start.elapsed() < Duration::from_secs(10), "{pid} lives on");
         std::thread::sleep(Duration::from_millis(10));
     }
@@ -123,8 +113,7 @@ fn the_example_in_python_builds_a_tree() {
     }
     let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scripts/external_method.py");
     let folder = folder(&format!("exec python3 '{}' \"$@\"", example.display()), "");
-    let output = run(folder.path(), &["spec.toml"]);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let rows = rows(folder.path(), ["method", "cost_over_base", "nodes", "stop"]);
+    said(folder.path(), &["spec.toml"]);
+    let rows = columns(folder.path(), ["method", "cost_over_base", "nodes", "stop"]);
     assert!(rows[2][2] == "149" && rows[2][1].parse::<f64>().unwrap() < 3.0, "{rows:?}");
 }

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
-use support::{harness, reproducible, run, run_on_a_small_disk, text, wait_for};
+use support::{ended, folder_with, harness, refused, reproducible, run_on_a_small_disk, said, wait_for};
 
 const SPEC: &str = "
 question = 'What survives?'
@@ -23,9 +23,7 @@ methods = [
 
 /// A folder with the spec in it.
 fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("spec.toml"), SPEC).unwrap();
-    folder
+    folder_with("spec.toml", SPEC)
 }
 
 /// What is killed or goes on in the background: nobody reads what it says.
@@ -33,20 +31,6 @@ fn command(folder: &Path, args: &[&str]) -> Command {
     let mut command = harness(folder, args);
     command.stdout(Stdio::null()).stderr(Stdio::null());
     command
-}
-
-/// Runs what must succeed.
-fn succeed(folder: &Path, args: &[&str]) {
-    let output = run(folder, args);
-    assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
-}
-
-/// Runs what must fail, with parts of what is said.
-fn fail(folder: &Path, args: &[&str], code: i32, parts: &[&str]) {
-    let output = run(folder, args);
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{args:?}: {said}");
-    assert!(parts.iter().all(|part| said.contains(part)), "{args:?}: {said}");
 }
 
 /// What a run leaves that every run must leave.
@@ -58,7 +42,7 @@ fn results(out: &Path) -> Vec<(String, Vec<u8>)> {
 
 /// What one uninterrupted run writes.
 fn whole(folder: &Path) -> Vec<(String, Vec<u8>)> {
-    succeed(folder, &["spec.toml", "--out", "whole"]);
+    said(folder, &["spec.toml", "--out", "whole"]);
     results(&folder.join("whole"))
 }
 
@@ -86,7 +70,7 @@ fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
             panic!("after {killed} kills --resume fails");
         }
     }
-    succeed(folder.path(), &["spec.toml", "--resume", "--out", &out]);
+    said(folder.path(), &["spec.toml", "--resume", "--out", &out]);
     let found = results(&folder.path().join(&out));
     let names = |files: &[(String, Vec<u8>)]| files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
     let differ: Vec<&String> = found.iter().zip(&whole).filter(|(a, b)| a != b).map(|(a, _)| &a.0).collect();
@@ -110,14 +94,14 @@ fn a_second_harness_on_the_same_folder_is_refused_and_disturbs_nothing() {
     wait_for(&folder.path().join("results/long/.partial/000000"));
     for more in [&[][..], &["--resume"], &["--seed=3"], &["--shard=1/2"]] {
         let args = [&["long.toml"], more].concat();
-        fail(folder.path(), &args, 1, &["results/long is in use by another harness", "--out"]);
+        refused(folder.path(), &args, 1, &["results/long is in use by another harness", "--out"]);
     }
     // Other folders are free, and the kept run is still there.
-    succeed(folder.path(), &["spec.toml"]);
+    said(folder.path(), &["spec.toml"]);
     assert!(folder.path().join("results/long/.partial/000000/runs.csv").is_file());
     drop(first);
     // The lock died with its owner.
-    fail(folder.path(), &["long.toml", "--resume", "--seed=3"], 2, &["results/long", "another spec"]);
+    refused(folder.path(), &["long.toml", "--resume", "--seed=3"], 2, &["results/long", "another spec"]);
 }
 
 #[cfg(unix)]
@@ -129,11 +113,9 @@ fn a_full_disk_is_reported_and_what_was_finished_is_kept() {
         let out = format!("full{blocks}");
         let args = format!("spec.toml --jobs 2 --out {out}");
         let output = run_on_a_small_disk(folder.path(), &args, blocks);
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{said}");
-        assert!(said.contains(&format!("{out}/spec")) && said.contains("cannot write the file"), "{said}");
+        ended(&output, 1, &[&format!("{out}/spec"), "cannot write the file"]);
         assert!(!folder.path().join(&out).join("spec/runs.csv").exists());
-        succeed(folder.path(), &["spec.toml", "--resume", "--out", &out]);
+        said(folder.path(), &["spec.toml", "--resume", "--out", &out]);
         assert!(results(&folder.path().join(&out)) == whole);
     }
 }
@@ -144,13 +126,12 @@ fn what_cannot_be_said_is_an_error_and_a_reader_that_left_is_none() {
     let folder = folder();
     let full = || Stdio::from(fs::File::options().write(true).open("/dev/full").unwrap());
     let output = command(folder.path(), &["scenes"]).stdout(full()).stderr(Stdio::piped()).output().unwrap();
-    assert_eq!(output.status.code(), Some(1));
-    assert!(text(&output.stderr).contains("standard output"));
+    ended(&output, 1, &["standard output"]);
     let mut child = command(folder.path(), &["scenes"]).stdout(Stdio::piped()).spawn().unwrap();
     drop(child.stdout.take());
     assert!(child.wait().unwrap().success());
     // A file is put in the place of what has its name: never of a device.
-    fail(folder.path(), &["render", "spheres75", "--out", "/dev/full"], 2, &["--out", "/dev/full"]);
+    refused(folder.path(), &["render", "spheres75", "--out", "/dev/full"], 2, &["--out", "/dev/full"]);
 }
 
 /// Makes a folder unwritable, for root too where the file system can; undone when dropped.
@@ -189,21 +170,26 @@ fn a_folder_that_cannot_be_written_is_named() {
     let folder = folder();
     let locked = folder.path().join("locked");
     fs::create_dir(&locked).unwrap();
-    succeed(folder.path(), &["bake", "spheres75", "--budget=0s", "--out=good.bvh"]);
+    said(folder.path(), &["bake", "spheres75", "--budget=0s", "--out=good.bvh"]);
     let Some(_guard) = ReadOnly::new(&locked) else {
         eprintln!("not tried: this user can write into any folder here");
         return;
     };
-    fail(folder.path(), &["spec.toml", "--out=locked"], 1, &["locked/spec", "cannot create the folder"]);
-    fail(
+    refused(folder.path(), &["spec.toml", "--out=locked"], 1, &["locked/spec", "cannot create the folder"]);
+    refused(
         folder.path(),
         &["bake", "spheres75", "--budget=1h", "--out=locked/x.bvh"],
         1,
         &["locked", "cannot create"],
     );
-    fail(folder.path(), &["inspect", "good.bvh", "--nodes=locked/x.csv"], 1, &["locked/x.csv", "cannot write"]);
+    refused(
+        folder.path(),
+        &["inspect", "good.bvh", "--nodes=locked/x.csv"],
+        1,
+        &["locked/x.csv", "cannot write"],
+    );
     let render = ["render", "spheres75", "--size=8x8", "--out=locked/x.png"];
-    fail(folder.path(), &render, 1, &["locked/x.png", "cannot"]);
+    refused(folder.path(), &render, 1, &["locked/x.png", "cannot"]);
     assert_eq!(fs::read_dir(&locked).unwrap().count(), 0);
 }
 
@@ -214,23 +200,23 @@ fn a_folder_where_a_file_should_be_is_named_and_so_is_the_reverse() {
     fs::create_dir(at.join("folder.obj")).unwrap();
     fs::create_dir(at.join("folder.toml")).unwrap();
     fs::create_dir(at.join("folder.bvh")).unwrap();
-    fail(at, &["folder.toml"], 2, &["folder.toml"]);
-    fail(at, &["spec.toml", "--scene=folder.obj"], 2, &["folder.obj", "directory"]);
-    fail(at, &["inspect", "folder.bvh"], 2, &["folder.bvh", "a folder"]);
-    fail(at, &["render", "spheres75", "--accel=folder.bvh", "--out=x.png"], 2, &["--accel", "folder.bvh"]);
+    refused(at, &["folder.toml"], 2, &["folder.toml"]);
+    refused(at, &["spec.toml", "--scene=folder.obj"], 2, &["folder.obj", "directory"]);
+    refused(at, &["inspect", "folder.bvh"], 2, &["folder.bvh", "a folder"]);
+    refused(at, &["render", "spheres75", "--accel=folder.bvh", "--out=x.png"], 2, &["--accel", "folder.bvh"]);
     let made = |path: &str| fs::create_dir_all(at.join(path)).unwrap();
     made("a/spec/runs.csv");
-    fail(at, &["spec.toml", "--out=a"], 1, &["a/spec/runs.csv", "cannot replace the file"]);
+    refused(at, &["spec.toml", "--out=a"], 1, &["a/spec/runs.csv", "cannot replace the file"]);
     assert!(!at.join("a/spec/runs.csv.unfinished").exists());
     fs::remove_dir(at.join("a/spec/runs.csv")).unwrap();
     // The runs were not lost.
-    succeed(at, &["spec.toml", "--out=a", "--resume"]);
+    said(at, &["spec.toml", "--out=a", "--resume"]);
     made("b/spec/.lock");
-    fail(at, &["spec.toml", "--out=b"], 1, &["b/spec/.lock", "cannot create the file"]);
+    refused(at, &["spec.toml", "--out=b"], 1, &["b/spec/.lock", "cannot create the file"]);
     made("c/spec");
     fs::write(at.join("c/spec/.partial"), "").unwrap();
-    fail(at, &["spec.toml", "--out=c"], 1, &["c/spec/.partial", "cannot"]);
+    refused(at, &["spec.toml", "--out=c"], 1, &["c/spec/.partial", "cannot"]);
     made("d");
     fs::write(at.join("d/spec"), "").unwrap();
-    fail(at, &["spec.toml", "--out=d"], 1, &["d/spec", "cannot create the folder"]);
+    refused(at, &["spec.toml", "--out=d"], 1, &["d/spec", "cannot create the folder"]);
 }

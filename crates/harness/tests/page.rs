@@ -3,7 +3,7 @@
 mod support;
 
 use std::fs;
-use support::{run, text};
+use support::{folder_with, refused, said};
 
 const SPEC: &str = "
 question = 'Do results survive?'
@@ -35,18 +35,16 @@ fn between<'a>(page: &'a str, before: &str, after: &str) -> Vec<&'a str> {
 
 #[test]
 fn the_page_of_all_results_answers_first_and_leads_to_files_that_are_there_but_needs_none() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("spec.toml"), SPEC).unwrap();
+    let folder = folder_with("spec.toml", SPEC);
     let of_lists =
         "question = 'What is listed?'\nscenes = ['escher:50']\nmethods = [{ method = 'muller_fellner' }]\n";
     fs::write(folder.path().join("list.toml"), of_lists).unwrap();
-    assert!(run(folder.path(), &["spec.toml", "list.toml"]).status.success());
-    assert!(run(folder.path(), &["spec.toml", "--quick"]).status.success());
+    said(folder.path(), &["spec.toml", "list.toml"]);
+    said(folder.path(), &["spec.toml", "--quick"]);
     fs::create_dir(folder.path().join("a folder")).unwrap();
     for out in ["results/report.html", "a folder/page.html"] {
-        let output = run(folder.path(), &["report", "--out", out]);
-        assert!(output.status.success(), "{}", text(&output.stderr));
-        assert!(text(&output.stdout).contains("2 experiments"), "{}", text(&output.stdout));
+        let said = said(folder.path(), &["report", "--out", out]);
+        assert!(said.contains("2 experiments"), "{said}");
         let page = fs::read_to_string(folder.path().join(out)).unwrap();
         let (answers, sections) = page.split_once("<section").unwrap();
         let answers = between(answers, "<li id=\"answer-", "</li>");
@@ -80,7 +78,5 @@ fn the_page_of_all_results_answers_first_and_leads_to_files_that_are_there_but_n
             assert!(!page.contains(other), "{other}");
         }
     }
-    let nothing = run(folder.path(), &["report", "--results", "."]);
-    assert_eq!(nothing.status.code(), Some(2));
-    assert!(text(&nothing.stderr).contains("no finished experiment"), "{}", text(&nothing.stderr));
+    refused(folder.path(), &["report", "--results", "."], 2, &["no finished experiment"]);
 }

@@ -6,7 +6,7 @@ mod support;
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use support::{harness, reproducible, run, text};
+use support::{ended, folder_with, harness, names, reproducible, run, said, send, text, wait_for};
 
 const SPEC: &str = "
 question = 'What stays?'
@@ -17,30 +17,12 @@ methods = [{ method = 'muller_fellner' }, { method = 'grasp', trials = 3 }]
 
 /// A folder with a spec of this name in it.
 fn folder(spec: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join(spec), SPEC).unwrap();
-    folder
+    folder_with(spec, SPEC)
 }
 
-fn succeed(folder: &Path, args: &[&str]) -> String {
-    let output = run(folder, args);
-    assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
-    text(&output.stdout)
-}
-
-/// Runs what must be refused, with parts of the message.
+/// What must be refused as a wrong call is, with parts of the message.
 fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
-    let output = run(folder, args);
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
-    assert!(parts.iter().all(|part| said.contains(part)), "{args:?}: {said}");
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> =
-        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
+    support::refused(folder, args, 2, parts);
 }
 
 #[test]
@@ -65,20 +47,20 @@ fn two_specs_of_one_name_in_one_command_are_refused_before_the_work() {
 fn finished_results_are_replaced_by_force_only() {
     let folder = folder("spec.toml");
     let at = folder.path();
-    succeed(at, &["spec.toml"]);
+    said(at, &["spec.toml"]);
     let files =
         || (reproducible(&at.join("results/spec")), fs::read(at.join("results/spec/timing.csv")).unwrap());
     let first = files();
     // A repetition goes beside them.
-    let said = succeed(at, &["spec.toml"]);
-    assert!(said.contains("results/spec is kept and has the same rows"), "{said}");
+    let repeated = said(at, &["spec.toml"]);
+    assert!(repeated.contains("results/spec is kept and has the same rows"), "{repeated}");
     assert!(files() == first && reproducible(&at.join("results/spec.new")) == first.0);
     // Other runs are refused.
     for other in [&["--scene=spheres750"][..], &["--seed=2"], &["--shard=1/2"]] {
         refused(at, &[&["spec.toml"], other].concat(), &["results/spec", "--force", "--out"]);
     }
     assert!(files() == first);
-    succeed(at, &["spec.toml", "--seed=2", "--force"]);
+    said(at, &["spec.toml", "--seed=2", "--force"]);
     assert!(files().0 != first.0);
 }
 
@@ -86,11 +68,11 @@ fn finished_results_are_replaced_by_force_only() {
 fn the_finished_runs_of_an_interrupted_experiment_are_discarded_by_force_only() {
     let folder = folder("spec.toml");
     let at = folder.path();
-    succeed(at, &["spec.toml", "--shard=1/2"]);
+    said(at, &["spec.toml", "--shard=1/2"]);
     refused(at, &["spec.toml"], &["finished runs", "--resume", "--force"]);
     assert!(at.join("results/spec/.partial/000000").is_dir());
-    succeed(at, &["spec.toml", "--resume"]);
-    succeed(at, &["spec.toml", "--out=whole"]);
+    said(at, &["spec.toml", "--resume"]);
+    said(at, &["spec.toml", "--out=whole"]);
     assert!(reproducible(&at.join("results/spec")) == reproducible(&at.join("whole/spec")));
 }
 
@@ -98,7 +80,7 @@ fn the_finished_runs_of_an_interrupted_experiment_are_discarded_by_force_only() 
 fn a_damaged_finished_run_is_named_and_done_again_or_refused() {
     let folder = folder("spec.toml");
     let at = folder.path();
-    succeed(at, &["spec.toml", "--out=whole"]);
+    said(at, &["spec.toml", "--out=whole"]);
     let whole = reproducible(&at.join("whole/spec"));
     let damages: [fn(&Path); 3] = [
         |part| fs::remove_file(part.join("runs.csv")).unwrap(),
@@ -110,17 +92,15 @@ fn a_damaged_finished_run_is_named_and_done_again_or_refused() {
     ];
     for (number, damage) in damages.into_iter().enumerate() {
         let (one, two) = (format!("one{number}"), format!("two{number}"));
-        succeed(at, &["spec.toml", "--shard=1/2", "--out", &one]);
-        succeed(at, &["spec.toml", "--shard=2/2", "--out", &two]);
+        said(at, &["spec.toml", "--shard=1/2", "--out", &one]);
+        said(at, &["spec.toml", "--shard=2/2", "--out", &two]);
         damage(&at.join(&one).join("spec/.partial/000002"));
         let merge = run(at, &["merge", &one, &two, "--out=merged"]);
-        let said = text(&merge.stderr);
-        assert!(!merge.status.success() && said.contains("000002") && said.contains("damaged"), "{said}");
+        let error = text(&merge.stderr);
+        assert!(!merge.status.success() && error.contains("000002") && error.contains("damaged"), "{error}");
         assert!(!at.join("merged").exists());
         let resumed = run(at, &["spec.toml", "--resume", "--out", &one]);
-        let said = text(&resumed.stderr);
-        assert!(resumed.status.success(), "{said}");
-        assert!(said.contains("done again") && said.contains("000002"), "{said}");
+        ended(&resumed, 0, &["done again", "000002"]);
         assert!(reproducible(&at.join(&one).join("spec")) == whole);
     }
 }
@@ -131,8 +111,8 @@ fn no_command_replaces_a_file_of_another_kind() {
     let at = folder.path();
     let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     fs::write(at.join("mesh.obj"), mesh).unwrap();
-    succeed(at, &["bake", "mesh.obj", "--budget=0s", "--out=tree.bvh"]);
-    succeed(at, &["spec.toml"]);
+    said(at, &["bake", "mesh.obj", "--budget=0s", "--out=tree.bvh"]);
+    said(at, &["spec.toml"]);
     refused(at, &["bake", "mesh.obj", "--budget=0s", "--out=mesh.obj"], &["--out", "mesh.obj", "tree file"]);
     refused(at, &["render", "mesh.obj", "--size=8x8", "--out=mesh.obj"], &["--out", "mesh.obj", "PNG"]);
     refused(at, &["render", "mesh.obj", "--accel=tree.bvh", "--out=tree.bvh"], &["--out", "tree.bvh", "PNG"]);
@@ -142,11 +122,11 @@ fn no_command_replaces_a_file_of_another_kind() {
     assert_eq!(fs::read_to_string(at.join("mesh.obj")).unwrap(), mesh);
     assert_eq!(fs::read_to_string(at.join("spec.toml")).unwrap(), SPEC);
     // Files of the same kind are replaced.
-    succeed(at, &["bake", "mesh.obj", "--budget=0s", "--out=tree.bvh", "--from=tree.bvh"]);
+    said(at, &["bake", "mesh.obj", "--budget=0s", "--out=tree.bvh", "--from=tree.bvh"]);
     for _ in 0..2 {
-        succeed(at, &["inspect", "tree.bvh", "--nodes=nodes.csv"]);
-        succeed(at, &["report", "--out=page.html"]);
-        succeed(at, &["render", "mesh.obj", "--size=8x8", "--out=x.png"]);
+        said(at, &["inspect", "tree.bvh", "--nodes=nodes.csv"]);
+        said(at, &["report", "--out=page.html"]);
+        said(at, &["render", "mesh.obj", "--size=8x8", "--out=x.png"]);
     }
 }
 
@@ -162,7 +142,7 @@ fn a_file_whose_name_says_another_kind_is_not_begun() {
     ] {
         refused(at, args, &["a name that ends with", accepted, "accepted"]);
     }
-    succeed(at, &["bake", "spheres75", "--budget=0s", "--out=tree"]);
+    said(at, &["bake", "spheres75", "--budget=0s", "--out=tree"]);
     assert_eq!(names(at), ["spec.toml", "tree"]);
 }
 
@@ -178,7 +158,7 @@ fn results_come_from_the_programs_repository_and_not_from_the_current_folders() 
     let Some(elsewhere) = git(&["rev-parse", "HEAD"]).filter(|output| output.status.success()) else {
         return eprintln!("left out: there is no git");
     };
-    succeed(folder.path(), &["spec.toml"]);
+    said(folder.path(), &["spec.toml"]);
     let provenance = fs::read_to_string(folder.path().join("results/spec/provenance.toml")).unwrap();
     let provenance: toml::Table = provenance.parse().unwrap();
     assert_eq!(provenance["revision"].as_str(), Some(env!("HARNESS_REVISION")));
@@ -233,12 +213,9 @@ fn the_first_signal_ends_even_a_program_that_waits_for_another() {
     lock.lock().unwrap();
     let mut child = harness(at, &["spec.toml"]).stderr(std::process::Stdio::null()).spawn().unwrap();
     // All runs are finished, and the best known costs are in use by us.
-    while !at.join("results/spec/runs.csv").exists() {
-        std::thread::sleep(Duration::from_millis(10));
-    }
+    wait_for(&at.join("results/spec/runs.csv"));
     let start = Instant::now();
-    let signal = std::process::Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
-    assert!(signal.unwrap().success());
+    send("-TERM", &child);
     while child.try_wait().unwrap().is_none() && start.elapsed() < Duration::from_secs(5) {
         std::thread::sleep(Duration::from_millis(10));
     }
@@ -247,7 +224,7 @@ fn the_first_signal_ends_even_a_program_that_waits_for_another() {
     assert_eq!(child.wait().unwrap().code(), Some(130), "{:?}", start.elapsed());
     // Nothing is lost.
     drop(lock);
-    succeed(at, &["spec.toml", "--resume"]);
+    said(at, &["spec.toml", "--resume"]);
 }
 
 #[test]

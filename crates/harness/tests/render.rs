@@ -4,7 +4,7 @@ mod support;
 
 use std::collections::BTreeSet;
 use std::fs;
-use support::{run, text};
+use support::{folder_with, refused, said};
 
 #[test]
 fn every_structure_and_any_number_of_threads_write_the_same_file() {
@@ -13,9 +13,8 @@ fn every_structure_and_any_number_of_threads_write_the_same_file() {
     let structures = ["brute", "kdtree", "bvh", "wide"];
     for (accel, jobs) in structures.into_iter().zip(["1", "2", "3", "1"]) {
         let args = ["render", "escher:cluster:300:1", "--out", "p.png", "--size", "50x31", "--accel", accel];
-        let output = run(folder.path(), &[&args[..], &["--jobs", jobs]].concat());
-        assert!(output.status.success(), "{accel}: {}", text(&output.stderr));
-        assert_eq!(text(&output.stdout).contains("per ray"), accel != "wide", "{}", text(&output.stdout));
+        let said = said(folder.path(), &[&args[..], &["--jobs", jobs]].concat());
+        assert_eq!(said.contains("per ray"), accel != "wide", "{said}");
         files.insert(fs::read(folder.path().join("p.png")).unwrap());
     }
     assert_eq!(files.len(), 1);
@@ -28,9 +27,8 @@ fn the_eye_may_be_anywhere_and_the_scene_a_single_point() {
     fs::write(folder.path().join("flat.obj"), "v 0 0 0\nv 1e30 0 0\nv 0 0 1e30\nf 1 2 3\n").unwrap();
     for scene in ["point.obj", "flat.obj"] {
         for eye in [&[][..], &["--from", "-1,2,3", "--at", "-1,2,3"], &["--from", "1,2,3", "--no-lights"]] {
-            let args = [&["render", scene, "--out", "p.png", "--size", "20x10", "--heatmap"], eye].concat();
-            let output = run(folder.path(), &args);
-            assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
+            let args = ["render", scene, "--out", "p.png", "--size", "20x10", "--heatmap"];
+            said(folder.path(), &[&args, eye].concat());
         }
     }
 }
@@ -52,17 +50,13 @@ fn what_cannot_be_drawn_is_refused_with_what_would_be_accepted() {
         (&["spheres75", "--size", "8x8", "--out", "no/p.png"], 1, &["no/p.png", "cannot"]),
     ] {
         let out: &[&str] = if args.contains(&"--out") { &[] } else { &["--out", "p.png"] };
-        let output = run(folder.path(), &[&["render"], args, out].concat());
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{args:?}: {said}");
-        assert!(parts.iter().all(|part| said.contains(part)), "{args:?}: {said}");
+        refused(folder.path(), &[&["render"], args, out].concat(), code, parts);
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing was written");
 }
 
 #[test]
 fn an_experiment_draws_with_every_tree_and_the_baselines_and_keeps_seconds_apart() {
-    let folder = tempfile::tempdir().unwrap();
     let spec = "
 question = 'Is it faster?'
 scenes = ['spheres75', 'escher:cluster:90:1']
@@ -77,11 +71,9 @@ methods = ['median_cut', 'random_orders']
 scene = 'spheres75'
 document = { 'brute force' = 32.77, 'KD-tree' = 1.8 }
 ";
-    fs::write(folder.path().join("spec.toml"), spec).unwrap();
-    let output = run(folder.path(), &["spec.toml"]);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("18.21"), "{}", text(&output.stdout));
-    assert!(text(&output.stdout).contains("same picture"), "{}", text(&output.stdout));
+    let folder = folder_with("spec.toml", spec);
+    let shown = said(folder.path(), &["spec.toml"]);
+    assert!(shown.contains("18.21") && shown.contains("same picture"), "{shown}");
     let results = folder.path().join("results/spec");
     let mut reader = csv::Reader::from_path(results.join("renders.csv")).unwrap();
     let rows: Vec<harness::run::rows::RenderRow> = reader.deserialize().map(Result::unwrap).collect();
@@ -93,13 +85,7 @@ document = { 'brute force' = 32.77, 'KD-tree' = 1.8 }
     }
     assert!(!fs::read_to_string(results.join("pictures.csv")).unwrap().contains("seconds"));
     assert!(fs::read_to_string(results.join("timing_pictures.csv")).unwrap().contains("seconds"));
-    let output = run(folder.path(), &["spec.toml", "--check", "--jobs", "1"]);
-    assert!(output.status.success(), "{}", text(&output.stdout));
+    said(folder.path(), &["spec.toml", "--check", "--jobs", "1"]);
     fs::write(folder.path().join("wrong.toml"), spec.replace("width = 24", "width = 0")).unwrap();
-    let output = run(folder.path(), &["wrong.toml"]);
-    assert!(
-        text(&output.stderr).contains("render.width is 0; accepted: 1 to 10000"),
-        "{}",
-        text(&output.stderr)
-    );
+    refused(folder.path(), &["wrong.toml"], 2, &["render.width is 0; accepted: 1 to 10000"]);
 }

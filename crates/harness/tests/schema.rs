@@ -6,7 +6,7 @@ mod support;
 use serde_json::{Map, Value};
 use std::fs;
 use std::path::{Path, PathBuf};
-use support::{run, text};
+use support::{refused, said};
 
 fn top() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -64,8 +64,7 @@ fn fault(root: &Value, schema: &Value, value: &Value, at: &str) -> Option<String
 
 #[test]
 fn the_schema_accepts_every_committed_spec_and_refuses_a_mistyped_key_anywhere() {
-    let printed = run(Path::new("."), &["schema"]);
-    let schema: Value = serde_json::from_slice(&printed.stdout).unwrap();
+    let schema: Value = serde_json::from_str(&said(Path::new("."), &["schema"])).unwrap();
     let parsed = |text: &str| serde_json::to_value(toml::from_str::<toml::Table>(text).unwrap()).unwrap();
     for entry in fs::read_dir(top().join("experiments")).unwrap() {
         let path = entry.unwrap().path();
@@ -113,18 +112,13 @@ fn the_page_of_keys_is_what_the_declarations_say() {
 fn a_new_spec_runs_as_it_is_and_replaces_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let made = run(at, &["new", "mine.toml"]);
-    assert!(made.status.success(), "{}", text(&made.stderr));
-    let quick = run(at, &["mine.toml", "--quick"]);
-    assert!(quick.status.success() && text(&quick.stdout).contains("best"), "{}", text(&quick.stderr));
+    said(at, &["new", "mine.toml"]);
+    assert!(said(at, &["mine.toml", "--quick"]).contains("best"));
     // Whole, too, as far as the scenes go.
-    let whole = run(at, &["mine.toml", "--explain", "--scene", "spheres75"]);
-    assert!(whole.status.success(), "{}", text(&whole.stderr));
+    said(at, &["mine.toml", "--explain", "--scene", "spheres75"]);
     fs::write(at.join("mine.toml"), "mine").unwrap();
     for (file, part) in [("mine.toml", "is there already"), ("mine", "ends with .toml")] {
-        let refused = run(at, &["new", file]);
-        assert_eq!(refused.status.code(), Some(2));
-        assert!(text(&refused.stderr).contains(part), "{}", text(&refused.stderr));
+        refused(at, &["new", file], 2, &[part]);
     }
     assert_eq!(fs::read(at.join("mine.toml")).unwrap(), b"mine");
 }

@@ -63,57 +63,33 @@ fn every_scene_has_the_size_it_is_asked_for() {
     assert_eq!(STIFF.len(), CASES.iter().filter(|case| case.scene().is_some()).count());
 }
 
-/// The methods of one half, so that two threads share them.
-fn check_methods(half: usize, effort: Effort) {
-    let mut found = Vec::new();
-    for (label, method) in stress::methods().into_iter().skip(half).step_by(2) {
-        for case in &CASES {
-            found.extend(broken(case, &label, case.of_method(&method, &effort)));
-        }
-    }
-    assert_kept(found);
+/// Every case with every one of these methods.
+fn check_methods(methods: &[(String, Method)], effort: Effort) {
+    let found = methods.par_iter().flat_map_iter(|(label, method)| {
+        CASES.iter().filter_map(move |case| broken(case, label, case.of_method(method, &effort)))
+    });
+    assert_kept(found.collect());
 }
 
 #[test]
 fn every_case_holds_for_every_method() {
-    check_methods(0, QUICK);
+    check_methods(&stress::methods(), QUICK);
 }
 
 #[test]
-fn every_case_holds_for_every_other_method() {
-    check_methods(1, QUICK);
-}
-
-/// What is asked in the slow tier: thousands of objects for builders and searches alike.
-const LARGE: Effort = Effort {
-    builders: Size::Many,
-    work_per_object: WORK,
-    larger: Some(LargerScenes { objects: 2000, work_per_object: 60 }),
-};
-
-#[test]
-#[ignore = "slow: thousands of objects"]
+#[ignore = "slow: thousands of objects for builders and searches alike"]
 fn every_case_holds_for_every_method_at_a_larger_size() {
-    check_methods(0, LARGE);
-}
-
-#[test]
-#[ignore = "slow: thousands of objects"]
-fn every_case_holds_for_every_other_method_at_a_larger_size() {
-    check_methods(1, LARGE);
+    let larger = Some(LargerScenes { objects: 2000, work_per_object: 60 });
+    check_methods(&stress::methods(), Effort { builders: Size::Many, work_per_object: WORK, larger });
 }
 
 #[test]
 #[ignore = "by hand: minutes and gigabytes, S36 has ten million triangles"]
 fn every_scene_holds_for_every_builder_at_its_full_size() {
-    let full = Effort { builders: Size::All, ..QUICK };
-    let mut found = Vec::new();
-    for method in Method::all().iter().filter(|method| is_builder(method)) {
-        for case in &CASES {
-            found.extend(broken(case, method.name(), case.of_method(method, &full)));
-        }
+    let builders = Method::all().into_iter().filter(is_builder);
+    for builder in builders.map(|method| (method.name().to_owned(), method)) {
+        check_methods(&[builder], Effort { builders: Size::All, ..QUICK });
     }
-    assert_kept(found);
 }
 
 #[test]
@@ -226,6 +202,19 @@ fn the_rays_of_the_suite_hit_miss_and_cover_every_kind() {
     );
 }
 
+/// The cost that is reported for a tree is the one that it has.
+fn assert_reported(who: &str, reported: f64, cost: f64) {
+    assert!((reported - cost).abs() <= examine::ROUNDING * cost, "{who}: {reported} reported, {cost}");
+}
+
+/// The layout answers rays through the triangles as another one does.
+fn assert_same_answers(case: &Case, wide: &WideBvh, plain: &WideBvh, triangles: &[Triangle]) {
+    for ray in tracing::rays(triangles, 300, 2) {
+        assert_eq!(wide.nearest_hit(&ray), plain.nearest_hit(&ray), "{}: {ray:?}", case.id);
+        assert_eq!(wide.any_hit(&ray), plain.any_hit(&ray), "{}: {ray:?}", case.id);
+    }
+}
+
 #[test]
 fn every_objective_is_what_its_method_reports() {
     for (label, method) in stress::methods() {
@@ -238,8 +227,7 @@ fn every_objective_is_what_its_method_reports() {
                     solve(&method, &Problem { objective, ..Problem::new(&boxes) }, 1, budget, &()).unwrap();
                 validate(&outcome.tree, &boxes).unwrap();
                 let cost = objective.cost(&outcome.tree);
-                let close = (outcome.cost - cost).abs() <= examine::ROUNDING * cost;
-                assert!(close, "{label}, {objective:?}: {} reported, {cost}", outcome.cost);
+                assert_reported(&format!("{label}, {objective:?}"), outcome.cost, cost);
             }
         }
     }
@@ -269,10 +257,8 @@ fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
         let budget = examine::budget(&method, boxes.len(), WORK);
         let outcome = optimize(&start, &problem, &Default::default(), 1, budget, &()).unwrap();
         validate(&outcome.tree, &boxes).unwrap();
-        let cost = problem.cost(&outcome.tree);
         assert!(outcome.cost <= problem.cost(&start), "{}: a worse tree", case.id);
-        let close = (outcome.cost - cost).abs() <= examine::ROUNDING * cost;
-        assert!(close, "{}: {} reported, {cost}", case.id, outcome.cost);
+        assert_reported(case.id, outcome.cost, problem.cost(&outcome.tree));
         // What is saved can be loaded, and every ray has its right answer in the layout for these rays.
         let visits = density.visits(&outcome.tree);
         let bytes = file::save(&outcome.tree, &boxes, &file::Origin { visits: &visits, ..Default::default() });
@@ -280,10 +266,7 @@ fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
         assert_eq!(file::TreeFile::open(&bytes).unwrap().visits().unwrap().unwrap(), visits);
         let wide = WideBvh::for_rays(&outcome.tree, &triangles, &visits).unwrap();
         let plain = WideBvh::new(&start, &triangles).unwrap();
-        for ray in tracing::rays(&triangles, 300, 2) {
-            assert_eq!(wide.nearest_hit(&ray), plain.nearest_hit(&ray), "{}: {ray:?}", case.id);
-            assert_eq!(wide.any_hit(&ray), plain.any_hit(&ray), "{}: {ray:?}", case.id);
-        }
+        assert_same_answers(case, &wide, &plain, &triangles);
     }
     assert!(searched > 25 && refused < 10, "{searched} searched, {refused} without a density");
 }
@@ -309,18 +292,13 @@ fn every_case_holds_with_divided_objects_and_with_the_cost_of_the_layout() {
                     .unwrap_or_else(|fault| panic!("{}, {objective:?}, {references}: {fault}", case.id));
                 assert!(outcome.tree.prim_ids.len() <= most.max(boxes.len()), "{}", case.id);
                 divided += usize::from(outcome.tree.prim_ids.len() > boxes.len());
-                let cost = problem.cost(&outcome.tree);
-                let close = (outcome.cost - cost).abs() <= examine::ROUNDING * cost;
-                assert!(close, "{}: {} reported, {cost}", case.id, outcome.cost);
+                assert_reported(case.id, outcome.cost, problem.cost(&outcome.tree));
                 let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
                 let bytes = file::save_references(&outcome.tree, &boxes, &objects, &file::Origin::default());
                 assert_eq!(file::load(&bytes.unwrap(), &boxes), Ok(outcome.tree.clone()), "{}", case.id);
                 let wide = WideBvh::new(&outcome.tree, &triangles).unwrap();
                 let plain = WideBvh::new(&greedy, &triangles).unwrap();
-                for ray in tracing::rays(&triangles, 300, 2) {
-                    assert_eq!(wide.nearest_hit(&ray), plain.nearest_hit(&ray), "{}: {ray:?}", case.id);
-                    assert_eq!(wide.any_hit(&ray), plain.any_hit(&ray), "{}: {ray:?}", case.id);
-                }
+                assert_same_answers(case, &wide, &plain, &triangles);
             }
         }
     }

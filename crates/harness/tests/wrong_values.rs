@@ -12,7 +12,7 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
-use support::{run, text};
+use support::{folder_with, names, refused, run, said, text};
 use toml::{Table, Value};
 
 /// A step from a table to a value in it.
@@ -206,10 +206,15 @@ fn harness(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
     (output.status.code(), text(&[output.stdout, output.stderr].concat()))
 }
 
+/// The arguments of a command; the one without a name runs specs.
+fn call<'a>(command: &'a str, args: &[&'a str]) -> Vec<&'a str> {
+    let name: &[&str] = if command.is_empty() { &[] } else { &[command] };
+    [name, args].concat()
+}
+
 /// The flags of a command with the name of their value, as its help lists them.
 fn flags(folder: &Path, command: &str) -> Vec<(String, Option<String>)> {
-    let args: Vec<&str> = [command, "--help"].into_iter().filter(|arg| !arg.is_empty()).collect();
-    let (_, help) = harness(folder, &args);
+    let help = said(folder, &call(command, &["--help"]));
     let flag = |line: &str| {
         let mut words = line.split_whitespace().skip_while(|word| !word.starts_with("--"));
         let name = words.next()?.trim_end_matches(',').to_owned();
@@ -221,16 +226,13 @@ fn flags(folder: &Path, command: &str) -> Vec<(String, Option<String>)> {
 
 #[test]
 fn a_wrong_value_of_any_flag_is_refused_by_name() {
-    let folder = tempfile::tempdir().unwrap();
+    let spec = "question = 'q'\nscenes = ['spheres75']\nmethods = [{ method = 'median_cut' }]\n";
+    let folder = folder_with("spec.toml", spec);
     let at = folder.path();
     fs::create_dir(at.join("folder")).unwrap();
     fs::write(at.join("file"), "").unwrap();
-    let spec = "question = 'q'\nscenes = ['spheres75']\nmethods = [{ method = 'median_cut' }]\n";
-    fs::write(at.join("spec.toml"), spec).unwrap();
-    let (code, said) = harness(at, &["bake", "spheres75", "--budget=0s", "--out=good.bvh"]);
-    assert_eq!(code, Some(0), "{said}");
-    let entries = || fs::read_dir(at).unwrap().count();
-    let before = entries();
+    said(at, &["bake", "spheres75", "--budget=0s", "--out=good.bvh"]);
+    let before = names(at);
     // Every command with what it cannot do without.
     let commands: [(&str, &[&str]); 12] = [
         ("", &["spec.toml"]),
@@ -246,7 +248,7 @@ fn a_wrong_value_of_any_flag_is_refused_by_name() {
         ("completions", &["bash"]),
         ("man", &[]),
     ];
-    let (_, help) = harness(at, &["--help"]);
+    let help = said(at, &["--help"]);
     let listed =
         help.split_once("Commands:").unwrap().1.lines().skip(1).take_while(|line| !line.trim().is_empty());
     let listed: BTreeSet<&str> = listed.filter_map(|line| line.split_whitespace().next()).collect();
@@ -266,13 +268,9 @@ fn a_wrong_value_of_any_flag_is_refused_by_name() {
             for wrong in wrong {
                 // A seed may be any number, and work may be much.
                 let given = format!("{flag}={wrong}");
-                let others = needed.iter().filter(|arg| !arg.starts_with(&format!("{flag}=")));
-                let args: Vec<&str> = [command]
-                    .into_iter()
-                    .filter(|c| !c.is_empty())
-                    .chain(others.copied())
-                    .chain([given.as_str()])
-                    .collect();
+                let mut args = call(command, needed);
+                args.retain(|arg| !arg.starts_with(&format!("{flag}=")));
+                args.push(&given);
                 let (code, said) = harness(at, &args);
                 let named =
                     said.contains(&flag) || (flag == "--scene" && said.contains(&format!("scene {wrong}")));
@@ -281,12 +279,9 @@ fn a_wrong_value_of_any_flag_is_refused_by_name() {
                 }
             }
         }
-        let unknown: Vec<&str> =
-            [command].into_iter().filter(|c| !c.is_empty()).chain(["--unheard-of"]).collect();
-        let (code, said) = harness(at, &unknown);
-        assert!(code == Some(2) && said.contains("--unheard-of"), "{unknown:?}: {said}");
+        refused(at, &call(command, &["--unheard-of"]), 2, &["--unheard-of"]);
     }
     assert!(count > 30, "{count} flags");
     assert!(found.is_empty(), "\n{}", found.join("\n"));
-    assert_eq!(entries(), before, "nothing was written");
+    assert_eq!(names(at), before, "nothing was written");
 }

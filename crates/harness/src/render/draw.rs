@@ -1,6 +1,6 @@
 //! From a scene and a view to a picture: tiles in parallel, the same bytes on any number of threads.
 
-use super::film::{Film, Tile};
+use super::film::Film;
 use super::framing;
 use super::light::{self, Light, World};
 use crate::measure::camera::{Camera, View};
@@ -65,7 +65,7 @@ pub fn render(
     };
     let world = World::new(accelerator, &view, up, &bounds, lights, options.ground, options.depth);
     let columns = width.div_ceil(TILE);
-    let finished: Option<Vec<Tile>> = (0..tiles(options) as u32)
+    let finished: Option<Vec<Film>> = (0..tiles(options) as u32)
         .into_par_iter()
         .map(|index| {
             let (x, y) = (index % columns * TILE, index / columns * TILE);

@@ -1,9 +1,10 @@
-//! A finished picture, put together from tiles.
+//! A picture, put together from tiles, which are small pictures.
 
 use bvh_core::TestCounts;
 
-/// A finished picture, with the rays and tests that it took. Rows run from the top, pixels from the left.
-#[derive(Clone, Debug, PartialEq)]
+/// A picture, or a tile of one that one thread has drawn, with the rays and tests that it took. Rows run from the top, pixels from
+/// the left.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Film {
     /// Pixels per row.
     pub width: u32,
@@ -17,37 +18,26 @@ pub struct Film {
     pub rays: u64,
 }
 
-/// A rectangle of a picture, drawn by one thread.
-pub struct Tile {
-    /// Pixels per row.
-    pub width: usize,
-    /// The colour of each pixel and the number of tests of all its rays, row by row.
-    pub pixels: Vec<([u8; 3], u64)>,
-    /// The tests of the whole tile.
-    pub counts: TestCounts,
-    /// The rays of the whole tile.
-    pub rays: u64,
-}
-
 impl Film {
     /// Puts tiles together, `columns` of them side by side.
-    pub fn of_tiles(width: u32, tiles: &[Tile], columns: usize) -> Self {
-        let (mut pixels, mut tests) = (Vec::new(), Vec::new());
-        let (mut counts, mut rays) = (TestCounts::default(), 0);
+    pub fn of_tiles(width: u32, tiles: &[Self], columns: usize) -> Self {
+        let mut film = Self { width, ..Self::default() };
         for row in tiles.chunks(columns) {
-            let lines = row.iter().map(|tile| tile.pixels.len() / tile.width).max();
-            for y in 0..lines.unwrap_or(0) {
-                for line in row.iter().filter_map(|tile| tile.pixels.chunks(tile.width).nth(y)) {
-                    pixels.extend(line.iter().map(|pixel| pixel.0));
-                    tests.extend(line.iter().map(|pixel| pixel.1));
-                }
-            }
-            for tile in row {
-                counts.boxes += tile.counts.boxes;
-                counts.objects += tile.counts.objects;
-                rays += tile.rays;
+            let lines = row[0].pixels.len() / row[0].width as usize;
+            for (y, tile) in (0..lines).flat_map(|y| row.iter().map(move |tile| (y, tile))) {
+                let line = y * tile.width as usize..(y + 1) * tile.width as usize;
+                film.pixels.extend(&tile.pixels[line.clone()]);
+                film.tests.extend(&tile.tests[line]);
             }
         }
-        Self { width, pixels, tests, counts, rays }
+        tiles.iter().for_each(|tile| film.count(tile.counts, tile.rays));
+        film
+    }
+
+    /// Adds tests and rays to those of the whole picture.
+    pub fn count(&mut self, tests: TestCounts, rays: u64) {
+        self.counts.boxes += tests.boxes;
+        self.counts.objects += tests.objects;
+        self.rays += rays;
     }
 }

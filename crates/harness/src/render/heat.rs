@@ -82,11 +82,9 @@ fn key(width: u32, range: &Range) -> ColourBar {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bvh_core::TestCounts;
 
     fn film(width: u32, tests: Vec<u64>) -> Film {
-        let pixels = vec![[0; 3]; tests.len()];
-        Film { width, pixels, tests, counts: TestCounts::default(), rays: 0 }
+        Film { width, tests, ..Film::default() }
     }
 
     #[test]

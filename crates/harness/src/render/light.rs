@@ -1,6 +1,6 @@
 //! Computes the light that reaches a pixel, by rays through it, to the lights, and along mirror reflections.
 
-use super::film::Tile;
+use super::film::Film;
 use super::image;
 use super::surface::{Ground, Surface};
 use crate::measure::camera::{Camera, View};
@@ -105,8 +105,8 @@ impl<'a> World<'a> {
     }
 
     /// A tile of the picture, `samples`² rays per pixel.
-    pub fn tile(&self, camera: &Camera, x: Range<u32>, y: Range<u32>, samples: u32) -> Tile {
-        let mut tile = Tile { width: x.len(), pixels: Vec::new(), counts: TestCounts::default(), rays: 0 };
+    pub fn tile(&self, camera: &Camera, x: Range<u32>, y: Range<u32>, samples: u32) -> Film {
+        let mut tile = Film { width: x.end - x.start, ..Film::default() };
         let offset = |sample: u32| (f64::from(sample) + 0.5) / f64::from(samples);
         for y in y {
             for x in x.clone() {
@@ -118,11 +118,9 @@ impl<'a> World<'a> {
                         sum += image::expose(self.radiance(camera.origin, direction, &mut tally));
                     }
                 }
-                let pixel = image::encode(sum / f64::from(samples * samples));
-                tile.pixels.push((pixel, tally.counts.boxes + tally.counts.objects));
-                tile.counts.boxes += tally.counts.boxes;
-                tile.counts.objects += tally.counts.objects;
-                tile.rays += tally.rays;
+                tile.pixels.push(image::encode(sum / f64::from(samples * samples)));
+                tile.tests.push(tally.counts.boxes + tally.counts.objects);
+                tile.count(tally.counts, tally.rays);
             }
         }
         tile

@@ -6,11 +6,23 @@ use std::collections::HashSet;
 
 const GOOD: &str = "question = 'q'\nscenes = ['escher']\nmethods = [{ method = 'grasp', noise = 0.1 }]\n";
 
-fn read(text: &str, overrides: &Overrides) -> Result<Experiment, String> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("spec.toml");
-    std::fs::write(&path, text).unwrap();
-    Experiment::read(&path, overrides).map_err(|error| error.to_string())
+fn read(text: &str) -> Result<Experiment, String> {
+    parse(text, &Overrides::default())
+}
+
+/// The quick variant.
+fn read_quick(text: &str) -> Result<Experiment, String> {
+    parse(text, &Overrides { quick: true, ..Default::default() })
+}
+
+fn parse(text: &str, overrides: &Overrides) -> Result<Experiment, String> {
+    Experiment::parse("spec.toml".as_ref(), text, overrides).map_err(|error| error.to_string())
+}
+
+/// The spec is refused by a message with all these parts.
+fn refused(text: &str, parts: &[&str]) {
+    let message = read(text).unwrap_err();
+    parts.iter().for_each(|part| assert!(message.contains(part), "{part} in {message} for {text}"));
 }
 
 #[test]
@@ -43,8 +55,7 @@ fn wrong_keys_and_values_are_named_with_what_would_be_accepted() {
         } else {
             GOOD.into()
         };
-        let message = read(&format!("{good}{wrong}"), &Overrides::default()).unwrap_err();
-        assert!(parts.iter().all(|part| message.contains(part)), "{wrong}: {message}");
+        refused(&format!("{good}{wrong}"), parts);
     }
 }
 
@@ -52,8 +63,8 @@ fn wrong_keys_and_values_are_named_with_what_would_be_accepted() {
 fn nothing_that_repeats_stands_beside_a_budget_in_seconds() {
     let clocked = format!("{GOOD}sequential = true\nmax_seconds = 0.5\n");
     let of_one = GOOD.replace("noise = 0.1", "max_seconds = 2.0");
-    assert!(read(&clocked, &Overrides::default()).unwrap().is_by_the_clock());
-    assert!(!read(GOOD, &Overrides::default()).unwrap().is_by_the_clock());
+    assert!(read(&clocked).unwrap().is_by_the_clock());
+    assert!(!read(GOOD).unwrap().is_by_the_clock());
     let report = "[[reports]]\nkind = 'numbers'\ntitle = 't'\nmethods = ['grasp']\n";
     for (spec, key) in [
         (format!("{clocked}{report}"), "line 6: reports is set"),
@@ -64,13 +75,12 @@ fn nothing_that_repeats_stands_beside_a_budget_in_seconds() {
         (format!("{clocked}[render]\nwidth = 10\n"), "render is set"),
         (of_one, "sequential is false"),
     ] {
-        let message = read(&spec, &Overrides::default()).unwrap_err();
+        let message = read(&spec).unwrap_err();
         let parts = ["spec.toml", key, "beside `max_seconds`; accepted: "];
         assert!(parts.iter().all(|part| message.contains(part)), "{spec}: {message}");
         assert_eq!(message.lines().count(), 1, "{message}");
     }
-    let alone = read(&format!("{GOOD}tinybvh = 'x'\n"), &Overrides::default()).unwrap_err();
-    assert!(alone.contains("tinybvh is set without `max_seconds`"), "{alone}");
+    refused(&format!("{GOOD}tinybvh = 'x'\n"), &["tinybvh is set without `max_seconds`"]);
 }
 
 #[test]
@@ -80,7 +90,7 @@ fn the_lower_of_both_budgets_in_seconds_holds_and_only_for_methods_of_ours() {
     let spec = format!(
         "question = 'q'\nscenes = ['escher']\nsequential = true\nmax_seconds = 1.0\nmethods = {methods}\n"
     );
-    let spec = read(&spec, &Overrides::default()).unwrap();
+    let spec = read(&spec).unwrap();
     let limits: Vec<_> = spec.methods.iter().map(|method| spec.max_seconds_of(method)).collect();
     assert_eq!(limits, [Some(0.2), Some(1.0), None]);
 }
@@ -116,9 +126,7 @@ fn finite_nonsense_in_reports_is_named_with_what_would_be_accepted() {
             _ if wrong.starts_with("methods") => common.to_owned(),
             _ => format!("{common}methods = ['grasp']\n"),
         };
-        let text = format!("{GOOD}[[reports]]\nkind = '{kind}'\n{keys}{wrong}\n");
-        let message = read(&text, &Overrides::default()).unwrap_err();
-        assert!(parts.iter().all(|part| message.contains(part)), "{kind}, {wrong}: {message}");
+        refused(&format!("{GOOD}[[reports]]\nkind = '{kind}'\n{keys}{wrong}\n"), parts);
     }
 }
 
@@ -144,8 +152,7 @@ fn nonsense_beside_reports_is_named_with_what_would_be_accepted() {
             &["ray_cost.trained is 100000", "up to 95325", "11 rays"],
         ),
     ] {
-        let message = read(&text, &Overrides::default()).unwrap_err();
-        assert!(parts.iter().all(|part| message.contains(part)), "{text}: {message}");
+        refused(&text, parts);
     }
 }
 
@@ -171,9 +178,7 @@ fn wrong_methods_are_named_with_what_would_be_accepted() {
         ("[{ method = 'best', for_rays = 'all' }]", &["methods[0].for_rays", "all", "default"]),
         ("[{ method = 'grasp' }, { method = 'grasp' }]", &["methods[1].label", "second time"]),
     ] {
-        let text = format!("question = 'q'\nscenes = ['escher']\nmethods = {methods}\n");
-        let message = read(&text, &Overrides::default()).unwrap_err();
-        assert!(parts.iter().all(|part| message.contains(part)), "{methods}: {message}");
+        refused(&format!("question = 'q'\nscenes = ['escher']\nmethods = {methods}\n"), parts);
     }
 }
 
@@ -185,12 +190,10 @@ fn another_library_is_accepted_exactly_with_its_feature() {
         else {
             panic!("{name} is no library");
         };
-        let read = read(&text, &Overrides::default());
+        let read = read(&text);
         match peer.missing_feature() {
             Some(feature) => {
-                let message = read.unwrap_err();
-                let parts = ["methods[0].method", name, "--features", feature, "muller_fellner"];
-                assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+                refused(&text, &["methods[0].method", name, "--features", feature, "muller_fellner"]);
             }
             None => assert!(read.is_ok(), "{read:?}"),
         }
@@ -200,22 +203,22 @@ fn another_library_is_accepted_exactly_with_its_feature() {
 #[test]
 fn quick_takes_no_infinity_either() {
     let text = format!("{GOOD}[quick]\nobjective = {{ sah = {{ traversal = inf }} }}\n");
-    let error = read(&text, &Overrides { quick: true, ..Default::default() }).unwrap_err().to_string();
+    let error = read_quick(&text).unwrap_err().to_string();
     assert!(error.contains("quick.objective.sah.traversal is inf"), "{error}");
 }
 
 #[test]
 fn quick_replaces_keys_and_names_its_results_apart() {
     let text = format!("{GOOD}repetitions = 5\n[quick]\nrepetitions = 2\n");
-    let quick = read(&text, &Overrides { quick: true, ..Default::default() }).unwrap();
+    let quick = read_quick(&text).unwrap();
     assert_eq!((quick.repetitions, quick.folder()), (2, "quick/spec".into()));
-    assert_eq!(read(&text, &Overrides::default()).unwrap().repetitions, 5);
+    assert_eq!(read(&text).unwrap().repetitions, 5);
 }
 
 #[test]
 fn a_resolved_spec_spells_out_every_default_and_reads_back_as_itself() {
     let good = GOOD.replace("0.1 }", "0.1, budget = { max_work = 9 } }");
-    let experiment = read(&good, &Overrides::default()).unwrap();
+    let experiment = read(&good).unwrap();
     let text = toml::to_string(&experiment).unwrap();
     assert!(text.contains("trials = 100") && text.contains("skip_same_order = true"), "{text}");
     assert_eq!(toml::from_str::<Experiment>(&text).unwrap(), experiment);
@@ -225,7 +228,7 @@ fn a_resolved_spec_spells_out_every_default_and_reads_back_as_itself() {
 fn of_two_limits_the_lower_one_counts() {
     let good = GOOD.replace("0.1 }", "0.1, budget = { max_work = 9 } }");
     let budget = |of_all: &str| {
-        let experiment = read(&format!("{good}budget = {of_all}\n"), &Overrides::default()).unwrap();
+        let experiment = read(&format!("{good}budget = {of_all}\n")).unwrap();
         experiment.budget_of(&experiment.methods[0])
     };
     let (max_evaluations, max_work) = (Some(3), Some(5));
@@ -235,13 +238,13 @@ fn of_two_limits_the_lower_one_counts() {
 
 #[test]
 fn seeds_differ_between_runs_and_follow_the_spec_alone() {
-    let experiment = read(GOOD, &Overrides::default()).unwrap();
+    let experiment = read(GOOD).unwrap();
     let mut seeds: Vec<u64> =
         (0..100).map(|repetition| experiment.seed_of("escher", "grasp", repetition)).collect();
     seeds.push(experiment.seed_of("bijou", "grasp", 0));
     let distinct: HashSet<_> = seeds.iter().collect();
     assert_eq!(distinct.len(), seeds.len());
-    assert_eq!(seeds[0], read(GOOD, &Overrides::default()).unwrap().seed_of("escher", "grasp", 0));
+    assert_eq!(seeds[0], read(GOOD).unwrap().seed_of("escher", "grasp", 0));
 }
 
 #[test]
@@ -251,7 +254,7 @@ fn naming_a_wrong_key_among_thousands_of_methods_takes_no_time() {
     let text =
         format!("question = 'q'\nscenes = ['escher']\n{}", many.replacen("'2900'", "'2900'\nnoise = 'x'", 1));
     let start = std::time::Instant::now();
-    let message = read(&text, &Overrides::default()).unwrap_err();
+    let message = read(&text).unwrap_err();
     assert!(message.contains("methods[2900].noise"), "{message}");
     assert!(start.elapsed().as_secs_f64() < 1.0, "{:?}", start.elapsed());
 }
@@ -287,7 +290,7 @@ methods = []
 at_seconds = [1, -1]
 file = '../x'
 ";
-    let message = read(text, &Overrides::default()).unwrap_err();
+    let message = read(text).unwrap_err();
     let key = |line: &str| {
         let (place, rest) = line.split_once("spec.toml: ")?.1.split_once(": ")?;
         Some(format!("{} {}", place.strip_prefix("line ")?, rest.split([' ', ':']).next()?))
@@ -333,7 +336,7 @@ file = '../x'
     // Labels that can be told are.
     let labels = "question = 'q'\nscenes = ['escher']\n[[methods]]\nmethod = 'grep'\n[[methods]]\nmethod = 'grasp'\n\
                   [[methods]]\nmethod = 'grasp'\n[[reports]]\nkind = 'numbers'\nmethods = ['grep', 'grasp', 'a', 'b']\n";
-    let message = read(labels, &Overrides::default()).unwrap_err();
+    let message = read(labels).unwrap_err();
     let said: Vec<String> = message.lines().filter_map(key).collect();
     assert_eq!(
         said,
@@ -345,7 +348,7 @@ file = '../x'
 fn a_search_that_would_go_on_for_hours_is_refused_unless_the_spec_says_when_it_ends() {
     let spec = |rest: &str, of_best: &str| {
         let methods = format!("methods = [{{ method = 'grasp' }}, {{ method = 'best'{of_best} }}]");
-        read(&format!("question = 'q'\nscenes = ['escher']\n{rest}\n{methods}\n"), &Overrides::default())
+        read(&format!("question = 'q'\nscenes = ['escher']\n{rest}\n{methods}\n"))
     };
     let message = spec("", "").unwrap_err();
     let parts =
@@ -365,7 +368,7 @@ fn a_search_that_would_go_on_for_hours_is_refused_unless_the_spec_says_when_it_e
 #[test]
 fn quick_is_refused_where_nothing_says_what_it_is() {
     let text = "question = 'q'\nscenes = ['escher']\n[[methods]]\nmethod = 'median_cut'\n";
-    let message = read(text, &Overrides { quick: true, ..Default::default() }).unwrap_err();
+    let message = read_quick(text).unwrap_err();
     assert!(message.contains("quick is missing") && message.contains("--quick"), "{message}");
 }
 

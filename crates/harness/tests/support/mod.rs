@@ -4,10 +4,25 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_harness");
+
+/// A new folder with a spec of this name in it.
+pub fn folder_with(spec: &str, text: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join(spec), text).unwrap();
+    folder
+}
+
+/// The names of what a folder holds, in order.
+pub fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
 
 /// The program in a folder, without input.
 pub fn harness(folder: &Path, args: &[&str]) -> Command {
@@ -42,21 +57,45 @@ pub fn text(bytes: &[u8]) -> String {
 
 /// The CSV files without seconds, by name, and the resolved spec.
 pub fn reproducible(folder: &Path) -> Vec<(String, Vec<u8>)> {
-    let mut files: Vec<_> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+    names(folder)
+        .into_iter()
         .filter(|name| (name.ends_with(".csv") && !name.starts_with("timing")) || name == "resolved.toml")
         .map(|name| (name.clone(), fs::read(folder.join(name)).unwrap()))
-        .collect();
-    files.sort();
-    files
+        .collect()
+}
+
+/// The rows of a CSV file by column names.
+pub fn rows(path: &Path) -> Vec<BTreeMap<String, String>> {
+    csv::Reader::from_path(path).unwrap().deserialize().map(Result::unwrap).collect()
 }
 
 /// Standard output of a command that must succeed.
 pub fn said(folder: &Path, args: &[&str]) -> String {
     let output = run(folder, args);
-    assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
+    assert!(output.status.success(), "{args:?}: {}{}", text(&output.stdout), text(&output.stderr));
     text(&output.stdout)
+}
+
+/// Runs a command that must end with this code, and say each of the parts on standard error.
+pub fn refused(folder: &Path, args: &[&str], code: i32, parts: &[&str]) {
+    ended(&run(folder, args), code, parts);
+}
+
+/// What a command must have ended with, and what it must have said on standard error.
+pub fn ended(output: &Output, code: i32, parts: &[&str]) {
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{parts:?}: {said}");
+    parts.iter().for_each(|part| assert!(said.contains(part), "{part} in {said}"));
+}
+
+/// The program at work in the background; what it says on standard error is kept.
+pub fn begin(folder: &Path, args: &[&str]) -> Child {
+    harness(folder, args).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// Sends a signal, such as `-INT`.
+pub fn send(signal: &str, to: &Child) {
+    assert!(Command::new("kill").args([signal, &to.id().to_string()]).status().unwrap().success());
 }
 
 /// The facts that `inspect` and the readers print.
@@ -65,4 +104,9 @@ pub fn facts(text: &str) -> BTreeMap<String, String> {
         .filter_map(|line| line.split_once(": "))
         .map(|(what, value)| (what.into(), value.into()))
         .collect()
+}
+
+/// The internal area of the tree in a file, as `inspect` has it.
+pub fn cost(folder: &Path, file: &str) -> f64 {
+    facts(&said(folder, &["inspect", file]))["internal area"].parse().unwrap()
 }
