@@ -1,7 +1,7 @@
 //! Why an OBJ file was refused.
 
-use super::geometry::MOST_CORNERS;
-use std::path::{Path, PathBuf};
+use super::statements::MOST_CORNERS;
+use std::path::PathBuf;
 use thiserror::Error;
 
 /// A line of a file; shown as `path:line`.
@@ -58,11 +58,4 @@ pub enum ObjError {
     /// `tobj` refused statements in which no fault was found here.
     #[error("{}: {source}; expected a Wavefront OBJ file", .path.display())]
     Tobj { path: PathBuf, source: tobj::LoadError },
-}
-
-impl ObjError {
-    /// For a file in which no face has three vertices.
-    pub(super) fn without_faces(path: &Path, vertices: usize) -> Self {
-        Self::NoFaces { path: path.to_path_buf(), vertices }
-    }
 }

@@ -1,40 +1,44 @@
 //! The `v` and `f` statements of an OBJ file, one per line and without colours, texture and normal indices, for `tobj`.
 
-use super::statements::{Keyword, Statements, shown, vertex_index};
+use super::check;
+use super::error::{ObjError, Place};
+use super::statements::{Keyword, MOST_CORNERS, Statements, shown, vertex_index};
 use std::io::{self, BufRead, Read};
-
-/// Most vertices of one face. The fan of a larger one would take a hundred bytes for each two bytes of the file.
-pub const MOST_CORNERS: usize = 1 << 16;
+use std::path::Path;
 
 /// Bytes that are prepared at a time.
 const BLOCK: usize = 1 << 16;
 
-/// Reads like a file of checked length and shape; no number is parsed here.
+/// Reads like a file of checked numbers, up to the first fault.
 pub struct Geometry<'a> {
+    path: &'a Path,
     statements: Statements<'a>,
     words: Vec<&'a [u8]>,
     /// Statements that are ready, from `taken` on.
     block: Vec<u8>,
     taken: usize,
+    fault: Option<ObjError>,
+    /// The highest index of a vertex so far, and the first line that names it.
+    highest: (usize, usize),
     /// `v` statements so far.
     pub vertices: usize,
     /// `f` statements of fewer than three vertices so far; they are left out.
     pub short_faces: usize,
-    /// Whether there was a statement in which `tobj` might not see a fault.
-    pub doubtful: bool,
 }
 
 impl<'a> Geometry<'a> {
-    /// Of the bytes of a file.
-    pub fn new(bytes: &'a [u8]) -> Self {
+    /// Of the bytes of a file; `path` only names it in errors.
+    pub fn new(bytes: &'a [u8], path: &'a Path) -> Self {
         Self {
+            path,
             statements: Statements::new(bytes),
             words: Vec::new(),
             block: Vec::new(),
             taken: 0,
+            fault: None,
+            highest: (0, 0),
             vertices: 0,
             short_faces: 0,
-            doubtful: false,
         }
     }
 
@@ -43,40 +47,57 @@ impl<'a> Geometry<'a> {
         self.statements.unknown.map(|(count, line, word)| (count, line, shown(word)))
     }
 
-    /// Adds the next statement to the block; `false` at the end of the file.
+    /// Reads on to the end of the file.
+    ///
+    /// # Errors
+    ///
+    /// The first fault in the order of the file. An index above the number of vertices can be told only at the end of the
+    /// file, since faces may name vertices below them, and comes last.
+    pub fn finish(&mut self) -> Result<(), ObjError> {
+        while self.add_statement() {}
+        let ((index, line), vertices) = (self.highest, self.vertices);
+        match self.fault.take() {
+            Some(fault) => Err(fault),
+            None if index > vertices => Err(ObjError::IndexAbove { place: self.place(line), index, vertices }),
+            None => Ok(()),
+        }
+    }
+
+    fn place(&self, line: usize) -> Place {
+        Place { path: self.path.to_path_buf(), line }
+    }
+
+    /// Adds the next statement to the block; `false` at the end of the file and at a fault.
     fn add_statement(&mut self) -> bool {
-        let Some((keyword, _)) = self.statements.next(&mut self.words, MOST_CORNERS + 1) else { return false };
-        match keyword {
-            Keyword::Vertex => self.add_vertex(),
-            Keyword::Face => self.add_face(),
+        if self.fault.is_some() {
+            return false;
         }
-        true
-    }
-
-    fn add_vertex(&mut self) {
-        self.vertices += 1;
-        let kept = match self.words.len() {
-            3 | 6 | 7 => 3,
-            4 => 4,
-            _ => 0,
+        let Some((keyword, line)) = self.statements.next(&mut self.words, MOST_CORNERS + 1) else {
+            return false;
         };
-        // A weight may be zero, or take a coordinate beyond all numbers.
-        self.doubtful |= kept != 3 || !self.words[..kept].iter().all(|word| is_plainly_finite(word));
-        add(b'v', self.words[..kept].iter().copied(), &mut self.block);
+        self.fault = self.add_checked(keyword, line).err();
+        self.fault.is_none()
     }
 
-    fn add_face(&mut self) {
-        let corners = self.words.len();
-        let is_index =
-            |word: &[u8]| !word.is_empty() && word.iter().all(|b| b.is_ascii_digit() || b"+-".contains(b));
-        let indices = self.words.iter().map(|corner| vertex_index(corner));
-        self.doubtful |= corners > MOST_CORNERS || !indices.clone().all(is_index);
-        if corners < 3 {
-            self.short_faces += 1;
-            self.doubtful = true;
-        } else if corners <= MOST_CORNERS {
-            add(b'f', indices, &mut self.block);
+    fn add_checked(&mut self, keyword: Keyword, line: usize) -> Result<(), ObjError> {
+        match keyword {
+            Keyword::Vertex => {
+                let words = check::vertex(&self.words, || self.place(line))?;
+                add(b'v', words.iter().copied(), &mut self.block);
+                self.vertices += 1;
+            }
+            Keyword::Face => {
+                let index = check::face(&self.words, self.vertices, || self.place(line))?;
+                if index > self.highest.0 {
+                    self.highest = (index, line);
+                }
+                match self.words.len() {
+                    0..3 => self.short_faces += 1,
+                    _ => add(b'f', self.words.iter().map(|corner| vertex_index(corner)), &mut self.block),
+                }
+            }
         }
+        Ok(())
     }
 }
 
@@ -87,14 +108,6 @@ fn add<'a>(keyword: u8, words: impl Iterator<Item = &'a [u8]>, block: &mut Vec<u
         block.extend_from_slice(word);
     }
     block.push(b'\n');
-}
-
-/// Whether a word that parses as a number is surely finite as `f32`: at most 38 digits, no positive exponent, no name.
-fn is_plainly_finite(word: &[u8]) -> bool {
-    let digits = |part: &[u8]| part.iter().all(|b| b.is_ascii_digit() || b"+-.".contains(b));
-    let mut parts = word.splitn(2, |b| b.eq_ignore_ascii_case(&b'e'));
-    let (mantissa, exponent) = (parts.next().unwrap_or_default(), parts.next());
-    word.len() <= 38 && digits(mantissa) && exponent.is_none_or(|e| e.starts_with(b"-") && digits(e))
 }
 
 impl BufRead for Geometry<'_> {

@@ -3,14 +3,14 @@
 //! `tobj` parses the numbers, resolves relative indices and cuts polygons into triangle fans. It is given the `v` and
 //! `f` statements only, as `Geometry` finds them, because `tobj` 4.0.5 reads a polyline `l 1 2 3` as a triangle, skips
 //! the first vertex after a byte order mark, and refuses Latin-1 comments, comments at the end of a line, continued
-//! lines, and files in which only some vertices have a colour. It names no line in its errors and accepts `nan`: when it
-//! refuses a file, or a word is not plainly a finite number, `explain` reads the file again and names the line.
+//! lines, and files in which only some vertices have a colour. It names no line in its errors and accepts `nan`: `check`
+//! looks at every number before `tobj` sees it.
 //!
 //! Points, lines, curves, names, groups, materials (whose files are never opened), normals and texture coordinates are
 //! ignored. Lines may end in LF, CRLF or CR, and a backslash at the end continues a statement on the next line.
 
+mod check;
 mod error;
-mod explain;
 mod geometry;
 mod statements;
 
@@ -18,21 +18,18 @@ pub use error::{ObjError, Place};
 
 use super::mesh::Mesh;
 use bvh_core::Triangle;
-use explain::explain;
 use geometry::Geometry;
 use glam::Vec3;
 use std::path::Path;
 
 /// Reads the bytes of an OBJ file; `path` only names it in errors. O(bytes). Any bytes give a mesh or an error.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, ObjError> {
-    let mut geometry = Geometry::new(bytes);
+    let mut geometry = Geometry::new(bytes, path);
     let options =
         tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
     let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
     let loaded = tobj::load_obj_buf(&mut geometry, &options, no_materials);
-    if loaded.is_err() || geometry.doubtful {
-        explain(bytes, path)?;
-    }
+    geometry.finish()?;
     let (models, _) = loaded.map_err(|source| ObjError::Tobj { path: path.to_path_buf(), source })?;
     let mut triangles = Vec::new();
     let mut used = 0;
@@ -45,7 +42,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, ObjError> {
         used += corners.len();
     }
     if triangles.is_empty() {
-        return Err(ObjError::without_faces(path, geometry.vertices));
+        return Err(ObjError::NoFaces { path: path.to_path_buf(), vertices: geometry.vertices });
     }
     Ok(Mesh {
         unused_vertices: geometry.vertices - used,

@@ -9,6 +9,9 @@ pub enum Keyword {
     Face,
 }
 
+/// Most vertices of one face. The fan of a larger one would take a hundred bytes for each two bytes of the file.
+pub const MOST_CORNERS: usize = 1 << 16;
+
 /// Keywords of the format that are ignored (Wavefront, "Object Files", version 3.0).
 const IGNORED: [&[u8]; 43] = [
     b"vt",
