@@ -7,7 +7,7 @@ use glam::{Affine3A, Vec3};
 use harness::scenes::Scene;
 use std::fs;
 use std::path::Path;
-use support::{names, refused, said};
+use support::{glb, names, refused, said};
 
 /// A GLB file of two meshes and one of points, under nodes that turn them by right angles and mirror them, so that nothing is rounded.
 fn forest() -> (Vec<u8>, [Vec<Triangle>; 2]) {
@@ -35,11 +35,7 @@ fn forest() -> (Vec<u8>, [Vec<Triangle>; 2]) {
           "bufferViews": [{{"buffer": 0, "byteLength": {0}}}], "buffers": [{{"byteLength": {0}}}]}}"#,
         corners.len()
     );
-    let mut json = json.into_bytes();
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let chunk = |kind: &[u8; 4], bytes: &[u8]| [&(bytes.len() as u32).to_le_bytes()[..], kind, bytes].concat();
-    let chunks = [chunk(b"JSON", &json), chunk(b"BIN\0", &corners)].concat();
-    ([&b"glTF\x02\0\0\0"[..], &(12 + chunks.len() as u32).to_le_bytes(), &chunks].concat(), meshes)
+    (glb(json, &corners), meshes)
 }
 
 /// The files of a folder of instances as a user loads them, who has the meshes.

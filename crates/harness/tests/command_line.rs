@@ -153,7 +153,7 @@ fn what_is_wrong_is_named_and_costs_nothing_but_a_message() {
         (&["missing.toml"][..], &["missing.toml"][..]),
         (&["key.toml"], &["key.toml", "repetition", "repetitions"]),
         (&["parameter.toml"], &["line 7", "methods[1].noise is 2", "0 to 1"]),
-        (&["scene.toml"], &["sofa", "accepted: bijou"]),
+        (&["scene.toml"], &["sofa", "accepted: bijou, cloister, escher, konistil"]),
         (&["label.toml"], &["reports[0]", "nose", "accepted: greedy, noise, k"]),
         (&["spec.toml", "--scene", "nan.obj"], &["nan.obj:2", "nan"]),
         (&["spec.toml", "--scene", "empty.obj"], &["empty.obj is empty"]),

@@ -12,18 +12,17 @@
 //! `below` behind it for percent below one, `above` for percent above one, `percent` for a fraction. Conditions compare
 //! whole cells, a comma in which is written `\,`; `COLUMN!=TEXT` excludes, `*` stands for no condition.
 
+mod support;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use support::{assert_current, experiments, top};
 
 /// Stands for a comma within a cell while conditions are divided.
 const COMMA: &str = "\u{0}";
 
 type Row = BTreeMap<String, String>;
-
-fn top() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
 
 /// The rows of a committed CSV that meet all conditions; at least one.
 fn rows(file: &str, conditions: &str) -> Vec<Row> {
@@ -188,18 +187,7 @@ fn pages() -> Vec<PathBuf> {
 #[test]
 fn the_documentation_shows_the_committed_numbers() {
     for page in pages() {
-        let text = fs::read_to_string(&page).unwrap();
-        let expected = renewed(&text);
-        if std::env::var_os("UPDATE_DOCS").is_some() {
-            fs::write(&page, &expected).unwrap();
-        } else {
-            let differs = text.lines().zip(expected.lines()).find(|(now, then)| now != then);
-            assert!(
-                text == expected,
-                "{}: {differs:?}; UPDATE_DOCS=1 cargo test -p harness --test docs rewrites it",
-                page.display()
-            );
-        }
+        assert_current(&page, &renewed(&fs::read_to_string(&page).unwrap()), "docs");
     }
 }
 
@@ -207,9 +195,7 @@ fn the_documentation_shows_the_committed_numbers() {
 fn every_link_of_the_documentation_leads_somewhere() {
     for page in pages() {
         let text = fs::read_to_string(&page).unwrap();
-        for (_, link) in
-            text.split("](").skip(1).filter_map(|rest| rest.split_once(')').map(|(link, _)| ((), link)))
-        {
+        for (link, _) in text.split("](").skip(1).filter_map(|rest| rest.split_once(')')) {
             let target = link.split('#').next().unwrap_or_default();
             if !target.is_empty() && !target.contains("://") {
                 assert!(page.parent().unwrap().join(target).exists(), "{}: {link}", page.display());
@@ -221,10 +207,8 @@ fn every_link_of_the_documentation_leads_somewhere() {
 #[test]
 fn the_index_of_results_has_every_experiment_with_its_question() {
     let index = fs::read_to_string(top().join("results/README.md")).unwrap();
-    for entry in fs::read_dir(top().join("experiments")).unwrap() {
-        let path = entry.unwrap().path();
-        let spec: toml::Table = toml::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
-        let name = path.file_stem().unwrap().to_str().unwrap();
+    for (name, text) in experiments() {
+        let spec: toml::Table = toml::from_str(&text).unwrap();
         let question = spec["question"].as_str().unwrap();
         let line = format!("| [{name}]({name}) | {question} |");
         assert!(index.contains(&line), "results/README.md lacks: {line}");
@@ -235,12 +219,10 @@ fn the_index_of_results_has_every_experiment_with_its_question() {
 fn every_experiment_is_checked_on_every_commit() {
     let run = fs::read_to_string(top().join(".ci/run")).unwrap();
     let words: BTreeSet<&str> = run.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
-    for entry in fs::read_dir(top().join("experiments")).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_stem().unwrap().to_str().unwrap();
+    for (name, text) in experiments() {
         // CI does not build other libraries.
-        let needs_libraries = fs::read_to_string(&path).unwrap().contains("method = \"obvhs\"");
-        assert!(words.contains(name) || needs_libraries, ".ci/run does not check {name}");
+        let needs_libraries = text.contains("method = \"obvhs\"");
+        assert!(words.contains(name.as_str()) || needs_libraries, ".ci/run does not check {name}");
     }
 }
 
@@ -250,14 +232,7 @@ fn every_column_of_every_committed_table_is_on_the_page_of_columns() {
     let unsaid: Vec<_> =
         declared.iter().filter_map(|file| Some((file.to_string(), file.unsaid()?.to_owned()))).collect();
     assert!(unsaid.is_empty(), "without a meaning: {unsaid:#?}");
-    let (path, page) = (top().join("docs/COLUMNS.md"), harness::cli::columns::page());
-    if std::env::var_os("UPDATE_DOCS").is_some() {
-        fs::write(&path, &page).unwrap();
-    }
-    assert!(
-        fs::read_to_string(&path).is_ok_and(|text| text == page),
-        "docs/COLUMNS.md is stale; UPDATE_DOCS=1 cargo test -p harness --test docs rewrites it"
-    );
+    assert_current(&top().join("docs/COLUMNS.md"), &harness::cli::columns::page(), "docs");
     let (mut folders, mut found) = (vec![top().join("results")], 0);
     while let Some(folder) = folders.pop() {
         for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {

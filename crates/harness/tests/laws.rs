@@ -21,7 +21,7 @@
 //! | | every method | the root's box stays |
 
 use bvh_core::{Aabb, cost};
-use bvh_search::{Method, Outcome, exact};
+use bvh_search::{Method, Outcome};
 use glam::{DVec3, Vec3};
 use harness::stress::examine::{ROUNDING, check_outcome, check_scale, run};
 use harness::stress::transform::{mirrored, same_topology, scale_range, shuffled};
@@ -38,6 +38,12 @@ fn solved(method: &Method, boxes: &[Aabb]) -> Outcome {
 /// As many boxes as the method takes.
 fn taken<'a>(method: &Method, boxes: &'a [Aabb]) -> &'a [Aabb] {
     if let Method::Exact(_) = method { &boxes[..boxes.len().min(EXACT_OBJECTS - 4)] } else { boxes }
+}
+
+/// Whether the method makes the same tree of the same cost over both, bit by bit.
+fn alike(method: &Method, boxes: &[Aabb], others: &[Aabb]) -> bool {
+    let [one, other] = [boxes, others].map(|boxes| solved(method, taken(method, boxes)));
+    same_topology(&one.tree, &other.tree) && one.cost == other.cost
 }
 
 fn named(name: &str) -> Method {
@@ -146,8 +152,7 @@ proptest! {
         let by = Vec3::from(by.map(|whole| whole as f32 * unit));
         let Some(moved) = translated(&boxes, by) else { return Err(TestCaseError::reject("rounds")) };
         for (label, method) in methods() {
-            let (here, there) = (solved(&method, taken(&method, &boxes)), solved(&method, taken(&method, &moved)));
-            prop_assert!(same_topology(&here.tree, &there.tree) && here.cost == there.cost, "{}", label);
+            prop_assert!(alike(&method, &boxes, &moved), "{}", label);
         }
     }
 
@@ -155,8 +160,7 @@ proptest! {
     fn a_reflection_changes_nothing_for_those_that_see_areas_only(boxes in any_boxes(), axis in 0usize..3) {
         let other = mirrored(&boxes, axis);
         for method in insertion_and_exact() {
-            let (one, other) = (solved(&method, taken(&method, &boxes)), solved(&method, taken(&method, &other)));
-            prop_assert!(same_topology(&one.tree, &other.tree) && one.cost == other.cost, "{}", method.name());
+            prop_assert!(alike(&method, &boxes, &other), "{}", method.name());
         }
     }
 
@@ -188,8 +192,7 @@ proptest! {
     ) {
         let other = with_axes(&boxes, to);
         for method in insertion_and_exact() {
-            let (one, other) = (solved(&method, taken(&method, &boxes)), solved(&method, taken(&method, &other)));
-            prop_assert!(same_topology(&one.tree, &other.tree) && one.cost == other.cost, "{}", method.name());
+            prop_assert!(alike(&method, &boxes, &other), "{}", method.name());
         }
     }
 
@@ -209,7 +212,7 @@ proptest! {
 
     #[test]
     fn the_order_of_objects_keeps_the_optimum(boxes in any_boxes(), seed in any::<u64>()) {
-        let exact = Method::Exact(exact::Config::default());
+        let exact = named("exact");
         let boxes = taken(&exact, &boxes);
         let costs = [solved(&exact, boxes).cost, solved(&exact, &shuffled(boxes, seed).0).cost];
         prop_assert!(close(costs[0], costs[1]), "{:?}", costs);
@@ -219,7 +222,7 @@ proptest! {
     fn every_object_twice_costs_its_area_more_at_most(boxes in any_boxes()) {
         let boxes = &boxes[..boxes.len().min(6)];
         let twice: Vec<Aabb> = boxes.iter().flat_map(|b| [*b; 2]).collect();
-        let exact = Method::Exact(exact::Config::default());
+        let exact = named("exact");
         let (once, both) = (solved(&exact, boxes).cost, solved(&exact, &twice).cost);
         let most: f64 = once + boxes.iter().map(Aabb::half_area).sum::<f64>();
         prop_assert!(once <= both * (1.0 + ROUNDING) && both <= most * (1.0 + ROUNDING), "{once} {both} {most}");
@@ -237,7 +240,7 @@ proptest! {
         let around = boxes[which.index(boxes.len())];
         let inside = Aabb { min: around.min, max: around.min };
         let more = [boxes, &[inside]].concat();
-        let exact = Method::Exact(exact::Config::default());
+        let exact = named("exact");
         let (before, after) = (solved(&exact, boxes).cost, solved(&exact, &more).cost);
         let most = before + around.half_area();
         prop_assert!(before <= after * (1.0 + ROUNDING) && after <= most * (1.0 + ROUNDING), "{before} {after}");

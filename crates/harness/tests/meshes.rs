@@ -1,5 +1,7 @@
 //! Mesh files of every format give the same triangles, and any bytes give a mesh or an error that names its place.
 
+mod support;
+
 use base64::Engine as _;
 use bvh_core::Triangle;
 use glam::Vec3;
@@ -101,11 +103,7 @@ fn gltf(nodes: &str, primitive: &str) -> Vec<u8> {
 }
 
 fn glb() -> Vec<u8> {
-    let mut json = gltf_json("", r#"{"mesh": 0}"#, INDEXED).into_bytes();
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let chunk = |kind: &[u8; 4], bytes: &[u8]| [&(bytes.len() as u32).to_le_bytes()[..], kind, bytes].concat();
-    let chunks = [chunk(b"JSON", &json), chunk(b"BIN\0", &buffer())].concat();
-    [&b"glTF\x02\0\0\0"[..], &(12 + chunks.len() as u32).to_le_bytes(), &chunks].concat()
+    support::glb(gltf_json("", r#"{"mesh": 0}"#, INDEXED), &buffer())
 }
 
 /// A square in every format.

@@ -12,7 +12,7 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
-use support::{folder_with, names, refused, run, said, text};
+use support::{experiments, folder_with, names, refused, run, said, text};
 use toml::{Table, Value};
 
 /// A step from a table to a value in it.
@@ -81,12 +81,9 @@ fn place(spec: &Value, path: &[Step]) -> String {
 
 /// The committed experiments with every default spelled out, and one with every method.
 fn specs() -> Vec<Value> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments");
-    let mut paths: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    paths.sort();
     let mut specs = Vec::new();
-    for path in paths {
-        let mut spec: Table = fs::read_to_string(&path).unwrap().parse().unwrap();
+    for (_, text) in experiments() {
+        let mut spec: Table = text.parse().unwrap();
         spec.remove("quick");
         // Other libraries may not be compiled in; any method may stand for them.
         for method in spec.get_mut("methods").and_then(Value::as_array_mut).into_iter().flatten() {

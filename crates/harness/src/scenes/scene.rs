@@ -188,12 +188,6 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_scene_is_answered_with_the_known_ones() {
-        let message = Scene::load("eschre").unwrap_err().to_string();
-        assert!(message.contains("eschre") && message.contains("escher, konistil"), "{message}");
-    }
-
-    #[test]
     fn a_subset_has_as_many_distinct_objects_as_asked_for() {
         let scene = Scene::load("spheres75:30").unwrap();
         assert_eq!((scene.name.as_str(), scene.boxes.len()), ("spheres75:30", 30));

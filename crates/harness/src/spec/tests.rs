@@ -38,6 +38,7 @@ fn wrong_keys_and_values_are_named_with_what_would_be_accepted() {
         ("[[reports]]\nkind = 'pie'\n", &["pie", "table"]),
         ("rays = [{ family = 'lines', query = 'any', count = 0 }]\n", &["rays[0].count is 0"]),
         ("tracing = { rounds = 0 }\n", &["tracing.rounds is 0", "1 to 1000000"]),
+        ("render = { width = 0 }\n", &["render.width is 0; accepted: 1 to 10000"]),
         ("max_seconds = 0\n", &["max_seconds is 0", "0.001 to 1000000"]),
         ("threads = 0\n", &["threads is 0", "1 to 1024"]),
         ("threads = 65535\n", &["threads is 65535", "1 to 1024"]),

@@ -95,8 +95,9 @@ pub fn columns() -> Vec<Columns> {
 const MEMORY: &str = "S36";
 
 impl Row {
-    fn new(case: &Case, method: &str, cell: Cell) -> (Self, Option<Examined>) {
-        let row = |outcome, note| Self {
+    /// A row without numbers.
+    fn bare(case: &Case, method: &str, outcome: Class, note: String) -> Self {
+        Self {
             scene: format!("{} {}", case.id, case.name),
             method: method.into(),
             outcome,
@@ -105,7 +106,11 @@ impl Row {
             cost: None,
             relative_error: None,
             note,
-        };
+        }
+    }
+
+    fn new(case: &Case, method: &str, cell: Cell) -> (Self, Option<Examined>) {
+        let row = |outcome, note| Self::bare(case, method, outcome, note);
         match cell {
             Cell::Refused(error) => (row(Class::Refused, error), None),
             Cell::Broken(broken) => (row(Class::Broken, broken.to_string()), None),
@@ -128,16 +133,9 @@ impl Row {
         found: Option<&Found>,
         broken: &[String],
     ) -> Self {
-        Self {
-            scene: format!("{} {}", case.id, case.name),
-            method: peer.into(),
-            outcome,
-            objects,
-            depth: found.map(|found| found.depth),
-            cost: found.map(|found| found.cost).filter(|cost| cost.is_finite()),
-            relative_error: None,
-            note: broken.join(BETWEEN),
-        }
+        let (depth, cost) = (found.map(|found| found.depth), found.map(|found| found.cost));
+        let cost = cost.filter(|cost| cost.is_finite());
+        Self { objects, depth, cost, ..Self::bare(case, peer, outcome, broken.join(BETWEEN)) }
     }
 
     /// What the heat map shows: the broken promises, or the depth.

@@ -3,11 +3,38 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_harness");
+
+/// The project's folder.
+pub fn top() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The committed specs, each with its name and text, in the order of their names.
+pub fn experiments() -> Vec<(String, String)> {
+    let folder = top().join("experiments");
+    let read =
+        |file: String| (file.trim_end_matches(".toml").into(), fs::read_to_string(folder.join(file)).unwrap());
+    names(&folder).into_iter().map(read).collect()
+}
+
+/// A page of the documentation is what it is made to be by the test `by`, which rewrites it where `UPDATE_DOCS` is set.
+pub fn assert_current(path: &Path, made: &str, by: &str) {
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        fs::write(path, made).unwrap();
+    }
+    let text = fs::read_to_string(path).unwrap_or_default();
+    let differs = text.lines().zip(made.lines()).find(|(now, then)| now != then);
+    let stale = path.display();
+    assert!(
+        text == made,
+        "{stale} is stale: {differs:?}; UPDATE_DOCS=1 cargo test -p harness --test {by} rewrites it"
+    );
+}
 
 /// A new folder with a spec of this name in it.
 pub fn folder_with(spec: &str, text: &str) -> tempfile::TempDir {
@@ -67,6 +94,15 @@ pub fn reproducible(folder: &Path) -> Vec<(String, Vec<u8>)> {
 /// The rows of a CSV file by column names.
 pub fn rows(path: &Path) -> Vec<BTreeMap<String, String>> {
     csv::Reader::from_path(path).unwrap().deserialize().map(Result::unwrap).collect()
+}
+
+/// A GLB file of this JSON and these bytes.
+pub fn glb(json: String, binary: &[u8]) -> Vec<u8> {
+    let mut json = json.into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let chunk = |kind: &[u8; 4], bytes: &[u8]| [&(bytes.len() as u32).to_le_bytes()[..], kind, bytes].concat();
+    let chunks = [chunk(b"JSON", &json), chunk(b"BIN\0", binary)].concat();
+    [&b"glTF\x02\0\0\0"[..], &(12 + chunks.len() as u32).to_le_bytes(), &chunks].concat()
 }
 
 /// Standard output of a command that must succeed.
