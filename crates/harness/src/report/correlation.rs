@@ -5,7 +5,7 @@ use super::data::distinct;
 use super::metric::Metric;
 use super::prelude::*;
 use crate::run::rows::{RunRow, RunTestRow, VisitRow};
-use crate::statistics::{pearson, range, spearman};
+use crate::statistics::{pearson, spearman};
 
 /// One cost against one kind of rays over the trees of one set, as written to `correlation.csv`.
 #[derive(Serialize, JsonSchema)]
@@ -112,10 +112,7 @@ fn draw(scene: &str, (family, query): (&str, &str), methods: &[(&str, Vec<Tree>)
 
 /// How well every cost ranks the trees, over scenes and kinds of rays.
 fn reading(over_all: &[&Correlation], costs: &[Cost]) -> String {
-    let costs = each(costs, |(cost, _)| {
-        let own = over_all.iter().filter(|row| row.cost == cost);
-        let (low, high) = range(own.filter_map(|row| row.spearman))?;
-        Some(format!("{cost} {low:.3} to {high:.3}"))
-    });
+    let costs = costs.iter().map(|(cost, _)| cost.as_str());
+    let costs = spans(costs, over_all, |row| row.cost, |row| row.spearman, 3);
     format!("Rank correlation of tests per ray over all trees of a scene: with {costs}.")
 }

@@ -4,7 +4,7 @@ use super::config::Labels;
 use super::data::ratio;
 use super::prelude::*;
 use crate::run::rows::RunRow;
-use crate::statistics::{quartiles, range};
+use crate::statistics::quartiles;
 
 bvh_build::config! { serde;
     /// An ablation. Fails if leaving something out has made a cost higher, or different where it must not.
@@ -80,11 +80,8 @@ impl Config {
         let columns = "omission scene ratio_low ratio_median ratio_high";
         output.show("Time with it left out over time without, median and quartiles:", &times, columns)?;
         let other = compared.iter().filter(|row| !row.same_cost).count();
-        let saved = each(&self.pairs, |pair| {
-            let own = times.iter().filter(|row| row.omission == pair.name).map(|row| row.ratio_median);
-            let (low, high) = range(own)?;
-            Some(format!("{} {low:.2} to {high:.2}", pair.name))
-        });
+        let names = self.pairs.iter().map(|pair| pair.name.as_str());
+        let saved = spans(names, &times, |row| row.omission, |row| Some(row.ratio_median), 2);
         let cost = match other {
             0 => "No cost changes".into(),
             other => {

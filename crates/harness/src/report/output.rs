@@ -5,6 +5,7 @@ use crate::Error;
 use crate::figures::{self, Axis, Figure, Layer, Look, Panel};
 use crate::run::rows::to_bytes;
 use crate::run::store::Store;
+use crate::statistics::range;
 use comfy_table::{Table, presets};
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -134,6 +135,21 @@ pub fn panel(title: impl Into<String>, x: Axis, y: Axis, layers: Vec<Layer>) -> 
 /// What `say` has to say of each item, separated by commas.
 pub fn each<T>(items: impl IntoIterator<Item = T>, say: impl FnMut(T) -> Option<String>) -> String {
     items.into_iter().filter_map(say).collect::<Vec<_>>().join(", ")
+}
+
+/// From where to where the values of the rows of each name go, to so many decimals: `a 0.91 to 1.20, b 1.02 to 1.10`.
+/// Names without values are left out.
+pub fn spans<'n, R>(
+    names: impl IntoIterator<Item = &'n str>,
+    rows: &[R],
+    name_of: impl Fn(&R) -> &str,
+    value: impl Fn(&R) -> Option<f64>,
+    decimals: usize,
+) -> String {
+    each(names, |name| {
+        let (low, high) = range(rows.iter().filter(|row| name_of(row) == name).filter_map(&value))?;
+        Some(format!("{name} {low:.decimals$} to {high:.decimals$}"))
+    })
 }
 
 /// For how many of `total` cases something holds, by name: `‘a’, ‘b’ for all 7 scenes; ‘c’ for 3 of 7 scenes; ‘d’ for

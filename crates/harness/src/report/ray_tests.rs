@@ -150,11 +150,8 @@ impl Config {
     }
 
     fn reading(&self, table: &[Measured]) -> String {
-        let ratios = each(self.methods.iter().skip(1), |method| {
-            let own = table.iter().filter(|row| row.method == method).map(|row| row.boxes_over_first);
-            let (low, high) = range(own)?;
-            Some(format!("{method} {low:.2} to {high:.2}"))
-        });
+        let others = self.methods.iter().skip(1).map(String::as_str);
+        let ratios = spans(others, table, |row| row.method, |row| Some(row.boxes_over_first), 2);
         format!("Box tests per ray over those of {}: {ratios}.", first(&self.methods))
     }
 }

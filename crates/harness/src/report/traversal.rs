@@ -4,7 +4,7 @@ use super::config::Methods;
 use super::metric::Metric;
 use super::prelude::*;
 use crate::run::rows::TraceRow;
-use crate::statistics::{median, pearson, range, spearman};
+use crate::statistics::{median, pearson, spearman};
 use std::collections::BTreeSet;
 
 /// Cost against tests or time over the trees of a scene in one layout, as written to `rank.csv` and `timing_rank.csv`.
@@ -108,11 +108,7 @@ fn rank<'a>([scene, layout, rays]: Setting<'a>, measure: Metric, pairs: &[(f64, 
 /// The speeds of every layout, and how well the cost ranks them.
 fn reading(speeds: &[Speed], ranks: &[Rank]) -> String {
     let layouts: BTreeSet<&str> = speeds.iter().map(|row| row.layout).collect();
-    let layouts = each(layouts, |layout| {
-        let own = speeds.iter().filter(|row| row.layout == layout).map(|row| row.mrays_per_second);
-        let (low, high) = range(own)?;
-        Some(format!("{layout} {low:.2} to {high:.2}"))
-    });
+    let layouts = spans(layouts, speeds, |row| row.layout, |row| Some(row.mrays_per_second), 2);
     let correlation = median(&ranks.iter().filter_map(|rank| rank.spearman).collect::<Vec<_>>());
     let correlation = correlation.map_or_else(String::new, |median| {
         format!(" Rank correlation of cost and time per ray over trees: {median:.2} (median over scenes, layouts and \

@@ -104,11 +104,8 @@ impl Config {
     }
 
     fn reading(&self, table: &[Variation]) -> String {
-        let ratios = each(self.methods.iter().skip(1), |method| {
-            let own = table.iter().filter(|row| row.method == method).map(|row| row.cost_over_first);
-            let (low, high) = range(own)?;
-            Some(format!("{method} {low:.3} to {high:.3}"))
-        });
+        let others = self.methods.iter().skip(1).map(String::as_str);
+        let ratios = spans(others, table, |row| row.method, |row| Some(row.cost_over_first), 3);
         format!("Final cost over that of {}, over scenes: {ratios}.", first(&self.methods))
     }
 }
