@@ -141,12 +141,18 @@ const TESTED: usize = 40;
 /// The scene of a case, times two to this power.
 type Scaled = (&'static Case, i32, Vec<Triangle>);
 
+/// The scene of every case that has one, in its smallest size but with at most so many triangles.
+fn scenes(most: usize) -> impl Iterator<Item = (&'static Case, Vec<Triangle>)> {
+    CASES.iter().filter_map(move |case| {
+        let few = case.scene()?.sizes[Size::Few as usize];
+        Some((case, case.triangles(few.min(most))))
+    })
+}
+
 /// So many rays of both sorts, or a few more, through the scene of every case, at every scale at which it is finite.
 fn check_kernels(random: usize, adversarial: usize) {
     let mut jobs = Vec::new();
-    for case in &CASES {
-        let Some(scene) = case.scene() else { continue };
-        let triangles = case.triangles(scene.sizes[Size::Few as usize].min(TESTED));
+    for (case, triangles) in scenes(TESTED) {
         let scaled = SCALES.into_iter().filter_map(|by| Some((case, by, kernels::scaled(&triangles, by)?)));
         let scaled: Vec<Scaled> = scaled.collect();
         let pieces = random.div_ceil(PIECE * scaled.len()) * scaled.len();
@@ -163,7 +169,7 @@ fn check_kernels(random: usize, adversarial: usize) {
     let checked: Vec<Result<usize, String>> = jobs.into_par_iter().enumerate().map(check).collect();
     let hits: usize = checked.iter().flatten().sum();
     assert_kept(checked.into_iter().filter_map(Result::err).collect());
-    let rays = CASES.iter().filter(|case| case.scene().is_some()).count() * (random + adversarial);
+    let rays = STIFF.len() * (random + adversarial);
     assert!(hits > rays / 10, "{hits} of {rays} rays hit");
 }
 
@@ -202,6 +208,10 @@ fn the_rays_of_the_suite_hit_miss_and_cover_every_kind() {
     );
 }
 
+fn best() -> Method {
+    Method::Best(bvh_search::best::Config::default())
+}
+
 /// The cost that is reported for a tree is the one that it has.
 fn assert_reported(who: &str, reported: f64, cost: f64) {
     assert!((reported - cost).abs() <= examine::ROUNDING * cost, "{who}: {reported} reported, {cost}");
@@ -235,11 +245,9 @@ fn every_objective_is_what_its_method_reports() {
 
 #[test]
 fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
-    let method = Method::Best(bvh_search::best::Config::default());
+    let method = best();
     let (mut searched, mut refused) = (0, 0);
-    for case in &CASES {
-        let Some(scene) = case.scene() else { continue };
-        let triangles = case.triangles(scene.sizes[0].min(2000));
+    for (case, triangles) in scenes(2000) {
         let boxes = stiff::boxes(&triangles);
         let bounds = boxes.iter().fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
         let segments: Vec<Segment> = tracing::rays(&triangles, 3000, 1)
@@ -273,11 +281,9 @@ fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
 
 #[test]
 fn every_case_holds_with_divided_objects_and_with_the_cost_of_the_layout() {
-    let method = Method::Best(bvh_search::best::Config::default());
+    let method = best();
     let mut divided = 0;
-    for case in &CASES {
-        let Some(scene) = case.scene() else { continue };
-        let triangles = case.triangles(scene.sizes[0].min(2000));
+    for (case, triangles) in scenes(2000) {
         let (boxes, objects) = (stiff::boxes(&triangles), Primitives::Triangles(triangles.clone()));
         let budget = examine::budget(&method, boxes.len(), WORK);
         for objective in [Objective::Layout, Objective::InternalArea] {
@@ -307,11 +313,9 @@ fn every_case_holds_with_divided_objects_and_with_the_cost_of_the_layout() {
 
 #[test]
 fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
-    let method = Method::Best(bvh_search::best::Config::default());
+    let method = best();
     let mut divided = 0;
-    for case in &CASES {
-        let Some(scene) = case.scene() else { continue };
-        let few = case.triangles(scene.sizes[0].min(300));
+    for (case, few) in scenes(300) {
         // Long ones, which are worth dividing, from one corner of the scene to another.
         let others = few.iter().cycle().skip(few.len() / 2);
         let long = |(near, far): (&Triangle, &Triangle)| Triangle([near.0[0], near.0[1], far.0[2]]);

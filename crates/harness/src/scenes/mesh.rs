@@ -42,13 +42,10 @@ impl Mesh {
         let counted = |count: usize, one: &str, many: &str| {
             (count > 0).then(|| if count == 1 { format!("1 {one}") } else { format!("{count} {many}") })
         };
-        let unknown = self.unknown.as_ref().map(|(count, line, word)| {
-            let lines = if *count == 1 {
-                "line with an unknown keyword was"
-            } else {
-                "lines with unknown keywords were"
-            };
-            format!("{count} {lines} ignored (`{word}` in line {line})")
+        let unknown = self.unknown.as_ref().and_then(|(count, line, word)| {
+            let lines =
+                counted(*count, "line with an unknown keyword was", "lines with unknown keywords were")?;
+            Some(format!("{lines} ignored (`{word}` in line {line})"))
         });
         let parts = [
             counted(self.unused_vertices, "vertex is used by no face", "vertices are used by no face"),

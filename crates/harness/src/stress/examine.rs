@@ -44,18 +44,16 @@ pub fn budget(method: &Method, objects: usize, work_per_object: u64) -> Budget {
 /// Runs a method with seed 1; a panic is a broken promise.
 pub fn run(method: &Method, boxes: &[Aabb], work_per_object: u64) -> Result<Outcome, Broken> {
     let budget = budget(method, boxes.len(), work_per_object);
-    let solved = catch_unwind(AssertUnwindSafe(|| solve(method, &Problem::new(boxes), 1, budget, &())));
-    match solved {
-        Ok(Ok(outcome)) => Ok(outcome),
-        Ok(Err(error)) => Err(P1.broken(format!("refused: {error}"))),
-        Err(panic) => Err(panicked(&*panic)),
-    }
+    solved(method, boxes, budget)?.map_err(|error| P1.broken(format!("refused: {error}")))
 }
 
-fn panicked(panic: &(dyn std::any::Any + Send)) -> Broken {
-    let text = panic.downcast_ref::<String>().cloned();
-    let text = text.or_else(|| panic.downcast_ref::<&str>().map(|&text| text.into()));
-    P1.broken(format!("panicked: {}", text.unwrap_or_default()))
+fn solved(method: &Method, boxes: &[Aabb], budget: Budget) -> Result<Result<Outcome, SearchError>, Broken> {
+    let solved = catch_unwind(AssertUnwindSafe(|| solve(method, &Problem::new(boxes), 1, budget, &())));
+    solved.map_err(|panic| {
+        let text = panic.downcast_ref::<String>().cloned();
+        let text = text.or_else(|| panic.downcast_ref::<&str>().map(|&text| text.into()));
+        P1.broken(format!("panicked: {}", text.unwrap_or_default()))
+    })
 }
 
 /// Checks a method on the scene of a case with so many objects.
@@ -139,14 +137,11 @@ pub fn check_scale(
 
 /// The method refuses the boxes and names the object.
 pub fn refuses(method: &Method, boxes: &[Aabb], object: usize) -> Verdict {
-    let solved =
-        catch_unwind(AssertUnwindSafe(|| solve(method, &Problem::new(boxes), 1, Budget::UNLIMITED, &())));
-    match solved {
-        Ok(Err(error @ SearchError::Build(_))) if error.to_string().contains(&format!("object {object} ")) => {
+    match solved(method, boxes, Budget::UNLIMITED)? {
+        Err(error @ SearchError::Build(_)) if error.to_string().contains(&format!("object {object} ")) => {
             Ok(error.to_string())
         }
-        Ok(Err(error)) => Err(P1.broken(format!("the error names no object {object}: {error}"))),
-        Ok(Ok(_)) => Err(P1.broken(format!("built a tree over object {object}"))),
-        Err(panic) => Err(panicked(&*panic)),
+        Err(error) => Err(P1.broken(format!("the error names no object {object}: {error}"))),
+        Ok(_) => Err(P1.broken(format!("built a tree over object {object}"))),
     }
 }

@@ -7,20 +7,15 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use std::ops::RangeInclusive;
 
-/// 2^k for the k of normal numbers.
-fn power(k: i32) -> f64 {
-    f64::from_bits(((k.clamp(-1022, 1023) + 1023) as u64) << 52)
-}
-
 /// All coordinates times 2^k; exact for the k of [`scale_range`].
 pub fn scaled(boxes: &[Aabb], k: i32) -> Vec<Aabb> {
-    let scale = |p: Vec3| (p.as_dvec3() * power(k)).as_vec3();
+    let scale = |p: Vec3| (p.as_dvec3() * libm::exp2(k.into())).as_vec3();
     boxes.iter().map(|b| Aabb { min: scale(b.min), max: scale(b.max) }).collect()
 }
 
 /// A cost in units of area after the scene was scaled by 2^k.
 pub fn scaled_area(area: f64, k: i32) -> f64 {
-    area * power(k) * power(k)
+    area * libm::exp2((2 * k).into())
 }
 
 /// The k by which all coordinates can be scaled so that none overflows or becomes denormal; 0 is always among them.

@@ -13,51 +13,9 @@ pub enum Keyword {
 pub const MOST_CORNERS: usize = 1 << 16;
 
 /// Keywords of the format that are ignored (Wavefront, "Object Files", version 3.0).
-const IGNORED: [&[u8]; 43] = [
-    b"vt",
-    b"vn",
-    b"vp",
-    b"p",
-    b"l",
-    b"curv",
-    b"curv2",
-    b"surf",
-    b"parm",
-    b"trim",
-    b"hole",
-    b"scrv",
-    b"sp",
-    b"end",
-    b"con",
-    b"cstype",
-    b"deg",
-    b"bmat",
-    b"step",
-    b"g",
-    b"o",
-    b"s",
-    b"mg",
-    b"bevel",
-    b"c_interp",
-    b"d_interp",
-    b"lod",
-    b"maplib",
-    b"usemap",
-    b"usemtl",
-    b"mtllib",
-    b"shadow_obj",
-    b"trace_obj",
-    b"ctech",
-    b"stech",
-    b"call",
-    b"csh",
-    b"bsp",
-    b"bzp",
-    b"cdc",
-    b"cdp",
-    b"res",
-    b"vw",
-];
+const IGNORED: &str = "vt vn vp p l curv curv2 surf parm trim hole scrv sp end con cstype deg bmat step g o s mg bevel \
+    c_interp d_interp lod maplib usemap usemtl mtllib shadow_obj trace_obj ctech stech call csh bsp bzp \
+    cdc cdp res vw";
 
 /// The statements of a file, in order.
 pub struct Statements<'a> {
@@ -93,7 +51,7 @@ impl<'a> Statements<'a> {
                 word => {
                     // A line that ends in a backslash by accident, such as a path, must not swallow a vertex: its next
                     // line is ignored only if it is no `v` or `f` statement.
-                    if let Some(word) = word.filter(|word| !self.ignoring && !IGNORED.contains(word)) {
+                    if let Some(word) = word.filter(|word| !self.ignoring && !is_ignored(word)) {
                         let (count, line, first) = self.unknown.unwrap_or((0, number, word));
                         self.unknown = Some((count + 1, line, first));
                     }
@@ -127,6 +85,10 @@ impl<'a> Statements<'a> {
             None => (code, false),
         })
     }
+}
+
+fn is_ignored(word: &[u8]) -> bool {
+    IGNORED.split(' ').any(|known| known.as_bytes() == word)
 }
 
 fn split(code: &[u8]) -> impl Iterator<Item = &[u8]> {
