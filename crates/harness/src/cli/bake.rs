@@ -77,7 +77,8 @@ pub enum BakeCost {
 }
 
 impl BakeArgs {
-    /// What is minimised. Rays save about twice as many tests by the cost of the layout: `results/ray_objective`.
+    /// What is minimised. Rays save more tests by the cost of the layout, and without a camera hardly any by area:
+    /// `results/ray_objective`.
     fn cost(&self) -> BakeCost {
         let suits = if self.rays.is_some() { BakeCost::Layout } else { BakeCost::Area };
         self.cost.unwrap_or(suits)

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::measure::ray_cost::{Config, TrainedOn, test_rays};
 use crate::run::job::{Job, Watch, collapsed_sah, density};
-use crate::run::rows::{LayoutRow, Row, RunTestRow, TestRow, TestTimeRow, VisitRow, to_bytes};
+use crate::run::rows::{LayoutRow, RunTestRow, TestRow, TestTimeRow, VisitRow};
 use crate::run::store::Store;
 use crate::run::trace::{Trees, complete};
 use crate::spec::Experiment;
@@ -11,7 +11,6 @@ use bvh_core::cost::{self, Objective};
 use bvh_core::{Bvh, WideBvh};
 use bvh_search::Observer;
 use rayon::prelude::*;
-use std::path::Path;
 
 /// The name in results of the trees that are trained on rays, whatever the label of their method.
 const RAYS: &str = "rays";
@@ -94,14 +93,14 @@ pub(crate) fn judge(
             }
         }
     }
-    store.write(TestRow::FILE, &to_bytes(&rows, Path::new(TestRow::FILE))?)?;
-    store.write(LayoutRow::FILE, &to_bytes(&sizes, Path::new(LayoutRow::FILE))?)?;
+    store.write_rows(&rows)?;
+    store.write_rows(&sizes)?;
     if !config.costs.is_empty() {
-        store.write(VisitRow::FILE, &to_bytes(&visits, Path::new(VisitRow::FILE))?)?;
-        store.write(RunTestRow::FILE, &to_bytes(&of_runs, Path::new(RunTestRow::FILE))?)?;
+        store.write_rows(&visits)?;
+        store.write_rows(&of_runs)?;
     }
     if !times.is_empty() {
-        store.write(TestTimeRow::FILE, &to_bytes(&times, Path::new(TestTimeRow::FILE))?)?;
+        store.write_rows(&times)?;
     }
     Ok(())
 }
