@@ -1,8 +1,9 @@
 //! A measure of boxes in place of the area: every builder and search goes by it, and the area as a measure is the area.
 
+use bvh_build::Builder;
 use bvh_core::cost::{self, Measure, Objective};
 use bvh_core::{Aabb, PackedAabb, RayDensity, Segment, glam, validate};
-use bvh_search::{Budget, Method, Outcome, Problem, Shortcut, Start, best, exact, solve};
+use bvh_search::{Budget, Method, Outcome, Problem, Shortcut, Start, best, exact, reinsertion, solve};
 
 /// Rays that are nearly parallel to the x axis: the face across it counts most. Monotone, as every sum of products of
 /// extents is.
@@ -78,6 +79,39 @@ fn builders_and_searches_go_by_the_measure_and_report_every_objective_by_it() {
             assert_eq!(area.cost, objective.cost(&area.tree), "{name} {objective:?}");
             assert!(name == "median_cut" || area.tree != found.tree, "{name} {objective:?}");
         }
+    }
+}
+
+#[test]
+fn local_searches_begin_with_a_tree_by_the_measure() {
+    let boxes = boxes(700);
+    let begun = Start::default().build_by(&boxes, Some(&AlongX)).unwrap();
+    let by_area = Start::default().build(&boxes).unwrap();
+    let [begun, by_area] = [begun, by_area].map(|tree| cost::internal_measure(&tree, &AlongX));
+    assert!(begun < 0.99 * by_area, "{begun} {by_area}");
+    let reinsertion = reinsertion::Config { start: Start::default(), ..Default::default() };
+    let best = best::Config { start: Some(Start::default()), ..Default::default() };
+    for method in [Method::Reinsertion(reinsertion), Method::Best(best)] {
+        for objective in [Objective::InternalArea, Objective::Layout] {
+            let problem = Problem {
+                measure: Some(&AlongX),
+                objective,
+                disabled: &[Shortcut::Tiny],
+                ..Problem::new(&boxes)
+            };
+            let outcome = solve(&method, &problem, 1, Budget::UNLIMITED, &Stopped).unwrap();
+            let cost = cost::internal_measure(&outcome.tree, &AlongX);
+            assert_eq!(cost, begun, "{} {objective:?}", method.name());
+        }
+    }
+}
+
+/// Stops a search as soon as it asks.
+struct Stopped;
+
+impl bvh_search::Observer for Stopped {
+    fn cancelled(&self) -> bool {
+        true
     }
 }
 

@@ -87,7 +87,7 @@ impl Config {
     /// Subtrees, if there are several, are annealed in parallel, each with a random stream of its own.
     fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         if problem.splits.is_some() || problem.objective == Objective::Layout {
-            let tree = self.start.clone().unwrap_or_default().build(problem.boxes)?;
+            let tree = self.start.clone().unwrap_or_default().build_by(problem.boxes, problem.measure)?;
             let other = problem.splits.filter(|splits| splits.most > problem.boxes.len());
             let other = other.map(|Splits { objects, most }| {
                 spatial::Config::default().build_at_most(most, problem.boxes, objects)

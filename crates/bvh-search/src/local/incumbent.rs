@@ -26,7 +26,7 @@ impl<'p> Incumbent<'p> {
         metric: A,
         run: &mut Run,
     ) -> Result<(Self, Working<A>), SearchError> {
-        let incumbent = Self::begin(builder.build(problem.boxes)?, problem, run);
+        let incumbent = Self::begin(builder.build_by(problem.boxes, problem.measure)?, problem, run);
         let working = incumbent.working(metric)?;
         Ok((incumbent, working))
     }

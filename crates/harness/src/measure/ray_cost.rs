@@ -47,8 +47,8 @@ config! {
     serde;
     /// How trees are trained on rays, and judged by others.
     pub struct Config {
-        /// Primary rays of each path that judge trees; without a camera, rays of each family.
-        count: u32 = 50_000, in 1..=10_000_000;
+        /// Primary rays of each path that judge trees; without a camera, rays of each family. 0 to train trees and judge none.
+        count: u32 = 50_000, in 0..=10_000_000;
         /// Primary rays that trees are trained on; without a camera, rays of each family.
         trained: u32 = 100_000, in 1..;
         /// Turns in which rays are timed; 0 for counting only.
@@ -68,7 +68,8 @@ config! {
 pub struct Cameras {
     /// The path that trees are trained on; other rays from it judge them.
     pub same: Vec<Viewpoint>,
-    /// A path that trees are only judged by.
+    /// A path that trees are only judged by; needless where none are.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub other: Vec<Viewpoint>,
     /// Positions of lights.
     pub lights: Vec<[f64; 3]>,
@@ -92,8 +93,8 @@ impl Config {
         let rendered = self.cameras.values().map(|cameras| 2 + cameras.lights.len());
         let too_many = check_count("trained", self.trained, rendered.fold(OF_ANYTHING, usize::max));
         let paths = |(scene, cameras): (&String, &Cameras)| {
-            [("same", &cameras.same), ("other", &cameras.other)]
-                .map(|(name, path)| (scene.clone(), name, path.is_empty()))
+            [("same", &cameras.same, true), ("other", &cameras.other, self.count > 0)]
+                .map(|(name, path, is_used)| (scene.clone(), name, is_used && path.is_empty()))
         };
         let empty = self.cameras.iter().flat_map(paths).filter(|(.., is_empty)| *is_empty);
         too_many.into_iter().chain(empty.map(|(scene, name, _)| {

@@ -60,6 +60,13 @@ pub enum Layout {
     WidePortable,
 }
 
+impl Layout {
+    /// Whether it is made for random lines alone, whatever rays the tree is for.
+    pub fn is_for_lines(self) -> bool {
+        matches!(self, Self::WideCheapBlocks | Self::WideDearBlocks)
+    }
+}
+
 /// Rays that are traced together.
 #[derive(Clone, Copy, Debug)]
 pub struct Batch<'a> {
@@ -152,18 +159,25 @@ fn in_batches(wide: &WideBvh, query: Query, rays: &[Ray], hits: &mut [Option<Hit
     rays.chunks(PART).zip(hits.chunks_mut(PART)).map(part).collect()
 }
 
-/// One of our trees, valid over the scene, in each of these layouts. An error says why there is no such layout.
+/// One of our trees, valid over the scene, in each of these layouts; wide ones for rays that enter the tree's nodes as often as
+/// `visits` says, if it does. An error says why there is no such layout.
 pub fn own_contenders<'a>(
     layouts: &[Layout],
     scene: &'a Scene,
     tree: &'a Bvh,
+    visits: Option<&[f32]>,
 ) -> Result<Vec<Contender<'a>>, String> {
     let contender = |&layout: &Layout| {
         let triangles = scene.triangles().map_err(|error| error.to_string())?;
         let accelerator = |structure| Tracer::Own(Accelerator::new(&scene.primitives, structure));
         let start = Instant::now();
         let made = |wide: Result<_, InvalidBvh>| wide.map_err(|error| error.to_string());
-        let wide = || made(WideBvh::new(tree, triangles));
+        let wide = || {
+            made(match visits {
+                Some(visits) => WideBvh::for_rays(tree, triangles, visits),
+                None => WideBvh::new(tree, triangles),
+            })
+        };
         let blocks =
             |cost| Ok::<_, String>(Tracer::Batches(made(WideBvh::with_block_cost(tree, triangles, cost))?));
         let (name, tracer) = match layout {
@@ -289,6 +303,7 @@ impl OfKind<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::ray_cost::TrainedOn;
     use bvh_build::{Builder, median_cut, muller_fellner};
 
     #[test]
@@ -300,7 +315,7 @@ mod tests {
         config.layouts.push(Layout::WideBatches);
         let mut contenders = Vec::new();
         for (method, tree) in [("good", &good), ("bad", &bad)] {
-            let own = own_contenders(&config.layouts, &scene, tree).unwrap();
+            let own = own_contenders(&config.layouts, &scene, tree, None).unwrap();
             contenders.extend(own.into_iter().map(|contender| (method.to_owned(), contender)));
         }
         let (rows, times) = measure(&config, &scene, &good, &contenders, 1, || false).unwrap().unwrap();
@@ -317,5 +332,27 @@ mod tests {
         assert!(boxes("good", "binary") < boxes("bad", "binary"));
         assert!(boxes("good", "wide") < boxes("bad", "wide"));
         assert_eq!(boxes("good", "wide"), boxes("good", "wide, portable"));
+    }
+
+    #[test]
+    fn a_tree_for_rays_is_traced_in_the_wide_layout_for_those_rays_and_answers_the_same() {
+        let scene = Scene::load("escher:3000").unwrap();
+        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+        let trained = crate::measure::ray_cost::Config { trained: 5000, ..Default::default() };
+        let visits = trained.density(TrainedOn::Camera, &scene, 2).unwrap().visits(&tree);
+        let config: Config = toml::from_str("count = 5000\nrounds = 1\nrays = ['primary']").unwrap();
+        let mut contenders = Vec::new();
+        for (rays, visits) in [("lines", None), ("camera", Some(&visits[..]))] {
+            let own = own_contenders(&config.layouts, &scene, &tree, visits).unwrap();
+            contenders.extend(own.into_iter().map(|contender| (rays.to_owned(), contender)));
+        }
+        let (rows, _) = measure(&config, &scene, &tree, &contenders, 1, || false).unwrap().unwrap();
+        assert!(rows.iter().all(|row| (row.missed_hits, row.false_hits, row.other_hits) == (0, 0, 0)));
+        let tests = |rays: &str, layout: &str| {
+            let row = rows.iter().find(|row| row.method == rays && row.layout == layout).unwrap();
+            row.boxes_per_ray.unwrap() / 8.0 + row.objects_per_ray.unwrap() / 4.0
+        };
+        assert_eq!(tests("lines", "binary"), tests("camera", "binary"));
+        assert!(tests("camera", "wide") < tests("lines", "wide"));
     }
 }

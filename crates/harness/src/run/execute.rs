@@ -57,7 +57,7 @@ pub fn execute(
     let whole_only = [
         (experiment.suite.is_some(), "the suite of cases is not done in parts"),
         (experiment.tracing.is_some(), "rays are timed against each other, not in parts"),
-        (experiment.ray_cost.is_some(), "trees are judged by rays beside each other, not in parts"),
+        (experiment.judges().is_some(), "trees are judged by rays beside each other, not in parts"),
     ];
     if let Some((_, why)) = whole_only.iter().find(|(whole, _)| *whole && extent.shard.is_some()) {
         return Err(Error::Usage(format!("{}: {why}", experiment.name)));
@@ -100,7 +100,7 @@ fn run(
     if let Some(config) = &experiment.tracing {
         traced = trace(experiment, config, &jobs, &mut trees, &watch, &store)?;
     }
-    if let Some(config) = &experiment.ray_cost {
+    if let Some(config) = experiment.judges() {
         ray_cost::judge(experiment, config, &jobs, &mut trees, &watch, &store)?;
     }
     if let Some(program) = &experiment.tinybvh {
@@ -160,7 +160,7 @@ fn perform_all(
         let start = Instant::now();
         if let Some((run, tree)) = perform(experiment, &jobs[index], watch)? {
             store.keep(index, &run)?;
-            if experiment.ray_cost.is_some() || experiment.tracing.is_some() && jobs[index].repetition == 0 {
+            if experiment.judges().is_some() || experiment.tracing.is_some() && jobs[index].repetition == 0 {
                 trees.lock().unwrap_or_else(PoisonError::into_inner).insert(index, tree);
             }
             let finished = finished.fetch_add(1, Relaxed) + 1;

@@ -187,6 +187,11 @@ pub(crate) fn density(experiment: &Experiment, job: &Job) -> Result<Option<RayDe
     config.density(trained, job.scene, seed).map(Some).map_err(failed)
 }
 
+/// How often those rays enter the nodes of the job's tree, which decides how it is laid out.
+pub(crate) fn visits(experiment: &Experiment, job: &Job, tree: &Bvh) -> Result<Option<Vec<f32>>, Error> {
+    Ok(density(experiment, job)?.map(|density| density.visits(tree)))
+}
+
 /// The surface area heuristic with both constants 1, after the best collapse of leaves.
 pub(crate) fn collapsed_sah(tree: &Bvh) -> f64 {
     let constants = SahConstants::default();

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::measure::ray_cost::{Config, TrainedOn, test_rays};
-use crate::run::job::{Job, Watch, collapsed_sah, density};
+use crate::run::job::{Job, Watch, collapsed_sah, visits};
 use crate::run::rows::{LayoutRow, RunTestRow, TestRow, TestTimeRow, VisitRow};
 use crate::run::store::Store;
 use crate::run::trace::{Trees, complete};
@@ -130,8 +130,8 @@ fn costs(
 fn layout(experiment: &Experiment, job: &Job, tree: &Bvh) -> Result<WideBvh, Error> {
     let failed = |message| Error::Tracing { scene: job.scene.name.clone(), message };
     let triangles = job.scene.triangles().map_err(|error| failed(error.to_string()))?;
-    let made = match density(experiment, job)? {
-        Some(density) => WideBvh::for_rays(tree, triangles, &density.visits(tree)),
+    let made = match visits(experiment, job, tree)? {
+        Some(visits) => WideBvh::for_rays(tree, triangles, &visits),
         None => WideBvh::new(tree, triangles),
     };
     made.map_err(|error| failed(error.to_string()))

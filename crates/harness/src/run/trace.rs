@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::measure::speed;
 use crate::peers::{comparison, external};
-use crate::run::job::{Job, Watch, perform};
+use crate::run::job::{Job, Watch, perform, visits};
 use crate::run::store::Store;
 use crate::spec::{Contestant, Experiment};
 use bvh_core::Bvh;
@@ -47,7 +47,8 @@ pub(crate) fn trace(
             let made = match &job.labelled.method {
                 Contestant::Peer(peer) => peer.contenders(scene),
                 Contestant::Ours(_) | Contestant::External(_) => {
-                    speed::own_contenders(&config.layouts, scene, tree)
+                    let visits = visits(experiment, job, tree)?;
+                    speed::own_contenders(&config.layouts, scene, tree, visits.as_deref())
                 }
             };
             let made = made.map_err(failed)?;

@@ -89,6 +89,11 @@ impl Experiment {
             let accepted = "with the experiment's `ray_cost`";
             faults.push(Fault::new("for_rays", "set without `ray_cost`", accepted));
         }
+        let layouts = self.tracing.iter().flat_map(|tracing| &tracing.layouts);
+        if for_rays.is_some() && layouts.into_iter().any(|layout| layout.is_for_lines()) {
+            let found = "set beside `tracing.layouts` with another cost of blocks";
+            faults.push(Fault::new("for_rays", found, "with other layouts, which can be for rays"));
+        }
         let found = format!("{:?}", method.name());
         if self.suite.is_some() && !is_ours {
             let accepted = "methods of ours; the suite runs the libraries that are compiled in by itself";

@@ -95,6 +95,11 @@ impl Experiment {
             .map(|(index, (labelled, repetition))| (labelled, repetition, index == 0))
     }
 
+    /// The rays that judge its trees, if any do.
+    pub fn judges(&self) -> Option<&ray_cost::Config> {
+        self.ray_cost.as_ref().filter(|config| config.count > 0)
+    }
+
     /// Whether gaps are measured on scenes of so many objects from their exact optimum.
     pub fn needs_optimum(&self, objects: usize) -> bool {
         objects <= exact::MOST_OBJECTS && self.reports.iter().any(Report::needs_references)

@@ -175,6 +175,13 @@ fn wrong_methods_are_named_with_what_would_be_accepted() {
             "[{ method = 'median_cut', for_rays = 'inside' }]",
             &["methods[0].for_rays", "median_cut, which compares"],
         ),
+        (
+            "[{ method = 'best', for_rays = 'camera' }]\n[ray_cost]\n[tracing]\nlayouts = ['wide_dear_blocks']",
+            &[
+                "methods[0].for_rays is set beside `tracing.layouts` with another cost of blocks",
+                "other layouts",
+            ],
+        ),
         ("[{ method = 'obvhs', for_rays = 'inside' }]", &["methods[0].for_rays is set for obvhs", "of ours"]),
         ("[{ method = 'best', for_rays = 'all' }]", &["methods[0].for_rays", "all", "default"]),
         ("[{ method = 'grasp' }, { method = 'grasp' }]", &["methods[1].label", "second time"]),
