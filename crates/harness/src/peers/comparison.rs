@@ -74,27 +74,33 @@ const AGAINST: [(&str, IsRival); 3] = [
     ("robust", |row| row.library == "embree" && row.mode.contains("robust")),
 ];
 
-/// For each of our modes and kind of rays, its speed over that of the fastest mode of other libraries, scene by scene: the
-/// geometric mean and the least.
+/// For each of our modes and kind of rays, its speed over that of the fastest mode of other libraries: scene by scene, and their
+/// geometric mean.
 pub fn ratios(rows: &[PeerRayRow]) -> Vec<RayRatioRow> {
     let mut ratios = Vec::new();
     for mean in rows.iter().filter(|row| row.library == OURS && row.scene == MEAN) {
         let of_scenes = |row: &&PeerRayRow| row.scene != MEAN && row.rays == mean.rays;
         let own = rows.iter().filter(of_scenes).filter(|row| row.library == OURS && row.mode == mean.mode);
         for (against, is_rival) in AGAINST {
+            let over = |scene: &str, ratio| RayRatioRow {
+                scene: scene.into(),
+                mode: mean.mode.clone(),
+                against: against.into(),
+                rays: mean.rays.clone(),
+                ratio,
+            };
             let of_scene = |own: &PeerRayRow| {
                 let rivals = rows.iter().filter(of_scenes).filter(|row| row.scene == own.scene);
                 let rivals = rivals.filter(|row| row.library != OURS && is_rival(row));
                 let fastest = rivals.map(|row| row.million_per_s).reduce(f64::max)?;
-                Some((own.million_per_s / fastest, own.scene.clone()))
+                Some(over(&own.scene, own.million_per_s / fastest))
             };
-            let found: Vec<_> = own.clone().filter_map(of_scene).collect();
-            let Some((least, scene)) = found.iter().min_by(|a, b| a.0.total_cmp(&b.0)).cloned() else {
-                continue;
-            };
-            let ratio = geometric_mean(&found.iter().map(|(ratio, _)| *ratio).collect::<Vec<_>>());
-            let (mode, rays) = (mean.mode.clone(), mean.rays.clone());
-            ratios.push(RayRatioRow { mode, against: against.into(), rays, ratio, least, scene });
+            let found: Vec<RayRatioRow> = own.clone().filter_map(of_scene).collect();
+            if !found.is_empty() {
+                let mean = geometric_mean(&found.iter().map(|row| row.ratio).collect::<Vec<_>>());
+                ratios.extend(found);
+                ratios.push(over(MEAN, mean));
+            }
         }
     }
     ratios
@@ -107,12 +113,13 @@ pub fn text(ratios: &[RayRatioRow]) -> String {
     kinds.sort_unstable();
     kinds.dedup();
     for kind in kinds {
-        let of = ratios.iter().filter(|row| row.rays == kind && row.against == AGAINST[0].0);
-        if let Some(row) = of.max_by(|a, b| a.ratio.total_cmp(&b.ratio)) {
-            text += &format!(
-                "  {kind}: {:.2} ({}), least {:.2} on {}\n",
-                row.ratio, row.mode, row.least, row.scene
-            );
+        let of_kind = || ratios.iter().filter(|row| row.rays == kind && row.against == AGAINST[0].0);
+        let order = |a: &&RayRatioRow, b: &&RayRatioRow| a.ratio.total_cmp(&b.ratio);
+        let fastest = of_kind().filter(|row| row.scene == MEAN).max_by(order);
+        let of_mode = |mode: &str| of_kind().filter(|row| row.mode == mode).min_by(order);
+        if let Some((mean, least)) = fastest.and_then(|mean| Some((mean, of_mode(&mean.mode)?))) {
+            let (RayRatioRow { ratio, mode, .. }, least, scene) = (mean, least.ratio, &least.scene);
+            text += &format!("  {kind}: {ratio:.2} ({mode}), least {least:.2} on {scene}\n");
         }
     }
     text
@@ -157,17 +164,15 @@ mod tests {
         ];
         measured.extend(means(&measured));
         let ratios = ratios(&measured);
-        let shown: Vec<_> = ratios.iter().map(|row| (row.against.as_str(), row.ratio, row.least)).collect();
-        let expected =
-            [("any mode", 1.0, 0.5), ("whole triangles", 6f64.sqrt(), 2.0), ("robust", 18f64.sqrt(), 2.0)];
-        assert_eq!(shown.len(), expected.len());
-        for (shown, expected) in shown.iter().zip(expected) {
-            assert!(
-                shown.0 == expected.0 && (shown.1 - expected.1).abs() < 1e-12 && shown.2 == expected.2,
-                "{shown:?}"
-            );
-        }
-        let slower = RayRatioRow { mode: "binary".into(), ratio: 0.5, ..ratios[0].clone() };
+        let of = |against: &str| -> Vec<(&str, f64)> {
+            let of = ratios.iter().filter(|row| row.against == against);
+            of.map(|row| (row.scene.as_str(), row.ratio)).collect()
+        };
+        assert_eq!(of("any mode"), [("a", 0.5), ("b", 2.0), (MEAN, 1.0)]);
+        assert_eq!(of("whole triangles")[..2], [("a", 2.0), ("b", 3.0)]);
+        assert_eq!(of("robust")[..2], [("a", 2.0), ("b", 9.0)]);
+        assert!((of("robust")[2].1 - 18f64.sqrt()).abs() < 1e-12);
+        let slower = RayRatioRow { mode: "binary".into(), ratio: 0.4, ..ratios[2].clone() };
         let text = text(&[vec![slower], ratios].concat());
         assert!(text.contains("primary: 1.00 (wide), least 0.50 on a"), "of our fastest mode: {text}");
     }

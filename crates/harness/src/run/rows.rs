@@ -260,18 +260,16 @@ rows! {
     }
 
     /// One row of `timing_ratios.csv`: the speed of rays of one kind in one of our modes, over the fastest mode of other
-    /// libraries on the same scene.
+    /// libraries on the same scene; after the scenes the geometric mean over them.
     RayRatioRow in "timing_ratios.csv" {
+        scene: String,
         /// Our mode.
         mode: String,
         /// The modes compared with: `any mode`, those of `whole triangles`, or Embree's `robust` ones.
         against: String,
         rays: String,
-        /// The geometric mean over the scenes.
+        /// Our speed over the fastest of theirs; more than 1 is faster.
         ratio: f64,
-        /// The least of any scene, and which scene that is.
-        least: f64,
-        scene: String,
     }
 
     /// One row of `timing_tests.csv`: the speed of the same rays in the tree of the first run, on one thread.
