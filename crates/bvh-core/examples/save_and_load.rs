@@ -1,4 +1,5 @@
-//! Takes a tree from another builder, saves it, loads it two ways, and traces it where it lies.
+//! Converts a tree of another builder, saves it, loads it in two ways, and traces it without
+//! copying it.
 //!
 //! `cargo run -p bvh-core --example save_and_load`
 
@@ -6,27 +7,36 @@ use bvh_core::file::{self, FileError, Origin, TreeFile};
 use bvh_core::{Aabb, Bvh, FirstCountNode, Ray, Triangle, boxes, nearest_hit, validate};
 use std::error::Error;
 
-/// A row of triangles; any scene will do.
+/// Makes a row of triangles. Any scene will do.
 fn triangles() -> Vec<Triangle> {
-    let triangle = |x: f32| Triangle::from([[x, 0.0, 0.0], [x + 0.75, 0.0, 0.0], [x, 1.0, 0.5]]);
-    (0..64u8).map(|i| triangle(i.into())).collect()
+    let mut triangles = Vec::new();
+    for x in (0..64u8).map(f32::from) {
+        triangles.push(Triangle::from([[x, 0.0, 0.0], [x + 0.75, 0.0, 0.0], [x, 1.0, 0.5]]));
+    }
+    triangles
 }
 
-/// A builder of one's own, in the plain form that most have: two children at `first`, or `count` objects from `first`
-/// on.
+/// A custom builder. Like most builders it makes plain nodes: two children at `first`, or `count`
+/// objects from `first` on.
 fn halves(boxes: &[Aabb]) -> Vec<FirstCountNode> {
     let mut nodes = vec![FirstCountNode { first: 0, count: boxes.len() as u32, ..Default::default() }];
-    let mut at = 0;
-    while at < nodes.len() {
-        let FirstCountNode { first, count, .. } = nodes[at];
-        let around = boxes[first as usize..][..count as usize].iter().fold(Aabb::EMPTY, |b, o| b.union(o));
-        (nodes[at].min, nodes[at].max) = (around.min.to_array(), around.max.to_array());
-        if count > 2 {
-            let children = [(first, count / 2), (first + count / 2, count - count / 2)];
-            (nodes[at].first, nodes[at].count) = (nodes.len() as u32, 0);
-            nodes.extend(children.map(|(first, count)| FirstCountNode { first, count, ..Default::default() }));
+    let mut index = 0;
+    while index < nodes.len() {
+        let FirstCountNode { first, count, .. } = nodes[index];
+        let mut around = Aabb::EMPTY;
+        for aabb in &boxes[first as usize..][..count as usize] {
+            around = around.union(aabb);
         }
-        at += 1;
+        nodes[index].min = around.min.to_array();
+        nodes[index].max = around.max.to_array();
+        if count > 2 {
+            let half = count / 2;
+            nodes[index].first = nodes.len() as u32;
+            nodes[index].count = 0;
+            nodes.push(FirstCountNode { first, count: half, ..Default::default() });
+            nodes.push(FirstCountNode { first: first + half, count: count - half, ..Default::default() });
+        }
+        index += 1;
     }
     nodes
 }
@@ -38,16 +48,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let tree = Bvh::from_first_count(&halves(&boxes), &ids)?;
     validate(&tree, &boxes)?;
 
-    // Save. The library makes bytes; where they go is the caller's affair.
-    let path = std::env::temp_dir().join(format!("save_and_load.{}.bvh", std::process::id()));
-    std::fs::write(&path, file::save(&tree, &boxes, &Origin { method: "halves", ..Default::default() })?)?;
+    // Save. The library makes bytes, and the program decides where to store them.
+    let name = format!("save_and_load.{}.bvh", std::process::id());
+    let path = std::env::temp_dir().join(name);
+    let origin = Origin { method: "halves", ..Default::default() };
+    std::fs::write(&path, file::save(&tree, &boxes, &origin)?)?;
 
-    // Load: an owned tree, from bytes that lie anywhere.
+    // Load an owned tree. The bytes may have any alignment.
     let bytes = std::fs::read(&path)?;
     std::fs::remove_file(&path)?;
     assert_eq!(file::load(&bytes, &boxes)?, tree);
 
-    // Or no copy: bytes of a mapped file are a tree after a check and a cast.
+    // Or load without a copy: bytes of a mapped file become a tree by a check and a cast.
     let file = TreeFile::open(&bytes)?.for_boxes(&boxes)?;
     println!("{} bytes, by {}, cost {}", bytes.len(), file.header().method, file.header().cost);
     match file.view() {
@@ -57,13 +69,16 @@ fn main() -> Result<(), Box<dyn Error>> {
             println!("hit triangle {} at {}", hit.object, hit.t);
             assert_eq!(hit.object, 10);
         }
-        // A `Vec<u8>` promises no alignment, a mapped file does.
+        // A mapped file is always aligned, a `Vec<u8>` need not be.
         Err(FileError::Alignment(_) | FileError::Machine) => println!("these bytes must be loaded"),
         Err(error) => return Err(error.into()),
     }
 
-    // Another scene, or one whose objects have moved, is refused.
-    let moved: Vec<Aabb> = boxes.iter().map(|b| Aabb { min: b.min, max: b.max + 1.0 }).collect();
+    // A scene whose objects have moved is another scene, and is rejected.
+    let mut moved = boxes.clone();
+    for aabb in &mut moved {
+        aabb.max += 1.0;
+    }
     println!("moved: {}", file::load(&bytes, &moved).expect_err("another scene"));
     Ok(())
 }

@@ -1,9 +1,10 @@
-//! Axis-aligned boxes, which stand for the objects in every builder, search and cost.
+//! Axis-aligned boxes. Every builder, search and cost sees an object only as its box.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec4};
 
-/// An axis-aligned bounding box in world units. Extents may be zero; [`Aabb::EMPTY`] is the box around nothing.
+/// An axis-aligned bounding box in world units. Its extents may be zero. [`Aabb::EMPTY`] is the box
+/// around nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Aabb {
@@ -17,25 +18,32 @@ impl Aabb {
     /// The neutral element of [`union`](Aabb::union): contains nothing, area 0 by definition.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// The smallest box around `points`, [`Aabb::EMPTY`] if there are none. A NaN coordinate of any point makes the box
-    /// NaN along that axis, so that [`check`](Self::check) refuses it.
+    /// Returns the smallest box around `points`, or [`Aabb::EMPTY`] if there are none. A NaN
+    /// coordinate of any point makes the box NaN along that axis, and [`check`](Self::check)
+    /// rejects such a box.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
-        points.into_iter().fold(Self::EMPTY, |b, p| {
-            // Minima and maxima of vectors may take either operand if one is NaN.
-            let nan = b.min.is_nan_mask() | p.is_nan_mask();
-            let [min, max] = [b.min.min(p), b.max.max(p)].map(|corner| Vec3::select(nan, Vec3::NAN, corner));
-            Self { min, max }
-        })
+        points.into_iter().fold(Self::EMPTY, Self::extended_to)
     }
 
-    /// The smallest box around both.
+    /// Returns the smallest box around this box and `point`, with NaN along every axis where one of
+    /// them is NaN.
+    fn extended_to(self, point: Vec3) -> Self {
+        // The minimum and maximum of vectors may return either operand if one of them is NaN.
+        let nan = self.min.is_nan_mask() | point.is_nan_mask();
+        Self {
+            min: Vec3::select(nan, Vec3::NAN, self.min.min(point)),
+            max: Vec3::select(nan, Vec3::NAN, self.max.max(point)),
+        }
+    }
+
+    /// Returns the smallest box around both boxes.
     #[inline]
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// What both have in common; [`Aabb::EMPTY`] if that is nothing.
+    /// Returns the intersection of both boxes, or [`Aabb::EMPTY`] if they are disjoint.
     #[inline]
     #[must_use]
     pub fn intersection(&self, other: &Self) -> Self {
@@ -43,66 +51,80 @@ impl Aabb {
         if common.min.cmpgt(common.max).any() { Self::EMPTY } else { common }
     }
 
-    /// The parts on the lower and on the upper side of the plane at `at` along an axis, 0 to 2, which cuts the box.
+    /// Cuts the box at a plane and returns the lower and the upper part. `axis` is 0 to 2, and
+    /// `plane` is a coordinate along that axis inside the box.
     #[inline]
     #[must_use]
-    pub fn halves(&self, axis: usize, at: f32) -> [Self; 2] {
-        let [mut low, mut high] = [*self; 2];
-        (low.max[axis], high.min[axis]) = (at, at);
+    pub fn halves(&self, axis: usize, plane: f32) -> [Self; 2] {
+        let mut low = *self;
+        let mut high = *self;
+        low.max[axis] = plane;
+        high.min[axis] = plane;
         [low, high]
     }
 
-    /// Half of the surface area, xy + yz + zx, in world units squared; 0 for an empty box.
+    /// Returns half of the surface area, xy + yz + zx, in world units squared; 0 for an empty box.
     ///
-    /// Coordinates are promoted to f64 *before* they are subtracted. So finite f32 coordinates always give a finite area,
-    /// and scaling by a power of two scales the area exactly. Monotone: a box inside another never has the larger area,
-    /// rounding included.
+    /// Coordinates are promoted to f64 *before* they are subtracted. Finite f32 coordinates
+    /// therefore always give a finite area, and scaling the box by a power of two scales the area
+    /// exactly. The area is monotone, rounding included: a box never has a larger area than a box
+    /// that contains it.
     #[inline]
     pub fn half_area(&self) -> f64 {
-        let d = self.extent();
-        if d.cmplt(DVec3::ZERO).any() { 0.0 } else { d.x * d.y + d.y * d.z + d.z * d.x }
+        let size = self.extent();
+        let is_empty = size.cmplt(DVec3::ZERO).any();
+        if is_empty { 0.0 } else { size.x * size.y + size.y * size.z + size.z * size.x }
     }
 
-    /// Side lengths in world units; negative infinity for an empty box.
+    /// Returns the side lengths in world units; negative infinity for an empty box.
     #[inline]
     pub fn extent(&self) -> DVec3 {
         self.max.as_dvec3() - self.min.as_dvec3()
     }
 
-    /// *Twice* the centre of the box, the sort key of builders: unlike the centre it is exact for coordinates of similar
-    /// magnitude and never out of range. Zeros are positive, so that −0 and +0 are one key.
+    /// Returns *twice* the centre of the box, the sort key of builders. Unlike the centre it is
+    /// exact for coordinates of similar magnitude and never out of range. Zeros are positive,
+    /// because −0 and +0 must be the same key.
     #[inline]
     pub fn doubled_centroid(&self) -> DVec3 {
         self.min.as_dvec3() + self.max.as_dvec3() + DVec3::ZERO
     }
 
-    /// Whether `other` lies inside this box or touches its border from inside, compared without tolerance. Every box
-    /// contains the empty box.
+    /// Returns whether `other` is inside this box. Equal borders count as inside, and there is no
+    /// tolerance. Every box contains the empty box.
     #[inline]
     pub fn contains(&self, other: &Self) -> bool {
-        // Four lanes at a time: min x, y, z, max x, then min z, max x, y, z.
-        let lanes = |aabb: &Self| {
-            let [min_x, min_y, min_z, max_x, max_y, max_z] = bytemuck::cast(*aabb);
-            (Vec4::new(min_x, min_y, min_z, max_x), Vec4::new(min_z, max_x, max_y, max_z))
-        };
-        let ((min, max), (other_min, other_max)) = (lanes(self), lanes(other));
-        let (above, below) = (min.cmple(other_min).bitmask(), max.cmpge(other_max).bitmask());
+        let [min, max] = self.lanes();
+        let [other_min, other_max] = other.lanes();
+        let above = min.cmple(other_min).bitmask();
+        let below = max.cmpge(other_max).bitmask();
+        // The fourth lane of `min` and the first lane of `max` belong to the other corner. `&`
+        // instead of `&&` avoids a branch.
         (above & 0b0111 == 0b0111) & (below & 0b1110 == 0b1110)
     }
 
-    /// The axis (0, 1 or 2) of the largest extent; the lowest such axis on ties.
-    pub fn longest_axis(&self) -> usize {
-        let d = self.extent();
-        let mut axis = 0;
-        for candidate in 1..3 {
-            if d[candidate] > d[axis] {
-                axis = candidate;
-            }
-        }
-        axis
+    /// Returns min x, y, z, max x, and min z, max x, y, z: two loads of four lanes that stay within
+    /// the six coordinates.
+    #[inline(always)]
+    fn lanes(&self) -> [Vec4; 2] {
+        let [min_x, min_y, min_z, max_x, max_y, max_z] = bytemuck::cast(*self);
+        [Vec4::new(min_x, min_y, min_z, max_x), Vec4::new(min_z, max_x, max_y, max_z)]
     }
 
-    /// Refuses a box that no object may have: its coordinates must be finite, and `min` not above `max`.
+    /// Returns the axis (0, 1 or 2) of the largest extent; the lowest such axis on ties.
+    pub fn longest_axis(&self) -> usize {
+        let extent = self.extent();
+        let mut longest = 0;
+        for axis in 1..3 {
+            if extent[axis] > extent[longest] {
+                longest = axis;
+            }
+        }
+        longest
+    }
+
+    /// Rejects a box that no object may have: coordinates must be finite, and no component of `min`
+    /// may exceed the same component of `max`.
     pub fn check(&self) -> Result<(), InvalidBoxReason> {
         if !(self.min.is_finite() && self.max.is_finite()) {
             Err(InvalidBoxReason::NotFinite)
@@ -121,39 +143,46 @@ impl From<([f32; 3], [f32; 3])> for Aabb {
 }
 
 impl From<[[f32; 3]; 2]> for Aabb {
-    /// From the lower and the upper corner.
+    /// Makes a box from its lower and its upper corner.
     fn from([min, max]: [[f32; 3]; 2]) -> Self {
         Self { min: min.into(), max: max.into() }
     }
 }
 
-/// Why a box is not accepted as an object's.
+/// The reason why a box is rejected as the box of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidBoxReason {
     /// A coordinate is NaN or infinite.
     #[error("has a coordinate that is not finite")]
     NotFinite,
-    /// Some component of `min` exceeds that of `max`.
+    /// A component of `min` exceeds the same component of `max`.
     #[error("has min above max")]
     Inverted,
 }
 
-/// An object's box that was refused.
+/// The rejected box of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the box of object {index} {reason}")]
 pub struct InvalidBox {
     /// Index of the object.
     pub index: usize,
-    /// What is wrong with its box.
+    /// The fault of its box.
     pub reason: InvalidBoxReason,
 }
 
-/// Refuses the first box that no object may have. O(n).
+/// Rejects the first box that no object may have. O(n).
 pub fn check_boxes(boxes: &[Aabb]) -> Result<(), InvalidBox> {
-    for (index, b) in boxes.iter().enumerate() {
-        b.check().map_err(|reason| InvalidBox { index, reason })?;
+    for (index, aabb) in boxes.iter().enumerate() {
+        aabb.check().map_err(|reason| InvalidBox { index, reason })?;
     }
     Ok(())
+}
+
+/// Returns the largest f32 that is not above `x`.
+#[inline]
+pub(crate) fn round_down(x: f64) -> f32 {
+    let nearest = x as f32;
+    if f64::from(nearest) > x { nearest.next_down() } else { nearest }
 }
 
 #[cfg(test)]
@@ -184,14 +213,18 @@ mod tests {
     }
 
     #[test]
-    fn a_nan_coordinate_of_any_point_makes_the_box_one_that_is_refused() {
-        for (point, axis) in (0..3).flat_map(|point| [0, 1, 2].map(|axis| (point, axis))) {
-            let mut points = [Vec3::ZERO, Vec3::ONE, Vec3::new(-1.0, 2.0, 0.5)];
-            points[point][axis] = f32::NAN;
-            let aabb = Aabb::around(points);
-            assert_eq!(aabb.check(), Err(InvalidBoxReason::NotFinite), "{points:?}");
-            let others = [0, 1, 2].into_iter().filter(|&other| other != axis);
-            others.for_each(|other| assert!(aabb.min[other].is_finite() && aabb.max[other].is_finite()));
+    fn a_nan_coordinate_of_any_point_makes_a_box_that_is_rejected() {
+        for point in 0..3 {
+            for axis in 0..3 {
+                let mut points = [Vec3::ZERO, Vec3::ONE, Vec3::new(-1.0, 2.0, 0.5)];
+                points[point][axis] = f32::NAN;
+                let aabb = Aabb::around(points);
+                assert_eq!(aabb.check(), Err(InvalidBoxReason::NotFinite), "{points:?}");
+                for other_axis in (0..3).filter(|&other_axis| other_axis != axis) {
+                    assert!(aabb.min[other_axis].is_finite());
+                    assert!(aabb.max[other_axis].is_finite());
+                }
+            }
         }
     }
 
@@ -202,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn refused_boxes_are_named_by_index() {
+    fn a_rejected_box_is_reported_by_its_index() {
         let good = Aabb::from(([0.0; 3], [1.0; 3]));
         for (bad, reason) in [
             (Aabb::from(([0.0, f32::NAN, 0.0], [1.0; 3])), InvalidBoxReason::NotFinite),

@@ -1,26 +1,28 @@
-//! The one tree type: flat nodes with adjacent siblings, and leaves that name ranges of object ids.
+//! The one tree type: flat nodes with adjacent siblings, and leaves that refer to ranges of object
+//! ids.
 
 use crate::Aabb;
 use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 
-/// The most objects one tree may hold: node indices and counts stay within 31 bits.
+/// The largest number of objects in one tree. It keeps node indices and counts within 31 bits.
 pub const MAX_OBJECTS: usize = 1 << 30;
 
 const LEAF: u32 = 1 << 31;
 
-/// A node of a [`Bvh`]: 32 bytes, plain data.
+/// A node of a [`Bvh`]: 32 bytes of plain data.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Node {
-    /// Contains everything below the node. The builders of this workspace make it the exact union.
+    /// A box around everything below the node. The builders of this workspace make it the exact
+    /// union.
     pub aabb: Aabb,
     first: u32,
     /// The count, with its highest bit set for a leaf.
     tagged_count: u32,
 }
 
-/// What a node refers to.
+/// The children or the objects of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NodeKind {
     /// Two or more children at `nodes[first..first + count]`.
@@ -40,46 +42,48 @@ pub enum NodeKind {
 }
 
 impl Node {
-    /// An inner node over `nodes[first..first + count]`. `count` must be below 2^31.
+    /// Makes an inner node over `nodes[first..first + count]`. `count` must be below 2^31.
     #[inline]
     pub fn inner(aabb: Aabb, first: u32, count: u32) -> Self {
         debug_assert!(count < LEAF);
         Self { aabb, first, tagged_count: count }
     }
 
-    /// A leaf over `prim_ids[first..first + count]`. `count` must be below 2^31.
+    /// Makes a leaf over `prim_ids[first..first + count]`. `count` must be below 2^31.
     #[inline]
     pub fn leaf(aabb: Aabb, first: u32, count: u32) -> Self {
         debug_assert!(count < LEAF);
         Self { aabb, first, tagged_count: count | LEAF }
     }
 
-    /// What the node refers to.
+    /// Returns the children or the objects of the node.
     #[inline]
     pub fn kind(&self) -> NodeKind {
-        let (first, count) = (self.first, self.tagged_count & !LEAF);
+        let first = self.first;
+        let count = self.tagged_count & !LEAF;
         if self.is_leaf() { NodeKind::Leaf { first, count } } else { NodeKind::Inner { first, count } }
     }
 
-    /// Moves the node's range of children or of entries of `prim_ids`, without changing its length, to `first`.
+    /// Moves the start of the node's range, of children or of entries in `prim_ids`, to `first`.
+    /// The length of the range stays the same.
     #[inline(always)]
     pub fn set_first(&mut self, first: u32) {
         self.first = first;
     }
 
-    /// `first`, and the count with its highest bit set for a leaf.
+    /// Returns `first`, and the count with its highest bit set for a leaf.
     #[inline(always)]
     pub(crate) fn words(&self) -> [u32; 2] {
         [self.first, self.tagged_count]
     }
 
-    /// Whether the node is a leaf.
+    /// Returns whether the node is a leaf.
     #[inline]
     pub fn is_leaf(&self) -> bool {
         self.tagged_count & LEAF != 0
     }
 
-    /// The indices in `nodes` of the node's children; empty for a leaf.
+    /// Returns the indices of the node's children in `nodes`; empty for a leaf.
     #[inline]
     pub fn children(&self) -> core::ops::Range<usize> {
         match self.kind() {
@@ -88,7 +92,7 @@ impl Node {
         }
     }
 
-    /// The positions in `prim_ids` of the leaf's objects; empty for an inner node.
+    /// Returns the positions of the leaf's objects in `prim_ids`; empty for an inner node.
     #[inline]
     pub fn prims(&self) -> core::ops::Range<usize> {
         match self.kind() {
@@ -100,23 +104,24 @@ impl Node {
 
 /// A bounding volume hierarchy over objects `0..n`.
 ///
-/// Node 0 is the root. The children of a node are adjacent and come after it; inner nodes have two *or more* of them, as
-/// Goldsmith–Salmon trees need. Leaves name ranges of `prim_ids`, a permutation of the objects. A tree over no objects
-/// has no nodes. [`validate`](crate::validate()) checks all of this.
+/// Node 0 is the root. The children of a node are adjacent and come after their parent. An inner
+/// node has two *or more* children, because Goldsmith–Salmon trees need wide nodes. Leaves refer to
+/// ranges of `prim_ids`, a permutation of the objects. A tree over no objects has no nodes.
+/// [`validate`](crate::validate()) checks all of this.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bvh {
     /// The nodes; one entry per node, the root first.
     pub nodes: Vec<Node>,
-    /// Object ids, in leaf order; one entry per object.
+    /// The object ids in the order of the leaves; one entry per object.
     pub prim_ids: Vec<u32>,
 }
 
-/// A borrowed [`Bvh`], in a mapped file for example; traversals take this type.
+/// A borrowed [`Bvh`], in a mapped file for example. Traversals accept this type.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BvhView<'a> {
-    /// As [`Bvh::nodes`].
+    /// The nodes, see [`Bvh::nodes`].
     pub nodes: &'a [Node],
-    /// As [`Bvh::prim_ids`].
+    /// The object ids, see [`Bvh::prim_ids`].
     pub prim_ids: &'a [u32],
 }
 
@@ -128,21 +133,23 @@ impl<'a> From<&'a Bvh> for BvhView<'a> {
 }
 
 impl Bvh {
-    /// The root's box; `None` for the tree over no objects.
+    /// Returns the root's box; `None` for the tree over no objects.
     pub fn root_aabb(&self) -> Option<Aabb> {
         self.nodes.first().map(|root| root.aabb)
     }
 
-    /// Number of inner nodes, in O(nodes).
+    /// Returns the number of inner nodes. O(nodes).
     pub fn inner_count(&self) -> usize {
         self.nodes.iter().filter(|node| !node.is_leaf()).count()
     }
 
-    /// Number of edges from the root to the deepest leaf, in O(nodes) time and memory; 0 for at most one node.
+    /// Returns the number of edges from the root to the deepest leaf; 0 for a tree of at most one
+    /// node. O(nodes) time and memory.
     ///
     /// # Panics
-    /// May panic on a tree that [`validate`](crate::validate()) refuses.
+    /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn depth(&self) -> usize {
+        // One pass from the front is enough, because children come after their parents.
         let mut depth = alloc::vec![0u32; self.nodes.len()];
         for (index, node) in self.nodes.iter().enumerate() {
             let below = depth[index] + 1;
@@ -151,35 +158,38 @@ impl Bvh {
         depth.into_iter().max().unwrap_or(0) as usize
     }
 
-    /// Recomputes every box from the leaves up. Boxes are tight again after objects have moved, or after another library
-    /// has padded them. O(nodes + objects).
+    /// Recomputes every box from the leaves up. Makes boxes tight again after objects have moved,
+    /// or after another library has padded the boxes. O(nodes + objects).
     ///
     /// # Panics
-    /// Panics if `boxes` has fewer entries than the tree's objects, or the tree is one that
-    /// [`validate`](crate::validate()) refuses.
+    /// Panics if `boxes` has fewer entries than the tree has objects, and may panic on a tree that
+    /// [`validate`](crate::validate()) rejects.
     pub fn refit(&mut self, boxes: &[Aabb]) {
+        // Children come after their parents, so a pass from the back meets them first.
         for index in (0..self.nodes.len()).rev() {
             self.nodes[index].aabb = self.around(&self.nodes[index], boxes);
         }
     }
 
-    /// Whether every box is the smallest around the node's children or objects, so that [`refit`](Self::refit) would
-    /// change nothing. O(nodes + objects).
+    /// Returns whether every box is the smallest box around the node's children or objects. If it
+    /// is, [`refit`](Self::refit) would change nothing. O(nodes + objects).
     ///
     /// # Panics
-    /// As [`refit`](Self::refit).
+    /// Under the same conditions as [`refit`](Self::refit).
     pub fn is_tight(&self, boxes: &[Aabb]) -> bool {
         self.nodes.iter().all(|node| node.aabb == self.around(node, boxes))
     }
 
-    /// The box around a node's children or objects.
+    /// Returns the box around a node's children or objects.
     fn around(&self, node: &Node, boxes: &[Aabb]) -> Aabb {
         match node.kind() {
             NodeKind::Inner { .. } => {
-                self.nodes[node.children()].iter().fold(Aabb::EMPTY, |b, child| b.union(&child.aabb))
+                let children = self.nodes[node.children()].iter();
+                children.fold(Aabb::EMPTY, |around, child| around.union(&child.aabb))
             }
             NodeKind::Leaf { .. } => {
-                self.prim_ids[node.prims()].iter().fold(Aabb::EMPTY, |b, &id| b.union(&boxes[id as usize]))
+                let objects = self.prim_ids[node.prims()].iter();
+                objects.fold(Aabb::EMPTY, |around, &id| around.union(&boxes[id as usize]))
             }
         }
     }
@@ -197,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tree_is_tight_until_a_box_has_room_to_spare_and_again_when_refitted() {
+    fn a_tree_with_a_padded_box_is_not_tight_until_it_is_refitted() {
         let boxes = [0.0, 2.0].map(|x| Aabb::from(([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0])));
         let padded = Aabb::from(([0.0; 3], [4.0; 3]));
         for loose in 0..3 {
@@ -220,11 +230,15 @@ mod tests {
     #[test]
     fn depth_counts_edges_to_the_deepest_leaf() {
         let unit = Aabb::from(([0.0; 3], [1.0; 3]));
-        let leaf = |i| Node::leaf(unit, i, 1);
-        let tree = Bvh {
-            nodes: vec![Node::inner(unit, 1, 3), leaf(0), Node::inner(unit, 4, 2), leaf(1), leaf(2), leaf(3)],
-            prim_ids: vec![0, 1, 2, 3],
-        };
+        let nodes = vec![
+            Node::inner(unit, 1, 3),
+            Node::leaf(unit, 0, 1),
+            Node::inner(unit, 4, 2),
+            Node::leaf(unit, 1, 1),
+            Node::leaf(unit, 2, 1),
+            Node::leaf(unit, 3, 1),
+        ];
+        let tree = Bvh { nodes, prim_ids: vec![0, 1, 2, 3] };
         assert_eq!(tree.depth(), 2);
         assert_eq!(Bvh::default().depth(), 0);
     }
@@ -238,9 +252,9 @@ mod tests {
             prim_ids: vec![1, 0],
         };
         tree.refit(&boxes);
-        assert_eq!(
-            tree.nodes.iter().map(|n| n.aabb).collect::<Vec<_>>(),
-            [boxes[0].union(&boxes[1]), boxes[1], boxes[0]]
-        );
+        assert_eq!(tree.nodes[0].aabb, boxes[0].union(&boxes[1]));
+        // The first leaf has object 1, the second has object 0.
+        assert_eq!(tree.nodes[1].aabb, boxes[1]);
+        assert_eq!(tree.nodes[2].aabb, boxes[0]);
     }
 }

@@ -1,7 +1,9 @@
-//! Parts of objects: the boxes of *references*, where an object lies in several leaves, each with a part of it.
+//! Parts of objects. If an object is divided among several leaves, each leaf has a *reference* to
+//! it and a box around a part of it.
 //!
-//! A long thin triangle fills little of its box, and no tree over whole boxes can help it. A tree with split references
-//! (Stich, Friedrich & Dietrich 2009) names it in several leaves, whose boxes together cover it:
+//! A long thin triangle fills little of its box, and no tree over full boxes can change that. A
+//! tree with split references (Stich, Friedrich & Dietrich 2009) refers to the triangle in several
+//! leaves, and the boxes of these leaves together cover the triangle:
 //!
 //! ```text
 //!   one leaf            three leaves
@@ -13,21 +15,25 @@
 //!   └──────────────┘
 //! ```
 //!
-//! Builders and searches see boxes only; the one question that they ask of a shape is how large its part in a region is.
+//! Builders and searches see only boxes. [`Clip`] tells them how large the part of an object in a
+//! region is.
 
+use crate::aabb::round_down;
 use crate::{Aabb, Primitives, Triangle};
 use core::fmt::Debug;
 use glam::{DVec3, Vec3};
 
 /// Objects whose parts have boxes.
 pub trait Clip: Debug + Sync {
-    /// A box inside `region` and inside the object's own box, around everything of the object that is in `region`;
-    /// [`Aabb::EMPTY`] if that is nothing. With the object's own box as the region, that box.
+    /// Returns a box around everything of the object that is in `region`, or [`Aabb::EMPTY`] if
+    /// nothing is. The returned box is inside `region` and inside the object's box. If `region` is
+    /// the object's box, the returned box equals it.
     fn clip(&self, object: u32, region: &Aabb) -> Aabb;
 
-    /// As [`clip`](Self::clip), and inside what that gives for any region around this one. Validation asks for it, so that
-    /// the parts that a builder made may be a little larger than the parts that it finds, and never smaller. The default is
-    /// right where boxes are exact.
+    /// Returns such a box for validation. It is also inside the box that [`clip`](Self::clip)
+    /// returns for any region around this one. The parts that a builder made may therefore be a
+    /// little larger than the parts that validation finds, and are never smaller. The default is
+    /// correct if `clip` returns exact boxes.
     fn clip_tightly(&self, object: u32, region: &Aabb) -> Aabb {
         self.clip(object, region)
     }
@@ -44,7 +50,7 @@ impl Clip for &[Triangle] {
     }
 }
 
-/// Spheres keep their box but for what is outside of the region: cheap, and exact.
+/// The part of a sphere is the intersection of its box with the region: cheap and exact.
 impl Clip for Primitives {
     fn clip(&self, object: u32, region: &Aabb) -> Aabb {
         match self {
@@ -61,66 +67,78 @@ impl Clip for Primitives {
     }
 }
 
-/// Multiples of the error bound by which a triangle's part is widened: more for builders than for validation.
+/// By how many error bounds builders widen a triangle's part: more than validation does.
 const BUILDERS: f64 = 4.0;
+/// By how many error bounds validation widens a triangle's part.
 const VALIDATION: f64 = 1.0;
 
-/// The box around a triangle's part in a region.
+/// Returns the box around a triangle's part in a region.
 ///
-/// The triangle is cut by the region's planes in f64 (Sutherland & Hodgman 1974). A corner that a cut makes is off by a few
-/// rounding errors, and a later cut may drop what is off by so much: an edge that lies along a plane would be lost whole. So
-/// the planes are moved outwards by a bound of the error before they cut, and the corners after it; the result is rounded
-/// outwards to f32 and never leaves the region. The bound is relative to the triangle's largest coordinate: 2⁻⁴⁶ of it, 64
-/// rounding errors, where six cuts make 4 each.
+/// The planes of the region cut the triangle in f64 (Sutherland & Hodgman 1974). A cut makes
+/// corners that are off by a few rounding errors, and a later cut may drop geometry within that
+/// error: an edge along a plane would be lost completely. The planes are therefore moved outwards
+/// by a bound of the error before they cut, and the corners are moved outwards after the cuts. The
+/// result is rounded outwards to f32 and never leaves the region. The bound is relative to the
+/// triangle's largest coordinate: 2⁻⁴⁶ of it, 64 rounding errors, while each of the six cuts makes
+/// 4.
 fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
-    let whole = triangle.aabb();
-    let common = whole.intersection(region);
-    if common == whole || common == Aabb::EMPTY {
+    let full = triangle.aabb();
+    let common = full.intersection(region);
+    // Most triangles are inside the region or outside of it, and need no cut.
+    if common == full || common == Aabb::EMPTY {
         return common;
     }
-    let largest = whole.min.abs().max(whole.max.abs()).max_element();
+    let farthest = full.min.abs().max(full.max.abs());
+    let largest = farthest.max_element();
     let error = DVec3::splat(f64::from(largest) * (slack * (64.0 * f64::EPSILON)));
-    let [low, high] = [region.min.as_dvec3() - error, region.max.as_dvec3() + error];
-    // Every cut adds one corner at most.
-    let (mut corners, mut len) = ([DVec3::ZERO; 9], 3);
+    let low = region.min.as_dvec3() - error;
+    let high = region.max.as_dvec3() + error;
+    // Each of six cuts adds at most one corner.
+    let mut corners = [DVec3::ZERO; 9];
+    let mut len = 3;
     corners[..3].copy_from_slice(&triangle.0.map(Vec3::as_dvec3));
     for axis in 0..3 {
-        if whole.min[axis] < region.min[axis] {
+        // Planes that miss the triangle cut nothing off.
+        if full.min[axis] < region.min[axis] {
             len = cut(&mut corners, len, axis, low[axis], 1.0);
         }
-        if whole.max[axis] > region.max[axis] {
+        if full.max[axis] > region.max[axis] {
             len = cut(&mut corners, len, axis, high[axis], -1.0);
         }
     }
     if len == 0 {
         return Aabb::EMPTY;
     }
-    let rest = &corners[..len];
-    let low = rest.iter().fold(DVec3::INFINITY, |low, corner| low.min(*corner)) - error;
-    let high = rest.iter().fold(DVec3::NEG_INFINITY, |high, corner| high.max(*corner)) + error;
+    let kept = &corners[..len];
+    let min = kept.iter().fold(DVec3::INFINITY, |min, corner| min.min(*corner)) - error;
+    let max = kept.iter().fold(DVec3::NEG_INFINITY, |max, corner| max.max(*corner)) + error;
     let part = Aabb {
-        min: Vec3::from_array(low.to_array().map(down)),
-        max: Vec3::from_array((-high).to_array().map(|x| -down(x))),
+        min: Vec3::from_array(min.to_array().map(round_down)),
+        max: -Vec3::from_array((-max).to_array().map(round_down)),
     };
     part.intersection(&common)
 }
 
-/// Keeps the part of a convex polygon on one side of a plane. Returns its number of corners.
+/// Keeps the part of a convex polygon on one side of a plane across `axis`: the upper side if
+/// `side` is 1, the lower side if it is −1. Returns the number of corners that are left.
 #[inline]
 fn cut(corners: &mut [DVec3; 9], len: usize, axis: usize, plane: f64, side: f64) -> usize {
     let polygon = *corners;
     let mut kept = 0;
+    // A convex polygon has room for all its corners. `get_mut` instead of an index, because
+    // rounding could make the polygon slightly concave.
     let mut add = |corner: DVec3| {
         if let Some(place) = corners.get_mut(kept) {
             *place = corner;
             kept += 1;
         }
     };
-    for (at, &to) in polygon[..len].iter().enumerate() {
-        let from = polygon[if at == 0 { len - 1 } else { at - 1 }];
+    for (index, &to) in polygon[..len].iter().enumerate() {
+        let from = polygon[if index == 0 { len - 1 } else { index - 1 }];
         let [before, after] = [from, to].map(|corner| side * (corner[axis] - plane));
         if (before < 0.0) != (after < 0.0) {
             let mut corner = from + (to - from) * (before / (before - after));
+            // Exactly on the plane, whatever the rounding of the line above.
             corner[axis] = plane;
             add(corner);
         }
@@ -131,13 +149,6 @@ fn cut(corners: &mut [DVec3; 9], len: usize, axis: usize, plane: f64, side: f64)
     kept
 }
 
-/// The largest f32 that is not above `x`.
-#[inline]
-fn down(x: f64) -> f32 {
-    let nearest = x as f32;
-    if f64::from(nearest) > x { nearest.next_down() } else { nearest }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -145,7 +156,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn coordinate() -> impl Strategy<Value = f32> {
-        // Of all sizes, and often the same one.
+        // Coordinates of all magnitudes, and often the same one, so that planes go through corners.
         prop_oneof![-4.0f32..4.0, (-3i8..3).prop_map(f32::from), -1e-30f32..1e-30, -1e6f32..1e6]
     }
 
@@ -155,6 +166,12 @@ mod tests {
 
     fn region() -> impl Strategy<Value = Aabb> {
         [point(), point()].prop_map(Aabb::around)
+    }
+
+    fn is_inside(point: DVec3, aabb: &Aabb) -> bool {
+        let above = point.cmpge(aabb.min.as_dvec3());
+        let below = point.cmple(aabb.max.as_dvec3());
+        (above & below).all()
     }
 
     fn scene(corners: [Vec3; 3]) -> Vec<Triangle> {
@@ -168,15 +185,14 @@ mod tests {
             let triangles = scene(corners);
             let part = triangles.as_slice().clip(0, &region);
             let tight = triangles.as_slice().clip_tightly(0, &region);
-            prop_assert!(part.contains(&tight) && region.contains(&part) && triangles[0].aabb().contains(&part));
+            prop_assert!(part.contains(&tight) && region.contains(&part));
+            prop_assert!(triangles[0].aabb().contains(&part));
             let [a, b, c] = corners.map(Vec3::as_dvec3);
-            let sum: f64 = weights.iter().sum::<f64>().max(1e-9);
-            let point = (a * weights[0] + b * weights[1] + c * weights[2]) / sum;
-            // Off by rounding errors of the largest coordinate, which a tight part allows for too.
-            let inside = |aabb: &Aabb| {
-                point.cmpge(aabb.min.as_dvec3()).all() && point.cmple(aabb.max.as_dvec3()).all()
-            };
-            prop_assert!(!inside(&region) || inside(&tight), "{point} in {tight:?}");
+            let sum: f64 = weights.iter().sum();
+            let point = (a * weights[0] + b * weights[1] + c * weights[2]) / sum.max(1e-9);
+            // The point is off by rounding errors of the largest coordinate, and a tight part
+            // allows for such errors.
+            prop_assert!(!is_inside(point, &region) || is_inside(point, &tight), "{point} in {tight:?}");
         }
 
         #[test]
@@ -185,8 +201,9 @@ mod tests {
             let triangles = scene(corners);
             let mut inner = outer;
             inner.max[axis] = cut.clamp(outer.min[axis], outer.max[axis]);
-            let [inner, outer] = [triangles.as_slice().clip_tightly(0, &inner), triangles.as_slice().clip(0, &outer)];
-            prop_assert!(outer.contains(&inner), "{inner:?} in {outer:?}");
+            let inner_part = triangles.as_slice().clip_tightly(0, &inner);
+            let outer_part = triangles.as_slice().clip(0, &outer);
+            prop_assert!(outer_part.contains(&inner_part), "{inner_part:?} in {outer_part:?}");
         }
     }
 
@@ -195,9 +212,12 @@ mod tests {
         let triangles = scene([Vec3::ZERO, Vec3::new(4.0, 4.0, 0.0), Vec3::new(4.0, 4.0, 1.0)]);
         let half = Aabb::from([[0.0; 3], [2.0, 4.0, 1.0]]);
         let part = triangles.as_slice().clip(0, &half);
-        assert_eq!((part.min, part.max.x), (Vec3::ZERO, 2.0));
-        assert!((part.max.y - 2.0).abs() < 1e-6 && (part.max.z - 0.5).abs() < 1e-6, "{part:?}");
-        let beside = Aabb::from([[0.0, 3.0, 0.0], [1.0, 4.0, 1.0]]);
-        assert_eq!(triangles.as_slice().clip(0, &beside), Aabb::EMPTY);
+        assert_eq!(part.min, Vec3::ZERO);
+        assert_eq!(part.max.x, 2.0);
+        assert!((part.max.y - 2.0).abs() < 1e-6, "{part:?}");
+        assert!((part.max.z - 0.5).abs() < 1e-6, "{part:?}");
+        // This region overlaps the triangle's box, but not the triangle.
+        let missed = Aabb::from([[0.0, 3.0, 0.0], [1.0, 4.0, 1.0]]);
+        assert_eq!(triangles.as_slice().clip(0, &missed), Aabb::EMPTY);
     }
 }

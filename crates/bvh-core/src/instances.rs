@@ -1,10 +1,14 @@
-//! A scene of parts that stand in many places: a tree over the instances, each of a part in the wide layout.
+//! Instancing: a tree over transformed copies of parts, each part in the wide layout.
 //!
-//! An instance sees a ray as `transform⁻¹` moves it, computed in f64 and rounded to f32 once, with its direction's length changed
-//! along. So a distance means the same to all of them, and the answer is, bit by bit, the least that the parts' own layouts give to
-//! these rays, whatever the tree over the instances. Beside the same scene with all triangles written out, distances differ by the
-//! rounding of the moved rays here and of the moved corners there, some 10⁻⁷ of the coordinates; without rounding, as
-//! by whole translations and turns by right angles, not at all.
+//! An instance is tested against the ray that `transform⁻¹` moves into the part's coordinates. The
+//! moved ray is computed in f64 and rounded to f32 once. The length of its direction changes with
+//! the transform, so a distance means the same for every instance. The answer is, bit by bit, the
+//! least distance that the parts' layouts return for the moved rays, for any tree over the
+//! instances.
+//!
+//! Compared with the same scene whose triangles are all written out, distances differ by the
+//! rounding of the moved rays and of the moved corners, about 10⁻⁷ of the coordinates. They do not
+//! differ if transforms do not round: translations by whole numbers and turns by right angles.
 //!
 //! ```
 //! use bvh_core::{Aabb, Bvh, Instance, InstanceHit, Instances, Node, Ray, Triangle, WideBvh, boxes};
@@ -13,9 +17,9 @@
 //! let aabb = boxes(&triangles)[0];
 //! let part = WideBvh::new(&Bvh { nodes: vec![Node::leaf(aabb, 0, 1)], prim_ids: vec![0] }, &triangles)?;
 //! let parts = vec![part];
-//! let at = |z| Instance { part: 0, transform: Affine3A::from_translation(Vec3::Z * z) };
-//! let instances = vec![at(0.0), at(4.0)];
-//! // Any builder of `bvh-build` makes the tree over these boxes; here it is one leaf.
+//! let moved = |z| Instance { part: 0, transform: Affine3A::from_translation(Vec3::Z * z) };
+//! let instances = vec![moved(0.0), moved(4.0)];
+//! // Any builder of `bvh-build` can make the tree over these boxes. Here it is a single leaf.
 //! let boxes = Instance::boxes(&instances, &parts)?;
 //! let top = Bvh { nodes: vec![Node::leaf(boxes[0].union(&boxes[1]), 0, 2)], prim_ids: vec![0, 1] };
 //! let scene = Instances::new(parts, instances, top)?;
@@ -26,21 +30,21 @@
 
 use crate::{Aabb, Bvh, Hit, InvalidBvh, Ray, Slabs, WideBvh, any_hit_by, nearest_hit_by, validate};
 use alloc::vec::Vec;
-use glam::{Affine3A, DAffine3, DVec3};
+use glam::{Affine3A, DAffine3, DMat3, DVec3};
 
-/// A part, put somewhere.
+/// A transformed copy of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instance {
     /// The part's index.
     pub part: u32,
-    /// From the part's coordinates to the scene's; it must have an inverse.
+    /// The transform from the part's coordinates to the scene's. It must have an inverse.
     pub transform: Affine3A,
 }
 
-/// Why there is no such scene of instances.
+/// The reason why instances are rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InvalidInstances {
-    /// A part that does not exist.
+    /// The part does not exist.
     #[error("instance {instance} is of part {part} of {parts}, counted from 0")]
     Part {
         /// The instance.
@@ -50,43 +54,54 @@ pub enum InvalidInstances {
         /// The number of parts.
         parts: usize,
     },
-    /// A part has no triangle that a ray could hit.
+    /// The part has no triangle that a ray could hit.
     #[error("instance {0} is of a part without triangles")]
     Empty(usize),
     /// The transform is not finite or has no inverse, or its box is not finite in f32.
     #[error("the transform of instance {0} or of its box is not finite, or has no inverse")]
     Transform(usize),
-    /// The tree is none over the instances' boxes, or a part's none over its triangles'.
+    /// The tree is not valid over the boxes of the instances, or the tree of a part is not valid
+    /// over the boxes of its triangles.
     #[error(transparent)]
     Tree(#[from] InvalidBvh),
 }
 
 impl Instance {
-    /// The scene's boxes of all instances, in their order, for any builder.
+    /// Returns the boxes of all instances in the scene's coordinates, in the same order, for any
+    /// builder.
     pub fn boxes(instances: &[Self], parts: &[WideBvh]) -> Result<Vec<Aabb>, InvalidInstances> {
-        let prepare = |(at, instance): (usize, &Self)| instance.placed(at, parts).map(|placed| placed.aabb);
-        instances.iter().enumerate().map(prepare).collect()
+        let placed = place_all(instances, parts)?;
+        Ok(placed.iter().map(|placed| placed.aabb).collect())
     }
 
-    fn placed(&self, instance: usize, parts: &[WideBvh]) -> Result<Placed, InvalidInstances> {
-        let missing = InvalidInstances::Part { instance, part: self.part, parts: parts.len() };
-        let part = parts.get(self.part as usize).ok_or(missing)?;
+    /// Checks the instance and prepares it for rays. `instance` is its index, for errors.
+    fn place(&self, instance: usize, parts: &[WideBvh]) -> Result<Placed, InvalidInstances> {
+        let Some(part) = parts.get(self.part as usize) else {
+            return Err(InvalidInstances::Part { instance, part: self.part, parts: parts.len() });
+        };
         if part.root.is_none() {
             return Err(InvalidInstances::Empty(instance));
         }
-        let transform = DAffine3::from_mat3_translation(
-            glam::DMat3::from_cols_array(&self.transform.matrix3.to_cols_array().map(f64::from)),
-            DVec3::from_array(self.transform.translation.to_array().map(f64::from)),
-        );
+        let matrix = self.transform.matrix3.to_cols_array().map(f64::from);
+        let translation = self.transform.translation.to_array().map(f64::from);
+        let transform =
+            DAffine3::from_mat3_translation(DMat3::from_cols_array(&matrix), DVec3::from_array(translation));
         let inverse = transform.inverse();
-        let (mut min, mut max, mut size) =
-            (transform.translation, transform.translation, transform.translation.abs());
+        // The box of the transformed box, column by column (Arvo 1990, 'Transforming axis-aligned
+        // bounding boxes'). `size` bounds every intermediate result.
+        let mut min = transform.translation;
+        let mut max = transform.translation;
+        let mut size = transform.translation.abs();
         for axis in 0..3 {
             let column = transform.matrix3.col(axis);
-            let (a, b) = (column * f64::from(part.bounds.min[axis]), column * f64::from(part.bounds.max[axis]));
-            (min, max, size) = (min + a.min(b), max + a.max(b), size + a.abs().max(b.abs()));
+            let a = column * f64::from(part.bounds.min[axis]);
+            let b = column * f64::from(part.bounds.max[axis]);
+            min += a.min(b);
+            max += a.max(b);
+            size += a.abs().max(b.abs());
         }
-        // More than what the rounding of a ray's origin near the part, and of the corners of this box, can move a hit.
+        // Rounding moves a hit by less than this: the rounding of the ray's origin near the part,
+        // and of the corners of this box.
         let margin = size * f64::from(Slabs::MARGIN);
         let aabb = Aabb { min: (min - margin).as_vec3(), max: (max + margin).as_vec3() };
         if !inverse.is_finite() || transform.matrix3.determinant() == 0.0 || aabb.check().is_err() {
@@ -96,7 +111,13 @@ impl Instance {
     }
 }
 
-/// An instance, ready for rays.
+/// Prepares all instances for rays.
+fn place_all(instances: &[Instance], parts: &[WideBvh]) -> Result<Vec<Placed>, InvalidInstances> {
+    let numbered = instances.iter().enumerate();
+    numbered.map(|(index, instance)| instance.place(index, parts)).collect()
+}
+
+/// An instance that is prepared for rays.
 #[derive(Clone, Copy, Debug)]
 struct Placed {
     part: u32,
@@ -105,7 +126,8 @@ struct Placed {
 }
 
 impl Placed {
-    /// The ray as the part sees it, up to `t_max`. `None` where the transform makes its direction vanish or overflow.
+    /// Returns the ray in the part's coordinates, up to `t_max`; `None` if the transform makes its
+    /// direction vanish or overflow.
     #[inline(always)]
     fn local(&self, ray: &Ray, t_max: f32) -> Option<Ray> {
         let origin = self.to_local.transform_point3(ray.origin().as_dvec3()).as_vec3();
@@ -114,18 +136,18 @@ impl Placed {
     }
 }
 
-/// What a ray meets first among instances.
+/// The nearest hit of a ray among instances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstanceHit {
     /// The distance, in multiples of the length of the ray's direction.
     pub t: f32,
-    /// The instance.
+    /// The index of the instance.
     pub instance: u32,
-    /// The triangle of its part.
+    /// The index of the triangle in the instance's part.
     pub triangle: u32,
 }
 
-/// A scene of instances, for tracing.
+/// A scene of instances for tracing.
 #[derive(Clone, Debug)]
 pub struct Instances {
     parts: Vec<WideBvh>,
@@ -134,42 +156,41 @@ pub struct Instances {
 }
 
 impl Instances {
-    /// The scene of `instances` of `parts`, with a tree over [their boxes](Instance::boxes). Instances that move need
-    /// a refitted or new tree, and no new parts. O(instances).
+    /// Makes a scene of `instances` of `parts`, with a tree over the [boxes of the
+    /// instances](Instance::boxes). If instances move, they need a refitted or new tree, but no new
+    /// parts. O(instances).
     pub fn new(parts: Vec<WideBvh>, instances: Vec<Instance>, top: Bvh) -> Result<Self, InvalidInstances> {
-        let prepare = |(at, instance): (usize, &Instance)| instance.placed(at, &parts);
-        let placed: Vec<Placed> = instances.iter().enumerate().map(prepare).collect::<Result<_, _>>()?;
-        validate(&top, &placed.iter().map(|placed| placed.aabb).collect::<Vec<_>>())?;
+        let placed = place_all(&instances, &parts)?;
+        let boxes: Vec<Aabb> = placed.iter().map(|placed| placed.aabb).collect();
+        validate(&top, &boxes)?;
         Ok(Self { parts, placed, top })
     }
 
-    /// The parts again, for other instances of them.
+    /// Returns the parts, for other instances of the same parts.
     pub fn into_parts(self) -> Vec<WideBvh> {
         self.parts
     }
 
-    /// The ray as an instance sees it. `None` where the instance's transform makes its direction vanish or overflow; such a
-    /// ray does not hit the instance.
+    /// Returns the ray in the coordinates of an instance's part. Returns `None` if the instance's
+    /// transform makes the direction vanish or overflow; such a ray does not hit the instance.
     ///
     /// # Panics
-    /// If there is no such instance.
+    /// Panics if there is no such instance.
     pub fn local_ray(&self, instance: u32, ray: &Ray) -> Option<Ray> {
         self.placed[instance as usize].local(ray, ray.t_max())
     }
 
-    /// The nearest triangle of any instance that `ray` meets in its range; of several at the same distance the one of the lowest
-    /// instance, and within it of the lowest id.
+    /// Returns the nearest triangle of any instance that `ray` hits in its range. Of several
+    /// triangles at the same distance it returns one of the lowest instance, and of these the one
+    /// with the lowest id.
     pub fn nearest_hit(&self, ray: &Ray) -> Option<InstanceHit> {
         let slabs = Slabs::new(ray, &self.top.root_aabb()?);
         let mut nearest: Option<(Hit, u32)> = None;
-        let test = |object: u32, t_max: f32| {
-            let placed = &self.placed[object as usize];
-            let local = self.parts[placed.part as usize].nearest_hit(&placed.local(ray, t_max)?)?;
-            // Not before the box, lest a tree that looks into it later should not look at all.
-            let t = local.t.max(slabs.entry(&placed.aabb));
-            let hit = Hit { t, object };
+        let test = |instance: u32, t_max: f32| {
+            let Hit { t, object: triangle } = self.nearest_in(instance, ray, t_max, &slabs)?;
+            let hit = Hit { t, object: instance };
             if t <= t_max && nearest.is_none_or(|(nearest, _)| hit.precedes(&nearest)) {
-                nearest = Some((hit, local.object));
+                nearest = Some((hit, triangle));
             }
             Some(t)
         };
@@ -177,16 +198,36 @@ impl Instances {
         nearest.map(|(Hit { t, object: instance }, triangle)| InstanceHit { t, instance, triangle })
     }
 
-    /// Whether `ray` meets a triangle of any instance in its range.
+    /// Returns the nearest hit of the ray, up to `t_max`, in the part of an instance.
+    #[inline(always)]
+    fn nearest_in(&self, instance: u32, ray: &Ray, t_max: f32, slabs: &Slabs) -> Option<Hit> {
+        let placed = &self.placed[instance as usize];
+        let local_ray = placed.local(ray, t_max)?;
+        let hit = self.parts[placed.part as usize].nearest_hit(&local_ray)?;
+        // A hit in front of the instance's box would depend on the tree: a tree that visits the box
+        // later would skip it.
+        Some(Hit { t: hit.t.max(slabs.entry(&placed.aabb)), ..hit })
+    }
+
+    /// Returns whether `ray` hits a triangle of any instance in its range.
     pub fn any_hit(&self, ray: &Ray) -> bool {
         let Some(bounds) = self.top.root_aabb() else { return false };
         let slabs = Slabs::new(ray, &bounds);
-        let test = |object: u32| {
-            let placed = &self.placed[object as usize];
-            let local = placed.local(ray, ray.t_max());
-            slabs.entry(&placed.aabb) <= ray.t_max()
-                && local.is_some_and(|local| self.parts[placed.part as usize].any_hit(&local))
-        };
-        any_hit_by(&self.top, ray, test, &mut ())
+        any_hit_by(&self.top, ray, |instance| self.hits(instance, ray, &slabs), &mut ())
+    }
+
+    /// Returns whether the ray hits a triangle of an instance.
+    #[inline(always)]
+    fn hits(&self, instance: u32, ray: &Ray, slabs: &Slabs) -> bool {
+        let placed = &self.placed[instance as usize];
+        // The nearest hit is never in front of the instance's box. If the ray ends before the box,
+        // no hit counts here either.
+        if slabs.entry(&placed.aabb) > ray.t_max() {
+            return false;
+        }
+        match placed.local(ray, ray.t_max()) {
+            Some(local_ray) => self.parts[placed.part as usize].any_hit(&local_ray),
+            None => false,
+        }
     }
 }

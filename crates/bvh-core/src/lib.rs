@@ -1,4 +1,4 @@
-// The root of the crate; its front page is its README.
+// The README is the front page of the crate's documentation.
 #![doc = include_str!("../README.md")]
 #![cfg_attr(not(feature = "std"), no_std)]
 
@@ -8,8 +8,11 @@ mod aabb;
 mod bvh;
 mod clip;
 mod collapse;
+mod components;
 pub mod cost;
 mod dispatch;
+mod exact;
+mod expansion;
 pub mod export;
 pub mod file;
 mod instances;
@@ -33,6 +36,7 @@ pub use aabb::{Aabb, InvalidBox, InvalidBoxReason, check_boxes};
 pub use bvh::{Bvh, BvhView, MAX_OBJECTS, Node, NodeKind};
 pub use clip::Clip;
 pub use collapse::collapse_leaves;
+pub use components::{Distances, InvalidRays, RayComponents};
 pub use export::FirstCountNode;
 pub use instances::{Instance, InstanceHit, Instances, InvalidInstances};
 pub use mesh::MeshError;

@@ -3,6 +3,7 @@
 use crate::cost::{SahConstants, Sum};
 use crate::{Aabb, Bvh, NodeKind, Triangle};
 use alloc::vec::Vec;
+use core::ops::Range;
 use glam::DVec3;
 
 /// The end-point overlap, EPO = Σ over nodes of C(node) · A((S \ Q(node)) ∩ box(node)) / A(S), where S is the surface
@@ -24,53 +25,137 @@ use glam::DVec3;
 /// # Panics
 /// May panic on a tree that [`validate`](crate::validate()) refuses for the triangles' boxes.
 pub fn end_point_overlap(tree: &Bvh, triangles: &[Triangle], constants: &SahConstants) -> f64 {
-    let (mut parent, mut leaf_of) = (alloc::vec![0; tree.nodes.len()], alloc::vec![0; triangles.len()]);
-    for (index, node) in tree.nodes.iter().enumerate() {
-        parent[node.children()].fill(index);
-        tree.prim_ids[node.prims()].iter().for_each(|&object| leaf_of[object as usize] = index);
+    let parts = EndPointOverlap::new(tree, triangles, constants);
+    let mut sum = Overlap::default();
+    (0..parts.count()).for_each(|number| sum.add(&parts.part(number)));
+    sum.value()
+}
+
+/// The [`end_point_overlap`] in parts, which can be computed in any order or in parallel.
+///
+/// Added in their order, they give the same bits as the whole.
+#[derive(Clone, Debug)]
+pub struct EndPointOverlap<'a> {
+    tree: &'a Bvh,
+    triangles: &'a [Triangle],
+    constants: SahConstants,
+    /// Per node, the range of the object ids below it, by their positions from the first leaf to the last.
+    below: Vec<Range<u32>>,
+    /// Pairs of an object and one of its positions, sorted.
+    positions: Vec<(u32, u32)>,
+    /// Every object once, neighbours in the tree next to each other, with the range of its `positions`.
+    objects: Vec<(u32, Range<u32>)>,
+}
+
+/// What some triangles contribute to the end-point overlap.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Overlap {
+    /// Their area.
+    surface: Sum,
+    /// Their area in nodes that they do not belong to, times the costs of these nodes.
+    weighted: Sum,
+}
+
+impl Overlap {
+    /// Adds the contribution of other triangles.
+    pub fn add(&mut self, other: &Self) {
+        self.surface.add_sum(&other.surface);
+        self.weighted.add_sum(&other.weighted);
     }
-    // Which triangle a node was last found to be above of, by number + 1.
-    let mut above = alloc::vec![0; tree.nodes.len()];
-    let (mut total, mut overlap) = (Sum::default(), Sum::default());
-    let mut open = Vec::new();
-    for (object, triangle) in triangles.iter().enumerate() {
-        let mut node = leaf_of[object];
-        above[node] = object + 1;
-        while node != 0 {
-            node = parent[node];
-            above[node] = object + 1;
+
+    /// The end-point overlap if all triangles have contributed.
+    pub fn value(&self) -> f64 {
+        let surface = self.surface.value();
+        if surface > 0.0 { self.weighted.value() / surface } else { 0.0 }
+    }
+}
+
+impl<'a> EndPointOverlap<'a> {
+    /// Triangles per part.
+    const PART: usize = 4096;
+
+    /// Prepares the parts. O(nodes + n log n).
+    ///
+    /// # Panics
+    /// May panic on a tree that [`validate`](crate::validate()) refuses for the triangles' boxes.
+    pub fn new(tree: &'a Bvh, triangles: &'a [Triangle], constants: &SahConstants) -> Self {
+        let mut below = alloc::vec![0..0; tree.nodes.len()];
+        let mut positions = Vec::with_capacity(tree.prim_ids.len());
+        let mut stack: Vec<(usize, bool)> = tree.nodes.first().map(|_| (0, false)).into_iter().collect();
+        while let Some((at, children_done)) = stack.pop() {
+            let node = &tree.nodes[at];
+            if children_done {
+                below[at].end = positions.len() as u32;
+                continue;
+            }
+            below[at].start = positions.len() as u32;
+            for &object in &tree.prim_ids[node.prims()] {
+                positions.push((object, positions.len() as u32));
+            }
+            stack.push((at, true));
+            stack.extend(node.children().rev().map(|child| (child, false)));
         }
-        let (aabb, corners) = (triangle.aabb(), triangle.0.map(|corner| corner.as_dvec3()));
-        let area = Polygon::new(corners).area();
-        total.add(area);
+        positions.sort_unstable();
+        let mut objects: Vec<(u32, Range<u32>)> = Vec::with_capacity(triangles.len());
+        for (at, &(object, _)) in (0..).zip(&positions) {
+            match objects.last_mut().filter(|(last, _)| *last == object) {
+                Some((_, range)) => range.end = at + 1,
+                None => objects.push((object, at..at + 1)),
+            }
+        }
+        objects.sort_unstable_by_key(|(_, range)| positions[range.start as usize].1);
+        Self { tree, triangles, constants: *constants, below, positions, objects }
+    }
+
+    /// Number of parts.
+    pub fn count(&self) -> usize {
+        self.objects.len().div_ceil(Self::PART)
+    }
+
+    /// The contribution of the triangles of one part.
+    ///
+    /// # Panics
+    /// If there is no part of this number.
+    pub fn part(&self, number: usize) -> Overlap {
+        let mut sum = Overlap::default();
+        let mut open = Vec::new();
+        let start = number * Self::PART;
+        for (object, positions) in &self.objects[start..self.objects.len().min(start + Self::PART)] {
+            let positions = &self.positions[positions.start as usize..positions.end as usize];
+            self.visit(&self.triangles[*object as usize], positions, &mut open, &mut sum);
+        }
+        sum
+    }
+
+    /// Adds the contribution of a triangle with these positions.
+    fn visit(&self, triangle: &Triangle, positions: &[(u32, u32)], open: &mut Vec<usize>, sum: &mut Overlap) {
+        let aabb = triangle.aabb();
+        let polygon = Polygon::new(triangle.0.map(|corner| corner.as_dvec3()));
+        let area = polygon.area();
+        sum.surface.add(area);
         open.push(0);
         while let Some(index) = open.pop() {
-            let node = &tree.nodes[index];
-            if above[index] != object + 1 {
-                let inside = if node.aabb.contains(&aabb) {
-                    area
-                } else {
-                    if (node.aabb.min.cmpgt(aabb.max) | node.aabb.max.cmplt(aabb.min)).any() {
-                        continue;
-                    }
-                    let clipped = Polygon::new(corners).clipped(&node.aabb);
-                    if clipped.len == 0 {
-                        continue;
-                    }
-                    clipped.area()
+            let node = &self.tree.nodes[index];
+            let is_above = positions.iter().any(|(_, position)| self.below[index].contains(position));
+            if !is_above {
+                let inside = polygon.area_inside(&node.aabb, &aabb, area);
+                if inside == 0.0 {
+                    // Nor is anything with an area inside a box below.
+                    continue;
+                }
+                let cost = match node.kind() {
+                    NodeKind::Inner { .. } => self.constants.traversal,
+                    NodeKind::Leaf { count, .. } => self.constants.intersection * f64::from(count),
                 };
-                overlap.add(
-                    inside
-                        * match node.kind() {
-                            NodeKind::Inner { .. } => constants.traversal,
-                            NodeKind::Leaf { count, .. } => constants.intersection * f64::from(count),
-                        },
-                );
+                sum.weighted.add(inside * cost);
             }
-            open.extend(node.children());
+            let meets = |child: &usize| {
+                let child = &self.tree.nodes[*child].aabb;
+                !(child.min.cmpgt(aabb.max) | child.max.cmplt(aabb.min)).any()
+            };
+            open.extend(node.children().filter(meets));
         }
     }
-    if total.value() > 0.0 { overlap.value() / total.value() } else { 0.0 }
 }
 
 /// A convex planar polygon: a triangle cut by up to six planes, each of which adds one corner at most.
@@ -94,15 +179,27 @@ impl Polygon {
         libm::sqrt(doubled.length_squared()) / 2.0
     }
 
-    /// The part inside a box; no corners if there is none.
-    fn clipped(self, aabb: &Aabb) -> Self {
-        let (min, max) = (aabb.min.as_dvec3(), aabb.max.as_dvec3());
-        (0..3).fold(self, |polygon, axis| polygon.cut(|p| p[axis] - min[axis]).cut(|p| max[axis] - p[axis]))
+    /// The area inside a box, if `area` is that of the whole and `own` is the box around it. Planes that do not cut it are skipped,
+    /// which changes no bit.
+    fn area_inside(&self, aabb: &Aabb, own: &Aabb, area: f64) -> f64 {
+        let mut part: Option<Self> = None;
+        for axis in 0..3 {
+            if own.min[axis] < aabb.min[axis] {
+                let min = f64::from(aabb.min[axis]);
+                part = Some(part.as_ref().unwrap_or(self).cut(|p| p[axis] - min));
+            }
+            if own.max[axis] > aabb.max[axis] {
+                let max = f64::from(aabb.max[axis]);
+                part = Some(part.as_ref().unwrap_or(self).cut(|p| max - p[axis]));
+            }
+        }
+        part.map_or(area, |part| part.area())
     }
 
     /// The part where `height` is not negative.
-    fn cut(self, height: impl Fn(DVec3) -> f64) -> Self {
-        let mut kept = Self { len: 0, ..self };
+    #[inline(always)]
+    fn cut(&self, height: impl Fn(DVec3) -> f64) -> Self {
+        let mut kept = Self { len: 0, corners: [DVec3::ZERO; 9] };
         let mut keep = |corner| {
             kept.corners[kept.len] = corner;
             kept.len += 1;
@@ -154,10 +251,12 @@ mod tests {
     fn clipped_areas_add_up_over_a_grid() {
         let corners = [DVec3::new(-0.3, 0.1, 2.2), DVec3::new(4.1, 3.3, -0.4), DVec3::new(1.0, 3.9, 3.7)];
         let whole = Polygon::new(corners);
+        let own = Triangle(corners.map(|corner| corner.as_vec3())).aabb();
         let mut sum = 0.0;
         for cell in 0..6 * 6 * 6u8 {
             let min = [cell % 6, cell / 6 % 6, cell / 36].map(|i| f32::from(i) - 1.0);
-            sum += whole.clipped(&Aabb::from([min, min.map(|x| x + 1.0)])).area();
+            let cell = Aabb::from([min, min.map(|x| x + 1.0)]);
+            sum += whole.area_inside(&cell, &own, whole.area());
         }
         assert!((sum - whole.area()).abs() < 1e-12 * whole.area(), "{sum} {}", whole.area());
     }

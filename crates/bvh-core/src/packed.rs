@@ -1,11 +1,13 @@
-//! Boxes in two vector registers, for the inner loops of builders and searches.
+//! A box in two vector registers, for the inner loops of builders and searches.
 
 use crate::Aabb;
 use glam::{DVec4, Vec4};
 
-/// A box stored as `-min` and `max`, so that a union is two maxima and an extent one addition, four lanes at a time.
+/// A box that is stored as `-min` and `max`. A union is two maxima and an extent is one addition,
+/// four lanes at a time.
 ///
-/// Holds the same numbers as an [`Aabb`] (negation is exact) and has the same half area, bit by bit.
+/// It holds the same numbers as an [`Aabb`], because negation is exact, and has the same half area,
+/// bit by bit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(32))]
 pub struct PackedAabb {
@@ -14,7 +16,7 @@ pub struct PackedAabb {
 }
 
 impl PackedAabb {
-    /// The neutral element of [`grow`](Self::grow). Has no meaningful area.
+    /// The neutral element of [`grow`](Self::grow). It has no meaningful area.
     pub const EMPTY: Self = Self { negated_min: Vec4::NEG_INFINITY, max: Vec4::NEG_INFINITY };
 
     /// Extends the box to contain `other`.
@@ -24,7 +26,7 @@ impl PackedAabb {
         self.max = self.max.max(other.max);
     }
 
-    /// The smallest box around both.
+    /// Returns the smallest box around both boxes.
     #[inline(always)]
     #[must_use]
     pub fn union(mut self, other: &Self) -> Self {
@@ -32,26 +34,28 @@ impl PackedAabb {
         self
     }
 
-    /// Half of the surface area in f64, equal to [`Aabb::half_area`] for every non-empty box.
+    /// Returns half of the surface area in f64. It equals [`Aabb::half_area`] for every box that is
+    /// not empty.
     #[inline(always)]
     pub fn half_area(&self) -> f64 {
         let DVec4 { x, y, z, .. } = self.extent();
         x * y + y * z + z * x
     }
 
-    /// Twice the centre, as [`Aabb::doubled_centroid`] but for the sign of zeros; the fourth lane 0.
+    /// Returns twice the centre, with 0 in the fourth lane. It equals [`Aabb::doubled_centroid`]
+    /// except for the sign of zeros.
     #[inline(always)]
     pub fn doubled_centroid(&self) -> DVec4 {
         self.max.as_dvec4() - self.negated_min.as_dvec4()
     }
 
-    /// `-min` and `max`; the fourth numbers of an object's box are 0.
+    /// Returns `-min` and `max`. Their fourth lanes are 0 for the box of an object.
     #[inline(always)]
     pub fn planes(&self) -> [[f32; 4]; 2] {
         [self.negated_min.to_array(), self.max.to_array()]
     }
 
-    /// Side lengths in world units, the fourth lane 0.
+    /// Returns the side lengths in world units, with 0 in the fourth lane.
     #[inline(always)]
     pub fn extent(&self) -> DVec4 {
         self.max.as_dvec4() + self.negated_min.as_dvec4()
@@ -60,17 +64,20 @@ impl PackedAabb {
 
 impl From<&Aabb> for PackedAabb {
     #[inline]
-    fn from(b: &Aabb) -> Self {
-        Self { negated_min: (-b.min).extend(0.0), max: b.max.extend(0.0) }
+    fn from(aabb: &Aabb) -> Self {
+        Self { negated_min: (-aabb.min).extend(0.0), max: aabb.max.extend(0.0) }
     }
 }
 
 impl From<&PackedAabb> for Aabb {
-    /// Coordinates at zero become +0 whichever sign they had: unions must not depend on the order in which −0 and +0
-    /// were met.
+    /// Unpacks a box. Zeros become +0, because a union must not depend on the order in which −0 and
+    /// +0 were added to it.
     #[inline]
-    fn from(b: &PackedAabb) -> Self {
-        Self { min: (Vec4::ZERO - b.negated_min).truncate(), max: (b.max + Vec4::ZERO).truncate() }
+    fn from(packed: &PackedAabb) -> Self {
+        // 0 − x and x + 0 are +0 for both zeros; −x would not be.
+        let min = Vec4::ZERO - packed.negated_min;
+        let max = packed.max + Vec4::ZERO;
+        Self { min: min.truncate(), max: max.truncate() }
     }
 }
 
@@ -80,12 +87,13 @@ mod tests {
     use glam::Vec3;
     use proptest::prelude::*;
 
+    fn any_point() -> impl Strategy<Value = Vec3> {
+        let finite = prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL | prop::num::f32::ZERO;
+        prop::array::uniform3(finite).prop_map(Vec3::from_array)
+    }
+
     fn any_box() -> impl Strategy<Value = Aabb> {
-        let finite = || prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL | prop::num::f32::ZERO;
-        prop::array::uniform6(finite()).prop_map(|c| {
-            let (a, b) = (Vec3::new(c[0], c[1], c[2]), Vec3::new(c[3], c[4], c[5]));
-            Aabb { min: a.min(b), max: a.max(b) }
-        })
+        (any_point(), any_point()).prop_map(|(a, b)| Aabb { min: a.min(b), max: a.max(b) })
     }
 
     proptest! {

@@ -1,21 +1,22 @@
-//! The objects of a scene, by their geometry.
+//! The geometry of a scene's objects.
 
 use crate::{Aabb, Ray, Shear, Sphere, Triangle};
 use alloc::vec::Vec;
 
-/// An object of any kind that has a box and that rays can be tested against.
+/// An object of any kind that has a box and that can be tested against rays.
 pub trait Primitive {
-    /// A ray, prepared once for tests against many objects.
+    /// A ray that is prepared once for tests against many objects.
     type Prepared;
 
-    /// A box around the object.
+    /// Returns a box around the object.
     fn aabb(&self) -> Aabb;
 
     /// Prepares a ray.
     fn prepare(ray: &Ray) -> Self::Prepared;
 
-    /// The distance at which the ray meets the object, if that is in the ray's range and at most `t_max`. It must lie in the
-    /// interval of the object's box, as [`clip_to_box`](crate::clip_to_box) makes it, for the answer not to depend on the tree.
+    /// Returns the distance at which the ray hits the object if that distance is in the ray's range
+    /// and at most `t_max`. The distance must be inside the interval of the object's box, which
+    /// [`clip_to_box`](crate::clip_to_box) ensures. Otherwise the answer depends on the tree.
     fn intersect(&self, ray: &Self::Prepared, t_max: f32) -> Option<f32>;
 }
 
@@ -55,12 +56,12 @@ impl Primitive for Sphere {
     }
 }
 
-/// The boxes of objects, one each: what builders and searches see of them.
+/// Returns the box of every object, in the same order, as builders and searches need them.
 pub fn boxes<P: Primitive>(objects: &[P]) -> Vec<Aabb> {
     objects.iter().map(P::aabb).collect()
 }
 
-/// The objects of a scene: all of one kind, each named by its index.
+/// The objects of a scene. All are of one kind, and the index of an object is its id.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Primitives {
     /// Triangles in world units.
@@ -70,7 +71,7 @@ pub enum Primitives {
 }
 
 impl Primitives {
-    /// The objects' boxes, one each.
+    /// Returns the box of every object, in the same order.
     pub fn boxes(&self) -> Vec<Aabb> {
         match self {
             Self::Triangles(triangles) => boxes(triangles),
@@ -78,15 +79,19 @@ impl Primitives {
         }
     }
 
-    /// The objects with these indices.
+    /// Returns the objects with these indices.
     ///
     /// # Panics
-    /// If there is no object of such an index.
+    /// Panics if an index is out of range.
     #[must_use]
     pub fn select(&self, indices: &[usize]) -> Self {
         match self {
-            Self::Triangles(all) => Self::Triangles(indices.iter().map(|&index| all[index]).collect()),
-            Self::Spheres(all) => Self::Spheres(indices.iter().map(|&index| all[index]).collect()),
+            Self::Triangles(triangles) => Self::Triangles(select(triangles, indices)),
+            Self::Spheres(spheres) => Self::Spheres(select(spheres, indices)),
         }
     }
+}
+
+fn select<T: Copy>(objects: &[T], indices: &[usize]) -> Vec<T> {
+    indices.iter().map(|&index| objects[index]).collect()
 }

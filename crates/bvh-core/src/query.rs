@@ -1,19 +1,21 @@
-//! Questions of a tree that are not rays': what lies in a region, and what lies nearest to a point.
+//! Queries other than the first hit of a ray: the objects in a region, the objects nearest to a
+//! point, and all hits of a ray.
 //!
-//! As for rays, the objects may be anything: the caller passes a closure that looks at one of them. It is also the filter: what it passes
-//! over is not found. Boxes are tested conservatively, so that the answers are those of looking at every object, whatever the tree.
+//! The objects may be of any kind. The caller passes a closure that examines one object and that
+//! can also skip it. Boxes are tested conservatively. For any tree, the answer is the same as the
+//! answer of examining every object.
 //!
-//! | question | function | boxes visited |
+//! | query | function | boxes visited |
 //! |---|---|---|
-//! | what may overlap a box, a sphere, a frustum, or contain a point? | [`overlapping`] | those that do, and their siblings |
-//! | what does a ray hit, all of it? | [`all_hits`] | likewise |
-//! | what may a ray meet, hit or not? | [`along`] | likewise |
-//! | what is nearest to a point? | [`nearest`] | about O(log n) for objects that are spread out |
-//! | what are the k nearest? | [`k_nearest`] | about O(k + log n) likewise |
+//! | objects that may overlap a box, a sphere or a frustum, or may contain a point | [`overlapping`] | boxes that do, and their siblings |
+//! | all hits of a ray | [`all_hits`] | boxes that the ray meets, and their siblings |
+//! | objects that a ray may meet | [`along`] | the same |
+//! | the object nearest to a point | [`nearest`] | about O(log n) for objects that are spread out |
+//! | the k objects nearest to a point | [`k_nearest`] | about O(k + log n) for such objects |
 //!
-//! All of them go over the tree. The [wide layout](crate::WideBvh) has only what rays can hit, and answers rays only, with a filter by
-//! [`nearest_hit_where`](crate::WideBvh::nearest_hit_where): it leaves out triangles without area, which lie in regions and near to points
-//! as others do.
+//! All queries use the tree. The [wide layout](crate::WideBvh) can only answer rays, because it
+//! omits triangles without area: rays cannot hit them, but they may be in regions and near points.
+//! Its [`nearest_hit_where`](crate::WideBvh::nearest_hit_where) filters the hits of rays.
 //!
 //! ```
 //! use bvh_core::{Aabb, Bvh, Node, Triangle, query};
@@ -40,7 +42,8 @@ use glam::{DVec3, Vec3};
 
 /// A part of space.
 pub trait Region {
-    /// Whether the region may have a point in the box, borders included: never false if it has.
+    /// Returns whether the region may have a point in the box, borders included. The answer may be
+    /// true without such a point, but never false with one.
     fn may_meet(&self, aabb: &Aabb) -> bool;
 }
 
@@ -51,7 +54,7 @@ impl Region for Aabb {
     }
 }
 
-/// The point alone: which objects may contain it?
+/// A single point. Objects whose boxes contain the point may contain it.
 impl Region for Vec3 {
     #[inline]
     fn may_meet(&self, aabb: &Aabb) -> bool {
@@ -67,51 +70,63 @@ impl Region for Sphere {
     }
 }
 
-/// The points on the inner sides of some planes: the view of a camera, for example.
+/// The points on the inner sides of several planes: the view of a camera, for example.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frustum {
-    /// `[a, b, c, d]` of each plane, on the inner side of which a·x + b·y + c·z + d is not negative.
+    /// `[a, b, c, d]` of each plane. The inner side is where a·x + b·y + c·z + d is not negative.
     pub planes: Vec<[f32; 4]>,
 }
 
 impl Region for Frustum {
-    /// A box beyond an edge of the frustum may be accepted though no point of it is inside.
+    /// Returns whether the frustum may have a point in the box. A box beyond an edge of the frustum
+    /// may be accepted although no point of the box is inside.
     #[inline]
     fn may_meet(&self, aabb: &Aabb) -> bool {
-        self.planes.iter().all(|&[a, b, c, d]| {
-            let normal = Vec3::new(a, b, c);
-            // The corner that lies farthest inside. Products are exact in f64; their sums are rounded, hence the margin.
-            let corner = Vec3::select(normal.cmpge(Vec3::ZERO), aabb.max, aabb.min).as_dvec3();
-            let terms = normal.as_dvec3() * corner;
-            let size = terms.abs().element_sum() + f64::from(d.abs());
-            terms.element_sum() + f64::from(d) >= -ROUNDING * size
-        })
+        self.planes.iter().all(|plane| is_partly_inside(aabb, plane))
     }
 }
 
-/// More than the relative rounding error of any distance here.
-const ROUNDING: f64 = 1e-14;
-
-/// The squared distance of a point from a box, at most: 0 inside, and never more than that of any point of the box, however that is
-/// rounded.
+/// Returns whether a box has a point on the inner side of a plane.
 #[inline]
-fn least_distance_squared(aabb: &Aabb, point: Vec3) -> f64 {
-    let outside = (aabb.min.as_dvec3() - point.as_dvec3()).max(point.as_dvec3() - aabb.max.as_dvec3());
-    outside.max(DVec3::ZERO).length_squared() * (1.0 - ROUNDING)
+fn is_partly_inside(aabb: &Aabb, &[a, b, c, d]: &[f32; 4]) -> bool {
+    let normal = Vec3::new(a, b, c);
+    // The corner that is farthest inside decides.
+    let corner = Vec3::select(normal.cmpge(Vec3::ZERO), aabb.max, aabb.min);
+    let terms = normal.as_dvec3() * corner.as_dvec3();
+    // Products of f32 are exact in f64, but their sums are rounded, hence the margin.
+    let size = terms.abs().element_sum() + f64::from(d.abs());
+    terms.element_sum() + f64::from(d) >= -ROUNDING * size
 }
 
-/// Shows `visit` the objects of every leaf whose box the region may meet, until it breaks. Returns what it broke with. A divided
-/// object is shown once for each of its leaves.
+/// A bound of the relative rounding error of any distance in this module.
+const ROUNDING: f64 = 1e-14;
+
+/// Returns a lower bound of the squared distance of a point from a box; 0 inside. It never exceeds
+/// the squared distance of any point of the box, even if that distance is rounded.
+#[inline]
+fn least_distance_squared(aabb: &Aabb, point: Vec3) -> f64 {
+    let below = aabb.min.as_dvec3() - point.as_dvec3();
+    let above = point.as_dvec3() - aabb.max.as_dvec3();
+    let outside = below.max(above).max(DVec3::ZERO);
+    outside.length_squared() * (1.0 - ROUNDING)
+}
+
+/// Calls `visit` with the objects of every leaf whose box the region may meet, until `visit`
+/// breaks. Returns the value of the break. A divided object is visited once for each of its leaves.
 ///
 /// # Panics
-/// May panic, or not return, for a tree that [`validate`](crate::validate()) refuses; so may the other queries.
+/// May panic or not return for a tree that [`validate`](crate::validate()) rejects. This holds for
+/// all queries.
 pub fn overlapping<'t, B>(
     tree: impl Into<BvhView<'t>>,
     region: &impl Region,
     mut visit: impl FnMut(u32) -> ControlFlow<B>,
 ) -> Option<B> {
     let tree = tree.into();
-    let mut open: Vec<usize> = (0..tree.nodes.len().min(1)).collect();
+    let mut open: Vec<usize> = Vec::new();
+    if !tree.nodes.is_empty() {
+        open.push(0);
+    }
     while let Some(index) = open.pop() {
         let node = &tree.nodes[index];
         if !region.may_meet(&node.aabb) {
@@ -131,27 +146,27 @@ pub fn overlapping<'t, B>(
     None
 }
 
-/// Shows `visit` the objects of every leaf whose box the ray meets in its range, in no order of distance, until it breaks: for all hits
-/// along a ray. Returns what it broke with.
+/// Calls `visit` with the objects of every leaf whose box the ray meets in its range, until `visit`
+/// breaks. Returns the value of the break. The order of the objects is not the order of their
+/// distances.
 pub fn along<'t, B>(
     tree: impl Into<BvhView<'t>>,
     ray: &Ray,
     mut visit: impl FnMut(u32) -> ControlFlow<B>,
 ) -> Option<B> {
-    let mut broke_with = None;
-    let breaks = |object| match visit(object) {
-        ControlFlow::Continue(()) => false,
-        ControlFlow::Break(with) => {
-            broke_with = Some(with);
-            true
-        }
+    let mut broken = None;
+    // No object counts as hit until `visit` breaks, so the traversal visits every leaf.
+    let breaks = |object| {
+        broken = visit(object).break_value();
+        broken.is_some()
     };
     any_hit_by(tree, ray, breaks, &mut ());
-    broke_with
+    broken
 }
 
-/// Every one of `objects` that the ray hits in its range and that `keep` does not pass over, the nearest first; of several at the same
-/// distance the one of the lowest id. `tree` is one over their [boxes](crate::boxes).
+/// Returns the hits of the ray, in its range, with all `objects` that `keep` accepts. The nearest
+/// hit comes first; of several hits at the same distance the hit with the lowest id comes first.
+/// `tree` is a tree over the [boxes](crate::boxes) of `objects`.
 pub fn all_hits<'t, P: Primitive>(
     tree: impl Into<BvhView<'t>>,
     objects: &[P],
@@ -168,8 +183,11 @@ pub fn all_hits<'t, P: Primitive>(
         }
         ControlFlow::Continue(())
     });
-    hits.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object)));
-    // A split object is met in several leaves.
+    hits.sort_unstable_by(|a, b| {
+        let by_distance = a.t.total_cmp(&b.t);
+        by_distance.then(a.object.cmp(&b.object))
+    });
+    // A divided object is hit in several leaves, every time at the same distance.
     hits.dedup();
     hits
 }
@@ -177,9 +195,9 @@ pub fn all_hits<'t, P: Primitive>(
 /// An object near a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Near {
-    /// The object.
+    /// The id of the object.
     pub object: u32,
-    /// The square of its distance, world units squared.
+    /// The square of its distance in world units squared.
     pub distance_squared: f64,
 }
 
@@ -192,15 +210,19 @@ impl PartialOrd for Near {
 }
 
 impl Ord for Near {
-    /// The nearer first; of equally near ones the lower id.
+    /// Compares distances, then ids.
     fn cmp(&self, other: &Self) -> Ordering {
-        self.distance_squared.total_cmp(&other.distance_squared).then(self.object.cmp(&other.object))
+        let by_distance = self.distance_squared.total_cmp(&other.distance_squared);
+        by_distance.then(self.object.cmp(&other.object))
     }
 }
 
-/// The object nearest to `point`, of equally near ones the one of the lowest id, if its squared distance is at most `limit`.
-/// `distance_squared` gives that of an object, the whole of one that is divided, which must be no less than that of its box, or `None`
-/// to pass it over.
+/// Returns the object nearest to `point` if its squared distance is at most `limit`. Of several
+/// objects at the same distance it returns the one with the lowest id.
+///
+/// `distance_squared` returns the squared distance of an object, or `None` to skip the object. The
+/// distance must not be less than the distance of the object's box. The distance of a divided
+/// object is the distance of the full object.
 pub fn nearest<'t>(
     tree: impl Into<BvhView<'t>>,
     point: impl Into<Vec3>,
@@ -210,7 +232,8 @@ pub fn nearest<'t>(
     k_nearest(tree, point, 1, limit, distance_squared).pop()
 }
 
-/// The `k` objects nearest to `point`, or fewer if there are fewer within `limit`, nearest first; otherwise as [`nearest`].
+/// Returns the `k` objects nearest to `point`, the nearest first. There may be fewer than `k`
+/// objects within `limit`. Everything else is as for [`nearest`].
 pub fn k_nearest<'t>(
     tree: impl Into<BvhView<'t>>,
     point: impl Into<Vec3>,
@@ -218,33 +241,49 @@ pub fn k_nearest<'t>(
     limit: f64,
     mut distance_squared: impl FnMut(u32) -> Option<f64>,
 ) -> Vec<Near> {
-    let (tree, point) = (tree.into(), point.into());
-    // A set, because a divided object is met in several leaves.
+    let tree = tree.into();
+    let point = point.into();
+    // A set, because a divided object is in several leaves.
     let mut found: BTreeSet<Near> = BTreeSet::new();
     if k == 0 || limit.is_nan() {
         return vec![];
     }
-    let least = |index: usize| least_distance_squared(&tree.nodes[index].aabb, point);
-    let mut open: Vec<(f64, usize)> = (0..tree.nodes.len().min(1)).map(|root| (least(root), root)).collect();
+    // Nodes with lower bounds of the distances of their objects.
+    let mut open: Vec<(f64, usize)> = Vec::new();
+    if let Some(root) = tree.nodes.first() {
+        open.push((least_distance_squared(&root.aabb, point), 0));
+    }
     while let Some((distance, index)) = open.pop() {
-        let most =
-            if found.len() == k { found.last().map_or(limit, |near| near.distance_squared) } else { limit };
+        // Only objects nearer than the worst of `k` objects matter.
+        let most = match found.last() {
+            Some(worst) if found.len() == k => worst.distance_squared,
+            _ => limit,
+        };
         if distance > most {
             continue;
         }
         let node = &tree.nodes[index];
         if !node.is_leaf() {
-            let from = open.len();
-            open.extend(node.children().map(|child| (least(child), child)).filter(|child| child.0 <= most));
-            // The nearest child is visited next.
-            open[from..].sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
+            let first_child = open.len();
+            for child in node.children() {
+                let bound = least_distance_squared(&tree.nodes[child].aabb, point);
+                if bound <= most {
+                    open.push((bound, child));
+                }
+            }
+            // The nearest child last, so that it is visited next.
+            open[first_child..].sort_by(|a, b| {
+                let by_distance = b.0.total_cmp(&a.0);
+                by_distance.then(b.1.cmp(&a.1))
+            });
             continue;
         }
         for &object in &tree.prim_ids[node.prims()] {
-            let Some(distance_squared) = distance_squared(object).filter(|&distance| distance <= limit) else {
-                continue;
-            };
-            found.insert(Near { object, distance_squared });
+            if let Some(distance_squared) = distance_squared(object)
+                && distance_squared <= limit
+            {
+                found.insert(Near { object, distance_squared });
+            }
             if found.len() > k {
                 found.pop_last();
             }

@@ -75,10 +75,10 @@ impl Ray {
         let inverse = (1.0 / direction.extend(1.0)).max(Vec4::MIN).min(Vec4::MAX);
         let sizes = inverse.abs();
         let least = sizes.x.min(sizes.y).min(sizes.z);
-        // A zero is +0.
+        // A zero is +0, so that no kernel hands out another one.
         Self {
             origin: origin.extend(t_min + 0.0),
-            direction: direction.extend(t_max.min(f32::MAX)),
+            direction: direction.extend(t_max.min(f32::MAX) + 0.0),
             inverse: inverse.with_w(least),
         }
     }
@@ -195,6 +195,12 @@ mod tests {
             let refused = Ray::new(Vec3::ZERO, Vec3::X, t_min, t_max);
             assert!(matches!(refused, Err(InvalidRay::Range { .. })), "{t_min} {t_max}");
         }
+    }
+
+    #[test]
+    fn a_range_begins_and_ends_at_positive_zeros() {
+        let ray = Ray::new(Vec3::ZERO, Vec3::X, -0.0, -0.0).unwrap();
+        assert_eq!([ray.t_min(), ray.t_max()].map(f32::to_bits), [0, 0]);
     }
 
     #[test]

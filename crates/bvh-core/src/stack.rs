@@ -1,8 +1,8 @@
-//! The stack of a traversal, which allocates memory only for very deep trees.
+//! The stack of a traversal. It allocates memory only for very deep trees.
 
 use alloc::vec::Vec;
 
-/// A stack that keeps its upper `N` entries inline, and the lower ones of a deep stack on the heap.
+/// A stack with room for `N` entries inline. The lower entries of a deeper stack are on the heap.
 pub(crate) struct Stack<T, const N: usize> {
     inline: [T; N],
     len: usize,
@@ -10,13 +10,14 @@ pub(crate) struct Stack<T, const N: usize> {
 }
 
 impl<T: Copy, const N: usize> Stack<T, N> {
-    /// The empty stack. `filler` may be any value; one whose bits are all zero is fastest.
+    /// Makes an empty stack. `filler` may be any value; a value whose bits are all zero is fastest.
     #[inline(always)]
     pub(crate) fn new(filler: T) -> Self {
         Self { inline: [filler; N], len: 0, spilled: Vec::new() }
     }
 
-    /// Space for `K` entries above the topmost. [`grow`](Self::grow) adds those that were written to the stack.
+    /// Returns the space for `K` entries above the topmost entry. The caller writes entries there,
+    /// and [`grow`](Self::grow) adds them to the stack.
     #[inline(always)]
     pub(crate) fn room<const K: usize>(&mut self) -> &mut [T; K] {
         const { assert!(K <= N) };
@@ -24,6 +25,7 @@ impl<T: Copy, const N: usize> Stack<T, N> {
             spill(&self.inline[..self.len], &mut self.spilled);
             self.len = 0;
         }
+        // The check above and `K <= N` leave room for `K` entries.
         match self.inline[self.len..].first_chunk_mut() {
             Some(room) => room,
             None => unreachable!("at most N - K entries are inline"),
@@ -43,6 +45,7 @@ impl<T: Copy, const N: usize> Stack<T, N> {
         self.grow(usize::from(condition));
     }
 
+    /// Removes the topmost entry and returns it; `None` if the stack is empty.
     #[inline(always)]
     pub(crate) fn pop(&mut self) -> Option<T> {
         if self.len == 0 {
@@ -53,7 +56,8 @@ impl<T: Copy, const N: usize> Stack<T, N> {
     }
 }
 
-/// Not a method, so that the stack's length stays in a register.
+/// Moves all inline entries to the heap. A method would take `&mut self`, and the stack's length
+/// could not stay in a register.
 #[cold]
 #[inline(never)]
 fn spill<T: Copy>(inline: &[T], spilled: &mut Vec<T>) {

@@ -1,11 +1,15 @@
-//! Which object a ray meets first, and whether it meets any: traversal of the one tree type.
+//! Traversal of the one tree type: the nearest hit of a ray, and whether a ray hits anything.
 //!
-//! [`nearest_hit`] and [`any_hit`] take triangles, spheres, or objects of any kind that is a [`Primitive`]; [`nearest_hit_by`]
-//! and [`any_hit_by`] a closure that tests one object, which can also pass objects over, and a counter of tests. Boxes are
-//! visited front to back, skipped when they begin behind the nearest hit, and tested conservatively ([`Slabs`](crate::Slabs)). With tests
-//! whose distances lie inside their objects' boxes, as [`Triangle::intersect`](crate::Triangle::intersect),
-//! [`Sphere::intersect`](crate::Sphere::intersect) and [`clip_to_box`](crate::clip_to_box) give them, the answer is
-//! that of testing every object, bit by bit, whatever the tree.
+//! [`nearest_hit`] and [`any_hit`] accept triangles, spheres, or objects of any other kind that
+//! implements [`Primitive`]. [`nearest_hit_by`] and [`any_hit_by`] accept a closure that tests one
+//! object, and a counter of tests. The closure can also skip objects.
+//!
+//! Boxes are visited front to back and skipped if they begin behind the nearest hit. The box test
+//! ([`Slabs`](crate::Slabs)) is conservative. The answer is the same, bit by bit, as the answer of
+//! testing every object, for any tree, provided that every distance that a test returns is inside
+//! the interval of the object's box. [`Triangle::intersect`](crate::Triangle::intersect),
+//! [`Sphere::intersect`](crate::Sphere::intersect) and [`clip_to_box`](crate::clip_to_box) return
+//! such distances.
 //!
 //! ```
 //! use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Shear, TestCounts, Triangle, nearest_hit, nearest_hit_by};
@@ -19,7 +23,8 @@
 //! };
 //! let ray = Ray::half_line(Vec3::new(0.2, 0.2, 3.0), -Vec3::Z)?;
 //! assert_eq!(nearest_hit(&tree, &triangles, &ray), Some(Hit { t: 2.0, object: 1 }));
-//! let (shear, mut counts) = (Shear::new(&ray), TestCounts::default());
+//! let shear = Shear::new(&ray);
+//! let mut counts = TestCounts::default();
 //! let hit = nearest_hit_by(&tree, &ray, |id, t_max| triangles[id as usize].intersect(&shear, t_max), &mut counts);
 //! assert_eq!(hit, Some(Hit { t: 2.0, object: 1 }));
 //! assert_eq!(counts, TestCounts { boxes: 3, objects: 1 });
@@ -31,25 +36,25 @@ use crate::{BvhView, Hit, Node, NodeKind, Primitive, Ray, Slabs};
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
-/// What counts the tests of a traversal. `()` counts nothing and costs nothing.
+/// A counter of the tests of a traversal. `()` counts nothing and costs nothing.
 pub trait Counter {
-    /// `boxes` more boxes are tested. The root's box counts too.
+    /// Adds the tests of `boxes` boxes. The root's box counts too.
     #[inline(always)]
     fn boxes(&mut self, boxes: usize) {
         let _ = boxes;
     }
 
-    /// One more object is tested.
+    /// Adds the test of one object.
     #[inline(always)]
     fn object(&mut self) {}
 }
 
 impl Counter for () {}
 
-/// Numbers of tests, of one ray or of many.
+/// The numbers of tests of one ray or of many rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TestCounts {
-    /// Tests against boxes of nodes, the root's and the leaves' included.
+    /// Tests against the boxes of nodes, root and leaves included.
     pub boxes: u64,
     /// Tests against objects.
     pub objects: u64,
@@ -67,32 +72,37 @@ impl Counter for TestCounts {
     }
 }
 
-/// The nearest of `objects` that `ray` meets in its range; of several at the same distance the one of the lowest id.
+/// Returns the nearest of `objects` that `ray` hits in its range. Of several objects at the same
+/// distance it returns the one with the lowest id.
 ///
-/// `tree` is a [`&Bvh`](crate::Bvh) over their [boxes](crate::boxes), or a view of one.
+/// `tree` is a [`&Bvh`](crate::Bvh) over the [boxes](crate::boxes) of `objects`, or a view of one.
 ///
 /// # Panics
-/// May panic, or not return, for a tree that [`validate`](crate::validate()) refuses, or of more objects.
+/// May panic or not return for a tree that [`validate`](crate::validate()) rejects, and may panic
+/// for a tree over more objects.
 #[inline]
 pub fn nearest_hit<'t, P: Primitive>(tree: impl Into<BvhView<'t>>, objects: &[P], ray: &Ray) -> Option<Hit> {
     let prepared = P::prepare(ray);
     nearest_hit_by(tree, ray, |id, t_max| objects[id as usize].intersect(&prepared, t_max), &mut ())
 }
 
-/// Whether `ray` meets any of `objects` in its range: the question of a shadow ray. Otherwise as [`nearest_hit`].
+/// Returns whether `ray` hits any of `objects` in its range: the query of a shadow ray.
+///
+/// `tree` and panics are as for [`nearest_hit`].
 #[inline]
 pub fn any_hit<'t, P: Primitive>(tree: impl Into<BvhView<'t>>, objects: &[P], ray: &Ray) -> bool {
     let prepared = P::prepare(ray);
     any_hit_by(tree, ray, |id| objects[id as usize].intersect(&prepared, ray.t_max()).is_some(), &mut ())
 }
 
-/// [`nearest_hit`] of objects that a closure tests, with the tests counted; `&mut ()` counts nothing.
+/// Returns the [`nearest_hit`] of objects that a closure tests, and counts the tests. `&mut ()`
+/// counts nothing.
 ///
-/// `tree` is a [`&Bvh`](crate::Bvh) or a view of one. `test(object, t_max)` gives the distance at which the ray meets
-/// the object, if that is in `ray.t_min()..=t_max`.
+/// `tree` is a [`&Bvh`](crate::Bvh) or a view of one. `test(object, t_max)` returns the distance at
+/// which the ray hits the object if that distance is in `ray.t_min()..=t_max`.
 ///
 /// # Panics
-/// May panic, or not return, for a tree that [`validate`](crate::validate()) refuses.
+/// May panic or not return for a tree that [`validate`](crate::validate()) rejects.
 #[inline]
 pub fn nearest_hit_by<'t>(
     tree: impl Into<BvhView<'t>>,
@@ -108,13 +118,14 @@ pub fn nearest_hit_by<'t>(
     nearest
 }
 
-/// [`any_hit`] of objects that a closure tests, with the tests counted.
+/// Returns whether a ray hits [any](any_hit) of the objects that a closure tests, and counts the
+/// tests.
 ///
-/// `test(object)` says whether the ray meets the object. Boxes are visited front to back all the same: a hit ends the
-/// search, and near objects fill more of the view.
+/// `test(object)` returns whether the ray hits the object. Although any hit is enough, boxes are
+/// visited front to back: near objects fill more of the view and are more likely to be hit.
 ///
 /// # Panics
-/// As [`nearest_hit_by`].
+/// Under the same conditions as [`nearest_hit_by`].
 #[inline]
 pub fn any_hit_by<'t>(
     tree: impl Into<BvhView<'t>>,
@@ -136,7 +147,8 @@ pub fn any_hit_by<'t>(
     found
 }
 
-/// [`nearest_hit_by`] without a tree: tests the objects `0..objects` one after the other.
+/// Returns the nearest hit without a tree. Tests the objects `0..objects` one after the other;
+/// otherwise the same as [`nearest_hit_by`].
 pub fn nearest_hit_of_all(
     objects: u32,
     ray: &Ray,
@@ -148,7 +160,8 @@ pub fn nearest_hit_of_all(
     nearest
 }
 
-/// [`any_hit_by`] without a tree: tests the objects `0..objects` one after the other.
+/// Returns whether a ray hits any object, without a tree. Tests the objects `0..objects` one after
+/// the other; otherwise the same as [`any_hit_by`].
 pub fn any_hit_of_all(objects: u32, mut test: impl FnMut(u32) -> bool, counter: &mut impl Counter) -> bool {
     (0..objects).any(|object| {
         counter.object();
@@ -156,6 +169,7 @@ pub fn any_hit_of_all(objects: u32, mut test: impl FnMut(u32) -> bool, counter: 
     })
 }
 
+/// Tests `objects` one after the other. Stores the nearest hit, and lowers `t_max` to its distance.
 #[inline(always)]
 fn nearest_of(
     objects: impl Iterator<Item = u32>,
@@ -166,6 +180,7 @@ fn nearest_of(
 ) {
     for object in objects {
         counter.object();
+        // A closure of the caller may ignore `t_max`.
         if let Some(t) = test(object, *t_max)
             && t <= *t_max
         {
@@ -178,16 +193,17 @@ fn nearest_of(
     }
 }
 
-/// A node whose box the ray enters at `entry`, to be visited later. By what it names, not by its index: the node itself
-/// may have left the cache by then.
+/// A node that is visited later, and the distance `entry` at which the ray enters its box. The
+/// stack keeps the node's children or objects instead of its index, because the node may have left
+/// the cache by then.
 #[derive(Clone, Copy)]
 struct Pending {
     entry: f32,
     kind: NodeKind,
 }
 
-/// Hands the objects of leaves that the ray may meet to `leaf`, the nearest first, until it breaks. `leaf` may lower
-/// the distance from which on boxes are skipped.
+/// Calls `leaf` with the objects of every leaf that the ray may hit, the nearest leaf first, until
+/// `leaf` breaks. `leaf` may lower the distance beyond which boxes are skipped.
 #[inline(always)]
 fn walk<C: Counter>(
     tree: BvhView,
@@ -203,8 +219,9 @@ fn walk<C: Counter>(
         return;
     }
     let mut kind = root.kind();
-    let mut stack =
-        Stack::<Pending, 48>::new(Pending { entry: 0.0, kind: NodeKind::Inner { first: 0, count: 0 } });
+    // Its bits are all zero, which is the fastest filler.
+    let filler = Pending { entry: 0.0, kind: NodeKind::Inner { first: 0, count: 0 } };
+    let mut stack = Stack::<Pending, 48>::new(filler);
     loop {
         match kind {
             NodeKind::Leaf { .. } => {
@@ -215,9 +232,10 @@ fn walk<C: Counter>(
             NodeKind::Inner { first, count: 2 } => {
                 counter.boxes(2);
                 let pair = &tree.nodes[first as usize..first as usize + 2];
-                let (a, b) = (slabs.entry(&pair[0].aabb), slabs.entry(&pair[1].aabb));
-                // A branch, though often mispredicted: the processor goes on with the child it expects to be nearer
-                // while the distances are still computed.
+                let a = slabs.entry(&pair[0].aabb);
+                let b = slabs.entry(&pair[1].aabb);
+                // This branch is often mispredicted, but it pays: the processor continues with the
+                // child that it expects to be nearer while the distances are still being computed.
                 let next = if b < a {
                     descend(tree, &pair[1], &pair[0], [b, a], &mut t_max, &mut stack, &mut leaf, counter)
                 } else {
@@ -240,6 +258,7 @@ fn walk<C: Counter>(
         }
         kind = loop {
             let Some(pending) = stack.pop() else { return };
+            // A hit that was found after the push may lie in front of this box.
             if pending.entry <= t_max {
                 break pending.kind;
             }
@@ -247,8 +266,9 @@ fn walk<C: Counter>(
     }
 }
 
-/// Visits the nearer one of two children if it is a leaf. Returns what to visit next, if it is one of the two, and
-/// pushes the farther one if that comes later.
+/// Visits the nearer of two children at once if it is a leaf, and otherwise returns it to be
+/// visited next. Pushes the farther child if it has to wait, and returns it if the nearer one is
+/// done. Returns `None` if the ray enters neither.
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "the state of a walk, in registers")]
 fn descend<C: Counter, const N: usize>(
@@ -266,6 +286,7 @@ fn descend<C: Counter, const N: usize>(
     }
     if let NodeKind::Leaf { .. } = near.kind() {
         leaf(objects(tree, near.kind()), t_max, counter)?;
+        // `leaf` may have lowered `t_max`.
         return ControlFlow::Continue((far_entry <= *t_max).then(|| far.kind()));
     }
     if far_entry <= *t_max {
@@ -274,7 +295,7 @@ fn descend<C: Counter, const N: usize>(
     ControlFlow::Continue(Some(near.kind()))
 }
 
-/// The objects of a leaf.
+/// Returns the objects of a leaf.
 #[inline(always)]
 fn objects(tree: BvhView<'_>, leaf: NodeKind) -> &[u32] {
     match leaf {
@@ -283,8 +304,10 @@ fn objects(tree: BvhView<'_>, leaf: NodeKind) -> &[u32] {
     }
 }
 
-/// Pushes the children that the ray enters, the nearest last; of two at the same distance the first one.
+/// Pushes the children that the ray enters, in such an order that the nearest one is popped first.
+/// Of two children at the same distance the one with the lower index is popped first.
 fn push_sorted<const N: usize>(children: &[Node], slabs: &Slabs, t_max: f32, stack: &mut Stack<Pending, N>) {
+    // Only nodes with more than 16 children need memory from the heap.
     let mut few = [(0.0, 0); 16];
     let mut many = Vec::new();
     let entered = match few.get_mut(..children.len()) {
@@ -297,10 +320,14 @@ fn push_sorted<const N: usize>(children: &[Node], slabs: &Slabs, t_max: f32, sta
     let mut count = 0;
     for (index, child) in children.iter().enumerate() {
         let entry = slabs.entry(&child.aabb);
+        // Written always and kept only if the ray enters the child: no branch.
         entered[count] = (entry, index);
         count += usize::from(entry <= t_max);
     }
-    entered[..count].sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
+    entered[..count].sort_unstable_by(|a, b| {
+        let by_distance = b.0.total_cmp(&a.0);
+        by_distance.then(b.1.cmp(&a.1))
+    });
     for &(entry, index) in &entered[..count] {
         stack.push_if(true, Pending { entry, kind: children[index].kind() });
     }

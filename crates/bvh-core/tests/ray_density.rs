@@ -1,49 +1,49 @@
-//! The ray density counts what it says: segment by segment on the grid, monotone everywhere, area for uniform lines.
+//! The ray density counts segments exactly on the grid, is monotone everywhere, and equals the area
+//! for uniform lines.
 
 mod support;
 
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, DensityError, PackedAabb, RayDensity, Segment};
+use glam::Vec3;
 use proptest::prelude::*;
 use std::sync::OnceLock;
 use support::Random;
 
-/// Bounds whose cells have a side of 1, so that boxes with whole coordinates lie on the grid.
+/// The size of bounds whose cells have a side of 1. Boxes with integer coordinates are on the grid.
 const GRID: f32 = 32.0;
 
 fn bounds() -> Aabb {
     Aabb::from([[0.0; 3], [GRID; 3]])
 }
 
-/// Numbers in 0..1 from a seed.
-fn uniform(seed: u64) -> impl FnMut() -> f32 {
-    let mut random = Random(seed);
-    move || random.unit()
-}
-
-/// Segments inside, through and beside the bounds.
+/// Makes segments inside the bounds, through them and outside of them.
 fn segments(count: usize, seed: u64) -> Vec<Segment> {
-    let mut next = uniform(seed);
-    let mut point = |spread: f32| [0, 1, 2].map(|_| GRID * (0.5 + spread * (next() - 0.5)));
-    (0..count)
-        .map(|i| {
-            if i % 2 == 0 {
-                Segment { from: point(1.0), to: point(1.0) }
-            } else {
-                Segment { from: point(3.0), to: point(1.5) }
-            }
-        })
-        .collect()
+    let mut random = Random(seed);
+    let mut segments = Vec::new();
+    for i in 0..count {
+        let [spread_from, spread_to] = if i % 2 == 0 { [1.0, 1.0] } else { [3.0, 1.5] };
+        let from = point(spread_from, &mut random);
+        let to = point(spread_to, &mut random);
+        segments.push(Segment { from, to });
+    }
+    segments
 }
 
-/// Whether the segment has a point in the box, by its slabs.
+/// Returns a point of a cube around the middle of the bounds, `spread` times as large.
+fn point(spread: f32, random: &mut Random) -> [f32; 3] {
+    [0, 1, 2].map(|_| GRID * (0.5 + spread * (random.unit() - 0.5)))
+}
+
+/// Returns whether the segment has a point in the box, by its slabs.
 fn meets(segment: &Segment, bounds: &Aabb) -> bool {
-    let (low, high) = (bounds.min.to_array(), bounds.max.to_array());
-    let (mut first, mut last) = (0.0f64, 1.0f64);
+    let mut first = 0.0f64;
+    let mut last = 1.0f64;
     for axis in 0..3 {
-        let (from, to) = (f64::from(segment.from[axis]), f64::from(segment.to[axis]));
-        let cut = |plane: f32| (f64::from(plane) - from) / (to - from);
-        let (a, b) = (cut(low[axis]), cut(high[axis]));
+        let from = f64::from(segment.from[axis]);
+        let to = f64::from(segment.to[axis]);
+        let a = (f64::from(bounds.min[axis]) - from) / (to - from);
+        let b = (f64::from(bounds.max[axis]) - from) / (to - from);
         first = first.max(a.min(b));
         last = last.min(a.max(b));
     }
@@ -54,26 +54,27 @@ fn meets(segment: &Segment, bounds: &Aabb) -> bool {
 fn boxes_on_the_grid_are_entered_as_often_as_segments_meet_them() {
     let segments = segments(3000, 1);
     let density = RayDensity::new(&bounds(), &segments, 0.0).unwrap();
-    let mut next = uniform(2);
+    let mut random = Random(2);
     for _ in 0..2000 {
-        let ends = [0, 1, 2].map(|_| {
-            let (a, b) = ((next() * 33.0).floor(), (next() * 33.0).floor());
-            (a.min(b), a.max(b).max(a.min(b) + 1.0).min(GRID))
-        });
-        let cells = Aabb::from([ends.map(|end| end.0), ends.map(|end| end.1)]);
-        if cells.half_area() == 0.0 || ends.iter().any(|end| end.0 == end.1) {
+        let a = [0, 1, 2].map(|_| random.below(33) as f32);
+        let b = [0, 1, 2].map(|_| random.below(33) as f32);
+        let cells = around(a, b);
+        // Only boxes of at least one cell along every axis.
+        if cells.extent().min_element() == 0.0 {
             continue;
         }
-        let counted = segments.iter().filter(|segment| meets(segment, &cells)).count();
-        assert_eq!(density.entries(&cells), counted as f64, "{cells:?}");
+        let mut counted = 0;
+        for segment in &segments {
+            counted += u32::from(meets(segment, &cells));
+        }
+        assert_eq!(density.entries(&cells), f64::from(counted), "{cells:?}");
     }
     assert_eq!(density.measure(&bounds()), bounds().half_area());
 }
 
-/// A box from two corners, any order.
+/// Makes a box from two corners in any order.
 fn around(a: [f32; 3], b: [f32; 3]) -> Aabb {
-    let pick = |take: fn(f32, f32) -> f32| [0, 1, 2].map(|axis| take(a[axis], b[axis]));
-    Aabb::from([pick(f32::min), pick(f32::max)])
+    Aabb::around([a.into(), b.into()])
 }
 
 fn corner() -> impl Strategy<Value = [f32; 3]> {
@@ -81,16 +82,20 @@ fn corner() -> impl Strategy<Value = [f32; 3]> {
     prop::array::uniform3(coordinate)
 }
 
-/// Densities of three samples with three weights of area, made once.
+/// Returns one of nine densities, of three samples with three weights of area. They are made once.
 fn density(sample: usize, share: usize) -> &'static RayDensity {
-    static MADE: OnceLock<Vec<RayDensity>> = OnceLock::new();
-    let made = MADE.get_or_init(|| {
-        let make = |i: usize| {
-            RayDensity::new(&bounds(), &segments(200, i as u64 / 3), [0.0, 0.1, 1.0][i % 3]).unwrap()
-        };
-        (0..9).map(make).collect()
-    });
-    &made[3 * sample + share]
+    static DENSITIES: OnceLock<Vec<RayDensity>> = OnceLock::new();
+    &DENSITIES.get_or_init(all_densities)[3 * sample + share]
+}
+
+fn all_densities() -> Vec<RayDensity> {
+    let mut densities = Vec::new();
+    for seed in 0..3 {
+        for area_weight in [0.0, 0.1, 1.0] {
+            densities.push(RayDensity::new(&bounds(), &segments(200, seed), area_weight).unwrap());
+        }
+    }
+    densities
 }
 
 proptest! {
@@ -113,18 +118,14 @@ proptest! {
 
 #[test]
 fn uniform_endless_lines_give_the_area_back() {
-    let mut next = uniform(5);
+    let mut random = Random(5);
     let mut lines = Vec::new();
-    // Lines through two points of a sphere around the bounds, uniform and independent, are uniform lines.
-    let mut on_sphere = || loop {
-        let p = [0, 1, 2].map(|_| 2.0 * next() - 1.0);
-        let length = p.iter().map(|c| c * c).sum::<f32>();
-        if length > 1e-4 && length <= 1.0 {
-            return p.map(|c| 16.0 + 28.0 * c / length.sqrt());
-        }
-    };
+    // Lines through two uniform and independent points of a sphere around the bounds are uniform
+    // lines.
     while lines.len() < 400_000 {
-        lines.push(Segment { from: on_sphere(), to: on_sphere() });
+        let from = on_sphere(&mut random);
+        let to = on_sphere(&mut random);
+        lines.push(Segment { from, to });
     }
     let density = RayDensity::new(&bounds(), &lines, 0.0).unwrap();
     for cells in [
@@ -139,8 +140,20 @@ fn uniform_endless_lines_give_the_area_back() {
     }
 }
 
+/// Returns a uniform point of a sphere around the bounds.
+fn on_sphere(random: &mut Random) -> [f32; 3] {
+    loop {
+        let offset = random.point();
+        let length_squared = offset.length_squared();
+        // Points of the cube outside of the ball would favour its corners.
+        if length_squared > 1e-4 && length_squared <= 1.0 {
+            return (Vec3::splat(16.0) + 28.0 * offset / length_squared.sqrt()).to_array();
+        }
+    }
+}
+
 #[test]
-fn nonsense_is_refused_by_name() {
+fn each_invalid_input_has_its_error() {
     let one = [Segment { from: [1.0; 3], to: [2.0; 3] }];
     let nan = [one[0], Segment { from: [f32::NAN; 3], to: [2.0; 3] }];
     let far = [Segment { from: [100.0; 3], to: [200.0; 3] }];
@@ -154,28 +167,42 @@ fn nonsense_is_refused_by_name() {
 #[test]
 fn rays_that_end_on_a_wall_enter_the_flat_box_around_it() {
     // Downwards onto a wall in the middle of the cells between 16 and 17.
-    let mut next = uniform(5);
-    let rays: Vec<Segment> = (0..1000)
-        .map(|_| {
-            let [x, z] = [GRID * next(), GRID * next()];
-            Segment { from: [x, 30.2, z], to: [x, 16.5, z] }
-        })
-        .collect();
-    let wall = Aabb::from([[0.0, 16.5, 0.0], [GRID, 16.5, GRID]]);
-    let entries = |density: RayDensity| density.entries(&wall);
-    assert_eq!(entries(RayDensity::new(&bounds(), &rays, 0.0).unwrap()), 500.0);
-    let longer: Vec<Segment> =
-        rays.iter().map(|ray| Segment { to: [ray.to[0], 15.9, ray.to[2]], ..*ray }).collect();
-    assert_eq!(entries(RayDensity::new(&bounds(), &longer, 0.0).unwrap()), 1000.0);
-    // On average over walls at all heights, half of the rays seem to enter, and three quarters of the lengthened ones.
-    let mean = (0..64).map(|i| {
-        let height = 16.0 + i as f32 / 64.0;
-        let rays: Vec<Segment> =
-            rays.iter().map(|ray| Segment { to: [ray.to[0], height, ray.to[2]], ..*ray }).collect();
-        let wall = Aabb::from([[0.0, height, 0.0], [GRID, height, GRID]]);
-        [RayDensity::new, RayDensity::of_rays].map(|made| made(&bounds(), &rays, 0.0).unwrap().entries(&wall))
-    });
-    let sums = mean.fold([0.0, 0.0], |sums, entries| [sums[0] + entries[0], sums[1] + entries[1]]);
-    let [plain, lengthened] = sums.map(|sum| sum / 64.0 / 1000.0);
-    assert!((0.45..0.55).contains(&plain) && (0.7..0.8).contains(&lengthened), "{plain} {lengthened}");
+    let mut random = Random(5);
+    let mut rays = Vec::new();
+    for _ in 0..1000 {
+        let x = GRID * random.unit();
+        let z = GRID * random.unit();
+        rays.push(Segment { from: [x, 30.2, z], to: [x, 16.5, z] });
+    }
+    let wall = wall_at(16.5);
+    let plain = RayDensity::new(&bounds(), &rays, 0.0).unwrap();
+    assert_eq!(plain.entries(&wall), 500.0);
+    let longer = RayDensity::new(&bounds(), &ending_at(&rays, 15.9), 0.0).unwrap();
+    assert_eq!(longer.entries(&wall), 1000.0);
+    // On average over walls at all heights, half of the rays seem to enter, and three quarters of
+    // the extended rays.
+    let mut plain_entries = 0.0;
+    let mut extended_entries = 0.0;
+    for i in 0..64u8 {
+        let height = 16.0 + f32::from(i) / 64.0;
+        let ending = ending_at(&rays, height);
+        let wall = wall_at(height);
+        plain_entries += RayDensity::new(&bounds(), &ending, 0.0).unwrap().entries(&wall);
+        extended_entries += RayDensity::of_rays(&bounds(), &ending, 0.0).unwrap().entries(&wall);
+    }
+    let plain_share = plain_entries / 64.0 / 1000.0;
+    let extended_share = extended_entries / 64.0 / 1000.0;
+    assert!((0.45..0.55).contains(&plain_share), "{plain_share}");
+    assert!((0.7..0.8).contains(&extended_share), "{extended_share}");
+}
+
+/// Returns a flat box across the bounds.
+fn wall_at(height: f32) -> Aabb {
+    Aabb::from([[0.0, height, 0.0], [GRID, height, GRID]])
+}
+
+/// Returns vertical rays that end at this height instead.
+fn ending_at(rays: &[Segment], height: f32) -> Vec<Segment> {
+    let end = |ray: &Segment| [ray.to[0], height, ray.to[2]];
+    rays.iter().map(|ray| Segment { to: end(ray), ..*ray }).collect()
 }

@@ -8,21 +8,21 @@ use bvh_core::{
     validate,
 };
 use glam::Vec3;
-use support::{Random, SHAPES, ball, boxes, chain, grid_box, rays, scaled, soup, tree};
+use support::{Random, SHAPES, ball, bits, boxes, chain, grid_box, rays, scaled, soup, tree};
 
-/// The answer of testing every triangle, and whether any was hit.
+/// Returns the nearest hit by testing every triangle.
 fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
     let shear = Shear::new(ray);
     let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
-    let n = triangles.len() as u32;
-    let nearest = nearest_hit_of_all(n, ray, test, &mut ());
-    assert_eq!(any_hit_of_all(n, |id| test(id, ray.t_max()).is_some(), &mut ()), nearest.is_some());
+    let objects = triangles.len() as u32;
+    let nearest = nearest_hit_of_all(objects, ray, test, &mut ());
+    let any = any_hit_of_all(objects, |id| test(id, ray.t_max()).is_some(), &mut ());
+    assert_eq!(any, nearest.is_some());
     nearest
 }
 
 fn check(name: &str, tree: &Bvh, triangles: &[Triangle], ray: &Ray, expected: Option<Hit>) {
     let hit = nearest_hit(tree, triangles, ray);
-    let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
     assert_eq!(bits(hit), bits(expected), "{name}: {ray:?}");
     assert_eq!(any_hit(tree, triangles, ray), expected.is_some(), "{name}: {ray:?}");
 }
@@ -36,17 +36,20 @@ fn every_tree_answers_as_brute_force_at_every_scale() {
         for exponent in [-60, 0, 60] {
             let triangles = scaled(&scene, libm::exp2f(exponent as f32));
             let boxes = boxes(&triangles);
-            let mut trees: Vec<Bvh> = SHAPES.iter().map(|&shape| tree(&boxes, shape, &mut random)).collect();
+            let mut trees = SHAPES.map(|shape| tree(&boxes, shape, &mut random)).to_vec();
             trees.push(chain(&boxes));
-            let collapsed: Vec<Bvh> =
-                trees.iter().map(|tree| collapse_leaves(tree, &SahConstants::default())).collect();
-            trees.extend(collapsed);
-            trees.iter().for_each(|tree| validate(tree, &boxes).unwrap());
+            for index in 0..trees.len() {
+                trees.push(collapse_leaves(&trees[index], &SahConstants::default()));
+            }
+            for tree in &trees {
+                validate(tree, &boxes).unwrap();
+            }
             for ray in rays(&triangles, 3000, &mut random) {
                 let expected = brute_force(&triangles, &ray);
                 hits += usize::from(expected.is_some());
-                for (i, tree) in trees.iter().enumerate() {
-                    check(&format!("{name} * 2^{exponent}, tree {i}"), tree, &triangles, &ray, expected);
+                for (index, tree) in trees.iter().enumerate() {
+                    let case = format!("{name} * 2^{exponent}, tree {index}");
+                    check(&case, tree, &triangles, &ray, expected);
                 }
             }
         }
@@ -57,31 +60,36 @@ fn every_tree_answers_as_brute_force_at_every_scale() {
 #[test]
 fn spheres_and_boxes_are_traced_by_the_same_functions() {
     let mut random = Random(2);
-    let spheres: Vec<Sphere> =
-        (0..75).map(|_| Sphere { center: random.point(), radius: 0.01 + 0.2 * random.unit() }).collect();
+    let mut spheres = Vec::new();
+    for _ in 0..75 {
+        spheres.push(Sphere { center: random.point(), radius: 0.01 + 0.2 * random.unit() });
+    }
     let boxes: Vec<Aabb> = spheres.iter().map(Sphere::aabb).collect();
     let trees = SHAPES.map(|shape| tree(&boxes, shape, &mut random));
     for _ in 0..5000 {
-        let (origin, target) = (random.point() * random.of(&[1.0, 100.0]), random.point());
+        let origin = random.point() * random.of(&[1.0, 100.0]);
+        let target = random.point();
         let ray = Ray::half_line(origin, target - origin).unwrap();
         let sphere = |id: u32, t_max| spheres[id as usize].intersect(&ray, t_max);
-        // A box is met where its interval begins.
-        let solid = |id: u32, t_max| clip_to_box(&ray, &boxes[id as usize], ray.t_min(), t_max);
-        let n = spheres.len() as u32;
-        let expected =
-            (nearest_hit_of_all(n, &ray, sphere, &mut ()), nearest_hit_of_all(n, &ray, solid, &mut ()));
+        // A box is hit where its interval begins.
+        let solid_box = |id: u32, t_max| clip_to_box(&ray, &boxes[id as usize], ray.t_min(), t_max);
+        let objects = spheres.len() as u32;
+        let nearest_sphere = nearest_hit_of_all(objects, &ray, sphere, &mut ());
+        let nearest_box = nearest_hit_of_all(objects, &ray, solid_box, &mut ());
         for tree in &trees {
-            let found = (nearest_hit(tree, &spheres, &ray), nearest_hit_by(tree, &ray, solid, &mut ()));
-            assert_eq!(found, expected, "{ray:?}");
+            assert_eq!(nearest_hit(tree, &spheres, &ray), nearest_sphere, "{ray:?}");
+            assert_eq!(nearest_hit_by(tree, &ray, solid_box, &mut ()), nearest_box, "{ray:?}");
         }
     }
 }
 
 #[test]
 fn a_chain_of_twenty_thousand_is_traced_from_both_ends() {
-    let triangles: Vec<Triangle> = (0..20_000)
-        .map(|i| Triangle([Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p + Vec3::Z * (i as f32))))
-        .collect();
+    let mut triangles = Vec::new();
+    for i in 0..20_000u16 {
+        let shift = Vec3::Z * f32::from(i);
+        triangles.push(Triangle([shift, Vec3::X + shift, Vec3::Y + shift]));
+    }
     let tree = chain(&boxes(&triangles));
     assert_eq!(tree.depth(), triangles.len() - 1);
     for (z, direction, object) in [(-1.0, 1.0, 0), (30_000.0, -1.0, 19_999)] {
@@ -105,7 +113,8 @@ fn no_ray_leaves_a_closed_mesh_through_an_edge_or_a_vertex() {
             let Triangle([a, b, _]) = random.of(&triangles);
             let target = a + (b - a) * random.of(&[0.0, 0.5, 1.0, 1.0 / 3.0]);
             let origin = random.point() * 0.5;
-            // Next to an edge that reaches far, the rounding of its ends is large beside the distance to it.
+            // Close to a long edge the rounding of its ends is large compared with the distance to
+            // the edge.
             let close = target * (1.0 - random.of(&[1e-2, 1e-4, 1e-6])) + random.point() * target.abs() * 1e-7;
             for origin in [origin, Vec3::ZERO, close] {
                 let direction = (target - origin) * random.of(&[1.0, 1e5]);
@@ -118,29 +127,26 @@ fn no_ray_leaves_a_closed_mesh_through_an_edge_or_a_vertex() {
     }
 }
 
-/// Two triangles side by side share an edge along one axis, and with it a face of both boxes. A ray that starts close
-/// to the edge and runs nearly along it meets the sheet next to the edge, where the rounding of the far corners moves
-/// the side on which a triangle is hit by far more than the rounding of the box test moves its box: without
-/// [`Slabs::MARGIN`](bvh_core::Slabs::MARGIN) this loses one of these rays in thirty.
+/// Two adjacent triangles share an edge along one axis, and their boxes share a face. A ray that
+/// starts close to the edge and runs nearly along it hits the sheet next to the edge. There the
+/// rounding of the far corners moves the decision which triangle is hit by far more than the
+/// rounding of the box test moves the boxes. Without [`Slabs::MARGIN`](bvh_core::Slabs::MARGIN) one
+/// of thirty such rays is lost.
 #[test]
 fn no_ray_slips_between_the_boxes_beside_a_long_edge() {
     let mut random = Random(4);
     for axis in 0..3 {
-        let place = |x: f32, y: f32, z: f32| {
-            let mut p = Vec3::ZERO;
-            (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (x, y, z);
-            p
-        };
-        let ends = [place(0.0, -1.0, 0.0), place(0.0, 1.0, 0.0)];
-        let triangles = [-1.0, 1.0].map(|x| Triangle([ends[0], ends[1], place(x, 0.0, 0.0)]));
+        let ends = [turned(axis, 0.0, -1.0, 0.0), turned(axis, 0.0, 1.0, 0.0)];
+        let triangles = [-1.0, 1.0].map(|x| Triangle([ends[0], ends[1], turned(axis, x, 0.0, 0.0)]));
         let tree = tree(&boxes(&triangles), SHAPES[0], &mut random);
         let wide = WideBvh::new(&tree, &triangles).unwrap();
         for _ in 0..20_000 {
             let height = random.of(&[1e-3, 1e-4, 1e-5, 1e-6]) * (1.0 + random.unit());
-            let (aside, rise) = (random.unit() - 0.5, 0.3 + 0.6 * random.unit());
+            let aside = random.unit() - 0.5;
+            let rise = 0.3 + 0.6 * random.unit();
             let start = -aside / rise * height + (random.unit() - 0.5) * 2e-7;
-            let origin = place(start, random.unit() - 0.5, -height);
-            let ray = Ray::half_line(origin, place(aside, 1.0, rise)).unwrap();
+            let origin = turned(axis, start, random.unit() - 0.5, -height);
+            let ray = Ray::half_line(origin, turned(axis, aside, 1.0, rise)).unwrap();
             let shear = Shear::new(&ray);
             let test = |id: u32| triangles[id as usize].intersect(&shear, ray.t_max()).is_some();
             assert!(any_hit_by(&tree, &ray, test, &mut ()), "axis {axis}: {ray:?}");
@@ -149,34 +155,45 @@ fn no_ray_slips_between_the_boxes_beside_a_long_edge() {
     }
 }
 
+/// Returns the point x, y, z with its coordinates turned so that x is along `axis`.
+fn turned(axis: usize, x: f32, y: f32, z: f32) -> Vec3 {
+    let mut point = Vec3::ZERO;
+    point[axis] = x;
+    point[(axis + 1) % 3] = y;
+    point[(axis + 2) % 3] = z;
+    point
+}
+
+/// Counts the tests of the search for the nearest of some boxes.
+fn tests_of_nearest(tree: &Bvh, boxes: &[Aabb], ray: &Ray) -> TestCounts {
+    let mut counts = TestCounts::default();
+    let test = |id: u32, t_max| clip_to_box(ray, &boxes[id as usize], 0.0, t_max);
+    nearest_hit_by(tree, ray, test, &mut counts);
+    counts
+}
+
+/// Counts the tests of the search for any object, where every object is hit.
+fn tests_of_any(tree: &Bvh, ray: &Ray) -> TestCounts {
+    let mut counts = TestCounts::default();
+    any_hit_by(tree, ray, |_| true, &mut counts);
+    counts
+}
+
 #[test]
 fn counts_include_the_root_and_stop_at_the_first_hit() {
-    let boxes: Vec<Aabb> =
-        (0..4).map(|i| Aabb { min: Vec3::X * (2 * i) as f32, max: Vec3::X * (2 * i) as f32 + 1.0 }).collect();
+    let boxes = [0.0, 2.0, 4.0, 6.0].map(|x| Aabb { min: Vec3::X * x, max: Vec3::X * x + 1.0 });
     let tree = chain(&boxes);
-    let count = |ray: &Ray, any: bool| {
-        let mut counts = TestCounts::default();
-        if any {
-            any_hit_by(&tree, ray, |_| true, &mut counts);
-        } else {
-            nearest_hit_by(
-                &tree,
-                ray,
-                |id, t_max| clip_to_box(ray, &boxes[id as usize], 0.0, t_max),
-                &mut counts,
-            );
-        }
-        (counts.boxes, counts.objects)
-    };
     let middle = Vec3::splat(0.5);
     let forwards = Ray::half_line(middle - Vec3::X, Vec3::X).unwrap();
-    assert_eq!(count(&forwards, true), (3, 1));
-    assert_eq!(count(&forwards, false), (3, 1));
+    assert_eq!(tests_of_any(&tree, &forwards), TestCounts { boxes: 3, objects: 1 });
+    assert_eq!(tests_of_nearest(&tree, &boxes, &forwards), TestCounts { boxes: 3, objects: 1 });
     let backwards = Ray::half_line(middle + Vec3::X * 9.0, -Vec3::X).unwrap();
-    assert_eq!(count(&backwards, true), (7, 1));
+    assert_eq!(tests_of_any(&tree, &backwards), TestCounts { boxes: 7, objects: 1 });
+    // A ray that misses the root tests its box and nothing else.
     let past = Ray::half_line(middle + Vec3::X * 9.0, Vec3::X).unwrap();
-    assert_eq!(count(&past, false), (1, 0));
+    assert_eq!(tests_of_nearest(&tree, &boxes, &past), TestCounts { boxes: 1, objects: 0 });
     assert_eq!(nearest_hit_by(&Bvh::default(), &past, |_, _| Some(0.0), &mut ()), None);
+    // A ray with an empty range does so too.
     let empty = Ray::new(middle - Vec3::X, Vec3::X, 2.0, 1.0).unwrap();
-    assert_eq!(count(&empty, false), (1, 0));
+    assert_eq!(tests_of_nearest(&tree, &boxes, &empty), TestCounts { boxes: 1, objects: 0 });
 }

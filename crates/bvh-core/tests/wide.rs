@@ -141,6 +141,23 @@ fn distances_that_underflow_are_answered_alike() {
 }
 
 #[test]
+fn a_range_that_ends_at_either_zero_has_the_same_bits_from_every_kernel() {
+    let mut random = Random(4);
+    let sheet =
+        |x: f32| Triangle([Vec3::new(x, -1.0, 0.0), Vec3::new(x + 1.0, -1.0, 0.0), Vec3::new(x, 3.0, 0.0)]);
+    let triangles: Vec<Triangle> = (0..20).map(|x| sheet(x as f32)).collect();
+    let layouts = layouts(&triangles, &mut random);
+    let ray = |i: usize| {
+        let side = [1.0, -1.0][i % 2];
+        Ray::new(Vec3::new(0.3 * i as f32, 0.0, 0.0), Vec3::new(0.0, 0.0, side), 0.0, [-0.0, 0.0][i / 2 % 2])
+            .unwrap()
+    };
+    let rays: Vec<Ray> = (0..64).map(ray).collect();
+    let hits = check("sheets that rays begin in", &triangles, &layouts, &rays);
+    assert!(hits > 40, "{hits} of 64");
+}
+
+#[test]
 fn coordinates_down_to_denormal_ones_are_answered_alike() {
     let mut random = Random(3);
     for exponent in [-149, -140, -127, -110, -91, -88] {

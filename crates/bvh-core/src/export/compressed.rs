@@ -1,4 +1,5 @@
-//! Nodes of eight children in 80 bytes, whose boxes are rounded outwards to a grid of 8 bits per axis.
+//! Nodes of eight children in 80 bytes. The children's boxes are rounded outwards to a grid of 8
+//! bits per axis.
 
 use super::unpack::{Part, unpack};
 use crate::collapse::{binary, collect};
@@ -6,30 +7,33 @@ use crate::wide::{areas, children, decide};
 use crate::{Aabb, Bvh, InvalidBvh, Node, validate};
 use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
+use core::ops::Range;
 use glam::{DVec3, Vec3};
 
-/// The most objects of a leaf: their number is written in unary.
+/// The largest number of objects in a leaf. Three bits store the number in unary.
 const LEAF: usize = 3;
 
-/// A node of eight children, or fewer, in 80 bytes.
+/// A node of up to eight children in 80 bytes.
 ///
 /// | bytes | type | field |
 /// |---|---|---|
 /// | 0..12 | `f32[3]` | lower corner of the node: the grid's origin |
-/// | 12..15 | `u8[3]` | the grid's step along x, y and z: a power of two, of which this is the `f32`'s exponent |
+/// | 12..15 | `u8[3]` | the grid's step along x, y and z: the biased exponent of an `f32` power of two |
 /// | 15 | `u8` | bit `i` is set if the child in slot `i` is a node |
-/// | 16..20 | `u32` | index of the first child that is a node; the others follow in the order of their slots |
+/// | 16..20 | `u32` | index of the first child that is a node; other such children follow in the order of their slots |
 /// | 20..24 | `u32` | position of the first object id of the node's leaves |
-/// | 24..32 | `u8[8]` | of each slot: 0 if it is empty; `0b001` in the upper bits and 24 + slot in the lower five for a node; for a leaf, as many ones as it has objects (1 to 3) in the upper three bits, and the position of its first object after the node's first in the lower five |
+/// | 24..32 | `u8[8]` | one byte per slot. Empty slot: 0. Node: `0b001` in the upper three bits and 24 + slot in the lower five. Leaf: as many ones as it has objects (1 to 3) in the upper three bits, and the position of its first object relative to the node's first in the lower five |
 /// | 32..56 | `u8[3][8]` | lower x of all slots, lower y, lower z, in steps from the origin |
 /// | 56..80 | `u8[3][8]` | upper x, upper y, upper z |
 ///
-/// Slots are filled so that the child in slot `i` lies on the upper side along x if bit 2 of `i` is set, along y for bit 1, along z for
-/// bit 0, as far as that can be: rays visit slots in the order of `slot ^ octant` without sorting.
+/// The child in slot `i` is on the upper side along x if bit 2 of `i` is set, along y for bit 1,
+/// and along z for bit 0, as far as the children allow it. Rays can therefore visit slots in the
+/// order of `slot ^ octant` without sorting.
 ///
-/// Source: Ylitie, Karras & Laine 2017, 'Efficient incoherent ray traversal on GPUs through compressed wide BVHs', section 3. Differs from
-/// the paper: slots are assigned greedily, as in `tinybvh`. `tinybvh` keeps the exponents less 127, `obvhs` the planes in the order
-/// lower x, upper x, lower y and so on; all else is the same in both.
+/// Source: Ylitie, Karras & Laine 2017, 'Efficient incoherent ray traversal on GPUs through
+/// compressed wide BVHs', section 3. Differs from the paper: slots are assigned greedily, as in
+/// `tinybvh`. `tinybvh` stores exponents minus 127. `obvhs` stores the planes in the order lower x,
+/// upper x, lower y and so on. Everything else is the same in both libraries.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct CompressedNode {
@@ -43,57 +47,65 @@ pub struct CompressedNode {
     high: [[u8; 8]; 3],
 }
 
-/// A tree as compressed nodes, the root first, and its objects in their order.
+/// A tree of compressed nodes, the root first, and its object ids.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CompressedBvh {
     /// The nodes.
     pub nodes: Vec<CompressedNode>,
-    /// The object ids, in the order in which leaves name them.
+    /// The object ids in the order of the leaves.
     pub prim_ids: Vec<u32>,
 }
 
-/// The size of a grid's step. An exponent of 0 would stand for a step of 0.
+/// Returns the step of a grid. An exponent of 0 would mean a step of 0.
 fn step(exponent: u8) -> f32 {
     f32::from_bits(u32::from(exponent) << 23)
 }
 
 impl CompressedNode {
-    /// A node around `aabb` without children.
+    /// Makes a node around `aabb` without children.
     fn around(aabb: &Aabb) -> Self {
-        let exponent = |extent: f64| {
-            let exponent = (libm::ilogb(extent / 255.0).saturating_add(127)).clamp(1, 253) as u8;
-            exponent + u8::from(255.0 * f64::from(step(exponent)) < extent)
-        };
-        Self { origin: aabb.min, exponents: aabb.extent().to_array().map(exponent), ..Self::zeroed() }
+        let extent = aabb.extent().to_array();
+        Self { origin: aabb.min, exponents: extent.map(exponent), ..Self::zeroed() }
     }
 
-    /// Writes the box of a slot, rounded outwards. In f64 all is exact but the quotient by a power of two, which is too.
+    /// Stores the box of a slot, rounded outwards. All f64 operations are exact, the division by a
+    /// power of two included.
     fn set_box(&mut self, slot: usize, aabb: &Aabb) {
         let steps = DVec3::from(self.exponents.map(|exponent| f64::from(step(exponent))));
-        let (low, high) = (
-            (aabb.min.as_dvec3() - self.origin.as_dvec3()) / steps,
-            (aabb.max.as_dvec3() - self.origin.as_dvec3()) / steps,
-        );
+        let origin = self.origin.as_dvec3();
+        let low = (aabb.min.as_dvec3() - origin) / steps;
+        let high = (aabb.max.as_dvec3() - origin) / steps;
         for axis in 0..3 {
             self.low[axis][slot] = libm::floor(low[axis]) as u8;
             self.high[axis][slot] = libm::ceil(high[axis]) as u8;
         }
     }
 
-    /// The box of a slot. Rounding to f32 is monotone: what is inside the grid's planes is inside the rounded ones.
+    /// Returns the box of a slot. Rounding to f32 is monotone: everything inside the grid's planes
+    /// is inside the rounded planes.
     fn slot_box(&self, slot: usize) -> Aabb {
-        let plane = |planes: &[[u8; 8]; 3]| {
-            let steps =
-                Vec3::from([0, 1, 2].map(|axis| f32::from(planes[axis][slot]) * step(self.exponents[axis])));
-            (self.origin + steps).min(Vec3::MAX)
-        };
-        Aabb { min: plane(&self.low), max: plane(&self.high) }
+        Aabb { min: self.corner(slot, &self.low), max: self.corner(slot, &self.high) }
+    }
+
+    fn corner(&self, slot: usize, planes: &[[u8; 8]; 3]) -> Vec3 {
+        let offset = [0, 1, 2].map(|axis| f32::from(planes[axis][slot]) * step(self.exponents[axis]));
+        // The last plane of a huge grid may overflow, and boxes are finite.
+        (self.origin + Vec3::from(offset)).min(Vec3::MAX)
     }
 }
 
+/// Returns the exponent of the smallest step of which 255 cover `extent`.
+fn exponent(extent: f64) -> u8 {
+    let rounded_down = libm::ilogb(extent / 255.0).saturating_add(127);
+    let exponent = rounded_down.clamp(1, 253) as u8;
+    // One more where the power of two below is too small.
+    exponent + u8::from(255.0 * f64::from(step(exponent)) < extent)
+}
+
 impl CompressedBvh {
-    /// The compressed nodes of `tree`, valid over `boxes`, of least expected time for a random line among those that leave nodes of
-    /// the tree out. Larger leaves are divided into leaves of three objects at most. O(objects).
+    /// Compresses `tree`, which must be valid over `boxes`. Of all wide trees that result from
+    /// removing nodes of `tree`, this is the one with the least expected time for a random line.
+    /// Leaves of more than three objects are divided first. O(objects).
     pub fn new(tree: &Bvh, boxes: &[Aabb]) -> Result<Self, InvalidBvh> {
         validate(tree, boxes)?;
         let mut compressed = Self::default();
@@ -104,17 +116,20 @@ impl CompressedBvh {
         let visits = areas(tree);
         let decisions = decide(tree, &visits, |objects| (objects <= LEAF as u32).then_some(1.0));
         compressed.nodes.push(CompressedNode::around(&tree.nodes[0].aabb));
+        // The nodes of `tree` that the compressed nodes stand for, in the same order.
         let mut subtrees = alloc::vec![0];
-        let mut at = 0;
-        while let Some(&subtree) = subtrees.get(at) {
+        let mut index = 0;
+        while let Some(&subtree) = subtrees.get(index) {
+            // A root that is a leaf becomes a node with one child.
             let (below, count) = match decisions[subtree].leaf {
                 true => ([subtree; 8], 1),
                 false => children(tree, &decisions, subtree),
             };
             let slots = slots(&tree.nodes[subtree].aabb, &below[..count], tree);
-            let (first_node, first_object) = (compressed.nodes.len(), compressed.prim_ids.len());
-            let mut node = compressed.nodes[at];
-            (node.first_node, node.first_object) = (first_node as u32, first_object as u32);
+            let first_object = compressed.prim_ids.len();
+            let mut node = compressed.nodes[index];
+            node.first_node = compressed.nodes.len() as u32;
+            node.first_object = first_object as u32;
             for (slot, child) in slots.into_iter().enumerate() {
                 let Some(child) = child else { continue };
                 let aabb = &tree.nodes[child].aabb;
@@ -131,24 +146,30 @@ impl CompressedBvh {
                     compressed.nodes.push(CompressedNode::around(aabb));
                 }
             }
-            compressed.nodes[at] = node;
-            at += 1;
+            compressed.nodes[index] = node;
+            index += 1;
         }
         Ok(compressed)
     }
 
-    /// The tree of compressed nodes, with up to eight children per node and the boxes as the grids have them: too large by up to a
-    /// step, and so not always inside their parent's. [`Bvh::refit`] makes them tight. Traversals find in either what they
-    /// find in the tree that was compressed. Refuses indices out of bounds and nodes with two parents. O(nodes).
+    /// Makes a tree from the compressed nodes, with up to eight children per node. Boxes keep the
+    /// rounding of the grids: they are too large by up to a step, and not always inside their
+    /// parent's box. [`Bvh::refit`] makes them tight. With either boxes, traversals find the same
+    /// hits as in the tree that was compressed. Rejects indices out of bounds and nodes with two
+    /// parents. O(nodes).
     pub fn decode(&self) -> Result<Bvh, InvalidBvh> {
-        unpack(self.nodes.len(), &self.prim_ids, None, |from, parts| {
-            let node = &self.nodes[from];
+        unpack(self.nodes.len(), &self.prim_ids, None, |index, parts| {
+            let node = &self.nodes[index];
             let mut child = node.first_node as usize;
-            for (slot, &meta) in node.meta.iter().enumerate().filter(|(_, meta)| **meta > 0) {
+            for (slot, &meta) in node.meta.iter().enumerate() {
+                if meta == 0 {
+                    continue;
+                }
                 let part = if node.inner >> slot & 1 == 1 {
                     child += 1;
                     Part::Node(child - 1)
                 } else {
+                    // A saturated sum of a forged node is out of range, and `unpack` rejects it.
                     let first = node.first_object.saturating_add(u32::from(meta & 31));
                     Part::Leaf { first, count: (meta >> 5).count_ones() }
                 };
@@ -159,46 +180,58 @@ impl CompressedBvh {
     }
 }
 
-/// The binary tree with its larger leaves halved, in their order.
+/// Halves the larger leaves of a binary tree, in the order of their objects.
 fn with_small_leaves(mut tree: Bvh, boxes: &[Aabb]) -> Bvh {
-    let mut at = 0;
-    while at < tree.nodes.len() {
-        let prims = tree.nodes[at].prims();
+    let mut index = 0;
+    // The halves are appended, and so they are visited and halved again if necessary.
+    while index < tree.nodes.len() {
+        let prims = tree.nodes[index].prims();
         if prims.len() > LEAF {
             let middle = prims.start + prims.len() / 2;
-            let halves = [prims.start..middle, middle..prims.end].map(|half| {
-                let ids = tree.prim_ids[half.clone()].iter();
-                let aabb = ids.fold(Aabb::EMPTY, |around, &id| around.union(&boxes[id as usize]));
-                Node::leaf(aabb, half.start as u32, half.len() as u32)
-            });
-            tree.nodes[at] = Node::inner(tree.nodes[at].aabb, tree.nodes.len() as u32, 2);
-            tree.nodes.extend(halves);
+            let lower = leaf_over(&tree, prims.start..middle, boxes);
+            let upper = leaf_over(&tree, middle..prims.end, boxes);
+            tree.nodes[index] = Node::inner(tree.nodes[index].aabb, tree.nodes.len() as u32, 2);
+            tree.nodes.extend([lower, upper]);
         }
-        at += 1;
+        index += 1;
     }
     tree
 }
 
-/// Puts every child into the slot whose corner of the node it is nearest to, the most decided first.
-fn slots(aabb: &Aabb, below: &[usize], tree: &Bvh) -> [Option<usize>; 8] {
+/// Makes a leaf over a range of a tree's object ids.
+fn leaf_over(tree: &Bvh, prims: Range<usize>, boxes: &[Aabb]) -> Node {
+    let mut aabb = Aabb::EMPTY;
+    for &id in &tree.prim_ids[prims.clone()] {
+        aabb = aabb.union(&boxes[id as usize]);
+    }
+    Node::leaf(aabb, prims.start as u32, prims.len() as u32)
+}
+
+/// Puts every child into the slot whose corner of the node it is nearest to. The child with the
+/// clearest preference is placed first.
+fn slots(aabb: &Aabb, children: &[usize], tree: &Bvh) -> [Option<usize>; 8] {
     let mut slots = [None; 8];
-    let mut open: Vec<usize> = below.to_vec();
+    let mut open: Vec<usize> = children.to_vec();
     let middle = aabb.doubled_centroid();
-    let along = |child: usize, slot: usize| {
-        let towards = DVec3::from([2, 1, 0].map(|bit| if slot >> bit & 1 == 1 { 1.0 } else { -1.0 }));
-        (tree.nodes[child].aabb.doubled_centroid() - middle).dot(towards)
-    };
     while !open.is_empty() {
         let mut best = (f64::NEG_INFINITY, 0, 0);
-        for (at, &child) in open.iter().enumerate() {
-            for slot in (0..8).filter(|&slot| slots[slot].is_none()) {
-                let along = along(child, slot);
-                if along > best.0 {
-                    best = (along, at, slot);
+        for (position, &child) in open.iter().enumerate() {
+            let offset = tree.nodes[child].aabb.doubled_centroid() - middle;
+            for (slot, occupant) in slots.iter().enumerate() {
+                let along = offset.dot(direction(slot));
+                if occupant.is_none() && along > best.0 {
+                    best = (along, position, slot);
                 }
             }
         }
-        slots[best.2] = Some(open.remove(best.1));
+        let (_, position, slot) = best;
+        slots[slot] = Some(open.remove(position));
     }
     slots
+}
+
+/// Returns the direction from a node's centre to the corner of a slot.
+fn direction(slot: usize) -> DVec3 {
+    let side = |bit: usize| if slot >> bit & 1 == 1 { 1.0 } else { -1.0 };
+    DVec3::new(side(2), side(1), side(0))
 }

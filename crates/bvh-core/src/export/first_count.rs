@@ -1,4 +1,5 @@
-//! Conversion from and to the arrays of other libraries: binary nodes with `first` and `count`.
+//! Conversion from and to the arrays of other libraries: binary nodes with the fields `first` and
+//! `count`.
 
 use super::unpack::{Part, unpack};
 use crate::collapse::binary;
@@ -6,8 +7,8 @@ use crate::{Aabb, Bvh, InvalidBvh, NodeKind};
 use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 
-/// A binary node of 32 bytes, as in most libraries. The order of the fields is that of `tinybvh`'s `BVHNode` and of many
-/// GPU tracers; `obvhs` has the same fields in another order.
+/// A binary node of 32 bytes, as in most libraries. The fields have the same order as in `BVHNode`
+/// of `tinybvh` and in many GPU tracers. `obvhs` has the same fields in another order.
 ///
 /// | bytes | type | field |
 /// |---|---|---|
@@ -29,62 +30,75 @@ pub struct FirstCountNode {
 }
 
 impl Bvh {
-    /// The tree as binary nodes, the root first and children after their parents, to be used with the tree's
-    /// [`prim_ids`](Bvh::prim_ids). A node with more than two children becomes several, which halve them in their order.
-    /// O(nodes).
+    /// Converts the tree to binary nodes, the root first and children after their parents. The
+    /// nodes refer to the tree's [`prim_ids`](Bvh::prim_ids). A node with more than two children
+    /// becomes several nodes, which halve the children in their order. O(nodes).
     ///
     /// # Panics
-    /// May panic on a tree that [`validate`](crate::validate()) refuses.
+    /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn to_first_count(&self) -> Vec<FirstCountNode> {
         first_count(&binary(self), 0)
     }
 
-    /// As [`to_first_count`](Self::to_first_count), with an unused node at index 1. So every pair of siblings begins at
-    /// an even index and shares a cache line, as in `tinybvh`.
+    /// Converts the tree like [`to_first_count`](Self::to_first_count), but with an unused node at
+    /// index 1. Every pair of siblings then begins at an even index and shares a cache line, as in
+    /// `tinybvh`.
     ///
     /// # Panics
-    /// May panic on a tree that [`validate`](crate::validate()) refuses.
+    /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn to_first_count_aligned(&self) -> Vec<FirstCountNode> {
         first_count(&binary(self), 1)
     }
 
-    /// The tree of binary nodes and object ids, in depth-first order. Children may come before their parents; nodes and
-    /// ids that cannot be reached from the root are left out. Refuses indices out of bounds and nodes with two parents.
-    /// O(nodes).
+    /// Makes a tree from binary nodes and object ids, in depth-first order. Children may come
+    /// before their parents. Nodes and ids that cannot be reached from the root are skipped.
+    /// Rejects indices out of bounds and nodes with two parents. O(nodes).
     ///
-    /// Does not look at the boxes: [`validate`](crate::validate()) checks them, and [`refit`](Bvh::refit) makes padded
-    /// ones tight.
+    /// Does not check the boxes: [`validate`](crate::validate()) checks boxes, and
+    /// [`refit`](Bvh::refit) makes padded boxes tight.
     pub fn from_first_count(nodes: &[FirstCountNode], prim_ids: &[u32]) -> Result<Self, InvalidBvh> {
-        let box_of = |node: &FirstCountNode| Aabb::from([node.min, node.max]);
-        unpack(nodes.len(), prim_ids, nodes.first().map(box_of), |from, parts| {
-            let FirstCountNode { first, count, .. } = nodes[from];
-            if count > 0 {
-                parts.push((box_of(&nodes[from]), Part::Leaf { first, count }));
+        let root = nodes.first().map(FirstCountNode::aabb);
+        unpack(nodes.len(), prim_ids, root, |index, parts| {
+            let node = &nodes[index];
+            let first = node.first;
+            if node.count > 0 {
+                parts.push((node.aabb(), Part::Leaf { first, count: node.count }));
                 return Ok(());
             }
-            let bad = InvalidBvh::BadChildren { node: from, first, count: 2, nodes: nodes.len() };
-            let (pair, _) = nodes.get(first as usize..).and_then(<[_]>::split_first_chunk::<2>).ok_or(bad)?;
-            parts.extend((first as usize..).zip(pair).map(|(child, node)| (box_of(node), Part::Node(child))));
+            let left = first as usize;
+            let Some([left_node, right_node]) = nodes.get(left..).and_then(<[_]>::first_chunk) else {
+                return Err(InvalidBvh::BadChildren { node: index, first, count: 2, nodes: nodes.len() });
+            };
+            parts.push((left_node.aabb(), Part::Node(left)));
+            parts.push((right_node.aabb(), Part::Node(left + 1)));
             Ok(())
         })
     }
 }
 
-/// The nodes of a binary tree, with `spare` unused ones after the root. In the tree itself pairs of siblings begin at odd
-/// indices.
+impl FirstCountNode {
+    fn aabb(&self) -> Aabb {
+        Aabb::from([self.min, self.max])
+    }
+}
+
+/// Converts the nodes of a binary tree, with `spare` unused nodes after the root. In the tree
+/// itself every pair of siblings begins at an odd index.
 fn first_count(tree: &Bvh, spare: usize) -> Vec<FirstCountNode> {
     let mut nodes = alloc::vec![FirstCountNode::default(); tree.nodes.len()];
+    // A root without children needs no spare node.
     if nodes.len() > 1 {
         nodes.resize(nodes.len() + spare, FirstCountNode::default());
     }
-    let place = |index: usize| if index == 0 { 0 } else { index + spare };
     for (index, node) in tree.nodes.iter().enumerate() {
         let (first, count) = match node.kind() {
-            NodeKind::Inner { first, .. } => (place(first as usize) as u32, 0),
+            NodeKind::Inner { first, .. } => (first + spare as u32, 0),
             NodeKind::Leaf { first, count } => (first, count),
         };
-        let (min, max) = (node.aabb.min.to_array(), node.aabb.max.to_array());
-        nodes[place(index)] = FirstCountNode { min, first, max, count };
+        let place = if index == 0 { 0 } else { index + spare };
+        let min = node.aabb.min.to_array();
+        let max = node.aabb.max.to_array();
+        nodes[place] = FirstCountNode { min, first, max, count };
     }
     nodes
 }
@@ -95,29 +109,42 @@ mod tests {
     use crate::{Node, validate};
     use alloc::vec;
 
-    /// A node of three children over seven boxes, with leaves of up to three.
+    /// Makes a tree over seven boxes. The root has three children, and leaves have up to three
+    /// objects.
     fn scene() -> (Bvh, Vec<Aabb>) {
-        let boxes: Vec<Aabb> =
-            (0..7u8).map(f32::from).map(|x| Aabb::from([[x, 0.0, 0.0], [x + 2.0, 1.0, x]])).collect();
-        let leaf = |first, count| Node::leaf(Aabb::EMPTY, first, count);
-        let inner = |first, count| Node::inner(Aabb::EMPTY, first, count);
-        let nodes = vec![inner(1, 3), leaf(0, 1), inner(4, 2), leaf(6, 1), leaf(1, 3), leaf(4, 2)];
+        let mut boxes = Vec::new();
+        for x in (0..7u8).map(f32::from) {
+            boxes.push(Aabb::from([[x, 0.0, 0.0], [x + 2.0, 1.0, x]]));
+        }
+        let nodes = vec![
+            Node::inner(Aabb::EMPTY, 1, 3),
+            Node::leaf(Aabb::EMPTY, 0, 1),
+            Node::inner(Aabb::EMPTY, 4, 2),
+            Node::leaf(Aabb::EMPTY, 6, 1),
+            Node::leaf(Aabb::EMPTY, 1, 3),
+            Node::leaf(Aabb::EMPTY, 4, 2),
+        ];
         let mut tree = Bvh { nodes, prim_ids: vec![6, 5, 4, 3, 2, 1, 0] };
         tree.refit(&boxes);
         (tree, boxes)
     }
 
     #[test]
-    fn a_binary_tree_survives_the_way_there_and_back() {
+    fn a_binary_tree_survives_a_round_trip() {
         let (tree, boxes) = scene();
         let binary = Bvh::from_first_count(&tree.to_first_count(), &tree.prim_ids).unwrap();
         validate(&binary, &boxes).unwrap();
-        assert_eq!((binary.nodes.len(), &binary.prim_ids), (7, &tree.prim_ids));
+        assert_eq!(binary.nodes.len(), 7);
+        assert_eq!(binary.prim_ids, tree.prim_ids);
         for nodes in [binary.to_first_count(), binary.to_first_count_aligned()] {
             assert_eq!(Bvh::from_first_count(&nodes, &binary.prim_ids), Ok(binary.clone()));
         }
-        let aligned = binary.to_first_count_aligned();
-        assert!(aligned.iter().enumerate().all(|(at, node)| at == 1 || node.count > 0 || node.first % 2 == 0));
+        for (index, node) in binary.to_first_count_aligned().iter().enumerate() {
+            // Index 1 is the unused node.
+            if index != 1 && node.count == 0 {
+                assert_eq!(node.first % 2, 0, "{index}");
+            }
+        }
     }
 
     #[test]
@@ -132,25 +159,25 @@ mod tests {
     }
 
     #[test]
-    fn arrays_that_lead_astray_are_refused() {
+    fn arrays_with_invalid_indices_are_rejected() {
         let (tree, _) = scene();
-        let nodes = tree.to_first_count();
-        let refusal = |at: usize, first, count| {
-            let mut nodes = nodes.clone();
-            (nodes[at].first, nodes[at].count) = (first, count);
-            Bvh::from_first_count(&nodes, &tree.prim_ids).unwrap_err()
-        };
-        assert_eq!(refusal(0, 6, 0), InvalidBvh::BadChildren { node: 0, first: 6, count: 2, nodes: 7 });
-        assert_eq!(
-            refusal(0, u32::MAX, 0),
-            InvalidBvh::BadChildren { node: 0, first: u32::MAX, count: 2, nodes: 7 }
-        );
-        assert!(matches!(refusal(0, 0, 0), InvalidBvh::Parents { parents: 2, .. }));
-        assert_eq!(refusal(1, 7, 1), InvalidBvh::BadLeaf { node: 1, first: 7, count: 1, objects: 7 });
-        assert_eq!(
-            refusal(1, 1, u32::MAX),
-            InvalidBvh::BadLeaf { node: 1, first: 1, count: u32::MAX, objects: 7 }
-        );
-        assert!(matches!(refusal(1, 0, 7), InvalidBvh::ObjectCount { objects: 7, .. }));
+        for first in [6, u32::MAX] {
+            let bad_children = InvalidBvh::BadChildren { node: 0, first, count: 2, nodes: 7 };
+            assert_eq!(rejection(&tree, 0, first, 0), bad_children);
+        }
+        assert!(matches!(rejection(&tree, 0, 0, 0), InvalidBvh::Parents { parents: 2, .. }));
+        for (first, count) in [(7, 1), (1, u32::MAX)] {
+            let bad_leaf = InvalidBvh::BadLeaf { node: 1, first, count, objects: 7 };
+            assert_eq!(rejection(&tree, 1, first, count), bad_leaf);
+        }
+        assert!(matches!(rejection(&tree, 1, 0, 7), InvalidBvh::ObjectCount { objects: 7, .. }));
+    }
+
+    /// Returns the error of the tree's array after the fields of one node were replaced.
+    fn rejection(tree: &Bvh, index: usize, first: u32, count: u32) -> InvalidBvh {
+        let mut nodes = tree.to_first_count();
+        nodes[index].first = first;
+        nodes[index].count = count;
+        Bvh::from_first_count(&nodes, &tree.prim_ids).unwrap_err()
     }
 }

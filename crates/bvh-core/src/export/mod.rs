@@ -1,4 +1,5 @@
-//! Layouts that other libraries and GPU tracers load, each with its bytes documented and with a way back to a [`Bvh`](crate::Bvh).
+//! Layouts that other libraries and GPU tracers load. Each layout is documented byte by byte and
+//! can be converted back to a [`Bvh`](crate::Bvh).
 //!
 //! | layout | bytes | to | from | used by |
 //! |---|---|---|---|---|
@@ -6,25 +7,28 @@
 //! | [children's boxes](AilaLaineNode) | 64 per node | [`to_aila_laine`](crate::Bvh::to_aila_laine) | [`from_aila_laine`](crate::Bvh::from_aila_laine) | `tinybvh` (`BVH_GPU`), after Aila & Laine 2009 |
 //! | [compressed, eight-wide](CompressedNode) | 80 per node | [`CompressedBvh::new`] | [`CompressedBvh::decode`] | `obvhs`, `tinybvh`, after Ylitie et al. 2017 |
 //!
-//! Numbers are little-endian, and nodes are plain data: `bytemuck::cast_slice` gives their bytes on little-endian machines. The way back
-//! refuses indices that lead astray, and traces the same hits as the tree that went there, bit by bit: no box is ever smaller
-//! than in the tree.
+//! Numbers are little-endian, and nodes are plain data: `bytemuck::cast_slice` gives their bytes on
+//! little-endian machines. The conversion back rejects invalid indices. A tree that was converted
+//! back traces the same hits as the original tree, bit by bit, because no box is smaller than in
+//! the original tree.
 //!
-//! [`shaders`] trace rays through them on a GPU; `examples/gpu` of the repository runs them all.
+//! [`shaders`] trace rays through these layouts on a GPU; `examples/gpu` of the repository runs all
+//! of them.
 
 mod aila_laine;
 mod compressed;
 mod first_count;
 mod unpack;
 
-/// Compute shaders, each whole: buffers of nodes, object ids, corners and rays in, one of hits out, as its declarations say.
+/// Complete compute shaders. Each one reads buffers of nodes, object ids, corners and rays, and
+/// writes a buffer of hits; its declarations define the bindings.
 pub mod shaders {
-    /// Traces [`AilaLaineNode`](super::AilaLaineNode)s; GLSL for Vulkan.
+    /// Traces [`AilaLaineNode`](super::AilaLaineNode)s. Written in GLSL for Vulkan.
     pub const AILA_LAINE: &str = include_str!("../../shaders/aila_laine.comp");
-    /// Traces [`FirstCountNode`](super::FirstCountNode)s; WGSL.
+    /// Traces [`FirstCountNode`](super::FirstCountNode)s. Written in WGSL.
     pub const BINARY: &str =
         concat!(include_str!("../../shaders/trace.wgsl"), include_str!("../../shaders/binary.wgsl"));
-    /// Traces [`CompressedNode`](super::CompressedNode)s; WGSL.
+    /// Traces [`CompressedNode`](super::CompressedNode)s. Written in WGSL.
     pub const COMPRESSED: &str =
         concat!(include_str!("../../shaders/trace.wgsl"), include_str!("../../shaders/compressed.wgsl"));
 }

@@ -1,20 +1,20 @@
-//! Why bytes are not accepted as a tree, or a tree is not written.
+//! The errors of tree files.
 
 use crate::InvalidBvh;
 
 /// The latest version of the format.
 pub(super) const LATEST: u32 = 4;
 
-/// Why bytes were not accepted as a tree, or a tree was not written.
+/// The reason why bytes are rejected as a tree file, or why a tree cannot be written.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FileError {
-    /// The first eight bytes are not those of a tree file.
+    /// The first eight bytes are not the magic number of tree files.
     #[error("not a tree file")]
     Magic,
-    /// Fewer bytes than a header has.
+    /// The file is shorter than a header.
     #[error("the file ends within its header")]
     Header,
-    /// Written by an earlier version of this program.
+    /// The file has an earlier version of the format that is no longer read.
     #[error(
         "the tree was written by version {found} of the format; this program reads version {}: bake it again",
         LATEST
@@ -23,7 +23,7 @@ pub enum FileError {
         /// The version found.
         found: u32,
     },
-    /// Written by a later version of this program.
+    /// The file has a later version of the format.
     #[error(
         "the tree was written by version {found} of the format; this program reads version {}: update the program",
         LATEST
@@ -32,27 +32,27 @@ pub enum FileError {
         /// The version found.
         found: u32,
     },
-    /// Written most significant byte first.
+    /// The file was written with the most significant byte first.
     #[error("the file is big-endian; the format is little-endian")]
     Endianness,
-    /// A field of the header has a value that no tree can give it.
+    /// A field of the header has a value that no tree can have.
     #[error("the header's {0} is out of range; the file is damaged")]
     Field(&'static str),
-    /// A method's name has at most 64 bytes of UTF-8, none of them zero.
+    /// The name of a method must have at most 64 bytes of UTF-8, and no zeros.
     #[error("the method's name is not at most 64 bytes of UTF-8 without zeros")]
     Method,
-    /// The file was cut or extended.
+    /// The file is too short or too long.
     #[error("the file has {found} bytes where its header asks for {expected}; it was cut or extended")]
     Length {
         /// Bytes in the file.
         found: u64,
-        /// Bytes that the header asks for.
+        /// Bytes that the header requires.
         expected: u64,
     },
-    /// Some byte is not the one that was written.
+    /// A byte of the file has changed.
     #[error("the file's checksum is wrong; it is damaged")]
     Checksum,
-    /// Saved for a scene of another size.
+    /// The tree was saved for a scene with another number of objects.
     #[error("the file is for a scene of {expected} objects; this one has {found}")]
     ObjectCount {
         /// Objects in the scene.
@@ -60,7 +60,7 @@ pub enum FileError {
         /// Objects in the file.
         expected: usize,
     },
-    /// Saved for another scene, or for the same objects in another order.
+    /// The tree was saved for another scene, or for the same objects in another order.
     #[error(
         "the file is for another scene: its objects' checksum is {expected:08x}, this scene's is {found:08x}"
     )]
@@ -70,14 +70,15 @@ pub enum FileError {
         /// The checksum in the file.
         expected: u32,
     },
-    /// The checksum is right, but the nodes and object ids that it covers are not a tree.
+    /// The checksum is correct, but the nodes and object ids are not a tree.
     #[error(transparent)]
     Tree(#[from] InvalidBvh),
-    /// The visits of a node are no number from 0 to those of its parent, or not as many as there are nodes.
-    #[error("the visits of node {0} are not from 0 to those of its parent")]
+    /// The visits of a node are not between 0 and the visits of its parent, or the number of visits
+    /// is not the number of nodes.
+    #[error("the visits of node {0} are not between 0 and the visits of its parent")]
     Visits(usize),
     /// Views need aligned bytes.
-    #[error("the bytes do not lie at a multiple of {0}; load them instead")]
+    #[error("the address of the bytes is not a multiple of {0}; load them instead")]
     Alignment(usize),
     /// Views need a little-endian machine.
     #[error("this machine is big-endian; load the bytes instead of viewing them")]

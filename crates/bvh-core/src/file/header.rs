@@ -1,28 +1,30 @@
-//! The first 192 bytes of a tree file: format, sizes, cost, origin, and the checksum of the scene.
+//! The header of a tree file, its first 192 bytes: format, sizes, cost, origin, and the checksum of
+//! the scene.
 
 use super::error::{FileError, LATEST};
 use crate::cost::{Objective, SahConstants};
-use crate::{Aabb, MAX_OBJECTS};
+use crate::{Aabb, MAX_OBJECTS, Node};
 use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// The header of a tree file. [The format](super) says where each field lies.
+/// The header of a tree file. [The format](super) documents the position of each field.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
-    /// Number of nodes.
+    /// The number of nodes.
     pub nodes: usize,
-    /// Number of objects.
+    /// The number of objects.
     pub objects: usize,
-    /// Number of object ids in all leaves: more than there are objects if objects are divided among leaves.
+    /// The number of object ids in all leaves. It exceeds the number of objects if objects are
+    /// divided among leaves.
     pub references: usize,
-    /// The objective that `cost` is a value of.
+    /// The objective of `cost`.
     pub objective: Objective,
-    /// The tree's cost when it was saved.
+    /// The cost of the tree when it was saved.
     pub cost: f64,
     /// The seed of the search.
     pub seed: u64,
-    /// The search's work, in nodes made or visited.
+    /// The work of the search, in nodes made or visited.
     pub work: u64,
     /// The [checksum](super::boxes_checksum) of the boxes that the tree was built over.
     pub scene: u32,
@@ -30,35 +32,59 @@ pub struct Header {
     pub bounds: Aabb,
     /// The name of the method that built the tree.
     pub method: String,
-    /// Whether the file says how often rays visit each node; see [`TreeFile::visits`](super::TreeFile::visits).
+    /// Whether the file records how often rays visit each node; see
+    /// [`TreeFile::visits`](super::TreeFile::visits).
     pub has_visits: bool,
 }
 
 impl Header {
-    /// Bytes of a header.
+    /// The number of bytes of a header.
     pub const BYTES: usize = 192;
-    /// The first eight bytes of every tree file, chosen after PNG's: a transfer that converts line ends or clears high
-    /// bits changes them.
+    /// The first eight bytes of every tree file, modelled on PNG's: a transfer that converts line
+    /// ends or clears high bits changes them.
     pub const MAGIC: [u8; 8] = *b"\x89BVH\r\n\x1a\n";
-    /// The latest version of the format, that of trees whose objects are divided among leaves, or whose cost is that of the wide
-    /// layout. This crate also reads versions 2 and 3, and writes them where they suffice, so that older programs read them.
+    /// The latest version of the format. It is written for trees whose objects are divided among
+    /// leaves, and for trees whose cost is the cost of the wide layout. Other trees are written as
+    /// version 2, or 3 with visits. All three versions are read.
     pub const VERSION: u32 = LATEST;
     const WITH_VISITS: u32 = 3;
     const PLAIN: u32 = 2;
-    /// The flag of files of version 4 that have visits.
+    /// The flag of a file of version 4 that has visits.
     const VISITS: u32 = 1;
-    /// Stored in the file's byte order, so that its bytes tell the order.
+    /// A number that is stored in the byte order of the file and thereby identifies it.
     const ENDIANNESS: u32 = 0x0102_0304;
-    /// The box of the root, as in the node.
+    /// The bytes of the root's box. They equal the box in the first node.
     pub(super) const BOUNDS: core::ops::Range<usize> = 80..104;
-    /// Where the fields of version 4 begin.
+    /// The offset of the fields of version 4.
     const REFERENCES: usize = 168;
-    /// The last field, which every other byte of the file is covered by.
+    /// The last field, the checksum of every other byte of the file.
     pub(super) const CHECKSUM: core::ops::Range<usize> = 188..192;
 
-    /// The bytes, with a checksum of 0.
+    /// Returns the header of a file of `length` bytes, of which `beginning` holds at least the first [`BYTES`](Self::BYTES).
+    /// Rejects a file of another length than its header demands, so that nobody has to read it. Does not check the checksum,
+    /// which [`TreeFile::open`](super::TreeFile::open) does.
+    pub fn of_file(beginning: &[u8], length: u64) -> Result<Self, FileError> {
+        let header = Self::decode(beginning)?;
+        let expected = Self::BYTES as u64 + header.sections().iter().sum::<u64>();
+        if length == expected { Ok(header) } else { Err(FileError::Length { found: length, expected }) }
+    }
+
+    /// Returns the bytes of the nodes, of the object ids, and of the visits. Counts are below 2^32, so nothing overflows.
+    pub(super) fn sections(&self) -> [u64; 3] {
+        let nodes = self.nodes as u64;
+        let references = self.references as u64;
+        let visits = if self.has_visits { nodes } else { 0 };
+        [
+            nodes * size_of::<Node>() as u64,
+            references * size_of::<u32>() as u64,
+            visits * size_of::<f32>() as u64,
+        ]
+    }
+
+    /// Returns the bytes of the header, with a checksum of 0.
     pub(super) fn encode(&self) -> Result<Vec<u8>, FileError> {
         let name = self.method.as_bytes();
+        // The name is padded with zeros, so it cannot contain any.
         if name.len() > 64 || name.contains(&0) {
             return Err(FileError::Method);
         }
@@ -80,20 +106,23 @@ impl Header {
         for number in [self.cost, constants[0], constants[1]] {
             bytes.extend_from_slice(&number.to_le_bytes());
         }
-        for coordinate in [self.bounds.min, self.bounds.max].iter().flat_map(|corner| corner.to_array()) {
-            bytes.extend_from_slice(&coordinate.to_le_bytes());
+        for corner in [self.bounds.min, self.bounds.max] {
+            for coordinate in corner.to_array() {
+                bytes.extend_from_slice(&coordinate.to_le_bytes());
+            }
         }
         bytes.extend_from_slice(name);
         bytes.resize(Self::REFERENCES, 0);
         if version == Self::VERSION {
+            let flags = if self.has_visits { Self::VISITS } else { 0 };
             bytes.extend_from_slice(&(self.references as u64).to_le_bytes());
-            bytes.extend_from_slice(&(if self.has_visits { Self::VISITS } else { 0 }).to_le_bytes());
+            bytes.extend_from_slice(&flags.to_le_bytes());
         }
         bytes.resize(Self::BYTES, 0);
         Ok(bytes)
     }
 
-    /// The first version that has all that the file says.
+    /// Returns the first version that can store everything in the file.
     fn version(&self) -> u32 {
         if self.references != self.objects || self.objective == Objective::Layout {
             Self::VERSION
@@ -104,88 +133,137 @@ impl Header {
         }
     }
 
-    /// Reads all fields but the checksum. Of several faults it reports the one that says most about the file: that it
-    /// is no tree file before its byte order, the byte order before the version, the version before any other field.
+    /// Reads all fields except the checksum.
+    ///
+    /// Of several faults it reports the most informative one: first a wrong magic number, then the
+    /// byte order, then the version, then any other field.
     pub(super) fn decode(bytes: &[u8]) -> Result<Self, FileError> {
         let mut fields = Fields(bytes);
         let magic: [u8; 8] = fields.take().ok_or(FileError::Magic)?;
         if magic != Self::MAGIC {
             return Err(FileError::Magic);
         }
-        let (version, mark): ([u8; 4], [u8; 4]) = (fields.need()?, fields.need()?);
+        let version: [u8; 4] = fields.need()?;
+        let mark: [u8; 4] = fields.need()?;
         if mark == Self::ENDIANNESS.to_be_bytes() {
             return Err(FileError::Endianness);
         }
-        let version = u32::from_le_bytes(version);
-        match version {
-            Self::PLAIN..=Self::VERSION => {}
-            found if found < Self::PLAIN => return Err(FileError::OldVersion { found }),
-            found => return Err(FileError::NewVersion { found }),
-        }
+        let version = supported_version(u32::from_le_bytes(version))?;
         if mark != Self::ENDIANNESS.to_le_bytes() {
             return Err(FileError::Field("endianness mark"));
         }
-        let [objective, scene] = [fields.need()?, fields.need()?].map(u32::from_le_bytes);
+        let objective = fields.word()?;
+        let scene = fields.word()?;
         let [nodes, objects, seed, work]: [u64; 4] = fields.words()?;
-        // A binary tree with one object per leaf has the most nodes.
-        let most = |limit: u64| move |count: &u64| *count <= limit;
-        let objects = Some(objects).filter(most(MAX_OBJECTS as u64)).ok_or(FileError::Field("objects"))?;
+        if objects > MAX_OBJECTS as u64 {
+            return Err(FileError::Field("objects"));
+        }
         let [cost, traversal, intersection] = fields.words()?.map(f64::from_bits);
         if !(cost.is_finite() && cost >= 0.0) {
             return Err(FileError::Field("cost"));
         }
-        let constants =
-            SahConstants::new(traversal, intersection).map_err(|_| FileError::Field("constants"))?;
-        let objective = match objective {
-            0 => Objective::InternalArea,
-            1 => Objective::GoldsmithSalmon,
-            2 => Objective::Sah(constants),
-            3 if version == Self::VERSION => Objective::Layout,
-            _ => return Err(FileError::Field("objective")),
-        };
-        if objective != Objective::Sah(constants) && [traversal, intersection].map(f64::to_bits) != [0; 2] {
-            return Err(FileError::Field("constants"));
-        }
+        let objective = decode_objective(objective, version, traversal, intersection)?;
         let mut corners = [[0.0; 3]; 2];
         for coordinate in corners.as_flattened_mut() {
             *coordinate = f32::from_le_bytes(fields.need()?);
         }
-        let name: [u8; 64] = fields.need()?;
-        let end = name.iter().position(|&byte| byte == 0).unwrap_or(name.len());
-        let method = core::str::from_utf8(&name[..end]).map_err(|_| FileError::Method)?.to_owned();
-        let (references, flags): ([u8; 8], [u8; 4]) = (fields.need()?, fields.need()?);
-        let (references, flags) = (u64::from_le_bytes(references), u32::from_le_bytes(flags));
+        let padded_name: [u8; 64] = fields.need()?;
+        let (name, padding) = split_name(&padded_name);
+        let method = core::str::from_utf8(name).map_err(|_| FileError::Method)?;
+        let [stored_references] = fields.words()?;
+        let flags = fields.word()?;
+        // Versions 2 and 3 have zeros instead of these two fields.
         let (references, has_visits, unused) = match version {
-            Self::VERSION => (references, flags & Self::VISITS != 0, u64::from(flags & !Self::VISITS)),
-            _ => (objects, version == Self::WITH_VISITS, references | u64::from(flags)),
+            Self::VERSION => (stored_references, flags & Self::VISITS != 0, u64::from(flags & !Self::VISITS)),
+            _ => (objects, version == Self::WITH_VISITS, stored_references | u64::from(flags)),
         };
-        let possible =
-            |&count: &u64| (objects..=MAX_OBJECTS as u64).contains(&count) && (objects > 0 || count == 0);
-        let references = Some(references).filter(possible).ok_or(FileError::Field("references"))?;
-        let nodes = Some(nodes).filter(most(2 * references)).ok_or(FileError::Field("nodes"))?;
+        // Every object has a reference, and there are none without objects.
+        let fits = (objects..=MAX_OBJECTS as u64).contains(&references);
+        if !fits || (objects == 0 && references > 0) {
+            return Err(FileError::Field("references"));
+        }
+        // A binary tree with one reference per leaf has the most nodes.
+        if nodes > 2 * references {
+            return Err(FileError::Field("nodes"));
+        }
         let reserved: [u8; 8] = fields.need()?;
         let _checksum: [u8; 4] = fields.need()?;
-        if reserved != [0; 8] || unused != 0 || name[end..].iter().any(|&byte| byte != 0) {
+        if reserved != [0; 8] || unused != 0 || padding.iter().any(|&byte| byte != 0) {
             return Err(FileError::Field("padding"));
         }
-        let [nodes, objects, references] = [nodes, objects, references].map(|count| count as usize);
-        let bounds = Aabb::from(corners);
-        Ok(Self { nodes, objects, references, objective, cost, seed, work, scene, bounds, method, has_visits })
+        Ok(Self {
+            nodes: nodes as usize,
+            objects: objects as usize,
+            references: references as usize,
+            objective,
+            cost,
+            seed,
+            work,
+            scene,
+            bounds: Aabb::from(corners),
+            method: method.to_owned(),
+            has_visits,
+        })
     }
+}
+
+/// Rejects versions that this crate does not read.
+fn supported_version(found: u32) -> Result<u32, FileError> {
+    if found < Header::PLAIN {
+        Err(FileError::OldVersion { found })
+    } else if found > Header::VERSION {
+        Err(FileError::NewVersion { found })
+    } else {
+        Ok(found)
+    }
+}
+
+/// Returns the objective with this number. Constants must be 0 unless the objective uses them.
+fn decode_objective(
+    number: u32,
+    version: u32,
+    traversal: f64,
+    intersection: f64,
+) -> Result<Objective, FileError> {
+    let constants = SahConstants::new(traversal, intersection).map_err(|_| FileError::Field("constants"))?;
+    let objective = match number {
+        0 => Objective::InternalArea,
+        1 => Objective::GoldsmithSalmon,
+        2 => return Ok(Objective::Sah(constants)),
+        3 if version == Header::VERSION => Objective::Layout,
+        _ => return Err(FileError::Field("objective")),
+    };
+    // Bits, because −0 is not what `encode` writes.
+    if traversal.to_bits() != 0 || intersection.to_bits() != 0 {
+        return Err(FileError::Field("constants"));
+    }
+    Ok(objective)
+}
+
+/// Splits a name from the zeros after it.
+fn split_name(padded: &[u8; 64]) -> (&[u8], &[u8]) {
+    let end = padded.iter().position(|&byte| byte == 0);
+    padded.split_at(end.unwrap_or(padded.len()))
 }
 
 /// The bytes that are still to be read.
 struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {
+    /// Reads the next `N` bytes; `None` if there are fewer.
     fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
         let (field, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
         Some(*field)
     }
 
+    /// Reads the next `N` bytes.
     fn need<const N: usize>(&mut self) -> Result<[u8; N], FileError> {
         self.take().ok_or(FileError::Header)
+    }
+
+    fn word(&mut self) -> Result<u32, FileError> {
+        Ok(u32::from_le_bytes(self.need()?))
     }
 
     fn words<const N: usize>(&mut self) -> Result<[u64; N], FileError> {

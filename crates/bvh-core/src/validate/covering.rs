@@ -1,35 +1,41 @@
-//! Whether the boxes of an object's leaves together cover it.
+//! The check that the boxes of an object's leaves together cover the object.
 //!
-//! The object's box is cut at the faces of its leaves' boxes until every cell lies in one of them. A cell that no face cuts
-//! and that lies in no box is a gap: what the object has there is in no leaf.
+//! The object's box is cut at the faces of its leaves' boxes until every cell is inside one of
+//! these boxes. A cell that no face cuts and that is inside no box is a gap: the part of the object
+//! in this cell is in no leaf.
 
 use crate::{Aabb, Clip};
 use alloc::vec::Vec;
 
-/// Cells per leaf that are looked at before a covering counts as none: divisions by planes, as builders and searches make
-/// them, need a few, and a forged file must not take for ever.
+/// The number of cells per leaf after which a covering is rejected. Divisions by planes, as
+/// builders and searches make them, need a few cells. A forged file must not keep the check busy
+/// for ever.
 const CELLS_PER_LEAF: usize = 256;
 
-/// Whether everything of `object`, which lies in `whole`, is in one of `leaves`, compared without tolerance.
-pub(super) fn is_covered(objects: &dyn Clip, object: u32, whole: &Aabb, leaves: &[Aabb]) -> bool {
-    let mut left = CELLS_PER_LEAF * leaves.len();
-    let mut open: Vec<Aabb> = alloc::vec![*whole];
+/// Returns whether every part of `object`, whose box is `full`, is in one of `leaves`, compared
+/// without tolerance.
+pub(super) fn is_covered(objects: &dyn Clip, object: u32, full: &Aabb, leaves: &[Aabb]) -> bool {
+    let mut cells_left = CELLS_PER_LEAF * leaves.len();
+    let mut open: Vec<Aabb> = alloc::vec![*full];
     while let Some(region) = open.pop() {
+        // Tightly: a part that is a little too large might stick out of the leaf that was made for
+        // it.
         let part = objects.clip_tightly(object, &region);
         if part == Aabb::EMPTY || leaves.iter().any(|leaf| leaf.contains(&part)) {
             continue;
         }
         let Some((axis, plane)) = face_through(&part, leaves) else { return false };
-        if left == 0 {
+        if cells_left == 0 {
             return false;
         }
-        left -= 1;
+        cells_left -= 1;
         open.extend(part.halves(axis, plane));
     }
     true
 }
 
-/// A face of a leaf's box that cuts `part`: of the box that has the largest part of it.
+/// Returns a face, as axis and coordinate, that cuts `part`. Of all boxes with such a face it takes
+/// the one that shares most with `part`, so that few cuts are needed.
 fn face_through(part: &Aabb, leaves: &[Aabb]) -> Option<(usize, f32)> {
     let mut best = None;
     let mut largest = -1.0;
@@ -38,18 +44,30 @@ fn face_through(part: &Aabb, leaves: &[Aabb]) -> Option<(usize, f32)> {
         if common == Aabb::EMPTY {
             continue;
         }
+        // The sum of the sides instead of the area: flat parts have a size too.
         let extent = common.extent();
         let size = extent.x + extent.y + extent.z;
         if size <= largest {
             continue;
         }
-        let faces = (0..3).flat_map(|axis| [(axis, leaf.min[axis]), (axis, leaf.max[axis])]);
-        let cuts = |&(axis, plane): &(usize, f32)| part.min[axis] < plane && plane < part.max[axis];
-        if let Some(face) = faces.into_iter().find(cuts) {
-            (best, largest) = (Some(face), size);
+        if let Some(face) = face_of(leaf, part) {
+            best = Some(face);
+            largest = size;
         }
     }
     best
+}
+
+/// Returns the first face of a leaf's box that cuts `part`.
+fn face_of(leaf: &Aabb, part: &Aabb) -> Option<(usize, f32)> {
+    for axis in 0..3 {
+        for plane in [leaf.min[axis], leaf.max[axis]] {
+            if part.min[axis] < plane && plane < part.max[axis] {
+                return Some((axis, plane));
+            }
+        }
+    }
+    None
 }
 
 #[cfg(test)]
@@ -58,34 +76,38 @@ mod tests {
     use crate::Triangle;
     use glam::Vec3;
 
+    /// The parts of the only object of `objects` in the two halves of `part`.
+    fn halves_of_part(objects: &dyn Clip, part: &Aabb, axis: usize) -> [Aabb; 2] {
+        let middle = 0.5 * (part.min[axis] + part.max[axis]);
+        part.halves(axis, middle).map(|region| objects.clip(0, &region))
+    }
+
     #[test]
     fn halves_of_halves_cover_a_triangle_until_one_of_them_is_smaller() {
         let triangles = [Triangle([Vec3::ZERO, Vec3::new(3.0, 2.0, 0.1), Vec3::new(2.9, 2.1, 0.3)])];
         let objects = triangles.as_slice();
-        let whole = triangles[0].aabb();
-        let mut leaves = alloc::vec![whole];
-        // Every part is cut at its middle along every axis in turn.
+        let full = triangles[0].aabb();
+        let mut leaves = alloc::vec![full];
+        // Every part is cut at its middle along one axis after the other.
         for axis in [0, 1, 2, 0] {
-            let halves = |part: &Aabb| {
-                let at = 0.5 * (part.min[axis] + part.max[axis]);
-                part.halves(axis, at).map(|region| objects.clip(0, &region))
-            };
-            leaves = leaves.iter().flat_map(halves).filter(|part| *part != Aabb::EMPTY).collect();
+            leaves = leaves.iter().flat_map(|part| halves_of_part(&objects, part, axis)).collect();
+            leaves.retain(|part| *part != Aabb::EMPTY);
         }
         assert!(leaves.len() > 6, "{}", leaves.len());
-        assert!(is_covered(&objects, 0, &whole, &leaves));
-        for at in 0..leaves.len() {
+        assert!(is_covered(&objects, 0, &full, &leaves));
+        for leaf in 0..leaves.len() {
             let mut fewer = leaves.clone();
-            fewer.remove(at);
-            assert!(!is_covered(&objects, 0, &whole, &fewer), "without {at}");
+            fewer.remove(leaf);
+            assert!(!is_covered(&objects, 0, &full, &fewer), "without {leaf}");
             for axis in 0..3 {
                 let mut smaller = leaves.clone();
-                let extent = smaller[at].extent()[axis] as f32;
-                smaller[at].min[axis] += 0.01 * extent;
-                assert!(
-                    extent == 0.0 || !is_covered(&objects, 0, &whole, &smaller),
-                    "{at} smaller along {axis}"
-                );
+                let extent = smaller[leaf].extent()[axis] as f32;
+                // A flat part cannot become smaller.
+                if extent == 0.0 {
+                    continue;
+                }
+                smaller[leaf].min[axis] += 0.01 * extent;
+                assert!(!is_covered(&objects, 0, &full, &smaller), "{leaf} smaller along {axis}");
             }
         }
     }

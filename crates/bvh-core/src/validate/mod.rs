@@ -1,4 +1,5 @@
-//! The one validator: whether nodes and object ids form a tree over exactly the given objects.
+//! The one validator. It checks that nodes and object ids form a tree over exactly the given
+//! objects.
 
 mod covering;
 mod fast_path;
@@ -8,89 +9,96 @@ pub(crate) use fast_path::FastPath;
 use crate::{Aabb, Bvh, BvhView, Clip, InvalidBoxReason, MAX_OBJECTS, NodeKind};
 use alloc::vec::Vec;
 
-/// Why a tree was refused. Nodes and objects are named by index.
+/// The reason why a tree is rejected. Nodes and objects are identified by index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[allow(missing_docs)] // the fields are the indices that the messages name
+#[allow(missing_docs)] // The messages explain the fields.
 pub enum InvalidBvh {
     /// The tree was built for another number of objects.
     #[error("the tree names {named} objects but the scene has {objects}")]
     ObjectCount { named: usize, objects: usize },
-    /// Counts and indices are 31 bits wide.
+    /// Counts and indices have 31 bits.
     #[error("{objects} objects are more than the {MAX_OBJECTS} a tree can hold")]
     TooManyObjects { objects: usize },
-    /// Objects without nodes, or nodes without objects.
+    /// There are objects without nodes, nodes without objects, or too many nodes.
     #[error("the tree has {nodes} nodes over {objects} objects")]
     NodeCount { nodes: usize, objects: usize },
     /// A node's box is not finite or is inverted.
     #[error("the box of node {node} {reason}")]
     Box { node: usize, reason: InvalidBoxReason },
-    /// Children must follow their parent and lie inside the array, two at least.
+    /// There must be at least two children, after their parent and inside the array.
     #[error("inner node {node} names children {first}..{first}+{count}, of {nodes} nodes")]
     BadChildren { node: usize, first: u32, count: u32, nodes: usize },
-    /// A leaf's range must be non-empty and inside `prim_ids`.
+    /// A leaf's range must not be empty and must be inside `prim_ids`.
     #[error("leaf {node} names objects {first}..{first}+{count}, of {objects}")]
     BadLeaf { node: usize, first: u32, count: u32, objects: usize },
-    /// A node that no parent or more than one parent names; only two are counted.
+    /// A node has no parent or more than one parent. At most two parents are counted.
     #[error("node {node} has {parents} parents")]
     Parents { node: usize, parents: u32 },
-    /// An object id outside the scene.
+    /// An object id is outside the scene.
     #[error("leaf {node} names object {object}, of {objects}")]
     BadObject { node: usize, object: u32, objects: usize },
-    /// An object in no leaf or in several.
+    /// An object is in no leaf or in several leaves.
     #[error("object {object} is in {leaves} leaves")]
     Leaves { object: usize, leaves: u32 },
-    /// A child's box that is not inside its parent's.
+    /// A child's box is not inside its parent's box.
     #[error("node {child} is not inside its parent {node}")]
     ChildOutside { node: usize, child: usize },
-    /// An object's box that is not inside its leaf's.
+    /// An object's box is not inside its leaf's box.
     #[error("object {object} is not inside its leaf {node}")]
     ObjectOutside { node: usize, object: usize },
-    /// A part of an object that is in none of its leaves.
+    /// A part of an object is in none of the object's leaves.
     #[error("the leaves of object {object} do not cover it")]
     Uncovered { object: usize },
 }
 
-/// Checks that `tree` is a tree over exactly the objects of `boxes`: every node is reached once, every object is in
-/// exactly one leaf, and every box is finite and lies inside its parent's, compared without tolerance.
-/// O(nodes + objects), no recursion; safe on any bits.
+/// Checks that `tree` is a tree over exactly the objects of `boxes`. Every node must be reached
+/// once, every object must be in exactly one leaf, and every box must be finite and inside its
+/// parent's box. Boxes are compared without tolerance. O(nodes + objects), without recursion; safe
+/// on any bits.
 pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
     check_structure(tree.into(), boxes.len())?;
     check_nesting(tree)?;
-    for (node, at) in tree.nodes.iter().enumerate() {
-        let mut objects = tree.prim_ids[at.prims()].iter().map(|&object| object as usize);
-        if let Some(object) = objects.find(|&object| !at.aabb.contains(&boxes[object])) {
-            return Err(InvalidBvh::ObjectOutside { node, object });
+    for (index, node) in tree.nodes.iter().enumerate() {
+        for &object in &tree.prim_ids[node.prims()] {
+            if !node.aabb.contains(&boxes[object as usize]) {
+                return Err(InvalidBvh::ObjectOutside { node: index, object: object as usize });
+            }
         }
     }
     Ok(())
 }
 
-/// As [`validate`], for trees in which an object may be in several leaves: their boxes together must cover it. `objects` are
-/// those whose boxes are `boxes`. O(nodes + references), and O(k²) for an object that k leaves share.
+/// Checks a tree in which an object may be in several leaves. The boxes of these leaves together
+/// must cover the object; everything else is as for [`validate`]. `boxes` are the boxes of
+/// `objects`. O(nodes + references), and O(k²) for an object that k leaves share.
 pub fn validate_references(tree: &Bvh, boxes: &[Aabb], objects: &dyn Clip) -> Result<(), InvalidBvh> {
     if tree.prim_ids.len() == boxes.len() {
         return validate(tree, boxes);
     }
     find_fault(tree.into(), boxes.len(), Leaves::OneOrMore)?;
     check_nesting(tree)?;
-    let mut leaves_of = alloc::vec![0u32; boxes.len()];
-    tree.prim_ids.iter().for_each(|&object| leaves_of[object as usize] += 1);
+    let mut leaf_counts = alloc::vec![0u32; boxes.len()];
+    for &object in &tree.prim_ids {
+        leaf_counts[object as usize] += 1;
+    }
+    // Objects and leaves, for every divided object.
     let mut parts: Vec<(u32, u32)> = Vec::new();
-    for (node, at) in tree.nodes.iter().enumerate() {
-        for &object in &tree.prim_ids[at.prims()] {
-            if leaves_of[object as usize] > 1 {
-                parts.push((object, node as u32));
-            } else if !at.aabb.contains(&boxes[object as usize]) {
-                return Err(InvalidBvh::ObjectOutside { node, object: object as usize });
+    for (index, node) in tree.nodes.iter().enumerate() {
+        for &object in &tree.prim_ids[node.prims()] {
+            if leaf_counts[object as usize] > 1 {
+                parts.push((object, index as u32));
+            } else if !node.aabb.contains(&boxes[object as usize]) {
+                return Err(InvalidBvh::ObjectOutside { node: index, object: object as usize });
             }
         }
     }
+    // Sorting gathers the leaves of each object.
     parts.sort_unstable();
     let mut leaves = Vec::new();
-    for parts in parts.chunk_by(|a, b| a.0 == b.0) {
-        let object = parts[0].0;
+    for parts_of_object in parts.chunk_by(|a, b| a.0 == b.0) {
+        let (object, _) = parts_of_object[0];
         leaves.clear();
-        leaves.extend(parts.iter().map(|&(_, node)| tree.nodes[node as usize].aabb));
+        leaves.extend(parts_of_object.iter().map(|&(_, leaf)| tree.nodes[leaf as usize].aabb));
         if !covering::is_covered(objects, object, &boxes[object as usize], &leaves) {
             return Err(InvalidBvh::Uncovered { object: object as usize });
         }
@@ -98,35 +106,38 @@ pub fn validate_references(tree: &Bvh, boxes: &[Aabb], objects: &dyn Clip) -> Re
     Ok(())
 }
 
-/// Refuses a child's box that is not inside its parent's.
+/// Rejects a tree in which a child's box is not inside its parent's box.
 fn check_nesting(tree: &Bvh) -> Result<(), InvalidBvh> {
-    for (node, at) in tree.nodes.iter().enumerate() {
-        if let Some(child) = at.children().find(|&child| !at.aabb.contains(&tree.nodes[child].aabb)) {
-            return Err(InvalidBvh::ChildOutside { node, child });
+    for (index, node) in tree.nodes.iter().enumerate() {
+        for child in node.children() {
+            if !node.aabb.contains(&tree.nodes[child].aabb) {
+                return Err(InvalidBvh::ChildOutside { node: index, child });
+            }
         }
     }
     Ok(())
 }
 
-/// [`validate`] without the nesting of the boxes: the properties that make a traversal end and stay in bounds, and boxes
-/// and costs finite.
+/// Checks a tree as [`validate`] does, except for the nesting of the boxes. A tree that passes has
+/// the properties that make traversals end and stay in bounds, and its boxes and costs are finite.
 ///
-/// Loading a tree spends most of its time here, so the most common kind of tree is passed by a check without
-/// unpredictable branches. Any other tree, and any fault, goes to [`find_fault`].
+/// Loading a tree spends most of its time here. The most common kind of tree therefore passes a
+/// check without unpredictable branches. Any other tree, and any fault, goes to [`find_fault`].
 pub(crate) fn check_structure(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
     if FastPath::passes(tree, objects) { Ok(()) } else { find_fault(tree, objects, Leaves::One) }
 }
 
-/// How many leaves an object may be in.
+/// The number of leaves that an object may be in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Leaves {
     One,
     OneOrMore,
 }
 
-/// The first fault in a tree's structure, if it has any.
+/// Returns the first fault in a tree's structure as an error.
 pub(crate) fn find_fault(tree: BvhView, objects: usize, leaves: Leaves) -> Result<(), InvalidBvh> {
-    let (nodes, references) = (tree.nodes.len(), tree.prim_ids.len());
+    let nodes = tree.nodes.len();
+    let references = tree.prim_ids.len();
     if objects.max(references) > MAX_OBJECTS {
         return Err(InvalidBvh::TooManyObjects { objects: objects.max(references) });
     }
@@ -137,18 +148,23 @@ pub(crate) fn find_fault(tree: BvhView, objects: usize, leaves: Leaves) -> Resul
     if (nodes == 0) != (objects == 0) || nodes > 2 * references {
         return Err(InvalidBvh::NodeCount { nodes, objects });
     }
-    let (mut reached, mut placed) = (Marks::new(nodes), Marks::new(objects));
-    // Positions in `prim_ids`. Without splits, each is in one leaf if each object is.
+    let mut reached = Marks::new(nodes);
+    let mut placed = Marks::new(objects);
+    // Positions in `prim_ids`. Without splits they need no marks: every position is in one leaf if
+    // every object is.
     let mut positions = Marks::new(if split { references } else { 0 });
-    // Every node but the root is a child once, every object in a leaf once, if none is repeated and the sums are right.
-    let (mut children, mut prims, mut distinct) = (0, 0, 0);
+    // If nothing is repeated and these sums are right, every node except the root is a child once,
+    // and every object is in a leaf once.
+    let mut children = 0;
+    let mut prims = 0;
+    let mut distinct = 0;
     let mut repeated = None;
     for (index, node) in tree.nodes.iter().enumerate() {
         node.aabb.check().map_err(|reason| InvalidBvh::Box { node: index, reason })?;
         match node.kind() {
             NodeKind::Inner { first, count } => {
                 let range = node.children();
-                // Children after parents: together with one parent each this excludes cycles.
+                // Children after parents and one parent per child: both together exclude cycles.
                 if count < 2 || range.start <= index || range.end > nodes {
                     return Err(InvalidBvh::BadChildren { node: index, first, count, nodes });
                 }
@@ -192,14 +208,14 @@ pub(crate) fn find_fault(tree: BvhView, objects: usize, leaves: Leaves) -> Resul
     {
         return Err(InvalidBvh::Leaves { object, leaves: 0 });
     }
-    // Nothing is named in vain.
+    // Every position in `prim_ids` must be in a leaf.
     if prims < references {
         return Err(InvalidBvh::ObjectCount { named: references, objects: prims });
     }
     Ok(())
 }
 
-/// One bit per index.
+/// A set of indices, one bit per index.
 pub(crate) struct Marks(Vec<u64>);
 
 impl Marks {
@@ -207,10 +223,11 @@ impl Marks {
         Self(alloc::vec![0; len.div_ceil(64)])
     }
 
-    /// Marks an index and returns whether it was unmarked before.
+    /// Marks an index. Returns whether it was not marked before.
     #[inline(always)]
     pub(crate) fn set(&mut self, index: usize) -> bool {
-        let (word, bit) = (&mut self.0[index / 64], 1 << (index % 64));
+        let word = &mut self.0[index / 64];
+        let bit = 1 << (index % 64);
         let is_new = *word & bit == 0;
         *word |= bit;
         is_new
@@ -252,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_of_damage_is_named() {
+    fn every_kind_of_damage_is_reported() {
         type Damage = fn(&mut Bvh);
         let cases: [(Damage, InvalidBvh); 12] = [
             (|t| t.prim_ids.truncate(2), InvalidBvh::ObjectCount { named: 2, objects: 3 }),

@@ -1,15 +1,30 @@
 //! A tree of triangles laid out for speed: eight children per node and four triangles per leaf block, tested at once.
 
+// Of the vector kernels, which not every machine has.
+#![cfg_attr(not(all(feature = "std", target_arch = "x86_64")), allow(dead_code))]
+
+mod answer;
+mod batch;
+mod batches;
 mod build;
+mod in_flight;
+mod instructions;
 mod kernel;
+mod lanes;
 mod layout;
 mod node;
+mod packet;
+mod pairs;
 mod portable;
+mod prepared;
+mod ray_lanes;
 mod refit;
+mod source;
 mod triangles;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod x86;
 
+pub use batches::Coherence;
 pub(crate) use build::{BLOCK_COST, NODE_COST, areas, children, decide};
 pub use kernel::Kernel;
 pub use layout::WideBvh;
@@ -20,19 +35,6 @@ use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_referen
 use alloc::vec::Vec;
 use kernel::STACK;
 use portable::walk;
-
-/// What a caller expects of the rays of a batch. A hint: the answers are the same. What follows is of [`Kernel::Avx512`];
-/// the others trace one ray after the other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Coherence {
-    /// Consecutive rays begin close to each other and run the same way, as those through neighbouring pixels or from
-    /// neighbouring points to a light. They are traced in packets of sixteen where they do, and else as
-    /// incoherent ones.
-    Coherent,
-    /// Consecutive rays have little in common. Two dozen are on their way at a time, a step of each in turn, which hides
-    /// what one alone would wait for: from a hundred rays on it pays.
-    Incoherent,
-}
 
 impl WideBvh {
     /// Boxes that are tested, and counted, at every node.
@@ -117,40 +119,6 @@ impl WideBvh {
             };
         }
         self.any_hit_counted(ray, &mut ())
-    }
-
-    /// [`nearest_hit`](Self::nearest_hit) of every ray, into as many `hits`; [`Hit::MISS`] for a ray that meets nothing.
-    ///
-    /// # Panics
-    /// If `rays` and `hits` are not equally many.
-    pub fn nearest_hits(&self, rays: &[Ray], hits: &mut [Hit], coherence: Coherence) {
-        assert_eq!(rays.len(), hits.len(), "a hit for every ray");
-        #[cfg(all(feature = "std", target_arch = "x86_64"))]
-        if self.kernel == Kernel::Avx512 {
-            // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
-            return unsafe { x86::batch::trace(self, rays, hits, coherence) };
-        }
-        let _ = coherence;
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = self.nearest_hit(ray).unwrap_or(Hit::MISS);
-        }
-    }
-
-    /// [`any_hit`](Self::any_hit) of every ray, into as many `hits`.
-    ///
-    /// # Panics
-    /// If `rays` and `hits` are not equally many.
-    pub fn any_hits(&self, rays: &[Ray], hits: &mut [bool], coherence: Coherence) {
-        assert_eq!(rays.len(), hits.len(), "an answer for every ray");
-        #[cfg(all(feature = "std", target_arch = "x86_64"))]
-        if self.kernel == Kernel::Avx512 {
-            // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
-            return unsafe { x86::batch::trace(self, rays, hits, coherence) };
-        }
-        let _ = coherence;
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = self.any_hit(ray);
-        }
     }
 
     /// The same layout traced by another kernel; `None` if this processor cannot run it. Layouts of trees far deeper

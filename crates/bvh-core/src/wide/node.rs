@@ -61,13 +61,11 @@ impl Child {
         (self.0 & !Self::LEAF) as usize
     }
 
-    #[cfg(all(feature = "std", target_arch = "x86_64"))]
     #[inline(always)]
     pub(crate) fn bits(self) -> u32 {
         self.0
     }
 
-    #[cfg(all(feature = "std", target_arch = "x86_64"))]
     #[inline(always)]
     pub(crate) fn from_bits(bits: u32) -> Self {
         Self(bits)

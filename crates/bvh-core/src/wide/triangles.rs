@@ -1,5 +1,6 @@
 //! Triangles side by side, for tests of one ray against all of them.
 
+use super::lanes::Lanes;
 use crate::{MAX_OBJECTS, Shear, Triangle};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -57,14 +58,12 @@ impl TriangleBlock {
     }
 
     /// All four ids, the first with its mark, as [`LAST`](Self::LAST) says.
-    #[cfg(all(feature = "std", target_arch = "x86_64"))]
     #[inline(always)]
     pub(crate) fn ids(&self) -> *const u32 {
         self.ids.as_ptr()
     }
 
     /// How many lanes are used; they are the first.
-    #[cfg(all(feature = "std", target_arch = "x86_64"))]
     #[inline(always)]
     pub(crate) fn len(&self) -> usize {
         1 + (1..Self::LANES).map(|lane| usize::from(self.ids[lane] != Self::UNUSED)).sum::<usize>()
@@ -101,6 +100,20 @@ impl TriangleBlock {
             candidates |= u32::from(!(negative & positive)) << i;
         }
         candidates
+    }
+
+    /// The corners of the triangle in a lane along these axes, each coordinate in all lanes.
+    ///
+    /// # Safety
+    /// The processor has the instructions; axes are below 3, and `lane` is one.
+    #[inline(always)]
+    pub(crate) unsafe fn splat_corners<L: Lanes>(&self, lane: usize, axes: [usize; 3]) -> [[L; 3]; 3] {
+        // SAFETY: the caller's promises.
+        unsafe {
+            let lanes = self.corners.as_ptr().cast::<f32>().add(lane);
+            let of = |corner: usize, axis: usize| L::splat(*lanes.add((3 * corner + axes[axis]) * Self::LANES));
+            [[of(0, 0), of(0, 1), of(0, 2)], [of(1, 0), of(1, 1), of(1, 2)], [of(2, 0), of(2, 1), of(2, 2)]]
+        }
     }
 
     /// The triangle in a lane, and its id; `None` in an unused lane.

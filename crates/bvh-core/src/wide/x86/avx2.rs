@@ -1,11 +1,17 @@
 //! The AVX2 kernel: eight boxes at once with fused multiply-add, entered children sorted without a branch.
 
-use super::box_ray::BoxRay;
-use super::one_ray::{Instructions, Pending, any, nearest};
-use crate::Ray;
+use super::lanes::F32x8;
+use super::one_ray::{any, nearest};
+use super::sort;
+use crate::wide::answer::Answers;
+use crate::wide::instructions::{Instructions, Pending, last_pending};
 use crate::wide::layout::WideBvh;
 use crate::wide::node::{Child, WideNode};
+use crate::wide::source::Source;
+use crate::wide::{batch, in_flight};
+use crate::{Coherence, Ray};
 use core::arch::x86_64::*;
+use core::ops::Range;
 
 pub(crate) struct Avx2;
 
@@ -19,6 +25,25 @@ pub(crate) unsafe fn nearest_hit(wide: &WideBvh, ray: &Ray) -> (f32, u32) {
 pub(crate) unsafe fn any_hit(wide: &WideBvh, ray: &Ray) -> bool {
     // SAFETY: the caller's promises.
     unsafe { any::<Avx2>(wide, ray) }
+}
+
+/// As [`batch::trace`].
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+pub(crate) unsafe fn trace<A: Answers>(
+    wide: &WideBvh,
+    rays: impl Source,
+    answers: &mut A,
+    coherence: Coherence,
+) {
+    // SAFETY: the caller's promises.
+    unsafe { batch::trace::<Avx2, A>(wide, rays, answers, coherence) }
+}
+
+/// As [`in_flight::trace`].
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+unsafe fn in_flight<A: Answers>(wide: &WideBvh, rays: impl Source, answers: &mut A, numbers: Range<usize>) {
+    // SAFETY: the caller's promises.
+    unsafe { in_flight::trace::<Avx2, A>(wide, rays, answers, numbers) }
 }
 
 /// The lanes of each mask, the lowest first: what compresses eight lanes by one permutation.
@@ -40,17 +65,64 @@ static LANES_OF: [[u8; 8]; 256] = {
 };
 
 impl Instructions for Avx2 {
+    type Boxes = F32x8;
+    type Rays = F32x8;
+    const PACKET: usize = 64;
+    const FLIGHT: usize = 24;
+
     #[inline(always)]
-    unsafe fn boxes(node: &WideNode, ray: &BoxRay, t_min: f32, t_max: f32) -> (__m256, u32) {
-        // SAFETY: the caller's promises; loads are of whole arrays of 32 bytes.
+    unsafe fn sort_keys(entry: F32x8, mask: u32, to: *mut u32) {
+        // SAFETY: the caller's promises.
+        unsafe { sort::descending(compress(sort::keys(entry.0), mask), mask.count_ones(), to) }
+    }
+
+    #[inline(always)]
+    unsafe fn compress_keys(entry: F32x8, mask: u32, to: *mut u32) {
+        // SAFETY: the caller's promises.
+        unsafe { _mm256_storeu_si256(to.cast(), compress(sort::keys(entry.0), mask)) }
+    }
+
+    #[inline(always)]
+    unsafe fn prefetch(line: *const u8) {
+        // SAFETY: a prefetch may name any address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(line.cast()) }
+    }
+
+    #[inline(always)]
+    unsafe fn in_flight<A: Answers>(wide: &WideBvh, rays: impl Source, answers: &mut A, numbers: Range<usize>) {
+        // SAFETY: the caller's promises.
+        unsafe { in_flight(wide, rays, answers, numbers) }
+    }
+
+    #[inline(always)]
+    unsafe fn compress_pending(node: &WideNode, mask: u32, to: *mut Pending) {
+        // SAFETY: the caller's promises.
         unsafe {
-            let (entry, exit) = super::one_ray::interval(node, ray, t_min, t_max);
-            (entry, _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(entry, exit)) as u32)
+            let children = compress(_mm256_load_si256(node.children.as_ptr().cast()), mask);
+            let to = to.cast::<__m256i>();
+            _mm256_storeu_si256(to, _mm256_cvtepu32_epi64(_mm256_castsi256_si128(children)));
+            _mm256_storeu_si256(to.add(1), _mm256_cvtepu32_epi64(_mm256_extracti128_si256::<1>(children)));
         }
     }
 
     #[inline(always)]
-    unsafe fn sort(node: &WideNode, entry: __m256, mask: u32, stack: *mut Pending) -> Child {
+    unsafe fn drop_farther(base: *mut Pending, top: *mut Pending, nearest: f32) -> *mut Pending {
+        // SAFETY: the stack is between its ends.
+        unsafe {
+            let last = last_pending(nearest);
+            let (mut from, mut to) = (base, base);
+            while from < top {
+                let pending = *from;
+                *to = pending;
+                to = to.add(usize::from(pending <= last));
+                from = from.add(1);
+            }
+            to
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn sort(node: &WideNode, F32x8(entry): F32x8, mask: u32, stack: *mut Pending) -> Child {
         const TURNS: [[i32; 8]; 7] = {
             let mut turns = [[0; 8]; 7];
             let mut i = 0;
@@ -111,5 +183,17 @@ impl Instructions for Avx2 {
             let children = _mm256_load_si256(node.children.as_ptr().cast());
             _mm256_storeu_si256(stack.cast(), _mm256_permutevar8x32_epi32(children, order));
         }
+    }
+}
+
+/// The entered lanes moved to the front, zeros behind them.
+#[inline(always)]
+unsafe fn compress(lanes: __m256i, mask: u32) -> __m256i {
+    // SAFETY: the caller has AVX2.
+    unsafe {
+        let order = _mm256_cvtepu8_epi32(_mm_loadl_epi64(LANES_OF[mask as usize & 255].as_ptr().cast()));
+        let count = _mm256_set1_epi32(mask.count_ones() as i32);
+        let used = _mm256_cmpgt_epi32(count, _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+        _mm256_and_si256(used, _mm256_permutevar8x32_epi32(lanes, order))
     }
 }

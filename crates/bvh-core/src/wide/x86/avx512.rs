@@ -1,11 +1,17 @@
 //! The AVX-512 kernel: eight boxes at once, entered children compressed into place.
 
-use super::box_ray::BoxRay;
-use super::one_ray::{Instructions, Pending, any, nearest};
-use crate::Ray;
+use super::lanes::{F32x8, F32x16};
+use super::one_ray::{any, nearest};
+use super::sort;
+use crate::wide::answer::Answers;
+use crate::wide::instructions::{Instructions, Pending, last_pending};
 use crate::wide::layout::WideBvh;
 use crate::wide::node::{Child, WideNode};
+use crate::wide::source::Source;
+use crate::wide::{batch, in_flight};
+use crate::{Coherence, Ray};
 use core::arch::x86_64::*;
+use core::ops::Range;
 
 pub(crate) struct Avx512;
 
@@ -21,18 +27,88 @@ pub(crate) unsafe fn any_hit(wide: &WideBvh, ray: &Ray) -> bool {
     unsafe { any::<Avx512>(wide, ray) }
 }
 
+/// As [`batch::trace`].
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+pub(crate) unsafe fn trace<A: Answers>(
+    wide: &WideBvh,
+    rays: impl Source,
+    answers: &mut A,
+    coherence: Coherence,
+) {
+    // SAFETY: the caller's promises.
+    unsafe { batch::trace::<Avx512, A>(wide, rays, answers, coherence) }
+}
+
+/// As [`in_flight::trace`].
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+unsafe fn in_flight<A: Answers>(wide: &WideBvh, rays: impl Source, answers: &mut A, numbers: Range<usize>) {
+    // SAFETY: the caller's promises.
+    unsafe { in_flight::trace::<Avx512, A>(wide, rays, answers, numbers) }
+}
+
 impl Instructions for Avx512 {
+    type Boxes = F32x8;
+    type Rays = F32x16;
+    const PACKET: usize = 64;
+    const FLIGHT: usize = 24;
+
     #[inline(always)]
-    unsafe fn boxes(node: &WideNode, ray: &BoxRay, t_min: f32, t_max: f32) -> (__m256, u32) {
-        // SAFETY: the caller's promises; loads are of whole arrays of 32 bytes.
+    unsafe fn sort_keys(entry: F32x8, mask: u32, to: *mut u32) {
+        // SAFETY: the caller's promises.
         unsafe {
-            let (entry, exit) = super::one_ray::interval(node, ray, t_min, t_max);
-            (entry, u32::from(_mm256_cmp_ps_mask::<_CMP_LE_OQ>(entry, exit)))
+            let keys = _mm256_maskz_compress_epi32(mask as u8, sort::keys(entry.0));
+            sort::descending(keys, mask.count_ones(), to);
         }
     }
 
     #[inline(always)]
-    unsafe fn sort(node: &WideNode, entry: __m256, mask: u32, stack: *mut Pending) -> Child {
+    unsafe fn compress_keys(entry: F32x8, mask: u32, to: *mut u32) {
+        // SAFETY: the caller's promises.
+        unsafe { _mm256_storeu_si256(to.cast(), _mm256_maskz_compress_epi32(mask as u8, sort::keys(entry.0))) }
+    }
+
+    #[inline(always)]
+    unsafe fn prefetch(line: *const u8) {
+        // SAFETY: a prefetch may name any address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(line.cast()) }
+    }
+
+    #[inline(always)]
+    unsafe fn in_flight<A: Answers>(wide: &WideBvh, rays: impl Source, answers: &mut A, numbers: Range<usize>) {
+        // SAFETY: the caller's promises.
+        unsafe { in_flight(wide, rays, answers, numbers) }
+    }
+
+    #[inline(always)]
+    unsafe fn compress_pending(node: &WideNode, mask: u32, to: *mut Pending) {
+        // SAFETY: the caller's promises.
+        unsafe {
+            let children = _mm256_load_si256(node.children.as_ptr().cast());
+            let entered = _mm256_maskz_compress_epi32(mask as u8, children);
+            _mm512_storeu_si512(to.cast(), _mm512_cvtepu32_epi64(entered));
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn drop_farther(base: *mut Pending, top: *mut Pending, nearest: f32) -> *mut Pending {
+        // SAFETY: the stack has room for a register more than it holds, and is aligned.
+        unsafe {
+            let nearest = _mm512_set1_epi64(last_pending(nearest) as i64);
+            let (mut from, mut to) = (base, base);
+            while from < top {
+                let pending = _mm512_load_si512(from.cast());
+                let held = (0xff_u32 >> (8 - (top.offset_from(from) as usize).min(8))) as u8;
+                let kept = _mm512_mask_cmple_epu64_mask(held, pending, nearest);
+                _mm512_storeu_si512(to.cast(), _mm512_maskz_compress_epi64(kept, pending));
+                to = to.add(kept.count_ones() as usize);
+                from = from.add(8);
+            }
+            to
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn sort(node: &WideNode, F32x8(entry): F32x8, mask: u32, stack: *mut Pending) -> Child {
         // SAFETY: the caller's promises; the stack has room for eight entries.
         unsafe {
             // The inverted lane in the last three bits prefers the higher of two lanes.

@@ -19,13 +19,14 @@ use core::arch::x86_64::*;
 /// (p − L) · i · (1 − 2u) − 2⁻¹⁴⁹ if p > L and no positive one otherwise, and for an upper plane, with the factor
 /// [`Slabs::FAR`] and U = o − m, at most (p − U) · i · (1 + 12u) + 2⁻¹⁴⁸.
 ///
-/// 1. *Shift.* With L' = o + M rounded, the shift −L' · s is off by at most u|L'|s + 2⁻¹⁵⁰ where s is the scale. As
-///    S ≥ 2⁻⁹⁰, the difference L' − L is at least (16 − 10 − 2)uS − 2⁻¹²⁶, of which u|L'| pays for this
-///    error; 2.8uS remain. Likewise for U' = o − M.
+/// 1. *Shift.* With L' = o + M rounded, the shift −L' · s − τ is rounded once, after τ of step 3 is subtracted: it is off by at
+///    most u(|L'|s + τ) + 2⁻¹⁵⁰, where s is the scale. As S ≥ 2⁻⁹⁰, the difference L' − L is at least
+///    (16 − 10 − 2)uS − 2⁻¹²⁶, of which u|L'| pays for this error; 2.8uS remain. Likewise for U' = o − M.
 /// 2. *Scale.* Near planes use s = i(1 − 6u), far planes s = i(1 + 16u), each with one rounding, and the fused
 ///    operation rounds once: (1 − 5u)(1 + u) ≤ 1 − 2u and (1 + 15u)(1 − u) ≥ 1 + 12u.
-/// 3. *Underflow.* Subtracting τ = 2⁻¹⁴⁶ from near shifts and adding it to far ones pays for all absolute errors of
-///    denormal numbers: where it is too small to change a shift c, |c| > 2⁻¹²³, and uSs of what step 1 left is larger.
+/// 3. *Underflow.* Subtracting τ = 2⁻¹²⁶ from near shifts and adding it to far ones pays for all absolute errors of
+///    subnormal numbers, which are below 2⁻¹⁴⁶ together. A smaller τ would do, but would itself be subnormal, and Intel's
+///    processors take about 150 cycles for every multiplication with such an operand.
 /// 4. *Clamp.* Where |d| is far smaller than D, i · o could overflow. So |i| is clamped to K = 2²⁴ / D. Nearer distances
 ///    to near planes are conservative. A far plane p that `Slabs` puts in front of the origin has p ≥ U, and then
 ///    (p − U') · K ≥ 2.8uS · K = 2.8S / D, which no distance exceeds that `Slabs` accepts on the axis of D.
@@ -49,8 +50,8 @@ impl BoxRay {
     pub(crate) const MARGIN: f32 = 2.0 * Slabs::MARGIN;
     pub(crate) const NEAR: f32 = 1.0 - 6.0 * Self::U;
     pub(crate) const FAR: f32 = 1.0 + 16.0 * Self::U;
-    /// τ of step 3: 2⁻¹⁴⁶.
-    pub(crate) const UNDERFLOW: f32 = f32::from_bits(8);
+    /// τ of step 3: 2⁻¹²⁶, the smallest number that is not subnormal.
+    pub(crate) const UNDERFLOW: f32 = f32::MIN_POSITIVE;
     /// K of step 4, times the largest component of the direction: 2²⁴.
     pub(crate) const CLAMP: f32 = pow2(24);
     /// The bounds of step 5, on S from both sides and on S · K.

@@ -2,7 +2,10 @@
 //! of four triangles at once.
 
 use super::box_ray::BoxRay;
+use super::lanes::F32x8;
+use crate::wide::instructions::{Instructions, Pending};
 use crate::wide::kernel::STACK;
+use crate::wide::lanes::{Lanes, Mask};
 use crate::wide::layout::WideBvh;
 use crate::wide::node::{Child, WideNode};
 use crate::wide::portable::walk;
@@ -11,32 +14,15 @@ use crate::{Hit, Ray, Shear, Slabs};
 use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
 
-/// A child to visit later: the bits of its entry, of which the last three are any, above those of the child. Entries
-/// are not negative, so that their bits are ordered as they are.
-pub(crate) type Pending = u64;
-
 /// What aligns the frame of the function that holds it: otherwise the compiler keeps vectors of 32 bytes at odd multiples of
 /// 16, by where its caller's frame happens to end, and then every other one crosses a line of the cache. That costs a ray
 /// which misses everything 5 of 14 ns.
 #[repr(align(32))]
 struct Aligned<T>(T);
 
-/// The instruction set of a kernel.
-pub(crate) trait Instructions {
-    /// Tests the eight boxes of a node: the distances at which the ray enters them, and a bit for each box entered
-    /// before `t_max`.
-    unsafe fn boxes(node: &WideNode, ray: &BoxRay, t_min: f32, t_max: f32) -> (__m256, u32);
-
-    /// The nearest of two or more entered children; the `n - 1` others are written to `stack`, the nearest last.
-    unsafe fn sort(node: &WideNode, entry: __m256, mask: u32, stack: *mut Pending) -> Child;
-
-    /// Writes the entered children to `stack` in the order of their lanes. Seven more places are overwritten.
-    unsafe fn compress(node: &WideNode, mask: u32, stack: *mut Child);
-}
-
-/// Where the ray enters and leaves the eight boxes, `t_min` and `t_max` included.
+/// The distances at which the ray enters the eight boxes of a node, and a bit for each box entered before `t_max`.
 #[inline(always)]
-pub(crate) unsafe fn interval(node: &WideNode, ray: &BoxRay, t_min: f32, t_max: f32) -> (__m256, __m256) {
+unsafe fn boxes(node: &WideNode, ray: &BoxRay, t_min: f32, t_max: f32) -> (F32x8, u32) {
     // SAFETY: the caller has AVX2 and FMA; loads are of whole, aligned planes of 32 bytes, which `BoxRay` names.
     unsafe {
         let distance = |plane: usize, scale: __m256, shift: __m256| {
@@ -48,7 +34,8 @@ pub(crate) unsafe fn interval(node: &WideNode, ray: &BoxRay, t_min: f32, t_max: 
         let entry = _mm256_max_ps(_mm256_max_ps(near(0), near(1)), entry);
         let exit = _mm256_min_ps(_mm256_min_ps(far(0), far(1)), far(2));
         // Of a NaN and a number the instruction gives the second operand: unused lanes stay NaN.
-        (entry, _mm256_min_ps(_mm256_set1_ps(t_max), exit))
+        let exit = F32x8(_mm256_min_ps(_mm256_set1_ps(t_max), exit));
+        (F32x8(entry), F32x8(entry).le(exit).bits())
     }
 }
 
@@ -58,13 +45,13 @@ pub(crate) unsafe fn interval(node: &WideNode, ray: &BoxRay, t_min: f32, t_max: 
 /// The processor has the instructions of `K`, and the caller is compiled with them; the references of `wide` are
 /// sound and its `stack_need` is at most [`STACK`].
 #[inline(always)]
-pub(crate) unsafe fn nearest<K: Instructions>(wide: &WideBvh, ray: &Ray) -> (f32, u32) {
+pub(crate) unsafe fn nearest<K: Instructions<Boxes = F32x8>>(wide: &WideBvh, ray: &Ray) -> (f32, u32) {
     // SAFETY: the caller's promises.
     unsafe {
-        let (Some(root), Some(boxes)) = (wide.root, BoxRay::new(ray, wide.largest)) else {
+        let (Some(root), Some(box_ray)) = (wide.root, BoxRay::new(ray, wide.largest)) else {
             return nearest_portable(wide, ray);
         };
-        let boxes = &boxes;
+        let box_ray = &box_ray;
         let (nodes, blocks) = (wide.nodes.as_ptr(), wide.blocks.as_ptr());
         let mut stack = MaybeUninit::<Aligned<[Pending; STACK + 8]>>::uninit();
         let base = stack.as_mut_ptr().cast::<Pending>();
@@ -76,7 +63,7 @@ pub(crate) unsafe fn nearest<K: Instructions>(wide: &WideBvh, ray: &Ray) -> (f32
         loop {
             while child.is_node() {
                 let node = &*nodes.add(child.index());
-                let (entry, mask) = K::boxes(node, boxes, ray.t_min(), t_max);
+                let (entry, mask) = boxes(node, box_ray, ray.t_min(), t_max);
                 if mask & mask.wrapping_sub(1) == 0 {
                     if mask == 0 {
                         break;
@@ -149,13 +136,13 @@ fn any_portable(wide: &WideBvh, ray: &Ray) -> bool {
 /// # Safety
 /// As [`nearest`].
 #[inline(always)]
-pub(crate) unsafe fn any<K: Instructions>(wide: &WideBvh, ray: &Ray) -> bool {
+pub(crate) unsafe fn any<K: Instructions<Boxes = F32x8>>(wide: &WideBvh, ray: &Ray) -> bool {
     // SAFETY: the caller's promises.
     unsafe {
-        let (Some(root), Some(boxes)) = (wide.root, BoxRay::new(ray, wide.largest)) else {
+        let (Some(root), Some(box_ray)) = (wide.root, BoxRay::new(ray, wide.largest)) else {
             return any_portable(wide, ray);
         };
-        let boxes = &boxes;
+        let box_ray = &box_ray;
         let (nodes, blocks) = (wide.nodes.as_ptr(), wide.blocks.as_ptr());
         let mut stack = MaybeUninit::<Aligned<[Child; STACK + 8]>>::uninit();
         let base = stack.as_mut_ptr().cast::<Child>();
@@ -167,7 +154,7 @@ pub(crate) unsafe fn any<K: Instructions>(wide: &WideBvh, ray: &Ray) -> bool {
         loop {
             while child.is_node() {
                 let node = &*nodes.add(child.index());
-                let (_, mask) = K::boxes(node, boxes, t_min, t_max);
+                let (_, mask) = boxes(node, box_ray, t_min, t_max);
                 if mask == 0 {
                     break;
                 }

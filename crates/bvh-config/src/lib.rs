@@ -1,0 +1,348 @@
+//! Configurations: a field declares its name, type, default and accepted values once, by [`config!`](crate::config!).
+//!
+//! ```
+//! bvh_config::config! {
+//!     /// How to measure.
+//!     pub struct Config {
+//!         /// Number of measurements.
+//!         count: u32 = 3, in 1..=1000;
+//!         /// Fraction of them that is thrown away, if any.
+//!         outliers: Option<f64>, in 0.0..=1.0;
+//!     }
+//! }
+//! use bvh_config::Check;
+//! assert_eq!(Config::default().check(), Ok(()));
+//! let refused = Config { outliers: Some(2.0), ..Config::default() }.check().unwrap_err();
+//! assert_eq!(refused.to_string(), "outliers is 2; accepted: 0 to 1");
+//! ```
+
+#[cfg(feature = "toml")]
+pub mod fault;
+mod numbers;
+
+pub use numbers::{Number, Numbers};
+
+use std::fmt::Display;
+use std::ops::Bound::{self, Excluded, Included, Unbounded};
+use std::ops::{RangeBounds, RangeFrom, RangeInclusive, RangeToInclusive};
+
+/// A parameter whose value is not accepted.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{key} is {found}; accepted: {accepted}")]
+pub struct OutOfRange {
+    /// The parameter's name; dots lead to those of inner configurations, as in TOML.
+    pub key: String,
+    /// The value found.
+    pub found: String,
+    /// The values that would be accepted, in words.
+    pub accepted: String,
+}
+
+impl OutOfRange {
+    /// The refusal of the value `found` of `key`.
+    pub fn new(key: impl Display, found: impl Display, accepted: impl Display) -> Self {
+        Self { key: key.to_string(), found: found.to_string(), accepted: accepted.to_string() }
+    }
+
+    /// The same refusal, seen from the configuration that holds the refused one under `key`.
+    #[must_use]
+    pub fn below(self, key: impl Display) -> Self {
+        let dot = if self.key.starts_with('[') { "" } else { "." };
+        Self { key: format!("{key}{dot}{}", self.key), ..self }
+    }
+}
+
+/// A value that knows whether all its parameters are in range.
+pub trait Check {
+    /// All parameters that are out of their ranges, in order.
+    fn faults(&self) -> Vec<OutOfRange> {
+        Vec::new()
+    }
+
+    /// Refuses the first parameter that is out of its range.
+    fn check(&self) -> Result<(), OutOfRange> {
+        self.faults().into_iter().next().map_or(Ok(()), Err)
+    }
+}
+
+impl<C: Check> Check for Option<C> {
+    fn faults(&self) -> Vec<OutOfRange> {
+        self.iter().flat_map(C::faults).collect()
+    }
+}
+
+impl<C: Check> Check for Vec<C> {
+    fn faults(&self) -> Vec<OutOfRange> {
+        let below = |(at, inner): (usize, &C)| Itself.faults(&format!("[{at}]"), inner);
+        self.iter().enumerate().flat_map(below).collect()
+    }
+}
+
+/// The right side of a field's `in`: which values of type `V` are accepted.
+///
+/// Implemented by the ranges of the standard library for numbers and for collections of them, and by [`Itself`].
+pub trait Accepts<V: ?Sized> {
+    /// What is not accepted in the value `found` of the parameter `key`.
+    fn faults(&self, key: &str, found: &V) -> Vec<OutOfRange>;
+
+    /// Refuses the value unless it is accepted.
+    fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange> {
+        self.faults(key, found).into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// The accepted values in words, if there is more to say than their type does.
+    fn accepted(&self) -> Option<String> {
+        None
+    }
+}
+
+/// The fields of a configuration, as [`config!`](crate::config!) declares them.
+pub trait Keys {
+    /// Their names, in order.
+    const KEYS: &[&str];
+
+    /// What each accepts, in words, if there is more to say than its type does.
+    fn accepted() -> Vec<Option<String>>;
+}
+
+/// Adds what each field accepts to its description in the JSON schema of the configuration.
+#[cfg(feature = "schema")]
+pub fn describe_accepted<C: Keys>(schema: &mut schemars::Schema) {
+    let Some(fields) = schema.get_mut("properties").and_then(|fields| fields.as_object_mut()) else { return };
+    for (key, accepted) in C::KEYS.iter().zip(C::accepted()) {
+        let description = fields.get_mut(*key).and_then(|field| field.get_mut("description"));
+        if let (Some(words), Some(text)) = (accepted, description) {
+            *text = format!("{}\nAccepted: {words}.", text.as_str().unwrap_or_default()).into();
+        }
+    }
+}
+
+/// Accepts the values that pass their own [`Check`]: inner configurations.
+#[derive(Clone, Copy, Debug)]
+pub struct Itself;
+
+impl<C: Check> Accepts<C> for Itself {
+    fn faults(&self, key: &str, found: &C) -> Vec<OutOfRange> {
+        found.faults().into_iter().map(|fault| fault.below(key)).collect()
+    }
+}
+
+macro_rules! ranges {
+    ($($range:ty,)*) => { $(
+        impl<V: Numbers + ?Sized> Accepts<V> for $range {
+            fn faults(&self, key: &str, found: &V) -> Vec<OutOfRange> {
+                let unlimited = matches!(self.end_bound(), Unbounded);
+                let mut faults = Vec::new();
+                found.each(key, &mut |key, number| {
+                    if !self.contains(number) || unlimited && !number.is_finite() {
+                        faults.push(OutOfRange::new(key, number, in_words(self)));
+                    }
+                });
+                faults
+            }
+
+            fn accepted(&self) -> Option<String> {
+                Some(in_words(self))
+            }
+        }
+    )* };
+}
+
+// Not for all `R: RangeBounds`, which would leave no room for `Itself`.
+ranges! {
+    RangeInclusive<V::Number>, RangeFrom<V::Number>, RangeToInclusive<V::Number>,
+    (Bound<V::Number>, Bound<V::Number>),
+}
+
+/// All numbers above `low`, without `low` itself.
+pub const fn above<N>(low: N) -> (Bound<N>, Bound<N>) {
+    (Excluded(low), Unbounded)
+}
+
+fn in_words<N: Display>(range: &impl RangeBounds<N>) -> String {
+    match (range.start_bound(), range.end_bound()) {
+        (Included(low), Included(high)) => format!("{low} to {high}"),
+        (Excluded(low), Included(high)) => format!("above {low}, up to {high}"),
+        (Included(low), Excluded(high)) => format!("{low} or more, below {high}"),
+        (Excluded(low), Excluded(high)) => format!("above {low} and below {high}"),
+        (Included(low), Unbounded) => format!("{low} or more"),
+        (Excluded(low), Unbounded) => format!("above {low}"),
+        (Unbounded, Included(high)) => format!("at most {high}"),
+        (Unbounded, Excluded(high)) => format!("below {high}"),
+        (Unbounded, Unbounded) => "any finite number".into(),
+    }
+}
+
+/// Adds what is wrong with several fields together, but for those fields that are out of their own range.
+#[doc(hidden)]
+pub fn add_together(faults: &mut Vec<OutOfRange>, together: impl IntoIterator<Item = OutOfRange>) {
+    let known: Vec<String> = faults.iter().map(|fault| fault.key.clone()).collect();
+    faults.extend(together.into_iter().filter(|late| !known.contains(&late.key)));
+}
+
+/// Declares a configuration: a struct with public fields, each `name: type = default, in accepted;`.
+///
+/// From the declaration follow the struct with `Clone`, `Debug`, `PartialEq` and [`Default`]; a sentence in the
+/// documentation of every field that states its default and the accepted values; [`Check`](crate::Check); and serde's
+/// traits, under the feature `serde` of the crate that calls the macro, with unknown keys refused and missing ones
+/// replaced by their defaults; and a JSON schema by `schemars`, under its feature `schema`. A crate that always depends on both
+/// writes `serde;` first.
+///
+/// Without `= default` a field has the default of its type, unsaid; without `in` every value is accepted. The right side
+/// of `in` is anything that [`Accepts`](crate::Accepts) the field's type. What several fields have to be
+/// together is checked by the function after the struct, which returns all that is wrong, as in `check Self::temperatures_fall;`.
+#[macro_export]
+macro_rules! config {
+    (@default) => { ::core::default::Default::default() };
+    (@default $default:expr) => { $default };
+    (@accepted $type:ty) => { ::core::option::Option::None };
+    (@accepted $type:ty, $range:expr) => { $crate::Accepts::<$type>::accepted(&($range)) };
+    (@doc [] []) => { "" };
+    (@doc [] [$range:expr]) => { concat!("Accepted: `", stringify!($range), "`.") };
+    (@doc [$default:expr] []) => { concat!("Default `", stringify!($default), "`.") };
+    (@doc [$default:expr] [$range:expr]) => {
+        concat!("Default `", stringify!($default), "`; accepted: `", stringify!($range), "`.")
+    };
+    (@struct { $(#[$serde:meta])* }
+        $(#[$meta:meta])*
+        $visibility:vis struct $name:ident {
+            $($(#[$field_meta:meta])* $field:ident: $type:ty $(= $default:expr)? $(, in $range:expr)?;)*
+        }
+        $(check $together:expr;)?
+    ) => {
+        #[derive(Clone, Debug, PartialEq)]
+        $(#[$serde])*
+        $(#[$meta])*
+        $visibility struct $name {
+            $(
+                $(#[$field_meta])*
+                #[doc = $crate::config!(@doc [$($default)?] [$($range)?])]
+                pub $field: $type,
+            )*
+        }
+
+        impl $crate::Keys for $name {
+            const KEYS: &[&str] = &[$(stringify!($field)),*];
+
+            fn accepted() -> ::std::vec::Vec<::core::option::Option<::std::string::String>> {
+                ::std::vec![$($crate::config!(@accepted $type $(, $range)?)),*]
+            }
+        }
+
+        impl ::core::default::Default for $name {
+            fn default() -> Self {
+                Self { $($field: $crate::config!(@default $($default)?)),* }
+            }
+        }
+
+        impl $crate::Check for $name {
+            fn faults(&self) -> ::std::vec::Vec<$crate::OutOfRange> {
+                #[allow(unused_mut, reason = "of some configurations every value is accepted")]
+                let mut faults = ::std::vec::Vec::new();
+                $($(faults.extend($crate::Accepts::faults(&($range), stringify!($field), &self.$field));)?)*
+                $($crate::add_together(&mut faults, $together(self));)?
+                faults
+            }
+        }
+    };
+    (serde; $($tokens:tt)*) => {
+        $crate::config! {
+            @struct {
+                #[derive(::serde::Serialize, ::serde::Deserialize, ::schemars::JsonSchema)]
+                #[serde(deny_unknown_fields, default)]
+                #[schemars(transform = $crate::describe_accepted::<Self>)]
+            }
+            $($tokens)*
+        }
+    };
+    ($($tokens:tt)*) => {
+        $crate::config! {
+            @struct {
+                #[cfg_attr(
+                    feature = "serde",
+                    derive(::serde::Serialize, ::serde::Deserialize),
+                    serde(deny_unknown_fields, default)
+                )]
+                #[cfg_attr(
+                    feature = "schema",
+                    derive(::schemars::JsonSchema),
+                    schemars(transform = $crate::describe_accepted::<Self>)
+                )]
+            }
+            $($tokens)*
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    crate::config! {
+        /// A configuration with another inside.
+        struct Outer {
+            /// Limited on both sides, without the lower end.
+            part: f64 = 0.5, in (Excluded(0.0), Included(1.0));
+            /// Anything finite above 0.
+            factor: f64 = 2.0, in above(0.0);
+            /// A list of whole numbers.
+            sizes: Vec<u32> = vec![1], in 1..;
+            /// Numbers by name.
+            by_name: BTreeMap<String, [f64; 2]>, in ..=9.0;
+            /// Other configurations.
+            inner: Vec<Inner>, in Itself;
+        }
+        check |outer: &Outer| match outer.sizes.is_sorted() {
+            true => None,
+            false => Some(OutOfRange::new("sizes", "not sorted", "ascending numbers")),
+        };
+    }
+
+    crate::config! {
+        /// Held by another configuration.
+        struct Inner {
+            /// May be infinite.
+            limit: f64 = f64::INFINITY, in 1.0..=f64::INFINITY;
+        }
+    }
+
+    #[test]
+    fn every_field_says_in_words_what_it_accepts_beyond_its_type() {
+        let said =
+            Outer::KEYS.iter().zip(Outer::accepted()).map(|(key, words)| (*key, words.unwrap_or_default()));
+        let expected = [
+            ("part", "above 0, up to 1"),
+            ("factor", "above 0"),
+            ("sizes", "1 or more"),
+            ("by_name", "at most 9"),
+            ("inner", ""),
+        ];
+        assert!(said.eq(expected.map(|(key, words)| (key, words.to_owned()))));
+    }
+
+    #[test]
+    fn a_refusal_names_the_key_the_value_and_what_would_be_accepted() {
+        let refused = |change: fn(&mut Outer)| {
+            let mut outer = Outer::default();
+            change(&mut outer);
+            outer.check().map_err(|error| error.to_string())
+        };
+        assert_eq!(refused(|_| ()), Ok(()));
+        assert_eq!(refused(|outer| outer.part = 1.0), Ok(()));
+        let expect = |change, message: &str| assert_eq!(refused(change), Err(message.into()));
+        expect(|outer| outer.part = 0.0, "part is 0; accepted: above 0, up to 1");
+        expect(|outer| outer.part = f64::NAN, "part is NaN; accepted: above 0, up to 1");
+        expect(|outer| outer.factor = f64::INFINITY, "factor is inf; accepted: above 0");
+        expect(|outer| outer.sizes = vec![1, 0], "sizes[1] is 0; accepted: 1 or more");
+        expect(|outer| outer.sizes = vec![2, 1], "sizes is not sorted; accepted: ascending numbers");
+        let name = |outer: &mut Outer| outer.by_name = BTreeMap::from([("a".into(), [0.0, 10.0])]);
+        expect(name, "by_name.a[1] is 10; accepted: at most 9");
+        let inner = |outer: &mut Outer| outer.inner = vec![Inner::default(), Inner { limit: 0.0 }];
+        expect(inner, "inner[1].limit is 0; accepted: 1 to inf");
+        let outer =
+            Outer { part: 0.0, sizes: vec![0, 7, 0], inner: vec![Inner { limit: 0.0 }], ..Outer::default() };
+        let keys: Vec<String> = outer.faults().into_iter().map(|fault| fault.key).collect();
+        assert_eq!(keys, ["part", "sizes[0]", "sizes[2]", "inner[0].limit", "sizes"]);
+    }
+}

@@ -1,0 +1,71 @@
+//! What counts as a number, or as a collection of numbers, when a parameter's range is checked.
+
+use std::collections::BTreeMap;
+use std::fmt::Display;
+
+/// A number that can be a parameter.
+pub trait Number: PartialOrd + Display {
+    /// Whether it is neither infinite nor NaN. Infinity is accepted only where a range names it as its end.
+    fn is_finite(&self) -> bool {
+        true
+    }
+}
+
+/// A number, or any collection of numbers of which each has to be in range.
+pub trait Numbers {
+    /// The type of the numbers.
+    type Number: Number;
+    /// Calls `visit` with every number and its key, below `key` in a collection.
+    fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &Self::Number));
+}
+
+macro_rules! numbers {
+    ($($number:ident $(by $is_finite:path)?,)*) => { $(
+        impl Number for $number {
+            $(fn is_finite(&self) -> bool { $is_finite(*self) })?
+        }
+        impl Numbers for $number {
+            type Number = Self;
+            fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &Self)) {
+                visit(key, self);
+            }
+        }
+    )* };
+}
+
+numbers!(u8, u16, u32, u64, usize, i32, i64, f32 by f32::is_finite, f64 by f64::is_finite,);
+
+impl<V: Numbers> Numbers for Option<V> {
+    type Number = V::Number;
+    fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &V::Number)) {
+        self.iter().for_each(|inner| inner.each(key, visit));
+    }
+}
+
+impl<V: Numbers> Numbers for [V] {
+    type Number = V::Number;
+    fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &V::Number)) {
+        self.iter().enumerate().for_each(|(at, inner)| inner.each(&format!("{key}[{at}]"), visit));
+    }
+}
+
+impl<V: Numbers, const N: usize> Numbers for [V; N] {
+    type Number = V::Number;
+    fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &V::Number)) {
+        self.as_slice().each(key, visit);
+    }
+}
+
+impl<V: Numbers> Numbers for Vec<V> {
+    type Number = V::Number;
+    fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &V::Number)) {
+        self.as_slice().each(key, visit);
+    }
+}
+
+impl<V: Numbers> Numbers for BTreeMap<String, V> {
+    type Number = V::Number;
+    fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &V::Number)) {
+        self.iter().for_each(|(name, inner)| inner.each(&format!("{key}.{name}"), visit));
+    }
+}

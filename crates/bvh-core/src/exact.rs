@@ -1,0 +1,317 @@
+//! Intersection of a ray and a triangle in real arithmetic.
+//!
+//! # Meaning of an answer
+//!
+//! A ray has an origin `o`, a direction `d` and a range `t_min..=t_max`, a triangle has corners
+//! `a`, `b`, `c`; all are f32 and are taken as the real numbers that they are. The ray *meets* the
+//! triangle if its line crosses the closed triangle (edges and corners belong to it) and is not
+//! parallel to the triangle's plane. With `A = a − o` and so on,
+//!
+//! ```text
+//!   u = d · (C × B)     v = d · (A × C)     w = d · (B × A)      n = (b − a) × (c − a)
+//!   meets  ⇔  u, v, w ≥ 0 or u, v, w ≤ 0,  and  u + v + w = −d · n ≠ 0
+//!   distance  t = A · n / d · n
+//! ```
+//!
+//! The real distance is *rounded once*, to the nearest f32, ties to even. The ray *hits* the
+//! triangle if `t ≥ 0` and `t_min ≤ rounded t ≤ t_max`. From this follow the cases at the border:
+//!
+//! - Triangles without area, and rays in a triangle's plane, have `d · n = 0`: never hit.
+//! - A triangle behind the origin is not hit, however little; a distance below 2⁻¹⁵⁰ rounds to +0,
+//!   and no distance is −0.
+//! - A distance that rounds to infinity is beyond every `t_max`.
+//! - A triangle with a corner that is not finite is never hit.
+//!
+//! Of several triangles the *nearest* hit is the one of the least rounded distance, and of the
+//! lowest id among equals. Neither a tree nor an instruction set appears in these definitions.
+//! Closed meshes are watertight: a line that passes from one side of a surface to the other crosses
+//! some closed triangle of the surface, if it is not parallel to it.
+//!
+//! # Layers
+//!
+//! ```text
+//!   f64           sheared corners, error bound    nearly all triangles   ──> miss, or rounded distance
+//!    │ perhaps
+//!   expansions    exact                           what remains           ──> miss, or rounded distance
+//! ```
+//!
+//! The first layer answers only where its error bound proves the answer. It could be omitted, or
+//! computed with other roundings, and no answer would change.
+//!
+//! # The bounds
+//!
+//! Let axis z be the axis of the largest component of `d`, x and y the others, `R ≥ |A|, |B|, |C|`
+//! (largest components), and ε half a unit in the last place of 1. Multiplication by `d_z` shears a
+//! corner into the plane across the ray:
+//!
+//! ```text
+//!   x(A) = d_z A_x − d_x A_z,  y(A) = d_z A_y − d_y A_z,    and   u = (x(C) y(B) − y(C) x(B)) / d_z,  …
+//! ```
+//!
+//! *f64*, ε = 2⁻⁵³. `A_x` and `A_z` are off by ε of themselves, both products by 2ε and the
+//! difference by ε: `x(A)` is off by less than 6.1 εR|d_z|. Let e = 2⁻⁴⁷R|d_z| = 64 εR|d_z|, and S
+//! the largest computed |x|, |y| of a corner; S < 2.1 R|d_z|. The computed `u d_z` is off by less
+//! than 4 · 6.1 εR|d_z|S + 2 (6.1 εR|d_z|)² from its operands, and by 4.1 εS² ≤ 8.7 εR|d_z|S from
+//! its own three roundings: in total less than `E = e (S + e)`. With one value below −E and another
+//! above E the line misses. With all three above E, or below −E, it crosses, and the determinant is
+//! not zero.
+//!
+//! The distance is computed from depths relative to the first corner, where errors of `u`, `v`, `w`
+//! count little:
+//!
+//! ```text
+//!   t d_z = A_z + (v (B_z − A_z) + w (C_z − A_z)) / D,      D = u + v + w
+//! ```
+//!
+//! The weights `v / D` and `w / D` are off by 4E / D each. With Z the larger |B_z − A_z|, |C_z −
+//! A_z| this moves `t d_z` by 8 EZ / D; all roundings together are below 40 εR. The bound `(16 EZ /
+//! |D| + 2⁻⁴⁷R) / |d_z|` covers both. If both ends of this interval round to one f32, that is the
+//! rounded distance, since rounding is monotone.
+//!
+//! Nothing overflows or underflows: coordinates are multiples of 2⁻¹⁴⁹ below 2¹²⁹, all values above
+//! are between 2⁻⁷⁵⁰ and 2⁷⁵⁰ or zero.
+//!
+//! *Expansions* are exact. The quotient is rounded by the sign of `A · n − m d · n`, where m is the
+//! middle between two f32.
+//!
+//! Sources: Möller & Trumbore 1997, 'Fast, minimum storage ray/triangle intersection' (the
+//! quotients); Woop, Benthin & Wald 2013, 'Watertight ray/triangle intersection' (the shear);
+//! Shewchuk 1997, 'Adaptive precision floating-point arithmetic and fast robust geometric
+//! predicates' (filters and expansions). Different from the second: the shear decides no answer,
+//! because every answer within the errors of the shear is left to the next layer.
+
+use crate::Ray;
+use crate::expansion::Expansion;
+use glam::Vec3;
+
+/// The answer of a layer with errors about a line and a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Verdict {
+    /// The line does not cross the triangle, or behind the origin or beyond every f32.
+    Miss,
+    /// It crosses the triangle at this distance, rounded from the real one.
+    Hit(f32),
+    /// The error bound allows several answers.
+    Unsure,
+}
+
+/// A ray in f64: its origin and direction in the order of axes whose last is the axis of the
+/// largest component.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Line {
+    origin: [f64; 3],
+    direction: [f64; 3],
+    axes: [usize; 3],
+}
+
+/// 64ε in f64: the factor of error bounds.
+const ERROR: f64 = 1.0 / (1_u64 << 47) as f64;
+
+impl Line {
+    /// Prepares a ray.
+    pub(crate) fn new(ray: &Ray) -> Self {
+        let (origin, direction) = (ray.origin(), ray.direction());
+        let size = direction.abs();
+        let largest = if size.z > size.x.max(size.y) { 2 } else { usize::from(size.y > size.x) };
+        let axes = [(largest + 1) % 3, (largest + 2) % 3, largest];
+        Self {
+            origin: axes.map(|axis| f64::from(origin[axis])),
+            direction: axes.map(|axis| f64::from(direction[axis])),
+            axes,
+        }
+    }
+
+    /// The triangle's corners relative to the origin, in the order of axes.
+    #[inline(always)]
+    fn relative(&self, triangle: &[Vec3; 3]) -> [[f64; 3]; 3] {
+        let [kx, ky, kz] = self.axes;
+        let [ox, oy, oz] = self.origin;
+        let relative = |corner: Vec3| {
+            let corner: &[f32; 3] = corner.as_ref();
+            [f64::from(corner[kx]) - ox, f64::from(corner[ky]) - oy, f64::from(corner[kz]) - oz]
+        };
+        let [a, b, c] = *triangle;
+        [relative(a), relative(b), relative(c)]
+    }
+
+    /// The edge values `u`, `v`, `w`, multiplied by `d_z`, and the bound of their errors.
+    #[inline(always)]
+    fn edges(&self, corners: &[[f64; 3]; 3]) -> ([f64; 3], f64) {
+        let [dx, dy, dz] = self.direction;
+        let reach = largest(corners.as_flattened());
+        let error = reach * dz.abs() * ERROR;
+        let sheared = |[x, y, z]: [f64; 3]| [x * dz - dx * z, y * dz - dy * z];
+        let [a, b, c] = *corners;
+        let [a, b, c] = [sheared(a), sheared(b), sheared(c)];
+        let spread = largest([a, b, c].as_flattened());
+        let cross = |p: [f64; 2], q: [f64; 2]| p[0] * q[1] - p[1] * q[0];
+        ([cross(c, b), cross(a, c), cross(b, a)], error * (spread + error))
+    }
+
+    /// Decides in f64 where the error bound permits.
+    #[inline(always)]
+    pub(crate) fn filter(&self, triangle: &[Vec3; 3]) -> Verdict {
+        let corners = self.relative(triangle);
+        let ([u, v, w], edge_error) = self.edges(&corners);
+        let least = u.min(v).min(w);
+        let most = u.max(v).max(w);
+        if least < -edge_error && most > edge_error {
+            return Verdict::Miss;
+        }
+        let is_inside = least > edge_error || most < -edge_error;
+        if !is_inside {
+            return Verdict::Unsure;
+        }
+        let [az, bz, cz] = corners.map(|corner| corner[2]);
+        let dz = self.direction[2];
+        let reach = largest(corners.as_flattened());
+        let determinant = u + v + w;
+        let (b_depth, c_depth) = (bz - az, cz - az);
+        let t = (az * determinant + (v * b_depth + w * c_depth)) / (determinant * dz);
+        let depth = larger(b_depth.abs(), c_depth.abs());
+        let slack = (16.0 * edge_error * depth / determinant.abs() + reach * ERROR) / dz.abs();
+        let low = t - slack;
+        let high = t + slack;
+        if high < 0.0 {
+            return Verdict::Miss;
+        }
+        let (low_rounded, high_rounded) = (low as f32, high as f32);
+        if low >= 0.0 && low_rounded == high_rounded {
+            return if high_rounded.is_finite() { Verdict::Hit(high_rounded) } else { Verdict::Miss };
+        }
+        Verdict::Unsure
+    }
+}
+
+/// The rounded distance at which the ray's line crosses the triangle at or in front of the origin,
+/// by exact arithmetic. Does not allocate.
+#[cold]
+#[inline(never)]
+pub(crate) fn distance(ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
+    let volumes = Volumes::new(ray, triangle)?;
+    let signs = volumes.edges().map(|edge| edge.sign());
+    if signs.contains(&-1) && signs.contains(&1) {
+        return None;
+    }
+    round_quotient(&volumes.along_normal(), &volumes.determinant())
+}
+
+type Vector<const N: usize> = [Expansion<N>; 3];
+
+/// The exact difference of two points.
+fn difference(p: Vec3, q: Vec3) -> Vector<2> {
+    [0, 1, 2].map(|axis| Expansion::difference(p[axis], q[axis]))
+}
+
+/// The exact cross product.
+fn cross(p: &Vector<2>, q: &Vector<2>) -> Vector<16> {
+    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
+        let mut component = Expansion::ZERO;
+        component.add_product(&p[i], &q[j]);
+        component.subtract_product(&p[j], &q[i]);
+        component
+    })
+}
+
+/// The exact values that decide about a ray and a triangle.
+struct Volumes {
+    direction: Vec3,
+    /// The corners relative to the origin.
+    corners: [Vector<2>; 3],
+    normal: Vector<16>,
+}
+
+impl Volumes {
+    /// Prepares exact values; `None` if a coordinate is not finite.
+    fn new(ray: &Ray, triangle: &[Vec3; 3]) -> Option<Self> {
+        let [a, b, c] = *triangle;
+        let (origin, direction) = (ray.origin(), ray.direction());
+        let is_finite = [a, b, c, origin, direction].iter().all(|point| point.is_finite());
+        is_finite.then(|| Self {
+            direction,
+            corners: [a, b, c].map(|corner| difference(corner, origin)),
+            normal: cross(&difference(b, a), &difference(c, a)),
+        })
+    }
+
+    /// `u`, `v` and `w`.
+    fn edges(&self) -> [Expansion<96>; 3] {
+        let [a, b, c] = &self.corners;
+        [(c, b), (a, c), (b, a)].map(|(p, q)| self.along_direction(&cross(p, q)))
+    }
+
+    /// `d · n`, which is −(u + v + w).
+    fn determinant(&self) -> Expansion<96> {
+        self.along_direction(&self.normal)
+    }
+
+    /// The product of the direction and a vector.
+    fn along_direction(&self, vector: &Vector<16>) -> Expansion<96> {
+        let mut sum = Expansion::ZERO;
+        for (component, along) in vector.iter().zip(self.direction.to_array()) {
+            sum.add_scaled(component, f64::from(along));
+        }
+        sum
+    }
+
+    /// `A · n`.
+    fn along_normal(&self) -> Expansion<192> {
+        let mut sum = Expansion::ZERO;
+        for (component, along) in self.normal.iter().zip(&self.corners[0]) {
+            sum.add_product(component, along);
+        }
+        sum
+    }
+}
+
+/// The quotient, rounded to the nearest f32, ties to even; `None` if it is negative, its
+/// denominator zero, or it rounds to infinity.
+fn round_quotient(numerator: &Expansion<192>, denominator: &Expansion<96>) -> Option<f32> {
+    let sign = denominator.sign();
+    if sign == 0 || numerator.sign() * sign < 0 {
+        return None;
+    }
+    // The quotient of the approximations is off by less than 2⁻³⁸ of itself: it rounds to the right f32 or to a neighbour.
+    let near = ((numerator.approximate() / denominator.approximate()) as f32).min(f32::MAX);
+    // The side of the middle between two neighbours on which the exact quotient is.
+    let side = |middle: f64| {
+        let mut difference: Expansion<384> = numerator.widened();
+        difference.add_scaled(denominator, -middle);
+        difference.sign() * sign
+    };
+    let is_odd = near.to_bits() & 1 == 1;
+    let above = side(middle_above(near));
+    if above > 0 || (above == 0 && is_odd) {
+        let up = near.next_up();
+        return up.is_finite().then_some(up);
+    }
+    if near > 0.0 {
+        let below = side(middle_above(near.next_down()));
+        if below < 0 || (below == 0 && is_odd) {
+            return Some(near.next_down());
+        }
+    }
+    // A zero is +0.
+    Some(near + 0.0)
+}
+
+/// The middle between a number that is not negative and the next f32, where the largest is followed
+/// by 2¹²⁸.
+fn middle_above(number: f32) -> f64 {
+    const BEYOND: f64 = 2.0 * (1_u128 << 127) as f64;
+    let next = number.next_up();
+    let next = if next.is_finite() { f64::from(next) } else { BEYOND };
+    0.5 * (f64::from(number) + next)
+}
+
+/// The largest size of a number.
+#[inline(always)]
+fn largest(numbers: &[f64]) -> f64 {
+    numbers.iter().fold(0.0, |most, number| larger(most, number.abs()))
+}
+
+/// The larger of two numbers, the second if one is NaN.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}

@@ -1,0 +1,139 @@
+//! Exact sums and products of f64: numbers as unevaluated sums of floating-point terms.
+//!
+//! An expansion is a sum of terms, the smallest first, none of them zero. Terms neither overlap nor
+//! are adjacent: between the last bit of a term and the first bit of the term before it is a zero
+//! bit. The terms before the last one together are therefore smaller than half of the last one,
+//! which has the sign of the sum. Sums and products of expansions are exact as long as nothing
+//! overflows or underflows, which coordinates in f32 guarantee: every number here is a multiple of
+//! 2⁻⁷⁵⁰ and below 2⁷⁵⁰.
+//!
+//! Source: Shewchuk 1997, 'Adaptive precision floating-point arithmetic and fast robust geometric
+//! predicates', theorems 6 (Knuth's sum), 10 (grow-expansion), 18 (Dekker's product); zero terms
+//! are eliminated as in section 2.3.
+
+/// An exact number: the sum of at most `N` terms.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Expansion<const N: usize> {
+    terms: [f64; N],
+    len: usize,
+}
+
+impl<const N: usize> Expansion<N> {
+    pub(crate) const ZERO: Self = Self { terms: [0.0; N], len: 0 };
+
+    /// Returns `self` with room for more terms.
+    pub(crate) fn widened<const M: usize>(&self) -> Expansion<M> {
+        let mut wide = Expansion::ZERO;
+        wide.terms[..self.len].copy_from_slice(self.terms());
+        wide.len = self.len;
+        wide
+    }
+
+    /// The terms, the smallest first.
+    fn terms(&self) -> &[f64] {
+        &self.terms[..self.len]
+    }
+
+    /// Adds a number, which makes the expansion longer by one term at most.
+    ///
+    /// # Panics
+    /// If there is no room for another term.
+    pub(crate) fn add(&mut self, number: f64) {
+        let mut carry = number;
+        let mut kept = 0;
+        for i in 0..self.len {
+            let (sum, rest) = two_sum(carry, self.terms[i]);
+            if rest != 0.0 {
+                self.terms[kept] = rest;
+                kept += 1;
+            }
+            carry = sum;
+        }
+        if carry != 0.0 {
+            self.terms[kept] = carry;
+            kept += 1;
+        }
+        self.len = kept;
+    }
+
+    /// Adds the product of an expansion and a number: two terms at most for each term of the
+    /// expansion.
+    pub(crate) fn add_scaled<const M: usize>(&mut self, factor: &Expansion<M>, number: f64) {
+        for &term in factor.terms() {
+            let (product, rest) = two_product(term, number);
+            self.add(rest);
+            self.add(product);
+        }
+    }
+
+    /// Adds the product of two expansions: two terms at most for each pair of their terms.
+    pub(crate) fn add_product<const A: usize, const B: usize>(&mut self, a: &Expansion<A>, b: &Expansion<B>) {
+        for &term in b.terms() {
+            self.add_scaled(a, term);
+        }
+    }
+
+    /// Subtracts the product of two expansions, likewise.
+    pub(crate) fn subtract_product<const A: usize, const B: usize>(
+        &mut self,
+        a: &Expansion<A>,
+        b: &Expansion<B>,
+    ) {
+        for &term in b.terms() {
+            self.add_scaled(a, -term);
+        }
+    }
+
+    /// The sign of the exact value: −1, 0 or 1.
+    pub(crate) fn sign(&self) -> i32 {
+        match self.terms().last() {
+            None => 0,
+            Some(last) if *last < 0.0 => -1,
+            Some(_) => 1,
+        }
+    }
+
+    /// The value in f64, off by less than 2⁻⁴⁰ of itself, and with the sign of the exact value.
+    pub(crate) fn approximate(&self) -> f64 {
+        self.terms().iter().sum()
+    }
+}
+
+impl Expansion<2> {
+    /// The exact difference of two numbers.
+    pub(crate) fn difference(a: f32, b: f32) -> Self {
+        let (sum, rest) = two_sum(f64::from(a), -f64::from(b));
+        let mut difference = Self::ZERO;
+        difference.add(rest);
+        difference.add(sum);
+        difference
+    }
+}
+
+/// The rounded sum of two numbers, and what rounding took from it.
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let b_part = sum - a;
+    let a_part = sum - b_part;
+    (sum, (a - a_part) + (b - b_part))
+}
+
+/// The rounded product of two numbers, and what rounding took from it. Without a fused operation,
+/// which the processor may lack and `core` does not have.
+fn two_product(a: f64, b: f64) -> (f64, f64) {
+    let product = a * b;
+    let (a_high, a_low) = split(a);
+    let (b_high, b_low) = split(b);
+    let rest = a_high * b_high - product;
+    let rest = rest + a_high * b_low;
+    let rest = rest + a_low * b_high;
+    (product, rest + a_low * b_low)
+}
+
+/// Two halves of at most 26 bits each.
+fn split(a: f64) -> (f64, f64) {
+    const SPLITTER: f64 = ((1_u64 << 27) + 1) as f64;
+    let scaled = SPLITTER * a;
+    let high = scaled - (scaled - a);
+    (high, a - high)
+}

@@ -1,0 +1,49 @@
+//! The shortcut for boxes within a cell changes no bit.
+
+use super::*;
+
+/// A linear congruential generator (Knuth's MMIX).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, end: u32) -> u32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005);
+        self.0 = self.0.wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as u32 % end
+    }
+
+    fn point(&mut self) -> [f32; 3] {
+        [0, 1, 2].map(|_| self.below(1 << 20) as f32 / (1 << 15) as f32)
+    }
+}
+
+#[test]
+fn the_shortcut_within_a_cell_and_the_sum_over_corners_give_the_same_bits() {
+    let mut random = Random(1);
+    let mut segments = Vec::new();
+    for _ in 0..2000 {
+        segments.push(Segment { from: random.point(), to: random.point() });
+    }
+    let bounds = Aabb::from([[0.0; 3], [CELLS as f32; 3]]);
+    let density = RayDensity::new(&bounds, &segments, 0.0).unwrap();
+    let mut entered = 0;
+    for _ in 0..20_000 {
+        let cell = [0, 1, 2].map(|_| random.below(CELLS as u32) as usize);
+        let mut rounded = Rounded { low: [0; 3], high: [0; 3] };
+        for (axis, &index) in cell.iter().enumerate() {
+            let begin = (index as u32) << FRACTION_BITS;
+            let a = begin + random.below(FRACTIONS + 1);
+            let b = begin + random.below(FRACTIONS + 1);
+            rounded.low[axis] = a.min(b);
+            rounded.high[axis] = a.max(b);
+        }
+        // A lower corner at the upper end of its cell belongs to the next cell.
+        if rounded.low.map(cell_of) == cell {
+            let short = within(&density.cells[index(cell)], &rounded, cell);
+            let full = density.across(&rounded);
+            assert_eq!(short.to_bits(), full.to_bits(), "{rounded:?}");
+            entered += u32::from(short > 0.0);
+        }
+    }
+    assert!(entered > 5000);
+}

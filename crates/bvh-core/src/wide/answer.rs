@@ -1,0 +1,87 @@
+//! What may be asked of rays: their nearest hits, or whether they have any.
+
+use super::lanes::Lanes;
+use super::layout::WideBvh;
+use crate::{Hit, Ray};
+
+/// The answers to the rays of a batch, by their numbers.
+pub(crate) trait Answers {
+    /// Whether the first hit that is found will do.
+    const ANY: bool;
+
+    /// Writes the answer for a ray whose traversal ended at this distance with this object, `u32::MAX` for none.
+    fn write(&mut self, number: usize, t: f32, object: u32);
+
+    /// Writes the answers for rays side by side, likewise.
+    #[inline(always)]
+    fn write_lanes<L: Lanes>(&mut self, first: usize, t: L, object: L) {
+        const { assert!(L::N <= 16) };
+        let (mut distances, mut objects) = ([0.0; 16], [0.0; 16]);
+        // SAFETY: there is room for sixteen.
+        unsafe {
+            t.store(distances.as_mut_ptr());
+            object.store(objects.as_mut_ptr());
+        }
+        for lane in 0..L::N {
+            self.write(first + lane, distances[lane], f32::to_bits(objects[lane]));
+        }
+    }
+
+    /// Traces one ray by itself, and writes its answer.
+    #[inline(always)]
+    fn alone(&mut self, number: usize, wide: &WideBvh, ray: &Ray) {
+        if Self::ANY {
+            self.write(number, 0.0, if wide.any_hit(ray) { 0 } else { u32::MAX });
+        } else {
+            let Hit { t, object } = wide.nearest_hit(ray).unwrap_or(Hit::MISS);
+            self.write(number, t, object);
+        }
+    }
+}
+
+/// The distance of a hit, infinite for none.
+#[inline(always)]
+fn distance(t: f32, object: u32) -> f32 {
+    if object == u32::MAX { f32::INFINITY } else { t }
+}
+
+impl Answers for &mut [Hit] {
+    const ANY: bool = false;
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, t: f32, object: u32) {
+        self[number] = Hit { t: distance(t, object), object };
+    }
+}
+
+impl Answers for &mut [bool] {
+    const ANY: bool = true;
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, _: f32, object: u32) {
+        self[number] = object != u32::MAX;
+    }
+}
+
+/// Distances and objects in slices of their own.
+impl Answers for (&mut [f32], &mut [u32]) {
+    const ANY: bool = false;
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, t: f32, object: u32) {
+        self.0[number] = distance(t, object);
+        self.1[number] = object;
+    }
+
+    #[inline(always)]
+    fn write_lanes<L: Lanes>(&mut self, first: usize, t: L, object: L) {
+        let (distances, objects) = (&mut self.0[first..][..L::N], &mut self.1[first..][..L::N]);
+        // SAFETY: values exist; there is room for as many as there are lanes.
+        unsafe {
+            let none = L::splat_bits(u32::MAX);
+            let is_hit = object.below(none);
+            L::select(is_hit, t, L::splat(f32::INFINITY)).store(distances.as_mut_ptr());
+            object.store(objects.as_mut_ptr().cast());
+        }
+    }
+}

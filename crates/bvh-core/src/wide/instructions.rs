@@ -1,0 +1,58 @@
+//! What an instruction set brings to the kernels besides its lanes.
+
+use super::answer::Answers;
+use super::lanes::Lanes;
+use super::layout::WideBvh;
+use super::node::{Child, WideNode};
+use super::source::Source;
+use core::ops::Range;
+
+/// A child to visit later: the bits of its entry, of which the last three are any, above those of the child. Entries
+/// are not negative, so that their bits are ordered as they are.
+pub(crate) type Pending = u64;
+
+/// An instruction set. Every function is inlined into one that is compiled with its instructions, or it is very slow.
+///
+/// All functions are unsafe for the same reasons: the processor has the instructions, and there is room for eight places more than
+/// are written.
+pub(crate) trait Instructions {
+    /// As many numbers as a node has children.
+    type Boxes: Lanes;
+    /// The widest register: one ray per lane.
+    type Rays: Lanes;
+    /// Rays of a packet.
+    const PACKET: usize;
+    /// Rays in flight.
+    const FLIGHT: usize;
+
+    /// Writes the keys of the entered children, the nearest last: the bits of the entry, of which the last three are the
+    /// inverted lane. Entries are not negative, so that keys are ordered as they are, and distinct.
+    unsafe fn sort_keys(entry: Self::Boxes, mask: u32, to: *mut u32);
+
+    /// Writes the keys of the entered children in the order of their lanes.
+    unsafe fn compress_keys(entry: Self::Boxes, mask: u32, to: *mut u32);
+
+    /// The nearest of two or more entered children; all are written to `to`, the nearest last.
+    unsafe fn sort(node: &WideNode, entry: Self::Boxes, mask: u32, to: *mut Pending) -> Child;
+
+    /// Writes the entered children in the order of their lanes.
+    unsafe fn compress(node: &WideNode, mask: u32, to: *mut Child);
+
+    /// As [`compress`](Self::compress), with entries of 0.
+    unsafe fn compress_pending(node: &WideNode, mask: u32, to: *mut Pending);
+
+    /// Has a line of memory fetched, which may be anywhere.
+    unsafe fn prefetch(line: *const u8);
+
+    /// [`in_flight::trace`](super::in_flight::trace), not inlined.
+    unsafe fn in_flight<A: Answers>(wide: &WideBvh, rays: impl Source, answers: &mut A, numbers: Range<usize>);
+
+    /// Takes what begins behind `nearest` from a stack that is aligned to 64 bytes; its new end.
+    unsafe fn drop_farther(base: *mut Pending, top: *mut Pending, nearest: f32) -> *mut Pending;
+}
+
+/// What is behind a hit at this distance is greater.
+#[inline(always)]
+pub(crate) fn last_pending(nearest: f32) -> Pending {
+    u64::from(nearest.to_bits() | 7) << 32 | u64::from(u32::MAX)
+}

@@ -1,0 +1,171 @@
+//! Lanes as a type: numbers side by side in one register. Kernels are written once over [`Lanes`]; instruction sets are its
+//! implementations.
+
+use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
+
+/// `N` numbers of f32, or of u32 where an operation says so.
+///
+/// A value exists only where the processor has the instructions: what makes one out of nothing is unsafe, what takes one is
+/// not. Every function is inlined into one that is compiled with these instructions, or it is very slow.
+pub(crate) trait Lanes:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + BitAnd<Output = Self>
+    + BitOr<Output = Self>
+    + BitXor<Output = Self>
+{
+    /// The number of lanes.
+    const N: usize;
+    /// A set of lanes.
+    type Mask: Mask;
+    /// As many numbers of f64.
+    type Double: DoubleLanes<Mask = Self::Mask>;
+
+    /// The same number in all lanes.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    unsafe fn splat(x: f32) -> Self;
+
+    /// `N` numbers from memory.
+    ///
+    /// # Safety
+    /// The processor has the instructions; `from` is aligned to `N` numbers.
+    unsafe fn load(from: *const f32) -> Self;
+
+    /// As [`load`](Self::load), from any place.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    unsafe fn load_unaligned(from: *const f32) -> Self;
+
+    /// Writes `N` numbers to any place.
+    ///
+    /// # Safety
+    /// There is room.
+    unsafe fn store(self, to: *mut f32);
+
+    /// The lesser; of two zeros, or a NaN and a number, `other`.
+    fn min(self, other: Self) -> Self;
+
+    /// The greater; of two zeros, or a NaN and a number, `other`.
+    fn max(self, other: Self) -> Self;
+
+    /// `self · factor + term`, rounded once.
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+
+    /// Where `self < other`; not where either is NaN.
+    fn lt(self, other: Self) -> Self::Mask;
+
+    /// Where `self <= other`; not where either is NaN.
+    fn le(self, other: Self) -> Self::Mask;
+
+    /// Where `self == other`; not where either is NaN.
+    fn eq(self, other: Self) -> Self::Mask;
+
+    /// Where `self < other` as u32.
+    fn below(self, other: Self) -> Self::Mask;
+
+    /// A bit per lane whose sign is set, lane 0 lowest.
+    fn signs(self) -> u32;
+
+    /// The greatest number, none of which is NaN.
+    fn greatest(self) -> f32;
+
+    /// `yes` where the mask is set, else `no`.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+
+    /// The same numbers in f64.
+    fn double(self) -> Self::Double;
+
+    /// The numbers of f64 rounded to f32.
+    fn single(double: Self::Double) -> Self;
+
+    /// Four lanes from each of `N / 4` places.
+    ///
+    /// # Safety
+    /// The processor has the instructions; the first `N / 4` places are aligned to four numbers.
+    unsafe fn load_quarters(from: [*const f32; 4]) -> Self;
+
+    /// Writes four lanes to each of `N / 4` places.
+    ///
+    /// # Safety
+    /// The first `N / 4` places are aligned to four numbers.
+    unsafe fn store_quarters(self, to: [*mut f32; 4]);
+
+    /// Transposes four rows of four lanes in each quarter.
+    fn transpose_quarters(rows: [Self; 4]) -> [Self; 4];
+
+    /// One of its four lanes in every lane of a quarter.
+    fn spread<const LANE: usize>(self) -> Self;
+
+    /// The lanes of every quarter in the order 2, 3, 0, 1.
+    fn swap_twos(self) -> Self;
+
+    /// The lanes of every quarter in the order 1, 0, 3, 2.
+    fn swap_ones(self) -> Self;
+
+    /// The same bits in all lanes.
+    ///
+    /// # Safety
+    /// As [`splat`](Self::splat).
+    #[inline(always)]
+    unsafe fn splat_bits(bits: u32) -> Self {
+        // SAFETY: the caller's promise.
+        unsafe { Self::splat(f32::from_bits(bits)) }
+    }
+
+    /// The sizes.
+    #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: a value exists.
+        unsafe { self & Self::splat_bits(u32::MAX >> 1) }
+    }
+}
+
+/// A set of lanes.
+pub(crate) trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
+    /// A bit per lane, lane 0 lowest.
+    fn bits(self) -> u32;
+
+    /// The set of these bits, of which those beyond the lanes are ignored.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    unsafe fn from_bits(bits: u32) -> Self;
+
+    /// The lanes that are not in `other`.
+    fn and_not(self, other: Self) -> Self;
+}
+
+/// As many numbers of f64 as there are lanes.
+pub(crate) trait DoubleLanes:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// A set of lanes.
+    type Mask;
+
+    /// The same number in all lanes.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    unsafe fn splat(x: f64) -> Self;
+
+    /// The lesser, as [`Lanes::min`].
+    fn min(self, other: Self) -> Self;
+
+    /// The greater, as [`Lanes::max`].
+    fn max(self, other: Self) -> Self;
+
+    /// Where `self < other`.
+    fn lt(self, other: Self) -> Self::Mask;
+
+    /// Where `self <= other`.
+    fn le(self, other: Self) -> Self::Mask;
+
+    /// Where `self == other`.
+    fn eq(self, other: Self) -> Self::Mask;
+}

@@ -1,0 +1,194 @@
+//! Rays side by side, a ray per lane, from any order in memory.
+
+use super::lanes::{Lanes, Mask};
+use super::pairs::Pairs;
+use crate::Slabs;
+use crate::ray::pow2;
+use crate::triangle::AXES;
+
+// Why the box tests of packets and of rays in flight are conservative. Names are those of the proof of `BoxRay`: u = 2^-24, S the
+// largest size of a coordinate, o the origin, i the reciprocal of the direction, s the same clamped, i > 0; the other sign
+// mirrors every step. The distance to a near plane p is `(p - M) * s - o * s`, to a far plane `(p + M) * s - o * s`, with the margin
+// M = 16uS; packets take the largest S of their rays, and rays in flight add M to the origin instead of the plane.
+//
+// 1. Shift. The sum with M is off by at most uS, the product o * s by uS * s, and so is the other product where it is not fused. The
+//    margin is left with at least 13uS, of which `Slabs` takes 10uS.
+// 2. Scale. The last operation rounds once: a near distance is too far by a factor of at most 1 + u, a far one too near by 1 - u, and
+//    `Slabs` multiplies its exit by 1 + 8u. One factor FAR = 1 + 24u on the exit covers all of it, on the nearest hit so far, too, since
+//    that is the least of the far distances.
+// 3. Underflow. Errors of subnormal numbers are below 2^-146 together; UNDERFLOW = 2^-125 covers them at both ends.
+// 4. Clamp and overflow are those of `BoxRay`: rays outside its bounds are left to the portable kernel.
+//
+// Interval arithmetic takes the least and the greatest product over all origins and all scales of a packet, by the same operations:
+// rounding is monotone, so that it is not beyond any ray's own distance by more than the steps above allow.
+
+/// What an exit is multiplied by before an entry is compared with it.
+pub(crate) const FAR: f32 = 1.0 + 24.0 * (f32::EPSILON / 2.0);
+/// What is added to it then.
+pub(crate) const UNDERFLOW: f32 = 2.0 * f32::MIN_POSITIVE;
+
+/// As many rays as there are lanes. Vectors of three are by axis.
+#[derive(Clone, Copy)]
+pub(crate) struct RayLanes<L> {
+    pub(crate) origin: [L; 3],
+    pub(crate) direction: [L; 3],
+    pub(crate) inverse: [L; 3],
+    pub(crate) t_min: L,
+    pub(crate) t_max: L,
+}
+
+impl<L: Lanes> RayLanes<L> {
+    /// By how much boxes grow, in multiples of the largest size of a coordinate.
+    pub(crate) const MARGIN: f32 = 2.0 * Slabs::MARGIN;
+    /// What an entry is compared with.
+    #[inline(always)]
+    pub(crate) fn beyond(exit: L) -> L {
+        // SAFETY: a value exists.
+        unsafe { exit.mul_add(L::splat(FAR), L::splat(UNDERFLOW)) }
+    }
+
+    /// A bit per axis along which the first ray runs backwards.
+    #[inline(always)]
+    pub(crate) fn octant(&self) -> u32 {
+        let [x, y, z] = self.inverse;
+        x.signs() & 1 | (y.signs() & 1) << 1 | (z.signs() & 1) << 2
+    }
+
+    /// The axes of the shear of rays that [cohere](Self::cohere).
+    #[inline(always)]
+    pub(crate) fn axes(&self) -> [usize; 3] {
+        let (second, third) = self.largest();
+        AXES[if third.bits() != 0 { 2 } else { usize::from(second.bits() != 0) }]
+    }
+
+    /// The rays whose direction is largest along y, and along z: the lowest axis on ties.
+    #[inline(always)]
+    pub(crate) fn largest(&self) -> (L::Mask, L::Mask) {
+        let [x, y, z] = self.direction;
+        let (x, y, z) = (x.abs(), y.abs(), z.abs());
+        let third = x.max(y).lt(z);
+        (x.lt(y).and_not(third), third)
+    }
+
+    /// The rays within the bounds of `BoxRay`, the largest size of a coordinate for each, and the
+    /// reciprocals of the directions made so small that nothing overflows.
+    #[inline(always)]
+    pub(crate) fn bounded(&self, largest: f32) -> (L::Mask, L, [L; 3]) {
+        // SAFETY: values exist.
+        unsafe {
+            let [x, y, z] = self.inverse;
+            let limit = x.abs().min(y.abs()).min(z.abs()) * L::splat(pow2(24));
+            let [ox, oy, oz] = self.origin;
+            let size = ox.abs().max(oy.abs()).max(oz.abs()) + L::splat(largest);
+            let in_range = size.lt(L::splat(pow2(60)))
+                & L::splat(pow2(-90)).le(size)
+                & (size * limit).lt(L::splat(pow2(120)));
+            let least = L::splat(0.0) - limit;
+            let scale = [x.max(least).min(limit), y.max(least).min(limit), z.max(least).min(limit)];
+            (in_range, size, scale)
+        }
+    }
+
+    /// The bounded reciprocals, if all rays are in range, run to the same sides, and mostly along the same axis.
+    #[inline(always)]
+    pub(crate) fn cohere(&self, largest: f32) -> Option<[L; 3]> {
+        let all = u32::MAX >> (32 - L::N);
+        let same = |mask: u32| mask == 0 || mask == all;
+        let [x, y, z] = self.inverse;
+        let (second, third) = self.largest();
+        let (in_range, _, scale) = self.bounded(largest);
+        let cohere = same(x.signs())
+            & same(y.signs())
+            & same(z.signs())
+            & same(second.bits())
+            & same(third.bits())
+            & (in_range.bits() == all);
+        cohere.then_some(scale)
+    }
+
+    /// The rays as triangles are tested with them.
+    #[inline(always)]
+    pub(crate) fn sheared(&self, [x, y, z]: [usize; 3]) -> Pairs<L> {
+        let Self { origin, direction, inverse, t_min, .. } = self;
+        Pairs {
+            origin: [origin[x], origin[y], origin[z]],
+            inverse: [inverse[x], inverse[y], inverse[z]],
+            slope: [direction[x] / direction[z], direction[y] / direction[z]],
+            depth: direction[z],
+            t_min: *t_min,
+        }
+    }
+}
+
+/// The extremes of many rays, lane by lane.
+pub(crate) struct RayBounds<L> {
+    lowest: [L; 3],
+    highest: [L; 3],
+    least: [L; 3],
+    most: [L; 3],
+    begin: L,
+    end: L,
+}
+
+impl<L: Lanes> RayBounds<L> {
+    /// Of no rays.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    #[inline(always)]
+    pub(crate) unsafe fn none() -> Self {
+        // SAFETY: the caller's promise.
+        let (low, high) = unsafe { (L::splat(f32::NEG_INFINITY), L::splat(f32::INFINITY)) };
+        Self { lowest: [high; 3], highest: [low; 3], least: [high; 3], most: [low; 3], begin: high, end: low }
+    }
+
+    #[inline(always)]
+    pub(crate) fn add(&mut self, rays: &RayLanes<L>, scale: &[L; 3]) {
+        for (axis, (&origin, &scale)) in rays.origin.iter().zip(scale).enumerate() {
+            self.lowest[axis] = self.lowest[axis].min(origin);
+            self.highest[axis] = self.highest[axis].max(origin);
+            self.least[axis] = self.least[axis].min(scale);
+            self.most[axis] = self.most[axis].max(scale);
+        }
+        self.begin = self.begin.min(rays.t_min);
+        self.end = self.end.max(rays.t_max);
+    }
+
+    #[inline(always)]
+    pub(crate) fn origins(&self, axis: usize) -> [f32; 2] {
+        [least(self.lowest[axis]), self.highest[axis].greatest()]
+    }
+
+    #[inline(always)]
+    pub(crate) fn scales(&self, axis: usize) -> [f32; 2] {
+        [least(self.least[axis]), self.most[axis].greatest()]
+    }
+
+    #[inline(always)]
+    pub(crate) fn begin(&self) -> f32 {
+        least(self.begin)
+    }
+
+    #[inline(always)]
+    pub(crate) fn end(&self) -> f32 {
+        self.end.greatest()
+    }
+
+    /// The margin of boxes for all rays, in a scene whose coordinates are at most `largest`.
+    #[inline(always)]
+    pub(crate) fn margin(&self, largest: f32) -> f32 {
+        let mut size = self.highest[0].max(self.lowest[0].abs());
+        for axis in 0..3 {
+            size = size.max(self.lowest[axis].abs()).max(self.highest[axis].abs());
+        }
+        (size.greatest() + largest) * RayLanes::<L>::MARGIN
+    }
+}
+
+/// The least lane.
+#[inline(always)]
+fn least<L: Lanes>(lanes: L) -> f32 {
+    // SAFETY: a value exists.
+    let minus = unsafe { L::splat(-0.0) };
+    -(lanes ^ minus).greatest()
+}

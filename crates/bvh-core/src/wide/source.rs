@@ -1,0 +1,118 @@
+//! Where the rays of a batch come from: rays one after the other, or components in slices.
+
+use super::lanes::Lanes;
+use super::ray_lanes::RayLanes;
+use crate::components::Distances;
+use crate::{Ray, RayComponents};
+
+/// Rays in memory, by their numbers.
+pub(crate) trait Source: Copy {
+    /// How many rays there are.
+    fn len(self) -> usize;
+
+    /// One of the rays.
+    fn ray(self, number: usize) -> Ray;
+
+    /// As many rays as there are lanes, from number `first` on.
+    ///
+    /// # Safety
+    /// The processor has the instructions, and there are so many rays.
+    unsafe fn lanes<L: Lanes>(self, first: usize) -> RayLanes<L>;
+
+    /// As [`lanes`](Self::lanes); where there are fewer rays the last one is repeated.
+    ///
+    /// # Safety
+    /// The processor has the instructions, and there is a ray.
+    #[inline(always)]
+    unsafe fn lanes_up_to<L: Lanes>(self, first: usize, end: usize) -> RayLanes<L> {
+        // SAFETY: the caller's promises.
+        unsafe {
+            if first + L::N <= end {
+                return self.lanes(first);
+            }
+            let padded: [Ray; 16] = core::array::from_fn(|i| self.ray((first + i).min(end - 1)));
+            padded.as_slice().lanes(0)
+        }
+    }
+}
+
+impl Source for &[Ray] {
+    #[inline(always)]
+    fn len(self) -> usize {
+        <[Ray]>::len(self)
+    }
+
+    #[inline(always)]
+    fn ray(self, number: usize) -> Ray {
+        self[number]
+    }
+
+    #[inline(always)]
+    unsafe fn lanes<L: Lanes>(self, first: usize) -> RayLanes<L> {
+        // SAFETY: the caller's promises; a ray is three vectors of four lanes.
+        unsafe {
+            let rays = self.as_ptr().add(first);
+            let [ox, oy, oz, t_min] = transpose(rays, 0);
+            let [dx, dy, dz, t_max] = transpose(rays, 1);
+            let [ix, iy, iz, _] = transpose(rays, 2);
+            RayLanes { origin: [ox, oy, oz], direction: [dx, dy, dz], inverse: [ix, iy, iz], t_min, t_max }
+        }
+    }
+}
+
+impl Source for &RayComponents<'_> {
+    #[inline(always)]
+    fn len(self) -> usize {
+        RayComponents::len(self)
+    }
+
+    #[inline(always)]
+    fn ray(self, number: usize) -> Ray {
+        RayComponents::ray(self, number)
+    }
+
+    #[inline(always)]
+    unsafe fn lanes<L: Lanes>(self, first: usize) -> RayLanes<L> {
+        let [[ox, oy, oz], [dx, dy, dz]] = self.slices();
+        let [t_min, t_max] = self.ranges();
+        // SAFETY: the caller's promises; slices are equally long.
+        unsafe {
+            let component = |slice: &[f32]| L::load_unaligned(slice.as_ptr().add(first));
+            let distance = |distances: Distances<'_>| match distances {
+                Distances::All(distance) => L::splat(distance),
+                Distances::Each(distances) => component(distances),
+            };
+            let direction = [component(dx), component(dy), component(dz)];
+            let (one, most) = (L::splat(1.0), L::splat(f32::MAX));
+            let least = L::splat(f32::MIN);
+            // As `Ray` does.
+            let inverse = |direction: L| (one / direction).max(least).min(most);
+            RayLanes {
+                origin: [component(ox), component(oy), component(oz)],
+                direction,
+                inverse: [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])],
+                t_min: distance(t_min) + L::splat(0.0),
+                t_max: distance(t_max).min(most),
+            }
+        }
+    }
+}
+
+/// One of the three vectors of rays, by component.
+#[inline(always)]
+unsafe fn transpose<L: Lanes>(rays: *const Ray, vector: usize) -> [L; 4] {
+    const STEP: usize = size_of::<Ray>() / 4;
+    // SAFETY: the caller's promises; quarters beyond the lanes are not loaded.
+    unsafe {
+        let row = |i: usize| {
+            let ray = rays.cast::<f32>().wrapping_add(4 * vector + i * STEP);
+            L::load_quarters([
+                ray,
+                ray.wrapping_add(4 * STEP),
+                ray.wrapping_add(8 * STEP),
+                ray.wrapping_add(12 * STEP),
+            ])
+        };
+        L::transpose_quarters([row(0), row(1), row(2), row(3)])
+    }
+}

@@ -1,0 +1,444 @@
+//! Registers of AVX2 and AVX-512 as [`Lanes`].
+//!
+//! Why every call of an instruction here is safe: a value of these types exists only where the processor has the instructions,
+//! and what makes one out of nothing is unsafe for its caller.
+#![allow(clippy::undocumented_unsafe_blocks)]
+
+use crate::wide::lanes::{DoubleLanes, Lanes, Mask};
+use core::arch::x86_64::*;
+use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
+
+/// Operators of a register, each one instruction.
+macro_rules! operators {
+    ($name:ident: $($operator:ident $function:ident $instruction:ident),*) => {$(
+        impl $operator for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn $function(self, other: Self) -> Self {
+                unsafe { Self($instruction(self.0, other.0)) }
+            }
+        }
+    )*};
+}
+
+/// Functions of two registers or three, each one expression.
+macro_rules! functions {
+    ($($name:ident($lanes:ident $(, $argument:ident)*) -> $result:ty = $value:expr;)*) => {$(
+        #[inline(always)]
+        fn $name(self, $($argument: Self),*) -> $result {
+            let $lanes = self;
+            #[allow(unused_unsafe)]
+            unsafe {
+                $value
+            }
+        }
+    )*};
+}
+
+/// What loads and stores a register, and fills all its lanes.
+macro_rules! memory {
+    ($splat:ident $load:ident $load_unaligned:ident $store:ident) => {
+        #[inline(always)]
+        unsafe fn splat(x: f32) -> Self {
+            unsafe { Self($splat(x)) }
+        }
+        #[inline(always)]
+        unsafe fn load(from: *const f32) -> Self {
+            unsafe { Self($load(from)) }
+        }
+        #[inline(always)]
+        unsafe fn load_unaligned(from: *const f32) -> Self {
+            unsafe { Self($load_unaligned(from)) }
+        }
+        #[inline(always)]
+        unsafe fn store(self, to: *mut f32) {
+            unsafe { $store(to, self.0) }
+        }
+    };
+}
+
+/// What moves lanes within quarters of a register.
+macro_rules! quarters {
+    ($low:ident $high:ident $shuffle:ident $permute:ident) => {
+        #[inline(always)]
+        fn transpose_quarters([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+            unsafe {
+                let (ab, cd) = ($low(a.0, b.0), $low(c.0, d.0));
+                let (ab_high, cd_high) = ($high(a.0, b.0), $high(c.0, d.0));
+                [
+                    Self($shuffle::<0b01_00_01_00>(ab, cd)),
+                    Self($shuffle::<0b11_10_11_10>(ab, cd)),
+                    Self($shuffle::<0b01_00_01_00>(ab_high, cd_high)),
+                    Self($shuffle::<0b11_10_11_10>(ab_high, cd_high)),
+                ]
+            }
+        }
+        #[inline(always)]
+        fn spread<const LANE: usize>(self) -> Self {
+            unsafe {
+                match LANE {
+                    0 => Self($permute::<0b00_00_00_00>(self.0)),
+                    1 => Self($permute::<0b01_01_01_01>(self.0)),
+                    2 => Self($permute::<0b10_10_10_10>(self.0)),
+                    _ => Self($permute::<0b11_11_11_11>(self.0)),
+                }
+            }
+        }
+        #[inline(always)]
+        fn swap_twos(self) -> Self {
+            unsafe { Self($permute::<0b01_00_11_10>(self.0)) }
+        }
+        #[inline(always)]
+        fn swap_ones(self) -> Self {
+            unsafe { Self($permute::<0b10_11_00_01>(self.0)) }
+        }
+    };
+}
+
+/// Four numbers.
+#[derive(Clone, Copy)]
+pub(crate) struct F32x4(pub(crate) __m128);
+
+/// Eight numbers.
+#[derive(Clone, Copy)]
+pub(crate) struct F32x8(pub(crate) __m256);
+
+/// Sixteen numbers.
+#[derive(Clone, Copy)]
+pub(crate) struct F32x16(pub(crate) __m512);
+
+/// Sets of lanes: all bits of a lane, or none.
+#[derive(Clone, Copy)]
+pub(crate) struct Mask4(__m128);
+#[derive(Clone, Copy)]
+pub(crate) struct Mask8(__m256);
+
+/// Sets of lanes, a bit each.
+#[derive(Clone, Copy)]
+pub(crate) struct Bits8(u8);
+#[derive(Clone, Copy)]
+pub(crate) struct Bits16(pub(crate) u16);
+
+/// Numbers of f64.
+#[derive(Clone, Copy)]
+pub(crate) struct F64x4(__m256d);
+#[derive(Clone, Copy)]
+pub(crate) struct F64x8(__m512d);
+
+/// The numbers of two registers.
+#[derive(Clone, Copy)]
+pub(crate) struct Two<T>(T, T);
+
+operators!(F32x4: Add add _mm_add_ps, Sub sub _mm_sub_ps, Mul mul _mm_mul_ps, Div div _mm_div_ps,
+    BitAnd bitand _mm_and_ps, BitOr bitor _mm_or_ps, BitXor bitxor _mm_xor_ps);
+operators!(F32x8: Add add _mm256_add_ps, Sub sub _mm256_sub_ps, Mul mul _mm256_mul_ps, Div div _mm256_div_ps,
+    BitAnd bitand _mm256_and_ps, BitOr bitor _mm256_or_ps, BitXor bitxor _mm256_xor_ps);
+operators!(F32x16: Add add _mm512_add_ps, Sub sub _mm512_sub_ps, Mul mul _mm512_mul_ps, Div div _mm512_div_ps,
+    BitAnd bitand _mm512_and_ps, BitOr bitor _mm512_or_ps, BitXor bitxor _mm512_xor_ps);
+operators!(F64x4: Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_mul_pd, Div div _mm256_div_pd);
+operators!(F64x8: Add add _mm512_add_pd, Sub sub _mm512_sub_pd, Mul mul _mm512_mul_pd, Div div _mm512_div_pd);
+operators!(Mask4: BitAnd bitand _mm_and_ps, BitOr bitor _mm_or_ps);
+operators!(Mask8: BitAnd bitand _mm256_and_ps, BitOr bitor _mm256_or_ps);
+
+impl Lanes for F32x4 {
+    const N: usize = 4;
+    type Mask = Mask4;
+    type Double = F64x4;
+    memory!(_mm_set1_ps _mm_load_ps _mm_loadu_ps _mm_storeu_ps);
+    #[inline(always)]
+    unsafe fn load_quarters(from: [*const f32; 4]) -> Self {
+        unsafe { Self::load(from[0]) }
+    }
+    #[inline(always)]
+    unsafe fn store_quarters(self, to: [*mut f32; 4]) {
+        unsafe { self.store(to[0]) }
+    }
+    quarters!(_mm_unpacklo_ps _mm_unpackhi_ps _mm_shuffle_ps _mm_permute_ps);
+    functions! {
+        min(a, b) -> Self = Self(_mm_min_ps(a.0, b.0));
+        max(a, b) -> Self = Self(_mm_max_ps(a.0, b.0));
+        mul_add(a, b, c) -> Self = Self(_mm_fmadd_ps(a.0, b.0, c.0));
+        lt(a, b) -> Mask4 = Mask4(_mm_cmp_ps::<_CMP_LT_OQ>(a.0, b.0));
+        le(a, b) -> Mask4 = Mask4(_mm_cmp_ps::<_CMP_LE_OQ>(a.0, b.0));
+        eq(a, b) -> Mask4 = Mask4(_mm_cmp_ps::<_CMP_EQ_OQ>(a.0, b.0));
+        signs(a) -> u32 = _mm_movemask_ps(a.0) as u32;
+        double(a) -> F64x4 = F64x4(_mm256_cvtps_pd(a.0));
+        greatest(a) -> f32 = {
+            let two = _mm_max_ps(a.0, _mm_movehl_ps(a.0, a.0));
+            _mm_cvtss_f32(_mm_max_ss(two, _mm_permute_ps::<0b01>(two)))
+        };
+        below(a, b) -> Mask4 = {
+            let (a, b) = (_mm_castps_si128(a.0), _mm_castps_si128(b.0));
+            let not_below = _mm_cmpeq_epi32(_mm_max_epu32(a, b), a);
+            Mask4(_mm_castsi128_ps(_mm_xor_si128(not_below, _mm_set1_epi32(-1))))
+        };
+    }
+    #[inline(always)]
+    fn select(mask: Mask4, yes: Self, no: Self) -> Self {
+        unsafe { Self(_mm_blendv_ps(no.0, yes.0, mask.0)) }
+    }
+    #[inline(always)]
+    fn single(double: F64x4) -> Self {
+        unsafe { Self(_mm256_cvtpd_ps(double.0)) }
+    }
+}
+
+impl Lanes for F32x8 {
+    const N: usize = 8;
+    type Mask = Mask8;
+    type Double = Two<F64x4>;
+    memory!(_mm256_set1_ps _mm256_load_ps _mm256_loadu_ps _mm256_storeu_ps);
+    #[inline(always)]
+    unsafe fn load_quarters(from: [*const f32; 4]) -> Self {
+        unsafe { Self(_mm256_setr_m128(_mm_load_ps(from[0]), _mm_load_ps(from[1]))) }
+    }
+    #[inline(always)]
+    unsafe fn store_quarters(self, to: [*mut f32; 4]) {
+        unsafe {
+            _mm_store_ps(to[0], _mm256_castps256_ps128(self.0));
+            _mm_store_ps(to[1], _mm256_extractf128_ps::<1>(self.0));
+        }
+    }
+    quarters!(_mm256_unpacklo_ps _mm256_unpackhi_ps _mm256_shuffle_ps _mm256_permute_ps);
+    functions! {
+        min(a, b) -> Self = Self(_mm256_min_ps(a.0, b.0));
+        max(a, b) -> Self = Self(_mm256_max_ps(a.0, b.0));
+        mul_add(a, b, c) -> Self = Self(_mm256_fmadd_ps(a.0, b.0, c.0));
+        lt(a, b) -> Mask8 = Mask8(_mm256_cmp_ps::<_CMP_LT_OQ>(a.0, b.0));
+        le(a, b) -> Mask8 = Mask8(_mm256_cmp_ps::<_CMP_LE_OQ>(a.0, b.0));
+        eq(a, b) -> Mask8 = Mask8(_mm256_cmp_ps::<_CMP_EQ_OQ>(a.0, b.0));
+        signs(a) -> u32 = _mm256_movemask_ps(a.0) as u32;
+        greatest(a) -> f32 =
+            F32x4(_mm_max_ps(_mm256_castps256_ps128(a.0), _mm256_extractf128_ps::<1>(a.0))).greatest();
+        double(a) -> Two<F64x4> = Two(
+            F64x4(_mm256_cvtps_pd(_mm256_castps256_ps128(a.0))),
+            F64x4(_mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a.0))),
+        );
+        below(a, b) -> Mask8 = {
+            let (a, b) = (_mm256_castps_si256(a.0), _mm256_castps_si256(b.0));
+            let not_below = _mm256_cmpeq_epi32(_mm256_max_epu32(a, b), a);
+            Mask8(_mm256_castsi256_ps(_mm256_xor_si256(not_below, _mm256_set1_epi32(-1))))
+        };
+    }
+    #[inline(always)]
+    fn select(mask: Mask8, yes: Self, no: Self) -> Self {
+        unsafe { Self(_mm256_blendv_ps(no.0, yes.0, mask.0)) }
+    }
+    #[inline(always)]
+    fn single(Two(low, high): Two<F64x4>) -> Self {
+        unsafe { Self(_mm256_setr_m128(_mm256_cvtpd_ps(low.0), _mm256_cvtpd_ps(high.0))) }
+    }
+}
+
+impl Lanes for F32x16 {
+    const N: usize = 16;
+    type Mask = Bits16;
+    type Double = Two<F64x8>;
+    memory!(_mm512_set1_ps _mm512_load_ps _mm512_loadu_ps _mm512_storeu_ps);
+    #[inline(always)]
+    unsafe fn load_quarters(from: [*const f32; 4]) -> Self {
+        unsafe {
+            let low = _mm256_setr_m128(_mm_load_ps(from[0]), _mm_load_ps(from[1]));
+            let high = _mm256_setr_m128(_mm_load_ps(from[2]), _mm_load_ps(from[3]));
+            Self(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
+        }
+    }
+    #[inline(always)]
+    unsafe fn store_quarters(self, to: [*mut f32; 4]) {
+        unsafe {
+            _mm_store_ps(to[0], _mm512_castps512_ps128(self.0));
+            _mm_store_ps(to[1], _mm512_extractf32x4_ps::<1>(self.0));
+            _mm_store_ps(to[2], _mm512_extractf32x4_ps::<2>(self.0));
+            _mm_store_ps(to[3], _mm512_extractf32x4_ps::<3>(self.0));
+        }
+    }
+    quarters!(_mm512_unpacklo_ps _mm512_unpackhi_ps _mm512_shuffle_ps _mm512_permute_ps);
+    functions! {
+        min(a, b) -> Self = Self(_mm512_min_ps(a.0, b.0));
+        max(a, b) -> Self = Self(_mm512_max_ps(a.0, b.0));
+        mul_add(a, b, c) -> Self = Self(_mm512_fmadd_ps(a.0, b.0, c.0));
+        lt(a, b) -> Bits16 = Bits16(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a.0, b.0));
+        le(a, b) -> Bits16 = Bits16(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a.0, b.0));
+        eq(a, b) -> Bits16 = Bits16(_mm512_cmp_ps_mask::<_CMP_EQ_OQ>(a.0, b.0));
+        signs(a) -> u32 = u32::from(_mm512_movepi32_mask(_mm512_castps_si512(a.0)));
+        greatest(a) -> f32 =
+            F32x8(_mm256_max_ps(_mm512_castps512_ps256(a.0), _mm512_extractf32x8_ps::<1>(a.0))).greatest();
+        double(a) -> Two<F64x8> = Two(
+            F64x8(_mm512_cvtps_pd(_mm512_castps512_ps256(a.0))),
+            F64x8(_mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(a.0))),
+        );
+        below(a, b) -> Bits16 =
+            Bits16(_mm512_cmplt_epu32_mask(_mm512_castps_si512(a.0), _mm512_castps_si512(b.0)));
+    }
+    #[inline(always)]
+    fn select(mask: Bits16, yes: Self, no: Self) -> Self {
+        unsafe { Self(_mm512_mask_mov_ps(no.0, mask.0, yes.0)) }
+    }
+    #[inline(always)]
+    fn single(Two(low, high): Two<F64x8>) -> Self {
+        unsafe {
+            let low = _mm512_castps256_ps512(_mm512_cvtpd_ps(low.0));
+            Self(_mm512_insertf32x8::<1>(low, _mm512_cvtpd_ps(high.0)))
+        }
+    }
+}
+
+impl DoubleLanes for F64x4 {
+    type Mask = Mask4;
+    #[inline(always)]
+    unsafe fn splat(x: f64) -> Self {
+        unsafe { Self(_mm256_set1_pd(x)) }
+    }
+    functions! {
+        min(a, b) -> Self = Self(_mm256_min_pd(a.0, b.0));
+        max(a, b) -> Self = Self(_mm256_max_pd(a.0, b.0));
+        lt(a, b) -> Mask4 = narrow(_mm256_cmp_pd::<_CMP_LT_OQ>(a.0, b.0));
+        le(a, b) -> Mask4 = narrow(_mm256_cmp_pd::<_CMP_LE_OQ>(a.0, b.0));
+        eq(a, b) -> Mask4 = narrow(_mm256_cmp_pd::<_CMP_EQ_OQ>(a.0, b.0));
+    }
+}
+
+/// A half of every lane.
+#[inline(always)]
+unsafe fn narrow(mask: __m256d) -> Mask4 {
+    unsafe {
+        let mask = _mm256_castpd_ps(mask);
+        Mask4(_mm_shuffle_ps::<0b10_00_10_00>(_mm256_castps256_ps128(mask), _mm256_extractf128_ps::<1>(mask)))
+    }
+}
+
+impl DoubleLanes for F64x8 {
+    type Mask = Bits8;
+    #[inline(always)]
+    unsafe fn splat(x: f64) -> Self {
+        unsafe { Self(_mm512_set1_pd(x)) }
+    }
+    functions! {
+        min(a, b) -> Self = Self(_mm512_min_pd(a.0, b.0));
+        max(a, b) -> Self = Self(_mm512_max_pd(a.0, b.0));
+        lt(a, b) -> Bits8 = Bits8(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a.0, b.0));
+        le(a, b) -> Bits8 = Bits8(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(a.0, b.0));
+        eq(a, b) -> Bits8 = Bits8(_mm512_cmp_pd_mask::<_CMP_EQ_OQ>(a.0, b.0));
+    }
+}
+
+/// Sets of lanes that two halves make up.
+pub(crate) trait Join {
+    type Joined;
+    fn join(self, high: Self) -> Self::Joined;
+}
+
+impl Join for Mask4 {
+    type Joined = Mask8;
+    #[inline(always)]
+    fn join(self, high: Self) -> Mask8 {
+        unsafe { Mask8(_mm256_setr_m128(self.0, high.0)) }
+    }
+}
+
+impl Join for Bits8 {
+    type Joined = Bits16;
+    #[inline(always)]
+    fn join(self, high: Self) -> Bits16 {
+        Bits16(u16::from(self.0) | u16::from(high.0) << 8)
+    }
+}
+
+/// Operators of both halves.
+macro_rules! of_halves {
+    ($($operator:ident $function:ident),*) => {$(
+        impl<T: $operator<Output = T>> $operator for Two<T> {
+            type Output = Self;
+            #[inline(always)]
+            fn $function(self, other: Self) -> Self {
+                Self(self.0.$function(other.0), self.1.$function(other.1))
+            }
+        }
+    )*};
+}
+
+of_halves!(Add add, Sub sub, Mul mul, Div div);
+
+impl<T: DoubleLanes<Mask: Join>> DoubleLanes for Two<T> {
+    type Mask = <T::Mask as Join>::Joined;
+    #[inline(always)]
+    unsafe fn splat(x: f64) -> Self {
+        unsafe { Self(T::splat(x), T::splat(x)) }
+    }
+    functions! {
+        min(a, b) -> Self = Self(a.0.min(b.0), a.1.min(b.1));
+        max(a, b) -> Self = Self(a.0.max(b.0), a.1.max(b.1));
+        lt(a, b) -> Self::Mask = a.0.lt(b.0).join(a.1.lt(b.1));
+        le(a, b) -> Self::Mask = a.0.le(b.0).join(a.1.le(b.1));
+        eq(a, b) -> Self::Mask = a.0.eq(b.0).join(a.1.eq(b.1));
+    }
+}
+
+impl Mask for Mask4 {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        unsafe { _mm_movemask_ps(self.0) as u32 }
+    }
+    #[inline(always)]
+    unsafe fn from_bits(bits: u32) -> Self {
+        unsafe {
+            let lanes = _mm_setr_epi32(1, 2, 4, 8);
+            let set = _mm_and_si128(_mm_set1_epi32(bits as i32), lanes);
+            Self(_mm_castsi128_ps(_mm_cmpeq_epi32(set, lanes)))
+        }
+    }
+    #[inline(always)]
+    fn and_not(self, other: Self) -> Self {
+        unsafe { Self(_mm_andnot_ps(other.0, self.0)) }
+    }
+}
+
+impl Mask for Mask8 {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        unsafe { _mm256_movemask_ps(self.0) as u32 }
+    }
+    #[inline(always)]
+    unsafe fn from_bits(bits: u32) -> Self {
+        unsafe {
+            let lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let set = _mm256_and_si256(_mm256_set1_epi32(bits as i32), lanes);
+            Self(_mm256_castsi256_ps(_mm256_cmpeq_epi32(set, lanes)))
+        }
+    }
+    #[inline(always)]
+    fn and_not(self, other: Self) -> Self {
+        unsafe { Self(_mm256_andnot_ps(other.0, self.0)) }
+    }
+}
+
+impl Mask for Bits16 {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        u32::from(self.0)
+    }
+    #[inline(always)]
+    unsafe fn from_bits(bits: u32) -> Self {
+        Self(bits as u16)
+    }
+    #[inline(always)]
+    fn and_not(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+}
+
+impl BitAnd for Bits16 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+}
+
+impl BitOr for Bits16 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
