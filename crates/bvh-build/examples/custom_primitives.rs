@@ -1,4 +1,5 @@
-//! Traces primitives of one's own beside spheres: a tree needs a box of each, a ray a test of each.
+//! Traces custom primitives together with spheres. Builders need the box of an object, rays need a
+//! test.
 //!
 //! `cargo run -p bvh-build --example custom_primitives`
 
@@ -6,7 +7,7 @@ use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Primitive, Ray, Sphere, boxes, clip_to_box, nearest_hit};
 use std::error::Error;
 
-/// A horizontal disc, which no library knows.
+/// A horizontal disc. The library has no such primitive.
 struct Disc {
     center: [f32; 3],
     radius: f32,
@@ -37,11 +38,15 @@ impl Primitive for Object {
         match self {
             Self::Sphere(sphere) => sphere.intersect(ray, t_max),
             Self::Disc(disc) => {
-                let (origin, direction) = (ray.origin().to_array(), ray.direction().to_array());
-                let t = (disc.center[1] - origin[1]) / direction[1];
-                let [dx, dz] = [0, 2].map(|axis| origin[axis] + t * direction[axis] - disc.center[axis]);
+                let origin = ray.origin();
+                let direction = ray.direction();
+                let [x, y, z] = disc.center;
+                let t = (y - origin.y) / direction.y;
+                let dx = origin.x + t * direction.x - x;
+                let dz = origin.z + t * direction.z - z;
                 let inside = dx * dx + dz * dz <= disc.radius * disc.radius;
-                // Keeps the distance within that of the box, so that the answer does not depend on the tree.
+                // Keeps the distance inside the interval of the box. Otherwise the answer would
+                // depend on the tree.
                 if inside { clip_to_box(ray, &self.aabb(), t, t_max) } else { None }
             }
         }
@@ -49,17 +54,17 @@ impl Primitive for Object {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let objects: Vec<Object> = (0..1000u16)
-        .map(|i| {
-            let center = [f32::from(i % 10) * 3.0, f32::from(i / 10 % 10) * 3.0, f32::from(i / 100) * 3.0];
-            match i % 3 {
-                0 => Object::Sphere(Sphere::new(center, 1.0)),
-                _ => Object::Disc(Disc { center, radius: 1.25 }),
-            }
-        })
-        .collect();
+    let mut objects = Vec::new();
+    for i in 0..1000u16 {
+        let center = [i % 10, i / 10 % 10, i / 100].map(|cell| f32::from(cell) * 3.0);
+        objects.push(match i % 3 {
+            0 => Object::Sphere(Sphere::new(center, 1.0)),
+            _ => Object::Disc(Disc { center, radius: 1.25 }),
+        });
+    }
     let tree = muller_fellner::Config::default().build(&boxes(&objects))?;
-    let (mut spheres, mut discs) = (0, 0);
+    let mut spheres = 0;
+    let mut discs = 0;
     for i in 0..100u8 {
         let across = [f32::from(i % 10) - 4.5, -10.0, f32::from(i / 10) - 4.5];
         let ray = Ray::half_line([15.0, 40.0, 15.0], across)?;

@@ -1,43 +1,47 @@
-//! The refusals of builders, and the check of a scene that all of them make.
+//! The errors of builders, and the check of a scene that all builders make.
 
 use crate::OutOfRange;
 use bvh_core::{Aabb, InvalidBox, MAX_OBJECTS, check_boxes};
 
-/// Why no tree was built. Any other input, of finite boxes and numbers, gives a tree.
+/// The reason why no tree was built. Any other input of finite boxes and numbers gives a tree unless the
+/// caller cancels.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BuildError {
     /// An object's box is not finite or is inverted.
     #[error(transparent)]
     InvalidBox(#[from] InvalidBox),
-    /// More objects than nodes' indices of 31 bits allow.
+    /// There are more objects than node indices of 31 bits allow.
     #[error("{objects} objects are more than the {MAX_OBJECTS} a tree can hold")]
     TooManyObjects {
-        /// How many were given.
+        /// The number of objects.
         objects: usize,
     },
-    /// The number of weights is not the number of objects.
+    /// The number of weights differs from the number of objects.
     #[error("{weights} weights were given for {objects} objects")]
     WeightCount {
-        /// How many weights were given.
+        /// The number of weights.
         weights: usize,
-        /// How many boxes were given.
+        /// The number of boxes.
         objects: usize,
     },
-    /// A weight, which is an expected cost, is not finite or is negative.
+    /// A weight is not finite or is negative. Weights are expected costs.
     #[error("the weight of object {index} is {weight}; it must be finite and not negative")]
     InvalidWeight {
         /// Index of the object.
         index: usize,
-        /// Its weight.
+        /// The weight of the object.
         weight: f64,
     },
     /// A parameter of the builder is out of its range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
+    /// The caller's [`Watch`](crate::Watch) ended the construction.
+    #[error("the construction was cancelled")]
+    Cancelled,
 }
 
-/// Refuses scenes that no builder accepts: with too many objects, or with a box that is not finite or is inverted.
-pub(crate) fn check_scene(boxes: &[Aabb]) -> Result<(), BuildError> {
+/// Rejects scenes with too many objects, and scenes with a box that is not finite or is inverted.
+pub fn check_scene(boxes: &[Aabb]) -> Result<(), BuildError> {
     if boxes.len() > MAX_OBJECTS {
         return Err(BuildError::TooManyObjects { objects: boxes.len() });
     }

@@ -1,4 +1,4 @@
-//! Müller–Fellner against an O(n²) transcription of the paper, and the laws it must obey.
+//! Müller–Fellner compared with an O(n²) transcription of the paper, and the laws of the method.
 
 use bvh_build::muller_fellner::{Config, Heuristic, MadeUpCosts};
 use bvh_build::top_down::AreaOnly;
@@ -6,17 +6,18 @@ use bvh_build::{BuildError, Builder};
 use bvh_core::{Aabb, Bvh, validate};
 use proptest::prelude::*;
 
-/// The sorted object ids below every node, the node's own first, then its children's: the topology of a tree
-/// whose nodes come depth first, left before right.
+/// Returns the sorted object ids below every node, depth first and left before right. This
+/// describes the topology of a tree.
 fn topology(tree: &Bvh) -> Vec<Vec<u32>> {
     let mut stack = if tree.nodes.is_empty() { vec![] } else { vec![0] };
     let mut sets = Vec::new();
     while let Some(index) = stack.pop() {
         let mut below = Vec::new();
         let mut todo = vec![index];
-        while let Some(at) = todo.pop() {
-            below.extend(&tree.prim_ids[tree.nodes[at].prims()]);
-            todo.extend(tree.nodes[at].children());
+        while let Some(descendant) = todo.pop() {
+            let node = &tree.nodes[descendant];
+            below.extend(&tree.prim_ids[node.prims()]);
+            todo.extend(node.children());
         }
         below.sort_unstable();
         sets.push(below);
@@ -25,10 +26,10 @@ fn topology(tree: &Bvh) -> Vec<Vec<u32>> {
     sets
 }
 
-/// The paper's Table 1 word by word: every candidate of every axis from scratch, no blocks, no pruning. The same
-/// topology as [`topology`] returns, for `weight` per object and a cost of a split from areas and loads.
+/// The paper's Table 1 word by word: examines every candidate of every axis, without blocks and
+/// without pruning. Returns the same topology as [`topology`], for a `weight` per object and a cost
+/// of a split from areas and loads.
 fn brute_force(boxes: &[Aabb], weights: &[f32], cost: fn([f64; 2], [f64; 2]) -> f64) -> Vec<Vec<u32>> {
-    let around = |ids: &[u32]| ids.iter().fold(Aabb::EMPTY, |b, &id| b.union(&boxes[id as usize]));
     let load = |ids: &[u32]| ids.iter().map(|&id| f64::from(weights[id as usize])).sum::<f64>();
     let mut stack: Vec<Vec<u32>> = vec![(0..boxes.len() as u32).collect()];
     let mut sets = Vec::new();
@@ -43,40 +44,70 @@ fn brute_force(boxes: &[Aabb], weights: &[f32], cost: fn([f64; 2], [f64; 2]) -> 
         let n = ids.len();
         let mut candidates = Vec::new();
         for axis in 0..3 {
-            ids.sort_unstable();
-            ids.sort_by(|&a, &b| {
-                let key = |id: u32| boxes[id as usize].doubled_centroid()[axis];
-                key(a).total_cmp(&key(b))
-            });
-            let spanned = [ids[0], ids[n - 1]].iter().all(|&id| boxes[id as usize] == around(&ids));
-            for left in if spanned { n / 2..n / 2 + 1 } else { 1..n } {
-                let (l, r) = ids.split_at(left);
-                let areas = [around(l).half_area(), around(r).half_area()];
-                let value = cost(areas, [load(l), load(r)]);
-                candidates.push((value, n.abs_diff(2 * left), axis, left, l.to_vec(), r.to_vec()));
+            sort_along(&mut ids, axis, boxes);
+            // If the first and the last box each span all others, all parts of all splits have the
+            // same box, and the split in the middle is the only candidate.
+            let around_all = around(&ids, boxes);
+            let is_spanned = boxes[ids[0] as usize] == around_all && boxes[ids[n - 1] as usize] == around_all;
+            for left in if is_spanned { n / 2..n / 2 + 1 } else { 1..n } {
+                let (low, high) = ids.split_at(left);
+                let areas = [around(low, boxes).half_area(), around(high, boxes).half_area()];
+                candidates.push(Candidate {
+                    cost: cost(areas, [load(low), load(high)]),
+                    // Of equal costs the most even split wins, then the lowest axis.
+                    rank: (n.abs_diff(2 * left), axis, left),
+                    parts: [high.to_vec(), low.to_vec()],
+                });
             }
         }
-        let best = candidates
-            .into_iter()
-            .min_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2, a.3).cmp(&(b.1, b.2, b.3))));
-        let (.., l, r) = best.unwrap();
-        stack.extend([r, l]);
+        candidates.sort_by(|a, b| {
+            let by_cost = a.cost.total_cmp(&b.cost);
+            by_cost.then(a.rank.cmp(&b.rank))
+        });
+        stack.extend(candidates.swap_remove(0).parts);
     }
     sets
 }
 
-/// Boxes on a coarse grid, so that ties, coincidence and zero extents are common, or anywhere.
+/// A way to split some objects.
+struct Candidate {
+    cost: f64,
+    rank: (usize, usize, usize),
+    /// The upper and the lower part.
+    parts: [Vec<u32>; 2],
+}
+
+/// Sorts by centroid, and by id where centroids are equal.
+fn sort_along(ids: &mut [u32], axis: usize, boxes: &[Aabb]) {
+    let key = |id: u32| boxes[id as usize].doubled_centroid()[axis];
+    ids.sort_unstable();
+    ids.sort_by(|&a, &b| key(a).total_cmp(&key(b)));
+}
+
+fn around(ids: &[u32], boxes: &[Aabb]) -> Aabb {
+    let mut aabb = Aabb::EMPTY;
+    for &id in ids {
+        aabb = aabb.union(&boxes[id as usize]);
+    }
+    aabb
+}
+
+/// Makes boxes on a coarse grid or anywhere. On the grid ties, coincidence and zero extents are
+/// common.
 fn scene(max: usize) -> impl Strategy<Value = Vec<Aabb>> {
-    let cell = || (0..8i32).prop_map(|c| c as f32);
-    let grid = (prop::array::uniform3(cell()), prop::array::uniform3((0..3i32).prop_map(|c| c as f32)));
-    let real = (prop::array::uniform3(-1e3f32..1e3), prop::array::uniform3(0f32..50.0));
-    let boxed = |(low, size): ([f32; 3], [f32; 3])| {
-        Aabb::from((low, std::array::from_fn(|axis| low[axis] + size[axis])))
-    };
+    let grid_corner = prop::array::uniform3((0..8u8).prop_map(f32::from));
+    let grid_size = prop::array::uniform3((0..3u8).prop_map(f32::from));
+    let real_corner = prop::array::uniform3(-1e3f32..1e3);
+    let real_size = prop::array::uniform3(0f32..50.0);
     prop_oneof![
-        prop::collection::vec(grid.prop_map(boxed), 0..max),
-        prop::collection::vec(real.prop_map(boxed), 0..max),
+        prop::collection::vec((grid_corner, grid_size).prop_map(sized_box), 0..max),
+        prop::collection::vec((real_corner, real_size).prop_map(sized_box), 0..max),
     ]
+}
+
+fn sized_box((low, size): ([f32; 3], [f32; 3])) -> Aabb {
+    let high = [0, 1, 2].map(|axis| low[axis] + size[axis]);
+    Aabb::from((low, high))
 }
 
 fn valid(config: &Config, boxes: &[Aabb]) -> Bvh {
@@ -98,7 +129,7 @@ proptest! {
 
     #[test]
     fn the_weighted_tree_is_the_brute_force_one(boxes in scene(60), seed in 0u32..1000) {
-        // Whole numbers, whose sums are exact in any order.
+        // Sums of integers are exact in any order.
         let weights: Vec<f32> = (0..boxes.len() as u32).map(|i| ((i * 7919 + seed) % 5) as f32).collect();
         let tree = Config::default().build_weighted(&boxes, &weights).unwrap();
         validate(&tree, &boxes).unwrap();
@@ -107,12 +138,14 @@ proptest! {
 
     #[test]
     fn made_up_costs_are_weights(boxes in scene(60), every in 1u32..5, cost in 0u8..9) {
-        let dear = |object: u32| object.is_multiple_of(every);
-        let weights = (0..boxes.len() as u32).map(|object| if dear(object) { f32::from(cost) } else { 1.0 });
-        let weights: Vec<f32> = weights.collect();
+        let mut weights = vec![1.0; boxes.len()];
+        for weight in weights.iter_mut().step_by(every as usize) {
+            *weight = f32::from(cost);
+        }
         let costs = MadeUpCosts { every, cost: cost.into() };
         let config = Config { heuristic: Heuristic::AreaTimesCost(costs), ..Config::default() };
-        prop_assert_eq!(config.build(&boxes).unwrap(), Config::default().build_weighted(&boxes, &weights).unwrap());
+        let weighted = Config::default().build_weighted(&boxes, &weights).unwrap();
+        prop_assert_eq!(config.build(&boxes).unwrap(), weighted);
     }
 
     #[test]
@@ -134,13 +167,13 @@ proptest! {
     }
 
     #[test]
-    fn skipping_identical_orders_changes_nothing(boxes in scene(200), flat in 0..4usize) {
-        let mut boxes = boxes;
-        if flat < 3 {
-            // Two axes alike: identical orders from the root on.
-            boxes.iter_mut().for_each(|b| {
-                (b.min[flat], b.max[flat]) = (b.min[(flat + 1) % 3], b.max[(flat + 1) % 3]);
-            });
+    fn skipping_identical_orders_changes_nothing(mut boxes in scene(200), copied in 0..4usize) {
+        if copied < 3 {
+            // Two equal axes have identical orders from the root on.
+            for aabb in &mut boxes {
+                aabb.min[copied] = aabb.min[(copied + 1) % 3];
+                aabb.max[copied] = aabb.max[(copied + 1) % 3];
+            }
         }
         let skipping = Config::default();
         let scanning = Config { skip_same_order: false, ..Config::default() };
@@ -148,44 +181,54 @@ proptest! {
     }
 }
 
-/// A reproducible scatter of `n` small boxes.
+/// Makes `n` small boxes at pseudo-random places.
 fn scatter(n: u32) -> Vec<Aabb> {
-    let hash = |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 65_521) as f32;
-    (0..n)
-        .map(|i| {
-            let low = [hash(i, 3), hash(i, 11), hash(i, 19)];
-            Aabb::from((low, low.map(|c| c + hash(i, 27) / 4096.0)))
-        })
-        .collect()
+    let mut boxes = Vec::new();
+    for i in 0..n {
+        let low = [hash(i, 3), hash(i, 11), hash(i, 19)];
+        let size = hash(i, 27) / 4096.0;
+        boxes.push(Aabb::from((low, low.map(|x| x + size))));
+    }
+    boxes
+}
+
+fn hash(i: u32, salt: u32) -> f32 {
+    let bits = i.wrapping_mul(2_654_435_761).rotate_left(salt);
+    (bits % 65_521) as f32
 }
 
 #[test]
 fn any_number_of_threads_builds_the_same_bytes() {
     let boxes = scatter(30_000);
-    let on = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| valid(&Config::default(), &boxes))
-    };
-    let one = on(1);
+    let expected = valid_on_threads(1, &boxes);
     for threads in [2, 3, 8] {
-        assert!(one == on(threads), "{threads} threads");
+        assert!(valid_on_threads(threads, &boxes) == expected, "{threads} threads");
     }
+}
+
+fn valid_on_threads(threads: usize, boxes: &[Aabb]) -> Bvh {
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    builder.build().unwrap().install(|| valid(&Config::default(), boxes))
 }
 
 #[test]
 fn a_chain_does_not_overflow_any_stack() {
     // Growing concentric boxes: S(L) + S(R) peels one at a time.
-    let boxes: Vec<Aabb> = (1..20_000).map(|i| Aabb::from(([-(i as f32); 3], [i as f32; 3]))).collect();
+    let mut boxes = Vec::new();
+    for size in (1..20_000u16).map(f32::from) {
+        boxes.push(Aabb::from(([-size; 3], [size; 3])));
+    }
     let config = Config { heuristic: Heuristic::AreaOnly(AreaOnly::Sum), ..Config::default() };
     assert!(valid(&config, &boxes).depth() > 15_000);
 }
 
 #[test]
-fn what_cannot_be_built_is_refused_by_name() {
+fn an_error_reports_the_invalid_input() {
     let boxes = scatter(3);
-    let weighted = |weights: &[f32]| Config::default().build_weighted(&boxes, weights).unwrap_err().to_string();
-    assert_eq!(weighted(&[1.0]), "1 weights were given for 3 objects");
-    assert!(weighted(&[1.0, -2.0, 0.0]).starts_with("the weight of object 1 is -2;"));
+    let weighted = |weights: &[f32]| Config::default().build_weighted(&boxes, weights).unwrap_err();
+    assert_eq!(weighted(&[1.0]).to_string(), "1 weights were given for 3 objects");
+    let negative = weighted(&[1.0, -2.0, 0.0]).to_string();
+    assert!(negative.starts_with("the weight of object 1 is -2;"), "{negative}");
     let mut bad = boxes.clone();
     bad[2].max.y = f32::NAN;
     assert!(matches!(Config::default().build(&bad), Err(BuildError::InvalidBox(error)) if error.index == 2));
@@ -204,14 +247,13 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
     #[test]
     fn scenes_of_few_distinct_boxes_have_exact_boxes_too(corners in prop::collection::vec(any::<[bool; 6]>(), 1..300)) {
-        let boxes: Vec<Aabb> = corners
-            .iter()
-            .map(|c| {
-                let at = c.map(|bit| f32::from(u8::from(bit)));
-                let min = [at[0] * at[3], at[1] * at[4], at[2] * at[5]];
-                Aabb::from((min, std::array::from_fn(|k| at[k].max(at[k + 3] * at[0] * at[1]))))
-            })
-            .collect();
+        let mut boxes = Vec::new();
+        for bits in corners {
+            let [a, b, c, d, e, f] = bits.map(|bit| f32::from(u8::from(bit)));
+            let min = [a * d, b * e, c * f];
+            let max = [a.max(d * a * b), b.max(e * a * b), c.max(f * a * b)];
+            boxes.push(Aabb::from((min, max)));
+        }
         let tree = Config::default().build(&boxes).unwrap();
         validate(&tree, &boxes).unwrap();
         prop_assert!(tree.is_tight(&boxes));

@@ -2,6 +2,7 @@
 
 use super::block::{Block, LANES, NONE, Size, family, place};
 use super::{Object, Scene, Workspace};
+use crate::watch::Pace;
 use bvh_core::cost::Sum;
 use std::ops::Range;
 
@@ -90,9 +91,11 @@ struct Stop {
     pair_among: Option<usize>,
     /// Number of the nodes in `grown` that are enlarged.
     grown: usize,
+    /// Number of blocks that the search for it examined.
+    examined: usize,
 }
 
-/// Inserts the objects of a valid order and returns the tree's cost. The upper part of the path is found for a batch of
+/// Inserts the objects of a valid order and returns the tree's cost; `None` if the construction ends before. The upper part of the path is found for a batch of
 /// objects at once, and again from the node below which an insertion of the same batch has changed the tree.
 #[inline(always)]
 pub(super) fn insert_each<R: Rule>(
@@ -100,10 +103,11 @@ pub(super) fn insert_each<R: Rule>(
     size: impl Size,
     order: &[u32],
     workspace: &mut Workspace,
-) -> f64 {
+    mut pace: Pace,
+) -> Option<f64> {
     let Workspace { blocks, walk, grown, .. } = workspace;
     blocks.clear();
-    let Some((&first, rest)) = order.split_first() else { return 0.0 };
+    let Some((&first, rest)) = order.split_first() else { return Some(0.0) };
     let root = &scene.objects[first as usize];
     blocks.push(Block::EMPTY);
     blocks[0].put_leaf(0, root, first, R::leaf_area(root));
@@ -113,6 +117,7 @@ pub(super) fn insert_each<R: Rule>(
         walk.trail.clear();
         walk.trail.push([NONE; BATCH]);
         walk.descend(blocks, &objects, 0..batch.len(), 0);
+        let mut examined = walk.trail.len();
         let mut changes = [(0, NONE); BATCH];
         for (i, (&id, object)) in batch.iter().zip(&objects).enumerate() {
             let passed = |&&(row, node): &&(usize, u32)| walk.trail[row][i] == node;
@@ -122,6 +127,7 @@ pub(super) fn insert_each<R: Rule>(
             let row = walk.last[i];
             changes[i] = (row, walk.trail[row][i]);
             let stop = find_stop::<R>(blocks, size, object, walk.trail[row][i], grown);
+            examined += stop.examined;
             let attached_to = attach::<R>(blocks, &stop, object, id);
             grown.truncate(stop.grown);
             if let Some(last) = grown.last_mut() {
@@ -133,9 +139,12 @@ pub(super) fn insert_each<R: Rule>(
             }
             cost.add(stop.increase);
         }
+        if pace.ends_after(examined) {
+            return None;
+        }
     }
     let root_area = blocks[0].area[0];
-    if rest.is_empty() || root_area <= 0.0 { 0.0 } else { cost.value() / root_area }
+    Some(if rest.is_empty() || root_area <= 0.0 { 0.0 } else { cost.value() / root_area })
 }
 
 /// The stop of least increase on the path whose last node to contain the object is `last`. Fills `grown` with the rest
@@ -152,12 +161,14 @@ fn find_stop<R: Rule>(
     // Stopping at a node that contains the object adds the node's area and nothing else. No node above adds less.
     let (block, lane) = place(last);
     let increase = if last == NONE { f64::INFINITY } else { blocks[block].area[lane] };
-    let mut stop = Stop { increase, node: last, pair_among: None, grown: 0 };
+    let mut stop = Stop { increase, node: last, pair_among: None, grown: 0, examined: 0 };
     let (mut first, mut count) = family(blocks, last);
     let mut inherited = 0.0;
+    let mut examined = 0;
     // Every stop further down adds at least the growth of the nodes above it and the object's own area.
     while inherited + object.area < stop.increase {
         let (mut least, mut next) = (f64::INFINITY, Grown { node: NONE, area: 0.0 });
+        examined += count.div_ceil(LANES);
         for (at, block) in blocks.iter().enumerate().skip(first).take(count.div_ceil(LANES)) {
             // Only leaves follow, each of which adds at least twice the object's area.
             if block.is_leaf(0) {
@@ -187,19 +198,25 @@ fn find_stop<R: Rule>(
         if !is_leaf {
             inherited += if R::BY_AREA { least * f64::from(blocks[block].count[lane]) } else { least };
             if inherited + area < stop.increase {
-                stop = Stop { increase: inherited + area, node, pair_among: None, grown: grown.len() };
+                stop = Stop {
+                    increase: inherited + area,
+                    node,
+                    pair_among: None,
+                    grown: grown.len(),
+                    examined: 0,
+                };
             }
         }
         if (is_leaf || R::PAIR_INNER) && above + 2.0 * area < stop.increase {
             let increase = above + 2.0 * area;
-            stop = Stop { increase, node, pair_among: Some(first), grown: grown.len() };
+            stop = Stop { increase, node, pair_among: Some(first), grown: grown.len(), examined: 0 };
         }
         if is_leaf {
             break;
         }
         (first, count) = family(blocks, node);
     }
-    stop
+    Stop { examined, ..stop }
 }
 
 /// Makes the object a child of the stop, or of a new inner node that replaces it. Returns the grown node.

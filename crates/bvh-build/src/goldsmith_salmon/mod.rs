@@ -26,13 +26,14 @@ mod block;
 mod insertion;
 
 use crate::error::check_scene;
-use crate::{BuildError, Builder};
+use crate::watch::Pace;
+use crate::{BuildError, Builder, Watch};
 use block::{Block, LANES, LEAF, Size, family, place};
 use bvh_core::cost::{Area, Measure};
 use bvh_core::{Aabb, Bvh, Node, PackedAabb};
 use insertion::{Rules, Walk, insert_each};
 
-crate::config! {
+bvh_config::config! {
     /// How to insert. As a [`Builder`], inserts in the order of the indices.
     pub struct Config {
         /// Which child is the next node of the path.
@@ -101,7 +102,7 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Why an insertion order was refused. It must name every object of the scene exactly once.
+/// Why the objects were not inserted. An order must name every object of the scene exactly once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidOrder {
     /// Too few or too many entries.
@@ -130,6 +131,9 @@ pub enum InvalidOrder {
         /// The object.
         object: u32,
     },
+    /// The caller's [`Watch`] ended the insertion.
+    #[error("the insertion was cancelled")]
+    Cancelled,
 }
 
 /// The growing tree and the buffers of a build, reused by further builds without allocating. Takes at most 192 bytes per
@@ -155,34 +159,65 @@ impl Config {
         order: &[u32],
         workspace: &mut Workspace,
     ) -> Result<f64, InvalidOrder> {
-        check_order(order, scene.len(), &mut workspace.named)?;
-        Ok(self.insert_valid(scene, order, workspace))
+        self.insert_watched(scene, order, workspace, &Watch::default())
     }
 
-    fn insert_valid(&self, scene: &Scene, order: &[u32], workspace: &mut Workspace) -> f64 {
+    /// As [`insert_all`](Self::insert_all), unless the `watch` ends it: the workspace then holds no complete tree.
+    pub fn insert_watched(
+        &self,
+        scene: &Scene,
+        order: &[u32],
+        workspace: &mut Workspace,
+        watch: &Watch,
+    ) -> Result<f64, InvalidOrder> {
+        check_order(order, scene.len(), &mut workspace.named)?;
+        self.insert_valid(scene, order, workspace, watch).ok_or(InvalidOrder::Cancelled)
+    }
+
+    /// `None` if the `watch` ends the insertion.
+    fn insert_valid(
+        &self,
+        scene: &Scene,
+        order: &[u32],
+        workspace: &mut Workspace,
+        watch: &Watch,
+    ) -> Option<f64> {
+        let pace = Pace::new(watch);
         match scene.measure {
-            Some(measure) => self.insert_by(measure, scene, order, workspace),
-            None => self.insert_by(Area, scene, order, workspace),
+            Some(measure) => self.insert_by(measure, scene, order, workspace, pace),
+            None => self.insert_by(Area, scene, order, workspace, pace),
         }
     }
 
-    fn insert_by(&self, size: impl Size, scene: &Scene, order: &[u32], workspace: &mut Workspace) -> f64 {
+    fn insert_by(
+        &self,
+        size: impl Size,
+        scene: &Scene,
+        order: &[u32],
+        workspace: &mut Workspace,
+        pace: Pace,
+    ) -> Option<f64> {
         match (self.descent, self.pair_inner) {
-            (Descent::Cost, false) => insert_each::<Rules<false, false>>(scene, size, order, workspace),
-            (Descent::Cost, true) => insert_each::<Rules<false, true>>(scene, size, order, workspace),
-            (Descent::Area, false) => insert_each::<Rules<true, false>>(scene, size, order, workspace),
-            (Descent::Area, true) => insert_each::<Rules<true, true>>(scene, size, order, workspace),
+            (Descent::Cost, false) => insert_each::<Rules<false, false>>(scene, size, order, workspace, pace),
+            (Descent::Cost, true) => insert_each::<Rules<false, true>>(scene, size, order, workspace, pace),
+            (Descent::Area, false) => insert_each::<Rules<true, false>>(scene, size, order, workspace, pace),
+            (Descent::Area, true) => insert_each::<Rules<true, true>>(scene, size, order, workspace, pace),
         }
     }
 }
 
 impl Builder for Config {
-    fn build_by(&self, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Result<Bvh, BuildError> {
+    fn build_watched(
+        &self,
+        boxes: &[Aabb],
+        measure: Option<&dyn Measure>,
+        watch: &Watch,
+    ) -> Result<Bvh, BuildError> {
         let scene = Scene::by(boxes, measure)?;
         let order: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut workspace = Workspace::default();
         let mut tree = Bvh::default();
-        self.insert_valid(&scene, &order, &mut workspace);
+        self.insert_valid(&scene, &order, &mut workspace, watch).ok_or(BuildError::Cancelled)?;
         workspace.write(&mut tree);
         Ok(tree)
     }

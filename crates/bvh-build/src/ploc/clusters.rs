@@ -1,6 +1,7 @@
 //! The rounds of the clustering: clusters in Morton order, their nearest neighbours, and the nodes of joined ones.
 
 use super::neighbours::{self, CHUNK, Scratch};
+use crate::{OBJECTS_PER_POLL, Watch};
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Node, PackedAabb};
 use std::mem::MaybeUninit;
@@ -62,21 +63,30 @@ impl Clusters {
         self.boxes.len()
     }
 
-    /// Finds every cluster's nearest neighbour up to `radius` positions away, by half area or by a measure.
-    pub(super) fn find_nearest(&mut self, radius: usize, measure: Option<&dyn Measure>) {
+    /// Finds every cluster's nearest neighbour up to `radius` positions away, by half area or by a measure. Once the `watch` has
+    /// ended the construction, not every cluster gets one.
+    pub(super) fn find_nearest(&mut self, radius: usize, measure: Option<&dyn Measure>, watch: &Watch) {
         let (scale, nearest) = (self.scale, &mut self.nearest[..self.boxes.len()]);
+        let chunks_per_poll = OBJECTS_PER_POLL / CHUNK;
+        let ends_at = |number: usize| number % chunks_per_poll == chunks_per_poll - 1 && watch.is_cancelled();
         #[cfg(feature = "rayon")]
         if nearest.len() * radius >= PARALLEL_PAIRS && rayon::current_num_threads() > 1 {
             use rayon::prelude::*;
             nearest.par_chunks_mut(CHUNK).enumerate().for_each_init(
                 Scratch::default,
                 |scratch, (number, found)| {
+                    if ends_at(number) {
+                        return;
+                    }
                     neighbours::find(&self.boxes, scale, measure, radius, number * CHUNK, found, scratch);
                 },
             );
             return;
         }
         for (number, found) in nearest.chunks_mut(CHUNK).enumerate() {
+            if ends_at(number) {
+                return;
+            }
             neighbours::find(&self.boxes, scale, measure, radius, number * CHUNK, found, &mut self.scratch);
         }
     }

@@ -15,12 +15,12 @@ mod morton;
 mod neighbours;
 
 use crate::error::check_scene;
-use crate::{BuildError, Builder, Check};
+use crate::{BuildError, Builder, Check, OBJECTS_PER_POLL, Watch};
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh, PackedAabb};
 use clusters::Clusters;
 
-crate::config! {
+bvh_config::config! {
     /// How far to look for a neighbour.
     pub struct Config {
         /// Clusters looked at on either side.
@@ -33,9 +33,18 @@ crate::config! {
 impl Builder for Config {
     /// O(radius · n), and a radix sort. The search for neighbours uses all threads of the current rayon pool; their
     /// number does not change the tree.
-    fn build_by(&self, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Result<Bvh, BuildError> {
+    fn build_watched(
+        &self,
+        boxes: &[Aabb],
+        measure: Option<&dyn Measure>,
+        watch: &Watch,
+    ) -> Result<Bvh, BuildError> {
         self.check()?;
-        MortonOrder::new(boxes)?.build_by(self, measure)
+        let sorted = MortonOrder::new(boxes)?;
+        if boxes.len() >= OBJECTS_PER_POLL && watch.is_cancelled() {
+            return Err(BuildError::Cancelled);
+        }
+        sorted.build_watched(self, measure, watch)
     }
 }
 
@@ -67,11 +76,16 @@ impl MortonOrder {
 
     /// Clusters the sorted objects by half area.
     pub fn build(self, config: &Config) -> Result<Bvh, BuildError> {
-        self.build_by(config, None)
+        self.build_watched(config, None, &Watch::default())
     }
 
-    /// The same, with a measure in place of the half area.
-    pub fn build_by(self, config: &Config, measure: Option<&dyn Measure>) -> Result<Bvh, BuildError> {
+    /// The same, with a measure in place of the half area if there is one, unless the `watch` ends it.
+    pub fn build_watched(
+        self,
+        config: &Config,
+        measure: Option<&dyn Measure>,
+        watch: &Watch,
+    ) -> Result<Bvh, BuildError> {
         config.check()?;
         let Self { boxes, bounds, order } = self;
         if boxes.is_empty() {
@@ -82,7 +96,8 @@ impl MortonOrder {
         let mut round = 0;
         while clusters.count() > 1 {
             let radius = if round < config.near_rounds { 1 } else { config.radius as usize };
-            clusters.find_nearest(radius, measure);
+            clusters.find_nearest(radius, measure, watch);
+            watch.ensure_wanted()?;
             clusters.join();
             round += 1;
         }

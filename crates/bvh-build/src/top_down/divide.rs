@@ -9,7 +9,10 @@
 use super::presort::PARALLEL_OBJECTS;
 use super::presort::{Presorted, note_same_orders};
 use super::split_cost::SplitCost;
-use super::sweep::{Block, SplitRule, Sweep, union_of};
+use super::stall::{LEAST_STALLED, is_stall};
+use super::sweep::{Block, Split, SplitRule, Sweep, union_of};
+use crate::watch::Pace;
+use crate::{BuildError, Watch};
 use bvh_core::{Aabb, Bvh, Node, PackedAabb, with_vector_instructions};
 #[cfg(feature = "rayon")]
 use std::sync::Mutex;
@@ -50,6 +53,8 @@ struct Known {
     aabb: PackedAabb,
     /// Per axis, the lowest axis known to order the objects identically, usually itself.
     same_as: [u8; 3],
+    /// Number of [stalls](stalls) from the root down to the node.
+    stalls: u8,
 }
 
 /// A subtree below a node that is already written, with exclusive parts of all arrays: it can be built independently.
@@ -62,80 +67,108 @@ struct Task<'a> {
     known: Known,
 }
 
-/// The input that all tasks of a build share.
-struct Shared<'a, C> {
-    boxes: &'a [PackedAabb],
-    split_cost: &'a C,
+/// A division of a scene into a tree, ready to be made.
+#[derive(Clone, Copy, Debug)]
+pub struct Division<'a, C> {
+    /// The objects.
+    pub scene: &'a Presorted,
+    /// The cost of splits.
+    pub split_cost: &'a C,
     /// Whether to look for axes that order a node's objects identically.
-    skip_same_order: bool,
+    pub skip_same_order: bool,
+    /// The caller's way to end the division.
+    pub watch: &'a Watch<'a>,
 }
 
-/// Divides the scene by `rule` into `tree` on one thread, reusing the memory of tree and workspace. O(n log n) for
-/// balanced splits, O(n²) if every split separates a single object.
-pub fn divide<C: SplitCost, R: SplitRule>(
-    scene: &Presorted,
-    split_cost: &C,
-    rule: &mut R,
-    skip_same_order: bool,
-    workspace: &mut Workspace,
-    tree: &mut Bvh,
-) {
-    if let Some((shared, task, scratch)) = prepare(scene, split_cost, skip_same_order, workspace, tree) {
-        build(&shared, task, rule, scratch);
-    }
+/// Whether a split of the node into sides with these boxes [stalls](is_stall).
+#[inline(always)]
+fn stalls<C: SplitCost>(node: &Sweep<C>, split: &Split, side_boxes: &[PackedAabb; 2]) -> bool {
+    let counts = [split.left as usize, node.len() - split.left as usize];
+    let larger = usize::from(counts[1] > counts[0]);
+    is_stall(counts, node.split_cost.size(&side_boxes[larger]), node.split_cost.size(&node.aabb))
 }
 
-/// As [`divide`], on the threads of the current rayon pool and with the same bytes. `rule` is copied into every task.
-#[cfg(feature = "rayon")]
-pub fn divide_parallel<C: SplitCost, R: SplitRule + Copy + Send + Sync>(
-    scene: &Presorted,
-    split_cost: &C,
-    rule: R,
-    skip_same_order: bool,
-    workspace: &mut Workspace,
-    tree: &mut Bvh,
-) {
-    fn spawn<'s, C: SplitCost, R: SplitRule + Copy + Send + Sync + 's>(
-        scope: &rayon::Scope<'s>,
-        shared: &'s Shared<'s, C>,
-        scratches: &'s Mutex<Vec<Scratch>>,
-        mut task: Task<'s>,
-        mut rule: R,
-    ) {
-        // At most one set of buffers per thread is made. Buffers have no invariant, so a poisoned lock does no harm.
-        let pooled = || scratches.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let mut scratch = pooled().pop().unwrap_or_default();
-        scratch.goes_left.resize(shared.boxes.len(), 0);
-        // A loop rather than a recursion: one side goes to the pool and the other stays, however unbalanced the splits.
-        while task.objects() >= PARALLEL_OBJECTS {
-            let (left, right) = split_task(shared, task, &mut rule, &mut scratch);
-            let (larger, smaller) =
-                if left.objects() > right.objects() { (left, right) } else { (right, left) };
-            if smaller.objects() >= PARALLEL_OBJECTS {
-                scope.spawn(move |scope| spawn(scope, shared, scratches, smaller, rule));
-            } else {
-                build(shared, smaller, &mut rule, &mut scratch);
-            }
-            task = larger;
+impl<C: SplitCost> Division<'_, C> {
+    /// Divides by `rule` into `tree` on one thread, reusing the memory of tree and workspace. O(n log n), but for costs of
+    /// splits that do not [limit](SplitCost::most_stalls) stalls: O(n²) if every split separates a single object. Clears the tree if
+    /// the watch ends the division.
+    pub fn on_one_thread<R: SplitRule>(
+        &self,
+        rule: &mut R,
+        workspace: &mut Workspace,
+        tree: &mut Bvh,
+    ) -> Result<(), BuildError> {
+        if let Some((task, scratch)) = prepare(self.scene, workspace, tree) {
+            build(self, task, rule, scratch);
         }
-        build(shared, task, &mut rule, &mut scratch);
-        pooled().push(scratch);
+        self.finish(tree)
     }
-    if let Some((shared, task, scratch)) = prepare(scene, split_cost, skip_same_order, workspace, tree) {
-        let shared = &shared;
-        let scratches = &Mutex::new(vec![std::mem::take(scratch)]);
-        rayon::scope(|scope| spawn(scope, shared, scratches, task, rule));
+
+    /// As [`on_one_thread`](Self::on_one_thread), on the threads of the current rayon pool and with the same bytes. `rule` is copied
+    /// into every task.
+    #[cfg(feature = "rayon")]
+    pub fn on_all_threads<R: SplitRule + Copy + Send + Sync>(
+        &self,
+        rule: R,
+        workspace: &mut Workspace,
+        tree: &mut Bvh,
+    ) -> Result<(), BuildError> {
+        if let Some((task, scratch)) = prepare(self.scene, workspace, tree) {
+            let scratches = &Mutex::new(vec![std::mem::take(scratch)]);
+            rayon::scope(|scope| spawn(scope, self, scratches, task, rule));
+        }
+        self.finish(tree)
     }
+
+    /// Clears a tree whose division has ended too early.
+    fn finish(&self, tree: &mut Bvh) -> Result<(), BuildError> {
+        let finished = self.watch.ensure_wanted();
+        if finished.is_err() {
+            tree.nodes.clear();
+            tree.prim_ids.clear();
+        }
+        finished
+    }
+}
+
+/// Builds a task's subtree, parts of it in tasks of their own.
+#[cfg(feature = "rayon")]
+fn spawn<'s, C: SplitCost, R: SplitRule + Copy + Send + Sync + 's>(
+    scope: &rayon::Scope<'s>,
+    division: &'s Division<'s, C>,
+    scratches: &'s Mutex<Vec<Scratch>>,
+    mut task: Task<'s>,
+    mut rule: R,
+) {
+    // At most one set of buffers per thread is made. Buffers have no invariant, so a poisoned lock does no harm.
+    let pooled = || scratches.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let mut scratch = pooled().pop().unwrap_or_default();
+    scratch.goes_left.resize(division.scene.len(), 0);
+    let mut pace = Pace::new(division.watch);
+    // A loop rather than a recursion: one side goes to the pool and the other stays, however unbalanced the splits.
+    while task.objects() >= PARALLEL_OBJECTS {
+        if pace.ends_after(task.objects()) {
+            return;
+        }
+        let (left, right) = split_task(division, task, &mut rule, &mut scratch);
+        let (larger, smaller) = if left.objects() > right.objects() { (left, right) } else { (right, left) };
+        if smaller.objects() >= PARALLEL_OBJECTS {
+            scope.spawn(move |scope| spawn(scope, division, scratches, smaller, rule));
+        } else {
+            build(division, smaller, &mut rule, &mut scratch);
+        }
+        task = larger;
+    }
+    build(division, task, &mut rule, &mut scratch);
+    pooled().push(scratch);
 }
 
 /// Sizes all arrays, writes the root, and returns the root's task; `None` for a scene without objects.
-fn prepare<'a, C>(
-    scene: &'a Presorted,
-    split_cost: &'a C,
-    skip_same_order: bool,
+fn prepare<'a>(
+    scene: &Presorted,
     workspace: &'a mut Workspace,
     tree: &'a mut Bvh,
-) -> Option<(Shared<'a, C>, Task<'a>, &'a mut Scratch)> {
+) -> Option<(Task<'a>, &'a mut Scratch)> {
     let n = scene.len();
     let Workspace { orders: [y, z], scratch } = workspace;
     tree.prim_ids.clone_from(&scene.orders[0]);
@@ -146,13 +179,9 @@ fn prepare<'a, C>(
     let (root, below) = tree.nodes.split_first_mut()?;
     let aabb = union_of(&scene.boxes, &tree.prim_ids);
     *root = if n == 1 { Node::leaf((&aabb).into(), 0, 1) } else { Node::inner((&aabb).into(), 1, 2) };
-    let shared = Shared { boxes: &scene.boxes, split_cost, skip_same_order };
-    let known = Known { aabb, same_as: [0, 1, 2] };
-    Some((
-        shared,
-        Task { below, below_at: 1, objects_at: 0, orders: [&mut tree.prim_ids, y, z], known },
-        scratch,
-    ))
+    let known = Known { aabb, same_as: [0, 1, 2], stalls: 0 };
+    let task = Task { below, below_at: 1, objects_at: 0, orders: [&mut tree.prim_ids, y, z], known };
+    Some((task, scratch))
 }
 
 #[cfg(feature = "rayon")]
@@ -165,13 +194,13 @@ impl Task<'_> {
 /// Divides the task's node, of two or more objects, writes its children and returns them as tasks.
 #[cfg(feature = "rayon")]
 fn split_task<'a, C: SplitCost, R: SplitRule>(
-    shared: &Shared<'_, C>,
+    division: &Division<'_, C>,
     task: Task<'a>,
     rule: &mut R,
     scratch: &mut Scratch,
 ) -> (Task<'a>, Task<'a>) {
     let Task { below, below_at, objects_at, orders: [x, y, z], known } = task;
-    let (left, [known_left, known_right]) = split_node_fast(shared, [x, y, z], known, rule, scratch);
+    let (left, [known_left, known_right]) = split_node_fast(division, [x, y, z], known, rule, scratch);
     let (children, below) = below.split_at_mut(2);
     let (below_left, below_right) = below.split_at_mut(2 * left - 2);
     let [x, y, z] = [x, y, z].map(|order| order.split_at_mut(left));
@@ -204,21 +233,21 @@ fn split_task<'a, C: SplitCost, R: SplitRule>(
 with_vector_instructions! {
     /// [`build_plain`], with the vector instructions that the processor has.
     build = build_plain<C: SplitCost, R: SplitRule>(
-        shared: &Shared<'_, C>, task: Task<'_>, rule: &mut R, scratch: &mut Scratch)
+        division: &Division<'_, C>, task: Task<'_>, rule: &mut R, scratch: &mut Scratch)
 }
 
 with_vector_instructions! {
     /// [`split_node`], with the vector instructions that the processor has.
     #[cfg(feature = "rayon")]
     split_node_fast = split_node<C: SplitCost, R: SplitRule>(
-        shared: &Shared<'_, C>, orders: [&mut [u32]; 3], known: Known, rule: &mut R, scratch: &mut Scratch)
+        division: &Division<'_, C>, orders: [&mut [u32]; 3], known: Known, rule: &mut R, scratch: &mut Scratch)
         -> (usize, [Known; 2])
 }
 
 /// Builds everything below a task's node, left subtrees first, with an explicit stack.
 #[inline(always)]
 fn build_plain<C: SplitCost, R: SplitRule>(
-    shared: &Shared<'_, C>,
+    division: &Division<'_, C>,
     task: Task<'_>,
     rule: &mut R,
     scratch: &mut Scratch,
@@ -228,17 +257,22 @@ fn build_plain<C: SplitCost, R: SplitRule>(
     if x.len() > 1 {
         stack.push(Frame { start: 0, len: x.len() as u32, below: 0, known });
     }
+    let mut pace = Pace::new(division.watch);
     while let Some(Frame { start, len, below, known }) = stack.pop() {
+        if pace.ends_after(len as usize) {
+            stack.clear();
+            break;
+        }
         let range = start as usize..(start + len) as usize;
         if len == 2 {
             for (at, &object) in x[range].iter().enumerate() {
-                let aabb = (&shared.boxes[object as usize]).into();
+                let aabb = (&division.scene.boxes[object as usize]).into();
                 nodes[below as usize + at] = Node::leaf(aabb, objects_at + start + at as u32, 1);
             }
             continue;
         }
         let orders = [&mut x[range.clone()], &mut y[range.clone()], &mut z[range]];
-        let (left, known) = split_node(shared, orders, known, rule, scratch);
+        let (left, known) = split_node(division, orders, known, rule, scratch);
         let left = left as u32;
         let sides = [
             Frame { start, len: left, below: below + 2, known: known[0] },
@@ -261,26 +295,38 @@ fn build_plain<C: SplitCost, R: SplitRule>(
 /// left and the facts about both sides.
 #[inline(always)]
 fn split_node<C: SplitCost, R: SplitRule>(
-    shared: &Shared<'_, C>,
+    division: &Division<'_, C>,
     orders: [&mut [u32]; 3],
-    Known { aabb, mut same_as }: Known,
+    Known { aabb, mut same_as, stalls: mut known_stalls }: Known,
     rule: &mut R,
     scratch: &mut Scratch,
 ) -> (usize, [Known; 2]) {
-    if shared.skip_same_order {
+    if division.skip_same_order {
         note_same_orders(orders.each_ref().map(|order| &**order), &mut same_as);
     }
     let [x, y, z] = orders;
     let mut sweep = Sweep {
-        boxes: shared.boxes,
-        split_cost: shared.split_cost,
+        boxes: &division.scene.boxes,
+        split_cost: division.split_cost,
         orders: [&*x, &*y, &*z],
         same_as,
         aabb,
         blocks: &mut scratch.blocks,
     };
-    let split = rule.choose(&mut sweep);
-    let known = sweep.side_boxes(&split).map(|aabb| Known { aabb, same_as });
+    let mut split = rule.choose(&mut sweep);
+    let mut side_boxes = sweep.side_boxes(&split);
+    if let Some(most) = division.split_cost.most_stalls() {
+        let is_last = known_stalls >= most;
+        if (is_last || sweep.len() >= LEAST_STALLED) && stalls(&sweep, &split, &side_boxes) {
+            if is_last {
+                split = sweep.best_balanced();
+                side_boxes = sweep.side_boxes(&split);
+            } else {
+                known_stalls += 1;
+            }
+        }
+    }
+    let known = side_boxes.map(|aabb| Known { aabb, same_as, stalls: known_stalls });
     let (axis, left) = (split.axis as usize, split.left as usize);
     let orders = [x, y, z];
     if (0..3).any(|other| other != axis && same_as[other] as usize == other) {

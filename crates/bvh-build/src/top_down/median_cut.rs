@@ -6,11 +6,12 @@
 //! Differs from the sources: an odd object goes to the left half; equal centres are ordered by index.
 
 use crate::error::check_scene;
-use crate::{BuildError, Builder, Check};
+use crate::watch::Pace;
+use crate::{BuildError, Builder, Check, Watch};
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh, Node};
 
-crate::config! {
+bvh_config::config! {
     /// How to cut.
     pub struct Config {
         /// Which axis a node is cut along.
@@ -41,10 +42,11 @@ struct Frame {
 
 impl Builder for Config {
     /// O(n log n); depth at most ⌈log₂ n⌉.
-    fn build_by(
+    fn build_watched(
         &self,
         boxes: &[Aabb],
         _sizes_are_not_compared: Option<&dyn Measure>,
+        watch: &Watch,
     ) -> Result<Bvh, BuildError> {
         check_scene(boxes)?;
         self.check()?;
@@ -58,7 +60,11 @@ impl Builder for Config {
             nodes.push(placeholder);
             stack.push(Frame { node: 0, start: 0, len: n, level: 0 });
         }
+        let mut pace = Pace::new(watch);
         while let Some(Frame { node, start, len, level }) = stack.pop() {
+            if pace.ends_after(len) {
+                return Err(BuildError::Cancelled);
+            }
             let ids = &mut prim_ids[start..start + len];
             let aabb = ids.iter().fold(Aabb::EMPTY, |b, &id| b.union(&boxes[id as usize]));
             if len <= max_leaf {

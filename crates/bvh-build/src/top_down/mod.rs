@@ -6,11 +6,10 @@ pub mod muller_fellner;
 mod presort;
 pub mod spatial;
 mod split_cost;
+mod stall;
 mod sweep;
 
-#[cfg(feature = "rayon")]
-pub use divide::divide_parallel;
-pub use divide::{Workspace, divide};
+pub use divide::{Division, Workspace};
 pub use presort::{PARALLEL_OBJECTS, Presorted};
 pub use split_cost::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, SplitCost};
 pub use sweep::{Split, SplitRule, Sweep, TakeBest};

@@ -7,18 +7,18 @@
 //! Scans are pruned without changing their result. Ties go to the more balanced split, then to the lower axis and
 //! position.
 
-use super::divide::{self, Workspace};
+use super::divide::{Division, Workspace};
 #[cfg(feature = "rayon")]
 use super::presort::PARALLEL_OBJECTS;
 use super::presort::Presorted;
 use super::split_cost::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, ByMeasure, SplitCost};
 use super::sweep::{SplitRule, TakeBest};
-use crate::config::{Accepts, Itself};
-use crate::{BuildError, Builder, Check, OutOfRange};
+use crate::{BuildError, Builder, Check, OutOfRange, Watch};
+use bvh_config::{Accepts, Itself};
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 
-crate::config! {
+bvh_config::config! {
     /// How to divide.
     pub struct Config {
         /// The cost of a split. The default is the original's.
@@ -89,30 +89,39 @@ impl Check for Heuristic {
 }
 
 impl Builder for Config {
-    fn build_by(&self, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Result<Bvh, BuildError> {
+    fn build_watched(
+        &self,
+        boxes: &[Aabb],
+        measure: Option<&dyn Measure>,
+        watch: &Watch,
+    ) -> Result<Bvh, BuildError> {
         // Every tree over a scene without area has the same area, but not the same measure.
-        let scene = Presorted::sort(boxes, self.skip_sorted, self.skip_flat && measure.is_none())?;
+        let scene = Presorted::sort(boxes, self.skip_sorted, self.skip_flat && measure.is_none(), watch)?;
         self.check()?;
         let mut tree = Bvh::default();
-        self.by_heuristic(scene.len(), measure, Greedy { config: self, scene: &scene, tree: &mut tree });
+        let greedy = Greedy { config: self, scene: &scene, watch, tree: &mut tree };
+        self.by_heuristic(scene.len(), measure, greedy)?;
         Ok(tree)
     }
 }
 
 /// A division that waits for its split cost.
-trait Division {
-    fn by<C: SplitCost>(self, split_cost: &C);
+trait Divide {
+    fn by<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError>;
 }
 
 struct Greedy<'a> {
     config: &'a Config,
     scene: &'a Presorted,
+    watch: &'a Watch<'a>,
     tree: &'a mut Bvh,
 }
 
-impl Division for Greedy<'_> {
-    fn by<C: SplitCost>(self, split_cost: &C) {
-        self.config.greedy(self.scene, split_cost, self.tree);
+impl Divide for Greedy<'_> {
+    fn by<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError> {
+        let skip_same_order = self.config.skip_same_order;
+        let division = Division { scene: self.scene, split_cost, skip_same_order, watch: self.watch };
+        greedy(&division, self.tree)
     }
 }
 
@@ -121,19 +130,24 @@ struct ByRule<'a, R> {
     scene: &'a Presorted,
     rule: &'a mut R,
     skip_same_order: bool,
+    watch: &'a Watch<'a>,
     workspace: &'a mut Workspace,
     tree: &'a mut Bvh,
 }
 
-impl<R: SplitRule> Division for ByRule<'_, R> {
-    fn by<C: SplitCost>(self, split_cost: &C) {
-        let Self { scene, rule, skip_same_order, workspace, tree } = self;
-        divide::divide(scene, split_cost, rule, skip_same_order, workspace, tree);
+impl<R: SplitRule> Divide for ByRule<'_, R> {
+    fn by<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError> {
+        let Self { scene, rule, skip_same_order, watch, workspace, tree } = self;
+        Division { scene, split_cost, skip_same_order, watch }.on_one_thread(rule, workspace, tree)
     }
 }
 
 /// Divides by this split cost, of a measure if there is one.
-fn by_cost(cost: &impl SplitCost, measure: Option<&dyn Measure>, division: impl Division) {
+fn by_cost(
+    cost: &impl SplitCost,
+    measure: Option<&dyn Measure>,
+    division: impl Divide,
+) -> Result<(), BuildError> {
     match measure {
         Some(measure) => division.by(&ByMeasure { cost, measure }),
         None => division.by(cost),
@@ -144,7 +158,8 @@ impl Config {
     /// Builds with `weights[i]` as the expected cost C_obj of intersecting object `i`, in any unit, finite and not
     /// negative. The configured heuristic is not used.
     pub fn build_weighted(&self, boxes: &[Aabb], weights: &[f32]) -> Result<Bvh, BuildError> {
-        let scene = Presorted::sort(boxes, self.skip_sorted, self.skip_flat)?;
+        let watch = &Watch::default();
+        let scene = &Presorted::sort(boxes, self.skip_sorted, self.skip_flat, watch)?;
         if weights.len() != boxes.len() {
             return Err(BuildError::WeightCount { weights: weights.len(), objects: boxes.len() });
         }
@@ -152,34 +167,33 @@ impl Config {
             return Err(BuildError::InvalidWeight { index, weight: weights[index].into() });
         }
         let mut tree = Bvh::default();
-        self.greedy(&scene, &AreaTimesWeight(weights), &mut tree);
+        let split_cost = &AreaTimesWeight(weights);
+        let division = Division { scene, split_cost, skip_same_order: self.skip_same_order, watch };
+        greedy(&division, &mut tree)?;
         Ok(tree)
     }
 
-    fn greedy<C: SplitCost>(&self, scene: &Presorted, split_cost: &C, tree: &mut Bvh) {
-        let workspace = &mut Workspace::default();
-        #[cfg(feature = "rayon")]
-        if scene.len() >= PARALLEL_OBJECTS && rayon::current_num_threads() > 1 {
-            return divide::divide_parallel(scene, split_cost, TakeBest, self.skip_same_order, workspace, tree);
-        }
-        divide::divide(scene, split_cost, &mut TakeBest, self.skip_same_order, workspace, tree);
-    }
-
-    /// Divides by any rule, such as a randomised one, on one thread, by half area or by a measure. Reuses the memory of `workspace`
-    /// and `tree`. The heuristic's parameter must be [in range](Check).
+    /// Divides by any rule, such as a randomised one, on one thread, by half area or by a measure, unless the `watch` ends it. Reuses
+    /// the memory of `workspace` and `tree`. The heuristic's parameter must be [in range](Check).
     pub fn construct(
         &self,
         scene: &Presorted,
         measure: Option<&dyn Measure>,
         rule: &mut impl SplitRule,
-        workspace: &mut Workspace,
-        tree: &mut Bvh,
-    ) {
+        (workspace, tree): (&mut Workspace, &mut Bvh),
+        watch: &Watch,
+    ) -> Result<(), BuildError> {
         let skip_same_order = self.skip_same_order;
-        self.by_heuristic(scene.len(), measure, ByRule { scene, rule, skip_same_order, workspace, tree });
+        let division = ByRule { scene, rule, skip_same_order, watch, workspace, tree };
+        self.by_heuristic(scene.len(), measure, division)
     }
 
-    fn by_heuristic(&self, objects: usize, measure: Option<&dyn Measure>, division: impl Division) {
+    fn by_heuristic(
+        &self,
+        objects: usize,
+        measure: Option<&dyn Measure>,
+        division: impl Divide,
+    ) -> Result<(), BuildError> {
         match self.heuristic {
             Heuristic::AreaTimesCount => by_cost(&AreaTimesCount, measure, division),
             Heuristic::AreaTimesPower(p) => by_cost(&AreaTimesPower::new(objects, p), measure, division),
@@ -187,4 +201,14 @@ impl Config {
             Heuristic::AreaTimesCost(costs) => by_cost(&AreaTimesWeight(&costs.of(objects)), measure, division),
         }
     }
+}
+
+/// Divides by the best splits, on as many threads as pay.
+fn greedy<C: SplitCost>(division: &Division<C>, tree: &mut Bvh) -> Result<(), BuildError> {
+    let workspace = &mut Workspace::default();
+    #[cfg(feature = "rayon")]
+    if division.scene.len() >= PARALLEL_OBJECTS && rayon::current_num_threads() > 1 {
+        return division.on_all_threads(TakeBest, workspace, tree);
+    }
+    division.on_one_thread(&mut TakeBest, workspace, tree)
 }

@@ -1,7 +1,7 @@
 //! The objects of a scene, checked, packed and sorted once along every axis.
 
-use crate::BuildError;
 use crate::error::check_scene;
+use crate::{BuildError, OBJECTS_PER_POLL, Watch};
 use bvh_core::{Aabb, PackedAabb};
 
 /// Number of objects from which on sorting and division run in parallel: large enough that the start of a task takes a
@@ -24,15 +24,28 @@ impl Presorted {
     ///
     /// Source: Ng & Trifonov 2003, Table 1, step 1: 'sort boxes along all three axes', by *box* centre.
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
-        Self::sort(boxes, true, false)
+        Self::watched(boxes, &Watch::default())
+    }
+
+    /// As [`new`](Self::new), unless the `watch` ends it: it is asked before every axis.
+    pub fn watched(boxes: &[Aabb], watch: &Watch) -> Result<Self, BuildError> {
+        Self::sort(boxes, true, false, watch)
     }
 
     /// As [`new`](Self::new). Without `skip_sorted`, objects that already came in order are sorted, too. With
     /// `x_without_area`, a scene without area is sorted along x alone and has that order along all axes: every candidate
     /// split of its nodes costs nothing, and of those a greedy build takes the halves along the lowest axis.
-    pub(crate) fn sort(boxes: &[Aabb], skip_sorted: bool, x_without_area: bool) -> Result<Self, BuildError> {
+    pub(crate) fn sort(
+        boxes: &[Aabb],
+        skip_sorted: bool,
+        x_without_area: bool,
+        watch: &Watch,
+    ) -> Result<Self, BuildError> {
         check_scene(boxes)?;
         let sorted = |axis: usize| {
+            if boxes.len() >= OBJECTS_PER_POLL && watch.is_cancelled() {
+                return (Vec::new(), false);
+            }
             let mut keyed: Vec<(f64, u32)> =
                 boxes.iter().zip(0..).map(|(b, index)| (b.doubled_centroid()[axis], index)).collect();
             // Most unsorted scenes are found to be so within a few objects.
@@ -47,14 +60,10 @@ impl Presorted {
                 let x = sorted(0);
                 return [x.clone(), x.clone(), x];
             }
-            #[cfg(feature = "rayon")]
-            if boxes.len() >= PARALLEL_OBJECTS {
-                let (x, (y, z)) = rayon::join(|| sorted(0), || rayon::join(|| sorted(1), || sorted(2)));
-                return [x, y, z];
-            }
-            [sorted(0), sorted(1), sorted(2)]
+            in_parallel(boxes.len(), || sorted(0), || sorted(1), || sorted(2))
         };
         let [x, y, z] = sorted();
+        watch.ensure_wanted()?;
         let (orders, in_order) = ([x.0, y.0, z.0], [x.1, y.1, z.1]);
         Ok(Self { boxes: boxes.iter().map(PackedAabb::from).collect(), orders, in_order })
     }
@@ -87,6 +96,23 @@ impl Presorted {
     pub fn is_empty(&self) -> bool {
         self.boxes.is_empty()
     }
+}
+
+/// The results for all three axes, on several threads if there are so many `objects` that they pay.
+pub(super) fn in_parallel<T: Send>(
+    objects: usize,
+    x: impl FnOnce() -> T + Send,
+    y: impl FnOnce() -> T + Send,
+    z: impl FnOnce() -> T + Send,
+) -> [T; 3] {
+    #[cfg(feature = "rayon")]
+    if objects >= PARALLEL_OBJECTS {
+        let (x, (y, z)) = rayon::join(x, || rayon::join(y, z));
+        return [x, y, z];
+    }
+    #[cfg(not(feature = "rayon"))]
+    let _ = objects;
+    [x(), y(), z()]
 }
 
 /// Finds axes that order a node's objects identically, given those of its parent. They do so in the whole subtree.

@@ -34,6 +34,13 @@ pub trait SplitCost: Sync {
     fn join(&self, left: f64, right: f64) -> f64 {
         left + right
     }
+    /// The number of splits between the root and a node that may stall, which is to separate a few objects from almost all others in a
+    /// box almost as large. After so many, every split that would stall is replaced by a balanced one of least size times load. Default
+    /// 64, more than scenes with a few objects as large as the scene need; `None` is no limit.
+    #[inline(always)]
+    fn most_stalls(&self) -> Option<u8> {
+        Some(64)
+    }
     /// A lower bound on the cost of all splits whose sides have at least these values. Default: [`join`](Self::join).
     #[inline(always)]
     fn bound(&self, left: f64, right: f64) -> f64 {
@@ -95,6 +102,11 @@ impl SplitCost for AreaTimesPower {
     fn side(&self, area: f64, load: f64) -> f64 {
         area * self.0[load as usize]
     }
+    /// 8: powers below 1 favour splits that separate single objects.
+    #[inline(always)]
+    fn most_stalls(&self) -> Option<u8> {
+        Some(8)
+    }
 }
 
 /// A heuristic that 'only considers the surface area of the subscene bounding volumes, ignoring the number of
@@ -136,10 +148,37 @@ impl SplitCost for AreaOnly {
             Self::Product => left * right,
         }
     }
+    /// No limit: to leave out the numbers of objects is what these are about.
+    #[inline(always)]
+    fn most_stalls(&self) -> Option<u8> {
+        None
+    }
     #[inline(always)]
     fn bound(&self, left: f64, right: f64) -> f64 {
         // Only the difference may shrink as a side grows.
         if *self == Self::Difference { 0.0 } else { self.join(left, right) }
+    }
+}
+
+/// Size times load, whatever the power, with the sizes and loads of another cost.
+pub(super) struct Linear<'a, C>(pub &'a C);
+
+impl<C: SplitCost> SplitCost for Linear<'_, C> {
+    #[inline(always)]
+    fn load(&self, object: u32) -> f64 {
+        self.0.load(object)
+    }
+    #[inline(always)]
+    fn total_load(&self, objects: &[u32]) -> f64 {
+        self.0.total_load(objects)
+    }
+    #[inline(always)]
+    fn size(&self, aabb: &PackedAabb) -> f64 {
+        self.0.size(aabb)
+    }
+    #[inline(always)]
+    fn side(&self, size: f64, load: f64) -> f64 {
+        size * load
     }
 }
 
@@ -168,5 +207,8 @@ impl SplitCost for ByMeasure<'_> {
     }
     fn bound(&self, left: f64, right: f64) -> f64 {
         self.cost.bound(left, right)
+    }
+    fn most_stalls(&self) -> Option<u8> {
+        self.cost.most_stalls()
     }
 }

@@ -1,6 +1,6 @@
 //! The candidate splits of one node: every position along every axis, valued by two scans per axis.
 
-use super::split_cost::SplitCost;
+use super::split_cost::{Linear, SplitCost};
 use bvh_core::PackedAabb;
 use std::cmp::Ordering;
 
@@ -51,6 +51,9 @@ impl SplitRule for TakeBest {
 /// Objects per block of a scan; nodes of up to twice as many form one block. Blocks of 8 and of 32 were slower.
 const BLOCK: usize = 16;
 
+/// In a balanced split, either side has at least one in this many objects.
+const BALANCED: u32 = 8;
+
 /// The surroundings of one block of consecutive objects in a node's order.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Block {
@@ -96,6 +99,25 @@ impl<C: SplitCost> Sweep<'_, C> {
         let mut best = Split::NONE;
         for axis in self.distinct_axes() {
             best = self.improve(axis, best);
+        }
+        best
+    }
+
+    /// The split with at least one in [`BALANCED`] objects on either side whose size times load is least. O(n).
+    #[inline(never)]
+    pub(super) fn best_balanced(&mut self) -> Split {
+        let split_cost = &Linear(self.split_cost);
+        let &mut Sweep { boxes, orders, same_as, aabb, ref mut blocks, .. } = self;
+        let mut linear = Sweep { boxes, split_cost, orders, same_as, aabb, blocks };
+        let (all, mut best) = (linear.len() as u32, Split::NONE);
+        for axis in linear.distinct_axes() {
+            linear.scan::<false>(axis, best.cost, |candidate| {
+                let least = candidate.left.min(all - candidate.left);
+                if least >= all / BALANCED && candidate.rank(&best).is_lt() {
+                    best = candidate;
+                }
+                best.cost
+            });
         }
         best
     }

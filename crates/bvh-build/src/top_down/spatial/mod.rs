@@ -1,0 +1,276 @@
+//! Top-down division with spatial splits: an object that a plane cuts may go to both sides, each with its part of it.
+//!
+//! Stich, Friedrich & Dietrich 2009, 'Spatial splits in bounding volume hierarchies', with its reference unsplitting.
+//!
+//! Differs from the source: the node with the largest box is divided next, so that a limit on the number of references is
+//! spent where it saves most; nodes are divided down to single references; the cost of a side grows with |side|^0.9, which
+//! searches start from (see [`muller_fellner::Heuristic`](crate::muller_fellner::Heuristic)); every position between two
+//! objects is a candidate, not those of bins. Spatial splits have bins.
+
+mod object_split;
+mod plane;
+
+use super::stall::{LEAST_STALLED, is_stall};
+use crate::error::check_scene;
+use crate::watch::Pace;
+use crate::{BuildError, Check, Watch};
+use bvh_core::{Aabb, Bvh, Clip, Node};
+use object_split::{Axis, Candidates};
+use std::collections::BinaryHeap;
+
+bvh_config::config! {
+    /// How many references, and where to look for spatial splits.
+    pub struct Config {
+        /// Maximum number of references per object, 1 or more. With 1 nothing is split.
+        references: f64 = 1.2, in 1.0..=16.0;
+        /// Least area that the sides of the best object split have in common for a spatial split to be looked for, relative to the
+        /// root's box.
+        overlap: f64 = 1e-5, in 0.0..=1.0;
+        /// Bins along every axis, whose borders are the candidates of spatial splits.
+        bins: u32 = 32, in 2..=1024;
+        /// The power of the number of references in the cost of a side.
+        power: f64 = 0.9, in 0.0..=1.0;
+    }
+}
+
+/// The part of an object in a leaf.
+#[derive(Clone, Copy, Debug)]
+struct Reference {
+    aabb: Aabb,
+    object: u32,
+}
+
+/// A node that is to be divided: the largest first, equal ones in the order in which they were made.
+#[derive(Debug)]
+struct Open {
+    area: f64,
+    node: u32,
+    references: Vec<Reference>,
+    /// Number of splits between the root and the node that have stalled.
+    stalls: u8,
+}
+
+impl Ord for Open {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.area.total_cmp(&other.area).then(other.node.cmp(&self.node))
+    }
+}
+
+impl PartialOrd for Open {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Open {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Open {}
+
+/// Two sides of a node, and what they cost.
+#[derive(Debug)]
+struct Sides {
+    cost: f64,
+    boxes: [Aabb; 2],
+    references: [Vec<Reference>; 2],
+}
+
+impl Sides {
+    /// Whether the split of a node of this size [stalls](is_stall).
+    fn stall(&self, node_size: f64) -> bool {
+        let counts = self.references.each_ref().map(Vec::len);
+        let larger = usize::from(counts[1] > counts[0]);
+        is_stall(counts, self.boxes[larger].half_area(), node_size)
+    }
+}
+
+impl Config {
+    /// Builds a tree over `boxes`, one per object, whose objects may lie in several leaves. One reference per leaf;
+    /// [`validate_references`](bvh_core::validate_references) holds, and boxes are those of the parts. O(r log² r) time for
+    /// r references and balanced splits, beside the clipping.
+    pub fn build(&self, boxes: &[Aabb], objects: &dyn Clip) -> Result<Bvh, BuildError> {
+        self.check()?;
+        let most = (self.references * boxes.len() as f64) as usize;
+        self.build_at_most(most, boxes, objects)
+    }
+
+    /// As [`build`](Self::build), with at most so many references, at least one per object.
+    pub fn build_at_most(&self, most: usize, boxes: &[Aabb], objects: &dyn Clip) -> Result<Bvh, BuildError> {
+        self.build_watched(most, boxes, objects, &Watch::default())
+    }
+
+    /// As [`build_at_most`](Self::build_at_most), unless the `watch` ends it.
+    pub fn build_watched(
+        &self,
+        most: usize,
+        boxes: &[Aabb],
+        objects: &dyn Clip,
+        watch: &Watch,
+    ) -> Result<Bvh, BuildError> {
+        self.check()?;
+        check_scene(boxes)?;
+        let mut build = Build {
+            config: self,
+            objects,
+            extra: most.saturating_sub(boxes.len()),
+            watch,
+            least_overlap: 0.0,
+            powers: Vec::new(),
+            axes: Default::default(),
+        };
+        build.divide(boxes)
+    }
+}
+
+/// A build at work.
+struct Build<'a> {
+    config: &'a Config,
+    objects: &'a dyn Clip,
+    /// References that may still be added.
+    extra: usize,
+    watch: &'a Watch<'a>,
+    /// Least common area for which a spatial split is looked for.
+    least_overlap: f64,
+    /// |side|^power by |side|.
+    powers: Vec<f64>,
+    axes: [Axis; 3],
+}
+
+/// Stalls on the way to a node after which a split that would stall is replaced by a balanced one.
+const MOST_STALLS: u8 = 8;
+
+impl Build<'_> {
+    fn divide(&mut self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
+        let mut tree = Bvh::default();
+        if boxes.is_empty() {
+            return Ok(tree);
+        }
+        let mut pace = Pace::new(self.watch);
+        self.powers = (0..=boxes.len()).map(|n| libm::pow(n as f64, self.config.power)).collect();
+        let references: Vec<Reference> =
+            boxes.iter().zip(0..).map(|(&aabb, object)| Reference { aabb, object }).collect();
+        let root = union(&references);
+        self.least_overlap = self.config.overlap * root.half_area();
+        tree.nodes.push(Node::leaf(root, 0, 1));
+        let mut open = BinaryHeap::from([Open { area: root.half_area(), node: 0, references, stalls: 0 }]);
+        while let Some(Open { node, references, mut stalls, .. }) = open.pop() {
+            if pace.ends_after(references.len()) {
+                return Err(BuildError::Cancelled);
+            }
+            let aabb = tree.nodes[node as usize].aabb;
+            if let [one] = references.as_slice() {
+                tree.nodes[node as usize] = Node::leaf(aabb, tree.prim_ids.len() as u32, 1);
+                tree.prim_ids.push(one.object);
+                continue;
+            }
+            let Sides { boxes, references: sides, .. } = self.split(&aabb, &references, &mut stalls)?;
+            self.watch.ensure_wanted()?;
+            drop(references);
+            let first = tree.nodes.len() as u32;
+            tree.nodes[node as usize] = Node::inner(aabb, first, 2);
+            for ((node, aabb), references) in (first..).zip(boxes).zip(sides) {
+                tree.nodes.push(Node::leaf(aabb, 0, 1));
+                open.push(Open { area: aabb.half_area(), node, references, stalls });
+            }
+        }
+        Ok(tree)
+    }
+
+    /// The cost of a side.
+    fn cost(&self, aabb: &Aabb, count: usize) -> f64 {
+        aabb.half_area() * self.powers[count]
+    }
+
+    /// Divides two references or more by the better of the best object split and the best spatial split, or in balance where the node
+    /// is below so many splits that have stalled. Fails if the watch ends the division.
+    fn split(&mut self, aabb: &Aabb, references: &[Reference], stalled: &mut u8) -> Result<Sides, BuildError> {
+        let extra = self.extra;
+        let sides = self.cheapest_split(aabb, references)?;
+        let node_area = aabb.half_area();
+        let is_last = *stalled == MOST_STALLS;
+        if (is_last || references.len() >= LEAST_STALLED) && sides.stall(node_area) {
+            if is_last {
+                self.extra = extra;
+                return self.object_split(references, Candidates::Balanced);
+            }
+            *stalled += 1;
+        }
+        Ok(sides)
+    }
+
+    fn cheapest_split(&mut self, aabb: &Aabb, references: &[Reference]) -> Result<Sides, BuildError> {
+        let by_objects = self.object_split(references, Candidates::All)?;
+        let [left, right] = &by_objects.boxes;
+        if self.extra == 0 || left.intersection(right).half_area() <= self.least_overlap {
+            return Ok(by_objects);
+        }
+        let spatial = self.best_plane(aabb, references).filter(|plane| plane.cost < by_objects.cost);
+        let spatial = spatial.and_then(|plane| self.spatial_split(references, plane));
+        Ok(match spatial.filter(|spatial| spatial.cost < by_objects.cost) {
+            Some(spatial) => {
+                let [left, right] = spatial.references.each_ref().map(Vec::len);
+                self.extra -= left + right - references.len();
+                spatial
+            }
+            None => by_objects,
+        })
+    }
+}
+
+/// The box around the references.
+fn union(references: &[Reference]) -> Aabb {
+    references.iter().fold(Aabb::EMPTY, |aabb, reference| aabb.union(&reference.aabb))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Builder, muller_fellner};
+    use bvh_core::{Triangle, cost, validate_references};
+    use glam::Vec3;
+
+    /// Long triangles in many directions, which cross each other.
+    fn needles(n: u32) -> Vec<Triangle> {
+        let coordinate =
+            |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 4093) as f32 / 41.0;
+        let point = |i, salt| Vec3::new(coordinate(i, salt), coordinate(i, salt + 7), coordinate(i, salt + 13));
+        (0..n).map(|i| Triangle([point(i, 3), point(i, 5), point(i, 3) + Vec3::splat(0.5)])).collect()
+    }
+
+    #[test]
+    fn every_limit_of_references_gives_a_valid_tree_and_more_leave_a_cheaper_one() {
+        let triangles = needles(400);
+        let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+        let objects = &triangles.as_slice();
+        let mut before = f64::INFINITY;
+        for references in [1.0, 1.1, 1.5, 3.0] {
+            let tree = Config { references, ..Config::default() }.build(&boxes, objects).unwrap();
+            validate_references(&tree, &boxes, objects).unwrap();
+            let count = tree.prim_ids.len();
+            assert!(count <= (references * 400.0) as usize && (count > 400) == (references > 1.0), "{count}");
+            let cost = cost::total_area(&tree);
+            assert!(cost <= before, "{cost} {before}");
+            before = cost;
+        }
+        let whole = muller_fellner::Config::default().build(&boxes).unwrap();
+        let whole = cost::total_area(&whole);
+        assert!(before < 0.97 * whole, "{before} of {whole}");
+    }
+
+    #[test]
+    fn scenes_of_points_of_one_object_and_of_none_are_built_and_bad_boxes_refused() {
+        for triangles in [vec![], needles(1), vec![Triangle([Vec3::ONE; 3]); 30], vec![needles(1)[0]; 3000]] {
+            let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+            let tree = Config::default().build(&boxes, &triangles.as_slice()).unwrap();
+            validate_references(&tree, &boxes, &triangles.as_slice()).unwrap();
+            assert_eq!(tree.prim_ids.len(), triangles.len(), "there is nothing to split");
+            assert!(tree.depth() <= 12, "objects in one place are not halved: {}", tree.depth());
+        }
+        let wrong = [Aabb::from([[f32::NAN; 3], [1.0; 3]])];
+        assert!(Config::default().build(&wrong, &needles(1).as_slice()).is_err());
+        assert!(Config { references: 0.5, ..Config::default() }.build(&[], &needles(1).as_slice()).is_err());
+    }
+}

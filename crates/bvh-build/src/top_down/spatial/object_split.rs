@@ -1,0 +1,105 @@
+//! Object splits of a node: every position between two references in the orders of their centres along the axes.
+
+use super::{Build, Reference, Sides, union};
+use crate::top_down::presort::in_parallel;
+use crate::{BuildError, OBJECTS_PER_POLL};
+use bvh_core::Aabb;
+
+/// The candidates of object splits along one axis.
+#[derive(Debug, Default)]
+pub(super) struct Axis {
+    /// The references' centres along the axis and their positions, in order.
+    keys: Vec<(f64, u32)>,
+    /// The half areas of the last references, by their number less 1.
+    areas: Vec<f64>,
+}
+
+/// Which object splits are candidates, and what a side costs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Candidates {
+    /// All, by area times a power of the number of references.
+    All,
+    /// Those with at least one in eight references on either side, by area times number.
+    Balanced,
+}
+
+impl Axis {
+    /// Sorts the references by their centres along the axis of this number, equal centres in their order.
+    fn sort(&mut self, references: &[Reference], number: usize) {
+        self.keys.clear();
+        self.keys.extend(references.iter().zip(0..).map(|(r, at)| (r.aabb.doubled_centroid()[number], at)));
+        if references.len() >= RADIX_SORTED {
+            radsort::sort_by_key(&mut self.keys, |&(centre, _)| centre);
+        } else {
+            self.keys.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        }
+    }
+
+    /// The least cost of the candidates and the number of references on the left side; of equal ones the first.
+    fn best(&mut self, references: &[Reference], powers: &[f64], candidates: Candidates) -> (f64, usize) {
+        let count = references.len();
+        let side_cost = |area: f64, side: usize| match candidates {
+            Candidates::All => area * powers[side],
+            Candidates::Balanced => area * side as f64,
+        };
+        let least_side = if candidates == Candidates::All { 1 } else { (count / 8).max(1) };
+        let mut aabb = Aabb::EMPTY;
+        self.areas.clear();
+        for &(_, at) in self.keys.iter().rev() {
+            aabb = aabb.union(&references[at as usize].aabb);
+            self.areas.push(aabb.half_area());
+        }
+        aabb = Aabb::EMPTY;
+        let mut best = (f64::INFINITY, 1);
+        for (before, &(_, at)) in (1..count).zip(&self.keys) {
+            aabb = aabb.union(&references[at as usize].aabb);
+            let after = count - before;
+            let cost = side_cost(aabb.half_area(), before) + side_cost(self.areas[after - 1], after);
+            if cost < best.0 && before.min(after) >= least_side {
+                best = (cost, before);
+            }
+        }
+        best
+    }
+}
+
+/// References from which on a radix sort is faster.
+const RADIX_SORTED: usize = 2048;
+
+impl Build<'_> {
+    /// The best of the object splits in the orders of the centres along the axes; ties go to the lower axis and position.
+    /// Fails if the watch ends the division.
+    pub(super) fn object_split(
+        &mut self,
+        references: &[Reference],
+        candidates: Candidates,
+    ) -> Result<Sides, BuildError> {
+        let count = references.len();
+        let Self { powers, axes: [x, y, z], watch, .. } = self;
+        let best = |axis: &mut Axis, number: usize| {
+            if count >= OBJECTS_PER_POLL && watch.is_cancelled() {
+                return (f64::INFINITY, 1);
+            }
+            axis.sort(references, number);
+            axis.best(references, powers, candidates)
+        };
+        let found = in_parallel(count, || best(x, 0), || best(y, 1), || best(z, 2));
+        watch.ensure_wanted()?;
+        let (mut least, mut axis, mut left) = (f64::INFINITY, 0, 1);
+        for (number, (cost, position)) in found.into_iter().enumerate() {
+            if cost < least {
+                (least, axis, left) = (cost, number, position);
+            }
+        }
+        let keys = &self.axes[axis].keys;
+        let mut ordered: Vec<Reference> = keys.iter().map(|&(_, at)| references[at as usize]).collect();
+        if union(&ordered[..left]) == union(&ordered[left..]) {
+            // Nothing is gained, and the power would take off one reference after the other.
+            left = count / 2;
+        }
+        let sides = [ordered[..left].to_vec(), ordered.split_off(left)];
+        let boxes = sides.each_ref().map(|side| union(side));
+        let cost = self.cost(&boxes[0], left) + self.cost(&boxes[1], count - left);
+        Ok(Sides { cost, boxes, references: sides })
+    }
+}

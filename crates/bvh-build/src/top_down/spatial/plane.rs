@@ -1,0 +1,149 @@
+//! Spatial splits of a node: the borders of bins, and the references that go to either side or to both.
+
+use super::{Build, Reference, Sides, union};
+use crate::top_down::presort::in_parallel;
+use crate::watch::Pace;
+use bvh_core::Aabb;
+
+/// A candidate of a spatial split.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plane {
+    pub cost: f64,
+    axis: usize,
+    at: f32,
+}
+
+impl Build<'_> {
+    /// The border of bins where a spatial split costs least, by its cost before unsplitting; of equal ones the first.
+    pub(super) fn best_plane(&self, aabb: &Aabb, references: &[Reference]) -> Option<Plane> {
+        let along = |axis| self.best_plane_along(axis, aabb, references);
+        let found = in_parallel(references.len(), || along(0), || along(1), || along(2));
+        found.into_iter().flatten().reduce(|best, plane| if plane.cost < best.cost { plane } else { best })
+    }
+
+    fn best_plane_along(&self, axis: usize, aabb: &Aabb, references: &[Reference]) -> Option<Plane> {
+        let bins = self.config.bins as usize;
+        let all = references.len();
+        let low = f64::from(aabb.min[axis]);
+        let extent = aabb.extent()[axis];
+        let border = |bin: usize| (low + extent * (bin as f64 / bins as f64)) as f32;
+        let bin_of = |x: f32| {
+            let guess = ((f64::from(x) - low) / extent * bins as f64) as usize;
+            guess.min(bins - 1)
+        };
+        if border(1) <= aabb.min[axis] || border(bins - 1) >= aabb.max[axis] {
+            return None;
+        }
+        let mut parts = vec![(Aabb::EMPTY, 0usize, 0usize); bins];
+        let bins_of = |reference: &Reference| [reference.aabb.min[axis], reference.aabb.max[axis]].map(bin_of);
+        for [first, last] in references.iter().map(bins_of) {
+            parts[first].1 += 1;
+            parts[last].2 += 1;
+        }
+        // Where every plane cuts all that is on one side of it, there are no parts to look at.
+        let (mut entered, mut gone) = (0, 0);
+        let divides = parts[..bins - 1].iter().any(|part| {
+            (entered, gone) = (entered + part.1, gone + part.2);
+            (1..all).contains(&entered) && (1..all).contains(&(all - gone))
+        });
+        if !divides {
+            return None;
+        }
+        let mut pace = Pace::new(self.watch);
+        for reference in references {
+            let [first, last] = bins_of(reference);
+            if pace.ends_after(1 + last - first) {
+                return None;
+            }
+            if first == last {
+                parts[first].0 = parts[first].0.union(&reference.aabb);
+                continue;
+            }
+            for (bin, part) in parts.iter_mut().enumerate().take(last + 1).skip(first) {
+                let mut region = reference.aabb;
+                if bin > first {
+                    region.min[axis] = border(bin);
+                }
+                if bin < last {
+                    region.max[axis] = border(bin + 1);
+                }
+                part.0 = part.0.union(&self.objects.clip(reference.object, &region));
+            }
+        }
+        let mut after = vec![(Aabb::EMPTY, 0usize); bins + 1];
+        for bin in (0..bins).rev() {
+            after[bin] = (after[bin + 1].0.union(&parts[bin].0), after[bin + 1].1 + parts[bin].2);
+        }
+        let mut best: Option<Plane> = None;
+        let (mut before, mut entered) = (Aabb::EMPTY, 0);
+        for bin in 1..bins {
+            before = before.union(&parts[bin - 1].0);
+            entered += parts[bin - 1].1;
+            let (behind, left) = &after[bin];
+            // A side with all references divides nothing.
+            if entered == 0 || *left == 0 || entered >= all || *left >= all || entered + left - all > self.extra
+            {
+                continue;
+            }
+            let cost = self.cost(&before, entered) + self.cost(behind, *left);
+            if best.is_none_or(|best| cost < best.cost) {
+                best = Some(Plane { cost, axis, at: border(bin) });
+            }
+        }
+        best
+    }
+
+    /// Divides the references at a plane. One that the plane cuts goes whole to one side where that costs less. `None` if a side
+    /// would have all of them, or more references than there may be.
+    pub(super) fn spatial_split(
+        &self,
+        references: &[Reference],
+        Plane { axis, at, .. }: Plane,
+    ) -> Option<Sides> {
+        let (mut sides, mut cut) = ([Vec::new(), Vec::new()], Vec::new());
+        for reference in references {
+            if reference.aabb.max[axis] <= at {
+                sides[0].push(*reference);
+            } else if reference.aabb.min[axis] >= at {
+                sides[1].push(*reference);
+            } else {
+                let halves = reference.aabb.halves(axis, at);
+                let parts = halves.map(|region| self.objects.clip(reference.object, &region));
+                match parts.map(|part| part != Aabb::EMPTY) {
+                    [true, true] => cut.push((*reference, parts)),
+                    [left, _] => sides[usize::from(!left)].push(*reference),
+                }
+            }
+        }
+        let mut boxes = sides.each_ref().map(|side| union(side));
+        let mut counts = sides.each_ref().map(|side| side.len() + cut.len());
+        for (_, parts) in &cut {
+            boxes = [boxes[0].union(&parts[0]), boxes[1].union(&parts[1])];
+        }
+        for (whole, parts) in cut {
+            let divided = self.cost(&boxes[0], counts[0]) + self.cost(&boxes[1], counts[1]);
+            let [left, right] = [0, 1].map(|side| {
+                let grown = boxes[side].union(&whole.aabb);
+                self.cost(&grown, counts[side]) + self.cost(&boxes[1 - side], counts[1 - side] - 1)
+            });
+            if divided <= left.min(right) {
+                for (side, aabb) in sides.iter_mut().zip(parts) {
+                    side.push(Reference { aabb, ..whole });
+                }
+                continue;
+            }
+            let side = usize::from(right < left);
+            boxes[side] = boxes[side].union(&whole.aabb);
+            counts[1 - side] -= 1;
+            sides[side].push(whole);
+        }
+        let [left, right] = sides.each_ref().map(Vec::len);
+        let all = references.len();
+        if left == 0 || right == 0 || left >= all || right >= all || left + right - all > self.extra {
+            return None;
+        }
+        // Unsplitting may have left a side smaller than it was when the others were decided on.
+        let boxes = sides.each_ref().map(|side| union(side));
+        Some(Sides { cost: self.cost(&boxes[0], left) + self.cost(&boxes[1], right), boxes, references: sides })
+    }
+}

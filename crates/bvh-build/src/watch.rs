@@ -1,0 +1,104 @@
+//! How a caller ends a construction before it is finished.
+
+use crate::BuildError;
+use std::fmt::{self, Debug, Formatter};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+/// Asks the caller whether a construction is still wanted. Builders ask about once per millisecond of each of their threads, and never
+/// while they have done less than [`OBJECTS_PER_POLL`]: small scenes are always built.
+///
+/// The [default](Default) never ends a construction.
+///
+/// ```
+/// use bvh_build::{BuildError, Builder, Watch, muller_fellner};
+/// use bvh_core::Aabb;
+/// let boxes = vec![Aabb::from([[0.0; 3], [1.0; 3]]); 100_000];
+/// let stop = || true;
+/// let built = muller_fellner::Config::default().build_watched(&boxes, None, &Watch::new(&stop));
+/// assert_eq!(built, Err(BuildError::Cancelled));
+/// ```
+#[derive(Default)]
+pub struct Watch<'a> {
+    is_cancelled: Option<&'a (dyn Fn() -> bool + Sync)>,
+    /// Set by the first answer that ends the construction, so that all threads agree.
+    ended: AtomicBool,
+}
+
+/// Objects that a builder visits between two questions.
+pub const OBJECTS_PER_POLL: usize = 1 << 15;
+
+impl<'a> Watch<'a> {
+    /// Ends a construction soon after `is_cancelled` returns true, on whichever thread.
+    pub fn new(is_cancelled: &'a (dyn Fn() -> bool + Sync)) -> Self {
+        Self { is_cancelled: Some(is_cancelled), ended: AtomicBool::new(false) }
+    }
+
+    /// Asks. Once the construction has ended it stays so.
+    pub fn is_cancelled(&self) -> bool {
+        if self.ended.load(Relaxed) {
+            return true;
+        }
+        let cancelled = self.is_cancelled.is_some_and(|is_cancelled| is_cancelled());
+        if cancelled {
+            self.ended.store(true, Relaxed);
+        }
+        cancelled
+    }
+
+    /// Returns [`BuildError::Cancelled`] if the construction has ended, without asking again.
+    pub fn ensure_wanted(&self) -> Result<(), BuildError> {
+        if self.ended.load(Relaxed) { Err(BuildError::Cancelled) } else { Ok(()) }
+    }
+}
+
+impl Debug for Watch<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Watch").field("ended", &self.ended).finish_non_exhaustive()
+    }
+}
+
+/// The questions of one thread, spaced by its work.
+pub(crate) struct Pace<'a> {
+    watch: &'a Watch<'a>,
+    /// Objects still to be visited before the next question.
+    left: usize,
+}
+
+impl<'a> Pace<'a> {
+    pub fn new(watch: &'a Watch<'a>) -> Self {
+        Self { watch, left: OBJECTS_PER_POLL }
+    }
+
+    /// Counts visits of objects. Returns whether the construction ends.
+    #[inline(always)]
+    pub fn ends_after(&mut self, objects: usize) -> bool {
+        if objects < self.left {
+            self.left -= objects;
+            return false;
+        }
+        self.left = OBJECTS_PER_POLL;
+        self.watch.is_cancelled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicUsize;
+
+    #[test]
+    fn questions_are_spaced_by_work_and_an_end_is_final() {
+        let asked = AtomicUsize::new(0);
+        let third = || asked.fetch_add(1, Relaxed) == 2;
+        let watch = Watch::new(&third);
+        let mut pace = Pace::new(&watch);
+        let mut visited = 0;
+        while !pace.ends_after(1000) {
+            assert_eq!(watch.ensure_wanted(), Ok(()));
+            visited += 1000;
+        }
+        assert!((2 * OBJECTS_PER_POLL..4 * OBJECTS_PER_POLL).contains(&visited), "{visited}");
+        assert!(watch.is_cancelled() && asked.load(Relaxed) == 3);
+        assert_eq!(watch.ensure_wanted(), Err(BuildError::Cancelled));
+    }
+}
