@@ -9,13 +9,13 @@
 use crate::run::{Problem, Run, Search, SearchError, Shortcut};
 use crate::tree::{Area, Subsets};
 use bvh_build::BuildError;
-use bvh_build::config::Accepts;
+use bvh_config::Accepts;
 use bvh_core::{Aabb, Bvh, Node, PackedAabb, check_boxes};
 
 /// The most objects a scene may have: 3¹⁶ / 2 divisions take a few hundredths of a second and 2¹⁶ sets 2.8 MB.
 pub const MOST_OBJECTS: usize = 16;
 
-bvh_build::config! {
+bvh_config::config! {
     /// Without parameters.
     pub struct Config {}
 }

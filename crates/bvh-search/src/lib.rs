@@ -33,7 +33,7 @@ pub use local::{LocalSearch, reinsertion, rotation, treelet};
 pub use multistart::{grasp, iterated, rebuild};
 pub use optimize::optimize;
 pub use orders::{genetic, random_orders};
-pub use owned::{Objects, OwnedTree};
+pub use owned::{Improvement, Objects, OwnedTree};
 #[cfg(feature = "serde")]
 pub use registry::Method;
 pub use run::{

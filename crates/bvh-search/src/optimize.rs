@@ -3,7 +3,7 @@
 use crate::best;
 use crate::run::{Budget, Found, Observer, Outcome, Problem, Run, SearchError, solve};
 use crate::tree::{Metric, search_by_metric};
-use bvh_build::{Check, OutOfRange};
+use bvh_config::{Check, OutOfRange};
 use bvh_core::cost::Objective;
 use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate, validate_references};
 
@@ -48,7 +48,8 @@ pub fn optimize(
     tight.prim_ids = (0..leaves.len() as u32).collect();
     let leaf_boxes: Vec<Aabb> = leaves.iter().map(|(aabb, _)| *aabb).collect();
     let mut outcome = {
-        let problem = Problem { boxes: &leaf_boxes, objective: Objective::InternalArea, ..*problem };
+        let problem =
+            Problem { boxes: &leaf_boxes, objective: Objective::InternalArea, known: None, ..*problem };
         solve(&From { tree: tight, config }, &problem, seed, budget, observer)?
     };
     let mut prim_ids = Vec::with_capacity(boxes.len());
@@ -60,6 +61,13 @@ pub fn optimize(
         }
     }
     outcome.tree.prim_ids = prim_ids;
+    if let Some(known) = problem.known {
+        let cost = Problem { objective: Objective::InternalArea, ..*problem }.cost(known);
+        if cost < outcome.cost {
+            outcome.cost = cost;
+            outcome.tree = known.clone();
+        }
+    }
     Ok(outcome)
 }
 

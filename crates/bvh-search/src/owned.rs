@@ -14,6 +14,10 @@ pub enum Objects {
     Shapes(Primitives),
 }
 
+/// A better tree over the objects of an [`OwnedTree`], from [`OwnedTree::improvement`].
+#[derive(Clone, Debug)]
+pub struct Improvement(Outcome);
+
 /// A tree found by [`best`](crate::best), with its objects.
 #[derive(Clone, Debug)]
 pub struct OwnedTree {
@@ -48,10 +52,21 @@ impl OwnedTree {
 
     /// Improves the tree until `observer` cancels the search; the cost never rises.
     pub fn improve(&mut self, observer: &dyn Observer) -> Result<(), SearchError> {
-        let config = best::Config::default();
-        let outcome = optimize(&self.tree, &self.problem(), &config, 1, Budget::UNLIMITED, observer)?;
-        self.take(outcome);
+        let improvement = self.improvement(observer)?;
+        self.apply(improvement);
         Ok(())
+    }
+
+    /// Searches as [`improve`](Self::improve) does and leaves the tree as it is, so that others can read it meanwhile. The result is
+    /// for [`apply`](Self::apply).
+    pub fn improvement(&self, observer: &dyn Observer) -> Result<Improvement, SearchError> {
+        let config = best::Config::default();
+        optimize(&self.tree, &self.problem(), &config, 1, Budget::UNLIMITED, observer).map(Improvement)
+    }
+
+    /// Puts an improvement of this very tree in its place.
+    pub fn apply(&mut self, improvement: Improvement) {
+        self.take(improvement.0);
     }
 
     /// The tree as a file, which [`load`](Self::load) and the harness read.

@@ -2,6 +2,9 @@
 //!
 //! Results come in the order of the tasks, whichever thread has done them.
 
+/// The most nodes of all trees that a batch of trials keeps, 1 GB. It decides how often the budget is checked, and no result.
+pub(crate) const KEPT_NODES: u64 = 1 << 25;
+
 /// The results of the tasks `0..count`. Every thread has a state of its own, made by `init`: buffers that are reused.
 pub(crate) fn map_init<S, T: Send>(
     count: usize,

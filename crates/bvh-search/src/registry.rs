@@ -1,7 +1,7 @@
 //! The one registry of methods: the only place that knows all of them by name.
 
 use crate::run::{Problem, Run, Search, SearchError};
-use bvh_build::{Check, OutOfRange};
+use bvh_config::{Check, OutOfRange};
 use bvh_core::Bvh;
 use serde::{Deserialize, Deserializer, Serialize};
 

@@ -55,7 +55,7 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 1,10,60 SCENE..." {
 }}
 
 // The cost of the wide layout.
-tuned! { "harness bake SCENE --cost layout --budget 100Mwork --out FILE" {
+tuned! { "bvh bake SCENE --cost layout --budget 100Mwork --out FILE" {
     /// How much more a move may add to the area than a temperature would allow, before the layout judges it.
     DEARER_BY_AREA: f64 = 10.0, "factor";
     /// Temperatures for the cost of the layout, which is about a third of the tree's area and falls by small moves.
@@ -65,7 +65,7 @@ tuned! { "harness bake SCENE --cost layout --budget 100Mwork --out FILE" {
 }}
 
 // Split references.
-tuned! { "harness bake SCENE --references 1.2 --budget 100Mwork --out FILE" {
+tuned! { "bvh bake SCENE --references 1.2 --budget 100Mwork --out FILE" {
     /// Ancestors whose boxes suggest planes at which to divide a leaf.
     LEVELS_OF_PLANES: u32 = 12, "levels";
     /// What a division has to save. Without a price, layouts cost more in the end, and leave is spent on divisions that save next to
@@ -98,6 +98,11 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 --threa
     WORTH_SUBTREES: f64 = 256.0, "work per object";
     /// Subtrees per thread, so that unequal ones fill the threads.
     SUBTREES_PER_THREAD: usize = 4, "subtrees";
+    /// Size up to which trees are recombined after a cancellation: it takes about a microsecond per object.
+    RECOMBINED_AT_ONCE: usize = 100_000, "objects";
+    /// Cost of a clustering over that of a top-down division below which annealing begins with the clustering, although it ends lower
+    /// from a division of the same cost.
+    CLUSTERING_MUCH_CHEAPER: f64 = 0.9, "fraction";
     /// End of the plan where generations do not grow.
     MOST_GENERATIONS: u64 = 10_000, "annealing runs";
 }}

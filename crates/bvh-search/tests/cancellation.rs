@@ -1,5 +1,6 @@
 //! A search returns soon after its observer cancels, whatever numbers its configuration has.
 
+use bvh_build::{Builder, median_cut, ploc};
 use bvh_core::{Aabb, validate};
 use bvh_search::{
     Budget, Event, Method, Observer, Problem, best, genetic, grasp, random_orders, rebuild, ruin_recreate,
@@ -91,4 +92,45 @@ fn numbers_that_no_poll_could_interrupt_are_refused() {
     let population = genetic::Config { population: 1_000_000, ..Default::default() };
     let message = "population is 1000000; accepted: at most 262144";
     assert_eq!(refused(Method::Genetic(population), &boxes(1024)), message);
+}
+
+/// Methods whose first tree is a construction over all objects.
+fn constructing() -> impl Iterator<Item = Method> {
+    Method::all().into_iter().filter(|method| method.name() != "exact")
+}
+
+#[test]
+fn a_search_that_is_cancelled_during_its_first_construction_returns_the_known_tree_or_that_of_the_fastest_builder()
+ {
+    let boxes = boxes(100_000);
+    let known = median_cut::Config::default().build(&boxes).unwrap();
+    let fastest = ploc::Config { radius: 1, near_rounds: 0 }.build(&boxes).unwrap();
+    for method in constructing() {
+        for (known, expected) in [(Some(&known), &known), (None, &fastest)] {
+            let polls = Polls { polled: 0.into(), until: 0 };
+            let problem = Problem { known, ..Problem::new(&boxes) };
+            let outcome = solve(&method, &problem, 1, Budget::UNLIMITED, &polls).unwrap();
+            assert_eq!(outcome.tree, *expected, "{}", method.name());
+            assert_eq!(outcome.cost, problem.cost(expected), "{}", method.name());
+            assert!(polls.polled.into_inner() < 100, "{}", method.name());
+        }
+    }
+}
+
+#[test]
+fn randomised_constructions_are_polled_and_the_incumbent_is_kept_when_one_is_cut_off() {
+    let boxes = boxes(60_000);
+    for method in [
+        Method::Grasp(grasp::Config { trials: 1000, ..Default::default() }),
+        Method::RandomOrders(random_orders::Config { trials: 1000, ..Default::default() }),
+        Method::Genetic(genetic::Config { population: 4, generations: 1000, ..Default::default() }),
+    ] {
+        let polls = Polls { polled: 0.into(), until: 400 };
+        let outcome = solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &polls).unwrap();
+        validate(&outcome.tree, &boxes).unwrap();
+        let cost = Problem::new(&boxes).cost(&outcome.tree);
+        assert_eq!(outcome.cost, cost, "{}", method.name());
+        let polled = polls.polled.into_inner();
+        assert!(polled < 450, "{}: {polled} polls", method.name());
+    }
 }

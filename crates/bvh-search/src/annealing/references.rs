@@ -348,7 +348,7 @@ mod tests {
             let mut most_seen = 0;
             // With less leave than there are references, nothing is divided, and leaves that pay little are still reunited.
             for most in [180, 200, 160, 150] {
-                let mut divider = Divider::new(Splits { objects, most }, by_layout);
+                let mut divider = Divider::new(Splits { objects, most, division: None }, by_layout);
                 let mut references = tree.objects();
                 for round in 0..4 {
                     let tally = divider.pass(&mut tree, quota, &mut stream(7, round), &());

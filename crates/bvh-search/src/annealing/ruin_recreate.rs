@@ -13,11 +13,11 @@ use crate::local::initial::Start;
 use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Node, PositionSearch, Scope, Working, search_by_metric};
 use crate::tuning::{DEARER_BY_AREA, LAYOUT_HEAT};
-use bvh_build::config::{Itself, above};
+use bvh_config::{Itself, above};
 use rand::RngExt;
 use rand::seq::SliceRandom;
 
-bvh_build::config! {
+bvh_config::config! {
     /// What to ruin, how to cool, and for how long.
     pub struct Config {
         /// The move.
@@ -35,7 +35,7 @@ bvh_build::config! {
     check |config: &Config| check_fall(config.hot, config.cold);
 }
 
-bvh_build::config! {
+bvh_config::config! {
     /// A move. Some levels up from a random node, more often one below a large node, is the *top* of the ruined part. Either
     /// several random descents from there each end at a subtree that is taken out; or everything in a layer at one side of
     /// the top's box is, without which that box cannot shrink. Then every subtree gets the best position.

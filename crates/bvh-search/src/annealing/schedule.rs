@@ -18,7 +18,7 @@ use crate::local::initial::Start;
 use crate::run::{Observer, Problem, Quota, Run, SearchError, Tally};
 use crate::tree::{Metric, Working};
 use crate::tuning::{FINAL_PASSES_PART, FINAL_PASSES_WORK, LAST_ROUND, ROUNDS, WORK_PER_ROUND};
-use bvh_build::OutOfRange;
+use bvh_config::OutOfRange;
 use bvh_core::Bvh;
 
 /// The temperatures of one annealing run, and how long it lasts.

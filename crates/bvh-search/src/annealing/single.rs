@@ -10,12 +10,11 @@ use super::schedule::{AnnealingRun, check_fall};
 use crate::local::initial::Start;
 use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
-use bvh_build::OutOfRange;
-use bvh_build::config::{Accepts, Itself, above};
+use bvh_config::{Accepts, Itself, OutOfRange, above};
 use bvh_core::PackedAabb;
 use rand::RngExt;
 
-bvh_build::config! {
+bvh_config::config! {
     /// What to move where, how to cool, and for how long.
     pub struct Config {
         /// The move; `move` in specs.
@@ -33,7 +32,7 @@ bvh_build::config! {
     check Self::check_together;
 }
 
-bvh_build::config! {
+bvh_config::config! {
     /// A move: a random subtree, more often one below a large node, is taken out of the tree and placed again, not more than
     /// some levels up from where it was.
     pub struct SingleMove {

@@ -15,7 +15,7 @@ use rand::RngExt;
 /// Random streams per round: one for the whole tree, one for every subtree.
 pub(crate) const STREAMS: u64 = 1 << 24;
 
-/// One round of annealing of a `tree` in preorder, which is in preorder again at the end: first on about `count` subtrees, if
+/// One round of annealing of a `tree` in preorder, which is in preorder again at the end unless the observer cancels: first on about `count` subtrees, if
 /// more than one, then on the whole tree, where moves begin near the nodes that are in no subtree.
 pub(crate) fn cool<M: Mover>(
     mover: &(impl Fn() -> M + Sync),
@@ -47,7 +47,10 @@ pub(crate) fn cool<M: Mover>(
         *whole.sampler() = NodeSampler::among(starts);
     }
     done += metropolis::cool(&mut whole, tree, heat, quota.less(&done), &mut rng, observer);
-    tree.sort_in_preorder();
+    // After a cancellation whatever comes next sorts first, and somebody may be waiting.
+    if !observer.cancelled() {
+        tree.sort_in_preorder();
+    }
     done
 }
 

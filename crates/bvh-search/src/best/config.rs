@@ -3,10 +3,10 @@
 use crate::annealing::ruin_recreate::{Ruin, Scale};
 use crate::local::initial::Start;
 use crate::run::Run;
-use bvh_build::config::{Itself, above};
+use bvh_config::{Itself, above};
 use std::ops::Bound::{Excluded, Included};
 
-bvh_build::config! {
+bvh_config::config! {
     /// How long the annealing runs are and how hot.
     pub struct Config {
         /// Work per object of the first generation if the end is not known.

@@ -11,11 +11,11 @@ use crate::annealing::schedule::{Schedule, anneal};
 use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion;
 use crate::parallel::threads;
-use crate::run::{Observer, Problem, Quota, Run, Stream, Tally, stream};
+use crate::run::{Observer, Problem, Quota, Run, StopReason, Stream, Tally, stream};
 use crate::tree::{Metric, Working};
 use crate::tuning::{
-    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, ROUNDS_PER_LOOK, SECURED_FROM, SUBTREES_PER_THREAD,
-    TRIAL, WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_SUBTREES,
+    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, RECOMBINED_AT_ONCE, ROUNDS_PER_LOOK, SECURED_FROM,
+    SUBTREES_PER_THREAD, TRIAL, WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_SUBTREES,
 };
 use bvh_core::cost::Objective;
 
@@ -215,7 +215,7 @@ impl Improvement<'_, '_, '_, '_> {
             &mut |tree, tally| {
                 done += tally;
                 run.count(tally);
-                if let Some(divider) = &mut divider {
+                if let Some(divider) = divider.as_mut().filter(|_| !observer.cancelled()) {
                     let work = (tally.work as f64 * WORK_ON_REFERENCES) as u64;
                     let tally = divider.pass(tree, run.left().at_most(work), &mut division, observer);
                     done += tally;
@@ -235,6 +235,10 @@ impl Improvement<'_, '_, '_, '_> {
             }
         } else if first && annealed.area() < tree.area() {
             *tree = annealed;
+        } else if run.stopped() == Some(StopReason::Cancelled) && annealed.objects() > RECOMBINED_AT_ONCE {
+            if annealed.area() < tree.area() {
+                *tree = annealed;
+            }
         } else if !first || observer.progress().is_none() {
             *tree = recombine(&[tree, &annealed]);
         }

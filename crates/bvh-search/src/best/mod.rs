@@ -52,10 +52,11 @@ mod small_budget;
 use crate::exact;
 use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion;
-use crate::run::{Budget, Found, Observer, Outcome, Problem, Run, SearchError, Splits, StopReason, solve};
+use crate::run::{Budget, Found, Observer, Outcome, Problem, Run, SearchError, solve, watched};
 use crate::tree::{Metric, WithLeaves, Working, search_by_metric};
-use crate::tuning::SECURED_FROM;
-use bvh_build::{Builder, spatial};
+use crate::tuning::{CLUSTERING, CLUSTERING_MUCH_CHEAPER, SECURED_FROM};
+use bvh_build::ploc::MortonOrder;
+use bvh_build::{BuildError, Builder, Watch};
 use bvh_core::Bvh;
 use bvh_core::cost::Objective;
 pub use config::{Config, Horizon};
@@ -74,12 +75,27 @@ pub fn fallback(problem: &Problem, work: u64, observer: &dyn Observer) -> Result
     solve(&reinsertion::Config::default(), problem, 0, Budget::UNLIMITED, observer).map(Some)
 }
 
-/// What a search found; if it was stopped early, with the [`fallback`]'s tree where that costs less.
+/// What a search found, with the [`fallback`]'s tree where that costs less, as it may after a search that was stopped early.
 pub fn unless_behind(found: Outcome, fallback: Option<Outcome>) -> Outcome {
-    let better = fallback.filter(|other| found.stop == StopReason::Cancelled && other.cost < found.cost);
+    let better = fallback.filter(|other| other.cost < found.cost);
     match better {
         Some(Outcome { tree, cost, .. }) => Outcome { tree, cost, ..found },
         None => found,
+    }
+}
+
+/// The division with spatial splits, if the problem allows them: the one that the caller has, or a new one, unless the observer
+/// cancels before it is made.
+fn division(problem: &Problem, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
+    let Some(splits) = problem.splits.filter(|splits| splits.most > problem.boxes.len()) else {
+        return Ok(None);
+    };
+    if let Some(division) = splits.division {
+        return Ok(Some(division.clone()));
+    }
+    match watched(observer, |watch| splits.divide(problem.boxes, watch)) {
+        Err(BuildError::Cancelled) => Ok(None),
+        divided => Ok(Some(divided?)),
     }
 }
 
@@ -87,12 +103,9 @@ impl Config {
     /// Subtrees, if there are several, are annealed in parallel, each with a random stream of its own.
     fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         if problem.splits.is_some() || problem.objective == Objective::Layout {
-            let tree = self.start.clone().unwrap_or_default().build_by(problem.boxes, problem.measure)?;
-            let other = problem.splits.filter(|splits| splits.most > problem.boxes.len());
-            let other = other.map(|Splits { objects, most }| {
-                spatial::Config::default().build_at_most(most, problem.boxes, objects)
-            });
-            return self.improved((tree, other.transpose()?), metric, problem, seed, run);
+            let tree = self.initial(None, problem, run)?;
+            let other = division(problem, run.observer())?;
+            return self.improved((tree, other), metric, problem, seed, run);
         }
         let (_, work) = self.horizon(problem.boxes.len() as u64, run);
         if let Some(optimum) = exact::instead(problem, work, run)? {
@@ -101,15 +114,49 @@ impl Config {
         // Small budgets go by area.
         let small = match problem.measure {
             None if self.start.is_none() => small_budget::search(problem, metric, run)?,
-            _ => None,
+            _ => SmallBudget::Large(None),
         };
         let (mut best, mut tree) = match small {
-            Some(SmallBudget::Tree(tree)) => return Ok(tree),
-            Some(SmallBudget::LocalOptimum(best, tree)) => (best, tree),
-            None => Incumbent::build(&self.start.clone().unwrap_or_default(), problem, metric, run)?,
+            SmallBudget::Tree(tree) => return Ok(tree),
+            SmallBudget::LocalOptimum(best, tree) => (best, tree),
+            SmallBudget::Large(morton) => {
+                let best = Incumbent::begin(self.initial(morton, problem, run)?, problem, run);
+                let tree = best.working(metric)?;
+                (best, tree)
+            }
         };
         improve(self, (&mut tree, None), seed, problem, &mut best, run);
         Ok(best.tree)
+    }
+
+    /// Builds the initial tree. Unless that is chosen by the configuration, a clustering is built as well, which takes a fraction of the
+    /// time: it is the initial tree where it is much cheaper, and otherwise kept aside, so that no budget ends above what the smallest
+    /// ones begin with. Like that of the [`fallback`], its work counts only where it is used.
+    fn initial(
+        &self,
+        morton: Option<MortonOrder>,
+        problem: &Problem,
+        run: &mut Run,
+    ) -> Result<Bvh, SearchError> {
+        let boxes = problem.boxes;
+        let start = self.start.clone().unwrap_or_default();
+        let build = |watch: &Watch| start.build_watched(boxes, problem.measure, watch);
+        if self.start.is_some() {
+            return Ok(watched(run.observer(), build)?);
+        }
+        let morton = morton.map_or_else(|| MortonOrder::new(boxes), Ok)?;
+        let clustered = watched(run.observer(), |watch| morton.build_watched(&CLUSTERING, None, watch))?;
+        let started = match watched(run.observer(), build) {
+            Err(BuildError::Cancelled) => return Ok(clustered),
+            started => started?,
+        };
+        let [other, first] = [&clustered, &started].map(|tree| problem.cost(tree));
+        if other < CLUSTERING_MUCH_CHEAPER * first {
+            run.keep_aside(problem, started);
+            return Ok(clustered);
+        }
+        run.keep_aside(problem, clustered);
+        Ok(started)
     }
 
     /// Improves a tree with one reference per leaf, and its references if they may change; or another one, where a trial shows that
@@ -126,9 +173,12 @@ impl Config {
         if problem.splits.is_some() {
             let metric = WithLeaves(metric);
             let mut tree = best.working(metric)?;
-            let other =
-                other.map(|tree| Working::from_bvh(&tree, metric.internal(&tree), metric)).transpose()?;
-            improve(self, (&mut tree, other), seed, problem, &mut best, run);
+            let working = |tree: &Bvh| Working::from_bvh(tree, metric.internal(tree), metric);
+            let other_working = other.as_ref().map(working).transpose()?;
+            if let Some(other) = other {
+                run.keep_aside(problem, other);
+            }
+            improve(self, (&mut tree, other_working), seed, problem, &mut best, run);
         } else {
             improve(self, (&mut best.working(metric)?, None), seed, problem, &mut best, run);
         }

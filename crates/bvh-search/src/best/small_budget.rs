@@ -9,36 +9,38 @@ use crate::local::incumbent::Incumbent;
 use crate::local::initial::construction;
 use crate::local::reinsertion::pass;
 use crate::parallel::threads;
-use crate::run::{Observer, Problem, Run, SearchError, Tally};
+use crate::run::{Observer, Problem, Run, SearchError, Tally, watched};
 use crate::tree::{Linked, Metric, Siblings, Working};
 use crate::tuning::{
     ANNEAL_FROM_TIME, ANNEAL_FROM_WORK, BUILDS, CLUSTERING, COLD_MEMORY, FINISH_TIME, FIRST_PASS, FRONT,
     MOVES_PER_READING, SAMPLED_FROM, SAMPLED_PART, SAMPLES, SEVERAL_THREADS, TOP_DOWN_BELOW,
     TWO_STARTS_FROM_TIME, WARM_SAMPLE,
 };
-use bvh_build::Builder;
 use bvh_build::ploc::MortonOrder;
+use bvh_build::{BuildError, Builder};
 use bvh_core::{Aabb, Bvh, cost};
 
 /// The result of a small budget.
 #[allow(clippy::large_enum_variant, reason = "one is made per search, and taken apart at once")]
 pub(super) enum SmallBudget<'p, A> {
+    /// The budget is not small. The objects in Morton order, if there was a clock for whose sake they were sorted.
+    Large(Option<MortonOrder>),
     /// The budget is used up.
     Tree(Bvh),
     /// A local optimum of reinsertion came before the end of the budget: the search can go on.
     LocalOptimum(Incumbent<'p>, Working<A>),
 }
 
-/// The search for a small budget; `None` if the budget is not small.
+/// The search for a small budget.
 pub(super) fn search<'p, A: Metric>(
     problem: &Problem<'p>,
     metric: A,
     run: &mut Run,
-) -> Result<Option<SmallBudget<'p, A>>, SearchError> {
+) -> Result<SmallBudget<'p, A>, SearchError> {
     let (observer, n) = (run.observer(), problem.boxes.len());
     let (began, work) = (observer.progress(), run.left().work / n.max(1) as u64);
     if n < 3 || began.is_none() && work >= ANNEAL_FROM_WORK {
-        return Ok(None);
+        return Ok(SmallBudget::Large(None));
     }
     let morton = MortonOrder::new(problem.boxes)?;
     let (mut two_starts, mut end) = (false, f64::INFINITY);
@@ -52,19 +54,17 @@ pub(super) fn search<'p, A: Metric>(
             || times >= annealing_from / COLD_MEMORY
                 && (1.0 - began) / warm_sort(problem, observer)? >= annealing_from
         {
-            return Ok(None);
+            return Ok(SmallBudget::Large(Some(morton)));
         }
         if let Some((_, config)) = BUILDS.into_iter().find(|(enough, _)| times < *enough) {
-            return Ok(Some(SmallBudget::Tree(
-                Incumbent::begin_unbounded(morton.build(&config)?, problem, run).tree,
-            )));
+            let tree = Incumbent::begin_unbounded(morton.build(&config)?, problem, run).tree;
+            return Ok(SmallBudget::Tree(tree));
         }
         (two_starts, end) = (times >= two_starts_from, 1.0 - FINISH_TIME * sort);
     }
     let two_starts = two_starts && top_down_may_be_better(&morton, problem, run)?;
     let (mut start, mut front) = (morton.build(&CLUSTERING)?, FRONT);
-    if two_starts {
-        let divided = construction().build(problem.boxes)?;
+    if two_starts && let Some(divided) = divided(problem.boxes, run)? {
         run.count(Tally { moves: 1, kept: 0, work: divided.nodes.len() as u64 });
         if cost::internal_area(&divided) < cost::internal_area(&start) {
             (start, front) = (divided, usize::MAX);
@@ -88,13 +88,21 @@ pub(super) fn search<'p, A: Metric>(
         None => Incumbent::begin_unbounded(tree, problem, run),
     };
     if !still {
-        return Ok(Some(SmallBudget::Tree(best.tree)));
+        return Ok(SmallBudget::Tree(best.tree));
     }
     if began.is_some() {
         best.bound(run);
     }
     let tree = best.working(metric)?;
-    Ok(Some(SmallBudget::LocalOptimum(best, tree)))
+    Ok(SmallBudget::LocalOptimum(best, tree))
+}
+
+/// The top-down division, unless the observer cancels before it is made.
+fn divided(boxes: &[Aabb], run: &Run) -> Result<Option<Bvh>, SearchError> {
+    match watched(run.observer(), |watch| construction().build_watched(boxes, None, watch)) {
+        Err(BuildError::Cancelled) => Ok(None),
+        built => Ok(Some(built?)),
+    }
 }
 
 /// Estimates the time of the sort in warm memory, which the steps after it have, as a fraction of all time.
@@ -117,7 +125,8 @@ fn top_down_may_be_better(morton: &MortonOrder, problem: &Problem, run: &mut Run
     for stretch in order.chunks(order.len().div_ceil(SAMPLES)) {
         let objects = &stretch[..stretch.len() / SAMPLED_PART];
         let boxes: Vec<Aabb> = objects.iter().map(|&object| problem.boxes[object as usize]).collect();
-        divided += cost::internal_area(&construction().build(&boxes)?);
+        let Some(tree) = self::divided(&boxes, run)? else { return Ok(false) };
+        divided += cost::internal_area(&tree);
         clustered += cost::internal_area(&CLUSTERING.build(&boxes)?);
         run.count(Tally { moves: 2, kept: 0, work: 4 * boxes.len() as u64 });
     }

@@ -2,9 +2,9 @@
 
 use super::pass::TOLERANCE;
 use crate::lower_bound;
-use crate::run::{Observer, Problem, Quota, Run, SearchError, Shortcut, Tally};
+use crate::run::{Observer, Problem, Quota, Run, SearchError, Shortcut, Tally, watched};
 use crate::tree::{Metric, Working};
-use bvh_build::Builder;
+use bvh_build::{Builder, Watch};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective};
 
@@ -26,7 +26,8 @@ impl<'p> Incumbent<'p> {
         metric: A,
         run: &mut Run,
     ) -> Result<(Self, Working<A>), SearchError> {
-        let incumbent = Self::begin(builder.build_by(problem.boxes, problem.measure)?, problem, run);
+        let build = |watch: &Watch| builder.build_watched(problem.boxes, problem.measure, watch);
+        let incumbent = Self::begin(watched(run.observer(), build)?, problem, run);
         let working = incumbent.working(metric)?;
         Ok((incumbent, working))
     }

@@ -1,7 +1,7 @@
 //! The builders of the initial tree of a local search.
 
-use bvh_build::config::{Accepts, Itself};
-use bvh_build::{BuildError, Builder, Check, OutOfRange, muller_fellner, ploc};
+use bvh_build::{BuildError, Builder, Watch, muller_fellner, ploc};
+use bvh_config::{Accepts, Check, Itself, OutOfRange};
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 
@@ -39,10 +39,15 @@ impl Check for Start {
 }
 
 impl Builder for Start {
-    fn build_by(&self, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Result<Bvh, BuildError> {
+    fn build_watched(
+        &self,
+        boxes: &[Aabb],
+        measure: Option<&dyn Measure>,
+        watch: &Watch,
+    ) -> Result<Bvh, BuildError> {
         match self {
-            Self::MullerFellner(config) => config.build_by(boxes, measure),
-            Self::Agglomerative(config) => config.build_by(boxes, measure),
+            Self::MullerFellner(config) => config.build_watched(boxes, measure, watch),
+            Self::Agglomerative(config) => config.build_watched(boxes, measure, watch),
         }
     }
 }

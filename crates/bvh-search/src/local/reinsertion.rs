@@ -10,11 +10,11 @@ use super::initial::Start;
 use super::pass::{TOLERANCE, repeat, sort_by_area};
 use crate::run::{Found, Observer, Problem, Quota, Run, Tally, WORK_PER_POLL, stream};
 use crate::tree::{Linked, Metric, PositionSearch, Working, search_by_metric};
-use bvh_build::config::Itself;
+use bvh_config::Itself;
 use bvh_core::with_vector_instructions;
 use rand::seq::SliceRandom;
 
-bvh_build::config! {
+bvh_config::config! {
     /// In which order to try the nodes, how often, and from where.
     pub struct Config {
         /// The order of a pass over all nodes.

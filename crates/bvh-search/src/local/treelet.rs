@@ -12,10 +12,10 @@ use super::initial::Start;
 use super::pass::{TOLERANCE, repeat};
 use crate::run::{Found, Observer, Problem, Quota, Run, Tally};
 use crate::tree::{Metric, NONE, Subsets, Working, search_by_metric};
-use bvh_build::config::Itself;
+use bvh_config::Itself;
 use bvh_core::with_vector_instructions;
 
-bvh_build::config! {
+bvh_config::config! {
     /// How large treelets are, how often all are tried, and from where.
     pub struct Config {
         /// Leaves of a treelet. Solving one takes O(3^size) time. The paper takes 7.

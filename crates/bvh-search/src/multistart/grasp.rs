@@ -16,17 +16,17 @@
 //! it is the probability of taking one of the candidates other than the best, each equally likely.
 
 use crate::local::LocalSearch;
-use crate::parallel::map_init;
-use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Stream, Tally, stream};
+use crate::parallel::{KEPT_NODES, map_init};
+use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Stream, Tally, stream, watched};
 use crate::tree::{Area, Metric, Working};
-use bvh_build::config::{Accepts, Itself};
 use bvh_build::top_down::{Split, SplitCost, SplitRule, Sweep, Workspace};
-use bvh_build::{Check, OutOfRange, Presorted, muller_fellner};
+use bvh_build::{BuildError, Presorted, Watch, muller_fellner};
+use bvh_config::{Accepts, Check, Itself, OutOfRange};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Measure};
 use rand::RngExt;
 
-bvh_build::config! {
+bvh_config::config! {
     /// How to construct trees, and how many.
     pub struct Config {
         /// Number of independent constructions.
@@ -76,23 +76,18 @@ impl Config {
         scene: &Presorted,
         measure: Option<&dyn Measure>,
         (seed, trial): (u64, u64),
-        workspace: &mut Workspace,
-        tree: &mut Bvh,
-    ) {
+        buffers: (&mut Workspace, &mut Bvh),
+        watch: &Watch,
+    ) -> Result<(), BuildError> {
         let Self { candidates, noise, .. } = *self;
         let mut rule = Randomised::new(candidates, noise, stream(seed, trial));
-        self.construction.construct(scene, measure, &mut rule, workspace, tree);
+        self.construction.construct(scene, measure, &mut rule, buffers, watch)
     }
 
-    /// Improves a tree to a local optimum; leaves it as it was if the observer cancels before.
-    fn improve(
-        &self,
-        tree: &mut Bvh,
-        problem: &Problem,
-        observer: &dyn Observer,
-    ) -> Result<Improved, SearchError> {
+    /// Improves a tree to a local optimum; leaves it as it was if the observer cancels before. Returns the nodes visited.
+    fn improve(&self, tree: &mut Bvh, problem: &Problem, observer: &dyn Observer) -> Result<u64, SearchError> {
         if self.local_search.is_none() {
-            return Ok(Improved { finished: true, work: 0 });
+            return Ok(0);
         }
         match problem.measure {
             Some(measure) => self.improve_by(measure, tree, cost::internal_measure(tree, measure), observer),
@@ -106,53 +101,79 @@ impl Config {
         tree: &mut Bvh,
         area: f64,
         observer: &dyn Observer,
-    ) -> Result<Improved, SearchError> {
+    ) -> Result<u64, SearchError> {
         let mut working = Working::from_bvh(tree, area, metric)?;
         let Tally { work, .. } = self.local_search.improve(&mut working, Quota::ENDLESS, observer);
-        let finished = !observer.cancelled();
-        if finished {
+        if !observer.cancelled() {
             *tree = working.to_bvh();
         }
-        Ok(Improved { finished, work })
+        Ok(work)
+    }
+
+    /// Makes trial number `trial`: constructs and improves a tree in `tree`. `None` if the observer cancels before the tree is
+    /// constructed; the first trial then fails, so that it is never without a tree.
+    fn attempt(
+        &self,
+        scene: &Presorted,
+        problem: &Problem,
+        (seed, trial): (u64, u64),
+        (workspace, tree): (&mut Workspace, &mut Bvh),
+        observer: &dyn Observer,
+    ) -> Result<Option<Trial>, SearchError> {
+        if trial > 0 && observer.cancelled() {
+            return Ok(None);
+        }
+        let constructed = watched(observer, |watch| {
+            self.construct(scene, problem.measure, (seed, trial), (workspace, &mut *tree), watch)
+        });
+        match constructed {
+            Err(BuildError::Cancelled) if trial > 0 => return Ok(None),
+            constructed => constructed?,
+        }
+        let work = self.improve(tree, problem, observer)?;
+        Ok(Some(Trial { cost: problem.cost(tree), work, tree: None }))
     }
 }
 
-/// How the local search of a constructed tree ended.
-#[derive(Clone, Copy, Debug)]
-struct Improved {
-    /// Whether the local optimum was reached and kept.
-    finished: bool,
-    /// Nodes visited.
+/// A constructed and improved tree.
+#[derive(Debug)]
+struct Trial {
+    cost: f64,
+    /// Nodes visited by the local search.
     work: u64,
+    /// Kept if it was cheaper than the incumbent when the trial began.
+    tree: Option<Bvh>,
 }
 
 impl Search for Config {
     /// Trials are independent: each draws from a stream of its own, so they run in parallel.
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
-        let scene = Presorted::new(problem.boxes)?;
+        let scene = watched(run.observer(), |watch| Presorted::watched(problem.boxes, watch))?;
         let construction = (2 * scene.len() as u64).saturating_sub(1);
         let observer = run.observer();
-        let attempt = |(workspace, tree): &mut (Workspace, Bvh), trial: u64| {
-            // The first trial is always made, so that there is a tree.
-            if trial > 0 && observer.cancelled() {
-                return Ok(None);
-            }
-            self.construct(&scene, problem.measure, (seed, trial), workspace, tree);
-            let improved = self.improve(tree, problem, observer)?;
-            Ok::<_, SearchError>(Some((problem.cost(tree), improved)))
-        };
         // Trials whose work is not known in advance run in smaller batches, to waste less at the end of a budget.
         let most = if self.local_search.is_none() { BATCH } else { SMALL_BATCH };
-        let (mut next, mut best) = (0, (0, true));
+        let most = most.min(KEPT_NODES / construction.max(1)).max(1);
+        let mut next = 0;
+        let mut best = Bvh::default();
         while next < self.trials && run.stopped().is_none() {
             let end = self.trials.min(next.saturating_add(run.evaluations_left(construction).min(most)));
+            let limit = run.incumbent();
             let results = map_init((end - next) as usize, Default::default, |buffers, at| {
-                attempt(buffers, next + at as u64)
+                let (workspace, tree): &mut (Workspace, Bvh) = buffers;
+                let number = (seed, next + at as u64);
+                let mut trial = self.attempt(&scene, problem, number, (workspace, tree), observer)?;
+                if let Some(trial) = trial.as_mut().filter(|trial| trial.cost < limit) {
+                    trial.tree = Some(std::mem::take(tree));
+                }
+                Ok::<_, SearchError>(trial)
             });
-            for (trial, result) in (next..end).zip(results) {
-                let Some((cost, Improved { finished, work })) = result? else { break };
-                if run.record(cost, construction + work) {
-                    best = (trial, finished);
+            for result in results {
+                let Some(Trial { cost, work, tree }) = result? else { break };
+                if run.record(cost, construction + work)
+                    && let Some(tree) = tree
+                {
+                    best = tree;
                 }
                 if run.stopped().is_some() {
                     break;
@@ -160,13 +181,7 @@ impl Search for Config {
             }
             next = end;
         }
-        // Trials keep only their costs: the incumbent is constructed once more, and improved to the end this time.
-        let (mut tree, (trial, finished)) = (Bvh::default(), best);
-        self.construct(&scene, problem.measure, (seed, trial), &mut Workspace::default(), &mut tree);
-        if finished {
-            self.improve(&mut tree, problem, &())?;
-        }
-        Ok(tree)
+        Ok(best)
     }
 }
 

@@ -10,10 +10,10 @@ use crate::local::incumbent::Incumbent;
 use crate::local::initial::Start;
 use crate::run::{Found, Problem, Run, Tally, stream};
 use crate::tree::{Metric, search_by_metric};
-use bvh_build::config::Itself;
+use bvh_config::Itself;
 use std::ops::Bound::{Excluded, Included};
 
-bvh_build::config! {
+bvh_config::config! {
     /// How strongly to perturb, how to search locally, and for how long.
     pub struct Config {
         /// Random moves of a perturbation per object; there is at least one.

@@ -14,16 +14,16 @@ use crate::local::initial::{Start, construction};
 use crate::local::pass::TOLERANCE;
 use crate::local::{LocalSearch, reinsertion};
 use crate::parallel;
-use crate::run::{Found, Observer, Problem, Quota, Run, SearchError, Stream, Tally, stream};
+use crate::run::{Found, Observer, Problem, Quota, Run, SearchError, Stream, Tally, stream, watched};
 use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
-use bvh_build::config::Itself;
 use bvh_build::top_down::Workspace;
-use bvh_build::{Presorted, muller_fellner};
+use bvh_build::{BuildError, Presorted, muller_fellner};
+use bvh_config::Itself;
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 use rand::RngExt;
 
-bvh_build::config! {
+bvh_config::config! {
     /// Which subtrees to rebuild, how, and for how long.
     pub struct Config {
         /// Maximum number of objects of a rebuilt subtree.
@@ -189,7 +189,13 @@ impl Config {
         let mut rule = Randomised::new(self.candidates, Some(self.noise), rng);
         let mut other = Bvh::default();
         let scene = Presorted::new(&boxes)?;
-        self.construction.construct(&scene, measure, &mut rule, &mut Workspace::default(), &mut other);
+        let buffers = (&mut Workspace::default(), &mut other);
+        let constructed =
+            watched(observer, |watch| self.construction.construct(&scene, measure, &mut rule, buffers, watch));
+        match constructed {
+            Err(BuildError::Cancelled) => return Ok((None, Tally::default())),
+            constructed => constructed?,
+        }
         let mut other = Working::from_bvh(&other, tree.metric().internal(&other), tree.metric())?;
         let mut tally = self.local_search.improve(&mut other, quota, observer);
         tally = Tally { moves: 0, kept: 0, work: tally.work + 2 * boxes.len() as u64 };

@@ -13,15 +13,15 @@
 //! *Not done*: resuming an insertion where a child's order first differs from its parent's. Of 2n/500 swapped positions
 //! the first comes so early that only about one insertion in twenty could be saved, less than keeping the trees costs.
 
-use super::{Insertion, random_order};
+use super::{Evaluated, Insertion, random_order};
 use crate::run::{Problem, Run, Search, SearchError, Stream, stream};
-use bvh_build::config::{Accepts, Itself};
 use bvh_build::goldsmith_salmon;
+use bvh_config::{Accepts, Itself};
 use bvh_core::Bvh;
 use rand::RngExt;
 use rand::seq::SliceRandom;
 
-bvh_build::config! {
+bvh_config::config! {
     /// Size and operators.
     pub struct Config {
         /// Number of individuals.
@@ -57,7 +57,8 @@ impl Search for Config {
             let order = random_order(insertion.len(), &mut rng);
             population.push(Individual { order, cost: f64::INFINITY, evaluated: false });
         }
-        let mut best = evaluate(&insertion, &mut population, run);
+        let (mut best, tree) = evaluate(&insertion, &mut population, run)?;
+        let mut built = (best.order.clone(), tree.unwrap_or_default());
         let mut marks = vec![false; insertion.len()];
         for _ in 0..self.generations {
             if run.stopped().is_some() {
@@ -68,28 +69,42 @@ impl Search for Config {
             for individual in &mut population {
                 mutate(individual, self.mutation, &mut rng);
             }
-            let fittest = evaluate(&insertion, &mut population, run);
+            let (fittest, tree) = evaluate(&insertion, &mut population, run)?;
+            if let Some(tree) = tree {
+                built = (fittest.order.clone(), tree);
+            }
             if fittest.cost <= best.cost {
                 best = fittest;
             } else {
                 keep(&best, &mut population);
             }
         }
-        Ok(insertion.tree(&best.order))
+        // Another order of the same cost may have taken the place of the one whose tree was kept.
+        if built.0 != best.order
+            && let Some(tree) = insertion.tree(&best.order, run.observer())
+        {
+            return Ok(tree);
+        }
+        Ok(built.1)
     }
 }
 
 /// The most entries of all permutations together: 1 GB.
 const MOST_ENTRIES: usize = 1 << 28;
 
-/// Evaluates the individuals that have changed and records the generation. Returns the fittest, the first of equals.
-/// Individuals that a cancellation leaves without evaluation are no candidates.
-fn evaluate(insertion: &Insertion, population: &mut [Individual], run: &mut Run) -> Individual {
+/// Evaluates the individuals that have changed and records the generation. Returns the fittest, the first of equals, and its tree if
+/// it was evaluated now. Individuals that a cancellation leaves without evaluation are no candidates.
+fn evaluate(
+    insertion: &Insertion,
+    population: &mut [Individual],
+    run: &mut Run,
+) -> Result<(Individual, Option<Bvh>), SearchError> {
     let mut changed: Vec<&mut Individual> = population.iter_mut().filter(|i| !i.evaluated).collect();
     let orders: Vec<&[u32]> = changed.iter().map(|individual| individual.order.as_slice()).collect();
-    let costs = insertion.costs(&orders, run.observer());
+    let Evaluated { costs, cheapest } = insertion.evaluate(&orders, run)?;
     let missing = costs.iter().filter(|cost| cost.is_none()).count();
     let work = (costs.len() - missing) as u64 * insertion.work();
+    let cheapest = cheapest.map(|(number, tree)| (orders[number].to_vec(), tree));
     for (individual, cost) in changed.iter_mut().zip(costs) {
         (individual.cost, individual.evaluated) = (cost.unwrap_or(f64::INFINITY), cost.is_some());
     }
@@ -100,7 +115,8 @@ fn evaluate(insertion: &Insertion, population: &mut [Individual], run: &mut Run)
         }
     }
     run.record_generation((population.len() - missing) as u64, fittest.cost, work);
-    fittest.clone()
+    let tree = cheapest.filter(|(order, _)| *order == fittest.order).map(|(_, tree)| tree);
+    Ok((fittest.clone(), tree))
 }
 
 /// The winners of as many tournaments of two as there are individuals. A tournament may draw the same individual twice.

@@ -3,9 +3,10 @@
 pub mod genetic;
 pub mod random_orders;
 
-use crate::parallel::map_init;
-use crate::run::{Observer, Problem, SearchError, Stream};
-use bvh_build::goldsmith_salmon::{self, Scene, Workspace};
+use crate::parallel::{KEPT_NODES, map_init};
+use crate::run::{Observer, Problem, Run, SearchError, Stream, watched};
+use bvh_build::goldsmith_salmon::{self, InvalidOrder, Scene, Workspace};
+use bvh_build::{BuildError, Watch};
 use bvh_core::{Bvh, cost::Objective};
 use rand::seq::SliceRandom;
 
@@ -38,38 +39,81 @@ impl<'p> Insertion<'p> {
         2 * self.scene.len() as u64
     }
 
-    /// The cost of the tree of one order, which must be a permutation of the objects.
-    fn cost(&self, order: &[u32], (workspace, tree): &mut Buffers) -> f64 {
-        // An order that is not a permutation would be a defect of the search, and never becomes the incumbent.
-        let Ok(goldsmith_salmon) = self.config.insert_all(&self.scene, order, workspace) else {
-            debug_assert!(false, "orders are permutations");
-            return f64::INFINITY;
+    /// The cost of the tree of one order, which must be a permutation of the objects; `None` if the observer cancels before.
+    fn cost(&self, order: &[u32], (workspace, tree): &mut Buffers, observer: &dyn Observer) -> Option<f64> {
+        let insert = |watch: &Watch| self.config.insert_watched(&self.scene, order, workspace, watch);
+        let goldsmith_salmon = match watched(observer, insert) {
+            Ok(cost) => cost,
+            Err(InvalidOrder::Cancelled) => return None,
+            // It would be a defect of the search, and never becomes the incumbent.
+            Err(_) => {
+                debug_assert!(false, "orders are permutations");
+                return Some(f64::INFINITY);
+            }
         };
         let Problem { judge, objective, .. } = self.problem;
         if judge.is_none() && objective == Objective::GoldsmithSalmon {
-            goldsmith_salmon
-        } else {
-            workspace.write(tree);
-            self.problem.cost(tree)
+            return Some(goldsmith_salmon);
         }
+        workspace.write(tree);
+        Some(self.problem.cost(tree))
     }
 
-    /// The tree of one order.
-    fn tree(&self, order: &[u32]) -> Bvh {
+    /// The tree of one order, unless the observer cancels before it is built.
+    fn tree(&self, order: &[u32], observer: &dyn Observer) -> Option<Bvh> {
         let (mut workspace, mut tree) = Buffers::default();
-        if self.config.insert_all(&self.scene, order, &mut workspace).is_ok() {
-            workspace.write(&mut tree);
-        }
-        tree
+        let insert = |watch: &Watch| self.config.insert_watched(&self.scene, order, &mut workspace, watch);
+        watched(observer, insert).ok()?;
+        workspace.write(&mut tree);
+        Some(tree)
     }
 
-    /// The costs of several orders, in their order, on all threads of the current rayon pool. The first is always
-    /// evaluated, the others unless the observer cancels before.
-    fn costs(&self, orders: &[&[u32]], observer: &dyn Observer) -> Vec<Option<f64>> {
-        map_init(orders.len(), Buffers::default, |buffers, at| {
-            (at == 0 || !observer.cancelled()).then(|| self.cost(orders[at], buffers))
-        })
+    /// Evaluates several orders on all threads of the current rayon pool: all, unless the observer cancels before. Without an order
+    /// that was evaluated before, fails if it cancels before the first one.
+    fn evaluate(&self, orders: &[&[u32]], run: &Run) -> Result<Evaluated, SearchError> {
+        let observer = run.observer();
+        let mut found = Evaluated { costs: Vec::with_capacity(orders.len()), cheapest: None };
+        let mut limit = run.incumbent();
+        // Only so many trees are kept at a time.
+        let most = (KEPT_NODES / self.work().max(1)).max(1) as usize;
+        for (number, orders) in orders.chunks(most).enumerate() {
+            let evaluated = map_init(orders.len(), Buffers::default, |buffers, at| {
+                if number + at > 0 && observer.cancelled() {
+                    return None;
+                }
+                let cost = self.cost(orders[at], buffers, observer)?;
+                let (workspace, _) = buffers;
+                let tree = (cost <= limit).then(|| {
+                    let mut tree = Bvh::default();
+                    workspace.write(&mut tree);
+                    tree
+                });
+                Some((cost, tree))
+            });
+            for (at, evaluated) in evaluated.into_iter().enumerate() {
+                let (cost, tree) = evaluated.unzip();
+                found.costs.push(cost);
+                let is_cheapest =
+                    cost.is_some_and(|cost| found.cheapest.is_none() && cost <= limit || cost < limit);
+                if let (Some(cost), Some(tree), true) = (cost, tree.flatten(), is_cheapest) {
+                    limit = cost;
+                    found.cheapest = Some((number * most + at, tree));
+                }
+            }
+        }
+        if limit == f64::INFINITY && found.costs.iter().all(Option::is_none) {
+            return Err(BuildError::Cancelled.into());
+        }
+        Ok(found)
     }
+}
+
+/// The outcome of evaluating several orders.
+struct Evaluated {
+    /// In the order of the orders; `None` where a cancellation came before.
+    costs: Vec<Option<f64>>,
+    /// The number of the first of the cheapest orders, and its tree, unless it is dearer than the incumbent.
+    cheapest: Option<(usize, Bvh)>,
 }
 
 /// A permutation of `0..n`, each equally likely.

@@ -4,13 +4,13 @@
 //!
 //! Differs from the paper: nothing known.
 
-use super::{Insertion, random_order};
+use super::{Evaluated, Insertion, random_order};
 use crate::run::{Problem, Run, Search, SearchError, stream};
-use bvh_build::config::Itself;
 use bvh_build::goldsmith_salmon;
+use bvh_config::Itself;
 use bvh_core::Bvh;
 
-bvh_build::config! {
+bvh_config::config! {
     /// How many orders to try.
     pub struct Config {
         /// Number of independent random orders.
@@ -27,19 +27,22 @@ impl Search for Config {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         let insertion = Insertion::new(problem, &self.insertion)?;
         let order = |trial| random_order(insertion.len(), &mut stream(seed, trial));
-        let (mut next, mut best) = (0, 0);
+        let mut next = 0;
+        let mut best = Bvh::default();
         while next < self.trials && run.stopped().is_none() {
             let end = self.trials.min(next.saturating_add(run.evaluations_left(insertion.work()).min(BATCH)));
             let orders: Vec<Vec<u32>> = (next..end).map(order).collect();
             let orders: Vec<&[u32]> = orders.iter().map(Vec::as_slice).collect();
-            for (trial, cost) in (next..end).zip(insertion.costs(&orders, run.observer())) {
-                let Some(cost) = cost else { break };
-                if run.record(cost, insertion.work()) {
-                    best = trial;
-                }
+            let Evaluated { costs, cheapest } = insertion.evaluate(&orders, run)?;
+            let mut improved = false;
+            for cost in costs.into_iter().flatten() {
+                improved |= run.record(cost, insertion.work());
+            }
+            if let Some((_, tree)) = cheapest.filter(|_| improved) {
+                best = tree;
             }
             next = end;
         }
-        Ok(insertion.tree(&order(best)))
+        Ok(best)
     }
 }

@@ -1,6 +1,7 @@
 //! What a search can refuse.
 
-use bvh_build::{BuildError, OutOfRange};
+use bvh_build::BuildError;
+use bvh_config::OutOfRange;
 use bvh_core::{Bvh, InvalidBvh};
 
 /// What a search returns.

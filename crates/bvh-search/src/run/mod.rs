@@ -10,14 +10,16 @@ mod problem;
 mod stream;
 
 pub use budget::{Budget, Quota, StopReason, Tally};
-use bvh_build::{Builder, Check};
+use bvh_build::ploc::Config as Clustering;
+use bvh_build::{BuildError, Builder};
+use bvh_config::Check;
 use bvh_core::Bvh;
 #[cfg(feature = "std")]
 pub use deadline::{Deadline, Watched};
 pub(crate) use error::Found;
 pub use error::SearchError;
-pub(crate) use observer::WORK_PER_POLL;
 pub use observer::{Event, Observer};
+pub(crate) use observer::{WORK_PER_POLL, watched};
 pub use problem::{Judge, Problem, Shortcut, Splits};
 pub use stream::Stream;
 pub(crate) use stream::stream;
@@ -32,7 +34,7 @@ pub trait Search: Check {
 
 impl<B: Builder> Search for B {
     fn search(&self, problem: &Problem, _seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
-        let tree = self.build_by(problem.boxes, problem.measure)?;
+        let tree = watched(run.observer(), |watch| self.build_watched(problem.boxes, problem.measure, watch))?;
         run.record(problem.cost(&tree), tree.nodes.len() as u64);
         Ok(tree)
     }
@@ -47,6 +49,8 @@ pub struct Run<'a> {
     incumbent: f64,
     /// The proof that no tree costs less than the incumbent, if there is one.
     optimal: Option<Shortcut>,
+    /// The cheapest of the trees that were built and not followed, with its cost.
+    aside: Option<(f64, Bvh)>,
     history: Vec<Event>,
 }
 
@@ -93,6 +97,48 @@ impl<'a> Run<'a> {
         let event = Event { evaluations, work, cost, incumbent };
         self.history.push(event);
         self.observer.event(&event);
+    }
+
+    /// Keeps a tree that the search has built and does not follow: if it ends up as the cheapest of all, it is the outcome. O(nodes).
+    pub fn keep_aside(&mut self, problem: &Problem, tree: Bvh) {
+        let cost = problem.cost(&tree);
+        if self.aside.as_ref().is_none_or(|(least, _)| cost < *least) {
+            self.aside = Some((cost, tree));
+        }
+    }
+
+    /// The cheapest of what a search has `found`, what it has kept aside, and what the caller knows. Where a cancellation came before
+    /// there was anything, the tree of the fastest builder.
+    fn cheapest(&mut self, found: Found, problem: &Problem, known: Option<(f64, &Bvh)>) -> Found {
+        let mut tree = match found {
+            Err(SearchError::Build(BuildError::Cancelled)) => None,
+            found => Some(found?),
+        };
+        if let Some((cost, aside)) = self.aside.take() {
+            self.prefer(&mut tree, cost, || aside);
+        }
+        if let Some((cost, known)) = known {
+            self.prefer(&mut tree, cost, || known.clone());
+        }
+        if let Some(tree) = tree {
+            return Ok(tree);
+        }
+        let tree = FASTEST.build_by(problem.boxes, problem.measure)?;
+        self.record(problem.cost(&tree), tree.nodes.len() as u64);
+        Ok(tree)
+    }
+
+    /// Replaces the tree by another one of this cost if that is cheaper, or if there is no tree.
+    fn prefer(&mut self, tree: &mut Option<Bvh>, cost: f64, other: impl FnOnce() -> Bvh) {
+        if tree.is_none() || cost < self.incumbent {
+            self.improve(cost);
+            *tree = Some(other());
+        }
+    }
+
+    /// The lowest cost so far.
+    pub fn incumbent(&self) -> f64 {
+        self.incumbent
     }
 
     /// Ends the search, because this shortcut proved that no tree costs less than the incumbent.
@@ -142,6 +188,9 @@ impl<'a> Run<'a> {
     }
 }
 
+/// The builder for searches that were cancelled during their first construction.
+const FASTEST: Clustering = Clustering { radius: 1, near_rounds: 0 };
+
 /// What a search found.
 #[derive(Clone, Debug)]
 pub struct Outcome {
@@ -162,7 +211,10 @@ pub struct Outcome {
     pub history: Vec<Event>,
 }
 
-/// Runs one search within `budget`, after a [check](Check) of its parameters; randomness comes from `seed` alone.
+/// Runs one search within `budget`, after a [check](Check) of its parameters; randomness comes from `seed` alone. The outcome never
+/// costs more than any tree built on the way, nor than the problem's [known](Problem::known) one.
+///
+/// A cancelled search returns soon: constructions are cut off, too.
 pub fn solve(
     search: &dyn Search,
     problem: &Problem,
@@ -171,10 +223,21 @@ pub fn solve(
     observer: &dyn Observer,
 ) -> Result<Outcome, SearchError> {
     let incumbent = f64::INFINITY;
-    let mut run =
-        Run { budget, observer, evaluations: 0, work: 0, incumbent, optimal: None, history: Vec::new() };
+    let mut run = Run {
+        budget,
+        observer,
+        evaluations: 0,
+        work: 0,
+        incumbent,
+        optimal: None,
+        aside: None,
+        history: Vec::new(),
+    };
     search.check()?;
-    let tree = search.search(problem, seed, &mut run)?;
+    // A cancelled search has no time for that at its end.
+    let known = problem.known.map(|tree| (problem.cost(tree), tree));
+    let found = search.search(problem, seed, &mut run);
+    let tree = run.cheapest(found, problem, known)?;
     let stop = run.stopped().unwrap_or(StopReason::Completed);
     let Run { evaluations, work, incumbent: cost, optimal: proof, history, .. } = run;
     Ok(Outcome { tree, cost, evaluations, work, stop, proof, history })

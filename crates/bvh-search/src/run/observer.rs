@@ -1,5 +1,7 @@
 //! How a caller follows a search, and stops it.
 
+use bvh_build::Watch;
+
 /// One point of a search's history: a trial, a generation, or an improvement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
@@ -23,7 +25,8 @@ pub trait Observer: Sync {
     /// Called whenever moves or trees have been counted, with all evaluations and all work so far: a search may go on for long
     /// without an event.
     fn counted(&self, _evaluations: u64, _work: u64) {}
-    /// Polled often; the search returns its incumbent soon after this becomes true.
+    /// Polled often, by constructions too; the search returns its incumbent soon after this becomes true. If there is none yet, it
+    /// returns the caller's [known](crate::Problem::known) tree, or that of the fastest builder.
     fn cancelled(&self) -> bool {
         false
     }
@@ -35,3 +38,9 @@ pub trait Observer: Sync {
 }
 
 impl Observer for () {}
+
+/// Constructs something, unless the observer cancels.
+pub(crate) fn watched<T>(observer: &dyn Observer, construct: impl FnOnce(&Watch) -> T) -> T {
+    let is_cancelled = || observer.cancelled();
+    construct(&Watch::new(&is_cancelled))
+}

@@ -1,6 +1,6 @@
 //! What a search is asked for, and what it may skip on the way because the answer stays the same.
 
-use bvh_build::{BuildError, spatial};
+use bvh_build::{BuildError, Watch, spatial};
 use bvh_core::cost::{self, Measure, Objective};
 use bvh_core::{Aabb, Bvh, Clip};
 use std::fmt::Debug;
@@ -18,21 +18,22 @@ pub struct Splits<'a> {
     pub objects: &'a dyn Clip,
     /// Maximum number of references: leaves, for trees with one reference per leaf. At least the number of objects.
     pub most: usize,
+    /// The [division](Self::divide) of these objects, if it has been made: the search then does not make it again.
+    pub division: Option<&'a Bvh>,
 }
 
 impl<'a> Splits<'a> {
     /// Leave for so many references, if they are more than the objects of these `boxes`: with no more, nothing can be divided, and
     /// the problem without splits is the same, with more ways to solve it.
     pub fn at_most(most: usize, boxes: &[Aabb], objects: &'a dyn Clip) -> Option<Self> {
-        (most > boxes.len()).then_some(Self { objects, most })
+        (most > boxes.len()).then_some(Self { objects, most, division: None })
     }
 
-    /// The same, if a top-down division of the objects of these `boxes` finds a plane at which dividing them saves something. Where
-    /// it finds none, a search is taken to find none either, and would pay for looking. Takes as long as
-    /// [`spatial::Config::build`].
-    pub fn if_they_pay(self, boxes: &[Aabb]) -> Result<Option<Self>, BuildError> {
-        let tree = spatial::Config::default().build_at_most(self.most, boxes, self.objects)?;
-        Ok((tree.prim_ids.len() > boxes.len()).then_some(self))
+    /// The top-down division of the objects of these `boxes` with [spatial splits](spatial), unless the `watch` ends it. Where it has
+    /// no more references than objects, no plane was found at which dividing them saves something: a search is taken to find none
+    /// either, and would pay for looking.
+    pub fn divide(&self, boxes: &[Aabb], watch: &Watch) -> Result<Bvh, BuildError> {
+        spatial::Config::default().build_watched(self.most, boxes, self.objects, watch)
     }
 }
 
@@ -53,6 +54,8 @@ pub struct Problem<'a> {
     /// What judges trees in place of both, for searches that make every tree anew: builders, GRASP without local search,
     /// insertion orders. The others change trees by the parts of a cost, and take no notice.
     pub judge: Option<&'a dyn Judge>,
+    /// A valid tree over these objects that the caller has already. The outcome never costs more.
+    pub known: Option<&'a Bvh>,
     /// Shortcuts that must not be taken, so that their savings can be measured. Empty in production.
     pub disabled: &'a [Shortcut],
 }
@@ -60,7 +63,15 @@ pub struct Problem<'a> {
 impl<'a> Problem<'a> {
     /// The paper's problem: least total area of inner nodes.
     pub fn new(boxes: &'a [Aabb]) -> Self {
-        Self { boxes, objective: Objective::default(), measure: None, splits: None, judge: None, disabled: &[] }
+        Self {
+            boxes,
+            objective: Objective::default(),
+            measure: None,
+            splits: None,
+            judge: None,
+            known: None,
+            disabled: &[],
+        }
     }
 
     /// The cost of a tree. O(nodes), unless there is a judge.
