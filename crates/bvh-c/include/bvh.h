@@ -126,7 +126,7 @@ BvhTree *bvh_tree_load_boxes(const char *path, const float *boxes, size_t count)
 // `path` is a string; `corners` points to 9 * `count` floats.
 BvhTree *bvh_tree_load_triangles(const char *path, const float *corners, size_t count);
 
-// Writes the tree to the file `path`, UTF-8, which is replaced if it is there.
+// Writes the tree to the file `path`, UTF-8. One that is there is replaced when the new one is complete: after a failure it is the old one.
 //
 // `tree` is a tree; `path` is a string.
 BvhStatus bvh_tree_save(const BvhTree *tree, const char *path);

@@ -1,5 +1,7 @@
 //! How functions fail: by a status or by null, with a message for the thread that called; panics end here too.
 
+use bvh_files::WriteError;
+use bvh_files::tree_file::TreeFileError;
 use std::cell::RefCell;
 use std::ffi::{CString, c_char};
 use std::fmt::Display;
@@ -31,10 +33,21 @@ impl Failure {
     pub fn invalid(message: impl Display) -> Self {
         Self { status: BvhStatus::Invalid, message: message.to_string() }
     }
+}
 
-    /// What happened to a file.
-    pub fn file(path: &str, error: impl Display) -> Self {
-        Self { status: BvhStatus::File, message: format!("{path}: {error}") }
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        Self { status: BvhStatus::File, message: error.to_string() }
+    }
+}
+
+impl From<TreeFileError> for Failure {
+    fn from(error: TreeFileError) -> Self {
+        let status = match error {
+            TreeFileError::Read(_) => BvhStatus::File,
+            TreeFileError::Invalid { .. } => BvhStatus::Invalid,
+        };
+        Self { status, message: error.to_string() }
     }
 }
 

@@ -129,6 +129,27 @@ fn files_come_back_and_what_is_wrong_with_one_is_named() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn a_save_puts_a_new_file_in_the_place_of_the_old_one_and_never_writes_into_it() {
+    let corners = corners(9);
+    let tree = tree(&corners);
+    let folder = tempfile::tempdir().unwrap();
+    let [path, link] = ["tree.bvh", "link"].map(|name| folder.path().join(name));
+    std::fs::write(&path, "precious").unwrap();
+    // What is written into the old file would be seen under its other name.
+    std::fs::hard_link(&path, &link).unwrap();
+    let named = CString::new(path.to_str().unwrap()).unwrap();
+    // SAFETY: a tree, and a string that ends with a zero.
+    unsafe {
+        assert_eq!(bvh_tree_save(tree, named.as_ptr()), BvhStatus::Ok, "{}", last_error());
+        bvh_tree_free(tree);
+    }
+    assert_eq!(std::fs::read(&link).unwrap(), b"precious");
+    assert!(std::fs::read(&path).unwrap().starts_with(b"\x89BVH"));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+}
+
 #[test]
 fn what_no_call_can_take_is_refused_by_name() {
     let mut wrong = corners(5);

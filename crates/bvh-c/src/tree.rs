@@ -202,7 +202,7 @@ pub unsafe extern "C" fn bvh_tree_load_triangles(
     made(|| unsafe { loaded(text(path)?, triangles_of(corners, count)?) })
 }
 
-/// Writes the tree to the file `path`, UTF-8, which is replaced if it is there.
+/// Writes the tree to the file `path`, UTF-8. One that is there is replaced when the new one is complete: after a failure it is the old one.
 ///
 /// `tree` is a tree; `path` is a string.
 #[unsafe(no_mangle)]
@@ -211,7 +211,7 @@ pub unsafe extern "C" fn bvh_tree_save(tree: *const BvhTree, path: *const c_char
         // SAFETY: promised by the caller.
         let (tree, path) = unsafe { (given("tree", tree)?, text(path)?) };
         let bytes = tree.owned.save().map_err(Failure::invalid)?;
-        std::fs::write(path, bytes).map_err(|error| Failure::file(path, error))
+        Ok(bvh_files::write(path.as_ref(), &bytes)?)
     })
 }
 
@@ -240,7 +240,7 @@ fn found(objects: Objects, references: f64, seconds: f64) -> Result<BvhTree, Fai
 }
 
 fn loaded(path: &str, objects: Objects) -> Result<BvhTree, Failure> {
-    let bytes = std::fs::read(path).map_err(|error| Failure::file(path, error))?;
+    let bytes = bvh_files::tree_file::read(path.as_ref())?;
     let loaded = OwnedTree::load(objects, &bytes);
     loaded.map(whole).map_err(|error| Failure::invalid(format!("{path}: {error}")))
 }

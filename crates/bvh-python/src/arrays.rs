@@ -24,14 +24,31 @@ fn floats<'py>(
     let how = PyDict::new(py);
     how.set_item("dtype", "float32")?;
     how.set_item("order", "C")?;
-    let array = py.import("numpy")?.call_method("asarray", (argument,), Some(&how));
-    let array = array.map_err(|error| refused(format!("{name}: {}; accepted: {accepted}", error.value(py))))?;
+    let numpy = py.import("numpy")?;
+    let no_array = |error: PyErr| refused(format!("{name}: {}; accepted: {accepted}", error.value(py)));
+    let given = numpy.call_method1("asanyarray", (argument,)).map_err(no_array)?;
+    check_elements(name, &numpy, &given)?;
+    let array = numpy.call_method("asarray", (given,), Some(&how)).map_err(no_array)?;
     let array: PyReadonlyArrayDyn<f32> = array.extract()?;
     if accepts(array.shape()) {
         return Ok(array);
     }
     let sizes: Vec<String> = array.shape().iter().map(usize::to_string).collect();
     Err(refused(format!("{name} has shape ({}); accepted: {accepted}", sizes.join(", "))))
+}
+
+/// Refuses elements of which a conversion to `float32` would drop something without a word: imaginary parts, units, masks.
+fn check_elements(name: &str, numpy: &Bound<PyModule>, array: &Bound<PyAny>) -> PyResult<()> {
+    const REAL_NUMBERS: &str = "biuf";
+    let dtype = array.getattr("dtype")?;
+    let kind: String = dtype.getattr("kind")?.extract()?;
+    if !REAL_NUMBERS.contains(&kind) {
+        return Err(refused(format!("{name} has dtype {}; accepted: real numbers", dtype.str()?)));
+    }
+    if numpy.getattr("ma")?.call_method1("is_masked", (array,))?.is_truthy()? {
+        return Err(refused(format!("{name} has masked elements; accepted: none")));
+    }
+    Ok(())
 }
 
 /// Triangles, three corners each.

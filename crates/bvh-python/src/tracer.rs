@@ -21,8 +21,9 @@ impl Tracer {
     #[new]
     fn new(tree: &Tree) -> PyResult<Self> {
         let refusal = || refused("tree is over boxes; accepted: a tree over triangles");
-        let triangles = tree.owned.triangles().ok_or_else(refusal)?;
-        Ok(Self { wide: WideBvh::new(tree.owned.tree(), triangles).map_err(refused)? })
+        let owned = tree.owned();
+        let triangles = owned.triangles().ok_or_else(refusal)?;
+        Ok(Self { wide: WideBvh::new(owned.tree(), triangles).map_err(refused)? })
     }
 
     /// The distances of the nearest hits, in multiples of the directions' lengths, and the triangles' indices; infinity and −1 for a

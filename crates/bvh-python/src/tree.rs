@@ -2,17 +2,36 @@
 
 use crate::arrays::{boxes, refused, triangles};
 use crate::search::searched;
+use bvh_files::WriteError;
+use bvh_files::tree_file::{self, TreeFileError};
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
 use bvh_search::{Objects, OwnedTree};
 use numpy::{IntoPyArray, PyArray1};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use std::fmt::Display;
-use std::path::{Path, PathBuf};
+use std::io;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, TryLockError};
 
 /// A tree with its objects. `from_triangles`, `from_boxes` and `load` make one; `len` is the number of objects.
-#[pyclass(module = "bvh_search")]
+#[pyclass(frozen, module = "bvh_search")]
 pub struct Tree {
-    pub owned: OwnedTree,
+    /// Nobody calls Python while it is locked: Python may let another thread run, which would wait for the lock and not let this one on.
+    owned: RwLock<OwnedTree>,
+    /// Locked by the thread that improves the tree.
+    improving: Mutex<()>,
+}
+
+impl Tree {
+    fn new(owned: OwnedTree) -> Self {
+        Self { owned: RwLock::new(owned), improving: Mutex::new(()) }
+    }
+
+    /// The tree as it is now. After a panic it is as before: it is replaced whole.
+    pub fn owned(&self) -> RwLockReadGuard<'_, OwnedTree> {
+        self.owned.read().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 #[pymethods]
@@ -44,23 +63,28 @@ impl Tree {
             (None, Some(boxes)) => self::boxes(boxes)?,
             _ => return Err(refused("a tree is over triangles or boxes; accepted: one of the two")),
         };
-        let bytes = std::fs::read(&path).map_err(|error| file(&path, error))?;
-        let owned = OwnedTree::load(objects, &bytes).map_err(|error| at("path", error))?;
-        Ok(Self { owned })
+        let bytes = tree_file::read(&path).map_err(unread)?;
+        OwnedTree::load(objects, &bytes).map(Self::new).map_err(|error| at("path", error))
     }
 
-    /// Writes the tree to a file, which is replaced if it is there.
+    /// Writes the tree to a file. One that is there is replaced when the new one is complete: after a failure it is the old one.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        let bytes = self.owned.save().map_err(refused)?;
-        std::fs::write(&path, bytes).map_err(|error| file(&path, error))
+        let bytes = self.owned().save().map_err(refused)?;
+        bvh_files::write(&path, &bytes).map_err(unwritten)
     }
 
-    /// Improves the tree for about so many seconds. Ctrl-C ends it sooner, and the tree keeps what was gained. Until then no
-    /// other thread can use the tree.
+    /// Improves the tree for about so many seconds. Ctrl-C ends it sooner, and the tree keeps what was gained. Until it returns other
+    /// threads use the tree as it was, and a second `improve` of theirs is a `RuntimeError`.
     #[pyo3(signature = (seconds = 1.0))]
-    fn improve(&mut self, py: Python, seconds: f64) -> PyResult<()> {
-        let (improved, raised) = searched(py, seconds, |observer| self.owned.improve(observer))?;
-        improved.map_err(refused)?;
+    fn improve(&self, py: Python, seconds: f64) -> PyResult<()> {
+        let _improving = match self.improving.try_lock() {
+            Ok(guard) => guard,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => return Err(PyRuntimeError::new_err(IMPROVING)),
+        };
+        let (improvement, raised) = searched(py, seconds, |observer| self.owned().improvement(observer))?;
+        let improvement = improvement.map_err(refused)?;
+        self.owned.write().unwrap_or_else(PoisonError::into_inner).apply(improvement);
         raised
     }
 
@@ -78,13 +102,13 @@ impl Tree {
                 return Err(refused(format!("kind is {kind:?}; accepted: {accepted}")));
             }
         };
-        Ok(self.owned.cost(objective))
+        Ok(self.owned().cost(objective))
     }
 
     /// The nodes, the root first, as an array with the fields `min`, `first`, `max` and `count`: `count` is 0 for an inner node, whose two
     /// children begin at `first`; else the node is a leaf, whose objects are `object_ids()[first:first + count]`.
     fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let words: Vec<u32> = bytemuck::cast_slice(&self.owned.tree().to_first_count()).to_vec();
+        let words: Vec<u32> = bytemuck::cast_slice(&self.owned().tree().to_first_count()).to_vec();
         let (point, number) = ("3f4", "u4");
         let fields = [("min", point), ("first", number), ("max", point), ("count", number)];
         let kind = py.import("numpy")?.call_method1("dtype", (fields.to_vec(),))?;
@@ -93,23 +117,27 @@ impl Tree {
 
     /// The object ids that leaves name by position.
     fn object_ids<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
-        self.owned.tree().prim_ids.clone().into_pyarray(py)
+        let ids = self.owned().tree().prim_ids.clone();
+        ids.into_pyarray(py)
     }
 
     fn __len__(&self) -> usize {
-        self.owned.objects()
+        self.owned().objects()
     }
 
     fn __repr__(&self) -> String {
-        let (nodes, objects) = (self.owned.tree().nodes.len(), self.owned.objects());
-        format!("<Tree of {nodes} nodes over {objects} objects>")
+        let owned = self.owned();
+        format!("<Tree of {} nodes over {} objects>", owned.tree().nodes.len(), owned.objects())
     }
 }
+
+/// The message of a second improvement.
+const IMPROVING: &str = "another thread is improving this tree; accepted: `improve` when its call has returned";
 
 fn found(py: Python, name: &str, objects: Objects, references: f64, seconds: f64) -> PyResult<Tree> {
     let (found, raised) = searched(py, seconds, |observer| OwnedTree::find(objects, references, observer))?;
     raised?;
-    Ok(Tree { owned: found.map_err(|error| at(name, error))? })
+    found.map(Tree::new).map_err(|error| at(name, error))
 }
 
 /// What is wrong with an argument.
@@ -117,7 +145,15 @@ fn at(name: &str, error: impl Display) -> PyErr {
     refused(format!("{name}: {error}"))
 }
 
-/// What happened to a file, as the `OSError` of its kind.
-fn file(path: &Path, error: std::io::Error) -> PyErr {
-    std::io::Error::new(error.kind(), format!("{}: {error}", path.display())).into()
+/// What happened to a file that was to be read, as the `OSError` of its kind, or as the `ValueError` of what it holds.
+fn unread(error: TreeFileError) -> PyErr {
+    match error {
+        TreeFileError::Invalid { source, .. } => at("path", source),
+        TreeFileError::Read(error) => io::Error::new(error.kind(), error.to_string()).into(),
+    }
+}
+
+/// What happened to a file that was to be written, as the `OSError` of its kind.
+fn unwritten(error: WriteError) -> PyErr {
+    io::Error::new(error.source.kind(), error.to_string()).into()
 }

@@ -93,6 +93,22 @@ def test_trees_come_back_from_files(tmp_path, references):
         tree.save(tmp_path / "nowhere" / "tree.bvh")
 
 
+def test_a_save_that_fails_leaves_the_old_file_whole(tmp_path):
+    resource = pytest.importorskip("resource")
+    path = tmp_path / "tree.bvh"
+    Tree.from_triangles(TRIANGLES[:50], 0).save(path)
+    old, limits = path.read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
+    # No file may grow further, as on a full disk.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2 * len(old), limits[1]))
+    try:
+        with pytest.raises(OSError, match="tree.bvh"):
+            Tree.from_triangles(TRIANGLES, 0).save(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert path.read_bytes() == old
+    assert os.listdir(tmp_path) == ["tree.bvh"]
+
+
 def test_whatever_numpy_makes_an_array_of_is_taken():
     tree = Tree.from_triangles(TRIANGLES[::2].astype(np.float64).tolist(), 0)
     reference = Tree.from_triangles(TRIANGLES[::2], 0)
@@ -109,7 +125,12 @@ def test_whatever_numpy_makes_an_array_of_is_taken():
     [
         (lambda: Tree.from_triangles(TRIANGLES[0]), r"triangles has shape \(3, 3\); accepted: \(n, 3, 3\)"),
         (lambda: Tree.from_boxes(TRIANGLES), r"boxes has shape \(500, 3, 3\); accepted: \(n, 2, 3\) or \(n, 6\)"),
-        (lambda: Tree.from_triangles([["a"]]), "triangles: could not convert .* accepted"),
+        (lambda: Tree.from_triangles([["a"]]), "triangles has dtype <U1; accepted: real numbers"),
+        (lambda: Tree.from_triangles(TRIANGLES.astype(str)), "triangles has dtype <U.*; accepted: real numbers"),
+        (lambda: Tree.from_triangles(TRIANGLES + 1j), "triangles has dtype complex64; accepted: real numbers"),
+        (lambda: Tree.from_triangles(TRIANGLES.astype("M8[s]")), "triangles has dtype datetime64.*; accepted: real numbers"),
+        (lambda: Tree.from_triangles(np.ma.masked_less(TRIANGLES, 5)), "triangles has masked elements; accepted: none"),
+        (lambda: Tree.from_triangles([[1, 2], [3]]), "triangles: .*inhomogeneous.*; accepted"),
         (lambda: Tree.from_triangles(np.where(np.arange(500)[:, None, None] == 4, np.nan, TRIANGLES)), "triangles: .*4"),
         (lambda: Tree.from_boxes(boxes_of(TRIANGLES)[:, ::-1]), "boxes: "),
         (lambda: Tree.from_triangles(TRIANGLES, -1), "seconds is -1; accepted: 0 or more, finite"),
@@ -158,4 +179,21 @@ def test_an_interrupt_ends_a_search_which_keeps_what_it_gained():
         with pytest.raises(KeyboardInterrupt):
             search()
     assert time.monotonic() - start < 20
+    assert tree.cost() < before
+
+
+def test_until_an_improvement_ends_other_threads_use_the_tree_as_it_was_and_cannot_improve_it():
+    tree = Tree.from_triangles(TRIANGLES, 0)
+    before, nodes = tree.cost(), tree.nodes()
+    improvement = threading.Thread(target=tree.improve, args=(2,))
+    improvement.start()
+    time.sleep(0.3)
+    with pytest.raises(RuntimeError, match="another thread is improving this tree; accepted: .* when its call has returned"):
+        tree.improve(0.1)
+    for _ in range(10):
+        assert (tree.cost(), len(tree)) == (before, 500)
+        np.testing.assert_array_equal(tree.nodes(), nodes)
+        assert Tracer(tree).any([[0, 0, 0]], [[1, 1, 1]]).shape == (1,)
+    assert improvement.is_alive()
+    improvement.join()
     assert tree.cost() < before

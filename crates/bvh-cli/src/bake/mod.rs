@@ -1,0 +1,231 @@
+//! `bvh bake`: the best tree for a scene that a budget buys, kept in a file.
+
+mod effort;
+pub mod instances;
+mod plan;
+mod rays;
+mod starts;
+mod watch;
+
+use crate::Error;
+use crate::scene_files::SceneFiles;
+use bvh_core::cost::Objective;
+use bvh_core::file::Header;
+use bvh_scenes::tree_file::{self, TreeFileError};
+use bvh_scenes::{Scene, explain};
+use bvh_search::best::{self, Horizon};
+use bvh_search::{Method, StopReason};
+use bvh_terminal::arguments::{FileKind, Jobs, input_file, output_file};
+use bvh_terminal::files::Reserved;
+use bvh_terminal::output::{print_error, print_line};
+use clap::Args;
+use effort::Effort;
+use plan::{Bake, Baked, Plan, Start};
+use rays::Rays;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use watch::gain;
+
+/// Search for the best tree of a scene within a budget, and save it.
+#[derive(Args, Clone, Debug)]
+pub struct BakeArgs {
+    /// Name of a scene, or path of a mesh file.
+    pub scene: String,
+    /// How long to search: a time (`10s`, `1m 30s`), or work (`50Mwork`: 50 million nodes visited), which gives the
+    /// same bytes everywhere.
+    #[arg(long, value_name = "TIME|WORK")]
+    pub budget: Effort,
+    /// The file to write; an old one is replaced when the new one is complete. With --instances a new or empty folder.
+    #[arg(long, value_name = "FILE.bvh|DIR")]
+    pub out: PathBuf,
+    /// Bake a tree for every mesh of a glTF file, each once, and one over the places where its nodes put them.
+    #[arg(long, conflicts_with_all = ["rays", "from", "explain"])]
+    pub instances: bool,
+    /// Seed of the random numbers.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Search for the least cost of rays instead of area: `default`, rays that need no camera, or a file that describes those
+    /// of a renderer.
+    #[arg(long, value_name = "default|FILE.toml")]
+    pub rays: Option<String>,
+    /// What the search minimises: `area`, the internal area, which suits every tracer; or `layout`, the nodes and blocks of triangles
+    /// that are tested in this project's own wide layout. Default: `layout` with --rays, else `area`.
+    #[arg(long, value_name = "area|layout", value_enum)]
+    pub cost: Option<BakeCost>,
+    /// Let objects be divided among leaves where that pays, up to so many references per object, 1 to 16. Leaves count in the cost
+    /// then.
+    #[arg(long, value_name = "N", default_value_t = 1.0)]
+    pub references: f64,
+    /// The method, with its default parameters.
+    #[arg(long, value_name = "NAME", default_value = BEST)]
+    pub method: String,
+    /// Go on from the tree of an earlier bake of the same scene; the result is never worse.
+    #[arg(long, value_name = "FILE.bvh")]
+    pub from: Option<PathBuf>,
+    /// Limits the threads.
+    #[command(flatten)]
+    pub jobs: Jobs,
+    /// Says what the scene's files may refer to.
+    #[command(flatten)]
+    pub files: SceneFiles,
+    /// Say first what the scene does not need and is left out, and why.
+    #[arg(long)]
+    pub explain: bool,
+}
+
+/// The cost that a bake minimises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum BakeCost {
+    /// The internal area.
+    Area,
+    /// The cost of the wide layout.
+    Layout,
+}
+
+/// Baked trees.
+const TREE: FileKind = FileKind { name: "a tree file", beginning: &Header::MAGIC, extension: "bvh" };
+/// The method that goes on from a given tree.
+const BEST: &str = "best";
+
+impl BakeArgs {
+    /// The search that the arguments ask for.
+    fn plan(&self) -> Result<Plan, Error> {
+        let rays = self.rays.as_deref().map(Rays::read).transpose()?;
+        let method = self.method()?;
+        self.check_references(&method)?;
+        // Rays save more tests by the cost of the layout: `results/ray_objective`.
+        let default_cost = if rays.is_some() { BakeCost::Layout } else { BakeCost::Area };
+        let objective = match self.cost.unwrap_or(default_cost) {
+            BakeCost::Area => Objective::InternalArea,
+            BakeCost::Layout => Objective::Layout,
+        };
+        Ok(Plan {
+            method,
+            effort: self.budget,
+            seed: self.seed,
+            objective,
+            references: self.references,
+            rays,
+            name: self.recorded(),
+        })
+    }
+
+    /// The method that was named. Rejects one that cannot start from a tree if a tree is given.
+    fn method(&self) -> Result<Method, Error> {
+        let name = &self.method;
+        let found = Method::all().into_iter().find(|method| method.name() == name);
+        match found {
+            None => {
+                let accepted = Method::NAMES.join(", ");
+                Err(Error::Usage(format!("--method {name}: no such method; accepted: {accepted}")))
+            }
+            Some(Method::Best(config)) => {
+                // The budget ends the search; the limit of the method itself does not count.
+                Ok(Method::Best(best::Config { horizon: Some(Horizon::Known), ..config }))
+            }
+            Some(_) if self.from.is_some() => {
+                Err(Error::Usage(format!("--method {name} cannot go on --from a tree; accepted: {BEST}")))
+            }
+            Some(method) => Ok(method),
+        }
+    }
+
+    /// Rejects numbers of references that are out of range, and methods that would ignore them.
+    fn check_references(&self, method: &Method) -> Result<(), Error> {
+        let references = self.references;
+        if !(1.0..=16.0).contains(&references) {
+            return Err(Error::Usage(format!("--references {references}; accepted: 1 to 16")));
+        }
+        if references > 1.0 && !matches!(method, Method::Best(_)) {
+            let name = &self.method;
+            let message = format!("--references {references} with --method {name}; accepted: {BEST}");
+            return Err(Error::Usage(message));
+        }
+        Ok(())
+    }
+
+    /// The name that the file records: the method's, and that of the rays if there are any.
+    fn recorded(&self) -> String {
+        const MOST_BYTES: usize = 64;
+        let Some(rays) = &self.rays else { return self.method.clone() };
+        let file = Path::new(rays).file_name();
+        let file = file.map_or(rays.clone(), |name| name.to_string_lossy().into_owned());
+        let mut name = format!("{} for rays of {file}", self.method).replace('\0', "");
+        while name.len() > MOST_BYTES {
+            name.pop();
+        }
+        name
+    }
+}
+
+/// Searches until the budget is spent or `interrupted` becomes true, writes the best tree found, and prints its cost. If it is
+/// interrupted, it writes the file all the same and returns [`Error::Stopped`].
+pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+    if let Some(from) = &args.from {
+        input_file("--from", from)?;
+    }
+    output_file("--out", &args.out, &TREE)?;
+    let plan = args.plan()?;
+    args.jobs.apply()?;
+    let scene = args.files.load(&args.scene)?;
+    scene.remark.iter().for_each(|remark| print_error(remark));
+    if args.explain {
+        let text = explain::scene(&scene).map_err(Error::search(&scene.name, "--explain"))?;
+        print_line(&text);
+    }
+    let start = match &args.from {
+        Some(path) => {
+            let (tree, header) = tree_file::load(path, &scene)?;
+            Some(Start { tree, work: header.work })
+        }
+        None => None,
+    };
+    let reserved = Reserved::new(&args.out, plan.most_bytes(&scene))?;
+    let bake = plan.begin(&scene, start.as_ref(), interrupted)?;
+    if args.explain && bake.is_whole() {
+        print_line("  left out: divided objects: no spatial split of a top-down division saves anything");
+    }
+    let baked = bake.search(interrupted)?;
+    let bytes = bake.file(&baked).map_err(TreeFileError::of(&args.out))?;
+    reserved.write(&bytes)?;
+    if interrupted.load(Relaxed) {
+        return Err(Error::Stopped { path: args.out.clone(), cost: baked.outcome.cost });
+    }
+    print_line(&summary(&plan, &scene, &bake, &baked));
+    print_line(&format!("{}: {} bytes", args.out.display(), bytes.len()));
+    Ok(())
+}
+
+/// The result of a bake in words.
+fn summary(plan: &Plan, scene: &Scene, bake: &Bake, baked: &Baked) -> String {
+    let Baked { outcome, base, before, seconds } = baked;
+    let objects = scene.boxes.len();
+    let method = plan.method.name();
+    let mut lines = vec![
+        format!("{} ({}), {objects} objects, {method}, seed {}", scene.name, scene.kind, plan.seed),
+        format!("{} {}, {} Müller–Fellner's {base}", bake.unit(), outcome.cost, gain(outcome.cost, *base)),
+    ];
+    if let Some(before) = before {
+        lines.push(format!("{} the tree it went on from, {before}", gain(outcome.cost, *before)));
+    }
+    if plan.references > 1.0 {
+        let references = outcome.tree.prim_ids.len();
+        let allowed = plan.references;
+        lines.push(if references > objects {
+            format!("{references} references to {objects} objects, where no more than {allowed} were allowed")
+        } else {
+            "no object is divided, because that does not pay here".into()
+        });
+    }
+    // A method that plans with the clock has carried out its plan when the time is over.
+    let in_time = matches!(plan.effort, Effort::Time(limit) if *seconds >= 0.5 * limit.as_secs_f64());
+    let why = match outcome.stop {
+        StopReason::Completed if in_time => "",
+        StopReason::Completed => ", and nothing more that this method does",
+        StopReason::Optimal => ", and no tree is better",
+        _ => "",
+    };
+    let moves = outcome.evaluations;
+    lines.push(format!("{moves} moves, {} nodes visited, {seconds:.1} s{why}", outcome.work));
+    lines.join("\n")
+}

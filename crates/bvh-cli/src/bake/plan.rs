@@ -1,0 +1,178 @@
+//! A bake without its command line: the search, what it found, and the tree file of that.
+
+use super::effort::Effort;
+use super::rays::Rays;
+use super::starts::{Division, greedy};
+use super::watch::{Interrupted, Watch};
+use crate::Error;
+use bvh_core::cost::{Measure, Objective};
+use bvh_core::file::{self, FileError, Header, Origin};
+use bvh_core::{Bvh, Node, RayDensity};
+use bvh_scenes::Scene;
+use bvh_search::{Budget, Deadline, Method, Outcome, Problem, SearchError, best, optimize, solve};
+use bvh_terminal::interrupt;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+/// A search for the best tree of any scene.
+#[derive(Clone)]
+pub struct Plan {
+    /// The method, with its parameters.
+    pub method: Method,
+    /// How long to search.
+    pub effort: Effort,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    /// The cost that is minimised.
+    pub objective: Objective,
+    /// Most references per object that leaves may have; 1 for whole objects.
+    pub references: f64,
+    /// Rays whose visits take the place of areas.
+    pub rays: Option<Rays>,
+    /// The name of the method that the tree file records.
+    pub name: String,
+}
+
+/// The tree of an earlier bake, from which a search goes on.
+pub struct Start {
+    /// Over the same scene.
+    pub tree: Bvh,
+    /// The work that it took, in nodes made or visited.
+    pub work: u64,
+}
+
+impl Plan {
+    /// The most references to a scene's objects that leaves may have.
+    fn most_references(&self, scene: &Scene) -> usize {
+        (self.references * scene.boxes.len() as f64) as usize
+    }
+
+    /// The size of the largest tree file that a bake of this scene can write, in bytes.
+    pub fn most_bytes(&self, scene: &Scene) -> usize {
+        let reference = 2 * (size_of::<Node>() + size_of::<f32>()) + size_of::<u32>();
+        Header::BYTES + self.most_references(scene) * reference
+    }
+
+    /// Begins a bake: from now on its time runs.
+    pub fn begin<'a>(
+        &'a self,
+        scene: &'a Scene,
+        start: Option<&'a Start>,
+        interrupted: &AtomicBool,
+    ) -> Result<Bake<'a>, Error> {
+        let greedy = greedy(self.method.name(), scene, interrupted)?;
+        let deadline = self.effort.deadline();
+        interrupt::hold();
+        let is_over = || {
+            let is_timed = matches!(self.effort, Effort::Time(_));
+            interrupted.load(Relaxed) || is_timed && deadline.has_passed()
+        };
+        let from = start.map(|start| &start.tree);
+        let division = Division::decide(self.most_references(scene), scene, from, &is_over)?;
+        let density = match &self.rays {
+            Some(rays) => Some(rays.density(scene, &greedy, self.seed)?),
+            None => None,
+        };
+        Ok(Bake { plan: self, scene, start, greedy, deadline, division, density })
+    }
+}
+
+/// A bake that has begun.
+pub struct Bake<'a> {
+    plan: &'a Plan,
+    scene: &'a Scene,
+    start: Option<&'a Start>,
+    greedy: Bvh,
+    deadline: Deadline,
+    division: Division<'a>,
+    density: Option<RayDensity>,
+}
+
+impl Bake<'_> {
+    /// Whether the search is for whole objects although it may divide them, because no split saves anything.
+    pub fn is_whole(&self) -> bool {
+        matches!(self.division, Division::Useless)
+    }
+
+    /// Searches until the budget is spent or `interrupted` becomes true.
+    pub fn search(&self, interrupted: &AtomicBool) -> Result<Baked, Error> {
+        let problem = Problem {
+            objective: self.plan.objective,
+            splits: self.division.splits(),
+            measure: self.density.as_ref().map(|density| density as &dyn Measure),
+            known: Some(&self.greedy),
+            ..Problem::new(&self.scene.boxes)
+        };
+        let base = problem.cost(&self.greedy);
+        let watch = Watch::new(self.plan.effort, self.deadline, base, interrupted);
+        let outcome = self.outcome(&problem, &watch, interrupted);
+        watch.bar.finish_and_clear();
+        Ok(Baked {
+            outcome: outcome.map_err(Error::search(&self.scene.name, self.plan.method.name()))?,
+            base,
+            before: self.start.map(|start| problem.cost(&start.tree)),
+            seconds: self.deadline.elapsed().as_secs_f64(),
+        })
+    }
+
+    fn outcome(
+        &self,
+        problem: &Problem,
+        watch: &Watch,
+        interrupted: &AtomicBool,
+    ) -> Result<Outcome, SearchError> {
+        let Plan { method, effort, seed, .. } = self.plan;
+        let budget = match *effort {
+            Effort::Time(_) => Budget::UNLIMITED,
+            Effort::Work(work) => Budget { max_work: Some(work), ..Budget::UNLIMITED },
+        };
+        let fallback = match (*effort, method) {
+            (Effort::Work(work), Method::Best(_)) => best::fallback(problem, work, &Interrupted(interrupted))?,
+            _ => None,
+        };
+        let found = match (self.start, method) {
+            (Some(start), Method::Best(config)) => {
+                optimize(&start.tree, problem, config, *seed, budget, watch)?
+            }
+            _ => solve(method, problem, *seed, budget, watch)?,
+        };
+        Ok(best::unless_behind(found, fallback))
+    }
+
+    /// Returns the bytes of the tree file.
+    pub fn file(&self, baked: &Baked) -> Result<Vec<u8>, FileError> {
+        let tree = &baked.outcome.tree;
+        let spent = self.start.map_or(0, |start| start.work);
+        let visits = self.density.as_ref().map_or_else(Vec::new, |density| density.visits(tree));
+        let origin = Origin {
+            method: &self.plan.name,
+            seed: self.plan.seed,
+            work: spent.saturating_add(baked.outcome.work),
+            visits: &visits,
+            objective: self.plan.objective,
+        };
+        file::save_references(tree, &self.scene.boxes, &self.scene.primitives, &origin)
+    }
+
+    /// The cost that the search minimises, in words.
+    pub fn unit(&self) -> &'static str {
+        match (self.plan.objective, &self.density) {
+            (Objective::Layout, Some(_)) => "cost of the wide layout for rays, times root area,",
+            (Objective::Layout, None) => "cost of the wide layout, times root area,",
+            (_, Some(_)) => "visits of rays times root area",
+            (_, None) if self.division.splits().is_some() => "area of all nodes",
+            (_, None) => "internal area",
+        }
+    }
+}
+
+/// The result of a search.
+pub struct Baked {
+    /// The best tree, and how the search ended.
+    pub outcome: Outcome,
+    /// The cost of the greedy tree.
+    pub base: f64,
+    /// The cost of the tree that the search went on from.
+    pub before: Option<f64>,
+    /// Elapsed since the bake began.
+    pub seconds: f64,
+}

@@ -1,0 +1,104 @@
+//! The failures of the commands, and the exit code of each.
+
+use bvh_core::DensityError;
+use bvh_scenes::render::StructureError;
+use bvh_scenes::tree_file::TreeFileError;
+use bvh_scenes::{ReadError, SceneError};
+use bvh_search::SearchError;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A failure, with the file or object it concerns.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each message says what its fields are")]
+pub enum Error {
+    /// A scene that is neither built in, nor fetched, nor a readable mesh file.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A command line that asks for something contradictory.
+    #[error("{0}")]
+    Usage(String),
+    /// A file of rays that is wrong: file, key, found, accepted.
+    #[error("{}: {message}", .file.display())]
+    Rays { file: PathBuf, message: String },
+    /// An input that could not be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A file or folder that could not be read or written.
+    #[error("{}: cannot {action}: {source}", .path.display())]
+    Io { path: PathBuf, action: &'static str, source: io::Error },
+    /// A search failed.
+    #[error("scene {scene}, method {method}: {source}")]
+    Search { scene: String, method: String, source: Box<SearchError> },
+    /// Rays cannot be traced through this scene.
+    #[error("scene {scene}, tracing: {source}")]
+    Tracing { scene: String, source: DensityError },
+    /// A tree file that is damaged, or for another scene.
+    #[error(transparent)]
+    TreeFile(#[from] TreeFileError),
+    /// A structure that a picture cannot be traced with.
+    #[error(transparent)]
+    Structure(#[from] StructureError),
+    /// Ctrl-C during a picture.
+    #[error("interrupted; no picture was written")]
+    Abandoned,
+    /// Ctrl-C before a bake has any tree.
+    #[error("interrupted; there was no tree yet, and no file was written")]
+    NoTree,
+    /// Ctrl-C during a bake.
+    #[error("interrupted; the best tree so far, of cost {cost}, is in {0}; `--from {0}` goes on", .path.display())]
+    Stopped { path: PathBuf, cost: f64 },
+    /// Ctrl-C during a bake of instances.
+    #[error("interrupted; the best trees so far, of all meshes and over the instances, are in {}", .path.display())]
+    StoppedInstances { path: PathBuf },
+}
+
+impl Error {
+    /// 2 for faults of the command line or its inputs, 130 after Ctrl-C, otherwise 1.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Scene(_) | Self::Usage(_) | Self::Rays { .. } => 2,
+            Self::Read(error) | Self::TreeFile(TreeFileError::Read(error)) => of_reading(error),
+            Self::TreeFile(_) => 2,
+            Self::Structure(error) => match error {
+                StructureError::File(TreeFileError::Read(error)) => of_reading(error),
+                StructureError::Unknown(_) | StructureError::Spheres(_) | StructureError::File(_) => 2,
+                StructureError::Build { .. } | StructureError::Layout { .. } => 1,
+            },
+            Self::Stopped { .. } | Self::StoppedInstances { .. } | Self::Abandoned | Self::NoTree => 130,
+            Self::Io { .. } | Self::Search { .. } | Self::Tracing { .. } => 1,
+        }
+    }
+
+    /// Returns a function for `map_err` on file operations that names the path and the operation.
+    pub fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::Io { path: path.to_owned(), action, source }
+    }
+
+    /// Returns a function for `map_err` on builders and searches that names the scene and the method.
+    pub fn search<E: Into<SearchError>>(scene: &str, method: &str) -> impl FnOnce(E) -> Self {
+        let scene = scene.to_owned();
+        let method = method.to_owned();
+        move |source| Self::Search { scene, method, source: Box::new(source.into()) }
+    }
+}
+
+fn of_reading(error: &ReadError) -> u8 {
+    if error.is_of_the_path() { 2 } else { 1 }
+}
+
+impl From<bvh_terminal::Error> for Error {
+    fn from(error: bvh_terminal::Error) -> Self {
+        match error {
+            bvh_terminal::Error::Usage(message) => Self::Usage(message),
+            bvh_terminal::Error::Io { path, action, source } => Self::Io { path, action, source },
+        }
+    }
+}
+
+impl From<bvh_terminal::files::WriteError> for Error {
+    fn from(error: bvh_terminal::files::WriteError) -> Self {
+        let bvh_terminal::files::WriteError { path, action, source } = error;
+        Self::Io { path, action, source }
+    }
+}

@@ -1,0 +1,244 @@
+//! `bvh inspect` and `bvh verify`: what a tree file is, what its tree costs, and what it looks like.
+
+use crate::scene_files::SceneFiles;
+use crate::{Error, csv};
+use bvh_build::{Builder, muller_fellner};
+use bvh_core::cost::{self, EndPointOverlap, Objective, Overlap, SahConstants};
+use bvh_core::file::{FileError, Header, TreeFile};
+use bvh_core::{Bvh, NodeKind, Triangle, validate_references};
+use bvh_scenes::Scene;
+use bvh_scenes::tree_file::{self, TreeFileError};
+use bvh_terminal::arguments::{FileKind, output_file};
+use bvh_terminal::files;
+use bvh_terminal::output::{print_error, print_line};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+use serde::{Serialize, Serializer};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::fmt::{self, Display, Formatter};
+use std::path::{Path, PathBuf};
+
+/// Say what a tree file holds: its origin, costs, depth, arity, validity.
+#[derive(Args, Clone, Debug)]
+pub struct InspectArgs {
+    /// The tree file.
+    #[arg(value_name = "FILE.bvh")]
+    pub file: PathBuf,
+    /// The scene it is for, by name or path of a mesh file: checks the tree against its objects, compares it with
+    /// Müller–Fellner's, and measures the end-point overlap.
+    pub scene: Option<String>,
+    /// Write the nodes to a CSV file, one row each, in full precision.
+    #[arg(long, value_name = "NODES.csv")]
+    pub nodes: Option<PathBuf>,
+    /// Says what the scene's files may refer to.
+    #[command(flatten)]
+    pub files: SceneFiles,
+    /// Print the facts as JSON, under the same names.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The nodes of a tree.
+const NODES: FileKind = FileKind { name: "a CSV file of nodes", beginning: b"node,parent,", extension: "csv" };
+/// The columns of the nodes, which docs/TREE_FILES.md describes.
+const COLUMNS: &str = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
+
+/// Facts by name, in the order in which they are printed: as a text, and as JSON.
+#[derive(Default)]
+struct Facts(Vec<(String, String, serde_json::Value)>);
+
+impl Facts {
+    fn add(&mut self, what: &str, value: impl Display + Serialize) {
+        self.0.push((what.into(), value.to_string(), json!(value)));
+    }
+}
+
+impl Display for Facts {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|(what, text, _)| writeln!(f, "{what}: {text}"))
+    }
+}
+
+impl Serialize for Facts {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(what, _, value)| (what, value)))
+    }
+}
+
+/// Inspects a file, and prints a line per fact, `what: value`, or JSON. Refuses a file that is damaged, or for another scene than
+/// the one named.
+pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
+    if let Some(nodes) = &args.nodes {
+        output_file("--nodes", nodes, &NODES)?;
+    }
+    let scene = args.scene.as_deref().map(|name| args.files.load(name)).transpose()?;
+    let (tree, facts) = examine(&args.file, scene.as_ref())?;
+    if let Some(path) = &args.nodes {
+        write_nodes(&tree, path)?;
+    }
+    print(&facts, args.json);
+    Ok(())
+}
+
+/// Prove that a tree file, whoever made it, holds a tree for a scene: validity and costs are computed again.
+#[derive(Args, Clone, Debug)]
+pub struct VerifyArgs {
+    /// The tree file.
+    #[arg(value_name = "FILE.bvh")]
+    pub file: PathBuf,
+    /// The scene it is for, by name or path of a mesh file.
+    pub scene: String,
+    /// Says what the scene's files may refer to.
+    #[command(flatten)]
+    pub files: SceneFiles,
+    /// Print the facts as JSON, under the same names.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// As [`inspect`], of a file that must be for the scene.
+pub fn verify(args: &VerifyArgs) -> Result<(), Error> {
+    let scene = args.files.load(&args.scene)?;
+    let (_, facts) = examine(&args.file, Some(&scene))?;
+    print(&facts, args.json);
+    Ok(())
+}
+
+fn print(facts: &Facts, as_json: bool) {
+    print_line(&if as_json { format!("{:#}", json!(facts)) } else { facts.to_string() });
+}
+
+/// The tree in a file and the facts about it.
+fn examine(path: &Path, scene: Option<&Scene>) -> Result<(Bvh, Facts), Error> {
+    let bytes = tree_file::read(path)?;
+    let file = tree_file::open(path, &bytes)?;
+    scene.iter().filter_map(|scene| scene.remark.as_ref()).for_each(|remark| print_error(remark));
+    let mut facts = Facts::default();
+    describe(file.header(), &bytes, &mut facts);
+    let tree = file.tree().map_err(TreeFileError::of(path))?;
+    measure(&tree, &mut facts);
+    match scene {
+        Some(scene) => against(&tree, file, scene, &mut facts).map_err(TreeFileError::of(path))?,
+        None => facts.add("valid", "as a tree; with a scene its objects are checked too"),
+    }
+    Ok((tree, facts))
+}
+
+/// The facts in the header.
+fn describe(header: &Header, bytes: &[u8], facts: &mut Facts) {
+    let objective = match header.objective {
+        Objective::InternalArea => "internal area".to_owned(),
+        Objective::GoldsmithSalmon => "Goldsmith–Salmon".to_owned(),
+        Objective::Layout => "cost of the wide layout, by area".to_owned(),
+        Objective::Sah(constants) => {
+            let (traversal, intersection) = (constants.traversal(), constants.intersection());
+            format!("surface area heuristic, traversal {traversal}, intersection {intersection}")
+        }
+    };
+    // The magic comes first, then the version.
+    let version = bytes[Header::MAGIC.len()..].first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+    facts.add("version", version);
+    facts.add("bytes", bytes.len());
+    facts.add("method", &header.method);
+    facts.add("seed", header.seed);
+    facts.add("work", header.work);
+    facts.add("objective", objective);
+    facts.add("cost when saved", header.cost);
+    facts.add("checksum of the scene", format!("{:08x}", header.scene));
+    facts.add("objects", header.objects);
+    facts.add("references", header.references);
+    facts.add("nodes", header.nodes);
+}
+
+/// The facts that follow from the tree alone.
+fn measure(tree: &Bvh, facts: &mut Facts) {
+    let area = cost::internal_area(tree);
+    facts.add("inner nodes", tree.inner_count());
+    facts.add("leaves", tree.nodes.len() - tree.inner_count());
+    facts.add("depth", tree.depth());
+    facts.add("internal area", area);
+    facts.add("internal area over root area", cost::over_root_area(tree, area));
+    facts.add("Goldsmith–Salmon cost", cost::goldsmith_salmon(tree));
+    facts.add("surface area heuristic", cost::sah(tree, &SahConstants::default()));
+    let (mut arities, mut leaves) = (BTreeMap::new(), BTreeMap::new());
+    for node in &tree.nodes {
+        let (histogram, count) = match node.kind() {
+            NodeKind::Inner { count, .. } => (&mut arities, count),
+            NodeKind::Leaf { count, .. } => (&mut leaves, count),
+        };
+        *histogram.entry(count).or_insert(0usize) += 1;
+    }
+    facts.add("inner nodes by children", histogram(&arities));
+    facts.add("leaves by objects", histogram(&leaves));
+}
+
+/// `2 × 100, 3 × 7`: sizes and how many have them.
+fn histogram(counts: &BTreeMap<u32, usize>) -> String {
+    let bins: Vec<String> = counts.iter().map(|(size, count)| format!("{size} × {count}")).collect();
+    if bins.is_empty() { "none".into() } else { bins.join(", ") }
+}
+
+/// The facts that only the scene can tell.
+fn against(tree: &Bvh, file: TreeFile, scene: &Scene, facts: &mut Facts) -> Result<(), FileError> {
+    file.for_boxes(&scene.boxes)?;
+    validate_references(tree, &scene.boxes, &scene.primitives)?;
+    facts.add("scene", &scene.name);
+    facts.add("valid", "yes, over this scene's objects");
+    // Boxes that the file's checksum has accepted are finite: a valid tree lies around them.
+    if let Ok(greedy) = muller_fellner::Config::default().build(&scene.boxes) {
+        let base = cost::internal_area(&greedy);
+        if base > 0.0 {
+            facts.add("internal area over Müller–Fellner's", cost::internal_area(tree) / base);
+        }
+    }
+    match scene.triangles() {
+        Ok(triangles) => {
+            facts.add("end-point overlap", end_point_overlap(tree, triangles));
+        }
+        Err(_) => facts.add("end-point overlap", "of triangles only"),
+    }
+    Ok(())
+}
+
+/// Computes the end-point overlap on all threads, under a progress bar.
+fn end_point_overlap(tree: &Bvh, triangles: &[Triangle]) -> f64 {
+    let parts = EndPointOverlap::new(tree, triangles, &SahConstants::default());
+    let bar = ProgressBar::new(parts.count() as u64).with_message("end-point overlap");
+    let style = ProgressStyle::with_template("{bar:10} {msg}, {eta} left");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let part = |number| {
+        let part = parts.part(number);
+        bar.inc(1);
+        part
+    };
+    let found: Vec<Overlap> = (0..parts.count()).into_par_iter().map(part).collect();
+    bar.finish_and_clear();
+    let mut sum = Overlap::default();
+    found.iter().for_each(|part| sum.add(part));
+    sum.value()
+}
+
+fn write_nodes(tree: &Bvh, path: &Path) -> Result<(), Error> {
+    let mut parents = vec![None; tree.nodes.len()];
+    for (index, node) in tree.nodes.iter().enumerate() {
+        parents[node.children()].fill(Some(index));
+    }
+    let mut table = csv::Table::new(COLUMNS);
+    for (index, (node, parent)) in tree.nodes.iter().zip(parents).enumerate() {
+        let (kind, first, count) = match node.kind() {
+            NodeKind::Inner { first, count } => ("inner", first, count),
+            NodeKind::Leaf { first, count } => ("leaf", first, count),
+        };
+        table.cell(index);
+        table.cell(parent.map_or_else(String::new, |parent| parent.to_string()));
+        table.cell(kind);
+        table.cell(first);
+        table.cell(count);
+        table.numbers(&node.aabb.min.to_array());
+        table.numbers(&node.aabb.max.to_array());
+        table.end_row();
+    }
+    Ok(files::write(path, table.text().as_bytes())?)
+}

@@ -1,0 +1,78 @@
+//! The program `bvh`: parses the arguments, calls the command, and sets the exit code.
+
+mod bake;
+mod commands;
+mod csv;
+mod error;
+mod inspect;
+mod render;
+mod scene_files;
+mod scenes;
+
+use bvh_terminal::interrupt::{self, INTERRUPTED};
+use bvh_terminal::output::{answered, print_bytes, print_error, succeeded};
+use clap::{CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
+use error::Error;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Bounding volume hierarchies by stochastic search: bake the best tree that a budget buys, and look at it.
+#[derive(Parser)]
+#[command(name = "bvh", version, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Bake(bake::BakeArgs),
+    Inspect(inspect::InspectArgs),
+    Verify(inspect::VerifyArgs),
+    Render(render::RenderArgs),
+    /// List the built-in scenes, their sizes, and what each stands in for.
+    Scenes,
+    /// Print the file by which a shell completes arguments.
+    Completions {
+        shell: Shell,
+    },
+    /// Print the manual page, for `man -l -`.
+    Man,
+}
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(answer) => return answered(&answer),
+    };
+    interrupt::listen("error: interrupted");
+    match run(cli.command) {
+        Ok(()) => succeeded(),
+        Err(error) => {
+            print_error(&format!("error: {error}"));
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn run(command: Command) -> Result<(), Error> {
+    match command {
+        Command::Bake(args) if args.instances => bake::instances::bake(&args, &INTERRUPTED),
+        Command::Bake(args) => bake::bake(&args, &INTERRUPTED),
+        Command::Inspect(args) => inspect::inspect(&args),
+        Command::Verify(args) => inspect::verify(&args),
+        Command::Render(args) => render::render(&args, &INTERRUPTED),
+        Command::Scenes => scenes::scenes(),
+        Command::Completions { shell } => {
+            print_bytes(&commands::completions(shell, &mut Cli::command()));
+            Ok(())
+        }
+        Command::Man => {
+            let page = commands::manual(Cli::command());
+            let page = page.map_err(Error::io(Path::new("the manual page"), "write"))?;
+            print_bytes(&page);
+            Ok(())
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! Ctrl-C while `bvh bake` searches: the best tree so far is kept, and it is worth having.
+#![cfg(unix)]
+
+mod support;
+
+use bvh_scenes::Scene;
+use bvh_scenes::tree_file;
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+use support::{begin, cost, ended, said, send, text};
+
+/// Bakes konistil into `a.bvh`, and interrupts it a while after it has begun, however long it would take.
+fn interrupted(folder: &Path, more: &[&str], after: Duration) -> String {
+    let args = [&["bake", "konistil", "--out", "a.bvh"], more].concat();
+    let before = fs::read_dir(folder).unwrap().count();
+    let child = begin(folder, &args);
+    // The file is reserved before the search begins.
+    while fs::read_dir(folder).unwrap().count() == before {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(after);
+    send("-INT", &child);
+    let output = child.wait_with_output().unwrap();
+    ended(&output, 130, &[]);
+    text(&output.stderr)
+}
+
+#[test]
+fn ctrl_c_keeps_the_best_tree_so_far() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = interrupted(folder.path(), &["--budget", "1h"], Duration::ZERO);
+    assert!(said.contains("`--from a.bvh` goes on"), "{said}");
+    tree_file::load(&folder.path().join("a.bvh"), &Scene::load("konistil").unwrap()).unwrap();
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_bake_that_is_interrupted_early_is_not_behind_plain_reinsertion() {
+    let folder = tempfile::tempdir().unwrap();
+    let cost = |file: &str| cost(folder.path(), file);
+    let begin = Instant::now();
+    let args = ["bake", "konistil", "--method", "reinsertion", "--budget", "1000Gwork", "--out", "plain.bvh"];
+    said(folder.path(), &args);
+    // Long enough for reinsertion and the starts that precede it, on a busy machine too; the heat of a long search has not paid by then.
+    let (plain, after) = (cost("plain.bvh"), Duration::from_secs(1) + 8 * begin.elapsed());
+    for more in
+        [&["--budget", "1h"][..], &["--budget", "1000Gwork"], &["--budget", "1h", "--references", "1.2"]]
+    {
+        interrupted(folder.path(), more, after);
+        // Where leaves may be divided they are part of the measure, and moves that save as much come in another order.
+        let most = if more.contains(&"--references") { 1.0001 } else { 1.0 };
+        let found = cost("a.bvh");
+        assert!(found <= most * plain, "{more:?}: {found} is above {plain}");
+        fs::remove_file(folder.path().join("a.bvh")).unwrap();
+    }
+}

@@ -1,0 +1,39 @@
+//! The examples in the documentation that call `bvh`, or describe rays for it.
+
+#[path = "../../bvh-terminal/tests/program/pages.rs"]
+mod pages;
+mod support;
+
+use pages::{Called, UNREADABLE, blocks_in};
+use std::fs;
+use support::{run, said, text};
+
+#[test]
+fn every_description_of_rays_is_baked_for_as_it_is_printed() {
+    let mut descriptions = 0;
+    for block in blocks_in("toml").into_iter().filter(|block| block.text.contains("cameras = ")) {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("rays.toml"), &block.text).unwrap();
+        said(folder.path(), &["bake", "escher:60", "--budget=1kwork", "--rays=rays.toml", "--out=x.bvh"]);
+        descriptions += 1;
+    }
+    assert!(descriptions > 0);
+}
+
+#[test]
+fn every_command_is_one_that_the_program_reads() {
+    let bvh = Called { name: "bvh", package: "bvh-cli" };
+    assert!(bvh.reads_blocks() > 2 && bvh.knows_sentences() > 3);
+}
+
+#[test]
+fn what_is_not_read_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    for wrong in [
+        &["bake", "scene.obj", "--budgett", "10s"][..],
+        &["bake", "scene.obj", "--budget", "ten", "--out", "x.bvh"],
+        &["bake", "scene.obj", "--budget", "10s"],
+    ] {
+        assert!(text(&run(folder.path(), wrong).stderr).contains(UNREADABLE), "{wrong:?}");
+    }
+}

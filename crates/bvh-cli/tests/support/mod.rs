@@ -1,0 +1,27 @@
+//! The program `bvh` as a child process, and what it says of trees.
+#![allow(dead_code, unused_imports)] // each test file uses some of it
+
+#[path = "../../../bvh-scenes/tests/support/glb.rs"]
+mod glb;
+#[path = "../../../bvh-terminal/tests/program/mod.rs"]
+mod program;
+
+pub use glb::glb;
+pub use program::*;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_bvh");
+
+/// The facts that `inspect` and the readers print.
+pub fn facts(text: &str) -> BTreeMap<String, String> {
+    text.lines()
+        .filter_map(|line| line.split_once(": "))
+        .map(|(what, value)| (what.into(), value.into()))
+        .collect()
+}
+
+/// The internal area of the tree in a file, as `inspect` has it.
+pub fn cost(folder: &Path, file: &str) -> f64 {
+    facts(&said(folder, &["inspect", file]))["internal area"].parse().unwrap()
+}

@@ -1,0 +1,99 @@
+//! Whole files, or why there is none: nothing is read that might never end.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::str::Utf8Error;
+use thiserror::Error;
+
+/// Why a file could not be read.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "each message says what its fields are")]
+pub enum ReadError {
+    /// Nothing at this path.
+    #[error("{}: no such file", .path.display())]
+    NotFound { path: PathBuf },
+    /// A folder at this path.
+    #[error("{}: a folder; accepted: a file", .path.display())]
+    Folder { path: PathBuf },
+    /// A device, pipe or socket at this path, which might never end.
+    #[error("{}: not a regular file; accepted: a file", .path.display())]
+    NotRegular { path: PathBuf },
+    /// A file of text that is not UTF-8.
+    #[error("{}: {source}; accepted: UTF-8", .path.display())]
+    NotUtf8 { path: PathBuf, source: Utf8Error },
+    /// The file exists and could not be read.
+    #[error("{} could not be read: {source}", .path.display())]
+    Failed { path: PathBuf, source: io::Error },
+}
+
+impl ReadError {
+    /// The kind of error that the operating system would report, by which bindings choose an exception.
+    pub fn kind(&self) -> io::ErrorKind {
+        match self {
+            Self::NotFound { .. } => io::ErrorKind::NotFound,
+            Self::Folder { .. } => io::ErrorKind::IsADirectory,
+            Self::NotRegular { .. } => io::ErrorKind::InvalidInput,
+            Self::NotUtf8 { .. } => io::ErrorKind::InvalidData,
+            Self::Failed { source, .. } => source.kind(),
+        }
+    }
+
+    /// Whether another path would mend it, as opposed to a fault of the system.
+    pub fn is_of_the_path(&self) -> bool {
+        !matches!(self, Self::Failed { .. })
+    }
+}
+
+/// Returns the text of the regular file at `path`.
+pub fn read_text(path: &Path) -> Result<String, ReadError> {
+    String::from_utf8(read(path)?)
+        .map_err(|error| ReadError::NotUtf8 { path: path.to_path_buf(), source: error.utf8_error() })
+}
+
+/// Returns the bytes of the regular file at `path`. Anything else is rejected unread: a pipe could keep the program waiting for
+/// ever, and a device need not end.
+pub fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
+    regular(path)?;
+    std::fs::read(path).map_err(|source| failed(path, source))
+}
+
+/// The number of bytes of the regular file at `path`.
+pub(crate) fn regular(path: &Path) -> Result<u64, ReadError> {
+    let file = std::fs::metadata(path).map_err(|source| failed(path, source))?;
+    match file.is_file() {
+        true => Ok(file.len()),
+        false if file.is_dir() => Err(ReadError::Folder { path: path.to_path_buf() }),
+        false => Err(ReadError::NotRegular { path: path.to_path_buf() }),
+    }
+}
+
+fn failed(path: &Path, source: io::Error) -> ReadError {
+    let path = path.to_path_buf();
+    match source.kind() {
+        io::ErrorKind::NotFound => ReadError::NotFound { path },
+        _ => ReadError::Failed { path, source },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tree_file;
+
+    #[test]
+    fn what_is_no_file_is_rejected_unread() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = folder.path().join("x");
+        assert!(matches!(read(folder.path()), Err(ReadError::Folder { .. })));
+        assert!(matches!(read(&missing), Err(ReadError::NotFound { .. })));
+        for path in [folder.path(), &missing, Path::new("/dev/zero")] {
+            assert!(
+                matches!(tree_file::read(path), Err(tree_file::TreeFileError::Read(_))),
+                "{}",
+                path.display()
+            );
+        }
+        #[cfg(unix)]
+        assert!(matches!(read(Path::new("/dev/zero")), Err(ReadError::NotRegular { .. })));
+    }
+}

@@ -1,0 +1,83 @@
+//! Sphere scenes for ray tracing: the 75 spheres of the second source document, and more of them at the same density.
+//!
+//! Centres follow Roberts' (2018) additive recurrence on the plastic-number generalization of the
+//! golden ratio, which keeps any number of points evenly apart without a grid. Differs from the
+//! document: it gives no positions.
+
+use super::stand_ins::jitter;
+use bvh_core::Sphere;
+use glam::DVec3;
+
+/// Half the size of the box that holds the centres: about 16:9 seen along the z axis, centred at
+/// the origin.
+const HALF_SIZE: DVec3 = DVec3::new(8.0, 4.5, 5.0);
+
+/// `count` spheres whose centres fill the box |x| <= 8, |y| <= 4.5, |z| <= 5 at every count. Radii
+/// vary by a factor of 4 and shrink with the cube root of `count`, so that the volume taken is the
+/// same; few spheres touch. The same bytes at every call and on every machine. O(count).
+pub fn spheres(count: usize) -> Vec<Sphere> {
+    // 1/g, 1/g², 1/g³ for the real root g of g⁴ = g + 1.
+    let steps = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_2);
+    let volume = 8.0 * HALF_SIZE.x * HALF_SIZE.y * HALF_SIZE.z;
+    let spacing = libm::cbrt(volume / count as f64);
+    (0..count)
+        .map(|i| {
+            let unit = (steps * i as f64 + DVec3::splat(0.5)).map(|x| x - x.floor());
+            // A small jitter hides the planes in which the recurrence lies.
+            let loose = DVec3::splat(0.12 * spacing);
+            let shift = DVec3::new(jitter(12, i), jitter(13, i), jitter(14, i)) * loose;
+            let center = (unit * 2.0 - DVec3::ONE) * (HALF_SIZE - loose) + shift;
+            // Many small, few large: the square of an even draw.
+            let draw = 0.5 + 0.5 * jitter(11, i);
+            let radius = spacing * (0.10 + 0.30 * draw * draw);
+            Sphere { center: center.as_vec3(), radius: radius as f32 }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUNTS: [usize; 4] = [1, 75, 750, 7500];
+
+    #[test]
+    fn every_count_gives_that_many_finite_spheres_inside_the_region() {
+        assert!(spheres(0).is_empty());
+        for count in COUNTS {
+            let spheres = spheres(count);
+            assert_eq!(spheres.len(), count);
+            for sphere in spheres {
+                assert!(sphere.radius > 0.0 && sphere.radius.is_finite(), "{count}: {sphere:?}");
+                assert!(sphere.center.abs().cmple(HALF_SIZE.as_vec3()).all(), "{count}: {sphere:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_machine_changes_a_bit_of_any_sphere() {
+        let fingerprints = [75, 750, 7500].map(|count| {
+            let spheres = spheres(count);
+            let numbers = spheres.iter().flat_map(|s| [s.center.x, s.center.y, s.center.z, s.radius]);
+            crate::fnv1a(numbers.flat_map(f32::to_le_bytes))
+        });
+        let pinned = [0xfc00_d4e2_6fbf_f38a, 0xbb9c_cd48_f5fe_ee71, 0x8b82_4c8d_585f_1de7];
+        assert_eq!(fingerprints, pinned, "{fingerprints:#x?}");
+    }
+
+    #[test]
+    fn no_sphere_holds_the_centre_of_another_and_few_touch() {
+        for count in [75, 750] {
+            let spheres = spheres(count);
+            let mut touching = 0;
+            for (i, a) in spheres.iter().enumerate() {
+                for b in &spheres[..i] {
+                    let distance = a.center.distance(b.center);
+                    assert!(distance > a.radius.max(b.radius), "{count}: {a:?} {b:?}");
+                    touching += usize::from(distance < a.radius + b.radius);
+                }
+            }
+            assert!(touching * 5 < count, "{touching} of {count}");
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! Stand-in for bijou: a ring with a brilliant-cut stone, shoulders of small stones, and a chain.
+//!
+//! Every stone is a whole standard brilliant (table, stars, bezels, girdle, pavilion), whatever its
+//! size, beside a smooth shank, prongs and beads, on a cushion of a few large polygons; the ring
+//! leans against the axes. World units are chosen so that the greedy MF tree costs about 1.7e7, as
+//! the original's did.
+
+use super::mesh_builder::{
+    MeshBuilder, about_x, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright,
+};
+use bvh_core::Triangle;
+use glam::{DAffine3, DMat3, DVec3};
+
+/// World units per inner radius of the shank.
+const UNIT: f64 = 118.0;
+
+/// Half the side of the cushion, in inner radii of the shank.
+const CUSHION: f64 = 2.6;
+
+/// The triangles of the scene; the same bytes at every call and on every machine.
+pub fn triangles() -> Vec<Triangle> {
+    let mut scene = MeshBuilder::default();
+    let lean = about_z(0.09) * about_x(0.045) * about_y(-0.03);
+    scene.place(&ring(), &placed(lean, DVec3::new(0.0, 0.0, 1.12)));
+    scene.place(&chain(44), &DAffine3::IDENTITY);
+    cushion(&mut scene);
+    for (x, y, size, turns) in [(2.1, -1.6, 0.22, 0.02), (0.4, -0.9, 0.17, 0.11), (-0.7, 1.0, 0.26, 0.07)] {
+        // Loose stones lie on their pavilion: girdle and culet touch the cushion.
+        let tilted = about_z(turns * 5.0) * about_y(0.39) * about_z(turns);
+        scene.place(&brilliant(), &placed(tilted * size, DVec3::new(x, y, padding(x, y) + 0.66 * size)));
+    }
+    scene.finish(UNIT, DVec3::ZERO)
+}
+
+/// A brilliant of girdle radius 1, its girdle plane at z = 0, its table up: 110 triangles.
+fn brilliant() -> MeshBuilder {
+    let mut stone = MeshBuilder::default();
+    let eighth = |k: usize| fraction(k, 8);
+    let table = |k: usize| on_circle(0.56, eighth(k), 0.33);
+    let star = |k: usize| on_circle(0.78, eighth(k) + 1.0 / 16.0, 0.2);
+    let girdle = |j: usize, z: f64| on_circle(1.0, fraction(j, 16), z);
+    let pavilion = |k: usize| on_circle(0.3, eighth(k) + 1.0 / 16.0, -0.66);
+    let (upper, lower, culet) = (0.02, -0.02, DVec3::new(0.0, 0.0, -0.88));
+    let corners: Vec<_> = (0..8).map(table).collect();
+    stone.polygon(&corners);
+    for k in 0..8 {
+        stone.triangle(table(k), star(k), table(k + 1));
+        stone.quad(table(k), star(k + 7), girdle(2 * k, upper), star(k));
+        for (j, end) in [(2 * k, 2 * k + 1), (2 * k + 1, 2 * k + 2)] {
+            stone.triangle(star(k), girdle(j, upper), girdle(end, upper));
+            stone.quad(girdle(j, upper), girdle(j, lower), girdle(end, lower), girdle(end, upper));
+            stone.triangle(pavilion(k), girdle(end, lower), girdle(j, lower));
+        }
+        stone.quad(girdle(2 * k, lower), pavilion(k + 7), culet, pavilion(k));
+    }
+    stone
+}
+
+/// The ring, its finger hole along y, the main stone above on the z axis; inner radius 1.
+fn ring() -> MeshBuilder {
+    let mut ring = MeshBuilder::default();
+    shank(&mut ring);
+    let stone = brilliant();
+    let head = 1.62;
+    ring.place(&stone, &placed(about_z(0.013) * 0.52, DVec3::Z * head));
+
+    // The setting: two gallery rails, a halo plate, six prongs bent over the girdle.
+    for (radius, z, thickness) in [(0.3, 1.22, 0.035), (0.46, 1.47, 0.04)] {
+        ring.place(&torus(radius, thickness, 40, 7), &upright(0.0, 0.0, 0.0, z));
+    }
+    let halo: Vec<_> = [(0.56, 1.5), (0.56, 1.54), (0.74, 1.54), (0.74, 1.48), (0.56, 1.5)].into();
+    ring.revolve(&halo, 56);
+    for k in 0..6 {
+        let bent =
+            [(0.2, 1.05), (0.34, 1.25), (0.48, 1.48), (0.545, 1.62), (0.54, 1.68), (0.5, 1.71), (0.43, 1.73)];
+        let path: Vec<_> = bent.map(|(r, z)| on_circle(r, fraction(k, 6) + 0.02, z)).into();
+        let side = on_circle(1.0, fraction(k, 6) + 0.27, 0.0);
+        ring.sweep(&path, side, &circle(0.045, 9), |i| 1.0 - 0.06 * i as f64);
+    }
+
+    // Halo stones in a circle, then pavé rows over both shoulders, beads between neighbours.
+    let bead = bead();
+    for k in 0..24 {
+        let at = |turns: f64, z: f64| upright(turns, 0.0, 0.0, 0.0) * upright(0.0, 0.65, 0.0, z);
+        ring.place(&stone, &(at(fraction(k, 24), 1.58) * small(0.076)));
+        for (shift, radial) in [(0.5, 0.075), (0.5, -0.075)] {
+            let between = at((k as f64 + shift) / 24.0, 1.55);
+            ring.place(&bead, &(between * upright(0.0, radial, 0.0, 0.0) * small(0.024)));
+        }
+    }
+    for row in [-1.0, 0.0, 1.0] {
+        for k in 0..34 {
+            // Stones run from 0.09 to 0.25 turns away from the head, smaller as the shank tapers.
+            let (half, i) = (if k < 17 { 1.0 } else { -1.0 }, k % 17);
+            let away = half * (0.082 + 0.0105 * i as f64 + 0.002 * row);
+            let size = 0.042 - 0.0009 * i as f64;
+            let seat = |away: f64, across: f64| {
+                placed(about_y(away), DVec3::ZERO)
+                    * placed(DMat3::IDENTITY, DVec3::new(0.0, across, surface(away, across)))
+            };
+            let lean = placed(about_x(-0.035 * row), DVec3::ZERO);
+            ring.place(&stone, &(seat(away, 0.105 * row) * lean * small(size)));
+            for (along, across) in [(-0.0053, 0.052), (0.0053, -0.052)] {
+                ring.place(&bead, &(seat(away + along, 0.105 * row + across) * small(0.016)));
+            }
+        }
+    }
+    ring
+}
+
+/// Half the width of the shank, `away` turns from the head.
+fn half_width(away: f64) -> f64 {
+    0.21 - 0.22 * away.abs()
+}
+
+/// Radius of the shank's domed outer surface, `away` turns from the head and `across` from its
+/// middle.
+fn surface(away: f64, across: f64) -> f64 {
+    let x = across / half_width(away);
+    1.19 - 0.14 * away.abs() - 0.08 * x * x * x * x
+}
+
+/// The shank: flat inside, domed outside, wider at the head; finer towards the head than at the
+/// back.
+fn shank(mesh: &mut MeshBuilder) {
+    let dome = 9;
+    let steps = 72;
+    mesh.grid(dome + 2, steps, |i, j| {
+        // A cubic spacing of the steps: most of them near the head, where the shoulders are.
+        let s = 2.0 * fraction(j, steps) - 1.0;
+        let away = 0.5 * s * (0.45 + 0.55 * s * s);
+        let width = half_width(away);
+        let (across, radius) = match i % (dome + 2) {
+            0 => (-width, 1.0),
+            k if k <= dome => {
+                let across = width * (2.0 * fraction(k - 1, dome - 1) - 1.0);
+                (across, surface(away, across))
+            }
+            _ => (width, 1.0),
+        };
+        about_y(away) * DVec3::new(0.0, across, radius)
+    });
+}
+
+/// The placement that shrinks a part to `size`.
+fn small(size: f64) -> DAffine3 {
+    DAffine3::from_scale(DVec3::splat(size))
+}
+
+/// A grain of metal between two stones: a coarse dome of radius 1.
+fn bead() -> MeshBuilder {
+    let mut bead = MeshBuilder::default();
+    bead.revolve(&[(1.0, -0.5), (1.0, 0.3), (0.6, 0.85), (0.0, 1.0)], 6);
+    bead
+}
+
+/// A torus about the z axis.
+fn torus(radius: f64, thickness: f64, segments: usize, sides: usize) -> MeshBuilder {
+    let profile: Vec<_> = (0..=sides)
+        .map(|i| on_circle(thickness, fraction(i, sides), 0.0))
+        .map(|corner| (radius + corner.x, corner.y))
+        .collect();
+    let mut torus = MeshBuilder::default();
+    torus.revolve(&profile, segments);
+    torus
+}
+
+/// A chain of `links` oval links, alternately flat and on edge, laid in a wave around the ring.
+fn chain(links: usize) -> MeshBuilder {
+    let mut chain = MeshBuilder::default();
+    let link = torus(0.06, 0.016, 12, 6);
+    let at = |t: f64| {
+        let spot = on_circle(1.75 + 0.22 * cos_sin(2.5 * t).0, 0.55 + 0.8 * t, 0.0);
+        spot.with_z(padding(spot.x, spot.y) + 0.05)
+    };
+    for k in 0..links {
+        let (before, here, after) =
+            (at(fraction(k, links)), at(fraction(2 * k + 1, 2 * links)), at(fraction(k + 1, links)));
+        let along = (after - before).normalize();
+        let across = DVec3::Z.cross(along).normalize();
+        let heading = DMat3::from_cols(along, across, along.cross(across));
+        let roll = if k % 2 == 0 { 0.02 } else { 0.23 };
+        let stretch = DMat3::from_diagonal(DVec3::new(1.7, 1.0, 1.0));
+        chain.place(&link, &placed(heading * about_x(roll) * stretch, here));
+    }
+    chain
+}
+
+/// A padded top over a plain box.
+fn cushion(mesh: &mut MeshBuilder) {
+    mesh.cuboid(DVec3::new(-CUSHION, -CUSHION, -0.9), DVec3::new(CUSHION, CUSHION, -0.35));
+    mesh.grid(20, 20, |i, j| {
+        let (x, y) = (CUSHION * (2.0 * fraction(i, 20) - 1.0), CUSHION * (2.0 * fraction(j, 20) - 1.0));
+        DVec3::new(x, y, padding(x, y))
+    });
+}
+
+/// Height of the cushion's top; its middle, under the ring, is dented.
+fn padding(x: f64, y: f64) -> f64 {
+    let (u, v) = (x * x / (CUSHION * CUSHION), y * y / (CUSHION * CUSHION));
+    0.36 * (1.0 - u * u) * (1.0 - v * v) - 0.35 - 0.12 / (1.0 + 12.0 * (u + v))
+}

@@ -1,0 +1,352 @@
+//! Stand-in for Cloister: an arcaded courtyard with vaulted walks, tiled roofs and a well.
+//!
+//! Twin columns with base, leaved capital and abacus carry moulded round arches; behind them groin
+//! vaults with ribs; outside, walls of a few large polygons. Shafts, ribs and tiles are long and
+//! thin. Nothing is irregular, but the walks differ in length, columns stand turned, and the gate,
+//! the well and the garden lie oblique. World units are chosen so that the greedy MF tree costs
+//! about 1.8e9, as the original's did.
+
+use super::mesh_builder::{
+    MeshBuilder, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright,
+};
+use bvh_core::Triangle;
+use glam::{DMat3, DVec3};
+use std::f64::consts::SQRT_2;
+
+/// World units per metre.
+const UNIT: f64 = 138.0;
+/// Width of a bay and depth of the walk, metres.
+const BAY: f64 = 3.6;
+/// Height of the parapet on which the columns stand, metres.
+const PARAPET: f64 = 0.7;
+/// Height of the arches' springing, metres.
+const SPRING: f64 = 3.0;
+/// Height of wall plate and eaves, metres.
+const EAVES: f64 = 5.4;
+
+/// The triangles of the scene; the same bytes at every call and on every machine.
+pub fn triangles() -> Vec<Triangle> {
+    let mut cloister = MeshBuilder::default();
+    // Court sides in bays: long walks along x, short ones along y.
+    let (long, short) = (9, 7);
+    let half = DVec3::new(long as f64, short as f64, 0.0) * (0.5 * BAY);
+    let parts = Parts::new();
+    for (turns, bays, offset) in
+        [(0.0, long, half.y), (0.25, short, half.x), (0.5, long, half.y), (0.75, short, half.x)]
+    {
+        // Each walk is built along +x with the court on its +y side, its corner vault at its far
+        // end.
+        cloister.place(&walk(&parts, bays), &(upright(turns, 0.0, 0.0, 0.0) * upright(0.0, 0.0, -offset, 0.0)));
+    }
+    court(&mut cloister, half);
+    cloister.place(&well(), &upright(0.037, 2.1, -1.4, 0.0));
+    cloister.finish(UNIT, DVec3::new(1250.0, -430.0, 75.0))
+}
+
+/// The pieces that are repeated in every bay.
+struct Parts {
+    column: MeshBuilder,
+    arch: MeshBuilder,
+    vault: MeshBuilder,
+    tile: MeshBuilder,
+}
+
+impl Parts {
+    fn new() -> Self {
+        let mut tile = MeshBuilder::default();
+        // A barrel tile of length 1 down the slope, slightly conical.
+        tile.grid(3, 1, |i, j| {
+            let (c, s) = cos_sin(0.5 * fraction(i, 3));
+            let width = 0.15 - 0.02 * j as f64;
+            DVec3::new(width * c, j as f64 * 1.06, width * s)
+        });
+        Self { column: column(), arch: arcade_arch(), vault: vault(), tile }
+    }
+}
+
+/// One column on z = 0, 2.3 m high.
+fn column() -> MeshBuilder {
+    let mut column = MeshBuilder::default();
+    let square = |mesh: &mut MeshBuilder, half: f64, low: f64, high: f64| {
+        mesh.cuboid(DVec3::new(-half, -half, low), DVec3::new(half, half, high));
+    };
+    square(&mut column, 0.17, 0.0, 0.12);
+    // Attic base: torus, scotia, torus; then one long quad per side of the shaft, a necking, and
+    // the bell.
+    let base =
+        [(0.17, 0.12), (0.175, 0.15), (0.165, 0.18), (0.135, 0.2), (0.13, 0.22), (0.145, 0.25), (0.12, 0.28)];
+    let bell = [(0.1, 1.8), (0.115, 1.83), (0.1, 1.86), (0.105, 2.0), (0.13, 2.1), (0.18, 2.18)];
+    let profile: Vec<_> = base.into_iter().chain(bell).collect();
+    column.revolve(&profile, 12);
+    square(&mut column, 0.19, 2.18, 2.24);
+    square(&mut column, 0.22, 2.24, 2.3);
+    for k in 0..8 {
+        // Leaves in two rows, curling outwards at the tip.
+        let (low, tall) = if k % 2 == 0 { (1.87, 0.22) } else { (1.93, 0.24) };
+        let mut leaf = MeshBuilder::default();
+        leaf.grid(2, 4, |i, j| {
+            let (u, v) = (fraction(i, 2) - 0.5, fraction(j, 4));
+            let width = 0.085 * (1.0 - v * v * v) + 0.012;
+            DVec3::new(
+                0.108 + 0.085 * v * v * v + 0.01 * (1.0 - 4.0 * u * u),
+                u * width,
+                low + tall * (v - 0.35 * v * v * v),
+            )
+        });
+        column.place(&leaf, &upright(fraction(k, 8) + 0.021, 0.0, 0.0, 0.0));
+    }
+    column
+}
+
+/// The arch over one bay with its moulding on both faces; springs at z = 0, centred on x = 0.
+fn arcade_arch() -> MeshBuilder {
+    let mut arch = MeshBuilder::default();
+    let radius = 0.5 * BAY - 0.42;
+    arch.arch(radius, 0.5 * BAY, EAVES - SPRING, 0.5, 14);
+    for face in [-0.25, 0.25] {
+        let path: Vec<_> = (0..=14)
+            .map(|k| cos_sin(0.5 * fraction(k, 14)))
+            .map(|(c, s)| DVec3::new(radius * c, face, radius * s))
+            .collect();
+        let profile = [(0.0, 0.0), (0.0, 0.05), (-0.07, 0.09), (-0.12, 0.05), (-0.2, 0.07), (-0.24, 0.0)];
+        let outwards = profile.map(|(x, y)| (x, if face > 0.0 { -y } else { y }));
+        arch.sweep(&path, DVec3::Y, &outwards, |_| 1.0);
+    }
+    arch
+}
+
+/// A groin vault over one square bay, centred on the z axis, springing at z = 0: the lower envelope
+/// of two barrels is left open, so four webs meet in the groins; diagonal ribs run below these.
+fn vault() -> MeshBuilder {
+    let mut vault = MeshBuilder::default();
+    let half = 0.5 * BAY;
+    let crown = |t: f64| cos_sin(0.25 * t);
+    for k in 0..4 {
+        // One web: from the groin (|y| = x) to the wall arch at x = half, courses parallel to y.
+        let mut web = MeshBuilder::default();
+        web.grid(6, 6, |i, j| {
+            let (c, s) = crown(fraction(j, 6));
+            let reach = half * c;
+            let y = (2.0 * fraction(i, 6) - 1.0) * reach;
+            DVec3::new(reach, y, half * s)
+        });
+        vault.place(&web, &upright(0.25 * k as f64, 0.0, 0.0, 0.0));
+    }
+    for turns in [0.125, 0.375] {
+        let path: Vec<_> = (0..=14)
+            .map(|k| cos_sin(0.5 * fraction(k, 14)))
+            .map(|(c, s)| about_z(turns) * DVec3::new(half * SQRT_2 * c, 0.0, half * s - 0.02))
+            .collect();
+        let rib = [(0.05, -0.07), (0.09, 0.0), (0.05, 0.07), (-0.03, 0.07), (-0.03, -0.07)];
+        vault.sweep(&path, about_z(turns) * DVec3::Y, &rib, |_| 1.0);
+    }
+    vault.place(&boss(), &upright(0.05, 0.0, 0.0, half - 0.2));
+    vault
+}
+
+/// The keystone where the ribs of a vault cross.
+fn boss() -> MeshBuilder {
+    let mut boss = MeshBuilder::default();
+    boss.revolve(&[(0.0, 0.0), (0.1, 0.02), (0.18, 0.08), (0.2, 0.16), (0.17, 0.2)], 10);
+    boss
+}
+
+/// A walk of `bays` bays along x, centred, its arcade in the plane y = 0 and its back wall at y =
+/// −`BAY`.
+fn walk(parts: &Parts, bays: usize) -> MeshBuilder {
+    let mut walk = MeshBuilder::default();
+    let start = -0.5 * BAY * bays as f64;
+    let end = -start;
+    let back = -BAY - 0.25;
+    walk.cuboid(DVec3::new(start, -0.3, 0.0), DVec3::new(end, 0.3, PARAPET));
+    walk.sweep(
+        &[DVec3::new(start, 0.0, PARAPET), DVec3::new(end, 0.0, PARAPET)],
+        DVec3::Z,
+        &[(0.36, 0.0), (0.36, 0.06), (0.31, 0.1), (-0.31, 0.1), (-0.36, 0.06), (-0.36, 0.0)],
+        |_| 1.0,
+    );
+    for bay in 0..=bays {
+        let x = start + BAY * bay as f64;
+        // Bays run on into the corner, where the vault is shared and no arch stands.
+        let middle = x + 0.5 * BAY;
+        walk.place(&parts.vault, &upright(0.0, middle, -0.5 * BAY - 0.1, SPRING));
+        if bay < bays {
+            for (turns, y) in [(0.003 * bay as f64, -0.18), (0.002 * bay as f64 - 0.01, 0.18)] {
+                walk.place(&parts.column, &upright(turns, x, y, PARAPET));
+            }
+            walk.place(&parts.arch, &upright(0.0, middle, 0.0, SPRING));
+            buttress(&mut walk, x);
+        }
+        paving(&mut walk, x, bay);
+    }
+    let bed = |x: f64, y: f64| DVec3::new(x, y, -0.02);
+    let outer = end - back;
+    walk.quad(bed(start, 0.0), bed(end, 0.0), bed(outer, back), bed(-outer, back));
+    // The back wall: three polygons with a doorway between them, closed above by its arch.
+    let door = start + BAY * (0.5 + (bays / 2) as f64);
+    let upright_quad = |mesh: &mut MeshBuilder, from: f64, to: f64, low: f64, high: f64| {
+        let at = |x: f64, z: f64| DVec3::new(x, back, z);
+        mesh.quad(at(from, low), at(to, low), at(to, high), at(from, high));
+    };
+    upright_quad(&mut walk, -outer, door - 1.0, 0.0, 6.9);
+    upright_quad(&mut walk, door + 1.0, outer, 0.0, 6.9);
+    upright_quad(&mut walk, door - 1.0, door + 1.0, 4.2, 6.9);
+    let mut doorway = MeshBuilder::default();
+    doorway.arch(0.8, 1.0, 1.7, 0.4, 18);
+    for x in [-1.0, 0.8] {
+        doorway.cuboid(DVec3::new(x, -0.2, -2.5), DVec3::new(x + 0.2, 0.2, 0.0));
+    }
+    // The door leaf stands ajar.
+    let mut leaf = MeshBuilder::default();
+    leaf.cuboid(DVec3::ZERO, DVec3::new(1.5, 0.06, 2.4));
+    for z in [0.4, 1.2, 2.0] {
+        leaf.cuboid(DVec3::new(0.0, -0.02, z), DVec3::new(1.1, 0.08, z + 0.06));
+    }
+    doorway.place(&leaf, &upright(0.079, -0.78, 0.1, -2.5));
+    walk.place(&doorway, &upright(0.0, door, back, 2.5));
+    roof(&mut walk, parts, end);
+    walk
+}
+
+/// A slender stepped pier against the arcade's court side.
+fn buttress(mesh: &mut MeshBuilder, x: f64) {
+    let at = |dx: f64, y: f64, z: f64| DVec3::new(x + dx, y, z);
+    for (depth, low, high) in [(0.52, 3.1, 3.9), (0.42, 3.9, 4.9)] {
+        mesh.cuboid(at(-0.14, 0.25, low), at(0.14, depth, high));
+    }
+    mesh.quad(at(-0.14, 0.42, 4.9), at(0.14, 0.42, 4.9), at(0.14, 0.25, 5.2), at(-0.14, 0.25, 5.2));
+}
+
+/// The floor of one bay: a border of long slabs around a lozenge of square tiles, whose size
+/// changes from bay to bay.
+fn paving(mesh: &mut MeshBuilder, x: f64, bay: usize) {
+    let tiles = 3 + bay % 3;
+    let (middle, half) = (DVec3::new(x + 0.5 * BAY, -0.5 * BAY - 0.1, 0.0), 0.5 * BAY - 0.3);
+    for k in 0..4 {
+        let corner = |i: usize, reach: f64| middle + on_circle(reach * SQRT_2, fraction(2 * i + 1, 8), 0.0);
+        mesh.quad(corner(k, half), corner(k, half + 0.3), corner(k + 1, half + 0.3), corner(k + 1, half));
+        let tip = middle + on_circle(half, fraction(k, 4), 0.0);
+        let next = middle + on_circle(half, fraction(k + 1, 4), 0.0);
+        mesh.triangle(tip, corner(k, half), next);
+    }
+    mesh.grid(tiles, tiles, |i, j| {
+        let (u, v) = (fraction(i, tiles) - 0.5, fraction(j, tiles) - 0.5);
+        middle + DVec3::new((u - v) * half, (u + v) * half, 0.0)
+    });
+}
+
+/// The lean-to roof over a walk, `half` its arcade's half length: rafters below, boarding in five
+/// panels, rows of barrel tiles above; mitred at both corners.
+fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
+    let (eaves, ridge) = (DVec3::new(0.0, 0.7, EAVES), DVec3::new(0.0, -BAY - 0.25, EAVES + 1.5));
+    let slope = (ridge - eaves).length();
+    let up = (ridge - eaves) / slope;
+    let normal = up.cross(DVec3::X);
+    let along = |x: f64| DVec3::X * x;
+    let (low, high) = (half - eaves.y, half - ridge.y);
+    mesh.grid(5, 1, |i, j| {
+        let side = 2.0 * fraction(i, 5) - 1.0;
+        if j == 0 { eaves + along(side * low) } else { ridge + along(side * high) }
+    });
+    let rafters = (2.0 * low / 0.9) as usize;
+    let beam = [(0.05, -0.12), (0.05, -0.02), (-0.05, -0.02), (-0.05, -0.12)];
+    for k in 0..rafters {
+        let foot = eaves + along(low * (2.0 * fraction(2 * k + 1, 2 * rafters) - 1.0));
+        mesh.sweep(&[foot, foot + up * (slope - 0.1)], normal, &beam, |_| 1.0);
+    }
+    let rows = 6;
+    let columns = (2.0 * high / 0.5) as usize;
+    let length = slope / rows as f64;
+    let frame = DMat3::from_cols(DVec3::X, up * length, normal);
+    for i in 0..columns {
+        let x = high * (2.0 * fraction(2 * i + 1, 2 * columns) - 1.0);
+        for j in 0..rows {
+            let limit = low + (high - low) * fraction(2 * j + 1, 2 * rows);
+            if x.abs() < limit {
+                mesh.place(
+                    &parts.tile,
+                    &placed(frame, eaves + along(x) + up * (length * j as f64) + normal * 0.02),
+                );
+            }
+        }
+    }
+}
+
+/// The garden: paths that cross obliquely over one lawn, and hedges of plain boxes.
+fn court(mesh: &mut MeshBuilder, half: DVec3) {
+    let inner = half - DVec3::new(0.25, 0.25, 0.0);
+    let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+    mesh.grid(3, 2, |i, j| at(inner.x * (2.0 * fraction(i, 3) - 1.0), inner.y * (j as f64 - 1.0), -0.1));
+    for (turns, length) in [(0.037, 14.0), (0.287, 11.0)] {
+        let mut path = MeshBuilder::default();
+        let stones = 18;
+        path.grid(stones, 2, |i, j| {
+            at((2.0 * fraction(i, stones) - 1.0) * length, 0.7 * (j as f64 - 1.0), -0.06)
+        });
+        mesh.place(&path, &upright(turns, 2.1, -1.4, 0.0));
+        for (x, y) in [(3.0, 1.0), (3.0, -1.6), (-9.0, 1.0), (-9.0, -1.6)] {
+            let mut hedge = MeshBuilder::default();
+            hedge.cuboid(at(x, y, -0.1), at(x + 6.0, y + 0.6, 0.55));
+            mesh.place(&hedge, &upright(turns, 2.1, -1.4, 0.0));
+        }
+    }
+}
+
+/// The well: three octagonal steps, a carved round kerb, an iron yoke with chain and bucket.
+fn well() -> MeshBuilder {
+    let mut well = MeshBuilder::default();
+    well.revolve(&[(2.0, -0.1), (2.0, 0.1), (1.65, 0.1), (1.65, 0.3), (1.3, 0.3), (1.3, 0.5), (0.7, 0.5)], 8);
+    let kerb = [
+        (0.95, 0.5),
+        (0.98, 0.6),
+        (0.88, 0.68),
+        (0.84, 1.1),
+        (0.92, 1.2),
+        (0.98, 1.28),
+        (0.95, 1.36),
+        (0.7, 1.36),
+        (0.7, -2.5),
+    ];
+    well.revolve(&kerb, 36);
+    for k in 0..12 {
+        // Blind arches around the kerb.
+        let mut niche = MeshBuilder::default();
+        niche.arch(0.13, 0.2, 0.19, 0.05, 8);
+        well.place(&niche, &(upright(fraction(k, 12), 0.0, 0.0, 0.0) * upright(0.25, 0.88, 0.0, 0.88)));
+    }
+    let yoke: Vec<_> = (0..=20)
+        .map(|k| cos_sin(0.5 * fraction(k, 20)))
+        .map(|(c, s)| DVec3::new(0.83 * c, 0.0, 1.36 + 1.9 * libm::sqrt(s)))
+        .collect();
+    well.sweep(&yoke, DVec3::Y, &circle(0.035, 7), |_| 1.0);
+    let mut link = MeshBuilder::default();
+    let ring: Vec<_> =
+        (0..=6).map(|i| on_circle(0.012, fraction(i, 6), 0.0)).map(|p| (0.03 + p.x, p.y)).collect();
+    link.revolve(&ring, 9);
+    for k in 0..18 {
+        let turned = about_z(if k % 2 == 0 { 0.02 } else { 0.27 }) * about_y(0.25);
+        well.place(&link, &placed(turned, DVec3::new(0.0, 0.0, 3.2 - 0.05 * k as f64)));
+    }
+    well.place(&bucket(), &upright(0.06, 0.0, 0.0, 1.95));
+    well
+}
+
+/// A wooden bucket, hoops included.
+fn bucket() -> MeshBuilder {
+    let mut bucket = MeshBuilder::default();
+    bucket.revolve(
+        &[
+            (0.0, 0.0),
+            (0.16, 0.0),
+            (0.165, 0.08),
+            (0.175, 0.08),
+            (0.175, 0.12),
+            (0.19, 0.36),
+            (0.175, 0.36),
+            (0.15, 0.03),
+            (0.0, 0.03),
+        ],
+        14,
+    );
+    bucket
+}

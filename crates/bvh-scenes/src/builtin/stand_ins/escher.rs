@@ -1,0 +1,249 @@
+//! Stand-in for escher: staircases that interlock under three directions of gravity.
+//!
+//! After the print 'Relativity'. Each gravity has its own flights, landings, arcade and balustrades in one room; the
+//! flights differ in length, place and bearing, so that no symmetry of the axes decides a split. Walls and
+//! floors are a few large polygons. World units are chosen so that the greedy MF tree costs about
+//! 4.8e5, as the original's did.
+
+use super::mesh_builder::{MeshBuilder, about_z, circle, cos_sin, fraction, on_circle, placed, upright};
+use bvh_core::Triangle;
+use glam::{DMat3, DVec3};
+
+/// World units per tread depth.
+const UNIT: f64 = 2.17;
+/// Height of a step, in tread depths.
+const RISE: f64 = 0.62;
+/// Height of a handrail, in tread depths.
+const RAIL: f64 = 2.6;
+/// Side of the room, in tread depths.
+const ROOM: f64 = 30.0;
+
+/// The triangles of the scene; the same bytes at every call and on every machine.
+pub fn triangles() -> Vec<Triangle> {
+    let mut room = MeshBuilder::default();
+    // Cyclic changes of the axes: each column set sends 'up' to another axis.
+    let gravities = [
+        DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::Z),
+        DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X),
+        DMat3::from_cols(DVec3::Z, DVec3::X, DVec3::Y),
+    ];
+    let plans = [
+        Plan {
+            first: 13,
+            second: 9,
+            width: 3.6,
+            x: 3.0,
+            y: 4.5,
+            oblique: 0.038,
+            bays: 3,
+            climbs_beneath: true,
+        },
+        Plan {
+            first: 10,
+            second: 11,
+            width: 3.0,
+            x: 7.0,
+            y: 9.0,
+            oblique: -0.061,
+            bays: 2,
+            climbs_beneath: false,
+        },
+        Plan {
+            first: 15,
+            second: 7,
+            width: 2.6,
+            x: 2.0,
+            y: 14.0,
+            oblique: 0.094,
+            bays: 4,
+            climbs_beneath: true,
+        },
+    ];
+    for (gravity, plan) in gravities.into_iter().zip(&plans) {
+        room.place(&storey(plan), &placed(gravity, DVec3::ZERO));
+    }
+    room.place(&spiral(22), &upright(0.11, 26.0, 25.5, 0.0));
+    room.finish(UNIT, DVec3::ZERO)
+}
+
+/// What distinguishes one gravity's staircases from the other two.
+struct Plan {
+    first: usize,
+    second: usize,
+    width: f64,
+    x: f64,
+    y: f64,
+    oblique: f64,
+    bays: usize,
+    climbs_beneath: bool,
+}
+
+/// One gravity's floor, flights, landings and arcade; up is z.
+fn storey(plan: &Plan) -> MeshBuilder {
+    let mut storey = MeshBuilder::default();
+    storey.grid(3, 2, |i, j| DVec3::new(fraction(i, 3), fraction(j, 2), 0.0) * ROOM);
+
+    // First flight along x to a landing, second along y to a gallery, third down at an angle of its
+    // own.
+    let (width, deep) = (plan.width, plan.width + 1.0);
+    let (low, high) = (plan.first as f64 * RISE, (plan.first + plan.second) as f64 * RISE);
+    let turn = plan.x + plan.first as f64;
+    storey.place(&flight(plan.first, width, plan.climbs_beneath), &upright(0.0, plan.x, plan.y, 0.0));
+    landing(&mut storey, DVec3::new(turn, plan.y, low), deep, width);
+    storey.place(&flight(plan.second, width, false), &upright(0.25, turn + deep, plan.y + width, low));
+    let gallery = plan.y + width + plan.second as f64;
+    landing(&mut storey, DVec3::new(turn, gallery, high), deep, deep);
+    let bearing = 0.5 + plan.oblique;
+    let down = high - 8.0 * RISE;
+    let (c, s) = cos_sin(bearing);
+    // The descending flight is an ascending one seen from its foot.
+    let foot = DVec3::new(turn + 8.0 * c, gallery + 8.0 * s + width, down);
+    storey
+        .place(&flight(8, width, plan.climbs_beneath), &upright(plan.oblique, foot.x, foot.y - width, foot.z));
+    landing(&mut storey, foot + DVec3::new(-3.0, -width, 0.0), 3.0, width);
+
+    // The arcade that carries the gallery, a doorway in the back wall, and a free-standing oblique
+    // gate.
+    for bay in 0..plan.bays {
+        let x = turn + deep - 2.2 - 4.4 * bay as f64;
+        storey.place(&gate(1.7, 2.2, high - 3.3, 9), &upright(0.0, x, gallery + deep, 0.0));
+    }
+    storey.place(&gate(1.9, 4.0, 4.2, 14), &upright(0.25, ROOM - 0.5, plan.y + 11.0, 0.0));
+    storey.place(&gate(1.4, 2.0, 3.1, 10), &upright(2.6 * plan.oblique, plan.x + 6.0, plan.y + 9.0, 0.0));
+    storey
+}
+
+/// A flight of `steps` along x with balustrades on both sides; its underside is a slope or, upside
+/// down, stairs too.
+fn flight(steps: usize, width: f64, climbs_beneath: bool) -> MeshBuilder {
+    let mut flight = MeshBuilder::default();
+    let run = steps as f64;
+    let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z * RISE);
+    let depth = 2.5;
+    for k in 0..steps {
+        let x = k as f64;
+        let (y0, y1) = (0.0, width);
+        flight.quad(at(x, y0, x), at(x, y1, x), at(x, y1, x + 1.0), at(x, y0, x + 1.0));
+        flight.quad(at(x, y0, x + 1.0), at(x, y1, x + 1.0), at(x + 1.0, y1, x + 1.0), at(x + 1.0, y0, x + 1.0));
+        if climbs_beneath {
+            let z = x - depth;
+            flight.quad(at(x, y0, z), at(x, y1, z), at(x + 1.0, y1, z), at(x + 1.0, y0, z));
+            flight.quad(
+                at(x + 1.0, y0, z),
+                at(x + 1.0, y1, z),
+                at(x + 1.0, y1, z + 1.0),
+                at(x + 1.0, y0, z + 1.0),
+            );
+        }
+        for y in [y0, y1] {
+            flight.triangle(at(x, y, x), at(x + 1.0, y, x + 1.0), at(x, y, x + 1.0));
+            if climbs_beneath {
+                flight.triangle(
+                    at(x, y, x - depth),
+                    at(x + 1.0, y, x - depth),
+                    at(x + 1.0, y, x + 1.0 - depth),
+                );
+            }
+        }
+    }
+    for y in [0.0, width] {
+        flight.quad(at(0.0, y, 0.0), at(run, y, run), at(run, y, run - depth), at(0.0, y, -depth));
+    }
+    if !climbs_beneath {
+        flight.quad(
+            at(0.0, 0.0, -depth),
+            at(0.0, width, -depth),
+            at(run, width, run - depth),
+            at(run, 0.0, run - depth),
+        );
+    }
+    for y in [0.15, width - 0.15] {
+        let feet: Vec<_> = (0..steps).map(|k| at(k as f64 + 0.5, y, k as f64 + 1.0)).collect();
+        balustrade(&mut flight, &feet);
+    }
+    flight
+}
+
+/// A slab with its near corner at `corner`, its top at that height, and a balustrade along its far
+/// side.
+fn landing(mesh: &mut MeshBuilder, corner: DVec3, length: f64, width: f64) {
+    mesh.cuboid(corner - DVec3::Z * 0.8, corner + DVec3::new(length, width, 0.0));
+    let posts = (length / 0.9) as usize;
+    let feet: Vec<_> =
+        (0..=posts).map(|k| corner + DVec3::new(0.2 + fraction(k, posts) * (length - 0.4), 0.2, 0.0)).collect();
+    balustrade(mesh, &feet);
+}
+
+/// Square balusters set on the diagonal at `feet`, a handrail over them, and a turned newel at
+/// either end.
+fn balustrade(mesh: &mut MeshBuilder, feet: &[DVec3]) {
+    let up = DVec3::Z * RAIL;
+    for &foot in feet {
+        let mut baluster = MeshBuilder::default();
+        baluster.revolve(&[(0.08, 0.0), (0.08, RAIL)], 4);
+        mesh.place(&baluster, &upright(0.0, foot.x, foot.y, foot.z));
+    }
+    let (Some(&first), Some(&last)) = (feet.first(), feet.last()) else {
+        return;
+    };
+    let rail = [(0.16, -0.08), (0.16, 0.06), (0.07, 0.14), (-0.07, 0.14), (-0.16, 0.06), (-0.16, -0.08)];
+    mesh.sweep(&[first + up, last + up], DVec3::Z, &rail, |_| 1.0);
+    for (end, turns) in [(first, 0.03), (last, 0.07)] {
+        let mut newel = MeshBuilder::default();
+        newel.revolve(&[(0.2, -0.4), (0.2, 2.2), (0.13, 2.4), (0.13, 2.8), (0.24, 3.0), (0.0, 3.3)], 5);
+        mesh.place(&newel, &upright(turns, end.x, end.y, end.z));
+    }
+}
+
+/// An arch on two square piers of height `pier`, with a moulding around it; stands on z = 0, passes
+/// along y.
+fn gate(radius: f64, half_width: f64, pier: f64, segments: usize) -> MeshBuilder {
+    let mut gate = MeshBuilder::default();
+    let mut arch = MeshBuilder::default();
+    arch.arch(radius, half_width, radius + 0.8, 1.0, segments);
+    let path: Vec<_> = (0..=segments)
+        .map(|k| cos_sin(0.5 * fraction(k, segments)))
+        .map(|(c, s)| DVec3::new(radius * c, -0.5, radius * s))
+        .collect();
+    arch.sweep(&path, DVec3::Y, &[(0.0, 0.0), (0.0, -0.12), (-0.12, -0.2), (-0.24, 0.0)], |_| 1.0);
+    gate.place(&arch, &placed(DMat3::IDENTITY, DVec3::Z * pier));
+    for (low, high) in [(-half_width, -radius), (radius, half_width)] {
+        gate.cuboid(DVec3::new(low, -0.5, 0.0), DVec3::new(high, 0.5, pier - 0.2));
+        gate.cuboid(DVec3::new(low - 0.1, -0.6, pier - 0.2), DVec3::new(high + 0.1, 0.6, pier));
+    }
+    gate
+}
+
+/// A spiral stair of `steps` wedges about a column, with a winding handrail.
+fn spiral(steps: usize) -> MeshBuilder {
+    let mut spiral = MeshBuilder::default();
+    let (per_step, rise, radius) = (0.062, 0.9, 3.4);
+    let height = steps as f64 * rise;
+    spiral.revolve(
+        &[(0.7, 0.0), (0.7, 0.3), (0.45, 0.6), (0.45, height), (0.6, height + 0.3), (0.0, height + 1.2)],
+        12,
+    );
+    for k in 0..steps {
+        let z = (k + 1) as f64 * rise;
+        let mut wedge = |drop: f64| {
+            let edge = |r: f64, end: usize| on_circle(r, (k + end) as f64 * per_step, z - drop);
+            let corners = [edge(0.4, 0), edge(radius, 0), edge(radius, 1), edge(0.4, 1)];
+            spiral.polygon(&corners);
+            corners
+        };
+        let (top, bottom) = (wedge(0.0), wedge(0.25));
+        for (i, j) in [(0, 1), (1, 2), (2, 3)] {
+            spiral.quad(top[i], top[j], bottom[j], bottom[i]);
+        }
+    }
+    let rail: Vec<_> = (0..=steps)
+        .map(|k| on_circle(radius - 0.2, (k as f64 + 0.5) * per_step, k as f64 * rise + rise + RAIL))
+        .collect();
+    for (k, &top) in rail.iter().enumerate().take(steps) {
+        let mut rod = MeshBuilder::default();
+        rod.revolve(&[(0.06, -RAIL), (0.06, 0.0)], 5);
+        spiral.place(&rod, &placed(about_z(k as f64 * per_step), top));
+    }
+    spiral.sweep(&rail, DVec3::Z, &circle(0.14, 7), |_| 1.0);
+    spiral
+}

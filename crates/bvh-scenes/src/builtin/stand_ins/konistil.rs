@@ -1,0 +1,339 @@
+//! Stand-in for konistil: a valley with town and railway, in millimetres on a map grid.
+//!
+//! Coordinates run into the millions, costs to 1e14, beside parts a few tens of units thick: rails,
+//! wires and lattice masts are long and thin; the terrain is one coarse sheet, fine only where the
+//! town stands. Ground, houses and trees are irregular by a small seeded jitter.
+
+use super::mesh_builder::{MeshBuilder, about_z, circle, cos_sin, fraction, jitter, placed, upright};
+use bvh_core::Triangle;
+use glam::{DMat3, DVec3};
+
+/// World units per metre.
+const UNIT: f64 = 1000.0;
+/// The map grid's coordinates of the valley's corner, world units.
+const ORIGIN: DVec3 = DVec3::new(5.2e5, 3.1e5, 4.0e4);
+/// Size of the terrain in metres.
+const SIZE: (f64, f64) = (2700.0, 2000.0);
+/// Terrain cells along x and y.
+const CELLS: (usize, usize) = (36, 27);
+/// Height of the railway, metres.
+const TRACK: f64 = 78.0;
+
+/// The triangles of the scene; the same bytes at every call and on every machine.
+pub fn triangles() -> Vec<Triangle> {
+    let mut valley = MeshBuilder::default();
+    terrain(&mut valley);
+    railway(&mut valley);
+    viaduct(&mut valley);
+    station(&mut valley);
+    town(&mut valley);
+    power_line(&mut valley);
+    forest(&mut valley);
+    valley.finish(UNIT, ORIGIN)
+}
+
+/// Height of the ground in metres: two slopes, a hill, and three octaves of value noise.
+fn ground(x: f64, y: f64) -> f64 {
+    let across = (y - course(x)) / SIZE.1;
+    let slope = 420.0 * across * across / (0.06 + across.abs());
+    let mut noise = 0.0;
+    for (octave, cell) in [400.0, 130.0, 45.0].into_iter().enumerate() {
+        noise += 0.055 * cell * value_noise(octave as u32, x / cell, y / cell);
+    }
+    // Level ground around station and town.
+    let (dx, dy) = ((x - 1500.0) / 700.0, (y - course(x) - 190.0) / 260.0);
+    let wild = 1.0 - 0.85 / (1.0 + dx * dx * dx * dx + dy * dy * dy * dy);
+    60.0 + slope * wild + noise * wild
+}
+
+/// Smooth noise in [−1, 1): jittered values on the integer lattice, interpolated with a cubic ease.
+fn value_noise(stream: u32, x: f64, y: f64) -> f64 {
+    let (i, j) = (x.floor(), y.floor());
+    let ease = |t: f64| t * t * (3.0 - 2.0 * t);
+    let (u, v) = (ease(x - i), ease(y - j));
+    let at = |a: f64, b: f64| jitter(stream, ((i + a + 64.0) * 512.0 + j + b + 64.0) as usize);
+    let low = at(0.0, 0.0) * (1.0 - u) + at(1.0, 0.0) * u;
+    let high = at(0.0, 1.0) * (1.0 - u) + at(1.0, 1.0) * u;
+    low * (1.0 - v) + high * v
+}
+
+/// The line that valley and railway follow: y in metres at x, oblique to the map and slightly
+/// curved.
+fn course(x: f64) -> f64 {
+    760.0 + 0.17 * x + 110.0 * cos_sin(x / 5200.0).1
+}
+
+/// A point on the railway, `aside` metres to its left.
+fn beside(x: f64, aside: f64, z: f64) -> DVec3 {
+    let along = heading(x);
+    DVec3::new(x - along.y * aside, course(x) + along.x * aside, z)
+}
+
+/// Unit direction of the railway at x.
+fn heading(x: f64) -> DVec3 {
+    DVec3::new(20.0, course(x + 10.0) - course(x - 10.0), 0.0).normalize()
+}
+
+/// Rotation that carries the x axis to the railway's direction at x.
+fn aligned(x: f64) -> DMat3 {
+    let along = heading(x);
+    DMat3::from_cols(along, DVec3::Z.cross(along), DVec3::Z)
+}
+
+/// The ground: two triangles per cell, 4 × 4 times as many within the town, without stitching.
+fn terrain(mesh: &mut MeshBuilder) {
+    for j in 0..CELLS.1 {
+        for i in 0..CELLS.0 {
+            let size = DVec3::new(SIZE.0 / CELLS.0 as f64, SIZE.1 / CELLS.1 as f64, 0.0);
+            let corner = DVec3::new(i as f64, j as f64, 0.0) * size;
+            let aside = corner.y - course(corner.x);
+            let near = (corner.x - 1500.0).abs() < 620.0 && (-150.0..460.0).contains(&aside);
+            let parts = if near { 4 } else { 1 };
+            mesh.grid(parts, parts, |a, b| {
+                let (x, y) = (corner.x + size.x * fraction(a, parts), corner.y + size.y * fraction(b, parts));
+                DVec3::new(x, y, ground(x, y))
+            });
+        }
+    }
+}
+
+/// Two tracks on an embankment: rails, sleepers near the station, masts and contact wires.
+fn railway(mesh: &mut MeshBuilder) {
+    let steps = 64;
+    let at = |k: usize| SIZE.0 * fraction(k, steps);
+    let bed = [(-14.0, TRACK - 9.0), (-6.0, TRACK - 0.6), (6.0, TRACK - 0.6), (14.0, TRACK - 9.0)];
+    mesh.grid(steps, bed.len() - 1, |k, row| beside(at(k), bed[row].0, bed[row].1));
+    let rail = [(0.035, 0.0), (0.035, 0.16), (-0.035, 0.16), (-0.035, 0.0)];
+    for aside in [-2.8, -1.3, 1.3, 2.8] {
+        let path: Vec<_> = (0..=steps).map(|k| beside(at(k), aside, TRACK)).collect();
+        mesh.sweep(&path, DVec3::Z, &rail, |_| 1.0);
+    }
+    let mut sleeper = MeshBuilder::default();
+    sleeper.cuboid(DVec3::new(-0.13, -1.3, -0.2), DVec3::new(0.13, 1.3, 0.0));
+    for k in 0..110 {
+        let x = 1428.0 + 1.3 * k as f64;
+        mesh.place(&sleeper, &placed(aligned(x), beside(x, if k % 2 == 0 { 2.05 } else { -2.05 }, TRACK)));
+    }
+    let spans = 48;
+    for k in 0..spans {
+        let (x, next) = (SIZE.0 * fraction(k, spans), SIZE.0 * fraction(k + 1, spans));
+        for side in [-1.0, 1.0] {
+            let foot = beside(x, 4.6 * side, TRACK - 0.6);
+            mesh.cuboid(foot - DVec3::new(0.15, 0.15, 0.0), foot + DVec3::new(0.15, 0.15, 8.0));
+            mesh.bar(beside(x, 4.6 * side, TRACK + 6.4), beside(x, 2.05 * side, TRACK + 6.0), 0.04, 4);
+            mesh.bar(beside(x, 2.05 * side, TRACK + 5.9), beside(next, 2.05 * side, TRACK + 5.9), 0.012, 3);
+        }
+    }
+}
+
+/// A viaduct that crosses valley and main line: round arches on tall tapered piers.
+fn viaduct(mesh: &mut MeshBuilder) {
+    let (spans, span) = (28, 24.0);
+    let mut bay = MeshBuilder::default();
+    let mut arch = MeshBuilder::default();
+    arch.arch(9.5, 12.0, 12.5, 7.0, 14);
+    bay.place(&arch, &upright(0.0, 0.0, 0.0, -13.5));
+    for y in [-3.6, 3.2] {
+        bay.cuboid(DVec3::new(-12.0, y, -1.0), DVec3::new(12.0, y + 0.4, 0.9));
+    }
+    let mut pier = MeshBuilder::default();
+    pier.revolve(&[(5.6, -75.0), (5.2, -60.0), (4.2, -14.5), (4.6, -14.2), (4.6, -13.5)], 4);
+    for k in 0..spans {
+        let place = placed(aligned(430.0) * about_z(0.231), beside(430.0, 0.0, 118.0))
+            * upright(0.0, span * (k as f64 - 13.5), 0.0, 0.0);
+        mesh.place(&bay, &place);
+        mesh.place(&pier, &(place * upright(0.125, 12.0, 0.0, 0.0)));
+    }
+}
+
+/// The station: a glazed barrel roof on ribs, platforms, a hall with a row of arches, a clock
+/// tower.
+fn station(mesh: &mut MeshBuilder) {
+    let mut station = MeshBuilder::default();
+    let (length, half, ribs) = (140.0, 19.0, 15);
+    let vault = |t: f64, x: f64, reach: f64| {
+        let (c, s) = cos_sin(0.5 * t);
+        DVec3::new(x, -reach * c, 7.0 + 0.62 * reach * s)
+    };
+    station.grid(24, ribs - 1, |i, j| vault(fraction(i, 24), length * (fraction(j, ribs - 1) - 0.5), half));
+    for j in 0..ribs {
+        let x = length * (fraction(j, ribs - 1) - 0.5);
+        let path: Vec<_> = (0..=18).map(|i| vault(fraction(i, 18), x, half - 0.3)).collect();
+        station.sweep(&path, DVec3::X, &[(-0.2, -0.12), (0.2, -0.12), (0.2, 0.12), (-0.2, 0.12)], |_| 1.0);
+        for y in [-half, half] {
+            let mut post = MeshBuilder::default();
+            post.revolve(&[(0.45, 0.0), (0.25, 0.6), (0.2, 6.4), (0.5, 7.0)], 8);
+            station.place(&post, &upright(0.02, x, y, 0.0));
+        }
+    }
+    for (low, high) in [(-12.0, -4.2), (4.2, 17.0)] {
+        station.cuboid(DVec3::new(-0.7 * length, low, -0.6), DVec3::new(0.7 * length, high, 0.75));
+    }
+    let mut bay = MeshBuilder::default();
+    bay.arch(2.6, 3.5, 4.2, 0.8, 12);
+    for k in 0..14 {
+        station.place(&bay, &upright(0.0, 7.0 * (k as f64 - 6.5), 23.0, 4.0));
+        station.cuboid(
+            DVec3::new(7.0 * (k as f64 - 7.0) - 0.9, 22.6, 0.0),
+            DVec3::new(7.0 * (k as f64 - 7.0) + 0.9, 23.4, 4.0),
+        );
+    }
+    station.place(&house(98.0, 14.0, 9.0, 5.0), &upright(0.0, 0.0, 31.0, 0.0));
+    station.cuboid(DVec3::new(50.0, 24.0, 0.0), DVec3::new(58.0, 32.0, 27.0));
+    let mut cap = MeshBuilder::default();
+    cap.revolve(&[(6.4, 27.0), (5.0, 31.0), (1.2, 34.0), (0.9, 38.0), (0.0, 41.0)], 8);
+    station.place(&cap, &upright(1.0 / 16.0, 54.0, 28.0, 0.0));
+    mesh.place(&station, &placed(aligned(1500.0), beside(1500.0, 0.0, TRACK)));
+}
+
+/// A gabled house, `length` along x, with eaves, windows, a door and a chimney; stands on z = 0,
+/// sunk a little.
+fn house(length: f64, width: f64, wall: f64, gable: f64) -> MeshBuilder {
+    let mut house = MeshBuilder::default();
+    let (x, y) = (0.5 * length, 0.5 * width);
+    let at = |i: f64, j: f64, z: f64| DVec3::new(i, j, z);
+    for side in [-1.0, 1.0] {
+        house.quad(
+            at(-x, side * y, -4.0),
+            at(x, side * y, -4.0),
+            at(x, side * y, wall),
+            at(-x, side * y, wall),
+        );
+        let end = side * x;
+        house.polygon(&[
+            at(end, -y, -4.0),
+            at(end, y, -4.0),
+            at(end, y, wall),
+            at(end, 0.0, wall + gable),
+            at(end, -y, wall),
+        ]);
+        // The roof overhangs on all sides.
+        let eaves = wall - 0.7 * gable / y;
+        house.quad(
+            at(-x - 0.5, side * (y + 0.7), eaves),
+            at(x + 0.5, side * (y + 0.7), eaves),
+            at(x + 0.5, 0.0, wall + gable),
+            at(-x - 0.5, 0.0, wall + gable),
+        );
+        let windows = (length / 4.5) as usize;
+        for k in 0..windows {
+            let middle = length * (fraction(2 * k + 1, 2 * windows) - 0.5);
+            let face = side * (y + 0.05);
+            house.quad(
+                at(middle - 0.6, face, 1.2),
+                at(middle + 0.6, face, 1.2),
+                at(middle + 0.6, face, 2.9),
+                at(middle - 0.6, face, 2.9),
+            );
+        }
+    }
+    house.cuboid(at(0.22 * x, 0.3 * y, wall), at(0.22 * x + 0.9, 0.3 * y + 0.9, wall + gable + 0.8));
+    house
+}
+
+/// Streets of houses, each turned its own way, around a church on the rise behind the station.
+fn town(mesh: &mut MeshBuilder) {
+    for street in 0..6 {
+        for k in 0..40 {
+            let index = street * 40 + k;
+            let x = 1010.0 + 23.0 * k as f64 + 5.0 * jitter(20, index);
+            let aside = 88.0 + 55.0 * street as f64 + 9.0 * jitter(21, index);
+            let spot = beside(x, aside, 0.0);
+            let yard = spot - beside(1560.0, 225.0, 0.0);
+            if yard.length() < 52.0 {
+                continue; // the churchyard
+            }
+            let size =
+                (11.0 + 3.0 * jitter(22, index), 8.5 + 1.5 * jitter(23, index), 6.0 + 2.0 * jitter(24, index));
+            let turn = about_z(0.018 * jitter(25, index) + if index % 5 == 0 { 0.25 } else { 0.0 });
+            let part = house(size.0, size.1, size.2, 0.42 * size.1);
+            mesh.place(&part, &placed(aligned(x) * turn, spot + DVec3::Z * ground(spot.x, spot.y)));
+        }
+    }
+    let spot = beside(1560.0, 225.0, 0.0);
+    mesh.place(&church(), &placed(aligned(1560.0) * about_z(0.043), spot + DVec3::Z * ground(spot.x, spot.y)));
+}
+
+/// A church with nave, round apse and a tower with an octagonal spire.
+fn church() -> MeshBuilder {
+    let mut church = house(34.0, 14.0, 12.0, 8.0);
+    let mut apse = MeshBuilder::default();
+    apse.revolve(&[(5.5, -4.0), (5.5, 9.0), (5.9, 9.3), (0.0, 14.0)], 16);
+    church.place(&apse, &upright(0.0, 17.0, 0.0, 0.0));
+    church.cuboid(DVec3::new(-25.0, -4.0, -4.0), DVec3::new(-17.0, 4.0, 30.0));
+    let mut spire = MeshBuilder::default();
+    spire.revolve(&[(5.2, 29.5), (3.2, 34.0), (0.15, 62.0), (0.0, 64.0)], 8);
+    church.place(&spire, &upright(1.0 / 16.0, -21.0, 0.0, 0.0));
+    church
+}
+
+/// A power line on lattice masts over the hills, its wires sagging between them.
+fn power_line(mesh: &mut MeshBuilder) {
+    let masts = 10;
+    let foot = |k: usize| {
+        let (x, y) = (70.0 + 255.0 * k as f64, 220.0 + 26.0 * k as f64);
+        DVec3::new(x, y, ground(x, y))
+    };
+    let mast = mast();
+    // The arms stand across the line.
+    let along = (foot(1) - foot(0)).with_z(0.0).normalize();
+    let across = DMat3::from_cols(DVec3::Z.cross(along), -along, DVec3::Z);
+    for k in 0..masts {
+        mesh.place(&mast, &placed(across, foot(k)));
+        if k + 1 == masts {
+            continue;
+        }
+        for (aside, height) in [(-8.0, 30.0), (8.0, 30.0), (-6.0, 38.0), (6.0, 38.0), (0.0, 46.0)] {
+            let end = |k: usize| foot(k) + across * DVec3::new(aside, 0.0, height);
+            let path: Vec<_> = (0..=8)
+                .map(|i| fraction(i, 8))
+                .map(|t| end(k).lerp(end(k + 1), t) - DVec3::Z * (36.0 * t * (1.0 - t)))
+                .collect();
+            mesh.sweep(&path, DVec3::Z, &circle(0.03, 3), |_| 1.0);
+        }
+    }
+}
+
+/// A lattice mast of thin bars: four legs, cross braces in every storey, two arms.
+fn mast() -> MeshBuilder {
+    let mut mast = MeshBuilder::default();
+    let storeys = 5;
+    let corner = |k: usize, storey: usize| {
+        let t = fraction(storey, storeys);
+        let (c, s) = cos_sin(fraction(2 * k + 1, 8));
+        DVec3::new(c, s, 0.0) * (4.2 * (1.0 - t) + 0.7) + DVec3::Z * (46.0 * t)
+    };
+    for k in 0..4 {
+        mast.bar(corner(k, 0), corner(k, storeys), 0.11, 4);
+        for storey in 0..storeys {
+            mast.bar(corner(k, storey), corner(k + 1, storey + 1), 0.05, 3);
+            mast.bar(corner(k + 1, storey), corner(k, storey + 1), 0.05, 3);
+        }
+    }
+    for (reach, height) in [(8.0, 30.0), (6.0, 38.0)] {
+        for y in [-0.6, 0.6] {
+            for side in [-1.0, 1.0] {
+                mast.bar(DVec3::new(0.0, y, height + 2.0), DVec3::new(side * reach, 0.0, height), 0.06, 4);
+            }
+        }
+    }
+    mast
+}
+
+/// Firs on the slopes: a pyramid on a thin trunk.
+fn forest(mesh: &mut MeshBuilder) {
+    for k in 0..520 {
+        // Low-discrepancy spots (plastic number), left out where town and railway are.
+        let unit = |step: f64| (0.5 + step * k as f64) - (0.5 + step * k as f64).floor();
+        let (x, y) = (SIZE.0 * unit(0.754_877_666_246_692_8), SIZE.1 * unit(0.569_840_290_998_053_2));
+        let aside = y - course(x);
+        if (-120.0..420.0).contains(&aside) {
+            continue;
+        }
+        let mut fir = MeshBuilder::default();
+        let height = 17.0 + 6.0 * jitter(30, k);
+        fir.revolve(&[(0.3, -1.0), (0.3, 3.0)], 3);
+        fir.revolve(&[(0.24 * height, 2.5), (0.0, height)], 6);
+        mesh.place(&fir, &upright(jitter(31, k), x, y, ground(x, y)));
+    }
+}

@@ -1,0 +1,240 @@
+//! Turns surfaces, swept profiles and placed copies into triangles, for the mesh stand-ins.
+//!
+//! All coordinates are f64 until [`MeshBuilder::finish`] rounds each of them to f32 once. Angles are in
+//! turns, so that quarter turns are exact; sine and cosine come from `libm`, so that every machine
+//! gets the same bytes.
+
+use bvh_core::Triangle;
+use glam::{DAffine3, DMat3, DVec3};
+
+/// Triangles under construction, in the order in which they were added.
+#[derive(Default)]
+pub struct MeshBuilder {
+    triangles: Vec<[DVec3; 3]>,
+}
+
+impl MeshBuilder {
+    /// Adds one triangle.
+    pub fn triangle(&mut self, a: DVec3, b: DVec3, c: DVec3) {
+        self.triangles.push([a, b, c]);
+    }
+
+    /// Adds the quadrilateral `a b c d` as two triangles, split along `a c`.
+    pub fn quad(&mut self, a: DVec3, b: DVec3, c: DVec3, d: DVec3) {
+        self.triangle(a, b, c);
+        self.triangle(a, c, d);
+    }
+
+    /// Adds a convex polygon as a fan around its first corner; fewer than three corners add
+    /// nothing.
+    pub fn polygon(&mut self, corners: &[DVec3]) {
+        for pair in corners.windows(2).skip(1) {
+            self.triangle(corners[0], pair[0], pair[1]);
+        }
+    }
+
+    /// Adds a surface of `columns` × `rows` quadrilaterals with the corners `point(i, j)`, `i <=
+    /// columns`, `j <= rows`.
+    pub fn grid(&mut self, columns: usize, rows: usize, point: impl Fn(usize, usize) -> DVec3) {
+        for j in 0..rows {
+            for i in 0..columns {
+                self.quad(point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1));
+            }
+        }
+    }
+
+    /// Adds the surface of revolution of a `(radius, z)` profile about the z axis, with `segments`
+    /// sides.
+    pub fn revolve(&mut self, profile: &[(f64, f64)], segments: usize) {
+        self.grid(segments, profile.len().saturating_sub(1), |i, j| {
+            let (radius, z) = profile[j];
+            on_circle(radius, fraction(i, segments), z)
+        });
+    }
+
+    /// Sweeps a closed polygon along a path and closes both ends. The profile's first coordinate
+    /// points along `side` × path, its second completes the frame; `side` must not be parallel to
+    /// the path. The profile is multiplied by `scale(k)` at path point `k`.
+    pub fn sweep(&mut self, path: &[DVec3], side: DVec3, profile: &[(f64, f64)], scale: impl Fn(usize) -> f64) {
+        let Some(last) = path.len().checked_sub(1) else {
+            return;
+        };
+        let corner = |i: usize, k: usize| {
+            let tangent = (path[(k + 1).min(last)] - path[k.saturating_sub(1)]).normalize();
+            let across = side.cross(tangent).normalize();
+            let (x, y) = profile[i % profile.len()];
+            path[k] + (across * x + tangent.cross(across) * y) * scale(k)
+        };
+        self.grid(profile.len(), last, corner);
+        for k in [0, last] {
+            let cap: Vec<_> = (0..profile.len()).map(|i| corner(i, k)).collect();
+            self.polygon(&cap);
+        }
+    }
+
+    /// Adds a straight round bar of `sides` sides between two points that differ in x or y.
+    pub fn bar(&mut self, from: DVec3, to: DVec3, radius: f64, sides: usize) {
+        self.sweep(&[from, to], DVec3::Z, &circle(radius, sides), |_| 1.0);
+    }
+
+    /// Adds the 12 triangles of a box parallel to the axes.
+    pub fn cuboid(&mut self, min: DVec3, max: DVec3) {
+        let at = |i: usize| {
+            let pick = |bit: usize, low: f64, high: f64| if (i >> bit) & 1 == 0 { low } else { high };
+            DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z))
+        };
+        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        for [a, b, c, d] in sides {
+            self.quad(at(a), at(b), at(c), at(d));
+        }
+    }
+
+    /// Adds a wall of the given thickness, pierced by a round arch that springs from z = 0 at x =
+    /// ±`radius`: the two faces |x| <= `half_width`, z <= `top`, and the soffit between them, with
+    /// `segments` steps around the arch.
+    pub fn arch(&mut self, radius: f64, half_width: f64, top: f64, thickness: f64, segments: usize) {
+        let front = |i: usize, y: f64| {
+            let (c, s) = cos_sin(fraction(i, segments) * 0.5);
+            DVec3::new(radius * c, y, radius * s)
+        };
+        for y in [-0.5 * thickness, 0.5 * thickness] {
+            self.grid(segments, 1, |i, j| {
+                let arc = front(i, y);
+                if j == 0 { arc } else { DVec3::new(arc.x, y, top) }
+            });
+            for (inner, outer) in [(radius, half_width), (-half_width, -radius)] {
+                self.grid(1, 1, |i, j| {
+                    DVec3::new(if i == 0 { inner } else { outer }, y, if j == 0 { 0.0 } else { top })
+                });
+            }
+        }
+        self.grid(segments, 1, |i, j| front(i, if j == 0 { -0.5 } else { 0.5 } * thickness));
+    }
+
+    /// Adds a copy of `part`, moved by `placement`.
+    pub fn place(&mut self, part: &MeshBuilder, placement: &DAffine3) {
+        let moved = |corner: DVec3| placement.transform_point3(corner);
+        self.triangles.extend(part.triangles.iter().map(|triangle| triangle.map(moved)));
+    }
+
+    /// Multiplies by `unit`, adds `origin`, rounds to f32 and drops the triangles without area (a quadrilateral at a
+    /// pole gives one).
+    pub fn finish(self, unit: f64, origin: DVec3) -> Vec<Triangle> {
+        let rounded = |corner: DVec3| (corner * unit + origin).as_vec3();
+        let triangles = self.triangles.into_iter().map(|corners| Triangle(corners.map(rounded)));
+        triangles.filter(|triangle| !triangle.is_degenerate()).collect()
+    }
+}
+
+/// Cosine and sine of an angle in turns; exact at multiples of a quarter turn.
+pub fn cos_sin(turns: f64) -> (f64, f64) {
+    let within = turns - turns.floor();
+    let quarters = (within * 4.0).floor();
+    let rest = (within - quarters * 0.25) * std::f64::consts::TAU;
+    let (c, s) = (libm::cos(rest), libm::sin(rest));
+    match quarters as u32 {
+        1 => (-s, c),
+        2 => (-c, -s),
+        3 => (s, -c),
+        _ => (c, s),
+    }
+}
+
+/// The point at height `z` and distance `radius` from the z axis, `turns` around it from the x
+/// axis.
+pub fn on_circle(radius: f64, turns: f64, z: f64) -> DVec3 {
+    let (c, s) = cos_sin(turns);
+    DVec3::new(radius * c, radius * s, z)
+}
+
+/// A regular polygon of `sides` corners as a profile for [`MeshBuilder::sweep`].
+pub fn circle(radius: f64, sides: usize) -> Vec<(f64, f64)> {
+    (0..sides).map(|i| cos_sin(fraction(i, sides))).map(|(c, s)| (radius * c, radius * s)).collect()
+}
+
+/// `i / n`, the parameter of the i-th of n steps.
+pub fn fraction(i: usize, n: usize) -> f64 {
+    i as f64 / n as f64
+}
+
+/// Rotation about the x axis by an angle in turns.
+pub fn about_x(turns: f64) -> DMat3 {
+    let (c, s) = cos_sin(turns);
+    DMat3::from_cols(DVec3::X, DVec3::new(0.0, c, s), DVec3::new(0.0, -s, c))
+}
+
+/// Rotation about the y axis by an angle in turns.
+pub fn about_y(turns: f64) -> DMat3 {
+    let (c, s) = cos_sin(turns);
+    DMat3::from_cols(DVec3::new(c, 0.0, -s), DVec3::Y, DVec3::new(s, 0.0, c))
+}
+
+/// Rotation about the z axis by an angle in turns.
+pub fn about_z(turns: f64) -> DMat3 {
+    let (c, s) = cos_sin(turns);
+    DMat3::from_cols(DVec3::new(c, s, 0.0), DVec3::new(-s, c, 0.0), DVec3::Z)
+}
+
+/// The placement that turns a part by `rotation` and carries its origin to `origin`.
+pub fn placed(rotation: DMat3, origin: DVec3) -> DAffine3 {
+    DAffine3::from_mat3_translation(rotation, origin)
+}
+
+/// The placement that turns a part by `turns` about the z axis and carries its origin to (x, y, z).
+pub fn upright(turns: f64, x: f64, y: f64, z: f64) -> DAffine3 {
+    placed(about_z(turns), DVec3::new(x, y, z))
+}
+
+/// A number in [-1, 1) that depends on its two arguments only: the finalizer of MurmurHash3 over
+/// both, top 24 bits. Stand-ins use it where nature is irregular (scales, terrain, trees), nowhere
+/// else.
+pub fn jitter(stream: u32, index: usize) -> f64 {
+    let mut bits = (index as u32).wrapping_mul(0x9e37_79b9) ^ stream.wrapping_mul(0x27d4_eb2f);
+    bits = (bits ^ (bits >> 16)).wrapping_mul(0x85eb_ca6b);
+    bits = (bits ^ (bits >> 13)).wrapping_mul(0xc2b2_ae35);
+    bits ^= bits >> 16;
+    f64::from(bits >> 8) / f64::from(1_u32 << 23) - 1.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quarter_turns_are_exact_and_other_angles_lie_on_the_unit_circle() {
+        assert_eq!([0.0, 0.25, 0.5, -0.25].map(cos_sin), [(1.0, 0.0), (-0.0, 1.0), (-1.0, -0.0), (0.0, -1.0)]);
+        for i in 0..97 {
+            let (c, s) = cos_sin(fraction(i, 31) - 1.5);
+            assert!((c * c + s * s - 1.0).abs() < 1e-15, "{i}");
+        }
+    }
+
+    #[test]
+    fn a_cuboid_and_a_closed_sweep_enclose_their_volume() {
+        let volume = |mesh: &MeshBuilder| {
+            let six: f64 = mesh.triangles.iter().map(|[a, b, c]| a.cross(*b).dot(*c)).sum();
+            (six / 6.0).abs()
+        };
+        let mut cuboid = MeshBuilder::default();
+        cuboid.cuboid(DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0));
+        assert_eq!(volume(&cuboid), 6.0);
+        let mut bar = MeshBuilder::default();
+        bar.revolve(&[(0.0, 0.0), (1.0, 0.0), (1.0, 5.0), (0.0, 5.0)], 4);
+        assert!((volume(&bar) - 10.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn triangles_without_area_are_left_out() {
+        let mut cone = MeshBuilder::default();
+        cone.revolve(&[(1.0, 0.0), (0.0, 1.0)], 9);
+        assert_eq!(cone.triangles.len(), 18);
+        assert_eq!(cone.finish(1.0, DVec3::ZERO).len(), 9);
+    }
+
+    #[test]
+    fn jitter_stays_in_range_and_is_balanced() {
+        let draws: Vec<f64> = (0..1000).map(|i| jitter(7, i)).collect();
+        assert!(draws.iter().all(|x| (-1.0..1.0).contains(x)));
+        assert!(draws.iter().sum::<f64>().abs() < 60.0, "three standard deviations of the sum are about 55");
+    }
+}

@@ -1,0 +1,318 @@
+//! The stiff and extreme scenes: each a function of the number of objects, found by the identifier of its case.
+//!
+//! All consist of triangles, so that everything can be traced; a scene of boxes has in each box the triangle over its
+//! diagonal. The same number gives the same scene on every machine.
+
+use bvh_core::{Aabb, Triangle};
+use bvh_search::Stream;
+use glam::Vec3;
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+
+/// Makes a scene of so many triangles, or of about as many where no such scene exists.
+pub type Generator = fn(usize) -> Vec<Triangle>;
+
+/// Every stiff scene by the identifier of the case that builds and traces it. Cases that ask different things may have the
+/// same scene, and those that are not listed ask about rays, refusals, files or threads.
+pub const STIFF: [(&str, Generator); 31] = [
+    ("S01", uniform),
+    ("S02", uniform),
+    ("S03", uniform),
+    ("S04", identical_boxes),
+    ("S05", identical_points),
+    ("S06", concentric),
+    ("S07", identical_boxes),
+    ("S08", collinear_centres),
+    ("S09", planar_grid),
+    ("S10", on_a_line),
+    ("S11", facets),
+    ("S12", closed_box),
+    ("S13", closed_box),
+    ("S14", closed_box),
+    ("S17", degenerate),
+    ("S21", uniform),
+    ("S22", denormal),
+    ("S23", enormous),
+    ("S24", far_away),
+    ("S25", powers_of_two),
+    ("S26", sorted),
+    ("S27", teapot_in_a_stadium),
+    ("S28", giant_over_small),
+    ("S29", slivers),
+    ("S30", overlapping),
+    ("S31", two_densities),
+    ("S32", symmetric),
+    ("S33", uniform),
+    ("S34", tenfold),
+    ("S36", uniform),
+    ("S45", two_cubes),
+];
+
+/// The generator of the case `id`, such as `S34`.
+pub fn by_id(id: &str) -> Option<Generator> {
+    STIFF.iter().find(|(known, _)| *known == id).map(|(_, generator)| *generator)
+}
+
+/// The boxes of the triangles.
+pub fn boxes(triangles: &[Triangle]) -> Vec<Aabb> {
+    triangles.iter().map(Triangle::aabb).collect()
+}
+
+/// A triangle with this box.
+fn diagonal(Aabb { min, max }: Aabb) -> Triangle {
+    Triangle([min, max, Vec3::new(max.x, min.y, max.z)])
+}
+
+fn cube(min: Vec3, size: f32) -> Triangle {
+    diagonal(Aabb { min, max: min + size })
+}
+
+fn random(salt: u64) -> Stream {
+    Stream::seed_from_u64(salt)
+}
+
+/// A point uniform in the cube from 0 to `size`.
+fn point(rng: &mut Stream, size: f32) -> Vec3 {
+    Vec3::from([(); 3].map(|()| rng.random::<f32>())) * size
+}
+
+/// A triangle with this corner and edges of at most `size` along every axis.
+fn around(rng: &mut Stream, corner: Vec3, size: f32) -> Triangle {
+    Triangle([corner, corner + point(rng, size), corner + point(rng, size)])
+}
+
+fn many(n: usize, salt: u64, mut make: impl FnMut(&mut Stream, usize) -> Triangle) -> Vec<Triangle> {
+    let mut rng = random(salt);
+    (0..n).map(|i| make(&mut rng, i)).collect()
+}
+
+/// Small triangles at uniform positions; all coordinates lie within 1 to 18.
+pub fn uniform(n: usize) -> Vec<Triangle> {
+    many(n, 1, |rng, _| {
+        let corner = point(rng, 16.0) + 1.0;
+        around(rng, corner, 0.5)
+    })
+}
+
+/// S04, S07: the same box n times.
+pub fn identical_boxes(n: usize) -> Vec<Triangle> {
+    vec![cube(Vec3::splat(0.1), 1.0); n]
+}
+
+/// S05: the same point n times.
+pub fn identical_points(n: usize) -> Vec<Triangle> {
+    vec![cube(Vec3::splat(0.1), 0.0); n]
+}
+
+/// S06: boxes around one centre, each larger than the one before.
+pub fn concentric(n: usize) -> Vec<Triangle> {
+    (1..=n).map(|i| cube(Vec3::splat(-(i as f32)), 2.0 * i as f32)).collect()
+}
+
+/// S08: boxes of sizes 1 to 9 whose centres lie on the x axis, in mixed order.
+pub fn collinear_centres(n: usize) -> Vec<Triangle> {
+    let mut order: Vec<usize> = (0..n).collect();
+    order.shuffle(&mut random(8));
+    let place = |i: usize| {
+        let half = Vec3::new(1.0, (1 + i % 5) as f32, (1 + i % 9) as f32) / 2.0;
+        let center = Vec3::X * (3 * i) as f32;
+        diagonal(Aabb { min: center - half, max: center + half })
+    };
+    order.into_iter().map(place).collect()
+}
+
+/// S09: one triangle in every cell of a square grid in a plane, row by row.
+pub fn planar_grid(n: usize) -> Vec<Triangle> {
+    let side = n.isqrt().max(1);
+    let at = |i: usize| Vec3::new((i % side) as f32, (i / side) as f32, 0.0);
+    (0..n).map(|i| Triangle([at(i), at(i) + Vec3::X, at(i) + Vec3::Y])).collect()
+}
+
+/// S10: segments on the x axis, in mixed order.
+pub fn on_a_line(n: usize) -> Vec<Triangle> {
+    let mut order: Vec<usize> = (0..n).collect();
+    order.shuffle(&mut random(10));
+    let segment = |i: usize| [0.0, 1.0, 0.5].map(|x| Vec3::X * (2.0 * i as f32 + x));
+    order.into_iter().map(|i| Triangle(segment(i))).collect()
+}
+
+/// S11: facets parallel to the three coordinate planes.
+pub fn facets(n: usize) -> Vec<Triangle> {
+    many(n, 11, |rng, i| {
+        let corner = point(rng, 16.0);
+        let (a, b) = [(Vec3::X, Vec3::Y), (Vec3::Y, Vec3::Z), (Vec3::Z, Vec3::X)][i % 3];
+        Triangle([corner, corner + a, corner + b])
+    })
+}
+
+/// S12 to S16: the surface of the cube from -1 to 1, six faces of equal squares, two triangles each. At least 12.
+pub fn closed_box(n: usize) -> Vec<Triangle> {
+    let cells = (n / 12).isqrt().max(1);
+    let at = |i: usize| 2.0 * i as f32 / cells as f32 - 1.0;
+    let mut triangles = Vec::new();
+    for face in 0..6 {
+        let corner = |u: usize, v: usize| {
+            let (u, v, w) = (at(u), at(v), if face < 3 { -1.0 } else { 1.0 });
+            [Vec3::new(w, u, v), Vec3::new(v, w, u), Vec3::new(u, v, w)][face % 3]
+        };
+        for (u, v) in (0..cells * cells).map(|i| (i % cells, i / cells)) {
+            let (a, b, c, d) = (corner(u, v), corner(u + 1, v), corner(u + 1, v + 1), corner(u, v + 1));
+            triangles.extend([Triangle([a, b, c]), Triangle([a, c, d])]);
+        }
+    }
+    triangles
+}
+
+/// S17: every second triangle has three equal, two equal or collinear corners.
+pub fn degenerate(n: usize) -> Vec<Triangle> {
+    many(n, 17, |rng, i| {
+        // Eighths: multiples are exact, the corners truly collinear.
+        let mut corner = || (point(rng, 64.0)).round() / 8.0;
+        let (a, b, c) = (corner(), corner(), corner());
+        match i % 6 {
+            1 => Triangle([a; 3]),
+            3 => Triangle([a, b, a]),
+            5 => Triangle([a, a + (b - a) * 2.0, b]),
+            _ => Triangle([a, a + (b - a) / 8.0, a + (c - a) / 8.0]),
+        }
+    })
+}
+
+/// S22: every coordinate is denormal.
+pub fn denormal(n: usize) -> Vec<Triangle> {
+    let mut triangles = uniform(n);
+    let unit = f32::from_bits(1);
+    triangles.iter_mut().flat_map(|t| &mut t.0).for_each(|p| *p = (*p * 64.0).round() * unit);
+    triangles
+}
+
+/// S23: coordinates up to ±3e38.
+pub fn enormous(n: usize) -> Vec<Triangle> {
+    let mut triangles = uniform(n);
+    triangles.iter_mut().flat_map(|t| &mut t.0).for_each(|p| *p = (*p - 9.5) * (3e38 / 8.5));
+    triangles
+}
+
+/// S24: unit detail at offset 1e6, where it is coarse, and at 1e8, where it vanishes.
+pub fn far_away(n: usize) -> Vec<Triangle> {
+    let mut triangles = uniform(n);
+    for (i, triangle) in triangles.iter_mut().enumerate() {
+        let offset = if i % 2 == 0 { 1e6 } else { 1e8 };
+        triangle.0.iter_mut().for_each(|p| *p += offset);
+    }
+    triangles
+}
+
+/// S25: cubes at 2^k whose sides are a quarter of that, from small to large; at most 250 objects are distinct.
+pub fn powers_of_two(n: usize) -> Vec<Triangle> {
+    let low = -(n as i32) / 2;
+    (0..n as i32)
+        .map(|i| 2f32.powi((low + i).clamp(-124, 125)))
+        .map(|x| cube(Vec3::splat(x), x / 4.0))
+        .collect()
+}
+
+/// S26: the uniform scene, sorted along x.
+pub fn sorted(n: usize) -> Vec<Triangle> {
+    let mut triangles = uniform(n);
+    triangles.sort_by(|a, b| a.0[0].x.total_cmp(&b.0[0].x));
+    triangles
+}
+
+/// Triangles of the stadium.
+pub const STADIUM: usize = 48;
+
+/// S27: a ball of small triangles on the floor of a box a million times larger, whose triangles come first.
+pub fn teapot_in_a_stadium(n: usize) -> Vec<Triangle> {
+    let mut triangles = closed_box(STADIUM);
+    // The ball is at the origin, where it keeps its detail, and not at the middle of the floor.
+    let move_to = Vec3::new(0.37, -0.21, 1.0);
+    triangles.iter_mut().flat_map(|t| &mut t.0).for_each(|p| *p = (*p + move_to) * 5e5);
+    triangles.extend(many(n.saturating_sub(STADIUM), 27, |rng, _| {
+        let at = (point(rng, 2.0) - 1.0).normalize_or(Vec3::X) * 0.5 + Vec3::Z * 0.5;
+        around(rng, at, 0.05)
+    }));
+    triangles.truncate(n);
+    triangles
+}
+
+/// S28: one triangle over all the others.
+pub fn giant_over_small(n: usize) -> Vec<Triangle> {
+    let mut triangles = uniform(n);
+    if let Some(first) = triangles.first_mut() {
+        *first = Triangle([Vec3::ZERO, Vec3::new(40.0, 0.0, 20.0), Vec3::new(0.0, 40.0, 40.0)]);
+    }
+    triangles
+}
+
+/// S29: triangles a million times as long as wide, in all directions.
+pub fn slivers(n: usize) -> Vec<Triangle> {
+    many(n, 29, |rng, _| {
+        let (a, along, across) = (point(rng, 100.0), point(rng, 2.0) - 1.0, point(rng, 2.0) - 1.0);
+        let length = 100.0;
+        Triangle([
+            a,
+            a + along.normalize_or(Vec3::X) * length,
+            a + across.normalize_or(Vec3::Y) * length * 1e-6,
+        ])
+    })
+}
+
+/// S30: triangles whose corners lie anywhere in the scene, so that most overlap.
+pub fn overlapping(n: usize) -> Vec<Triangle> {
+    many(n, 30, |rng, _| Triangle([(); 3].map(|()| point(rng, 16.0))))
+}
+
+/// S31: half of the objects in a cube of side 0.001, half in one of side 1000.
+pub fn two_densities(n: usize) -> Vec<Triangle> {
+    many(n, 31, |rng, i| {
+        let size = if i % 2 == 0 { 1e-3 } else { 1e3 };
+        let corner = point(rng, size) + size;
+        around(rng, corner, size / 50.0)
+    })
+}
+
+/// S32: every second box is the reflection of the one before it in the origin. No two have the same centre along any
+/// axis.
+pub fn symmetric(n: usize) -> Vec<Triangle> {
+    let half = uniform(n.div_ceil(2));
+    let all = half.iter().flat_map(|t| [*t, Triangle(t.0.map(|p| -p))]);
+    all.take(n).collect()
+}
+
+/// S34: the uniform scene with every triangle ten times in succession.
+pub fn tenfold(n: usize) -> Vec<Triangle> {
+    uniform(n.div_ceil(10)).into_iter().flat_map(|t| [t; 10]).take(n).collect()
+}
+
+/// S45: two unit cubes whose centres are two apart.
+pub fn two_cubes(n: usize) -> Vec<Triangle> {
+    [0.0, 2.0].map(|x| cube(Vec3::X * x, 1.0)).into_iter().take(n).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_triangle_over_a_diagonal_has_that_box() {
+        let b = Aabb::from(([-1.0, 0.0, 2.0], [3.0, 0.5, 2.0]));
+        assert_eq!(diagonal(b).aabb(), b);
+    }
+
+    #[test]
+    fn the_closed_box_has_two_triangles_per_square_and_the_cubes_bounds() {
+        let triangles = closed_box(48);
+        assert_eq!(triangles.len(), 48);
+        let bounds = boxes(&triangles).iter().fold(Aabb::EMPTY, |a, b| a.union(b));
+        assert_eq!(bounds, Aabb::from(([-1.0; 3], [1.0; 3])));
+    }
+
+    #[test]
+    fn segments_on_a_line_have_no_area_and_do_not_touch() {
+        let mut spans: Vec<Aabb> = boxes(&on_a_line(50));
+        spans.sort_by(|a, b| a.min.x.total_cmp(&b.min.x));
+        assert!(spans.windows(2).all(|pair| pair[0].max.x <= pair[1].min.x));
+        assert!(spans.iter().all(|b| b.half_area() == 0.0));
+    }
+}

@@ -1,0 +1,25 @@
+//! Scenes for bounding volume hierarchies: by name or from a mesh file, with their rays and their pictures.
+//!
+//! ```
+//! let scene = bvh_scenes::Scene::load("escher:100").unwrap();
+//! assert_eq!(scene.boxes.len(), 100);
+//! ```
+//!
+//! [`load`] reads OBJ, PLY, STL and glTF files, and [`builtin`] generates scenes in code; a [`Scene`] is either, or a
+//! [`subset`] of one. [`trace`] finds the objects on a ray by any structure, [`rays`] has the rays of measurements and of
+//! renderers with their density, and [`render`] draws a picture.
+
+pub mod builtin;
+pub mod explain;
+mod fnv;
+pub mod load;
+pub mod rays;
+pub mod render;
+mod scene;
+pub mod subset;
+pub mod trace;
+pub mod tree_file;
+
+pub use bvh_files::{ReadError, read, read_text};
+pub use fnv::fnv1a;
+pub use scene::{FETCHED, NoTriangles, SPHERES, Scene, SceneError, SceneKind, fetched_path};

@@ -1,0 +1,95 @@
+//! Mesh files of every kind: the kind is told by the bytes, and where they do not tell by the name.
+
+pub mod gltf;
+pub mod mesh;
+pub mod obj;
+mod ply;
+mod stl;
+
+use crate::{ReadError, read};
+pub use gltf::OutsideFiles;
+use mesh::{Fault, Mesh};
+use obj::ObjError;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Why a file gave no triangles.
+#[derive(Debug, Error)]
+pub enum MeshError {
+    /// There is no file, or it cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// No bytes, or only blanks.
+    #[error("{} is empty; expected an OBJ, PLY, STL or glTF file", .0.display())]
+    Empty(PathBuf),
+    /// The OBJ file is wrong.
+    #[error(transparent)]
+    Obj(#[from] ObjError),
+    /// The PLY, STL or glTF file is wrong.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+}
+
+/// The formats of meshes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Wavefront OBJ.
+    Obj,
+    /// Polygon File Format, of text or binary.
+    Ply,
+    /// Stereolithography, of text or binary.
+    Stl,
+    /// glTF 2.0, as JSON or as one binary file (GLB).
+    Gltf,
+}
+
+impl Format {
+    /// The format of a file with these bytes at this path. OBJ has no mark of its own: it is what all else is taken for.
+    pub fn of(bytes: &[u8], path: &Path) -> Self {
+        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+        if bytes.starts_with(b"glTF") || text.starts_with(b"{") {
+            return Self::Gltf;
+        }
+        if bytes.starts_with(b"ply") && bytes.get(3).is_some_and(u8::is_ascii_whitespace) {
+            return Self::Ply;
+        }
+        if stl::is_binary(bytes) || stl::is_text(text) {
+            return Self::Stl;
+        }
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        match extension.as_deref() {
+            Some("ply") => Self::Ply,
+            Some("stl") => Self::Stl,
+            Some("gltf" | "glb") => Self::Gltf,
+            _ => Self::Obj,
+        }
+    }
+}
+
+/// Reads the mesh file at `path`. O(bytes) in time; memory is a few hundred bytes per triangle besides the file. Whatever the
+/// file's bytes are, the outcome is a mesh with at least one triangle or an error.
+pub fn load(path: &Path) -> Result<Mesh, MeshError> {
+    load_with(path, OutsideFiles::Refused)
+}
+
+/// As [`load`]; `outside` says whether a glTF file may refer to files outside its folder.
+pub fn load_with(path: &Path, outside: OutsideFiles) -> Result<Mesh, MeshError> {
+    parse_with(&read(path)?, path, outside)
+}
+
+/// Reads the bytes of a mesh file. `path` names it in errors, and says where the files are that a glTF file refers to.
+pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
+    parse_with(bytes, path, OutsideFiles::Refused)
+}
+
+fn parse_with(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Mesh, MeshError> {
+    if bytes.trim_ascii().is_empty() {
+        return Err(MeshError::Empty(path.to_path_buf()));
+    }
+    Ok(match Format::of(bytes, path) {
+        Format::Obj => obj::parse(bytes, path)?,
+        Format::Ply => ply::parse(bytes, path)?,
+        Format::Stl => stl::parse(bytes, path)?,
+        Format::Gltf => gltf::parse(bytes, path, outside)?,
+    })
+}

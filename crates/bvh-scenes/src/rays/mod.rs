@@ -1,0 +1,13 @@
+//! The rays of measurements and of renderers, their parts up to the hit, and the density of these parts.
+
+mod camera;
+mod density;
+mod random;
+mod segments;
+
+pub use camera::{Camera, View, frame};
+pub use density::{TRAINED, density};
+pub use random::{Family, Kind, Viewpoint, in_box, random_ray, rays};
+pub use segments::{
+    OF_ANYTHING, Pose, RenderedRays, TracedRay, check_count, of_anything, of_inside, of_renderer,
+};

@@ -1,0 +1,120 @@
+//! From a scene and a view to a picture: tiles in parallel, the same bytes on any number of threads.
+
+use super::film::Film;
+use super::framing;
+use super::light::{self, Light, World};
+use crate::Scene;
+use crate::rays::{Camera, View};
+use crate::trace::Accelerator;
+use bvh_core::Aabb;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// What is drawn, and how finely.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `samples`² rays go through each pixel, on a grid; 1 or more.
+    pub samples: u32,
+    /// The number of mirror reflections that are followed one after the other.
+    pub depth: u32,
+    /// The view; without one, the whole scene is framed.
+    pub view: Option<View>,
+    /// Lights in place of those that fit the view. If the list is empty, surfaces are lit from the eye and no shadow
+    /// ray is sent.
+    pub lights: Option<Vec<DVec3>>,
+    /// Whether there is a ground below a scene that is seen from outside.
+    pub ground: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { width: 960, height: 540, samples: 2, depth: 4, view: None, lights: None, ground: true }
+    }
+}
+
+/// Pixels on a tile's side. A thread reports progress after every tile.
+const TILE: u32 = 16;
+
+/// Number of tiles that [`render`] reports.
+pub fn tiles(options: &Options) -> u64 {
+    u64::from(options.width.div_ceil(TILE)) * u64::from(options.height.div_ceil(TILE))
+}
+
+/// Draws the scene on all threads of the current rayon pool. `tile_done` is called after every tile; once it returns
+/// false, the picture is abandoned and `None` returned.
+pub fn render(
+    scene: &Scene,
+    accelerator: &Accelerator,
+    options: &Options,
+    tile_done: &(dyn Fn() -> bool + Sync),
+) -> Option<Film> {
+    let bounds = scene.boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
+    let (width, height) = (options.width, options.height);
+    let up = scene.up();
+    let aspect = f64::from(width) / f64::from(height);
+    let automatic = || framing::automatic(scene, &bounds, aspect);
+    let view = options.view.clone().unwrap_or_else(automatic);
+    let camera = Camera::new(&view, up, width, height);
+    let lights = match &options.lights {
+        Some(positions) => Light::white(positions),
+        None => light::automatic(&view, up, &bounds),
+    };
+    let world = World::new(accelerator, &view, up, &bounds, lights, options.ground, options.depth);
+    let columns = width.div_ceil(TILE);
+    let finished: Option<Vec<Film>> = (0..tiles(options) as u32)
+        .into_par_iter()
+        .map(|index| {
+            let (x, y) = (index % columns * TILE, index / columns * TILE);
+            let tile =
+                world.tile(&camera, x..(x + TILE).min(width), y..(y + TILE).min(height), options.samples);
+            tile_done().then_some(tile)
+        })
+        .collect();
+    finished.map(|tiles| Film::of_tiles(width, &tiles, columns as usize))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::Structure;
+
+    fn picture(scene: &Scene, options: &Options) -> Film {
+        let brute = Accelerator::new(&scene.primitives, Structure::Brute);
+        render(scene, &brute, options, &|| true).unwrap()
+    }
+
+    #[test]
+    fn any_number_of_threads_and_any_size_give_the_same_pixels() {
+        let scene = Scene::load("spheres75").unwrap();
+        for (width, height) in [(1, 1), (16, 16), (17, 33), (5, 40)] {
+            let options = Options { width, height, samples: 1, ..Options::default() };
+            let films = [1, 3].map(|threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| picture(&scene, &options))
+            });
+            assert_eq!(films[0].pixels.len(), (width * height) as usize);
+            assert_eq!(films[0], films[1]);
+        }
+    }
+
+    #[test]
+    fn without_lights_no_shadow_ray_is_sent() {
+        let scene = Scene::load("escher:cluster:600:1").unwrap();
+        let options = Options { width: 32, height: 18, samples: 1, ground: false, ..Options::default() };
+        let dark = Options { lights: Some(vec![]), ..options.clone() };
+        let rays = |options: &Options| picture(&scene, options).rays;
+        assert_eq!(rays(&dark), 32 * 18, "triangles mirror nothing");
+        assert!(rays(&options) > rays(&dark));
+    }
+
+    #[test]
+    fn a_picture_is_abandoned_when_asked_to() {
+        let scene = Scene::load("spheres75").unwrap();
+        let brute = Accelerator::new(&scene.primitives, Structure::Brute);
+        assert_eq!(render(&scene, &brute, &Options::default(), &|| false), None);
+    }
+}

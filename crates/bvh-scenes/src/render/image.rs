@@ -1,0 +1,61 @@
+//! Turns linear light into the bytes of a PNG file.
+
+use glam::DVec3;
+
+/// Exposure by which a white surface in the automatic light comes out just below white.
+const EXPOSURE: f64 = 0.66;
+
+/// Maps linear light of any strength to 0..1, as film does: overexposed light loses its colour but not its shape.
+///
+/// Source: Narkowicz 2015, 'ACES filmic tone mapping curve'.
+pub fn expose(light: DVec3) -> DVec3 {
+    light.map(|x| {
+        let x = (EXPOSURE * x).min(1e6);
+        ((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)).min(1.0)
+    })
+}
+
+/// Exposed light to sRGB bytes (IEC 61966-2-1).
+pub fn encode(light: DVec3) -> [u8; 3] {
+    light.to_array().map(|x| {
+        let x = x.clamp(0.0, 1.0);
+        let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::pow(x, 1.0 / 2.4) - 0.055 };
+        (encoded * 255.0 + 0.5) as u8
+    })
+}
+
+/// Encodes pixels, row by row from the top, as a PNG file, compressed as far as it goes.
+pub fn png(width: u32, pixels: &[[u8; 3]]) -> Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, pixels.len() as u32 / width);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    encoder.set_filter(png::Filter::Adaptive);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(pixels.as_flattened())?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn brighter_light_gives_brighter_bytes_up_to_white() {
+        let bytes = [0.0, 1e-2, 0.1, 0.5, 1.0, 4.0, 1e9].map(|x| encode(expose(DVec3::splat(x)))[0]);
+        assert!(bytes.is_sorted_by(|a, b| a < b) && bytes[0] == 0 && bytes[6] == 255, "{bytes:?}");
+    }
+
+    #[test]
+    fn what_is_encoded_is_decoded_again() {
+        let pixels = [[1, 2, 3], [255, 0, 128], [9, 9, 9], [0, 0, 0], [7, 70, 250], [4, 5, 6]];
+        let bytes = png(3, &pixels).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        let mut read = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut read).unwrap();
+        assert_eq!((info.width, info.height, info.color_type), (3, 2, png::ColorType::Rgb));
+        assert_eq!(read, pixels.as_flattened());
+    }
+}

@@ -1,0 +1,224 @@
+//! Computes the light that reaches a pixel, by rays through it, to the lights, and along mirror reflections.
+
+use super::film::Film;
+use super::image;
+use super::surface::{Ground, Surface};
+use crate::rays::{Camera, View};
+use crate::trace::Accelerator;
+use bvh_core::{Aabb, Ray, TestCounts};
+use glam::DVec3;
+use std::ops::Range;
+
+/// A point light.
+#[derive(Clone, Debug)]
+pub struct Light {
+    position: DVec3,
+    /// Linear red, green and blue at distance 0.
+    colour: DVec3,
+    /// The distance at which half of the light is left.
+    reach: f64,
+}
+
+impl Light {
+    /// White lights at these positions. They do not fade with distance; together they are as bright as the automatic
+    /// ones.
+    pub fn white(positions: &[DVec3]) -> Vec<Self> {
+        let colour = DVec3::splat(1.3 / positions.len().max(1) as f64);
+        positions.iter().map(|&position| Self { position, colour, reach: f64::INFINITY }).collect()
+    }
+
+    /// The light that arrives at a distance.
+    fn at(&self, distance: f64) -> DVec3 {
+        if self.reach.is_finite() {
+            let relative = distance / self.reach;
+            self.colour / (1.0 + relative * relative)
+        } else {
+            self.colour
+        }
+    }
+}
+
+/// Lights that suit a view. A scene seen from outside has a warm light at the upper left and a weak cool one at the
+/// right; a scene seen from inside has a sun overhead, sunlight reflected by the floor, and a weak lamp near the eye.
+pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
+    if bounds.check().is_err() {
+        return vec![];
+    }
+    let center = bounds.doubled_centroid() / 2.0;
+    let radius = bounds.extent().length() / 2.0;
+    let forward = (view.at - view.from).normalize_or(DVec3::NEG_Z);
+    let right = forward.cross(up).normalize_or_zero();
+    let light = |position, colour: [f64; 3], reach| Light { position, colour: colour.into(), reach };
+    if view.is_inside(bounds) {
+        let sun = center + up * (4.0 * radius) + right * (0.85 * radius) + forward * (0.6 * radius);
+        let lamp = view.from + up * (0.05 * radius) - right * (0.04 * radius);
+        // Stands for the sunlight that falls on the floor here and is reflected to walls and vaults.
+        let floor = view.at - up * (0.15 * radius) + right * (0.05 * radius);
+        return vec![
+            light(sun, [2.0, 1.72, 1.3], f64::INFINITY),
+            light(lamp, [0.50, 0.34, 0.19], 0.3 * radius),
+            light(floor, [0.95, 0.74, 0.48], 0.3 * radius),
+        ];
+    }
+    let key = center + up * (2.2 * radius) - right * (1.5 * radius) - forward * (1.4 * radius);
+    let fill = center + up * (1.2 * radius) + right * (2.2 * radius) - forward * (1.2 * radius);
+    vec![light(key, [1.25, 1.16, 1.02], f64::INFINITY), light(fill, [0.20, 0.24, 0.32], f64::INFINITY)]
+}
+
+/// Everything that a ray can meet, and the light on it.
+pub struct World<'a> {
+    accelerator: &'a Accelerator<'a>,
+    up: DVec3,
+    lights: Vec<Light>,
+    ground: Option<Ground>,
+    depth: u32,
+}
+
+/// The number of rays of a pixel, and of their tests.
+#[derive(Default)]
+struct Tally {
+    counts: TestCounts,
+    rays: u64,
+}
+
+const HORIZON: DVec3 = DVec3::new(0.58, 0.66, 0.76);
+const ZENITH: DVec3 = DVec3::new(0.11, 0.24, 0.50);
+/// Light from below, reflected by everything around.
+const BELOW: DVec3 = DVec3::new(0.22, 0.20, 0.18);
+/// The fraction of the surrounding light that reaches a surface.
+const AMBIENT: f64 = 0.42;
+
+impl<'a> World<'a> {
+    pub fn new(
+        accelerator: &'a Accelerator<'a>,
+        view: &View,
+        up: DVec3,
+        bounds: &Aabb,
+        lights: Vec<Light>,
+        ground: bool,
+        depth: u32,
+    ) -> Self {
+        // A scene that is seen from inside is its own ground.
+        let ground =
+            (ground && !view.is_inside(bounds)).then(|| Ground::below(accelerator.objects(), bounds, up));
+        Self { accelerator, up, lights, ground: ground.flatten(), depth }
+    }
+
+    /// A tile of the picture, `samples`² rays per pixel.
+    pub fn tile(&self, camera: &Camera, x: Range<u32>, y: Range<u32>, samples: u32) -> Film {
+        let mut tile = Film { width: x.end - x.start, ..Film::default() };
+        let offset = |sample: u32| (f64::from(sample) + 0.5) / f64::from(samples);
+        for y in y {
+            for x in x.clone() {
+                let (mut sum, mut tally) = (DVec3::ZERO, Tally::default());
+                for v in 0..samples {
+                    for u in 0..samples {
+                        let direction = camera.direction(f64::from(x) + offset(u), f64::from(y) + offset(v));
+                        // Samples are exposed before they are averaged, which keeps the edges of highlights smooth.
+                        sum += image::expose(self.radiance(camera.origin, direction, &mut tally));
+                    }
+                }
+                tile.pixels.push(image::encode(sum / f64::from(samples * samples)));
+                tile.tests.push(tally.counts.boxes + tally.counts.objects);
+                tile.count(tally.counts, tally.rays);
+            }
+        }
+        tile
+    }
+
+    /// The light that comes from `direction`. Reflections are followed in a loop, as each surface has only one.
+    fn radiance(&self, mut origin: DVec3, mut direction: DVec3, tally: &mut Tally) -> DVec3 {
+        let mut light = DVec3::ZERO;
+        let mut weight = 1.0;
+        for _ in 0..=self.depth {
+            let Some(surface) = self.meet(origin, direction, tally) else { break };
+            let facing = -surface.normal.dot(direction);
+            // Schlick 1994, 'An inexpensive BRDF model for physically-based rendering'.
+            let grazing = 1.0 - facing.clamp(0.0, 1.0);
+            let rise = (grazing * grazing) * (grazing * grazing) * grazing;
+            let mirror =
+                if surface.mirror > 0.0 { surface.mirror + (1.0 - surface.mirror) * rise } else { 0.0 };
+            let reflected = direction + surface.normal * (2.0 * facing);
+            let start = self.lifted(&surface, origin);
+            let own = self.direct(&surface, start, reflected, mirror, facing, tally);
+            light += weight * (own * (1.0 - surface.haze) + HORIZON * surface.haze);
+            weight *= mirror * (1.0 - surface.haze);
+            if weight < 1.0 / 256.0 {
+                return light;
+            }
+            (origin, direction) = (start, reflected);
+        }
+        light + weight * self.sky(direction)
+    }
+
+    /// The first surface that the ray meets, the ground included.
+    fn meet(&self, origin: DVec3, direction: DVec3, tally: &mut Tally) -> Option<Surface> {
+        tally.rays += 1;
+        let ray = Ray::half_line(origin.as_vec3(), direction.as_vec3());
+        let hit = ray.ok().and_then(|ray| self.accelerator.nearest_hit_counted(&ray, &mut tally.counts));
+        let ground = self.ground.as_ref().and_then(|ground| Some((ground, ground.meet(origin, direction)?)));
+        match (hit, ground) {
+            (Some(hit), ground) if ground.is_none_or(|(_, distance)| f64::from(hit.t) <= distance) => {
+                Some(Surface::of_object(self.accelerator.objects(), &hit, origin, direction))
+            }
+            (_, Some((ground, distance))) => Some(ground.surface(origin, direction, distance)),
+            (_, None) => None,
+        }
+    }
+
+    /// A point just in front of the surface, from which a ray does not meet the same surface again. Rounding moves a
+    /// hit by a few units in the last place of the largest coordinate at hand; this moves it by a few dozen.
+    fn lifted(&self, surface: &Surface, seen_from: DVec3) -> DVec3 {
+        let size = surface.point.abs().max(seen_from.abs()).max_element();
+        surface.point + surface.normal * (size * (64.0 * f64::from(f32::EPSILON)))
+    }
+
+    /// The light that the surface sends to the eye from lights and surroundings, without its mirror reflection.
+    fn direct(
+        &self,
+        surface: &Surface,
+        start: DVec3,
+        reflected: DVec3,
+        mirror: f64,
+        facing: f64,
+        tally: &mut Tally,
+    ) -> DVec3 {
+        let height = 0.5 + 0.5 * surface.normal.dot(self.up);
+        let mut diffuse = (BELOW + (ZENITH * 0.5 + HORIZON * 0.5 - BELOW) * height) * AMBIENT;
+        let mut highlight = DVec3::ZERO;
+        if self.lights.is_empty() {
+            diffuse += DVec3::splat(facing.max(0.0));
+        }
+        for light in &self.lights {
+            let to_light = light.position - start;
+            let distance = to_light.length();
+            let towards = to_light / distance;
+            let cosine = surface.normal.dot(towards);
+            // The cosine is NaN where the light lies on the surface.
+            if cosine.is_nan() || cosine <= 0.0 || self.is_shadowed(start, towards, distance, tally) {
+                continue;
+            }
+            let arriving = light.at(distance);
+            diffuse += arriving * cosine;
+            if mirror > 0.0 {
+                let mut gloss = reflected.dot(towards).max(0.0);
+                for _ in 0..7 {
+                    gloss *= gloss;
+                }
+                highlight += arriving * gloss * 0.9;
+            }
+        }
+        surface.colour * diffuse * (1.0 - mirror) + highlight
+    }
+
+    fn is_shadowed(&self, start: DVec3, towards: DVec3, distance: f64, tally: &mut Tally) -> bool {
+        tally.rays += 1;
+        let ray = Ray::new(start.as_vec3(), towards.as_vec3(), 0.0, distance as f32);
+        ray.is_ok_and(|ray| self.accelerator.any_hit_counted(&ray, &mut tally.counts))
+    }
+
+    /// The light from a direction in which there is nothing.
+    fn sky(&self, direction: DVec3) -> DVec3 {
+        HORIZON + (ZENITH - HORIZON) * direction.dot(self.up).clamp(0.0, 1.0)
+    }
+}

@@ -1,0 +1,131 @@
+//! Subsets of scenes by name: evenly spaced, at random, or around one object.
+
+use bvh_core::Aabb;
+use bvh_search::Stream;
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+
+/// Which objects of a scene to take, as the end of its name says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Subset {
+    /// `:COUNT`: this many, evenly spaced in the scene's order.
+    Spaced(usize),
+    /// `:random:COUNT:SEED`: this many, drawn without replacement.
+    Random(usize, u64),
+    /// `:cluster:COUNT:SEED`: this many around a random object, those with the nearest box centres.
+    Cluster(usize, u64),
+}
+
+impl Subset {
+    /// The scene's name and the subset, if `name` ends like one.
+    pub fn parse(name: &str) -> Option<(&str, Self)> {
+        let (before, last) = name.rsplit_once(':')?;
+        let seeded = || {
+            let (before, count) = before.rsplit_once(':')?;
+            let (whole, kind) = before.rsplit_once(':')?;
+            let (count, seed) = (count.parse().ok()?, last.parse().ok()?);
+            match kind {
+                "random" => Some((whole, Self::Random(count, seed))),
+                "cluster" => Some((whole, Self::Cluster(count, seed))),
+                _ => None,
+            }
+        };
+        seeded().or_else(|| Some((before, Self::Spaced(last.parse().ok()?))))
+    }
+
+    /// Number of objects.
+    pub fn count(&self) -> usize {
+        match *self {
+            Self::Spaced(count) | Self::Random(count, _) | Self::Cluster(count, _) => count,
+        }
+    }
+
+    /// The objects' indices in ascending order. The count must be 1 to the number of boxes. O(n log n) for a cluster,
+    /// else O(n).
+    pub fn choose(&self, boxes: &[Aabb]) -> Vec<usize> {
+        let all = boxes.len();
+        let mut chosen = match *self {
+            Self::Spaced(count) => (0..count).map(|index| index * all / count).collect(),
+            Self::Random(count, seed) => {
+                let mut objects: Vec<usize> = (0..all).collect();
+                objects.partial_shuffle(&mut Stream::seed_from_u64(seed), count).0.to_vec()
+            }
+            Self::Cluster(count, seed) => {
+                let center = boxes[Stream::seed_from_u64(seed).random_range(0..all)].doubled_centroid();
+                let distance = |&object: &usize| (boxes[object].doubled_centroid() - center).length_squared();
+                let mut nearest: Vec<usize> = (0..all).collect();
+                nearest.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+                nearest.truncate(count);
+                nearest
+            }
+        };
+        chosen.sort_unstable();
+        chosen
+    }
+}
+
+/// Number of names that [`expand`] makes of this one.
+pub fn names(name: &str) -> u64 {
+    let ranges = name.split(':').skip(1).filter_map(range);
+    ranges.map(|(low, high)| (u64::from(high) + 1).saturating_sub(low.into())).fold(1, u64::saturating_mul)
+}
+
+/// The ends of `A..B`.
+fn range(word: &str) -> Option<(u32, u32)> {
+    let (low, high) = word.split_once("..")?;
+    Some((low.parse().ok()?, high.parse().ok()?))
+}
+
+/// `name` with every `A..B` after a colon replaced by A, A + 1, …, B: many subsets of a scene on one line of a spec.
+pub fn expand(name: &str) -> Vec<String> {
+    let mut names = vec![String::new()];
+    for (index, word) in name.split(':').enumerate() {
+        let words: Vec<String> = match range(word).filter(|_| index > 0) {
+            Some((low, high)) => (low..=high).map(|number| number.to_string()).collect(),
+            None => vec![word.to_owned()],
+        };
+        let colon = if index > 0 { ":" } else { "" };
+        let longer =
+            |name: &String| words.iter().map(|word| format!("{name}{colon}{word}")).collect::<Vec<_>>();
+        names = names.iter().flat_map(longer).collect();
+    }
+    names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn subsets_are_told_by_what_follows_the_name() {
+        assert_eq!(Subset::parse("a:30"), Some(("a", Subset::Spaced(30))));
+        assert_eq!(Subset::parse("a:random:12:7"), Some(("a", Subset::Random(12, 7))));
+        assert_eq!(Subset::parse("c:/b.obj:cluster:6:0"), Some(("c:/b.obj", Subset::Cluster(6, 0))));
+        for none in ["a", "c:/b.obj", "a:cluster:6:x", "a:cluster"] {
+            assert_eq!(Subset::parse(none), None, "{none}");
+        }
+    }
+
+    #[test]
+    fn ranges_are_expanded_from_left_to_right() {
+        let expected = ["a:random:6:0", "a:random:6:1", "a:random:7:0", "a:random:7:1"];
+        assert_eq!(expand("a:random:6..7:0..1"), expected);
+        assert_eq!(expand("../x..y.obj"), ["../x..y.obj"]);
+        for name in ["a", "a:1..3", "a:random:6..7:0..1", "../x..y.obj", "a:3..1"] {
+            assert_eq!(names(name), expand(name).len() as u64, "{name}");
+        }
+    }
+
+    #[test]
+    fn chosen_objects_are_distinct_and_a_cluster_is_around_one_of_them() {
+        let cube = |x: f32| Aabb::from(([x * x, 0.0, 0.0], [x * x + 1.0, 1.0, 1.0]));
+        let boxes: Vec<Aabb> = (0..100u8).map(f32::from).map(cube).collect();
+        for seed in 0..20 {
+            let random = Subset::Random(30, seed).choose(&boxes);
+            assert!(random.is_sorted_by(|a, b| a < b) && random.len() == 30);
+            let cluster = Subset::Cluster(9, seed).choose(&boxes);
+            assert!(cluster.windows(2).all(|pair| pair[1] == pair[0] + 1) && cluster.len() == 9, "{cluster:?}");
+        }
+        assert_ne!(Subset::Random(30, 1).choose(&boxes), Subset::Random(30, 2).choose(&boxes));
+    }
+}

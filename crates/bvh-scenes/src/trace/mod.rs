@@ -1,0 +1,6 @@
+//! Finds the objects on a ray by any structure: a hierarchy, the wide layout, a KD-tree, or none.
+
+mod accelerator;
+pub mod kd_tree;
+
+pub use accelerator::{Accelerator, Query, Structure};

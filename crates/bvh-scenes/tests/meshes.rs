@@ -1,0 +1,342 @@
+//! Mesh files of every format give the same triangles, and any bytes give a mesh or an error that names its place.
+
+#[path = "support/glb.rs"]
+mod binary;
+
+use base64::Engine as _;
+use bvh_core::Triangle;
+use bvh_scenes::load::mesh::Mesh;
+use bvh_scenes::load::{Format, MeshError, load, parse};
+use bvh_scenes::{ReadError, Scene};
+use glam::Vec3;
+use proptest::prelude::*;
+use std::path::Path;
+
+const CORNERS: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.5], [0.0, 1.0, 0.5]];
+const FACES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
+
+fn square() -> Vec<Triangle> {
+    Triangle::from_mesh(&CORNERS, &FACES).unwrap()
+}
+
+fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
+    values.into_iter().flat_map(f32::to_le_bytes).collect()
+}
+
+fn ply_text() -> Vec<u8> {
+    let mut text = "ply\nformat ascii 1.0\ncomment a square\nelement vertex 4\nproperty float x\nproperty double y\n\
+                    property float z\nproperty uchar red\nelement face 1\nproperty list uchar int vertex_indices\n\
+                    end_header\n"
+        .to_string();
+    CORNERS.iter().for_each(|[x, y, z]| text += &format!("{x} {y} {z} 255\n"));
+    (text + "4 0 1 2 3\n").into_bytes()
+}
+
+fn ply_binary(big: bool) -> Vec<u8> {
+    let order = if big { "big" } else { "little" };
+    let mut bytes = format!(
+        "ply\nformat binary_{order}_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+         element face 2\nproperty list uchar uint vertex_index\nend_header\n"
+    )
+    .into_bytes();
+    let word = |x: u32| if big { x.to_be_bytes() } else { x.to_le_bytes() };
+    bytes.extend(CORNERS.as_flattened().iter().flat_map(|x| word(x.to_bits())));
+    for face in FACES {
+        bytes.push(3);
+        bytes.extend(face.into_iter().flat_map(word));
+    }
+    bytes
+}
+
+fn stl_text() -> Vec<u8> {
+    let mut text = String::new();
+    // Two solids, of which the second has no name.
+    for (solid, triangle) in ["solid a square", "solid"].iter().zip(square()) {
+        text += &format!("{solid}\r\n facet normal 0 0 1\r\n  outer loop\r\n");
+        triangle.0.iter().for_each(|p| text += &format!("   vertex {} {:e} {}\r\n", p.x, p.y, p.z));
+        text += "  endloop\r\n endfacet\r\nendsolid\r\n";
+    }
+    text.into_bytes()
+}
+
+fn stl_binary() -> Vec<u8> {
+    let mut bytes = b"solid of a program that knows no better".to_vec();
+    bytes.resize(80, b' ');
+    bytes.extend(2u32.to_le_bytes());
+    for triangle in square() {
+        bytes.extend(floats([0.0; 3]));
+        bytes.extend(floats(triangle.0.iter().flat_map(|p| p.to_array())));
+        bytes.extend([7, 7]);
+    }
+    bytes
+}
+
+/// The JSON of a scene over a buffer of four positions and the indices of two triangles, `u16`.
+fn gltf_json(uri: &str, nodes: &str, primitive: &str) -> String {
+    let uri = if uri.is_empty() { String::new() } else { format!(r#""uri": "{uri}", "#) };
+    format!(
+        r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}], "nodes": [{nodes}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}{primitive}}}]}}],
+        "accessors": [
+            {{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]}},
+            {{"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": 48}}, {{"buffer": 0, "byteOffset": 48, "byteLength": 12}}],
+        "buffers": [{{{uri}"byteLength": 60}}]}}"#
+    )
+}
+
+const INDEXED: &str = r#", "indices": 1"#;
+
+fn buffer() -> Vec<u8> {
+    let indices = FACES.as_flattened().iter().flat_map(|&index| (index as u16).to_le_bytes());
+    floats(CORNERS.as_flattened().iter().copied()).into_iter().chain(indices).collect()
+}
+
+fn data_uri() -> String {
+    format!(
+        "data:application/octet-stream;base64,{}",
+        base64::engine::general_purpose::STANDARD.encode(buffer())
+    )
+}
+
+fn gltf(nodes: &str, primitive: &str) -> Vec<u8> {
+    gltf_json(&data_uri(), nodes, primitive).into_bytes()
+}
+
+fn glb() -> Vec<u8> {
+    binary::glb(gltf_json("", r#"{"mesh": 0}"#, INDEXED), &buffer())
+}
+
+/// A square in every format.
+fn samples() -> [(&'static str, Format, Vec<u8>); 8] {
+    let obj = b"v 0 0 0\nv 1 0 0\nv 1 1 0.5\nv 0 1 0.5\nf 1 2 3 4\n".to_vec();
+    [
+        ("square.obj", Format::Obj, obj),
+        ("text.ply", Format::Ply, ply_text()),
+        ("little.ply", Format::Ply, ply_binary(false)),
+        ("big.ply", Format::Ply, ply_binary(true)),
+        ("text.stl", Format::Stl, stl_text()),
+        ("binary.stl", Format::Stl, stl_binary()),
+        ("square.gltf", Format::Gltf, gltf(r#"{"mesh": 0}"#, INDEXED)),
+        ("square.glb", Format::Gltf, glb()),
+    ]
+}
+
+fn refusal(bytes: impl AsRef<[u8]>, name: &str) -> String {
+    parse(bytes.as_ref(), Path::new(name)).unwrap_err().to_string()
+}
+
+/// The bytes with one text in place of another.
+fn with(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
+    let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).expect(from);
+    [&bytes[..at], to.as_bytes(), &bytes[at + from.len()..]].concat()
+}
+
+#[test]
+fn every_format_gives_the_same_triangles_whatever_the_file_is_called() {
+    for (name, format, bytes) in samples() {
+        for name in [name, "scene.obj", "scene.stl", "scene"] {
+            if format == Format::Obj && name == "scene.stl" {
+                continue; // OBJ has no mark of its own.
+            }
+            assert_eq!(Format::of(&bytes, Path::new(name)), format);
+            assert_eq!(parse(&bytes, Path::new(name)).unwrap(), Mesh::new(square()), "{name}");
+        }
+    }
+}
+
+#[test]
+fn text_formats_may_begin_with_a_byte_order_mark() {
+    for (name, _, bytes) in samples() {
+        if ["square.obj", "text.stl", "square.gltf"].contains(&name) {
+            let marked = [b"\xef\xbb\xbf", &bytes[..]].concat();
+            assert_eq!(parse(&marked, Path::new(name)).unwrap(), Mesh::new(square()), "{name}");
+        }
+    }
+    let wrong = [b"\xef\xbb\xbf", &with(&stl_text(), "vertex 1 0e0 0\r", "vertex 1 0\r")[..]].concat();
+    assert!(refusal(wrong, "a.stl").starts_with("a.stl:5: "));
+}
+
+#[test]
+fn a_mesh_file_is_a_scene_by_its_path_and_a_missing_one_is_said_to_be_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, _, bytes) in samples() {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        let scene = Scene::load(path.to_str().unwrap()).unwrap();
+        assert_eq!((scene.triangles().unwrap(), name.starts_with(&scene.name)), (&square()[..], true));
+    }
+    for missing in ["none.ply", "none.obj", "folder/none"] {
+        assert!(Scene::load(missing).unwrap_err().to_string().contains(&format!("{missing}: no such file")));
+    }
+    assert!(matches!(load(folder.path()), Err(MeshError::Read(ReadError::Folder { .. }))));
+    #[cfg(unix)]
+    assert!(matches!(load(Path::new("/dev/zero")), Err(MeshError::Read(ReadError::NotRegular { .. }))));
+    assert!(matches!(parse(b" \r\n", Path::new("a.ply")), Err(MeshError::Empty(_))));
+}
+
+#[test]
+fn nodes_move_their_meshes_and_what_hangs_on_them() {
+    let nodes = r#"{"children": [1, 2], "translation": [10, 0, 0]},
+        {"mesh": 0, "scale": [2, 2, 2]},
+        {"mesh": 0, "matrix": [0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1]}"#;
+    let mesh = parse(&gltf(nodes, INDEXED), Path::new("a.gltf")).unwrap();
+    let moved =
+        |by: &dyn Fn(Vec3) -> Vec3| square().into_iter().map(|t| Triangle(t.0.map(by))).collect::<Vec<_>>();
+    let scaled = moved(&|p| p * 2.0 + Vec3::X * 10.0);
+    let turned = moved(&|p| Vec3::new(10.0 - p.y, p.x, p.z + 5.0));
+    assert_eq!(mesh.triangles, [scaled, turned].concat());
+}
+
+#[test]
+fn strips_fans_and_lists_without_indices_are_triangles_and_lines_are_not() {
+    let corner = |at: usize| Vec3::from(CORNERS[at]);
+    let of = |corners: [[usize; 3]; 2]| corners.map(|c| Triangle(c.map(corner))).to_vec();
+    let triangles = |primitive: &str| {
+        parse(&gltf(r#"{"mesh": 0}"#, primitive), Path::new("a.gltf")).map(|mesh| mesh.triangles)
+    };
+    assert_eq!(triangles(r#", "mode": 5"#).unwrap(), of([[0, 1, 2], [1, 3, 2]]));
+    assert_eq!(triangles(r#", "mode": 6"#).unwrap(), of([[0, 1, 2], [0, 2, 3]]));
+    assert_eq!(triangles(r#", "mode": 4"#).unwrap(), of([[0, 1, 2]; 2])[..1]);
+    assert!(triangles(r#", "mode": 1"#).unwrap_err().to_string().contains("no triangle"));
+}
+
+#[test]
+fn buffers_are_files_beside_the_one_that_names_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.gltf");
+    std::fs::write(&path, gltf_json("my%20buffer.bin", r#"{"mesh": 0}"#, INDEXED)).unwrap();
+    let missing = load(&path).unwrap_err().to_string();
+    assert!(missing.contains("buffers[0]") && missing.contains("my buffer.bin: no such file"), "{missing}");
+    std::fs::write(folder.path().join("my buffer.bin"), buffer()).unwrap();
+    assert_eq!(load(&path).unwrap().triangles, square());
+    std::fs::write(folder.path().join("my buffer.bin"), &buffer()[..50]).unwrap();
+    assert!(load(&path).unwrap_err().to_string().contains("buffers[0]: 50 bytes; expected 60"));
+    let remote = refusal(gltf_json("http://example.org/a.bin", r#"{"mesh": 0}"#, INDEXED), "a.gltf");
+    assert!(remote.contains("a file beside this one"), "{remote}");
+}
+
+#[test]
+fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
+    let (ply, stl, node) = (ply_text(), stl_text(), r#"{"mesh": 0}"#);
+    let json = String::from_utf8(gltf(node, INDEXED)).unwrap();
+    let change = |from: &str, to: &str| with(json.as_bytes(), from, to);
+    let mut nan = stl_binary();
+    nan[84 + 50 + 20..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    let cases: [(Vec<u8>, &str, &[&str]); 22] = [
+        (with(&ply, "1 1 0.5", "1 nan 0.5"), "a.ply", &["a.ply:14: ", "nan"]),
+        (with(&ply, "1 1 0.5", "1 1e99 0.5"), "a.ply", &["vertex 2", "inf"]),
+        (with(&ply, "1 1 0.5", "1 one 0.5"), "a.ply", &["a.ply:14: ", "one"]),
+        (with(&ply, "4 0 1 2 3", "4 0 1 2 4"), "a.ply", &["face 0", "vertex 4", "below 4"]),
+        (with(&ply, "4 0 1 2 3", "4 0 1 2 -1"), "a.ply", &["face 0", "vertex -1"]),
+        (with(&ply, "4 0 1 2 3", "2 0 1"), "a.ply", &["4 vertices and 0 triangles"]),
+        (with(&ply, "property float x", "property float u"), "a.ply", &["vertex 0", "NaN"]),
+        (with(&ply, "element vertex 4", "element vertex 4000000000"), "a.ply", &["element vertex", "room for"]),
+        (with(&ply, "format ascii", "format octal"), "a.ply", &["a.ply:2: "]),
+        (ply_binary(false)[..190].to_vec(), "a.ply", &["a.ply: element vertex"]),
+        (
+            with(&stl, "vertex 1 0e0 0\r", "vertex 1 0 inf\r"),
+            "a.stl",
+            &["a.stl:5: ", "`1 0 inf`", "three finite"],
+        ),
+        (with(&stl, "vertex 1 0e0 0\r", "vertex 1 0\r"), "a.stl", &["a.stl:5: ", "`1 0`"]),
+        (with(&stl, "   vertex 1 0e0 0\r\n", ""), "a.stl", &["a.stl:6: ", "2 vertices"]),
+        (with(&stl, "endfacet\r\nendsolid\r\nsolid\r", "vertecks\r"), "a.stl", &["a.stl:8: ", "`vertecks`"]),
+        (nan, "a.stl", &["a.stl: facet 1", "NaN"]),
+        (stl_binary()[..150].to_vec(), "a.stl", &["1 whole facets", "expected the 2", "cut"]),
+        (change(r#""mesh": 0"#, r#""mesh": 7"#), "a.gltf", &["a.gltf: nodes[0]: no meshes[7]"]),
+        (
+            change(r#""count": 6"#, r#""count": 7"#),
+            "a.gltf",
+            &["meshes[0].primitives[0] at nodes[0]", "accessors[1]", "7 items"],
+        ),
+        (change(r#""byteOffset": 48"#, r#""byteOffset": 46"#), "a.gltf", &["index", "below 4"]),
+        (change("5126", "5123"), "a.gltf", &["accessors[0]", "F32"]),
+        (
+            change(r#""byteLength": 60"#, r#""byteLength": 61"#),
+            "a.gltf",
+            &["buffers[0]: 60 bytes; expected 61"],
+        ),
+        (json.as_bytes()[..200].to_vec(), "a.gltf", &["a.gltf: ", "EOF"]),
+    ];
+    for (bytes, name, parts) in cases {
+        let message = refusal(bytes, name);
+        parts.iter().for_each(|part| assert!(message.contains(part), "{part}: {message}"));
+        assert!(message.len() < 400 && !message.contains('\n'), "{message}");
+    }
+}
+
+#[test]
+fn files_made_to_harm_are_refused() {
+    let node = r#"{"mesh": 0}"#;
+    for cycle in [
+        r#"{"children": [1]}, {"children": [0], "mesh": 0}"#,
+        r#"{"children": [0], "mesh": 0}"#,
+        r#"{"children": [1, 1]}, {"mesh": 0}"#,
+    ] {
+        assert!(refusal(gltf(cycle, INDEXED), "a.gltf").contains("reached twice"), "{cycle}");
+    }
+    let json = gltf(node, INDEXED);
+    let beyond = "18446744073709551615";
+    for (from, to) in [
+        (r#""byteOffset": 48"#, format!(r#""byteOffset": {beyond}"#)),
+        (r#""count": 4"#, format!(r#""count": {beyond}"#)),
+        (r#""buffer": 0, "byteLength": 48"#, r#""buffer": 0, "byteStride": 4, "byteLength": 48"#.to_string()),
+        (r#""byteLength": 60"#, format!(r#""byteLength": {beyond}"#)),
+    ] {
+        refusal(with(&json, from, &to), "a.gltf");
+    }
+    for length in [0, 1, u32::MAX - 3, u32::MAX] {
+        let mut bytes = glb();
+        bytes[12..16].copy_from_slice(&length.to_le_bytes());
+        refusal(bytes, "a.glb");
+    }
+    let deep = format!("{}1{}", "[".repeat(100_000), "]".repeat(100_000));
+    refusal(format!(r#"{{"asset": {deep}}}"#), "a.gltf");
+    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 90000000000\nend_header\n";
+    assert!(refusal(header, "a.ply").contains("room for"));
+    let list = "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uint int vertex_indices\nend_header\n";
+    refusal([list.as_bytes(), &[255; 8]].concat(), "a.ply");
+    let mut stl = stl_binary();
+    stl[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
+    assert!(refusal(stl, "a.stl").contains("4294967295"));
+}
+
+#[test]
+fn cut_files_give_a_mesh_or_an_error() {
+    for (name, _, bytes) in samples() {
+        for length in 0..bytes.len() {
+            check(&bytes[..length], name);
+        }
+    }
+}
+
+/// Whatever the bytes are, a mesh has triangles and all of them are finite.
+fn check(bytes: &[u8], name: &str) {
+    if let Ok(mesh) = parse(bytes, Path::new(name)) {
+        assert!(!mesh.triangles.is_empty());
+        assert!(mesh.triangles.iter().flat_map(|t| t.0).all(|corner| corner.is_finite()));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+    #[test]
+    fn damaged_files_give_a_mesh_or_an_error(
+        which in 0usize..8,
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..5),
+        digits in prop::collection::vec((any::<prop::sample::Index>(), b'0'..=b'9'), 0..5),
+    ) {
+        let (name, _, original) = samples()[which].clone();
+        let mut bytes = original.clone();
+        changes.iter().for_each(|(at, byte)| bytes[at.index(original.len())] = *byte);
+        check(&bytes, name);
+        // Numbers that are wrong in files that are otherwise well formed.
+        let mut bytes = original;
+        let numbers: Vec<usize> = (0..bytes.len()).filter(|&at| bytes[at].is_ascii_digit()).collect();
+        for (at, digit) in digits.iter().filter(|_| !numbers.is_empty()) {
+            bytes[numbers[at.index(numbers.len())]] = *digit;
+        }
+        check(&bytes, name);
+    }
+}

@@ -1,0 +1,187 @@
+//! OBJ files as people write them, and as nobody should: what is read, and what is refused in which line.
+
+use bvh_core::Triangle;
+use bvh_scenes::load::mesh::Mesh;
+use bvh_scenes::load::obj::{ObjError, parse};
+use glam::Vec3;
+use proptest::prelude::*;
+use std::path::Path;
+
+/// The corners of a square and a fifth point.
+const POINTS: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 2 0\n";
+
+fn read(text: impl AsRef<[u8]>) -> Result<Mesh, ObjError> {
+    parse(text.as_ref(), Path::new("scene.obj"))
+}
+
+/// The mesh of the points followed by `faces`.
+fn mesh(faces: &str) -> Mesh {
+    read(format!("{POINTS}{faces}")).unwrap()
+}
+
+/// The message for the points, on lines 1 to 5, followed by `statements`.
+fn refusal(statements: &str) -> String {
+    read(format!("{POINTS}{statements}")).unwrap_err().to_string()
+}
+
+#[test]
+fn a_triangle_has_its_corners_and_leaves_two_vertices_unused() {
+    let read = mesh("f 1 2 3\n");
+    assert_eq!(read.triangles, [Triangle([Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y])]);
+    assert_eq!(read.unused_vertices, 2);
+    assert_eq!((read.short_faces, read.degenerate_triangles), (0, 0));
+}
+
+#[test]
+fn a_polygon_is_the_fan_around_its_first_vertex() {
+    assert_eq!(mesh("f 1 2 3 5 4\n"), mesh("f 1 2 3\nf 1 3 5\nf 1 5 4\n"));
+}
+
+#[test]
+fn spellings_of_the_same_triangle_agree() {
+    let expected = mesh("f 1 2 3\n");
+    for faces in [
+        "f -5 -4 -3\n",
+        "f 1/1 2/2/2 3//3\n",
+        "vt 0 0\nvn 0 0 1\nf 1/-9 2/99 3//-9\n",
+        "  f\t1 2  3",
+        "f 1 2 3 # the first\n",
+        "f 1 2\\\n3\n",
+        "f \\\r\n1 2 \\  \r\n\\\r\n3\r\n",
+        "f 1 2 3 \\",
+        "# f 1 2 4 \\\nf 1 2 3\n#f 1 2 4\n",
+        "l 1 2 3 4\np 1 2 3\nl\nf 1 2 3\n",
+        "mtllib none.mtl\nusemtl\nusemtl gold\ng\no\ns off\nf 1 2 3\ncurv 0 1 1 2 \\\n3\n",
+    ] {
+        assert_eq!(mesh(faces), expected, "{faces:?}");
+    }
+    let text = format!("{POINTS}f 1 2 3\n");
+    assert_eq!(read(text.replace('\n', "\r\n")).unwrap(), expected);
+    assert_eq!(read(text.replace('\n', "\r")).unwrap(), expected);
+    // Two programs may each have added a mark.
+    for marks in ["\u{feff}", "\u{feff}\u{feff}"] {
+        assert_eq!(read(format!("{marks}{text}")).unwrap(), expected);
+    }
+    assert_eq!(read([b"# caf\xe9\ng \xff\n", text.as_bytes()].concat()).unwrap(), expected);
+    let colours = text.replacen("0 0 0", "0 0 0 1 0.5 nan", 1).replacen("1 0 0", "1 0 0 1 1 1 1", 1);
+    assert_eq!(read(colours).unwrap(), expected);
+}
+
+#[test]
+fn objects_and_groups_are_joined_in_the_order_of_the_file() {
+    let grouped = "o a\nf 5 4 3\ng b\nf 1 2 3\nusemtl c\nf 1 3 4\n";
+    assert_eq!(mesh(grouped), mesh("f 5 4 3\nf 1 2 3\nf 1 3 4\n"));
+}
+
+#[test]
+fn a_face_may_name_vertices_below_it() {
+    let above = read(format!("g a\nf 1 2 3\ng b\n{POINTS}")).unwrap();
+    assert_eq!(above, mesh("f 1 2 3\n"));
+}
+
+#[test]
+fn a_weight_divides_the_coordinates() {
+    let weighted = read("v 2 4 6 2\nv 0 0 0 -1\nv 1 0 0\nf 1 2 3\n").unwrap();
+    assert_eq!(weighted.triangles[0].0[0], Vec3::new(1.0, 2.0, 3.0));
+}
+
+#[test]
+fn faces_of_fewer_than_three_vertices_are_counted_and_left_out() {
+    let read = mesh("f\nf 1\nf 1 2\nf 1 2 3\n");
+    assert_eq!((read.short_faces, read.triangles.len()), (3, 1));
+}
+
+#[test]
+fn lines_with_unknown_keywords_are_counted_and_all_oddities_are_remarked_in_one_sentence() {
+    let read = mesh("V 7 7 7\nf 1 2 3\ncurv 0 1 \\\n1 2\nF 1 2 4\nf 1 2 2\nf 1 2\n");
+    assert_eq!(read.unknown, Some((2, 6, "V".into())));
+    let remark = read.remark().unwrap();
+    for part in
+        ["2 vertices are used by no face", "1 face has fewer", "1 triangle has no area", "`V` in line 6"]
+    {
+        assert!(remark.contains(part), "{part}: {remark}");
+    }
+    assert_eq!(mesh("f 1 2 3\nf 3 4 5\n").remark(), None);
+}
+
+#[test]
+fn a_face_of_too_many_vertices_is_refused() {
+    let face = |corners: usize| format!("{POINTS}f{}\n", " 1".repeat(corners));
+    assert_eq!(read(face(1 << 16)).unwrap().triangles.len(), (1 << 16) - 2);
+    assert!(
+        read(face((1 << 16) + 1)).unwrap_err().to_string().starts_with("scene.obj:6: face of more than 65536")
+    );
+}
+
+#[test]
+fn triangles_without_area_are_counted_and_kept_at_every_scale() {
+    for scale in ["1e-45", "1", "3e38"] {
+        let points = format!("v 0 0 0\nv {scale} 0 0\nv -{scale} 0 0\nv 0 {scale} 0\n");
+        let read = read(format!("{points}f 1 1 1\nf 1 2 2\nf 1 2 3\nf 1 2 4\n")).unwrap();
+        assert_eq!(read.triangles.len(), 4);
+        assert_eq!(read.degenerate_triangles, 3, "scale {scale}");
+    }
+}
+
+#[test]
+fn a_refused_statement_is_named_with_its_line_and_what_would_be_accepted() {
+    for (statements, names) in [
+        ("v nan 0 0\nf 1 2 3\n", ["scene.obj:6: ", "`nan`", "finite"]),
+        ("f 1 2 3\n\nv 0 -inf 0", [":8: ", "`-inf`", "finite"]),
+        ("v 0 0 1e39", [":6: ", "`1e39`", "3.4e38"]),
+        ("v 0 0 0,5", [":6: ", "`0,5`", "finite number"]),
+        ("v 0 0", [":6: ", "length 2", "3 (x y z)"]),
+        ("v 0 0 0 1 1", [":6: ", "length 5", "3 (x y z)"]),
+        ("v 0 0 0 0", [":6: ", "weight `0`", "other than 0"]),
+        ("v 1e30 0 0 1e-30", [":6: ", "weight `1e-30`", "3.4e38"]),
+        ("v 1 1 1 inf", [":6: ", "weight `inf`", "finite"]),
+        ("f 0 1 2", [":6: ", "`0`", "from 1"]),
+        ("f 1 2 x/1", [":6: ", "`x/1`", "whole number"]),
+        ("f 1 2 \u{a0}3", [":6: ", r"`\xc2\xa03`", "whole number"]),
+        ("f 1 2 3\\\n4 \\\n\nf 1 2 6", [":9: ", "6", "at most 5"]),
+        ("f 6\nf 1 2 3", [":6: ", "6", "at most 5"]),
+        ("f -6 1 2\nv 0 0 0", [":6: ", "-6", "at least -5"]),
+        ("f 1 2 9223372036854775808", [":6: ", "5808`", "from 1"]),
+        ("f 1 2 9223372036854775807", [":6: ", "5807", "most 5"]),
+        ("f 1 2 -9223372036854775808", [":6: ", "5808", "least -5"]),
+    ] {
+        let message = refusal(statements);
+        for name in names {
+            assert!(message.contains(name), "{statements:?}: {message}");
+        }
+    }
+}
+
+#[test]
+fn an_endless_word_gives_a_short_message() {
+    assert!(refusal(&format!("v 0 0 {}", "x".repeat(1_000_000))).len() < 200);
+}
+
+#[test]
+fn what_holds_no_triangle_is_refused_in_one_sentence() {
+    assert!(matches!(read("[package]\nname = 1\n"), Err(ObjError::NoFaces { vertices: 0, .. })));
+    assert!(refusal("l 1 2 3\nf 1 2\n").contains("5 vertices and no face"));
+}
+
+proptest! {
+    #[test]
+    fn triangles_come_back_as_they_were_written(
+        corners in prop::collection::vec(
+            prop::array::uniform3(prop::array::uniform3(
+                any::<f32>().prop_filter("finite", |x| x.is_finite()))),
+            1..20,
+        )
+    ) {
+        let mut text = String::new();
+        for triangle in &corners {
+            for [x, y, z] in triangle {
+                text += &format!("v {x} {y} {z:e}\n");
+            }
+            text += "f -3 -2 -1\n";
+        }
+        let read = read(text).unwrap();
+        let expected: Vec<_> = corners.iter().map(|&t| Triangle::from(t)).collect();
+        prop_assert_eq!(read.triangles, expected);
+        prop_assert_eq!(read.unused_vertices, 0);
+    }
+}

@@ -1,0 +1,116 @@
+//! The key to the series and reference lines of a figure, shared by all its panels.
+
+use plotters::element::{DashedPathElement, Polygon};
+use plotters::prelude::{DrawingBackend, RGBColor};
+
+use super::canvas::{Align, Fault, Frame, Sheet, pen, steps};
+use super::model::{Figure, Layer};
+use super::style::{INK, REFERENCE_LINE, Stroke, Strokes};
+use super::text::{BODY, Fonts};
+
+/// Width of a sample.
+const SAMPLE: f64 = 30.0;
+/// From a sample to its name, and from a name to the next sample.
+const GAPS: (f64, f64) = (7.0, 18.0);
+/// Height of a row.
+const ROW: f64 = 20.0;
+
+/// One series with the kinds of marks it has.
+struct Entry {
+    name: String,
+    stroke: Stroke,
+    line: bool,
+    marker: bool,
+    /// It has bars or bands.
+    area: bool,
+}
+
+/// The entries, in order of the series' appearance and then of the reference lines', in columns of equal width that
+/// are filled row by row.
+pub(super) struct Legend {
+    entries: Vec<Entry>,
+    columns: usize,
+    column_width: f64,
+}
+
+impl Legend {
+    pub fn new(figure: &Figure, strokes: &Strokes, width: f64, fonts: &Fonts) -> Self {
+        let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
+        let entry = |(name, stroke): &(String, Stroke)| {
+            let has =
+                |kind: fn(&Layer) -> bool| layers().any(|layer| layer.series() == Some(name) && kind(layer));
+            let line = has(Layer::is_line);
+            let marker = has(Layer::is_marked) || line && strokes.marks(*stroke);
+            let area = !line && has(|layer| !layer.is_marked());
+            Entry { name: name.clone(), stroke: *stroke, line, marker, area }
+        };
+        let mut entries: Vec<Entry> = strokes.series.iter().map(entry).collect();
+        for layer in layers() {
+            let is_new = entries.iter().all(|entry| entry.name != layer.name);
+            if layer.series().is_none() && !layer.name.trim().is_empty() && is_new {
+                let (name, stroke) = (layer.name.clone(), REFERENCE_LINE);
+                entries.push(Entry { name, stroke, line: true, marker: false, area: false });
+            }
+        }
+        Self::arrange(entries, width, fonts)
+    }
+
+    /// The key to areas of these names and colours.
+    pub fn of_areas(areas: impl Iterator<Item = (String, RGBColor)>, width: f64, fonts: &Fonts) -> Self {
+        let entry = |(name, colour)| {
+            let mut stroke = REFERENCE_LINE;
+            stroke.colour = colour;
+            Entry { name, stroke, line: false, marker: false, area: true }
+        };
+        Self::arrange(areas.map(entry).collect(), width, fonts)
+    }
+
+    fn arrange(mut entries: Vec<Entry>, width: f64, fonts: &Fonts) -> Self {
+        let before = SAMPLE + GAPS.0;
+        let room = width - before;
+        entries.iter_mut().for_each(|entry| entry.name = fonts.shorten(&entry.name, room, BODY));
+        let column_width = before + fonts.widest(entries.iter().map(|entry| &entry.name), BODY) + GAPS.1;
+        let most = (((width + GAPS.1) / column_width).floor() as usize).max(1);
+        // As even rows as possible: 4 + 4 rather than 7 + 1.
+        let columns = entries.len().div_ceil(entries.len().div_ceil(most).max(1)).max(1);
+        Self { entries, columns, column_width }
+    }
+
+    pub fn height(&self) -> f64 {
+        ROW * self.entries.len().div_ceil(self.columns) as f64
+    }
+
+    /// Draws the entries with their upper left corner at a point.
+    pub fn draw<B: DrawingBackend>(&self, sheet: &Sheet<B>, corner: (f64, f64)) -> Result<(), Fault<B>> {
+        for (index, entry) in self.entries.iter().enumerate() {
+            let left = corner.0 + self.column_width * (index % self.columns) as f64;
+            let middle = corner.1 + ROW * ((index / self.columns) as f64 + 0.5);
+            entry.draw(sheet, left, middle)?;
+            sheet.text((left + SAMPLE + GAPS.0, middle), &entry.name, BODY, INK, Align::Left)?;
+        }
+        Ok(())
+    }
+}
+
+impl Entry {
+    /// Draws a sample of the marks, its left end at a point.
+    fn draw<B: DrawingBackend>(&self, sheet: &Sheet<B>, left: f64, middle: f64) -> Result<(), Fault<B>> {
+        let (colour, style) = (self.stroke.colour, pen(self.stroke.colour, 2.0));
+        let ends = [left, left + SAMPLE].map(|x| (steps(x), steps(middle)));
+        if self.area {
+            sheet
+                .rectangle(Frame { left: left + 8.0, top: middle - 6.0, width: 14.0, height: 12.0 }, colour)?;
+        }
+        if self.line {
+            let (on, off) = self.stroke.dash.unwrap_or((SAMPLE, 1.0));
+            sheet.0.draw(&DashedPathElement::new(ends, steps(on), steps(off), style))?;
+        }
+        if self.marker {
+            let (x, y) = (steps(left + SAMPLE / 2.0), steps(middle));
+            let corners: Vec<_> =
+                self.stroke.outline(4.0).into_iter().map(|(dx, dy)| (x + dx, y + dy)).collect();
+            sheet.0.draw(&Polygon::new(corners, colour))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,185 @@
+//! The chart engine: data series in, SVG and PNG out. It knows no BVH, no files and no clock.
+//!
+//! A [`Figure`] or [`HeatMap`] says what is shown, in data units. [`svg`] and [`png()`] lay it out and draw
+//! it with plotters, once on its SVG backend and once into pixels, with fonts that are part of the program. The same
+//! picture gives the same bytes of SVG on every machine, and the same bytes of PNG on machines of the same processor
+//! architecture.
+//!
+//! Figures are 800 pixels wide with text of 12 pixels and more, as a README shows them. Series differ in colour and in
+//! dash or marker, so that they survive printing in grey.
+
+mod axis;
+mod canvas;
+mod figure;
+mod heatmap;
+mod legend;
+mod model;
+mod panel;
+mod raster;
+mod style;
+mod text;
+
+pub use canvas::Picture;
+pub use figure::Miniature;
+pub use model::{Axis, Cell, Figure, FigureError, HeatMap, Layer, Look, Marks, Panel, Scale};
+pub use raster::{PNG_SCALE, png};
+
+/// Draws a picture as an SVG document.
+///
+/// Degenerate data are drawn as far as they make sense: see [`Layer`].
+///
+/// # Errors
+/// [`FigureError::CellCount`] unless a heat map has one cell for every row and column, [`FigureError::Draw`] if plotters
+/// refuses, [`FigureError::Font`] if the embedded fonts are damaged.
+pub fn svg(picture: &impl Picture) -> Result<String, FigureError> {
+    canvas::svg(picture)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Values that have broken other charts.
+    const NASTY: [f64; 12] = [
+        0.0,
+        -0.0,
+        1.0,
+        1.0 + f64::EPSILON,
+        -3.5,
+        f64::NAN,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::MAX,
+        f64::MIN,
+        5e-324,
+        1e14,
+    ];
+
+    /// One layer of each kind with all of `points`.
+    fn all_layers(points: &[(f64, f64)]) -> Vec<Layer> {
+        let bands = || points.iter().map(|&(x, y)| (x, y, x)).collect();
+        let (x, y) = points.first().copied().unwrap_or_default();
+        let values = points.iter().map(|point| point.1).collect();
+        vec![
+            Layer::new("line", Marks::Line(points.to_vec())),
+            Layer::new("steps", Marks::Steps(points.to_vec())),
+            Layer::new("points <&>", Marks::Points(points.to_vec())),
+            Layer::new("", Marks::Band(bands())),
+            Layer::new("steps", Marks::StepBand(bands())),
+            Layer::new("bars", Marks::ErrorBars(points.iter().map(|&(x, y)| (x, y, y, x)).collect())),
+            Layer::new("bars", Marks::Bars { values, spread: points.to_vec(), base: x }),
+            Layer::new("level", Marks::HLine(y)),
+            Layer::new("upright", Marks::VLine(x)),
+        ]
+    }
+
+    fn axes() -> Vec<Axis> {
+        let names = |count: usize| (0..count).map(|i| format!("category {i}")).collect();
+        vec![
+            Axis::linear("x"),
+            Axis::log(""),
+            Axis::linear("very long label ".repeat(30)).range(f64::NAN, -1e300),
+            Axis::log("x").range(2.0, 1.0),
+            Axis::linear("x").range(0.5, 0.5),
+            Axis::categories("x", names(0)),
+            Axis::categories("x", names(200)),
+        ]
+    }
+
+    #[test]
+    fn whatever_the_data_there_is_a_picture() {
+        let mut data: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
+        data.extend(NASTY.iter().map(|&value| vec![(value, value)]));
+        data.push(NASTY.iter().flat_map(|&x| NASTY.iter().map(move |&y| (x, y))).collect());
+        for points in data {
+            for (kind, x) in axes().into_iter().enumerate() {
+                let panel = |(index, layer): (usize, Layer)| Panel {
+                    title: "title ".repeat(index),
+                    x: x.clone(),
+                    y: axes().swap_remove(index % 5),
+                    layers: if index == 0 { all_layers(&points) } else { vec![layer] },
+                };
+                let panels = all_layers(&points).into_iter().enumerate().map(panel).collect();
+                let figure = Figure { columns: points.len() % 6, panels, ..Figure::default() };
+                let picture = svg(&figure).unwrap();
+                assert!(!picture.contains("NaN") && !picture.contains("inf"), "{points:?} on {x:?}");
+                if points.len() > 1 && kind == 0 {
+                    png(&figure).unwrap();
+                }
+                let miniature = svg(&Miniature::from(&figure)).unwrap();
+                assert!(!miniature.contains("category") && !miniature.contains("<&>"), "{points:?} on {x:?}");
+            }
+        }
+        png(&Figure::default()).unwrap();
+    }
+
+    #[test]
+    fn a_panel_without_anything_to_show_says_so() {
+        let says = |layers: Vec<Layer>| {
+            let panel = Panel { title: String::new(), x: Axis::log("x"), y: Axis::log("y"), layers };
+            svg(&Figure { panels: vec![panel], ..Figure::default() }).unwrap().contains("no data")
+        };
+        let line = |points| vec![Layer::new("", Marks::Line(points))];
+        assert!(says(Vec::new()) && says(line(Vec::new())) && says(line(vec![(1.0, 0.0), (-1.0, 2.0)])));
+        assert!(!says(line(vec![(1.0, 2.0)])));
+    }
+
+    #[test]
+    fn the_same_figure_gives_the_same_bytes() {
+        let points: Vec<(f64, f64)> = (0..50).map(|i| (f64::from(i), f64::from(i * i % 17))).collect();
+        let panel = Panel {
+            title: "t".to_owned(),
+            x: Axis::linear("x"),
+            y: Axis::log("y"),
+            layers: all_layers(&points),
+        };
+        let figure = Figure { columns: 2, panels: vec![panel; 3], ..Figure::default() };
+        assert_eq!(svg(&figure).unwrap(), svg(&figure.clone()).unwrap());
+        assert_eq!(png(&figure).unwrap(), png(&figure.clone()).unwrap());
+    }
+
+    #[test]
+    fn a_million_points_are_drawn_as_few() {
+        let wave = (0..1_000_000).map(|i| (f64::from(i) * 1e-4, f64::from(i % 97)));
+        let layers = vec![Layer::new("", Marks::Line(wave.collect()))];
+        let panel = Panel { layers, ..Panel::default() };
+        let picture = svg(&Figure { panels: vec![panel], ..Figure::default() }).unwrap();
+        assert!(picture.len() < 100_000, "{} bytes", picture.len());
+    }
+
+    #[test]
+    fn names_cannot_break_the_svg() {
+        let figure = Figure {
+            title: "a < b & \u{0}c".to_owned(),
+            caption: "<\u{1}>&\"".to_owned(),
+            ..Figure::default()
+        };
+        let picture = svg(&figure).unwrap();
+        assert!(
+            picture.contains("<title>a &lt; b &amp;  c</title>") && picture.contains("&lt; &gt;&amp;&quot;")
+        );
+    }
+
+    #[test]
+    fn a_heat_map_of_any_shape_is_drawn() {
+        for classes in [vec![], vec!["good".to_owned(), "bad".to_owned()]] {
+            for (rows, columns) in [(0, 0), (0, 3), (3, 0), (1, 12), (12, 1), (45, 29)] {
+                let cell = |i: usize| Cell { class: i.checked_sub(1), text: "text ".repeat(i.min(60)) };
+                let map = HeatMap {
+                    title: "a heat map".to_owned(),
+                    caption: String::new(),
+                    row_label: "row".to_owned(),
+                    rows: (0..rows).map(|i| "long name ".repeat(i)).collect(),
+                    columns: (0..columns).map(|i| "name ".repeat(i)).collect(),
+                    cells: (0..rows * columns).map(cell).collect(),
+                    classes: classes.clone(),
+                };
+                svg(&map).unwrap();
+                png(&map).unwrap();
+                let missing =
+                    HeatMap { rows: vec![String::new(); rows + 1], columns: vec![String::new(); 2], ..map };
+                assert!(matches!(svg(&missing), Err(FigureError::CellCount { .. })) || rows + 1 == columns);
+            }
+        }
+    }
+}

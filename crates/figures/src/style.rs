@@ -1,0 +1,176 @@
+//! Gives every series of a figure its colour, dash and marker.
+
+use plotters::style::RGBColor;
+
+use super::canvas::steps;
+use super::model::{Figure, Look};
+
+/// The background.
+pub(super) const WHITE: RGBColor = RGBColor(255, 255, 255);
+/// Text and axes.
+pub(super) const INK: RGBColor = RGBColor(34, 34, 34);
+/// Captions and reference lines.
+pub(super) const GREY: RGBColor = RGBColor(85, 85, 85);
+/// Grid lines at labelled ticks.
+pub(super) const GRID: RGBColor = RGBColor(221, 221, 221);
+/// Grid lines between them.
+pub(super) const FAINT: RGBColor = RGBColor(240, 240, 240);
+
+/// Okabe and Ito's colours without yellow, which is lost on white, and black, which is the reference's; then darker
+/// ones of Paul Tol's, brown and grey.
+const COLOURS: [RGBColor; Look::COLOURS] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(136, 34, 85),
+    RGBColor(130, 130, 130),
+    RGBColor(51, 34, 136),
+    RGBColor(153, 153, 51),
+    RGBColor(140, 86, 75),
+    RGBColor(17, 119, 51),
+];
+
+/// Lengths of a dash and of the gap after it, in pixels; a solid line has none.
+type Dash = Option<(f64, f64)>;
+/// The series' dashes. Four successive series share one, and the next series of the same colour has another.
+const DASHES: [Dash; 3] = [None, Some((9.0, 3.0)), Some((3.0, 2.5))];
+/// The dash of reference lines and series.
+const REFERENCE_DASH: Dash = Some((5.0, 4.0));
+
+/// A star: its number of points, its inner radius where the outer is 1, and the direction of its first point in parts
+/// of a turn, clockwise from the right. A regular polygon is a star without notches.
+type Star = (u32, f64, f64);
+/// Disc, square, triangle, diamond, triangle on its tip, upright cross and star.
+const MARKERS: [Star; 7] = [
+    (6, 1.0, 0.0),
+    (4, 0.71, 0.125),
+    (3, 0.5, 0.75),
+    (4, 0.71, 0.0),
+    (3, 0.5, 0.25),
+    (4, 0.42, 0.0),
+    (5, 0.45, 0.75),
+];
+/// A tilted cross.
+const REFERENCE_MARKER: Star = (4, 0.42, 0.125);
+
+/// How one series is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stroke {
+    pub colour: RGBColor,
+    pub dash: Dash,
+    marker: Star,
+}
+
+impl Stroke {
+    fn of(look: Look) -> Self {
+        match look {
+            Look::Reference => {
+                Self { colour: RGBColor(0, 0, 0), dash: REFERENCE_DASH, marker: REFERENCE_MARKER }
+            }
+            Look::Slot(slot) => Self {
+                colour: COLOURS[slot % COLOURS.len()],
+                dash: DASHES[(slot / 4 + slot / 12) % DASHES.len()],
+                marker: MARKERS[slot % MARKERS.len()],
+            },
+        }
+    }
+
+    /// The marker around the origin as a polygon of as large an area as a disc of this radius, roughly.
+    pub fn outline(&self, radius: f64) -> Vec<(i32, i32)> {
+        let (points, inner, first) = self.marker;
+        let outer = radius * (1.6 - 0.6 * inner);
+        let corner = |index: u32| {
+            let (turn, part) =
+                (f64::from(index) / f64::from(2 * points), if index.is_multiple_of(2) { 1.0 } else { inner });
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * (first + turn));
+            (steps(outer * part * cos), steps(outer * part * sin))
+        };
+        (0..2 * points).map(corner).collect()
+    }
+}
+
+/// Reference lines.
+pub(super) const REFERENCE_LINE: Stroke =
+    Stroke { colour: GREY, dash: REFERENCE_DASH, marker: REFERENCE_MARKER };
+/// The series without a name.
+const UNNAMED: Stroke = Stroke { colour: GREY, dash: None, marker: MARKERS[0] };
+
+/// The strokes of all series of a figure, in order of their first appearance.
+pub(super) struct Strokes {
+    pub series: Vec<(String, Stroke)>,
+    /// Whether lines carry markers: colours and dashes tell no more than four of them apart at a glance.
+    marked_lines: bool,
+}
+
+impl Strokes {
+    pub fn new(figure: &Figure) -> Self {
+        let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
+        let shown = |name: &str| layers().any(|layer| layer.series() == Some(name));
+        let set = |name: &str| figure.looks.iter().find(|(known, _)| known == name).map(|&(_, look)| look);
+        let taken = |slot| figure.looks.iter().any(|(name, look)| *look == Look::Slot(slot) && shown(name));
+        let mut free = (0..).filter(|&slot| !taken(slot)).map(Look::Slot);
+        let (mut series, mut lines): (Vec<(String, Stroke)>, Vec<&str>) = (Vec::new(), Vec::new());
+        for layer in layers() {
+            let Some(name) = layer.series().filter(|name| !name.is_empty()) else { continue };
+            if series.iter().all(|(known, _)| known != name) {
+                let look = set(name).or_else(|| free.next()).unwrap_or(Look::Reference);
+                series.push((name.to_owned(), Stroke::of(look)));
+            }
+            if layer.is_line() && set(name) != Some(Look::Reference) && !lines.contains(&name) {
+                lines.push(name);
+            }
+        }
+        Self { series, marked_lines: lines.len() > 4 }
+    }
+
+    /// Whether the lines of a series carry markers.
+    pub fn marks(&self, stroke: Stroke) -> bool {
+        self.marked_lines && stroke.marker != REFERENCE_MARKER
+    }
+
+    /// The named series' place in the order of appearance, and its stroke; solid grey for the one without a name.
+    pub fn of(&self, name: &str) -> (usize, Stroke) {
+        let place = self.series.iter().position(|(known, _)| known == name);
+        place.map_or((0, UNNAMED), |place| (place, self.series[place].1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::model::{Layer, Marks, Panel};
+    use super::*;
+
+    fn strokes(names: &[String], looks: Vec<(String, Look)>) -> Strokes {
+        let line = |name: &String| Layer::new(name, Marks::Line(Vec::new()));
+        let layers = names.iter().chain(names.iter().rev()).map(line).collect();
+        let panel = Panel { layers, ..Panel::default() };
+        Strokes::new(&Figure { panels: vec![panel], looks, ..Figure::default() })
+    }
+
+    #[test]
+    fn every_series_has_its_own_look_and_twelve_their_own_colour() {
+        let names: Vec<String> = (0..84).map(|i| format!("series {i}")).collect();
+        let series = strokes(&names, Vec::new()).series;
+        assert!(series.iter().map(|(name, _)| name).eq(&names));
+        for (i, (_, one)) in series.iter().enumerate() {
+            for (_, other) in &series[..i] {
+                assert!(
+                    one != other && (i >= 12 || one.colour != other.colour),
+                    "series {i} looks like another"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn looks_given_in_advance_are_kept_and_not_given_again() {
+        let looks = vec![("paper".to_owned(), Look::Reference), ("GRASP".to_owned(), Look::Slot(0))];
+        let strokes = strokes(&["MF", "GRASP", "paper"].map(str::to_owned), looks);
+        assert_eq!(strokes.of("GRASP").1, Stroke::of(Look::Slot(0)));
+        assert_eq!(strokes.of("MF").1, Stroke::of(Look::Slot(1)));
+        assert_eq!(strokes.of("paper").1, Stroke::of(Look::Reference));
+    }
+}

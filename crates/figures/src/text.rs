@@ -1,0 +1,202 @@
+//! Measures, wraps and rasterises text in the embedded fonts, so that no figure depends on the machine's fonts.
+
+use std::collections::HashMap;
+
+use ab_glyph::{Font, FontRef, PxScale, point};
+
+use super::model::FigureError;
+
+/// DejaVu Sans, reduced to the characters that figures use.
+const REGULAR: &[u8] = include_bytes!("../assets/DejaVuSans-subset.ttf");
+/// DejaVu Sans Bold, reduced likewise.
+const BOLD: &[u8] = include_bytes!("../assets/DejaVuSans-Bold-subset.ttf");
+
+/// The `font-family` of SVGs: DejaVu Sans, then fonts that are no wider.
+pub(super) const FAMILY: &str = "DejaVu Sans, Verdana, Arial, sans-serif";
+
+/// Size and weight of a text.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Type {
+    /// Font size in pixels.
+    pub size: f64,
+    /// Bold instead of regular.
+    pub bold: bool,
+}
+
+impl Type {
+    /// Distance between two baselines in pixels.
+    pub fn line(self) -> f64 {
+        1.3 * self.size
+    }
+}
+
+/// Figure titles.
+pub(super) const TITLE: Type = Type { size: 17.0, bold: true };
+/// Panel titles.
+pub(super) const HEADING: Type = Type { size: 14.0, bold: true };
+/// Captions, axis labels and legends.
+pub(super) const BODY: Type = Type { size: 13.0, bold: false };
+/// Tick labels.
+pub(super) const SMALL: Type = Type { size: 12.0, bold: false };
+
+/// The embedded fonts.
+pub struct Fonts {
+    regular: Face,
+    bold: Face,
+}
+
+/// One of the fonts.
+struct Face {
+    font: FontRef<'static>,
+    /// By how much its characters advance, in font sizes: the font's own tables are slow to search.
+    advances: HashMap<char, f64>,
+}
+
+impl Face {
+    fn new(bytes: &'static [u8]) -> Result<Self, FigureError> {
+        let font =
+            FontRef::try_from_slice(bytes).map_err(|error| FigureError::Font { reason: error.to_string() })?;
+        let advances =
+            font.codepoint_ids().map(|(_, character)| (character, advance(&font, character))).collect();
+        Ok(Self { font, advances })
+    }
+}
+
+/// The advance of a character in font sizes, that of a box if the font lacks it.
+fn advance(font: &FontRef, character: char) -> f64 {
+    f64::from(font.h_advance_unscaled(font.glyph_id(character)) / font.units_per_em().unwrap_or(1.0))
+}
+
+impl Fonts {
+    /// Parses the embedded fonts.
+    pub fn new() -> Result<Self, FigureError> {
+        Ok(Self { regular: Face::new(REGULAR)?, bold: Face::new(BOLD)? })
+    }
+
+    fn face(&self, style: Type) -> &Face {
+        if style.bold { &self.bold } else { &self.regular }
+    }
+
+    fn advance(&self, character: char, style: Type) -> f64 {
+        let Face { font, advances } = self.face(style);
+        style.size * advances.get(&character).copied().unwrap_or_else(|| advance(font, character))
+    }
+
+    /// Width of a line of text in pixels, without kerning.
+    pub fn width(&self, text: &str, style: Type) -> f64 {
+        text.chars().map(|character| self.advance(character, style)).sum()
+    }
+
+    /// The largest width among lines of text, in pixels.
+    pub fn widest<'a>(&self, lines: impl IntoIterator<Item = &'a String>, style: Type) -> f64 {
+        lines.into_iter().map(|line| self.width(line, style)).fold(0.0, f64::max)
+    }
+
+    /// Breaks a text at blanks into lines of at most `width` pixels. A word that is wider is broken anywhere. An
+    /// empty text has no lines.
+    pub fn wrap(&self, text: &str, width: f64, style: Type) -> Vec<String> {
+        let mut lines: Vec<String> = Vec::new();
+        let mut line = String::new();
+        for word in text.split_whitespace() {
+            let longer = if line.is_empty() { word.to_owned() } else { format!("{line} {word}") };
+            if self.width(&longer, style) <= width {
+                line = longer;
+                continue;
+            }
+            if !line.is_empty() {
+                lines.push(std::mem::take(&mut line));
+            }
+            for character in word.chars() {
+                line.push(character);
+                if self.width(&line, style) > width && line.chars().nth(1).is_some() {
+                    line.pop();
+                    lines.push(std::mem::replace(&mut line, character.to_string()));
+                }
+            }
+        }
+        lines.extend(Some(line).filter(|line| !line.is_empty()));
+        lines
+    }
+
+    /// The text, or as much of its beginning as fits `width` pixels with an ellipsis.
+    pub fn shorten(&self, text: &str, width: f64, style: Type) -> String {
+        if self.width(text, style) <= width {
+            return text.to_owned();
+        }
+        let mut room = width - self.width("…", style);
+        let fits = |character: &char| {
+            room -= self.advance(*character, style);
+            room >= 0.0
+        };
+        let kept: String = text.chars().take_while(fits).collect();
+        format!("{}…", kept.trim_end())
+    }
+
+    /// The text in lines of at most `width` pixels, together at most 32 pixels high, in the first of these font sizes in
+    /// which that is possible without breaking a word. In the last size it is cut if need be.
+    pub fn fit(&self, text: &str, width: f64, sizes: &[f64]) -> (Vec<String>, Type) {
+        let mut style = SMALL;
+        for &size in sizes {
+            style = Type { size, bold: false };
+            let lines = self.wrap(text, width, style);
+            if lines.len() as f64 * style.line() <= 32.0 && lines.join(" ") == text {
+                return (lines, style);
+            }
+        }
+        (vec![self.shorten(text, width, style)], style)
+    }
+
+    /// Calls `pixel(x, y, coverage)` for every pixel that a line of text covers, the start of its baseline at
+    /// `(x, y)`. A character that the fonts lack is an empty box.
+    pub fn rasterise(
+        &self,
+        text: &str,
+        style: Type,
+        (mut x, y): (f64, f64),
+        mut pixel: impl FnMut(i32, i32, f64),
+    ) {
+        let font = &self.face(style).font;
+        let scale =
+            PxScale::from(style.size as f32 * font.height_unscaled() / font.units_per_em().unwrap_or(1.0));
+        for character in text.chars() {
+            let glyph = font.glyph_id(character).with_scale_and_position(scale, point(x as f32, y as f32));
+            if let Some(outline) = font.outline_glyph(glyph) {
+                let corner = outline.px_bounds().min;
+                outline.draw(|right, down, coverage| {
+                    pixel(corner.x as i32 + right as i32, corner.y as i32 + down as i32, f64::from(coverage));
+                });
+            }
+            x += self.advance(character, style);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_broken_at_blanks_into_lines_that_fit_or_cut_with_an_ellipsis() {
+        let fonts = Fonts::new().unwrap();
+        let words = "gap against seconds, median and quartiles of 25 seeds";
+        let lines = fonts.wrap(words, 120.0, BODY);
+        assert!(lines.len() > 1 && fonts.widest(&lines, BODY) <= 120.0);
+        assert_eq!(lines.join(" "), words);
+        assert_eq!(fonts.wrap("incomprehensibilities", 60.0, BODY).concat(), "incomprehensibilities");
+        assert_eq!((fonts.wrap("", 60.0, BODY).len(), fonts.wrap("ab", 0.0, BODY).len()), (0, 2));
+        let short = fonts.shorten("interlocking staircases", 80.0, SMALL);
+        assert!(short.ends_with('…') && fonts.width(&short, SMALL) <= 80.0);
+        assert_eq!(fonts.shorten("jewel", 80.0, SMALL), "jewel");
+        assert_eq!(fonts.fit("S14 origins at corners", 100.0, &[12.0, 10.0]).0, ["S14 origins at", "corners"]);
+        assert_eq!(fonts.fit("119", 18.0, &[12.0, 9.0]).1.size, 9.0);
+    }
+
+    #[test]
+    fn the_fonts_have_the_characters_of_figures() {
+        let fonts = Fonts::new().unwrap();
+        for character in "aZ09 äéñß αΩπσ ×÷±−≤≥≈∞√∑ ⁰¹²³⁴⁵⁶⁷⁸⁹⁻ ₀₁₉ ←→↑↓ …–—’“” °µ½ ✓✗ ●■▲".chars()
+        {
+            assert_ne!(fonts.regular.font.glyph_id(character).0, 0, "no {character}");
+        }
+    }
+}
