@@ -11,13 +11,36 @@ fn main() {
     let (profile, level, features) = (set("PROFILE"), set("OPT_LEVEL"), set("CARGO_CFG_TARGET_FEATURE"));
     println!("cargo:rustc-env=HARNESS_BUILD={profile}, opt-level {level}, target features {features}");
     println!("cargo:rustc-env=HARNESS_REVISION={}", revision().as_deref().unwrap_or("unknown"));
+    for library in ["bvh", "obvhs"] {
+        let version = locked_version(library).unwrap_or_else(|| "unknown".into());
+        println!("cargo:rustc-env=HARNESS_{}={version}", library.to_uppercase());
+    }
     for source in SOURCES {
         println!("cargo:rerun-if-changed={source}");
     }
 }
 
 /// What the program is made of, from this folder.
-const SOURCES: [&str; 5] = ["build.rs", "src", "../bvh-core/src", "../bvh-build/src", "../bvh-search/src"];
+const SOURCES: [&str; 9] = [
+    "build.rs",
+    "src",
+    "../bvh-config/src",
+    "../bvh-core/src",
+    "../bvh-build/src",
+    "../bvh-search/src",
+    "../bvh-scenes/src",
+    "../bvh-terminal/src",
+    "../figures/src",
+];
+
+/// The version of a package in the lock file of the workspace; the lowest if there are several.
+fn locked_version(package: &str) -> Option<String> {
+    const LOCK: &str = "../../Cargo.lock";
+    println!("cargo:rerun-if-changed={LOCK}");
+    let lock = std::fs::read_to_string(LOCK).ok()?;
+    let (_, after) = lock.split_once(&format!("name = \"{package}\"\nversion = \""))?;
+    Some(after.split('"').next()?.to_owned())
+}
 
 /// The commit of the sources, with a `+` where they differ from it. Found here and not when the program runs: then the current folder
 /// may belong to another repository, and the sources may have moved on.

@@ -1,17 +1,19 @@
 // Traces rays with Embree and tinybvh for the harness: a mesh and rays in through standard input, seconds and distances
-// out through standard output. `ray_peers MODE` traces by one mode; `ray_peers` alone lists all of them.
+// out through standard output. `ray_peers "LIBRARY MODE"` traces by one mode. `ray_peers` alone lists all modes, a line
+// each: instruction set, library, version and mode, between tabs.
 //
 // Everything is in the machine's byte order (little-endian on every supported one):
 //
 //   in:   u32 triangles, then 9 f32 for each
 //   out:  f64 seconds that the build took
-//   in:   u32 any hit (1) or nearest hit (0), u32 columns, u32 rays, u32 rays per part, then 8 f32 for each ray: origin,
-//         t_min, direction (a unit vector), t_max
+//   in:   u32 any hit (1) or nearest hit (0), u32 picture (1 or 0), u32 rays, u32 rays per part, then 8 f32 for each ray:
+//         origin, t_min, direction (a unit vector), t_max
 //   out:  f64 seconds for each part, then f32 for each ray: the distance of its hit, or infinity; for any hit 0 or infinity
 //
-// and so on until the input ends. `ray_peers "tinybvh tree splits"` answers the mesh with f64 seconds, u32 nodes, u32 references, the
-// nodes of 32 bytes each and the triangle of every reference as u32. `columns` is the width of a picture if the rays go from one point through its pixels, row
-// by row from the upper left corner in right-handed coordinates; otherwise 0. Only packets make use of it.
+// and so on until the input ends. `ray_peers "tinybvh tree splits"` answers the mesh with f64 seconds, u32 nodes,
+// u32 references, the nodes of 32 bytes each and the triangle of every reference as u32. The rays of a picture go from one
+// point through its pixels, which are in Morton order from the upper left corner in right-handed coordinates. Only
+// tinybvh's packets make use of it.
 
 #define TINYBVH_IMPLEMENTATION
 #include "tiny_bvh.h"
@@ -36,7 +38,7 @@ struct Ray {
 };
 
 struct Query {
-    uint32_t any, columns, count, part;
+    uint32_t any, picture, count, part;
 };
 
 double now() {
@@ -57,6 +59,26 @@ constexpr size_t BLOCK = 256;
 // ---------------------------------------------------------------------------------------------------------- Embree
 // The part of Embree 4's interface that is used here, so that only its library is needed, not its headers.
 
+/// Embree's packets of rays, by component: the same layout for 8 and 16 rays.
+template <int N> struct alignas(4 * N) Rays {
+    float org_x[N], org_y[N], org_z[N], tnear[N], dir_x[N], dir_y[N], dir_z[N], time[N], tfar[N];
+    unsigned mask[N], id[N], flags[N];
+};
+template <int N> struct alignas(4 * N) Hits {
+    float Ng_x[N], Ng_y[N], Ng_z[N], u[N], v[N];
+    unsigned primID[N], geomID[N], instID[N], instPrimID[N];
+};
+template <int N> struct RayHits {
+    Rays<N> ray;
+    Hits<N> hit;
+};
+/// Embree has one struct for nearest hits and one for any hits, with the same members.
+struct Arguments {
+    unsigned flags, features;
+    void *context, *filter, *callback;
+    float min_width;
+};
+
 extern "C" {
 struct RTCDeviceTy;
 struct RTCSceneTy;
@@ -74,6 +96,7 @@ struct RTCRayHit {
     RTCHit hit;
 };
 RTCDeviceTy *rtcNewDevice(const char *config);
+ssize_t rtcGetDeviceProperty(RTCDeviceTy *device, int property);
 RTCSceneTy *rtcNewScene(RTCDeviceTy *device);
 void rtcSetSceneFlags(RTCSceneTy *scene, int flags);
 void rtcSetSceneBuildQuality(RTCSceneTy *scene, int quality);
@@ -84,16 +107,42 @@ unsigned rtcAttachGeometry(RTCSceneTy *scene, RTCGeometryTy *geometry);
 void rtcCommitScene(RTCSceneTy *scene);
 void rtcIntersect1(RTCSceneTy *scene, RTCRayHit *ray, void *arguments);
 void rtcOccluded1(RTCSceneTy *scene, RTCRay *ray, void *arguments);
+void rtcIntersect8(const int *valid, RTCSceneTy *scene, RayHits<8> *rays, Arguments *arguments);
+void rtcOccluded8(const int *valid, RTCSceneTy *scene, Rays<8> *rays, Arguments *arguments);
+void rtcIntersect16(const int *valid, RTCSceneTy *scene, RayHits<16> *rays, Arguments *arguments);
+void rtcOccluded16(const int *valid, RTCSceneTy *scene, Rays<16> *rays, Arguments *arguments);
 }
 
+#ifdef __AVX512F__
+constexpr const char *INSTRUCTIONS = "AVX-512";
+constexpr const char *EMBREE_CONFIG = "threads=1,set_affinity=0";
+constexpr int PACKET = 16;
+#else
+constexpr const char *INSTRUCTIONS = "AVX2";
+constexpr const char *EMBREE_CONFIG = "threads=1,set_affinity=0,isa=avx2";
+constexpr int PACKET = 8;
+#endif
+
+template <int N> void intersect(const int *valid, RTCSceneTy *scene, RayHits<N> *rays, Arguments *arguments) {
+    if constexpr (N == 8) rtcIntersect8(valid, scene, rays, arguments);
+    else rtcIntersect16(valid, scene, rays, arguments);
+}
+
+template <int N> void occluded(const int *valid, RTCSceneTy *scene, Rays<N> *rays, Arguments *arguments) {
+    if constexpr (N == 8) rtcOccluded8(valid, scene, rays, arguments);
+    else rtcOccluded16(valid, scene, rays, arguments);
+}
+
+/// Embree, ray by ray.
 class Embree : public Tracer {
+protected:
     RTCSceneTy *scene;
 
 public:
     Embree(const std::vector<float> &corners, bool high, bool robust) {
         constexpr int TRIANGLE = 0, INDEX = 0, VERTEX = 1, UINT3 = 0x5003, FLOAT3 = 0x9003;
         constexpr int ROBUST = 1 << 2, MEDIUM_QUALITY = 1, HIGH_QUALITY = 2;
-        RTCDeviceTy *device = rtcNewDevice("threads=1,set_affinity=0");
+        RTCDeviceTy *device = rtcNewDevice(EMBREE_CONFIG);
         scene = rtcNewScene(device);
         rtcSetSceneFlags(scene, robust ? ROBUST : 0);
         rtcSetSceneBuildQuality(scene, high ? HIGH_QUALITY : MEDIUM_QUALITY);
@@ -127,6 +176,51 @@ public:
             for (size_t i = 0; i < size; i++) {
                 bool hit = query.any ? block[i].ray.tfar < 0 : block[i].hit.geomID != ~0u;
                 distances[first + i] = !hit ? MISS : query.any ? 0 : block[i].ray.tfar;
+            }
+        }
+        return seconds;
+    }
+};
+
+/// Embree by packets of the instruction set's width, of consecutive rays. The flag says how its packets are traversed.
+class EmbreePackets : public Embree {
+    Arguments arguments;
+
+public:
+    EmbreePackets(const std::vector<float> &corners, bool high, bool robust, bool coherent)
+        : Embree(corners, high, robust), arguments{coherent ? 1u << 16 : 0u, ~0u, nullptr, nullptr, nullptr, 0} {}
+
+    double trace(const Query &query, const Ray *rays, size_t count, float *distances) override {
+        constexpr size_t PACKETS = BLOCK / PACKET;
+        double seconds = 0;
+        RayHits<PACKET> block[PACKETS];
+        alignas(64) int valid[PACKETS][PACKET];
+        for (size_t first = 0; first < count; first += BLOCK) {
+            size_t size = std::min(BLOCK, count - first), packets = (size + PACKET - 1) / PACKET;
+            for (size_t i = 0; i < packets * PACKET; i++) {
+                // Lanes without a ray hold the last one, and are not valid.
+                const auto &[origin, t_min, direction, t_max] = rays[first + std::min(i, size - 1)];
+                Rays<PACKET> &to = block[i / PACKET].ray;
+                size_t lane = i % PACKET;
+                to.org_x[lane] = origin[0], to.org_y[lane] = origin[1], to.org_z[lane] = origin[2];
+                to.dir_x[lane] = direction[0], to.dir_y[lane] = direction[1], to.dir_z[lane] = direction[2];
+                to.tnear[lane] = t_min, to.tfar[lane] = t_max, to.time[lane] = 0;
+                to.mask[lane] = ~0u, to.id[lane] = 0, to.flags[lane] = 0;
+                Hits<PACKET> &hit = block[i / PACKET].hit;
+                hit.geomID[lane] = hit.instID[lane] = hit.instPrimID[lane] = ~0u;
+                valid[i / PACKET][lane] = i < size ? -1 : 0;
+            }
+            double start = now();
+            if (query.any)
+                for (size_t i = 0; i < packets; i++) occluded(valid[i], scene, &block[i].ray, &arguments);
+            else
+                for (size_t i = 0; i < packets; i++) intersect(valid[i], scene, &block[i], &arguments);
+            seconds += now() - start;
+            for (size_t i = 0; i < size; i++) {
+                const auto &[ray, hit] = block[i / PACKET];
+                size_t lane = i % PACKET;
+                bool is_hit = query.any ? ray.tfar[lane] < 0 : hit.geomID[lane] != ~0u;
+                distances[first + i] = !is_hit ? MISS : query.any ? 0 : ray.tfar[lane];
             }
         }
         return seconds;
@@ -194,26 +288,24 @@ public:
     using TinyBvh::TinyBvh;
 
     double trace(const Query &query, const Ray *rays, size_t count, float *distances) override {
-        uint32_t columns = query.columns;
-        // Packets are cut out of bands of 16 whole rows of the picture.
-        if (query.any || columns == 0 || columns % SIDE != 0 || count % (SIDE * columns) != 0)
-            return TinyBvh::trace(query, rays, count, distances);
+        // In Morton order every 256 pixels are a square of 16 × 16.
+        if (query.any || !query.picture || count % BLOCK != 0) return TinyBvh::trace(query, rays, count, distances);
         double seconds = 0;
         tinybvh::Ray packet[BLOCK];
-        for (size_t top = 0; top < count / columns; top += SIDE) {
-            for (size_t left = 0; left < columns; left += SIDE) {
-                // The order that tinybvh expects: 4 × 4 blocks of 4 × 4 pixels, mirrored, as its pictures are left-handed.
-                auto pixel = [&](uint32_t i) {
-                    uint32_t x = SIDE - 1 - (i / 16 % 4 * 4 + i % 4), y = i / 64 * 4 + i / 4 % 4;
-                    return (top + y) * columns + left + x;
-                };
-                for (uint32_t i = 0; i < BLOCK; i++) packet[i] = to_tinybvh(rays[pixel(i)]);
-                double start = now();
-                layout.Intersect256RaysSSE(packet);
-                seconds += now() - start;
-                for (uint32_t i = 0; i < BLOCK; i++)
-                    distances[pixel(i)] = packet[i].hit.t < far_end(rays[pixel(i)]) ? packet[i].hit.t : MISS;
-            }
+        for (size_t first = 0; first < count; first += BLOCK) {
+            // The order that tinybvh expects: 4 × 4 blocks of 4 × 4 pixels, mirrored, as its pictures are left-handed.
+            auto pixel = [&](uint32_t i) {
+                uint32_t x = SIDE - 1 - (i / 16 % 4 * 4 + i % 4), y = i / 64 * 4 + i / 4 % 4;
+                uint32_t morton = 0;
+                for (uint32_t bit = 0; bit < 4; bit++) morton |= (x >> bit & 1) << (2 * bit) | (y >> bit & 1) << (2 * bit + 1);
+                return first + morton;
+            };
+            for (uint32_t i = 0; i < BLOCK; i++) packet[i] = to_tinybvh(rays[pixel(i)]);
+            double start = now();
+            layout.Intersect256RaysSSE(packet);
+            seconds += now() - start;
+            for (uint32_t i = 0; i < BLOCK; i++)
+                distances[pixel(i)] = packet[i].hit.t < far_end(rays[pixel(i)]) ? packet[i].hit.t : MISS;
         }
         return seconds;
     }
@@ -235,6 +327,14 @@ constexpr Mode MODES[] = {
     {"embree high", make<Embree, true, false>},
     {"embree medium robust", make<Embree, false, true>},
     {"embree high robust", make<Embree, true, true>},
+    {"embree medium, coherent packets", make<EmbreePackets, false, false, true>},
+    {"embree medium, incoherent packets", make<EmbreePackets, false, false, false>},
+    {"embree high, coherent packets", make<EmbreePackets, true, false, true>},
+    {"embree high, incoherent packets", make<EmbreePackets, true, false, false>},
+    {"embree medium robust, coherent packets", make<EmbreePackets, false, true, true>},
+    {"embree medium robust, incoherent packets", make<EmbreePackets, false, true, false>},
+    {"embree high robust, coherent packets", make<EmbreePackets, true, true, true>},
+    {"embree high robust, incoherent packets", make<EmbreePackets, true, true, false>},
     {"tinybvh BVH4", make<TinyBvh<tinybvh::BVH4_CPU>, false>},
     {"tinybvh BVH4 splits", make<TinyBvh<tinybvh::BVH4_CPU>, true>},
     {"tinybvh BVH8", make<TinyBvh<tinybvh::BVH8_CPU>, false>},
@@ -299,11 +399,20 @@ int split_tree() {
 
 int main(int argc, char **argv) {
     if (argc > 1 && !strcmp(argv[1], "tinybvh tree splits")) return split_tree();
-    for (const Mode &mode : MODES) {
-        if (argc < 2) puts(mode.name);
-        else if (!strcmp(argv[1], mode.name)) return serve(mode);
+    if (argc < 2) {
+        ssize_t embree = rtcGetDeviceProperty(rtcNewDevice(EMBREE_CONFIG), 0);
+        for (const Mode &mode : MODES) {
+            const char *space = strchr(mode.name, ' ');
+            printf("%s\t%.*s\t", INSTRUCTIONS, int(space - mode.name), mode.name);
+            if (mode.name[0] == 'e') printf("%zd.%zd.%zd", embree / 10000, embree / 100 % 100, embree % 100);
+            else printf("%d.%d.%d", TINY_BVH_VERSION_MAJOR, TINY_BVH_VERSION_MINOR, TINY_BVH_VERSION_SUB);
+            printf("\t%s\n", space + 1);
+        }
+        return 0;
     }
-    if (argc < 2) return 0;
+    for (const Mode &mode : MODES) {
+        if (!strcmp(argv[1], mode.name)) return serve(mode);
+    }
     fprintf(stderr, "ray_peers: %s is no mode; accepted: one of those that ray_peers alone lists\n", argv[1]);
     return 2;
 }

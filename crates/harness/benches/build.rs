@@ -5,12 +5,12 @@
 mod paired;
 
 use bvh_build::top_down::Workspace;
-use bvh_build::{Builder, Presorted, goldsmith_salmon, muller_fellner};
+use bvh_build::{Builder, Presorted, Watch, goldsmith_salmon, muller_fellner};
 use bvh_core::{Aabb, Bvh};
+use bvh_scenes::Scene;
 use bvh_search::grasp::{self, Candidates};
 use bvh_search::{Budget, Problem, Stream, solve};
 use glam::Vec3;
-use harness::scenes::Scene;
 use paired::{Contender, compare};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -63,7 +63,9 @@ fn one_thread(scene: &Scene) {
         let scene = Presorted::new(boxes).expect("finite boxes");
         let (mut workspace, mut tree) = (Workspace::default(), Bvh::default());
         for _ in 0..TRIALS {
-            config.construct(&scene, None, &mut bvh_build::top_down::TakeBest, &mut workspace, &mut tree);
+            let buffers = (&mut workspace, &mut tree);
+            let rule = &mut bvh_build::top_down::TakeBest;
+            config.construct(&scene, None, rule, buffers, &Watch::default()).expect("nobody cancels");
             std::hint::black_box(bvh_core::cost::internal_area(&tree));
         }
     };

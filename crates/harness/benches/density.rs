@@ -7,8 +7,8 @@ mod paired;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::PackedAabb;
 use bvh_core::cost::{Area, Measure};
+use bvh_scenes::Scene;
 use harness::measure::ray_cost::{Config, TrainedOn};
-use harness::scenes::Scene;
 use paired::{Contender, compare};
 use std::hint::black_box;
 

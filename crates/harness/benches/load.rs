@@ -10,7 +10,7 @@ mod paired;
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::file::{self, Origin, TreeFile};
-use harness::scenes::Scene;
+use bvh_scenes::Scene;
 use memmap2::Mmap;
 use paired::{Contender, compare, compare_each_after};
 use std::fs::{self, File};

@@ -5,10 +5,11 @@
 //! Bytes are those that the program asks its allocator for, so that they are the same on every 64-bit machine: no pages,
 //! no padding, and not the program itself; a buffer that grows counts twice while it is copied.
 
+use bvh_scenes::Scene;
 use bvh_search::{Problem, solve};
-use harness::run::rows::{MemoryRow, to_bytes};
-use harness::scenes::Scene;
-use harness::spec::{Contestant, Experiment, Overrides};
+use harness::contestant::Contestant;
+use harness::rows::{MemoryRow, to_bytes};
+use harness::spec::{Experiment, Overrides};
 use peak_alloc::PeakAlloc;
 use std::fs;
 use std::path::Path;

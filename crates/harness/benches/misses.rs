@@ -6,13 +6,14 @@
 //! `scripts/ray-peers/build`: Embree and tinybvh on the same rays in the same turns. Theirs are made before their clocks
 //! start, and the same loop is subtracted.
 
-use bvh_build::{Builder, Query, muller_fellner};
+use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Coherence, Hit, Ray, WideBvh};
+use bvh_scenes::Scene;
+use bvh_scenes::trace::Query;
 use bvh_search::Stream;
 use glam::{DVec3, Vec3};
-use harness::measure::speed::{Batch, PART};
+use harness::measure::contender::{Batch, PART};
 use harness::peers::external;
-use harness::scenes::Scene;
 use harness::statistics::median;
 use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
@@ -64,9 +65,9 @@ fn main() {
     for (library, contender) in others.iter().flatten() {
         for query in [Query::Nearest, Query::Any] {
             let mut hits = vec![None; rays.len()];
+            let batch = Batch { query, coherence: Coherence::Incoherent, in_squares: false, rays };
             let trace = move || {
-                let seconds =
-                    contender.tracer.trace(&Batch { query, columns: 0, rays }, &mut hits).expect("answers");
+                let seconds = contender.tracer.trace(&batch, &mut hits).expect("answers");
                 assert!(hits.iter().all(Option::is_none));
                 seconds.iter().sum()
             };

@@ -11,9 +11,9 @@ mod clock;
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost;
+use bvh_scenes::Scene;
 use clap::Parser;
 use harness::peers::{NoSettings, Obvhs, Peer, Preset};
-use harness::scenes::Scene;
 
 /// The fraction of a library's time that `best` may plan with: other programs disturb both.
 const PLANNED: f64 = 0.99;

@@ -9,8 +9,8 @@ mod clock;
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost;
+use bvh_scenes::Scene;
 use clap::Parser;
-use harness::scenes::Scene;
 
 /// The fraction of the limit that runs on more than one thread have.
 const LESS_TIME: f64 = 0.6;

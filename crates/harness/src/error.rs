@@ -1,9 +1,13 @@
 //! What can go wrong in the harness, and the exit code of each failure.
 
-use crate::peers::command;
+use bvh_core::file::FileError;
+use bvh_scenes::render::StructureError;
+use bvh_scenes::tree_file::TreeFileError;
+use bvh_scenes::{ReadError, SceneError};
 use bvh_search::SearchError;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::process::ExitStatus;
 
 /// A failure, with the file or object it concerns.
 #[derive(Debug, thiserror::Error)]
@@ -13,8 +17,11 @@ pub enum Error {
     #[error("{}: {message}", .file.display())]
     Spec { file: PathBuf, message: String },
     /// A scene that is neither built in, nor fetched, nor a readable mesh file.
-    #[error("scene {name}: {message}")]
-    Scene { name: String, message: String },
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// An input that could not be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// A command line that asks for something contradictory.
     #[error("{0}")]
     Usage(String),
@@ -38,7 +45,7 @@ pub enum Error {
     Library { scene: String, library: &'static str, message: String },
     /// An external program did not do its part.
     #[error("scene {scene}, method {method}, command `{command}`: {source}")]
-    External { scene: String, method: String, command: String, source: command::Fault },
+    External { scene: String, method: String, command: String, source: CommandFault },
     /// Rays cannot be traced through this scene.
     #[error("scene {scene}, tracing: {message}")]
     Tracing { scene: String, message: String },
@@ -49,11 +56,14 @@ pub enum Error {
     #[error("scene {scene}, method {method} returned an invalid tree: {source}; please report this")]
     InvalidTree { scene: String, method: String, source: bvh_core::InvalidBvh },
     /// A tree file that is damaged, or for another scene.
-    #[error("{}: {source}", .path.display())]
-    TreeFile { path: PathBuf, source: bvh_core::file::FileError },
+    #[error(transparent)]
+    TreeFile(#[from] TreeFileError),
+    /// A structure that a picture cannot be traced with.
+    #[error(transparent)]
+    Structure(#[from] StructureError),
     /// A figure could not be drawn.
     #[error(transparent)]
-    Figure(#[from] crate::figures::FigureError),
+    Figure(#[from] figures::FigureError),
     /// `--check` found other numbers than the committed ones.
     #[error(
         "{differences} difference(s) from the committed results; if they are meant, run again without --check"
@@ -68,26 +78,47 @@ pub enum Error {
     /// Ctrl-C.
     #[error("interrupted; {finished} of {runs} runs are kept, `--resume` does the rest")]
     Interrupted { finished: usize, runs: usize },
-    /// Ctrl-C during a picture.
-    #[error("interrupted; no picture was written")]
-    Abandoned,
-    /// Ctrl-C during a bake.
-    #[error("interrupted; the best tree so far, of cost {cost}, is in {0}; `--from {0}` goes on", .path.display())]
-    Stopped { path: PathBuf, cost: f64 },
-    /// Ctrl-C during a bake of instances.
-    #[error("interrupted; the best trees so far, of all meshes and over the instances, are in {}", .path.display())]
-    StoppedInstances { path: PathBuf },
+}
+
+/// The failure of a program that is a method.
+#[derive(Debug, thiserror::Error)]
+pub enum CommandFault {
+    /// There is no such program, or it may not be run.
+    #[error("it cannot be started: {0}")]
+    NotStarted(io::Error),
+    /// It reports a failure, with the last line on standard error.
+    #[error("{status}: {last_line}")]
+    Failed {
+        /// How it ended.
+        status: ExitStatus,
+        /// Its last words.
+        last_line: String,
+    },
+    /// It ended without a tree.
+    #[error("it left no file at the path that is its last argument")]
+    NoTree,
+    /// Its tree is damaged, or none over these boxes.
+    #[error("its tree is refused: {0}")]
+    Refused(#[from] FileError),
+    /// It took too long.
+    #[error("it did not end within {0} s")]
+    TimedOut(f64),
+    /// The run was interrupted, and so it was ended.
+    #[error("it was interrupted")]
+    Interrupted,
+    /// Files could not be exchanged with it.
+    #[error("the files that it is given cannot be written or read: {0}")]
+    Exchange(#[from] io::Error),
 }
 
 impl Error {
     /// 2 for what the user can mend in a spec or a command line, 130 after Ctrl-C, otherwise 1.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Spec { .. } | Self::Scene { .. } | Self::Usage(_) | Self::TreeFile { .. } => 2,
-            Self::Interrupted { .. }
-            | Self::Stopped { .. }
-            | Self::StoppedInstances { .. }
-            | Self::Abandoned => 130,
+            Self::Read(error) | Self::TreeFile(TreeFileError::Read(error)) if !error.is_of_the_path() => 1,
+            Self::Read(_) => 2,
+            Self::Spec { .. } | Self::Scene(_) | Self::Usage(_) | Self::TreeFile(_) => 2,
+            Self::Interrupted { .. } => 130,
             _ => 1,
         }
     }
@@ -111,5 +142,21 @@ impl Error {
     /// For `map_err` on CSV operations: names the path.
     pub fn csv(path: &Path) -> impl FnOnce(csv::Error) -> Self {
         move |source| Self::Csv { path: path.to_owned(), source }
+    }
+}
+
+impl From<bvh_terminal::Error> for Error {
+    fn from(error: bvh_terminal::Error) -> Self {
+        match error {
+            bvh_terminal::Error::Usage(message) => Self::Usage(message),
+            bvh_terminal::Error::Io { path, action, source } => Self::Io { path, action, source },
+        }
+    }
+}
+
+impl From<bvh_terminal::files::WriteError> for Error {
+    fn from(error: bvh_terminal::files::WriteError) -> Self {
+        let bvh_terminal::files::WriteError { path, action, source } = error;
+        Self::Io { path, action, source }
     }
 }

@@ -1,19 +1,18 @@
 //! Experiments on bounding volume hierarchies: TOML specs in, CSV files and figures out.
 //!
-//! Data flows one way: [`spec`] → [`scenes`] → [`run`] → [`run::rows`] → [`report`], which reads the CSV files only.
-//! The commands are in [`cli`]. Everything that touches files, clocks, threads or the terminal lives in this crate.
+//! Data flows one way: [`spec`] → [scenes](bvh_scenes) → [`run`] → [`rows`] → [`report`], which reads the CSV files only.
+//! The commands are in [`cli`]. Clocks, threads and folders of results are here.
 
 pub mod cli;
+pub mod contestant;
 pub mod error;
-pub mod figures;
-pub mod files;
 pub mod measure;
 pub mod page;
 pub mod peers;
-pub mod render;
+pub mod processor;
 pub mod report;
+pub mod rows;
 pub mod run;
-pub mod scenes;
 pub mod spec;
 pub mod statistics;
 pub mod stress;

@@ -2,13 +2,15 @@
 
 mod support;
 
-use bvh_core::cost;
-use harness::files::load_tree;
+use bvh_build::{Builder, median_cut};
+use bvh_core::{Bvh, cost};
+use bvh_scenes::Scene;
+use bvh_scenes::tree_file;
+use bvh_search::{Budget, Problem, best, optimize};
 use harness::run::{archive, reference};
-use harness::scenes::Scene;
 use std::fs;
 use std::path::Path;
-use support::{refused, said, text};
+use support::{folder_with, refused, said, save, text};
 
 #[test]
 fn every_tree_of_the_archive_is_valid_costs_what_is_written_and_is_the_best_known() {
@@ -17,7 +19,7 @@ fn every_tree_of_the_archive_is_valid_costs_what_is_written_and_is_the_best_know
     assert_eq!(fs::read_dir(results.join("trees")).unwrap().count(), rows.len() + 1, "a row for every file");
     for row in rows {
         let scene = Scene::load(&row.scene).unwrap();
-        let tree = load_tree(&archive::path(&results, &row.scene), &scene).unwrap();
+        let (tree, _) = tree_file::load(&archive::path(&results, &row.scene), &scene).unwrap();
         assert_eq!(cost::internal_area(&tree), row.internal_area, "{}", row.scene);
         assert_eq!((row.objects, row.checksum), (scene.boxes.len(), format!("{:016x}", scene.checksum())));
         let known = reference::best_known(&results, &scene).unwrap().unwrap();
@@ -26,33 +28,62 @@ fn every_tree_of_the_archive_is_valid_costs_what_is_written_and_is_the_best_know
     }
 }
 
+/// A tree of the scene, and a better one.
+fn trees(scene: &Scene) -> [Bvh; 2] {
+    let poor = median_cut::Config::default().build(&scene.boxes).unwrap();
+    let budget = Budget { max_work: Some(200_000), ..Budget::UNLIMITED };
+    let config = best::Config::default();
+    let found = optimize(&poor, &Problem::new(&scene.boxes), &config, 1, budget, &()).unwrap();
+    [poor, found.tree]
+}
+
+#[test]
+fn a_tree_from_elsewhere_is_compared_with_the_best_known() {
+    let spec = "question = 'q'\nscenes = ['spheres75:60']\nmethods = [{ method = 'median_cut' }]\n";
+    let folder = folder_with("spec.toml", spec);
+    let at = folder.path();
+    said(at, &["spec.toml"]);
+    let scene = Scene::load("spheres75:60").unwrap();
+    let [poor, good] = trees(&scene);
+    save(&good, &scene, &at.join("good.bvh"));
+    let shown = said(at, &["compare", "good.bvh", "spheres75:60"]);
+    assert!(shown.contains("found by: median_cut"), "{shown}");
+    let ratio = cost::internal_area(&good) / cost::internal_area(&poor);
+    assert!(ratio < 1.0 && shown.contains(&format!("over the best known: {ratio}")), "{ratio}: {shown}");
+    // Nothing is known of another scene, and the tree is not for it.
+    let other = Scene::load("spheres75:50").unwrap();
+    let [tree, _] = trees(&other);
+    save(&tree, &other, &at.join("other.bvh"));
+    assert!(said(at, &["compare", "other.bvh", "spheres75:50"]).contains("none of this very scene"));
+    refused(at, &["compare", "other.bvh", "spheres75:60"], 2, &["other.bvh"]);
+}
+
 #[test]
 fn only_a_better_tree_comes_into_the_archive_and_becomes_the_best_known() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::create_dir(at.join("results")).unwrap();
-    for (method, budget) in [("median_cut", "0s"), ("best", "200kwork")] {
-        let out = format!("{budget}.bvh");
-        let bake = ["bake", "spheres75:60", "--method", method, "--budget", budget, "--out", &out];
-        said(at, &bake);
-    }
+    let scene = Scene::load("spheres75:60").unwrap();
+    let [poor, good] = trees(&scene);
+    save(&poor, &scene, &at.join("poor.bvh"));
+    save(&good, &scene, &at.join("good.bvh"));
     let files =
         || ["best_known.csv", "trees/trees.csv"].map(|file| fs::read(at.join("results").join(file)).unwrap());
-    for file in ["0s.bvh", "200kwork.bvh"] {
-        let kept = said(at, &["verify", file, "spheres75:60", "--keep", &format!("made {file}")]);
+    for file in ["poor.bvh", "good.bvh"] {
+        let kept = said(at, &["compare", file, "spheres75:60", "--keep", &format!("made {file}")]);
         assert!(kept.contains("kept in: results/trees/spheres75-60.bvh"), "{kept}");
         assert!(
             fs::read(at.join("results/trees/spheres75-60.bvh")).unwrap() == fs::read(at.join(file)).unwrap()
         );
         let [known, trees] = files().map(|bytes| text(&bytes));
-        let scene = Scene::load("spheres75:60").unwrap();
-        let cost = cost::internal_area(&load_tree(&at.join(file), &scene).unwrap()).to_string();
+        let (tree, _) = tree_file::load(&at.join(file), &scene).unwrap();
+        let cost = cost::internal_area(&tree).to_string();
         assert!(trees.contains(&format!("made {file}")) && trees.lines().count() == 2, "{trees}");
         assert!([known, trees].iter().all(|rows| rows.contains(&cost)), "{cost}");
     }
     let before = files();
-    for worse in ["0s.bvh", "200kwork.bvh"] {
-        refused(at, &["verify", worse, "spheres75:60", "--keep", "worse"], 2, &["its cost is"]);
+    for worse in ["poor.bvh", "good.bvh"] {
+        refused(at, &["compare", worse, "spheres75:60", "--keep", "worse"], 2, &["its cost is"]);
         assert!(files() == before);
     }
 }

@@ -1,12 +1,15 @@
-//! Files import each other one way only: no file of a crate uses a file that, by whatever way round, uses it.
+//! Imports lead downwards only: between the rooms of a crate as ARCHITECTURE.md lists them, and between files in no circle.
 //!
-//! Paths that begin with `crate`, `super`, or the name of a child module are followed, through re-exports, to the file
+//! A room is a file or folder at the top of a crate's sources. Paths that begin with `crate`, `super`, or the name of a child module are followed, through re-exports, to the file
 //! that defines the item. Re-exports themselves and unit tests do not count, nor does what a module defines for the files
 //! of its own folder.
+
+mod support;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use support::top;
 
 type Module = Vec<String>;
 
@@ -22,7 +25,7 @@ fn modules(folder: &Path, at: &Module, found: &mut BTreeMap<Module, String>) {
         };
         if path.is_dir() {
             modules(&path, &module, found);
-        } else if path.extension().is_some_and(|extension| extension == "rs") && !path.ends_with("main.rs") {
+        } else if is_source(&path) {
             let text = fs::read_to_string(&path).unwrap();
             let lines = text.lines().take_while(|line| *line != "#[cfg(test)]");
             let code =
@@ -30,6 +33,13 @@ fn modules(folder: &Path, at: &Module, found: &mut BTreeMap<Module, String>) {
             found.insert(module, code);
         }
     }
+}
+
+/// Whether a file is code of its crate: no unit tests, and no program beside a library.
+fn is_source(path: &Path) -> bool {
+    let is_beside_a_library = path.ends_with("main.rs") && path.with_file_name("lib.rs").exists();
+    let is_rust = path.extension().is_some_and(|extension| extension == "rs");
+    is_rust && !path.ends_with("tests.rs") && !is_beside_a_library
 }
 
 /// All paths of a use tree such as `a::{b, c::{d as e, self}}`.
@@ -97,23 +107,91 @@ fn resolve(path: &Module, exports: &BTreeMap<Module, Vec<Module>>, depth: usize)
     }
 }
 
+/// For every file of a crate's sources, the files that define what it uses, without those of its own folder.
+fn edges(folder: &Path) -> BTreeSet<(Module, Module)> {
+    let mut known = BTreeMap::new();
+    modules(folder, &Module::new(), &mut known);
+    let found: BTreeMap<_, _> =
+        known.iter().map(|(module, code)| (module, used(module, code, &known))).collect();
+    let exports = found.iter().map(|(module, [exports, _])| ((*module).clone(), exports.clone())).collect();
+    let mut edges = BTreeSet::new();
+    for (module, [_, paths]) in &found {
+        let targets = paths.iter().map(|path| resolve(path, &exports, 0));
+        // What a module defines is open to the files of its own folder.
+        let others = targets.filter(|target| !module.starts_with(target));
+        edges.extend(others.map(|target| ((*module).clone(), target)));
+    }
+    edges
+}
+
+/// The crates whose rooms ARCHITECTURE.md lists, each with its floors from the top down.
+fn floors(page: &str) -> Vec<(String, Vec<Vec<String>>)> {
+    let block = page.split("```floors\n").nth(1).unwrap().split("```").next().unwrap();
+    // A line that is indented goes on with the crate above.
+    let lines = block.replace("\n ", " ");
+    let floor =
+        |names: &str| names.split_whitespace().map(|name| name.trim_end_matches(',').to_owned()).collect();
+    let crates = lines.lines().map(|line| line.split_once(' ').unwrap());
+    crates.map(|(name, floors)| (name.to_owned(), floors.split(" → ").map(floor).collect())).collect()
+}
+
+/// The rooms of a crate: the files and folders at the top of its sources.
+fn rooms(folder: &Path) -> BTreeSet<String> {
+    let mut found = BTreeMap::new();
+    modules(folder, &Module::new(), &mut found);
+    found.into_keys().filter_map(|module| module.first().cloned()).collect()
+}
+
+/// All imports that lead from a room to one that is not on a lower floor.
+fn rising(edges: &BTreeSet<(Module, Module)>, floors: &[Vec<String>]) -> Vec<String> {
+    let floor = |module: &Module| floors.iter().position(|rooms| rooms.contains(&module[0]));
+    let rises = |(from, to): &&(Module, Module)| {
+        // The root of a crate is no room.
+        let are_rooms = !to.is_empty() && !from.is_empty();
+        are_rooms && from[0] != to[0] && floor(to) <= floor(from)
+    };
+    let shown = |(from, to): &(Module, Module)| format!("{} uses {}", from.join("/"), to.join("/"));
+    edges.iter().filter(rises).map(shown).collect()
+}
+
+#[test]
+fn rooms_import_only_rooms_on_lower_floors() {
+    let page = fs::read_to_string(top().join("ARCHITECTURE.md")).unwrap();
+    let listed = floors(&page);
+    for (name, floors) in &listed {
+        let folder = top().join("crates").join(name).join("src");
+        let known: BTreeSet<String> = floors.iter().flatten().cloned().collect();
+        assert_eq!(known, rooms(&folder), "{name}: the rooms of ARCHITECTURE.md, and those of the sources");
+        let rising = rising(&edges(&folder), floors);
+        assert!(rising.is_empty(), "{name}:\n{}", rising.join("\n"));
+    }
+    // Every crate of the workspace is listed.
+    let manifest = fs::read_to_string(top().join("Cargo.toml")).unwrap();
+    let manifest: toml::Table = manifest.parse().unwrap();
+    let members = manifest["workspace"]["members"].as_array().unwrap();
+    let members = members.iter().map(|member| member.as_str().unwrap().trim_start_matches("crates/"));
+    assert_eq!(listed.iter().map(|(name, _)| name.as_str()).collect::<BTreeSet<_>>(), members.collect());
+}
+
+#[test]
+fn an_import_of_a_room_above_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |file: &str, text: &str| fs::write(folder.path().join(file), text).unwrap();
+    write("lib.rs", "pub mod above;\nmod below;\npub use below::Low;\n");
+    write("above.rs", "use crate::Low;\npub struct High(Low);\n");
+    write("below.rs", "pub struct Low;\n");
+    let floors = [vec!["above".to_owned()], vec!["below".to_owned()]];
+    assert_eq!(rising(&edges(folder.path()), &floors), [""; 0]);
+    write("below.rs", "use crate::above::High;\npub struct Low;\nfn f(_: High) {}\n");
+    assert_eq!(rising(&edges(folder.path()), &floors), ["below uses above"]);
+}
+
 #[test]
 fn no_file_uses_a_file_that_uses_it() {
-    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    for name in ["bvh-core", "bvh-build", "bvh-search", "harness"] {
-        let mut known = BTreeMap::new();
-        modules(&crates.join(name).join("src"), &Module::new(), &mut known);
-        let found: BTreeMap<_, _> =
-            known.iter().map(|(module, code)| (module, used(module, code, &known))).collect();
-        let exports = found.iter().map(|(module, [exports, _])| ((*module).clone(), exports.clone())).collect();
-        let mut edges = BTreeSet::new();
-        for (module, [_, paths]) in &found {
-            let targets = paths.iter().map(|path| resolve(path, &exports, 0));
-            // What a module defines is open to the files of its own folder.
-            let others = targets.filter(|target| !module.starts_with(target));
-            edges.extend(others.map(|target| ((*module).clone(), target)));
-        }
-        assert!(edges.len() > 5, "{name}: {edges:?}");
+    for crate_folder in fs::read_dir(top().join("crates")).unwrap() {
+        let folder = crate_folder.unwrap().path();
+        let name = folder.file_name().unwrap().to_string_lossy().into_owned();
+        let mut edges = edges(&folder.join("src"));
         // What nothing uses, or what uses nothing, is in no circle.
         loop {
             let (uses, used): (BTreeSet<_>, BTreeSet<_>) = edges.iter().cloned().unzip();

@@ -170,11 +170,6 @@ fn what_is_wrong_is_named_and_costs_nothing_but_a_message() {
 }
 
 #[test]
-fn scenes_are_listed_with_what_they_stand_in_for() {
-    assert!(said(Path::new("."), &["scenes"]).contains("stand-in for Cloister"));
-}
-
-#[test]
 fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_differs_is_named() {
     let folder = folder();
     let part = |number: &str, out: &str| {
@@ -293,31 +288,19 @@ fn without_reports_there_is_a_table_and_without_a_terminal_a_line_for_the_last_r
 }
 
 #[test]
-fn every_shell_and_the_manual_get_all_commands() {
-    let folder = tempfile::tempdir().unwrap();
-    for args in [&["man"][..], &["completions", "bash"], &["completions", "zsh"], &["completions", "fish"]] {
-        let said = said(folder.path(), args);
-        for part in ["inspect", "budget", "Number of threads", "merge"] {
-            // Bash has no room for explanations.
-            assert!(said.contains(part) || (args[1..] == ["bash"] && part.contains(' ')), "{args:?}: {part}");
-        }
-    }
-}
-
-#[test]
 fn a_mistyped_command_is_answered_with_the_one_that_is_meant() {
     let folder = folder();
     for (args, meant) in [
-        (&["bakee", "escher", "--budget", "0s", "--out", "x.bvh"][..], "`bake`"),
-        (&["inspct", "x.bvh"], "`inspect`"),
-        (&["scene"], "`scenes`"),
+        (&["compar", "x.bvh", "escher"][..], "`compare`"),
+        (&["merg", "x"], "`merge`"),
+        (&["reports"], "`report`"),
     ] {
         refused(folder.path(), args, 2, &[args[0], meant]);
     }
     // A spec is none, though it be called alike.
-    refused(folder.path(), &["bake.toml"], 2, &["bake.toml: no such file"]);
-    fs::rename(folder.path().join("spec.toml"), folder.path().join("bakee")).unwrap();
-    said(folder.path(), &["bakee"]);
+    refused(folder.path(), &["merge.toml"], 2, &["merge.toml: no such file"]);
+    fs::rename(folder.path().join("spec.toml"), folder.path().join("mergee")).unwrap();
+    said(folder.path(), &["mergee"]);
 }
 
 #[test]

@@ -3,11 +3,13 @@
 
 mod support;
 
+use bvh_build::{Builder, muller_fellner};
+use bvh_scenes::Scene;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use support::{folder_with, harness, refused, rows, said, send, wait_for};
+use support::{folder_with, program, refused, rows, run, said, save, send, wait_for};
 
 /// A folder with a spec whose second method is the shell script, and with the file of a good tree.
 fn folder(script: &str, more: &str) -> tempfile::TempDir {
@@ -18,8 +20,9 @@ fn folder(script: &str, more: &str) -> tempfile::TempDir {
     );
     let folder = folder_with("spec.toml", &spec);
     fs::write(folder.path().join("peer.sh"), script).unwrap();
-    let bake = "bake spheres75 --method muller_fellner --budget 0s --out good.bvh";
-    said(folder.path(), &bake.split(' ').collect::<Vec<_>>());
+    let scene = Scene::load("spheres75").unwrap();
+    let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+    save(&tree, &scene, &folder.path().join("good.bvh"));
     folder
 }
 
@@ -90,20 +93,58 @@ fn commands_that_cannot_be_started_or_are_none_are_refused() {
 fn a_signal_ends_a_program_and_what_it_has_started_within_a_second() {
     let folder = folder("sleep 60 & echo $! > pid.new; mv pid.new pid; wait", "");
     let at = folder.path();
-    let mut child = harness(at, &["spec.toml", "--jobs=1"]).stderr(Stdio::null()).spawn().unwrap();
+    let mut child = program(at, &["spec.toml", "--jobs=1"]).stderr(Stdio::null()).spawn().unwrap();
     wait_for(&at.join("pid"));
     let start = Instant::now();
     send("-TERM", &child);
     assert_eq!(child.wait().unwrap().code(), Some(130));
     assert!(start.elapsed() < Duration::from_secs(1), "{:?}", start.elapsed());
+    assert_ended(at, "SIGTERM");
+}
+
+/// The process whose number is in the file `pid` of the folder has ended.
+fn assert_ended(at: &Path, how: &str) {
     let pid = fs::read_to_string(at.join("pid")).unwrap();
+    let start = Instant::now();
     // Whoever inherits it reaps it in a moment.
     let lives =
         || Command::new("kill").args(["-0", pid.trim()]).stderr(Stdio::null()).status().unwrap().success();
     while lives() {
-        assert!(start.elapsed() < Duration::from_secs(10), "{pid} lives on");
+        assert!(start.elapsed() < Duration::from_secs(5), "{how}: {pid} lives on");
         std::thread::sleep(Duration::from_millis(10));
     }
+}
+
+#[test]
+fn what_a_program_has_started_ends_with_it_however_the_program_ends() {
+    let begin =
+        "sh -c 'echo $$ > pid.new; mv pid.new pid; exec sleep 124' & while ! test -f pid; do sleep 0.01; done;";
+    let leave = begin.replace("sh -c", "setsid sh -c");
+    let daemon = format!("({leave});");
+    let ways = [begin, &leave, &daemon];
+    // On other systems nothing is known of what leaves the group.
+    let ways = if cfg!(target_os = "linux") { &ways[..] } else { &ways[..1] };
+    for begin in ways {
+        for (end, more, code) in [
+            ("cp good.bvh \"$2\"", "", 0),
+            ("exit 3", "", 1),
+            ("kill -9 $$", "", 1),
+            ("sleep 60", "timeout_seconds = 0.5", 1),
+        ] {
+            let folder = folder(&format!("rm -f pid; {begin} {end}"), more);
+            let output = run(folder.path(), &["spec.toml", "--jobs=1"]);
+            let how = format!("{begin} {end}");
+            assert_eq!(output.status.code(), Some(code), "{how}");
+            assert_ended(folder.path(), &how);
+        }
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_tree_of_64_gigabytes_is_refused_by_its_header() {
+    let folder = folder("truncate -s 64G \"$2\"", "");
+    refused(folder.path(), &["spec.toml"], 1, &["method theirs", "its tree is refused", "not a tree file"]);
 }
 
 #[test]

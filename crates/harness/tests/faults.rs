@@ -8,7 +8,9 @@ use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
-use support::{ended, folder_with, harness, refused, reproducible, run_on_a_small_disk, said, wait_for};
+use support::{
+    ReadOnly, ended, folder_with, program, refused, reproducible, run_on_a_small_disk, said, unsaid, wait_for,
+};
 
 const SPEC: &str = "
 question = 'What survives?'
@@ -28,7 +30,7 @@ fn folder() -> tempfile::TempDir {
 
 /// What is killed or goes on in the background: nobody reads what it says.
 fn command(folder: &Path, args: &[&str]) -> Command {
-    let mut command = harness(folder, args);
+    let mut command = program(folder, args);
     command.stdout(Stdio::null()).stderr(Stdio::null());
     command
 }
@@ -122,45 +124,10 @@ fn a_full_disk_is_reported_and_what_was_finished_is_kept() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn what_cannot_be_said_is_an_error_and_a_reader_that_left_is_none() {
+fn help_and_version_that_cannot_be_said_are_errors() {
     let folder = folder();
-    let full = || Stdio::from(fs::File::options().write(true).open("/dev/full").unwrap());
-    let output = command(folder.path(), &["scenes"]).stdout(full()).stderr(Stdio::piped()).output().unwrap();
-    ended(&output, 1, &["standard output"]);
-    let mut child = command(folder.path(), &["scenes"]).stdout(Stdio::piped()).spawn().unwrap();
-    drop(child.stdout.take());
-    assert!(child.wait().unwrap().success());
-    // A file is put in the place of what has its name: never of a device.
-    refused(folder.path(), &["render", "spheres75", "--out", "/dev/full"], 2, &["--out", "/dev/full"]);
-}
-
-/// Makes a folder unwritable, for root too where the file system can; undone when dropped.
-#[cfg(unix)]
-struct ReadOnly<'a>(&'a Path);
-
-#[cfg(unix)]
-impl<'a> ReadOnly<'a> {
-    /// `None` if this user can write there all the same.
-    fn new(folder: &'a Path) -> Option<Self> {
-        let this = Self(folder);
-        this.set("555", "+i");
-        let probe = folder.join("probe");
-        let refused = fs::write(&probe, "").is_err();
-        let _ = fs::remove_file(probe);
-        refused.then_some(this)
-    }
-
-    fn set(&self, mode: &str, attribute: &str) {
-        for (program, argument) in [("chattr", "-i"), ("chmod", mode), ("chattr", attribute)] {
-            let _ = Command::new(program).arg(argument).arg(self.0).stderr(Stdio::null()).status();
-        }
-    }
-}
-
-#[cfg(unix)]
-impl Drop for ReadOnly<'_> {
-    fn drop(&mut self) {
-        self.set("755", "-i");
+    for args in [&["--help"][..], &["--version"], &["-h"], &["merge", "--help"], &["help", "new"]] {
+        unsaid(folder.path(), args);
     }
 }
 
@@ -170,26 +137,11 @@ fn a_folder_that_cannot_be_written_is_named() {
     let folder = folder();
     let locked = folder.path().join("locked");
     fs::create_dir(&locked).unwrap();
-    said(folder.path(), &["bake", "spheres75", "--budget=0s", "--out=good.bvh"]);
     let Some(_guard) = ReadOnly::new(&locked) else {
         eprintln!("not tried: this user can write into any folder here");
         return;
     };
     refused(folder.path(), &["spec.toml", "--out=locked"], 1, &["locked/spec", "cannot create the folder"]);
-    refused(
-        folder.path(),
-        &["bake", "spheres75", "--budget=1h", "--out=locked/x.bvh"],
-        1,
-        &["locked", "cannot create"],
-    );
-    refused(
-        folder.path(),
-        &["inspect", "good.bvh", "--nodes=locked/x.csv"],
-        1,
-        &["locked/x.csv", "cannot write"],
-    );
-    let render = ["render", "spheres75", "--size=8x8", "--out=locked/x.png"];
-    refused(folder.path(), &render, 1, &["locked/x.png", "cannot"]);
     assert_eq!(fs::read_dir(&locked).unwrap().count(), 0);
 }
 
@@ -199,11 +151,8 @@ fn a_folder_where_a_file_should_be_is_named_and_so_is_the_reverse() {
     let at = folder.path();
     fs::create_dir(at.join("folder.obj")).unwrap();
     fs::create_dir(at.join("folder.toml")).unwrap();
-    fs::create_dir(at.join("folder.bvh")).unwrap();
     refused(at, &["folder.toml"], 2, &["folder.toml"]);
-    refused(at, &["spec.toml", "--scene=folder.obj"], 2, &["folder.obj", "directory"]);
-    refused(at, &["inspect", "folder.bvh"], 2, &["folder.bvh", "a folder"]);
-    refused(at, &["render", "spheres75", "--accel=folder.bvh", "--out=x.png"], 2, &["--accel", "folder.bvh"]);
+    refused(at, &["spec.toml", "--scene=folder.obj"], 2, &["folder.obj", "a folder"]);
     let made = |path: &str| fs::create_dir_all(at.join(path)).unwrap();
     made("a/spec/runs.csv");
     refused(at, &["spec.toml", "--out=a"], 1, &["a/spec/runs.csv", "cannot replace the file"]);

@@ -49,7 +49,7 @@ fn the_page_of_all_results_answers_first_and_leads_to_files_that_are_there_but_n
         let (answers, sections) = page.split_once("<section").unwrap();
         let answers = between(answers, "<li id=\"answer-", "</li>");
         let [spec, list] = answers[..] else { panic!("{answers:?}") };
-        for part in ["Do results survive?", "<svg", ">in part</strong> Comparisons with the paper: "] {
+        for part in ["Do results survive?", "<svg", "<strong class=\"", "best of 5 costs "] {
             assert!(spec.contains(part), "{part}: {spec}");
         }
         for part in ["What is listed?", "no figure", "No verdict is stated."] {

@@ -1,18 +1,25 @@
-//! The committed comparisons with the paper: every difference has a reason.
+//! The committed comparisons with the paper: one row for each number, a reason for every difference, and answers that follow from the
+//! committed rows.
 
 use harness::report::paper::{PaperRow, Verdict};
-use harness::run::rows::read;
-use std::path::Path;
+use harness::rows::read;
+use harness::run::finish::remade;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The folders of committed results that compare something with the paper.
+fn compared_folders() -> Vec<PathBuf> {
+    let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../results");
+    let folders = fs::read_dir(results).unwrap().map(|folder| folder.unwrap().path());
+    folders.filter(|folder| folder.join("paper.csv").is_file()).collect()
+}
 
 #[test]
 fn every_difference_from_the_paper_has_a_reason() {
-    let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../results");
     let mut compared = 0;
-    for folder in std::fs::read_dir(results).unwrap() {
-        let path = folder.unwrap().path().join("paper.csv");
-        if !path.is_file() {
-            continue;
-        }
+    for folder in compared_folders() {
+        let path = folder.join("paper.csv");
         // Rows without a value of the paper only add to the others.
         for row in read::<PaperRow>(&path).unwrap().iter().filter(|row| !row.paper.is_empty()) {
             let needs_none = matches!(row.verdict, Verdict::Agrees | Verdict::CannotBeTold);
@@ -21,5 +28,41 @@ fn every_difference_from_the_paper_has_a_reason() {
             compared += 1;
         }
     }
-    assert!(compared > 60, "{compared} rows");
+    assert!(compared > 30, "{compared} rows");
+}
+
+#[test]
+fn a_number_of_the_paper_has_one_row_and_a_verdict_needs_something_of_the_papers() {
+    for folder in compared_folders() {
+        let rows: Vec<PaperRow> = read(&folder.join("paper.csv")).unwrap();
+        let mut seen = BTreeSet::new();
+        for row in &rows {
+            let first = seen.insert((&row.source, &row.scene, &row.quantity));
+            assert!(first, "{}: twice: {row:?}", folder.display());
+            assert_eq!(
+                row.paper.is_empty(),
+                row.verdict == Verdict::NotInPaper,
+                "{}: {row:?}",
+                folder.display()
+            );
+            // The base over itself is 1 whatever is built.
+            assert_ne!(row.paper_over_base, Some(1.0), "{}: {row:?}", folder.display());
+        }
+    }
+}
+
+#[test]
+fn the_committed_answers_are_those_that_the_rules_give_on_the_committed_rows() {
+    let mut answered = 0;
+    for folder in compared_folders() {
+        let made = remade(&folder).unwrap();
+        for name in ["answer", "paper"] {
+            let mut written = made.iter().flat_map(|output| &output.csv).filter(|(csv, _)| csv == name);
+            let (_, bytes) = written.next().unwrap_or_else(|| panic!("{}: no {name}", folder.display()));
+            let committed = fs::read(folder.join(format!("{name}.csv"))).unwrap();
+            assert!(*bytes == committed, "{}: {name}.csv: renew it with --redraw", folder.display());
+        }
+        answered += 1;
+    }
+    assert!(answered > 9, "{answered} answers");
 }

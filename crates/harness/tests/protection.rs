@@ -6,13 +6,28 @@ mod support;
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use support::{ended, folder_with, harness, names, reproducible, run, said, send, text, wait_for};
+use support::{
+    ended, folder_with, names, outside_buffer, outside_scene, program, reproducible, run, said, send, text,
+    wait_for,
+};
 
 const SPEC: &str = "
 question = 'What stays?'
 scenes = ['spheres75']
 repetitions = 3
 methods = [{ method = 'muller_fellner' }, { method = 'grasp', trials = 3 }]
+";
+
+/// A measurement over the suite, of one case and one method.
+const SUITE: &str = "
+question = 'q'
+scenes = ['S01']
+methods = [{ method = 'median_cut' }]
+[suite.stability]
+builders = 'few'
+work_per_object = 1
+larger_searches = { objects = 0, work_per_object = 1 }
+rays = 1
 ";
 
 /// A folder with a spec of this name in it.
@@ -65,6 +80,48 @@ fn finished_results_are_replaced_by_force_only() {
 }
 
 #[test]
+fn resuming_what_is_finished_does_nothing() {
+    let folder = folder("spec.toml");
+    let at = folder.path();
+    said(at, &["spec.toml", "--resume"]);
+    let written = || {
+        let files = names(&at.join("results/spec")).into_iter().map(|name| at.join("results/spec").join(name));
+        files.map(|file| (fs::metadata(&file).unwrap().modified().unwrap(), file)).collect::<Vec<_>>()
+    };
+    let first = written();
+    let resumed = run(at, &["spec.toml", "--resume"]);
+    ended(&resumed, 0, &[]);
+    assert!(text(&resumed.stdout).contains("nothing was done"), "{}", text(&resumed.stdout));
+    assert_eq!(
+        (names(&at.join("results")), written()),
+        (vec![".lock".into(), "best_known.csv".into(), "spec".into()], first)
+    );
+    // An interrupted repetition beside it is completed.
+    said(at, &["spec.toml"]);
+    fs::create_dir(at.join("results/spec.new/.partial")).unwrap();
+    fs::copy(at.join("results/spec.new/resolved.toml"), at.join("results/spec.new/.partial/resolved.toml"))
+        .unwrap();
+    said(at, &["spec.toml", "--resume"]);
+    assert!(!at.join("results/spec.new/.partial").exists());
+    // The suite of cases is no exception.
+    fs::write(at.join("suite.toml"), SUITE).unwrap();
+    said(at, &["suite.toml"]);
+    assert!(said(at, &["suite.toml", "--resume"]).contains("nothing was done"));
+}
+
+#[test]
+fn a_missing_folder_is_named_before_the_work() {
+    let folder = folder("spec.toml");
+    refused(
+        folder.path(),
+        &["report", "--results=.", "--out=no/x.html"],
+        &["no is no folder", "accepted: a path in a folder that is there"],
+    );
+    refused(folder.path(), &["report"], &["--results", "results is no folder"]);
+    assert_eq!(names(folder.path()), ["spec.toml"]);
+}
+
+#[test]
 fn the_finished_runs_of_an_interrupted_experiment_are_discarded_by_force_only() {
     let folder = folder("spec.toml");
     let at = folder.path();
@@ -106,44 +163,17 @@ fn a_damaged_finished_run_is_named_and_done_again_or_refused() {
 }
 
 #[test]
-fn no_command_replaces_a_file_of_another_kind() {
+fn the_page_replaces_no_file_of_another_kind() {
     let folder = folder("spec.toml");
     let at = folder.path();
-    let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-    fs::write(at.join("mesh.obj"), mesh).unwrap();
-    said(at, &["bake", "mesh.obj", "--budget=0s", "--out=tree.bvh"]);
     said(at, &["spec.toml"]);
-    refused(at, &["bake", "mesh.obj", "--budget=0s", "--out=mesh.obj"], &["--out", "mesh.obj", "tree file"]);
-    refused(at, &["render", "mesh.obj", "--size=8x8", "--out=mesh.obj"], &["--out", "mesh.obj", "PNG"]);
-    refused(at, &["render", "mesh.obj", "--accel=tree.bvh", "--out=tree.bvh"], &["--out", "tree.bvh", "PNG"]);
-    refused(at, &["inspect", "tree.bvh", "--nodes=tree.bvh"], &["--nodes", "tree.bvh", "CSV"]);
     refused(at, &["report", "--out=spec.toml"], &["--out", "spec.toml", "HTML"]);
     refused(at, &["report", "--out=results/spec/runs.csv"], &["--out", "runs.csv", "HTML"]);
-    assert_eq!(fs::read_to_string(at.join("mesh.obj")).unwrap(), mesh);
+    refused(at, &["report", "--out=x.csv"], &["a name that ends with", ".html", "accepted"]);
     assert_eq!(fs::read_to_string(at.join("spec.toml")).unwrap(), SPEC);
-    // Files of the same kind are replaced.
-    said(at, &["bake", "mesh.obj", "--budget=0s", "--out=tree.bvh", "--from=tree.bvh"]);
     for _ in 0..2 {
-        said(at, &["inspect", "tree.bvh", "--nodes=nodes.csv"]);
         said(at, &["report", "--out=page.html"]);
-        said(at, &["render", "mesh.obj", "--size=8x8", "--out=x.png"]);
     }
-}
-
-#[test]
-fn a_file_whose_name_says_another_kind_is_not_begun() {
-    let folder = folder("spec.toml");
-    let at = folder.path();
-    for (args, accepted) in [
-        (&["bake", "spheres75", "--budget=0s", "--out=x.obj"][..], ".bvh"),
-        (&["render", "spheres75", "--size=8x8", "--out=x.jpg"], ".png"),
-        (&["inspect", "x.bvh", "--nodes=x.bvh"], ".csv"),
-        (&["report", "--out=x.csv"], ".html"),
-    ] {
-        refused(at, args, &["a name that ends with", accepted, "accepted"]);
-    }
-    said(at, &["bake", "spheres75", "--budget=0s", "--out=tree"]);
-    assert_eq!(names(at), ["spec.toml", "tree"]);
 }
 
 #[test]
@@ -171,13 +201,10 @@ fn pipes_and_devices_are_refused_as_inputs_and_links_are_not_written_through() {
     use std::os::unix::fs::symlink;
     let folder = folder("spec.toml");
     let at = folder.path();
-    let made = std::process::Command::new("mkfifo").args(["p.toml", "p.obj", "p.bvh"]).current_dir(at).status();
+    let made = std::process::Command::new("mkfifo").args(["p.toml", "p.obj"]).current_dir(at).status();
     assert!(made.unwrap().success());
     refused(at, &["p.toml"], &["p.toml", "not a regular file"]);
     refused(at, &["spec.toml", "--scene=p.obj"], &["p.obj"]);
-    refused(at, &["inspect", "p.bvh"], &["p.bvh", "not a regular file"]);
-    refused(at, &["bake", "spheres75", "--budget=0s", "--from=p.bvh", "--out=x.bvh"], &["p.bvh"]);
-    refused(at, &["bake", "/dev/zero", "--budget=0s", "--out=x.bvh"], &["/dev/zero"]);
     fs::write(at.join("precious"), "precious").unwrap();
     fs::create_dir_all(at.join("results/spec")).unwrap();
     for lock in ["results/.lock", "results/spec/.lock"] {
@@ -197,7 +224,7 @@ fn arguments_need_not_be_utf_8() {
     use std::os::unix::ffi::OsStrExt;
     let folder = folder("spec.toml");
     let out = OsStr::from_bytes(b"out\xff");
-    let output = harness(folder.path(), &["spec.toml", "--out"]).arg(out).output().unwrap();
+    let output = program(folder.path(), &["spec.toml", "--out"]).arg(out).output().unwrap();
     assert!(output.status.success(), "{}", text(&output.stderr));
     let provenance = fs::read_to_string(folder.path().join(out).join("spec/provenance.toml")).unwrap();
     assert!(provenance.contains("harness spec.toml --out out"), "{provenance}");
@@ -211,7 +238,7 @@ fn the_first_signal_ends_even_a_program_that_waits_for_another() {
     fs::create_dir(at.join("results")).unwrap();
     let lock = fs::File::create(at.join("results/.lock")).unwrap();
     lock.lock().unwrap();
-    let mut child = harness(at, &["spec.toml"]).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let mut child = program(at, &["spec.toml"]).stderr(std::process::Stdio::null()).spawn().unwrap();
     // All runs are finished, and the best known costs are in use by us.
     wait_for(&at.join("results/spec/runs.csv"));
     let start = Instant::now();
@@ -234,4 +261,19 @@ fn control_characters_of_a_spec_do_not_reach_the_terminal() {
     let output = run(folder.path(), &["wrong.toml"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(!output.stderr.contains(&0x1b) && text(&output.stderr).contains("red"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn a_buffer_outside_the_folder_of_a_scene_is_read_by_a_spec_that_is_told_so_and_by_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = &folder.path().join("inner");
+    fs::create_dir(at).unwrap();
+    fs::write(at.join("scene.gltf"), outside_scene("../outside.bin")).unwrap();
+    fs::write(folder.path().join("outside.bin"), outside_buffer()).unwrap();
+    let spec = "question = 'q'\nscenes = ['scene.gltf']\nmethods = [{ method = 'median_cut' }]\n";
+    fs::write(at.join("spec.toml"), spec).unwrap();
+    refused(at, &["spec.toml"], &["buffers[0]", "outside the scene's folder", "--outside-files"]);
+    said(at, &["spec.toml", "--outside-files"]);
+    fs::write(at.join("told.toml"), format!("outside_files = true\n{spec}")).unwrap();
+    said(at, &["told.toml"]);
 }

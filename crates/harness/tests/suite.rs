@@ -1,12 +1,13 @@
 //! Every case of the suite holds for every method, every traversal and every other part.
 
-use bvh_build::{Accelerator, Builder, Structure, muller_fellner, spatial};
+use bvh_build::{Builder, muller_fellner, spatial};
 use bvh_core::cost::{Objective, total_area};
 use bvh_core::{Aabb, Primitives, RayDensity, Segment, Triangle, WideBvh, file, validate, validate_references};
+use bvh_scenes::Scene;
+use bvh_scenes::builtin::stiff::{self, STIFF};
+use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_search::{Budget, Method, Problem, Splits, StopReason, optimize, solve};
 use glam::Vec3;
-use harness::scenes::Scene;
-use harness::scenes::stiff::{self, STIFF};
 use harness::stress::{
     self, CASES, Case, Cell, Check, EXACT_OBJECTS, Effort, LargerScenes, Part, Size, examine, is_builder,
     kernels,

@@ -12,7 +12,7 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
-use support::{experiments, folder_with, names, refused, run, said, text};
+use support::{experiments, folder_with, top, wrong_flags};
 use toml::{Table, Value};
 
 /// A step from a table to a value in it.
@@ -197,88 +197,22 @@ fn a_wrong_value_under_any_key_of_a_spec_is_refused_by_name() {
     assert!(found.is_empty(), "\n{}", found.into_iter().collect::<Vec<_>>().join("\n"));
 }
 
-/// The exit code, and all that is said.
-fn harness(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
-    let output = run(folder, args);
-    (output.status.code(), text(&[output.stdout, output.stderr].concat()))
-}
-
-/// The arguments of a command; the one without a name runs specs.
-fn call<'a>(command: &'a str, args: &[&'a str]) -> Vec<&'a str> {
-    let name: &[&str] = if command.is_empty() { &[] } else { &[command] };
-    [name, args].concat()
-}
-
-/// The flags of a command with the name of their value, as its help lists them.
-fn flags(folder: &Path, command: &str) -> Vec<(String, Option<String>)> {
-    let help = said(folder, &call(command, &["--help"]));
-    let flag = |line: &str| {
-        let mut words = line.split_whitespace().skip_while(|word| !word.starts_with("--"));
-        let name = words.next()?.trim_end_matches(',').to_owned();
-        Some((name, words.next().filter(|word| word.starts_with('<')).map(str::to_owned)))
-    };
-    let lines = help.lines().filter(|line| line.trim_start().starts_with('-'));
-    lines.filter_map(flag).filter(|(name, _)| !["--help", "--version"].contains(&name.as_str())).collect()
-}
-
 #[test]
 fn a_wrong_value_of_any_flag_is_refused_by_name() {
     let spec = "question = 'q'\nscenes = ['spheres75']\nmethods = [{ method = 'median_cut' }]\n";
     let folder = folder_with("spec.toml", spec);
-    let at = folder.path();
-    fs::create_dir(at.join("folder")).unwrap();
-    fs::write(at.join("file"), "").unwrap();
-    said(at, &["bake", "spheres75", "--budget=0s", "--out=good.bvh"]);
-    let before = names(at);
+    fs::copy(top().join("results/trees/spheres75.bvh"), folder.path().join("good.bvh")).unwrap();
     // Every command with what it cannot do without.
-    let commands: [(&str, &[&str]); 12] = [
-        ("", &["spec.toml"]),
-        ("bake", &["spheres75", "--budget=0s", "--out=x.bvh"]),
-        ("inspect", &["good.bvh", "spheres75"]),
-        ("verify", &["good.bvh", "spheres75"]),
-        ("render", &["spheres75", "--out=x.png", "--size=8x8"]),
-        ("report", &[]),
-        ("merge", &["folder", "--out=x"]),
-        ("scenes", &[]),
-        ("new", &["x.toml"]),
-        ("schema", &[]),
-        ("completions", &["bash"]),
-        ("man", &[]),
-    ];
-    let help = said(at, &["--help"]);
-    let listed =
-        help.split_once("Commands:").unwrap().1.lines().skip(1).take_while(|line| !line.trim().is_empty());
-    let listed: BTreeSet<&str> = listed.filter_map(|line| line.split_whitespace().next()).collect();
-    let tried: BTreeSet<&str> =
-        commands.map(|(name, _)| name).into_iter().chain(["help"]).filter(|n| !n.is_empty()).collect();
-    assert_eq!(listed, tried);
-    let (mut count, mut found) = (0, Vec::new());
-    for (command, needed) in commands {
-        for (flag, value) in flags(at, command) {
-            count += 1;
-            let wrong: &[&str] = match value.as_deref() {
-                None => &["3"],
-                Some("<DIR>") => &["file", "file/below", ""],
-                Some(file) if file.starts_with("<FILE") || file.ends_with(".csv>") => &["folder", ""],
-                Some(_) => &["no such thing", "-1", "nan", "99999999999999999999999", ""],
-            };
-            for wrong in wrong {
-                // A seed may be any number, and work may be much.
-                let given = format!("{flag}={wrong}");
-                let mut args = call(command, needed);
-                args.retain(|arg| !arg.starts_with(&format!("{flag}=")));
-                args.push(&given);
-                let (code, said) = harness(at, &args);
-                let named =
-                    said.contains(&flag) || (flag == "--scene" && said.contains(&format!("scene {wrong}")));
-                if code != Some(2) || !named {
-                    found.push(format!("{args:?}: code {code:?}: {said}"));
-                }
-            }
-        }
-        refused(at, &call(command, &["--unheard-of"]), 2, &["--unheard-of"]);
-    }
-    assert!(count > 30, "{count} flags");
-    assert!(found.is_empty(), "\n{}", found.join("\n"));
-    assert_eq!(names(at), before, "nothing was written");
+    let flags = wrong_flags(
+        folder.path(),
+        &[
+            ("", &["spec.toml"]),
+            ("report", &["--results=."]),
+            ("merge", &["folder", "--out=x"]),
+            ("compare", &["good.bvh", "spheres75"]),
+            ("new", &["x.toml"]),
+            ("schema", &[]),
+        ],
+    );
+    assert!(flags > 15, "{flags} flags");
 }

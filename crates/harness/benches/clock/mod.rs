@@ -1,8 +1,8 @@
 //! `best` against the clock, as the benchmarks of whole searches need it.
 
 use bvh_core::{cost, validate};
+use bvh_scenes::Scene;
 use bvh_search::{Budget, Deadline, Problem, solve};
-use harness::scenes::Scene;
 use std::time::Duration;
 
 /// The seconds that `best` takes when it may plan with `seconds`, and the internal area of its tree, which is valid.

@@ -1,9 +1,10 @@
 //! Boxes of any bits through every builder, search, bound and conversion.
 
 use super::bytes::Bytes;
-use bvh_build::{Builder, kd_tree, muller_fellner};
+use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, SahConstants};
 use bvh_core::{Aabb, Bvh, check_boxes, collapse_leaves, file, validate};
+use bvh_scenes::trace::kd_tree;
 use bvh_search::{Budget, Method, Problem, SearchError, best, lower_bound, optimize, solve};
 use harness::stress::EXACT_OBJECTS;
 use harness::stress::examine::{ROUNDING, check_outcome};

@@ -1,6 +1,6 @@
 //! OBJ files of any bytes.
 
-use harness::scenes::obj::parse;
+use bvh_scenes::load::obj::parse;
 use std::fmt::Write;
 use std::path::Path;
 

@@ -1,10 +1,11 @@
 //! Rays and triangles of any bits: every traversal against testing every object.
 
 use super::bytes::Bytes;
-use bvh_build::{Builder, goldsmith_salmon, kd_tree, muller_fellner};
+use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
 use bvh_core::{
     Aabb, Hit, Primitives, Ray, Sphere, Triangle, any_hit_by, clip_to_box, nearest_hit_by, nearest_hit_of_all,
 };
+use bvh_scenes::trace::kd_tree;
 use glam::Vec3;
 use harness::stress::tracing::{TRAVERSALS, check};
 

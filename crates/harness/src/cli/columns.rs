@@ -1,15 +1,13 @@
 //! The page of the columns of all CSV files, docs/COLUMNS.md: what is written wherever a file's rows are declared, in one place.
 
-use super::{bake_instances, inspect};
 use crate::report::Report;
-use crate::run::columns::Columns;
-use crate::run::rows;
+use crate::rows;
+use crate::rows::columns::Columns;
 use crate::stress::Measure;
 
 /// Every CSV file that the program writes.
 pub fn all() -> Vec<Columns> {
-    let own = vec![inspect::columns(), bake_instances::columns()];
-    [rows::columns(), Report::columns(), Measure::columns(), own].concat()
+    [rows::columns(), Report::columns(), Measure::columns()].concat()
 }
 
 /// The page, in Markdown.

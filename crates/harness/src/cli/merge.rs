@@ -1,10 +1,10 @@
 //! `harness merge`: joins the parts of experiments that were run with `--shard`.
 
 use crate::Error;
-use crate::cli::arguments::output_folder;
-use crate::cli::output::print_line;
+use crate::rows::store::Existing;
 use crate::run::merge;
-use crate::run::store::Existing;
+use bvh_terminal::arguments::output_folder;
+use bvh_terminal::output::print_line;
 use std::path::PathBuf;
 
 /// Join the parts of experiments made with --shard into what one run would have written.

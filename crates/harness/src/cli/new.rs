@@ -1,7 +1,7 @@
 //! `harness new` and `harness schema`: a spec to begin with, and what lets editors complete it.
 
-use crate::cli::output::{print_bytes, print_line};
 use crate::{Error, spec};
+use bvh_terminal::output::{print_bytes, print_line};
 use clap::Args;
 use std::fs::File;
 use std::io::{ErrorKind, Write};

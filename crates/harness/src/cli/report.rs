@@ -1,10 +1,13 @@
 //! `harness report`: all results on one page.
 
 use crate::Error;
-use crate::cli::arguments::{PAGE, input_folder, output_file};
-use crate::cli::output::print_line;
 use crate::page;
+use bvh_terminal::arguments::{FileKind, input_folder, output_file};
+use bvh_terminal::output::print_line;
 use std::path::PathBuf;
+
+/// The page of all results.
+const PAGE: FileKind = FileKind { name: "an HTML page", beginning: b"<!DOCTYPE html>", extension: "html" };
 
 /// Write all results on one HTML page.
 #[derive(clap::Args, Clone, Debug)]
@@ -19,8 +22,8 @@ pub struct ReportArgs {
 
 /// Writes the page, and prints how many experiments are on it.
 pub fn report(args: &ReportArgs) -> Result<(), Error> {
-    output_file("--out", &args.out, &PAGE)?;
     input_folder("--results", &args.results)?;
+    output_file("--out", &args.out, &PAGE)?;
     let experiments = page::write(&args.results, &args.out)?;
     print_line(&format!("{experiments} experiments: {}", args.out.display()));
     Ok(())

@@ -1,14 +1,14 @@
 //! `harness SPEC.toml...`: runs experiments, compares them with committed results, or makes their reports again.
 
 use crate::Error;
-use crate::cli::arguments::{Jobs, output_folder};
 use crate::cli::explain;
-use crate::cli::output::{print_error, print_line};
+use crate::rows::store::Existing;
 use crate::run::execute::{Extent, Said, execute};
 use crate::run::shard::Shard;
-use crate::run::store::Existing;
 use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
+use bvh_terminal::arguments::{Jobs, output_folder};
+use bvh_terminal::output::{print_error, print_line};
 use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -25,6 +25,9 @@ pub struct RunArgs {
     /// Scene to run on in place of the spec's, by name or path of a mesh file; may be repeated.
     #[arg(long = "scene", value_name = "NAME|PATH")]
     pub scenes: Vec<String>,
+    /// Let a glTF file name buffers outside its own folder. Whoever made the file then says which files are read.
+    #[arg(long)]
+    pub outside_files: bool,
     /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
@@ -40,7 +43,7 @@ pub struct RunArgs {
     /// Make the tables and figures again from the rows there are, with the best known costs of now; run nothing.
     #[arg(long, conflicts_with_all = ["check", "resume", "shard"])]
     pub redraw: bool,
-    /// Keep the finished runs of an interrupted experiment and do the rest.
+    /// Keep the finished runs of an interrupted experiment and do the rest, which is nothing if all are finished.
     #[arg(long)]
     pub resume: bool,
     /// Replace the results that are there already. Without it, finished results stay, and those of a repetition go
@@ -66,7 +69,12 @@ pub struct RunArgs {
 pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     output_folder("--out", &args.out)?;
     args.jobs.apply()?;
-    let overrides = Overrides { scenes: args.scenes.clone(), seed: args.seed, quick: args.quick };
+    let overrides = Overrides {
+        scenes: args.scenes.clone(),
+        outside_files: args.outside_files,
+        seed: args.seed,
+        quick: args.quick,
+    };
     // All specs are checked before the first one is run.
     let experiments =
         args.specs.iter().map(|path| Experiment::read(path, &overrides)).collect::<Result<Vec<_>, _>>()?;

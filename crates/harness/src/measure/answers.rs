@@ -55,9 +55,9 @@ fn compare(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::rays::{Kind, Viewpoint, rays};
-    use crate::scenes::Scene;
     use bvh_build::{Builder, muller_fellner};
+    use bvh_scenes::Scene;
+    use bvh_scenes::rays::{Kind, Viewpoint, rays};
 
     #[test]
     fn answers_are_compared_by_place_and_not_by_object() {

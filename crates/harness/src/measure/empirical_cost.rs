@@ -3,12 +3,13 @@
 //! Ng & Trifonov 2003, section 4: random rays from inside the root's box, and any hit ahead of the origin ends a ray.
 //! The surface area costs assume other rays: lines through the whole box that no hit ends.
 
-use super::rays::{Family, random_ray};
-use crate::run::rows::RayRow;
-use crate::scenes::Scene;
+use crate::rows::RayRow;
 use crate::statistics::NORMAL_95;
-use bvh_build::{Accelerator, Query, config};
+use bvh_config::config;
 use bvh_core::{Bvh, TestCounts};
+use bvh_scenes::Scene;
+use bvh_scenes::rays::{Family, random_ray};
+use bvh_scenes::trace::{Accelerator, Query};
 use bvh_search::Stream;
 use rand::SeedableRng;
 use rayon::prelude::*;

@@ -1,15 +1,16 @@
 //! Trees for the rays that are traced: the density of the rays that a tree is searched for, and the tests that other rays of the
 //! same kind, or of another camera, take in it.
 
-use super::rays::{Family, Kind, Viewpoint, in_box, random_ray};
-use super::segments::{
-    OF_ANYTHING, Pose, RenderedRays, TracedRay, check_count, of_anything, of_inside, of_renderer,
-};
-use super::speed::timed;
-use crate::scenes::Scene;
+use super::contender::timed;
 use crate::statistics::minimum;
-use bvh_build::{Builder, OutOfRange, config, muller_fellner};
-use bvh_core::{Bvh, DensityError, Hit, Ray, RayDensity, Segment, TestCounts, WideBvh};
+use bvh_build::{Builder, muller_fellner};
+use bvh_config::{OutOfRange, config};
+use bvh_core::{Bvh, Hit, Ray, RayDensity, TestCounts, WideBvh};
+use bvh_scenes::Scene;
+use bvh_scenes::rays::{
+    Family, Kind, OF_ANYTHING, Pose, RenderedRays, TRAINED, TracedRay, Viewpoint, check_count, density, in_box,
+    of_anything, of_inside, of_renderer, random_ray,
+};
 use bvh_search::Stream;
 use rand::SeedableRng;
 use serde::{Deserialize, Serialize};
@@ -39,10 +40,6 @@ impl TrainedOn {
     }
 }
 
-/// The part of a box's measure that is its area, so that boxes which none of the sampled rays enters are not free. Between 0.02 and 0.3
-/// trees for a camera differ by less than their seeds do; without a camera, 0.3 loses half of the gain in interiors.
-const AREA_WEIGHT: f64 = 0.1;
-
 config! {
     serde;
     /// How trees are trained on rays, and judged by others.
@@ -50,7 +47,7 @@ config! {
         /// Primary rays of each path that judge trees; without a camera, rays of each family. 0 to train trees and judge none.
         count: u32 = 50_000, in 0..=10_000_000;
         /// Primary rays that trees are trained on; without a camera, rays of each family.
-        trained: u32 = 100_000, in 1..;
+        trained: u32 = TRAINED, in 1..;
         /// Turns in which rays are timed; 0 for counting only.
         rounds: u32 = 3;
         /// Cameras by scene; scenes without an entry are seen from outside.
@@ -130,13 +127,6 @@ impl Config {
         };
         density(&rays, &tree).map_err(|error| error.to_string())
     }
-}
-
-/// The density of rays through the scene of a tree.
-pub fn density(rays: &[TracedRay], tree: &Bvh) -> Result<RayDensity, DensityError> {
-    let segments: Vec<Segment> = rays.iter().map(|traced| traced.segment).collect();
-    let bounds = tree.root_aabb().ok_or(DensityError::Bounds)?;
-    RayDensity::of_rays(&bounds, &segments, AREA_WEIGHT)
 }
 
 /// Rays that judge trees.

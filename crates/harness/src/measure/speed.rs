@@ -1,18 +1,17 @@
 //! Rays per second, and tests per ray: every contender in turns, on one thread, with all answers compared.
 
-use super::answers::{self, SOME_HIT};
-use super::rays::{Kind, Viewpoint, rays};
-use crate::run::rows::{TraceRow, TraceTimeRow};
-use crate::scenes::Scene;
+use super::answers;
+use super::contender::{Batch, Contender, PART, Tracer};
+use super::layout::{Instructions, Layout};
+use crate::rows::{TraceRow, TraceTimeRow};
 use crate::statistics::{median, minimum};
-use bvh_build::{Accelerator, Query, Structure, config};
-use bvh_core::cost::SahConstants;
-use bvh_core::{Bvh, Coherence, Hit, InvalidBvh, Ray, TestCounts, WideBvh, collapse_leaves};
-use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
+use bvh_config::config;
+use bvh_core::{Bvh, Hit, Ray, TestCounts};
+use bvh_scenes::Scene;
+use bvh_scenes::rays::{Kind, Viewpoint, rays};
+use bvh_scenes::trace::{Accelerator, Query};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::time::Instant;
 
 config! {
     serde;
@@ -28,178 +27,32 @@ config! {
         layouts: Vec<Layout> = vec![Layout::Binary, Layout::BinaryLeaves, Layout::Wide, Layout::WidePortable];
         /// Cameras of primary rays by scene; for other scenes one outside the root's box.
         cameras: BTreeMap<String, Viewpoint>;
-        /// The program of `scripts/ray-peers`, by which Embree and tinybvh trace too. All speeds go to `timing_rays.csv`.
-        ray_peers: Option<PathBuf>;
+        /// Instruction sets to which the wide layouts are held, each in turn; those that the processor lacks are skipped. None
+        /// stands for the best that the processor has.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        instructions: Vec<Instructions>;
+        /// The programs of `scripts/ray-peers`, by which Embree and tinybvh trace too. All speeds go to `timing_rays.csv`.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        ray_peers: Vec<PathBuf>;
     }
 }
 
 /// Most rays of a kind, all in memory at once.
 const MOST_RAYS: u32 = 100_000_000;
 
-/// A way to lay out one of our trees.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Layout {
-    /// The tree as it is.
-    Binary,
-    /// The tree with its leaves merged where the surface area heuristic, both constants 1, says so.
-    BinaryLeaves,
-    /// [`WideBvh`] with the best instructions of this machine.
-    Wide,
-    /// [`WideBvh`] with the best instructions of this machine, laid out once more: only noise tells its times from those
-    /// of `Wide`.
-    WideAgain,
-    /// [`WideBvh`] that is handed batches of rays, which it traces in packets where they cohere, and else with
-    /// many in flight.
-    WideBatches,
-    /// As `WideBatches`, laid out as if a block of triangles took half the time of a node.
-    WideCheapBlocks,
-    /// As `WideBatches`, laid out as if a block of triangles took twice the time of a node.
-    WideDearBlocks,
-    /// [`WideBvh`] with portable code.
-    WidePortable,
+/// The row of one contender for rays of one kind on one scene, and all that other libraries are compared by.
+pub struct Traced {
+    /// Answers and tests.
+    pub answers: TraceRow,
+    /// Seconds.
+    pub times: TraceTimeRow,
+    /// The instruction set that the contender was held to.
+    pub instructions: String,
+    /// The version of its library.
+    pub version: String,
+    /// The seconds of each turn.
+    pub turns: Vec<f64>,
 }
-
-impl Layout {
-    /// Whether it is made for random lines alone, whatever rays the tree is for.
-    pub fn is_for_lines(self) -> bool {
-        matches!(self, Self::WideCheapBlocks | Self::WideDearBlocks)
-    }
-}
-
-/// Rays that are traced together.
-#[derive(Clone, Copy, Debug)]
-pub struct Batch<'a> {
-    /// What they ask.
-    pub query: Query,
-    /// Pixels per row of the picture that the rays go through, row by row from its upper left corner; 0 if they go through
-    /// none.
-    pub columns: u32,
-    /// The rays.
-    pub rays: &'a [Ray],
-}
-
-/// Answers rays, the distance and the object of a hit for each (any of both for an any-hit query), and returns the
-/// seconds that each [`PART`] of the rays took. An error says why there are no answers.
-pub type Trace<'a> = Box<dyn Fn(&Batch, &mut [Option<Hit>]) -> Result<Vec<f64>, String> + 'a>;
-
-/// What traces the rays of a contender.
-pub enum Tracer<'a> {
-    /// One of ours. Its answers must be right bit by bit, and its tests are counted.
-    Own(Accelerator<'a>),
-    /// One of ours, batch by batch: packets share tests, which are not counted.
-    Batches(WideBvh),
-    /// Another library's.
-    Other(Trace<'a>),
-}
-
-impl Tracer<'_> {
-    /// Traces all rays; as [`Trace`].
-    pub fn trace(&self, batch: &Batch, hits: &mut [Option<Hit>]) -> Result<Vec<f64>, String> {
-        let rays = batch.rays;
-        match (self, batch.query) {
-            (Self::Other(trace), _) => trace(batch, hits),
-            (Self::Own(own), Query::Any) => Ok(timed(rays, hits, |ray| own.any_hit(ray).then_some(SOME_HIT))),
-            (Self::Own(own), _) => Ok(timed(rays, hits, |ray| own.nearest_hit(ray))),
-            (Self::Batches(wide), query) => Ok(in_batches(wide, query, rays, hits)),
-        }
-    }
-}
-
-/// A structure that traces rays, and what it is called in tables.
-pub struct Contender<'a> {
-    /// Name of the layout.
-    pub layout: String,
-    /// The time it took to make the layout: of ours from a tree, of another library's from triangles.
-    pub preparation_seconds: f64,
-    /// What traces.
-    pub tracer: Tracer<'a>,
-}
-
-/// Rays whose time is taken together. They are few, so that in some turn no other program interrupts them.
-pub const PART: usize = 8192;
-
-/// Answers every ray and returns the seconds that each part of them took.
-#[inline(always)]
-pub fn timed<R>(rays: &[R], hits: &mut [Option<Hit>], mut answer: impl FnMut(&R) -> Option<Hit>) -> Vec<f64> {
-    let part = |(rays, hits): (&[R], &mut [Option<Hit>])| {
-        let start = Instant::now();
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = answer(ray);
-        }
-        start.elapsed().as_secs_f64()
-    };
-    rays.chunks(PART).zip(hits.chunks_mut(PART)).map(part).collect()
-}
-
-/// Rays that the wide layout is handed at once: their answers stay in the first cache.
-const BATCH: usize = 1024;
-
-/// Answers every ray by batches and returns the seconds that each part of them took.
-fn in_batches(wide: &WideBvh, query: Query, rays: &[Ray], hits: &mut [Option<Hit>]) -> Vec<f64> {
-    let (mut nearest, mut any) = ([Hit::MISS; BATCH], [false; BATCH]);
-    let mut batch = |(rays, hits): (&[Ray], &mut [Option<Hit>])| {
-        let (nearest, any) = (&mut nearest[..rays.len()], &mut any[..rays.len()]);
-        let start = Instant::now();
-        if query == Query::Any {
-            wide.any_hits(rays, any, Coherence::Coherent);
-        } else {
-            wide.nearest_hits(rays, nearest, Coherence::Coherent);
-        }
-        let seconds = start.elapsed().as_secs_f64();
-        for ((hit, nearest), any) in hits.iter_mut().zip(nearest).zip(any) {
-            let found = if query == Query::Any { any.then_some(SOME_HIT) } else { Some(*nearest) };
-            *hit = found.filter(|hit| !hit.is_miss());
-        }
-        seconds
-    };
-    let part = |(rays, hits): (&[Ray], &mut [Option<Hit>])| {
-        rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)).map(&mut batch).sum()
-    };
-    rays.chunks(PART).zip(hits.chunks_mut(PART)).map(part).collect()
-}
-
-/// One of our trees, valid over the scene, in each of these layouts; wide ones for rays that enter the tree's nodes as often as
-/// `visits` says, if it does. An error says why there is no such layout.
-pub fn own_contenders<'a>(
-    layouts: &[Layout],
-    scene: &'a Scene,
-    tree: &'a Bvh,
-    visits: Option<&[f32]>,
-) -> Result<Vec<Contender<'a>>, String> {
-    let contender = |&layout: &Layout| {
-        let triangles = scene.triangles().map_err(|error| error.to_string())?;
-        let accelerator = |structure| Tracer::Own(Accelerator::new(&scene.primitives, structure));
-        let start = Instant::now();
-        let made = |wide: Result<_, InvalidBvh>| wide.map_err(|error| error.to_string());
-        let wide = || {
-            made(match visits {
-                Some(visits) => WideBvh::for_rays(tree, triangles, visits),
-                None => WideBvh::new(tree, triangles),
-            })
-        };
-        let blocks =
-            |cost| Ok::<_, String>(Tracer::Batches(made(WideBvh::with_block_cost(tree, triangles, cost))?));
-        let (name, tracer) = match layout {
-            Layout::Binary => ("binary", accelerator(Structure::Tree(Cow::Borrowed(tree)))),
-            Layout::BinaryLeaves => {
-                let merged = collapse_leaves(tree, &SahConstants::default());
-                ("binary, merged leaves", accelerator(Structure::Tree(Cow::Owned(merged))))
-            }
-            Layout::Wide => ("wide", accelerator(Structure::Wide(wide()?))),
-            Layout::WideAgain => ("wide, again", accelerator(Structure::Wide(wide()?))),
-            Layout::WideBatches => ("wide, batches", Tracer::Batches(wide()?)),
-            Layout::WideCheapBlocks => ("wide, cheap blocks", blocks(0.5)?),
-            Layout::WideDearBlocks => ("wide, dear blocks", blocks(2.0)?),
-            Layout::WidePortable => ("wide, portable", accelerator(Structure::WidePortable(wide()?))),
-        };
-        Ok(Contender { layout: name.into(), preparation_seconds: start.elapsed().as_secs_f64(), tracer })
-    };
-    layouts.iter().map(contender).collect()
-}
-
-/// The rows of one scene.
-pub type Rows = (Vec<TraceRow>, Vec<TraceTimeRow>);
 
 /// Traces rays, the same for all, through the contenders of a scene, each with its method's label. `tree` is any valid
 /// tree over the scene: the right answers, which are the same for every tree, come from it. `seed` draws the rays.
@@ -211,19 +64,25 @@ pub fn measure(
     contenders: &[(String, Contender)],
     seed: u64,
     cancelled: impl Fn() -> bool,
-) -> Result<Option<Rows>, String> {
-    let (mut rows, mut times) = Rows::default();
+) -> Result<Option<Vec<Traced>>, String> {
+    let mut traced = Vec::new();
     let viewpoint = config.cameras.get(&scene.name).copied().unwrap_or_default();
     let reference = Tracer::Own(Accelerator::of_tree(&scene.primitives, tree));
     for &kind in &config.rays {
         let rays = rays(kind, config.count, scene, tree, &viewpoint, seed);
-        let batch = Batch { query: kind.query(), columns: kind.columns(config.count), rays: &rays };
+        let batch = Batch {
+            query: kind.query(),
+            coherence: kind.coherence(),
+            in_squares: kind.is_in_squares(config.count),
+            rays: &rays,
+        };
         let mut right = vec![None; rays.len()];
         reference.trace(&batch, &mut right)?;
         let of_kind = OfKind { scene, tree, kind, rays: &rays, right: &right };
         let mut hits = vec![None; rays.len()];
-        // By contender, and by part of the rays, the seconds of each turn.
-        let mut turns = vec![vec![Vec::new(); rays.len().div_ceil(PART)]; contenders.len()];
+        let mut answers = Vec::new();
+        // By contender and turn, the seconds of each part of the rays.
+        let mut turns = vec![Vec::new(); contenders.len()];
         for round in 0..=config.rounds {
             for ((method, contender), turns) in contenders.iter().zip(&mut turns) {
                 if cancelled() {
@@ -232,28 +91,39 @@ pub fn measure(
                 hits.fill(None);
                 let seconds = contender.tracer.trace(&batch, &mut hits)?;
                 if round == 0 {
-                    rows.push(of_kind.row(method, contender, &hits));
+                    answers.push(of_kind.row(method, contender, &hits));
                 } else {
-                    turns.iter_mut().zip(seconds).for_each(|(turns, seconds)| turns.push(seconds));
+                    turns.push(seconds);
                 }
             }
         }
-        for ((method, contender), parts) in contenders.iter().zip(&turns) {
-            let sum = |of: fn(&[f64]) -> Option<f64>| parts.iter().filter_map(|turns| of(turns)).sum();
-            times.push(TraceTimeRow {
-                scene: scene.name.clone(),
-                method: method.clone(),
-                layout: contender.layout.clone(),
-                rays: kind.name().into(),
-                count: rays.len() as u64,
+        for (((_, contender), answers), turns) in contenders.iter().zip(answers).zip(&turns) {
+            let by_part: Vec<Vec<f64>> = (0..rays.len().div_ceil(PART))
+                .map(|part| turns.iter().map(|seconds| seconds[part]).collect())
+                .collect();
+            let fastest = by_part.iter().filter_map(|seconds| minimum(seconds.iter().copied()));
+            let middle = by_part.iter().filter_map(|seconds| median(seconds));
+            let times = TraceTimeRow {
+                scene: answers.scene.clone(),
+                method: answers.method.clone(),
+                layout: answers.layout.clone(),
+                rays: answers.rays.clone(),
+                count: answers.count,
                 rounds: config.rounds,
                 preparation_seconds: contender.preparation_seconds,
-                seconds: sum(|turns| minimum(turns.iter().copied())),
-                median_seconds: sum(median),
+                seconds: fastest.sum(),
+                median_seconds: middle.sum(),
+            };
+            traced.push(Traced {
+                answers,
+                times,
+                instructions: contender.instructions.clone(),
+                version: contender.version.clone(),
+                turns: turns.iter().map(|seconds| seconds.iter().sum()).collect(),
             });
         }
     }
-    Ok(Some((rows, times)))
+    Ok(Some(traced))
 }
 
 /// The rays of one kind on one scene, and their right answers.
@@ -303,6 +173,7 @@ impl OfKind<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::layout::own_contenders;
     use crate::measure::ray_cost::TrainedOn;
     use bvh_build::{Builder, median_cut, muller_fellner};
 
@@ -315,12 +186,17 @@ mod tests {
         config.layouts.push(Layout::WideBatches);
         let mut contenders = Vec::new();
         for (method, tree) in [("good", &good), ("bad", &bad)] {
-            let own = own_contenders(&config.layouts, &scene, tree, None).unwrap();
+            let own = own_contenders(&config.layouts, &[], &scene, tree, None).unwrap();
             contenders.extend(own.into_iter().map(|contender| (method.to_owned(), contender)));
         }
-        let (rows, times) = measure(&config, &scene, &good, &contenders, 1, || false).unwrap().unwrap();
-        assert_eq!((rows.len(), times.len()), (40, 40));
-        assert!(times.iter().all(|row| 0.0 < row.seconds && row.seconds <= row.median_seconds));
+        let traced = measure(&config, &scene, &good, &contenders, 1, || false).unwrap().unwrap();
+        assert_eq!(traced.len(), 40);
+        for traced in &traced {
+            let TraceTimeRow { seconds, median_seconds, .. } = traced.times;
+            assert!(0.0 < seconds && seconds <= median_seconds);
+            assert!(traced.turns.len() == 2 && traced.turns.iter().all(|turn| *turn >= seconds));
+        }
+        let rows: Vec<TraceRow> = traced.into_iter().map(|traced| traced.answers).collect();
         for row in &rows {
             assert!(row.hits > 100 && row.hits < row.count, "{row:?}");
             assert_eq!((row.missed_hits, row.false_hits, row.other_hits), (0, 0, 0), "{row:?}");
@@ -343,10 +219,11 @@ mod tests {
         let config: Config = toml::from_str("count = 5000\nrounds = 1\nrays = ['primary']").unwrap();
         let mut contenders = Vec::new();
         for (rays, visits) in [("lines", None), ("camera", Some(&visits[..]))] {
-            let own = own_contenders(&config.layouts, &scene, &tree, visits).unwrap();
+            let own = own_contenders(&config.layouts, &[], &scene, &tree, visits).unwrap();
             contenders.extend(own.into_iter().map(|contender| (rays.to_owned(), contender)));
         }
-        let (rows, _) = measure(&config, &scene, &tree, &contenders, 1, || false).unwrap().unwrap();
+        let traced = measure(&config, &scene, &tree, &contenders, 1, || false).unwrap().unwrap();
+        let rows: Vec<TraceRow> = traced.into_iter().map(|traced| traced.answers).collect();
         assert!(rows.iter().all(|row| (row.missed_hits, row.false_hits, row.other_hits) == (0, 0, 0)));
         let tests = |rays: &str, layout: &str| {
             let row = rows.iter().find(|row| row.method == rays && row.layout == layout).unwrap();

@@ -77,9 +77,9 @@ fn answer(section: &Section) -> String {
 
 fn verdict(verdict: &Verdict) -> String {
     let (mark, text) = match verdict {
-        Verdict::Paper(outcome) => {
+        Verdict::Paper(outcome, answer) => {
             let name = outcome.name();
-            (format!("<strong class=\"{}\">{name}</strong> ", name.replace(' ', "-")), outcome.to_string())
+            (format!("<strong class=\"{}\">{name}</strong> ", name.replace(' ', "-")), answer.clone())
         }
         Verdict::Reading(reading) => (String::new(), reading.clone()),
         Verdict::None => (String::new(), "No verdict is stated.".into()),

@@ -3,14 +3,14 @@
 mod html;
 
 use crate::Error;
-use crate::figures::{self, Miniature};
-use crate::files;
 use crate::report::output::Output;
 use crate::report::paper::Outcome;
 use crate::run::finish::outputs;
 use crate::run::provenance::Provenance;
 use crate::run::resolved::Resolved;
-use crate::scenes::SceneKind;
+use bvh_scenes::SceneKind;
+use bvh_terminal::files;
+use figures::Miniature;
 use serde::de::DeserializeOwned;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -39,7 +39,7 @@ struct Section {
 
 /// What an experiment comes to, by a rule that the page states.
 enum Verdict {
-    Paper(Outcome),
+    Paper(Outcome, String),
     Reading(String),
     None,
 }
@@ -117,10 +117,11 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
     })
 }
 
-/// Where numbers are beside the paper's, what they come to; elsewhere how the first report that does reads its own.
+/// Returns the verdict and the answers where numbers are next to the paper's, otherwise the first report's reading of its own.
 fn verdict(outputs: &[Output]) -> Verdict {
-    if let Some(outcome) = outputs.iter().find_map(|output| output.outcome) {
-        return Verdict::Paper(outcome);
+    let compared = outputs.iter().find_map(|output| Some((output.outcome?, output.answer.clone()?)));
+    if let Some((outcome, answer)) = compared {
+        return Verdict::Paper(outcome, answer);
     }
     let reading = outputs.iter().map(|output| output.reading.trim()).find(|reading| !reading.is_empty());
     reading.map_or(Verdict::None, |reading| Verdict::Reading(reading.into()))

@@ -1,13 +1,14 @@
 //! The crate `bvh`.
 
 use super::{Built, Raw};
-use crate::measure::speed::{Batch, Contender, Tracer, timed};
+use crate::measure::contender::{Batch, Contender, Tracer, timed};
+use crate::measure::layout::COMPILED;
 use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
 use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh as TheirBvh, BvhNode};
 use ::bvh::ray::Ray as TheirRay;
-use bvh_build::Query;
 use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle};
+use bvh_scenes::trace::Query;
 use glam::Vec3;
 use nalgebra::{Point3, Vector3};
 use std::time::Instant;
@@ -144,6 +145,8 @@ pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
     };
     Contender {
         layout: "binary, their own".into(),
+        instructions: COMPILED.into(),
+        version: env!("HARNESS_BVH").into(),
         preparation_seconds,
         tracer: Tracer::Other(Box::new(trace)),
     }

@@ -1,16 +1,19 @@
 //! Programs of others as methods, in whatever language: the boxes of a scene in a file, and a tree file back.
 
-use bvh_build::OutOfRange;
-use bvh_build::config::above;
+use super::program::Program;
+use crate::error::CommandFault;
+use bvh_config::{OutOfRange, above};
 use bvh_core::file::{self, FileError};
 use bvh_core::{Aabb, Bvh, Clip, validate_references};
+use bvh_scenes::ReadError;
+use bvh_scenes::tree_file::{self, TreeFileError};
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// A program that builds trees, called as `COMMAND… BOXES TREE` in the folder in which the harness was called.
     ///
     /// `BOXES` is a file with min x, y, z, max x, y, z of every object as little-endian `f32`, and nothing else: object `i` has
@@ -28,37 +31,6 @@ bvh_build::config! { serde;
     check Self::names_a_program;
 }
 
-/// What a program did not do.
-#[derive(Debug, thiserror::Error)]
-pub enum Fault {
-    /// There is no such program, or it may not be run.
-    #[error("it cannot be started: {0}")]
-    NotStarted(io::Error),
-    /// It reports a failure, with the last line on standard error.
-    #[error("{status}: {last_line}")]
-    Failed {
-        /// How it ended.
-        status: ExitStatus,
-        /// Its last words.
-        last_line: String,
-    },
-    /// It ended without a tree.
-    #[error("it left no file at the path that is its last argument")]
-    NoTree,
-    /// Its tree is damaged, or none over these boxes.
-    #[error("its tree is refused: {0}")]
-    Refused(#[from] FileError),
-    /// It took too long.
-    #[error("it did not end within {0} s")]
-    TimedOut(f64),
-    /// The run was interrupted, and so it was ended.
-    #[error("it was interrupted")]
-    Interrupted,
-    /// Files could not be exchanged with it.
-    #[error("the files that it is given cannot be written or read: {0}")]
-    Exchange(#[from] io::Error),
-}
-
 impl Config {
     /// The method's name in specs.
     pub const NAME: &str = "external";
@@ -69,14 +41,14 @@ impl Config {
     }
 
     /// The program's tree over `boxes`, those of the `objects`, and the seconds that it took, its start and files included. Ends the
-    /// program, and all that it has started, as soon as the run is `cancelled`.
+    /// program as soon as the run is `cancelled`, and with the program, however it ends, all that it has started.
     pub fn build(
         &self,
         boxes: &[Aabb],
         objects: &dyn Clip,
         seed: u64,
         cancelled: &dyn Fn() -> bool,
-    ) -> Result<(Bvh, f64), Fault> {
+    ) -> Result<(Bvh, f64), CommandFault> {
         let folder = tempfile::tempdir()?;
         let [given, tree, said] = ["boxes", "tree.bvh", "stderr"].map(|name| folder.path().join(name));
         let corners = boxes.iter().flat_map(|aabb| [aabb.min.to_array(), aabb.max.to_array()]).flatten();
@@ -84,48 +56,39 @@ impl Config {
         let mut command = Command::new(&self.command[0]);
         command.args(&self.command[1..]).args([&given, &tree]).env("BVH_SEED", seed.to_string());
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(File::create(&said)?);
-        // In a group of its own, so that what it starts can be ended with it.
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let start = Instant::now();
-        let mut child = command.spawn().map_err(Fault::NotStarted)?;
+        let mut program = Program::start(&mut command, folder.path()).map_err(CommandFault::NotStarted)?;
         let status = loop {
-            if let Some(status) = child.try_wait()? {
+            if let Some(status) = program.status()? {
                 break status;
             }
             let elapsed = start.elapsed();
             let late = self.timeout_seconds.filter(|limit| elapsed.as_secs_f64() > *limit);
             if late.is_some() || cancelled() {
-                end(child);
-                return Err(late.map_or(Fault::Interrupted, Fault::TimedOut));
+                return Err(late.map_or(CommandFault::Interrupted, CommandFault::TimedOut));
             }
             // The wait is at most a fiftieth of what is measured.
             std::thread::sleep((elapsed / 50).clamp(Duration::from_micros(200), Duration::from_millis(20)));
         };
         let seconds = start.elapsed().as_secs_f64();
+        drop(program);
         if !status.success() {
-            return Err(Fault::Failed { status, last_line: last_line(&said)? });
+            return Err(CommandFault::Failed { status, last_line: last_line(&said)? });
         }
-        // A pipe could keep us waiting for ever.
-        if !tree.is_file() {
-            return Err(Fault::NoTree);
-        }
-        let tree = file::load(&fs::read(&tree)?, boxes)?;
+        let tree = file::load(&tree_file::read(&tree)?, boxes)?;
         validate_references(&tree, boxes, objects).map_err(FileError::Tree)?;
         Ok((tree, seconds))
     }
 }
 
-/// Kills a program and its group. It may have ended meanwhile.
-fn end(mut child: Child) {
-    #[cfg(unix)]
-    {
-        use nix::{sys::signal, unistd::Pid};
-        let group = Pid::from_raw(child.id().cast_signed());
-        let _ = signal::killpg(group, signal::Signal::SIGKILL);
+impl From<TreeFileError> for CommandFault {
+    fn from(error: TreeFileError) -> Self {
+        match error {
+            TreeFileError::Read(ReadError::Failed { source, .. }) => Self::Exchange(source),
+            TreeFileError::Read(_) => Self::NoTree,
+            TreeFileError::Invalid { source, .. } => Self::Refused(source),
+        }
     }
-    let _ = child.kill();
-    let _ = child.wait();
 }
 
 /// The last line of a text file that says something; the file may be long.

@@ -1,8 +1,11 @@
 //! Rays per second of all libraries side by side: every mode on every scene, and geometric means over the scenes.
 
-use crate::run::rows::{PeerRayRow, RayRatioRow, TraceRow, TraceTimeRow};
-use crate::statistics::geometric_mean;
-use std::collections::BTreeMap;
+use crate::measure::layout::{COMPILED, is_repeat, is_single};
+use crate::measure::speed::Traced;
+use crate::processor::PROCESSOR;
+use crate::rows::{PeerRayRow, RayRatioRow};
+use crate::statistics::{geometric_mean, range};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The library of our own contenders.
 pub const OURS: &str = "ours";
@@ -10,116 +13,218 @@ pub const OURS: &str = "ours";
 /// The name in the column `scene` of rows that are means over all scenes.
 pub const MEAN: &str = "geometric mean";
 
-/// Most of a contender's answers that may be wrong: one in so many rays. What answers worse has failed, and so has its time:
-/// tinybvh's packets overflow their stack in deep trees.
+/// The largest accepted share of wrong answers: one in this number of rays. A contender above it has failed, and so has its
+/// time: tinybvh's packets overflow their stack in deep trees.
 const WRONG_AT_MOST_ONE_IN: u64 = 100;
 
-/// The rows of `timing_rays.csv`, without contenders that failed. `traces` and `times` are rows of the same contenders in the same order; `library_of` names the
-/// library of a method's label.
-pub fn rows(
-    traces: &[TraceRow],
-    times: &[TraceTimeRow],
-    library_of: impl Fn(&str) -> String,
-) -> Vec<PeerRayRow> {
-    let row = |(trace, time): (&TraceRow, &TraceTimeRow)| {
-        let library = library_of(&trace.method);
-        let mode = if library == trace.method {
-            trace.layout.clone()
-        } else {
-            format!("{}: {}", trace.method, trace.layout)
-        };
-        PeerRayRow {
-            scene: trace.scene.clone(),
-            library,
-            mode,
-            rays: trace.rays.clone(),
-            million_per_s: time.count as f64 * 1e-6 / time.seconds,
-            disagreements: trace.missed_hits + trace.false_hits + trace.other_hits,
-        }
-    };
-    let answers = |(trace, _): &(&TraceRow, &TraceTimeRow)| {
-        (trace.missed_hits + trace.false_hits + trace.other_hits) * WRONG_AT_MOST_ONE_IN <= trace.count
-    };
-    let mut rows: Vec<PeerRayRow> = traces.iter().zip(times).filter(answers).map(row).collect();
-    rows.extend(means(&rows));
-    rows
+/// The speed of one contender on one scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Speed {
+    /// The row of `timing_rays.csv`.
+    pub row: PeerRayRow,
+    /// Million rays per second of each turn.
+    pub turns: Vec<f64>,
 }
 
-/// For every mode and kind of rays that all scenes have, the geometric mean of the speeds and all disagreements.
-fn means(rows: &[PeerRayRow]) -> Vec<PeerRayRow> {
-    let scenes = rows.iter().map(|row| &row.scene).collect::<std::collections::BTreeSet<_>>().len();
-    let mut groups: BTreeMap<(&str, &str, &str), (usize, Vec<&PeerRayRow>)> = BTreeMap::new();
-    for (index, row) in rows.iter().enumerate() {
-        let group = groups.entry((&row.library, &row.mode, &row.rays)).or_insert((index, vec![]));
-        group.1.push(row);
-    }
-    let mut complete: Vec<_> = groups.into_values().filter(|(_, rows)| rows.len() == scenes).collect();
-    complete.sort_by_key(|(first, _)| *first);
-    let mean = |(_, rows): (usize, Vec<&PeerRayRow>)| PeerRayRow {
-        scene: MEAN.into(),
-        million_per_s: geometric_mean(&rows.iter().map(|row| row.million_per_s).collect::<Vec<_>>()),
-        disagreements: rows.iter().map(|row| row.disagreements).sum(),
-        ..rows[0].clone()
+/// The speeds of contenders that did not fail. `library_of` names the library of a method's label, and
+/// `search_seconds` the time in which the tree of a label was built on a scene, where the contender does not include it.
+pub fn speeds(
+    traced: &[Traced],
+    library_of: impl Fn(&str) -> String,
+    search_seconds: impl Fn(&str, &str) -> f64,
+) -> Vec<Speed> {
+    let speed = |traced: &Traced| {
+        let Traced { answers, times, .. } = traced;
+        let library = library_of(&answers.method);
+        let mode = if library == answers.method {
+            answers.layout.clone()
+        } else {
+            format!("{}: {}", answers.method, answers.layout)
+        };
+        let build_seconds = match library.as_str() {
+            OURS => search_seconds(&answers.scene, &answers.method) + times.preparation_seconds,
+            _ => times.preparation_seconds,
+        };
+        let million = times.count as f64 * 1e-6;
+        Speed {
+            row: PeerRayRow {
+                scene: answers.scene.clone(),
+                processor: PROCESSOR.name(),
+                instructions: traced.instructions.clone(),
+                library,
+                version: traced.version.clone(),
+                mode,
+                rays: answers.rays.clone(),
+                million_per_s: million / times.seconds,
+                build_seconds,
+                disagreements: wrong_answers(traced),
+            },
+            turns: traced.turns.iter().map(|seconds| million / seconds).collect(),
+        }
     };
-    complete.into_iter().map(mean).collect()
+    let answers_well = |traced: &&Traced| wrong_answers(traced) * WRONG_AT_MOST_ONE_IN <= traced.answers.count;
+    traced.iter().filter(answers_well).map(speed).collect()
+}
+
+fn wrong_answers(traced: &Traced) -> u64 {
+    let answers = &traced.answers;
+    answers.missed_hits + answers.false_hits + answers.other_hits
+}
+
+/// The rows of `timing_rays.csv`: all speeds, and for every contender and kind of rays that all scenes have, the geometric
+/// mean of the speeds and all disagreements.
+pub fn rows(speeds: &[Speed]) -> Vec<PeerRayRow> {
+    let rows: Vec<PeerRayRow> = speeds.iter().map(|speed| speed.row.clone()).collect();
+    let scenes: BTreeSet<&str> = rows.iter().map(|row| row.scene.as_str()).collect();
+    let mut groups: BTreeMap<[&str; 4], Vec<usize>> = BTreeMap::new();
+    for (index, row) in rows.iter().enumerate() {
+        groups.entry([&row.instructions, &row.library, &row.mode, &row.rays]).or_default().push(index);
+    }
+    let mut complete: Vec<Vec<usize>> =
+        groups.into_values().filter(|group| group.len() == scenes.len()).collect();
+    complete.sort();
+    let mean = |group: &Vec<usize>| {
+        let of_group: Vec<&PeerRayRow> = group.iter().map(|&index| &rows[index]).collect();
+        let speeds: Vec<f64> = of_group.iter().map(|row| row.million_per_s).collect();
+        PeerRayRow {
+            scene: MEAN.into(),
+            million_per_s: geometric_mean(&speeds),
+            build_seconds: mean_build_seconds(of_group.iter().map(|row| row.build_seconds)),
+            disagreements: of_group.iter().map(|row| row.disagreements).sum(),
+            ..of_group[0].clone()
+        }
+    };
+    let means: Vec<PeerRayRow> = complete.iter().map(mean).collect();
+    [rows, means].concat()
+}
+
+fn mean_build_seconds(seconds: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = seconds.len() as f64;
+    seconds.sum::<f64>() / count
 }
 
 /// Whether a row is of a mode that one of ours is compared with.
 type IsRival = fn(&PeerRayRow) -> bool;
 
 /// The modes of other libraries that ours are compared with.
-const AGAINST: [(&str, IsRival); 3] = [
+const AGAINST: [(&str, IsRival); 4] = [
     ("any mode", |_| true),
-    ("whole triangles", |row| row.mode != "high" && !row.mode.contains("splits")),
+    ("single calls", |row| is_single(&row.mode)),
+    ("whole triangles", |row| !row.mode.contains("splits") && !is_split_by_embree(row)),
     ("robust", |row| row.library == "embree" && row.mode.contains("robust")),
 ];
 
-/// For each of our modes and kind of rays, its speed over that of the fastest mode of other libraries: scene by scene, and their
-/// geometric mean.
-pub fn ratios(rows: &[PeerRayRow]) -> Vec<RayRatioRow> {
-    let mut ratios = Vec::new();
-    for mean in rows.iter().filter(|row| row.library == OURS && row.scene == MEAN) {
-        let of_scenes = |row: &&PeerRayRow| row.scene != MEAN && row.rays == mean.rays;
-        let own = rows.iter().filter(of_scenes).filter(|row| row.library == OURS && row.mode == mean.mode);
-        for (against, is_rival) in AGAINST {
-            let over = |scene: &str, ratio| RayRatioRow {
-                scene: scene.into(),
-                mode: mean.mode.clone(),
-                against: against.into(),
-                rays: mean.rays.clone(),
-                ratio,
-            };
-            let of_scene = |own: &PeerRayRow| {
-                let rivals = rows.iter().filter(of_scenes).filter(|row| row.scene == own.scene);
-                let rivals = rivals.filter(|row| row.library != OURS && is_rival(row));
-                let fastest = rivals.map(|row| row.million_per_s).reduce(f64::max)?;
-                Some(over(&own.scene, own.million_per_s / fastest))
-            };
-            let found: Vec<RayRatioRow> = own.clone().filter_map(of_scene).collect();
-            if !found.is_empty() {
-                let mean = geometric_mean(&found.iter().map(|row| row.ratio).collect::<Vec<_>>());
-                ratios.extend(found);
-                ratios.push(over(MEAN, mean));
-            }
-        }
-    }
-    ratios
+/// Embree's high quality divides triangles, unless its answers have to be robust.
+fn is_split_by_embree(row: &PeerRayRow) -> bool {
+    row.library == "embree" && row.mode.starts_with("high") && !row.mode.contains("robust")
 }
 
-/// Lines for the terminal: for every kind of rays our fastest mode, over the fastest of other libraries.
+/// For each of our modes and kinds of rays, its speed over that of the fastest mode of other libraries that are held to the
+/// same instruction set: scene by scene, and their geometric mean.
+pub fn ratios(speeds: &[Speed]) -> Vec<RayRatioRow> {
+    let mut groups: BTreeMap<[&str; 3], Vec<&Speed>> = BTreeMap::new();
+    let mut order = Vec::new();
+    for speed in speeds.iter().filter(|speed| speed.row.library == OURS && speed.row.instructions != COMPILED) {
+        let key = [&speed.row.instructions, &speed.row.mode, &speed.row.rays].map(String::as_str);
+        groups.entry(key).or_insert_with(|| {
+            order.push(key);
+            Vec::new()
+        });
+        groups.entry(key).and_modify(|group| group.push(speed));
+    }
+    let mut rows = Vec::new();
+    for key in order {
+        for (against, is_rival) in AGAINST {
+            let scenes: Vec<OverFastest> =
+                groups[&key].iter().filter_map(|own| over_fastest(own, speeds, against, is_rival)).collect();
+            rows.extend(scenes.iter().map(|over| over.row.clone()));
+            rows.extend(mean_ratio(&scenes));
+        }
+    }
+    rows
+}
+
+/// Our speed on one scene over the fastest rival's, in all turns and in each.
+struct OverFastest {
+    row: RayRatioRow,
+    turns: Vec<f64>,
+}
+
+fn over_fastest(own: &Speed, speeds: &[Speed], against: &str, is_rival: IsRival) -> Option<OverFastest> {
+    let is_comparable = |rival: &&Speed| {
+        rival.row.library != OURS
+            && rival.row.scene == own.row.scene
+            && rival.row.rays == own.row.rays
+            && [COMPILED, own.row.instructions.as_str()].contains(&rival.row.instructions.as_str())
+            && is_rival(&rival.row)
+    };
+    let by_speed = |a: &&Speed, b: &&Speed| a.row.million_per_s.total_cmp(&b.row.million_per_s);
+    let fastest = speeds.iter().filter(is_comparable).max_by(by_speed)?;
+    let turns: Vec<f64> = own.turns.iter().zip(&fastest.turns).map(|(own, rival)| own / rival).collect();
+    let ratio = own.row.million_per_s / fastest.row.million_per_s;
+    let (least_turn, greatest_turn) = range(turns.iter().copied()).unwrap_or((ratio, ratio));
+    let row = RayRatioRow {
+        scene: own.row.scene.clone(),
+        processor: format!("{}, {}", own.row.processor, own.row.instructions),
+        mode: own.row.mode.clone(),
+        against: against.into(),
+        fastest: format!("{} {}", fastest.row.library, fastest.row.mode),
+        rays: own.row.rays.clone(),
+        ratio,
+        least_turn,
+        greatest_turn,
+        build_seconds: own.row.build_seconds,
+        carried_by: String::new(),
+        ratio_without: None,
+    };
+    Some(OverFastest { row, turns })
+}
+
+/// The geometric mean over scenes, and the one without the scene that lifts it most.
+fn mean_ratio(scenes: &[OverFastest]) -> Option<RayRatioRow> {
+    let by_ratio = |a: &&OverFastest, b: &&OverFastest| a.row.ratio.total_cmp(&b.row.ratio);
+    let carrier = scenes.iter().max_by(by_ratio)?;
+    let mean_of = |ratios: Vec<f64>| geometric_mean(&ratios);
+    let without: Vec<f64> =
+        scenes.iter().filter(|over| over.row.scene != carrier.row.scene).map(|over| over.row.ratio).collect();
+    let ratio = mean_of(scenes.iter().map(|over| over.row.ratio).collect());
+    let turn_count = scenes.iter().map(|over| over.turns.len()).min().unwrap_or(0);
+    let mean_of_turn = |turn: usize| mean_of(scenes.iter().map(|over| over.turns[turn]).collect());
+    let (least_turn, greatest_turn) = range((0..turn_count).map(mean_of_turn)).unwrap_or((ratio, ratio));
+    Some(RayRatioRow {
+        scene: MEAN.into(),
+        fastest: String::new(),
+        ratio,
+        least_turn,
+        greatest_turn,
+        build_seconds: mean_build_seconds(scenes.iter().map(|over| over.row.build_seconds)),
+        carried_by: carrier.row.scene.clone(),
+        ratio_without: (!without.is_empty()).then(|| mean_of(without)),
+        ..carrier.row.clone()
+    })
+}
+
+/// Lines for the terminal: for every instruction set and kind of rays our fastest mode, over the fastest of other libraries.
 pub fn text(ratios: &[RayRatioRow]) -> String {
     let mut text = String::from("Speeds over those of the fastest mode of any other library:\n");
-    let mut kinds: Vec<&str> = ratios.iter().map(|row| row.rays.as_str()).collect();
-    kinds.sort_unstable();
-    kinds.dedup();
-    for kind in kinds {
-        let of_kind = || ratios.iter().filter(|row| row.rays == kind && row.against == AGAINST[0].0);
-        let order = |a: &&RayRatioRow, b: &&RayRatioRow| a.ratio.total_cmp(&b.ratio);
-        let fastest = of_kind().filter(|row| row.scene == MEAN).max_by(order);
-        let of_mode = |mode: &str| of_kind().filter(|row| row.mode == mode).min_by(order);
-        if let Some((mean, least)) = fastest.and_then(|mean| Some((mean, of_mode(&mean.mode)?))) {
-            let (RayRatioRow { ratio, mode, .. }, least, scene) = (mean, least.ratio, &least.scene);
-            text += &format!("  {kind}: {ratio:.2} ({mode}), least {least:.2} on {scene}\n");
+    let groups: BTreeSet<[&str; 2]> =
+        ratios.iter().map(|row| [row.processor.as_str(), row.rays.as_str()]).collect();
+    for [processor, kind] in groups {
+        let of_group = || {
+            let is_of_group = |row: &&RayRatioRow| row.processor == processor && row.rays == kind;
+            let of_group = ratios.iter().filter(is_of_group);
+            of_group.filter(|row| row.against == AGAINST[0].0 && !is_repeat(&row.mode))
+        };
+        let by_ratio = |a: &&RayRatioRow, b: &&RayRatioRow| a.ratio.total_cmp(&b.ratio);
+        let best_mean = of_group().filter(|row| row.scene == MEAN).max_by(by_ratio);
+        let least_of_mode = |mode: &str| of_group().filter(|row| row.mode == mode).min_by(by_ratio);
+        if let Some(mean) = best_mean
+            && let Some(least) = least_of_mode(&mean.mode)
+        {
+            text += &format!(
+                "  {processor}, {kind}: {:.2} ({}), least {:.2} on {}\n",
+                mean.ratio, mean.mode, least.ratio, least.scene
+            );
         }
     }
     text
@@ -128,60 +233,118 @@ pub fn text(ratios: &[RayRatioRow]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rows::{TraceRow, TraceTimeRow};
 
-    fn row(scene: &str, library: &str, mode: &str, million_per_s: f64, disagreements: u64) -> PeerRayRow {
-        let [scene, library, mode] = [scene, library, mode].map(String::from);
-        PeerRayRow { scene, library, mode, rays: "primary".into(), million_per_s, disagreements }
+    fn speed(scene: &str, library: &str, mode: &str, million_per_s: f64) -> Speed {
+        let row = PeerRayRow {
+            scene: scene.into(),
+            processor: "P".into(),
+            instructions: "AVX2".into(),
+            library: library.into(),
+            version: "1".into(),
+            mode: mode.into(),
+            rays: "primary".into(),
+            million_per_s,
+            build_seconds: million_per_s,
+            disagreements: 1,
+        };
+        Speed { row, turns: vec![million_per_s, million_per_s / 2.0] }
     }
 
     #[test]
     fn means_are_over_all_scenes_and_disagreements_add_up() {
         let measured = [
-            row("a", OURS, "wide", 2.0, 0),
-            row("a", "embree", "high", 1.0, 3),
-            row("b", OURS, "wide", 8.0, 0),
-            row("b", "embree", "high", 4.0, 4),
-            row("b", "embree", "robust", 4.0, 0),
+            speed("a", OURS, "wide", 2.0),
+            speed("a", "embree", "high", 1.0),
+            speed("b", OURS, "wide", 8.0),
+            speed("b", "embree", "high", 4.0),
+            speed("b", "embree", "robust", 4.0),
         ];
-        let means = means(&measured);
-        let shown: Vec<_> =
-            means.iter().map(|row| (row.library.as_str(), row.million_per_s, row.disagreements)).collect();
-        assert_eq!(shown.len(), 2, "a mode that not all scenes have has no mean: {shown:?}");
-        assert_eq!((shown[0].0, shown[1].0), (OURS, "embree"));
-        assert!((shown[0].1 - 4.0).abs() < 1e-12 && (shown[1].1 - 2.0).abs() < 1e-12 && shown[1].2 == 7);
+        let rows = rows(&measured);
+        let means: Vec<_> = rows
+            .iter()
+            .filter(|row| row.scene == MEAN)
+            .map(|row| (row.library.as_str(), row.million_per_s, row.build_seconds, row.disagreements))
+            .collect();
+        assert_eq!(rows.len(), 5 + 2, "a mode that not all scenes have has no mean: {means:?}");
+        assert_eq!((means[0].0, means[1].0), (OURS, "embree"));
+        assert!((means[0].1 - 4.0).abs() < 1e-12 && (means[1].1 - 2.0).abs() < 1e-12);
+        assert_eq!((means[0].2, means[0].3), (5.0, 2));
     }
 
     #[test]
     fn ratios_are_to_the_fastest_rival_of_each_scene_and_kind() {
-        let mut measured = vec![
-            row("a", OURS, "wide", 2.0, 0),
-            row("a", "embree", "high", 4.0, 0),
-            row("a", "embree", "high robust", 1.0, 0),
-            row("b", OURS, "wide", 9.0, 0),
-            row("b", "embree", "high robust", 1.0, 0),
-            row("b", "tinybvh", "BVH8 splits", 4.5, 0),
-            row("b", "tinybvh", "BVH8", 3.0, 0),
+        let measured = [
+            speed("a", OURS, "wide", 2.0),
+            speed("a", "embree", "high, coherent packets", 4.0),
+            speed("a", "embree", "high robust", 1.0),
+            speed("b", OURS, "wide", 9.0),
+            speed("b", "embree", "high robust", 1.0),
+            speed("b", "tinybvh", "BVH8 splits", 4.5),
+            speed("b", "tinybvh", "BVH8", 3.0),
         ];
-        measured.extend(means(&measured));
         let ratios = ratios(&measured);
         let of = |against: &str| -> Vec<(&str, f64)> {
             let of = ratios.iter().filter(|row| row.against == against);
             of.map(|row| (row.scene.as_str(), row.ratio)).collect()
         };
         assert_eq!(of("any mode"), [("a", 0.5), ("b", 2.0), (MEAN, 1.0)]);
+        assert_eq!(of("single calls")[..2], [("a", 2.0), ("b", 2.0)]);
         assert_eq!(of("whole triangles")[..2], [("a", 2.0), ("b", 3.0)]);
         assert_eq!(of("robust")[..2], [("a", 2.0), ("b", 9.0)]);
         assert!((of("robust")[2].1 - 18f64.sqrt()).abs() < 1e-12);
-        let slower = RayRatioRow { mode: "binary".into(), ratio: 0.4, ..ratios[2].clone() };
+        assert_eq!(
+            (ratios[0].fastest.as_str(), ratios[0].processor.as_str()),
+            ("embree high, coherent packets", "P, AVX2")
+        );
+        assert_eq!((ratios[2].carried_by.as_str(), ratios[2].ratio_without), ("b", Some(0.5)));
+        let slower = RayRatioRow { mode: "other".into(), ratio: 0.4, ..ratios[2].clone() };
         let text = text(&[vec![slower], ratios].concat());
-        assert!(text.contains("primary: 1.00 (wide), least 0.50 on a"), "of our fastest mode: {text}");
+        assert!(text.contains("P, AVX2, primary: 1.00 (wide), least 0.50 on a"), "of our fastest mode: {text}");
+    }
+
+    #[test]
+    fn ours_are_compared_with_the_same_instruction_set_and_with_code_that_has_none() {
+        let held_to = |instructions: &str, mut speed: Speed| {
+            speed.row.instructions = instructions.into();
+            speed
+        };
+        let measured = [
+            speed("a", OURS, "wide", 2.0),
+            held_to("AVX-512", speed("a", "embree", "high", 8.0)),
+            held_to(COMPILED, speed("a", "obvhs", "binary", 4.0)),
+            held_to(COMPILED, speed("a", OURS, "binary", 4.0)),
+        ];
+        let any: Vec<f64> = ratios(&measured)
+            .iter()
+            .filter(|row| row.scene == "a" && row.against == "any mode")
+            .map(|row| row.ratio)
+            .collect();
+        assert_eq!(any, [0.5]);
+    }
+
+    #[test]
+    fn turns_are_compared_one_by_one() {
+        let mut own = speed("a", OURS, "wide", 3.0);
+        own.turns = vec![1.0, 3.0, 2.0];
+        let mut rival = speed("a", "embree", "high", 2.0);
+        rival.turns = vec![2.0, 1.0, 2.0];
+        let scene = ratios(&[own, rival])[0].clone();
+        assert_eq!((scene.ratio, scene.least_turn, scene.greatest_turn), (1.5, 0.5, 3.0));
     }
 
     #[test]
     fn a_contender_that_answers_wrongly_has_no_speed() {
-        let trace = |missed_hits| TraceRow { count: 1000, missed_hits, ..TraceRow::default() };
-        let time = TraceTimeRow { count: 1000, seconds: 1.0, ..TraceTimeRow::default() };
-        let shown = |missed| rows(&[trace(missed)], std::slice::from_ref(&time), str::to_owned).len();
-        assert_eq!((shown(10), shown(11)), (2, 0), "the row and its mean, or nothing");
+        let shown = |missed_hits| {
+            let traced = Traced {
+                answers: TraceRow { count: 1000, missed_hits, ..TraceRow::default() },
+                times: TraceTimeRow { count: 1000, seconds: 1.0, ..TraceTimeRow::default() },
+                instructions: String::new(),
+                version: String::new(),
+                turns: vec![1.0],
+            };
+            speeds(&[traced], str::to_owned, |_, _| 0.0).len()
+        };
+        assert_eq!((shown(10), shown(11)), (1, 0));
     }
 }

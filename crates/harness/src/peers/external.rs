@@ -3,37 +3,78 @@
 //! `scripts/ray-peers/build` makes the program; its source describes the bytes that go through the pipes. One process
 //! per mode holds the scene for as long as the contender lives, so that all contenders take turns in one run.
 
-use crate::measure::speed::{Batch, Contender, PART, Tracer};
-use crate::scenes::Scene;
-use bvh_build::Query;
+use crate::measure::contender::{Batch, Contender, PART, Tracer};
 use bvh_core::{Bvh, FirstCountNode, Hit, Triangle};
+use bvh_scenes::Scene;
+use bvh_scenes::trace::Query;
 use std::cell::RefCell;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
+/// A mode of the program, as the program lists it.
+#[derive(Debug, PartialEq, Eq)]
+struct Mode {
+    instructions: String,
+    library: String,
+    version: String,
+    name: String,
+}
+
+impl Mode {
+    /// Reads a line of four parts between tabs.
+    fn parse(line: &str) -> Option<Self> {
+        let mut parts = line.split('\t').map(str::to_owned);
+        let [instructions, library, version, name] =
+            [parts.next()?, parts.next()?, parts.next()?, parts.next()?];
+        parts.next().is_none().then_some(Self { instructions, library, version, name })
+    }
+}
+
+/// The modes that the program lists.
+fn modes(program: &Path) -> Result<Vec<Mode>, String> {
+    let shown = program.display();
+    let listed = Command::new(program).output().map_err(|error| format!("{shown}: {error}"))?;
+    let text = String::from_utf8_lossy(&listed.stdout);
+    let parse = |line| {
+        Mode::parse(line).ok_or_else(|| {
+            format!(
+                "{shown}: it lists {line:?}; expected instruction set, library, version and mode between tabs \
+                 (scripts/ray-peers/build makes it again)"
+            )
+        })
+    };
+    let modes: Vec<Mode> = text.lines().map(parse).collect::<Result<_, _>>()?;
+    if modes.is_empty() {
+        return Err(format!("{shown}: it lists no mode; expected one per line"));
+    }
+    Ok(modes)
+}
+
 /// A contender for every mode of the program, each with the name of its library. An error says what the program did not
 /// do.
 pub fn contenders(program: &Path, scene: &Scene) -> Result<Vec<(String, Contender<'static>)>, String> {
     let triangles = scene.triangles().map_err(|error| error.to_string())?;
-    let failed = |error: io::Error| format!("{}: {error}", program.display());
-    let listed = Command::new(program).output().map_err(failed)?;
-    let modes = String::from_utf8_lossy(&listed.stdout).into_owned();
-    if modes.trim().is_empty() {
-        return Err(format!("{}: it names no mode; expected one per line", program.display()));
-    }
-    let contender = |line: &str| {
-        let (library, mode) = line.split_once(' ').unwrap_or((line, "default"));
-        let (process, preparation_seconds) = Process::start(program, line, triangles).map_err(failed)?;
+    let mut contenders = Vec::new();
+    for mode in modes(program)? {
+        let argument = format!("{} {}", mode.library, mode.name);
+        let command = format!("{} \"{argument}\"", program.display());
+        let started = Process::start(program, &argument, triangles);
+        let (process, preparation_seconds) = started.map_err(|error| format!("{command}: {error}"))?;
         let process = RefCell::new(process);
-        let command = format!("{} \"{line}\"", program.display());
         let trace = move |batch: &Batch, hits: &mut [Option<Hit>]| {
             process.borrow_mut().trace(batch, hits).map_err(|error| format!("{command}: {error}"))
         };
-        let tracer = Tracer::Other(Box::new(trace));
-        Ok((library.to_owned(), Contender { layout: mode.to_owned(), preparation_seconds, tracer }))
-    };
-    modes.lines().map(contender).collect()
+        let contender = Contender {
+            layout: mode.name,
+            instructions: mode.instructions,
+            version: mode.version,
+            preparation_seconds,
+            tracer: Tracer::Other(Box::new(trace)),
+        };
+        contenders.push((mode.library, contender));
+    }
+    Ok(contenders)
 }
 
 /// tinybvh's tree with spatial splits over the scene's triangles, with its own leaves and boxes, and the seconds that its build took.
@@ -106,7 +147,8 @@ impl Drop for Process {
 /// Writes rays and what they ask.
 fn ask(program: &mut impl Write, batch: &Batch) -> io::Result<()> {
     let any = u32::from(batch.query == Query::Any);
-    for number in [any, batch.columns, batch.rays.len() as u32, PART as u32] {
+    let picture = u32::from(batch.in_squares);
+    for number in [any, picture, batch.rays.len() as u32, PART as u32] {
         program.write_all(&number.to_le_bytes())?;
     }
     for ray in batch.rays {
@@ -133,17 +175,27 @@ fn answer(program: &mut impl Read, hits: &mut [Option<Hit>]) -> io::Result<Vec<f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bvh_core::Ray;
+    use bvh_core::{Coherence, Ray};
+
+    #[test]
+    fn a_line_of_the_list_of_modes_has_four_parts() {
+        let mode = Mode::parse("AVX2\tembree\t4.4.0\thigh robust, coherent packets").unwrap();
+        assert_eq!((mode.library.as_str(), mode.name.as_str()), ("embree", "high robust, coherent packets"));
+        assert_eq!((mode.instructions.as_str(), mode.version.as_str()), ("AVX2", "4.4.0"));
+        assert_eq!(Mode::parse("embree high"), None);
+        assert_eq!(Mode::parse("AVX2\tembree\t4.4.0\thigh\tmore"), None);
+    }
 
     #[test]
     fn rays_go_out_as_described_and_answers_come_back_in_their_order() {
         let rays = [Ray::new([1.0, 2.0, 3.0], [0.0, 0.0, -1.0], 0.0, 7.0).unwrap(); 3];
         let mut sent = Vec::new();
-        ask(&mut sent, &Batch { query: Query::Any, columns: 3, rays: &rays }).unwrap();
+        let batch = Batch { query: Query::Any, coherence: Coherence::Coherent, in_squares: true, rays: &rays };
+        ask(&mut sent, &batch).unwrap();
         assert_eq!(sent.len(), 4 * 4 + 3 * 8 * 4);
         let words = sent.as_chunks::<4>().0;
         let counts: Vec<u32> = words[..4].iter().map(|word| u32::from_le_bytes(*word)).collect();
-        assert_eq!(counts, [1, 3, 3, PART as u32]);
+        assert_eq!(counts, [1, 1, 3, PART as u32]);
         let ray: Vec<f32> = words[4..12].iter().map(|word| f32::from_le_bytes(*word)).collect();
         assert_eq!(ray, [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, -1.0, 7.0]);
 

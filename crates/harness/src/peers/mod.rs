@@ -10,14 +10,14 @@ pub mod comparison;
 pub mod external;
 #[cfg(feature = "peers")]
 mod obvhs;
+mod program;
 
-use crate::measure::speed::Contender;
-use crate::scenes::Scene;
-use bvh_build::config::Accepts;
-use bvh_build::{Check, OutOfRange};
+use crate::measure::contender::Contender;
+use bvh_config::{Accepts, Check, OutOfRange};
 use bvh_core::Bvh;
 #[cfg(feature = "peers")]
 use bvh_core::{Aabb, Ray};
+use bvh_scenes::Scene;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// A library with its settings, as a spec names it.
@@ -172,11 +172,11 @@ fn triangles(scene: &Scene) -> Result<&[bvh_core::Triangle], String> {
 #[cfg(all(test, feature = "peers"))]
 mod tests {
     use super::*;
+    use crate::measure::contender::{Batch, Tracer};
     use crate::measure::disagreements;
-    use crate::measure::rays::{Kind, rays};
-    use crate::measure::speed::{Batch, Tracer};
-    use bvh_build::{Accelerator, Query};
-    use bvh_core::validate;
+    use bvh_core::{Coherence, validate};
+    use bvh_scenes::rays::{Kind, rays};
+    use bvh_scenes::trace::{Accelerator, Query};
 
     fn all() -> Vec<Peer> {
         let mut peers = vec![Peer::Bvh(NoSettings {})];
@@ -208,7 +208,8 @@ mod tests {
         let scene = Scene::load("escher:2000").unwrap();
         let tree = Peer::Bvh(NoSettings {}).build(&scene).unwrap().tree;
         let rays = rays(Kind::Incoherent, 4000, &scene, &tree, &Default::default(), 1);
-        let batch = Batch { query: Query::Nearest, columns: 0, rays: &rays };
+        let batch =
+            Batch { query: Query::Nearest, coherence: Coherence::Incoherent, in_squares: false, rays: &rays };
         let mut right = vec![None; rays.len()];
         Tracer::Own(Accelerator::of_tree(&scene.primitives, &tree)).trace(&batch, &mut right).unwrap();
         for peer in all() {

@@ -1,15 +1,16 @@
 //! The crate `obvhs`.
 
 use super::{Built, Obvhs, Preset, Raw};
-use crate::measure::speed::{Batch, Contender, Tracer, timed};
+use crate::measure::contender::{Batch, Contender, Tracer, timed};
+use crate::measure::layout::COMPILED;
 use ::obvhs::bvh2::{Bvh2, builder as binary};
 use ::obvhs::cwbvh::builder as wide;
 use ::obvhs::ray::{Ray as TheirRay, RayHit};
 use ::obvhs::rt_triangle::RtTriangle;
 use ::obvhs::triangle::Triangle as TheirTriangle;
 use ::obvhs::{BvhBuildParams, aabb};
-use bvh_build::Query;
 use bvh_core::{Aabb, Bvh, FirstCountNode, Hit, Ray, Triangle};
+use bvh_scenes::trace::Query;
 use glam::{Vec3, Vec3A};
 use std::time::Duration;
 
@@ -77,7 +78,7 @@ pub(super) fn raw(config: &Obvhs, boxes: &[Aabb]) -> Raw {
     Raw { tree, nearest: Box::new(nearest) }
 }
 
-/// A [`Trace`](crate::measure::speed::Trace) by a tree over `triangles` in the order of its leaves. The library's trees
+/// A [`Trace`](crate::measure::contender::Trace) by a tree over `triangles` in the order of its leaves. The library's trees
 /// have the same functions but no common trait.
 macro_rules! traced_by {
     ($tree:ident, $triangles:expr) => {{
@@ -109,6 +110,8 @@ pub(super) fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contende
     let trace_wide = traced_by!(compressed, in_order(&compressed.primitive_indices));
     let contender = |layout: &str, time: Duration, trace| Contender {
         layout: layout.into(),
+        instructions: COMPILED.into(),
+        version: env!("HARNESS_OBVHS").into(),
         preparation_seconds: time.as_secs_f64(),
         tracer: Tracer::Other(trace),
     };

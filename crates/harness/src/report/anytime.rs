@@ -6,10 +6,9 @@ use super::output::text_table;
 use super::prelude::*;
 use super::progress::{ProgressAxis, Series, series};
 use crate::statistics::{median, quartiles, range};
-use bvh_build::OutOfRange;
-use bvh_build::config::above;
+use bvh_config::{OutOfRange, above};
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// Error against run time.
     pub struct Config {
         /// What it belongs to.
@@ -20,6 +19,8 @@ bvh_build::config! { serde;
         file: String = "anytime".into();
         /// Labels of the methods. One event per run, as a builder has, is shown as a point.
         methods: Vec<String>, in OneOrMore;
+        /// Panels next to each other in the figures.
+        panels_per_row: usize = 2, in 1..=4;
         /// Seconds, ascending, at which the table for the terminal reads the curves.
         at_seconds: Vec<f64> = vec![0.1, 1.0, 10.0, 60.0], in above(0.0);
     }
@@ -58,7 +59,7 @@ impl Config {
                 }
                 panels.push(panel(rows.shown(scene), axis.axis(), Metric::Gap.axis(), layers));
             }
-            output.add_figure(axis.file(&self.file), caption, 2, panels);
+            output.add_figure(axis.file(&self.file), caption, self.panels_per_row, panels);
             axis.add_csv(&mut output, &self.file, &points)?;
         }
         self.add_table(&mut output, rows);

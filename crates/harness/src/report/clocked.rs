@@ -2,7 +2,7 @@
 
 use super::data::distinct;
 use super::prelude::*;
-use crate::run::rows::{self, ClockedPeerRow, ClockedRow};
+use crate::rows::{self, ClockedPeerRow, ClockedRow};
 use crate::statistics::{median, minimum};
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -1,11 +1,10 @@
 //! What the configurations of reports share: keys that several kinds have, and what their lists have to be.
 
 use super::target::Target;
-use bvh_build::OutOfRange;
-use bvh_build::config::{Accepts, Itself};
+use bvh_config::{Accepts, Itself, OutOfRange};
 use std::collections::BTreeMap;
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// A report on some methods that needs to know nothing else.
     pub struct Methods {
         /// What it belongs to, such as a section of the paper.
@@ -17,7 +16,7 @@ bvh_build::config! { serde;
     }
 }
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// A report on how fast some methods reach targets. Every repetition is one run: 25 or more make a distribution.
     pub struct Targets {
         /// What it belongs to.

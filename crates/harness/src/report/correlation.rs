@@ -1,17 +1,39 @@
-//! How well costs predict the tests that rays take, over many trees of one scene.
+//! How well costs predict the tests that rays take, over the trees that one method builds of one scene. Trees of different methods are
+//! never pooled: a rank over binary and n-ary trees mostly tells the one kind from the other (Simpson 1951).
 
-use super::config::Methods;
+use super::config::first;
 use super::data::distinct;
 use super::metric::Metric;
+use super::paper::{PaperRow, Verdict, ratios};
 use super::prelude::*;
-use crate::run::rows::{RunRow, RunTestRow, VisitRow};
-use crate::statistics::{pearson, spearman};
+use crate::rows::{RunRow, RunTestRow, VisitRow};
+use crate::statistics::{pearson, pearson_interval, spearman};
+use bvh_config::above;
 
-/// One cost against one kind of rays over the trees of one set, as written to `correlation.csv`.
+bvh_config::config! { serde;
+    /// Costs against tests per ray.
+    pub struct Config {
+        /// What it belongs to, such as a section of the paper.
+        source: String;
+        /// Heading.
+        title: String;
+        /// Labels of the methods, the paper's own case first: the trees of each are compared among themselves.
+        methods: Vec<String>, in OneOrMore;
+        /// The words in which the paper describes the correlation over the trees of the first method.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        paper_says: Option<String>;
+        /// Pearson's correlation from which on these words hold.
+        paper_from: f64 = 0.9, in above(0.0);
+        /// Why ours differs, where it does.
+        reason: String;
+    }
+}
+
+/// One cost against one kind of rays over the trees of one method, as written to `correlation.csv`.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Correlation<'a> {
     scene: &'a str,
-    /// `all`, or the label of the method whose trees alone are compared.
+    /// Label of the method whose trees are compared.
     method: &'a str,
     /// Which cost.
     cost: &'a str,
@@ -19,10 +41,15 @@ pub(super) struct Correlation<'a> {
     query: &'a str,
     trees: usize,
     pearson: Option<f64>,
+    /// Lower end of its 95 % interval, by Fisher's transformation; empty for fewer than four trees.
+    pearson_low: Option<f64>,
+    /// The upper end.
+    pearson_high: Option<f64>,
     spearman: Option<f64>,
 }
 
-const ALL: &str = "all";
+/// The kind of rays that the paper sends: they start inside and end at any hit.
+const OF_PAPER: (&str, &str) = ("inside", "any");
 
 /// A tree, and the tests per ray of one kind in it.
 type Tree<'a> = (&'a RunRow, f64);
@@ -46,34 +73,74 @@ fn costs(rows: &Rows) -> Vec<Cost<'_>> {
     of_area.into_iter().chain(rays.into_iter().map(of_rays)).collect()
 }
 
-pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
-    let (mut correlations, mut panels, costs) = (Vec::new(), Vec::new(), costs(rows));
+pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
+    let mut correlations = Vec::new();
+    let mut panels = Vec::new();
+    let costs = costs(rows);
     let of_layouts = distinct(rows.run_tests.iter().map(|row| (row.judged_on.as_str(), row.camera.as_str())));
     let random = rows.ray_kinds().len();
     for scene in rows.scenes() {
         for (number, kind) in rows.ray_kinds().into_iter().chain(of_layouts.clone()).enumerate() {
-            let methods =
-                config.methods.iter().map(|method| (method.as_str(), trees(rows, scene, method, kind)));
-            let methods: Vec<(&str, Vec<Tree>)> = methods.collect();
-            let all = methods.iter().flat_map(|(_, trees)| trees.iter().copied()).collect();
             let start = correlations.len();
-            for (method, trees) in [(ALL, all)].iter().chain(&methods) {
-                correlations.extend(costs.iter().map(|cost| correlate(scene, method, kind, cost, trees)));
+            let mut drawn = Vec::new();
+            for method in &config.methods {
+                let trees = trees(rows, scene, method, kind);
+                correlations.extend(costs.iter().map(|cost| correlate(scene, method, kind, cost, &trees)));
+                drawn.push((method.as_str(), trees));
             }
             if number < random {
-                panels.push(draw(&rows.shown(scene), kind, &methods, correlations[start].spearman));
+                panels.push(draw(&rows.shown(scene), kind, &drawn, correlations[start].spearman));
             }
         }
     }
     let mut output = Output::new(&config.source, &config.title);
     output.add_csv("correlation", &correlations)?;
-    let caption = "One point per tree, the same rays for all. ρ is Spearman's rank correlation.";
-    output.add_figure("correlation", caption, 2, panels);
-    let over_all: Vec<&Correlation> = correlations.iter().filter(|row| row.method == ALL).collect();
-    let columns = "scene trees cost family query pearson spearman";
-    output.show("Correlation of costs and tests per ray over all trees of a scene:", &over_all, columns)?;
-    output.reading = reading(&over_all, &costs);
+    let caption = format!(
+        "One point per tree, the same rays for all trees of a scene. ρ is Spearman's rank correlation over the trees of ‘{}’.",
+        first(&config.methods)
+    );
+    output.add_figure("correlation", caption, random.clamp(1, 3), panels);
+    output.paper = config.compare(rows, &correlations);
+    output.answer = ratios(&output.paper);
+    let columns = "scene method trees cost family query pearson spearman";
+    output.show(
+        "Correlation of costs and tests per ray over the trees of each method:",
+        &correlations,
+        columns,
+    )?;
+    output.reading = reading(&correlations, &config.methods, &costs);
     Ok(output)
+}
+
+impl Config {
+    /// The paper's words next to the correlation of its cost and its rays over the trees of its case, scene by scene.
+    fn compare(&self, rows: &Rows, correlations: &[Correlation]) -> Vec<PaperRow> {
+        let Some(says) = &self.paper_says else { return Vec::new() };
+        let is_of_paper = |row: &&Correlation| {
+            row.method == first(&self.methods)
+                && row.cost == Metric::GoldsmithSalmon.column()
+                && (row.family, row.query) == OF_PAPER
+        };
+        let compare = |row: &Correlation| {
+            let (pearson, low, high) = (row.pearson?, row.pearson_low?, row.pearson_high?);
+            let verdict = if low >= self.paper_from {
+                Verdict::Agrees
+            } else if high < self.paper_from {
+                Verdict::Differs
+            } else {
+                Verdict::CannotBeTold
+            };
+            let quantity = "Pearson's correlation of cost and tests per ray over insertion orders";
+            let compared = PaperRow::new(&self.source, rows.shown(row.scene), quantity, &self.reason);
+            let rule = format!(
+                "its 95 % interval lies from {} on; it differs if the interval lies below",
+                self.paper_from
+            );
+            let compared = compared.compare(says, format!("{pearson:.2}"), verdict, rule);
+            Some(PaperRow { ours_low: Some(low), ours_high: Some(high), ..compared })
+        };
+        correlations.iter().filter(is_of_paper).filter_map(compare).collect()
+    }
 }
 
 /// The method's trees through which rays of the kind were sent: random ones through the binary tree, others through its wide layout.
@@ -96,8 +163,12 @@ fn correlate<'a>(
 ) -> Correlation<'a> {
     let pair = |(run, tests): &Tree| Some((of(run)?, *tests));
     let pairs: Vec<(f64, f64)> = trees.iter().filter_map(pair).collect();
-    let (pearson, spearman) = (pearson(&pairs), spearman(&pairs));
-    Correlation { scene, method, cost, family, query, trees: pairs.len(), pearson, spearman }
+    let pearson = pearson(&pairs);
+    let (pearson_low, pearson_high) =
+        pearson.and_then(|pearson| pearson_interval(pearson, pairs.len())).unzip();
+    let trees = pairs.len();
+    let spearman = spearman(&pairs);
+    Correlation { scene, method, cost, family, query, trees, pearson, pearson_low, pearson_high, spearman }
 }
 
 fn draw(scene: &str, (family, query): (&str, &str), methods: &[(&str, Vec<Tree>)], rank: Option<f64>) -> Panel {
@@ -110,9 +181,82 @@ fn draw(scene: &str, (family, query): (&str, &str), methods: &[(&str, Vec<Tree>)
     panel(format!("{scene}: {family}, {query}{rank}"), x, y, methods.iter().map(points).collect())
 }
 
-/// How well every cost ranks the trees, over scenes and kinds of rays.
-fn reading(over_all: &[&Correlation], costs: &[Cost]) -> String {
-    let costs = costs.iter().map(|(cost, _)| cost.as_str());
-    let costs = spans(costs, over_all, |row| row.cost, |row| row.spearman, 3);
-    format!("Rank correlation of tests per ray over all trees of a scene: with {costs}.")
+/// How well every cost ranks the trees of each method, over scenes and kinds of rays.
+fn reading(rows: &[Correlation], methods: &[String], costs: &[Cost]) -> String {
+    let of_method = |method: &String| {
+        let own: Vec<&Correlation> = rows.iter().filter(|row| row.method == method).collect();
+        let costs = costs.iter().map(|(cost, _)| cost.as_str());
+        let costs = spans(costs, &own, |row| row.cost, |row| row.spearman, 2);
+        Some(format!("{method}: {costs}"))
+    };
+    let methods: Vec<String> = methods.iter().filter_map(of_method).collect();
+    format!(
+        "Rank correlation of tests per ray with each cost, over scenes and kinds of rays. {}.",
+        methods.join("; ")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::data::run;
+    use crate::rows::RayRow;
+
+    /// Rows of two methods, whose costs predict nothing within either, though the second is dearer and takes more tests.
+    fn two_families() -> Rows {
+        let mut rows = Rows::default();
+        for (method, level) in [("orders", 1.0), ("splits", 100.0)] {
+            for (repetition, (cost, tests)) in (0..).zip([(1.0, 2.0), (2.0, 1.0), (3.0, 1.0), (4.0, 2.0)]) {
+                let goldsmith_salmon = level + cost;
+                rows.runs.push(RunRow { goldsmith_salmon, ..run(method, repetition, 1, 0) });
+                let (scene, method) = ("s".to_owned(), method.to_owned());
+                let (family, query) = (OF_PAPER.0.to_owned(), OF_PAPER.1.to_owned());
+                let boxes_per_ray = level + tests;
+                rows.rays.push(RayRow {
+                    scene,
+                    method,
+                    repetition,
+                    family,
+                    query,
+                    boxes_per_ray,
+                    ..RayRow::default()
+                });
+            }
+        }
+        rows
+    }
+
+    #[test]
+    fn trees_of_different_methods_are_never_ranked_together() {
+        let config = Config {
+            methods: vec!["orders".into(), "splits".into()],
+            paper_says: Some("very strong".into()),
+            ..Config::default()
+        };
+        let output = config_output(&config);
+        let csv = String::from_utf8(output.csv[0].1.clone()).unwrap();
+        let mut reader = csv::Reader::from_reader(csv.as_bytes());
+        let header = reader.headers().unwrap().clone();
+        let at = |name: &str| header.iter().position(|column| column == name).unwrap();
+        let records: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+        let own = records.iter().filter(|record| &record[at("cost")] == "goldsmith_salmon");
+        let own: Vec<(&str, f64)> =
+            own.map(|record| (&record[at("method")], record[at("spearman")].parse().unwrap())).collect();
+        assert_eq!(own, [("orders", 0.0), ("splits", 0.0)]);
+    }
+
+    #[test]
+    fn the_papers_words_hold_only_by_the_trees_of_its_own_case() {
+        let config = Config {
+            methods: vec!["orders".into(), "splits".into()],
+            paper_says: Some("very strong".into()),
+            ..Config::default()
+        };
+        let [row] = &config_output(&config).paper[..] else { panic!("one scene, one row") };
+        assert_eq!((row.ours.as_str(), row.verdict), ("0.00", Verdict::CannotBeTold));
+    }
+
+    fn config_output(config: &Config) -> Output {
+        write(config, &two_families()).unwrap()
+    }
 }

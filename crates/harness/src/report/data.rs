@@ -1,12 +1,13 @@
 //! An experiment's rows as its CSV files hold them, and the selections of them that reports share.
 
 use crate::Error;
-use crate::run::rows::{
+use crate::measure::layout::{is_repeat, is_single};
+use crate::rows::{
     self, BoundRow, ClockRow, HistoryRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row, RunRow,
     RunTestRow, TestRow, TestTimeRow, TimingRow, TraceRow, TraceTimeRow, VisitRow,
 };
-use crate::scenes::SceneKind;
 use crate::statistics::{median, minimum};
+use bvh_scenes::SceneKind;
 use std::path::Path;
 
 /// An experiment's rows.
@@ -174,9 +175,10 @@ impl Rows {
         own.filter(|row| row.count > 0).map(|row| 1e9 * row.seconds / row.count as f64)
     }
 
-    /// The method's layout that is fastest for these rays, with its nanoseconds per ray.
+    /// The method's layout that is fastest for these rays by single calls, with its nanoseconds per ray. Libraries without
+    /// batches can be compared so.
     pub fn fastest_layout(&self, scene: &str, method: &str, rays: &str) -> Option<(&str, f64)> {
-        let layouts = self.layouts().into_iter();
+        let layouts = self.layouts().into_iter().filter(|layout| is_single(layout) && !is_repeat(layout));
         let timed = layouts.filter_map(|layout| Some((layout, self.ns_per_ray(scene, method, layout, rays)?)));
         timed.min_by(|a, b| a.1.total_cmp(&b.1))
     }

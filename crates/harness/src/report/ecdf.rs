@@ -21,7 +21,10 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
     let mut output = Output::new(&config.source, &config.title);
     let targets = each(&config.targets, |target| Some(target.to_string()));
     let scenes = rows.all_shown().join(", ");
-    let caption = format!("Fraction of all runs and targets solved. Scenes: {scenes}. Targets: {targets}.");
+    let caption = format!(
+        "Fraction of all runs and targets solved. A method runs for its own budget, after which its line is flat: compare methods where \
+         all still run. Scenes: {scenes}. Targets: {targets}."
+    );
     for axis in ProgressAxis::of(rows, &config.methods) {
         let attempts = attempts(config, rows, axis);
         let ends = rows.scenes().into_iter().map(|scene| longest_of_all(rows, scene, &config.methods, axis));

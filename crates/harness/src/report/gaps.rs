@@ -1,11 +1,11 @@
 //! How far from the exact optimum every method ends on small scenes, and how tight the lower bound is there.
 
 use super::prelude::*;
-use crate::scenes::subset::Subset;
 use crate::statistics::{median, quantile};
+use bvh_scenes::subset::Subset;
 use std::collections::{BTreeMap, BTreeSet};
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// Gaps to the exact optimum.
     pub struct Config {
         /// Heading.

@@ -1,14 +1,13 @@
 //! The paper's Figures 2 to 4: cost against generation, the median run and the range of all, with random picking.
 
-use super::paper::{PaperRow, Verdict};
+use super::paper::{PaperRow, Verdict, ratios};
 use super::prelude::*;
-use crate::run::rows::HistoryRow;
+use crate::rows::HistoryRow;
 use crate::statistics::{expected_best_of, median, range};
-use bvh_build::OutOfRange;
-use bvh_build::config::above;
+use bvh_config::{OutOfRange, above};
 use std::collections::BTreeMap;
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// Cost against generation.
     pub struct Config {
         /// Where the paper has it, such as `Figure 2`.
@@ -27,9 +26,6 @@ bvh_build::config! { serde;
         /// What the paper says of the gain in place of a number.
         #[serde(skip_serializing_if = "Option::is_none")]
         paper_says: Option<String>;
-        /// The generation after which the paper still sees some improvement.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        paper_improves_after: Option<usize>;
         /// Why ours differs, where it does.
         reason: String;
     }
@@ -73,10 +69,11 @@ struct Final {
     base: f64,
 }
 
+/// The quantity that the paper reports as the gain.
+const GAIN: &str = "final cost over the average order's";
+
 /// Gains within this relative distance of the paper's agree with it, which says 'about a third'.
 const GAIN_TOLERANCE: f64 = 0.05;
-
-const PAPER: &str = "the paper's range of final costs, moved to our median run";
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
@@ -85,16 +82,17 @@ impl Config {
         for scene in rows.scenes() {
             let Some(runs) = self.runs(rows, scene) else { continue };
             let own = runs.generations();
-            panels.push(self.draw(&rows.shown(scene), scene, &own));
+            panels.push(draw(&rows.shown(scene), runs.runs.len(), &own));
             generations.extend(own);
             let Some(end) = runs.end(rows.base_cost(scene)) else { continue };
             output.reading += &end.reading(&rows.shown(scene));
             output.paper.extend(self.compare(&rows.shown(scene), &runs, &end));
         }
-        let caption = "Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the median, and the \
-                       range of all runs. Random picking: the exact expectation for as many orders.";
+        let caption = "Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the median and, of several runs, the \
+                       range. Random picking: the exact expectation for as many orders, as far as so many were drawn.";
         output.add_figure("generations", caption, 1, panels);
-        output.set_reference(PAPER);
+        let gains: Vec<PaperRow> = output.paper.iter().filter(|row| row.quantity == GAIN).cloned().collect();
+        output.answer = ratios(&gains);
         output.add_csv("generations", &generations)?;
         Ok(output)
     }
@@ -115,26 +113,7 @@ impl Config {
         Some(Runs { scene, runs, middle, random: rows.trial_costs(scene, &self.baseline) })
     }
 
-    fn draw(&self, shown: &str, scene: &str, generations: &[Generation]) -> Panel {
-        let at = |generation: &Generation| generation.generation as f64;
-        let median: Vec<_> = generations.iter().map(|g| (at(g), g.median_run_cost)).collect();
-        let range = generations.iter().map(|g| (at(g), g.lowest_cost, g.highest_cost)).collect();
-        let random = generations.iter().filter_map(|g| Some((at(g), g.random_picking_cost?))).collect();
-        let mut layers = vec![
-            Layer::new("range over runs", Marks::Band(range)),
-            Layer::new("median run", Marks::Line(median)),
-            Layer::new("random picking", Marks::Line(random)),
-        ];
-        // The paper's costs are of other scenes: only how far its runs spread can be compared.
-        if let (Some([low, high]), Some(last)) = (self.paper_final.get(scene), generations.last()) {
-            let scale = 2.0 * last.median_run_cost / (low + high);
-            let points = vec![(at(last), low * scale, last.median_run_cost, high * scale)];
-            layers.push(Layer::new(PAPER, Marks::ErrorBars(points)));
-        }
-        panel(shown, Axis::linear("generation"), Axis::linear("cost (Goldsmith–Salmon)"), layers)
-    }
-
-    /// Our final costs beside the paper's spread, gain and late improvement, as far as the spec has them.
+    /// Our final costs next to the paper's spread and gain, as far as the spec has them.
     fn compare(&self, shown: &str, runs: &Runs, end: &Final) -> Vec<PaperRow> {
         let row = |quantity: &str| PaperRow::new(&self.source, shown, quantity, &self.reason);
         let spread = self.paper_final.get(runs.scene).map(|&[low, high]| {
@@ -148,21 +127,13 @@ impl Config {
                 rule,
             )
         });
-        let gain = "final cost over the average order's";
         let says = self.paper_says.as_ref().map(|says| {
             let ours = format!("{:.3}", end.median / end.average);
-            row(gain).compare(says, ours, Verdict::CannotBeTold, "the paper gives no number")
+            row(GAIN).compare(says, ours, Verdict::CannotBeTold, "the paper gives no number")
         });
         let interval = (end.low / end.average, end.high / end.average);
         let gain = self.paper_gain.map(|paper| {
-            row(gain).compare_ratios(paper, end.median / end.average, Some(interval), GAIN_TOLERANCE)
-        });
-        let late = self.paper_improves_after.and_then(|after| {
-            let ours = end.median / runs.runs[runs.middle].get(after)?.incumbent;
-            let verdict = if ours < 1.0 { Verdict::Agrees } else { Verdict::Differs };
-            let row = row(&format!("final cost over that of generation {after}"));
-            let row = row.compare("some improvement", format!("{ours:.4}"), verdict, "below 1");
-            Some(PaperRow { ours_over_base: Some(ours), ..row })
+            row(GAIN).compare_ratios(paper, end.median / end.average, Some(interval), GAIN_TOLERANCE)
         });
         let ours = end.median / end.base;
         let over_base = PaperRow {
@@ -170,8 +141,24 @@ impl Config {
             ours_over_base: Some(ours),
             ..row("final cost over Müller–Fellner's, both Goldsmith–Salmon")
         };
-        [spread, says, gain, late, Some(over_base)].into_iter().flatten().collect()
+        [gain, says, spread, Some(over_base)].into_iter().flatten().collect()
     }
+}
+
+/// The paper's costs are of other scenes and in no unit that it names, so that they are not drawn.
+fn draw(shown: &str, runs: usize, generations: &[Generation]) -> Panel {
+    let at = |generation: &Generation| generation.generation as f64;
+    let median: Vec<_> = generations.iter().map(|g| (at(g), g.median_run_cost)).collect();
+    let range = generations.iter().map(|g| (at(g), g.lowest_cost, g.highest_cost)).collect();
+    let random = generations.iter().filter_map(|g| Some((at(g), g.random_picking_cost?))).collect();
+    let mut layers = vec![Layer::new("random picking", Marks::Line(random))];
+    if runs > 1 {
+        layers.insert(0, Layer::new("median run", Marks::Line(median)));
+        layers.insert(0, Layer::new("range over runs", Marks::Band(range)));
+    } else {
+        layers.insert(0, Layer::new("one run", Marks::Line(median)));
+    }
+    panel(shown, Axis::linear("generation"), Axis::linear("cost (Goldsmith–Salmon)"), layers)
 }
 
 impl<'a> Runs<'a> {

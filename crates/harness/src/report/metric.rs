@@ -1,8 +1,8 @@
 //! The metrics that reports compare trees by: name, unit, scale, and what counts as the worst value.
 
 use super::data::ratio;
-use crate::figures::Axis;
-use crate::run::rows::RunRow;
+use crate::rows::RunRow;
+use figures::Axis;
 
 /// A number of a tree or of a run; lower is better for all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

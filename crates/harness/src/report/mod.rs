@@ -28,6 +28,7 @@ mod ray_cost;
 pub mod ray_tests;
 mod ray_time;
 mod run_times;
+mod sides;
 pub mod significance;
 pub mod table;
 pub mod target;
@@ -38,15 +39,15 @@ pub mod trials;
 pub mod variations;
 
 use crate::Error;
-use crate::figures::{Figure, Layer, Look};
-use crate::run::columns::Columns;
-use crate::run::store::Store;
+use crate::rows::columns::Columns;
+use crate::rows::store::Store;
 use crate::statistics::{median, minimum};
-use bvh_build::{Check, OutOfRange};
+use bvh_config::{Check, OutOfRange};
 use config::Labels as _;
 use data::Rows;
+use figures::{Figure, Layer, Look};
 use output::Output;
-use paper::{Outcome, PaperRow};
+use paper::{Answer, Outcome, PaperRow};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -85,7 +86,7 @@ macro_rules! reports {
 
             /// The columns of the CSV files that reports make.
             pub fn columns() -> Vec<Columns> {
-                vec![$($(Columns::of::<$row>()),*),*, Columns::of::<PaperRow>()]
+                vec![$($(Columns::of::<$row>()),*),*, Columns::of::<PaperRow>(), Columns::of::<Answer>()]
             }
 
             /// The labels of the methods that the report names, each with its key.
@@ -110,7 +111,7 @@ reports! {
     /// Cost against number of trials.
     "trials" => Trials(trials::Config: methods) by trials::Config::write => [trials::Point];
     /// Times of runs against each other.
-    "times" => Times(times::Config: methods) by times::Config::write => [times::Ratio];
+    "times" => Times(times::Config: methods, again) by times::Config::write => [times::Ratio];
     /// Cost against generation.
     "generations" => Generations(generations::Config: method, baseline) by generations::Config::write => [generations::Generation];
     /// The distribution of costs over trials.
@@ -121,8 +122,8 @@ reports! {
     "ray_tests" => RayTests(ray_tests::Config: methods) by ray_tests::Config::write => [ray_tests::Measured];
     /// The error of the ray estimator against the number of rays, for the first repetition.
     "estimator" => Estimator(config::Methods: methods) by estimator::write => [estimator::Point];
-    /// Costs against tests per ray over many trees; every repetition is one tree.
-    "correlation" => Correlation(config::Methods: methods) by correlation::write => [correlation::Correlation];
+    /// Costs against tests per ray over the trees of each method; every repetition is one tree.
+    "correlation" => Correlation(correlation::Config: methods) by correlation::write => [correlation::Correlation];
     /// Error against run time and against work.
     "anytime" => Anytime(anytime::Config: methods) by anytime::Config::write => [anytime::Point];
     /// Gaps to the exact optimum of small scenes.
@@ -182,7 +183,8 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
     let paper: Vec<PaperRow> =
         outputs.iter_mut().flat_map(|output| std::mem::take(&mut output.paper)).collect();
     if !paper.is_empty() {
-        outputs.push(beside_paper(&paper)?);
+        let answers = answers(&outputs);
+        outputs.push(beside_paper(&paper, &answers)?);
     }
     let shown: Vec<_> =
         outputs.iter().flat_map(|output| &output.figures).map(|(_, figure)| series(figure)).collect();
@@ -261,9 +263,19 @@ fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, Look)> 
     methods.iter().zip(slots).map(|(method, slot)| ((*method).to_owned(), Look::Slot(slot))).collect()
 }
 
+/// The answers of all reports, in their order.
+fn answers(outputs: &[Output]) -> Vec<Answer> {
+    let mut answers: Vec<Answer> = Vec::new();
+    for output in outputs {
+        let Some(answer) = &output.answer else { continue };
+        answers.push(Answer { source: output.heading.clone(), answer: answer.clone() });
+    }
+    answers
+}
+
 /// The comparisons of all reports of an experiment with the paper. A number of the paper that several of ours are
 /// compared with is one number.
-fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
+fn beside_paper(rows: &[PaperRow], answers: &[Answer]) -> Result<Output, Error> {
     let numbers = rows.iter().filter(|row| row.paper_over_base.is_some());
     let numbers: BTreeSet<_> = numbers.map(|row| (&row.source, &row.scene, &row.paper)).collect();
     let reasons: BTreeSet<&str> = rows.iter().map(|row| row.reason.as_str()).collect();
@@ -272,6 +284,9 @@ fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
     let reasons = reasons.into_iter().collect::<Vec<_>>().join(" ");
     output.reading = format!("Numbers of the paper: {}. {outcome} {reasons}", numbers.len());
     output.outcome = Some(outcome);
+    let sentences: Vec<&str> = answers.iter().map(|answer| answer.answer.as_str()).collect();
+    output.answer = Some(sentences.join(" "));
+    output.add_csv("answer", answers)?;
     output.add_csv("paper", rows)?;
     let columns = "scene quantity paper ours ours_low ours_high verdict";
     output.show("What the paper says beside ours, which lies between low and high:", rows, columns)?;

@@ -4,10 +4,10 @@
 use super::data::ratio;
 use super::prelude::*;
 use super::progress::{ProgressAxis, Series, longest_of_all, series};
-use crate::run::rows::ReferenceRow;
+use crate::rows::ReferenceRow;
 use crate::statistics::{median, primal_integral, quartiles, range};
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// Numbers of every method on every scene.
     pub struct Config {
         /// Heading.

@@ -3,10 +3,10 @@
 use super::config::Labels;
 use super::data::ratio;
 use super::prelude::*;
-use crate::run::rows::RunRow;
+use crate::rows::RunRow;
 use crate::statistics::quartiles;
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// An ablation. Fails if leaving something out has made a cost higher, or different where it must not.
     pub struct Config {
         /// Heading.
@@ -16,7 +16,7 @@ bvh_build::config! { serde;
     }
 }
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// The same method with something left out and without.
     pub struct Pair {
         /// What is left out.

@@ -2,11 +2,11 @@
 
 use super::paper::{Outcome, PaperRow};
 use crate::Error;
-use crate::figures::{self, Axis, Figure, Layer, Look, Panel};
-use crate::run::rows::to_bytes;
-use crate::run::store::Store;
+use crate::rows::store::Store;
+use crate::rows::to_bytes;
 use crate::statistics::range;
 use comfy_table::{Table, presets};
+use figures::{Axis, Figure, Layer, Look, Panel};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -24,6 +24,9 @@ pub struct Output {
     pub paper: Vec<PaperRow>,
     /// The sentence that reads the result, made from its numbers; empty if the tables say it all.
     pub reading: String,
+    /// The sentence that answers next to the paper, chosen by a rule from the numbers; only where there is something of the paper's to
+    /// compare with.
+    pub answer: Option<String>,
     /// What the paper's numbers beside ours come to; only where they are compared.
     pub outcome: Option<Outcome>,
     /// The tables, each under a line that explains it.

@@ -35,6 +35,15 @@ pub struct PaperRow {
     pub reason: String,
 }
 
+/// One row of `answer.csv`: the sentence that a report answers with, chosen by a rule from its numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Answer {
+    /// Where the paper has it.
+    pub source: String,
+    /// The sentence.
+    pub answer: String,
+}
+
 impl PaperRow {
     /// A row about what the paper has in `source`, without numbers.
     pub fn new(source: &str, scene: impl Into<String>, quantity: impl Into<String>, reason: &str) -> Self {
@@ -84,6 +93,29 @@ impl PaperRow {
     }
 }
 
+/// Returns a sentence for each quantity that is compared: ours, the paper's and the verdict, scene by scene. `None` if nothing is.
+pub fn ratios(rows: &[PaperRow]) -> Option<String> {
+    let compared: Vec<&PaperRow> = rows.iter().filter(|row| row.verdict != Verdict::NotInPaper).collect();
+    let sentences: Vec<String> = compared.chunk_by(|a, b| a.quantity == b.quantity).map(sentence).collect();
+    (!sentences.is_empty()).then(|| sentences.join(" "))
+}
+
+/// The sentence for one quantity.
+fn sentence(rows: &[&PaperRow]) -> String {
+    let digits = |number: Option<f64>, text: &str| {
+        number.map_or_else(|| text.to_owned(), |number| format!("{number:.2}"))
+    };
+    let scene = |row: &&PaperRow| {
+        let ours = digits(row.ours_over_base, &row.ours);
+        let paper = digits(row.paper_over_base, &row.paper);
+        format!("{ours} on {}, where the paper has {paper} ({})", row.scene, row.verdict.name())
+    };
+    let scenes: Vec<String> = rows.iter().map(scene).collect();
+    let quantity = &rows[0].quantity;
+    let (first, rest) = quantity.split_at(quantity.chars().next().map_or(0, char::len_utf8));
+    format!("{}{rest}: {}.", first.to_uppercase(), scenes.join("; "))
+}
+
 /// How a number of ours compares with the paper's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Verdict {
@@ -114,6 +146,20 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// Its name, as in `paper.csv`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Agrees => "agrees",
+            Self::SameDirectionHigher => "same direction, higher",
+            Self::SameDirectionLower => "same direction, lower",
+            Self::DiffersHigher => "differs, higher",
+            Self::DiffersLower => "differs, lower",
+            Self::Differs => "differs",
+            Self::CannotBeTold => "cannot be told",
+            Self::NotInPaper => "not in the paper",
+        }
+    }
+
     /// How our ratio to base compares with the paper's: whether it is within `tolerance` of it, and on the same side of
     /// the base.
     fn of_ratios(paper: f64, ours: f64, tolerance: f64) -> Self {

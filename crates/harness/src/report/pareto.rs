@@ -43,7 +43,7 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
         "Cost is the total area of inner nodes over that of the greedy tree; one object per leaf, one thread.";
     output.add_figure("pareto", caption, 2, builds);
     if let Some(kind) = kind {
-        let caption = format!("{caption} Rays: {kind}, each method by its fastest layout.");
+        let caption = format!("{caption} Rays: {kind}, each method by its fastest layout, ray by ray.");
         output.add_figure("pareto_rays", caption, 2, rays);
     }
     Ok(output)

@@ -3,7 +3,7 @@
 use super::metric::Metric;
 use super::prelude::*;
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// A comparison with other libraries.
     pub struct Config {
         /// What it belongs to.
@@ -51,7 +51,7 @@ impl Config {
         output.add_csv("timing_peers", &comparisons)?;
         let columns = "scene method build_seconds cost_over_base rays layout mrays_per_second ours_over_this \
                        missed_hits false_hits other_hits";
-        output.show("Each method by its fastest layout, on one thread:", &comparisons, columns)?;
+        output.show("Each method by its fastest layout, ray by ray on one thread:", &comparisons, columns)?;
         output.reading = self.reading(&comparisons);
         Ok(output)
     }
@@ -93,6 +93,9 @@ impl Config {
         let total = others.clone().map(|method| own(method).len()).max().unwrap_or(0);
         let faster = |method| own(method).iter().filter(|row| row.ours_over_this > 1.0).count();
         let counts = tally(others.map(|method| (method.as_str(), faster(method))), total, "settings");
-        format!("Ours, ‘{}’, each by its fastest layout, traces more rays per second than {counts}.", self.ours)
+        format!(
+            "Ours, ‘{}’, each by its fastest layout, traces more rays ray by ray per second than {counts}.",
+            self.ours
+        )
     }
 }

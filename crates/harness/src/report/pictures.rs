@@ -3,12 +3,12 @@
 
 use super::data::middle;
 use super::prelude::*;
-use crate::render::experiment::BASELINES;
-use crate::run::rows::RenderRow;
-use bvh_build::config::above;
+use crate::measure::picture::BASELINES;
+use crate::rows::RenderRow;
+use bvh_config::above;
 use std::collections::BTreeMap;
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// A comparison of structures by the picture of each scene.
     pub struct Config {
         /// Where the document has it.

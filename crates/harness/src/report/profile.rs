@@ -26,7 +26,7 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
         axis.add_csv(&mut output, "profile", &table)?;
         let caption = format!(
             "On what fraction of {problems} problems the median run is within a factor of the fastest method's. A \
-             problem is a scene with a target: {}.",
+             problem is a scene with a target: {}. A method that ends before a target for want of budget counts as never reaching it.",
             each(&config.targets, |target| Some(target.to_string()))
         );
         let panels = vec![draw(config, &table, problems, axis)];

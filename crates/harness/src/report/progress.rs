@@ -4,8 +4,8 @@ use super::data::Rows;
 use super::metric::Metric;
 use super::output::Output;
 use crate::Error;
-use crate::figures::Axis;
 use crate::statistics::median;
+use figures::Axis;
 use serde::Serialize;
 
 /// What run time is measured by. Seconds belong to a machine and go into timing files only.

@@ -2,10 +2,10 @@
 
 use super::data::distinct;
 use super::prelude::*;
-use crate::run::rows::{TestRow, TestTimeRow};
+use crate::rows::{TestRow, TestTimeRow};
 use crate::statistics::{geometric_mean, student};
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// A comparison of trees by the tests of rays that they were not trained on.
     pub struct Config {
         /// What it belongs to.

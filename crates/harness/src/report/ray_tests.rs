@@ -3,14 +3,14 @@
 use super::config::{first, one_for_each};
 use super::data::middle;
 use super::metric::Metric;
-use super::paper::PaperRow;
+use super::paper::{PaperRow, ratios};
 use super::prelude::*;
-use crate::run::rows::RayRow;
+use crate::rows::RayRow;
 use crate::statistics::range;
-use bvh_build::config::above;
+use bvh_config::above;
 use std::collections::BTreeMap;
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// A comparison of methods by tests per ray.
     pub struct Config {
         /// Where the paper has it.
@@ -73,6 +73,7 @@ impl Config {
         output.add_figure("ray_tests", caption, 2, panels);
         output.set_reference(PAPER);
         output.paper = self.compare(rows, &table);
+        output.answer = ratios(&output.paper);
         let columns =
             "scene method family query boxes_low boxes_per_ray boxes_high boxes_over_first paper_boxes_per_ray";
         output.show("Box tests per ray with 95 % intervals:", &table, columns)?;

@@ -7,7 +7,7 @@ use crate::statistics::rank::{
 };
 use std::ops::Bound::Excluded;
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// A comparison of one method's final costs with those of others.
     pub struct Config {
         /// Heading.
@@ -46,6 +46,8 @@ pub(super) struct Row<'a> {
     /// How likely a run of the method ends below one of the other, ties counting a half; across scenes, its mean over
     /// them.
     a12: f64,
+    /// The method's median work over the other's, the median over scenes: budgets may differ.
+    work_ratio: Option<f64>,
     /// How the method's cost compares with the other's:
     verdict: Difference,
 }
@@ -88,12 +90,16 @@ impl Config {
             .iter()
             .flat_map(|scene| self.against.iter().filter_map(move |against| self.within(rows, scene, against)));
         let mut table = self.judged(across);
-        table.extend(self.judged(within.collect()));
+        // Too few runs for so many comparisons could tell nothing, whatever they found.
+        let within = self.judged(within.collect()).into_iter();
+        table.extend(within.filter(|row| row.least_holm_p_value < self.level));
         let mut output = Output::new("", &self.title);
         output.add_csv("significance", &table)?;
-        let explanation =
-            format!("Cost of '{}' against that of others, p-values by Holm's correction:", self.method);
-        let columns = "scene against test p_value holm_p_value a12 verdict";
+        let explanation = format!(
+            "Cost of '{}' against that of others, p-values by Holm's correction, and work:",
+            self.method
+        );
+        let columns = "scene against test p_value holm_p_value a12 work_ratio verdict";
         output.show(&explanation, &table, columns)?;
         output.reading = self.reading(&table);
         Ok(output)
@@ -114,7 +120,11 @@ impl Config {
         let lower = test.statistic < others * (others + 1.0) / 4.0;
         let row = self.row(ALL, against, [samples; 2], &test);
         let a12 = effects.iter().sum::<f64>() / samples as f64;
-        (samples > 0).then_some(Row { test: RankTest::Wilcoxon, a12, verdict: Difference::of(lower), ..row })
+        let work_ratio = median(
+            &rows.scenes().iter().filter_map(|scene| self.work_ratio(rows, scene, against)).collect::<Vec<_>>(),
+        );
+        let verdict = Difference::of(lower);
+        (samples > 0).then_some(Row { test: RankTest::Wilcoxon, a12, work_ratio, verdict, ..row })
     }
 
     /// The test of the runs on one scene; `None` if either method has only one, which says nothing about others.
@@ -123,7 +133,17 @@ impl Config {
         let (test, a12) = (mann_whitney(&own, &other)?, a12(&other, &own)?);
         let row = self.row(scene, against, [own.len(), other.len()], &test);
         let several = own.len() > 1 && other.len() > 1;
-        several.then_some(Row { a12, verdict: Difference::of(a12 > 0.5), ..row })
+        let work_ratio = self.work_ratio(rows, scene, against);
+        several.then_some(Row { a12, work_ratio, verdict: Difference::of(a12 > 0.5), ..row })
+    }
+
+    /// The method's median work on a scene over the other's.
+    fn work_ratio(&self, rows: &Rows, scene: &str, against: &str) -> Option<f64> {
+        let work = |method: &str| {
+            let work: Vec<f64> = rows.runs_of(scene, method).map(|run| run.work as f64).collect();
+            median(&work).filter(|&work| work > 0.0)
+        };
+        Some(work(&self.method)? / work(against)?)
     }
 
     fn row<'a>(
@@ -140,11 +160,13 @@ impl Config {
             test: RankTest::MannWhitney,
             samples,
             samples_against,
-            statistic,
+            // Minus zero is zero.
+            statistic: statistic + 0.0,
             p_value,
             least_holm_p_value: 1.0,
             holm_p_value: 1.0,
             a12: 0.5,
+            work_ratio: None,
             verdict: Difference::None,
         }
     }
@@ -171,15 +193,18 @@ impl Config {
     fn reading(&self, table: &[Row]) -> String {
         let of = |against: &String| {
             let own = || table.iter().filter(|row| row.against == against);
-            let count = |verdict| own().filter(|row| row.scene != ALL && row.verdict == verdict).count();
-            let scenes = own().filter(|row| row.scene != ALL).count();
-            let across = own().find(|row| row.scene == ALL).map_or("untested", |row| row.verdict.name());
+            let across = own().find(|row| row.scene == ALL);
+            let verdict = across.map_or("untested", |row| row.verdict.name());
+            let work = across.and_then(|row| row.work_ratio);
+            let work = work.map_or_else(String::new, |ratio| format!(", with {ratio:.1} times its work"));
+            let within: Vec<&Row> = own().filter(|row| row.scene != ALL).collect();
+            let count = |verdict| within.iter().filter(|row| row.verdict == verdict).count();
             let (lower, higher) = (count(Difference::Lower), count(Difference::Higher));
-            let untold = count(Difference::CannotBeTold);
-            format!(
-                "{against}: lower on {lower}, higher on {higher} of {scenes} scenes, on {untold} too few runs to tell; \
-                 across all {across}"
-            )
+            let within = match within.len() {
+                0 => "too few runs to compare within scenes".into(),
+                scenes => format!("lower on {lower} and higher on {higher} of {scenes} scenes"),
+            };
+            format!("{against}: {verdict} across scenes{work}; {within}")
         };
         let all: Vec<String> = self.against.iter().map(of).collect();
         let (method, level, all) = (&self.method, self.level, all.join("; against "));

@@ -4,11 +4,14 @@ use super::config::Labels;
 use super::output::text_table;
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
-use crate::statistics::{expected_best_of, median, minimum, range, spread_of_best};
-use bvh_build::config::{Accepts, Itself, above};
+use super::sides::Sides;
+use crate::statistics::best_of::predicted_best;
+use crate::statistics::{expected_best_of, median, minimum, range};
+use bvh_config::{Accepts, Itself, above};
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// A table of cost ratios.
     pub struct Config {
         /// Where the paper has it, such as `Table 4`.
@@ -23,7 +26,7 @@ bvh_build::config! { serde;
     check |config: &Self| OneOrMore.faults("columns", &config.columns);
 }
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// A column.
     pub struct Column {
         /// Heading.
@@ -59,9 +62,11 @@ pub(super) struct Cell<'a> {
     cost_over_base: f64,
     /// The expected best of so many trials, from all trials run.
     expected_over_base: Option<f64>,
-    /// The lower of two numbers between which the best of so many trials lies in nine of ten repetitions; of runs as a whole, in all.
+    /// The lower of two numbers between which the best of as many fresh trials lies in at least nine of ten repetitions. The pool
+    /// of all trials predicts them, by its order statistics or, below its lowest value, by an exponential tail. For full runs, the
+    /// lowest of the repetitions.
     low_over_base: Option<f64>,
-    /// The upper one.
+    /// The higher number.
     high_over_base: Option<f64>,
     /// The paper's ratio, where it has one.
     paper_over_base: Option<f64>,
@@ -70,10 +75,6 @@ pub(super) struct Cell<'a> {
 /// Bars that are higher than the paper's highest by more than this factor leave the panel.
 const MOST_OF_PAPER: f64 = 3.0;
 
-const CAPTION: &str = "Total area of inner nodes over that of the greedy Müller–Fellner tree. Ours on stand-in scenes, \
-                       the paper's on the originals: compare ratios within a column, not bar by bar. \
-                       Bars that reach the top go on beyond it.";
-
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let scenes = rows.scenes();
@@ -81,12 +82,9 @@ impl Config {
         let cells: Vec<Cell> = scenes.iter().flat_map(row).collect();
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("table", &cells)?;
-        output.add_figure("table", CAPTION, 1, vec![self.draw(rows, &cells)]);
-        for column in self.columns.iter().skip(1) {
-            let own: Vec<&Cell> = cells.iter().filter(|cell| cell.column == column.name).collect();
-            output.paper.extend(own.iter().filter_map(|cell| self.compare(rows, column, cell)));
-            output.paper.extend(self.compare_ranges(rows, column, &own));
-        }
+        output.add_figure("table", self.caption(&cells), 1, vec![self.draw(rows, &cells)]);
+        output.paper = self.compare_all(rows, &cells);
+        output.answer = self.answer(&cells);
         self.add_table(&mut output, rows, &cells);
         output.reading = self.reading(&cells);
         Ok(output)
@@ -100,7 +98,7 @@ impl Config {
             None => rows.final_ratios(scene, &column.method),
         };
         let interval = match column.best_of {
-            Some(m) => spread_of_best(&pool, m),
+            Some(m) => predicted_best(&pool, m),
             None => range(results.iter().copied()).filter(|(low, high)| low < high),
         };
         let (low_over_base, high_over_base) = interval.unzip();
@@ -118,6 +116,22 @@ impl Config {
         })
     }
 
+    /// Says only what the figure shows.
+    fn caption(&self, cells: &[Cell]) -> String {
+        let mut caption =
+            String::from("Total area of inner nodes over that of the greedy Müller–Fellner tree.");
+        if cells.iter().any(|cell| cell.best_of.is_some()) {
+            caption += " Whiskers: at least nine of ten repetitions of as many fresh trials end between them.";
+        }
+        if cells.iter().any(|cell| cell.paper_over_base.is_some()) {
+            caption += " Ours on stand-in scenes, the paper's on the originals: compare ratios within a column, not bar by bar.";
+        }
+        if is_cut(cells) {
+            caption += " Bars that reach the top go on beyond it.";
+        }
+        caption
+    }
+
     fn paper_ratio(&self, column: &Column, scene: &str) -> Option<f64> {
         Some(column.paper.get(scene)? / self.columns.first()?.paper.get(scene)?)
     }
@@ -131,34 +145,93 @@ impl Config {
         Some(row.compare_ratios(paper, ours, interval, self.tolerance))
     }
 
-    /// The paper's range over its scenes beside ours over the same, and beside every scene that the paper does not have.
-    fn compare_ranges(&self, rows: &Rows, column: &Column, own: &[&Cell]) -> Vec<PaperRow> {
-        let Some(paper) = range(own.iter().filter_map(|cell| cell.paper_over_base)) else { return vec![] };
-        let show = |(low, high): (f64, f64)| format!("{low:.3} to {high:.3}");
-        let compare = |scene: String, what: &str, cells: &[&Cell]| {
-            let ours = range(cells.iter().map(|cell| cell.cost_over_base))?;
-            let ends = cells.iter().flat_map(|cell| {
-                [cell.low_over_base, cell.high_over_base].map(|end| end.unwrap_or(cell.cost_over_base))
-            });
-            let inside = |(low, high)| paper.0 <= low && high <= paper.1;
-            let outside = |(low, high)| high < paper.0 || paper.1 < low;
-            let ends = range(ends)?;
-            let verdict = match (inside(ours), inside(ends), cells.len()) {
-                (true, true, _) => Verdict::Agrees,
-                (false, _, 1) if outside(ends) => Verdict::Differs,
-                (false, false, 2..) => Verdict::Differs,
-                _ => Verdict::CannotBeTold,
-            };
-            let ours = if ours.0 < ours.1 { show(ours) } else { format!("{:.3}", ours.0) };
-            let quantity = format!("{}, cost over base, {what}", column.name);
-            let row = PaperRow::new(&self.source, scene, quantity, &column.reason);
-            Some(row.compare(show(paper), ours, verdict, "all of ours in the paper's range"))
+    /// A number of the paper next to the closest of the columns that read it in different ways.
+    fn compare_readings(&self, rows: &Rows, scene: &str, cells: &[Cell]) -> Option<PaperRow> {
+        let distance =
+            |cell: &&Cell| cell.paper_over_base.map(|paper| (cell.cost_over_base / paper).ln().abs());
+        let base = &self.columns.first()?.name;
+        let read = cells
+            .iter()
+            .filter(|cell| cell.scene == scene && cell.column != base && cell.paper_over_base.is_some());
+        let closest = read.min_by(|a, b| distance(a).partial_cmp(&distance(b)).unwrap_or(Ordering::Equal))?;
+        let paper = closest.paper_over_base?;
+        let close = is_close(closest, self.tolerance);
+        let column = self.columns.iter().find(|column| column.name == closest.column)?;
+        let row = PaperRow::new(
+            &self.source,
+            rows.shown(scene),
+            "cost over base, the closest reading",
+            &column.reason,
+        );
+        let row = row.compare(
+            format!("{paper:.4}"),
+            format!("{:.4}, by {}", closest.cost_over_base, closest.column),
+            if close { Verdict::CannotBeTold } else { Verdict::Differs },
+            format!(
+                "differs if no reading is within {} % of the paper's; the paper prints no formula, so that a reading which is within cannot \
+                 be told from the paper's",
+                100.0 * self.tolerance
+            ),
+        );
+        Some(PaperRow { paper_over_base: Some(paper), ours_over_base: Some(closest.cost_over_base), ..row })
+    }
+
+    /// Whether the columns other than the base read one column of the paper in different ways.
+    fn are_readings(&self) -> bool {
+        let mut others = self.columns.iter().skip(1);
+        match others.next() {
+            Some(first) => {
+                !first.paper.is_empty() && others.len() > 0 && others.all(|column| column.paper == first.paper)
+            }
+            None => false,
+        }
+    }
+
+    /// The rows of `paper.csv`: one for each number of the paper.
+    fn compare_all(&self, rows: &Rows, cells: &[Cell]) -> Vec<PaperRow> {
+        if self.are_readings() {
+            let scenes = rows.scenes().into_iter();
+            return scenes.filter_map(|scene| self.compare_readings(rows, scene, cells)).collect();
+        }
+        let of_column = |column: &Column| {
+            let own = cells.iter().filter(|cell| cell.column == column.name);
+            own.filter_map(|cell| self.compare(rows, column, cell)).collect::<Vec<_>>()
         };
-        let (of_paper, others): (Vec<&Cell>, _) = own.iter().partition(|cell| cell.paper_over_base.is_some());
-        let all = compare("all of these".into(), "lowest and highest of all scenes", &of_paper);
-        let what = "in the range over the paper's scenes";
-        let each = others.into_iter().filter_map(|cell| compare(rows.shown(cell.scene), what, &[cell]));
-        all.into_iter().chain(each).collect()
+        self.columns.iter().skip(1).flat_map(of_column).collect()
+    }
+
+    /// The sentence that answers for the paper: how many scenes each column is above and below the base on, by whole intervals, or
+    /// how many of the paper's ratios each reading comes close to.
+    fn answer(&self, cells: &[Cell]) -> Option<String> {
+        cells.iter().find(|cell| cell.paper_over_base.is_some())?;
+        let of = |column: &Column| cells.iter().filter(|cell| cell.column == column.name).collect::<Vec<_>>();
+        if self.are_readings() {
+            let papers = of(self.columns.get(1)?).iter().filter(|cell| cell.paper_over_base.is_some()).count();
+            let close =
+                |column: &Column| of(column).into_iter().filter(|cell| is_close(cell, self.tolerance)).count();
+            let counts = self.columns.iter().skip(1).map(|column| (column.name.as_str(), close(column)));
+            let best = counts.max_by_key(|(_, count)| *count)?;
+            let percent = 100.0 * self.tolerance;
+            return Some(if best.1 == papers {
+                format!(
+                    "‘{}’ comes within {percent} % of the paper's ratio on all {papers} of its scenes.",
+                    best.0
+                )
+            } else {
+                let readings = self.columns.len() - 1;
+                format!(
+                    "None of {readings} readings comes within {percent} % of the paper's ratio on all {papers} of its scenes; the best does on {}.",
+                    best.1
+                )
+            });
+        }
+        let interval = |cell: &Cell| {
+            let ends = cell.low_over_base.zip(cell.high_over_base);
+            ends.unwrap_or((cell.cost_over_base, cell.cost_over_base))
+        };
+        let say = |column: &Column| Sides::of(of(column).into_iter().map(interval)).say(&column.name);
+        let each = self.columns.iter().skip(1).map(say);
+        Some(each.collect::<Vec<_>>().join(" "))
     }
 
     fn draw(&self, rows: &Rows, cells: &[Cell]) -> Panel {
@@ -169,7 +242,7 @@ impl Config {
             Layer::new(name, Marks::Bars { values, spread, base: 1.0 })
         };
         // Columns that are readings of one column of the paper share its bars.
-        let readings = columns().all(|column| column.paper == self.columns[1].paper);
+        let readings = self.are_readings();
         let mut layers = Vec::new();
         for (index, column) in columns().enumerate() {
             if !column.paper.is_empty() && (index == 0 || !readings) {
@@ -186,10 +259,8 @@ impl Config {
         }
         layers.push(Layer::new("greedy", Marks::HLine(1.0)));
         // Readings of a heuristic that peel off one object at a time would hide all differences between the others.
-        let theirs = cells.iter().filter_map(|cell| cell.paper_over_base).fold(1.0, f64::max);
-        let outlying = cells.iter().any(|cell| cell.cost_over_base > MOST_OF_PAPER * theirs);
         let y = Axis::linear("cost / base");
-        let y = if outlying && theirs > 1.0 { y.range(0.9, 1.2 * theirs) } else { y };
+        let y = if is_cut(cells) { y.range(0.9, 1.2 * highest_of_paper(cells)) } else { y };
         panel("", Axis::categories("", rows.all_shown()), y, layers)
     }
 
@@ -227,7 +298,75 @@ impl Config {
     }
 }
 
+/// The paper's highest ratio, and at least 1.
+fn highest_of_paper(cells: &[Cell]) -> f64 {
+    cells.iter().filter_map(|cell| cell.paper_over_base).fold(1.0, f64::max)
+}
+
+/// Whether the figure ends below some bars.
+fn is_cut(cells: &[Cell]) -> bool {
+    let theirs = highest_of_paper(cells);
+    theirs > 1.0 && cells.iter().any(|cell| cell.cost_over_base > MOST_OF_PAPER * theirs)
+}
+
+/// Whether the ratio is within the tolerance of the paper's.
+fn is_close(cell: &Cell, tolerance: f64) -> bool {
+    cell.paper_over_base.is_some_and(|paper| (cell.cost_over_base / paper - 1.0).abs() <= tolerance)
+}
+
 /// The cell of a column on a scene.
 fn find<'c, 'a>(cells: &'c [Cell<'a>], scene: &str, column: &Column) -> Option<&'c Cell<'a>> {
     cells.iter().find(|cell| cell.scene == scene && cell.column == column.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::data::run;
+    use crate::rows::RunRow;
+
+    /// Rows of methods by their costs over base.
+    fn rows(methods: &[(&str, f64)]) -> Rows {
+        let mut rows = Rows::default();
+        for &(method, cost) in methods {
+            rows.runs.push(RunRow { cost, base_cost: 1.0, ..run(method, 0, 1, 0) });
+        }
+        rows
+    }
+
+    fn column(name: &str, paper: f64) -> Column {
+        let paper = BTreeMap::from([("s".to_owned(), paper)]);
+        Column { name: name.into(), method: name.into(), paper, reason: "why".into(), ..Column::default() }
+    }
+
+    fn written(columns: Vec<Column>, costs: &[(&str, f64)]) -> Output {
+        let config = Config { columns, tolerance: 0.1, ..Config::default() };
+        config.write(&rows(costs)).unwrap()
+    }
+
+    #[test]
+    fn several_readings_of_one_number_of_the_paper_are_one_row_by_the_closest() {
+        let readings = || vec![column("base", 1.0), column("sum", 2.0), column("difference", 2.0)];
+        let near = written(readings(), &[("base", 1.0), ("sum", 500.0), ("difference", 1.9)]);
+        let [row] = &near.paper[..] else { panic!("one number, one row: {:?}", near.paper) };
+        // A reading that comes close may still not be the paper's.
+        assert_eq!((row.ours.as_str(), row.verdict), ("1.9000, by difference", Verdict::CannotBeTold));
+        assert!(near.answer.unwrap().contains("‘difference’ comes within 10 %"));
+        let far = written(readings(), &[("base", 1.0), ("sum", 500.0), ("difference", 3.0)]);
+        assert_eq!(far.paper[0].verdict, Verdict::Differs);
+        assert!(far.answer.unwrap().starts_with("None of 2 readings comes within 10 %"));
+    }
+
+    #[test]
+    fn columns_of_their_own_have_a_row_each_and_a_sentence_by_side() {
+        let columns = vec![column("base", 1.0), column("best of 10", 1.1), column("best of 100", 1.2)];
+        let output = written(columns, &[("base", 1.0), ("best of 10", 1.15), ("best of 100", 0.9)]);
+        let verdicts: Vec<Verdict> = output.paper.iter().map(|row| row.verdict).collect();
+        assert_eq!(verdicts, [Verdict::Agrees, Verdict::DiffersLower]);
+        let answer = output.answer.unwrap();
+        assert_eq!(
+            answer,
+            "The best of 10 costs more than greedy on all 1 scenes. The best of 100 costs less than greedy on all 1 scenes."
+        );
+    }
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::ops::Bound::{Excluded, Included};
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// A cost relative to the greedy tree's or to the best known.
     #[derive(Copy)]
     pub struct Target {

@@ -3,7 +3,7 @@
 use super::config::Methods;
 use super::metric::Metric;
 use super::prelude::*;
-use crate::run::rows::TraceRow;
+use crate::rows::TraceRow;
 use crate::statistics::{median, pearson, spearman};
 use std::collections::BTreeSet;
 

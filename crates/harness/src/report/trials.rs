@@ -4,7 +4,7 @@ use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
 use crate::statistics::{expected_best_of, mean_interval, minimum};
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// Cost against number of trials.
     pub struct Config {
         /// Where the paper has it, such as `Figure 1`.
@@ -56,7 +56,9 @@ impl Point<'_> {
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let mut output = Output::new(&self.source, &self.title);
-        let (mut points, mut panels) = (Vec::new(), Vec::new());
+        let mut points = Vec::new();
+        let mut panels = Vec::new();
+        let mut lists = Vec::new();
         for scene in rows.scenes() {
             let curves: Vec<Vec<Point>> =
                 self.methods.iter().map(|method| self.curve(rows, scene, method)).collect();
@@ -79,6 +81,7 @@ impl Config {
                 panels.push(panel(format!("{}, {what}", rows.shown(scene)), x, y, layers));
             }
             self.compare(&rows.shown(scene), &curves, &mut output);
+            lists.extend(self.best_lists(scene, &curves));
             points.extend(curves.into_iter().flatten());
         }
         let caption = "Lowest cost among so many trials, over that of the greedy tree. Left, one run, as in the paper; \
@@ -88,6 +91,7 @@ impl Config {
         let columns = "scene method expected_over_base expected_low expected_high";
         output.show(&format!("Expected best of {} trials over base:", self.best_of), &last, columns)?;
         output.reading = self.reading(&last);
+        output.answer = self.paper_best.as_ref().map(|paper| answer(&lists, &last, paper));
         output.add_csv("trials", &points)?;
         Ok(output)
     }
@@ -127,14 +131,25 @@ impl Config {
         format!("No other has a lower expected best of {}, as far as can be told: {counts}.", self.best_of)
     }
 
-    /// Ranks the methods by the expected best of as many trials as are compared. Best is what no other is below; where
-    /// that leaves several, which of them is best cannot be told.
-    fn compare(&self, scene: &str, curves: &[Vec<Point>], output: &mut Output) {
+    /// The methods that no other is below, by the expected best of as many trials as are compared, the lowest first.
+    fn best<'p, 'a>(&self, curves: &'p [Vec<Point<'a>>]) -> Vec<&'p Point<'a>> {
         let mut ranking: Vec<&Point> = curves.iter().filter_map(|curve| curve.last()).collect();
         ranking.sort_by(|a, b| a.expected_over_base.total_cmp(&b.expected_over_base));
-        let Some(least) = ranking.first() else { return };
-        let best: Vec<&Point> = ranking.iter().copied().filter(|point| !least.is_below(point)).collect();
-        let names = best.iter().map(|point| point.method).collect::<Vec<_>>().join(" or ");
+        let Some(least) = ranking.first().copied() else { return ranking };
+        ranking.retain(|point| !least.is_below(point));
+        ranking
+    }
+
+    /// The best methods on a scene in words, with the scene.
+    fn best_lists<'a>(&self, scene: &'a str, curves: &[Vec<Point>]) -> Option<(String, &'a str)> {
+        let best = self.best(curves);
+        (!best.is_empty()).then(|| (in_words(&best), scene))
+    }
+
+    /// Compares the best methods with the paper's. Where there are several, which of them is best cannot be told.
+    fn compare(&self, scene: &str, curves: &[Vec<Point>], output: &mut Output) {
+        let best = self.best(curves);
+        let Some(least) = best.first() else { return };
         let Some(paper) = &self.paper_best else { return };
         let verdict = match (best.iter().any(|point| point.method == paper), best.len()) {
             (true, 1) => Verdict::Agrees,
@@ -144,7 +159,7 @@ impl Config {
         let quantity = format!("best of the compared, by the expected best of {}", self.best_of);
         let row = PaperRow::new(&self.source, scene, quantity, &self.reason);
         let rule = "its 95 % interval lies below those of all others; it differs if that of another lies below its own";
-        let row = row.compare(paper, names, verdict, rule);
+        let row = row.compare(paper, in_words(&best), verdict, rule);
         output.paper.push(PaperRow {
             ours_over_base: Some(least.expected_over_base),
             ours_low: least.expected_low,
@@ -154,11 +169,39 @@ impl Config {
     }
 }
 
+fn in_words(best: &[&Point]) -> String {
+    best.iter().map(|point| point.method).collect::<Vec<_>>().join(" or ")
+}
+
+/// The sentence that answers for the paper: the best methods by scene, whether the paper's is one of them, and whether any is below
+/// the base.
+fn answer(lists: &[(String, &str)], last: &[&Point], paper: &str) -> String {
+    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (best, scene) in lists {
+        match groups.iter_mut().find(|(found, _)| found == best) {
+            Some((_, scenes)) => scenes.push(scene),
+            None => groups.push((best, vec![scene])),
+        }
+    }
+    let groups = each(groups, |(best, scenes)| Some(format!("{best} on {}", scenes.join(" and "))));
+    let is_paper = |best: &str| best.split(" or ").any(|name| name == paper);
+    let with_paper = lists.iter().filter(|(best, _)| is_paper(best)).count();
+    let of_paper = match with_paper {
+        0 => format!("The paper's {paper} is not among the best on any scene"),
+        all if all == lists.len() => format!("The paper's {paper} is among the best on all scenes"),
+        some => format!("The paper's {paper} is among the best on {some} of {} scenes", lists.len()),
+    };
+    let below = last.iter().filter(|point| point.interval().1 < 1.0).count();
+    let below =
+        if below == 0 { "no interval lies below greedy".into() } else { format!("{below} lie below greedy") };
+    format!("{of_paper}: best are {groups}; {below}.")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::report::data::run;
-    use crate::run::rows::HistoryRow;
+    use crate::rows::HistoryRow;
 
     /// Rows of two methods, each with the costs of its trials by repetition.
     fn rows(methods: [(&str, [[f64; 3]; 4]); 2]) -> Rows {
@@ -202,5 +245,18 @@ mod tests {
         let lucky = [[0.8, 1.1, 1.2], [1.02, 1.1, 1.2], [1.01, 1.1, 1.2], [1.02, 1.1, 1.2]];
         assert_eq!(verdict("one", lucky), ("other or one".into(), Verdict::CannotBeTold));
         assert_eq!(verdict("other", lucky), ("other or one".into(), Verdict::CannotBeTold));
+    }
+
+    #[test]
+    fn the_answer_names_the_best_by_scene_and_never_a_list_that_another_is_below() {
+        let lists = [("k = 2 or k = 30".to_owned(), "a"), ("k = 2".to_owned(), "b"), ("k = 2".to_owned(), "c")];
+        let said = answer(&lists, &[], "k = 5");
+        assert_eq!(
+            said,
+            "The paper's k = 5 is not among the best on any scene: best are k = 2 or k = 30 on a, k = 2 on b and c; no interval lies below greedy."
+        );
+        assert!(
+            answer(&lists, &[], "k = 30").starts_with("The paper's k = 30 is among the best on 1 of 3 scenes")
+        );
     }
 }

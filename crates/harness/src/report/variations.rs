@@ -1,13 +1,13 @@
 //! Final costs of variations of one method over those of the method itself.
 
 use super::config::first;
-use super::paper::PaperRow;
+use super::paper::{PaperRow, ratios};
 use super::prelude::*;
 use crate::statistics::{median, range};
-use bvh_build::config::above;
+use bvh_config::above;
 use std::collections::BTreeMap;
 
-bvh_build::config! { serde;
+bvh_config::config! { serde;
     /// Variations of a method.
     pub struct Config {
         /// Where the paper has it.
@@ -52,6 +52,7 @@ impl Config {
         let caption = "Median final cost over that of the first, whiskers over all pairs of runs.";
         output.add_figure("variations", caption, 1, vec![self.draw(rows, &table)]);
         output.paper = table.iter().filter_map(|row| self.compare(rows, row)).collect();
+        output.answer = ratios(&output.paper);
         let columns = "scene method runs over_first_low cost_over_first over_first_high paper_over_first";
         output.show("Final costs over those of the first:", &table, columns)?;
         output.reading = self.reading(&table);

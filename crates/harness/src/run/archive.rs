@@ -1,12 +1,14 @@
 //! The archive of the best known trees: a folder with a tree file per scene and a row per file, which anyone can beat.
 
 use crate::Error;
-use crate::files;
+use crate::rows::lock::wait_for_folder;
+use crate::rows::{ROUNDING, Row, TreeRow, read, to_bytes};
 use crate::run::reference::{best_known, improve};
 use crate::run::resolved::checksum;
-use crate::run::rows::{ROUNDING, Row, TreeRow, read, to_bytes};
-use crate::scenes::Scene;
 use bvh_core::cost;
+use bvh_scenes::Scene;
+use bvh_scenes::tree_file;
+use bvh_terminal::files;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -28,13 +30,14 @@ pub fn path(results: &Path, scene: &str) -> PathBuf {
 /// one that another of the archive, or the best known cost, is better than or equal to. Returns where it is kept.
 pub fn keep(results: &Path, scene: &Scene, file: &Path, command: &str) -> Result<PathBuf, Error> {
     let refused = |message: String| Err(Error::Usage(format!("--keep: {}: {message}", file.display())));
-    let (bytes, tree) = (files::read(file)?, files::load_tree(file, scene)?);
+    let bytes = tree_file::read(file)?;
+    let (tree, header) = tree_file::load(file, scene)?;
     let objects = scene.boxes.len();
     if tree.nodes.len() + 1 != 2 * objects {
         return refused("not a binary tree with one object per leaf".into());
     }
     let internal_area = cost::internal_area(&tree);
-    let _lock = files::wait_for_folder(results)?;
+    let _lock = wait_for_folder(results)?;
     let known = best_known(results, scene)?;
     if let Some(known) = known.as_ref().filter(|known| internal_area > known.cost * (1.0 + ROUNDING)) {
         return refused(format!("its cost is {internal_area}, and the best known is {}", known.cost));
@@ -49,7 +52,7 @@ pub fn keep(results: &Path, scene: &Scene, file: &Path, command: &str) -> Result
             old.internal_area
         ));
     }
-    let (header, path) = (files::open_tree(file, &bytes)?.header().clone(), path(results, &scene.name));
+    let path = path(results, &scene.name);
     rows.push(TreeRow {
         scene: scene.name.clone(),
         objects,

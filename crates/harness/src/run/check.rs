@@ -2,7 +2,8 @@
 //! and every figure but the timing ones byte by byte.
 
 use crate::Error;
-use crate::files;
+use bvh_scenes::read_text;
+use bvh_terminal::files;
 use csv::StringRecord;
 use std::collections::BTreeSet;
 use std::fs;
@@ -60,7 +61,7 @@ fn compare_figures(fresh: &Path, committed: &Path) -> Result<Vec<String>, Error>
 fn compare_specs(fresh: &Path, committed: &Path, left_out: &[String]) -> Result<Vec<String>, Error> {
     let read = |folder: &Path| -> Result<Value, Error> {
         let path = folder.join("resolved.toml");
-        let mut table: Table = toml::from_str(&files::read_text(&path)?).map_err(Error::toml(&path))?;
+        let mut table: Table = toml::from_str(&read_text(&path)?).map_err(Error::toml(&path))?;
         if let Some(Value::Array(scenes)) = table.get_mut("scenes") {
             let name = |scene: &Value| scene.get("name").and_then(Value::as_str).unwrap_or_default().to_owned();
             scenes.retain(|scene| !left_out.contains(&name(scene)));

@@ -1,15 +1,25 @@
 //! Another library's trees beside runs that the clock ends.
 
+use super::measurement::{Measurement, Work};
 use crate::Error;
+use crate::measure::layout::collapsed_sah;
 use crate::peers::external;
-use crate::run::job::collapsed_sah;
-use crate::run::rows::ClockedPeerRow;
-use crate::run::store::Store;
-use crate::scenes::Scene;
+use crate::rows::ClockedPeerRow;
+use crate::rows::store::Store;
+use bvh_scenes::Scene;
 use std::path::Path;
 
-/// Costs tinybvh's tree with spatial splits over every scene. Returns what is to be said where its program is not there.
-pub(crate) fn cost_peers(program: &Path, scenes: &[Scene], store: &Store) -> Result<String, Error> {
+/// The costs of tinybvh's trees with spatial splits, by this program.
+pub(crate) struct ClockedPeers<'a>(pub &'a Path);
+
+impl Measurement for ClockedPeers<'_> {
+    fn measure(&self, work: &mut Work) -> Result<String, Error> {
+        cost_peers(self.0, work.scenes, work.store)
+    }
+}
+
+/// Costs tinybvh's tree over every scene. Returns a remark if its program is not there.
+fn cost_peers(program: &Path, scenes: &[Scene], store: &Store) -> Result<String, Error> {
     if !program.exists() {
         let program = program.display();
         return Ok(format!("Without tinybvh: {program} is not there; scripts/ray-peers/build makes it.\n"));

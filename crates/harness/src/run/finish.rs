@@ -1,14 +1,14 @@
 //! From finished runs to results: joins their rows, brings the references up to date, makes the reports.
 
 use crate::Error;
-use crate::files;
 use crate::report::output::Output;
 use crate::report::{self, clocked};
+use crate::rows::store::{self, Existing, Store};
 use crate::run::provenance::Provenance;
 use crate::run::reference::{self, BestKnown};
 use crate::run::resolved::{Resolved, to_toml};
-use crate::run::store::{self, Existing, Store};
 use crate::spec::Experiment;
+use bvh_scenes::read_text;
 use std::path::{Path, PathBuf};
 
 /// What a finished experiment has to say.
@@ -26,6 +26,14 @@ pub struct Summary {
     pub beside: Option<PathBuf>,
 }
 
+impl Summary {
+    /// Of an experiment to be resumed whose results are finished.
+    pub(crate) fn finished(folder: PathBuf) -> Self {
+        let text = "All runs are finished; nothing was done. --force does them again, --redraw makes the reports again.\n";
+        Self { text: text.into(), folder, ..Self::default() }
+    }
+}
+
 /// Joins the kept runs and makes the reports. Returns the text for the terminal. Runs whose results lie beside others
 /// improve no best known costs.
 pub(crate) fn conclude(
@@ -35,7 +43,13 @@ pub(crate) fn conclude(
     store: Store,
 ) -> Result<String, Error> {
     store.join(resolved.run_count())?;
-    let text = report(resolved, best_known, provenance, &store)?;
+    // The suite has drawn its own table, and its cases have no best known costs.
+    let text = if resolved.experiment.suite.is_some() {
+        store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
+        String::new()
+    } else {
+        report(resolved, best_known, provenance, &store)?
+    };
     store.write("provenance.toml", to_toml(provenance)?.as_bytes())?;
     store.finish()?;
     Ok(text)
@@ -64,6 +78,13 @@ pub fn outputs(experiment: &Experiment, folder: &Path) -> Result<Vec<Output>, Er
     }
 }
 
+/// Makes the reports of the finished experiment in a folder again, by the spec that lies next to its rows. Writes nothing.
+pub fn remade(folder: &Path) -> Result<Vec<Output>, Error> {
+    let path = folder.join("resolved.toml");
+    let resolved: Resolved = toml::from_str(&read_text(&path)?).map_err(Error::toml(&path))?;
+    outputs(&resolved.experiment, folder)
+}
+
 /// Makes the reports of finished runs again, with the best known costs of now. Runs nothing and loads no scene: the rows
 /// in `out/NAME/` must come from the same spec, which may differ in its reports only.
 pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
@@ -72,7 +93,7 @@ pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     if store::is_unfinished(&folder) {
         return Err(refuse("the experiment was interrupted; finish it with --resume first"));
     }
-    let text = files::read_text(&folder.join("resolved.toml"))?;
+    let text = read_text(&folder.join("resolved.toml"))?;
     let found: Option<Resolved> = toml::from_str(&text).ok();
     let resolved = found.filter(|found| found.has_runs_of(experiment));
     let Some(Resolved { scenes, .. }) = resolved else {
@@ -82,7 +103,7 @@ pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     let store = Store::open(&folder, &text, Existing::Keep)?;
     // The rows stay those of the program that produced them, so its provenance is kept.
     let path = folder.join("provenance.toml");
-    let provenance: Provenance = toml::from_str(&files::read_text(&path)?).map_err(Error::toml(&path))?;
+    let provenance: Provenance = toml::from_str(&read_text(&path)?).map_err(Error::toml(&path))?;
     let text = report(&resolved, BestKnown::Improve(out), &provenance, &store)?;
     store.finish()?;
     Ok(Summary { text, left_out: vec![], remarks: vec![], folder, beside: None })

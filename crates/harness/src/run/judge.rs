@@ -1,9 +1,9 @@
 //! Random rays as the judge of trees, in place of a cost.
 
 use crate::measure::empirical_cost;
-use crate::run::rows::RayRow;
-use crate::scenes::Scene;
+use crate::rows::RayRow;
 use bvh_core::Bvh;
+use bvh_scenes::Scene;
 use bvh_search::Judge;
 
 /// The mean number of box tests of the same random rays through every tree.

@@ -1,13 +1,14 @@
 //! Joins the parts of an experiment that was run on several machines into what one machine would have written.
 
 use crate::Error;
-use crate::files;
+use crate::rows::lock::lock_folder;
+use crate::rows::store::{self, Existing, FinishedRun, Store};
 use crate::run::finish::conclude;
 use crate::run::provenance::Provenance;
 use crate::run::reference::BestKnown;
 use crate::run::resolved::Resolved;
-use crate::run::store::{self, Existing, FinishedRun, Store};
 use crate::run::target::Target;
+use bvh_terminal::files;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -55,7 +56,7 @@ fn parts(out: &Path) -> Result<Vec<(PathBuf, Part)>, Error> {
             let spec = partial.join("resolved.toml");
             if spec.is_file() {
                 // Locked until the end, so that no part changes meanwhile.
-                let lock = files::lock_folder(&path)?;
+                let lock = lock_folder(&path)?;
                 let resolved = fs::read_to_string(&spec).map_err(Error::io(&spec, "read the file"))?;
                 let name = path.strip_prefix(out).unwrap_or(&path).to_owned();
                 parts.push((name, Part { partial, resolved, _lock: lock }));
@@ -74,7 +75,7 @@ fn join(name: &Path, parts: &[Part], out: &Path, existing: Existing) -> Result<(
     }
     let resolved = common_spec(name, parts).map_err(fail)?;
     let owners = owners(&resolved, parts, fail)?;
-    let Target { folder, beside } = Target::choose(out, &resolved, existing, false)?;
+    let Target { folder, beside, .. } = Target::choose(out, &resolved, existing, false)?;
     let store = Store::open(&folder, &parts[0].resolved, existing)?;
     for (index, owner) in owners.iter().enumerate() {
         store.keep(index, &FinishedRun::read(owner)?)?;

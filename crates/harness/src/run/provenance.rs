@@ -1,5 +1,6 @@
 //! Where results come from: revision, compiler, processor, threads, date. In a file apart from the reproducible ones.
 
+use crate::processor::PROCESSOR;
 use serde::{Deserialize, Serialize};
 use std::time::SystemTime;
 
@@ -47,7 +48,7 @@ impl Provenance {
                 on(cfg!(debug_assertions)),
                 on(cfg!(feature = "peers"))
             ),
-            cpu: cpu(),
+            cpu: format!("{}, {}", PROCESSOR.name(), std::env::consts::ARCH),
             threads: rayon::current_num_threads(),
             date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
             parts: vec![],
@@ -57,12 +58,4 @@ impl Provenance {
 
 fn on(set: bool) -> &'static str {
     if set { "on" } else { "off" }
-}
-
-/// The model as Linux names it; elsewhere the architecture alone.
-fn cpu() -> String {
-    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model =
-        info.lines().find_map(|line| line.strip_prefix("model name")).and_then(|rest| rest.split(':').nth(1));
-    model.map_or_else(String::new, |model| format!("{}, ", model.trim())) + std::env::consts::ARCH
 }

@@ -1,11 +1,11 @@
 //! Judges the trees of all runs by rays that they were not trained on.
 
+use super::job::Job;
+use super::measurement::{Measurement, Work};
 use crate::Error;
+use crate::measure::layout::{collapsed_sah, widened};
 use crate::measure::ray_cost::{Config, TrainedOn, test_rays};
-use crate::run::job::{Job, Watch, collapsed_sah, visits};
-use crate::run::rows::{LayoutRow, RunTestRow, TestRow, TestTimeRow, VisitRow};
-use crate::run::store::Store;
-use crate::run::trace::{Trees, complete};
+use crate::rows::{LayoutRow, RunTestRow, TestRow, TestTimeRow, VisitRow};
 use crate::spec::Experiment;
 use bvh_core::cost::{self, Objective};
 use bvh_core::{Bvh, WideBvh};
@@ -15,17 +15,25 @@ use rayon::prelude::*;
 /// The name in results of the trees that are trained on rays, whatever the label of their method.
 const RAYS: &str = "rays";
 
+/// Rays that judge the trees of all runs.
+pub(crate) struct Judging<'a>(pub &'a Config);
+
+impl Measurement for Judging<'_> {
+    fn whole_only(&self) -> Option<&'static str> {
+        Some("trees are judged by rays beside each other, not in parts")
+    }
+
+    fn measure(&self, work: &mut Work) -> Result<String, Error> {
+        work.complete_trees(|_| true)?;
+        judge(self.0, work)?;
+        Ok(String::new())
+    }
+}
+
 /// Counts the tests of the same rays in the trees of all runs on a scene, each in the layout for the rays that it was trained on, and
 /// takes the time of those in the trees of first runs.
-pub(crate) fn judge(
-    experiment: &Experiment,
-    config: &Config,
-    jobs: &[Job],
-    trees: &mut Trees,
-    watch: &Watch,
-    store: &Store,
-) -> Result<(), Error> {
-    complete(trees, experiment, jobs, watch, |_| true)?;
+fn judge(config: &Config, work: &Work) -> Result<(), Error> {
+    let Work { experiment, jobs, trees, store, watch, .. } = work;
     let (mut rows, mut times, mut sizes) = (Vec::new(), Vec::new(), Vec::new());
     let (mut visits, mut of_runs) = (Vec::new(), Vec::new());
     let runs: Vec<(&Job, &Bvh)> = trees.iter().map(|(&index, tree)| (&jobs[index], tree)).collect();
@@ -46,7 +54,7 @@ pub(crate) fn judge(
         let seed = experiment.seed_of(&scene.name, "rays that judge trees", 0);
         for rays in test_rays(config, scene, of_scene[0].1, seed) {
             if watch.cancelled() {
-                return Err(Error::Interrupted { finished: jobs.len(), runs: jobs.len() });
+                return Err(work.interrupted());
             }
             let tests: Vec<[f64; 2]> = layouts.par_iter().map(|wide| rays.tests(wide)).collect();
             let of_run = |((job, _), tests): (&(&Job, &Bvh), &[f64; 2])| RunTestRow {
@@ -130,11 +138,8 @@ fn costs(
 fn layout(experiment: &Experiment, job: &Job, tree: &Bvh) -> Result<WideBvh, Error> {
     let failed = |message| Error::Tracing { scene: job.scene.name.clone(), message };
     let triangles = job.scene.triangles().map_err(|error| failed(error.to_string()))?;
-    let made = match visits(experiment, job, tree)? {
-        Some(visits) => WideBvh::for_rays(tree, triangles, &visits),
-        None => WideBvh::new(tree, triangles),
-    };
-    made.map_err(|error| failed(error.to_string()))
+    let visits = job.visits(experiment, tree)?;
+    widened(tree, triangles, visits.as_deref()).map_err(|error| failed(error.to_string()))
 }
 
 /// The sizes and costs of a method's trees and their layouts, means over repetitions.

@@ -8,17 +8,18 @@
 //! Only binary trees with one object per leaf count: wider nodes and leaves would make every cost beatable.
 
 use crate::Error;
-use crate::files;
 use crate::report::Report;
+use crate::rows::lock::wait_for_folder;
+use crate::rows::store::Store;
+use crate::rows::{BoundRow, ROUNDING, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
 use crate::run::provenance::Provenance;
 use crate::run::resolved::{LoadedScene, Resolved, checksum};
-use crate::run::rows::{BoundRow, ROUNDING, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
-use crate::run::store::Store;
-use crate::scenes::Scene;
 use bvh_core::Bvh;
 use bvh_core::cost::Objective;
 use bvh_core::file::Header;
+use bvh_scenes::Scene;
 use bvh_search::exact;
+use bvh_terminal::files;
 use std::fs;
 use std::path::Path;
 
@@ -47,7 +48,7 @@ pub(crate) fn update(
     let (BestKnown::Improve(out) | BestKnown::Read(out)) = best_known;
     let runs: Vec<RunRow> = read_if_any(store.folder())?;
     let bounds: Vec<BoundRow> = read_if_any(store.folder())?;
-    let _lock = files::wait_for_folder(out)?;
+    let _lock = wait_for_folder(out)?;
     let before = all_known(out)?;
     let mut known = before.clone();
     let experiment = &resolved.experiment;
@@ -84,7 +85,10 @@ fn all_known(results: &Path) -> Result<Vec<ReferenceRow>, Error> {
 fn write_all_known(results: &Path, mut known: Vec<ReferenceRow>, before: &[ReferenceRow]) -> Result<(), Error> {
     known.sort_by(|a, b| key_of(a).cmp(&key_of(b)));
     let path = results.join(BEST_KNOWN);
-    if known == before { Ok(()) } else { files::write(&path, &to_bytes(&known, &path)?) }
+    if known != before {
+        files::write(&path, &to_bytes(&known, &path)?)?;
+    }
+    Ok(())
 }
 
 /// Improves the best known costs of a scene by those of a binary tree with one object per leaf. The caller has locked the folder.

@@ -1,8 +1,9 @@
 //! What an experiment comes to: its spec with every default spelled out, and the scenes it runs on.
 
 use crate::Error;
-use crate::scenes::{Scene, subset};
 use crate::spec::Experiment;
+use bvh_scenes::load::OutsideFiles;
+use bvh_scenes::{Scene, subset};
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 
@@ -61,11 +62,16 @@ impl Resolved {
 
 /// Loads an experiment's scenes. Returns them and the names of the optional ones that are not there.
 pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>), Error> {
+    // The scenes of the suite are names of cases.
+    if experiment.suite.is_some() {
+        return Ok(Default::default());
+    }
     let names = experiment.scenes.iter().flat_map(|name| subset::expand(name));
-    let mut scenes = names.map(|name| Scene::load(&name)).collect::<Result<Vec<_>, _>>()?;
+    let outside = OutsideFiles::from(experiment.outside_files);
+    let mut scenes = names.map(|name| Scene::load_with(&name, outside)).collect::<Result<Vec<_>, _>>()?;
     let mut left_out = Vec::new();
     for name in &experiment.optional_scenes {
-        match Scene::load(name) {
+        match Scene::load_with(name, outside) {
             Ok(scene) => scenes.push(scene),
             Err(_) => left_out.push(name.clone()),
         }

@@ -1,42 +1,48 @@
 //! Traces rays through the trees of finished runs, and by the other libraries beside them.
 
+use super::job::Job;
+use super::measurement::{Measurement, Work};
 use crate::Error;
-use crate::measure::speed;
+use crate::contestant::Contestant;
+use crate::measure::layout::own_contenders;
+use crate::measure::speed::{self, Traced};
 use crate::peers::{comparison, external};
-use crate::run::job::{Job, Watch, perform, visits};
-use crate::run::store::Store;
-use crate::spec::{Contestant, Experiment};
+use crate::rows::store::Store;
+use crate::rows::{TimingRow, TraceRow, TraceTimeRow};
+use crate::spec::Experiment;
+use crate::statistics::median;
 use bvh_core::Bvh;
 use bvh_search::Observer;
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 
-/// The trees that rays are traced through, by the number of their run.
-pub(crate) type Trees = BTreeMap<usize, Bvh>;
+/// Rays through the trees of first runs, timed against each other.
+pub(crate) struct Tracing<'a>(pub &'a speed::Config);
 
-/// Traces rays through the trees of all first runs, scene by scene. Rebuilds the trees of runs that were kept from an
-/// interrupted experiment. Returns what there is to say about other libraries.
-pub(crate) fn trace(
-    experiment: &Experiment,
-    config: &speed::Config,
-    jobs: &[Job],
-    trees: &mut Trees,
-    watch: &Watch,
-    store: &Store,
-) -> Result<String, Error> {
-    let interrupted = || Error::Interrupted { finished: jobs.len(), runs: jobs.len() };
-    complete(trees, experiment, jobs, watch, |job| job.repetition == 0)?;
+impl Measurement for Tracing<'_> {
+    fn whole_only(&self) -> Option<&'static str> {
+        Some("rays are timed against each other, not in parts")
+    }
+
+    fn measure(&self, work: &mut Work) -> Result<String, Error> {
+        work.complete_trees(|job| job.repetition == 0)?;
+        trace(self.0, work)
+    }
+}
+
+/// Traces rays through the trees of all first runs, scene by scene. Returns remarks about other libraries.
+fn trace(config: &speed::Config, work: &Work) -> Result<String, Error> {
+    let Work { experiment, jobs, trees, store, watch, .. } = work;
     let mut text = String::new();
-    let program = config.ray_peers.as_deref().filter(|program| {
-        if !program.exists() {
-            text = format!(
-                "Without Embree and tinybvh: {} is not there; scripts/ray-peers/build makes it.\n",
-                program.display()
-            );
+    let mut programs = Vec::new();
+    for program in &config.ray_peers {
+        if program.exists() {
+            programs.push(program);
+        } else {
+            let program = program.display();
+            text += &format!("Without {program}: it is not there; scripts/ray-peers/build makes it.\n");
         }
-        program.exists()
-    });
-    let (mut rows, mut times) = (Vec::new(), Vec::new());
+    }
+    let mut traced = Vec::new();
     let first_runs = trees.iter().map(|(&index, tree)| (&jobs[index], tree));
     let first_runs: Vec<(&Job, &Bvh)> = first_runs.filter(|(job, _)| job.repetition == 0).collect();
     for of_scene in first_runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
@@ -47,51 +53,69 @@ pub(crate) fn trace(
             let made = match &job.labelled.method {
                 Contestant::Peer(peer) => peer.contenders(scene),
                 Contestant::Ours(_) | Contestant::External(_) => {
-                    let visits = visits(experiment, job, tree)?;
-                    speed::own_contenders(&config.layouts, scene, tree, visits.as_deref())
+                    let visits = job.visits(experiment, tree)?;
+                    own_contenders(&config.layouts, &config.instructions, scene, tree, visits.as_deref())
                 }
             };
             let made = made.map_err(failed)?;
             contenders.extend(made.into_iter().map(|contender| (job.labelled.label.clone(), contender)));
         }
-        if let Some(program) = program {
-            contenders.extend(external::contenders(program, scene).map_err(failed)?);
+        for program in &programs {
+            for (library, contender) in external::contenders(program, scene).map_err(failed)? {
+                // A processor without AVX-512 makes all programs the same.
+                if !contenders.iter().any(|(known, other)| *known == library && other.is_called_as(&contender))
+                {
+                    contenders.push((library, contender));
+                }
+            }
         }
         let seed = experiment.seed_of(&scene.name, "tracing", 0);
         let measured = speed::measure(config, scene, of_scene[0].1, &contenders, seed, || watch.cancelled());
-        let (scene_rows, scene_times) = measured.map_err(failed)?.ok_or_else(interrupted)?;
-        rows.extend(scene_rows);
-        times.extend(scene_times);
+        traced.extend(measured.map_err(failed)?.ok_or_else(|| work.interrupted())?);
     }
-    if config.ray_peers.is_some() {
-        let compared = comparison::rows(&rows, &times, |label| library(experiment, label));
-        store.write_rows(&compared)?;
-        let ratios = comparison::ratios(&compared);
+    if !config.ray_peers.is_empty() {
+        let search_seconds = search_seconds(&first_runs, jobs, store)?;
+        let seconds_of = |scene: &str, label: &str| search_seconds[&(scene.to_owned(), label.to_owned())];
+        let speeds = comparison::speeds(&traced, |label| library(experiment, label), seconds_of);
+        store.write_rows(&comparison::rows(&speeds))?;
+        let ratios = comparison::ratios(&speeds);
         store.write_rows(&ratios)?;
         text += &comparison::text(&ratios);
     }
-    // The other rows are compared with committed ones, so they must not depend on a program that may be missing.
-    rows.retain(|row| experiment.methods.iter().any(|method| method.label == row.method));
+    // Other rows are compared with committed ones. They must depend neither on a program that may be missing nor on the
+    // instruction sets of this processor.
+    let is_ours =
+        |traced: &Traced| experiment.methods.iter().any(|method| method.label == traced.answers.method);
+    let mut seen = BTreeSet::new();
+    traced.retain(|traced| {
+        let TraceRow { scene, method, layout, rays, .. } = &traced.answers;
+        is_ours(traced) && seen.insert([scene, method, layout, rays].map(String::clone))
+    });
+    let (rows, times): (Vec<TraceRow>, Vec<TraceTimeRow>) =
+        traced.into_iter().map(|traced| (traced.answers, traced.times)).unzip();
     store.write_rows(&rows)?;
     store.write_rows(&times)?;
     Ok(text)
 }
 
-/// Rebuilds those of the wanted trees that are missing, because their runs were kept from an interrupted experiment.
-pub(crate) fn complete(
-    trees: &mut Trees,
-    experiment: &Experiment,
+/// The median seconds of a method's runs on a scene, by scene and label.
+fn search_seconds(
+    first_runs: &[(&Job, &Bvh)],
     jobs: &[Job],
-    watch: &Watch,
-    wanted: impl Fn(&Job) -> bool,
-) -> Result<(), Error> {
-    let interrupted = || Error::Interrupted { finished: jobs.len(), runs: jobs.len() };
-    for (index, job) in jobs.iter().enumerate().filter(|(_, job)| wanted(job)) {
-        if let Entry::Vacant(missing) = trees.entry(index) {
-            missing.insert(perform(experiment, job, watch)?.ok_or_else(interrupted)?.1);
+    store: &Store,
+) -> Result<BTreeMap<(String, String), f64>, Error> {
+    let mut seconds: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
+    for index in 0..jobs.len() {
+        for TimingRow { scene, method, seconds: of_run, .. } in store.rows::<TimingRow>(index)? {
+            seconds.entry((scene, method)).or_default().push(of_run);
         }
     }
-    Ok(())
+    let of_run = |(job, _): &(&Job, &Bvh)| {
+        let run = (job.scene.name.clone(), job.labelled.label.clone());
+        let middle = seconds.get(&run).and_then(|seconds| median(seconds)).unwrap_or(f64::NAN);
+        (run, middle)
+    };
+    Ok(first_runs.iter().map(of_run).collect())
 }
 
 /// The library behind a label: ours, the library of a method, or else a library of the program.

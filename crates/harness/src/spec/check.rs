@@ -1,11 +1,12 @@
 //! What types alone do not say of a spec, part by part. Messages name the key, what was found, what would be accepted.
 
-use super::fault::{Fault, is_within};
-use super::method::Own;
-use super::{Contestant, Experiment, Labelled};
+use super::Experiment;
+use crate::contestant::{Contestant, Labelled, Own};
 use crate::report::Report;
-use crate::{scenes::subset, stress};
-use bvh_build::OutOfRange;
+use crate::stress;
+use bvh_config::OutOfRange;
+use bvh_config::fault::{Fault, is_within};
+use bvh_scenes::subset;
 use bvh_search::{Budget, Method, best};
 use std::collections::HashSet;
 

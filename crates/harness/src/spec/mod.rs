@@ -1,26 +1,25 @@
 //! Experiment specs: TOML in, a checked [`Experiment`] out, or an error with file, key, found and accepted.
 //!
-//! `read` leads from text to values, `check` refuses what types alone do not, `fault` says where and what is wrong,
-//! and `method` is one entry of `methods`.
+//! `read` leads from text to values, and `check` rejects what types alone do not. An entry of `methods` is a
+//! [`Labelled`].
 
 mod check;
-mod fault;
-mod method;
 mod name;
 mod read;
 mod schema;
 
+use crate::contestant::{Contestant, Labelled};
+use crate::measure::picture;
 use crate::measure::{empirical_cost, ray_cost, speed};
+use crate::processor::PROCESSOR;
 use crate::report::Report;
-use crate::scenes::fnv1a;
-use crate::{render, stress};
-use bvh_build::config;
-use bvh_build::config::Itself;
+use crate::stress;
+use bvh_config::{Itself, config};
 use bvh_core::cost::Objective;
+use bvh_scenes::fnv1a;
 use bvh_search::{Budget, exact};
-pub use method::{Contestant, Labelled};
 pub use name::Name;
-pub use read::{Overrides, configuration};
+pub use read::Overrides;
 pub use schema::{page, schema};
 use std::path::{Path, PathBuf};
 
@@ -45,12 +44,18 @@ config! {
         scenes: Vec<String>;
         /// Scenes that are left out, with a note, where they have not been fetched.
         optional_scenes: Vec<String>;
+        /// Whether glTF files may name buffers outside their own folders. Whoever made such a file then says which files are read.
+        #[serde(skip_serializing_if = "std::ops::Not::not")]
+        outside_files: bool;
         /// Every run's seed is derived from this one, the experiment, the scene, the method and the repetition.
         seed: u64 = 1, in 0..=i64::MAX as u64;
         /// Runs of every method on every scene.
         repetitions: u32 = 1, in 1..;
         /// Whether runs are done one at a time, methods in turns, because their times are the result.
         sequential: bool;
+        /// Whether results are kept apart by processor, in a folder of its name: they are speeds that another one has not.
+        #[serde(skip_serializing_if = "std::ops::Not::not")]
+        per_processor: bool;
         /// Threads of every run; by default those of the program.
         threads: Option<u16>, in 1..=1024;
         /// What `cost` means; by default the paper's objective.
@@ -69,7 +74,7 @@ config! {
         /// Measurements of every run's tree with random rays.
         rays: Vec<empirical_cost::Config>, in Itself;
         /// A picture drawn with every run's tree, and with brute force and a KD-tree.
-        render: Option<render::experiment::Config>, in Itself;
+        render: Option<picture::Config>, in Itself;
         /// Rays traced through the tree of every method's first run, in all layouts, in turns.
         tracing: Option<speed::Config>, in Itself;
         /// Rays that methods with `for_rays` are trained on, and others that judge all trees by the tests that they take.
@@ -80,9 +85,16 @@ config! {
 }
 
 impl Experiment {
-    /// The folder of its results within that of all results.
+    /// The folder of its results within that of all results. Quick results have no speeds, and no processor.
     pub fn folder(&self) -> PathBuf {
-        if self.quick { Path::new("quick").join(self.name.as_str()) } else { self.name.as_str().into() }
+        let name = self.name.as_str();
+        if self.quick {
+            Path::new("quick").join(name)
+        } else if self.per_processor {
+            Path::new(name).join(PROCESSOR.folder())
+        } else {
+            name.into()
+        }
     }
 
     /// The runs on one scene in order: method, repetition, and whether it is the first.

@@ -1,13 +1,11 @@
 //! From a spec's text to a checked [`Experiment`], with what the command line changes.
 
-use super::fault::{self, Fault, Read};
 use super::{Experiment, Labelled, Name, check};
 use crate::Error;
-use crate::files;
 use crate::report::Report;
-use bvh_build::Check;
+use bvh_config::fault::{self, Fault, Read};
+use bvh_scenes::read_text;
 use bvh_search::Method;
-use serde::de::DeserializeOwned;
 use std::ffi::OsStr;
 use std::path::Path;
 use toml::{Table, Value};
@@ -17,26 +15,18 @@ use toml::{Table, Value};
 pub struct Overrides {
     /// Replaces the scenes, if any are given.
     pub scenes: Vec<String>,
+    /// Allows glTF files to name buffers outside their folders.
+    pub outside_files: bool,
     /// Replaces the seed.
     pub seed: Option<u64>,
     /// Applies the spec's `quick` table.
     pub quick: bool,
 }
 
-/// Reads and checks a file of one configuration.
-pub fn configuration<C: DeserializeOwned + Check>(path: &Path) -> Result<C, Error> {
-    let text = files::read_text(path)?;
-    let refuse = |message: String| Error::Spec { file: path.to_owned(), message };
-    let table: Table = text.parse().map_err(|error: toml::de::Error| refuse(error.to_string()))?;
-    let (config, faults) = fault::deserialize(table);
-    let all = || refuse(fault::say(&faults, &text, &path.to_string_lossy(), None));
-    config.filter(|_| faults.is_empty()).ok_or_else(all)
-}
-
 impl Experiment {
     /// Reads and checks the spec at `path`. Does not load its scenes.
     pub fn read(path: &Path, overrides: &Overrides) -> Result<Self, Error> {
-        Self::parse(path, &files::read_text(path)?, overrides)
+        Self::parse(path, &read_text(path)?, overrides)
     }
 
     /// Reads and checks a spec's text; `path` gives it its name.
@@ -93,6 +83,7 @@ impl Experiment {
         if let Some(seed) = overrides.seed {
             experiment.seed = seed;
         }
+        experiment.outside_files |= overrides.outside_files;
         if !overrides.scenes.is_empty() {
             experiment.scenes.clone_from(&overrides.scenes);
             experiment.optional_scenes.clear();

@@ -1,9 +1,9 @@
 //! The JSON schema of specs, by which editors complete and check them, and the page of all keys. Both are made from the
 //! declarations that read and check the keys.
 
-use super::method::Own;
 use super::{Contestant, Experiment, Labelled};
-use bvh_build::config::Keys;
+use crate::contestant::Own;
+use bvh_config::Keys;
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde_json::{Map, Value, json};

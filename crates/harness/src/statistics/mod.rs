@@ -1,5 +1,6 @@
 //! Statistics: quantiles, the expected best of several trials, the primal integral, correlations, rank tests, time-to-target fits.
 
+pub mod best_of;
 pub mod rank;
 pub mod time_to_target;
 
@@ -30,6 +31,29 @@ pub fn order_quantile(values: &[f64], q: f64) -> Option<f64> {
 /// The median of finite values.
 pub fn median(values: &[f64]) -> Option<f64> {
     quantile(values, 0.5)
+}
+
+/// Returns two of the values between which the median of their distribution lies with a probability of at least 95 %: the narrowest pair of
+/// order statistics that leaves as many values out on both sides (the interval of the sign test). The lowest and the highest of fewer than
+/// six values, which hold it with a lower probability. `None` of none. O(N log N).
+pub fn median_interval(values: &[f64]) -> Option<(f64, f64)> {
+    let sorted = sorted(values);
+    let n = sorted.len();
+    let last = n.checked_sub(1)?;
+    // Probability that exactly `left_out` of the values lie below the median.
+    let mut exactly = 0.5f64.powi(n as i32);
+    let mut at_most = 0.0;
+    let mut left_out = 0;
+    while left_out < last - left_out {
+        at_most += exactly;
+        if at_most > 0.025 {
+            break;
+        }
+        exactly *= (n - left_out) as f64 / (left_out + 1) as f64;
+        left_out += 1;
+    }
+    let left_out = left_out.saturating_sub(1);
+    Some((sorted[left_out], sorted[last - left_out]))
 }
 
 /// The lower quartile, the median and the upper quartile of finite values; NaN of none.
@@ -68,29 +92,6 @@ pub fn expected_best_of(pool: &[f64], m: usize) -> Option<f64> {
         }
     }
     Some(expected)
-}
-
-/// Between which values the lowest of `m` values drawn without replacement from a pool of N lies in nine of ten draws. If
-/// `m` is N there is only one draw: then the interval of the lowest of N / 2 is laid to both sides of the pool's lowest,
-/// which is wider than it need be. `None` if the pool has fewer than `m` values, or only one. O(N log N).
-pub fn spread_of_best(pool: &[f64], m: usize) -> Option<(f64, f64)> {
-    let n = pool.len();
-    if n < m || n < 2 {
-        return None;
-    }
-    let drawn = if m < n { m } else { n / 2 };
-    let sorted = sorted(pool);
-    // How likely none of the values so far is drawn, from before the i-th.
-    let mut none = 1.0;
-    let reached = sorted.iter().enumerate().map(|(i, value)| {
-        none *= (n - i).saturating_sub(drawn) as f64 / (n - i) as f64;
-        (1.0 - none, *value)
-    });
-    let reached: Vec<(f64, f64)> = reached.collect();
-    let at =
-        |probability: f64| reached.iter().find(|(found, _)| *found >= probability).map(|(_, value)| *value);
-    let (low, high) = (at(0.05)?, at(0.95)?);
-    Some(if m < n { (low, high) } else { (sorted[0] - (high - low), sorted[0] + (high - low)) })
 }
 
 /// Half the width of the normal distribution's central 95 %, in standard deviations.
@@ -152,6 +153,14 @@ pub fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
     (pairs.len() > 1 && xx > 0.0 && yy > 0.0).then(|| product(|x, y| x * y) / (xx.sqrt() * yy.sqrt()))
 }
 
+/// Returns the 95 % interval of Pearson's correlation of so many pairs, by Fisher's transformation; `None` for fewer than four.
+pub fn pearson_interval(correlation: f64, pairs: usize) -> Option<(f64, f64)> {
+    let freedom = pairs.checked_sub(3).filter(|&freedom| freedom > 0)?;
+    let half = NORMAL_95 / (freedom as f64).sqrt();
+    let transformed = correlation.atanh();
+    Some(((transformed - half).tanh(), (transformed + half).tanh()))
+}
+
 /// Spearman's rank correlation of pairs: Pearson's of the ranks, equal values sharing their mean rank.
 pub fn spearman(pairs: &[(f64, f64)]) -> Option<f64> {
     let of = |side: fn(&(f64, f64)) -> f64| ranks(&pairs.iter().map(side).collect::<Vec<_>>());
@@ -199,23 +208,14 @@ mod tests {
     }
 
     #[test]
-    fn nine_of_ten_draws_lie_in_the_spread_of_the_best() {
-        let pool: Vec<f64> = (0..12).map(|i| f64::from(i * i % 13)).collect();
-        for m in 1..pool.len() {
-            let (low, high) = spread_of_best(&pool, m).unwrap();
-            let sets = (0u32..1 << pool.len()).filter(|set| set.count_ones() as usize == m);
-            let best =
-                |set: u32| minimum((0..pool.len()).filter(|i| set >> i & 1 == 1).map(|i| pool[i])).unwrap();
-            let (mut below, mut above, mut all) = (0, 0, 0);
-            for best in sets.map(best) {
-                (below, above, all) =
-                    (below + usize::from(best < low), above + usize::from(best > high), all + 1);
-            }
-            assert!(20 * below <= all && 20 * above <= all, "m = {m}: {below} and {above} of {all}");
-        }
-        // With one draw only, to both sides of it.
-        let (low, high) = spread_of_best(&pool, pool.len()).unwrap();
-        assert!(low < 0.0 && high == -low && spread_of_best(&pool, 13).is_none());
+    fn the_interval_of_a_median_is_that_of_the_sign_test() {
+        // Of 25 values the 8th and the 18th: 7 or fewer of 25 coins show heads with 0.0216, 8 or fewer with 0.054.
+        let values: Vec<f64> = (1..=25).rev().map(f64::from).collect();
+        assert_eq!(median_interval(&values), Some((8.0, 18.0)));
+        assert_eq!(median_interval(&values[..6]), Some((20.0, 25.0)));
+        assert_eq!(median_interval(&values[..2]), Some((24.0, 25.0)));
+        assert_eq!(median_interval(&[3.0]), Some((3.0, 3.0)));
+        assert_eq!(median_interval(&[]), None);
     }
 
     #[test]
@@ -249,6 +249,15 @@ mod tests {
         assert_eq!(primal_integral(&incumbents, 10.0, 4.0), Some((2.0 + 0.5 * 2.0) / 4.0));
         assert_eq!(primal_integral(&[], 10.0, 4.0), Some(1.0));
         assert_eq!(primal_integral(&incumbents, 10.0, 0.0), None);
+    }
+
+    #[test]
+    fn the_interval_of_a_correlation_is_fishers() {
+        // The textbook's example: 0.5 of 28 pairs.
+        let (low, high) = pearson_interval(0.5, 28).unwrap();
+        assert!((low - 0.156).abs() < 1e-3 && (high - 0.736).abs() < 1e-3, "{low} {high}");
+        assert_eq!(pearson_interval(1.0, 10), Some((1.0, 1.0)));
+        assert_eq!(pearson_interval(0.5, 3), None);
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! What a case is: a stiff scene, checks of methods, or checks of other parts of the program.
 
 use super::promise::Verdict;
-use crate::scenes::stiff;
 use bvh_core::{Aabb, Triangle};
+use bvh_scenes::builtin::stiff;
 use bvh_search::{Method, Outcome};
 
 /// One case.

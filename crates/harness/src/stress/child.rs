@@ -2,7 +2,7 @@
 //! memory is to be known.
 
 use super::peers::{self, Found};
-use crate::scenes::stiff;
+use bvh_scenes::builtin::stiff;
 use bvh_search::{Budget, Method, Problem, solve};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};

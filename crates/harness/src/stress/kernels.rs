@@ -3,8 +3,8 @@
 
 use super::promise::{Broken, ensure};
 use super::tracing::{self, bits, wide_layouts};
-use bvh_build::{Accelerator, Structure};
-use bvh_core::{Coherence, Hit, Primitives, Ray, Triangle};
+use bvh_core::{Coherence, Distances, Hit, Primitives, Ray, RayComponents, Triangle, WideBvh};
+use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_search::Stream;
 use glam::Vec3;
 use rand::seq::IndexedRandom;
@@ -43,9 +43,35 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
             }
             let nearest: Vec<_> = nearest.iter().map(|hit| (!hit.is_miss()).then_some(*hit)).collect();
             answers(&format!("{kernel:?}, {coherence:?}"), &nearest, &any)?;
+            let (nearest, any) = by_component(&wide, rays, coherence);
+            answers(&format!("{kernel:?}, {coherence:?}, by component"), &nearest, &any)?;
         }
     }
     Ok(expected.iter().flatten().count())
+}
+
+/// The answers to one batch of rays, handed over by component.
+fn by_component(wide: &WideBvh, rays: &[Ray], coherence: Coherence) -> (Vec<Option<Hit>>, Vec<bool>) {
+    let component =
+        |of: fn(&Ray) -> Vec3, axis: usize| rays.iter().map(|ray| of(ray)[axis]).collect::<Vec<_>>();
+    let origins = [0, 1, 2].map(|axis| component(Ray::origin, axis));
+    let directions = [0, 1, 2].map(|axis| component(Ray::direction, axis));
+    let t_min: Vec<_> = rays.iter().map(Ray::t_min).collect();
+    let t_max: Vec<_> = rays.iter().map(Ray::t_max).collect();
+    let components = RayComponents::new(
+        origins.each_ref().map(Vec::as_slice),
+        directions.each_ref().map(Vec::as_slice),
+        Distances::Each(&t_min),
+        Distances::Each(&t_max),
+    );
+    let components = components.expect("rays");
+    let (mut distances, mut objects) = (vec![0.0; rays.len()], vec![0; rays.len()]);
+    let mut any = vec![false; rays.len()];
+    wide.nearest_hits_by_component(&components, &mut distances, &mut objects, coherence);
+    wide.any_hits_by_component(&components, &mut any, coherence);
+    let hits = distances.into_iter().zip(objects).map(|(t, object)| Hit { t, object });
+    let nearest = hits.map(|hit| if hit.is_miss() { None } else { Some(hit) });
+    (nearest.collect(), any)
 }
 
 /// Rays of [`tracing::rays`]: half of them one by one, half in bundles.
@@ -120,7 +146,7 @@ fn pick<T: Copy>(of: &[T], rng: &mut Stream) -> T {
 }
 
 /// Rays in a bundle: those of a packet.
-const BUNDLE: usize = 16;
+const BUNDLE: usize = 64;
 
 /// The rays that `make` makes, a half of `count`, and bundles around further ones: equal, all but equal, or close to each other.
 fn half_in_bundles(count: usize, seed: u64, mut make: impl FnMut(usize) -> Vec<Ray>) -> Vec<Ray> {

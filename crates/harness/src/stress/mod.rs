@@ -20,9 +20,8 @@ pub mod transform;
 
 use crate::Error;
 use crate::report::output::Output;
-use crate::run::columns::Columns;
-use bvh_build::OutOfRange;
-use bvh_build::config::{Accepts, Itself};
+use crate::rows::columns::Columns;
+use bvh_config::{Accepts, Itself, OutOfRange};
 pub use case::{Case, Check, EXACT_OBJECTS, Effort, LargerScenes, Part, Size, is_builder, methods};
 pub use cell::Cell;
 pub use promise::{Broken, Promise, Verdict};
@@ -54,7 +53,7 @@ impl Measure {
     }
 }
 
-impl bvh_build::Check for Measure {
+impl bvh_config::Check for Measure {
     fn faults(&self) -> Vec<OutOfRange> {
         match self {
             Self::Stability(config) => Itself.faults("stability", config),

@@ -31,14 +31,14 @@ pub fn examine(_: &str, _: &[bvh_core::Triangle]) -> Option<Found> {
 mod compiled_in {
     use super::Found;
     use crate::peers::{NoSettings, Obvhs, Peer, Preset, Raw};
-    use crate::scenes::stiff;
     use crate::stress::exact_area;
     use crate::stress::examine::ROUNDING;
     use crate::stress::promise::Promise::{P2, P3, P5, P7};
     use crate::stress::tracing::rays;
     use crate::stress::transform::{same_topology, scale_range, scaled};
-    use bvh_build::{Accelerator, Structure};
     use bvh_core::{Primitives, Ray, Shear, Triangle, cost, validate};
+    use bvh_scenes::builtin::stiff;
+    use bvh_scenes::trace::{Accelerator, Structure};
 
     /// The libraries by name. A further one is one line, here and in [`peer`].
     pub const NAMES: &[&str] = &["bvh 0.13", "obvhs 0.4 fast", "obvhs 0.4 slow"];

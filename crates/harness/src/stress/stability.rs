@@ -8,12 +8,12 @@ use super::promise::{Broken, Promise};
 use super::table::CASES;
 use super::{child, tracing};
 use crate::Error;
-use crate::figures::{self, HeatMap};
+use crate::contestant::{Contestant, Labelled};
 use crate::report::output::Output;
-use crate::run::columns::{Columns, read, to_bytes};
-use crate::run::store::Store;
-use crate::spec::{Contestant, Labelled};
-use bvh_build::config;
+use crate::rows::columns::{Columns, read, to_bytes};
+use crate::rows::store::Store;
+use bvh_config::config;
+use figures::HeatMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -52,7 +52,7 @@ enum Class {
 
 const CLASSES: [&str; 4] = ["as promised", "typed error, as promised", "promise broken", "crash or hang"];
 
-/// One cell, as written to `cells.csv`, and for other libraries to `timing_peers.csv`.
+/// One cell, as written to `cells.csv`, and for other libraries to `timing_third_party_cells.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 struct Row {
     /// The case.
@@ -209,7 +209,10 @@ impl Config {
         store.write("cells.csv", &to_bytes(&rows, Path::new("cells.csv"))?)?;
         store.write("timing_cells.csv", &to_bytes(&times, Path::new("timing_cells.csv"))?)?;
         if !peers.is_empty() {
-            store.write("timing_peers.csv", &to_bytes(&peers, Path::new("timing_peers.csv"))?)?;
+            store.write(
+                "timing_third_party_cells.csv",
+                &to_bytes(&peers, Path::new("timing_third_party_cells.csv"))?,
+            )?;
         }
         // Like the file of the other libraries: what is drawn depends on which are compiled in.
         let map = heat_map(&self::rows(store.folder())?.concat());
@@ -243,7 +246,7 @@ impl Config {
 /// The rows of the CSV files in the folder, our own and the other libraries'. The latter may be those of an earlier run:
 /// without the feature `peers` none are written.
 fn rows(folder: &Path) -> Result<[Vec<Row>; 2], Error> {
-    let peers = folder.join("timing_peers.csv");
+    let peers = folder.join("timing_third_party_cells.csv");
     Ok([read(&folder.join("cells.csv"))?, if peers.is_file() { read(&peers)? } else { vec![] }])
 }
 
@@ -269,7 +272,9 @@ fn heat_map(rows: &[Row]) -> HeatMap {
         title: HEADING.into(),
         caption:
             "Every case with all that can be asked: methods, traversals, readers, and other libraries. Numbers \
-             are depths of trees; where a promise was broken, which. Grey: not asked."
+             are depths of trees; where a promise was broken, which: P1 no crash or hang, P2 boxes contain, P3 no hit is missed, P4 the \
+             same bytes for any number of threads, P5 scaling by 2^k changes no tree (other libraries promise none of this, least of \
+             all P5), P6 depth is reported, P7 costs are finite. Grey: not asked."
                 .into(),
         row_label: "case".into(),
         rows: scenes,

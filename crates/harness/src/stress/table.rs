@@ -4,8 +4,8 @@ use super::case::Check::{Method, Part, Refused, Scene};
 use super::case::Part::{Costs, ObjFiles, Rays, TreeFiles};
 use super::case::{Also, Case, Check, SceneCase};
 use super::checks::{files, methods, rays, scenes};
-use crate::scenes::stiff;
 use bvh_core::Aabb;
+use bvh_scenes::builtin::stiff;
 use glam::Vec3;
 
 /// The case of this identifier.

@@ -1,10 +1,11 @@
 //! Every traversal against testing every triangle, and the rays that make it hard.
 
 use super::promise::{Broken, Verdict, ensure};
-use bvh_build::{Accelerator, Builder, Structure, goldsmith_salmon, kd_tree, median_cut, muller_fellner};
+use bvh_build::{Builder, goldsmith_salmon, median_cut, muller_fellner};
 use bvh_core::{
     Aabb, Bvh, Hit, Kernel, Primitives, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants,
 };
+use bvh_scenes::trace::{Accelerator, Structure, kd_tree};
 use bvh_search::Stream;
 use glam::Vec3;
 use rand::seq::IndexedRandom;

@@ -51,7 +51,7 @@ pub fn same_topology(a: &Bvh, b: &Bvh) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenes::stiff;
+    use bvh_scenes::builtin::stiff;
 
     #[test]
     fn scaling_within_the_range_is_exact_and_beyond_it_is_not() {

@@ -1,11 +1,11 @@
 //! What the cases ask of the readers of OBJ files and tree files.
 
-use crate::scenes::mesh::Mesh;
-use crate::scenes::{obj, stiff};
 use crate::stress::promise::{Broken, Verdict, ensure};
 use crate::stress::tracing;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Primitives, Shear, Triangle, file};
+use bvh_scenes::load::mesh::Mesh;
+use bvh_scenes::{builtin::stiff, load::obj};
 use std::path::Path;
 
 /// S17: degenerate triangles are never hit, and counted by the reader.

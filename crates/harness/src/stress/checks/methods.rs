@@ -1,11 +1,11 @@
 //! What the cases ask of methods apart from their stiff scenes: scales, threads, budgets, edges of parameters.
 
-use crate::scenes::stiff;
 use crate::stress::case::is_builder;
 use crate::stress::examine::{ROUNDING, check_outcome, check_scale, on_threads, run};
 use crate::stress::promise::{Broken, Verdict, ensure};
 use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
 use bvh_core::{Aabb, cost};
+use bvh_scenes::builtin::stiff;
 use bvh_search::grasp::{self, Candidates};
 use bvh_search::{Budget, Event, Method, Observer, Outcome, Problem, Search, annealing, exact, genetic, solve};
 use glam::Vec3;

@@ -1,12 +1,14 @@
 //! What the cases ask of rays, their ranges, and the estimator that traces random ones.
 
-use crate::measure::{empirical_cost, rays::Family};
-use crate::run::rows::RayRow;
-use crate::scenes::{Scene, SceneKind, stiff};
+use crate::measure::empirical_cost;
+use crate::rows::RayRow;
 use crate::stress::promise::{Broken, Verdict, ensure};
 use crate::stress::tracing;
-use bvh_build::{Accelerator, Builder, Query, Structure, muller_fellner};
+use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Primitives, Ray, Triangle, validate};
+use bvh_scenes::rays::Family;
+use bvh_scenes::trace::{Accelerator, Query, Structure};
+use bvh_scenes::{Scene, SceneKind, builtin::stiff};
 use glam::Vec3;
 
 /// S15: zero, NaN and infinite directions and origins are refused before any traversal.

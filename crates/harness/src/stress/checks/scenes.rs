@@ -1,11 +1,11 @@
 //! What single cases promise besides P1 to P7 of one method's outcome on their scene.
 
-use crate::scenes::stiff::STADIUM;
 use crate::stress::examine::{ROUNDING, run};
 use crate::stress::promise::{Broken, Verdict, ensure};
 use crate::stress::transform::{mirrored, same_topology, shuffled};
 use bvh_build::muller_fellner;
 use bvh_core::{Aabb, Bvh, cost};
+use bvh_scenes::builtin::stiff::STADIUM;
 use bvh_search::{Method, Outcome};
 
 fn is_top_down(method: &Method) -> bool {

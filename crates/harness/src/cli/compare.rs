@@ -1,0 +1,65 @@
+//! `harness compare`: a tree against the best known one of its scene, and into the archive if it is better.
+
+use crate::Error;
+use crate::run::{archive, reference};
+use bvh_core::cost;
+use bvh_scenes::{Scene, tree_file};
+use bvh_terminal::arguments::input_folder;
+use bvh_terminal::output::print_line;
+use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
+use std::path::{Path, PathBuf};
+
+/// Compare the tree in a file, whoever made it, with the best known one of a scene; cost and validity are computed again.
+#[derive(Args, Clone, Debug)]
+pub struct CompareArgs {
+    /// The tree file.
+    #[arg(value_name = "FILE.bvh")]
+    pub file: PathBuf,
+    /// The scene it is for, by name or path of a mesh file.
+    pub scene: String,
+    /// Let a glTF file name buffers outside its own folder. Whoever made the file then says which files are read.
+    #[arg(long)]
+    pub outside_files: bool,
+    /// Folder with the best known costs, by default `results`, if it is there.
+    #[arg(long, value_name = "DIR")]
+    pub results: Option<PathBuf>,
+    /// If the tree is the best known, keep it in the archive among the results, with the command that made it.
+    #[arg(long, value_name = "COMMAND", value_parser = NonEmptyStringValueParser::new())]
+    pub keep: Option<String>,
+}
+
+/// Prints the costs of the tree and of the best known one, which is a binary tree with one object per leaf.
+pub fn compare(args: &CompareArgs) -> Result<(), Error> {
+    let file = &args.file;
+    let results = args.results.as_deref().unwrap_or(Path::new("results"));
+    if args.results.is_some() {
+        input_folder("--results", results)?;
+    }
+    if args.keep.is_some() {
+        input_folder("--keep", results)?;
+    }
+    let scene = Scene::load_with(&args.scene, args.outside_files.into())?;
+    let (tree, _) = tree_file::load(file, &scene)?;
+    let area = cost::internal_area(&tree);
+    print_line(&format!("internal area: {area}"));
+    print_line(&best_known(results, &scene, area)?);
+    if let Some(command) = &args.keep {
+        let path = archive::keep(results, &scene, file, command)?;
+        print_line(&format!("kept in: {}", path.display()));
+    }
+    Ok(())
+}
+
+/// The best known cost of the scene, its method, and the ratio of `area` to it.
+fn best_known(results: &Path, scene: &Scene, area: f64) -> Result<String, Error> {
+    let Some(best) = reference::best_known(results, scene)? else {
+        return Ok("best known internal area: none of this very scene".into());
+    };
+    Ok(format!(
+        "best known internal area: {}\nfound by: {}\ninternal area over the best known: {}",
+        best.cost,
+        best.method,
+        area / best.cost
+    ))
+}

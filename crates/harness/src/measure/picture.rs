@@ -1,0 +1,98 @@
+//! Pictures as measurements: the tests and the seconds that they take with a run's tree, with brute force and with a
+//! KD-tree.
+
+use crate::Error;
+use crate::rows::{RenderRow, RenderTimeRow, RunRow};
+use bvh_config::config;
+use bvh_core::Bvh;
+use bvh_scenes::render::{Film, Options, render, structure};
+use bvh_scenes::trace::{Accelerator, Structure};
+use bvh_scenes::{Scene, fnv1a};
+use std::borrow::Cow;
+use std::time::Instant;
+
+config! {
+    serde;
+    /// The picture that is drawn with every run's tree; it frames the whole scene.
+    pub struct Config {
+        /// In pixels.
+        width: u32 = 320, in 1..=10_000;
+        /// In pixels.
+        height: u32 = 180, in 1..=10_000;
+        /// `samples`² rays go through each pixel.
+        samples: u32 = 1, in 1..=16;
+    }
+}
+
+/// The structures that are not trees of ours: their names in tables, and the names that `--accel` accepts.
+pub const BASELINES: [(&str, &str); 2] = [("brute force", "brute"), ("KD-tree", "kdtree")];
+
+/// A picture is drawn again until this many seconds have passed.
+const REPEAT_WITHIN: f64 = 2.0;
+/// A picture is drawn at most so often.
+const MOST_REPEATS: usize = 25;
+
+impl Config {
+    /// Draws the scene on one thread with the tree of `run`, which took `build_seconds` to build. If `first`, draws it
+    /// with each of the [`BASELINES`] before that.
+    pub fn measure(
+        &self,
+        scene: &Scene,
+        tree: &Bvh,
+        run: &RunRow,
+        build_seconds: f64,
+        first: bool,
+    ) -> Result<(Vec<RenderRow>, Vec<RenderTimeRow>), Error> {
+        let mut structures = Vec::new();
+        for (label, name) in BASELINES.into_iter().filter(|_| first) {
+            let start = Instant::now();
+            let structure = structure::by_name(name, scene)?;
+            structures.push((label, structure, 0, start.elapsed().as_secs_f64()));
+        }
+        structures.push((&run.method, Structure::Tree(Cow::Borrowed(tree)), run.repetition, build_seconds));
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        let pool = pool.map_err(|error| Error::Usage(format!("cannot start a thread: {error}")))?;
+        let (mut rows, mut times) = (Vec::new(), Vec::new());
+        for (method, structure, repetition, build_seconds) in structures {
+            let accelerator = Accelerator::new(&scene.primitives, structure);
+            let (film, seconds) = pool.install(|| self.draw(scene, &accelerator));
+            let per_ray = |tests: u64| tests as f64 / film.rays as f64;
+            let (boxes, objects) = (film.counts.boxes, film.counts.objects);
+            rows.push(RenderRow {
+                scene: scene.name.clone(),
+                method: method.into(),
+                repetition,
+                objects: scene.boxes.len(),
+                rays: film.rays,
+                boxes_per_ray: per_ray(boxes),
+                objects_per_ray: per_ray(objects),
+                picture: format!("{:016x}", fnv1a(film.pixels.as_flattened().iter().copied())),
+            });
+            times.push(RenderTimeRow {
+                scene: scene.name.clone(),
+                method: method.into(),
+                repetition,
+                repeats: seconds.len(),
+                build_seconds,
+                render_seconds: seconds.into_iter().fold(f64::INFINITY, f64::min),
+            });
+        }
+        Ok((rows, times))
+    }
+
+    /// The picture, and the seconds that each repetition took.
+    fn draw(&self, scene: &Scene, accelerator: &Accelerator) -> (Film, Vec<f64>) {
+        let Self { width, height, samples } = *self;
+        let options = Options { width, height, samples, ..Options::default() };
+        let mut seconds = Vec::new();
+        loop {
+            let start = Instant::now();
+            let film = render(scene, accelerator, &options, &|| true);
+            seconds.push(start.elapsed().as_secs_f64());
+            let done = seconds.iter().sum::<f64>() >= REPEAT_WITHIN || seconds.len() == MOST_REPEATS;
+            if let Some(film) = film.filter(|_| done) {
+                return (film, seconds);
+            }
+        }
+    }
+}

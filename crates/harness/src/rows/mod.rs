@@ -1,0 +1,412 @@
+//! The rows of the CSV files: flat, units in the names, full precision.
+//!
+//! Columns that many files have are described in [`mod@columns`], and the page of all columns is made from both.
+#![allow(missing_docs, reason = "columns whose names say it all, and those above")]
+
+pub mod columns;
+pub mod lock;
+pub mod store;
+
+use crate::Error;
+use columns::Columns;
+pub use columns::{Row, read, to_bytes};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Declares kinds of rows with the names of their files.
+macro_rules! rows {
+    ($($(#[$meta:meta])* $kind:ident in $file:literal { $($(#[$of:meta])* $column:ident: $type:ty,)* })*) => {$(
+        $(#[$meta])*
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+        pub struct $kind {
+            $($(#[$of])* pub $column: $type,)*
+        }
+
+        impl Row for $kind {
+            const FILE: &'static str = $file;
+        }
+    )*
+        /// The columns of all these files.
+        pub fn columns() -> Vec<Columns> {
+            vec![$(Columns::of::<$kind>()),*]
+        }
+    };
+}
+
+rows! {
+    /// One row of `runs.csv`: what one run of one method on one scene found.
+    RunRow in "runs.csv" {
+        scene: String,
+        scene_kind: String,
+        method: String,
+        seed: u64,
+        repetition: u32,
+        objects: usize,
+        evaluations: u64,
+        work: u64,
+        /// Why it ended:
+        stop: bvh_search::StopReason,
+        /// The objective's value for the best tree found.
+        cost: f64,
+        /// The objective's value for the greedy Müller–Fellner tree of the scene, the base of ratios.
+        base_cost: f64,
+        /// `cost` divided by `base_cost`; 1 when that is 0.
+        cost_over_base: f64,
+        /// `internal_area` divided by the root's half area.
+        cost_over_root_area: f64,
+        /// The paper's objective: total half area of inner nodes, world units squared.
+        internal_area: f64,
+        goldsmith_salmon: f64,
+        /// The surface area heuristic with both constants 1.
+        sah: f64,
+        nodes: usize,
+        depth: usize,
+    }
+
+    /// One row of `history.csv`: one trial, generation or improvement of a run.
+    HistoryRow in "history.csv" {
+        scene: String,
+        method: String,
+        seed: u64,
+        repetition: u32,
+        /// Trees or moves evaluated so far.
+        evaluations: u64,
+        /// Nodes made or visited so far.
+        work: u64,
+        /// The objective's value found now.
+        cost: f64,
+        /// The lowest value so far.
+        incumbent: f64,
+    }
+
+    /// One row of `timing.csv`: how long a run took.
+    TimingRow in "timing.csv" {
+        scene: String,
+        method: String,
+        seed: u64,
+        repetition: u32,
+        threads: usize,
+        /// Wall time of the whole run.
+        seconds: f64,
+    }
+
+    /// One row of `timing_runs.csv`: what a run found that the clock ended.
+    ClockedRow in "timing_runs.csv" {
+        scene: String,
+        method: String,
+        seed: u64,
+        repetition: u32,
+        threads: usize,
+        /// Wall time of the whole run.
+        seconds: f64,
+        evaluations: u64,
+        work: u64,
+        /// As in `runs.csv`.
+        cost: f64,
+        cost_over_base: f64,
+        references_per_object: f64,
+        collapsed_sah: f64,
+    }
+
+    /// One row of `timing_third_party_trees.csv`: a third-party tree next to such runs.
+    ClockedPeerRow in "timing_third_party_trees.csv" {
+        scene: String,
+        method: String,
+        /// Wall time of its build, on one thread.
+        seconds: f64,
+        references_per_object: f64,
+        collapsed_sah: f64,
+    }
+
+    /// One row of `timing_history.csv`: when the event of the same row of `history.csv` happened.
+    ClockRow in "timing_history.csv" {
+        scene: String,
+        method: String,
+        repetition: u32,
+        /// Number of the event within its run, from 0.
+        event: usize,
+        /// Wall time since the run began.
+        seconds: f64,
+    }
+
+    /// One row of `rays.csv`: the tests that random rays took in a run's tree.
+    #[derive(Default)]
+    RayRow in "rays.csv" {
+        scene: String,
+        method: String,
+        /// Seed of the run; the rays are the same for all runs on a scene.
+        seed: u64,
+        repetition: u32,
+        /// Where the rays come from.
+        family: String,
+        /// What they ask.
+        query: String,
+        /// Number of rays.
+        rays: u64,
+        /// Fraction of them that hit something.
+        hit_fraction: f64,
+        /// Mean number of tests against boxes, the root's and the leaves' included.
+        boxes_per_ray: f64,
+        /// Of that mean.
+        boxes_standard_error: f64,
+        boxes_low: f64,
+        boxes_high: f64,
+        objects_per_ray: f64,
+        /// Of that mean.
+        objects_standard_error: f64,
+    }
+
+    /// One row of `timing_rays.csv`, of a comparison with other libraries: the speed of rays of one kind.
+    PeerRayRow in "timing_rays.csv" {
+        /// Name of the scene, or that the row is a mean over all scenes.
+        scene: String,
+        /// The processor that was measured.
+        processor: String,
+        /// The instruction set that the library is held to.
+        instructions: String,
+        /// The library, or ours.
+        library: String,
+        /// The version of the library.
+        version: String,
+        /// The library's settings and its structure for rays.
+        mode: String,
+        /// The kind of rays.
+        rays: String,
+        /// Million rays per second on one thread, each part of the rays by its fastest turn.
+        million_per_s: f64,
+        /// What tree and layout took to build; in the mean over scenes, their mean.
+        build_seconds: f64,
+        /// Rays that this contender answers otherwise than brute force.
+        disagreements: u64,
+    }
+
+    /// One row of `renders.csv`: the tests that one picture took.
+    RenderRow in "renders.csv" {
+        scene: String,
+        method: String,
+        repetition: u32,
+        objects: usize,
+        /// Number of rays: through pixels, to lights, and mirrored.
+        rays: u64,
+        /// Mean number of tests against boxes, or of cells of a KD-tree.
+        boxes_per_ray: f64,
+        objects_per_ray: f64,
+        /// 64-bit FNV-1a of the pixels: the same for all structures.
+        picture: String,
+    }
+
+    /// One row of `timing_renders.csv`: the seconds of the same row of `renders.csv`.
+    RenderTimeRow in "timing_renders.csv" {
+        scene: String,
+        method: String,
+        repetition: u32,
+        /// How often the picture was drawn.
+        repeats: usize,
+        /// Wall time of making the structure.
+        build_seconds: f64,
+        /// Wall time of drawing on one thread, the least of all repeats.
+        render_seconds: f64,
+    }
+
+    #[derive(Default)]
+    /// One row of `traversal.csv`: what rays of one kind found and took in one layout of a run's tree.
+    TraceRow in "traversal.csv" {
+        scene: String,
+        method: String,
+        layout: String,
+        /// Kind of the rays, the same ones for all methods and layouts.
+        rays: String,
+        count: u64,
+        /// How many hit something.
+        hits: u64,
+        missed_hits: u64,
+        false_hits: u64,
+        other_hits: u64,
+        /// Mean number of tests against boxes, the root's included where it is tested; 8 for every wide node.
+        boxes_per_ray: Option<f64>,
+        /// Mean number of tests against objects; 4 for every block of triangles.
+        objects_per_ray: Option<f64>,
+    }
+
+    #[derive(Default)]
+    /// One row of `timing_traversal.csv`: the time of rays of one kind in one layout of a run's tree, on one thread.
+    TraceTimeRow in "timing_traversal.csv" {
+        scene: String,
+        method: String,
+        layout: String,
+        rays: String,
+        count: u64,
+        /// Turns that were timed.
+        rounds: u32,
+        /// What it took to make the layout from the tree; for other libraries with the tree.
+        preparation_seconds: f64,
+        /// What all rays took: the sum over small parts of them of each part's fastest turn.
+        seconds: f64,
+        /// The same with each part's median turn.
+        median_seconds: f64,
+    }
+
+    /// One row of `tests.csv`: the tests of rays that a tree was not trained on, in the wide layout.
+    TestRow in "tests.csv" {
+        scene: String,
+        method: String,
+        /// The method's label, or `rays` if the tree was trained on rays.
+        tree: String,
+        /// `none`, `default` or `camera`.
+        trained_on: String,
+        /// Kind of the rays.
+        judged_on: String,
+        /// Whether they come from the training's path of cameras: `same`, `other`, or `none` without a camera.
+        camera: String,
+        /// Mean number of nodes tested per ray, eight boxes each: over all rays and repetitions.
+        node_tests: f64,
+        /// Mean number of blocks of four triangles tested per ray.
+        block_tests: f64,
+        /// Runs with other seeds and, if they are trained, other rays.
+        repetitions: usize,
+        /// Standard error of the sum of both tests over the repetitions; empty for one.
+        tests_standard_error: Option<f64>,
+        /// Number of rays.
+        rays: u64,
+    }
+
+    /// One row of `timing_ratios.csv`: the speed of rays of one kind in one of our modes, over the fastest mode of other
+    /// libraries on the same scene; after the scenes the geometric mean over them.
+    RayRatioRow in "timing_ratios.csv" {
+        scene: String,
+        /// The processor that was measured, and the instruction set that all are held to.
+        processor: String,
+        /// Our mode.
+        mode: String,
+        /// The modes compared with: `any mode`, `single calls`, those of `whole triangles`, or Embree's `robust` ones.
+        against: String,
+        /// The fastest of them on this scene; empty for means.
+        fastest: String,
+        rays: String,
+        /// Our speed over the fastest of theirs; more than 1 is faster.
+        ratio: f64,
+        /// The least ratio of one turn.
+        least_turn: f64,
+        /// The greatest ratio of one turn.
+        greatest_turn: f64,
+        /// What tree and layout took to build; in the mean over scenes, their mean.
+        build_seconds: f64,
+        /// The scene that lifts the mean most; empty for scenes.
+        carried_by: String,
+        /// The geometric mean without that scene; empty for scenes.
+        ratio_without: Option<f64>,
+    }
+
+    /// One row of `timing_tests.csv`: the speed of the same rays in the tree of the first run, on one thread.
+    TestTimeRow in "timing_tests.csv" {
+        scene: String,
+        method: String,
+        judged_on: String,
+        camera: String,
+        /// Million rays per second, each part of the rays by its fastest turn; trees take turns.
+        million_per_s: f64,
+    }
+
+    /// One row of `visits.csv`: the cost of a run's tree for one kind of rays, others than those that are tested.
+    VisitRow in "visits.csv" {
+        scene: String,
+        method: String,
+        repetition: u32,
+        rays: String,
+        /// The Goldsmith–Salmon cost by the density of these rays.
+        goldsmith_salmon: f64,
+    }
+
+    /// One row of `run_tests.csv`: the tests that rays took in the wide layout of a run's tree.
+    RunTestRow in "run_tests.csv" {
+        scene: String,
+        method: String,
+        repetition: u32,
+        judged_on: String,
+        camera: String,
+        /// Tests of nodes and of blocks of triangles per ray.
+        tests: f64,
+    }
+
+    /// One row of `layouts.csv`: the size and the cost of a method's trees and of the wide layouts that rays are traced through.
+    LayoutRow in "layouts.csv" {
+        scene: String,
+        method: String,
+        /// Trees that the numbers are means over.
+        repetitions: usize,
+        references_per_object: f64,
+        /// Of the wide layout.
+        bytes_per_object: f64,
+        collapsed_sah: f64,
+        /// Nodes and blocks of triangles that a random line through the root's box is expected to visit.
+        layout_over_root: f64,
+    }
+
+    /// One row of `memory.csv`: the most memory that a method had allocated at once, on one thread.
+    MemoryRow in "memory.csv" {
+        scene: String,
+        objects: usize,
+        method: String,
+        /// Trees, working memory and history; not the scene's boxes.
+        peak_bytes: usize,
+        bytes_per_object: f64,
+    }
+
+    /// One row of `bounds.csv`: a proven lower bound of a scene.
+    BoundRow in "bounds.csv" {
+        scene: String,
+        objects: usize,
+        /// No binary tree with one object per leaf has less `internal_area`.
+        lower_bound: f64,
+    }
+
+    /// One row of `trees.csv`: a file of the archive of best known trees.
+    TreeRow in "trees.csv" {
+        scene: String,
+        objects: usize,
+        /// Of the boxes, hexadecimal.
+        checksum: String,
+        internal_area: f64,
+        /// The greatest proven lower bound known of `internal_area`.
+        lower_bound: Option<f64>,
+        /// What made the tree.
+        command: String,
+    }
+
+    /// One row of `best_known.csv` and `references.csv`: what gaps are measured from. Trees are binary, with one object per leaf.
+    ReferenceRow in "references.csv" {
+        scene: String,
+        objects: usize,
+        /// Of the boxes, hexadecimal: scenes of the same name are told apart by it.
+        checksum: String,
+        /// Which cost.
+        objective: String,
+        /// The least known, or the exact optimum.
+        cost: f64,
+        /// Label of the method that found it; `exact` for the optimum.
+        method: String,
+        /// Seed of the run that found it.
+        seed: u64,
+        /// Git revision of the program that found it.
+        revision: String,
+        /// The greatest proven lower bound known, in the unit of `cost`.
+        lower_bound: Option<f64>,
+    }
+}
+
+/// Costs that differ by less than this, relatively, are equal: the rest is rounding.
+pub const ROUNDING: f64 = 1e-12;
+
+impl ReferenceRow {
+    /// Whether the lower bound proves the reference to be the optimum.
+    pub fn is_optimum(&self) -> bool {
+        self.lower_bound.is_some_and(|bound| bound >= self.cost * (1.0 - ROUNDING))
+    }
+}
+
+/// Reads all rows of a kind from an experiment's folder; none if no run left any.
+pub fn read_if_any<R: Row>(folder: &Path) -> Result<Vec<R>, Error> {
+    let path = folder.join(R::FILE);
+    if path.is_file() { read(&path) } else { Ok(vec![]) }
+}

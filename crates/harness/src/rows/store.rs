@@ -1,0 +1,294 @@
+//! The folder of one experiment's results: one writer at a time, finished runs kept one by one, files replaced whole.
+//!
+//! Until all runs are finished, each finished one is a folder `.partial/NNNNNN/` with its own rows. The folder is written
+//! under another name, synced, and renamed, so that every finished run survives a crash, a full disk or `kill -9`. At
+//! the end the rows of all runs are joined in the order of the spec, so that their bytes do not depend on the order in
+//! which runs finish.
+
+use super::lock::lock_folder;
+use super::{Row, read_if_any, to_bytes};
+use crate::Error;
+use bvh_scenes::fnv1a;
+use bvh_terminal::files;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+/// The file in which a kept run lists its other files, one a line: name, number of bytes and checksum.
+const CONTENTS: &str = "contents.txt";
+
+/// The rows of one finished run: one CSV file for every kind of rows that it has.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct FinishedRun {
+    files: BTreeMap<String, Vec<u8>>,
+}
+
+impl FinishedRun {
+    /// Adds rows of one kind, once per kind; none leave no file.
+    pub fn add<R: Row>(&mut self, rows: &[R]) -> Result<(), Error> {
+        if !rows.is_empty() {
+            self.files.insert(R::FILE.into(), to_bytes(rows, Path::new(R::FILE))?);
+        }
+        Ok(())
+    }
+
+    /// Reads a kept run back. Refuses one whose files are not what was written.
+    pub fn read(part: &Path) -> Result<Self, Error> {
+        let damaged = |file: &str| Error::Damaged { part: part.to_owned(), file: file.to_owned() };
+        let contents = fs::read_to_string(part.join(CONTENTS)).map_err(|_| damaged(CONTENTS))?;
+        let mut files = BTreeMap::new();
+        for name in files::names(part)?.into_iter().filter(|name| name != CONTENTS) {
+            let path = part.join(&name);
+            files.insert(name, fs::read(&path).map_err(Error::io(&path, "read the file"))?);
+        }
+        let run = Self { files };
+        let found = run.contents();
+        let [expected, found] = [&contents, &found].map(|text| text.lines().collect::<BTreeSet<&str>>());
+        match expected.symmetric_difference(&found).next() {
+            Some(line) => Err(damaged(line.split(' ').next().unwrap_or_default())),
+            // Every run has rows.
+            None if expected.is_empty() => Err(damaged(CONTENTS)),
+            None => Ok(run),
+        }
+    }
+
+    /// What [`CONTENTS`] has to say.
+    fn contents(&self) -> String {
+        let line = |(name, bytes): (&String, &Vec<u8>)| {
+            format!("{name} {} {:016x}\n", bytes.len(), fnv1a(bytes.iter().copied()))
+        };
+        self.files.iter().map(line).collect()
+    }
+
+    /// The first file, other than those with seconds, in which two runs differ.
+    pub fn difference<'a>(&'a self, other: &'a Self) -> Option<&'a str> {
+        let names = self.files.keys().chain(other.files.keys()).map(String::as_str);
+        names
+            .filter(|name| !name.starts_with("timing"))
+            .find(|&name| self.files.get(name) != other.files.get(name))
+    }
+}
+
+/// What happens to the results that are there already.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Existing {
+    /// They stay. A repetition of the same runs goes beside them; other runs are refused.
+    #[default]
+    Keep,
+    /// They stay, and those of an interrupted experiment are completed.
+    Resume,
+    /// They are replaced.
+    Replace,
+}
+
+/// What `.partial/` is called while it is removed.
+const REMOVED: &str = ".removed";
+
+/// An experiment's folder, locked until dropped.
+#[derive(Debug)]
+pub struct Store {
+    folder: PathBuf,
+    partial: PathBuf,
+    _lock: File,
+}
+
+impl Store {
+    /// Creates and locks `folder`. If the finished runs of an interrupted experiment are there, `existing` decides whether
+    /// they are resumed, which takes the same resolved spec, discarded, or the reason to refuse.
+    pub fn open(folder: &Path, resolved: &str, existing: Existing) -> Result<Self, Error> {
+        let (folder, partial) = (folder.to_owned(), folder.join(".partial"));
+        fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
+        let lock = lock_folder(&folder)?;
+        let removed = folder.join(REMOVED);
+        if removed.exists() {
+            fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))?;
+        }
+        let spec = partial.join("resolved.toml");
+        let found = fs::read_to_string(&spec).ok();
+        let refuse = |what: &str| Err(Error::Usage(format!("{}: {what}", folder.display())));
+        match (existing, found) {
+            (Existing::Resume, Some(found)) if found == resolved => {}
+            (Existing::Resume, Some(_)) => {
+                return refuse(
+                    "the interrupted experiment had another spec, scene or seed; --force discards it",
+                );
+            }
+            (Existing::Keep, Some(_)) if has_finished_runs(&partial)? => {
+                return refuse(
+                    "there are finished runs of an interrupted experiment; --resume does the rest, --force \
+                     discards them",
+                );
+            }
+            _ => {
+                if partial.is_dir() {
+                    fs::rename(&partial, &removed).map_err(Error::io(&partial, "rename the folder"))?;
+                    fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))?;
+                }
+                fs::create_dir_all(&partial).map_err(Error::io(&partial, "create the folder"))?;
+                files::write(&spec, resolved.as_bytes())?;
+            }
+        }
+        Ok(Self { folder, partial, _lock: lock })
+    }
+
+    /// Where the results go.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    fn part(&self, index: usize) -> PathBuf {
+        self.partial.join(part_name(index))
+    }
+
+    /// Whether run `index` has been kept; an error if it has, but is damaged.
+    pub fn has(&self, index: usize) -> Result<bool, Error> {
+        let part = self.part(index);
+        if part.is_dir() { FinishedRun::read(&part).map(|_| true) } else { Ok(false) }
+    }
+
+    /// Keeps run `index`, in place of a damaged one.
+    pub fn keep(&self, index: usize, run: &FinishedRun) -> Result<(), Error> {
+        let part = self.part(index);
+        let unfinished = part.with_extension("unfinished");
+        for old in [&unfinished, &part] {
+            if old.exists() {
+                fs::remove_dir_all(old).map_err(Error::io(old, "remove the folder"))?;
+            }
+        }
+        fs::create_dir(&unfinished).map_err(Error::io(&unfinished, "create the folder"))?;
+        for (name, bytes) in &run.files {
+            files::write_synced(&unfinished.join(name), bytes)?;
+        }
+        files::write_synced(&unfinished.join(CONTENTS), run.contents().as_bytes())?;
+        fs::rename(&unfinished, &part).map_err(Error::io(&part, "rename the folder"))
+    }
+
+    /// The rows of one kind that run `index`, which has been kept, left; none if it left no such rows.
+    pub fn rows<R: Row>(&self, index: usize) -> Result<Vec<R>, Error> {
+        read_if_any(&self.part(index))
+    }
+
+    /// Joins all `runs` kept runs into the CSV files.
+    pub fn join(&self, runs: usize) -> Result<(), Error> {
+        let parts: Vec<(PathBuf, BTreeSet<String>)> = (0..runs)
+            .map(|index| self.part(index))
+            .map(|part| Ok((part.clone(), files::names(&part)?)))
+            .collect::<Result<_, Error>>()?;
+        let names: BTreeSet<&String> = parts.iter().flat_map(|(_, names)| names).collect();
+        let names = names.into_iter().filter(|name| *name != CONTENTS);
+        for name in names {
+            let mut joined = Vec::new();
+            for (part, _) in parts.iter().filter(|(_, names)| names.contains(name)) {
+                let path = part.join(name);
+                let bytes = fs::read(&path).map_err(Error::io(&path, "read the file"))?;
+                // Every part begins with the same header line.
+                let header = bytes.iter().position(|&byte| byte == b'\n').map_or(bytes.len(), |end| end + 1);
+                joined.extend_from_slice(if joined.is_empty() { &bytes } else { &bytes[header..] });
+            }
+            files::write(&self.folder.join(name), &joined)?;
+        }
+        Ok(())
+    }
+
+    /// Writes the file of one kind of rows.
+    pub fn write_rows<R: Row>(&self, rows: &[R]) -> Result<(), Error> {
+        self.write(R::FILE, &to_bytes(rows, Path::new(R::FILE))?)
+    }
+
+    /// Writes another file of the results.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
+        Ok(files::write(&self.folder.join(name), bytes)?)
+    }
+
+    /// Leaves the finished runs of a shard for merging, with where they come from.
+    pub fn keep_shard(self, provenance: &str) -> Result<(), Error> {
+        Ok(files::write(&self.partial.join("provenance.toml"), provenance.as_bytes())?)
+    }
+
+    /// Removes what only an interrupted experiment needs. The lock file stays: removing it would race.
+    pub fn finish(self) -> Result<(), Error> {
+        // Renamed first, so that an interrupted removal leaves nothing that looks like finished runs.
+        let removed = self.folder.join(REMOVED);
+        fs::rename(&self.partial, &removed).map_err(Error::io(&self.partial, "rename the folder"))?;
+        fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))
+    }
+}
+
+/// The name of the folder in which run `index` is kept.
+pub fn part_name(index: usize) -> String {
+    format!("{index:06}")
+}
+
+/// Whether an interrupted experiment, or a part of one, has left finished runs in its folder.
+pub fn is_unfinished(folder: &Path) -> bool {
+    folder.join(".partial").exists()
+}
+
+fn has_finished_runs(partial: &Path) -> Result<bool, Error> {
+    let is_run = |name: &String| !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_digit());
+    Ok(files::names(partial)?.iter().any(is_run))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run() -> FinishedRun {
+        let file = |name: &str, text: &str| (name.to_owned(), text.as_bytes().to_vec());
+        FinishedRun { files: [file("runs.csv", "a,b\n1,2\n"), file("history.csv", "a\n1\n")].into() }
+    }
+
+    #[test]
+    fn a_second_writer_is_refused() {
+        let out = tempfile::tempdir().unwrap();
+        let open = || Store::open(&out.path().join("x"), "", Existing::Keep);
+        let first = open().unwrap();
+        assert!(matches!(open(), Err(Error::Busy(_))));
+        drop(first);
+        assert!(open().is_ok());
+    }
+
+    #[test]
+    fn finished_runs_are_resumed_by_the_same_spec_only_and_discarded_only_if_asked() {
+        let out = tempfile::tempdir().unwrap();
+        let open = |resolved, existing| Store::open(&out.path().join("x"), resolved, existing);
+        open("a", Existing::Keep).unwrap().keep(0, &run()).unwrap();
+        assert!(matches!(open("b", Existing::Resume), Err(Error::Usage(_))));
+        assert!(matches!(open("a", Existing::Keep), Err(Error::Usage(_))));
+        assert!(open("a", Existing::Resume).unwrap().has(0).unwrap());
+        assert!(!open("a", Existing::Replace).unwrap().has(0).unwrap());
+    }
+
+    #[test]
+    fn a_kept_run_whose_files_are_missing_cut_emptied_or_edited_is_refused_by_name() {
+        let out = tempfile::tempdir().unwrap();
+        let store = Store::open(&out.path().join("x"), "", Existing::Keep).unwrap();
+        type Damage = fn(&Path);
+        let damages: [(&str, Damage); 6] = [
+            ("runs.csv", |part| fs::remove_file(part.join("runs.csv")).unwrap()),
+            ("runs.csv", |part| fs::write(part.join("runs.csv"), "").unwrap()),
+            ("runs.csv", |part| fs::write(part.join("runs.csv"), "a,b\n").unwrap()),
+            ("history.csv", |part| fs::write(part.join("history.csv"), "a\n2\n").unwrap()),
+            ("rays.csv", |part| fs::write(part.join("rays.csv"), "a\n").unwrap()),
+            (CONTENTS, |part| fs::remove_file(part.join(CONTENTS)).unwrap()),
+        ];
+        for (file, damage) in damages {
+            store.keep(0, &run()).unwrap();
+            assert!(store.has(0).unwrap());
+            damage(&store.part(0));
+            let message = store.has(0).unwrap_err().to_string();
+            assert!(message.contains(file) && message.contains("000000"), "{message}");
+        }
+        // The run is done again, and what was damaged is replaced.
+        store.keep(0, &run()).unwrap();
+        assert!(store.has(0).unwrap());
+    }
+
+    #[test]
+    fn a_file_where_the_folder_should_be_is_named() {
+        let out = tempfile::tempdir().unwrap();
+        fs::write(out.path().join("x"), "").unwrap();
+        let message = Store::open(&out.path().join("x"), "", Existing::Keep).unwrap_err().to_string();
+        assert!(message.contains("cannot create the folder"), "{message}");
+    }
+}

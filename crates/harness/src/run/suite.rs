@@ -1,0 +1,25 @@
+//! The suite of stiff cases as a measurement.
+
+use super::measurement::{Measurement, Work};
+use crate::Error;
+use crate::stress::Measure;
+use bvh_search::Observer;
+
+/// A measurement over the suite, always from the start.
+pub(crate) struct Suite<'a>(pub &'a Measure);
+
+impl Measurement for Suite<'_> {
+    fn whole_only(&self) -> Option<&'static str> {
+        Some("the suite of cases is not done in parts")
+    }
+
+    fn measure(&self, work: &mut Work) -> Result<String, Error> {
+        let Work { experiment, store, watch, .. } = work;
+        match self.0 {
+            Measure::Stability(config) => {
+                config.execute(&experiment.scenes, &experiment.methods, store, &|| watch.cancelled())
+            }
+            Measure::Precision(config) => config.execute(store),
+        }
+    }
+}
