@@ -4,12 +4,16 @@ use std::process::Command;
 
 fn main() {
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".into());
-    let version = Command::new(rustc).arg("--version").output().ok().filter(|output| output.status.success());
+    let version =
+        Command::new(rustc).arg("--version").output().ok().filter(|output| output.status.success());
     let version = version.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
     println!("cargo:rustc-env=HARNESS_RUSTC={}", version.as_deref().unwrap_or("unknown"));
     let set = |name| std::env::var(name).unwrap_or_else(|_| "unknown".into());
-    let (profile, level, features) = (set("PROFILE"), set("OPT_LEVEL"), set("CARGO_CFG_TARGET_FEATURE"));
-    println!("cargo:rustc-env=HARNESS_BUILD={profile}, opt-level {level}, target features {features}");
+    let (profile, level, features) =
+        (set("PROFILE"), set("OPT_LEVEL"), set("CARGO_CFG_TARGET_FEATURE"));
+    println!(
+        "cargo:rustc-env=HARNESS_BUILD={profile}, opt-level {level}, target features {features}"
+    );
     println!("cargo:rustc-env=HARNESS_REVISION={}", revision().as_deref().unwrap_or("unknown"));
     for library in ["bvh", "obvhs"] {
         let version = locked_version(library).unwrap_or_else(|| "unknown".into());
@@ -46,13 +50,18 @@ fn locked_version(package: &str) -> Option<String> {
 /// may belong to another repository, and the sources may have moved on.
 fn revision() -> Option<String> {
     let git = |args: &[&str]| {
-        let output = Command::new("git").args(args).output().ok().filter(|output| output.status.success())?;
+        let output = Command::new("git")
+            .args(args)
+            .output()
+            .ok()
+            .filter(|output| output.status.success())?;
         Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
     // Sources in a folder of somebody else's repository are not of its commit.
     git(&["ls-files", "--error-unmatch", "build.rs"])?;
     // The log of HEAD changes with every commit and checkout.
     println!("cargo:rerun-if-changed={}", git(&["rev-parse", "--git-path", "logs/HEAD"])?);
-    let dirty = git(&[&["status", "--porcelain", "--untracked-files=no", "--"], &SOURCES[..]].concat())?;
+    let dirty =
+        git(&[&["status", "--porcelain", "--untracked-files=no", "--"], &SOURCES[..]].concat())?;
     Some(git(&["rev-parse", "HEAD"])? + if dirty.is_empty() { "" } else { "+" })
 }

@@ -53,12 +53,14 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let folder = PathBuf::from(std::env::args_os().nth(1).ok_or("expected the folder to write to")?);
+    let folder =
+        PathBuf::from(std::env::args_os().nth(1).ok_or("expected the folder to write to")?);
     let metadata: Value = serde_json::from_reader(io::stdin())
         .map_err(|error| format!("no output of `cargo metadata` on the standard input: {error}"))?;
     fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     for scene in &SCENES {
-        let report = put(scene, &folder, &metadata).map_err(|error| format!("{}: {error}", scene.file))?;
+        let report =
+            put(scene, &folder, &metadata).map_err(|error| format!("{}: {error}", scene.file))?;
         println!("{report}");
     }
     Ok(())
@@ -83,7 +85,9 @@ fn put(scene: &Scene, folder: &Path, metadata: &Value) -> Result<String, Box<dyn
             let found = sha256(&text);
             if found != scene.sha256 {
                 let package = &package.name;
-                return Err(format!("{package} holds SHA-256 {found}, expected {}", scene.sha256).into());
+                return Err(
+                    format!("{package} holds SHA-256 {found}, expected {}", scene.sha256).into()
+                );
             }
             write(&target, &text)?;
             (text, "written")

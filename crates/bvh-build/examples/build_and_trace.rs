@@ -3,7 +3,9 @@
 //! `cargo run -p bvh-build --example build_and_trace`
 
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::{Ray, Shear, TestCounts, Triangle, WideBvh, any_hit, boxes, cost, nearest_hit, nearest_hit_by};
+use bvh_core::{
+    Ray, Shear, TestCounts, Triangle, WideBvh, any_hit, boxes, cost, nearest_hit, nearest_hit_by,
+};
 use std::error::Error;
 
 /// Makes a bumpy ground with two triangles per square metre.

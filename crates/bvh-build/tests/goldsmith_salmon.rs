@@ -40,7 +40,10 @@ fn insert(config: &Config, boxes: &[Aabb], order: &[u32], workspace: &mut Worksp
     validate(&tree, boxes).unwrap();
     assert!(tree.is_tight(boxes));
     let recomputed = cost::goldsmith_salmon(&tree);
-    assert!((cost - recomputed).abs() <= 1e-12 * recomputed, "{cost} kept, {recomputed} recomputed");
+    assert!(
+        (cost - recomputed).abs() <= 1e-12 * recomputed,
+        "{cost} kept, {recomputed} recomputed"
+    );
     (tree, cost)
 }
 
@@ -70,7 +73,9 @@ fn sized_box(low: [f32; 3], size: [f32; 3]) -> Aabb {
     Aabb::from((low, high))
 }
 
-fn with_order(boxes: impl Strategy<Value = Vec<Aabb>>) -> impl Strategy<Value = (Vec<Aabb>, Vec<u32>)> {
+fn with_order(
+    boxes: impl Strategy<Value = Vec<Aabb>>,
+) -> impl Strategy<Value = (Vec<Aabb>, Vec<u32>)> {
     boxes.prop_flat_map(|boxes| {
         let order: Vec<u32> = (0..boxes.len() as u32).collect();
         (Just(boxes), Just(order).prop_shuffle())
@@ -201,7 +206,11 @@ fn two_small_neighbours_in_a_large_scene_become_a_pair() {
 fn an_object_as_large_as_the_scene_stays_with_the_root() {
     let boxes = [cube([0.0; 3], 1.0), cube([9.0; 3], 1.0), cube([0.0; 3], 10.0)];
     for config in &CONFIGS {
-        assert_eq!(topology(&by_index(&boxes, config).0), [Ok(3), Err(0), Err(1), Err(2)], "{config:?}");
+        assert_eq!(
+            topology(&by_index(&boxes, config).0),
+            [Ok(3), Err(0), Err(1), Err(2)],
+            "{config:?}"
+        );
     }
 }
 
@@ -260,7 +269,10 @@ fn an_invalid_order_is_rejected_and_the_tree_is_kept() {
         (vec![0, 1], InvalidOrder::Length { named: 2, objects: 3 }),
         (vec![0, 1, 2, 0], InvalidOrder::Length { named: 4, objects: 3 }),
         (vec![0, 3, 1], InvalidOrder::NoObject { position: 1, object: 3, objects: 3 }),
-        (vec![0, u32::MAX, 1], InvalidOrder::NoObject { position: 1, object: u32::MAX, objects: 3 }),
+        (
+            vec![0, u32::MAX, 1],
+            InvalidOrder::NoObject { position: 1, object: u32::MAX, objects: 3 },
+        ),
         (vec![1, 0, 1], InvalidOrder::Repeated { position: 2, object: 1 }),
     ] {
         assert_eq!(Config::default().insert_all(&scene, &order, &mut workspace), Err(expected));

@@ -29,7 +29,11 @@ fn topology(tree: &Bvh) -> Vec<Vec<u32>> {
 /// The paper's Table 1 word by word: examines every candidate of every axis, without blocks and
 /// without pruning. Returns the same topology as [`topology`], for a `weight` per object and a cost
 /// of a split from areas and loads.
-fn brute_force(boxes: &[Aabb], weights: &[f32], cost: fn([f64; 2], [f64; 2]) -> f64) -> Vec<Vec<u32>> {
+fn brute_force(
+    boxes: &[Aabb],
+    weights: &[f32],
+    cost: fn([f64; 2], [f64; 2]) -> f64,
+) -> Vec<Vec<u32>> {
     let load = |ids: &[u32]| ids.iter().map(|&id| f64::from(weights[id as usize])).sum::<f64>();
     let mut stack: Vec<Vec<u32>> = vec![(0..boxes.len() as u32).collect()];
     let mut sets = Vec::new();
@@ -48,7 +52,8 @@ fn brute_force(boxes: &[Aabb], weights: &[f32], cost: fn([f64; 2], [f64; 2]) -> 
             // If the first and the last box each span all others, all parts of all splits have the
             // same box, and the split in the middle is the only candidate.
             let around_all = around(&ids, boxes);
-            let is_spanned = boxes[ids[0] as usize] == around_all && boxes[ids[n - 1] as usize] == around_all;
+            let is_spanned =
+                boxes[ids[0] as usize] == around_all && boxes[ids[n - 1] as usize] == around_all;
             for left in if is_spanned { n / 2..n / 2 + 1 } else { 1..n } {
                 let (low, high) = ids.split_at(left);
                 let areas = [around(low, boxes).half_area(), around(high, boxes).half_area()];
@@ -231,7 +236,9 @@ fn an_error_reports_the_invalid_input() {
     assert!(negative.starts_with("the weight of object 1 is -2;"), "{negative}");
     let mut bad = boxes.clone();
     bad[2].max.y = f32::NAN;
-    assert!(matches!(Config::default().build(&bad), Err(BuildError::InvalidBox(error)) if error.index == 2));
+    assert!(
+        matches!(Config::default().build(&bad), Err(BuildError::InvalidBox(error)) if error.index == 2)
+    );
     let config = Config { heuristic: Heuristic::AreaTimesPower(1.5), ..Config::default() };
     assert_eq!(
         config.build(&boxes).unwrap_err().to_string(),

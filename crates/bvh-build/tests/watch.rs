@@ -2,8 +2,8 @@
 
 use bvh_build::top_down::{TakeBest, Workspace};
 use bvh_build::{
-    BuildError, Builder, OBJECTS_PER_POLL, Presorted, Watch, goldsmith_salmon, median_cut, muller_fellner,
-    ploc, spatial,
+    BuildError, Builder, OBJECTS_PER_POLL, Presorted, Watch, goldsmith_salmon, median_cut,
+    muller_fellner, ploc, spatial,
 };
 use bvh_core::{Aabb, Bvh, Triangle, cost, validate};
 use muller_fellner::Heuristic;
@@ -65,18 +65,27 @@ fn every_builder_ends_when_its_watch_says_so_whenever_that_is() {
             for end in [1, 2, questions / 2] {
                 let (built, questions) = pool.install(|| asked(end, build));
                 assert_eq!(built, Err(BuildError::Cancelled), "{name}");
-                assert!(questions < end + 2 * threads, "{name}: went on for {questions} questions after {end}");
+                assert!(
+                    questions < end + 2 * threads,
+                    "{name}: went on for {questions} questions after {end}"
+                );
             }
         }
     }
     let divide = |watch: &Watch| {
-        spatial::Config::default().build_watched(boxes.len() * 6 / 5, &boxes, &triangles.as_slice(), watch)
+        spatial::Config::default().build_watched(
+            boxes.len() * 6 / 5,
+            &boxes,
+            &triangles.as_slice(),
+            watch,
+        )
     };
     assert_eq!(asked(2, divide), (Err(BuildError::Cancelled), 2));
     let scene = Presorted::new(&boxes).unwrap();
     let (mut workspace, mut tree) = (Workspace::default(), Bvh::default());
     let buffers = (&mut workspace, &mut tree);
-    let construct = |watch: &Watch| power(0.9).construct(&scene, None, &mut TakeBest, buffers, watch);
+    let construct =
+        |watch: &Watch| power(0.9).construct(&scene, None, &mut TakeBest, buffers, watch);
     assert_eq!(asked(2, construct), (Err(BuildError::Cancelled), 2));
     assert_eq!(tree, Bvh::default());
 }
@@ -91,7 +100,8 @@ fn small_scenes_are_built_whatever_the_watch_says() {
 }
 
 #[test]
-fn objects_as_large_as_the_scene_are_divided_in_little_time_into_a_tree_about_as_good_as_the_greedy_one() {
+fn objects_as_large_as_the_scene_are_divided_in_little_time_into_a_tree_about_as_good_as_the_greedy_one()
+ {
     for n in [5000, 20_000, 80_000] {
         let boxes = boxes(&soup(n));
         let greedy = cost::internal_area(&muller_fellner::Config::default().build(&boxes).unwrap());

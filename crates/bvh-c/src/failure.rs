@@ -116,7 +116,10 @@ fn check<T>(name: &str, first: *const T, count: usize) -> Result<(), Failure> {
         return Err(Failure::invalid(format!("{name} is null; accepted: {count} elements")));
     }
     if !first.is_aligned() {
-        return Err(Failure::invalid(format!("{name} does not lie at a multiple of {}", align_of::<T>())));
+        return Err(Failure::invalid(format!(
+            "{name} does not lie at a multiple of {}",
+            align_of::<T>()
+        )));
     }
     if count > isize::MAX as usize / size_of::<T>() {
         return Err(Failure::invalid(format!("{name} has {count} elements, more than memory can")));
@@ -128,7 +131,11 @@ fn check<T>(name: &str, first: *const T, count: usize) -> Result<(), Failure> {
 ///
 /// # Safety
 /// `first` points to `count` elements that nobody changes while the result is in use.
-pub(crate) unsafe fn slice<'a, T>(name: &str, first: *const T, count: usize) -> Result<&'a [T], Failure> {
+pub(crate) unsafe fn slice<'a, T>(
+    name: &str,
+    first: *const T,
+    count: usize,
+) -> Result<&'a [T], Failure> {
     if count == 0 {
         return Ok(&[]);
     }
@@ -141,7 +148,11 @@ pub(crate) unsafe fn slice<'a, T>(name: &str, first: *const T, count: usize) -> 
 ///
 /// # Safety
 /// `first` points to `count` elements that nobody else uses while the result is in use.
-pub(crate) unsafe fn slice_mut<'a, T>(name: &str, first: *mut T, count: usize) -> Result<&'a mut [T], Failure> {
+pub(crate) unsafe fn slice_mut<'a, T>(
+    name: &str,
+    first: *mut T,
+    count: usize,
+) -> Result<&'a mut [T], Failure> {
     if count == 0 {
         return Ok(&mut []);
     }

@@ -60,7 +60,10 @@ fn trees_and_hits_are_those_of_the_rust_crates() {
                 bvh_tracer_nearest_hits(tracer, rays, count, coherent, hits.as_mut_ptr()),
                 BvhStatus::Ok
             );
-            assert_eq!(bvh_tracer_any_hits(tracer, rays, count, coherent, any.as_mut_ptr()), BvhStatus::Ok);
+            assert_eq!(
+                bvh_tracer_any_hits(tracer, rays, count, coherent, any.as_mut_ptr()),
+                BvhStatus::Ok
+            );
             for (index, (hit, any)) in hits.iter().zip(&any).enumerate() {
                 let ray = Ray::half_line((*rays.add(index)).origin, [0.0, 0.0, 1.0]).unwrap();
                 let expected = nearest_hit((*tree).owned.tree(), &triangles, &ray);
@@ -98,7 +101,10 @@ fn a_search_of_hours_ends_when_the_caller_says_so_and_keeps_what_it_found() {
     unsafe {
         bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut before);
         let context = (&raw mut asked).cast();
-        assert_eq!(bvh_tree_improve_until(tree, 36_000.0, Some(asked_enough), context), BvhStatus::Ok);
+        assert_eq!(
+            bvh_tree_improve_until(tree, 36_000.0, Some(asked_enough), context),
+            BvhStatus::Ok
+        );
         bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut after);
         bvh_tree_free(tree);
     }
@@ -185,7 +191,9 @@ fn what_no_call_can_take_is_refused_by_name() {
         assert_eq!((bvh_tree_cost(null(), 0, &mut cost), cost), (BvhStatus::Invalid, 7.0));
         refused("tree is null");
         assert_eq!(bvh_tree_cost(tree, 0, null_mut()), BvhStatus::Invalid);
-        assert!(bvh_tree_nodes(tree, null_mut()).is_null() && bvh_tree_nodes(null(), &mut 0).is_null());
+        assert!(
+            bvh_tree_nodes(tree, null_mut()).is_null() && bvh_tree_nodes(null(), &mut 0).is_null()
+        );
         assert_eq!(bvh_tree_improve(null_mut(), 1.0), BvhStatus::Invalid);
         let tracer = bvh_tracer_new(tree);
         let mut hit = BvhHit { t: 5.0, object: 5 };

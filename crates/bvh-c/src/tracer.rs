@@ -129,7 +129,10 @@ fn in_batches(rays: &[BvhRay], mut trace: impl FnMut(usize, &[Ray])) -> Result<(
     let mut batch = Vec::with_capacity(BATCH);
     for (number, rays) in rays.chunks(BATCH).enumerate() {
         batch.clear();
-        batch.extend(rays.iter().map(|ray| Ray::assume_valid(ray.origin, ray.direction, ray.t_min, ray.t_max)));
+        batch.extend(
+            rays.iter()
+                .map(|ray| Ray::assume_valid(ray.origin, ray.direction, ray.t_min, ray.t_max)),
+        );
         trace(number * BATCH, &batch);
     }
     Ok(())

@@ -45,7 +45,11 @@ pub enum BvhCost {
 ///
 /// `boxes` points to 6 * `count` floats.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_from_boxes(boxes: *const f32, count: usize, seconds: f64) -> *mut BvhTree {
+pub unsafe extern "C" fn bvh_tree_from_boxes(
+    boxes: *const f32,
+    count: usize,
+    seconds: f64,
+) -> *mut BvhTree {
     made(|| {
         // SAFETY: promised by the caller.
         let boxes = unsafe { boxes_of(boxes, count) }?;
@@ -131,7 +135,11 @@ impl Observer for Until {
 ///
 /// `tree` is a tree; `cost` points to a double.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_cost(tree: *const BvhTree, kind: u32, cost: *mut f64) -> BvhStatus {
+pub unsafe extern "C" fn bvh_tree_cost(
+    tree: *const BvhTree,
+    kind: u32,
+    cost: *mut f64,
+) -> BvhStatus {
     status(|| {
         let kinds = [
             (BvhCost::InternalArea, Objective::InternalArea),
@@ -166,7 +174,10 @@ pub unsafe extern "C" fn bvh_tree_nodes(tree: *const BvhTree, count: *mut usize)
 ///
 /// `tree` is a tree; `count` points to a size.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_object_ids(tree: *const BvhTree, count: *mut usize) -> *const u32 {
+pub unsafe extern "C" fn bvh_tree_object_ids(
+    tree: *const BvhTree,
+    count: *mut usize,
+) -> *const u32 {
     array(|| {
         // SAFETY: promised by the caller.
         let (tree, count) = unsafe { (given("tree", tree)?, given_mut("count", count)?) };
@@ -247,7 +258,8 @@ fn loaded(path: &str, objects: Objects) -> Result<BvhTree, Failure> {
 
 fn deadline(seconds: f64) -> Result<Deadline, Failure> {
     let time = Duration::try_from_secs_f64(seconds);
-    let refused = |_| Failure::invalid(format!("seconds is {seconds}; accepted: 0 or more, finite"));
+    let refused =
+        |_| Failure::invalid(format!("seconds is {seconds}; accepted: 0 or more, finite"));
     time.map(Deadline::after).map_err(refused)
 }
 

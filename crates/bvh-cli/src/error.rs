@@ -62,10 +62,15 @@ impl Error {
             Self::TreeFile(_) => 2,
             Self::Structure(error) => match error {
                 StructureError::File(TreeFileError::Read(error)) => of_reading(error),
-                StructureError::Unknown(_) | StructureError::Spheres(_) | StructureError::File(_) => 2,
+                StructureError::Unknown(_)
+                | StructureError::Spheres(_)
+                | StructureError::File(_) => 2,
                 StructureError::Build { .. } | StructureError::Layout { .. } => 1,
             },
-            Self::Stopped { .. } | Self::StoppedInstances { .. } | Self::Abandoned | Self::NoTree => 130,
+            Self::Stopped { .. }
+            | Self::StoppedInstances { .. }
+            | Self::Abandoned
+            | Self::NoTree => 130,
             Self::Io { .. } | Self::Search { .. } | Self::Tracing { .. } => 1,
         }
     }

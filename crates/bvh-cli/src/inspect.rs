@@ -41,7 +41,8 @@ pub struct InspectArgs {
 }
 
 /// The nodes of a tree.
-const NODES: FileKind = FileKind { name: "a CSV file of nodes", beginning: b"node,parent,", extension: "csv" };
+const NODES: FileKind =
+    FileKind { name: "a CSV file of nodes", beginning: b"node,parent,", extension: "csv" };
 /// The columns of the nodes, which docs/TREE_FILES.md describes.
 const COLUMNS: &str = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
 
@@ -138,7 +139,8 @@ fn describe(header: &Header, bytes: &[u8], facts: &mut Facts) {
         }
     };
     // The magic comes first, then the version.
-    let version = bytes[Header::MAGIC.len()..].first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+    let version =
+        bytes[Header::MAGIC.len()..].first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
     facts.add("version", version);
     facts.add("bytes", bytes.len());
     facts.add("method", &header.method);
@@ -176,7 +178,8 @@ fn measure(tree: &Bvh, facts: &mut Facts) {
 
 /// `2 × 100, 3 × 7`: sizes and how many have them.
 fn histogram(counts: &BTreeMap<u32, usize>) -> String {
-    let bins: Vec<String> = counts.iter().map(|(size, count)| format!("{size} × {count}")).collect();
+    let bins: Vec<String> =
+        counts.iter().map(|(size, count)| format!("{size} × {count}")).collect();
     if bins.is_empty() { "none".into() } else { bins.join(", ") }
 }
 

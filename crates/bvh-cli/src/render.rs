@@ -72,10 +72,13 @@ const PICTURE: FileKind = FileKind { name: "a PNG file", beginning: b"\x89PNG", 
 const LARGEST: u64 = 100_000_000;
 
 fn size(text: &str) -> Result<(u32, u32), String> {
-    let parsed =
-        text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
+    let parsed = text
+        .split_once('x')
+        .and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
     match parsed {
-        Some((width, height)) if width > 0 && height > 0 && u64::from(width) * u64::from(height) <= LARGEST => {
+        Some((width, height))
+            if width > 0 && height > 0 && u64::from(width) * u64::from(height) <= LARGEST =>
+        {
             Ok((width, height))
         }
         _ => Err(format!("accepted: width and height as in 960x540, {LARGEST} pixels at most")),
@@ -83,7 +86,8 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 }
 
 fn point(text: &str) -> Result<DVec3, String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|number| number.trim().parse().ok()).collect();
     match numbers.as_deref() {
         Some(&[x, y, z]) if [x, y, z].iter().all(|&number| (number as f32).is_finite()) => {
             Ok(DVec3::new(x, y, z))
@@ -138,7 +142,9 @@ pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> 
     let built = start.elapsed().as_secs_f64();
     let bar = ProgressBar::new(tiles(&options));
     let template = "{msg} {wide_bar} {pos}/{len} tiles, {eta} left";
-    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.set_style(
+        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
     bar.set_message(scene.name.clone());
     let tile_done = || {
         bar.inc(1);
@@ -156,7 +162,8 @@ pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> 
 
 /// Writes the picture, or its heat map.
 fn write(args: &RenderArgs, film: &Film, rays_per_pixel: u32) -> Result<(), Error> {
-    let failed = |error: String| Error::io(&args.out, "encode the picture")(std::io::Error::other(error));
+    let failed =
+        |error: String| Error::io(&args.out, "encode the picture")(std::io::Error::other(error));
     let bytes = if args.heatmap {
         let pixels = heat::map(film, rays_per_pixel).map_err(|error| failed(error.to_string()))?;
         image::png(film.width, &pixels)

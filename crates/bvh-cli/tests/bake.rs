@@ -41,35 +41,54 @@ fn a_bake_for_rays_keeps_how_often_they_visit_each_node() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("walk.toml"), WALK).unwrap();
-    for (rays, name) in [("default", "best for rays of default"), ("walk.toml", "best for rays of walk.toml")] {
+    for (rays, name) in
+        [("default", "best for rays of default"), ("walk.toml", "best for rays of walk.toml")]
+    {
         let bytes = ["1", "2"].map(|jobs| {
-            let args =
-                ["bake", "escher", "--budget", "2Mwork", "--out", "x.bvh", "--rays", rays, "--jobs", jobs];
+            let args = [
+                "bake", "escher", "--budget", "2Mwork", "--out", "x.bvh", "--rays", rays, "--jobs",
+                jobs,
+            ];
             let said = said(at, &args);
-            assert!(said.contains("wide layout for rays") && said.contains("below Müller–Fellner's"), "{said}");
+            assert!(
+                said.contains("wide layout for rays") && said.contains("below Müller–Fellner's"),
+                "{said}"
+            );
             fs::read(at.join("x.bvh")).unwrap()
         });
         assert!(bytes[0] == bytes[1], "{rays}: the same bytes on any number of threads");
         let scene = Scene::load("escher").unwrap();
-        let file = bvh_core::file::TreeFile::open(&bytes[0]).unwrap().for_boxes(&scene.boxes).unwrap();
+        let file =
+            bvh_core::file::TreeFile::open(&bytes[0]).unwrap().for_boxes(&scene.boxes).unwrap();
         assert_eq!(file.header().method, name);
         let (tree, visits) = (file.tree().unwrap(), file.visits().unwrap().unwrap());
         assert_eq!(visits[0], 1.0);
         bvh_core::WideBvh::for_rays(&tree, scene.triangles().unwrap(), &visits).unwrap();
         assert_eq!(facts(&said(at, &["inspect", "x.bvh", "escher"]))["method"], name);
-        let by_area =
-            ["bake", "escher", "--budget", "2Mwork", "--out", "x.bvh", "--rays", rays, "--cost", "area"];
+        let by_area = [
+            "bake", "escher", "--budget", "2Mwork", "--out", "x.bvh", "--rays", rays, "--cost",
+            "area",
+        ];
         assert!(said(at, &by_area).contains("visits of rays times root area"));
-        assert!(fs::read(at.join("x.bvh")).unwrap() != bytes[0], "{rays}: another cost, another tree");
+        assert!(
+            fs::read(at.join("x.bvh")).unwrap() != bytes[0],
+            "{rays}: another cost, another tree"
+        );
     }
-    fs::write(at.join("wrong.toml"), WALK.replace("bounces = 2", "bounces = 2\nbouncy = 1")).unwrap();
+    fs::write(at.join("wrong.toml"), WALK.replace("bounces = 2", "bounces = 2\nbouncy = 1"))
+        .unwrap();
     fs::write(at.join("none.toml"), "bounces = 1").unwrap();
     for (file, parts) in [
         ("wrong.toml", &["wrong.toml", "line 3", "bouncy", "bounces"][..]),
         ("none.toml", &["none.toml", "cameras is empty", "eye"]),
         ("gone.toml", &["--rays", "gone.toml", "no such file"]),
     ] {
-        refused(at, &["bake", "escher", "--budget", "1s", "--out", "y.bvh", "--rays", file], 2, parts);
+        refused(
+            at,
+            &["bake", "escher", "--budget", "1s", "--out", "y.bvh", "--rays", file],
+            2,
+            parts,
+        );
         assert!(!at.join("y.bvh").exists());
     }
 }
@@ -93,7 +112,9 @@ fn a_bake_goes_on_from_another_and_is_never_worse() {
     };
     let greedy = bake("a.bvh", &["--method", "muller_fellner", "--budget", "1s"]);
     let mut before = greedy;
-    for (seed, budget) in [("1", "0s"), ("2", "1work"), ("3", "2Mwork"), ("4", "4Mwork"), ("5", "100ms")] {
+    for (seed, budget) in
+        [("1", "0s"), ("2", "1work"), ("3", "2Mwork"), ("4", "4Mwork"), ("5", "100ms")]
+    {
         let after = bake("a.bvh", &["--from", "a.bvh", "--seed", seed, "--budget", budget]);
         assert!(after <= before, "{before} became {after} within {budget}");
         before = after;
@@ -115,7 +136,8 @@ fn a_kill_leaves_the_old_file_or_a_whole_new_one() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bvh");
     let scene = Scene::load("spheres750").unwrap();
-    let bake = ["bake", "spheres750", "--method", "muller_fellner", "--budget", "0s", "--out", "a.bvh"];
+    let bake =
+        ["bake", "spheres750", "--method", "muller_fellner", "--budget", "0s", "--out", "a.bvh"];
     said(folder.path(), &bake);
     let old = fs::read(&path).unwrap();
     let mut replaced = 0;
@@ -151,7 +173,11 @@ fn what_cannot_be_baked_or_inspected_is_said_and_nothing_is_lost() {
         (bake(&["--out", "folder"]), 2, &["folder is a folder"][..]),
         (bake(&["--out", "none/x.bvh"]), 2, &["none is no folder"]),
         (bake(&["--out", "file/x.bvh"]), 2, &["file is no folder"]),
-        (bake(&["--out", "good.bvh", "--method", "greedy"]), 2, &["greedy", "accepted: muller_fellner"]),
+        (
+            bake(&["--out", "good.bvh", "--method", "greedy"]),
+            2,
+            &["greedy", "accepted: muller_fellner"],
+        ),
         (
             bake(&["--out", "good.bvh", "--method", "grasp", "--from", "good.bvh"]),
             2,
@@ -161,8 +187,16 @@ fn what_cannot_be_baked_or_inspected_is_said_and_nothing_is_lost() {
         (bake(&["--out", "good.bvh", "--from", "flipped.bvh"]), 2, &["flipped.bvh", "checksum"]),
         (bake(&["--out", "good.bvh", "--from", "file"]), 2, &["file", "not a tree file"]),
         (bake(&["--out", "good.bvh", "--from", "x.bvh"]), 2, &["x.bvh", "no such file"]),
-        (vec!["bake", "sofa", "--budget", "1s", "--out", "good.bvh"], 2, &["sofa", "accepted: bijou"]),
-        (vec!["bake", "spheres75", "--budget", "ten", "--out", "good.bvh"], 2, &["ten", "10s", "50Mwork"]),
+        (
+            vec!["bake", "sofa", "--budget", "1s", "--out", "good.bvh"],
+            2,
+            &["sofa", "accepted: bijou"],
+        ),
+        (
+            vec!["bake", "spheres75", "--budget", "ten", "--out", "good.bvh"],
+            2,
+            &["ten", "10s", "50Mwork"],
+        ),
         (vec!["inspect", "good.bvh", "spheres750"], 2, &["good.bvh", "75 objects", "750"]),
         (vec!["inspect", "good.bvh", "spheres750:75"], 2, &["good.bvh", "another scene"]),
         (vec!["inspect", "flipped.bvh"], 2, &["flipped.bvh", "checksum"]),
@@ -192,9 +226,13 @@ fn the_facts_are_the_same_in_json() {
     let plain = facts(&said(folder.path(), &["inspect", "x.bvh", "spheres75"]));
     let json = said(folder.path(), &["inspect", "x.bvh", "spheres75", "--json"]);
     let json: BTreeMap<String, serde_json::Value> = serde_json::from_str(&json).unwrap();
-    assert!(json["objects"] == 75 && json["method"] == "best" && json["depth"].is_u64(), "{json:?}");
+    assert!(
+        json["objects"] == 75 && json["method"] == "best" && json["depth"].is_u64(),
+        "{json:?}"
+    );
     assert!(json.keys().eq(plain.keys()));
-    for what in ["internal area", "surface area heuristic", "internal area over Müller–Fellner's"] {
+    for what in ["internal area", "surface area heuristic", "internal area over Müller–Fellner's"]
+    {
         assert_eq!(json[what].as_f64(), plain[what].parse().ok(), "{what}");
     }
 }
@@ -214,7 +252,9 @@ fn the_nodes_are_written_in_full_precision() {
     let folder = tempfile::tempdir().unwrap();
     said(folder.path(), &["bake", "spheres75", "--budget", "0s", "--out", "a.bvh"]);
     said(folder.path(), &["inspect", "a.bvh", "--nodes", "nodes.csv"]);
-    let tree = tree_file::load(&folder.path().join("a.bvh"), &Scene::load("spheres75").unwrap()).unwrap().0;
+    let tree = tree_file::load(&folder.path().join("a.bvh"), &Scene::load("spheres75").unwrap())
+        .unwrap()
+        .0;
     let mut reader = csv::Reader::from_path(folder.path().join("nodes.csv")).unwrap();
     let columns = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
     assert_eq!(reader.headers().unwrap().iter().collect::<Vec<_>>().join(","), columns);
@@ -243,7 +283,8 @@ fn agree(reader: &str, output: &Output, inspected: &BTreeMap<String, String>) {
         assert_eq!(read[what], inspected[what], "{reader}: {what}");
     }
     for what in ["cost when saved", "internal area"] {
-        let [own, theirs] = [&inspected[what], &read[what]].map(|value| value.parse::<f64>().unwrap());
+        let [own, theirs] =
+            [&inspected[what], &read[what]].map(|value| value.parse::<f64>().unwrap());
         assert!((own - theirs).abs() <= 1e-12 * own, "{reader}: {what}: {theirs}, not {own}");
     }
 }
@@ -264,7 +305,8 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_refuse_damage() {
         fs::write(at.join(format!("{index}.damaged")), bytes).unwrap();
     }
     let mut readers = Vec::new();
-    if Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success()) {
+    if Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success())
+    {
         readers.push(("python3", vec![scripts.join("read_tree.py")]));
     }
     let built = Command::new("c++")
@@ -278,7 +320,8 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_refuse_damage() {
     }
     for (name, args) in &readers {
         let program = if args.is_empty() { at.join(name).into_os_string() } else { name.into() };
-        let read = |file: String| Command::new(&program).args(args).arg(at.join(file)).output().unwrap();
+        let read =
+            |file: String| Command::new(&program).args(args).arg(at.join(file)).output().unwrap();
         for index in 0..trees.len() {
             let inspected = facts(&said(at, &["inspect", &format!("{index}.bvh")]));
             agree(name, &read(format!("{index}.bvh")), &inspected);

@@ -40,13 +40,24 @@ fn a_bake_that_is_interrupted_early_is_not_behind_plain_reinsertion() {
     let folder = tempfile::tempdir().unwrap();
     let cost = |file: &str| cost(folder.path(), file);
     let begin = Instant::now();
-    let args = ["bake", "konistil", "--method", "reinsertion", "--budget", "1000Gwork", "--out", "plain.bvh"];
+    let args = [
+        "bake",
+        "konistil",
+        "--method",
+        "reinsertion",
+        "--budget",
+        "1000Gwork",
+        "--out",
+        "plain.bvh",
+    ];
     said(folder.path(), &args);
     // Long enough for reinsertion and the starts that precede it, on a busy machine too; the heat of a long search has not paid by then.
     let (plain, after) = (cost("plain.bvh"), Duration::from_secs(1) + 8 * begin.elapsed());
-    for more in
-        [&["--budget", "1h"][..], &["--budget", "1000Gwork"], &["--budget", "1h", "--references", "1.2"]]
-    {
+    for more in [
+        &["--budget", "1h"][..],
+        &["--budget", "1000Gwork"],
+        &["--budget", "1h", "--references", "1.2"],
+    ] {
         interrupted(folder.path(), more, after);
         // Where leaves may be divided they are part of the measure, and moves that save as much come in another order.
         let most = if more.contains(&"--references") { 1.0001 } else { 1.0 };

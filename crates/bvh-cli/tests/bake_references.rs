@@ -20,7 +20,10 @@ fn a_bake_divides_objects_where_that_pays_and_searches_by_the_cost_of_the_layout
     let number = |facts: &BTreeMap<String, String>, what: &str| facts[what].parse::<f64>().unwrap();
     let (_, whole) = bake("whole.bvh", &[]);
     let (said_split, split) = bake("split.bvh", &["--references", "1.3"]);
-    assert!(said_split.contains("area of all nodes") && said_split.contains(" references to "), "{said_split}");
+    assert!(
+        said_split.contains("area of all nodes") && said_split.contains(" references to "),
+        "{said_split}"
+    );
     let (objects, references) = (number(&split, "objects"), number(&split, "references"));
     assert_eq!(number(&whole, "references"), objects);
     assert!(references > objects && references <= 1.3 * objects, "{references} of {objects}");
@@ -29,8 +32,9 @@ fn a_bake_divides_objects_where_that_pays_and_searches_by_the_cost_of_the_layout
     assert!(said_layout.contains("cost of the wide layout"), "{said_layout}");
     assert_eq!(layout["objective"], "cost of the wide layout, by area");
     let scene = Scene::load("pinecon2").unwrap();
-    let costs = ["layout.bvh", "whole.bvh"]
-        .map(|file| bvh_core::cost::layout_area(&tree_file::load(&at.join(file), &scene).unwrap().0));
+    let costs = ["layout.bvh", "whole.bvh"].map(|file| {
+        bvh_core::cost::layout_area(&tree_file::load(&at.join(file), &scene).unwrap().0)
+    });
     assert!(costs[0] < costs[1], "{costs:?}");
     bake("further.bvh", &["--references", "1.3", "--from", "split.bvh"]);
     said(at, &["render", "pinecon2", "--accel", "split.bvh", "--out", "a.png", "--size", "16x16"]);
@@ -43,13 +47,15 @@ fn a_bake_of_a_scene_that_needs_no_divided_objects_says_so_and_pays_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let bake = |scene: &str, cost: &str, references: &str| {
-        let args = ["bake", scene, "--budget", "300kwork", "--out", "x.bvh", "--explain", "--cost", cost];
+        let args =
+            ["bake", scene, "--budget", "300kwork", "--out", "x.bvh", "--explain", "--cost", cost];
         let said = said(at, &[&args[..], &["--references", references]].concat());
         (said, fs::read(at.join("x.bvh")).unwrap())
     };
     for scene in ["spheres75", "S04:3000"] {
         for cost in ["area", "layout"] {
-            let [(_, whole), (said, allowed)] = ["1", "1.5"].map(|references| bake(scene, cost, references));
+            let [(_, whole), (said, allowed)] =
+                ["1", "1.5"].map(|references| bake(scene, cost, references));
             assert!(
                 said.contains("left out: divided objects") && said.contains("no object is divided"),
                 "{said}"
@@ -57,6 +63,7 @@ fn a_bake_of_a_scene_that_needs_no_divided_objects_says_so_and_pays_nothing() {
             assert!(whole == allowed, "{scene}, {cost}: another tree");
         }
     }
-    let [(_, whole), (said, allowed)] = ["1", "1.5"].map(|references| bake("pinecon2", "layout", references));
+    let [(_, whole), (said, allowed)] =
+        ["1", "1.5"].map(|references| bake("pinecon2", "layout", references));
     assert!(!said.contains("divided objects") && whole != allowed, "{said}");
 }

@@ -6,7 +6,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Stdio;
 use support::{
-    ReadOnly, ended, names, outside_buffer, outside_scene, program, refused, said, unsaid, wrong_flags,
+    ReadOnly, ended, names, outside_buffer, outside_scene, program, refused, said, unsaid,
+    wrong_flags,
 };
 
 #[test]
@@ -17,11 +18,16 @@ fn scenes_are_listed_with_what_they_stand_in_for() {
 #[test]
 fn every_shell_and_the_manual_get_all_commands() {
     let folder = tempfile::tempdir().unwrap();
-    for args in [&["man"][..], &["completions", "bash"], &["completions", "zsh"], &["completions", "fish"]] {
+    for args in
+        [&["man"][..], &["completions", "bash"], &["completions", "zsh"], &["completions", "fish"]]
+    {
         let said = said(folder.path(), args);
         for part in ["inspect", "budget", "Number of threads", "heatmap"] {
             // Bash has no room for explanations.
-            assert!(said.contains(part) || (args[1..] == ["bash"] && part.contains(' ')), "{args:?}: {part}");
+            assert!(
+                said.contains(part) || (args[1..] == ["bash"] && part.contains(' ')),
+                "{args:?}: {part}"
+            );
         }
     }
 }
@@ -36,7 +42,10 @@ fn no_command_replaces_a_file_of_another_kind() {
     let no = |args: &[&str], parts: &[&str]| refused(at, args, 2, parts);
     no(&["bake", "mesh.obj", "--budget=0s", "--out=mesh.obj"], &["--out", "mesh.obj", "tree file"]);
     no(&["render", "mesh.obj", "--size=8x8", "--out=mesh.obj"], &["--out", "mesh.obj", "PNG"]);
-    no(&["render", "mesh.obj", "--accel=tree.bvh", "--out=tree.bvh"], &["--out", "tree.bvh", "PNG"]);
+    no(
+        &["render", "mesh.obj", "--accel=tree.bvh", "--out=tree.bvh"],
+        &["--out", "tree.bvh", "PNG"],
+    );
     no(&["inspect", "tree.bvh", "--nodes=tree.bvh"], &["--nodes", "tree.bvh", "CSV"]);
     assert_eq!(fs::read_to_string(at.join("mesh.obj")).unwrap(), mesh);
     // Files of the same kind are replaced.
@@ -100,14 +109,21 @@ fn what_cannot_be_said_is_an_error_and_a_reader_that_left_is_none() {
         assert!(child.wait().unwrap().success(), "{args:?}");
     }
     // A file is put in the place of what has its name: never of a device.
-    refused(folder.path(), &["render", "spheres75", "--out", "/dev/full"], 2, &["--out", "/dev/full"]);
+    refused(
+        folder.path(),
+        &["render", "spheres75", "--out", "/dev/full"],
+        2,
+        &["--out", "/dev/full"],
+    );
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn help_and_version_that_cannot_be_said_are_errors() {
     let folder = tempfile::tempdir().unwrap();
-    for args in [&["--help"][..], &["--version"], &["-h"], &["bake", "--help"], &["help", "inspect"]] {
+    for args in
+        [&["--help"][..], &["--version"], &["-h"], &["bake", "--help"], &["help", "inspect"]]
+    {
         unsaid(folder.path(), args);
     }
 }
@@ -168,7 +184,8 @@ fn a_wrong_value_of_any_flag_is_refused_by_name() {
 }
 
 #[test]
-fn a_buffer_outside_the_folder_of_a_scene_is_read_by_every_command_that_is_told_so_and_by_no_other() {
+fn a_buffer_outside_the_folder_of_a_scene_is_read_by_every_command_that_is_told_so_and_by_no_other()
+{
     let folder = tempfile::tempdir().unwrap();
     let at = &folder.path().join("inner");
     fs::create_dir(at).unwrap();

@@ -14,7 +14,10 @@ fn every_description_of_rays_is_baked_for_as_it_is_printed() {
     for block in blocks_in("toml").into_iter().filter(|block| block.text.contains("cameras = ")) {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("rays.toml"), &block.text).unwrap();
-        said(folder.path(), &["bake", "escher:60", "--budget=1kwork", "--rays=rays.toml", "--out=x.bvh"]);
+        said(
+            folder.path(),
+            &["bake", "escher:60", "--budget=1kwork", "--rays=rays.toml", "--out=x.bvh"],
+        );
         descriptions += 1;
     }
     assert!(descriptions > 0);

@@ -12,7 +12,16 @@ fn every_structure_and_any_number_of_threads_write_the_same_file() {
     let mut files = BTreeSet::new();
     let structures = ["brute", "kdtree", "bvh", "wide"];
     for (accel, jobs) in structures.into_iter().zip(["1", "2", "3", "1"]) {
-        let args = ["render", "escher:cluster:300:1", "--out", "p.png", "--size", "50x31", "--accel", accel];
+        let args = [
+            "render",
+            "escher:cluster:300:1",
+            "--out",
+            "p.png",
+            "--size",
+            "50x31",
+            "--accel",
+            accel,
+        ];
         let said = said(folder.path(), &[&args[..], &["--jobs", jobs]].concat());
         assert_eq!(said.contains("per ray"), accel != "wide", "{said}");
         files.insert(fs::read(folder.path().join("p.png")).unwrap());
@@ -24,9 +33,12 @@ fn every_structure_and_any_number_of_threads_write_the_same_file() {
 fn the_eye_may_be_anywhere_and_the_scene_a_single_point() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("point.obj"), "v 1 2 3\nv 1 2 3\nv 1 2 3\nf 1 2 3\n").unwrap();
-    fs::write(folder.path().join("flat.obj"), "v 0 0 0\nv 1e30 0 0\nv 0 0 1e30\nf 1 2 3\n").unwrap();
+    fs::write(folder.path().join("flat.obj"), "v 0 0 0\nv 1e30 0 0\nv 0 0 1e30\nf 1 2 3\n")
+        .unwrap();
     for scene in ["point.obj", "flat.obj"] {
-        for eye in [&[][..], &["--from", "-1,2,3", "--at", "-1,2,3"], &["--from", "1,2,3", "--no-lights"]] {
+        for eye in
+            [&[][..], &["--from", "-1,2,3", "--at", "-1,2,3"], &["--from", "1,2,3", "--no-lights"]]
+        {
             let args = ["render", scene, "--out", "p.png", "--size", "20x10", "--heatmap"];
             said(folder.path(), &[&args, eye].concat());
         }

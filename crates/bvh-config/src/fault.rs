@@ -20,7 +20,11 @@ pub struct Fault {
 
 impl Fault {
     /// The refusal of the value `found` of `key`.
-    pub fn new(key: impl fmt::Display, found: impl fmt::Display, accepted: impl fmt::Display) -> Self {
+    pub fn new(
+        key: impl fmt::Display,
+        found: impl fmt::Display,
+        accepted: impl fmt::Display,
+    ) -> Self {
         OutOfRange::new(key, found, accepted).into()
     }
 
@@ -33,7 +37,8 @@ impl Fault {
 
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rest = if self.key.is_empty() { self.rest.trim_start_matches([':', ' ']) } else { &self.rest };
+        let rest =
+            if self.key.is_empty() { self.rest.trim_start_matches([':', ' ']) } else { &self.rest };
         write!(f, "{}{rest}", self.key)
     }
 }
@@ -61,8 +66,12 @@ const MOST_FAULTS: usize = 100;
 
 /// Deserialises a table by `read`, and checks the ranges. Serde stops at the first error: what it refuses is left out, and the
 /// rest is read again, with a default in its place.
-fn tracked<T: Check>(table: Table, read: impl Fn(Tracked) -> Result<T, toml::de::Error>) -> Read<T> {
-    let (mut faults, mut left_out, mut table) = (Vec::<Fault>::new(), Vec::new(), Value::Table(table));
+fn tracked<T: Check>(
+    table: Table,
+    read: impl Fn(Tracked) -> Result<T, toml::de::Error>,
+) -> Read<T> {
+    let (mut faults, mut left_out, mut table) =
+        (Vec::<Fault>::new(), Vec::new(), Value::Table(table));
     while faults.len() < MOST_FAULTS {
         let mut track = Track::new();
         let error = match read(Deserializer::new(table.clone(), &mut track)) {
@@ -70,7 +79,8 @@ fn tracked<T: Check>(table: Table, read: impl Fn(Tracked) -> Result<T, toml::de:
             Ok(value) => {
                 let ranges = value.faults().into_iter().map(Fault::from);
                 // A list is empty if an element was refused.
-                let apart = |late: &Fault| !faults.iter().any(|fault| is_within(&fault.key, &late.key));
+                let apart =
+                    |late: &Fault| !faults.iter().any(|fault| is_within(&fault.key, &late.key));
                 let ranges: Vec<Fault> = ranges.filter(apart).collect();
                 return (Some(value), [faults, ranges].concat());
             }
@@ -99,10 +109,13 @@ fn tracked<T: Check>(table: Table, read: impl Fn(Tracked) -> Result<T, toml::de:
 fn leave_out(value: &mut Value, steps: &[&Segment]) -> Option<String> {
     match (steps, value) {
         ([Segment::Map { key }], Value::Table(table)) => table.remove(key).map(|_| key.clone()),
-        ([Segment::Map { key } | Segment::Enum { variant: key }, below @ ..], Value::Table(table)) => {
-            leave_out(table.get_mut(key)?, below)
+        (
+            [Segment::Map { key } | Segment::Enum { variant: key }, below @ ..],
+            Value::Table(table),
+        ) => leave_out(table.get_mut(key)?, below),
+        ([Segment::Seq { index }, below @ ..], Value::Array(list)) => {
+            leave_out(list.get_mut(*index)?, below)
         }
-        ([Segment::Seq { index }, below @ ..], Value::Array(list)) => leave_out(list.get_mut(*index)?, below),
         _ => None,
     }
 }
@@ -154,7 +167,8 @@ pub fn say(faults: &[Fault], text: &str, file: &str, above: Option<&str>) -> Str
         let replaced = replaced.filter(|_| replaced != of_table);
         replaced.or_else(|| start(&fault.key))
     };
-    let mut placed: Vec<(Option<usize>, &Fault)> = faults.iter().map(|fault| (place(fault), fault)).collect();
+    let mut placed: Vec<(Option<usize>, &Fault)> =
+        faults.iter().map(|fault| (place(fault), fault)).collect();
     placed.sort_by_key(|(at, _)| *at);
     let mut known = HashSet::new();
     placed.retain(|(_, fault)| known.insert(&fault.key));
@@ -191,9 +205,10 @@ mod tests {
 
     #[test]
     fn the_line_of_a_key_is_found_in_tables_and_lists() {
-        let text =
-            "a = 1\nb = [\n  { c = 1 },\n  { c = 2 },\n]\n[d]\n\"e f\" = 1\n[[g]]\nh = 1\n[[g]]\nh = 2\n";
-        for (key, line) in [("a", 1), ("b[1].c", 4), ("d.e f", 7), ("d.none", 6), ("g[1].h", 11), ("b[7]", 2)] {
+        let text = "a = 1\nb = [\n  { c = 1 },\n  { c = 2 },\n]\n[d]\n\"e f\" = 1\n[[g]]\nh = 1\n[[g]]\nh = 2\n";
+        for (key, line) in
+            [("a", 1), ("b[1].c", 4), ("d.e f", 7), ("d.none", 6), ("g[1].h", 11), ("b[7]", 2)]
+        {
             let said = say(&[Fault::new(key, 1, 2)], text, "", None);
             assert_eq!(said, format!("line {line}: {key} is 1; accepted: 2"));
         }

@@ -108,7 +108,10 @@ pub trait Keys {
 /// Adds what each field accepts to its description in the JSON schema of the configuration.
 #[cfg(feature = "schema")]
 pub fn describe_accepted<C: Keys>(schema: &mut schemars::Schema) {
-    let Some(fields) = schema.get_mut("properties").and_then(|fields| fields.as_object_mut()) else { return };
+    let Some(fields) = schema.get_mut("properties").and_then(|fields| fields.as_object_mut())
+    else {
+        return;
+    };
     for (key, accepted) in C::KEYS.iter().zip(C::accepted()) {
         let description = fields.get_mut(*key).and_then(|field| field.get_mut("description"));
         if let (Some(words), Some(text)) = (accepted, description) {
@@ -309,8 +312,10 @@ mod tests {
 
     #[test]
     fn every_field_says_in_words_what_it_accepts_beyond_its_type() {
-        let said =
-            Outer::KEYS.iter().zip(Outer::accepted()).map(|(key, words)| (*key, words.unwrap_or_default()));
+        let said = Outer::KEYS
+            .iter()
+            .zip(Outer::accepted())
+            .map(|(key, words)| (*key, words.unwrap_or_default()));
         let expected = [
             ("part", "above 0, up to 1"),
             ("factor", "above 0"),
@@ -335,13 +340,20 @@ mod tests {
         expect(|outer| outer.part = f64::NAN, "part is NaN; accepted: above 0, up to 1");
         expect(|outer| outer.factor = f64::INFINITY, "factor is inf; accepted: above 0");
         expect(|outer| outer.sizes = vec![1, 0], "sizes[1] is 0; accepted: 1 or more");
-        expect(|outer| outer.sizes = vec![2, 1], "sizes is not sorted; accepted: ascending numbers");
+        expect(
+            |outer| outer.sizes = vec![2, 1],
+            "sizes is not sorted; accepted: ascending numbers",
+        );
         let name = |outer: &mut Outer| outer.by_name = BTreeMap::from([("a".into(), [0.0, 10.0])]);
         expect(name, "by_name.a[1] is 10; accepted: at most 9");
         let inner = |outer: &mut Outer| outer.inner = vec![Inner::default(), Inner { limit: 0.0 }];
         expect(inner, "inner[1].limit is 0; accepted: 1 to inf");
-        let outer =
-            Outer { part: 0.0, sizes: vec![0, 7, 0], inner: vec![Inner { limit: 0.0 }], ..Outer::default() };
+        let outer = Outer {
+            part: 0.0,
+            sizes: vec![0, 7, 0],
+            inner: vec![Inner { limit: 0.0 }],
+            ..Outer::default()
+        };
         let keys: Vec<String> = outer.faults().into_iter().map(|fault| fault.key).collect();
         assert_eq!(keys, ["part", "sizes[0]", "sizes[2]", "inner[0].limit", "sizes"]);
     }

@@ -19,7 +19,8 @@ fn triangles() -> Vec<Triangle> {
 /// A custom builder. Like most builders it makes plain nodes: two children at `first`, or `count`
 /// objects from `first` on.
 fn halves(boxes: &[Aabb]) -> Vec<FirstCountNode> {
-    let mut nodes = vec![FirstCountNode { first: 0, count: boxes.len() as u32, ..Default::default() }];
+    let mut nodes =
+        vec![FirstCountNode { first: 0, count: boxes.len() as u32, ..Default::default() }];
     let mut index = 0;
     while index < nodes.len() {
         let FirstCountNode { first, count, .. } = nodes[index];
@@ -34,7 +35,11 @@ fn halves(boxes: &[Aabb]) -> Vec<FirstCountNode> {
             nodes[index].first = nodes.len() as u32;
             nodes[index].count = 0;
             nodes.push(FirstCountNode { first, count: half, ..Default::default() });
-            nodes.push(FirstCountNode { first: first + half, count: count - half, ..Default::default() });
+            nodes.push(FirstCountNode {
+                first: first + half,
+                count: count - half,
+                ..Default::default()
+            });
         }
         index += 1;
     }

@@ -206,7 +206,8 @@ mod tests {
                 let mut corners = [[0.0f32; 3], [1.0; 3]];
                 corners[plane / 3][plane % 3] = shifted;
                 let other = Aabb::from(corners);
-                let inside = inside || (plane < 3 && shifted == 1.5) || (plane >= 3 && shifted == -0.5);
+                let inside =
+                    inside || (plane < 3 && shifted == 1.5) || (plane >= 3 && shifted == -0.5);
                 assert_eq!(unit.contains(&other), inside, "{other:?}");
             }
         }

@@ -61,7 +61,11 @@ impl Node {
     pub fn kind(&self) -> NodeKind {
         let first = self.first;
         let count = self.tagged_count & !LEAF;
-        if self.is_leaf() { NodeKind::Leaf { first, count } } else { NodeKind::Inner { first, count } }
+        if self.is_leaf() {
+            NodeKind::Leaf { first, count }
+        } else {
+            NodeKind::Inner { first, count }
+        }
     }
 
     /// Moves the start of the node's range, of children or of entries in `prim_ids`, to `first`.

@@ -107,7 +107,8 @@ pub(crate) fn binary_visited<'t>(tree: &'t Bvh, visits: &mut Vec<f32>) -> Cow<'t
             }
             [node] => (node.aabb, node.children()),
             several => {
-                let aabb = several.iter().fold(Aabb::EMPTY, |around, node| around.union(&node.aabb));
+                let aabb =
+                    several.iter().fold(Aabb::EMPTY, |around, node| around.union(&node.aabb));
                 (aabb, siblings)
             }
         };
@@ -143,7 +144,8 @@ pub(crate) mod tests {
     /// object per leaf.
     pub(crate) fn scene(n: u32, seed: u32) -> (Vec<Triangle>, Bvh) {
         let triangles: Vec<Triangle> = (0..n).map(|i| triangle(i, seed)).collect();
-        let mut tree = Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, n)], prim_ids: (0..n).collect() };
+        let mut tree =
+            Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, n)], prim_ids: (0..n).collect() };
         let mut node = 0;
         while node < tree.nodes.len() {
             let range = tree.nodes[node].prims();

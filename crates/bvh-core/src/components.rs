@@ -82,7 +82,10 @@ impl<'a> RayComponents<'a> {
     ) -> Self {
         let count = origin[0].len();
         let are_equal = origin.iter().chain(&direction).all(|component| component.len() == count);
-        assert!(are_equal && t_min.is_for(count) && t_max.is_for(count), "slices of the same length");
+        assert!(
+            are_equal && t_min.is_for(count) && t_max.is_for(count),
+            "slices of the same length"
+        );
         Self { origin, direction, t_min, t_max }
     }
 

@@ -12,7 +12,11 @@ pub use crate::overlap::{EndPointOverlap, Overlap, end_point_overlap};
 
 /// The cost that a search minimises and that results report in the column `cost`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Objective {
     /// [`internal_area`], the paper's objective.
@@ -49,7 +53,9 @@ impl Objective {
                 let size = |node: &Node| if node.is_leaf() { 0.0 } else { size_by(measure, node) };
                 over(root, by_children(tree, size))
             }
-            Self::Sah(constants) => over(root, by_tests(tree, constants, |node| size_by(measure, node))),
+            Self::Sah(constants) => {
+                over(root, by_tests(tree, constants, |node| size_by(measure, node)))
+            }
             Self::Layout => layout_measure(tree, measure),
         }
     }
@@ -301,7 +307,8 @@ mod tests {
 
     /// Unit cubes at x = 0 and x = 2 under one root of half area 7.
     fn two_cubes() -> Bvh {
-        let boxes = [Aabb::from(([0.0; 3], [1.0; 3])), Aabb::from(([2.0, 0.0, 0.0], [3.0, 1.0, 1.0]))];
+        let boxes =
+            [Aabb::from(([0.0; 3], [1.0; 3])), Aabb::from(([2.0, 0.0, 0.0], [3.0, 1.0, 1.0]))];
         let root = Node::inner(boxes[0].union(&boxes[1]), 1, 2);
         let nodes = vec![root, Node::leaf(boxes[0], 0, 1), Node::leaf(boxes[1], 1, 1)];
         Bvh { nodes, prim_ids: vec![0, 1] }
@@ -324,7 +331,8 @@ mod tests {
                 assert_eq!(error, alloc::format!("{wrong} is not a constant from 0 to 1e200"));
             }
         }
-        let largest_box = Aabb { min: glam::Vec3::splat(f32::MIN), max: glam::Vec3::splat(f32::MAX) };
+        let largest_box =
+            Aabb { min: glam::Vec3::splat(f32::MIN), max: glam::Vec3::splat(f32::MAX) };
         let largest_leaf = Node::leaf(largest_box, 0, u32::MAX >> 1);
         let tree = Bvh { nodes: vec![largest_leaf; 100], prim_ids: vec![] };
         let constants = SahConstants::new(SahConstants::MAX, SahConstants::MAX).unwrap();
@@ -354,7 +362,8 @@ mod tests {
     #[test]
     fn a_sum_does_not_depend_on_the_order_of_its_terms() {
         // The terms span 30 orders of magnitude, so plain sums would differ.
-        let terms: Vec<f64> = (0..1000).map(|i| f64::from(i * i % 997) * 10f64.powi(i % 30)).collect();
+        let terms: Vec<f64> =
+            (0..1000).map(|i| f64::from(i * i % 997) * 10f64.powi(i % 30)).collect();
         let forwards: Sum = terms.iter().copied().collect();
         let backwards: Sum = terms.iter().rev().copied().collect();
         assert_eq!(forwards.value(), backwards.value());

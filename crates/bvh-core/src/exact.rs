@@ -177,7 +177,11 @@ impl Line {
         }
         let (low_rounded, high_rounded) = (low as f32, high as f32);
         if low >= 0.0 && low_rounded == high_rounded {
-            return if high_rounded.is_finite() { Verdict::Hit(high_rounded) } else { Verdict::Miss };
+            return if high_rounded.is_finite() {
+                Verdict::Hit(high_rounded)
+            } else {
+                Verdict::Miss
+            };
         }
         Verdict::Unsure
     }

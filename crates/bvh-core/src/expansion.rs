@@ -67,7 +67,11 @@ impl<const N: usize> Expansion<N> {
     }
 
     /// Adds the product of two expansions: two terms at most for each pair of their terms.
-    pub(crate) fn add_product<const A: usize, const B: usize>(&mut self, a: &Expansion<A>, b: &Expansion<B>) {
+    pub(crate) fn add_product<const A: usize, const B: usize>(
+        &mut self,
+        a: &Expansion<A>,
+        b: &Expansion<B>,
+    ) {
         for &term in b.terms() {
             self.add_scaled(a, term);
         }

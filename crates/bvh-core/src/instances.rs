@@ -28,7 +28,9 @@
 //! # Ok::<(), bvh_core::InvalidInstances>(())
 //! ```
 
-use crate::{Aabb, Bvh, Hit, InvalidBvh, Ray, Slabs, WideBvh, any_hit_by, nearest_hit_by, validate};
+use crate::{
+    Aabb, Bvh, Hit, InvalidBvh, Ray, Slabs, WideBvh, any_hit_by, nearest_hit_by, validate,
+};
 use alloc::vec::Vec;
 use glam::{Affine3A, DAffine3, DMat3, DVec3};
 
@@ -84,8 +86,10 @@ impl Instance {
         }
         let matrix = self.transform.matrix3.to_cols_array().map(f64::from);
         let translation = self.transform.translation.to_array().map(f64::from);
-        let transform =
-            DAffine3::from_mat3_translation(DMat3::from_cols_array(&matrix), DVec3::from_array(translation));
+        let transform = DAffine3::from_mat3_translation(
+            DMat3::from_cols_array(&matrix),
+            DVec3::from_array(translation),
+        );
         let inverse = transform.inverse();
         // The box of the transformed box, column by column (Arvo 1990, 'Transforming axis-aligned
         // bounding boxes'). `size` bounds every intermediate result.
@@ -159,7 +163,11 @@ impl Instances {
     /// Makes a scene of `instances` of `parts`, with a tree over the [boxes of the
     /// instances](Instance::boxes). If instances move, they need a refitted or new tree, but no new
     /// parts. O(instances).
-    pub fn new(parts: Vec<WideBvh>, instances: Vec<Instance>, top: Bvh) -> Result<Self, InvalidInstances> {
+    pub fn new(
+        parts: Vec<WideBvh>,
+        instances: Vec<Instance>,
+        top: Bvh,
+    ) -> Result<Self, InvalidInstances> {
         let placed = place_all(&instances, &parts)?;
         let boxes: Vec<Aabb> = placed.iter().map(|placed| placed.aabb).collect();
         validate(&top, &boxes)?;

@@ -47,7 +47,8 @@ pub use ray_density::{DensityError, RayDensity, Segment};
 pub use slabs::{Slabs, clip_to_box};
 pub use sphere::Sphere;
 pub use traverse::{
-    Counter, TestCounts, any_hit, any_hit_by, any_hit_of_all, nearest_hit, nearest_hit_by, nearest_hit_of_all,
+    Counter, TestCounts, any_hit, any_hit_by, any_hit_of_all, nearest_hit, nearest_hit_by,
+    nearest_hit_of_all,
 };
 pub use triangle::{Shear, Triangle};
 pub use validate::{InvalidBvh, validate, validate_references};

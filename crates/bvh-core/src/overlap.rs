@@ -81,7 +81,8 @@ impl<'a> EndPointOverlap<'a> {
     pub fn new(tree: &'a Bvh, triangles: &'a [Triangle], constants: &SahConstants) -> Self {
         let mut below = alloc::vec![0..0; tree.nodes.len()];
         let mut positions = Vec::with_capacity(tree.prim_ids.len());
-        let mut stack: Vec<(usize, bool)> = tree.nodes.first().map(|_| (0, false)).into_iter().collect();
+        let mut stack: Vec<(usize, bool)> =
+            tree.nodes.first().map(|_| (0, false)).into_iter().collect();
         while let Some((at, children_done)) = stack.pop() {
             let node = &tree.nodes[at];
             if children_done {
@@ -120,7 +121,8 @@ impl<'a> EndPointOverlap<'a> {
         let mut sum = Overlap::default();
         let mut open = Vec::new();
         let start = number * Self::PART;
-        for (object, positions) in &self.objects[start..self.objects.len().min(start + Self::PART)] {
+        for (object, positions) in &self.objects[start..self.objects.len().min(start + Self::PART)]
+        {
             let positions = &self.positions[positions.start as usize..positions.end as usize];
             self.visit(&self.triangles[*object as usize], positions, &mut open, &mut sum);
         }
@@ -128,7 +130,13 @@ impl<'a> EndPointOverlap<'a> {
     }
 
     /// Adds the contribution of a triangle with these positions.
-    fn visit(&self, triangle: &Triangle, positions: &[(u32, u32)], open: &mut Vec<usize>, sum: &mut Overlap) {
+    fn visit(
+        &self,
+        triangle: &Triangle,
+        positions: &[(u32, u32)],
+        open: &mut Vec<usize>,
+        sum: &mut Overlap,
+    ) {
         let aabb = triangle.aabb();
         let polygon = Polygon::new(triangle.0.map(|corner| corner.as_dvec3()));
         let area = polygon.area();
@@ -136,7 +144,8 @@ impl<'a> EndPointOverlap<'a> {
         open.push(0);
         while let Some(index) = open.pop() {
             let node = &self.tree.nodes[index];
-            let is_above = positions.iter().any(|(_, position)| self.below[index].contains(position));
+            let is_above =
+                positions.iter().any(|(_, position)| self.below[index].contains(position));
             if !is_above {
                 let inside = polygon.area_inside(&node.aabb, &aabb, area);
                 if inside == 0.0 {
@@ -175,7 +184,8 @@ impl Polygon {
     /// The area, whole, not half.
     fn area(&self) -> f64 {
         let fan = self.corners[..self.len].windows(2).skip(1);
-        let doubled: DVec3 = fan.map(|pair| (pair[0] - self.corners[0]).cross(pair[1] - self.corners[0])).sum();
+        let doubled: DVec3 =
+            fan.map(|pair| (pair[0] - self.corners[0]).cross(pair[1] - self.corners[0])).sum();
         libm::sqrt(doubled.length_squared()) / 2.0
     }
 
@@ -237,7 +247,11 @@ mod tests {
     fn overlap_is_what_the_hand_computes() {
         let overlap = |x| {
             let (triangles, tree) = pair(x);
-            end_point_overlap(&tree, &triangles, &SahConstants { traversal: 1.0, intersection: 2.0 })
+            end_point_overlap(
+                &tree,
+                &triangles,
+                &SahConstants { traversal: 1.0, intersection: 2.0 },
+            )
         };
         assert_eq!(overlap(2.0), 0.0);
         // Half of the first one's box holds the second without its corner, 1/2 − 1/8; the second's holds 1/8 of the
@@ -249,7 +263,8 @@ mod tests {
 
     #[test]
     fn clipped_areas_add_up_over_a_grid() {
-        let corners = [DVec3::new(-0.3, 0.1, 2.2), DVec3::new(4.1, 3.3, -0.4), DVec3::new(1.0, 3.9, 3.7)];
+        let corners =
+            [DVec3::new(-0.3, 0.1, 2.2), DVec3::new(4.1, 3.3, -0.4), DVec3::new(1.0, 3.9, 3.7)];
         let whole = Polygon::new(corners);
         let own = Triangle(corners.map(|corner| corner.as_vec3())).aabb();
         let mut sum = 0.0;

@@ -28,7 +28,9 @@ pub enum InvalidRay {
     #[error("the ray's origin {0} is not finite")]
     Origin(Vec3),
     /// A NaN or infinite component of the direction, or a zero, vanishing or enormous direction.
-    #[error("the ray's direction {0} must be finite, its largest component between 2^-100 and 2^100")]
+    #[error(
+        "the ray's direction {0} must be finite, its largest component between 2^-100 and 2^100"
+    )]
     Direction(Vec3),
     /// A range that is NaN or reaches behind the origin.
     #[error("the ray's range {t_min}..={t_max} must not be NaN and must start at 0 or later")]
@@ -70,7 +72,12 @@ impl Ray {
     /// whose largest component is between 2⁻¹⁰⁰ and 2¹⁰⁰, and `0 <= t_min`, none of them NaN. Of another ray every
     /// answer may be wrong, but nothing worse happens.
     #[inline]
-    pub fn assume_valid(origin: impl Into<Vec3>, direction: impl Into<Vec3>, t_min: f32, t_max: f32) -> Self {
+    pub fn assume_valid(
+        origin: impl Into<Vec3>,
+        direction: impl Into<Vec3>,
+        t_min: f32,
+        t_max: f32,
+    ) -> Self {
         let (origin, direction) = (origin.into(), direction.into());
         let inverse = (1.0 / direction.extend(1.0)).max(Vec4::MIN).min(Vec4::MAX);
         let sizes = inverse.abs();
@@ -98,7 +105,10 @@ impl Ray {
 
     /// The whole half line: `t` from 0 to the largest finite distance.
     #[inline]
-    pub fn half_line(origin: impl Into<Vec3>, direction: impl Into<Vec3>) -> Result<Self, InvalidRay> {
+    pub fn half_line(
+        origin: impl Into<Vec3>,
+        direction: impl Into<Vec3>,
+    ) -> Result<Self, InvalidRay> {
         Self::new(origin, direction, 0.0, f32::MAX)
     }
 
@@ -185,8 +195,13 @@ mod tests {
     #[test]
     fn rays_that_go_nowhere_are_refused_and_named() {
         let inf = f32::INFINITY;
-        for bad in [Vec3::ZERO, -Vec3::ZERO, Vec3::NAN, Vec3::X * inf, Vec3::X * 1e-45, Vec3::X * 3e38] {
-            assert!(matches!(Ray::half_line(Vec3::ZERO, bad), Err(InvalidRay::Direction(_))), "{bad}");
+        for bad in
+            [Vec3::ZERO, -Vec3::ZERO, Vec3::NAN, Vec3::X * inf, Vec3::X * 1e-45, Vec3::X * 3e38]
+        {
+            assert!(
+                matches!(Ray::half_line(Vec3::ZERO, bad), Err(InvalidRay::Direction(_))),
+                "{bad}"
+            );
         }
         for bad in [Vec3::NAN, Vec3::new(0.0, -inf, 0.0)] {
             assert!(matches!(Ray::half_line(bad, Vec3::X), Err(InvalidRay::Origin(_))), "{bad}");

@@ -158,7 +158,8 @@ mod tests {
             for origin in [Vec3::new(-1.0, 0.4, 0.1) * scale, Vec3::ZERO, point] {
                 let towards = (point - origin) / scale;
                 let ray =
-                    Ray::half_line(origin, if towards == Vec3::ZERO { Vec3::X } else { towards }).unwrap();
+                    Ray::half_line(origin, if towards == Vec3::ZERO { Vec3::X } else { towards })
+                        .unwrap();
                 assert!(meets(&ray, &Aabb { min: point, max: point }), "2^{k}: {ray:?}");
             }
         }
@@ -167,8 +168,12 @@ mod tests {
     #[test]
     fn what_lies_on_one_side_of_a_plane_is_met_on_that_side() {
         let b = Aabb::from(([0.1, -0.2, 0.3], [0.4, -0.2, 0.9]));
-        for direction in [Vec3::new(0.3, -0.1, 0.7), Vec3::new(-1e-40, 0.0, 1.0), Vec3::new(-0.0, 1.0, 0.0)] {
-            for origin in [Vec3::ZERO, b.min, b.max, Vec3::new(0.25, -0.2, -9.0), Vec3::splat(-3e38)] {
+        for direction in
+            [Vec3::new(0.3, -0.1, 0.7), Vec3::new(-1e-40, 0.0, 1.0), Vec3::new(-0.0, 1.0, 0.0)]
+        {
+            for origin in
+                [Vec3::ZERO, b.min, b.max, Vec3::new(0.25, -0.2, -9.0), Vec3::splat(-3e38)]
+            {
                 let ray = Ray::half_line(origin, direction).unwrap();
                 let slabs = Slabs::new(&ray, &b);
                 let (entry, exit) = slabs.interval(&b);
@@ -180,7 +185,8 @@ mod tests {
                     assert!(slabs.crossing(axis, near).0 <= entry, "{ray:?}");
                     assert!(slabs.crossing(axis, far).1 >= exit, "{ray:?}");
                     assert!(
-                        slabs.crossing(axis, near).0 <= slabs.crossing(axis, near).1.max(ray.t_min()),
+                        slabs.crossing(axis, near).0
+                            <= slabs.crossing(axis, near).1.max(ray.t_min()),
                         "{ray:?}"
                     );
                 }
@@ -192,8 +198,12 @@ mod tests {
     fn intervals_of_boxes_inside_others_are_inside_theirs() {
         let inner = Aabb::from(([0.1, 0.2, 0.3], [0.4, 0.2, 0.9]));
         let outer = Aabb::from(([0.1, -3.0, 0.3], [0.5, 0.2, 1e6]));
-        for direction in [Vec3::new(0.3, 0.1, 0.7), Vec3::new(-1e-40, 0.0, 1.0), Vec3::new(-0.0, 1.0, 0.0)] {
-            for origin in [Vec3::ZERO, Vec3::splat(0.2), Vec3::new(0.25, 0.2, -9.0), Vec3::splat(-3e38)] {
+        for direction in
+            [Vec3::new(0.3, 0.1, 0.7), Vec3::new(-1e-40, 0.0, 1.0), Vec3::new(-0.0, 1.0, 0.0)]
+        {
+            for origin in
+                [Vec3::ZERO, Vec3::splat(0.2), Vec3::new(0.25, 0.2, -9.0), Vec3::splat(-3e38)]
+            {
                 let ray = Ray::half_line(origin, direction).unwrap();
                 let own = Slabs::new(&ray, &inner).interval(&inner);
                 let scene = Slabs::new(&ray, &outer).interval(&inner);

@@ -57,7 +57,8 @@ impl Sphere {
         // A product, because the difference of the squares would cancel near the surface.
         let distance = to_center.length();
         let other = (distance - radius) * (distance + radius);
-        let (first, second) = if along >= 0.0 { (other / q, q / length2) } else { (q / length2, other / q) };
+        let (first, second) =
+            if along >= 0.0 { (other / q, q / length2) } else { (q / length2, other / q) };
         // A ray that starts inside hits the far side.
         let nearest = if first >= f64::from(ray.t_min()) { first } else { second };
         clip_to_box(ray, &self.aabb(), nearest as f32, t_max)
@@ -106,7 +107,9 @@ mod tests {
 
     #[test]
     fn the_box_of_a_sphere_contains_it_and_is_finite() {
-        for (center, radius) in [(Vec3::splat(0.1), 1e-9), (Vec3::splat(1e8), 0.3), (Vec3::splat(3e38), 3e38)] {
+        for (center, radius) in
+            [(Vec3::splat(0.1), 1e-9), (Vec3::splat(1e8), 0.3), (Vec3::splat(3e38), 3e38)]
+        {
             let aabb = Sphere { center, radius }.aabb();
             assert!(aabb.check().is_ok(), "{aabb:?}");
             let low = center.as_dvec3() - f64::from(radius);

@@ -81,7 +81,11 @@ impl Counter for TestCounts {
 /// May panic or not return for a tree that [`validate`](crate::validate()) rejects, and may panic
 /// for a tree over more objects.
 #[inline]
-pub fn nearest_hit<'t, P: Primitive>(tree: impl Into<BvhView<'t>>, objects: &[P], ray: &Ray) -> Option<Hit> {
+pub fn nearest_hit<'t, P: Primitive>(
+    tree: impl Into<BvhView<'t>>,
+    objects: &[P],
+    ray: &Ray,
+) -> Option<Hit> {
     let prepared = P::prepare(ray);
     nearest_hit_by(tree, ray, |id, t_max| objects[id as usize].intersect(&prepared, t_max), &mut ())
 }
@@ -92,7 +96,12 @@ pub fn nearest_hit<'t, P: Primitive>(tree: impl Into<BvhView<'t>>, objects: &[P]
 #[inline]
 pub fn any_hit<'t, P: Primitive>(tree: impl Into<BvhView<'t>>, objects: &[P], ray: &Ray) -> bool {
     let prepared = P::prepare(ray);
-    any_hit_by(tree, ray, |id| objects[id as usize].intersect(&prepared, ray.t_max()).is_some(), &mut ())
+    any_hit_by(
+        tree,
+        ray,
+        |id| objects[id as usize].intersect(&prepared, ray.t_max()).is_some(),
+        &mut (),
+    )
 }
 
 /// Returns the [`nearest_hit`] of objects that a closure tests, and counts the tests. `&mut ()`
@@ -162,7 +171,11 @@ pub fn nearest_hit_of_all(
 
 /// Returns whether a ray hits any object, without a tree. Tests the objects `0..objects` one after
 /// the other; otherwise the same as [`any_hit_by`].
-pub fn any_hit_of_all(objects: u32, mut test: impl FnMut(u32) -> bool, counter: &mut impl Counter) -> bool {
+pub fn any_hit_of_all(
+    objects: u32,
+    mut test: impl FnMut(u32) -> bool,
+    counter: &mut impl Counter,
+) -> bool {
     (0..objects).any(|object| {
         counter.object();
         test(object)
@@ -237,9 +250,27 @@ fn walk<C: Counter>(
                 // This branch is often mispredicted, but it pays: the processor continues with the
                 // child that it expects to be nearer while the distances are still being computed.
                 let next = if b < a {
-                    descend(tree, &pair[1], &pair[0], [b, a], &mut t_max, &mut stack, &mut leaf, counter)
+                    descend(
+                        tree,
+                        &pair[1],
+                        &pair[0],
+                        [b, a],
+                        &mut t_max,
+                        &mut stack,
+                        &mut leaf,
+                        counter,
+                    )
                 } else {
-                    descend(tree, &pair[0], &pair[1], [a, b], &mut t_max, &mut stack, &mut leaf, counter)
+                    descend(
+                        tree,
+                        &pair[0],
+                        &pair[1],
+                        [a, b],
+                        &mut t_max,
+                        &mut stack,
+                        &mut leaf,
+                        counter,
+                    )
                 };
                 match next {
                     ControlFlow::Continue(Some(next)) => {
@@ -299,14 +330,21 @@ fn descend<C: Counter, const N: usize>(
 #[inline(always)]
 fn objects(tree: BvhView<'_>, leaf: NodeKind) -> &[u32] {
     match leaf {
-        NodeKind::Leaf { first, count } => &tree.prim_ids[first as usize..first as usize + count as usize],
+        NodeKind::Leaf { first, count } => {
+            &tree.prim_ids[first as usize..first as usize + count as usize]
+        }
         NodeKind::Inner { .. } => &[],
     }
 }
 
 /// Pushes the children that the ray enters, in such an order that the nearest one is popped first.
 /// Of two children at the same distance the one with the lower index is popped first.
-fn push_sorted<const N: usize>(children: &[Node], slabs: &Slabs, t_max: f32, stack: &mut Stack<Pending, N>) {
+fn push_sorted<const N: usize>(
+    children: &[Node],
+    slabs: &Slabs,
+    t_max: f32,
+    stack: &mut Stack<Pending, N>,
+) {
     // Only nodes with more than 16 children need memory from the heap.
     let mut few = [(0.0, 0); 16];
     let mut many = Vec::new();

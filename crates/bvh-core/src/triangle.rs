@@ -91,11 +91,13 @@ impl Triangle {
         let on_edge = |from: DVec3, to: DVec3| {
             let edge = to - from;
             let length = edge.length_squared();
-            let along = if length > 0.0 { ((p - from).dot(edge) / length).clamp(0.0, 1.0) } else { 0.0 };
+            let along =
+                if length > 0.0 { ((p - from).dot(edge) / length).clamp(0.0, 1.0) } else { 0.0 };
             from + edge * along
         };
         let edges = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
-        let nearer = |x: DVec3, y: DVec3| if y.distance_squared(p) < x.distance_squared(p) { y } else { x };
+        let nearer =
+            |x: DVec3, y: DVec3| if y.distance_squared(p) < x.distance_squared(p) { y } else { x };
         nearer(nearer(edges[0], edges[1]), edges[2])
     }
 
@@ -104,7 +106,8 @@ impl Triangle {
     /// the plane.
     pub fn barycentrics(&self, ray: &Ray) -> Option<[f64; 3]> {
         let shear = Shear::new(ray);
-        let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = self.0.map(|corner| shear.apply(&corner).map(f64::from));
+        let [[ax, ay, _], [bx, by, _], [cx, cy, _]] =
+            self.0.map(|corner| shear.apply(&corner).map(f64::from));
         let weights = [cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax];
         let sum: f64 = weights.iter().sum();
         (sum != 0.0).then(|| weights.map(|weight| weight / sum))
@@ -168,7 +171,8 @@ impl Triangle {
     #[inline]
     pub fn intersect(&self, shear: &Shear, t_max: f32) -> Option<f32> {
         let [a, b, c] = &self.0;
-        let ([ax, ay, _], [bx, by, _], [cx, cy, _]) = (shear.apply(a), shear.apply(b), shear.apply(c));
+        let ([ax, ay, _], [bx, by, _], [cx, cy, _]) =
+            (shear.apply(a), shear.apply(b), shear.apply(c));
         // Rounding is monotone: the sign of a difference of rounded products is right, or the difference is 0.
         let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
         if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
@@ -214,7 +218,13 @@ mod tests {
 
     #[test]
     fn both_sides_edges_and_corners_are_hit_and_the_plane_and_the_back_are_not() {
-        for p in [Vec3::new(0.25, 0.25, 0.0), Vec3::ZERO, Vec3::X, Vec3::X / 2.0, Vec3::new(0.5, 0.5, 0.0)] {
+        for p in [
+            Vec3::new(0.25, 0.25, 0.0),
+            Vec3::ZERO,
+            Vec3::X,
+            Vec3::X / 2.0,
+            Vec3::new(0.5, 0.5, 0.0),
+        ] {
             for d in [Vec3::Z, -Vec3::Z, Vec3::new(0.5, -0.25, 1.0)] {
                 assert_eq!(hit(CORNER, p - 2.0 * d, d), Some(2.0), "{p} {d}");
                 assert_eq!(hit(CORNER, p, d), Some(0.0), "{p} {d}");
@@ -227,9 +237,13 @@ mod tests {
 
     #[test]
     fn the_weights_of_the_corners_are_those_of_the_point_that_is_hit() {
-        let triangle =
-            Triangle([Vec3::new(4.0, 0.0, 1.0), Vec3::new(0.0, 8.0, 2.0), Vec3::new(0.0, 0.0, -3.0)]);
-        for expected in [[0.25, 0.5, 0.25], [1.0, 0.0, 0.0], [0.0, 0.5, 0.5], [0.125, 0.125, 0.75]] {
+        let triangle = Triangle([
+            Vec3::new(4.0, 0.0, 1.0),
+            Vec3::new(0.0, 8.0, 2.0),
+            Vec3::new(0.0, 0.0, -3.0),
+        ]);
+        for expected in [[0.25, 0.5, 0.25], [1.0, 0.0, 0.0], [0.0, 0.5, 0.5], [0.125, 0.125, 0.75]]
+        {
             let [a, b, c] = triangle.0.map(Vec3::as_dvec3);
             let target = (a * expected[0] + b * expected[1] + c * expected[2]).as_vec3();
             for direction in [Vec3::Z, -Vec3::Z, Vec3::new(0.5, -0.25, 1.0)] {
@@ -244,7 +258,11 @@ mod tests {
     fn the_normal_is_on_the_side_from_which_the_corners_run_counterclockwise_at_every_size() {
         for exponent in [-126, -60, 0, 60, 120] {
             let scale = libm::exp2f(exponent as f32);
-            let triangle = Triangle([Vec3::ZERO, Vec3::new(2.0 * scale, 0.0, 0.0), Vec3::new(0.0, scale, 0.0)]);
+            let triangle = Triangle([
+                Vec3::ZERO,
+                Vec3::new(2.0 * scale, 0.0, 0.0),
+                Vec3::new(0.0, scale, 0.0),
+            ]);
             assert_eq!(triangle.normal(), Some(Vec3::Z), "2^{exponent}");
             let [a, b, c] = triangle.0;
             assert_eq!(Triangle([a, c, b]).normal(), Some(-Vec3::Z), "2^{exponent}");
@@ -255,8 +273,11 @@ mod tests {
 
     #[test]
     fn a_hit_behind_the_origin_is_none_though_the_box_reaches_forward() {
-        let slanted =
-            Triangle([Vec3::new(-9.0, -9.0, -9.0), Vec3::new(9.0, -9.0, 9.0), Vec3::new(0.0, 9.0, 0.0)]);
+        let slanted = Triangle([
+            Vec3::new(-9.0, -9.0, -9.0),
+            Vec3::new(9.0, -9.0, 9.0),
+            Vec3::new(0.0, 9.0, 0.0),
+        ]);
         assert_eq!(hit(slanted, Vec3::new(-1.0, 0.0, 0.0), Vec3::Z), None);
         assert_eq!(hit(slanted, Vec3::new(-1.0, 0.0, 0.0), -Vec3::Z), Some(1.0));
     }
@@ -265,12 +286,18 @@ mod tests {
     fn triangles_without_area_are_never_hit() {
         // Steps of eighths: the multiples below are exact, the corners truly collinear.
         let (a, b) = (Vec3::new(0.125, 0.75, 0.375), Vec3::new(0.875, -0.5, 2.0));
-        for corners in [[a; 3], [a, a, b], [a, b, a], [b, a, a], [a, (a + b) / 2.0, b], [a, 3.0 * a, 7.0 * a]] {
+        for corners in
+            [[a; 3], [a, a, b], [a, b, a], [b, a, a], [a, (a + b) / 2.0, b], [a, 3.0 * a, 7.0 * a]]
+        {
             let triangle = Triangle(corners);
             assert!(triangle.is_degenerate());
             for target in corners {
                 for direction in [Vec3::X, Vec3::new(0.3, 0.5, -0.7), b - a, -a] {
-                    assert_eq!(hit(triangle, target - direction / 3.0, direction), None, "{triangle:?}");
+                    assert_eq!(
+                        hit(triangle, target - direction / 3.0, direction),
+                        None,
+                        "{triangle:?}"
+                    );
                 }
             }
         }
@@ -278,7 +305,11 @@ mod tests {
 
     #[test]
     fn a_distance_scales_with_the_scene() {
-        let triangle = Triangle([Vec3::new(0.2, 0.1, 3.0), Vec3::new(1.7, 0.3, 2.5), Vec3::new(0.4, 1.9, 2.2)]);
+        let triangle = Triangle([
+            Vec3::new(0.2, 0.1, 3.0),
+            Vec3::new(1.7, 0.3, 2.5),
+            Vec3::new(0.4, 1.9, 2.2),
+        ]);
         let (origin, direction) = (Vec3::new(0.1, -0.2, 0.3), Vec3::new(0.2, 0.3, 1.0));
         let distance = hit(triangle, origin, direction).unwrap();
         for k in [-100, -60, 60, 100] {
@@ -287,6 +318,10 @@ mod tests {
             assert_eq!(hit(scaled, origin * s, direction), Some(distance * s), "2^{k}");
         }
         let huge = Triangle(CORNER.0.map(|p| (p - 0.5) * f32::MAX));
-        assert_eq!(hit(huge, Vec3::splat(f32::MAX), Vec3::splat(-1.0)), None, "relative coordinates overflow");
+        assert_eq!(
+            hit(huge, Vec3::splat(f32::MAX), Vec3::splat(-1.0)),
+            None,
+            "relative coordinates overflow"
+        );
     }
 }

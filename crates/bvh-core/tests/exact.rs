@@ -175,7 +175,8 @@ fn target(triangle: &Triangle, random: &mut Random) -> Vec3 {
     let mut point = point.as_vec3();
     if random.below(3) == 0 {
         let axis = random.below(3);
-        point[axis] = if random.below(2) == 0 { point[axis].next_up() } else { point[axis].next_down() };
+        point[axis] =
+            if random.below(2) == 0 { point[axis].next_up() } else { point[axis].next_down() };
     }
     point
 }
@@ -202,7 +203,8 @@ fn hard_ray(triangle: &Triangle, random: &mut Random) -> Option<Ray> {
         4 => (a, c - b),
         // Exactly through the target, if the sums are exact.
         5 => {
-            let step = Vec3::new(1.0, random.below(5) as f32 - 2.0, 0.5 * random.below(5) as f32 - 1.0);
+            let step =
+                Vec3::new(1.0, random.below(5) as f32 - 2.0, 0.5 * random.below(5) as f32 - 1.0);
             (target - step * power * size, step)
         }
         // Close to the triangle, nearly in its plane.
@@ -214,7 +216,8 @@ fn hard_ray(triangle: &Triangle, random: &mut Random) -> Option<Ray> {
         _ => (target + (target - a) * 2.0, a - target),
     };
     let direction = direction * random.of(&[1.0, 1.0, 1e-20, 1e20]);
-    let (t_min, t_max) = random.of(&[(0.0, f32::MAX), (0.0, f32::MAX), (1.0, 1.0), (0.5, 2.0), (0.0, 0.0)]);
+    let (t_min, t_max) =
+        random.of(&[(0.0, f32::MAX), (0.0, f32::MAX), (1.0, 1.0), (0.5, 2.0), (0.0, 0.0)]);
     Ray::new(origin, direction, t_min, t_max).ok()
 }
 
@@ -311,7 +314,8 @@ fn a_triangle_behind_the_origin_is_not_hit_however_little() {
 
 #[test]
 fn triangles_with_a_corner_that_is_not_finite_are_never_hit() {
-    let corners = [Vec3::new(-1.0, -1.0, 1.0), Vec3::new(3.0, -1.0, 1.0), Vec3::new(-1.0, 3.0, 1.0)];
+    let corners =
+        [Vec3::new(-1.0, -1.0, 1.0), Vec3::new(3.0, -1.0, 1.0), Vec3::new(-1.0, 3.0, 1.0)];
     let ray = Ray::half_line([0.1, 0.2, 0.0], [0.0, 0.0, 1.0]).unwrap();
     assert!(check(&ray, &Triangle(corners)));
     for corner in 0..3 {

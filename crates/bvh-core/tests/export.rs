@@ -24,7 +24,11 @@ fn check(name: &str, tree: &Bvh, triangles: &[Triangle], random: &mut Random) ->
     for (layout, mut returned) in returned(tree, &boxes) {
         for ray in &rays {
             let expected = nearest_hit(tree, triangles, ray);
-            assert_eq!(nearest_hit(&returned, triangles, ray), expected, "{name}, {layout}: {ray:?}");
+            assert_eq!(
+                nearest_hit(&returned, triangles, ray),
+                expected,
+                "{name}, {layout}: {ray:?}"
+            );
         }
         // Boxes are never smaller than the tight ones.
         let mut tight = returned.clone();
@@ -51,14 +55,24 @@ fn every_layout_traces_the_hits_of_the_tree_at_every_scale() {
     for corner in flat.iter_mut().flat_map(|triangle| &mut triangle.0) {
         corner.y = 0.25;
     }
-    let scenes = [("soup", soup(150, &mut random)), ("grid", grid_box(4)), ("ball", ball(2)), ("flat", flat)];
+    let scenes = [
+        ("soup", soup(150, &mut random)),
+        ("grid", grid_box(4)),
+        ("ball", ball(2)),
+        ("flat", flat),
+    ];
     for (name, scene) in scenes {
         for exponent in [-140, -60, 0, 60, 126] {
             let root = libm::exp2f(exponent as f32 / 2.0);
             let triangles = scaled(&scene, root * root);
             for shape in SHAPES {
                 let tree = tree(&boxes(&triangles), shape, &mut random);
-                hits += check(&format!("{name} * 2^{exponent}, {shape:?}"), &tree, &triangles, &mut random);
+                hits += check(
+                    &format!("{name} * 2^{exponent}, {shape:?}"),
+                    &tree,
+                    &triangles,
+                    &mut random,
+                );
             }
         }
     }
@@ -69,8 +83,11 @@ fn every_layout_traces_the_hits_of_the_tree_at_every_scale() {
 fn small_trees_deep_trees_and_trees_of_points_have_layouts() {
     let mut random = Random(2);
     let points = vec![Triangle([Vec3::new(1.0, 2.0, 3.0); 3]); 30];
-    let huge = [1.0, -1.0].map(|sign| Triangle([Vec3::splat(f32::MAX * sign), Vec3::ZERO, Vec3::X * sign]));
-    for triangles in [soup(1, &mut random), soup(3, &mut random), points, soup(300, &mut random), huge.into()] {
+    let huge = [1.0, -1.0]
+        .map(|sign| Triangle([Vec3::splat(f32::MAX * sign), Vec3::ZERO, Vec3::X * sign]));
+    for triangles in
+        [soup(1, &mut random), soup(3, &mut random), points, soup(300, &mut random), huge.into()]
+    {
         let boxes = boxes(&triangles);
         let count = boxes.len() as u32;
         let leaf = Node::leaf(Aabb::EMPTY, 0, count);
@@ -119,7 +136,10 @@ fn the_bytes_are_the_documented_ones() {
     assert_eq!([word(bytes, 16), word(bytes, 20)], [1, 0]);
     let slot = (0..8).find(|slot| bytes[24 + slot] != 0).unwrap();
     assert_eq!(bytes[24 + slot], 0b011_00000);
-    assert_eq!([32, 40, 48, 56, 64, 72].map(|offset| bytes[offset + slot]), [0, 0, 0, 255, 128, 128]);
+    assert_eq!(
+        [32, 40, 48, 56, 64, 72].map(|offset| bytes[offset + slot]),
+        [0, 0, 0, 255, 128, 128]
+    );
     assert_eq!(compressed.prim_ids, [1, 0]);
 }
 

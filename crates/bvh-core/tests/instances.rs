@@ -4,7 +4,8 @@
 mod support;
 
 use bvh_core::{
-    Aabb, Bvh, Instance, InstanceHit, Instances, InvalidInstances, Ray, Triangle, WideBvh, nearest_hit,
+    Aabb, Bvh, Instance, InstanceHit, Instances, InvalidInstances, Ray, Triangle, WideBvh,
+    nearest_hit,
 };
 use glam::{Affine3A, DAffine3, DMat3, DVec3, Mat3A, Quat, Vec3, Vec3A};
 use support::{Random, SHAPES, ball, boxes, grid_box, soup, tree};
@@ -51,7 +52,9 @@ impl Scene {
             let shift = DVec3::from_array(transform.translation.to_array().map(f64::from));
             let moved = DAffine3::from_mat3_translation(matrix, shift);
             for (id, triangle) in (0..).zip(&self.triangles[*part as usize]) {
-                flat.push(Triangle(triangle.0.map(|p| moved.transform_point3(p.as_dvec3()).as_vec3())));
+                flat.push(Triangle(
+                    triangle.0.map(|p| moved.transform_point3(p.as_dvec3()).as_vec3()),
+                ));
                 names.push((instance, id));
             }
         }
@@ -177,7 +180,11 @@ fn an_invalid_scene_is_rejected_by_its_instance() {
     assert_eq!(rejection(Instance { part: 1, ..valid }), InvalidInstances::Empty(1));
     for scale in [Vec3::new(1.0, 0.0, 1.0), Vec3::NAN, Vec3::INFINITY, Vec3::splat(3e38)] {
         let transform = Affine3A::from_scale(scale);
-        assert_eq!(rejection(Instance { transform, ..valid }), InvalidInstances::Transform(1), "{scale}");
+        assert_eq!(
+            rejection(Instance { transform, ..valid }),
+            InvalidInstances::Transform(1),
+            "{scale}"
+        );
     }
     let wrong_tree = Instances::new(parts.clone(), vec![valid], Bvh::default());
     assert!(matches!(wrong_tree, Err(InvalidInstances::Tree(_))));

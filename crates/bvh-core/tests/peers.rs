@@ -15,7 +15,11 @@ fn triangles(n: u32) -> Vec<Triangle> {
     for i in 0..n {
         let [x, y, z] = [3 * i, 3 * i + 1, 3 * i + 2].map(coordinate);
         let size = 0.25 + (i % 7) as f32 * 0.25;
-        triangles.push(Triangle::from([[x, y, z], [x + size, y, z + 0.5], [x, y + size, z - 0.25]]));
+        triangles.push(Triangle::from([
+            [x, y, z],
+            [x + size, y, z + 0.5],
+            [x, y + size, z - 0.25],
+        ]));
     }
     triangles
 }
@@ -81,7 +85,8 @@ fn a_tree_of_obvhs_survives_a_round_trip_and_traces_the_same_hits() {
         }
         for params in [BvhBuildParams::fast_build(), BvhBuildParams::medium_build()] {
             let built = build_bvh2(&their_boxes, params, &mut Default::default());
-            let tree = Bvh::from_first_count(&from_theirs(&built), &built.primitive_indices).unwrap();
+            let tree =
+                Bvh::from_first_count(&from_theirs(&built), &built.primitive_indices).unwrap();
             validate(&tree, &boxes).unwrap();
             assert_eq!(tree.nodes.len(), built.nodes.len());
             let returned = to_theirs(&tree);

@@ -18,7 +18,8 @@ fn point() -> impl Strategy<Value = Vec3> {
 
 fn small_triangle() -> impl Strategy<Value = Triangle> {
     let corners_and_size = (point(), point(), point(), 0.0f32..0.3);
-    corners_and_size.prop_map(|(a, b, c, size)| Triangle([a, a + (b - a) * size, a + (c - a) * size]))
+    corners_and_size
+        .prop_map(|(a, b, c, size)| Triangle([a, a + (b - a) * size, a + (c - a) * size]))
 }
 
 fn triangles() -> impl Strategy<Value = Vec<Triangle>> {

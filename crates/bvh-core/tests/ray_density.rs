@@ -157,8 +157,14 @@ fn each_invalid_input_has_its_error() {
     let one = [Segment { from: [1.0; 3], to: [2.0; 3] }];
     let nan = [one[0], Segment { from: [f32::NAN; 3], to: [2.0; 3] }];
     let far = [Segment { from: [100.0; 3], to: [200.0; 3] }];
-    assert_eq!(RayDensity::new(&bounds(), &nan, 0.1).unwrap_err(), DensityError::NotFinite { index: 1 });
-    assert_eq!(RayDensity::new(&bounds(), &[], 0.1).unwrap_err(), DensityError::Count { segments: 0 });
+    assert_eq!(
+        RayDensity::new(&bounds(), &nan, 0.1).unwrap_err(),
+        DensityError::NotFinite { index: 1 }
+    );
+    assert_eq!(
+        RayDensity::new(&bounds(), &[], 0.1).unwrap_err(),
+        DensityError::Count { segments: 0 }
+    );
     assert_eq!(RayDensity::new(&bounds(), &far, 0.1).unwrap_err(), DensityError::NoneMeets);
     assert_eq!(RayDensity::new(&bounds(), &one, -0.1).unwrap_err(), DensityError::AreaWeight(-0.1));
     assert_eq!(RayDensity::new(&Aabb::EMPTY, &one, 0.1).unwrap_err(), DensityError::Bounds);

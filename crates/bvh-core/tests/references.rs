@@ -4,7 +4,8 @@
 mod support;
 
 use bvh_core::{
-    Aabb, Bvh, Clip, Hit, InvalidBvh, Kernel, Node, Ray, Shear, Triangle, WideBvh, any_hit_by, collapse_leaves,
+    Aabb, Bvh, Clip, Hit, InvalidBvh, Kernel, Node, Ray, Shear, Triangle, WideBvh, any_hit_by,
+    collapse_leaves,
     cost::{SahConstants, layout_area},
     nearest_hit_by, query, validate, validate_references,
 };
@@ -13,7 +14,11 @@ use support::{Random, SHAPES, ball, bits, boxes, brute_force, grid_box, rays, sc
 
 /// Divides leaves of `tree` at random planes, and divides parts again. Returns the tree, and the
 /// object, axis and coordinate of each plane.
-fn divided(tree: &Bvh, triangles: &[Triangle], random: &mut Random) -> (Bvh, Vec<(u32, usize, f32)>) {
+fn divided(
+    tree: &Bvh,
+    triangles: &[Triangle],
+    random: &mut Random,
+) -> (Bvh, Vec<(u32, usize, f32)>) {
     let mut tree = tree.clone();
     let mut planes = Vec::new();
     let mut index = 0;
@@ -27,7 +32,8 @@ fn divided(tree: &Bvh, triangles: &[Triangle], random: &mut Random) -> (Bvh, Vec
             let somewhere = aabb.min[axis] + random.unit() * aabb.extent()[axis] as f32;
             // Planes through corners are the hard ones.
             let plane = random.of(&[somewhere, corner]);
-            let [low, high] = aabb.halves(axis, plane).map(|region| triangles.clip(object, &region));
+            let [low, high] =
+                aabb.halves(axis, plane).map(|region| triangles.clip(object, &region));
             let divides = aabb.min[axis] < plane && plane < aabb.max[axis];
             if divides && low != Aabb::EMPTY && high != Aabb::EMPTY {
                 let first = tree.nodes.len() as u32;
@@ -60,7 +66,8 @@ fn a_divided_object_is_near_once() {
         let mut expected: Vec<(f64, u32)> = (0..60).map(|id| (distance(id), id)).collect();
         expected.sort_by(|a, b| a.partial_cmp(b).unwrap());
         for k in [1, 7, 100] {
-            let nearest = query::k_nearest(&split, point, k, f64::INFINITY, |id| Some(distance(id)));
+            let nearest =
+                query::k_nearest(&split, point, k, f64::INFINITY, |id| Some(distance(id)));
             let mut found = Vec::new();
             for near in nearest {
                 found.push((near.distance_squared, near.object));
@@ -136,7 +143,9 @@ fn every_traversal_of_divided_triangles_answers_as_brute_force_at_every_scale() 
     let mut random = Random(4);
     let mut hits = 0;
     let mut divisions = 0;
-    for (name, scene) in [("soup", soup(120, &mut random)), ("grid", grid_box(3)), ("ball", ball(1))] {
+    for (name, scene) in
+        [("soup", soup(120, &mut random)), ("grid", grid_box(3)), ("ball", ball(1))]
+    {
         for exponent in [-120, -60, 0, 60, 120] {
             let triangles = scaled(&scene, libm::exp2f(exponent as f32));
             for shape in SHAPES {

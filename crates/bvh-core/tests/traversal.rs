@@ -3,9 +3,9 @@
 mod support;
 
 use bvh_core::{
-    Aabb, Bvh, Hit, Ray, Shear, Sphere, TestCounts, Triangle, WideBvh, any_hit, any_hit_by, any_hit_of_all,
-    clip_to_box, collapse_leaves, cost::SahConstants, nearest_hit, nearest_hit_by, nearest_hit_of_all,
-    validate,
+    Aabb, Bvh, Hit, Ray, Shear, Sphere, TestCounts, Triangle, WideBvh, any_hit, any_hit_by,
+    any_hit_of_all, clip_to_box, collapse_leaves, cost::SahConstants, nearest_hit, nearest_hit_by,
+    nearest_hit_of_all, validate,
 };
 use glam::Vec3;
 use support::{Random, SHAPES, ball, bits, boxes, chain, grid_box, rays, scaled, soup, tree};
@@ -100,7 +100,10 @@ fn a_chain_of_twenty_thousand_is_traced_from_both_ends() {
         // No object is hit: every node is visited.
         let mut counts = TestCounts::default();
         assert!(!any_hit_by(&tree, &ray, |_| false, &mut counts));
-        assert_eq!(counts, TestCounts { boxes: tree.nodes.len() as u64, objects: tree.prim_ids.len() as u64 });
+        assert_eq!(
+            counts,
+            TestCounts { boxes: tree.nodes.len() as u64, objects: tree.prim_ids.len() as u64 }
+        );
     }
 }
 
@@ -115,12 +118,14 @@ fn no_ray_leaves_a_closed_mesh_through_an_edge_or_a_vertex() {
             let origin = random.point() * 0.5;
             // Close to a long edge the rounding of its ends is large compared with the distance to
             // the edge.
-            let close = target * (1.0 - random.of(&[1e-2, 1e-4, 1e-6])) + random.point() * target.abs() * 1e-7;
+            let close = target * (1.0 - random.of(&[1e-2, 1e-4, 1e-6]))
+                + random.point() * target.abs() * 1e-7;
             for origin in [origin, Vec3::ZERO, close] {
                 let direction = (target - origin) * random.of(&[1.0, 1e5]);
                 let ray = Ray::half_line(origin, direction).unwrap();
                 let shear = Shear::new(&ray);
-                let test = |id: u32| triangles[id as usize].intersect(&shear, ray.t_max()).is_some();
+                let test =
+                    |id: u32| triangles[id as usize].intersect(&shear, ray.t_max()).is_some();
                 assert!(any_hit_by(&tree, &ray, test, &mut ()), "{name} leaks {ray:?}");
             }
         }
@@ -137,7 +142,8 @@ fn no_ray_slips_between_the_boxes_beside_a_long_edge() {
     let mut random = Random(4);
     for axis in 0..3 {
         let ends = [turned(axis, 0.0, -1.0, 0.0), turned(axis, 0.0, 1.0, 0.0)];
-        let triangles = [-1.0, 1.0].map(|x| Triangle([ends[0], ends[1], turned(axis, x, 0.0, 0.0)]));
+        let triangles =
+            [-1.0, 1.0].map(|x| Triangle([ends[0], ends[1], turned(axis, x, 0.0, 0.0)]));
         let tree = tree(&boxes(&triangles), SHAPES[0], &mut random);
         let wide = WideBvh::new(&tree, &triangles).unwrap();
         for _ in 0..20_000 {
@@ -150,7 +156,10 @@ fn no_ray_slips_between_the_boxes_beside_a_long_edge() {
             let shear = Shear::new(&ray);
             let test = |id: u32| triangles[id as usize].intersect(&shear, ray.t_max()).is_some();
             assert!(any_hit_by(&tree, &ray, test, &mut ()), "axis {axis}: {ray:?}");
-            assert!(wide.any_hit(&ray) && wide.any_hit_counted(&ray, &mut ()), "axis {axis}: {ray:?}");
+            assert!(
+                wide.any_hit(&ray) && wide.any_hit_counted(&ray, &mut ()),
+                "axis {axis}: {ray:?}"
+            );
         }
     }
 }

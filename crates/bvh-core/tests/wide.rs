@@ -3,10 +3,13 @@
 mod support;
 
 use bvh_core::{
-    Coherence, Hit, Kernel, Ray, RefitError, Shear, Triangle, WideBvh, collapse_leaves, cost::SahConstants,
+    Coherence, Hit, Kernel, Ray, RefitError, Shear, Triangle, WideBvh, collapse_leaves,
+    cost::SahConstants,
 };
 use glam::Vec3;
-use support::{Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree};
+use support::{
+    Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree,
+};
 
 /// The layouts of several trees over the triangles, for every kernel that this processor has.
 fn layouts(triangles: &[Triangle], random: &mut Random) -> Vec<(Kernel, WideBvh)> {
@@ -39,7 +42,11 @@ fn check(name: &str, triangles: &[Triangle], layouts: &[(Kernel, WideBvh)], rays
             wide.any_hits(rays, &mut any, coherence);
             for (i, (ray, &expected)) in rays.iter().zip(&expected).enumerate() {
                 let case = format!("{name}, {kernel:?}, {coherence:?}, {ray:?}");
-                assert_eq!(bits((!nearest[i].is_miss()).then_some(nearest[i])), bits(expected), "{case}");
+                assert_eq!(
+                    bits((!nearest[i].is_miss()).then_some(nearest[i])),
+                    bits(expected),
+                    "{case}"
+                );
                 assert_eq!(any[i], expected.is_some(), "{case}");
             }
         }
@@ -53,7 +60,10 @@ fn bundles(triangles: &[Triangle], count: usize, random: &mut Random) -> Vec<Ray
     let mut rays = Vec::new();
     for _ in 0..count {
         let Triangle([a, b, c]) = random.of(triangles);
-        let size = triangles.iter().flat_map(|t| t.0).fold(0.0f32, |size, p| size.max(p.abs().max_element()));
+        let size = triangles
+            .iter()
+            .flat_map(|t| t.0)
+            .fold(0.0f32, |size, p| size.max(p.abs().max_element()));
         let target = random.of(&[a, (a + b) * 0.5, (a + b + c) / 3.0]);
         let (far, inside, close) =
             (random.point() * 3.0, random.point(), target + random.point() * size * 1e-3);
@@ -66,9 +76,15 @@ fn bundles(triangles: &[Triangle], count: usize, random: &mut Random) -> Vec<Ray
                 to[random.below(3)] = 0.0;
             }
             let to = to / size.max(f32::MIN_POSITIVE);
-            let (t_min, t_max) =
-                random.of(&[(0.0, f32::MAX), (0.0, size), (size, size), (0.5 * size, f32::INFINITY)]);
-            rays.push(Ray::new(from, to, t_min, t_max).unwrap_or(Ray::half_line(from, Vec3::X).unwrap()));
+            let (t_min, t_max) = random.of(&[
+                (0.0, f32::MAX),
+                (0.0, size),
+                (size, size),
+                (0.5 * size, f32::INFINITY),
+            ]);
+            rays.push(
+                Ray::new(from, to, t_min, t_max).unwrap_or(Ray::half_line(from, Vec3::X).unwrap()),
+            );
         }
     }
     rays
@@ -78,7 +94,9 @@ fn bundles(triangles: &[Triangle], count: usize, random: &mut Random) -> Vec<Ray
 fn every_kernel_answers_as_brute_force_at_every_scale() {
     let mut random = Random(1);
     let mut hits = 0;
-    for (name, scene) in [("soup", soup(150, &mut random)), ("grid", grid_box(4)), ("ball", ball(2))] {
+    for (name, scene) in
+        [("soup", soup(150, &mut random)), ("grid", grid_box(4)), ("ball", ball(2))]
+    {
         for exponent in [-120, -60, -20, 0, 20, 60, 120] {
             let triangles = scaled(&scene, libm::exp2f(exponent as f32));
             let layouts = layouts(&triangles, &mut random);
@@ -99,7 +117,8 @@ fn batches_of_any_length_answer_as_their_rays_do() {
             let mut batch = rays(&triangles, count, &mut random);
             batch.truncate(count);
             for coherence in [Coherence::Coherent, Coherence::Incoherent] {
-                let (mut nearest, mut any) = (vec![Hit::MISS; batch.len()], vec![false; batch.len()]);
+                let (mut nearest, mut any) =
+                    (vec![Hit::MISS; batch.len()], vec![false; batch.len()]);
                 wide.nearest_hits(&batch, &mut nearest, coherence);
                 wide.any_hits(&batch, &mut any, coherence);
                 let alone: Vec<Hit> =
@@ -117,20 +136,30 @@ fn batches_of_any_length_answer_as_their_rays_do() {
 #[test]
 fn distances_that_underflow_are_answered_alike() {
     let mut random = Random(2);
-    let at = |z: f32| Triangle([Vec3::new(-1.0, -1.0, z), Vec3::new(3.0, -1.0, z), Vec3::new(-1.0, 3.0, z)]);
+    let at = |z: f32| {
+        Triangle([Vec3::new(-1.0, -1.0, z), Vec3::new(3.0, -1.0, z), Vec3::new(-1.0, 3.0, z)])
+    };
     let depths = [1e-30, 2e-30, 0.0, 1e-45, -1e-30, 3e-38, 1.5e-20, 1e-30];
     let triangles: Vec<Triangle> = depths.into_iter().map(at).collect();
     let layouts = layouts(&triangles, &mut random);
     let mut rays = Vec::new();
     for length in [1e20, 1e25, 1e15, 1.0, 1e8, 1e-20] {
-        for (t_min, t_max) in
-            [(0.0, 0.0), (0.0, f32::MAX), (0.0, 1e-45), (1e-45, 1e-45), (0.0, 1e-40), (1e-44, 1e-38)]
-        {
+        for (t_min, t_max) in [
+            (0.0, 0.0),
+            (0.0, f32::MAX),
+            (0.0, 1e-45),
+            (1e-45, 1e-45),
+            (0.0, 1e-40),
+            (1e-44, 1e-38),
+        ] {
             for side in [1.0, -1.0] {
                 for z in [0.0, -1e-30, 1e-45, 2e-38, 1e-20] {
                     for slope in [0.0, 0.1, 1e-30] {
                         let direction = Vec3::new(slope, slope, side) * length;
-                        rays.push(Ray::new(Vec3::new(0.1, 0.2, -side * z), direction, t_min, t_max).unwrap());
+                        rays.push(
+                            Ray::new(Vec3::new(0.1, 0.2, -side * z), direction, t_min, t_max)
+                                .unwrap(),
+                        );
                     }
                 }
             }
@@ -143,14 +172,20 @@ fn distances_that_underflow_are_answered_alike() {
 #[test]
 fn a_range_that_ends_at_either_zero_has_the_same_bits_from_every_kernel() {
     let mut random = Random(4);
-    let sheet =
-        |x: f32| Triangle([Vec3::new(x, -1.0, 0.0), Vec3::new(x + 1.0, -1.0, 0.0), Vec3::new(x, 3.0, 0.0)]);
+    let sheet = |x: f32| {
+        Triangle([Vec3::new(x, -1.0, 0.0), Vec3::new(x + 1.0, -1.0, 0.0), Vec3::new(x, 3.0, 0.0)])
+    };
     let triangles: Vec<Triangle> = (0..20).map(|x| sheet(x as f32)).collect();
     let layouts = layouts(&triangles, &mut random);
     let ray = |i: usize| {
         let side = [1.0, -1.0][i % 2];
-        Ray::new(Vec3::new(0.3 * i as f32, 0.0, 0.0), Vec3::new(0.0, 0.0, side), 0.0, [-0.0, 0.0][i / 2 % 2])
-            .unwrap()
+        Ray::new(
+            Vec3::new(0.3 * i as f32, 0.0, 0.0),
+            Vec3::new(0.0, 0.0, side),
+            0.0,
+            [-0.0, 0.0][i / 2 % 2],
+        )
+        .unwrap()
     };
     let rays: Vec<Ray> = (0..64).map(ray).collect();
     let hits = check("sheets that rays begin in", &triangles, &layouts, &rays);
@@ -204,10 +239,13 @@ fn a_filter_passes_over_hits_and_sees_all_of_them_if_it_accepts_none() {
     let (mut found, mut several) = (0, 0);
     for ray in rays(&triangles, 2000, &mut random) {
         let shear = Shear::new(&ray);
-        let hit = |id: u32| Some(Hit { t: triangles[id as usize].intersect(&shear, ray.t_max())?, object: id });
+        let hit = |id: u32| {
+            Some(Hit { t: triangles[id as usize].intersect(&shear, ray.t_max())?, object: id })
+        };
         let all: Vec<Hit> = (0..150).filter_map(hit).collect();
         let kept = all.iter().filter(|hit| hit.object % 3 > 0);
-        let nearest = kept.min_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object))).copied();
+        let nearest =
+            kept.min_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object))).copied();
         for (_, layout) in &layouts {
             assert_eq!(layout.nearest_hit_where(&ray, |hit| hit.object % 3 > 0), nearest);
             assert_eq!(layout.any_hit_where(&ray, |hit| hit.object % 3 > 0), nearest.is_some());
@@ -273,11 +311,9 @@ fn triangles_without_area_are_left_out_and_never_hit() {
     let mut triangles: Vec<Triangle> =
         corners.iter().flat_map(|&p| corners.iter().map(move |&q| flat(p, q))).collect();
     let empty = layouts(&triangles, &mut random);
-    assert!(
-        empty
-            .iter()
-            .all(|(_, wide)| wide.nearest_hit(&Ray::half_line(-Vec3::ONE, Vec3::ONE).unwrap()).is_none())
-    );
+    assert!(empty.iter().all(|(_, wide)| {
+        wide.nearest_hit(&Ray::half_line(-Vec3::ONE, Vec3::ONE).unwrap()).is_none()
+    }));
     triangles.push(Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]));
     let layouts = layouts(&triangles, &mut random);
     assert!(check("flat", &triangles, &layouts, &rays(&triangles, 500, &mut random)) > 0);
@@ -286,7 +322,11 @@ fn triangles_without_area_are_left_out_and_never_hit() {
 #[test]
 fn trees_too_deep_for_the_stack_of_a_vector_kernel_are_traced_all_the_same() {
     let triangles: Vec<Triangle> = (0..20_000)
-        .map(|i| Triangle([Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p * (i + 1) as f32 + Vec3::Z * (i as f32))))
+        .map(|i| {
+            Triangle(
+                [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p * (i + 1) as f32 + Vec3::Z * (i as f32)),
+            )
+        })
         .collect();
     let wide = WideBvh::new(&chain(&boxes(&triangles)), &triangles).unwrap();
     for (z, direction, object) in [(-1.0, 1.0, 0), (30_000.0, -1.0, 19_999)] {

@@ -46,8 +46,10 @@ impl ReadError {
 
 /// Returns the text of the regular file at `path`.
 pub fn read_text(path: &Path) -> Result<String, ReadError> {
-    String::from_utf8(read(path)?)
-        .map_err(|error| ReadError::NotUtf8 { path: path.to_path_buf(), source: error.utf8_error() })
+    String::from_utf8(read(path)?).map_err(|error| ReadError::NotUtf8 {
+        path: path.to_path_buf(),
+        source: error.utf8_error(),
+    })
 }
 
 /// Returns the bytes of the regular file at `path`. Anything else is rejected unread: a pipe could keep the program waiting for

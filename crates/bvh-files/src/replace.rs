@@ -51,7 +51,9 @@ fn remove_leftovers(folder: &Path, prefix: &str) {
 ///
 /// Between its creation and its lock another writer may take the file for a leftover. That writer removes it under the lock, so that
 /// whoever has the lock afterwards knows: where the name is gone, so is the file, and where it is still there, nobody removes it.
-fn create_locked(mut create: impl FnMut() -> io::Result<NamedTempFile>) -> io::Result<NamedTempFile> {
+fn create_locked(
+    mut create: impl FnMut() -> io::Result<NamedTempFile>,
+) -> io::Result<NamedTempFile> {
     loop {
         let file = create()?;
         // Where files cannot be locked, nobody removes any.
@@ -81,9 +83,12 @@ impl Reserved {
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let name = path.file_name().filter(|_| path.is_file() || !path.exists());
         let Some(name) = name else {
-            return Err(WriteError::of(&path, "replace the file")(io::Error::other("not a regular file")));
+            return Err(WriteError::of(&path, "replace the file")(io::Error::other(
+                "not a regular file",
+            )));
         };
-        let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder =
+            path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let prefix = format!("{}.", name.to_string_lossy());
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(UNFINISHED);
@@ -164,7 +169,8 @@ mod tests {
     #[test]
     fn a_file_that_another_writer_removes_before_it_is_locked_is_created_anew() {
         let folder = tempfile::tempdir().unwrap();
-        let create = || tempfile::Builder::new().prefix("x.").suffix(UNFINISHED).tempfile_in(folder.path());
+        let create =
+            || tempfile::Builder::new().prefix("x.").suffix(UNFINISHED).tempfile_in(folder.path());
         let mut times = 0;
         let file = create_locked(|| {
             times += 1;
@@ -195,9 +201,11 @@ mod tests {
         const TIMES: usize = 200;
         let folder = tempfile::tempdir().unwrap();
         let path = &folder.path().join("x.bvh");
-        let write_often = |writer: usize| (0..TIMES).try_for_each(|_| write(path, &[writer as u8; 100]));
+        let write_often =
+            |writer: usize| (0..TIMES).try_for_each(|_| write(path, &[writer as u8; 100]));
         let results: Vec<Result<(), WriteError>> = std::thread::scope(|scope| {
-            let threads: Vec<_> = (0..WRITERS).map(|writer| scope.spawn(move || write_often(writer))).collect();
+            let threads: Vec<_> =
+                (0..WRITERS).map(|writer| scope.spawn(move || write_often(writer))).collect();
             threads.into_iter().map(|thread| thread.join().unwrap()).collect()
         });
         assert!(results.iter().all(Result::is_ok), "{results:?}");
@@ -210,7 +218,11 @@ mod tests {
     fn only_regular_files_are_replaced() {
         let folder = tempfile::tempdir().unwrap();
         for wrong in [folder.path(), &folder.path().join("no/x.bvh"), Path::new("/dev/null")] {
-            assert!(matches!(Reserved::new(wrong, 1), Err(WriteError { .. })), "{}", wrong.display());
+            assert!(
+                matches!(Reserved::new(wrong, 1), Err(WriteError { .. })),
+                "{}",
+                wrong.display()
+            );
         }
     }
 }

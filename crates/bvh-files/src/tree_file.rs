@@ -40,7 +40,9 @@ pub fn read(path: &Path) -> Result<Vec<u8>, TreeFileError> {
     file.by_ref().take(Header::BYTES as u64).read_to_end(&mut bytes).map_err(failed)?;
     Header::of_file(&bytes, length).map_err(TreeFileError::of(path))?;
     let rest = length.saturating_sub(bytes.len() as u64);
-    bytes.try_reserve_exact(rest as usize).map_err(|_| failed(io::ErrorKind::OutOfMemory.into()))?;
+    bytes
+        .try_reserve_exact(rest as usize)
+        .map_err(|_| failed(io::ErrorKind::OutOfMemory.into()))?;
     file.take(rest).read_to_end(&mut bytes).map_err(failed)?;
     Ok(bytes)
 }

@@ -25,7 +25,8 @@ fn floats<'py>(
     how.set_item("dtype", "float32")?;
     how.set_item("order", "C")?;
     let numpy = py.import("numpy")?;
-    let no_array = |error: PyErr| refused(format!("{name}: {}; accepted: {accepted}", error.value(py)));
+    let no_array =
+        |error: PyErr| refused(format!("{name}: {}; accepted: {accepted}", error.value(py)));
     let given = numpy.call_method1("asanyarray", (argument,)).map_err(no_array)?;
     check_elements(name, &numpy, &given)?;
     let array = numpy.call_method("asarray", (given,), Some(&how)).map_err(no_array)?;
@@ -60,7 +61,9 @@ pub fn triangles(argument: &Bound<PyAny>) -> PyResult<Objects> {
 
 /// Boxes, lower and upper corner.
 pub fn boxes(argument: &Bound<PyAny>) -> PyResult<Objects> {
-    let array = floats("boxes", argument, "(n, 2, 3) or (n, 6)", |shape| matches!(shape, [_, 2, 3] | [_, 6]))?;
+    let array = floats("boxes", argument, "(n, 2, 3) or (n, 6)", |shape| {
+        matches!(shape, [_, 2, 3] | [_, 6])
+    })?;
     let boxes: &[Aabb] = bytemuck::cast_slice(array.as_slice()?);
     Ok(Objects::Boxes(boxes.to_vec()))
 }

@@ -33,7 +33,8 @@ pub fn searched<T: Send>(
     search: impl FnOnce(&dyn Observer) -> T + Send,
 ) -> PyResult<(T, PyResult<()>)> {
     let limit = Duration::try_from_secs_f64(seconds);
-    let limit = limit.map_err(|_| refused(format!("seconds is {seconds}; accepted: 0 or more, finite")))?;
+    let limit =
+        limit.map_err(|_| refused(format!("seconds is {seconds}; accepted: 0 or more, finite")))?;
     let watch = &Watch { deadline: Deadline::after(limit), pressed: AtomicBool::new(false) };
     // Python hands signals to its main thread only, which is the one that called, if any. So another one searches.
     Ok(py.detach(|| {
@@ -44,7 +45,9 @@ pub fn searched<T: Send>(
             loop {
                 match receiver.recv_timeout(NOTICE) {
                     Ok(found) => return (found, raised),
-                    Err(RecvTimeoutError::Disconnected) => panic!("the search ended without a tree"),
+                    Err(RecvTimeoutError::Disconnected) => {
+                        panic!("the search ended without a tree")
+                    }
                     Err(RecvTimeoutError::Timeout) if raised.is_ok() => {
                         raised = Python::attach(|py| py.check_signals());
                         watch.pressed.store(raised.is_err(), Relaxed);

@@ -44,7 +44,8 @@ impl Tracer {
         let (t, object) = py.detach(|| {
             let mut hits = vec![Hit::MISS; rays.len()];
             let batches = rays.par_chunks(BATCH).zip(hits.par_chunks_mut(BATCH));
-            batches.for_each(|(rays, hits)| self.wide.nearest_hits(rays, hits, coherence(coherent)));
+            batches
+                .for_each(|(rays, hits)| self.wide.nearest_hits(rays, hits, coherence(coherent)));
             // The number of no object becomes −1.
             hits.iter().map(|hit| (hit.t, hit.object as i32)).unzip::<_, _, Vec<_>, Vec<_>>()
         });

@@ -57,11 +57,17 @@ impl Tree {
     /// The tree in a file, over the same triangles or boxes as it was saved for.
     #[staticmethod]
     #[pyo3(signature = (path, *, triangles = None, boxes = None))]
-    fn load(path: PathBuf, triangles: Option<&Bound<PyAny>>, boxes: Option<&Bound<PyAny>>) -> PyResult<Self> {
+    fn load(
+        path: PathBuf,
+        triangles: Option<&Bound<PyAny>>,
+        boxes: Option<&Bound<PyAny>>,
+    ) -> PyResult<Self> {
         let objects = match (triangles, boxes) {
             (Some(triangles), None) => self::triangles(triangles)?,
             (None, Some(boxes)) => self::boxes(boxes)?,
-            _ => return Err(refused("a tree is over triangles or boxes; accepted: one of the two")),
+            _ => {
+                return Err(refused("a tree is over triangles or boxes; accepted: one of the two"));
+            }
         };
         let bytes = tree_file::read(&path).map_err(unread)?;
         OwnedTree::load(objects, &bytes).map(Self::new).map_err(|error| at("path", error))
@@ -82,7 +88,8 @@ impl Tree {
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => return Err(PyRuntimeError::new_err(IMPROVING)),
         };
-        let (improvement, raised) = searched(py, seconds, |observer| self.owned().improvement(observer))?;
+        let (improvement, raised) =
+            searched(py, seconds, |observer| self.owned().improvement(observer))?;
         let improvement = improvement.map_err(refused)?;
         self.owned.write().unwrap_or_else(PoisonError::into_inner).apply(improvement);
         raised
@@ -132,10 +139,18 @@ impl Tree {
 }
 
 /// The message of a second improvement.
-const IMPROVING: &str = "another thread is improving this tree; accepted: `improve` when its call has returned";
+const IMPROVING: &str =
+    "another thread is improving this tree; accepted: `improve` when its call has returned";
 
-fn found(py: Python, name: &str, objects: Objects, references: f64, seconds: f64) -> PyResult<Tree> {
-    let (found, raised) = searched(py, seconds, |observer| OwnedTree::find(objects, references, observer))?;
+fn found(
+    py: Python,
+    name: &str,
+    objects: Objects,
+    references: f64,
+    seconds: f64,
+) -> PyResult<Tree> {
+    let (found, raised) =
+        searched(py, seconds, |observer| OwnedTree::find(objects, references, observer))?;
     raised?;
     found.map(Tree::new).map_err(|error| at(name, error))
 }

@@ -13,14 +13,17 @@ pub fn scene(scene: &Scene) -> Result<String, BuildError> {
         Primitives::Spheres(_) => "spheres",
     };
     let size = facts.bounds.max - facts.bounds.min;
-    let mut text = format!("{} ({}): {} {kind} within {size}\n", scene.name, scene.kind, facts.objects);
+    let mut text =
+        format!("{} ({}): {} {kind} within {size}\n", scene.name, scene.kind, facts.objects);
     if let Some(remark) = &scene.remark {
         text += &format!("  {remark}\n");
     }
     for (_, why) in facts.shortcuts() {
         text += &format!("  left out: {why}\n");
     }
-    text += &format!("  left out: tests of anything but {kind}: there is a traversal for these alone\n");
+    text += &format!(
+        "  left out: tests of anything but {kind}: there is a traversal for these alone\n"
+    );
     if facts.repeated > 0 {
         text += &format!(
             "  not left out: {} objects with the box of the one before; between them a split may be as good as any\n",
@@ -43,7 +46,14 @@ mod tests {
         for (name, parts) in [
             ("escher:12", &["12 triangles", "the optimum takes no more", "no tree has less"][..]),
             ("spheres75", &["75 spheres", "tests of anything but spheres"]),
-            ("S08:50", &["sorting along y", "sorting along z", "splits along z: the order is that along y"]),
+            (
+                "S08:50",
+                &[
+                    "sorting along y",
+                    "sorting along z",
+                    "splits along z: the order is that along y",
+                ],
+            ),
             ("S10:50", &["splits along y and z", "an internal area of 0"]),
             ("S34:50", &["45 objects with the box of the one before"]),
         ] {

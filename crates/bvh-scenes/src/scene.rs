@@ -68,7 +68,8 @@ pub struct NoTriangles(pub String);
 pub const FETCHED: [(&str, &str); 3] = [("sponza", "bvh"), ("kitchen", "obvhs"), ("spot", "meshx")];
 
 /// The second document's sphere scenes: name and number of spheres.
-pub const SPHERES: [(&str, usize); 3] = [("spheres75", 75), ("spheres750", 750), ("spheres7500", 7500)];
+pub const SPHERES: [(&str, usize); 3] =
+    [("spheres75", 75), ("spheres750", 750), ("spheres7500", 7500)];
 
 /// The largest number of objects of a stiff scene: with boxes and a tree they take ten gigabytes.
 const MOST_STIFF: usize = 100_000_000;
@@ -89,18 +90,30 @@ impl Scene {
     /// As [`load`](Self::load); `outside` says whether a glTF file may refer to files outside its folder.
     pub fn load_with(name: &str, outside: OutsideFiles) -> Result<Self, SceneError> {
         match Subset::parse(name) {
-            Some((id, Subset::Spaced(objects))) if stiff::by_id(id).is_some() => Self::stiff(id, name, objects),
-            Some((whole, subset)) => Self::load_whole(whole, outside)?.subset(subset, &name[whole.len()..]),
+            Some((id, Subset::Spaced(objects))) if stiff::by_id(id).is_some() => {
+                Self::stiff(id, name, objects)
+            }
+            Some((whole, subset)) => {
+                Self::load_whole(whole, outside)?.subset(subset, &name[whole.len()..])
+            }
             None => Self::load_whole(name, outside),
         }
     }
 
     fn load_whole(name: &str, outside: OutsideFiles) -> Result<Self, SceneError> {
         if let Some(stand_in) = stand_ins::STAND_INS.iter().find(|scene| scene.name == name) {
-            return Ok(Self::new(name, SceneKind::StandIn, Primitives::Triangles((stand_in.triangles)())));
+            return Ok(Self::new(
+                name,
+                SceneKind::StandIn,
+                Primitives::Triangles((stand_in.triangles)()),
+            ));
         }
         if let Some(&(_, count)) = SPHERES.iter().find(|(spheres, _)| *spheres == name) {
-            return Ok(Self::new(name, SceneKind::Procedural, Primitives::Spheres(spheres::spheres(count))));
+            return Ok(Self::new(
+                name,
+                SceneKind::Procedural,
+                Primitives::Spheres(spheres::spheres(count)),
+            ));
         }
         let refused = |message: String| SceneError { name: name.into(), message };
         let path = match FETCHED.iter().find(|(fetched, _)| *fetched == name) {
@@ -117,9 +130,14 @@ impl Scene {
             return Err(refused(format!("no such scene; {}", known_scenes())));
         }
         let mesh = load::load_with(&path, outside).map_err(|error| refused(error.to_string()))?;
-        let stem = path.file_stem().map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
+        let stem = path
+            .file_stem()
+            .map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
         let remark = mesh.remark().map(|remark| format!("scene {stem}: {remark}"));
-        Ok(Self { remark, ..Self::new(&stem, SceneKind::File, Primitives::Triangles(mesh.triangles)) })
+        Ok(Self {
+            remark,
+            ..Self::new(&stem, SceneKind::File, Primitives::Triangles(mesh.triangles))
+        })
     }
 
     /// The stiff scene `id` of about `objects` objects: of exactly as many where such a scene exists.
@@ -168,7 +186,8 @@ impl Scene {
 
     /// A hash of all boxes, by which results tell whether they belong to this very scene.
     pub fn checksum(&self) -> u64 {
-        let coordinates = self.boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
+        let coordinates =
+            self.boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
         fnv1a(coordinates.flat_map(f32::to_le_bytes))
     }
 }
@@ -177,7 +196,10 @@ impl Scene {
 pub fn fetched_path(name: &str) -> Option<PathBuf> {
     let file = format!("{name}.obj");
     let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    [PathBuf::new(), repository].iter().map(|top| top.join("scenes").join(&file)).find(|path| path.is_file())
+    [PathBuf::new(), repository]
+        .iter()
+        .map(|top| top.join("scenes").join(&file))
+        .find(|path| path.is_file())
 }
 
 /// The names that are accepted, as a part of an error message.
@@ -229,7 +251,10 @@ mod tests {
         let path = folder.path().join("one.obj");
         std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2\n").unwrap();
         let scene = Scene::load(path.to_str().unwrap()).unwrap();
-        assert_eq!((scene.name.as_str(), scene.kind, scene.boxes.len()), ("one", SceneKind::File, 1));
+        assert_eq!(
+            (scene.name.as_str(), scene.kind, scene.boxes.len()),
+            ("one", SceneKind::File, 1)
+        );
         assert!(scene.remark.unwrap().contains("1 face"));
     }
 }

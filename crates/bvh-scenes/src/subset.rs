@@ -51,8 +51,10 @@ impl Subset {
                 objects.partial_shuffle(&mut Stream::seed_from_u64(seed), count).0.to_vec()
             }
             Self::Cluster(count, seed) => {
-                let center = boxes[Stream::seed_from_u64(seed).random_range(0..all)].doubled_centroid();
-                let distance = |&object: &usize| (boxes[object].doubled_centroid() - center).length_squared();
+                let center =
+                    boxes[Stream::seed_from_u64(seed).random_range(0..all)].doubled_centroid();
+                let distance =
+                    |&object: &usize| (boxes[object].doubled_centroid() - center).length_squared();
                 let mut nearest: Vec<usize> = (0..all).collect();
                 nearest.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
                 nearest.truncate(count);
@@ -67,7 +69,9 @@ impl Subset {
 /// Number of names that [`expand`] makes of this one.
 pub fn names(name: &str) -> u64 {
     let ranges = name.split(':').skip(1).filter_map(range);
-    ranges.map(|(low, high)| (u64::from(high) + 1).saturating_sub(low.into())).fold(1, u64::saturating_mul)
+    ranges
+        .map(|(low, high)| (u64::from(high) + 1).saturating_sub(low.into()))
+        .fold(1, u64::saturating_mul)
 }
 
 /// The ends of `A..B`.
@@ -85,8 +89,9 @@ pub fn expand(name: &str) -> Vec<String> {
             None => vec![word.to_owned()],
         };
         let colon = if index > 0 { ":" } else { "" };
-        let longer =
-            |name: &String| words.iter().map(|word| format!("{name}{colon}{word}")).collect::<Vec<_>>();
+        let longer = |name: &String| {
+            words.iter().map(|word| format!("{name}{colon}{word}")).collect::<Vec<_>>()
+        };
         names = names.iter().flat_map(longer).collect();
     }
     names
@@ -100,7 +105,10 @@ mod tests {
     fn subsets_are_told_by_what_follows_the_name() {
         assert_eq!(Subset::parse("a:30"), Some(("a", Subset::Spaced(30))));
         assert_eq!(Subset::parse("a:random:12:7"), Some(("a", Subset::Random(12, 7))));
-        assert_eq!(Subset::parse("c:/b.obj:cluster:6:0"), Some(("c:/b.obj", Subset::Cluster(6, 0))));
+        assert_eq!(
+            Subset::parse("c:/b.obj:cluster:6:0"),
+            Some(("c:/b.obj", Subset::Cluster(6, 0)))
+        );
         for none in ["a", "c:/b.obj", "a:cluster:6:x", "a:cluster"] {
             assert_eq!(Subset::parse(none), None, "{none}");
         }
@@ -124,7 +132,10 @@ mod tests {
             let random = Subset::Random(30, seed).choose(&boxes);
             assert!(random.is_sorted_by(|a, b| a < b) && random.len() == 30);
             let cluster = Subset::Cluster(9, seed).choose(&boxes);
-            assert!(cluster.windows(2).all(|pair| pair[1] == pair[0] + 1) && cluster.len() == 9, "{cluster:?}");
+            assert!(
+                cluster.windows(2).all(|pair| pair[1] == pair[0] + 1) && cluster.len() == 9,
+                "{cluster:?}"
+            );
         }
         assert_ne!(Subset::Random(30, 1).choose(&boxes), Subset::Random(30, 2).choose(&boxes));
     }

@@ -11,8 +11,9 @@ fn from_objects(tree: &Bvh, boxes: &[Aabb]) -> f64 {
     let mut below = vec![Aabb::EMPTY; tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate().rev() {
         let objects = tree.prim_ids[node.prims()].iter().map(|&id| boxes[id as usize]);
-        below[index] =
-            objects.chain(below[node.children()].iter().copied()).fold(Aabb::EMPTY, |a, b| a.union(&b));
+        below[index] = objects
+            .chain(below[node.children()].iter().copied())
+            .fold(Aabb::EMPTY, |a, b| a.union(&b));
         if !node.is_leaf() {
             let [x, y, z] = (below[index].max.as_dvec3() - below[index].min.as_dvec3()).to_array();
             total += x * y + y * z + z * x;

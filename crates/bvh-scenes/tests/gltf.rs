@@ -43,18 +43,28 @@ fn folder(name: &str) -> tempfile::TempDir {
 
 #[test]
 fn an_extension_that_a_file_requires_is_known_to_change_no_triangle_or_the_file_is_refused() {
-    let required =
-        |names: &str| glb(json(CHUNK, &format!(r#", "extensionsRequired": [{names}]"#)), &corner_bytes());
+    let required = |names: &str| {
+        glb(json(CHUNK, &format!(r#", "extensionsRequired": [{names}]"#)), &corner_bytes())
+    };
     let path = Path::new("a.glb");
-    for known in ["", r#""KHR_materials_unlit", "KHR_texture_basisu""#, r#""KHR_mesh_quantization""#] {
+    for known in
+        ["", r#""KHR_materials_unlit", "KHR_texture_basisu""#, r#""KHR_mesh_quantization""#]
+    {
         assert_eq!(parse(&required(known), path).unwrap(), triangle(), "{known}");
     }
-    for unknown in
-        ["EVIL_no_such", "EXT_meshopt_compression", "KHR_draco_mesh_compression", "EXT_mesh_gpu_instancing"]
-    {
-        let message =
-            parse(&required(&format!(r#""KHR_materials_unlit", "{unknown}""#)), path).unwrap_err().to_string();
-        assert!(message.contains(&format!("a.glb: extensionsRequired: `{unknown}`; expected")), "{message}");
+    for unknown in [
+        "EVIL_no_such",
+        "EXT_meshopt_compression",
+        "KHR_draco_mesh_compression",
+        "EXT_mesh_gpu_instancing",
+    ] {
+        let message = parse(&required(&format!(r#""KHR_materials_unlit", "{unknown}""#)), path)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.contains(&format!("a.glb: extensionsRequired: `{unknown}`; expected")),
+            "{message}"
+        );
     }
     // What is used and not required changes nothing for whoever does not know it.
     let used = glb(json(CHUNK, r#", "extensionsUsed": ["EVIL_no_such"]"#), &corner_bytes());
@@ -80,12 +90,17 @@ fn extras_of_any_kind_are_passed_over_wherever_they_are() {
     let text = json(CHUNK, "");
     // Attributes are names of accessors, nothing else.
     let places = text.match_indices('{').map(|(place, _)| place);
-    let places: Vec<usize> = places.filter(|&place| !text[place..].starts_with(r#"{"POSITION"#)).collect();
+    let places: Vec<usize> =
+        places.filter(|&place| !text[place..].starts_with(r#"{"POSITION"#)).collect();
     for extras in [r#""a text""#, "5", "-1.5e300", "true", "null", "[1, {}]", r#"{"a": [null]}"#] {
         for &place in &places {
             let mut text = text.clone();
             text.insert_str(place + 1, &format!(r#""extras": {extras}, "#));
-            assert_eq!(parse(&glb(text, &corner_bytes()), Path::new("a.glb")).unwrap(), triangle(), "{extras}");
+            assert_eq!(
+                parse(&glb(text, &corner_bytes()), Path::new("a.glb")).unwrap(),
+                triangle(),
+                "{extras}"
+            );
         }
     }
 }
@@ -122,7 +137,8 @@ fn a_buffer_outside_the_folder_of_the_scene_is_refused_unless_it_is_allowed() {
         assert_outside(folder.path());
     }
     // A file that is not there is not told from one that is.
-    let message = load(&folder("../no_such_file").path().join("scene.gltf")).unwrap_err().to_string();
+    let message =
+        load(&folder("../no_such_file").path().join("scene.gltf")).unwrap_err().to_string();
     assert!(message.contains("`../no_such_file` is outside"), "{message}");
     #[cfg(unix)]
     {

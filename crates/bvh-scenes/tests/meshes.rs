@@ -153,7 +153,8 @@ fn text_formats_may_begin_with_a_byte_order_mark() {
             assert_eq!(parse(&marked, Path::new(name)).unwrap(), Mesh::new(square()), "{name}");
         }
     }
-    let wrong = [b"\xef\xbb\xbf", &with(&stl_text(), "vertex 1 0e0 0\r", "vertex 1 0\r")[..]].concat();
+    let wrong =
+        [b"\xef\xbb\xbf", &with(&stl_text(), "vertex 1 0e0 0\r", "vertex 1 0\r")[..]].concat();
     assert!(refusal(wrong, "a.stl").starts_with("a.stl:5: "));
 }
 
@@ -164,14 +165,25 @@ fn a_mesh_file_is_a_scene_by_its_path_and_a_missing_one_is_said_to_be_missing() 
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
         let scene = Scene::load(path.to_str().unwrap()).unwrap();
-        assert_eq!((scene.triangles().unwrap(), name.starts_with(&scene.name)), (&square()[..], true));
+        assert_eq!(
+            (scene.triangles().unwrap(), name.starts_with(&scene.name)),
+            (&square()[..], true)
+        );
     }
     for missing in ["none.ply", "none.obj", "folder/none"] {
-        assert!(Scene::load(missing).unwrap_err().to_string().contains(&format!("{missing}: no such file")));
+        assert!(
+            Scene::load(missing)
+                .unwrap_err()
+                .to_string()
+                .contains(&format!("{missing}: no such file"))
+        );
     }
     assert!(matches!(load(folder.path()), Err(MeshError::Read(ReadError::Folder { .. }))));
     #[cfg(unix)]
-    assert!(matches!(load(Path::new("/dev/zero")), Err(MeshError::Read(ReadError::NotRegular { .. }))));
+    assert!(matches!(
+        load(Path::new("/dev/zero")),
+        Err(MeshError::Read(ReadError::NotRegular { .. }))
+    ));
     assert!(matches!(parse(b" \r\n", Path::new("a.ply")), Err(MeshError::Empty(_))));
 }
 
@@ -181,8 +193,9 @@ fn nodes_move_their_meshes_and_what_hangs_on_them() {
         {"mesh": 0, "scale": [2, 2, 2]},
         {"mesh": 0, "matrix": [0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1]}"#;
     let mesh = parse(&gltf(nodes, INDEXED), Path::new("a.gltf")).unwrap();
-    let moved =
-        |by: &dyn Fn(Vec3) -> Vec3| square().into_iter().map(|t| Triangle(t.0.map(by))).collect::<Vec<_>>();
+    let moved = |by: &dyn Fn(Vec3) -> Vec3| {
+        square().into_iter().map(|t| Triangle(t.0.map(by))).collect::<Vec<_>>()
+    };
     let scaled = moved(&|p| p * 2.0 + Vec3::X * 10.0);
     let turned = moved(&|p| Vec3::new(10.0 - p.y, p.x, p.z + 5.0));
     assert_eq!(mesh.triangles, [scaled, turned].concat());
@@ -207,12 +220,16 @@ fn buffers_are_files_beside_the_one_that_names_them() {
     let path = folder.path().join("scene.gltf");
     std::fs::write(&path, gltf_json("my%20buffer.bin", r#"{"mesh": 0}"#, INDEXED)).unwrap();
     let missing = load(&path).unwrap_err().to_string();
-    assert!(missing.contains("buffers[0]") && missing.contains("my buffer.bin: no such file"), "{missing}");
+    assert!(
+        missing.contains("buffers[0]") && missing.contains("my buffer.bin: no such file"),
+        "{missing}"
+    );
     std::fs::write(folder.path().join("my buffer.bin"), buffer()).unwrap();
     assert_eq!(load(&path).unwrap().triangles, square());
     std::fs::write(folder.path().join("my buffer.bin"), &buffer()[..50]).unwrap();
     assert!(load(&path).unwrap_err().to_string().contains("buffers[0]: 50 bytes; expected 60"));
-    let remote = refusal(gltf_json("http://example.org/a.bin", r#"{"mesh": 0}"#, INDEXED), "a.gltf");
+    let remote =
+        refusal(gltf_json("http://example.org/a.bin", r#"{"mesh": 0}"#, INDEXED), "a.gltf");
     assert!(remote.contains("a file beside this one"), "{remote}");
 }
 
@@ -231,7 +248,11 @@ fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
         (with(&ply, "4 0 1 2 3", "4 0 1 2 -1"), "a.ply", &["face 0", "vertex -1"]),
         (with(&ply, "4 0 1 2 3", "2 0 1"), "a.ply", &["4 vertices and 0 triangles"]),
         (with(&ply, "property float x", "property float u"), "a.ply", &["vertex 0", "NaN"]),
-        (with(&ply, "element vertex 4", "element vertex 4000000000"), "a.ply", &["element vertex", "room for"]),
+        (
+            with(&ply, "element vertex 4", "element vertex 4000000000"),
+            "a.ply",
+            &["element vertex", "room for"],
+        ),
         (with(&ply, "format ascii", "format octal"), "a.ply", &["a.ply:2: "]),
         (ply_binary(false)[..190].to_vec(), "a.ply", &["a.ply: element vertex"]),
         (
@@ -241,7 +262,11 @@ fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
         ),
         (with(&stl, "vertex 1 0e0 0\r", "vertex 1 0\r"), "a.stl", &["a.stl:5: ", "`1 0`"]),
         (with(&stl, "   vertex 1 0e0 0\r\n", ""), "a.stl", &["a.stl:6: ", "2 vertices"]),
-        (with(&stl, "endfacet\r\nendsolid\r\nsolid\r", "vertecks\r"), "a.stl", &["a.stl:8: ", "`vertecks`"]),
+        (
+            with(&stl, "endfacet\r\nendsolid\r\nsolid\r", "vertecks\r"),
+            "a.stl",
+            &["a.stl:8: ", "`vertecks`"],
+        ),
         (nan, "a.stl", &["a.stl: facet 1", "NaN"]),
         (stl_binary()[..150].to_vec(), "a.stl", &["1 whole facets", "expected the 2", "cut"]),
         (change(r#""mesh": 0"#, r#""mesh": 7"#), "a.gltf", &["a.gltf: nodes[0]: no meshes[7]"]),
@@ -281,7 +306,10 @@ fn files_made_to_harm_are_refused() {
     for (from, to) in [
         (r#""byteOffset": 48"#, format!(r#""byteOffset": {beyond}"#)),
         (r#""count": 4"#, format!(r#""count": {beyond}"#)),
-        (r#""buffer": 0, "byteLength": 48"#, r#""buffer": 0, "byteStride": 4, "byteLength": 48"#.to_string()),
+        (
+            r#""buffer": 0, "byteLength": 48"#,
+            r#""buffer": 0, "byteStride": 4, "byteLength": 48"#.to_string(),
+        ),
         (r#""byteLength": 60"#, format!(r#""byteLength": {beyond}"#)),
     ] {
         refusal(with(&json, from, &to), "a.gltf");

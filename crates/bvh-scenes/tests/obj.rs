@@ -63,7 +63,8 @@ fn spellings_of_the_same_triangle_agree() {
         assert_eq!(read(format!("{marks}{text}")).unwrap(), expected);
     }
     assert_eq!(read([b"# caf\xe9\ng \xff\n", text.as_bytes()].concat()).unwrap(), expected);
-    let colours = text.replacen("0 0 0", "0 0 0 1 0.5 nan", 1).replacen("1 0 0", "1 0 0 1 1 1 1", 1);
+    let colours =
+        text.replacen("0 0 0", "0 0 0 1 0.5 nan", 1).replacen("1 0 0", "1 0 0 1 1 1 1", 1);
     assert_eq!(read(colours).unwrap(), expected);
 }
 
@@ -96,9 +97,12 @@ fn lines_with_unknown_keywords_are_counted_and_all_oddities_are_remarked_in_one_
     let read = mesh("V 7 7 7\nf 1 2 3\ncurv 0 1 \\\n1 2\nF 1 2 4\nf 1 2 2\nf 1 2\n");
     assert_eq!(read.unknown, Some((2, 6, "V".into())));
     let remark = read.remark().unwrap();
-    for part in
-        ["2 vertices are used by no face", "1 face has fewer", "1 triangle has no area", "`V` in line 6"]
-    {
+    for part in [
+        "2 vertices are used by no face",
+        "1 face has fewer",
+        "1 triangle has no area",
+        "`V` in line 6",
+    ] {
         assert!(remark.contains(part), "{part}: {remark}");
     }
     assert_eq!(mesh("f 1 2 3\nf 3 4 5\n").remark(), None);
@@ -109,7 +113,10 @@ fn a_face_of_too_many_vertices_is_refused() {
     let face = |corners: usize| format!("{POINTS}f{}\n", " 1".repeat(corners));
     assert_eq!(read(face(1 << 16)).unwrap().triangles.len(), (1 << 16) - 2);
     assert!(
-        read(face((1 << 16) + 1)).unwrap_err().to_string().starts_with("scene.obj:6: face of more than 65536")
+        read(face((1 << 16) + 1))
+            .unwrap_err()
+            .to_string()
+            .starts_with("scene.obj:6: face of more than 65536")
     );
 }
 

@@ -29,7 +29,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{ms:4} ms: {part:.4} of the original after {} moves", event.evaluations);
     });
     let problem = Problem::new(&boxes);
-    let found = optimize(&tree, &problem, &best::Config::default(), 1, Budget::UNLIMITED, &watched)?;
+    let found =
+        optimize(&tree, &problem, &best::Config::default(), 1, Budget::UNLIMITED, &watched)?;
     validate(&found.tree, &boxes)?;
     println!("{:?}: {:.4} of the original", found.stop, found.cost / before);
     assert!(found.cost < before);

@@ -43,7 +43,11 @@ impl Search for Config {
 
 /// The optimum in place of a search, if the scene is [tiny](most_work_of_tiny) and the optimum takes no more work than
 /// `work` and the rest of the run's budget. Ends the run.
-pub(crate) fn instead(problem: &Problem, work: u64, run: &mut Run) -> Result<Option<Bvh>, SearchError> {
+pub(crate) fn instead(
+    problem: &Problem,
+    work: u64,
+    run: &mut Run,
+) -> Result<Option<Bvh>, SearchError> {
     let least = most_work_of_tiny(problem.boxes.len());
     let worth = least.is_some_and(|least| least <= work.min(run.left().work));
     if !worth || !problem.allows(Shortcut::Tiny) {
@@ -109,12 +113,18 @@ mod tests {
             for salt in 0..6 {
                 let boxes = scatter(100)[10 * salt..10 * salt + n].to_vec();
                 let measures = [None, density(&boxes)];
-                for measure in measures.iter().map(|of| of.as_ref().map(|density| density as &dyn Measure)) {
+                for measure in
+                    measures.iter().map(|of| of.as_ref().map(|density| density as &dyn Measure))
+                {
                     let problem = Problem { measure, ..Problem::new(&boxes) };
                     let found = solve(&Config {}, &problem, 1, Budget::UNLIMITED, &()).unwrap();
                     validate(&found.tree, &boxes).unwrap();
                     let least = brute_force(&boxes, measure.unwrap_or(&Area));
-                    assert!((found.cost - least).abs() <= 1e-14 * least, "{n} {salt}: {} {least}", found.cost);
+                    assert!(
+                        (found.cost - least).abs() <= 1e-14 * least,
+                        "{n} {salt}: {} {least}",
+                        found.cost
+                    );
                 }
             }
         }
@@ -123,9 +133,14 @@ mod tests {
     #[test]
     fn too_many_objects_and_bad_boxes_are_refused() {
         let refused = |boxes: &[Aabb]| {
-            solve(&Config {}, &Problem::new(boxes), 1, Budget::UNLIMITED, &()).unwrap_err().to_string()
+            solve(&Config {}, &Problem::new(boxes), 1, Budget::UNLIMITED, &())
+                .unwrap_err()
+                .to_string()
         };
-        assert_eq!(refused(&scatter(17)), format!("objects is 17; accepted: at most {MOST_OBJECTS}"));
+        assert_eq!(
+            refused(&scatter(17)),
+            format!("objects is 17; accepted: at most {MOST_OBJECTS}")
+        );
         let mut boxes = scatter(5);
         boxes[3].max.x = f32::NAN;
         assert!(refused(&boxes).contains("object 3"));

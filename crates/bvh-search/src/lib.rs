@@ -37,8 +37,8 @@ pub use owned::{Improvement, Objects, OwnedTree};
 #[cfg(feature = "serde")]
 pub use registry::Method;
 pub use run::{
-    Budget, Event, Judge, Observer, Outcome, Problem, Quota, Run, Search, SearchError, Shortcut, Splits,
-    StopReason, Stream, Tally, solve,
+    Budget, Event, Judge, Observer, Outcome, Problem, Quota, Run, Search, SearchError, Shortcut,
+    Splits, StopReason, Stream, Tally, solve,
 };
 #[cfg(feature = "std")]
 pub use run::{Deadline, Watched};

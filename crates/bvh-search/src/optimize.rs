@@ -48,8 +48,12 @@ pub fn optimize(
     tight.prim_ids = (0..leaves.len() as u32).collect();
     let leaf_boxes: Vec<Aabb> = leaves.iter().map(|(aabb, _)| *aabb).collect();
     let mut outcome = {
-        let problem =
-            Problem { boxes: &leaf_boxes, objective: Objective::InternalArea, known: None, ..*problem };
+        let problem = Problem {
+            boxes: &leaf_boxes,
+            objective: Objective::InternalArea,
+            known: None,
+            ..*problem
+        };
         solve(&From { tree: tight, config }, &problem, seed, budget, observer)?
     };
     let mut prim_ids = Vec::with_capacity(boxes.len());
@@ -82,7 +86,9 @@ fn one_reference_per_leaf(tree: &Bvh, problem: &Problem) -> Bvh {
             let middle = range.start + range.len() / 2;
             single.nodes[at] = Node::inner(node.aabb, single.nodes.len() as u32, 2);
             let halves = [range.start..middle, middle..range.end];
-            single.nodes.extend(halves.map(|half| Node::leaf(node.aabb, half.start as u32, half.len() as u32)));
+            single.nodes.extend(
+                halves.map(|half| Node::leaf(node.aabb, half.start as u32, half.len() as u32)),
+            );
         }
         at += 1;
     }
@@ -91,8 +97,12 @@ fn one_reference_per_leaf(tree: &Bvh, problem: &Problem) -> Bvh {
         let node = single.nodes[at];
         let below = single.nodes[node.children()].iter();
         let aabb = match (node.kind(), split) {
-            (NodeKind::Inner { .. }, _) => below.fold(Aabb::EMPTY, |aabb, child| aabb.union(&child.aabb)),
-            (NodeKind::Leaf { first, .. }, None) => problem.boxes[single.prim_ids[first as usize] as usize],
+            (NodeKind::Inner { .. }, _) => {
+                below.fold(Aabb::EMPTY, |aabb, child| aabb.union(&child.aabb))
+            }
+            (NodeKind::Leaf { first, .. }, None) => {
+                problem.boxes[single.prim_ids[first as usize] as usize]
+            }
             (NodeKind::Leaf { first, .. }, Some(splits)) => {
                 let part = splits.objects.clip(single.prim_ids[first as usize], &node.aabb);
                 // A reference to nothing does no harm.
@@ -122,7 +132,13 @@ impl Check for From<'_> {
 search_by_metric!(From<'_>);
 
 impl From<'_> {
-    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Found {
         self.config.improved((self.tree.clone(), None), metric, problem, seed, run)
     }
 }

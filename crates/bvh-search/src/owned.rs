@@ -33,9 +33,14 @@ pub struct OwnedTree {
 impl OwnedTree {
     /// The tree that is found until `observer` cancels the search, as a [`Deadline`](crate::Deadline) does. Shapes may be divided
     /// among leaves, into up to `references` parts each on average; boxes may not.
-    pub fn find(objects: Objects, references: f64, observer: &dyn Observer) -> Result<Self, SearchError> {
+    pub fn find(
+        objects: Objects,
+        references: f64,
+        observer: &dyn Observer,
+    ) -> Result<Self, SearchError> {
         let mut owned = Self::bare(objects, references);
-        let outcome = solve(&best::Config::default(), &owned.problem(), 1, Budget::UNLIMITED, observer)?;
+        let outcome =
+            solve(&best::Config::default(), &owned.problem(), 1, Budget::UNLIMITED, observer)?;
         owned.take(outcome);
         Ok(owned)
     }
@@ -61,7 +66,8 @@ impl OwnedTree {
     /// for [`apply`](Self::apply).
     pub fn improvement(&self, observer: &dyn Observer) -> Result<Improvement, SearchError> {
         let config = best::Config::default();
-        optimize(&self.tree, &self.problem(), &config, 1, Budget::UNLIMITED, observer).map(Improvement)
+        optimize(&self.tree, &self.problem(), &config, 1, Budget::UNLIMITED, observer)
+            .map(Improvement)
     }
 
     /// Puts an improvement of this very tree in its place.

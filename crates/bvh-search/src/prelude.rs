@@ -6,7 +6,7 @@ pub use crate::{Deadline, bake, improve};
 pub use bvh_build::{Builder, median_cut, muller_fellner, ploc};
 pub use bvh_core::glam::Vec3;
 pub use bvh_core::{
-    Aabb, Bvh, Coherence, Hit, Instance, InstanceHit, Instances, Primitive, Ray, Sphere, Triangle, WideBvh,
-    any_hit, boxes, cost, file, nearest_hit, query, validate,
+    Aabb, Bvh, Coherence, Hit, Instance, InstanceHit, Instances, Primitive, Ray, Sphere, Triangle,
+    WideBvh, any_hit, boxes, cost, file, nearest_hit, query, validate,
 };
 pub use std::time::Duration;

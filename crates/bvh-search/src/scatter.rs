@@ -6,7 +6,8 @@ use bvh_core::{Aabb, RayDensity, Segment, cost};
 
 /// A reproducible scatter of `n` small boxes.
 pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
-    let hash = |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 65_521) as f32;
+    let hash =
+        |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 65_521) as f32;
     (0..n)
         .map(|i| {
             let low = [hash(i, 3), hash(i, 11), hash(i, 19)];

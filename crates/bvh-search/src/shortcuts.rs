@@ -49,7 +49,10 @@ impl Facts {
         for (axis, name) in AXES.into_iter().enumerate() {
             let same = self.same_orders[axis] as usize;
             if self.in_order[axis] && !(self.flat && axis > 0) {
-                found.push((Shortcut::Sorted, format!("sorting along {name}: the objects come in that order")));
+                found.push((
+                    Shortcut::Sorted,
+                    format!("sorting along {name}: the objects come in that order"),
+                ));
             }
             if same != axis && !self.flat {
                 let same = AXES[same];
@@ -60,10 +63,14 @@ impl Facts {
             }
         }
         if self.flat {
-            found.push((Shortcut::Flat, "splits along y and z: without area every tree costs nothing".into()));
+            found.push((
+                Shortcut::Flat,
+                "splits along y and z: without area every tree costs nothing".into(),
+            ));
         }
         if let Some(work) = exact::most_work_of_tiny(self.objects) {
-            let why = format!("the search `best`, given {work} nodes of work: the optimum takes no more");
+            let why =
+                format!("the search `best`, given {work} nodes of work: the optimum takes no more");
             found.push((Shortcut::Tiny, why));
         }
         let why = format!(

@@ -43,12 +43,18 @@ fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
     // Long and thin, so that dividing them pays.
     let shifted = |corner: Vec3, by: f32| (corner + Vec3::splat(by)).to_array();
     let thin = scene().into_iter().take(300).map(|aabb| {
-        Triangle::from([aabb.min.to_array(), shifted(aabb.min, 20_000.0), shifted(aabb.max, 20_000.0)])
+        Triangle::from([
+            aabb.min.to_array(),
+            shifted(aabb.min, 20_000.0),
+            shifted(aabb.max, 20_000.0),
+        ])
     });
     let triangles: Vec<Triangle> = thin.collect();
     let boxes = boxes(&triangles);
     let shapes = || Objects::Shapes(Primitives::Triangles(triangles.clone()));
-    for (objects, references) in [(shapes(), 1.0), (shapes(), 2.0), (Objects::Boxes(boxes.clone()), 2.0)] {
+    for (objects, references) in
+        [(shapes(), 1.0), (shapes(), 2.0), (Objects::Boxes(boxes.clone()), 2.0)]
+    {
         let deadline = || Deadline::after(Duration::from_millis(50));
         let mut owned = OwnedTree::find(objects.clone(), references, &deadline()).unwrap();
         let first = cost::total_area(owned.tree());

@@ -3,8 +3,8 @@
 use bvh_build::{Builder, median_cut, ploc};
 use bvh_core::{Aabb, validate};
 use bvh_search::{
-    Budget, Event, Method, Observer, Problem, best, genetic, grasp, random_orders, rebuild, ruin_recreate,
-    solve,
+    Budget, Event, Method, Observer, Problem, best, genetic, grasp, random_orders, rebuild,
+    ruin_recreate, solve,
 };
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -32,7 +32,11 @@ fn a_search_that_is_cancelled_at_once_evaluates_one_tree_only() {
     for method in [
         Method::Grasp(grasp::Config { trials: u64::MAX, ..Default::default() }),
         Method::RandomOrders(random_orders::Config { trials: u64::MAX, ..Default::default() }),
-        Method::Genetic(genetic::Config { population: 800_000, generations: u64::MAX, ..Default::default() }),
+        Method::Genetic(genetic::Config {
+            population: 800_000,
+            generations: u64::MAX,
+            ..Default::default()
+        }),
     ] {
         let polls = Polls { polled: 0.into(), until: 0 };
         let outcome = solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &polls).unwrap();
@@ -60,7 +64,8 @@ fn the_observer_hears_of_moves_that_improve_nothing() {
     }
     let (boxes, counts) = (boxes(300), Counts::default());
     let budget = Budget { max_work: Some(10_000_000), ..Budget::UNLIMITED };
-    let outcome = solve(&best::Config::default(), &Problem::new(&boxes), 1, budget, &counts).unwrap();
+    let outcome =
+        solve(&best::Config::default(), &Problem::new(&boxes), 1, budget, &counts).unwrap();
     assert_eq!(counts.evaluations.into_inner(), outcome.evaluations);
     let (calls, events) = (counts.calls.into_inner(), counts.events.into_inner());
     assert!(calls > 2 * events, "{calls} calls, {events} events");
@@ -85,10 +90,16 @@ fn numbers_that_no_poll_could_interrupt_are_refused() {
         solve(&method, &Problem::new(boxes), 1, Budget::UNLIMITED, &()).unwrap_err().to_string()
     };
     let tournament = rebuild::Config { tournament: 1 << 31, ..Default::default() };
-    assert_eq!(refused(Method::Rebuild(tournament), &[]), "tournament is 2147483648; accepted: 1 to 1000");
+    assert_eq!(
+        refused(Method::Rebuild(tournament), &[]),
+        "tournament is 2147483648; accepted: 1 to 1000"
+    );
     let ruin = ruin_recreate::Ruin { removed: u32::MAX, ..Default::default() };
     let ruin = ruin_recreate::Config { ruin, ..Default::default() };
-    assert_eq!(refused(Method::RuinRecreate(ruin), &[]), "ruin.removed is 4294967295; accepted: 1 to 1000");
+    assert_eq!(
+        refused(Method::RuinRecreate(ruin), &[]),
+        "ruin.removed is 4294967295; accepted: 1 to 1000"
+    );
     let population = genetic::Config { population: 1_000_000, ..Default::default() };
     let message = "population is 1000000; accepted: at most 262144";
     assert_eq!(refused(Method::Genetic(population), &boxes(1024)), message);

@@ -3,8 +3,8 @@
 use bvh_build::Builder;
 use bvh_core::{Aabb, Bvh, Node, cost, validate};
 use bvh_search::{
-    Budget, Event, Method, Observer, Outcome, Problem, SearchError, StopReason, best, optimize, reinsertion,
-    ruin_recreate, solve,
+    Budget, Event, Method, Observer, Outcome, Problem, SearchError, StopReason, best, optimize,
+    reinsertion, ruin_recreate, solve,
 };
 use proptest::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
@@ -59,12 +59,13 @@ fn run(method: &Method, boxes: &[Aabb], max_work: u64) -> Outcome {
 fn every_method_improves_on_its_start_and_the_best_most() {
     let boxes = scatter(2000, 1);
     let start = cost::internal_area(&reinsertion::Config::default().start.build(&boxes).unwrap());
-    let [reinsertion, rotated, treelets, single, iterated, rebuilt, annealed, best] = METHODS.map(|name| {
-        let method = methods().find(|method| method.name() == name).unwrap();
-        let outcome = run(&method, &boxes, 8_000_000);
-        assert_eq!(outcome.history[0].cost, start);
-        outcome.cost
-    });
+    let [reinsertion, rotated, treelets, single, iterated, rebuilt, annealed, best] =
+        METHODS.map(|name| {
+            let method = methods().find(|method| method.name() == name).unwrap();
+            let outcome = run(&method, &boxes, 8_000_000);
+            assert_eq!(outcome.history[0].cost, start);
+            outcome.cost
+        });
     assert!(rotated < start && treelets < start && reinsertion < start);
     for (name, cost) in
         [("annealing", single), ("rebuild", rebuilt), ("ruin_recreate", annealed), ("best", best)]
@@ -96,11 +97,21 @@ fn budgets_end_a_search_where_they_say() {
         for max_work in [0, 1, 5_000, 100_000] {
             let outcome = run(&method, &boxes, max_work);
             // One move more at most, or the start alone.
-            assert!(outcome.work <= max_work.max(1999) + 2000, "{} {max_work} {}", method.name(), outcome.work);
+            assert!(
+                outcome.work <= max_work.max(1999) + 2000,
+                "{} {max_work} {}",
+                method.name(),
+                outcome.work
+            );
         }
         let budget = Budget { max_evaluations: Some(777), ..Budget::UNLIMITED };
         let outcome = solve(&method, &Problem::new(&boxes), 1, budget, &()).unwrap();
-        assert!((777..=778).contains(&outcome.evaluations), "{} {}", method.name(), outcome.evaluations);
+        assert!(
+            (777..=778).contains(&outcome.evaluations),
+            "{} {}",
+            method.name(),
+            outcome.evaluations
+        );
         assert_eq!(outcome.stop, StopReason::Evaluations);
     }
 }
@@ -131,7 +142,8 @@ fn a_cancelled_search_returns_what_it_has() {
     let boxes = scatter(1000, 4);
     for method in methods() {
         let observer = AfterTheStart(false.into());
-        let outcome = solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &observer).unwrap();
+        let outcome =
+            solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &observer).unwrap();
         assert_eq!(outcome.stop, StopReason::Cancelled, "{}", method.name());
         validate(&outcome.tree, &boxes).unwrap();
     }
@@ -182,7 +194,8 @@ fn the_deepest_tree_can_be_optimised() {
     let boxes = scatter(3000, 5);
     let tree = chain(&boxes);
     let outcome =
-        optimize(&tree, &Problem::new(&boxes), &best::Config::default(), 1, work(20_000_000), &()).unwrap();
+        optimize(&tree, &Problem::new(&boxes), &best::Config::default(), 1, work(20_000_000), &())
+            .unwrap();
     validate(&outcome.tree, &boxes).unwrap();
     assert!(outcome.cost < cost::internal_area(&tree) / 4.0);
 }
@@ -218,7 +231,9 @@ fn leaves_of_several_objects_are_kept_and_other_trees_refused_by_name() {
 #[test]
 fn parameters_outside_their_range_are_named() {
     let problem = Problem::new(&[]);
-    let refused = |method: Method| solve(&method, &problem, 1, Budget::UNLIMITED, &()).unwrap_err().to_string();
+    let refused = |method: Method| {
+        solve(&method, &problem, 1, Budget::UNLIMITED, &()).unwrap_err().to_string()
+    };
     let cold = ruin_recreate::Config { cold: 1.0, ..Default::default() };
     assert_eq!(refused(Method::RuinRecreate(cold)), "cold is 1; accepted: above 0, not above hot");
     let sweeps = reinsertion::Config { sweeps: 0, ..Default::default() };

@@ -3,7 +3,9 @@
 use bvh_build::Builder;
 use bvh_core::cost::{self, Measure, Objective};
 use bvh_core::{Aabb, PackedAabb, RayDensity, Segment, glam, validate};
-use bvh_search::{Budget, Method, Outcome, Problem, Shortcut, Start, best, exact, reinsertion, solve};
+use bvh_search::{
+    Budget, Method, Outcome, Problem, Shortcut, Start, best, exact, reinsertion, solve,
+};
 
 /// Rays that are nearly parallel to the x axis: the face across it counts most. Monotone, as every sum of products of
 /// extents is.
@@ -27,7 +29,9 @@ fn boxes(n: u32) -> Vec<Aabb> {
 /// All methods; `best` without its search by area within milliseconds.
 fn methods() -> impl Iterator<Item = Method> {
     Method::all().into_iter().filter(|method| method.name() != "exact").map(|method| match method {
-        Method::Best(config) => Method::Best(best::Config { start: Some(Start::default()), ..config }),
+        Method::Best(config) => {
+            Method::Best(best::Config { start: Some(Start::default()), ..config })
+        }
         other => other,
     })
 }
@@ -54,7 +58,8 @@ fn the_area_as_a_measure_gives_the_same_history_as_the_area() {
 #[test]
 fn builders_and_searches_go_by_the_measure_and_report_every_objective_by_it() {
     let boxes = boxes(700);
-    let objectives = [Objective::GoldsmithSalmon, Objective::Sah(Default::default()), Objective::Layout];
+    let objectives =
+        [Objective::GoldsmithSalmon, Objective::Sah(Default::default()), Objective::Layout];
     for method in methods() {
         let name = method.name();
         let (by_area, found) = (run(&method, &boxes, None), run(&method, &boxes, Some(&AlongX)));
@@ -120,12 +125,15 @@ fn no_search_goes_below_the_exact_optimum_of_the_measure_and_best_reaches_it() {
     for n in 3..9 {
         let boxes = boxes(10 * n)[9 * n as usize..].to_vec();
         let optimum = run(&Method::Exact(exact::Config::default()), &boxes, Some(&AlongX)).cost;
-        for method in methods()
-            .filter(|method| !["goldsmith_salmon", "random_orders", "genetic"].contains(&method.name()))
-        {
+        for method in methods().filter(|method| {
+            !["goldsmith_salmon", "random_orders", "genetic"].contains(&method.name())
+        }) {
             let cost = run(&method, &boxes, Some(&AlongX)).cost;
             assert!(cost >= optimum * (1.0 - 1e-12), "{} {n}: {cost} {optimum}", method.name());
-            assert!(method.name() != "best" || cost <= optimum * (1.0 + 1e-12), "{n}: {cost} {optimum}");
+            assert!(
+                method.name() != "best" || cost <= optimum * (1.0 + 1e-12),
+                "{n}: {cost} {optimum}"
+            );
         }
     }
 }
@@ -134,7 +142,9 @@ fn no_search_goes_below_the_exact_optimum_of_the_measure_and_best_reaches_it() {
 fn trees_for_a_sample_of_rays_are_entered_less_often_than_trees_by_area() {
     let boxes = boxes(2000);
     let bounds = boxes.iter().fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
-    let at = |i: u32, k: u32| (i.wrapping_mul(2_246_822_519).rotate_left(k) >> 8) as f32 / (1 << 24) as f32;
+    let at = |i: u32, k: u32| {
+        (i.wrapping_mul(2_246_822_519).rotate_left(k) >> 8) as f32 / (1 << 24) as f32
+    };
     let size = bounds.max - bounds.min;
     // A camera in one corner: no ray has a uniform direction.
     let segments: Vec<Segment> = (0..20_000)

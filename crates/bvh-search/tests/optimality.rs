@@ -11,7 +11,9 @@ fn sheet() -> Vec<Aabb> {
         let (x, y) = at(i);
         [x + (y * 0.61).fract(), y, wave(x, y)]
     };
-    let size = |i: u16| [0.4 + f32::from(i % 7) * 0.3, 0.2 + f32::from(i % 5) * 0.5, f32::from(i % 3) * 0.4];
+    let size = |i: u16| {
+        [0.4 + f32::from(i % 7) * 0.3, 0.2 + f32::from(i % 5) * 0.5, f32::from(i % 3) * 0.4]
+    };
     let high = |i| std::array::from_fn(|axis| low(i)[axis] + size(i)[axis]);
     (0..1600).map(|i| Aabb::from((low(i), high(i)))).collect()
 }
@@ -44,7 +46,8 @@ fn no_method_goes_below_the_optimum_the_bound_neither_above_and_the_best_reaches
     let mut reached = 0;
     for (number, boxes) in instances.iter().enumerate() {
         let problem = Problem::new(boxes);
-        let optimum = solve(&exact::Config::default(), &problem, 1, Budget::UNLIMITED, &()).unwrap().cost;
+        let optimum =
+            solve(&exact::Config::default(), &problem, 1, Budget::UNLIMITED, &()).unwrap().cost;
         assert!(lower_bound::internal_area(boxes, 8, &()).unwrap() <= optimum, "instance {number}");
         for method in Method::all() {
             let outcome = solve(&method, &problem, 1, budget, &()).unwrap();
@@ -52,7 +55,11 @@ fn no_method_goes_below_the_optimum_the_bound_neither_above_and_the_best_reaches
             validate(&outcome.tree, boxes).expect(&name);
             // Goldsmith–Salmon trees are not binary: their wider nodes leave terms out.
             let binary = outcome.tree.nodes.len() == 2 * boxes.len() - 1;
-            assert!(!binary || outcome.cost >= optimum * (1.0 - 1e-12), "{name}: {} {optimum}", outcome.cost);
+            assert!(
+                !binary || outcome.cost >= optimum * (1.0 - 1e-12),
+                "{name}: {} {optimum}",
+                outcome.cost
+            );
             if method.name() == "best" && outcome.cost <= optimum * (1.0 + 1e-12) {
                 reached += 1;
             }

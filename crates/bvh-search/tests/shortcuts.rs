@@ -72,8 +72,10 @@ fn a_search_that_meets_the_bound_stops_with_the_cost_of_one_that_goes_on() {
 fn a_tiny_scene_gets_the_optimum_in_place_of_a_search() {
     for n in 3..=10 {
         let boxes = scattered(n);
-        let (optimum, searched) = (best(&boxes, &[]), best(&boxes, &[Shortcut::Tiny, Shortcut::BoundMet]));
-        let exact = solve(&exact::Config {}, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap();
+        let (optimum, searched) =
+            (best(&boxes, &[]), best(&boxes, &[Shortcut::Tiny, Shortcut::BoundMet]));
+        let exact =
+            solve(&exact::Config {}, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap();
         assert_eq!(optimum.tree, exact.tree);
         assert_eq!((optimum.stop, optimum.evaluations), (StopReason::Optimal, 1));
         assert!(optimum.cost <= searched.cost * (1.0 + 1e-14), "{n}");
@@ -83,8 +85,11 @@ fn a_tiny_scene_gets_the_optimum_in_place_of_a_search() {
 #[test]
 fn no_tree_is_below_the_bound_and_stiff_scenes_meet_it() {
     for n in 2..=9 {
-        for (boxes, met) in stiff(n).into_iter().map(|boxes| (boxes, true)).chain([(scattered(n), false)]) {
-            let exact = solve(&exact::Config {}, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap();
+        for (boxes, met) in
+            stiff(n).into_iter().map(|boxes| (boxes, true)).chain([(scattered(n), false)])
+        {
+            let exact =
+                solve(&exact::Config {}, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap();
             let bound = lower_bound::of_largest(&boxes);
             assert!(bound <= exact.cost * (1.0 + 1e-14), "{bound} {}", exact.cost);
             assert!(!met || bound >= exact.cost * (1.0 - 1e-14), "{bound} {}", exact.cost);
@@ -113,7 +118,8 @@ fn a_flat_axis_that_orders_like_no_other_may_have_the_best_split() {
     // Two crossing rows of flat tiles, one after the other, and the same tiles in turns.
     let tile = |x: f32, y: f32| Aabb::from(([x, y, 0.0], [x + 1.0, y + 1.0, 0.0]));
     let at = |i: usize| 2.0 * i as f32;
-    let (row, column): (Vec<_>, Vec<_>) = (0..9).map(|i| (tile(at(i), 8.0), tile(8.0, at(i)))).unzip();
+    let (row, column): (Vec<_>, Vec<_>) =
+        (0..9).map(|i| (tile(at(i), 8.0), tile(8.0, at(i)))).unzip();
     let cost = |boxes: &[Aabb]| internal_area(&Config::default().build(boxes).unwrap());
     let one_by_one: Vec<Aabb> = row.iter().chain(&column).copied().collect();
     let in_turns: Vec<Aabb> = row.iter().zip(&column).flat_map(|(a, b)| [*a, *b]).collect();
@@ -126,7 +132,8 @@ fn a_flat_axis_that_orders_like_no_other_may_have_the_best_split() {
 fn a_tie_may_part_equal_boxes_so_that_merging_them_would_change_the_cost() {
     let (large, small) = (cube([0.0; 3], 4.0), cube([1.0; 3], 2.0));
     let apart = Config::default().build(&[large, small, small, small, small, large]).unwrap();
-    let merged = Config::default().build_weighted(&[large, small, large], &[1.0, 4.0, 1.0]).unwrap();
+    let merged =
+        Config::default().build_weighted(&[large, small, large], &[1.0, 4.0, 1.0]).unwrap();
     let expanded = internal_area(&merged) + 3.0 * small.half_area();
     assert_eq!(internal_area(&apart), 3.0 * large.half_area() + 2.0 * small.half_area());
     assert_eq!(expanded, 2.0 * large.half_area() + 3.0 * small.half_area());

@@ -53,9 +53,16 @@ pub fn output_file(flag: &str, path: &Path, kind: &FileKind) -> Result<(), Error
         Err(_) => match path.extension() {
             // A file under the name of another kind would be taken for one.
             Some(found) if !found.eq_ignore_ascii_case(kind.extension) => {
-                let accepted =
-                    format!("{}, by a name that ends with `.{}` or has no ending", kind.name, kind.extension);
-                refuse(flag, path, &format!("a name that ends with `.{}`", found.display()), &accepted)
+                let accepted = format!(
+                    "{}, by a name that ends with `.{}` or has no ending",
+                    kind.name, kind.extension
+                );
+                refuse(
+                    flag,
+                    path,
+                    &format!("a name that ends with `.{}`", found.display()),
+                    &accepted,
+                )
             }
             _ => Ok(()),
         },
@@ -64,12 +71,18 @@ pub fn output_file(flag: &str, path: &Path, kind: &FileKind) -> Result<(), Error
         Ok(_) => {
             let mut beginning = Vec::new();
             let length = kind.beginning.len() as u64;
-            let file = File::open(path).and_then(|file| file.take(length).read_to_end(&mut beginning));
+            let file =
+                File::open(path).and_then(|file| file.take(length).read_to_end(&mut beginning));
             file.map_err(Error::io(path, "read the file"))?;
             if beginning.is_empty() || beginning == kind.beginning {
                 return Ok(());
             }
-            refuse(flag, path, &format!("a file, but not {}", kind.name), "a new file, or one of that kind")
+            refuse(
+                flag,
+                path,
+                &format!("a file, but not {}", kind.name),
+                "a new file, or one of that kind",
+            )
         }
     }
 }

@@ -20,6 +20,7 @@ pub fn write_synced(path: &Path, bytes: &[u8]) -> Result<(), Error> {
 /// The names of what a folder holds.
 pub fn names(folder: &Path) -> Result<BTreeSet<String>, Error> {
     let entries = fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))?;
-    let name = |entry: io::Result<fs::DirEntry>| Ok(entry?.file_name().to_string_lossy().into_owned());
+    let name =
+        |entry: io::Result<fs::DirEntry>| Ok(entry?.file_name().to_string_lossy().into_owned());
     entries.map(name).collect::<io::Result<_>>().map_err(Error::io(folder, "read the folder"))
 }

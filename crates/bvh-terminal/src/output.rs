@@ -56,7 +56,8 @@ fn plain(text: &str) -> Cow<'_, str> {
     if !text.contains(commands) {
         return text.into();
     }
-    let spelled = |c: char| if commands(c) { c.escape_default().to_string() } else { c.to_string() };
+    let spelled =
+        |c: char| if commands(c) { c.escape_default().to_string() } else { c.to_string() };
     text.chars().map(spelled).collect::<String>().into()
 }
 

@@ -32,7 +32,10 @@ pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
     let any = (Ruled::new(&panel.x, &[], 0.0), Ruled::new(&panel.y, &[], 0.0));
     let (mut xs, mut ys) = (Vec::new(), Vec::new());
     let mut add = |x: f64, heights: &[f64]| {
-        for &y in heights.iter().filter(|&&y| any.0.coordinate(x).is_some() && any.1.coordinate(y).is_some()) {
+        for &y in heights
+            .iter()
+            .filter(|&&y| any.0.coordinate(x).is_some() && any.1.coordinate(y).is_some())
+        {
             xs.push(x);
             ys.push(y);
         }
@@ -52,7 +55,8 @@ pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
             }
             Marks::Bars { values, spread, base } => {
                 values.iter().zip(0..).for_each(|(&height, i)| add(f64::from(i), &[height]));
-                other_ys.extend(spread.iter().take(values.len()).flat_map(|&(low, high)| [low, high]));
+                other_ys
+                    .extend(spread.iter().take(values.len()).flat_map(|&(low, high)| [low, high]));
                 other_ys.push(*base);
             }
             Marks::HLine(y) => other_ys.push(*y),
@@ -77,19 +81,28 @@ impl Ruled {
             return Self { low: -0.5, high: names.len().max(1) as f64 - 0.5, ..any };
         }
         let shown = || values.iter().filter_map(|&value| any.coordinate(value));
-        let (least, most) = (shown().reduce(f64::min).unwrap_or(0.0), shown().reduce(f64::max).unwrap_or(1.0));
+        let (least, most) =
+            (shown().reduce(f64::min).unwrap_or(0.0), shown().reduce(f64::max).unwrap_or(1.0));
         // A single value stands in the middle of a range of its own size, or of one decade.
         let alone = if log || least == 0.0 { 0.5 } else { 0.1 * least.abs() };
         let margin = if most > least { margin * (most - least) } else { alone };
         // No margin beyond zero: a length or a count does not become negative.
         let low = if !log && least >= 0.0 { (least - margin).max(0.0) } else { least - margin };
-        let high = if !log && most <= 0.0 && least < most { (most + margin).min(0.0) } else { most + margin };
+        let high = if !log && most <= 0.0 && least < most {
+            (most + margin).min(0.0)
+        } else {
+            most + margin
+        };
         let set = |end: Option<f64>| end.and_then(|value| any.coordinate(value));
         let low = set(axis.low).unwrap_or(low);
         let high = set(axis.high).filter(|&high| high > low).unwrap_or(high);
         // Wide enough for the ends to be told apart in ten digits.
         let narrowest = (1e-9 * low.abs().max(high.abs())).max(1e-200);
-        Self { low, high: if high > low { high.max(low + narrowest) } else { low + narrowest.max(1.0) }, ..any }
+        Self {
+            low,
+            high: if high > low { high.max(low + narrowest) } else { low + narrowest.max(1.0) },
+            ..any
+        }
     }
 
     /// The value's coordinate, which may lie outside the shown part; none if the axis cannot show the value.
@@ -117,8 +130,11 @@ impl Ruled {
     /// Adds at most `most` ticks, at least three if that is possible.
     pub fn rule(&mut self, most: usize) {
         if !self.log || !self.rule_decades(most) {
-            let (low, high) =
-                if self.log { (libm::exp10(self.low), libm::exp10(self.high)) } else { (self.low, self.high) };
+            let (low, high) = if self.log {
+                (libm::exp10(self.low), libm::exp10(self.high))
+            } else {
+                (self.low, self.high)
+            };
             self.rule_evenly(low, high, most.max(3));
         }
     }
@@ -145,7 +161,8 @@ impl Ruled {
                 break;
             }
         }
-        self.factor = if factor == 0 { String::new() } else { format!("×10{}", superscript(factor)) };
+        self.factor =
+            if factor == 0 { String::new() } else { format!("×10{}", superscript(factor)) };
     }
 
     /// Ticks at powers of ten, and at multiples of them where they are few; false if there are too few of both.
@@ -154,13 +171,17 @@ impl Ruled {
         let plain = first >= -3 && last < 5;
         let at = |power: i32, mantissa: i32| f64::from(power) + libm::log10(f64::from(mantissa));
         let marks = |mantissas: &'static [i32]| -> Vec<(i32, i32)> {
-            let all =
-                (first - 1..=last).flat_map(|power| mantissas.iter().map(move |&mantissa| (power, mantissa)));
-            all.filter(|&(power, mantissa)| (self.low..=self.high).contains(&at(power, mantissa))).collect()
+            let all = (first - 1..=last)
+                .flat_map(|power| mantissas.iter().map(move |&mantissa| (power, mantissa)));
+            all.filter(|&(power, mantissa)| (self.low..=self.high).contains(&at(power, mantissa)))
+                .collect()
         };
         let tick = |&(power, mantissa): &(i32, i32)| {
             let label = if plain {
-                decimal(f64::from(mantissa) * libm::exp10(f64::from(power)), (-power).max(0) as usize)
+                decimal(
+                    f64::from(mantissa) * libm::exp10(f64::from(power)),
+                    (-power).max(0) as usize,
+                )
             } else if mantissa == 1 {
                 format!("10{}", superscript(power))
             } else {
@@ -169,15 +190,20 @@ impl Ruled {
             (at(power, mantissa), label)
         };
         let every = |step: i32| {
-            (first..=last).filter(|power| power.rem_euclid(step) == 0).map(|power| (power, 1)).collect()
+            (first..=last)
+                .filter(|power| power.rem_euclid(step) == 0)
+                .map(|power| (power, 1))
+                .collect()
         };
-        let multiples =
-            [marks(&[1, 2, 3, 5]), marks(&[1, 2, 5])].into_iter().filter(|_| plain || last <= first);
+        let multiples = [marks(&[1, 2, 3, 5]), marks(&[1, 2, 5])]
+            .into_iter()
+            .filter(|_| plain || last <= first);
         let chosen = multiples
             .filter(|ticks| ticks.len() >= 3)
             .chain((1..=last - first).map(every).filter(|ticks: &Vec<_>| ticks.len() >= 2))
             .find(|ticks| ticks.len() <= most.max(3));
-        let fine = if self.high - self.low <= 6.0 { marks(&[2, 3, 4, 5, 6, 7, 8, 9]) } else { every(1) };
+        let fine =
+            if self.high - self.low <= 6.0 { marks(&[2, 3, 4, 5, 6, 7, 8, 9]) } else { every(1) };
         self.minor = fine.iter().map(|&(power, mantissa)| at(power, mantissa)).collect();
         self.major = chosen.iter().flatten().map(tick).collect();
         chosen.is_some()
@@ -247,16 +273,28 @@ mod tests {
     fn a_log_axis_is_labelled_at_powers_of_ten_and_between_them_where_they_are_few() {
         assert_eq!(labels(&Axis::log(""), &[0.01, 100.0], 5), ["0.01", "0.1", "1", "10", "100"]);
         assert_eq!(labels(&Axis::log(""), &[1e-7, 1e-4], 10), ["10⁻⁷", "10⁻⁶", "10⁻⁵", "10⁻⁴"]);
-        assert_eq!(labels(&Axis::log(""), &[1e-12, 1.0], 5), ["10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "10⁰"]);
+        assert_eq!(
+            labels(&Axis::log(""), &[1e-12, 1.0], 5),
+            ["10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "10⁰"]
+        );
         assert_eq!(labels(&Axis::log(""), &[1.5, 60.0], 6), ["2", "5", "10", "20", "50"]);
         assert_eq!(labels(&Axis::log(""), &[1.01, 1.04], 6), ["1.01", "1.02", "1.03", "1.04"]);
     }
 
     #[test]
     fn linear_ticks_are_round_numbers_and_long_ones_share_a_power_of_ten() {
-        assert_eq!(labels(&Axis::linear(""), &[0.0, 100.0], 6), ["0", "20", "40", "60", "80", "100"]);
-        assert_eq!(labels(&Axis::linear(""), &[-0.1, 0.1], 5), ["−0.10", "−0.05", "0.00", "0.05", "0.10"]);
-        assert_eq!(labels(&Axis::linear(""), &[1.0e14, 1.3e14], 4), ["1.0", "1.1", "1.2", "1.3", "×10¹⁴"]);
+        assert_eq!(
+            labels(&Axis::linear(""), &[0.0, 100.0], 6),
+            ["0", "20", "40", "60", "80", "100"]
+        );
+        assert_eq!(
+            labels(&Axis::linear(""), &[-0.1, 0.1], 5),
+            ["−0.10", "−0.05", "0.00", "0.05", "0.10"]
+        );
+        assert_eq!(
+            labels(&Axis::linear(""), &[1.0e14, 1.3e14], 4),
+            ["1.0", "1.1", "1.2", "1.3", "×10¹⁴"]
+        );
     }
 
     #[test]
@@ -267,7 +305,9 @@ mod tests {
             Axis::log("").range(2.0, 1.0),
             Axis::linear("").range(9.0, f64::NAN),
         ] {
-            for values in [vec![], vec![7.0], vec![1e-320], vec![0.0], vec![1e300, -1e300, f64::NAN]] {
+            for values in
+                [vec![], vec![7.0], vec![1e-320], vec![0.0], vec![1e300, -1e300, f64::NAN]]
+            {
                 let ruled = Ruled::new(&axis, &values, 0.05);
                 assert!(ruled.low < ruled.high, "{values:?} gave {ruled:?}");
                 let ticks = labels(&axis, &values, 8);

@@ -131,7 +131,10 @@ impl<B: DrawingBackend> Sheet<B> {
     /// Fills a rectangle.
     pub(super) fn rectangle(&self, frame: Frame, colour: RGBColor) -> Result<(), Fault<B>> {
         let corner = |x: f64, y: f64| (steps(frame.left + x), steps(frame.top + y));
-        self.0.draw(&Rectangle::new([corner(0.0, 0.0), corner(frame.width, frame.height)], colour.filled()))
+        self.0.draw(&Rectangle::new(
+            [corner(0.0, 0.0), corner(frame.width, frame.height)],
+            colour.filled(),
+        ))
     }
 }
 
@@ -143,7 +146,8 @@ pub(super) fn svg(picture: &impl Picture) -> Result<String, FigureError> {
     let (across, down) = (steps(width.ceil()), steps(height.ceil()));
     let mut body = String::new();
     {
-        let area = SVGBackend::with_string(&mut body, (across as u32, down as u32)).into_drawing_area();
+        let area =
+            SVGBackend::with_string(&mut body, (across as u32, down as u32)).into_drawing_area();
         let refused = |fault: Fault<SVGBackend<'_>>| FigureError::Draw {
             title: picture.title().to_owned(),
             reason: fault.to_string(),
@@ -151,7 +155,8 @@ pub(super) fn svg(picture: &impl Picture) -> Result<String, FigureError> {
         layout.draw(&Sheet(area.clone())).map_err(refused)?;
         area.present().map_err(refused)?;
     }
-    let title = printable(picture.title()).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    let title =
+        printable(picture.title()).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let mut document = String::new();
     let _ = write!(
         document,
@@ -199,9 +204,14 @@ mod tests {
 
     #[test]
     fn dashes_of_one_style_become_one_path() {
-        let line = |style: &str, points: &str| format!("<polyline {style} points=\"{points} \"/>\n");
-        let svg =
-            format!("<svg>\n{}{}{}</svg>\n", line("a", "1,2 3,4"), line("a", "5,6 7,8"), line("b", "1,1 2,2"));
+        let line =
+            |style: &str, points: &str| format!("<polyline {style} points=\"{points} \"/>\n");
+        let svg = format!(
+            "<svg>\n{}{}{}</svg>\n",
+            line("a", "1,2 3,4"),
+            line("a", "5,6 7,8"),
+            line("b", "1,1 2,2")
+        );
         let paths = "<path a d=\"M1,2 3,4M5,6 7,8\"/>\n<path b d=\"M1,1 2,2\"/>\n";
         assert_eq!(joined(&svg), format!("<svg>\n{paths}</svg>\n"));
     }

@@ -64,7 +64,15 @@ impl Picture for Figure {
         let legend = Legend::new(self, &strokes, WIDTH - 2.0 * BORDER, fonts);
         let head = Head::new(&self.title, &self.caption, fonts);
         let columns = self.columns.clamp(1, HEIGHTS.len()).min(self.panels.len().max(1));
-        Ok(Plan::new(head, strokes, legend, &self.panels, columns, (WIDTH, HEIGHTS[columns - 1]), fonts))
+        Ok(Plan::new(
+            head,
+            strokes,
+            legend,
+            &self.panels,
+            columns,
+            (WIDTH, HEIGHTS[columns - 1]),
+            fonts,
+        ))
     }
 }
 
@@ -87,7 +95,10 @@ impl From<&Figure> for Miniature {
             y: wordless(&panel.y),
             layers: panel.layers.clone(),
         };
-        Self(Figure { panels: figure.panels.first().map(panel).into_iter().collect(), ..figure.clone() })
+        Self(Figure {
+            panels: figure.panels.first().map(panel).into_iter().collect(),
+            ..figure.clone()
+        })
     }
 }
 
@@ -116,7 +127,8 @@ impl<'a> Plan<'a> {
     ) -> Self {
         let room = whole - 2.0 * BORDER;
         // What stands beside the plots leaves their width, and that decides on what stands below them.
-        let mut plots: Vec<Plot> = panels.iter().map(|panel| Plot::new(panel, height, fonts)).collect();
+        let mut plots: Vec<Plot> =
+            panels.iter().map(|panel| Plot::new(panel, height, fonts)).collect();
         let beside = plots.iter().map(|plot| plot.left).fold(0.0, f64::max);
         let width = (room / columns as f64 - beside - GUTTER.0).max(60.0);
         plots.iter_mut().for_each(|plot| plot.fit_width(width, fonts));

@@ -73,7 +73,8 @@ impl Picture for HeatMap {
         let key = Legend::of_areas(classes, WIDTH - 2.0 * BORDER, fonts);
         let columns: Vec<String> =
             self.columns.iter().map(|name| fonts.shorten(name, LONGEST, SMALL)).collect();
-        let rows: Vec<_> = self.rows.iter().map(|name| fonts.fit(name, LONGEST, &NAME_SIZES)).collect();
+        let rows: Vec<_> =
+            self.rows.iter().map(|name| fonts.fit(name, LONGEST, &NAME_SIZES)).collect();
         let beside = rows.iter().map(|(lines, kind)| fonts.widest(lines, *kind));
         let left = BORDER + beside.fold(fonts.width(&self.row_label, SMALL), f64::max).ceil() + 8.0;
         let cell = ((WIDTH - left - BORDER) / columns.len().max(1) as f64).clamp(2.0, CELL);
@@ -102,18 +103,30 @@ impl Layout for Table<'_> {
         let align = if self.upright { Align::Up } else { Align::Center };
         for (index, name) in self.columns.iter().enumerate() {
             let x = self.left + self.cell * (index as f64 + 0.5);
-            sheet.text((x, if self.upright { self.top - 5.0 } else { above }), name, SMALL, INK, align)?;
+            sheet.text(
+                (x, if self.upright { self.top - 5.0 } else { above }),
+                name,
+                SMALL,
+                INK,
+                align,
+            )?;
         }
         for (index, (lines, kind)) in self.rows.iter().enumerate() {
-            let first = self.top + self.row * (index as f64 + 0.5) - kind.line() * lines.len() as f64 / 2.0;
+            let first =
+                self.top + self.row * (index as f64 + 0.5) - kind.line() * lines.len() as f64 / 2.0;
             sheet.lines((self.left - 6.0, first), lines, *kind, INK, Align::Right)?;
         }
         for (index, (cell, (lines, kind))) in self.map.cells.iter().zip(&self.texts).enumerate() {
             let (row, column) = (index / self.columns.len(), index % self.columns.len());
-            let (left, top) = (self.left + self.cell * column as f64, self.top + self.row * row as f64);
+            let (left, top) =
+                (self.left + self.cell * column as f64, self.top + self.row * row as f64);
             let colour = colour_of(cell.class.filter(|&class| class < self.map.classes.len()));
-            let inner =
-                Frame { left: left + 0.5, top: top + 0.5, width: self.cell - 1.0, height: self.row - 1.0 };
+            let inner = Frame {
+                left: left + 0.5,
+                top: top + 0.5,
+                width: self.cell - 1.0,
+                height: self.row - 1.0,
+            };
             sheet.rectangle(inner, colour)?;
             let first = top + (self.row - kind.line() * lines.len() as f64) / 2.0;
             let middle = left + self.cell / 2.0;

@@ -37,8 +37,9 @@ impl Legend {
     pub fn new(figure: &Figure, strokes: &Strokes, width: f64, fonts: &Fonts) -> Self {
         let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
         let entry = |(name, stroke): &(String, Stroke)| {
-            let has =
-                |kind: fn(&Layer) -> bool| layers().any(|layer| layer.series() == Some(name) && kind(layer));
+            let has = |kind: fn(&Layer) -> bool| {
+                layers().any(|layer| layer.series() == Some(name) && kind(layer))
+            };
             let line = has(Layer::is_line);
             let marker = has(Layer::is_marked) || line && strokes.marks(*stroke);
             let area = !line && has(|layer| !layer.is_marked());
@@ -56,7 +57,11 @@ impl Legend {
     }
 
     /// The key to areas of these names and colours.
-    pub fn of_areas(areas: impl Iterator<Item = (String, RGBColor)>, width: f64, fonts: &Fonts) -> Self {
+    pub fn of_areas(
+        areas: impl Iterator<Item = (String, RGBColor)>,
+        width: f64,
+        fonts: &Fonts,
+    ) -> Self {
         let entry = |(name, colour)| {
             let mut stroke = REFERENCE_LINE;
             stroke.colour = colour;
@@ -69,7 +74,8 @@ impl Legend {
         let before = SAMPLE + GAPS.0;
         let room = width - before;
         entries.iter_mut().for_each(|entry| entry.name = fonts.shorten(&entry.name, room, BODY));
-        let column_width = before + fonts.widest(entries.iter().map(|entry| &entry.name), BODY) + GAPS.1;
+        let column_width =
+            before + fonts.widest(entries.iter().map(|entry| &entry.name), BODY) + GAPS.1;
         let most = (((width + GAPS.1) / column_width).floor() as usize).max(1);
         // As even rows as possible: 4 + 4 rather than 7 + 1.
         let columns = entries.len().div_ceil(entries.len().div_ceil(most).max(1)).max(1);
@@ -81,7 +87,11 @@ impl Legend {
     }
 
     /// Draws the entries with their upper left corner at a point.
-    pub fn draw<B: DrawingBackend>(&self, sheet: &Sheet<B>, corner: (f64, f64)) -> Result<(), Fault<B>> {
+    pub fn draw<B: DrawingBackend>(
+        &self,
+        sheet: &Sheet<B>,
+        corner: (f64, f64),
+    ) -> Result<(), Fault<B>> {
         for (index, entry) in self.entries.iter().enumerate() {
             let left = corner.0 + self.column_width * (index % self.columns) as f64;
             let middle = corner.1 + ROW * ((index / self.columns) as f64 + 0.5);
@@ -94,12 +104,19 @@ impl Legend {
 
 impl Entry {
     /// Draws a sample of the marks, its left end at a point.
-    fn draw<B: DrawingBackend>(&self, sheet: &Sheet<B>, left: f64, middle: f64) -> Result<(), Fault<B>> {
+    fn draw<B: DrawingBackend>(
+        &self,
+        sheet: &Sheet<B>,
+        left: f64,
+        middle: f64,
+    ) -> Result<(), Fault<B>> {
         let (colour, style) = (self.stroke.colour, pen(self.stroke.colour, 2.0));
         let ends = [left, left + SAMPLE].map(|x| (steps(x), steps(middle)));
         if self.area {
-            sheet
-                .rectangle(Frame { left: left + 8.0, top: middle - 6.0, width: 14.0, height: 12.0 }, colour)?;
+            sheet.rectangle(
+                Frame { left: left + 8.0, top: middle - 6.0, width: 14.0, height: 12.0 },
+                colour,
+            )?;
         }
         if self.line {
             let (on, off) = self.stroke.dash.unwrap_or((SAMPLE, 1.0));

@@ -66,7 +66,10 @@ mod tests {
             Layer::new("points <&>", Marks::Points(points.to_vec())),
             Layer::new("", Marks::Band(bands())),
             Layer::new("steps", Marks::StepBand(bands())),
-            Layer::new("bars", Marks::ErrorBars(points.iter().map(|&(x, y)| (x, y, y, x)).collect())),
+            Layer::new(
+                "bars",
+                Marks::ErrorBars(points.iter().map(|&(x, y)| (x, y, y, x)).collect()),
+            ),
             Layer::new("bars", Marks::Bars { values, spread: points.to_vec(), base: x }),
             Layer::new("level", Marks::HLine(y)),
             Layer::new("upright", Marks::VLine(x)),
@@ -102,12 +105,18 @@ mod tests {
                 let panels = all_layers(&points).into_iter().enumerate().map(panel).collect();
                 let figure = Figure { columns: points.len() % 6, panels, ..Figure::default() };
                 let picture = svg(&figure).unwrap();
-                assert!(!picture.contains("NaN") && !picture.contains("inf"), "{points:?} on {x:?}");
+                assert!(
+                    !picture.contains("NaN") && !picture.contains("inf"),
+                    "{points:?} on {x:?}"
+                );
                 if points.len() > 1 && kind == 0 {
                     png(&figure).unwrap();
                 }
                 let miniature = svg(&Miniature::from(&figure)).unwrap();
-                assert!(!miniature.contains("category") && !miniature.contains("<&>"), "{points:?} on {x:?}");
+                assert!(
+                    !miniature.contains("category") && !miniature.contains("<&>"),
+                    "{points:?} on {x:?}"
+                );
             }
         }
         png(&Figure::default()).unwrap();
@@ -116,17 +125,21 @@ mod tests {
     #[test]
     fn a_panel_without_anything_to_show_says_so() {
         let says = |layers: Vec<Layer>| {
-            let panel = Panel { title: String::new(), x: Axis::log("x"), y: Axis::log("y"), layers };
+            let panel =
+                Panel { title: String::new(), x: Axis::log("x"), y: Axis::log("y"), layers };
             svg(&Figure { panels: vec![panel], ..Figure::default() }).unwrap().contains("no data")
         };
         let line = |points| vec![Layer::new("", Marks::Line(points))];
-        assert!(says(Vec::new()) && says(line(Vec::new())) && says(line(vec![(1.0, 0.0), (-1.0, 2.0)])));
+        assert!(
+            says(Vec::new()) && says(line(Vec::new())) && says(line(vec![(1.0, 0.0), (-1.0, 2.0)]))
+        );
         assert!(!says(line(vec![(1.0, 2.0)])));
     }
 
     #[test]
     fn the_same_figure_gives_the_same_bytes() {
-        let points: Vec<(f64, f64)> = (0..50).map(|i| (f64::from(i), f64::from(i * i % 17))).collect();
+        let points: Vec<(f64, f64)> =
+            (0..50).map(|i| (f64::from(i), f64::from(i * i % 17))).collect();
         let panel = Panel {
             title: "t".to_owned(),
             x: Axis::linear("x"),
@@ -156,7 +169,8 @@ mod tests {
         };
         let picture = svg(&figure).unwrap();
         assert!(
-            picture.contains("<title>a &lt; b &amp;  c</title>") && picture.contains("&lt; &gt;&amp;&quot;")
+            picture.contains("<title>a &lt; b &amp;  c</title>")
+                && picture.contains("&lt; &gt;&amp;&quot;")
         );
     }
 
@@ -164,7 +178,8 @@ mod tests {
     fn a_heat_map_of_any_shape_is_drawn() {
         for classes in [vec![], vec!["good".to_owned(), "bad".to_owned()]] {
             for (rows, columns) in [(0, 0), (0, 3), (3, 0), (1, 12), (12, 1), (45, 29)] {
-                let cell = |i: usize| Cell { class: i.checked_sub(1), text: "text ".repeat(i.min(60)) };
+                let cell =
+                    |i: usize| Cell { class: i.checked_sub(1), text: "text ".repeat(i.min(60)) };
                 let map = HeatMap {
                     title: "a heat map".to_owned(),
                     caption: String::new(),
@@ -176,9 +191,15 @@ mod tests {
                 };
                 svg(&map).unwrap();
                 png(&map).unwrap();
-                let missing =
-                    HeatMap { rows: vec![String::new(); rows + 1], columns: vec![String::new(); 2], ..map };
-                assert!(matches!(svg(&missing), Err(FigureError::CellCount { .. })) || rows + 1 == columns);
+                let missing = HeatMap {
+                    rows: vec![String::new(); rows + 1],
+                    columns: vec![String::new(); 2],
+                    ..map
+                };
+                assert!(
+                    matches!(svg(&missing), Err(FigureError::CellCount { .. }))
+                        || rows + 1 == columns
+                );
             }
         }
     }

@@ -221,7 +221,9 @@ pub enum FigureError {
     #[error("the embedded font could not be read: {reason}")]
     Font { reason: String },
     /// More pixels than a PNG should have.
-    #[error("a picture of {width} × {height} pixels is too large for a PNG; show fewer panels or rows")]
+    #[error(
+        "a picture of {width} × {height} pixels is too large for a PNG; show fewer panels or rows"
+    )]
     TooLarge { width: usize, height: usize },
     /// The PNG encoder failed.
     #[error("the PNG could not be encoded: {reason}")]

@@ -74,16 +74,22 @@ impl<'a> Plot<'a> {
         let mut depth = SMALL.line();
         if let Scale::Category(names) = &self.panel.x.scale {
             let room = width / names.len().max(1) as f64;
-            let fits =
-                |name: &String| name.split_whitespace().all(|word| fonts.width(word, SMALL) <= room - 6.0);
+            let fits = |name: &String| {
+                name.split_whitespace().all(|word| fonts.width(word, SMALL) <= room - 6.0)
+            };
             self.upright = !names.iter().all(fits);
             let every = if self.upright { (SMALL.line() / room).ceil() as usize } else { 1 };
-            let lines =
-                |name: String| if self.upright { vec![name] } else { fonts.wrap(&name, room - 6.0, SMALL) };
+            let lines = |name: String| {
+                if self.upright { vec![name] } else { fonts.wrap(&name, room - 6.0, SMALL) }
+            };
             let named = names.iter().zip(0..).step_by(every);
             self.names = named.map(|(name, at)| (f64::from(at), lines(name.clone()))).collect();
             let size = |(_, lines): &(f64, Vec<String>)| {
-                if self.upright { fonts.widest(lines, SMALL) } else { SMALL.line() * lines.len() as f64 }
+                if self.upright {
+                    fonts.widest(lines, SMALL)
+                } else {
+                    SMALL.line() * lines.len() as f64
+                }
             };
             depth = self.names.iter().map(size).fold(0.0, f64::max);
         } else {
@@ -91,7 +97,8 @@ impl<'a> Plot<'a> {
         }
         self.title = fonts.wrap(&self.panel.title, width, HEADING);
         self.above = HEADING.line() * self.title.len() as f64 + 5.0;
-        self.x_label = fonts.wrap(&format!("{} {}", self.panel.x.label, self.x.factor), width, BODY);
+        self.x_label =
+            fonts.wrap(&format!("{} {}", self.panel.x.label, self.x.factor), width, BODY);
         self.below = (2.0 * TICK + depth + LABEL + BODY.line() * self.x_label.len() as f64).ceil();
     }
 
@@ -174,14 +181,20 @@ impl<B: DrawingBackend> Layers<'_, B> {
         let (Marks::Band(points) | Marks::StepBand(points)) = &layer.marks else { return Ok(()) };
         let stairs = matches!(layer.marks, Marks::StepBand(_));
         let (x, y) = (&self.plot.x, &self.plot.y);
-        let at = |&(at, low, high): &(f64, f64, f64)| Some((x.nearest(at)?, y.nearest(low)?, y.nearest(high)?));
+        let at = |&(at, low, high): &(f64, f64, f64)| {
+            Some((x.nearest(at)?, y.nearest(low)?, y.nearest(high)?))
+        };
         for run in runs(points.iter().map(at)) {
             let side = |height: fn(&(f64, f64, f64)) -> f64| {
-                self.thinned(&stepped(run.iter().map(|point| (point.0, height(point))).collect(), stairs))
+                self.thinned(&stepped(
+                    run.iter().map(|point| (point.0, height(point))).collect(),
+                    stairs,
+                ))
             };
             let upper = side(|point| point.2).into_iter().rev();
             let outline: Vec<Point> = side(|point| point.1).into_iter().chain(upper).collect();
-            self.area.draw(&Polygon::new(outline, self.strokes.of(&layer.name).1.colour.mix(0.2)))?;
+            self.area
+                .draw(&Polygon::new(outline, self.strokes.of(&layer.name).1.colour.mix(0.2)))?;
         }
         Ok(())
     }
@@ -189,7 +202,9 @@ impl<B: DrawingBackend> Layers<'_, B> {
     /// Draws the bars of all series beside each other, and then their whiskers.
     fn bars(&self) -> Result<(), Fault<B>> {
         let (x, y) = (&self.plot.x, &self.plot.y);
-        let layers = || self.plot.panel.layers.iter().filter(|layer| matches!(layer.marks, Marks::Bars { .. }));
+        let layers = || {
+            self.plot.panel.layers.iter().filter(|layer| matches!(layer.marks, Marks::Bars { .. }))
+        };
         let width = 0.8 / layers().count().max(1) as f64;
         let mut whiskers = Vec::new();
         for (order, layer) in layers().enumerate() {
@@ -197,11 +212,18 @@ impl<B: DrawingBackend> Layers<'_, B> {
             let base = y.coordinate(*base).map_or(y.low, |base| base.clamp(y.low, y.high));
             for (index, &value) in values.iter().enumerate() {
                 let left = index as f64 - 0.4 + width * order as f64;
-                let Some((_, tip)) = x.shown(index as f64).zip(y.coordinate(value)) else { continue };
+                let Some((_, tip)) = x.shown(index as f64).zip(y.coordinate(value)) else {
+                    continue;
+                };
                 // A hair of white between neighbours.
-                let corners = [(left + 0.03 * width, base), (left + 0.97 * width, tip.clamp(y.low, y.high))];
-                self.area.draw(&Rectangle::new(corners, self.strokes.of(&layer.name).1.colour.filled()))?;
-                whiskers.extend(spread.get(index).map(|&(low, high)| (left + width / 2.0, low, high)));
+                let corners =
+                    [(left + 0.03 * width, base), (left + 0.97 * width, tip.clamp(y.low, y.high))];
+                self.area.draw(&Rectangle::new(
+                    corners,
+                    self.strokes.of(&layer.name).1.colour.filled(),
+                ))?;
+                whiskers
+                    .extend(spread.get(index).map(|&(low, high)| (left + width / 2.0, low, high)));
             }
         }
         whiskers.into_iter().try_for_each(|(at, low, high)| self.whisker(at, low, high, INK))
@@ -233,8 +255,11 @@ impl<B: DrawingBackend> Layers<'_, B> {
     fn line(&self, layer: &Layer) -> Result<(), Fault<B>> {
         let (order, stroke) = self.strokes.of(&layer.name);
         for path in self.paths(layer) {
-            let markers =
-                if self.strokes.marks(stroke) { self.along(&path, 37.0 * order as f64) } else { Vec::new() };
+            let markers = if self.strokes.marks(stroke) {
+                self.along(&path, 37.0 * order as f64)
+            } else {
+                Vec::new()
+            };
             self.stroke(path, stroke, LINE)?;
             markers.into_iter().try_for_each(|at| self.marker(at, stroke, 3.5, 0.7))?;
         }
@@ -245,14 +270,17 @@ impl<B: DrawingBackend> Layers<'_, B> {
         let style = pen(stroke.colour, width);
         match stroke.dash {
             None => self.area.draw(&PathElement::new(path, style)),
-            Some((on, off)) => self.area.draw(&DashedPathElement::new(path, steps(on), steps(off), style)),
+            Some((on, off)) => {
+                self.area.draw(&DashedPathElement::new(path, steps(on), steps(off), style))
+            }
         }
     }
 
     /// Draws a marker with a white edge that tells neighbours apart.
     fn marker(&self, at: Point, stroke: Stroke, radius: f64, edge: f64) -> Result<(), Fault<B>> {
         for (radius, colour) in [(radius + edge, WHITE), (radius, stroke.colour)] {
-            self.area.draw(&(EmptyElement::at(at) + Polygon::new(stroke.outline(radius), colour)))?;
+            self.area
+                .draw(&(EmptyElement::at(at) + Polygon::new(stroke.outline(radius), colour)))?;
         }
         Ok(())
     }
@@ -267,7 +295,9 @@ impl<B: DrawingBackend> Layers<'_, B> {
             match &layer.marks {
                 Marks::Points(points) => {
                     all.extend(
-                        points.iter().filter_map(|point| Some((name, (x.shown(point.0)?, y.shown(point.1)?)))),
+                        points.iter().filter_map(|point| {
+                            Some((name, (x.shown(point.0)?, y.shown(point.1)?)))
+                        }),
                     );
                 }
                 Marks::ErrorBars(points) => {
@@ -288,28 +318,37 @@ impl<B: DrawingBackend> Layers<'_, B> {
             300..3000 => (2.5, 0.3, 0.5),
             _ => (1.5, 0.0, 1.0),
         };
-        let cell = |axis: &Ruled, at: f64, length: f64| (axis.fraction(at) * length / grain).round() as i32;
+        let cell = |axis: &Ruled, at: f64, length: f64| {
+            (axis.fraction(at) * length / grain).round() as i32
+        };
         let mut seen: BTreeSet<(&str, i32, i32)> = BTreeSet::new();
         all.retain(|&(name, at)| {
             seen.insert((name, cell(x, at.0, self.frame.width), cell(y, at.1, self.frame.height)))
         });
-        all.into_iter().try_for_each(|(name, at)| self.marker(at, self.strokes.of(name).1, radius, edge))
+        all.into_iter()
+            .try_for_each(|(name, at)| self.marker(at, self.strokes.of(name).1, radius, edge))
     }
 
     /// The unbroken parts of a line or staircase; what leaves the panel is moved to its edge.
     fn paths(&self, layer: &Layer) -> Vec<Vec<Point>> {
         let (Marks::Line(points) | Marks::Steps(points)) = &layer.marks else { return Vec::new() };
         let stairs = matches!(layer.marks, Marks::Steps(_));
-        let shown =
-            |axis: &Ruled, value| axis.nearest(value).filter(|_| stairs || axis.coordinate(value).is_some());
-        let at = |point: &Point| Some((shown(&self.plot.x, point.0)?, shown(&self.plot.y, point.1)?));
-        runs(points.iter().map(at)).into_iter().map(|path| self.thinned(&stepped(path, stairs))).collect()
+        let shown = |axis: &Ruled, value| {
+            axis.nearest(value).filter(|_| stairs || axis.coordinate(value).is_some())
+        };
+        let at =
+            |point: &Point| Some((shown(&self.plot.x, point.0)?, shown(&self.plot.y, point.1)?));
+        runs(points.iter().map(at))
+            .into_iter()
+            .map(|path| self.thinned(&stepped(path, stairs)))
+            .collect()
     }
 
     /// Of successive points within half a pixel of x only the first, lowest, highest and last, and of a level line only
     /// the ends.
     fn thinned(&self, path: &[Point]) -> Vec<Point> {
-        let column = |point: &Point| (self.plot.x.fraction(point.0) * self.frame.width * 2.0).floor();
+        let column =
+            |point: &Point| (self.plot.x.fraction(point.0) * self.frame.width * 2.0).floor();
         let mut kept: Vec<Point> = Vec::new();
         for points in path.chunk_by(|one, next| column(one) == column(next)) {
             let by_height = |one: &&Point, other: &&Point| one.1.total_cmp(&other.1);
@@ -332,7 +371,10 @@ impl<B: DrawingBackend> Layers<'_, B> {
     /// Places for markers along a path: every [`APART`] pixels from an offset on, or the middle of a short path.
     fn along(&self, path: &[Point], offset: f64) -> Vec<Point> {
         let pixel = |at: &Point| {
-            (self.plot.x.fraction(at.0) * self.frame.width, self.plot.y.fraction(at.1) * self.frame.height)
+            (
+                self.plot.x.fraction(at.0) * self.frame.width,
+                self.plot.y.fraction(at.1) * self.frame.height,
+            )
         };
         let lengths: Vec<f64> = path
             .windows(2)

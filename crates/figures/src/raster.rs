@@ -5,7 +5,8 @@ use std::convert::Infallible;
 use plotters::prelude::{DrawingBackend, IntoDrawingArea};
 use plotters::style::text_anchor::{HPos, VPos};
 use plotters_backend::{
-    BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingErrorKind, FontStyle, FontTransform,
+    BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingErrorKind, FontStyle,
+    FontTransform,
 };
 
 use super::canvas::{FONT_SIZE, Layout as _, Picture, STEPS, Sheet, steps};
@@ -53,7 +54,8 @@ impl Raster<'_> {
             }
             for (old, new) in pixel.iter_mut().zip([red, green, blue]) {
                 let old_part = f64::from(*old);
-                *old = (old_part + (f64::from(new) - old_part) * colour.alpha.max(0.0)).round() as u8;
+                *old =
+                    (old_part + (f64::from(new) - old_part) * colour.alpha.max(0.0)).round() as u8;
             }
         }
     }
@@ -86,7 +88,8 @@ impl DrawingBackend for Raster<'_> {
         path: I,
         style: &S,
     ) -> Drawn {
-        let points: Vec<(f64, f64)> = path.into_iter().map(|(x, y)| (f64::from(x), f64::from(y))).collect();
+        let points: Vec<(f64, f64)> =
+            path.into_iter().map(|(x, y)| (f64::from(x), f64::from(y))).collect();
         let half = f64::from(style.stroke_width()) / 2.0;
         let joint = |index: usize| if index > 0 && index + 1 < points.len() { 1.0 } else { 0.0 };
         for (index, ends) in points.windows(2).enumerate() {
@@ -95,7 +98,10 @@ impl DrawingBackend for Raster<'_> {
             let (dx, dy) = ((x1 - x0) / length * half, (y1 - y0) / length * half);
             let (before, after) = (joint(index), joint(index + 1));
             let corner = |x: f64, y: f64, part: f64, side: f64| {
-                ((x + dx * part - dy * side).round() as i32, (y + dy * part + dx * side).round() as i32)
+                (
+                    (x + dx * part - dy * side).round() as i32,
+                    (y + dy * part + dx * side).round() as i32,
+                )
             };
             let corners = [
                 corner(x0, y0, -before, 1.0),
@@ -109,7 +115,12 @@ impl DrawingBackend for Raster<'_> {
     }
 
     /// Places the baseline where plotters' SVG backend does.
-    fn draw_text<S: BackendTextStyle>(&mut self, text: &str, style: &S, (x, y): BackendCoord) -> Drawn {
+    fn draw_text<S: BackendTextStyle>(
+        &mut self,
+        text: &str,
+        style: &S,
+        (x, y): BackendCoord,
+    ) -> Drawn {
         /// Height of lower-case letters in DejaVu Sans, in font sizes.
         const LOWER_CASE: f64 = 0.547;
         let bold = matches!(style.style(), FontStyle::Bold);
@@ -125,7 +136,8 @@ impl DrawingBackend for Raster<'_> {
             VPos::Center => 0.5 * LOWER_CASE * kind.size,
             VPos::Bottom => -0.5 * LOWER_CASE * kind.size,
         };
-        let (colour, turned) = (style.color(), matches!(style.transform(), FontTransform::Rotate270));
+        let (colour, turned) =
+            (style.color(), matches!(style.transform(), FontTransform::Rotate270));
         self.fonts.rasterise(text, kind, (start, baseline), |right, down, coverage| {
             let (right, down) = if turned { (down, -1 - right) } else { (right, down) };
             self.blend(x + right, y + down, colour.mix(coverage));
@@ -150,9 +162,10 @@ fn pixels(picture: &impl Picture) -> Result<Pixels, FigureError> {
     let mut white = vec![255; across * down * 3];
     let (fine, _) = white.as_chunks_mut();
     let raster = Raster { width: across as i32, height: down as i32, colours: fine, fonts: &fonts };
-    layout
-        .draw(&Sheet(raster.into_drawing_area()))
-        .map_err(|fault| FigureError::Draw { title: picture.title().to_owned(), reason: fault.to_string() })?;
+    layout.draw(&Sheet(raster.into_drawing_area())).map_err(|fault| FigureError::Draw {
+        title: picture.title().to_owned(),
+        reason: fault.to_string(),
+    })?;
     // By how much the samples of each pixel are darker than white, which most of a figure is: runs of it are only compared.
     let mut dark = vec![[0; 3]; width * height];
     let blank = [255; RUN * SAMPLES * 3];
@@ -172,7 +185,8 @@ fn pixels(picture: &impl Picture) -> Result<Pixels, FigureError> {
         }
     }
     let mean = |dark: usize| ((255 * SAMPLES * SAMPLES - dark) / (SAMPLES * SAMPLES)) as u8;
-    let colours = dark.into_iter().map(|[red, green, blue]| [mean(red), mean(green), mean(blue)]).collect();
+    let colours =
+        dark.into_iter().map(|[red, green, blue]| [mean(red), mean(green), mean(blue)]).collect();
     Ok(Pixels { width, height, colours })
 }
 
@@ -198,13 +212,18 @@ mod tests {
     use super::*;
 
     fn figure(title: &str, panels: usize) -> Figure {
-        Figure { title: title.to_owned(), panels: vec![Panel::default(); panels], ..Figure::default() }
+        Figure {
+            title: title.to_owned(),
+            panels: vec![Panel::default(); panels],
+            ..Figure::default()
+        }
     }
 
     #[test]
     fn the_png_is_twice_as_large_as_the_svg_up_to_a_limit() {
         let picture = figure("title", 1);
-        let decoded = png::Decoder::new(std::io::Cursor::new(png(&picture).unwrap())).read_info().unwrap();
+        let decoded =
+            png::Decoder::new(std::io::Cursor::new(png(&picture).unwrap())).read_info().unwrap();
         let (width, height) = (decoded.info().width / PNG_SCALE, decoded.info().height / PNG_SCALE);
         assert!(svg(&picture).unwrap().contains(&format!("width=\"{width}\" height=\"{height}\"")));
         assert!(matches!(png(&figure("", 100)), Err(FigureError::TooLarge { width: 1600, .. })));

@@ -83,8 +83,10 @@ impl Stroke {
         let (points, inner, first) = self.marker;
         let outer = radius * (1.6 - 0.6 * inner);
         let corner = |index: u32| {
-            let (turn, part) =
-                (f64::from(index) / f64::from(2 * points), if index.is_multiple_of(2) { 1.0 } else { inner });
+            let (turn, part) = (
+                f64::from(index) / f64::from(2 * points),
+                if index.is_multiple_of(2) { 1.0 } else { inner },
+            );
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * (first + turn));
             (steps(outer * part * cos), steps(outer * part * sin))
         };
@@ -109,8 +111,11 @@ impl Strokes {
     pub fn new(figure: &Figure) -> Self {
         let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
         let shown = |name: &str| layers().any(|layer| layer.series() == Some(name));
-        let set = |name: &str| figure.looks.iter().find(|(known, _)| known == name).map(|&(_, look)| look);
-        let taken = |slot| figure.looks.iter().any(|(name, look)| *look == Look::Slot(slot) && shown(name));
+        let set = |name: &str| {
+            figure.looks.iter().find(|(known, _)| known == name).map(|&(_, look)| look)
+        };
+        let taken =
+            |slot| figure.looks.iter().any(|(name, look)| *look == Look::Slot(slot) && shown(name));
         let mut free = (0..).filter(|&slot| !taken(slot)).map(Look::Slot);
         let (mut series, mut lines): (Vec<(String, Stroke)>, Vec<&str>) = (Vec::new(), Vec::new());
         for layer in layers() {
@@ -167,7 +172,8 @@ mod tests {
 
     #[test]
     fn looks_given_in_advance_are_kept_and_not_given_again() {
-        let looks = vec![("paper".to_owned(), Look::Reference), ("GRASP".to_owned(), Look::Slot(0))];
+        let looks =
+            vec![("paper".to_owned(), Look::Reference), ("GRASP".to_owned(), Look::Slot(0))];
         let strokes = strokes(&["MF", "GRASP", "paper"].map(str::to_owned), looks);
         assert_eq!(strokes.of("GRASP").1, Stroke::of(Look::Slot(0)));
         assert_eq!(strokes.of("MF").1, Stroke::of(Look::Slot(1)));

@@ -54,17 +54,21 @@ struct Face {
 
 impl Face {
     fn new(bytes: &'static [u8]) -> Result<Self, FigureError> {
-        let font =
-            FontRef::try_from_slice(bytes).map_err(|error| FigureError::Font { reason: error.to_string() })?;
-        let advances =
-            font.codepoint_ids().map(|(_, character)| (character, advance(&font, character))).collect();
+        let font = FontRef::try_from_slice(bytes)
+            .map_err(|error| FigureError::Font { reason: error.to_string() })?;
+        let advances = font
+            .codepoint_ids()
+            .map(|(_, character)| (character, advance(&font, character)))
+            .collect();
         Ok(Self { font, advances })
     }
 }
 
 /// The advance of a character in font sizes, that of a box if the font lacks it.
 fn advance(font: &FontRef, character: char) -> f64 {
-    f64::from(font.h_advance_unscaled(font.glyph_id(character)) / font.units_per_em().unwrap_or(1.0))
+    f64::from(
+        font.h_advance_unscaled(font.glyph_id(character)) / font.units_per_em().unwrap_or(1.0),
+    )
 }
 
 impl Fonts {
@@ -156,14 +160,20 @@ impl Fonts {
         mut pixel: impl FnMut(i32, i32, f64),
     ) {
         let font = &self.face(style).font;
-        let scale =
-            PxScale::from(style.size as f32 * font.height_unscaled() / font.units_per_em().unwrap_or(1.0));
+        let scale = PxScale::from(
+            style.size as f32 * font.height_unscaled() / font.units_per_em().unwrap_or(1.0),
+        );
         for character in text.chars() {
-            let glyph = font.glyph_id(character).with_scale_and_position(scale, point(x as f32, y as f32));
+            let glyph =
+                font.glyph_id(character).with_scale_and_position(scale, point(x as f32, y as f32));
             if let Some(outline) = font.outline_glyph(glyph) {
                 let corner = outline.px_bounds().min;
                 outline.draw(|right, down, coverage| {
-                    pixel(corner.x as i32 + right as i32, corner.y as i32 + down as i32, f64::from(coverage));
+                    pixel(
+                        corner.x as i32 + right as i32,
+                        corner.y as i32 + down as i32,
+                        f64::from(coverage),
+                    );
                 });
             }
             x += self.advance(character, style);
@@ -182,12 +192,18 @@ mod tests {
         let lines = fonts.wrap(words, 120.0, BODY);
         assert!(lines.len() > 1 && fonts.widest(&lines, BODY) <= 120.0);
         assert_eq!(lines.join(" "), words);
-        assert_eq!(fonts.wrap("incomprehensibilities", 60.0, BODY).concat(), "incomprehensibilities");
+        assert_eq!(
+            fonts.wrap("incomprehensibilities", 60.0, BODY).concat(),
+            "incomprehensibilities"
+        );
         assert_eq!((fonts.wrap("", 60.0, BODY).len(), fonts.wrap("ab", 0.0, BODY).len()), (0, 2));
         let short = fonts.shorten("interlocking staircases", 80.0, SMALL);
         assert!(short.ends_with('…') && fonts.width(&short, SMALL) <= 80.0);
         assert_eq!(fonts.shorten("jewel", 80.0, SMALL), "jewel");
-        assert_eq!(fonts.fit("S14 origins at corners", 100.0, &[12.0, 10.0]).0, ["S14 origins at", "corners"]);
+        assert_eq!(
+            fonts.fit("S14 origins at corners", 100.0, &[12.0, 10.0]).0,
+            ["S14 origins at", "corners"]
+        );
         assert_eq!(fonts.fit("119", 18.0, &[12.0, 9.0]).1.size, 9.0);
     }
 

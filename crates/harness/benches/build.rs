@@ -65,7 +65,9 @@ fn one_thread(scene: &Scene) {
         for _ in 0..TRIALS {
             let buffers = (&mut workspace, &mut tree);
             let rule = &mut bvh_build::top_down::TakeBest;
-            config.construct(&scene, None, rule, buffers, &Watch::default()).expect("nobody cancels");
+            config
+                .construct(&scene, None, rule, buffers, &Watch::default())
+                .expect("nobody cancels");
             std::hint::black_box(bvh_core::cost::internal_area(&tree));
         }
     };
@@ -81,7 +83,11 @@ fn one_thread(scene: &Scene) {
         ("k = 5, any", Box::new(trials(Candidates::KBest(5), None))),
         ("within 5 %, any", Box::new(trials(Candidates::Within(0.05), None))),
     ];
-    compare(&format!("{}, {TRIALS} constructions with their costs, one thread", scene.name), 9, contenders);
+    compare(
+        &format!("{}, {TRIALS} constructions with their costs, one thread", scene.name),
+        9,
+        contenders,
+    );
 }
 
 fn shuffled(n: u32) -> Vec<u32> {
@@ -100,8 +106,10 @@ fn peers(_boxes: &[Aabb]) -> Vec<Contender<'_>> {
 #[cfg(feature = "peers")]
 fn peers(boxes: &[Aabb]) -> Vec<Contender<'_>> {
     use obvhs::{BvhBuildParams, aabb, bvh2::builder::build_bvh2};
-    let theirs: Vec<aabb::Aabb> =
-        boxes.iter().map(|b| aabb::Aabb::new(b.min.to_array().into(), b.max.to_array().into())).collect();
+    let theirs: Vec<aabb::Aabb> = boxes
+        .iter()
+        .map(|b| aabb::Aabb::new(b.min.to_array().into(), b.max.to_array().into()))
+        .collect();
     let build = |preset: fn() -> BvhBuildParams| {
         let theirs = theirs.clone();
         Box::new(move || drop(build_bvh2(&theirs, preset(), &mut Default::default())))

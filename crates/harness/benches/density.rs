@@ -27,16 +27,25 @@ fn main() {
 /// Evaluates the boxes of a greedy tree in the tree's order, and pairs of neighbours in it, as a search for places joins them.
 fn evaluate(scene: &Scene) {
     let tree = muller_fellner::Config::default().build(&scene.boxes).expect("finite boxes");
-    let density = Config::default().density(TrainedOn::Default, scene, 1).expect("rays that meet the scene");
-    let nodes: Vec<PackedAabb> = tree.nodes.iter().map(|node| PackedAabb::from(&node.aabb)).collect();
+    let density =
+        Config::default().density(TrainedOn::Default, scene, 1).expect("rays that meet the scene");
+    let nodes: Vec<PackedAabb> =
+        tree.nodes.iter().map(|node| PackedAabb::from(&node.aabb)).collect();
     let joined: Vec<PackedAabb> = nodes.windows(2).map(|pair| pair[0].union(&pair[1])).collect();
     for (which, boxes) in [("boxes of nodes", &nodes), ("boxes of two nodes", &joined)] {
         let contenders: Vec<Contender> = vec![
             ("half area", Box::new(|| total(&Area, boxes))),
-            ("half area as any measure", Box::new(|| total(black_box(&Area as &dyn Measure), boxes))),
+            (
+                "half area as any measure",
+                Box::new(|| total(black_box(&Area as &dyn Measure), boxes)),
+            ),
             ("density of rays", Box::new(|| total(black_box(&density as &dyn Measure), boxes))),
         ];
-        compare(&format!("{}, {} {which}, {REPEATS} times", scene.name, boxes.len()), 25, contenders);
+        compare(
+            &format!("{}, {} {which}, {REPEATS} times", scene.name, boxes.len()),
+            25,
+            contenders,
+        );
     }
 }
 

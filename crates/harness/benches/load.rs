@@ -33,7 +33,8 @@ fn main() {
 fn loads(scene: &Scene, path: &Path) {
     let (boxes, config) = (&scene.boxes, muller_fellner::Config::default());
     let tree = config.build(boxes).expect("finite boxes");
-    fs::write(path, file::save(&tree, boxes, &Origin::default()).expect("a valid tree")).expect("a file");
+    fs::write(path, file::save(&tree, boxes, &Origin::default()).expect("a valid tree"))
+        .expect("a file");
     let held = map(path);
     let build = || drop(config.build(boxes));
     let load = || {
@@ -42,14 +43,18 @@ fn loads(scene: &Scene, path: &Path) {
         assert_eq!(view.expect("the tree").nodes.len(), tree.nodes.len());
     };
     let parts = || -> Vec<Contender> {
-        let touch = || _ = black_box(map(path).iter().step_by(4096).fold(0, |all, byte| all ^ byte));
+        let touch =
+            || _ = black_box(map(path).iter().step_by(4096).fold(0, |all, byte| all ^ byte));
         vec![
             ("  of that: map, touch every page, unmap", Box::new(touch)),
             (
                 "  of that: checksum and structure of the file",
                 Box::new(|| _ = black_box(TreeFile::open(&held))),
             ),
-            ("  of that: checksum of the boxes", Box::new(|| _ = black_box(file::boxes_checksum(boxes)))),
+            (
+                "  of that: checksum of the boxes",
+                Box::new(|| _ = black_box(file::boxes_checksum(boxes))),
+            ),
             ("one addition per eight bytes of the file", Box::new(|| _ = black_box(sum(&held)))),
         ]
     };

@@ -20,8 +20,8 @@ static ALLOCATED: PeakAlloc = PeakAlloc;
 fn main() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     std::env::set_current_dir(&top).expect("the project's folder");
-    let experiment =
-        Experiment::read(Path::new("experiments/anytime.toml"), &Overrides::default()).expect("a spec");
+    let experiment = Experiment::read(Path::new("experiments/anytime.toml"), &Overrides::default())
+        .expect("a spec");
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of threads");
     let mut rows = Vec::new();
     for name in experiment.scenes.iter().chain(&experiment.optional_scenes) {
@@ -43,10 +43,16 @@ fn measure(experiment: &Experiment, scene: &Scene, rows: &mut Vec<MemoryRow>) {
         let seed = experiment.seed_of(&scene.name, &labelled.label, 0);
         let before = ALLOCATED.current_usage();
         ALLOCATED.reset_peak_usage();
-        drop(solve(method, &problem, seed, experiment.budget_of(labelled), &()).expect("finite boxes"));
+        drop(
+            solve(method, &problem, seed, experiment.budget_of(labelled), &())
+                .expect("finite boxes"),
+        );
         let (peak_bytes, objects) = (ALLOCATED.peak_usage() - before, scene.boxes.len());
         let bytes_per_object = peak_bytes as f64 / objects as f64;
-        println!("{:<10} {:<24} {bytes_per_object:>9.1} bytes per object", scene.name, labelled.label);
+        println!(
+            "{:<10} {:<24} {bytes_per_object:>9.1} bytes per object",
+            scene.name, labelled.label
+        );
         let (scene, method) = (scene.name.clone(), labelled.label.clone());
         rows.push(MemoryRow { scene, objects, method, peak_bytes, bytes_per_object });
     }

@@ -32,7 +32,8 @@ type Contender<'a> = (String, Box<dyn FnMut() -> f64 + 'a>);
 
 fn main() {
     // Cargo adds `--bench`.
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    let arguments: Vec<String> =
+        std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     let scene = Scene::load(arguments.first().map_or("cloister", |name| name)).expect("a scene");
     let triangles = scene.triangles().expect("a scene of triangles");
     let tree = muller_fellner::Config::default().build(&scene.boxes).expect("finite boxes");
@@ -41,8 +42,9 @@ fn main() {
     assert!(rays.iter().all(|ray| !wide.any_hit(ray)));
 
     let parts: Vec<(Vec3, Vec3)> = rays.iter().map(|ray| (ray.origin(), ray.direction())).collect();
-    let others =
-        arguments.get(1).map(|program| external::contenders(Path::new(program), &scene).expect("the program"));
+    let others = arguments
+        .get(1)
+        .map(|program| external::contenders(Path::new(program), &scene).expect("the program"));
 
     let alone = "loop alone";
     let mut contenders: Vec<Contender> = vec![
@@ -52,12 +54,15 @@ fn main() {
     ];
     for hint in [Coherence::Coherent, Coherence::Incoherent] {
         let (mut hits, mut any) = ([Hit::MISS; BATCH], [false; BATCH]);
-        let nearest = move |rays: &[Ray; BATCH]| wide.nearest_hits(rays, black_box(&mut hits), hint);
-        contenders.push((format!("nearest_hits, {hint:?}"), timed(rays.as_chunks::<BATCH>().0, nearest)));
+        let nearest =
+            move |rays: &[Ray; BATCH]| wide.nearest_hits(rays, black_box(&mut hits), hint);
+        contenders
+            .push((format!("nearest_hits, {hint:?}"), timed(rays.as_chunks::<BATCH>().0, nearest)));
         let any = move |rays: &[Ray; BATCH]| wide.any_hits(rays, black_box(&mut any), hint);
         contenders.push((format!("any_hits, {hint:?}"), timed(rays.as_chunks::<BATCH>().0, any)));
     }
-    let assumed = |&(from, to): &(Vec3, Vec3)| _ = black_box(Ray::assume_valid(from, to, 0.0, f32::MAX));
+    let assumed =
+        |&(from, to): &(Vec3, Vec3)| _ = black_box(Ray::assume_valid(from, to, 0.0, f32::MAX));
     let checked = |&(from, to): &(Vec3, Vec3)| _ = black_box(Ray::new(from, to, 0.0, f32::MAX));
     contenders.push(("Ray::assume_valid".into(), timed(&parts, assumed)));
     contenders.push(("Ray::new".into(), timed(&parts, checked)));
@@ -71,7 +76,8 @@ fn main() {
                 assert!(hits.iter().all(Option::is_none));
                 seconds.iter().sum()
             };
-            contenders.push((format!("{library} {}, {query:?}", contender.layout), Box::new(trace)));
+            contenders
+                .push((format!("{library} {}, {query:?}", contender.layout), Box::new(trace)));
         }
     }
 
@@ -116,8 +122,8 @@ fn rays_that_miss(root: &Aabb) -> Vec<Ray> {
         let (origin, direction) =
             ((low + high) / 2.0 + point() * 2.0 * root.extent().length(), point().normalize());
         let Ok(ray) = Ray::half_line(origin.as_vec3(), direction.as_vec3()) else { continue };
-        let [enter, leave] =
-            [low, high].map(|corner| (corner - ray.origin().as_dvec3()) / ray.direction().as_dvec3());
+        let [enter, leave] = [low, high]
+            .map(|corner| (corner - ray.origin().as_dvec3()) / ray.direction().as_dvec3());
         let (first, last) = (enter.min(leave).max_element(), enter.max(leave).min_element());
         if first > last || last < 0.0 {
             rays.push(ray);

@@ -35,8 +35,12 @@ struct Args {
 
 fn main() {
     let Args { scenes, rounds, .. } = Args::parse();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of one thread");
-    println!("{:<16} {:<18} {:>9} {:>7} {:>9} {:>7}", "scene", "library", "time/ms", "cost", "best/ms", "cost");
+    let pool =
+        rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of one thread");
+    println!(
+        "{:<16} {:<18} {:>9} {:>7} {:>9} {:>7}",
+        "scene", "library", "time/ms", "cost", "best/ms", "cost"
+    );
     for name in scenes {
         match Scene::load(&name) {
             Ok(scene) => pool.install(|| measure(&scene, rounds)),
@@ -54,8 +58,9 @@ fn libraries() -> Vec<(String, Peer)> {
         ("slow", Preset::Slow),
         ("very slow", Preset::VerySlow),
     ];
-    let obvhs = presets
-        .map(|(name, preset)| (format!("obvhs {name}"), Peer::Obvhs(Obvhs { preset, reinsertion: None })));
+    let obvhs = presets.map(|(name, preset)| {
+        (format!("obvhs {name}"), Peer::Obvhs(Obvhs { preset, reinsertion: None }))
+    });
     obvhs.into_iter().chain([("bvh".into(), Peer::Bvh(NoSettings {}))]).collect()
 }
 

@@ -38,7 +38,10 @@ struct Args {
 
 fn main() {
     let Args { scenes, seconds, threads, seed, .. } = Args::parse();
-    println!("{:<24} {:>7} {:>7} {:>10} {:>10}", "scene", "threads", "limit/s", "taken/s", "below/%");
+    println!(
+        "{:<24} {:>7} {:>7} {:>10} {:>10}",
+        "scene", "threads", "limit/s", "taken/s", "below/%"
+    );
     for name in scenes {
         match Scene::load(&name) {
             Ok(scene) => measure(&scene, &seconds, &threads, seed),
@@ -52,7 +55,10 @@ fn measure(scene: &Scene, seconds: &[f64], threads: &[usize], seed: u64) {
     let base = cost::internal_area(&greedy);
     for &limit in seconds {
         for &threads in threads {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads");
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("a pool of threads");
             let limit = if threads > 1 { LESS_TIME * limit } else { limit };
             let (taken, area) = pool.install(|| clock::best(scene, PLANNED * limit, seed));
             let below = 100.0 * (1.0 - area / base);

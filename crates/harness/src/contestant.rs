@@ -42,11 +42,13 @@ impl Contestant {
         }
     }
 
-    fn read<'de, D: Deserializer<'de>>(name: &str, parameters: D) -> Result<Option<Self>, D::Error> {
+    fn read<'de, D: Deserializer<'de>>(
+        name: &str,
+        parameters: D,
+    ) -> Result<Option<Self>, D::Error> {
         match name {
-            command::Config::NAME => {
-                command::Config::deserialize(parameters).map(|program| Some(Self::External(program)))
-            }
+            command::Config::NAME => command::Config::deserialize(parameters)
+                .map(|program| Some(Self::External(program))),
             _ if Method::NAMES.contains(&name) => {
                 Method::read(name, parameters).map(|method| method.map(Self::Ours))
             }
@@ -106,9 +108,14 @@ impl Labelled {
         let own = Own::KEYS.iter().filter_map(|key| table.remove_entry(*key)).collect();
         let (own, mut faults) = fault::deserialize::<Own>(own);
         let (ours, libraries) = (Method::NAMES.join(", "), Peer::NAMES.join(", "));
-        let accepted = || format!("{ours}, the libraries {libraries}, or {}", command::Config::NAME);
-        let (method, of_method) =
-            fault::tagged(table, "method", |name, parameters| Contestant::read(name, parameters), accepted);
+        let accepted =
+            || format!("{ours}, the libraries {libraries}, or {}", command::Config::NAME);
+        let (method, of_method) = fault::tagged(
+            table,
+            "method",
+            |name, parameters| Contestant::read(name, parameters),
+            accepted,
+        );
         faults.extend(of_method);
         let labelled = own.zip(method).map(|(mut own, method)| {
             let label = own.label.take().unwrap_or_else(|| method.name().into());
@@ -121,7 +128,8 @@ impl Labelled {
 impl<'de> Deserialize<'de> for Labelled {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let (read, faults) = Self::read(Table::deserialize(deserializer)?);
-        let wrong = || serde::de::Error::custom(faults.iter().map(Fault::to_string).collect::<String>());
+        let wrong =
+            || serde::de::Error::custom(faults.iter().map(Fault::to_string).collect::<String>());
         read.filter(|_| faults.is_empty()).ok_or_else(wrong)
     }
 }

@@ -53,7 +53,9 @@ pub enum Error {
     #[error("scene {scene}: {message}; please report this")]
     Ablation { scene: String, message: String },
     /// A method returned something that is not a tree over the scene: a defect of the method.
-    #[error("scene {scene}, method {method} returned an invalid tree: {source}; please report this")]
+    #[error(
+        "scene {scene}, method {method} returned an invalid tree: {source}; please report this"
+    )]
     InvalidTree { scene: String, method: String, source: bvh_core::InvalidBvh },
     /// A tree file that is damaged, or for another scene.
     #[error(transparent)]
@@ -115,7 +117,11 @@ impl Error {
     /// 2 for what the user can mend in a spec or a command line, 130 after Ctrl-C, otherwise 1.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Read(error) | Self::TreeFile(TreeFileError::Read(error)) if !error.is_of_the_path() => 1,
+            Self::Read(error) | Self::TreeFile(TreeFileError::Read(error))
+                if !error.is_of_the_path() =>
+            {
+                1
+            }
             Self::Read(_) => 2,
             Self::Spec { .. } | Self::Scene(_) | Self::Usage(_) | Self::TreeFile(_) => 2,
             Self::Interrupted { .. } => 130,

@@ -9,7 +9,12 @@ use std::process::ExitCode;
 
 /// Experiments on bounding volume hierarchies: TOML specs in, CSV files and figures out.
 #[derive(Parser)]
-#[command(name = "harness", version, args_conflicts_with_subcommands = true, arg_required_else_help = true)]
+#[command(
+    name = "harness",
+    version,
+    args_conflicts_with_subcommands = true,
+    arg_required_else_help = true
+)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -35,7 +40,9 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    if let Some(message) = mistyped::mistyped(std::env::args_os().nth(1).as_deref(), &Cli::command()) {
+    if let Some(message) =
+        mistyped::mistyped(std::env::args_os().nth(1).as_deref(), &Cli::command())
+    {
         print_error(&format!("error: {message}"));
         return ExitCode::from(2);
     }
@@ -55,7 +62,9 @@ fn main() -> ExitCode {
             Ok(())
         }
         Some(Command::SuiteChild { subject, case, objects }) => {
-            child::main(&subject, &case, objects).map(|answer| print_line(&answer)).map_err(Error::Usage)
+            child::main(&subject, &case, objects)
+                .map(|answer| print_line(&answer))
+                .map_err(Error::Usage)
         }
     };
     match result {

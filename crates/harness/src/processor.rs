@@ -9,8 +9,9 @@ pub struct Processor {
 }
 
 /// The processor that this program runs on.
-pub static PROCESSOR: LazyLock<Processor> =
-    LazyLock::new(|| Processor::parse(&std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default()));
+pub static PROCESSOR: LazyLock<Processor> = LazyLock::new(|| {
+    Processor::parse(&std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default())
+});
 
 impl Processor {
     /// Reads the text in which Linux describes processors. Of other texts the architecture remains.
@@ -63,6 +64,9 @@ mod tests {
 
     #[test]
     fn a_machine_that_does_not_say_has_its_architecture() {
-        assert_eq!(Processor::parse("Features : fp asimd").folder(), std::env::consts::ARCH.replace('_', "-"));
+        assert_eq!(
+            Processor::parse("Features : fp asimd").folder(),
+            std::env::consts::ARCH.replace('_', "-")
+        );
     }
 }

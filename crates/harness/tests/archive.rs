@@ -16,14 +16,26 @@ use support::{folder_with, refused, said, save, text};
 fn every_tree_of_the_archive_is_valid_costs_what_is_written_and_is_the_best_known() {
     let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../results");
     let rows = archive::rows(&results).unwrap();
-    assert_eq!(fs::read_dir(results.join("trees")).unwrap().count(), rows.len() + 1, "a row for every file");
+    assert_eq!(
+        fs::read_dir(results.join("trees")).unwrap().count(),
+        rows.len() + 1,
+        "a row for every file"
+    );
     for row in rows {
         let scene = Scene::load(&row.scene).unwrap();
         let (tree, _) = tree_file::load(&archive::path(&results, &row.scene), &scene).unwrap();
         assert_eq!(cost::internal_area(&tree), row.internal_area, "{}", row.scene);
-        assert_eq!((row.objects, row.checksum), (scene.boxes.len(), format!("{:016x}", scene.checksum())));
+        assert_eq!(
+            (row.objects, row.checksum),
+            (scene.boxes.len(), format!("{:016x}", scene.checksum()))
+        );
         let known = reference::best_known(&results, &scene).unwrap().unwrap();
-        assert!(row.internal_area <= known.cost * (1.0 + 1e-12), "{}: {} is known", row.scene, known.cost);
+        assert!(
+            row.internal_area <= known.cost * (1.0 + 1e-12),
+            "{}: {} is known",
+            row.scene,
+            known.cost
+        );
         assert_eq!(row.lower_bound, known.lower_bound, "{}", row.scene);
     }
 }
@@ -49,12 +61,17 @@ fn a_tree_from_elsewhere_is_compared_with_the_best_known() {
     let shown = said(at, &["compare", "good.bvh", "spheres75:60"]);
     assert!(shown.contains("found by: median_cut"), "{shown}");
     let ratio = cost::internal_area(&good) / cost::internal_area(&poor);
-    assert!(ratio < 1.0 && shown.contains(&format!("over the best known: {ratio}")), "{ratio}: {shown}");
+    assert!(
+        ratio < 1.0 && shown.contains(&format!("over the best known: {ratio}")),
+        "{ratio}: {shown}"
+    );
     // Nothing is known of another scene, and the tree is not for it.
     let other = Scene::load("spheres75:50").unwrap();
     let [tree, _] = trees(&other);
     save(&tree, &other, &at.join("other.bvh"));
-    assert!(said(at, &["compare", "other.bvh", "spheres75:50"]).contains("none of this very scene"));
+    assert!(
+        said(at, &["compare", "other.bvh", "spheres75:50"]).contains("none of this very scene")
+    );
     refused(at, &["compare", "other.bvh", "spheres75:60"], 2, &["other.bvh"]);
 }
 
@@ -67,13 +84,16 @@ fn only_a_better_tree_comes_into_the_archive_and_becomes_the_best_known() {
     let [poor, good] = trees(&scene);
     save(&poor, &scene, &at.join("poor.bvh"));
     save(&good, &scene, &at.join("good.bvh"));
-    let files =
-        || ["best_known.csv", "trees/trees.csv"].map(|file| fs::read(at.join("results").join(file)).unwrap());
+    let files = || {
+        ["best_known.csv", "trees/trees.csv"]
+            .map(|file| fs::read(at.join("results").join(file)).unwrap())
+    };
     for file in ["poor.bvh", "good.bvh"] {
         let kept = said(at, &["compare", file, "spheres75:60", "--keep", &format!("made {file}")]);
         assert!(kept.contains("kept in: results/trees/spheres75-60.bvh"), "{kept}");
         assert!(
-            fs::read(at.join("results/trees/spheres75-60.bvh")).unwrap() == fs::read(at.join(file)).unwrap()
+            fs::read(at.join("results/trees/spheres75-60.bvh")).unwrap()
+                == fs::read(at.join(file)).unwrap()
         );
         let [known, trees] = files().map(|bytes| text(&bytes));
         let (tree, _) = tree_file::load(&at.join(file), &scene).unwrap();

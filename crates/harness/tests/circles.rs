@@ -15,7 +15,8 @@ type Module = Vec<String>;
 
 /// The code of every module of a crate, without comments and unit tests.
 fn modules(folder: &Path, at: &Module, found: &mut BTreeMap<Module, String>) {
-    let mut entries: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut entries: Vec<PathBuf> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     entries.sort();
     for path in entries {
         let name = path.file_stem().unwrap().to_string_lossy().into_owned();
@@ -28,8 +29,10 @@ fn modules(folder: &Path, at: &Module, found: &mut BTreeMap<Module, String>) {
         } else if is_source(&path) {
             let text = fs::read_to_string(&path).unwrap();
             let lines = text.lines().take_while(|line| *line != "#[cfg(test)]");
-            let code =
-                lines.map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n");
+            let code = lines
+                .map(|line| line.split("//").next().unwrap_or_default())
+                .collect::<Vec<_>>()
+                .join("\n");
             found.insert(module, code);
         }
     }
@@ -46,8 +49,11 @@ fn is_source(path: &Path) -> bool {
 fn paths(tree: &str) -> Vec<Module> {
     let tree = tree.trim();
     let (head, rest) = tree.split_once('{').unwrap_or((tree, ""));
-    let head: Module =
-        head.split("::").map(|name| name.split_whitespace().next().unwrap_or("")).map(Into::into).collect();
+    let head: Module = head
+        .split("::")
+        .map(|name| name.split_whitespace().next().unwrap_or(""))
+        .map(Into::into)
+        .collect();
     let head: Module =
         head.into_iter().filter(|name| !name.is_empty() && name != "self" && name != "*").collect();
     let (mut depth, mut start, mut found) = (0, 0, Vec::new());
@@ -62,7 +68,8 @@ fn paths(tree: &str) -> Vec<Module> {
             _ => {}
         }
     }
-    let below: Vec<Module> = found.into_iter().filter(|tree| !tree.trim().is_empty()).flat_map(paths).collect();
+    let below: Vec<Module> =
+        found.into_iter().filter(|tree| !tree.trim().is_empty()).flat_map(paths).collect();
     match below.is_empty() {
         true => vec![head],
         false => below.into_iter().map(|tail| [&head[..], &tail].concat()).collect(),
@@ -86,8 +93,10 @@ fn used(module: &Module, code: &str, known: &BTreeMap<Module, String>) -> [Vec<M
                 Some("crate") => path[1..].to_vec(),
                 _ => [&module[..module.len() - ups.min(module.len())], &path[ups..]].concat(),
             };
-            let is_child =
-                || (1..=path.len()).any(|length| known.contains_key(&[&module[..], &path[..length]].concat()));
+            let is_child = || {
+                (1..=path.len())
+                    .any(|length| known.contains_key(&[&module[..], &path[..length]].concat()))
+            };
             if ups > 0 || path.first().is_some_and(|name| name == "crate") || is_child() {
                 found[usize::from(!exported)].push(whole);
             }
@@ -98,7 +107,8 @@ fn used(module: &Module, code: &str, known: &BTreeMap<Module, String>) -> [Vec<M
 
 /// The module that defines what a path names.
 fn resolve(path: &Module, exports: &BTreeMap<Module, Vec<Module>>, depth: usize) -> Module {
-    let length = (0..=path.len()).rev().find(|&length| exports.contains_key(&path[..length])).unwrap_or(0);
+    let length =
+        (0..=path.len()).rev().find(|&length| exports.contains_key(&path[..length])).unwrap_or(0);
     let module = path[..length].to_vec();
     let Some(name) = path.get(length).filter(|_| depth < 9) else { return module };
     match exports[&module].iter().find(|exported| exported.last() == Some(name)) {
@@ -113,7 +123,8 @@ fn edges(folder: &Path) -> BTreeSet<(Module, Module)> {
     modules(folder, &Module::new(), &mut known);
     let found: BTreeMap<_, _> =
         known.iter().map(|(module, code)| (module, used(module, code, &known))).collect();
-    let exports = found.iter().map(|(module, [exports, _])| ((*module).clone(), exports.clone())).collect();
+    let exports =
+        found.iter().map(|(module, [exports, _])| ((*module).clone(), exports.clone())).collect();
     let mut edges = BTreeSet::new();
     for (module, [_, paths]) in &found {
         let targets = paths.iter().map(|path| resolve(path, &exports, 0));
@@ -129,10 +140,13 @@ fn floors(page: &str) -> Vec<(String, Vec<Vec<String>>)> {
     let block = page.split("```floors\n").nth(1).unwrap().split("```").next().unwrap();
     // A line that is indented goes on with the crate above.
     let lines = block.replace("\n ", " ");
-    let floor =
-        |names: &str| names.split_whitespace().map(|name| name.trim_end_matches(',').to_owned()).collect();
+    let floor = |names: &str| {
+        names.split_whitespace().map(|name| name.trim_end_matches(',').to_owned()).collect()
+    };
     let crates = lines.lines().map(|line| line.split_once(' ').unwrap());
-    crates.map(|(name, floors)| (name.to_owned(), floors.split(" → ").map(floor).collect())).collect()
+    crates
+        .map(|(name, floors)| (name.to_owned(), floors.split(" → ").map(floor).collect()))
+        .collect()
 }
 
 /// The rooms of a crate: the files and folders at the top of its sources.
@@ -161,7 +175,11 @@ fn rooms_import_only_rooms_on_lower_floors() {
     for (name, floors) in &listed {
         let folder = top().join("crates").join(name).join("src");
         let known: BTreeSet<String> = floors.iter().flatten().cloned().collect();
-        assert_eq!(known, rooms(&folder), "{name}: the rooms of ARCHITECTURE.md, and those of the sources");
+        assert_eq!(
+            known,
+            rooms(&folder),
+            "{name}: the rooms of ARCHITECTURE.md, and those of the sources"
+        );
         let rising = rising(&edges(&folder), floors);
         assert!(rising.is_empty(), "{name}:\n{}", rising.join("\n"));
     }
@@ -169,8 +187,12 @@ fn rooms_import_only_rooms_on_lower_floors() {
     let manifest = fs::read_to_string(top().join("Cargo.toml")).unwrap();
     let manifest: toml::Table = manifest.parse().unwrap();
     let members = manifest["workspace"]["members"].as_array().unwrap();
-    let members = members.iter().map(|member| member.as_str().unwrap().trim_start_matches("crates/"));
-    assert_eq!(listed.iter().map(|(name, _)| name.as_str()).collect::<BTreeSet<_>>(), members.collect());
+    let members =
+        members.iter().map(|member| member.as_str().unwrap().trim_start_matches("crates/"));
+    assert_eq!(
+        listed.iter().map(|(name, _)| name.as_str()).collect::<BTreeSet<_>>(),
+        members.collect()
+    );
 }
 
 #[test]

@@ -4,7 +4,9 @@ mod support;
 
 use std::fs;
 use std::path::Path;
-use support::{begin, ended, folder_with, names, refused, reproducible, rows, run, said, send, text, wait_for};
+use support::{
+    begin, ended, folder_with, names, refused, reproducible, rows, run, said, send, text, wait_for,
+};
 
 const SPEC: &str = "
 question = 'Do results survive?'
@@ -62,10 +64,15 @@ fn a_run_writes_rows_figures_and_provenance_and_prints_the_table() {
     let runs = fs::read_to_string(results.join("runs.csv")).unwrap();
     assert_eq!(runs.lines().count(), 1 + 2 * 3 * 3);
     assert!(!reproducible(&results).iter().any(|(_, bytes)| text(bytes).contains("seconds")));
-    let provenance: toml::Table = fs::read_to_string(results.join("provenance.toml")).unwrap().parse().unwrap();
+    let provenance: toml::Table =
+        fs::read_to_string(results.join("provenance.toml")).unwrap().parse().unwrap();
     let (build, assertions) = (provenance["build"].as_str().unwrap(), cfg!(debug_assertions));
-    let (profile, on) = if assertions { ("debug, opt-level ", "on") } else { ("release, opt-level ", "off") };
-    assert!(build.starts_with(profile) && build.contains(&format!("debug assertions {on}")), "{build}");
+    let (profile, on) =
+        if assertions { ("debug, opt-level ", "on") } else { ("release, opt-level ", "off") };
+    assert!(
+        build.starts_with(profile) && build.contains(&format!("debug assertions {on}")),
+        "{build}"
+    );
 }
 
 #[test]
@@ -83,12 +90,17 @@ fn any_number_of_threads_writes_the_same_bytes() {
 #[cfg(unix)]
 #[test]
 fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
-    let spec = SPEC.replace("repetitions = 3", "repetitions = 40").replace("trials = 12", "trials = 100");
+    let spec =
+        SPEC.replace("repetitions = 3", "repetitions = 40").replace("trials = 12", "trials = 100");
     let folder = folder_with("spec.toml", &spec);
     let child = begin(folder.path(), &["spec.toml"]);
     wait_for(&folder.path().join("results/spec/.partial/000000"));
     send("-INT", &child);
-    ended(&child.wait_with_output().unwrap(), 130, &["of 240 runs are kept, `--resume` does the rest"]);
+    ended(
+        &child.wait_with_output().unwrap(),
+        130,
+        &["of 240 runs are kept, `--resume` does the rest"],
+    );
     assert!(folder.path().join("results/spec/.partial/000000").is_dir());
 }
 
@@ -131,7 +143,11 @@ fn quick_seed_and_scene_change_what_is_run() {
     said(folder.path(), &["spec.toml", "--quick"]);
     let quick = fs::read_to_string(folder.path().join("results/quick/spec/runs.csv")).unwrap();
     assert_eq!(quick.lines().count(), 1 + 3);
-    fs::write(folder.path().join("two.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nf 1 2 3\nf 2 3 4\n").unwrap();
+    fs::write(
+        folder.path().join("two.obj"),
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nf 1 2 3\nf 2 3 4\n",
+    )
+    .unwrap();
     let args = ["spec.toml", "--quick", "--scene", "two.obj", "--seed", "9", "--out", "other"];
     said(folder.path(), &args);
     let other = fs::read_to_string(folder.path().join("other/quick/spec/runs.csv")).unwrap();
@@ -186,7 +202,11 @@ fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_di
     refused(&["merge", "one", "three", "--out", "merged"], 1, &missing);
     refused(&["merge", "one", "whole", "--out", "merged"], 2, &["whole", "--shard"]);
     refused(&["merge", "one", "nowhere", "--out", "merged"], 1, &["nowhere"]);
-    refused(&["spec.toml", "--shard", "4/3", "--out", "merged"], 2, &["--shard", "4/3", "from 1 to N"]);
+    refused(
+        &["spec.toml", "--shard", "4/3", "--out", "merged"],
+        2,
+        &["--shard", "4/3", "from 1 to N"],
+    );
 
     // The same runs twice are welcome, as long as they agree.
     part("2/3", "two");
@@ -210,9 +230,15 @@ fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_di
     refused(&["merge", "one", "--out", "one"], 2, &["--out one"]);
 
     let resolved = folder.path().join("one/spec/.partial/resolved.toml");
-    let edited = fs::read_to_string(&resolved).unwrap().replace("repetitions = 3", "repetitions = 4294967295");
+    let edited = fs::read_to_string(&resolved)
+        .unwrap()
+        .replace("repetitions = 3", "repetitions = 4294967295");
     fs::write(&resolved, edited).unwrap();
-    refused(&["merge", "one", "--out", "merged"], 1, &["one/spec/.partial/resolved.toml: ", "runs; accepted"]);
+    refused(
+        &["merge", "one", "--out", "merged"],
+        1,
+        &["one/spec/.partial/resolved.toml: ", "runs; accepted"],
+    );
 }
 
 const GAPS: &str = "
@@ -267,12 +293,14 @@ fn gaps_are_to_the_best_known_cost_and_stay_until_they_are_redrawn() {
 
 #[test]
 fn without_reports_there_is_a_table_and_without_a_terminal_a_line_for_the_last_run() {
-    let spec =
-        "question = 'q'\nscenes = ['spheres75']\nrepetitions = 3\nmethods = [{ method = 'median_cut' }]\n";
+    let spec = "question = 'q'\nscenes = ['spheres75']\nrepetitions = 3\nmethods = [{ method = 'median_cut' }]\n";
     let folder = folder_with("plain.toml", spec);
     let output = run(folder.path(), &["plain.toml"]);
     let (out, err) = (text(&output.stdout), text(&output.stderr));
-    assert!(["spheres75", "median_cut", "least_over_base"].iter().all(|part| out.contains(part)), "{out}");
+    assert!(
+        ["spheres75", "median_cut", "least_over_base"].iter().all(|part| out.contains(part)),
+        "{out}"
+    );
     assert!(err.contains("plain: 3 of 3 runs") && err.contains("median_cut on spheres75"), "{err}");
     let quiet = run(folder.path(), &["plain.toml", "--quiet", "--force"]);
     assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty());
@@ -282,7 +310,8 @@ fn without_reports_there_is_a_table_and_without_a_terminal_a_line_for_the_last_r
     let rows = fs::read_to_string(folder.path().join("results/plain/runs.csv")).unwrap();
     for (repetition, row) in rows.lines().skip(1).enumerate() {
         let seed = row.split(',').nth(3).unwrap();
-        let part = format!("median_cut on spheres75, repetition {repetition}, seed {seed}, took 0.");
+        let part =
+            format!("median_cut on spheres75, repetition {repetition}, seed {seed}, took 0.");
         assert!(said.contains(&part), "{part} in {said}");
     }
 }
@@ -309,7 +338,10 @@ fn runs_that_the_clock_ends_leave_rows_among_the_timings_alone_and_checks_do_not
                 methods = [{ method = 'best', references = 1.2 }]\ntinybvh = 'nowhere/ray_peers'\n";
     let folder = folder_with("clock.toml", spec);
     let first = said(folder.path(), &["clock.toml"]);
-    assert!(first.contains("collapsed_sah") && first.contains("Without tinybvh: nowhere/ray_peers"), "{first}");
+    assert!(
+        first.contains("collapsed_sah") && first.contains("Without tinybvh: nowhere/ray_peers"),
+        "{first}"
+    );
     let results = folder.path().join("results/clock");
     let mut names = names(&results);
     names.retain(|name| !name.starts_with('.'));
@@ -327,5 +359,9 @@ fn runs_that_the_clock_ends_leave_rows_among_the_timings_alone_and_checks_do_not
     fs::write(folder.path().join("clock.toml"), spec.replace("1.2", "1.3")).unwrap();
     let check = run(folder.path(), &["--check", "clock.toml"]);
     assert_eq!(check.status.code(), Some(1));
-    assert!(text(&check.stdout).contains("references is 1.3, committed 1.2"), "{}", text(&check.stdout));
+    assert!(
+        text(&check.stdout).contains("references is 1.3, committed 1.2"),
+        "{}",
+        text(&check.stdout)
+    );
 }

@@ -20,17 +20,24 @@ use support::{assert_current, experiments, top};
 /// The text with every value and table as the committed results have it.
 fn renewed(text: &str) -> String {
     let (mut out, mut rest) = (String::new(), text);
-    while let Some(start) = rest.find("<!-- value ").into_iter().chain(rest.find("<!-- pivot ")).min() {
+    while let Some(start) =
+        rest.find("<!-- value ").into_iter().chain(rest.find("<!-- pivot ")).min()
+    {
         let open = start + rest[start..].find(" -->").expect("a comment ends") + 4;
         let close = open
-            + rest[open..].find("<!-- end -->").unwrap_or_else(|| panic!("no end: {}", &rest[start..open]));
+            + rest[open..]
+                .find("<!-- end -->")
+                .unwrap_or_else(|| panic!("no end: {}", &rest[start..open]));
         let directive = &rest[start + 5..open - 4];
         let fields: Vec<&str> = directive[6..].split(" | ").collect();
         out.push_str(&rest[..open]);
         match fields[..] {
             [_, _, _, _] => out.push_str(&value(&directive[6..])),
             [file, conditions, axes, what, format] => {
-                out.push_str(&format!("\n{}\n", pivot(&rows(file, conditions), axes, what, format)));
+                out.push_str(&format!(
+                    "\n{}\n",
+                    pivot(&rows(file, conditions), axes, what, format)
+                ));
             }
             _ => panic!("{directive}"),
         }
@@ -93,8 +100,10 @@ fn every_experiment_is_checked_on_every_commit() {
 #[test]
 fn every_column_of_every_committed_table_is_on_the_page_of_columns() {
     let declared = harness::cli::columns::all();
-    let unsaid: Vec<_> =
-        declared.iter().filter_map(|file| Some((file.to_string(), file.unsaid()?.to_owned()))).collect();
+    let unsaid: Vec<_> = declared
+        .iter()
+        .filter_map(|file| Some((file.to_string(), file.unsaid()?.to_owned())))
+        .collect();
     assert!(unsaid.is_empty(), "without a meaning: {unsaid:#?}");
     assert_current(&top().join("docs/COLUMNS.md"), &harness::cli::columns::page(), "docs");
     let (mut folders, mut found) = (vec![top().join("results")], 0);

@@ -16,7 +16,12 @@ fn every_block_has_a_language_whose_examples_are_run() {
     for block in blocks() {
         // The floors are read by the test `circles`.
         let languages = ["c", "floors", "python", "rust", "rust,no_run", "sh", "text", "toml"];
-        assert!(languages.contains(&block.language.as_str()), "{}: `{}`", block.place(), block.language);
+        assert!(
+            languages.contains(&block.language.as_str()),
+            "{}: `{}`",
+            block.place(),
+            block.language
+        );
         // `scripts/languages` compiles and runs that of C, pytest that of Python.
         for (language, page) in [("c", "bvh-c/README.md"), ("python", "bvh-python/README.md")] {
             assert!(block.language != language || block.page.ends_with(page), "{}", block.place());
@@ -30,12 +35,18 @@ fn every_block_of_rust_is_a_doctest() {
     for entry in fs::read_dir(top().join("crates")).unwrap() {
         let library = entry.unwrap().path().join("src/lib.rs");
         let Ok(text) = fs::read_to_string(&library) else { continue };
-        for (page, _) in text.split("include_str!(\"").skip(1).filter_map(|rest| rest.split_once('"')) {
+        for (page, _) in
+            text.split("include_str!(\"").skip(1).filter_map(|rest| rest.split_once('"'))
+        {
             tested.insert(fs::canonicalize(library.with_file_name(page)).unwrap());
         }
     }
     for block in blocks_in("rust") {
-        assert!(tested.contains(&fs::canonicalize(&block.page).unwrap()), "{}: not a doctest", block.place());
+        assert!(
+            tested.contains(&fs::canonicalize(&block.page).unwrap()),
+            "{}: not a doctest",
+            block.place()
+        );
     }
 }
 
@@ -54,7 +65,11 @@ fn every_spec_runs_as_it_is_printed() {
             continue; // `bvh` runs it.
         }
         // Without a question it is a part of a spec.
-        let around = if table.contains_key("question") { "" } else { "question = 'q'\nscenes = ['escher']\n" };
+        let around = if table.contains_key("question") {
+            ""
+        } else {
+            "question = 'q'\nscenes = ['escher']\n"
+        };
         fs::write(at.join("spec.toml"), format!("{around}{}", block.text)).unwrap();
         for name in table.get("scenes").and_then(toml::Value::as_array).into_iter().flatten() {
             let loaded = Scene::load(name.as_str().unwrap());
@@ -81,7 +96,9 @@ fn run_python() -> bool {
 #[test]
 fn every_command_of_a_block_names_what_is_there_and_is_read_by_the_program() {
     for block in blocks_in("sh") {
-        commands(&block.text, &block.place()).iter().for_each(|command| check_files(command, &block.place()));
+        commands(&block.text, &block.place())
+            .iter()
+            .for_each(|command| check_files(command, &block.place()));
     }
     let harness = Called { name: "harness", package: "harness" };
     assert!(harness.reads_blocks() > 3 && harness.knows_sentences() > 3);
@@ -91,10 +108,17 @@ fn every_command_of_a_block_names_what_is_there_and_is_read_by_the_program() {
 fn check_files(command: &[String], place: &str) {
     let known = ["bvh", "c++", "cargo", "harness"];
     let program = &command[0];
-    assert!(known.contains(&program.as_str()) || program.starts_with("scripts/"), "{place}: `{program}`");
+    assert!(
+        known.contains(&program.as_str()) || program.starts_with("scripts/"),
+        "{place}: `{program}`"
+    );
     for word in command {
-        let of_project = ["scripts/", "experiments/", "crates/"].iter().any(|folder| word.starts_with(folder));
-        assert!(!of_project || word.contains("/target/") || top().join(word).exists(), "{place}: no {word}");
+        let of_project =
+            ["scripts/", "experiments/", "crates/"].iter().any(|folder| word.starts_with(folder));
+        assert!(
+            !of_project || word.contains("/target/") || top().join(word).exists(),
+            "{place}: no {word}"
+        );
     }
     for (flag, package) in command.iter().zip(&command[1..]) {
         let is_there = flag != "-p" || top().join("crates").join(package).is_dir();
@@ -105,8 +129,11 @@ fn check_files(command: &[String], place: &str) {
 #[test]
 fn what_is_not_read_is_found() {
     let folder = folder_with("spec.toml", "");
-    for wrong in [&["spec.toml", "--shardd", "1/8"][..], &["spec.toml", "--shard", "0/8"], &["merge", "parts"]]
-    {
+    for wrong in [
+        &["spec.toml", "--shardd", "1/8"][..],
+        &["spec.toml", "--shard", "0/8"],
+        &["merge", "parts"],
+    ] {
         assert!(text(&run(folder.path(), wrong).stderr).contains(UNREADABLE), "{wrong:?}");
     }
 }

@@ -84,7 +84,8 @@ fn commands_that_cannot_be_started_or_are_none_are_refused() {
         ),
         ("['a'], comand = 'b'", 2, "comand"),
     ] {
-        fs::write(folder.path().join("spec.toml"), spec.replace("['sh', 'peer.sh']", command)).unwrap();
+        fs::write(folder.path().join("spec.toml"), spec.replace("['sh', 'peer.sh']", command))
+            .unwrap();
         refused(folder.path(), &["spec.toml"], code, &[part]);
     }
 }
@@ -107,8 +108,14 @@ fn assert_ended(at: &Path, how: &str) {
     let pid = fs::read_to_string(at.join("pid")).unwrap();
     let start = Instant::now();
     // Whoever inherits it reaps it in a moment.
-    let lives =
-        || Command::new("kill").args(["-0", pid.trim()]).stderr(Stdio::null()).status().unwrap().success();
+    let lives = || {
+        Command::new("kill")
+            .args(["-0", pid.trim()])
+            .stderr(Stdio::null())
+            .status()
+            .unwrap()
+            .success()
+    };
     while lives() {
         assert!(start.elapsed() < Duration::from_secs(5), "{how}: {pid} lives on");
         std::thread::sleep(Duration::from_millis(10));
@@ -117,8 +124,7 @@ fn assert_ended(at: &Path, how: &str) {
 
 #[test]
 fn what_a_program_has_started_ends_with_it_however_the_program_ends() {
-    let begin =
-        "sh -c 'echo $$ > pid.new; mv pid.new pid; exec sleep 124' & while ! test -f pid; do sleep 0.01; done;";
+    let begin = "sh -c 'echo $$ > pid.new; mv pid.new pid; exec sleep 124' & while ! test -f pid; do sleep 0.01; done;";
     let leave = begin.replace("sh -c", "setsid sh -c");
     let daemon = format!("({leave});");
     let ways = [begin, &leave, &daemon];
@@ -144,12 +150,21 @@ fn what_a_program_has_started_ends_with_it_however_the_program_ends() {
 #[test]
 fn a_tree_of_64_gigabytes_is_refused_by_its_header() {
     let folder = folder("truncate -s 64G \"$2\"", "");
-    refused(folder.path(), &["spec.toml"], 1, &["method theirs", "its tree is refused", "not a tree file"]);
+    refused(
+        folder.path(),
+        &["spec.toml"],
+        1,
+        &["method theirs", "its tree is refused", "not a tree file"],
+    );
 }
 
 #[test]
 fn the_example_in_python_builds_a_tree() {
-    if !Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success()) {
+    if !Command::new("python3")
+        .arg("--version")
+        .output()
+        .is_ok_and(|output| output.status.success())
+    {
         return eprintln!("python3 is not here");
     }
     let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scripts/external_method.py");

@@ -9,7 +9,8 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 use support::{
-    ReadOnly, ended, folder_with, program, refused, reproducible, run_on_a_small_disk, said, unsaid, wait_for,
+    ReadOnly, ended, folder_with, program, refused, reproducible, run_on_a_small_disk, said,
+    unsaid, wait_for,
 };
 
 const SPEC: &str = "
@@ -57,7 +58,9 @@ fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
     let mut out = "out0".to_owned();
     while killed < kills {
         let mut child =
-            command(folder.path(), &["spec.toml", "--resume", "--jobs=2", "--out", &out]).spawn().unwrap();
+            command(folder.path(), &["spec.toml", "--resume", "--jobs=2", "--out", &out])
+                .spawn()
+                .unwrap();
         state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
         std::thread::sleep(Duration::from_micros(u64::from(state >> 8) % 60_000));
         if child.try_wait().unwrap().is_none() {
@@ -74,8 +77,11 @@ fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
     }
     said(folder.path(), &["spec.toml", "--resume", "--out", &out]);
     let found = results(&folder.path().join(&out));
-    let names = |files: &[(String, Vec<u8>)]| files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
-    let differ: Vec<&String> = found.iter().zip(&whole).filter(|(a, b)| a != b).map(|(a, _)| &a.0).collect();
+    let names = |files: &[(String, Vec<u8>)]| {
+        files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>()
+    };
+    let differ: Vec<&String> =
+        found.iter().zip(&whole).filter(|(a, b)| a != b).map(|(a, _)| &a.0).collect();
     assert!(found == whole, "{differ:?}, {:?} and {:?}", names(&found), names(&whole));
     eprintln!("{killed} kills, {} experiments finished", finished + 1);
 }
@@ -103,7 +109,12 @@ fn a_second_harness_on_the_same_folder_is_refused_and_disturbs_nothing() {
     assert!(folder.path().join("results/long/.partial/000000/runs.csv").is_file());
     drop(first);
     // The lock died with its owner.
-    refused(folder.path(), &["long.toml", "--resume", "--seed=3"], 2, &["results/long", "another spec"]);
+    refused(
+        folder.path(),
+        &["long.toml", "--resume", "--seed=3"],
+        2,
+        &["results/long", "another spec"],
+    );
 }
 
 #[cfg(unix)]
@@ -141,7 +152,12 @@ fn a_folder_that_cannot_be_written_is_named() {
         eprintln!("not tried: this user can write into any folder here");
         return;
     };
-    refused(folder.path(), &["spec.toml", "--out=locked"], 1, &["locked/spec", "cannot create the folder"]);
+    refused(
+        folder.path(),
+        &["spec.toml", "--out=locked"],
+        1,
+        &["locked/spec", "cannot create the folder"],
+    );
     assert_eq!(fs::read_dir(&locked).unwrap().count(), 0);
 }
 

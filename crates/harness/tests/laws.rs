@@ -47,7 +47,10 @@ fn alike(method: &Method, boxes: &[Aabb], others: &[Aabb]) -> bool {
 }
 
 fn named(name: &str) -> Method {
-    Method::all().into_iter().find(|method| method.name() == name).expect("a method of the registry")
+    Method::all()
+        .into_iter()
+        .find(|method| method.name() == name)
+        .expect("a method of the registry")
 }
 
 /// The methods that look at areas and indices only.
@@ -70,7 +73,8 @@ fn translated(boxes: &[Aabb], by: Vec3) -> Option<Vec<Aabb>> {
     let exact = |p: Vec3| {
         let sum = p.as_dvec3() + by.as_dvec3();
         // The sum of two f32 may not even be an f64: back again it must be the same.
-        (sum.as_vec3().as_dvec3() == sum && sum - by.as_dvec3() == p.as_dvec3()).then(|| sum.as_vec3())
+        (sum.as_vec3().as_dvec3() == sum && sum - by.as_dvec3() == p.as_dvec3())
+            .then(|| sum.as_vec3())
     };
     boxes.iter().map(|b| Some(Aabb { min: exact(b.min)?, max: exact(b.max)? })).collect()
 }
@@ -78,7 +82,8 @@ fn translated(boxes: &[Aabb], by: Vec3) -> Option<Vec<Aabb>> {
 /// Whether no two boxes have the same centre along any axis: then no order depends on indices.
 fn distinct_centres(boxes: &[Aabb]) -> bool {
     (0..3).all(|axis| {
-        let mut keys: Vec<f64> = boxes.iter().map(Aabb::doubled_centroid).map(|c: DVec3| c[axis]).collect();
+        let mut keys: Vec<f64> =
+            boxes.iter().map(Aabb::doubled_centroid).map(|c: DVec3| c[axis]).collect();
         keys.sort_by(f64::total_cmp);
         keys.windows(2).all(|pair| pair[0] < pair[1])
     })
@@ -92,10 +97,11 @@ fn box_of([a, b]: [[f32; 3]; 2]) -> Aabb {
 /// Boxes of any finite bits; of several exponents in a row, from one to all of them; zeros, repetitions.
 fn any_boxes() -> impl Strategy<Value = Vec<Aabb>> {
     (0u32..=254, 0u32..=254).prop_flat_map(|(low, width)| {
-        let coordinate = (any::<u32>(), low..=(low + width).min(254)).prop_map(move |(bits, exponent)| {
-            let random = f32::from_bits(bits & 0x807f_ffff | exponent << 23);
-            if bits.is_multiple_of(16) { 0.0 * random } else { random }
-        });
+        let coordinate =
+            (any::<u32>(), low..=(low + width).min(254)).prop_map(move |(bits, exponent)| {
+                let random = f32::from_bits(bits & 0x807f_ffff | exponent << 23);
+                if bits.is_multiple_of(16) { 0.0 * random } else { random }
+            });
         let corner = || prop::array::uniform3(coordinate.clone());
         prop::collection::vec([corner(), corner()].prop_map(box_of), 0..40)
     })

@@ -20,12 +20,15 @@ fn soup(n: usize) -> Vec<Aabb> {
 
 /// All scenes with some hundred objects, and a few that are stiff only where they are larger.
 fn scenes() -> Vec<(String, Vec<Aabb>)> {
-    let built_in = ["bijou", "cloister", "escher", "konistil", "pinecon2", "spheres7500"].map(|name| {
-        let name = format!("{name}:300");
-        let boxes = Scene::load(&name).unwrap().boxes;
-        (name, boxes)
-    });
-    let stiff = stiff::STIFF.iter().map(|(id, triangles)| ((*id).to_owned(), stiff::boxes(&triangles(300))));
+    let built_in =
+        ["bijou", "cloister", "escher", "konistil", "pinecon2", "spheres7500"].map(|name| {
+            let name = format!("{name}:300");
+            let boxes = Scene::load(&name).unwrap().boxes;
+            (name, boxes)
+        });
+    let stiff = stiff::STIFF
+        .iter()
+        .map(|(id, triangles)| ((*id).to_owned(), stiff::boxes(&triangles(300))));
     let soups = [300, 3000].map(|n| (format!("soup of {n}"), soup(n)));
     let larger = ["S06:2000", "S17:2000", "S30:2000"].map(|name| {
         let boxes = Scene::load(name).unwrap().boxes;
@@ -39,7 +42,8 @@ const WORK: [u64; 7] = [0, 3, 19, 20, 25, 60, 300];
 
 fn solved(method: &Method, problem: &Problem, work: u64, observer: &dyn Observer) -> Outcome {
     let max_work = Some(work * problem.boxes.len() as u64);
-    let outcome = solve(method, problem, 1, Budget { max_work, ..Budget::UNLIMITED }, observer).unwrap();
+    let outcome =
+        solve(method, problem, 1, Budget { max_work, ..Budget::UNLIMITED }, observer).unwrap();
     validate(&outcome.tree, problem.boxes).unwrap();
     outcome
 }
@@ -59,7 +63,8 @@ fn no_method_ends_above_a_tree_that_it_has_evaluated_or_that_its_caller_has() {
             for work in [0, 20, 60] {
                 let here = format!("{name}, {}, {work} per object", method.name());
                 let found = solved(&method, &Problem::new(boxes), work, &());
-                let least = found.history.iter().map(|event| event.cost).fold(f64::INFINITY, f64::min);
+                let least =
+                    found.history.iter().map(|event| event.cost).fold(f64::INFINITY, f64::min);
                 assert!(at_most(found.cost, least), "{here}: {} after {least}", found.cost);
                 assert!(at_most(cost::internal_area(&found.tree), found.cost), "{here}");
                 let problem = Problem { known: Some(&known), ..Problem::new(boxes) };
@@ -79,7 +84,11 @@ fn no_budget_of_the_best_ends_above_the_fastest_builder() {
         let limit = cost::internal_area(&fastest.build(&boxes).unwrap());
         for work in WORK {
             let found = solved(&method, &Problem::new(&boxes), work, &());
-            assert!(at_most(found.cost, limit), "{name}, {work} per object: {} above {limit}", found.cost);
+            assert!(
+                at_most(found.cost, limit),
+                "{name}, {work} per object: {} above {limit}",
+                found.cost
+            );
         }
     }
 }
@@ -88,8 +97,9 @@ fn no_budget_of_the_best_ends_above_the_fastest_builder() {
 fn local_searches_begin_no_more_than_a_little_above_the_greedy_tree() {
     for (name, boxes) in scenes() {
         let greedy = cost::internal_area(&muller_fellner::Config::default().build(&boxes).unwrap());
-        for method in
-            Method::all().iter().filter(|method| ["reinsertion", "annealing"].contains(&method.name()))
+        for method in Method::all()
+            .iter()
+            .filter(|method| ["reinsertion", "annealing"].contains(&method.name()))
         {
             let begin = solved(method, &Problem::new(&boxes), 0, &()).cost;
             assert!(begin <= 1.15 * greedy, "{name}, {}: {begin} above {greedy}", method.name());

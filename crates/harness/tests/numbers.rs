@@ -41,7 +41,8 @@ fn split(text: &str) -> (Vec<&str>, Vec<&str>) {
     let mut names = Vec::new();
     let mut rest = text;
     while let Some((before, after)) = rest.split_once('{') {
-        let (name, behind) = after.split_once('}').unwrap_or_else(|| panic!("{text}: a brace is not closed"));
+        let (name, behind) =
+            after.split_once('}').unwrap_or_else(|| panic!("{text}: a brace is not closed"));
         fixed.push(before);
         names.push(name);
         rest = behind;
@@ -80,8 +81,10 @@ fn numbers_at(page: &str, fixed: &[&str], start: usize) -> Option<Vec<Range<usiz
     let mut at = start + length_of_match(&page[start..], fixed[0])?;
     let mut found = Vec::new();
     for part in &fixed[1..] {
-        let is_of_number = |character: char| character.is_ascii_digit() || ".-−".contains(character);
-        let length = page[at..].find(|character| !is_of_number(character)).unwrap_or(page.len() - at);
+        let is_of_number =
+            |character: char| character.is_ascii_digit() || ".-−".contains(character);
+        let length =
+            page[at..].find(|character| !is_of_number(character)).unwrap_or(page.len() - at);
         // A full stop behind the number belongs to the sentence.
         let number = page[at..at + length].trim_end_matches('.');
         if number.is_empty() {
@@ -104,7 +107,8 @@ fn the_prose_shows_the_committed_numbers() {
         let mut made = shown.clone();
         for (place, name) in places.into_iter().zip(&names).rev() {
             let query = queries.get(*name).and_then(toml::Value::as_str);
-            let query = query.unwrap_or_else(|| panic!("docs/numbers.toml: {text}: no query for {name}"));
+            let query =
+                query.unwrap_or_else(|| panic!("docs/numbers.toml: {text}: no query for {name}"));
             made.replace_range(place, &value(query));
         }
         let unused: Vec<_> = queries.keys().filter(|key| !names.contains(&key.as_str())).collect();

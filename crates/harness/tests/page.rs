@@ -36,8 +36,7 @@ fn between<'a>(page: &'a str, before: &str, after: &str) -> Vec<&'a str> {
 #[test]
 fn the_page_of_all_results_answers_first_and_leads_to_files_that_are_there_but_needs_none() {
     let folder = folder_with("spec.toml", SPEC);
-    let of_lists =
-        "question = 'What is listed?'\nscenes = ['escher:50']\nmethods = [{ method = 'muller_fellner' }]\n";
+    let of_lists = "question = 'What is listed?'\nscenes = ['escher:50']\nmethods = [{ method = 'muller_fellner' }]\n";
     fs::write(folder.path().join("list.toml"), of_lists).unwrap();
     said(folder.path(), &["spec.toml", "list.toml"]);
     said(folder.path(), &["spec.toml", "--quick"]);
@@ -71,7 +70,13 @@ fn the_page_of_all_results_answers_first_and_leads_to_files_that_are_there_but_n
                 None => assert!(at.parent().unwrap().join(link).is_file(), "{link}"),
             }
         }
-        for file in ["spec.toml", "spec/resolved.toml", "spec/table.csv", "spec/table.svg", "spec/paper.csv"] {
+        for file in [
+            "spec.toml",
+            "spec/resolved.toml",
+            "spec/table.csv",
+            "spec/table.svg",
+            "spec/paper.csv",
+        ] {
             assert!(links.iter().any(|link| link.ends_with(file)), "{file}: {links:?}");
         }
         for other in ["<script", "<img", "<link", "src=", "url(http"] {

@@ -57,10 +57,16 @@ fn the_committed_answers_are_those_that_the_rules_give_on_the_committed_rows() {
     for folder in compared_folders() {
         let made = remade(&folder).unwrap();
         for name in ["answer", "paper"] {
-            let mut written = made.iter().flat_map(|output| &output.csv).filter(|(csv, _)| csv == name);
-            let (_, bytes) = written.next().unwrap_or_else(|| panic!("{}: no {name}", folder.display()));
+            let mut written =
+                made.iter().flat_map(|output| &output.csv).filter(|(csv, _)| csv == name);
+            let (_, bytes) =
+                written.next().unwrap_or_else(|| panic!("{}: no {name}", folder.display()));
             let committed = fs::read(folder.join(format!("{name}.csv"))).unwrap();
-            assert!(*bytes == committed, "{}: {name}.csv: renew it with --redraw", folder.display());
+            assert!(
+                *bytes == committed,
+                "{}: {name}.csv: renew it with --redraw",
+                folder.display()
+            );
         }
         answered += 1;
     }

@@ -29,7 +29,9 @@ document = { 'brute force' = 32.77, 'KD-tree' = 1.8 }
     let rows: Vec<harness::rows::RenderRow> = reader.deserialize().map(Result::unwrap).collect();
     assert_eq!(rows.len(), 2 * (2 + 2 * 2));
     for scene in rows.chunks(6) {
-        assert!(scene.iter().all(|row| row.picture == scene[0].picture && row.rays == scene[0].rays));
+        assert!(
+            scene.iter().all(|row| row.picture == scene[0].picture && row.rays == scene[0].rays)
+        );
         assert_eq!((scene[0].method.as_str(), scene[0].boxes_per_ray), ("brute force", 0.0));
         assert!(scene[1..].iter().all(|row| row.objects_per_ray < scene[0].objects_per_ray));
     }

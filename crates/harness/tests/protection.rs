@@ -7,8 +7,8 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use support::{
-    ended, folder_with, names, outside_buffer, outside_scene, program, reproducible, run, said, send, text,
-    wait_for,
+    ended, folder_with, names, outside_buffer, outside_scene, program, reproducible, run, said,
+    send, text, wait_for,
 };
 
 const SPEC: &str = "
@@ -63,8 +63,12 @@ fn finished_results_are_replaced_by_force_only() {
     let folder = folder("spec.toml");
     let at = folder.path();
     said(at, &["spec.toml"]);
-    let files =
-        || (reproducible(&at.join("results/spec")), fs::read(at.join("results/spec/timing.csv")).unwrap());
+    let files = || {
+        (
+            reproducible(&at.join("results/spec")),
+            fs::read(at.join("results/spec/timing.csv")).unwrap(),
+        )
+    };
     let first = files();
     // A repetition goes beside them.
     let repeated = said(at, &["spec.toml"]);
@@ -85,8 +89,12 @@ fn resuming_what_is_finished_does_nothing() {
     let at = folder.path();
     said(at, &["spec.toml", "--resume"]);
     let written = || {
-        let files = names(&at.join("results/spec")).into_iter().map(|name| at.join("results/spec").join(name));
-        files.map(|file| (fs::metadata(&file).unwrap().modified().unwrap(), file)).collect::<Vec<_>>()
+        let files = names(&at.join("results/spec"))
+            .into_iter()
+            .map(|name| at.join("results/spec").join(name));
+        files
+            .map(|file| (fs::metadata(&file).unwrap().modified().unwrap(), file))
+            .collect::<Vec<_>>()
     };
     let first = written();
     let resumed = run(at, &["spec.toml", "--resume"]);
@@ -99,8 +107,11 @@ fn resuming_what_is_finished_does_nothing() {
     // An interrupted repetition beside it is completed.
     said(at, &["spec.toml"]);
     fs::create_dir(at.join("results/spec.new/.partial")).unwrap();
-    fs::copy(at.join("results/spec.new/resolved.toml"), at.join("results/spec.new/.partial/resolved.toml"))
-        .unwrap();
+    fs::copy(
+        at.join("results/spec.new/resolved.toml"),
+        at.join("results/spec.new/.partial/resolved.toml"),
+    )
+    .unwrap();
     said(at, &["spec.toml", "--resume"]);
     assert!(!at.join("results/spec.new/.partial").exists());
     // The suite of cases is no exception.
@@ -144,7 +155,8 @@ fn a_damaged_finished_run_is_named_and_done_again_or_refused() {
         |part| fs::write(part.join("history.csv"), "").unwrap(),
         |part| {
             let rows = fs::read_to_string(part.join("runs.csv")).unwrap();
-            fs::write(part.join("runs.csv"), rows.split_once('\n').unwrap().0.to_owned() + "\n").unwrap();
+            fs::write(part.join("runs.csv"), rows.split_once('\n').unwrap().0.to_owned() + "\n")
+                .unwrap();
         },
     ];
     for (number, damage) in damages.into_iter().enumerate() {
@@ -154,7 +166,10 @@ fn a_damaged_finished_run_is_named_and_done_again_or_refused() {
         damage(&at.join(&one).join("spec/.partial/000002"));
         let merge = run(at, &["merge", &one, &two, "--out=merged"]);
         let error = text(&merge.stderr);
-        assert!(!merge.status.success() && error.contains("000002") && error.contains("damaged"), "{error}");
+        assert!(
+            !merge.status.success() && error.contains("000002") && error.contains("damaged"),
+            "{error}"
+        );
         assert!(!at.join("merged").exists());
         let resumed = run(at, &["spec.toml", "--resume", "--out", &one]);
         ended(&resumed, 0, &["done again", "000002"]);
@@ -181,15 +196,22 @@ fn results_come_from_the_programs_repository_and_not_from_the_current_folders() 
     let folder = folder("spec.toml");
     let git = |args: &[&str]| {
         let by = ["-c", "user.name=x", "-c", "user.email=x", "-c", "init.defaultBranch=x"];
-        std::process::Command::new("git").args(by).args(args).current_dir(folder.path()).output().ok()
+        std::process::Command::new("git")
+            .args(by)
+            .args(args)
+            .current_dir(folder.path())
+            .output()
+            .ok()
     };
     git(&["init"]);
     git(&["commit", "--allow-empty", "--no-gpg-sign", "--message=x"]);
-    let Some(elsewhere) = git(&["rev-parse", "HEAD"]).filter(|output| output.status.success()) else {
+    let Some(elsewhere) = git(&["rev-parse", "HEAD"]).filter(|output| output.status.success())
+    else {
         return eprintln!("left out: there is no git");
     };
     said(folder.path(), &["spec.toml"]);
-    let provenance = fs::read_to_string(folder.path().join("results/spec/provenance.toml")).unwrap();
+    let provenance =
+        fs::read_to_string(folder.path().join("results/spec/provenance.toml")).unwrap();
     let provenance: toml::Table = provenance.parse().unwrap();
     assert_eq!(provenance["revision"].as_str(), Some(env!("HARNESS_REVISION")));
     assert!(!env!("HARNESS_REVISION").starts_with(text(&elsewhere.stdout).trim()));
@@ -201,7 +223,8 @@ fn pipes_and_devices_are_refused_as_inputs_and_links_are_not_written_through() {
     use std::os::unix::fs::symlink;
     let folder = folder("spec.toml");
     let at = folder.path();
-    let made = std::process::Command::new("mkfifo").args(["p.toml", "p.obj"]).current_dir(at).status();
+    let made =
+        std::process::Command::new("mkfifo").args(["p.toml", "p.obj"]).current_dir(at).status();
     assert!(made.unwrap().success());
     refused(at, &["p.toml"], &["p.toml", "not a regular file"]);
     refused(at, &["spec.toml", "--scene=p.obj"], &["p.obj"]);
@@ -211,7 +234,11 @@ fn pipes_and_devices_are_refused_as_inputs_and_links_are_not_written_through() {
         let _ = fs::remove_file(at.join(lock));
         symlink(at.join("precious"), at.join(lock)).unwrap();
         let output = run(at, &["spec.toml", "--force"]);
-        assert!(!output.status.success() && text(&output.stderr).contains(lock), "{}", text(&output.stderr));
+        assert!(
+            !output.status.success() && text(&output.stderr).contains(lock),
+            "{}",
+            text(&output.stderr)
+        );
         fs::remove_file(at.join(lock)).unwrap();
     }
     assert_eq!(fs::read_to_string(at.join("precious")).unwrap(), "precious");
@@ -226,7 +253,8 @@ fn arguments_need_not_be_utf_8() {
     let out = OsStr::from_bytes(b"out\xff");
     let output = program(folder.path(), &["spec.toml", "--out"]).arg(out).output().unwrap();
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let provenance = fs::read_to_string(folder.path().join(out).join("spec/provenance.toml")).unwrap();
+    let provenance =
+        fs::read_to_string(folder.path().join(out).join("spec/provenance.toml")).unwrap();
     assert!(provenance.contains("harness spec.toml --out out"), "{provenance}");
 }
 
@@ -238,7 +266,8 @@ fn the_first_signal_ends_even_a_program_that_waits_for_another() {
     fs::create_dir(at.join("results")).unwrap();
     let lock = fs::File::create(at.join("results/.lock")).unwrap();
     lock.lock().unwrap();
-    let mut child = program(at, &["spec.toml"]).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let mut child =
+        program(at, &["spec.toml"]).stderr(std::process::Stdio::null()).spawn().unwrap();
     // All runs are finished, and the best known costs are in use by us.
     wait_for(&at.join("results/spec/runs.csv"));
     let start = Instant::now();
@@ -260,7 +289,11 @@ fn control_characters_of_a_spec_do_not_reach_the_terminal() {
     fs::write(folder.path().join("wrong.toml"), format!("{SPEC}\"\\u001b[31mred\" = 1\n")).unwrap();
     let output = run(folder.path(), &["wrong.toml"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(!output.stderr.contains(&0x1b) && text(&output.stderr).contains("red"), "{}", text(&output.stderr));
+    assert!(
+        !output.stderr.contains(&0x1b) && text(&output.stderr).contains("red"),
+        "{}",
+        text(&output.stderr)
+    );
 }
 
 #[test]

@@ -40,34 +40,40 @@ fn fault(root: &Value, schema: &Value, value: &Value, at: &str) -> Option<String
     let none = Map::new();
     let properties = schema.get("properties").and_then(Value::as_object).unwrap_or(&none);
     let (fields, items) = (value.as_object().unwrap_or(&none), schema.get("items"));
-    let missing =
-        list("required").into_iter().flatten().find(|key| !fields.contains_key(key.as_str().unwrap()));
+    let missing = list("required")
+        .into_iter()
+        .flatten()
+        .find(|key| !fields.contains_key(key.as_str().unwrap()));
     missing.map(|key| format!("{at}: {key} is missing")).or_else(|| {
-        let field =
-            |(key, value): (&String, &Value)| match (properties.get(key), schema.get("additionalProperties")) {
-                (Some(schema), _) => fault(root, schema, value, &format!("{at}.{key}")),
-                (None, Some(Value::Bool(false))) => Some(format!("{at}.{key} is no key")),
-                (None, Some(schema)) => fault(root, schema, value, &format!("{at}.{key}")),
-                (None, None) => None,
-            };
+        let field = |(key, value): (&String, &Value)| match (
+            properties.get(key),
+            schema.get("additionalProperties"),
+        ) {
+            (Some(schema), _) => fault(root, schema, value, &format!("{at}.{key}")),
+            (None, Some(Value::Bool(false))) => Some(format!("{at}.{key} is no key")),
+            (None, Some(schema)) => fault(root, schema, value, &format!("{at}.{key}")),
+            (None, None) => None,
+        };
         let elements = value.as_array().into_iter().flatten();
-        fields
-            .iter()
-            .find_map(field)
-            .or_else(|| elements.zip(items.into_iter().cycle()).find_map(|(v, s)| fault(root, s, v, at)))
+        fields.iter().find_map(field).or_else(|| {
+            elements.zip(items.into_iter().cycle()).find_map(|(v, s)| fault(root, s, v, at))
+        })
     })
 }
 
 #[test]
 fn the_schema_accepts_every_committed_spec_and_refuses_a_mistyped_key_anywhere() {
     let schema: Value = serde_json::from_str(&said(Path::new("."), &["schema"])).unwrap();
-    let parsed = |text: &str| serde_json::to_value(toml::from_str::<toml::Table>(text).unwrap()).unwrap();
+    let parsed =
+        |text: &str| serde_json::to_value(toml::from_str::<toml::Table>(text).unwrap()).unwrap();
     for (name, text) in experiments() {
         let spec = parsed(&text);
         assert_eq!(fault(&schema, &schema, &spec, ""), None, "{name}");
         // The same spec with one more letter in any key that is not a name.
-        for key in ["question", "methods", "trials", "kind", "title", "max_work", "quick", "label"] {
-            let mistyped = spec.to_string().replace(&format!("\"{key}\":"), &format!("\"{key}z\":"));
+        for key in ["question", "methods", "trials", "kind", "title", "max_work", "quick", "label"]
+        {
+            let mistyped =
+                spec.to_string().replace(&format!("\"{key}\":"), &format!("\"{key}z\":"));
             let mistyped: Value = serde_json::from_str(&mistyped).unwrap();
             let accepted = fault(&schema, &schema, &mistyped, "").is_none();
             assert!(mistyped == spec || !accepted, "{name}: {key}");
@@ -82,8 +88,8 @@ fn the_schema_accepts_every_committed_spec_and_refuses_a_mistyped_key_anywhere()
         ("methods = [{ method = 'grasp', candidates = 'all' }]", "candidates"),
         ("methods = [{ method = 'external' , command = 'sh' }]", "command"),
     ] {
-        let found =
-            fault(&schema, &schema, &parsed(wrong), "").unwrap_or_else(|| panic!("{wrong} is accepted"));
+        let found = fault(&schema, &schema, &parsed(wrong), "")
+            .unwrap_or_else(|| panic!("{wrong} is accepted"));
         assert!(found.contains(part), "{wrong}: {found}");
     }
 }

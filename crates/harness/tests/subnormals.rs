@@ -42,16 +42,26 @@ fn flags(wide: &WideBvh, rays: &[Ray]) -> Vec<(&'static str, Option<&'static str
     let mut hits = vec![Hit::MISS; rays.len()];
     let mut shadows = vec![false; rays.len()];
     let mut hit_count = 0;
-    let single_nearest = raised_by(|| hit_count += rays.iter().filter_map(|ray| wide.nearest_hit(ray)).count());
+    let single_nearest =
+        raised_by(|| hit_count += rays.iter().filter_map(|ray| wide.nearest_hit(ray)).count());
     let single_any = raised_by(|| hit_count += rays.iter().filter(|ray| wide.any_hit(ray)).count());
     assert!(hit_count > 0, "rays that meet nothing try no triangle");
     vec![
         ("nearest_hit", single_nearest),
         ("any_hit", single_any),
-        ("coherent nearest_hits", raised_by(|| wide.nearest_hits(rays, &mut hits, Coherence::Coherent))),
-        ("incoherent nearest_hits", raised_by(|| wide.nearest_hits(rays, &mut hits, Coherence::Incoherent))),
+        (
+            "coherent nearest_hits",
+            raised_by(|| wide.nearest_hits(rays, &mut hits, Coherence::Coherent)),
+        ),
+        (
+            "incoherent nearest_hits",
+            raised_by(|| wide.nearest_hits(rays, &mut hits, Coherence::Incoherent)),
+        ),
         ("coherent any_hits", raised_by(|| wide.any_hits(rays, &mut shadows, Coherence::Coherent))),
-        ("incoherent any_hits", raised_by(|| wide.any_hits(rays, &mut shadows, Coherence::Incoherent))),
+        (
+            "incoherent any_hits",
+            raised_by(|| wide.any_hits(rays, &mut shadows, Coherence::Incoherent)),
+        ),
     ]
 }
 
@@ -69,8 +79,9 @@ fn ordinary_rays_make_no_kernel_meet_subnormal_numbers() {
                 for kernel in Kernel::ALL {
                     let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
                     for (call, raised) in flags(&wide, &rays) {
-                        let raised = raised
-                            .map(|raised| format!("{name}, {}, {kernel:?}, {call}: {raised}", kind.name()));
+                        let raised = raised.map(|raised| {
+                            format!("{name}, {}, {kernel:?}, {call}: {raised}", kind.name())
+                        });
                         broken.extend(raised);
                     }
                 }
@@ -82,7 +93,9 @@ fn ordinary_rays_make_no_kernel_meet_subnormal_numbers() {
 
 #[test]
 fn the_flags_tell_subnormal_numbers_from_others() {
-    let product = |a: f32, b: f32| _ = std::hint::black_box(std::hint::black_box(a) * std::hint::black_box(b));
+    let product = |a: f32, b: f32| {
+        _ = std::hint::black_box(std::hint::black_box(a) * std::hint::black_box(b))
+    };
     assert_eq!(raised_by(|| product(1.5, 2.5)), None);
     assert_eq!(raised_by(|| product(1e-40, 2.5e10)), Some("a subnormal operand"));
     assert_eq!(raised_by(|| product(1e-20, 1.1e-20)), Some("an underflow"));

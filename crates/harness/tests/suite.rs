@@ -2,15 +2,17 @@
 
 use bvh_build::{Builder, muller_fellner, spatial};
 use bvh_core::cost::{Objective, total_area};
-use bvh_core::{Aabb, Primitives, RayDensity, Segment, Triangle, WideBvh, file, validate, validate_references};
+use bvh_core::{
+    Aabb, Primitives, RayDensity, Segment, Triangle, WideBvh, file, validate, validate_references,
+};
 use bvh_scenes::Scene;
 use bvh_scenes::builtin::stiff::{self, STIFF};
 use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_search::{Budget, Method, Problem, Splits, StopReason, optimize, solve};
 use glam::Vec3;
 use harness::stress::{
-    self, CASES, Case, Cell, Check, EXACT_OBJECTS, Effort, LargerScenes, Part, Size, examine, is_builder,
-    kernels,
+    self, CASES, Case, Cell, Check, EXACT_OBJECTS, Effort, LargerScenes, Part, Size, examine,
+    is_builder, kernels,
     tracing::{self, TRAVERSALS},
     transform::{same_topology, scale_range, scaled, scaled_area},
 };
@@ -30,7 +32,9 @@ fn assert_kept(broken: Vec<String>) {
 
 fn broken(case: &Case, subject: &str, cell: Option<Cell>) -> Option<String> {
     match cell {
-        Some(Cell::Broken(promise)) => Some(format!("{} ({}), {subject}: {promise}", case.id, case.name)),
+        Some(Cell::Broken(promise)) => {
+            Some(format!("{} ({}), {subject}: {promise}", case.id, case.name))
+        }
         _ => None,
     }
 }
@@ -44,8 +48,12 @@ fn every_case_from_s01_to_s45_is_there_and_checked() {
         // A check of a method or a part that does not exist would never be made.
         for check in case.checks {
             match check {
-                Check::Method(Some(name), _) => assert!(Method::NAMES.contains(name), "{}: {name}", case.id),
-                Check::Scene(_) => assert!(stiff::by_id(case.id).is_some(), "{} has no scene", case.id),
+                Check::Method(Some(name), _) => {
+                    assert!(Method::NAMES.contains(name), "{}: {name}", case.id)
+                }
+                Check::Scene(_) => {
+                    assert!(stiff::by_id(case.id).is_some(), "{} has no scene", case.id)
+                }
                 _ => {}
             }
         }
@@ -81,7 +89,10 @@ fn every_case_holds_for_every_method() {
 #[ignore = "slow: thousands of objects for builders and searches alike"]
 fn every_case_holds_for_every_method_at_a_larger_size() {
     let larger = Some(LargerScenes { objects: 2000, work_per_object: 60 });
-    check_methods(&stress::methods(), Effort { builders: Size::Many, work_per_object: WORK, larger });
+    check_methods(
+        &stress::methods(),
+        Effort { builders: Size::Many, work_per_object: WORK, larger },
+    );
 }
 
 #[test]
@@ -108,7 +119,8 @@ fn every_traversal_answers_as_brute_force_on_every_scene() {
 #[test]
 #[ignore = "slow: a million rays, each against every triangle"]
 fn every_traversal_answers_a_million_rays_as_brute_force() {
-    let clusters = ["escher", "bijou", "konistil", "pinecon2"].map(|name| format!("{name}:cluster:200:1"));
+    let clusters =
+        ["escher", "bijou", "konistil", "pinecon2"].map(|name| format!("{name}:cluster:200:1"));
     let meshes = clusters.map(|name| Scene::load(&name).unwrap().primitives);
     let meshes = meshes.into_iter().chain([Primitives::Triangles(stiff::closed_box(192))]);
     let mut jobs = Vec::new();
@@ -154,7 +166,8 @@ fn scenes(most: usize) -> impl Iterator<Item = (&'static Case, Vec<Triangle>)> {
 fn check_kernels(random: usize, adversarial: usize) {
     let mut jobs = Vec::new();
     for (case, triangles) in scenes(TESTED) {
-        let scaled = SCALES.into_iter().filter_map(|by| Some((case, by, kernels::scaled(&triangles, by)?)));
+        let scaled =
+            SCALES.into_iter().filter_map(|by| Some((case, by, kernels::scaled(&triangles, by)?)));
         let scaled: Vec<Scaled> = scaled.collect();
         let pieces = random.div_ceil(PIECE * scaled.len()) * scaled.len();
         jobs.extend((0..pieces).map(|piece| (pieces, scaled[piece % scaled.len()].clone())));
@@ -187,8 +200,9 @@ fn every_kernel_answers_a_million_rays_of_every_scene_as_brute_force() {
 
 #[test]
 fn every_other_part_keeps_its_promises() {
-    let parts =
-        CASES.iter().flat_map(|case| Part::ALL.map(|part| broken(case, part.name(), case.of_part(part))));
+    let parts = CASES
+        .iter()
+        .flat_map(|case| Part::ALL.map(|part| broken(case, part.name(), case.of_part(part))));
     assert_kept(parts.flatten().collect());
 }
 
@@ -205,7 +219,8 @@ fn the_rays_of_the_suite_hit_miss_and_cover_every_kind() {
     let signs: BTreeSet<u32> = zeros.map(f32::to_bits).collect();
     assert_eq!(signs.len(), 2, "zeros of both signs");
     assert!(
-        rays.iter().any(|ray| ray.t_min() > ray.t_max()) && rays.iter().any(|ray| ray.t_min() == ray.t_max())
+        rays.iter().any(|ray| ray.t_min() > ray.t_max())
+            && rays.iter().any(|ray| ray.t_min() == ray.t_max())
     );
 }
 
@@ -215,7 +230,10 @@ fn best() -> Method {
 
 /// The cost that is reported for a tree is the one that it has.
 fn assert_reported(who: &str, reported: f64, cost: f64) {
-    assert!((reported - cost).abs() <= examine::ROUNDING * cost, "{who}: {reported} reported, {cost}");
+    assert!(
+        (reported - cost).abs() <= examine::ROUNDING * cost,
+        "{who}: {reported} reported, {cost}"
+    );
 }
 
 /// The layout answers rays through the triangles as another one does.
@@ -235,7 +253,8 @@ fn every_objective_is_what_its_method_reports() {
             for objective in [Objective::GoldsmithSalmon, Objective::Sah(Default::default())] {
                 let budget = examine::budget(&method, n, WORK);
                 let outcome =
-                    solve(&method, &Problem { objective, ..Problem::new(&boxes) }, 1, budget, &()).unwrap();
+                    solve(&method, &Problem { objective, ..Problem::new(&boxes) }, 1, budget, &())
+                        .unwrap();
                 validate(&outcome.tree, &boxes).unwrap();
                 let cost = objective.cost(&outcome.tree);
                 assert_reported(&format!("{label}, {objective:?}"), outcome.cost, cost);
@@ -253,7 +272,10 @@ fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
         let bounds = boxes.iter().fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
         let segments: Vec<Segment> = tracing::rays(&triangles, 3000, 1)
             .iter()
-            .map(|ray| Segment { from: ray.origin().to_array(), to: ray.at(ray.t_max().min(1e30)).to_array() })
+            .map(|ray| Segment {
+                from: ray.origin().to_array(),
+                to: ray.at(ray.t_max().min(1e30)).to_array(),
+            })
             .filter(|segment| segment.from.iter().chain(&segment.to).all(|c| c.is_finite()))
             .collect();
         let Ok(density) = RayDensity::of_rays(&bounds, &segments, 0.1) else {
@@ -270,7 +292,11 @@ fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
         assert_reported(case.id, outcome.cost, problem.cost(&outcome.tree));
         // What is saved can be loaded, and every ray has its right answer in the layout for these rays.
         let visits = density.visits(&outcome.tree);
-        let bytes = file::save(&outcome.tree, &boxes, &file::Origin { visits: &visits, ..Default::default() });
+        let bytes = file::save(
+            &outcome.tree,
+            &boxes,
+            &file::Origin { visits: &visits, ..Default::default() },
+        );
         let bytes = bytes.unwrap_or_else(|error| panic!("{}: {error}", case.id));
         assert_eq!(file::TreeFile::open(&bytes).unwrap().visits().unwrap().unwrap(), visits);
         let wide = WideBvh::for_rays(&outcome.tree, &triangles, &visits).unwrap();
@@ -294,15 +320,31 @@ fn every_case_holds_with_divided_objects_and_with_the_cost_of_the_layout() {
                 let problem = Problem { objective, splits, ..Problem::new(&boxes) };
                 let solved = || solve(&method, &problem, 1, budget, &()).unwrap();
                 let outcome = solved();
-                assert_eq!(outcome.tree, solved().tree, "{}: another tree for the same seed", case.id);
-                validate_references(&outcome.tree, &boxes, &objects)
-                    .unwrap_or_else(|fault| panic!("{}, {objective:?}, {references}: {fault}", case.id));
+                assert_eq!(
+                    outcome.tree,
+                    solved().tree,
+                    "{}: another tree for the same seed",
+                    case.id
+                );
+                validate_references(&outcome.tree, &boxes, &objects).unwrap_or_else(|fault| {
+                    panic!("{}, {objective:?}, {references}: {fault}", case.id)
+                });
                 assert!(outcome.tree.prim_ids.len() <= most.max(boxes.len()), "{}", case.id);
                 divided += usize::from(outcome.tree.prim_ids.len() > boxes.len());
                 assert_reported(case.id, outcome.cost, problem.cost(&outcome.tree));
                 let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
-                let bytes = file::save_references(&outcome.tree, &boxes, &objects, &file::Origin::default());
-                assert_eq!(file::load(&bytes.unwrap(), &boxes), Ok(outcome.tree.clone()), "{}", case.id);
+                let bytes = file::save_references(
+                    &outcome.tree,
+                    &boxes,
+                    &objects,
+                    &file::Origin::default(),
+                );
+                assert_eq!(
+                    file::load(&bytes.unwrap(), &boxes),
+                    Ok(outcome.tree.clone()),
+                    "{}",
+                    case.id
+                );
                 let wide = WideBvh::new(&outcome.tree, &triangles).unwrap();
                 let plain = WideBvh::new(&greedy, &triangles).unwrap();
                 assert_same_answers(case, &wide, &plain, &triangles);
@@ -331,7 +373,8 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
         // By spatial splits, and searched by both costs.
         let trees = |k: i32| {
             let scale = |p: Vec3| (p.as_dvec3() * libm::exp2(k.into())).as_vec3();
-            let scaled: Vec<Triangle> = triangles.iter().map(|t| Triangle(t.0.map(scale))).collect();
+            let scaled: Vec<Triangle> =
+                triangles.iter().map(|t| Triangle(t.0.map(scale))).collect();
             let (boxes, objects) = (stiff::boxes(&scaled), Primitives::Triangles(scaled));
             let most = boxes.len() * 3 / 2;
             let built = spatial::Config::default().build_at_most(most, &boxes, &objects).unwrap();
@@ -345,7 +388,8 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
             searched.into_iter().chain([(total_area(&built), built)]).collect::<Vec<_>>()
         };
         let expected = trees(0);
-        divided += expected.iter().filter(|(_, tree)| tree.prim_ids.len() > triangles.len()).count();
+        divided +=
+            expected.iter().filter(|(_, tree)| tree.prim_ids.len() > triangles.len()).count();
         for threads in [1, 3] {
             let others = examine::on_threads(threads, || Ok(trees(0))).unwrap();
             assert!(others == expected, "{}: another tree on {threads} threads", case.id);
@@ -374,7 +418,8 @@ fn a_cancelled_method_says_so() {
     }
     let boxes = stiff::boxes(&stiff::uniform(EXACT_OBJECTS));
     for (label, method) in stress::methods() {
-        let cancelled = solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &Impatient).unwrap();
+        let cancelled =
+            solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &Impatient).unwrap();
         assert_eq!(cancelled.stop, StopReason::Cancelled, "{label}");
     }
 }

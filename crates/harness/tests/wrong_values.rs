@@ -38,7 +38,10 @@ fn tables(value: &Value, path: &[Step], found: &mut Vec<Vec<Step>>) {
             table.iter().for_each(|(key, value)| tables(value, &on(Step::Key(key.clone())), found));
         }
         Value::Array(array) => {
-            array.iter().enumerate().for_each(|(index, value)| tables(value, &on(Step::Index(index)), found));
+            array
+                .iter()
+                .enumerate()
+                .for_each(|(index, value)| tables(value, &on(Step::Index(index)), found));
         }
         _ => {}
     }
@@ -70,7 +73,8 @@ fn place(spec: &Value, path: &[Step]) -> String {
     let mut place = String::new();
     for step in path {
         at = follow(&mut at, step).clone();
-        let tag = ["kind", "method"].iter().find_map(|tag| at.get(tag)?.as_str()).unwrap_or_default();
+        let tag =
+            ["kind", "method"].iter().find_map(|tag| at.get(tag)?.as_str()).unwrap_or_default();
         match step {
             Step::Key(key) => place += &format!(".{key}"),
             Step::Index(_) => place += &format!("[{tag}]"),
@@ -98,9 +102,11 @@ fn specs() -> Vec<Value> {
         let experiment: Experiment = Value::Table(spec).try_into().unwrap();
         specs.push(Value::try_from(&experiment).unwrap());
     }
-    let methods: Vec<Table> = Method::all().iter().map(|method| Table::try_from(method).unwrap()).collect();
+    let methods: Vec<Table> =
+        Method::all().iter().map(|method| Table::try_from(method).unwrap()).collect();
     let question = Value::from("Which keys has every method?");
-    let all = [("question", question), ("scenes", vec!["escher"].into()), ("methods", methods.into())];
+    let all =
+        [("question", question), ("scenes", vec!["escher"].into()), ("methods", methods.into())];
     let mut all: Table = all.map(|(key, value)| (key.to_owned(), value)).into_iter().collect();
     let text = "
 budget = { max_work = 5 }
@@ -151,17 +157,19 @@ fn a_wrong_value_under_any_key_of_a_spec_is_refused_by_name() {
                 if key == "unheard_of" || seen.insert(format!("{place}.{key}"), ()).is_some() {
                     continue;
                 }
-                let try_value = |value: &Value| match read(&with(&spec, &path, &key, value.clone())) {
+                let try_value = |value: &Value| match read(&with(&spec, &path, &key, value.clone()))
+                {
                     Ok(_) => true,
                     Err((code, message)) => {
                         // What is refused is the key, or one within it.
                         // Nothing is wrong with a label but that a report names another. What a table may hold
                         // can be for the key above to say.
                         let other = key == "label" && message.contains("names method");
-                        let above = path.iter().rev().filter(|_| value.is_table()).any(|step| match step {
-                            Step::Key(above) => message.contains(above),
-                            Step::Index(_) => false,
-                        });
+                        let above =
+                            path.iter().rev().filter(|_| value.is_table()).any(|step| match step {
+                                Step::Key(above) => message.contains(above),
+                                Step::Index(_) => false,
+                            });
                         let named = message.starts_with("folder/some.toml: ")
                             && (message.contains(&key) || above || other)
                             && code == 2;

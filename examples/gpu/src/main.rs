@@ -12,11 +12,16 @@ use wgpu::{BindGroupEntry, BufferUsages, PollType, ShaderSource};
 fn scene() -> Result<Vec<Triangle>, Box<dyn Error>> {
     let point = |i: u32| {
         let (x, z) = ((i % 81) as f32, (i / 81 % 81) as f32);
-        if i < 81 * 81 { [x, 3.0 * (x * 0.3).sin() * (z * 0.2).cos(), z] } else { [x * 0.5, 6.0 + 0.1 * z, z] }
+        if i < 81 * 81 {
+            [x, 3.0 * (x * 0.3).sin() * (z * 0.2).cos(), z]
+        } else {
+            [x * 0.5, 6.0 + 0.1 * z, z]
+        }
     };
     let positions: Vec<[f32; 3]> = (0..2 * 81 * 81).map(point).collect();
     let cells = (0..positions.len() as u32).filter(|i| i % 81 < 80 && i / 81 % 81 < 80);
-    let indices: Vec<[u32; 3]> = cells.flat_map(|i| [[i, i + 1, i + 81], [i + 82, i + 81, i + 1]]).collect();
+    let indices: Vec<[u32; 3]> =
+        cells.flat_map(|i| [[i, i + 1, i + 81], [i + 82, i + 81, i + 1]]).collect();
     Ok(Triangle::from_mesh(&positions, &indices)?)
 }
 
@@ -53,8 +58,10 @@ fn trace(
             mapped_at_creation: false,
         })
     };
-    let mut buffers: Vec<wgpu::Buffer> =
-        data.iter().map(|bytes| buffer(bytes.len(), BufferUsages::STORAGE | BufferUsages::COPY_DST)).collect();
+    let mut buffers: Vec<wgpu::Buffer> = data
+        .iter()
+        .map(|bytes| buffer(bytes.len(), BufferUsages::STORAGE | BufferUsages::COPY_DST))
+        .collect();
     buffers.iter().zip(data).for_each(|(buffer, bytes)| queue.write_buffer(buffer, 0, bytes));
     buffers.push(buffer(8 * count, BufferUsages::STORAGE | BufferUsages::COPY_SRC));
     let read = buffer(8 * count, BufferUsages::COPY_DST | BufferUsages::MAP_READ);
@@ -93,9 +100,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (triangles, rays) = (scene()?, rays()?);
     let boxes = boxes(&triangles);
     let tree = bake(&boxes, Duration::from_millis(500))?.tree;
-    let expected: Vec<Option<Hit>> = rays.iter().map(|ray| nearest_hit(&tree, &triangles, ray)).collect();
-    let corners: Vec<f32> = triangles.iter().flat_map(|t| t.0).flat_map(|corner| corner.to_array()).collect();
-    let of_ray = |ray: &Ray| [ray.origin().extend(ray.t_min()), ray.direction().extend(ray.t_max())];
+    let expected: Vec<Option<Hit>> =
+        rays.iter().map(|ray| nearest_hit(&tree, &triangles, ray)).collect();
+    let corners: Vec<f32> =
+        triangles.iter().flat_map(|t| t.0).flat_map(|corner| corner.to_array()).collect();
+    let of_ray =
+        |ray: &Ray| [ray.origin().extend(ray.t_min()), ray.direction().extend(ray.t_max())];
     let of_rays: Vec<f32> = rays.iter().flat_map(of_ray).flat_map(|v| v.to_array()).collect();
 
     let (nodes, compressed) = (tree.to_first_count(), CompressedBvh::new(&tree, &boxes)?);
@@ -114,8 +124,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("children's boxes", glsl, boxes_of),
         ("compressed", wgsl(shaders::COMPRESSED), wide),
     ] {
-        let data =
-            [nodes, bytemuck::cast_slice(ids), bytemuck::cast_slice(&corners), bytemuck::cast_slice(&of_rays)];
+        let data = [
+            nodes,
+            bytemuck::cast_slice(ids),
+            bytemuck::cast_slice(&corners),
+            bytemuck::cast_slice(&of_rays),
+        ];
         let found = trace(&device, source, data, rays.len())?;
         // Of two triangles at an edge, or of almost the same distance, either will do.
         let same = |((t, object), expected): (&(f32, u32), &Option<Hit>)| match expected {

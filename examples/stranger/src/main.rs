@@ -9,13 +9,20 @@ use std::time::Instant;
 fn main() -> Result<(), Box<dyn Error>> {
     let knot = concat!(env!("CARGO_MANIFEST_DIR"), "/knot.obj").to_string();
     let mut triangles = Vec::new();
-    for model in tobj::load_obj(std::env::args().nth(1).unwrap_or(knot), &tobj::GPU_LOAD_OPTIONS)?.0 {
-        let (positions, indices) = (model.mesh.positions.as_chunks::<3>().0, model.mesh.indices.as_chunks().0);
+    for model in tobj::load_obj(std::env::args().nth(1).unwrap_or(knot), &tobj::GPU_LOAD_OPTIONS)?.0
+    {
+        let (positions, indices) =
+            (model.mesh.positions.as_chunks::<3>().0, model.mesh.indices.as_chunks().0);
         triangles.extend(Triangle::from_mesh(positions, indices)?);
     }
     let boxes = boxes(&triangles);
     let found = bake(&boxes, Duration::from_secs(1))?;
-    println!("{} triangles, cost {} after {} moves", triangles.len(), found.cost, found.evaluations);
+    println!(
+        "{} triangles, cost {} after {} moves",
+        triangles.len(),
+        found.cost,
+        found.evaluations
+    );
 
     // A million rays from points of a sphere around the scene to points of its box.
     let wide = WideBvh::new(&found.tree, &triangles)?;
@@ -24,9 +31,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let rays = (0..1_000_000u32).map(|i| {
         let part = |k: u32| (i.wrapping_mul(k) >> 8) as f32 / (1 << 24) as f32;
         let (z, angle) = (2.0 * part(2_654_435_769) - 1.0, 6.283 * part(3_242_174_889));
-        let around = Vec3::new(angle.cos() * (1.0 - z * z).sqrt(), angle.sin() * (1.0 - z * z).sqrt(), z);
+        let around =
+            Vec3::new(angle.cos() * (1.0 - z * z).sqrt(), angle.sin() * (1.0 - z * z).sqrt(), z);
         let from = bounds.min + 0.5 * size + size.length() * around;
-        let to = bounds.min + size * Vec3::new(part(2_447_445_413), part(1_640_531_527), part(374_761_393));
+        let to = bounds.min
+            + size * Vec3::new(part(2_447_445_413), part(1_640_531_527), part(374_761_393));
         Ray::half_line(from, to - from)
     });
     let rays: Vec<Ray> = rays.collect::<Result<_, _>>()?;
@@ -38,7 +47,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let point = Vec3::splat(0.5);
     let closest = |id: u32| triangles[id as usize].closest_point(point);
     let distance = |id| Some(closest(id).distance_squared(point.as_dvec3()));
-    let near = query::nearest(&found.tree, point, f64::INFINITY, distance).ok_or("an empty scene")?;
+    let near =
+        query::nearest(&found.tree, point, f64::INFINITY, distance).ok_or("an empty scene")?;
     println!("closest to {point} is {} of triangle {}", closest(near.object), near.object);
 
     let path = std::env::temp_dir().join(format!("stranger.{}.bvh", std::process::id()));
@@ -51,7 +61,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::remove_file(&path)?;
     let mapped = file::TreeFile::open(&map)?.for_boxes(&boxes)?;
     let view = mapped.view()?;
-    let same = |(ray, hit): (&Ray, &Hit)| nearest_hit(view, &triangles, ray).unwrap_or(Hit::MISS) == *hit;
+    let same =
+        |(ray, hit): (&Ray, &Hit)| nearest_hit(view, &triangles, ray).unwrap_or(Hit::MISS) == *hit;
     assert!(rays.iter().zip(&hits).all(same), "the mapped tree answers as the wide layout");
     Ok(())
 }

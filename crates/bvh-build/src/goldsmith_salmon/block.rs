@@ -93,7 +93,8 @@ impl Block {
     #[cfg(any(test, not(target_arch = "x86_64")))]
     #[inline(always)]
     fn containing_plain(&self, b: &[f32; 6]) -> u32 {
-        let contains = |lane: usize| !self.is_leaf(lane) && (0..6).all(|i| b[i] <= self.bounds[i][lane]);
+        let contains =
+            |lane: usize| !self.is_leaf(lane) && (0..6).all(|i| b[i] <= self.bounds[i][lane]);
         (0..LANES).map(|lane| u32::from(contains(lane)) << lane).sum()
     }
 

@@ -42,7 +42,13 @@ pub(super) struct Walk {
 impl Walk {
     /// Descends from the nodes in row `from`.
     #[inline(always)]
-    fn descend(&mut self, blocks: &[Block], objects: &[Object; BATCH], walkers: Range<usize>, from: usize) {
+    fn descend(
+        &mut self,
+        blocks: &[Block],
+        objects: &[Object; BATCH],
+        walkers: Range<usize>,
+        from: usize,
+    ) {
         // The blocks still to be searched.
         let mut ahead = [(0, 0); BATCH];
         for walker in walkers {
@@ -113,7 +119,8 @@ pub(super) fn insert_each<R: Rule>(
     blocks[0].put_leaf(0, root, first, R::leaf_area(root));
     let mut cost = Sum::default();
     for batch in rest.chunks(BATCH) {
-        let objects = std::array::from_fn(|i| scene.objects[batch[i.min(batch.len() - 1)] as usize]);
+        let objects =
+            std::array::from_fn(|i| scene.objects[batch[i.min(batch.len() - 1)] as usize]);
         walk.trail.clear();
         walk.trail.push([NONE; BATCH]);
         walk.descend(blocks, &objects, 0..batch.len(), 0);
@@ -182,7 +189,8 @@ fn find_stop<R: Rule>(
             for lane in 0..LANES.min(count - (at - first) * LANES) {
                 let area = block.union_size(lane, &object.bounds, size);
                 let growth = area - block.area[lane];
-                let growth = if R::BY_AREA { growth } else { growth * f64::from(block.count[lane]) };
+                let growth =
+                    if R::BY_AREA { growth } else { growth * f64::from(block.count[lane]) };
                 if growth < least {
                     (least, next) = (growth, Grown { node: (at * LANES + lane) as u32, area });
                 }
@@ -196,7 +204,8 @@ fn find_stop<R: Rule>(
         let (block, lane) = place(node);
         let (is_leaf, above) = (blocks[block].is_leaf(lane), inherited);
         if !is_leaf {
-            inherited += if R::BY_AREA { least * f64::from(blocks[block].count[lane]) } else { least };
+            inherited +=
+                if R::BY_AREA { least * f64::from(blocks[block].count[lane]) } else { least };
             if inherited + area < stop.increase {
                 stop = Stop {
                     increase: inherited + area,
@@ -209,7 +218,8 @@ fn find_stop<R: Rule>(
         }
         if (is_leaf || R::PAIR_INNER) && above + 2.0 * area < stop.increase {
             let increase = above + 2.0 * area;
-            stop = Stop { increase, node, pair_among: Some(first), grown: grown.len(), examined: 0 };
+            stop =
+                Stop { increase, node, pair_among: Some(first), grown: grown.len(), examined: 0 };
         }
         if is_leaf {
             break;

@@ -47,7 +47,11 @@ bvh_config::config! {
 
 /// The choice of the next node on the path among children that do not contain the object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Descent {
     /// The child whose cost grows least: by children · growth of S for an inner node, and by 2 · S(pair) for a leaf,
@@ -85,7 +89,8 @@ impl<'a> Scene<'a> {
         check_scene(boxes)?;
         let pack = |b: &Aabb| {
             let (min, max) = (-b.min, b.max);
-            let area = measure.map_or_else(|| b.half_area(), |measure| measure.of(&PackedAabb::from(b)));
+            let area =
+                measure.map_or_else(|| b.half_area(), |measure| measure.of(&PackedAabb::from(b)));
             Object { bounds: [min.x, min.y, min.z, max.x, max.y, max.z], area }
         };
         Ok(Self { objects: boxes.iter().map(pack).collect(), measure })
@@ -198,10 +203,18 @@ impl Config {
         pace: Pace,
     ) -> Option<f64> {
         match (self.descent, self.pair_inner) {
-            (Descent::Cost, false) => insert_each::<Rules<false, false>>(scene, size, order, workspace, pace),
-            (Descent::Cost, true) => insert_each::<Rules<false, true>>(scene, size, order, workspace, pace),
-            (Descent::Area, false) => insert_each::<Rules<true, false>>(scene, size, order, workspace, pace),
-            (Descent::Area, true) => insert_each::<Rules<true, true>>(scene, size, order, workspace, pace),
+            (Descent::Cost, false) => {
+                insert_each::<Rules<false, false>>(scene, size, order, workspace, pace)
+            }
+            (Descent::Cost, true) => {
+                insert_each::<Rules<false, true>>(scene, size, order, workspace, pace)
+            }
+            (Descent::Area, false) => {
+                insert_each::<Rules<true, false>>(scene, size, order, workspace, pace)
+            }
+            (Descent::Area, true) => {
+                insert_each::<Rules<true, true>>(scene, size, order, workspace, pace)
+            }
         }
     }
 }
@@ -241,7 +254,8 @@ impl Workspace {
             let (block, lane) = place(node);
             // As in `Aabb::from(&PackedAabb)`, adding 0 keeps the signs of zeros from depending on the order.
             let [x, y, z, far_x, far_y, far_z] = blocks[block].bounds.map(|bounds| bounds[lane]);
-            let aabb = Aabb::from(([0.0 - x, 0.0 - y, 0.0 - z], [far_x + 0.0, far_y + 0.0, far_z + 0.0]));
+            let aabb =
+                Aabb::from(([0.0 - x, 0.0 - y, 0.0 - z], [far_x + 0.0, far_y + 0.0, far_z + 0.0]));
             if blocks[block].is_leaf(lane) {
                 nodes[index as usize] = Node::leaf(aabb, prim_ids.len() as u32, 1);
                 prim_ids.push(blocks[block].link[lane] & !LEAF);
@@ -251,7 +265,11 @@ impl Workspace {
             let below = nodes.len() as u32;
             nodes[index as usize] = Node::inner(aabb, below, count as u32);
             nodes.resize(nodes.len() + count, Node::leaf(Aabb::EMPTY, 0, 1));
-            stack.extend((0..count as u32).rev().map(|child| (below + child, (first * LANES) as u32 + child)));
+            stack.extend(
+                (0..count as u32)
+                    .rev()
+                    .map(|child| (below + child, (first * LANES) as u32 + child)),
+            );
         }
     }
 }

@@ -65,10 +65,16 @@ impl Clusters {
 
     /// Finds every cluster's nearest neighbour up to `radius` positions away, by half area or by a measure. Once the `watch` has
     /// ended the construction, not every cluster gets one.
-    pub(super) fn find_nearest(&mut self, radius: usize, measure: Option<&dyn Measure>, watch: &Watch) {
+    pub(super) fn find_nearest(
+        &mut self,
+        radius: usize,
+        measure: Option<&dyn Measure>,
+        watch: &Watch,
+    ) {
         let (scale, nearest) = (self.scale, &mut self.nearest[..self.boxes.len()]);
         let chunks_per_poll = OBJECTS_PER_POLL / CHUNK;
-        let ends_at = |number: usize| number % chunks_per_poll == chunks_per_poll - 1 && watch.is_cancelled();
+        let ends_at =
+            |number: usize| number % chunks_per_poll == chunks_per_poll - 1 && watch.is_cancelled();
         #[cfg(feature = "rayon")]
         if nearest.len() * radius >= PARALLEL_PAIRS && rayon::current_num_threads() > 1 {
             use rayon::prelude::*;
@@ -78,7 +84,15 @@ impl Clusters {
                     if ends_at(number) {
                         return;
                     }
-                    neighbours::find(&self.boxes, scale, measure, radius, number * CHUNK, found, scratch);
+                    neighbours::find(
+                        &self.boxes,
+                        scale,
+                        measure,
+                        radius,
+                        number * CHUNK,
+                        found,
+                        scratch,
+                    );
                 },
             );
             return;
@@ -87,7 +101,15 @@ impl Clusters {
             if ends_at(number) {
                 return;
             }
-            neighbours::find(&self.boxes, scale, measure, radius, number * CHUNK, found, &mut self.scratch);
+            neighbours::find(
+                &self.boxes,
+                scale,
+                measure,
+                radius,
+                number * CHUNK,
+                found,
+                &mut self.scratch,
+            );
         }
     }
 

@@ -116,7 +116,8 @@ mod tests {
     }
 
     fn scatter(n: u32) -> Vec<Aabb> {
-        let hash = |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 65_521) as f32;
+        let hash =
+            |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 65_521) as f32;
         (0..n).map(|i| cube([hash(i, 3), hash(i, 11), hash(i, 19)], hash(i, 27) / 32.0)).collect()
     }
 
@@ -134,7 +135,8 @@ mod tests {
     fn a_radius_over_all_objects_joins_the_closest_pair_first() {
         let boxes = [0.0, 100.0, 10.0, 107.0].map(|x| cube([x, 0.0, 0.0], 1.0));
         let tree = Config { radius: 4, ..Config::default() }.build(&boxes).unwrap();
-        let sides: Vec<f32> = tree.nodes[0].children().map(|child| tree.nodes[child].aabb.max.x).collect();
+        let sides: Vec<f32> =
+            tree.nodes[0].children().map(|child| tree.nodes[child].aabb.max.x).collect();
         assert_eq!(sides, [11.0, 108.0]);
     }
 
@@ -148,7 +150,8 @@ mod tests {
     #[test]
     fn no_scene_takes_more_rounds_than_a_multiple_of_the_logarithm() {
         // One inside the other: every cluster's nearest is the smallest.
-        let boxes: Vec<Aabb> = (1..20_000u16).map(|i| cube([-f32::from(i); 3], 2.0 * f32::from(i))).collect();
+        let boxes: Vec<Aabb> =
+            (1..20_000u16).map(|i| cube([-f32::from(i); 3], 2.0 * f32::from(i))).collect();
         let tree = Config::default().build(&boxes).unwrap();
         validate(&tree, &boxes).unwrap();
         assert!(tree.depth() < 1000, "{}", tree.depth());
@@ -182,7 +185,8 @@ mod tests {
                 (area, at ^ other)
             };
             let nearest = |at: usize| {
-                let others = (at.saturating_sub(radius)..n.min(at + radius + 1)).filter(|&other| other != at);
+                let others = (at.saturating_sub(radius)..n.min(at + radius + 1))
+                    .filter(|&other| other != at);
                 others.min_by(|&a, &b| key(at, a).partial_cmp(&key(at, b)).unwrap()).unwrap()
             };
             let mut nearest: Vec<usize> = (0..n).map(nearest).collect();

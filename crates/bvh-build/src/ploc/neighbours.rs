@@ -53,10 +53,12 @@ fn find_plain(
         plane[..offset].fill(f32::INFINITY);
         plane[offset + last - first..].fill(f32::INFINITY);
     }
-    let [a, b, c, d, e, f] = planes.each_mut().map(|plane| &mut plane[offset..offset + last - first]);
+    let [a, b, c, d, e, f] =
+        planes.each_mut().map(|plane| &mut plane[offset..offset + last - first]);
     for (at, aabb) in boxes[first..last].iter().enumerate() {
-        let [low, high] =
-            aabb.planes().map(|plane| plane.map(|x| (f64::from(x) * scale).clamp(-FARTHEST, FARTHEST) as f32));
+        let [low, high] = aabb
+            .planes()
+            .map(|plane| plane.map(|x| (f64::from(x) * scale).clamp(-FARTHEST, FARTHEST) as f32));
         [a[at], b[at], c[at]] = [low[0], low[1], low[2]];
         [d[at], e[at], f[at]] = [high[0], high[1], high[2]];
     }
@@ -75,8 +77,8 @@ fn find_plain(
             continue;
         }
         for (axis, side) in sides.iter_mut().enumerate() {
-            let [low, high] =
-                [axis, axis + 3].map(|plane| &planes[plane][radius - distance..][..pairs + distance]);
+            let [low, high] = [axis, axis + 3]
+                .map(|plane| &planes[plane][radius - distance..][..pairs + distance]);
             joint_sides(low, high, distance, &mut side[..pairs]);
         }
         let [x, y, z] = sides.each_mut().map(|side| &mut side[..pairs]);
@@ -98,9 +100,12 @@ fn joint_sizes(
     sizes: &mut [f32],
 ) {
     for (size, second) in sizes.iter_mut().zip(start..) {
-        let pair = second.checked_sub(distance).and_then(|first| Some((&boxes[first], boxes.get(second)?)));
-        *size = pair
-            .map_or(f32::INFINITY, |(a, b)| ((measure.of(&a.union(b)) * scale * scale) as f32).min(f32::MAX));
+        let pair = second
+            .checked_sub(distance)
+            .and_then(|first| Some((&boxes[first], boxes.get(second)?)));
+        *size = pair.map_or(f32::INFINITY, |(a, b)| {
+            ((measure.of(&a.union(b)) * scale * scale) as f32).min(f32::MAX)
+        });
     }
 }
 

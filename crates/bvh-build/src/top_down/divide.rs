@@ -151,7 +151,8 @@ fn spawn<'s, C: SplitCost, R: SplitRule + Copy + Send + Sync + 's>(
             return;
         }
         let (left, right) = split_task(division, task, &mut rule, &mut scratch);
-        let (larger, smaller) = if left.objects() > right.objects() { (left, right) } else { (right, left) };
+        let (larger, smaller) =
+            if left.objects() > right.objects() { (left, right) } else { (right, left) };
         if smaller.objects() >= PARALLEL_OBJECTS {
             scope.spawn(move |scope| spawn(scope, division, scratches, smaller, rule));
         } else {
@@ -178,9 +179,11 @@ fn prepare<'a>(
     tree.nodes.resize((2 * n).saturating_sub(1), Node::leaf(Aabb::EMPTY, 0, 0));
     let (root, below) = tree.nodes.split_first_mut()?;
     let aabb = union_of(&scene.boxes, &tree.prim_ids);
-    *root = if n == 1 { Node::leaf((&aabb).into(), 0, 1) } else { Node::inner((&aabb).into(), 1, 2) };
+    *root =
+        if n == 1 { Node::leaf((&aabb).into(), 0, 1) } else { Node::inner((&aabb).into(), 1, 2) };
     let known = Known { aabb, same_as: [0, 1, 2], stalls: 0 };
-    let task = Task { below, below_at: 1, objects_at: 0, orders: [&mut tree.prim_ids, y, z], known };
+    let task =
+        Task { below, below_at: 1, objects_at: 0, orders: [&mut tree.prim_ids, y, z], known };
     Some((task, scratch))
 }
 
@@ -200,7 +203,8 @@ fn split_task<'a, C: SplitCost, R: SplitRule>(
     scratch: &mut Scratch,
 ) -> (Task<'a>, Task<'a>) {
     let Task { below, below_at, objects_at, orders: [x, y, z], known } = task;
-    let (left, [known_left, known_right]) = split_node_fast(division, [x, y, z], known, rule, scratch);
+    let (left, [known_left, known_right]) =
+        split_node_fast(division, [x, y, z], known, rule, scratch);
     let (children, below) = below.split_at_mut(2);
     let (below_left, below_right) = below.split_at_mut(2 * left - 2);
     let [x, y, z] = [x, y, z].map(|order| order.split_at_mut(left));
@@ -276,7 +280,12 @@ fn build_plain<C: SplitCost, R: SplitRule>(
         let left = left as u32;
         let sides = [
             Frame { start, len: left, below: below + 2, known: known[0] },
-            Frame { start: start + left, len: len - left, below: below + 2 * left, known: known[1] },
+            Frame {
+                start: start + left,
+                len: len - left,
+                below: below + 2 * left,
+                known: known[1],
+            },
         ];
         for (at, side) in sides.into_iter().enumerate().rev() {
             let aabb = (&side.known.aabb).into();

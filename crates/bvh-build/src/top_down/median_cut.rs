@@ -24,7 +24,11 @@ bvh_config::config! {
 
 /// Which axis a node is cut along.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum CutAxis {
     /// x at the root, then y, z, x and so on by level (Kay & Kajiya).
@@ -78,11 +82,18 @@ impl Builder for Config {
             };
             let half = len.div_ceil(2);
             let key = |id: u32| boxes[id as usize].doubled_centroid()[axis];
-            ids.select_nth_unstable_by(half - 1, |&a, &b| key(a).total_cmp(&key(b)).then(a.cmp(&b)));
+            ids.select_nth_unstable_by(half - 1, |&a, &b| {
+                key(a).total_cmp(&key(b)).then(a.cmp(&b))
+            });
             let first = nodes.len();
             nodes[node] = Node::inner(aabb, first as u32, 2);
             nodes.extend([placeholder; 2]);
-            stack.push(Frame { node: first + 1, start: start + half, len: len - half, level: level + 1 });
+            stack.push(Frame {
+                node: first + 1,
+                start: start + half,
+                len: len - half,
+                level: level + 1,
+            });
             stack.push(Frame { node: first, start, len: half, level: level + 1 });
         }
         Ok(Bvh { nodes, prim_ids })
@@ -109,14 +120,17 @@ mod tests {
 
     #[test]
     fn the_longest_axis_is_cut_when_asked_for() {
-        let tree = Config { axis: CutAxis::Longest, ..Config::default() }.build(&zigzag(4)).unwrap();
+        let tree =
+            Config { axis: CutAxis::Longest, ..Config::default() }.build(&zigzag(4)).unwrap();
         assert_eq!(tree.prim_ids, [0, 2, 1, 3]);
     }
 
     #[test]
     fn leaves_hold_at_most_the_given_fraction_of_all_objects() {
         for (fraction, expected) in [(0.1, 7), (0.0, 1), (1.0, 75)] {
-            let tree = Config { axis: CutAxis::Longest, leaf_fraction: fraction }.build(&zigzag(75)).unwrap();
+            let tree = Config { axis: CutAxis::Longest, leaf_fraction: fraction }
+                .build(&zigzag(75))
+                .unwrap();
             let largest = tree.nodes.iter().filter_map(|node| match node.kind() {
                 NodeKind::Leaf { count, .. } => Some(count),
                 NodeKind::Inner { .. } => None,

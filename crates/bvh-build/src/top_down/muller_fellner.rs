@@ -11,7 +11,9 @@ use super::divide::{Division, Workspace};
 #[cfg(feature = "rayon")]
 use super::presort::PARALLEL_OBJECTS;
 use super::presort::Presorted;
-use super::split_cost::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, ByMeasure, SplitCost};
+use super::split_cost::{
+    AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, ByMeasure, SplitCost,
+};
 use super::sweep::{SplitRule, TakeBest};
 use crate::{BuildError, Builder, Check, OutOfRange, Watch};
 use bvh_config::{Accepts, Itself};
@@ -34,7 +36,11 @@ bvh_config::config! {
 
 /// The cost of a split.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Heuristic {
     /// S(L)·|L| + S(R)·|R|.
@@ -66,8 +72,9 @@ pub struct MadeUpCosts {
 
 impl MadeUpCosts {
     fn of(self, objects: usize) -> Vec<f32> {
-        let cost =
-            |object: usize| if object.is_multiple_of(self.every as usize) { self.cost as f32 } else { 1.0 };
+        let cost = |object: usize| {
+            if object.is_multiple_of(self.every as usize) { self.cost as f32 } else { 1.0 }
+        };
         (0..objects).map(cost).collect()
     }
 }
@@ -96,7 +103,8 @@ impl Builder for Config {
         watch: &Watch,
     ) -> Result<Bvh, BuildError> {
         // Every tree over a scene without area has the same area, but not the same measure.
-        let scene = Presorted::sort(boxes, self.skip_sorted, self.skip_flat && measure.is_none(), watch)?;
+        let scene =
+            Presorted::sort(boxes, self.skip_sorted, self.skip_flat && measure.is_none(), watch)?;
         self.check()?;
         let mut tree = Bvh::default();
         let greedy = Greedy { config: self, scene: &scene, watch, tree: &mut tree };
@@ -120,7 +128,8 @@ struct Greedy<'a> {
 impl Divide for Greedy<'_> {
     fn by<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError> {
         let skip_same_order = self.config.skip_same_order;
-        let division = Division { scene: self.scene, split_cost, skip_same_order, watch: self.watch };
+        let division =
+            Division { scene: self.scene, split_cost, skip_same_order, watch: self.watch };
         greedy(&division, self.tree)
     }
 }
@@ -163,7 +172,9 @@ impl Config {
         if weights.len() != boxes.len() {
             return Err(BuildError::WeightCount { weights: weights.len(), objects: boxes.len() });
         }
-        if let Some(index) = weights.iter().position(|weight| !(weight.is_finite() && *weight >= 0.0)) {
+        if let Some(index) =
+            weights.iter().position(|weight| !(weight.is_finite() && *weight >= 0.0))
+        {
             return Err(BuildError::InvalidWeight { index, weight: weights[index].into() });
         }
         let mut tree = Bvh::default();
@@ -196,9 +207,13 @@ impl Config {
     ) -> Result<(), BuildError> {
         match self.heuristic {
             Heuristic::AreaTimesCount => by_cost(&AreaTimesCount, measure, division),
-            Heuristic::AreaTimesPower(p) => by_cost(&AreaTimesPower::new(objects, p), measure, division),
+            Heuristic::AreaTimesPower(p) => {
+                by_cost(&AreaTimesPower::new(objects, p), measure, division)
+            }
             Heuristic::AreaOnly(reading) => by_cost(&reading, measure, division),
-            Heuristic::AreaTimesCost(costs) => by_cost(&AreaTimesWeight(&costs.of(objects)), measure, division),
+            Heuristic::AreaTimesCost(costs) => {
+                by_cost(&AreaTimesWeight(&costs.of(objects)), measure, division)
+            }
         }
     }
 }

@@ -46,8 +46,11 @@ impl Presorted {
             if boxes.len() >= OBJECTS_PER_POLL && watch.is_cancelled() {
                 return (Vec::new(), false);
             }
-            let mut keyed: Vec<(f64, u32)> =
-                boxes.iter().zip(0..).map(|(b, index)| (b.doubled_centroid()[axis], index)).collect();
+            let mut keyed: Vec<(f64, u32)> = boxes
+                .iter()
+                .zip(0..)
+                .map(|(b, index)| (b.doubled_centroid()[axis], index))
+                .collect();
             // Most unsorted scenes are found to be so within a few objects.
             let in_order = keyed.is_sorted_by_key(|&(key, _)| key);
             if !(in_order && skip_sorted) {

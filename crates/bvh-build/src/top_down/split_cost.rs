@@ -113,7 +113,11 @@ impl SplitCost for AreaTimesPower {
 /// objects contained inside them' (Ng & Trifonov 2003, section 3.3 and Table 2). The paper gives no formula;
 /// these are the readings we know of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum AreaOnly {
     /// S(L) + S(R), the literal reading.

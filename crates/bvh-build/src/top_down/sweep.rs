@@ -219,19 +219,29 @@ impl<C: SplitCost> Sweep<'_, C> {
     ///
     /// Source: Ng & Trifonov 2003, section 3.2. Differs from the paper: the blocks, which change no result.
     #[inline(always)]
-    fn scan<const BEST: bool>(&mut self, axis: u8, mut bound: f64, mut visit: impl FnMut(Split) -> f64) {
+    fn scan<const BEST: bool>(
+        &mut self,
+        axis: u8,
+        mut bound: f64,
+        mut visit: impl FnMut(Split) -> f64,
+    ) {
         let Self { boxes, split_cost, .. } = self;
         let order = self.orders[axis as usize];
         let n = order.len();
-        let candidate =
-            |cost, left: usize| Split { cost, axis, left: left as u32, imbalance: n.abs_diff(2 * left) as u32 };
+        let candidate = |cost, left: usize| Split {
+            cost,
+            axis,
+            left: left as u32,
+            imbalance: n.abs_diff(2 * left) as u32,
+        };
 
         if boxes[order[0] as usize] == self.aabb && boxes[order[n - 1] as usize] == self.aabb {
             // The first and the last object fill the node's box, so every side of every candidate has that box, and all
             // candidates cost the same but for rounding. The node is halved.
             let area = split_cost.size(&self.aabb);
             let (left, right) = order.split_at(n / 2);
-            let [left, right] = [left, right].map(|side| split_cost.side(area, split_cost.total_load(side)));
+            let [left, right] =
+                [left, right].map(|side| split_cost.side(area, split_cost.total_load(side)));
             // Blocks of another node must not be taken for this one's in `side_boxes`.
             self.blocks[axis as usize].clear();
             visit(candidate(split_cost.join(left, right), n / 2));
@@ -287,10 +297,17 @@ impl<C: SplitCost> Sweep<'_, C> {
 
 /// The surroundings of every block of `order`.
 #[inline(always)]
-fn gather_blocks<C: SplitCost>(boxes: &[PackedAabb], split_cost: &C, order: &[u32], blocks: &mut Vec<Block>) {
+fn gather_blocks<C: SplitCost>(
+    boxes: &[PackedAabb],
+    split_cost: &C,
+    order: &[u32],
+    blocks: &mut Vec<Block>,
+) {
     blocks.clear();
     // Each block's own box is kept where the box of all objects before it goes later.
-    blocks.extend(order.chunks(BLOCK).map(|objects| Block { left: union_of(boxes, objects), ..Block::NONE }));
+    blocks.extend(
+        order.chunks(BLOCK).map(|objects| Block { left: union_of(boxes, objects), ..Block::NONE }),
+    );
     let (mut aabb, mut load) = (PackedAabb::EMPTY, 0.0);
     for (block, objects) in blocks.iter_mut().zip(order.chunks(BLOCK)).rev() {
         if aabb != PackedAabb::EMPTY {

@@ -5,8 +5,8 @@ use std::path::Path;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut builder =
-        cbindgen::Builder::new().with_config(cbindgen::Config::from_file(here.join("cbindgen.toml"))?);
+    let mut builder = cbindgen::Builder::new()
+        .with_config(cbindgen::Config::from_file(here.join("cbindgen.toml"))?);
     for source in ["failure", "tree", "tracer"] {
         builder = builder.with_src(here.join(format!("../src/{source}.rs")));
     }

@@ -42,7 +42,8 @@ impl FromStr for Effort {
                     "G" => Some(1_000_000_000),
                     _ => None,
                 };
-                unit.and_then(|unit| digits.trim_end().parse::<u64>().ok()?.checked_mul(unit)).map(Self::Work)
+                unit.and_then(|unit| digits.trim_end().parse::<u64>().ok()?.checked_mul(unit))
+                    .map(Self::Work)
             }
             // `5M` would be five months.
             None if text.contains('M') => None,

@@ -65,7 +65,12 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
 }
 
 /// Searches for the tree over one mesh or over the instances, and keeps it.
-fn bake_part(plan: &Plan, scene: &Scene, path: &Path, interrupted: &AtomicBool) -> Result<(), Error> {
+fn bake_part(
+    plan: &Plan,
+    scene: &Scene,
+    path: &Path,
+    interrupted: &AtomicBool,
+) -> Result<(), Error> {
     let bake = plan.begin(scene, None, interrupted)?;
     let baked = bake.search(interrupted)?;
     let bytes = bake.file(&baked).map_err(TreeFileError::of(path))?;
@@ -73,7 +78,10 @@ fn bake_part(plan: &Plan, scene: &Scene, path: &Path, interrupted: &AtomicBool) 
     let count = scene.boxes.len();
     let cost = baked.outcome.cost;
     let gain = gain(cost, baked.base);
-    print_line(&format!("{}: {count} objects, cost {cost}, {gain} Müller–Fellner's", path.display()));
+    print_line(&format!(
+        "{}: {count} objects, cost {cost}, {gain} Müller–Fellner's",
+        path.display()
+    ));
     Ok(())
 }
 
@@ -82,7 +90,10 @@ fn new_folder(path: &Path) -> Result<(), Error> {
     output_folder("--out", path)?;
     let is_empty = fs::read_dir(path).map_or(true, |mut entries| entries.next().is_none());
     let refused = || {
-        Error::Usage(format!("--out: {}: a folder with files; accepted: a new or empty one", path.display()))
+        Error::Usage(format!(
+            "--out: {}: a folder with files; accepted: a new or empty one",
+            path.display()
+        ))
     };
     if is_empty { Ok(()) } else { Err(refused()) }
 }
@@ -115,7 +126,12 @@ fn instances(parts: &gltf::Parts) -> Vec<Instance> {
 }
 
 /// The boxes of all instances, as a scene.
-fn top(stem: &str, scenes: &[Scene], instances: &[Instance], parts: &gltf::Parts) -> Result<Scene, Error> {
+fn top(
+    stem: &str,
+    scenes: &[Scene],
+    instances: &[Instance],
+    parts: &gltf::Parts,
+) -> Result<Scene, Error> {
     let name = format!("{stem}, instances");
     let failed = |message: String| Error::from(SceneError { name: name.clone(), message });
     let layout = |scene: &Scene| {
@@ -130,7 +146,9 @@ fn top(stem: &str, scenes: &[Scene], instances: &[Instance], parts: &gltf::Parts
         InvalidInstances::Transform(at) => {
             let (node, mesh) = (parts.places[at].node, parts.places[at].mesh);
             let found = "its transform has no inverse, or its box is not finite";
-            failed(format!("nodes[{node}] places meshes[{mesh}]: {found}; expected an invertible one"))
+            failed(format!(
+                "nodes[{node}] places meshes[{mesh}]: {found}; expected an invertible one"
+            ))
         }
         other => failed(other.to_string()),
     })?;

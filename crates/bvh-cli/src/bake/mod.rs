@@ -83,7 +83,8 @@ pub enum BakeCost {
 }
 
 /// Baked trees.
-const TREE: FileKind = FileKind { name: "a tree file", beginning: &Header::MAGIC, extension: "bvh" };
+const TREE: FileKind =
+    FileKind { name: "a tree file", beginning: &Header::MAGIC, extension: "bvh" };
 /// The method that goes on from a given tree.
 const BEST: &str = "best";
 
@@ -123,9 +124,9 @@ impl BakeArgs {
                 // The budget ends the search; the limit of the method itself does not count.
                 Ok(Method::Best(best::Config { horizon: Some(Horizon::Known), ..config }))
             }
-            Some(_) if self.from.is_some() => {
-                Err(Error::Usage(format!("--method {name} cannot go on --from a tree; accepted: {BEST}")))
-            }
+            Some(_) if self.from.is_some() => Err(Error::Usage(format!(
+                "--method {name} cannot go on --from a tree; accepted: {BEST}"
+            ))),
             Some(method) => Ok(method),
         }
     }
@@ -138,7 +139,8 @@ impl BakeArgs {
         }
         if references > 1.0 && !matches!(method, Method::Best(_)) {
             let name = &self.method;
-            let message = format!("--references {references} with --method {name}; accepted: {BEST}");
+            let message =
+                format!("--references {references} with --method {name}; accepted: {BEST}");
             return Err(Error::Usage(message));
         }
         Ok(())
@@ -183,7 +185,9 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let reserved = Reserved::new(&args.out, plan.most_bytes(&scene))?;
     let bake = plan.begin(&scene, start.as_ref(), interrupted)?;
     if args.explain && bake.is_whole() {
-        print_line("  left out: divided objects: no spatial split of a top-down division saves anything");
+        print_line(
+            "  left out: divided objects: no spatial split of a top-down division saves anything",
+        );
     }
     let baked = bake.search(interrupted)?;
     let bytes = bake.file(&baked).map_err(TreeFileError::of(&args.out))?;
@@ -203,7 +207,12 @@ fn summary(plan: &Plan, scene: &Scene, bake: &Bake, baked: &Baked) -> String {
     let method = plan.method.name();
     let mut lines = vec![
         format!("{} ({}), {objects} objects, {method}, seed {}", scene.name, scene.kind, plan.seed),
-        format!("{} {}, {} Müller–Fellner's {base}", bake.unit(), outcome.cost, gain(outcome.cost, *base)),
+        format!(
+            "{} {}, {} Müller–Fellner's {base}",
+            bake.unit(),
+            outcome.cost,
+            gain(outcome.cost, *base)
+        ),
     ];
     if let Some(before) = before {
         lines.push(format!("{} the tree it went on from, {before}", gain(outcome.cost, *before)));
@@ -218,7 +227,8 @@ fn summary(plan: &Plan, scene: &Scene, bake: &Bake, baked: &Baked) -> String {
         });
     }
     // A method that plans with the clock has carried out its plan when the time is over.
-    let in_time = matches!(plan.effort, Effort::Time(limit) if *seconds >= 0.5 * limit.as_secs_f64());
+    let in_time =
+        matches!(plan.effort, Effort::Time(limit) if *seconds >= 0.5 * limit.as_secs_f64());
     let why = match outcome.stop {
         StopReason::Completed if in_time => "",
         StopReason::Completed => ", and nothing more that this method does",

@@ -126,7 +126,9 @@ impl Bake<'_> {
             Effort::Work(work) => Budget { max_work: Some(work), ..Budget::UNLIMITED },
         };
         let fallback = match (*effort, method) {
-            (Effort::Work(work), Method::Best(_)) => best::fallback(problem, work, &Interrupted(interrupted))?,
+            (Effort::Work(work), Method::Best(_)) => {
+                best::fallback(problem, work, &Interrupted(interrupted))?
+            }
             _ => None,
         };
         let found = match (self.start, method) {

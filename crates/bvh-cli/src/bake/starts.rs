@@ -18,7 +18,9 @@ pub fn greedy(method: &str, scene: &Scene, interrupted: &AtomicBool) -> Result<B
     let config = muller_fellner::Config::default();
     let greedy = match config.build_watched(&scene.boxes, None, &Watch::new(&is_interrupted)) {
         Err(BuildError::Cancelled) if !interrupt::holds() => return Err(Error::NoTree),
-        Err(BuildError::Cancelled) => ploc::Config { radius: 1, ..Default::default() }.build(&scene.boxes),
+        Err(BuildError::Cancelled) => {
+            ploc::Config { radius: 1, ..Default::default() }.build(&scene.boxes)
+        }
         greedy => greedy,
     };
     greedy.map_err(Error::search(&scene.name, method))

@@ -39,7 +39,17 @@ impl<'a> Watch<'a> {
         let style = ProgressStyle::with_template("{bar:10} {wide_msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         let [moves, work, shown] = [0, 0, 0].map(AtomicU64::new);
-        Self { bar, deadline, effort, base, last: Mutex::default(), moves, work, shown, interrupted }
+        Self {
+            bar,
+            deadline,
+            effort,
+            base,
+            last: Mutex::default(),
+            moves,
+            work,
+            shown,
+            interrupted,
+        }
     }
 
     /// Shows incumbent, gain, rate and time left, ten times a second.
@@ -83,7 +93,8 @@ impl Observer for Watch<'_> {
 
     fn cancelled(&self) -> bool {
         self.show();
-        self.interrupted.load(Relaxed) || matches!(self.effort, Effort::Time(_)) && self.deadline.has_passed()
+        self.interrupted.load(Relaxed)
+            || matches!(self.effort, Effort::Time(_)) && self.deadline.has_passed()
     }
 
     fn progress(&self) -> Option<f64> {
@@ -94,5 +105,9 @@ impl Observer for Watch<'_> {
 /// Returns in words how far `cost` is below or above `base`.
 pub fn gain(cost: f64, base: f64) -> String {
     let percent = if base > 0.0 { 100.0 * (1.0 - cost / base) } else { 0.0 };
-    if percent >= 0.0 { format!("{percent:.2} % below") } else { format!("{:.2} % above", -percent) }
+    if percent >= 0.0 {
+        format!("{percent:.2} % below")
+    } else {
+        format!("{:.2} % above", -percent)
+    }
 }

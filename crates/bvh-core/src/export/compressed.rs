@@ -88,7 +88,8 @@ impl CompressedNode {
     }
 
     fn corner(&self, slot: usize, planes: &[[u8; 8]; 3]) -> Vec3 {
-        let offset = [0, 1, 2].map(|axis| f32::from(planes[axis][slot]) * step(self.exponents[axis]));
+        let offset =
+            [0, 1, 2].map(|axis| f32::from(planes[axis][slot]) * step(self.exponents[axis]));
         // The last plane of a huge grid may overflow, and boxes are finite.
         (self.origin + Vec3::from(offset)).min(Vec3::MAX)
     }

@@ -56,7 +56,10 @@ impl Bvh {
     ///
     /// Does not check the boxes: [`validate`](crate::validate()) checks boxes, and
     /// [`refit`](Bvh::refit) makes padded boxes tight.
-    pub fn from_first_count(nodes: &[FirstCountNode], prim_ids: &[u32]) -> Result<Self, InvalidBvh> {
+    pub fn from_first_count(
+        nodes: &[FirstCountNode],
+        prim_ids: &[u32],
+    ) -> Result<Self, InvalidBvh> {
         let root = nodes.first().map(FirstCountNode::aabb);
         unpack(nodes.len(), prim_ids, root, |index, parts| {
             let node = &nodes[index];
@@ -66,8 +69,14 @@ impl Bvh {
                 return Ok(());
             }
             let left = first as usize;
-            let Some([left_node, right_node]) = nodes.get(left..).and_then(<[_]>::first_chunk) else {
-                return Err(InvalidBvh::BadChildren { node: index, first, count: 2, nodes: nodes.len() });
+            let Some([left_node, right_node]) = nodes.get(left..).and_then(<[_]>::first_chunk)
+            else {
+                return Err(InvalidBvh::BadChildren {
+                    node: index,
+                    first,
+                    count: 2,
+                    nodes: nodes.len(),
+                });
             };
             parts.push((left_node.aabb(), Part::Node(left)));
             parts.push((right_node.aabb(), Part::Node(left + 1)));
@@ -150,7 +159,8 @@ mod tests {
     #[test]
     fn trees_of_no_node_and_of_one_have_arrays() {
         let aabb = Aabb::from([[0.0; 3], [1.0; 3]]);
-        for tree in [Bvh::default(), Bvh { nodes: vec![Node::leaf(aabb, 0, 1)], prim_ids: vec![0] }] {
+        for tree in [Bvh::default(), Bvh { nodes: vec![Node::leaf(aabb, 0, 1)], prim_ids: vec![0] }]
+        {
             for nodes in [tree.to_first_count(), tree.to_first_count_aligned()] {
                 assert_eq!(Bvh::from_first_count(&nodes, &tree.prim_ids), Ok(tree.clone()));
                 assert_eq!(nodes.len(), tree.nodes.len());

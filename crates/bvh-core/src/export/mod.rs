@@ -26,11 +26,15 @@ pub mod shaders {
     /// Traces [`AilaLaineNode`](super::AilaLaineNode)s. Written in GLSL for Vulkan.
     pub const AILA_LAINE: &str = include_str!("../../shaders/aila_laine.comp");
     /// Traces [`FirstCountNode`](super::FirstCountNode)s. Written in WGSL.
-    pub const BINARY: &str =
-        concat!(include_str!("../../shaders/trace.wgsl"), include_str!("../../shaders/binary.wgsl"));
+    pub const BINARY: &str = concat!(
+        include_str!("../../shaders/trace.wgsl"),
+        include_str!("../../shaders/binary.wgsl")
+    );
     /// Traces [`CompressedNode`](super::CompressedNode)s. Written in WGSL.
-    pub const COMPRESSED: &str =
-        concat!(include_str!("../../shaders/trace.wgsl"), include_str!("../../shaders/compressed.wgsl"));
+    pub const COMPRESSED: &str = concat!(
+        include_str!("../../shaders/trace.wgsl"),
+        include_str!("../../shaders/compressed.wgsl")
+    );
 }
 
 pub use aila_laine::AilaLaineNode;

@@ -62,12 +62,18 @@ pub(super) fn unpack(
                 }
                 match parts[..] {
                     [] => {
-                        return Err(InvalidBvh::BadChildren { node: index, first: 0, count: 0, nodes });
+                        return Err(InvalidBvh::BadChildren {
+                            node: index,
+                            first: 0,
+                            count: 0,
+                            nodes,
+                        });
                     }
                     [(_, part)] => open.push(Pending { part, parent: index, to }),
                     _ => {
                         let first = tree.nodes.len();
-                        tree.nodes[to] = Node::inner(tree.nodes[to].aabb, first as u32, parts.len() as u32);
+                        tree.nodes[to] =
+                            Node::inner(tree.nodes[to].aabb, first as u32, parts.len() as u32);
                         // Leaves without objects until the parts are read.
                         for (aabb, _) in &parts {
                             tree.nodes.push(Node::leaf(*aabb, 0, 0));
@@ -81,7 +87,10 @@ pub(super) fn unpack(
             }
             Part::Leaf { first, count } => {
                 // `first + count` could overflow, so `count` is subtracted instead.
-                if count == 0 || count as usize > objects || first as usize > objects - count as usize {
+                if count == 0
+                    || count as usize > objects
+                    || first as usize > objects - count as usize
+                {
                     return Err(InvalidBvh::BadLeaf { node: parent, first, count, objects });
                 }
                 // The leaves of a forged array may share ids and together have more than there are.

@@ -42,7 +42,9 @@ pub enum FileError {
     #[error("the method's name is not at most 64 bytes of UTF-8 without zeros")]
     Method,
     /// The file is too short or too long.
-    #[error("the file has {found} bytes where its header asks for {expected}; it was cut or extended")]
+    #[error(
+        "the file has {found} bytes where its header asks for {expected}; it was cut or extended"
+    )]
     Length {
         /// Bytes in the file.
         found: u64,

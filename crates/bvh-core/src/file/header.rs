@@ -66,7 +66,11 @@ impl Header {
     pub fn of_file(beginning: &[u8], length: u64) -> Result<Self, FileError> {
         let header = Self::decode(beginning)?;
         let expected = Self::BYTES as u64 + header.sections().iter().sum::<u64>();
-        if length == expected { Ok(header) } else { Err(FileError::Length { found: length, expected }) }
+        if length == expected {
+            Ok(header)
+        } else {
+            Err(FileError::Length { found: length, expected })
+        }
     }
 
     /// Returns the bytes of the nodes, of the object ids, and of the visits. Counts are below 2^32, so nothing overflows.
@@ -174,7 +178,9 @@ impl Header {
         let flags = fields.word()?;
         // Versions 2 and 3 have zeros instead of these two fields.
         let (references, has_visits, unused) = match version {
-            Self::VERSION => (stored_references, flags & Self::VISITS != 0, u64::from(flags & !Self::VISITS)),
+            Self::VERSION => {
+                (stored_references, flags & Self::VISITS != 0, u64::from(flags & !Self::VISITS))
+            }
             _ => (objects, version == Self::WITH_VISITS, stored_references | u64::from(flags)),
         };
         // Every object has a reference, and there are none without objects.
@@ -225,7 +231,8 @@ fn decode_objective(
     traversal: f64,
     intersection: f64,
 ) -> Result<Objective, FileError> {
-    let constants = SahConstants::new(traversal, intersection).map_err(|_| FileError::Field("constants"))?;
+    let constants =
+        SahConstants::new(traversal, intersection).map_err(|_| FileError::Field("constants"))?;
     let objective = match number {
         0 => Objective::InternalArea,
         1 => Objective::GoldsmithSalmon,

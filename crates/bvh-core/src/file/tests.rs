@@ -27,7 +27,8 @@ fn scene_of(n: u32, children: usize, leaf: usize) -> (Vec<Aabb>, Bvh) {
         let [x, y, z] = [i as f32, (i % 3) as f32, (i % 5) as f32 * 0.5];
         boxes.push(Aabb::from([[x, y, z], [x + 1.5, y + 1.0, z + 0.5]]));
     }
-    let mut tree = Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, n)], prim_ids: (0..n).rev().collect() };
+    let mut tree =
+        Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, n)], prim_ids: (0..n).rev().collect() };
     let mut index = 0;
     while index < tree.nodes.len() && n as usize > leaf {
         let range = tree.nodes[index].prims();
@@ -95,11 +96,16 @@ fn a_tree_with_divided_objects_comes_back_and_is_rejected_if_a_part_is_missing()
         }
         let mut smaller = tree.clone();
         smaller.nodes[index].aabb.max.y -= 0.25;
-        let Err(FileError::Tree(fault)) = save_references(&smaller, &boxes, &Filled(&boxes), &origin) else {
+        let Err(FileError::Tree(fault)) =
+            save_references(&smaller, &boxes, &Filled(&boxes), &origin)
+        else {
             panic!("node {index} does not cover its object");
         };
         // Leaf nodes of divided objects leave a gap, other leaves lose their object.
-        assert!(matches!(fault, InvalidBvh::Uncovered { .. } | InvalidBvh::ObjectOutside { .. }), "{index}");
+        assert!(
+            matches!(fault, InvalidBvh::Uncovered { .. } | InvalidBvh::ObjectOutside { .. }),
+            "{index}"
+        );
     }
 }
 
@@ -172,7 +178,10 @@ fn visits_come_back_and_only_those_of_a_monotone_measure_are_accepted() {
         assert_eq!(file.visits(), Ok(Some(visits.clone())));
         assert_eq!(&bytes[8..12], &3u32.to_le_bytes());
         for cut in 1..=4 {
-            assert!(matches!(TreeFile::open(&bytes[..bytes.len() - cut]), Err(FileError::Length { .. })));
+            assert!(matches!(
+                TreeFile::open(&bytes[..bytes.len() - cut]),
+                Err(FileError::Length { .. })
+            ));
         }
         let last = visits.len() - 1;
         for wrong in [-1.0, 1.5, f32::NAN, f32::INFINITY] {
@@ -236,11 +245,15 @@ fn with_field(file: &[u8], offset: usize, field: &[u8]) -> Vec<u8> {
 fn each_foreign_file_version_byte_order_and_scene_has_its_error() {
     let (boxes, tree) = scene(5);
     let bytes = save(&tree, &boxes, &ORIGIN).unwrap();
-    let changed = |offset, field: &[u8]| TreeFile::open(&with_field(&bytes, offset, field)).unwrap_err();
+    let changed =
+        |offset, field: &[u8]| TreeFile::open(&with_field(&bytes, offset, field)).unwrap_err();
     assert_eq!(changed(0, b"v 0 0 0\n"), FileError::Magic);
     let old = changed(8, &1u32.to_le_bytes());
     assert_eq!(old, FileError::OldVersion { found: 1 });
-    assert!(old.to_string().contains("version 1") && old.to_string().contains("bake it again"), "{old}");
+    assert!(
+        old.to_string().contains("version 1") && old.to_string().contains("bake it again"),
+        "{old}"
+    );
     assert_eq!(changed(8, &5u32.to_le_bytes()), FileError::NewVersion { found: 5 });
     assert_eq!(changed(8, &[0, 0, 0, 2, 1, 2, 3, 4]), FileError::Endianness);
     assert_eq!(changed(32, &u64::MAX.to_le_bytes()), FileError::Field("objects"));
@@ -269,9 +282,15 @@ fn fields_that_no_save_writes_are_rejected_even_with_a_correct_checksum() {
     assert_eq!(rejection(&empty, 72, &1f64.to_le_bytes()), FileError::Field("constants"));
     for offset in [80, 84, 100] {
         for wrong in [f32::NAN, f32::INFINITY, 0.25] {
-            assert_eq!(rejection(&file, offset, &wrong.to_le_bytes()), FileError::Field("box of the root"));
+            assert_eq!(
+                rejection(&file, offset, &wrong.to_le_bytes()),
+                FileError::Field("box of the root")
+            );
         }
-        assert_eq!(rejection(&empty, offset, &0.25f32.to_le_bytes()), FileError::Field("box of the root"));
+        assert_eq!(
+            rejection(&empty, offset, &0.25f32.to_le_bytes()),
+            FileError::Field("box of the root")
+        );
     }
     assert_eq!(rejection(&file, 104, b"be\0t"), FileError::Field("padding"));
     assert_eq!(rejection(&file, 187, &[1]), FileError::Field("padding"));

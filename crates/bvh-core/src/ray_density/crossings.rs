@@ -45,7 +45,11 @@ impl Crossings {
     pub fn new() -> Self {
         let unvisited = || vec![0; POINTS * CELLS * CELLS];
         let faces = || [unvisited(), unvisited()];
-        Self { segments: 0, starts: vec![0; CELLS * CELLS * CELLS], faces: [faces(), faces(), faces()] }
+        Self {
+            segments: 0,
+            starts: vec![0; CELLS * CELLS * CELLS],
+            faces: [faces(), faces(), faces()],
+        }
     }
 
     /// Records the cells that a segment visits within the grid, face by face. Coordinates are in
@@ -86,7 +90,10 @@ impl Crossings {
     pub fn corner_tables(&self) -> Vec<Corner> {
         let sums = Sums {
             starts: summed_starts(&self.starts),
-            faces: self.faces.each_ref().map(|ways| ways.each_ref().map(|faces| summed_faces(faces))),
+            faces: self
+                .faces
+                .each_ref()
+                .map(|ways| ways.each_ref().map(|faces| summed_faces(faces))),
         };
         let mut tables = Vec::with_capacity(8 * CELLS * CELLS * CELLS);
         for cell in cells() {
@@ -151,7 +158,13 @@ fn cell_at(point: DVec3) -> [usize; 3] {
 
 /// Returns when a segment leaves `cell` across an axis on its way to the cell `end`; infinity if it
 /// does not.
-fn time_of_next_face(axis: usize, cell: [usize; 3], end: [usize; 3], from: DVec3, ray: DVec3) -> f64 {
+fn time_of_next_face(
+    axis: usize,
+    cell: [usize; 3],
+    end: [usize; 3],
+    from: DVec3,
+    ray: DVec3,
+) -> f64 {
     if cell[axis] == end[axis] {
         return f64::INFINITY;
     }
@@ -218,8 +231,8 @@ fn summed_starts(starts: &[u32]) -> Vec<i64> {
             for x in 1..POINTS {
                 row += i64::from(starts[index([x - 1, y - 1, z - 1])]);
                 // The rectangle below both neighbours is in both of their sums.
-                sums[point(x, y, z)] =
-                    row + sums[point(x, y - 1, z)] + sums[point(x, y, z - 1)] - sums[point(x, y - 1, z - 1)];
+                sums[point(x, y, z)] = row + sums[point(x, y - 1, z)] + sums[point(x, y, z - 1)]
+                    - sums[point(x, y - 1, z - 1)];
             }
         }
     }

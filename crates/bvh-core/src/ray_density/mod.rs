@@ -151,7 +151,11 @@ impl RayDensity {
     /// # Errors
     /// Returns a [`DensityError`] if there are no segments or too many, if none meets the bounds,
     /// if one is not finite, or if the bounds or the weight are invalid.
-    pub fn new(bounds: &Aabb, segments: &[Segment], area_weight: f64) -> Result<Self, DensityError> {
+    pub fn new(
+        bounds: &Aabb,
+        segments: &[Segment],
+        area_weight: f64,
+    ) -> Result<Self, DensityError> {
         Self::lengthened(bounds, segments, area_weight, 0.0)
     }
 
@@ -165,7 +169,11 @@ impl RayDensity {
     ///
     /// # Errors
     /// The same as for [`new`](Self::new).
-    pub fn of_rays(bounds: &Aabb, segments: &[Segment], area_weight: f64) -> Result<Self, DensityError> {
+    pub fn of_rays(
+        bounds: &Aabb,
+        segments: &[Segment],
+        area_weight: f64,
+    ) -> Result<Self, DensityError> {
         Self::lengthened(bounds, segments, area_weight, LENGTHENED)
     }
 
@@ -300,7 +308,8 @@ impl RayDensity {
             // The weights of the lower and of the upper grid point along each axis.
             let [x, y, z] = part.map(|part| [f64::from(FRACTIONS - part), f64::from(part)]);
             let xy = [x[0] * y[0], x[1] * y[0], x[0] * y[1], x[1] * y[1]];
-            let plane = |k: usize| (0..4).map(|i| xy[i] * f64::from(values[4 * k + i])).sum::<f64>();
+            let plane =
+                |k: usize| (0..4).map(|i| xy[i] * f64::from(values[4 * k + i])).sum::<f64>();
             sum += z[0] * plane(0) + z[1] * plane(1);
         }
         sum

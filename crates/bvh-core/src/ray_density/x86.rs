@@ -49,7 +49,8 @@ pub(super) fn fractional_entries(density: &RayDensity, bounds: &PackedAabb) -> f
         let lower_plane = promoted([values[0], values[1], values[2], values[3]]);
         let upper_plane = promoted([values[4], values[5], values[6], values[7]]);
         let [lower_weight, upper_weight] = weights_z[k];
-        let along_z = _mm256_fmadd_pd(upper_plane, upper_weight, _mm256_mul_pd(lower_plane, lower_weight));
+        let along_z =
+            _mm256_fmadd_pd(upper_plane, upper_weight, _mm256_mul_pd(lower_plane, lower_weight));
         total = _mm256_fmadd_pd(along_z, _mm256_mul_pd(weights_x[i], weights_y[j]), total);
     }
     sum(total)
@@ -126,7 +127,10 @@ impl Weights {
         Self {
             x: _mm256_permute4x64_pd::<0b01_00_01_00>(xz),
             y: _mm256_permute4x64_pd::<0b01_01_00_00>(y),
-            z: [_mm256_permute4x64_pd::<0b10_10_10_10>(xz), _mm256_permute4x64_pd::<0b11_11_11_11>(xz)],
+            z: [
+                _mm256_permute4x64_pd::<0b10_10_10_10>(xz),
+                _mm256_permute4x64_pd::<0b11_11_11_11>(xz),
+            ],
         }
     }
 }

@@ -84,7 +84,8 @@ mod tests {
 
     #[test]
     fn halves_of_halves_cover_a_triangle_until_one_of_them_is_smaller() {
-        let triangles = [Triangle([Vec3::ZERO, Vec3::new(3.0, 2.0, 0.1), Vec3::new(2.9, 2.1, 0.3)])];
+        let triangles =
+            [Triangle([Vec3::ZERO, Vec3::new(3.0, 2.0, 0.1), Vec3::new(2.9, 2.1, 0.3)])];
         let objects = triangles.as_slice();
         let full = triangles[0].aabb();
         let mut leaves = alloc::vec![full];

@@ -239,7 +239,8 @@ mod avx2 {
     pub(super) fn words(nodes: &[Node; 8]) -> [[u32; 8]; 2] {
         let upper_half = |node: usize| bytemuck::cast::<Node, [__m128i; 2]>(nodes[node])[1];
         let two = |node: usize| _mm256_set_m128i(upper_half(node + 4), upper_half(node));
-        let four = |node: usize| _mm256_castsi256_ps(_mm256_unpackhi_epi64(two(node), two(node + 1)));
+        let four =
+            |node: usize| _mm256_castsi256_ps(_mm256_unpackhi_epi64(two(node), two(node + 1)));
         let low = four(0);
         let high = four(2);
         let words = [_mm256_shuffle_ps::<0x88>(low, high), _mm256_shuffle_ps::<0xdd>(low, high)];

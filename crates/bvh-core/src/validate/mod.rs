@@ -71,7 +71,11 @@ pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
 /// Checks a tree in which an object may be in several leaves. The boxes of these leaves together
 /// must cover the object; everything else is as for [`validate`]. `boxes` are the boxes of
 /// `objects`. O(nodes + references), and O(k²) for an object that k leaves share.
-pub fn validate_references(tree: &Bvh, boxes: &[Aabb], objects: &dyn Clip) -> Result<(), InvalidBvh> {
+pub fn validate_references(
+    tree: &Bvh,
+    boxes: &[Aabb],
+    objects: &dyn Clip,
+) -> Result<(), InvalidBvh> {
     if tree.prim_ids.len() == boxes.len() {
         return validate(tree, boxes);
     }
@@ -178,7 +182,12 @@ pub(crate) fn find_fault(tree: BvhView, objects: usize, leaves: Leaves) -> Resul
             NodeKind::Leaf { first, count } => {
                 let range = node.prims();
                 if count < 1 || range.end > references {
-                    return Err(InvalidBvh::BadLeaf { node: index, first, count, objects: references });
+                    return Err(InvalidBvh::BadLeaf {
+                        node: index,
+                        first,
+                        count,
+                        objects: references,
+                    });
                 }
                 prims += range.len();
                 for position in range {
@@ -286,14 +295,23 @@ mod tests {
                 |t| t.nodes[4] = Node::leaf(t.nodes[4].aabb, 2, 2),
                 InvalidBvh::BadLeaf { node: 4, first: 2, count: 2, objects: 3 },
             ),
-            (|t| t.nodes[0] = Node::leaf(t.nodes[0].aabb, 0, 1), InvalidBvh::Parents { node: 1, parents: 0 }),
+            (
+                |t| t.nodes[0] = Node::leaf(t.nodes[0].aabb, 0, 1),
+                InvalidBvh::Parents { node: 1, parents: 0 },
+            ),
             (
                 |t| t.nodes[0].aabb.min.x = f32::NEG_INFINITY,
                 InvalidBvh::Box { node: 0, reason: InvalidBoxReason::NotFinite },
             ),
-            (|t| t.nodes[3].aabb.max.z = -1.0, InvalidBvh::Box { node: 3, reason: InvalidBoxReason::Inverted }),
+            (
+                |t| t.nodes[3].aabb.max.z = -1.0,
+                InvalidBvh::Box { node: 3, reason: InvalidBoxReason::Inverted },
+            ),
             (|t| t.prim_ids[1] = 3, InvalidBvh::BadObject { node: 3, object: 3, objects: 3 }),
-            (|t| t.nodes[4] = Node::leaf(cube(2.0), 1, 1), InvalidBvh::Leaves { object: 1, leaves: 2 }),
+            (
+                |t| t.nodes[4] = Node::leaf(cube(2.0), 1, 1),
+                InvalidBvh::Leaves { object: 1, leaves: 2 },
+            ),
             (|t| t.nodes[0].aabb.max.x = 4.5, InvalidBvh::ChildOutside { node: 0, child: 2 }),
             (|t| t.nodes[4].aabb.min.y = 0.5, InvalidBvh::ObjectOutside { node: 4, object: 2 }),
         ];

@@ -60,7 +60,12 @@ impl WideBvh {
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
-    pub fn any_hits_by_component(&self, rays: &RayComponents, mut hits: &mut [bool], coherence: Coherence) {
+    pub fn any_hits_by_component(
+        &self,
+        rays: &RayComponents,
+        mut hits: &mut [bool],
+        coherence: Coherence,
+    ) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
         self.trace(rays, &mut hits, coherence);
     }

@@ -27,12 +27,17 @@ pub(crate) struct Decision {
 
 /// Decides by dynamic programming from the leaves up; every node of `tree` has two children or none. `leaf_cost` is the expected
 /// time of testing a leaf of so many objects, if there may be one.
-pub(crate) fn decide(tree: &Bvh, visits: &[f32], leaf_cost: impl Fn(u32) -> Option<f32>) -> Vec<Decision> {
+pub(crate) fn decide(
+    tree: &Bvh,
+    visits: &[f32],
+    leaf_cost: impl Fn(u32) -> Option<f32>,
+) -> Vec<Decision> {
     let nothing = Decision { costs: [0.0; 8], slots: [0; 8], objects: 0, leaf: true };
     let mut decisions = vec![nothing; tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate().rev() {
         let visits = visits[index];
-        let leaf_cost = |objects: u32| leaf_cost(objects).map_or(f32::INFINITY, |cost| visits * cost);
+        let leaf_cost =
+            |objects: u32| leaf_cost(objects).map_or(f32::INFINITY, |cost| visits * cost);
         decisions[index] = match (node.kind(), &decisions[node.children()]) {
             (NodeKind::Inner { .. }, [a, b]) => {
                 let objects = a.objects + b.objects;
@@ -47,9 +52,10 @@ pub(crate) fn decide(tree: &Bvh, visits: &[f32], leaf_cost: impl Fn(u32) -> Opti
                     }
                     (decision.costs[slots - 1], decision.slots[slots - 1]) = (least, split as u8);
                 }
-                let (as_node, as_leaf) = (decision.costs[7] + visits * NODE_COST, leaf_cost(objects));
-                decision.leaf =
-                    as_leaf < as_node || (as_leaf == as_node && objects <= TriangleBlock::LANES as u32);
+                let (as_node, as_leaf) =
+                    (decision.costs[7] + visits * NODE_COST, leaf_cost(objects));
+                decision.leaf = as_leaf < as_node
+                    || (as_leaf == as_node && objects <= TriangleBlock::LANES as u32);
                 decision.costs[0] = if decision.leaf { as_leaf } else { as_node };
                 // Fewer children where more are no better.
                 for slots in 1..7 {
@@ -126,7 +132,12 @@ pub(crate) fn areas(tree: &Bvh) -> Vec<f32> {
 
 /// The wide layout of least expected cost for rays that enter the nodes of `tree` as often as `visits` says, by default for
 /// random lines, where testing a block takes `block_cost`. `tree` must be valid over the triangles' boxes.
-pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>, block_cost: f32) -> WideBvh {
+pub(crate) fn widen(
+    tree: &Bvh,
+    triangles: &[Triangle],
+    visits: Option<&[f32]>,
+    block_cost: f32,
+) -> WideBvh {
     let bounds = tree.root_aabb().unwrap_or(Aabb::EMPTY);
     let mut wide = WideBvh {
         bounds,
@@ -153,7 +164,8 @@ pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>, 
     };
     let tree = &*tree;
     let split = tree.prim_ids.len() > triangles.len();
-    let blocks = |objects: u32| Some(block_cost * objects.div_ceil(TriangleBlock::LANES as u32) as f32);
+    let blocks =
+        |objects: u32| Some(block_cost * objects.div_ceil(TriangleBlock::LANES as u32) as f32);
     let decisions = decide(tree, &visits, blocks);
     let promise = promise(tree, triangles, &visits, &decisions);
     let mut ids = Vec::new();
@@ -206,7 +218,9 @@ mod tests {
     fn boxes(wide: &WideBvh) -> impl Iterator<Item = (Aabb, usize)> {
         let blocks = |child: Child| match child.is_node() {
             true => 0,
-            false => 1 + wide.blocks[child.index()..].iter().take_while(|block| !block.is_last()).count(),
+            false => {
+                1 + wide.blocks[child.index()..].iter().take_while(|block| !block.is_last()).count()
+            }
         };
         let root = wide.root.map(|root| (wide.bounds, blocks(root)));
         root.into_iter().chain(wide.nodes.iter().flat_map(move |node| {
@@ -231,7 +245,8 @@ mod tests {
         };
         for seed in 0..6 {
             let (triangles, tree) = scene(11, seed);
-            let visits: Vec<f32> = tree.nodes.iter().map(|node| along_x(&node.aabb) as f32).collect();
+            let visits: Vec<f32> =
+                tree.nodes.iter().map(|node| along_x(&node.aabb) as f32).collect();
             let wide = WideBvh::for_rays(&tree, &triangles, &visits).unwrap();
             check_optimal(&tree, &wide, along_x);
         }
@@ -277,7 +292,8 @@ mod tests {
     }
 
     #[test]
-    fn rays_that_ask_for_any_hit_come_to_a_wall_before_what_is_scattered_whether_the_wall_is_divided_or_not() {
+    fn rays_that_ask_for_any_hit_come_to_a_wall_before_what_is_scattered_whether_the_wall_is_divided_or_not()
+     {
         let corner = |x: f32, y: f32| [x, y, 0.0];
         let wall = Triangle::from([corner(0.0, 0.0), corner(2.0, 0.0), corner(0.0, 2.0)]);
         let speck = |i: u8| {
@@ -285,11 +301,15 @@ mod tests {
             Triangle::from([[at, at, 1.0 + at], [at + 0.1, at, 1.0 + at], [at, at + 0.1, 1.0 + at]])
         };
         let triangles: Vec<Triangle> = [wall].into_iter().chain((0..24).map(speck)).collect();
-        let halves = [[[0.0; 3], [1.1, 2.0, 0.0]], [[1.0, 0.0, 0.0], [2.0, 1.1, 0.0]]].map(Aabb::from);
+        let halves =
+            [[[0.0; 3], [1.1, 2.0, 0.0]], [[1.0, 0.0, 0.0], [2.0, 1.1, 0.0]]].map(Aabb::from);
         let scattered = Aabb::from([[0.0, 0.0, 1.0], [2.1, 2.1, 3.0]]);
         let whole = vec![Node::leaf(wall.aabb(), 0, 1), Node::leaf(scattered, 1, 24)];
-        let divided =
-            vec![Node::leaf(halves[0], 0, 1), Node::leaf(halves[1], 1, 1), Node::leaf(scattered, 2, 24)];
+        let divided = vec![
+            Node::leaf(halves[0], 0, 1),
+            Node::leaf(halves[1], 1, 1),
+            Node::leaf(scattered, 2, 24),
+        ];
         for (leaves, parts) in [(whole, 1), (divided, 2)] {
             let root = Aabb::from([[0.0; 3], [2.1, 2.1, 3.0]]);
             let prim_ids = core::iter::repeat_n(0, parts).chain(1..25).collect();
@@ -322,7 +342,8 @@ mod tests {
     #[test]
     fn trees_of_one_leaf_and_of_none_have_layouts() {
         let (triangles, _) = scene(9, 1);
-        let mut tree = Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, 9)], prim_ids: (0..9).rev().collect() };
+        let mut tree =
+            Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, 9)], prim_ids: (0..9).rev().collect() };
         tree.refit(&triangles.iter().map(Triangle::aabb).collect::<Vec<_>>());
         let wide = WideBvh::new(&tree, &triangles).unwrap();
         assert_eq!((wide.nodes.len(), wide.blocks.len()), (0, 3));

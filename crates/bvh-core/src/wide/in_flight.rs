@@ -210,7 +210,8 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
         let there = u32::MAX >> (32 - count);
         // SAFETY: the caller's promises; `ready` has room for sixteen.
         let in_range = unsafe {
-            let ready = Ready::new(self.rays.lanes_up_to::<K::Rays>(from, self.end), self.wide.largest);
+            let ready =
+                Ready::new(self.rays.lanes_up_to::<K::Rays>(from, self.end), self.wide.largest);
             self.waiting = there & ready.in_range & ready.enter(&self.wide.bounds);
             if self.waiting != 0 {
                 ready.write((from - first) as u32, self.ready.as_mut_ptr().cast());
@@ -301,7 +302,8 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
                 traversal.top = traversal.top.add(usize::from(!(*blocks.add(block)).is_last()));
                 if A::ANY {
                     let bottom = traversal.stack.0.as_mut_ptr().cast::<Pending>().add(1);
-                    traversal.top = if traversal.object == u32::MAX { traversal.top } else { bottom };
+                    traversal.top =
+                        if traversal.object == u32::MAX { traversal.top } else { bottom };
                 }
                 traversal.pop::<K>(self.wide);
                 self.enlist(traversal);
@@ -352,7 +354,10 @@ unsafe fn rays_of<'a>(four: [*mut Traversal; 4]) -> [&'a Prepared; 4] {
 
 /// The corners of the block at which each ray is, along the axes of its shear.
 #[inline(always)]
-unsafe fn corners<L: Lanes>(four: [*mut Traversal; 4], blocks: *const TriangleBlock) -> [[L; 3]; 3] {
+unsafe fn corners<L: Lanes>(
+    four: [*mut Traversal; 4],
+    blocks: *const TriangleBlock,
+) -> [[L; 3]; 3] {
     // SAFETY: the caller's promises; axes are below 3.
     unsafe {
         let lanes = |i: usize, corner: usize, axis: usize| {
@@ -369,7 +374,11 @@ unsafe fn corners<L: Lanes>(four: [*mut Traversal; 4], blocks: *const TriangleBl
                 lanes(3, corner, axis),
             ])
         };
-        [[of(0, 0), of(0, 1), of(0, 2)], [of(1, 0), of(1, 1), of(1, 2)], [of(2, 0), of(2, 1), of(2, 2)]]
+        [
+            [of(0, 0), of(0, 1), of(0, 2)],
+            [of(1, 0), of(1, 1), of(1, 2)],
+            [of(2, 0), of(2, 1), of(2, 2)],
+        ]
     }
 }
 
@@ -384,7 +393,8 @@ unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4], blocks: *const TriangleBlo
         let t_max = before.spread::<0>();
         let (inside, t) = Prepared::pairs::<L>(rays_of(four)).decide(&corners(four, blocks), t_max);
         let ids = |i: usize| (*blocks.wrapping_add((*four[i]).child.index())).ids().cast();
-        let ids = L::load_quarters([ids(0), ids(1), ids(2), ids(3)]) & L::splat_bits(!TriangleBlock::LAST);
+        let ids = L::load_quarters([ids(0), ids(1), ids(2), ids(3)])
+            & L::splat_bits(!TriangleBlock::LAST);
         let none = L::splat_bits(u32::MAX);
         let t = L::select(inside, t, t_max);
         let least = t.min(t.swap_twos());

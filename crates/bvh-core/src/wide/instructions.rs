@@ -45,7 +45,12 @@ pub(crate) trait Instructions {
     unsafe fn prefetch(line: *const u8);
 
     /// [`in_flight::trace`](super::in_flight::trace), not inlined.
-    unsafe fn in_flight<A: Answers>(wide: &WideBvh, rays: impl Source, answers: &mut A, numbers: Range<usize>);
+    unsafe fn in_flight<A: Answers>(
+        wide: &WideBvh,
+        rays: impl Source,
+        answers: &mut A,
+        numbers: Range<usize>,
+    );
 
     /// Takes what begins behind `nearest` from a stack that is aligned to 64 bytes; its new end.
     unsafe fn drop_farther(base: *mut Pending, top: *mut Pending, nearest: f32) -> *mut Pending;

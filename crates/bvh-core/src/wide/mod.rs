@@ -60,7 +60,11 @@ impl WideBvh {
     ///
     /// # Panics
     /// If there are not as many `visits` as nodes.
-    pub fn for_rays(tree: &Bvh, triangles: &[Triangle], visits: &[f32]) -> Result<Self, InvalidBvh> {
+    pub fn for_rays(
+        tree: &Bvh,
+        triangles: &[Triangle],
+        visits: &[f32],
+    ) -> Result<Self, InvalidBvh> {
         assert_eq!(tree.nodes.len(), visits.len(), "a number of visits for every node");
         Self::made(tree, triangles, Some(visits), BLOCK_COST)
     }
@@ -70,8 +74,15 @@ impl WideBvh {
     ///
     /// # Panics
     /// If `block_cost` is not positive and finite.
-    pub fn with_block_cost(tree: &Bvh, triangles: &[Triangle], block_cost: f32) -> Result<Self, InvalidBvh> {
-        assert!(block_cost > 0.0 && block_cost.is_finite(), "a positive, finite cost, not {block_cost}");
+    pub fn with_block_cost(
+        tree: &Bvh,
+        triangles: &[Triangle],
+        block_cost: f32,
+    ) -> Result<Self, InvalidBvh> {
+        assert!(
+            block_cost > 0.0 && block_cost.is_finite(),
+            "a positive, finite cost, not {block_cost}"
+        );
         Self::made(tree, triangles, None, block_cost)
     }
 

@@ -94,7 +94,8 @@ impl<K: Instructions> Packet<K> {
     /// Whether rays of this octant can be added.
     #[inline(always)]
     pub(crate) fn takes(&self, octant: u32) -> bool {
-        self.count == 0 || (self.count < VECTORS.min(K::PACKET / K::Rays::N) && self.octant == octant)
+        self.count == 0
+            || (self.count < VECTORS.min(K::PACKET / K::Rays::N) && self.octant == octant)
     }
 
     /// Adds rays that cohere, of which the first is number `first` of its batch.
@@ -149,7 +150,12 @@ impl<K: Instructions> Packet<K> {
     }
 
     #[inline(always)]
-    unsafe fn traverse<A: Answers>(&mut self, wide: &WideBvh, root: Child, culling: &Culling<K::Boxes>) {
+    unsafe fn traverse<A: Answers>(
+        &mut self,
+        wide: &WideBvh,
+        root: Child,
+        culling: &Culling<K::Boxes>,
+    ) {
         // SAFETY: the references of the layout are sound, and its stacks large enough.
         unsafe {
             let (nodes, blocks) = (wide.nodes.as_ptr(), wide.blocks.as_ptr());
@@ -245,7 +251,12 @@ impl<K: Instructions> Packet<K> {
     /// The least distance at which any ray may enter each child, and a bit per child that some ray may enter before
     /// `farthest`: the bounds of `(plane − origin) · scale` over all rays.
     #[inline(always)]
-    unsafe fn cull(&self, node: &WideNode, culling: &Culling<K::Boxes>, farthest: f32) -> (K::Boxes, u32) {
+    unsafe fn cull(
+        &self,
+        node: &WideNode,
+        culling: &Culling<K::Boxes>,
+        farthest: f32,
+    ) -> (K::Boxes, u32) {
         // SAFETY: the caller's promises; loads are of whole, aligned planes.
         unsafe {
             let (mut entry, mut exit) = (culling.begin, K::Boxes::splat(farthest));
@@ -267,7 +278,12 @@ impl<K: Instructions> Packet<K> {
 
     /// The planes of the child in a lane, near and far by axis, moved by the margin.
     #[inline(always)]
-    unsafe fn planes(&self, node: &WideNode, lane: usize, culling: &Culling<K::Boxes>) -> [[f32; 2]; 3] {
+    unsafe fn planes(
+        &self,
+        node: &WideNode,
+        lane: usize,
+        culling: &Culling<K::Boxes>,
+    ) -> [[f32; 2]; 3] {
         // SAFETY: planes are six, lanes eight.
         unsafe {
             let lanes = node.planes.as_ptr().cast::<f32>().add(lane);
@@ -331,7 +347,8 @@ impl<K: Instructions> Packet<K> {
                     let hits = if A::ANY {
                         inside
                     } else {
-                        t.lt(vector.t) & inside | t.eq(vector.t) & inside & object.below(vector.object)
+                        t.lt(vector.t) & inside
+                            | t.eq(vector.t) & inside & object.below(vector.object)
                     };
                     if hits.bits() != 0 {
                         is_hit = true;

@@ -136,7 +136,12 @@ impl Prepared {
         // SAFETY: the caller's promise.
         unsafe {
             let row = |row: usize| {
-                L::load_quarters([rays[0].row(row), rays[1].row(row), rays[2].row(row), rays[3].row(row)])
+                L::load_quarters([
+                    rays[0].row(row),
+                    rays[1].row(row),
+                    rays[2].row(row),
+                    rays[3].row(row),
+                ])
             };
             let (begin, far, origin, inverse) = (row(0), row(2), row(3), row(4));
             Pairs {

@@ -139,7 +139,14 @@ impl<L: Lanes> RayBounds<L> {
     pub(crate) unsafe fn none() -> Self {
         // SAFETY: the caller's promise.
         let (low, high) = unsafe { (L::splat(f32::NEG_INFINITY), L::splat(f32::INFINITY)) };
-        Self { lowest: [high; 3], highest: [low; 3], least: [high; 3], most: [low; 3], begin: high, end: low }
+        Self {
+            lowest: [high; 3],
+            highest: [low; 3],
+            least: [high; 3],
+            most: [low; 3],
+            begin: high,
+            end: low,
+        }
     }
 
     #[inline(always)]

@@ -29,7 +29,8 @@ impl WideBvh {
         let mut is_new = vec![true; triangles.len()];
         for block in &self.blocks {
             for (id, _) in block.triangles() {
-                let triangle = triangles.get(id as usize).filter(|triangle| !triangle.is_degenerate());
+                let triangle =
+                    triangles.get(id as usize).filter(|triangle| !triangle.is_degenerate());
                 triangle.ok_or(RefitError::Lost(id))?;
                 is_new[id as usize] = false;
             }
@@ -65,15 +66,19 @@ impl WideBvh {
         if child.is_node() {
             return around[child.index()];
         }
-        let corners =
-            self.leaf(child).iter().flat_map(TriangleBlock::triangles).flat_map(|(_, triangle)| triangle.0);
+        let corners = self
+            .leaf(child)
+            .iter()
+            .flat_map(TriangleBlock::triangles)
+            .flat_map(|(_, triangle)| triangle.0);
         Aabb::around(corners)
     }
 
     /// The blocks of a leaf.
     fn leaf(&self, leaf: Child) -> &[TriangleBlock] {
         let blocks = &self.blocks[leaf.index()..];
-        let end = blocks.iter().position(TriangleBlock::is_last).map_or(blocks.len(), |last| last + 1);
+        let end =
+            blocks.iter().position(TriangleBlock::is_last).map_or(blocks.len(), |last| last + 1);
         &blocks[..end]
     }
 

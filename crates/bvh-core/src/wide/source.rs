@@ -55,7 +55,13 @@ impl Source for &[Ray] {
             let [ox, oy, oz, t_min] = transpose(rays, 0);
             let [dx, dy, dz, t_max] = transpose(rays, 1);
             let [ix, iy, iz, _] = transpose(rays, 2);
-            RayLanes { origin: [ox, oy, oz], direction: [dx, dy, dz], inverse: [ix, iy, iz], t_min, t_max }
+            RayLanes {
+                origin: [ox, oy, oz],
+                direction: [dx, dy, dz],
+                inverse: [ix, iy, iz],
+                t_min,
+                t_max,
+            }
         }
     }
 }

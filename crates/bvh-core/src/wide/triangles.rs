@@ -107,12 +107,22 @@ impl TriangleBlock {
     /// # Safety
     /// The processor has the instructions; axes are below 3, and `lane` is one.
     #[inline(always)]
-    pub(crate) unsafe fn splat_corners<L: Lanes>(&self, lane: usize, axes: [usize; 3]) -> [[L; 3]; 3] {
+    pub(crate) unsafe fn splat_corners<L: Lanes>(
+        &self,
+        lane: usize,
+        axes: [usize; 3],
+    ) -> [[L; 3]; 3] {
         // SAFETY: the caller's promises.
         unsafe {
             let lanes = self.corners.as_ptr().cast::<f32>().add(lane);
-            let of = |corner: usize, axis: usize| L::splat(*lanes.add((3 * corner + axes[axis]) * Self::LANES));
-            [[of(0, 0), of(0, 1), of(0, 2)], [of(1, 0), of(1, 1), of(1, 2)], [of(2, 0), of(2, 1), of(2, 2)]]
+            let of = |corner: usize, axis: usize| {
+                L::splat(*lanes.add((3 * corner + axes[axis]) * Self::LANES))
+            };
+            [
+                [of(0, 0), of(0, 1), of(0, 2)],
+                [of(1, 0), of(1, 1), of(1, 2)],
+                [of(2, 0), of(2, 1), of(2, 2)],
+            ]
         }
     }
 
@@ -120,7 +130,8 @@ impl TriangleBlock {
     #[inline(always)]
     pub(crate) fn triangle(&self, lane: usize) -> Option<(u32, Triangle)> {
         let id = self.id(lane);
-        let corner = |corner: &[[f32; Self::LANES]; 3]| Vec3::from(corner.each_ref().map(|axis| axis[lane]));
+        let corner =
+            |corner: &[[f32; Self::LANES]; 3]| Vec3::from(corner.each_ref().map(|axis| axis[lane]));
         (id != Self::UNUSED).then(|| (id, Triangle(self.corners.each_ref().map(corner))))
     }
 }

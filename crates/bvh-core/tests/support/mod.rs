@@ -95,7 +95,8 @@ pub fn tree(boxes: &[Aabb], shape: Shape, random: &mut Random) -> Bvh {
 /// The deepest tree there is: every inner node has one leaf and the rest.
 pub fn chain(boxes: &[Aabb]) -> Bvh {
     let n = boxes.len() as u32;
-    let mut nodes = vec![if n == 1 { Node::leaf(Aabb::EMPTY, 0, 1) } else { Node::inner(Aabb::EMPTY, 1, 2) }];
+    let mut nodes =
+        vec![if n == 1 { Node::leaf(Aabb::EMPTY, 0, 1) } else { Node::inner(Aabb::EMPTY, 1, 2) }];
     for i in 0..n - 1 {
         nodes.push(Node::leaf(Aabb::EMPTY, i, 1));
         nodes.push(match i + 2 == n {

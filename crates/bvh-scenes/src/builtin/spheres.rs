@@ -17,7 +17,8 @@ const HALF_SIZE: DVec3 = DVec3::new(8.0, 4.5, 5.0);
 /// same; few spheres touch. The same bytes at every call and on every machine. O(count).
 pub fn spheres(count: usize) -> Vec<Sphere> {
     // 1/g, 1/g², 1/g³ for the real root g of g⁴ = g + 1.
-    let steps = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_2);
+    let steps =
+        DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_2);
     let volume = 8.0 * HALF_SIZE.x * HALF_SIZE.y * HALF_SIZE.z;
     let spacing = libm::cbrt(volume / count as f64);
     (0..count)
@@ -49,7 +50,10 @@ mod tests {
             assert_eq!(spheres.len(), count);
             for sphere in spheres {
                 assert!(sphere.radius > 0.0 && sphere.radius.is_finite(), "{count}: {sphere:?}");
-                assert!(sphere.center.abs().cmple(HALF_SIZE.as_vec3()).all(), "{count}: {sphere:?}");
+                assert!(
+                    sphere.center.abs().cmple(HALF_SIZE.as_vec3()).all(),
+                    "{count}: {sphere:?}"
+                );
             }
         }
     }
@@ -58,7 +62,8 @@ mod tests {
     fn no_machine_changes_a_bit_of_any_sphere() {
         let fingerprints = [75, 750, 7500].map(|count| {
             let spheres = spheres(count);
-            let numbers = spheres.iter().flat_map(|s| [s.center.x, s.center.y, s.center.z, s.radius]);
+            let numbers =
+                spheres.iter().flat_map(|s| [s.center.x, s.center.y, s.center.z, s.radius]);
             crate::fnv1a(numbers.flat_map(f32::to_le_bytes))
         });
         let pinned = [0xfc00_d4e2_6fbf_f38a, 0xbb9c_cd48_f5fe_ee71, 0x8b82_4c8d_585f_1de7];

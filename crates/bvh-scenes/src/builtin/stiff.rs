@@ -81,7 +81,11 @@ fn around(rng: &mut Stream, corner: Vec3, size: f32) -> Triangle {
     Triangle([corner, corner + point(rng, size), corner + point(rng, size)])
 }
 
-fn many(n: usize, salt: u64, mut make: impl FnMut(&mut Stream, usize) -> Triangle) -> Vec<Triangle> {
+fn many(
+    n: usize,
+    salt: u64,
+    mut make: impl FnMut(&mut Stream, usize) -> Triangle,
+) -> Vec<Triangle> {
     let mut rng = random(salt);
     (0..n).map(|i| make(&mut rng, i)).collect()
 }
@@ -156,7 +160,8 @@ pub fn closed_box(n: usize) -> Vec<Triangle> {
             [Vec3::new(w, u, v), Vec3::new(v, w, u), Vec3::new(u, v, w)][face % 3]
         };
         for (u, v) in (0..cells * cells).map(|i| (i % cells, i / cells)) {
-            let (a, b, c, d) = (corner(u, v), corner(u + 1, v), corner(u + 1, v + 1), corner(u, v + 1));
+            let (a, b, c, d) =
+                (corner(u, v), corner(u + 1, v), corner(u + 1, v + 1), corner(u, v + 1));
             triangles.extend([Triangle([a, b, c]), Triangle([a, c, d])]);
         }
     }

@@ -121,22 +121,30 @@ pub fn parts(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Parts, 
 }
 
 fn no_triangle(path: &Path) -> Fault {
-    Fault::new(path, Place::File, "no triangle in its scene; expected a glTF file with at least one")
+    Fault::new(
+        path,
+        Place::File,
+        "no triangle in its scene; expected a glTF file with at least one",
+    )
 }
 
 /// What a file says, and the bytes of the binary chunk of a GLB file.
 fn document<'a>(bytes: &'a [u8], path: &Path) -> Result<(Root, Option<&'a [u8]>), Fault> {
     let fault = |message: String| Fault::new(path, Place::File, message);
     let (json, chunk) = match bytes.starts_with(b"glTF") {
-        true => chunks(bytes)
-            .ok_or_else(|| fault("no chunk of JSON in version 2; expected a GLB file, and whole".into()))?,
+        true => chunks(bytes).ok_or_else(|| {
+            fault("no chunk of JSON in version 2; expected a GLB file, and whole".into())
+        })?,
         false => (bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), None),
     };
     let root = Root::from_slice(json).map_err(|error| fault(error.to_string()))?;
-    if let Some(unknown) = root.extensions_required.iter().find(|name| !HARMLESS.contains(&name.as_str())) {
+    if let Some(unknown) =
+        root.extensions_required.iter().find(|name| !HARMLESS.contains(&name.as_str()))
+    {
         let place = Place::Element("extensionsRequired".into());
-        let message =
-            format!("`{unknown}`; expected none that changes triangles (compressed meshes cannot be read)");
+        let message = format!(
+            "`{unknown}`; expected none that changes triangles (compressed meshes cannot be read)"
+        );
         return Err(Fault::new(path, place, message));
     }
     Ok((root, chunk))
@@ -169,8 +177,9 @@ fn transform(node: &Node) -> DMat4 {
         return DMat4::from_cols_array(&matrix.map(f64::from));
     }
     let vector = |of: Option<[f32; 3]>, or: DVec3| of.map_or(or, |v| DVec3::from(v.map(f64::from)));
-    let turn =
-        node.rotation.map_or(DQuat::IDENTITY, |turn| DQuat::from_array(turn.0.map(f64::from)).normalize());
+    let turn = node
+        .rotation
+        .map_or(DQuat::IDENTITY, |turn| DQuat::from_array(turn.0.map(f64::from)).normalize());
     DMat4::from_scale_rotation_translation(
         vector(node.scale, DVec3::ONE),
         turn,
@@ -188,25 +197,33 @@ impl<'a> Scene<'a> {
     where
         Root: Get<T>,
     {
-        self.root.get(index).ok_or_else(|| format!("no {name}[{}]; expected one that exists", index.value()))
+        self.root
+            .get(index)
+            .ok_or_else(|| format!("no {name}[{}]; expected one that exists", index.value()))
     }
 
     /// Follows the default scene, or the first one, from its roots. A node has one parent, so that none is reached twice.
     fn places(&self) -> Result<Vec<Placed>, Fault> {
         let path = self.path;
-        let fault = |place: String, message: String| Fault::new(path, Place::Element(place), message);
+        let fault =
+            |place: String, message: String| Fault::new(path, Place::Element(place), message);
         let scene = match self.root.scene {
-            Some(index) => Some(self.get(index, "scenes").map_err(|message| fault("scene".into(), message))?),
+            Some(index) => {
+                Some(self.get(index, "scenes").map_err(|message| fault("scene".into(), message))?)
+            }
             None => self.root.scenes.first(),
         };
         let mut places = Vec::new();
         let mut reached = vec![false; self.root.nodes.len()];
         let mut open: Vec<(Index<Node>, DMat4)> = Vec::new();
-        open.extend(scene.iter().flat_map(|scene| &scene.nodes).rev().map(|&node| (node, DMat4::IDENTITY)));
+        open.extend(
+            scene.iter().flat_map(|scene| &scene.nodes).rev().map(|&node| (node, DMat4::IDENTITY)),
+        );
         while let Some((index, parent)) = open.pop() {
             let place = || format!("nodes[{}]", index.value());
             let number = index.value();
-            let node = self.get(index, "nodes").map_err(|message| fault("scene".into(), message))?;
+            let node =
+                self.get(index, "nodes").map_err(|message| fault("scene".into(), message))?;
             if std::mem::replace(&mut reached[index.value()], true) {
                 let message = "reached twice; expected a tree of nodes, each with one parent";
                 return Err(fault(place(), message.into()));
@@ -235,14 +252,22 @@ impl<'a> Scene<'a> {
 
     /// Adds the triangles of a primitive; points and lines have none.
     fn add(&mut self, primitive: &Primitive, transform: &DMat4) -> Result<(), String> {
-        let Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) = primitive.mode else {
+        let Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) =
+            primitive.mode
+        else {
             return Ok(());
         };
-        let positions =
-            *primitive.attributes.get(&Valid(Semantic::Positions)).ok_or("no POSITION; expected one")?;
+        let positions = *primitive
+            .attributes
+            .get(&Valid(Semantic::Positions))
+            .ok_or("no POSITION; expected one")?;
         let mut points = Vec::new();
         for bytes in self.items(positions, Type::Vec3, &[ComponentType::F32])? {
-            let point = bytes.as_chunks().0.first_chunk().map_or([f32::NAN; 3], |x| x.map(f32::from_le_bytes));
+            let point = bytes
+                .as_chunks()
+                .0
+                .first_chunk()
+                .map_or([f32::NAN; 3], |x| x.map(f32::from_le_bytes));
             let point = Vec3::from(point);
             let moved = transform.transform_point3(point.as_dvec3()).as_vec3();
             if !moved.is_finite() {
@@ -257,15 +282,20 @@ impl<'a> Scene<'a> {
         let indices: Vec<u32> = match primitive.indices {
             None => (0..points.len() as u32).collect(),
             Some(accessor) => {
-                let index =
-                    |bytes: &[u8]| bytes.iter().rev().fold(0, |index, &byte| index << 8 | u32::from(byte));
+                let index = |bytes: &[u8]| {
+                    bytes.iter().rev().fold(0, |index, &byte| index << 8 | u32::from(byte))
+                };
                 self.items(accessor, Type::Scalar, &types)?.map(index).collect()
             }
         };
         if let Some(index) = indices.iter().find(|&&index| index as usize >= points.len()) {
             return Err(format!("index {index}; expected 0 to below {}", points.len()));
         }
-        let count = if mode == Mode::Triangles { indices.len() / 3 } else { indices.len().saturating_sub(2) };
+        let count = if mode == Mode::Triangles {
+            indices.len() / 3
+        } else {
+            indices.len().saturating_sub(2)
+        };
         if self.triangles.len() + count > MOST_TRIANGLES {
             return Err(format!("more than {MOST_TRIANGLES} triangles in all; expected no more"));
         }
@@ -290,12 +320,16 @@ impl<'a> Scene<'a> {
     ) -> Result<impl Iterator<Item = &[u8]>, String> {
         let place = format!("accessors[{}]", accessor.value());
         let accessor = self.get(accessor, "accessors")?;
-        let component =
-            components.iter().find(|&&wanted| matches!(accessor.component_type, Valid(of) if of.0 == wanted));
-        let (Some(component), true, None) = (component, accessor.type_ == Valid(type_), &accessor.sparse)
+        let component = components
+            .iter()
+            .find(|&&wanted| matches!(accessor.component_type, Valid(of) if of.0 == wanted));
+        let (Some(component), true, None) =
+            (component, accessor.type_ == Valid(type_), &accessor.sparse)
         else {
             let found = format!("{:?} of {:?}", accessor.type_, accessor.component_type);
-            return Err(format!("{place} is {found}, or sparse; expected {type_:?} of {components:?}"));
+            return Err(format!(
+                "{place} is {found}, or sparse; expected {type_:?} of {components:?}"
+            ));
         };
         let view = accessor.buffer_view.ok_or_else(|| {
             format!("{place} has no buffer view; expected one (compressed meshes cannot be read)")
@@ -315,8 +349,9 @@ impl<'a> Scene<'a> {
             (stride >= size).then(|| bytes.get(..need)).flatten()
         })();
         let count = accessor.count.0;
-        let bytes =
-            bytes.ok_or_else(|| format!("{place} reaches beyond its buffer; expected {count} items in it"))?;
+        let bytes = bytes.ok_or_else(|| {
+            format!("{place} reaches beyond its buffer; expected {count} items in it")
+        })?;
         self.items += count;
         if self.items > MOST_ITEMS {
             return Err(format!(

@@ -29,7 +29,10 @@ impl Mesh {
     /// These triangles, with nothing beside them.
     pub fn new(triangles: Vec<Triangle>) -> Self {
         Self {
-            degenerate_triangles: triangles.iter().filter(|triangle| triangle.is_degenerate()).count(),
+            degenerate_triangles: triangles
+                .iter()
+                .filter(|triangle| triangle.is_degenerate())
+                .count(),
             triangles,
             unused_vertices: 0,
             short_faces: 0,
@@ -40,15 +43,23 @@ impl Mesh {
     /// What the file contains besides plain triangles, as one sentence; none if nothing does.
     pub fn remark(&self) -> Option<String> {
         let counted = |count: usize, one: &str, many: &str| {
-            (count > 0).then(|| if count == 1 { format!("1 {one}") } else { format!("{count} {many}") })
+            (count > 0)
+                .then(|| if count == 1 { format!("1 {one}") } else { format!("{count} {many}") })
         };
         let unknown = self.unknown.as_ref().and_then(|(count, line, word)| {
-            let lines =
-                counted(*count, "line with an unknown keyword was", "lines with unknown keywords were")?;
+            let lines = counted(
+                *count,
+                "line with an unknown keyword was",
+                "lines with unknown keywords were",
+            )?;
             Some(format!("{lines} ignored (`{word}` in line {line})"))
         });
         let parts = [
-            counted(self.unused_vertices, "vertex is used by no face", "vertices are used by no face"),
+            counted(
+                self.unused_vertices,
+                "vertex is used by no face",
+                "vertices are used by no face",
+            ),
             counted(
                 self.short_faces,
                 "face has fewer than three vertices and was left out",

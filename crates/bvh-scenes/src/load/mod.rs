@@ -56,7 +56,8 @@ impl Format {
         if stl::is_binary(bytes) || stl::is_text(text) {
             return Self::Stl;
         }
-        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        let extension =
+            path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         match extension.as_deref() {
             Some("ply") => Self::Ply,
             Some("stl") => Self::Stl,

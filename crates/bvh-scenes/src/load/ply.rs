@@ -4,7 +4,9 @@ use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place};
 use bvh_core::Triangle;
 use glam::Vec3;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult};
+use ply_rs_bw::ply::{
+    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult,
+};
 use std::path::Path;
 
 /// A position; NaN where the file has none.
@@ -64,7 +66,9 @@ impl PropertyAccess for Other {
 /// Reads the bytes of a PLY file; `path` only names it in errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     let mut reader = Reader::new(bytes);
-    let header = Parser::<Other>::new().read_header(&mut reader).map_err(|error| told(path, None, &error))?;
+    let header = Parser::<Other>::new()
+        .read_header(&mut reader)
+        .map_err(|error| told(path, None, &error))?;
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
     for element in header.elements.values() {
         let place = || Place::Element(format!("element {}", element.name));
@@ -76,7 +80,11 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
                 element.properties.len(),
                 bytes.len()
             );
-            return Err(Fault::new(path, place(), format!("{found}; expected no more than it has room for")));
+            return Err(Fault::new(
+                path,
+                place(),
+                format!("{found}; expected no more than it has room for"),
+            ));
         }
         match element.name.as_str() {
             "vertex" => vertices = elements::<Vertex>(&mut reader, element, &header, path)?,
@@ -108,18 +116,26 @@ fn told(path: &Path, within: Option<(&ElementDef, &Header)>, error: &ParseError)
         _ => Place::File,
     };
     let message = error.to_string();
-    let message =
-        error.line().and_then(|line| message.strip_prefix(&format!("Line {line}: "))).unwrap_or(&message);
+    let message = error
+        .line()
+        .and_then(|line| message.strip_prefix(&format!("Line {line}: ")))
+        .unwrap_or(&message);
     Fault::new(path, place, message)
 }
 
 /// The fans of all faces.
 fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault> {
     let fault = |element, number: usize, message| {
-        Err(Fault::new(path, Place::Element(format!("{element} {number}, counted from 0")), message))
+        Err(Fault::new(
+            path,
+            Place::Element(format!("{element} {number}, counted from 0")),
+            message,
+        ))
     };
-    if let Some((number, Vertex(found))) =
-        vertices.iter().enumerate().find(|(_, Vertex(position))| position.iter().any(|x| !x.is_finite()))
+    if let Some((number, Vertex(found))) = vertices
+        .iter()
+        .enumerate()
+        .find(|(_, Vertex(position))| position.iter().any(|x| !x.is_finite()))
     {
         return fault("vertex", number, format!("position {found:?}; expected finite x, y and z"));
     }
@@ -128,7 +144,8 @@ fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault>
     for (number, Face(indices)) in faces.iter().enumerate() {
         let mut corners = Vec::with_capacity(indices.len());
         for &index in indices {
-            let Some(Vertex(position)) = usize::try_from(index).ok().and_then(|index| vertices.get(index))
+            let Some(Vertex(position)) =
+                usize::try_from(index).ok().and_then(|index| vertices.get(index))
             else {
                 return fault(
                     "face",

@@ -25,9 +25,12 @@ pub fn is_binary(bytes: &[u8]) -> bool {
 
 /// Whether text begins as an STL file does: `solid`, and a facet soon.
 pub fn is_text(text: &[u8]) -> bool {
-    let mut words = text[..text.len().min(4096)].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let mut words =
+        text[..text.len().min(4096)].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
     words.next().is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
-        && words.any(|word| word.eq_ignore_ascii_case(b"facet") || word.eq_ignore_ascii_case(b"endsolid"))
+        && words.any(|word| {
+            word.eq_ignore_ascii_case(b"facet") || word.eq_ignore_ascii_case(b"endsolid")
+        })
 }
 
 /// Reads the bytes of an STL file; `path` only names it in errors.
@@ -36,20 +39,25 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     let is_text = !is_binary(bytes) && is_text(text.trim_ascii_start());
     let triangles = if is_text { of_text(text, path)? } else { of_binary(bytes, path)? };
     match triangles.is_empty() {
-        true => Err(Fault::new(path, Place::File, "no facet; expected an STL file with at least one")),
+        true => {
+            Err(Fault::new(path, Place::File, "no facet; expected an STL file with at least one"))
+        }
         false => Ok(Mesh::new(triangles)),
     }
 }
 
 fn of_binary(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
     let facets = promised(bytes).ok_or_else(|| {
-        let message = format!("{} bytes; expected the {HEADER} of a binary STL file's header", bytes.len());
+        let message =
+            format!("{} bytes; expected the {HEADER} of a binary STL file's header", bytes.len());
         Fault::new(path, Place::File, message)
     })?;
     let body = bytes[HEADER..].chunks_exact(FACET);
     if body.len() < facets {
-        let message =
-            format!("{} whole facets; expected the {facets} of the header: the file was cut", body.len());
+        let message = format!(
+            "{} whole facets; expected the {facets} of the header: the file was cut",
+            body.len()
+        );
         return Err(Fault::new(path, Place::File, message));
     }
     let triangle = |(number, facet): (usize, &[u8])| {
@@ -59,7 +67,11 @@ fn of_binary(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
             None => Ok(Triangle::from(corners)),
             Some(found) => {
                 let place = Place::Element(format!("facet {number}, counted from 0"));
-                Err(Fault::new(path, place, format!("coordinate {found}; expected a finite number")))
+                Err(Fault::new(
+                    path,
+                    place,
+                    format!("coordinate {found}; expected a finite number"),
+                ))
             }
         }
     };
@@ -79,11 +91,19 @@ fn of_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
         match words.next().map(str::to_ascii_lowercase).as_deref() {
             Some("vertex") => {
                 let found: Vec<&str> = words.collect();
-                let numbers: Vec<f32> =
-                    found.iter().filter_map(|word| word.parse().ok()).filter(|x: &f32| x.is_finite()).collect();
+                let numbers: Vec<f32> = found
+                    .iter()
+                    .filter_map(|word| word.parse().ok())
+                    .filter(|x: &f32| x.is_finite())
+                    .collect();
                 match *numbers {
                     [x, y, z] if found.len() == 3 => corners.push(Vec3::new(x, y, z)),
-                    _ => return fault(format!("vertex `{}`; expected three finite numbers", found.join(" "))),
+                    _ => {
+                        return fault(format!(
+                            "vertex `{}`; expected three finite numbers",
+                            found.join(" ")
+                        ));
+                    }
                 }
                 if corners.len() > 3 {
                     return fault("a fourth vertex in a loop; expected three".into());
@@ -106,7 +126,11 @@ fn of_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
         }
     }
     if inside || !corners.is_empty() {
-        return Err(Fault::new(path, Place::Line(line), "the file ends in a facet; expected `endfacet`"));
+        return Err(Fault::new(
+            path,
+            Place::Line(line),
+            "the file ends in a facet; expected `endfacet`",
+        ));
     }
     Ok(triangles)
 }

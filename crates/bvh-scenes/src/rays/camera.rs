@@ -28,7 +28,8 @@ impl View {
 /// The directions of right and top in a picture seen in the direction `forward`.
 pub fn frame(forward: DVec3, up: DVec3) -> [DVec3; 2] {
     // Seen straight up or down, any direction may be the right one.
-    let right = forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
+    let right =
+        forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
     [right, right.cross(forward)]
 }
 
@@ -67,7 +68,8 @@ mod tests {
     #[test]
     fn the_middle_of_the_picture_looks_at_the_middle_of_the_view() {
         for at in [DVec3::X, DVec3::Y, DVec3::new(1.0, -2.0, 0.3)] {
-            let camera = Camera::new(&View { from: DVec3::ZERO, at, fov: 60.0 }, DVec3::Y, 640, 480);
+            let camera =
+                Camera::new(&View { from: DVec3::ZERO, at, fov: 60.0 }, DVec3::Y, 640, 480);
             assert!(camera.direction(320.0, 240.0).distance(at.normalize()) < 1e-12);
         }
     }

@@ -10,7 +10,11 @@ use rand::{RngExt, SeedableRng};
 
 /// A distribution of random rays over the root's box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Family {
     /// Origin uniform in the box, direction uniform: the paper's.
@@ -31,7 +35,8 @@ pub fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> 
             // is uniform among all lines that meet the box.
             let areas = [size.y * size.z, size.z * size.x, size.x * size.y];
             let pick = rng.random::<f64>() * areas.iter().sum::<f64>();
-            let axis = if pick < areas[0] { 0 } else { 1 + usize::from(pick >= areas[0] + areas[1]) };
+            let axis =
+                if pick < areas[0] { 0 } else { 1 + usize::from(pick >= areas[0] + areas[1]) };
             let far = rng.random::<bool>();
             let mut origin = inside;
             origin[axis] = f64::from(u8::from(far));
@@ -59,7 +64,11 @@ pub(super) fn on_sphere(rng: &mut Stream) -> DVec3 {
 
 /// A kind of rays that a renderer sends. All directions are unit vectors and all rays begin at distance 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Kind {
     /// Origins uniform in the root's box, directions uniform; nearest hit.
@@ -106,7 +115,11 @@ impl Kind {
 
 /// Where the primary rays of a scene come from, in fractions of the root's box: 0 is its lower corner, 1 the upper one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Viewpoint {
     /// The camera's position.
@@ -123,7 +136,14 @@ impl Default for Viewpoint {
 
 /// Rays of a kind through `tree`, which must be valid over the scene. There are fewer than `count` only where there are
 /// none: without a primary hit there is no shadow ray.
-pub fn rays(kind: Kind, count: u32, scene: &Scene, tree: &Bvh, viewpoint: &Viewpoint, seed: u64) -> Vec<Ray> {
+pub fn rays(
+    kind: Kind,
+    count: u32,
+    scene: &Scene,
+    tree: &Bvh,
+    viewpoint: &Viewpoint,
+    seed: u64,
+) -> Vec<Ray> {
     let Some(root) = tree.root_aabb() else { return Vec::new() };
     match kind {
         Kind::Incoherent => {
@@ -133,14 +153,20 @@ pub fn rays(kind: Kind, count: u32, scene: &Scene, tree: &Bvh, viewpoint: &Viewp
         Kind::Primary => primary_rays(count, &root, viewpoint),
         Kind::Bounce => {
             let mut rng = Stream::seed_from_u64(seed);
-            let points = hit_points(&primary_rays(count, &root, viewpoint), scene, tree, JUST_BEFORE);
+            let points =
+                hit_points(&primary_rays(count, &root, viewpoint), scene, tree, JUST_BEFORE);
             let ray = |&origin: &Vec3| Ray::half_line(origin, on_sphere(&mut rng).as_vec3()).ok();
             points.iter().cycle().take(count as usize).filter_map(ray).collect()
         }
         Kind::Shadow => {
             let points = hit_points(&primary_rays(count, &root, viewpoint), scene, tree, 1.0);
             let light = in_box(&root, [0.5, 0.95, 0.5]);
-            points.iter().cycle().take(count as usize).filter_map(|&point| shadow_ray(point, light)).collect()
+            points
+                .iter()
+                .cycle()
+                .take(count as usize)
+                .filter_map(|&point| shadow_ray(point, light))
+                .collect()
         }
     }
 }
@@ -173,7 +199,8 @@ fn hit_points(rays: &[Ray], scene: &Scene, tree: &Bvh, fraction: f32) -> Vec<Vec
 /// 10 11 │ 14 15
 /// ```
 fn primary_rays(count: u32, root: &Aabb, viewpoint: &Viewpoint) -> Vec<Ray> {
-    let view = View { from: in_box(root, viewpoint.eye), at: in_box(root, viewpoint.target), fov: 60.0 };
+    let view =
+        View { from: in_box(root, viewpoint.eye), at: in_box(root, viewpoint.target), fov: 60.0 };
     let side = picture_side(count);
     let camera = Camera::new(&view, DVec3::Y, side, side);
     let centre = |pixel: u32| f64::from(pixel) + 0.5;
@@ -226,7 +253,8 @@ mod tests {
                 continue;
             }
             for square in found.chunks(256) {
-                let corners: BTreeSet<[u32; 2]> = square.iter().map(|[x, y]| [x / 16, y / 16]).collect();
+                let corners: BTreeSet<[u32; 2]> =
+                    square.iter().map(|[x, y]| [x / 16, y / 16]).collect();
                 assert_eq!(corners.len(), 1, "{side}: {corners:?}");
             }
         }

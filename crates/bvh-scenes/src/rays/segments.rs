@@ -44,13 +44,21 @@ config! {
 
 impl RenderedRays {
     fn check_cameras(&self) -> Option<OutOfRange> {
-        let numbers = self.cameras.iter().flat_map(|pose| [pose.eye, pose.target]).chain(self.lights.clone());
+        let numbers =
+            self.cameras.iter().flat_map(|pose| [pose.eye, pose.target]).chain(self.lights.clone());
         if self.cameras.is_empty() {
-            return Some(OutOfRange::new("cameras", "empty", "at least one table with `eye` and `target`"));
+            return Some(OutOfRange::new(
+                "cameras",
+                "empty",
+                "at least one table with `eye` and `target`",
+            ));
         }
         let wrong = numbers.flatten().find(|number| !number.is_finite());
-        let wrong = wrong.map(|wrong| OutOfRange::new("cameras and lights", wrong, "finite coordinates"));
-        wrong.or_else(|| check_count("count", self.count, 1 + self.bounces as usize + self.lights.len()))
+        let wrong =
+            wrong.map(|wrong| OutOfRange::new("cameras and lights", wrong, "finite coordinates"));
+        wrong.or_else(|| {
+            check_count("count", self.count, 1 + self.bounces as usize + self.lights.len())
+        })
     }
 
     /// The camera at a place on its path, 0 at the first pose and 1 at the last; its picture is one unit high.
@@ -59,7 +67,8 @@ impl RenderedRays {
         let first = (at as usize).min(self.cameras.len() - 1);
         let (a, b) = (&self.cameras[first], &self.cameras[(first + 1).min(self.cameras.len() - 1)]);
         let between = |a: [f64; 3], b: [f64; 3]| DVec3::from(a).lerp(b.into(), at - first as f64);
-        let view = View { from: between(a.eye, b.eye), at: between(a.target, b.target), fov: self.fov };
+        let view =
+            View { from: between(a.eye, b.eye), at: between(a.target, b.target), fov: self.fov };
         Camera::new(&view, up, 1, 1)
     }
 }
@@ -130,7 +139,8 @@ pub fn of_anything(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<Trac
 pub fn of_inside(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, seed);
     for _ in 0..count {
-        let ray = tree.root_aabb().and_then(|root| random_ray(Family::Inside, &root, &mut tracing.rng));
+        let ray =
+            tree.root_aabb().and_then(|root| random_ray(Family::Inside, &root, &mut tracing.rng));
         let Some(ray) = ray else { continue };
         tracing.nearest(Kind::Incoherent, ray.origin(), ray.direction().as_dvec3());
     }
@@ -179,7 +189,8 @@ impl<'a> Tracing<'a> {
 
     /// A distance at which the ray is outside the scene.
     fn beyond(&self, ray: &Ray) -> f32 {
-        let reach = (self.bounds.min - ray.origin()).abs().max((self.bounds.max - ray.origin()).abs());
+        let reach =
+            (self.bounds.min - ray.origin()).abs().max((self.bounds.max - ray.origin()).abs());
         2.0 * reach.length() / ray.direction().length()
     }
 }
@@ -192,8 +203,12 @@ mod tests {
     #[test]
     fn more_rays_than_a_density_counts_are_refused_before_they_are_traced() {
         let pose = Pose { eye: [0.0; 3], target: [1.0; 3] };
-        let rays =
-            |count| RenderedRays { cameras: vec![pose.clone()], bounces: 2, count, ..Default::default() };
+        let rays = |count| RenderedRays {
+            cameras: vec![pose.clone()],
+            bounces: 2,
+            count,
+            ..Default::default()
+        };
         assert_eq!(rays(349_525).check(), Ok(()));
         let refused = rays(349_526).check().unwrap_err().to_string();
         assert_eq!(refused, "count is 349526; accepted: up to 349525, each with 3 rays in all");

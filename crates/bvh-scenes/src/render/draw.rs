@@ -32,7 +32,15 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { width: 960, height: 540, samples: 2, depth: 4, view: None, lights: None, ground: true }
+        Self {
+            width: 960,
+            height: 540,
+            samples: 2,
+            depth: 4,
+            view: None,
+            lights: None,
+            ground: true,
+        }
     }
 }
 
@@ -69,8 +77,12 @@ pub fn render(
         .into_par_iter()
         .map(|index| {
             let (x, y) = (index % columns * TILE, index / columns * TILE);
-            let tile =
-                world.tile(&camera, x..(x + TILE).min(width), y..(y + TILE).min(height), options.samples);
+            let tile = world.tile(
+                &camera,
+                x..(x + TILE).min(width),
+                y..(y + TILE).min(height),
+                options.samples,
+            );
             tile_done().then_some(tile)
         })
         .collect();
@@ -104,7 +116,8 @@ mod tests {
     #[test]
     fn without_lights_no_shadow_ray_is_sent() {
         let scene = Scene::load("escher:cluster:600:1").unwrap();
-        let options = Options { width: 32, height: 18, samples: 1, ground: false, ..Options::default() };
+        let options =
+            Options { width: 32, height: 18, samples: 1, ground: false, ..Options::default() };
         let dark = Options { lights: Some(vec![]), ..options.clone() };
         let rays = |options: &Options| picture(&scene, options).rays;
         assert_eq!(rays(&dark), 32 * 18, "triangles mirror nothing");

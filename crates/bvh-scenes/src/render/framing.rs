@@ -6,7 +6,8 @@ use bvh_core::{Aabb, Primitives};
 use glam::DVec3;
 
 /// Views of scenes that should be seen from inside: name, eye, middle of the picture, angle.
-const INSIDE: [(&str, [f64; 3], [f64; 3], f64); 1] = [("sponza", [-11.3, 1.9, -0.9], [3.0, 4.4, 0.5], 62.0)];
+const INSIDE: [(&str, [f64; 3], [f64; 3], f64); 1] =
+    [("sponza", [-11.3, 1.9, -0.9], [3.0, 4.4, 0.5], 62.0)];
 
 /// A view of a scene: a known good one, or else from outside, from above and a little from the side, at the distance at
 /// which the whole box just fits.
@@ -58,20 +59,26 @@ mod tests {
 
     #[test]
     fn every_corner_of_every_box_is_in_the_picture_and_one_is_near_its_edge() {
-        for (min, max) in
-            [([0.0; 3], [1.0; 3]), ([-9.0, 2.0, 1e6], [4.0, 2.0, 2e6]), ([5e5, 3e5, 4e4], [6e5, 4e5, 5e4])]
-        {
+        for (min, max) in [
+            ([0.0; 3], [1.0; 3]),
+            ([-9.0, 2.0, 1e6], [4.0, 2.0, 2e6]),
+            ([5e5, 3e5, 4e4], [6e5, 4e5, 5e4]),
+        ] {
             let bounds = Aabb::from((min, max));
             let towards = DVec3::new(0.4, 0.6, 1.0);
             let view = framing(&bounds, towards, DVec3::Y, 1.5, 40.0);
             let camera = Camera::new(&view, DVec3::Y, 300, 200);
             let mut widest: f64 = 0.0;
             for corner in 0..8 {
-                let pick = |bit: usize| if corner >> bit & 1 == 1 { bounds.max[bit] } else { bounds.min[bit] };
+                let pick = |bit: usize| {
+                    if corner >> bit & 1 == 1 { bounds.max[bit] } else { bounds.min[bit] }
+                };
                 let to = DVec3::from([0, 1, 2].map(|bit| f64::from(pick(bit)))) - camera.origin;
                 let forward = camera.corner + camera.steps[0] * 150.0 + camera.steps[1] * 100.0;
                 let scaled = to / to.dot(forward) - forward;
-                let place = |axis: usize| scaled.dot(camera.steps[axis]) / camera.steps[axis].length_squared();
+                let place = |axis: usize| {
+                    scaled.dot(camera.steps[axis]) / camera.steps[axis].length_squared()
+                };
                 assert!(place(0).abs() < 150.0 && place(1).abs() < 100.0, "{bounds:?}");
                 widest = widest.max(place(0).abs() / 150.0).max(place(1).abs() / 100.0);
             }

@@ -41,7 +41,9 @@ pub struct Range {
 pub fn range(film: &Film, rays_per_pixel: u32) -> Range {
     let mut sorted = film.tests.clone();
     sorted.sort_unstable();
-    let at = |index: usize| sorted.get(index).map_or(0.0, |&tests| tests as f64 / f64::from(rays_per_pixel));
+    let at = |index: usize| {
+        sorted.get(index).map_or(0.0, |&tests| tests as f64 / f64::from(rays_per_pixel))
+    };
     let last = sorted.len().saturating_sub(1);
     Range { min: at(0), median: at(last / 2), top: at(last - last / 200), max: at(last) }
 }
@@ -50,7 +52,8 @@ pub fn range(film: &Film, rays_per_pixel: u32) -> Range {
 pub fn map(film: &Film, rays_per_pixel: u32) -> Result<Vec<[u8; 3]>, BadFont> {
     let range = range(film, rays_per_pixel);
     let top = range.top.max(f64::MIN_POSITIVE) * f64::from(rays_per_pixel);
-    let mut pixels: Vec<[u8; 3]> = film.tests.iter().map(|&tests| colour(tests as f64 / top)).collect();
+    let mut pixels: Vec<[u8; 3]> =
+        film.tests.iter().map(|&tests| colour(tests as f64 / top)).collect();
     let colours: Vec<[u8; 3]> = (0..=255).map(|part| colour(f64::from(part) / 255.0)).collect();
     pixels.extend(key::draw(film.width, &colours, &labels(&range))?);
     Ok(pixels)
@@ -62,7 +65,8 @@ fn colour(at: f64) -> [u8; 3] {
     let index = (at as usize).min(INFERNO.len() - 2);
     let (low, high) = (INFERNO[index], INFERNO[index + 1]);
     let part = at - index as f64;
-    [0, 1, 2].map(|c| (f64::from(low[c]) + (f64::from(high[c]) - f64::from(low[c])) * part + 0.5) as u8)
+    [0, 1, 2]
+        .map(|c| (f64::from(low[c]) + (f64::from(high[c]) - f64::from(low[c])) * part + 0.5) as u8)
 }
 
 /// The texts below the left end of the key, its middle and its right end.
@@ -94,8 +98,9 @@ mod tests {
 
     #[test]
     fn more_tests_are_brighter_and_the_key_is_below() {
-        let luminance =
-            |[r, g, b]: [u8; 3]| 0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b);
+        let luminance = |[r, g, b]: [u8; 3]| {
+            0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
+        };
         let shades: Vec<f64> = (0..=64).map(|i| luminance(colour(f64::from(i) / 64.0))).collect();
         assert!(shades.is_sorted_by(|a, b| a < b), "{shades:?}");
         for width in [64, 65] {
@@ -107,6 +112,8 @@ mod tests {
 
     #[test]
     fn a_picture_without_tests_has_a_heat_map_too() {
-        assert!(map(&film(40, vec![0; 40]), 1).unwrap()[..40].iter().all(|&pixel| pixel == INFERNO[0]));
+        assert!(
+            map(&film(40, vec![0; 40]), 1).unwrap()[..40].iter().all(|&pixel| pixel == INFERNO[0])
+        );
     }
 }

@@ -19,7 +19,8 @@ pub fn expose(light: DVec3) -> DVec3 {
 pub fn encode(light: DVec3) -> [u8; 3] {
     light.to_array().map(|x| {
         let x = x.clamp(0.0, 1.0);
-        let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::pow(x, 1.0 / 2.4) - 0.055 };
+        let encoded =
+            if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::pow(x, 1.0 / 2.4) - 0.055 };
         (encoded * 255.0 + 0.5) as u8
     })
 }
@@ -44,7 +45,8 @@ mod tests {
 
     #[test]
     fn brighter_light_gives_brighter_bytes_up_to_white() {
-        let bytes = [0.0, 1e-2, 0.1, 0.5, 1.0, 4.0, 1e9].map(|x| encode(expose(DVec3::splat(x)))[0]);
+        let bytes =
+            [0.0, 1e-2, 0.1, 0.5, 1.0, 4.0, 1e9].map(|x| encode(expose(DVec3::splat(x)))[0]);
         assert!(bytes.is_sorted_by(|a, b| a < b) && bytes[0] == 0 && bytes[6] == 255, "{bytes:?}");
     }
 

@@ -23,7 +23,11 @@ const INK: [u8; 3] = [34, 34, 34];
 pub struct BadFont;
 
 /// Draws the key below an image of this width: `width` times some rows of pixels.
-pub fn draw(width: u32, colours: &[[u8; 3]], labels: &[String; 3]) -> Result<Vec<[u8; 3]>, BadFont> {
+pub fn draw(
+    width: u32,
+    colours: &[[u8; 3]],
+    labels: &[String; 3],
+) -> Result<Vec<[u8; 3]>, BadFont> {
     let font = FontRef::try_from_slice(FONT).map_err(|_| BadFont)?;
     let columns = width as usize;
     let mut pixels = vec![[255; 3]; columns * HEIGHT];
@@ -66,7 +70,8 @@ fn write(font: &FontRef, text: &str, start: f64, columns: usize, pixels: &mut [[
         outline.draw(|right, down, coverage| {
             let column = corner.x as i64 + i64::from(right);
             let row = corner.y as i64 + i64::from(down);
-            let is_inside = (0..columns as i64).contains(&column) && (0..HEIGHT as i64).contains(&row);
+            let is_inside =
+                (0..columns as i64).contains(&column) && (0..HEIGHT as i64).contains(&row);
             if is_inside {
                 blend(&mut pixels[row as usize * columns + column as usize], coverage);
             }

@@ -48,7 +48,8 @@ pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     let radius = bounds.extent().length() / 2.0;
     let forward = (view.at - view.from).normalize_or(DVec3::NEG_Z);
     let right = forward.cross(up).normalize_or_zero();
-    let light = |position, colour: [f64; 3], reach| Light { position, colour: colour.into(), reach };
+    let light =
+        |position, colour: [f64; 3], reach| Light { position, colour: colour.into(), reach };
     if view.is_inside(bounds) {
         let sun = center + up * (4.0 * radius) + right * (0.85 * radius) + forward * (0.6 * radius);
         let lamp = view.from + up * (0.05 * radius) - right * (0.04 * radius);
@@ -62,7 +63,10 @@ pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     }
     let key = center + up * (2.2 * radius) - right * (1.5 * radius) - forward * (1.4 * radius);
     let fill = center + up * (1.2 * radius) + right * (2.2 * radius) - forward * (1.2 * radius);
-    vec![light(key, [1.25, 1.16, 1.02], f64::INFINITY), light(fill, [0.20, 0.24, 0.32], f64::INFINITY)]
+    vec![
+        light(key, [1.25, 1.16, 1.02], f64::INFINITY),
+        light(fill, [0.20, 0.24, 0.32], f64::INFINITY),
+    ]
 }
 
 /// Everything that a ray can meet, and the light on it.
@@ -99,8 +103,8 @@ impl<'a> World<'a> {
         depth: u32,
     ) -> Self {
         // A scene that is seen from inside is its own ground.
-        let ground =
-            (ground && !view.is_inside(bounds)).then(|| Ground::below(accelerator.objects(), bounds, up));
+        let ground = (ground && !view.is_inside(bounds))
+            .then(|| Ground::below(accelerator.objects(), bounds, up));
         Self { accelerator, up, lights, ground: ground.flatten(), depth }
     }
 
@@ -113,7 +117,8 @@ impl<'a> World<'a> {
                 let (mut sum, mut tally) = (DVec3::ZERO, Tally::default());
                 for v in 0..samples {
                     for u in 0..samples {
-                        let direction = camera.direction(f64::from(x) + offset(u), f64::from(y) + offset(v));
+                        let direction =
+                            camera.direction(f64::from(x) + offset(u), f64::from(y) + offset(v));
                         // Samples are exposed before they are averaged, which keeps the edges of highlights smooth.
                         sum += image::expose(self.radiance(camera.origin, direction, &mut tally));
                     }
@@ -136,8 +141,11 @@ impl<'a> World<'a> {
             // Schlick 1994, 'An inexpensive BRDF model for physically-based rendering'.
             let grazing = 1.0 - facing.clamp(0.0, 1.0);
             let rise = (grazing * grazing) * (grazing * grazing) * grazing;
-            let mirror =
-                if surface.mirror > 0.0 { surface.mirror + (1.0 - surface.mirror) * rise } else { 0.0 };
+            let mirror = if surface.mirror > 0.0 {
+                surface.mirror + (1.0 - surface.mirror) * rise
+            } else {
+                0.0
+            };
             let reflected = direction + surface.normal * (2.0 * facing);
             let start = self.lifted(&surface, origin);
             let own = self.direct(&surface, start, reflected, mirror, facing, tally);
@@ -155,10 +163,14 @@ impl<'a> World<'a> {
     fn meet(&self, origin: DVec3, direction: DVec3, tally: &mut Tally) -> Option<Surface> {
         tally.rays += 1;
         let ray = Ray::half_line(origin.as_vec3(), direction.as_vec3());
-        let hit = ray.ok().and_then(|ray| self.accelerator.nearest_hit_counted(&ray, &mut tally.counts));
-        let ground = self.ground.as_ref().and_then(|ground| Some((ground, ground.meet(origin, direction)?)));
+        let hit =
+            ray.ok().and_then(|ray| self.accelerator.nearest_hit_counted(&ray, &mut tally.counts));
+        let ground =
+            self.ground.as_ref().and_then(|ground| Some((ground, ground.meet(origin, direction)?)));
         match (hit, ground) {
-            (Some(hit), ground) if ground.is_none_or(|(_, distance)| f64::from(hit.t) <= distance) => {
+            (Some(hit), ground)
+                if ground.is_none_or(|(_, distance)| f64::from(hit.t) <= distance) =>
+            {
                 Some(Surface::of_object(self.accelerator.objects(), &hit, origin, direction))
             }
             (_, Some((ground, distance))) => Some(ground.surface(origin, direction, distance)),
@@ -195,7 +207,8 @@ impl<'a> World<'a> {
             let towards = to_light / distance;
             let cosine = surface.normal.dot(towards);
             // The cosine is NaN where the light lies on the surface.
-            if cosine.is_nan() || cosine <= 0.0 || self.is_shadowed(start, towards, distance, tally) {
+            if cosine.is_nan() || cosine <= 0.0 || self.is_shadowed(start, towards, distance, tally)
+            {
                 continue;
             }
             let arriving = light.at(distance);

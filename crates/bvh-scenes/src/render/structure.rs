@@ -47,7 +47,8 @@ pub enum StructureError {
 
 /// Builds the structure that `--accel` names over the scene; trees by greedy Müller–Fellner division.
 pub fn by_name(name: &str, scene: &Scene) -> Result<Structure<'static>, StructureError> {
-    let failed = |source| StructureError::Build { scene: scene.name.clone(), name: name.into(), source };
+    let failed =
+        |source| StructureError::Build { scene: scene.name.clone(), name: name.into(), source };
     match name {
         "brute" => Ok(Structure::Brute),
         "kdtree" => {

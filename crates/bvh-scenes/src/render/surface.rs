@@ -97,7 +97,14 @@ impl Ground {
         let tile = |x: f64| (x * 3.0).floor() as i64 & 1;
         let flat = [0, 1, 2].map(|axis| if self.up[axis] == 0.0 { tile(aside[axis]) } else { 0 });
         let dark = self.checkered && (flat[0] + flat[1] + flat[2]) & 1 == 1;
-        let colour = if dark { DVec3::new(0.045, 0.05, 0.065) } else { DVec3::new(0.24, 0.25, 0.27) };
-        Surface { point, normal: self.up, colour, mirror: if self.checkered { 0.1 } else { 0.0 }, haze }
+        let colour =
+            if dark { DVec3::new(0.045, 0.05, 0.065) } else { DVec3::new(0.24, 0.25, 0.27) };
+        Surface {
+            point,
+            normal: self.up,
+            colour,
+            mirror: if self.checkered { 0.1 } else { 0.0 },
+            haze,
+        }
     }
 }

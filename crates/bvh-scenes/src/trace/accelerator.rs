@@ -2,14 +2,18 @@
 
 use super::kd_tree::KdTree;
 use bvh_core::{
-    Bvh, Counter, Hit, Primitives, Ray, Shear, TestCounts, WideBvh, any_hit_by, any_hit_of_all, nearest_hit_by,
-    nearest_hit_of_all,
+    Bvh, Counter, Hit, Primitives, Ray, Shear, TestCounts, WideBvh, any_hit_by, any_hit_of_all,
+    nearest_hit_by, nearest_hit_of_all,
 };
 use std::borrow::Cow;
 
 /// What a ray asks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Query {
     /// Whether it hits anything: the paper's shadow rays.
@@ -168,7 +172,9 @@ impl<'a> Accelerator<'a> {
     #[inline(always)]
     fn meets(&self, ray: &Ray, counter: &mut impl Counter) -> bool {
         match &self.structure {
-            Structure::Wide(wide) | Structure::WidePortable(wide) => wide.any_hit_counted(ray, counter),
+            Structure::Wide(wide) | Structure::WidePortable(wide) => {
+                wide.any_hit_counted(ray, counter)
+            }
             _ => self.visit(ray, true, counter),
         }
     }

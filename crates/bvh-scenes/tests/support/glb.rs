@@ -4,7 +4,9 @@
 pub fn glb(json: String, binary: &[u8]) -> Vec<u8> {
     let mut json = json.into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
-    let chunk = |kind: &[u8; 4], bytes: &[u8]| [&(bytes.len() as u32).to_le_bytes()[..], kind, bytes].concat();
+    let chunk = |kind: &[u8; 4], bytes: &[u8]| {
+        [&(bytes.len() as u32).to_le_bytes()[..], kind, bytes].concat()
+    };
     let chunks = [chunk(b"JSON", &json), chunk(b"BIN\0", binary)].concat();
     [&b"glTF\x02\0\0\0"[..], &(12 + chunks.len() as u32).to_le_bytes(), &chunks].concat()
 }

@@ -95,8 +95,10 @@ impl Layout {
             let node = &tree.nodes[at as usize];
             if !children_done && !node.is_leaf() {
                 self.stack.push((at, true));
-                let marked =
-                    node.children.into_iter().filter(|&child| self.marks[child as usize] == self.change);
+                let marked = node
+                    .children
+                    .into_iter()
+                    .filter(|&child| self.marks[child as usize] == self.change);
                 self.stack.extend(marked.map(|child| (child, false)));
                 continue;
             }

@@ -9,7 +9,8 @@ use bvh_core::with_vector_instructions;
 /// Makes moves of one kind.
 pub(crate) trait Mover {
     /// Changes the tree, and undoes the change unless Metropolis accepts it. Returns whether it was accepted.
-    fn step(&mut self, tree: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream) -> bool;
+    fn step(&mut self, tree: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream)
+    -> bool;
     /// Nodes visited by all moves so far.
     fn work(&self) -> u64;
     /// Draws the nodes at which moves begin.

@@ -132,11 +132,18 @@ mod tests {
             };
             let (total, times) = (nodes.iter().map(weight).sum::<f64>(), 400_000);
             let counts = drawn(&mut NodeSampler::among(only), &tree, times);
-            assert_eq!(counts.iter().sum::<u32>(), nodes.iter().map(|&at| counts[at as usize]).sum::<u32>());
+            assert_eq!(
+                counts.iter().sum::<u32>(),
+                nodes.iter().map(|&at| counts[at as usize]).sum::<u32>()
+            );
             for at in nodes {
                 let expected = f64::from(times) * weight(&at) / total;
                 let off = (f64::from(counts[at as usize]) - expected).abs();
-                assert!(off < 5.0 * expected.sqrt(), "node {at}: {} of {expected}", counts[at as usize]);
+                assert!(
+                    off < 5.0 * expected.sqrt(),
+                    "node {at}: {} of {expected}",
+                    counts[at as usize]
+                );
             }
         }
     }

@@ -109,7 +109,8 @@ impl<'a> Divider<'a> {
         }
         let (saved, sibling, visits) = tree.detach(leaf);
         self.visits += visits;
-        let limit = self.limit(saved + saved_other + leaf_cost(tree, a.area + b.area - area)) + price;
+        let limit =
+            self.limit(saved + saved_other + leaf_cost(tree, a.area + b.area - area)) + price;
         tree.resize_leaf(other, object, PackedAabb::EMPTY, 0.0);
         tree.resize_leaf(leaf, object, whole, area);
         let position = (area < limit)
@@ -145,7 +146,9 @@ impl<'a> Divider<'a> {
             return false;
         }
         let (axis, at) = self.planes[rng.random_range(0..self.planes.len())];
-        let parts = Aabb::from(&aabb).halves(axis, at).map(|region| self.splits.objects.clip(object, &region));
+        let parts = Aabb::from(&aabb)
+            .halves(axis, at)
+            .map(|region| self.splits.objects.clip(object, &region));
         if parts.contains(&Aabb::EMPTY) {
             return false;
         }
@@ -174,7 +177,8 @@ impl<'a> Divider<'a> {
             tree.resize_leaf(leaf, object, part, area);
             // The other part costs its own area at least.
             let rest = if side == 0 { areas[1] } else { 0.0 };
-            let Some(position) = self.search.detached(tree, Scope::ALL, (&part, area), sibling, limit - rest)
+            let Some(position) =
+                self.search.detached(tree, Scope::ALL, (&part, area), sibling, limit - rest)
             else {
                 tree.undo();
                 return false;
@@ -303,7 +307,8 @@ fn change_plain<A: Metric>(
         sum += if out { 0.0 } else { tree.nodes[leaf as usize].area.sqrt() + f64::MIN_POSITIVE };
         sums.push(sum);
     }
-    while !leaves.is_empty() && divider.count < divider.splits.most && !is_over(divider, &mut done) {
+    while !leaves.is_empty() && divider.count < divider.splits.most && !is_over(divider, &mut done)
+    {
         let drawn = rng.random::<f64>() * sum;
         let leaf = leaves[sums.partition_point(|&sum| sum <= drawn).min(leaves.len() - 1)];
         done.moves += 1;
@@ -341,7 +346,8 @@ mod tests {
         let objects = &triangles.as_slice();
         let quota = Quota { work: 40_000, moves: u64::MAX };
         for by_layout in [false, true] {
-            let cost = |tree: &bvh_core::Bvh| if by_layout { layout_area(tree) } else { total_area(tree) };
+            let cost =
+                |tree: &bvh_core::Bvh| if by_layout { layout_area(tree) } else { total_area(tree) };
             let start = muller_fellner::Config::default().build(&boxes).unwrap();
             let mut before = cost(&start);
             let mut tree = Working::from_bvh(&start, total_area(&start), WithLeaves(Area)).unwrap();
@@ -355,14 +361,23 @@ mod tests {
                     assert!(tally.work > 0);
                     let flat = tree.to_bvh();
                     validate_references(&flat, &boxes, objects).unwrap();
-                    assert!(flat.prim_ids.len() <= most.max(references), "{} {most}", flat.prim_ids.len());
+                    assert!(
+                        flat.prim_ids.len() <= most.max(references),
+                        "{} {most}",
+                        flat.prim_ids.len()
+                    );
                     assert!((tree.area() - total_area(&flat)).abs() <= 1e-9 * tree.area());
                     let after = cost(&flat);
                     // Every reference that was added has saved its price, and none that went cost more.
-                    let (gone, price) =
-                        (references as f64 - flat.prim_ids.len() as f64, PRICE_OF_A_REFERENCE * before);
+                    let (gone, price) = (
+                        references as f64 - flat.prim_ids.len() as f64,
+                        PRICE_OF_A_REFERENCE * before,
+                    );
                     let least_leave = if gone > 0.0 { gone / 150.0 } else { gone / 200.0 };
-                    assert!(after <= before * (1.0 + 1e-9) + price * least_leave, "{after} {before} {gone}");
+                    assert!(
+                        after <= before * (1.0 + 1e-9) + price * least_leave,
+                        "{after} {before} {gone}"
+                    );
                     references = flat.prim_ids.len();
                     (before, most_seen) = (after, most_seen.max(flat.prim_ids.len()));
                 }

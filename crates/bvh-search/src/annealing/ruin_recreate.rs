@@ -61,7 +61,11 @@ bvh_config::config! {
 
 /// The area that temperatures are relative to, so that one schedule suits nodes of all sizes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Scale {
     /// The area that the removal saves.
@@ -74,10 +78,17 @@ pub enum Scale {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Found {
         let Self { hot, cold, work_per_object, .. } = *self;
         let annealing = AnnealingRun { heat: [hot, cold], work_per_object, start: &self.start };
-        let length = work_per_object.min(run.left().work / problem.boxes.len().max(1) as u64) as f64;
+        let length =
+            work_per_object.min(run.left().work / problem.boxes.len().max(1) as u64) as f64;
         annealing.search(|| RuinMover::new(&self.ruin, length, false), metric, problem, seed, run)
     }
 }
@@ -129,13 +140,27 @@ impl<'a> RuinMover<'a> {
     pub fn new(ruin: &'a Ruin, length: f64, by_layout: bool) -> Self {
         let (search, side, removed) = Default::default();
         let layout = by_layout.then(Layout::default);
-        Self { ruin, sampler: NodeSampler::for_work(length), search, side, removed, layout, work: 0 }
+        Self {
+            ruin,
+            sampler: NodeSampler::for_work(length),
+            search,
+            side,
+            removed,
+            layout,
+            work: 0,
+        }
     }
 
     /// Takes scattered subtrees out of the scope, up to one level further down than the move has climbed. The scope keeps
     /// a root.
     #[inline(always)]
-    fn scattered(&mut self, tree: &mut Working<impl Metric>, scope: Scope, levels: u32, rng: &mut Stream) {
+    fn scattered(
+        &mut self,
+        tree: &mut Working<impl Metric>,
+        scope: Scope,
+        levels: u32,
+        rng: &mut Stream,
+    ) {
         for _ in 0..rng.random_range(1..=self.ruin.removed) {
             let mut node = scope.root(tree);
             if tree.nodes[node as usize].is_leaf() {
@@ -178,7 +203,12 @@ impl Mover for RuinMover<'_> {
     }
 
     #[inline(always)]
-    fn step(&mut self, tree: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream) -> bool {
+    fn step(
+        &mut self,
+        tree: &mut Working<impl Metric>,
+        temperature: f64,
+        rng: &mut Stream,
+    ) -> bool {
         let ruin = self.ruin;
         let mut top = self.sampler.draw(tree, rng);
         let levels = rng.random_range(1..=ruin.climb);
@@ -214,12 +244,14 @@ impl Mover for RuinMover<'_> {
         };
         let worse = -temperature * scale * libm::log(chance);
         // What costs more area may make a better layout.
-        let mut limit = *saved + if self.layout.is_some() { DEARER_BY_AREA * worse } else { worse } - *least;
+        let mut limit =
+            *saved + if self.layout.is_some() { DEARER_BY_AREA * worse } else { worse } - *least;
         for &(node, first) in &*roots {
             let item = &tree.nodes[node as usize];
             let (aabb, area) = (item.aabb, item.area);
             limit += area;
-            let Some(position) = self.search.detached(tree, positions, (&aabb, area), first, limit) else {
+            let Some(position) = self.search.detached(tree, positions, (&aabb, area), first, limit)
+            else {
                 tree.undo();
                 return false;
             };

@@ -59,9 +59,12 @@ impl AnnealingRun<'_> {
     ) -> Result<Bvh, SearchError> {
         let [hot, cold] = self.heat;
         let (mut best, mut tree) = Incumbent::build(self.start, problem, metric, run)?;
-        let quota = run.left().at_most(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
-        let (schedule, observer) =
-            (Schedule { hot, cold, quota, end: 1.0, subtrees: 1, to_local_optimum: true }, run.observer());
+        let quota =
+            run.left().at_most(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
+        let (schedule, observer) = (
+            Schedule { hot, cold, quota, end: 1.0, subtrees: 1, to_local_optimum: true },
+            run.observer(),
+        );
         anneal(mover, &schedule, &mut tree, [seed, 0], observer, &mut |tree, tally| {
             run.count(tally);
             best.offer(tree, run);
@@ -94,7 +97,8 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
         return;
     }
     let final_passes = FINAL_PASSES_WORK.saturating_mul(n);
-    let final_passes = if schedule.to_local_optimum { (work / FINAL_PASSES_PART).min(final_passes) } else { 0 };
+    let final_passes =
+        if schedule.to_local_optimum { (work / FINAL_PASSES_PART).min(final_passes) } else { 0 };
     let work = work - final_passes;
     let (mut done, mut streams) = (Tally::default(), first);
     let factor = schedule.cold / schedule.hot;
@@ -114,7 +118,8 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
         let is_last = began.is_none() && fraction + LAST_ROUND * step >= 1.0;
         let end = if is_last { work } else { work.min(done.work + next) };
         let quota = Quota { work: end, moves }.less(&done);
-        let tally = subtrees::cool(&mover, tree, heat, quota, schedule.subtrees, [seed, streams], observer);
+        let tally =
+            subtrees::cool(&mover, tree, heat, quota, schedule.subtrees, [seed, streams], observer);
         streams += subtrees::STREAMS;
         done += tally;
         round(tree, tally);
@@ -134,7 +139,12 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
         }
     }
     if schedule.to_local_optimum {
-        let tally = subtrees::to_local_optimum(tree, schedule.subtrees, schedule.quota.less(&done), observer);
+        let tally = subtrees::to_local_optimum(
+            tree,
+            schedule.subtrees,
+            schedule.quota.less(&done),
+            observer,
+        );
         round(tree, tally);
     }
 }
@@ -156,7 +166,12 @@ mod tests {
     }
 
     impl<M: Mover> Mover for Checked<'_, M> {
-        fn step(&mut self, tree: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream) -> bool {
+        fn step(
+            &mut self,
+            tree: &mut Working<impl Metric>,
+            temperature: f64,
+            rng: &mut Stream,
+        ) -> bool {
             let before = tree.area();
             let kept = self.inner.step(tree, temperature, rng);
             let area = tree.internal_area();
@@ -177,7 +192,8 @@ mod tests {
         let boxes = scatter(60);
         let mut tree = built(&muller_fellner::Config::default(), &boxes);
         let quota = Quota { moves: 300_000, work: u64::MAX / 1024 };
-        let schedule = Schedule { hot: 0.5, cold: 0.4, quota, end: 1.0, subtrees: 1, to_local_optimum: true };
+        let schedule =
+            Schedule { hot: 0.5, cold: 0.4, quota, end: 1.0, subtrees: 1, to_local_optimum: true };
         let moves = AtomicU64::new(0);
         let mover = || Checked { inner: inner(), moves: &moves };
         anneal(mover, &schedule, &mut tree, [1, 0], &(), &mut |_, _| ());

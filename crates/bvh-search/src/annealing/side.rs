@@ -72,7 +72,9 @@ mod tests {
         let (mut rng, mut removed, mut found) = (stream(8, 0), Side::default(), 0);
         for _ in 0..2000 {
             let top = rng.random_range(1..tree.nodes.len() as u32);
-            let Some(above) = Some(tree.nodes[top as usize].parent).filter(|&above| above != ANCHOR) else {
+            let Some(above) =
+                Some(tree.nodes[top as usize].parent).filter(|&above| above != ANCHOR)
+            else {
                 continue;
             };
             if tree.nodes[top as usize].is_leaf() {
@@ -91,7 +93,12 @@ mod tests {
             let after = tree.nodes[tree.nodes[above as usize].children[side] as usize].aabb;
             if !removed.roots.is_empty() {
                 let planes = |aabb: &bvh_core::PackedAabb| aabb.planes().concat();
-                assert!(planes(&after).iter().zip(planes(&before.0)).any(|(&after, before)| after < before));
+                assert!(
+                    planes(&after)
+                        .iter()
+                        .zip(planes(&before.0))
+                        .any(|(&after, before)| after < before)
+                );
                 found += 1;
             }
             tree.undo();

@@ -52,7 +52,11 @@ impl Config {
 
 /// Which position a subtree gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Target {
     /// The end of a random descent from the top, of at most one level more than the climb.
@@ -64,7 +68,13 @@ pub enum Target {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Found {
         let Self { hot, cold, work_per_object, .. } = *self;
         let annealing = AnnealingRun { heat: [hot, cold], work_per_object, start: &self.start };
         annealing.search(|| SingleMover::new(&self.step), metric, problem, seed, run)
@@ -138,7 +148,12 @@ impl Mover for SingleMover<'_> {
     }
 
     #[inline(always)]
-    fn step(&mut self, tree: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream) -> bool {
+    fn step(
+        &mut self,
+        tree: &mut Working<impl Metric>,
+        temperature: f64,
+        rng: &mut Stream,
+    ) -> bool {
         self.work += 1;
         let node = self.sampler.draw(tree, rng);
         if tree.nodes[node as usize].parent == ANCHOR {

@@ -30,7 +30,8 @@ pub(crate) fn cool<M: Mover>(
     if count > 1 && tree.objects() as f64 >= f64::from(count) * f64::from(LEAST_SUBTREE) {
         // Of another size in every round, so that the borders are elsewhere.
         let smaller = SMALLEST_SUBTREES + (1.0 - SMALLEST_SUBTREES) * rng.random::<f64>();
-        let (subtrees, starts) = cut(tree, smaller / f64::from(count), |at| node_sampler::weight(tree, at));
+        let (subtrees, starts) =
+            cut(tree, smaller / f64::from(count), |at| node_sampler::weight(tree, at));
         let all: f64 = subtrees.iter().map(|subtree| subtree.weight).sum();
         let share = |subtree: &Subtree| {
             let work = quota.work as f64 * (1.0 - WHOLE_TREE) * (subtree.weight / all);
@@ -38,7 +39,8 @@ pub(crate) fn cool<M: Mover>(
         };
         let found = parallel::map(subtrees.len(), |number| {
             let mut small = subtrees[number].take(tree);
-            let (rng, quota) = (&mut stream(seed, first + 1 + number as u64), share(&subtrees[number]));
+            let (rng, quota) =
+                (&mut stream(seed, first + 1 + number as u64), share(&subtrees[number]));
             let tally = metropolis::cool(&mut mover(), &mut small, heat, quota, rng, observer);
             small.sort_in_preorder();
             (small, tally)
@@ -89,7 +91,11 @@ struct Subtree {
 
 /// The largest subtrees of a tree in preorder that each have at most the fraction `most` of its weight, except the smallest
 /// ones; and the nodes that are in no subtree or near the root of one. O(n).
-fn cut(tree: &Working<impl Metric>, most: f64, weight: impl Fn(u32) -> f64) -> (Vec<Subtree>, Vec<u32>) {
+fn cut(
+    tree: &Working<impl Metric>,
+    most: f64,
+    weight: impl Fn(u32) -> f64,
+) -> (Vec<Subtree>, Vec<u32>) {
     let mut totals = vec![(1u32, 0.0); tree.nodes.len()];
     for (at, node) in tree.nodes.iter().enumerate().skip(1).rev() {
         let mut total = (1, weight(at as u32));
@@ -128,7 +134,9 @@ impl Subtree {
         let range = self.root as usize..(self.root + self.nodes) as usize;
         let mut nodes = Vec::with_capacity(range.len() + 1);
         nodes.push(Node { children: [1, NONE], ..tree.nodes[ANCHOR as usize] });
-        nodes.extend(tree.nodes[range].iter().map(|node| moved(node, |at| at.wrapping_sub(self.root - 1))));
+        nodes.extend(
+            tree.nodes[range].iter().map(|node| moved(node, |at| at.wrapping_sub(self.root - 1))),
+        );
         nodes[1].parent = ANCHOR;
         Working::from_nodes(nodes, tree.metric())
     }
@@ -142,7 +150,11 @@ fn moved(node: &Node, place: impl Fn(u32) -> u32) -> Node {
 }
 
 /// Puts trees in preorder back to where they were taken from. O(n).
-fn put_back<A: Metric>(tree: &mut Working<A>, subtrees: &[Subtree], found: Vec<(Working<A>, Tally)>) -> Tally {
+fn put_back<A: Metric>(
+    tree: &mut Working<A>,
+    subtrees: &[Subtree],
+    found: Vec<(Working<A>, Tally)>,
+) -> Tally {
     let mut done = Tally::default();
     let mut nodes = std::mem::take(&mut tree.nodes);
     for (subtree, (small, tally)) in subtrees.iter().zip(found) {
@@ -172,17 +184,17 @@ mod tests {
         for most in [0.007, 0.03, 0.3, 0.99] {
             let (subtrees, starts) = cut(&tree, most, |_| 1.0);
             assert!(subtrees.windows(2).all(|pair| pair[0].root + pair[0].nodes <= pair[1].root));
+            assert!(subtrees.iter().all(|subtree| f64::from(subtree.nodes) <= most * 5999.0
+                && starts.contains(&subtree.root)));
             assert!(
                 subtrees
                     .iter()
-                    .all(|subtree| f64::from(subtree.nodes) <= most * 5999.0 && starts.contains(&subtree.root))
-            );
-            assert!(
-                subtrees.iter().all(|subtree| f64::from(subtree.nodes).to_bits() == subtree.weight.to_bits())
+                    .all(|subtree| f64::from(subtree.nodes).to_bits() == subtree.weight.to_bits())
             );
             let covered: u32 = subtrees.iter().map(|subtree| subtree.nodes).sum();
             assert!(covered > if most > 0.01 { 3000 } else { 1000 }, "{covered}");
-            let taken = |subtree: &Subtree| (subtree.take(&tree), Tally { work: 1, ..Tally::default() });
+            let taken =
+                |subtree: &Subtree| (subtree.take(&tree), Tally { work: 1, ..Tally::default() });
             let mut again = tree.clone();
             let tally = put_back(&mut again, &subtrees, subtrees.iter().map(taken).collect());
             assert_eq!(tally.work, subtrees.len() as u64);

@@ -54,7 +54,11 @@ bvh_config::config! {
 
 /// What the search knows of its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Horizon {
     /// The search ends with the budget's work or the observer's time, or after `work_per_object` if there is neither. One

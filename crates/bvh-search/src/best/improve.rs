@@ -14,8 +14,8 @@ use crate::parallel::threads;
 use crate::run::{Observer, Problem, Quota, Run, StopReason, Stream, Tally, stream};
 use crate::tree::{Metric, Working};
 use crate::tuning::{
-    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, RECOMBINED_AT_ONCE, ROUNDS_PER_LOOK, SECURED_FROM,
-    SUBTREES_PER_THREAD, TRIAL, WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_SUBTREES,
+    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, RECOMBINED_AT_ONCE, ROUNDS_PER_LOOK,
+    SECURED_FROM, SUBTREES_PER_THREAD, TRIAL, WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_SUBTREES,
 };
 use bvh_core::cost::Objective;
 
@@ -36,8 +36,17 @@ pub(crate) fn improve<A: Metric>(
     let (horizon, work) = config.horizon(n, run);
     let by_layout = problem.objective == Objective::Layout;
     let divider = problem.splits.map(|splits| Divider::new(splits, by_layout));
-    let mut search =
-        Improvement { config, seed, n, left: work, by_layout, divider, best, run, is_secured: false };
+    let mut search = Improvement {
+        config,
+        seed,
+        n,
+        left: work,
+        by_layout,
+        divider,
+        best,
+        run,
+        is_secured: false,
+    };
     if let Some(other) = other {
         search.choose(tree, other, horizon);
     }
@@ -88,11 +97,16 @@ impl Improvement<'_, '_, '_, '_> {
         }
         let (all, began) = (self.left, observer.progress().unwrap_or(0.0));
         // Short runs are worth their work where they can be recombined, which layouts cannot.
-        let config = if self.by_layout { &Config { reheats: 0, ..self.config.clone() } } else { self.config };
+        let config = if self.by_layout {
+            &Config { reheats: 0, ..self.config.clone() }
+        } else {
+            self.config
+        };
         let (plan, each) = plan(config, length, n);
         for (number, Planned { hot, until }) in (0..).zip(plan) {
             let due = (until * all as f64) as u64;
-            let work = if timed { self.left } else { self.left.min(due.saturating_sub(all - self.left)) };
+            let work =
+                if timed { self.left } else { self.left.min(due.saturating_sub(all - self.left)) };
             let end = began + (end_of_all - began) * until;
             if observer.progress().is_some_and(|now| now >= end) {
                 continue;
@@ -135,7 +149,12 @@ impl Improvement<'_, '_, '_, '_> {
     }
 
     /// Anneals both trees for a short time, and goes on with the one that ends better.
-    fn choose<A: Metric>(&mut self, tree: &mut Working<A>, mut other: Working<A>, horizon: Horizon) {
+    fn choose<A: Metric>(
+        &mut self,
+        tree: &mut Working<A>,
+        mut other: Working<A>,
+        horizon: Horizon,
+    ) {
         let (n, observer) = (self.n as f64, self.run.observer());
         let began = observer.progress().unwrap_or(0.0);
         let work = match horizon {
@@ -163,7 +182,8 @@ impl Improvement<'_, '_, '_, '_> {
     /// The schedule of an annealing run; `length` is the work per object of the whole search, or of the generation.
     fn schedule(&self, hot: f64, work: u64, end: f64, length: f64) -> Schedule {
         let timed = self.run.observer().progress().is_some();
-        let by_threads = self.config.pieces == 0 && timed && length >= WORTH_SUBTREES && threads() > 1;
+        let by_threads =
+            self.config.pieces == 0 && timed && length >= WORTH_SUBTREES && threads() > 1;
         let subtrees = if by_threads {
             (SUBTREES_PER_THREAD * threads().min(1024)) as u32
         } else {
@@ -171,7 +191,14 @@ impl Improvement<'_, '_, '_, '_> {
         };
         let Config { cold, .. } = *self.config;
         let quota = self.run.left().at_most(work);
-        Schedule { hot: hot.max(cold), cold, quota, end, subtrees, to_local_optimum: !self.by_layout }
+        Schedule {
+            hot: hot.max(cold),
+            cold,
+            quota,
+            end,
+            subtrees,
+            to_local_optimum: !self.by_layout,
+        }
     }
 
     /// One annealing run from `tree`, which is recombined with the result. The `first` run of a plan, though, replaces
@@ -217,7 +244,8 @@ impl Improvement<'_, '_, '_, '_> {
                 run.count(tally);
                 if let Some(divider) = divider.as_mut().filter(|_| !observer.cancelled()) {
                     let work = (tally.work as f64 * WORK_ON_REFERENCES) as u64;
-                    let tally = divider.pass(tree, run.left().at_most(work), &mut division, observer);
+                    let tally =
+                        divider.pass(tree, run.left().at_most(work), &mut division, observer);
                     done += tally;
                     run.count(tally);
                 }
@@ -235,7 +263,9 @@ impl Improvement<'_, '_, '_, '_> {
             }
         } else if first && annealed.area() < tree.area() {
             *tree = annealed;
-        } else if run.stopped() == Some(StopReason::Cancelled) && annealed.objects() > RECOMBINED_AT_ONCE {
+        } else if run.stopped() == Some(StopReason::Cancelled)
+            && annealed.objects() > RECOMBINED_AT_ONCE
+        {
             if annealed.area() < tree.area() {
                 *tree = annealed;
             }
@@ -247,13 +277,20 @@ impl Improvement<'_, '_, '_, '_> {
     }
 
     /// Moves at the lowest temperature. Also returns the work that fits into the rest of the time at this rate.
-    fn probe(&self, tree: &mut Working<impl Metric>, mut rng: Stream, quota: Quota) -> (Tally, f64) {
+    fn probe(
+        &self,
+        tree: &mut Working<impl Metric>,
+        mut rng: Stream,
+        quota: Quota,
+    ) -> (Tally, f64) {
         let (observer, heat) = (self.run.observer(), [self.config.cold; 2]);
         let began = observer.progress();
         let mut mover = RuinMover::new(&self.config.ruin, PROBE as f64, self.by_layout);
         let tally = cool(&mut mover, tree, heat, quota, &mut rng, observer);
         let in_time = match (began, observer.progress()) {
-            (Some(began), Some(now)) => tally.work as f64 * (1.0 - now).max(0.0) / (now - began).max(1e-9),
+            (Some(began), Some(now)) => {
+                tally.work as f64 * (1.0 - now).max(0.0) / (now - began).max(1e-9)
+            }
             _ => f64::INFINITY,
         };
         (tally, in_time)
@@ -307,7 +344,8 @@ mod tests {
         let config = reinsertion::Config::default();
         let plain = solve(&config, &problem, 1, Budget::UNLIMITED, &()).unwrap();
         let clock = StoppedEarly(AtomicU32::new(0));
-        let found = solve(&best::Config::default(), &problem, 1, Budget::UNLIMITED, &clock).unwrap();
+        let found =
+            solve(&best::Config::default(), &problem, 1, Budget::UNLIMITED, &clock).unwrap();
         assert!(found.cost <= plain.cost, "{} is above {}", found.cost, plain.cost);
     }
 }

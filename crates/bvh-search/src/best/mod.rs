@@ -68,7 +68,11 @@ search_by_metric!(Config);
 /// What whoever stops a search of this much work early can have in place of a worse tree: the outcome of plain reinsertion, before the
 /// search. It takes a twentieth of the work at most; none if there is too little. By the clock, a search keeps such a tree
 /// itself; by work it does not, because its bytes are to follow from its plan alone.
-pub fn fallback(problem: &Problem, work: u64, observer: &dyn Observer) -> Result<Option<Outcome>, SearchError> {
+pub fn fallback(
+    problem: &Problem,
+    work: u64,
+    observer: &dyn Observer,
+) -> Result<Option<Outcome>, SearchError> {
     if (work as f64) < SECURED_FROM * problem.boxes.len() as f64 {
         return Ok(None);
     }
@@ -101,7 +105,13 @@ fn division(problem: &Problem, observer: &dyn Observer) -> Result<Option<Bvh>, S
 
 impl Config {
     /// Subtrees, if there are several, are annealed in parallel, each with a random stream of its own.
-    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Found {
         if problem.splits.is_some() || problem.objective == Objective::Layout {
             let tree = self.initial(None, problem, run)?;
             let other = division(problem, run.observer())?;
@@ -145,7 +155,8 @@ impl Config {
             return Ok(watched(run.observer(), build)?);
         }
         let morton = morton.map_or_else(|| MortonOrder::new(boxes), Ok)?;
-        let clustered = watched(run.observer(), |watch| morton.build_watched(&CLUSTERING, None, watch))?;
+        let clustered =
+            watched(run.observer(), |watch| morton.build_watched(&CLUSTERING, None, watch))?;
         let started = match watched(run.observer(), build) {
             Err(BuildError::Cancelled) => return Ok(clustered),
             started => started?,

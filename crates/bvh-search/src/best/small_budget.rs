@@ -12,8 +12,8 @@ use crate::parallel::threads;
 use crate::run::{Observer, Problem, Run, SearchError, Tally, watched};
 use crate::tree::{Linked, Metric, Siblings, Working};
 use crate::tuning::{
-    ANNEAL_FROM_TIME, ANNEAL_FROM_WORK, BUILDS, CLUSTERING, COLD_MEMORY, FINISH_TIME, FIRST_PASS, FRONT,
-    MOVES_PER_READING, SAMPLED_FROM, SAMPLED_PART, SAMPLES, SEVERAL_THREADS, TOP_DOWN_BELOW,
+    ANNEAL_FROM_TIME, ANNEAL_FROM_WORK, BUILDS, CLUSTERING, COLD_MEMORY, FINISH_TIME, FIRST_PASS,
+    FRONT, MOVES_PER_READING, SAMPLED_FROM, SAMPLED_PART, SAMPLES, SEVERAL_THREADS, TOP_DOWN_BELOW,
     TWO_STARTS_FROM_TIME, WARM_SAMPLE,
 };
 use bvh_build::ploc::MortonOrder;
@@ -116,7 +116,11 @@ fn warm_sort(problem: &Problem, observer: &dyn Observer) -> Result<f64, SearchEr
 
 /// Whether a top-down build is worth its time: it must be better than clustering on samples of the scene. Takes about a
 /// tenth of its time.
-fn top_down_may_be_better(morton: &MortonOrder, problem: &Problem, run: &mut Run) -> Result<bool, SearchError> {
+fn top_down_may_be_better(
+    morton: &MortonOrder,
+    problem: &Problem,
+    run: &mut Run,
+) -> Result<bool, SearchError> {
     let order = morton.order();
     if order.len() < SAMPLED_FROM {
         return Ok(true);
@@ -124,7 +128,8 @@ fn top_down_may_be_better(morton: &MortonOrder, problem: &Problem, run: &mut Run
     let (mut divided, mut clustered) = (0.0, 0.0);
     for stretch in order.chunks(order.len().div_ceil(SAMPLES)) {
         let objects = &stretch[..stretch.len() / SAMPLED_PART];
-        let boxes: Vec<Aabb> = objects.iter().map(|&object| problem.boxes[object as usize]).collect();
+        let boxes: Vec<Aabb> =
+            objects.iter().map(|&object| problem.boxes[object as usize]).collect();
         let Some(tree) = self::divided(&boxes, run)? else { return Ok(false) };
         divided += cost::internal_area(&tree);
         clustered += cost::internal_area(&CLUSTERING.build(&boxes)?);
@@ -205,7 +210,8 @@ mod tests {
         let mut before = f64::INFINITY;
         for work in [1, 600, 1200, 2400, 4800, 5900] {
             let budget = Budget { max_work: Some(work), ..Budget::UNLIMITED };
-            let found = solve(&best::Config::default(), &Problem::new(&boxes), 1, budget, &()).unwrap();
+            let found =
+                solve(&best::Config::default(), &Problem::new(&boxes), 1, budget, &()).unwrap();
             validate(&found.tree, &boxes).unwrap();
             assert_eq!(cost::internal_area(&found.tree), found.cost);
             assert!(found.cost <= before, "{work}");
@@ -218,7 +224,13 @@ mod tests {
         let boxes = scatter(300);
         for times in 1..100 {
             let clock = Asked { times, asked: AtomicU32::new(0) };
-            let found = solve(&best::Config::default(), &Problem::new(&boxes), 1, Budget::UNLIMITED, &clock);
+            let found = solve(
+                &best::Config::default(),
+                &Problem::new(&boxes),
+                1,
+                Budget::UNLIMITED,
+                &clock,
+            );
             validate(&found.unwrap().tree, &boxes).unwrap();
         }
     }

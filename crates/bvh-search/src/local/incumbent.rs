@@ -119,9 +119,8 @@ impl<'p> Incumbent<'p> {
 fn costs(problem: &Problem, tree: &Bvh) -> (f64, f64) {
     let cost = problem.cost(tree);
     let area = match *problem {
-        Problem { splits: Some(_), measure, .. } => {
-            measure.map_or_else(|| cost::total_area(tree), |measure| cost::total_measure(tree, measure))
-        }
+        Problem { splits: Some(_), measure, .. } => measure
+            .map_or_else(|| cost::total_area(tree), |measure| cost::total_measure(tree, measure)),
         Problem { objective: Objective::InternalArea, .. } => cost,
         Problem { measure: Some(measure), .. } => cost::internal_measure(tree, measure),
         _ => cost::internal_area(tree),

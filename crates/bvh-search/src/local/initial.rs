@@ -7,7 +7,11 @@ use bvh_core::{Aabb, Bvh};
 
 /// A builder of a tree with one object per leaf. Different initial trees lead to different local optima.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Start {
     /// Greedy top-down division.

@@ -12,7 +12,11 @@ use crate::tree::{Metric, Working};
 
 /// A local search by name, with its default order of nodes: how other searches improve a tree they have made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum LocalSearch {
     /// Leaves the tree as it is.

@@ -13,7 +13,11 @@ pub(super) fn sort_by_area(tree: &Working<impl Metric>, order: &mut [u32]) {
 }
 
 /// Repeats a pass until it keeps no move, the quota is used up, or the observer cancels.
-pub(super) fn repeat(quota: Quota, observer: &dyn Observer, mut pass: impl FnMut(Quota) -> Tally) -> Tally {
+pub(super) fn repeat(
+    quota: Quota,
+    observer: &dyn Observer,
+    mut pass: impl FnMut(Quota) -> Tally,
+) -> Tally {
     let mut total = Tally::default();
     loop {
         let done = pass(quota.less(&total));

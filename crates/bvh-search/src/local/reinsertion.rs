@@ -28,7 +28,11 @@ bvh_config::config! {
 
 /// The order of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Order {
     /// The largest node first, equal ones by index.
@@ -40,7 +44,13 @@ pub enum Order {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Found {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         best.improve(&mut tree, self.sweeps, run, |tree, number, quota, observer| {
             let mut order = tree.preorder();
@@ -55,7 +65,11 @@ impl Config {
 }
 
 /// Tries every node once, the largest first.
-pub(crate) fn pass_by_area(tree: &mut Working<impl Metric>, quota: Quota, observer: &dyn Observer) -> Tally {
+pub(crate) fn pass_by_area(
+    tree: &mut Working<impl Metric>,
+    quota: Quota,
+    observer: &dyn Observer,
+) -> Tally {
     let mut order = tree.preorder();
     sort_by_area(tree, &mut order);
     pass(tree, &order, quota, observer)
@@ -78,7 +92,12 @@ with_vector_instructions! {
 }
 
 #[inline(always)]
-fn pass_plain<T: Linked>(tree: &mut T, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally {
+fn pass_plain<T: Linked>(
+    tree: &mut T,
+    order: &[u32],
+    quota: Quota,
+    observer: &dyn Observer,
+) -> Tally {
     let mut done = Tally::default();
     let (mut search, mut poll) = (PositionSearch::default(), WORK_PER_POLL);
     for &node in order {

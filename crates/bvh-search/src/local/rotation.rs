@@ -28,7 +28,11 @@ bvh_config::config! {
 
 /// The order of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Order {
     /// Children before their parents.
@@ -40,7 +44,13 @@ pub enum Order {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, _seed: u64, run: &mut Run) -> Found {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        _seed: u64,
+        run: &mut Run,
+    ) -> Found {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         best.improve(&mut tree, self.sweeps, run, |tree, _, quota, observer| {
             pass(tree, &self.order.of(tree), quota, observer)
@@ -80,7 +90,12 @@ with_vector_instructions! {
 }
 
 #[inline(always)]
-fn pass_plain(tree: &mut Working<impl Metric>, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally {
+fn pass_plain(
+    tree: &mut Working<impl Metric>,
+    order: &[u32],
+    quota: Quota,
+    observer: &dyn Observer,
+) -> Tally {
     let mut done = Tally::default();
     for &node in order {
         if tree.nodes[node as usize].is_leaf() {
@@ -163,9 +178,12 @@ mod tests {
             let [Some(left), Some(right)] = [0, 1].map(|side| below(top).get(side).copied()) else {
                 continue;
             };
-            let mut pairs: Vec<(u32, u32)> = below(left).into_iter().map(|below| (below, right)).collect();
+            let mut pairs: Vec<(u32, u32)> =
+                below(left).into_iter().map(|below| (below, right)).collect();
             pairs.extend(below(right).into_iter().map(|below| (below, left)));
-            pairs.extend(below(left).iter().flat_map(|&a| below(right).into_iter().map(move |b| (a, b))));
+            pairs.extend(
+                below(left).iter().flat_map(|&a| below(right).into_iter().map(move |b| (a, b))),
+            );
             for (a, b) in pairs {
                 let mut other = tree.clone();
                 for (old, new) in [(a, b), (b, a)] {
@@ -189,7 +207,8 @@ mod tests {
 
     #[test]
     fn a_local_optimum_is_better_than_every_neighbour_and_areas_stay_exact() {
-        for (n, order) in [(40, Order::BottomUp), (60, Order::ByArea), (2, Order::ByArea), (3, Order::BottomUp)]
+        for (n, order) in
+            [(40, Order::BottomUp), (60, Order::ByArea), (2, Order::ByArea), (3, Order::BottomUp)]
         {
             let boxes = scatter(n);
             let mut tree = built(&median_cut::Config::default(), &boxes);
@@ -203,7 +222,8 @@ mod tests {
             let found = tree.to_bvh();
             validate(&found, &boxes).unwrap();
             assert!(found.is_tight(&boxes));
-            let least = neighbours(&tree, &tree.preorder()).into_iter().fold(f64::INFINITY, f64::min);
+            let least =
+                neighbours(&tree, &tree.preorder()).into_iter().fold(f64::INFINITY, f64::min);
             assert!(tree.area() <= least * (1.0 + 1e-11), "{} {least}", tree.area());
         }
     }

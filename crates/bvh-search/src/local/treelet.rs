@@ -30,7 +30,13 @@ bvh_config::config! {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, _seed: u64, run: &mut Run) -> Found {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        _seed: u64,
+        run: &mut Run,
+    ) -> Found {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         let mut solver = Solver::new(self.size, &tree);
         best.improve(&mut tree, self.sweeps, run, |tree, _, quota, observer| {
@@ -140,7 +146,8 @@ impl Solver {
             *place = node.children[0];
             self.leaves.push(node.children[1]);
         }
-        let last = self.leaves.iter().fold(last, |last, &leaf| last.max(tree.nodes[leaf as usize].stamp));
+        let last =
+            self.leaves.iter().fold(last, |last, &leaf| last.max(tree.nodes[leaf as usize].stamp));
         let solved = self.solved[root as usize];
         solved == NEVER || last > solved
     }
@@ -148,8 +155,9 @@ impl Solver {
     /// Finds the best shape. Returns whether it is better than the present one.
     #[inline(always)]
     fn solve(&mut self, tree: &Working<impl Metric>) -> bool {
-        let least =
-            self.subsets.solve(self.leaves.iter().map(|&leaf| tree.nodes[leaf as usize].aabb), tree.metric());
+        let least = self
+            .subsets
+            .solve(self.leaves.iter().map(|&leaf| tree.nodes[leaf as usize].aabb), tree.metric());
         let before: f64 = self.inner.iter().map(|&node| tree.nodes[node as usize].area).sum();
         least < before * (1.0 - TOLERANCE)
     }
@@ -217,7 +225,10 @@ mod tests {
             let mut solver = Solver::new(n, &tree);
             repeat(Quota::ENDLESS, &(), |quota| pass(&mut tree, &mut solver, quota, &()));
             let outcome = solve(
-                &Method::Best(crate::best::Config { work_per_object: 20_000, ..Default::default() }),
+                &Method::Best(crate::best::Config {
+                    work_per_object: 20_000,
+                    ..Default::default()
+                }),
                 &Problem::new(&boxes),
                 1,
                 Budget::UNLIMITED,

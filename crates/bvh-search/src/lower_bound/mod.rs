@@ -56,13 +56,18 @@ pub const DEFAULT_EFFORT: u32 = 16;
 ///
 /// The result is reduced by the fraction 10⁻¹², more than all rounding errors together. Areas are rounded as in the cost of
 /// a tree and are monotone in the box; only the sums of a few hundred terms and over all objects add errors.
-pub fn internal_area(boxes: &[Aabb], effort: u32, observer: &dyn Observer) -> Result<f64, BuildError> {
+pub fn internal_area(
+    boxes: &[Aabb],
+    effort: u32,
+    observer: &dyn Observer,
+) -> Result<f64, BuildError> {
     let mut clusters = Clusters::new(boxes)?;
     let n = boxes.len();
     if n < 2 {
         return Ok(0.0);
     }
-    let nearest = map_init(n, || (), |(), at| clusters.smallest_box(clusters.leaf(at), 2, effort, observer));
+    let nearest =
+        map_init(n, || (), |(), at| clusters.smallest_box(clusters.leaf(at), 2, effort, observer));
     let weights = weights(&nearest);
     clusters.set_weights(&weights);
     let classes = Classes::new(clusters.weight());
@@ -112,7 +117,8 @@ pub fn of_largest(boxes: &[Aabb]) -> f64 {
     if boxes.len() < 2 {
         return 0.0;
     }
-    let (mut least, mut most, mut root, mut sum) = (f64::INFINITY, 0.0f64, PackedAabb::EMPTY, Sum::default());
+    let (mut least, mut most, mut root, mut sum) =
+        (f64::INFINITY, 0.0f64, PackedAabb::EMPTY, Sum::default());
     for aabb in boxes.iter().map(PackedAabb::from) {
         let area = aabb.half_area();
         (least, most) = (least.min(area), most.max(area));
@@ -137,8 +143,12 @@ fn weights(nearest: &[f64]) -> Vec<u64> {
     let mut sorted = nearest.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let unit = sorted[sorted.len() / 4];
-    let weight = |area: f64| if unit > 0.0 { (area / unit).sqrt() * LEAST_WEIGHT as f64 } else { 0.0 };
-    nearest.iter().map(|&area| (weight(area).round() as u64).clamp(LEAST_WEIGHT, MOST_WEIGHT)).collect()
+    let weight =
+        |area: f64| if unit > 0.0 { (area / unit).sqrt() * LEAST_WEIGHT as f64 } else { 0.0 };
+    nearest
+        .iter()
+        .map(|&area| (weight(area).round() as u64).clamp(LEAST_WEIGHT, MOST_WEIGHT))
+        .collect()
 }
 
 /// The sizes for which smallest boxes are searched: every size while single objects matter, then ever larger steps.
@@ -164,7 +174,8 @@ impl Classes {
         };
         let first: Vec<u64> = std::iter::successors(Some(LEAST_WEIGHT), next).collect();
         let last = |class: usize| first.get(class + 1).map_or(total, |next| next - 1);
-        let leads = |to: usize| first.partition_point(|&from| from + LEAST_WEIGHT <= last(to)).min(to);
+        let leads =
+            |to: usize| first.partition_point(|&from| from + LEAST_WEIGHT <= last(to)).min(to);
         let rate = |from: usize, to: usize| {
             let y = last(from).min(last(to) - LEAST_WEIGHT);
             let x = first[to].max(y + LEAST_WEIGHT);
@@ -182,7 +193,8 @@ impl Classes {
         least[start] = 0.0;
         for to in start + 1..least.len() {
             let steps = least.iter().zip(&self.rates[to]).skip(start);
-            least[to] = steps.map(|(before, rate)| before + rate * areas[to]).fold(f64::INFINITY, f64::min);
+            least[to] =
+                steps.map(|(before, rate)| before + rate * areas[to]).fold(f64::INFINITY, f64::min);
         }
         least.last().copied().unwrap_or(0.0)
     }
@@ -239,11 +251,13 @@ mod tests {
     #[test]
     fn it_is_most_of_the_optimum_of_scattered_boxes() {
         for salt in 1..=4u16 {
-            let at =
-                |i: u16, k: u16| f32::from((i * 97 + salt * 41 + 7).wrapping_mul(k * 211 + 89) % 997) / 100.0;
+            let at = |i: u16, k: u16| {
+                f32::from((i * 97 + salt * 41 + 7).wrapping_mul(k * 211 + 89) % 997) / 100.0
+            };
             let corner = |i| [at(i, 1), at(i, 2), at(i, 3)];
-            let boxes: Vec<Aabb> =
-                (0..12).map(|i| Aabb::from((corner(i), corner(i).map(|c| c + at(i, 4) / 10.0)))).collect();
+            let boxes: Vec<Aabb> = (0..12)
+                .map(|i| Aabb::from((corner(i), corner(i).map(|c| c + at(i, 4) / 10.0))))
+                .collect();
             let tightness = internal_area(&boxes, DEFAULT_EFFORT, &()).unwrap() / optimum(&boxes);
             assert!(tightness > 0.8, "{tightness}");
         }

@@ -16,22 +16,23 @@ struct Reach([f32; 8]);
 impl Reach {
     #[inline(always)]
     fn union(&self, other: &Self) -> Self {
-        Self(std::array::from_fn(
-            |face| if other.0[face] > self.0[face] { other.0[face] } else { self.0[face] },
-        ))
+        Self(std::array::from_fn(|face| {
+            if other.0[face] > self.0[face] { other.0[face] } else { self.0[face] }
+        }))
     }
 
     #[inline(always)]
     fn common(&self, other: &Self) -> Self {
-        Self(std::array::from_fn(
-            |face| if other.0[face] < self.0[face] { other.0[face] } else { self.0[face] },
-        ))
+        Self(std::array::from_fn(|face| {
+            if other.0[face] < self.0[face] { other.0[face] } else { self.0[face] }
+        }))
     }
 
     /// The least half area of a box with this reach, rounded like [`Aabb::half_area`] and therefore as monotone.
     #[inline(always)]
     fn half_area(&self) -> f64 {
-        let extent = |axis: usize| f64::max(f64::from(self.0[axis + 4]) + f64::from(self.0[axis]), 0.0);
+        let extent =
+            |axis: usize| f64::max(f64::from(self.0[axis + 4]) + f64::from(self.0[axis]), 0.0);
         let [x, y, z] = [extent(0), extent(1), extent(2)];
         x * y + y * z + z * x
     }
@@ -80,7 +81,9 @@ pub(super) struct Grouped {
 impl Grouped {
     /// The area for one object.
     pub fn area(&self, at: usize) -> f64 {
-        self.groups.get(self.groups.partition_point(|group| group.0 <= at)).map_or(0.0, |group| group.1)
+        self.groups
+            .get(self.groups.partition_point(|group| group.0 <= at))
+            .map_or(0.0, |group| group.1)
     }
 }
 
@@ -88,10 +91,13 @@ impl Clusters {
     /// A tree of objects with weight 1 each. Refuses boxes that builders refuse. O(n log n).
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
         let tree = Config { axis: CutAxis::Longest, ..Config::default() }.build(boxes)?;
-        let reaches: Vec<Reach> = tree.prim_ids.iter().map(|&id| Reach::from(&boxes[id as usize])).collect();
+        let reaches: Vec<Reach> =
+            tree.prim_ids.iter().map(|&id| Reach::from(&boxes[id as usize])).collect();
         let nodes = nodes(&tree, &reaches);
         let mut leaves = vec![0; boxes.len()];
-        for (index, cluster) in nodes.iter().enumerate().filter(|(_, cluster)| cluster.children == 0) {
+        for (index, cluster) in
+            nodes.iter().enumerate().filter(|(_, cluster)| cluster.children == 0)
+        {
             leaves[cluster.objects.start] = index;
         }
         let mut clusters = Self { nodes, leaves, weight_before: vec![] };
@@ -151,7 +157,13 @@ impl Clusters {
     /// A lower bound of the half area of every box that contains an object of the cluster `seed` and weighs at least `weight`,
     /// which must not be more than all objects do; the exact minimum for a single object and enough effort.
     /// 0 once the observer cancels.
-    pub fn smallest_box(&self, seed: usize, weight: u64, effort: u32, observer: &dyn Observer) -> f64 {
+    pub fn smallest_box(
+        &self,
+        seed: usize,
+        weight: u64,
+        effort: u32,
+        observer: &dyn Observer,
+    ) -> f64 {
         if observer.cancelled() { 0.0 } else { search(self, seed, weight, effort, observer) }
     }
 }
@@ -165,7 +177,13 @@ fn nodes(tree: &Bvh, reaches: &[Reach]) -> Vec<Cluster> {
             NodeKind::Leaf { .. } => (0, node.prims()),
         };
         let reach = reaches[objects.start];
-        nodes.push(Cluster { objects, parent: 0, children, reach, half_area: node.aabb.half_area() });
+        nodes.push(Cluster {
+            objects,
+            parent: 0,
+            children,
+            reach,
+            half_area: node.aabb.half_area(),
+        });
     }
     for index in (0..nodes.len()).rev() {
         let first = nodes[index].children;
@@ -214,8 +232,10 @@ impl Region {
             let area = must.union(&clusters.nodes[member.cluster as usize].reach).half_area();
             Member { area, ..member }
         };
-        let mut members: Vec<Member> = members.map(with).filter(|member| member.area < *known).collect();
-        let weigh = |members: &[Member]| members.iter().map(|member| u64::from(member.weight)).sum::<u64>();
+        let mut members: Vec<Member> =
+            members.map(with).filter(|member| member.area < *known).collect();
+        let weigh =
+            |members: &[Member]| members.iter().map(|member| u64::from(member.weight)).sum::<u64>();
         if weigh(&members) < weight {
             return None;
         }
@@ -223,7 +243,8 @@ impl Region {
         let (mut low, mut high, mut missing) = (0, members.len(), weight);
         while high - low > 1 {
             let half = (high - low) / 2;
-            let by_area = |a: &Member, b: &Member| a.area.total_cmp(&b.area).then(a.cluster.cmp(&b.cluster));
+            let by_area =
+                |a: &Member, b: &Member| a.area.total_cmp(&b.area).then(a.cluster.cmp(&b.cluster));
             members[low..high].select_nth_unstable_by(half, by_area);
             let lower = weigh(&members[low..low + half]);
             if lower >= missing {
@@ -242,7 +263,9 @@ impl Region {
     /// The reaches of the first `enough` members.
     #[inline(always)]
     fn nearest<'a>(&'a self, clusters: &'a Clusters) -> impl Iterator<Item = &'a Reach> {
-        self.members[..self.enough].iter().map(|member| &clusters.nodes[member.cluster as usize].reach)
+        self.members[..self.enough]
+            .iter()
+            .map(|member| &clusters.nodes[member.cluster as usize].reach)
     }
 
     /// The box around them: a good box of the region.
@@ -283,7 +306,13 @@ with_vector_instructions! {
 }
 
 #[inline(always)]
-fn search_plain(clusters: &Clusters, seed: usize, weight: u64, effort: u32, observer: &dyn Observer) -> f64 {
+fn search_plain(
+    clusters: &Clusters,
+    seed: usize,
+    weight: u64,
+    effort: u32,
+    observer: &dyn Observer,
+) -> f64 {
     let mut around = seed;
     while around != 0 && clusters.weight_of(&clusters.nodes[around].objects) < weight {
         around = clusters.nodes[around].parent;
@@ -294,9 +323,11 @@ fn search_plain(clusters: &Clusters, seed: usize, weight: u64, effort: u32, obse
     // Regions without smaller boxes have been dropped; the others together contain all smaller boxes.
     let mut regions: Vec<Region> =
         Region::new(clusters, must, members.into_iter(), weight, &mut known).into_iter().collect();
-    let mut left = regions.iter().map(|region| region.members.len() as u64).sum::<u64>() * u64::from(effort);
+    let mut left =
+        regions.iter().map(|region| region.members.len() as u64).sum::<u64>() * u64::from(effort);
     loop {
-        let least = (0..regions.len()).min_by(|&a, &b| regions[a].bound.total_cmp(&regions[b].bound));
+        let least =
+            (0..regions.len()).min_by(|&a, &b| regions[a].bound.total_cmp(&regions[b].bound));
         let Some(least) = least.filter(|&least| regions[least].bound < known) else { return known };
         if left == 0 || observer.cancelled() {
             return regions[least].bound;
@@ -305,7 +336,8 @@ fn search_plain(clusters: &Clusters, seed: usize, weight: u64, effort: u32, obse
         left = left.saturating_sub(2 * region.members.len() as u64);
         let Some((face, at)) = region.division(clusters) else { return region.bound };
         let members = || region.members.iter().copied();
-        let short = members().filter(|member| clusters.nodes[member.cluster as usize].reach.0[face] < at);
+        let short =
+            members().filter(|member| clusters.nodes[member.cluster as usize].reach.0[face] < at);
         let mut far = region.must;
         far.0[face] = at;
         regions.extend(Region::new(clusters, region.must, short, weight, &mut known));

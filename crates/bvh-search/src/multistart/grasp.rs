@@ -17,7 +17,9 @@
 
 use crate::local::LocalSearch;
 use crate::parallel::{KEPT_NODES, map_init};
-use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Stream, Tally, stream, watched};
+use crate::run::{
+    Observer, Problem, Quota, Run, Search, SearchError, Stream, Tally, stream, watched,
+};
 use crate::tree::{Area, Metric, Working};
 use bvh_build::top_down::{Split, SplitCost, SplitRule, Sweep, Workspace};
 use bvh_build::{BuildError, Presorted, Watch, muller_fellner};
@@ -48,7 +50,11 @@ bvh_config::config! {
 
 /// The restricted candidate list of a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Candidates {
     /// The best split of each of the three axes.
@@ -85,12 +91,19 @@ impl Config {
     }
 
     /// Improves a tree to a local optimum; leaves it as it was if the observer cancels before. Returns the nodes visited.
-    fn improve(&self, tree: &mut Bvh, problem: &Problem, observer: &dyn Observer) -> Result<u64, SearchError> {
+    fn improve(
+        &self,
+        tree: &mut Bvh,
+        problem: &Problem,
+        observer: &dyn Observer,
+    ) -> Result<u64, SearchError> {
         if self.local_search.is_none() {
             return Ok(0);
         }
         match problem.measure {
-            Some(measure) => self.improve_by(measure, tree, cost::internal_measure(tree, measure), observer),
+            Some(measure) => {
+                self.improve_by(measure, tree, cost::internal_measure(tree, measure), observer)
+            }
             None => self.improve_by(Area, tree, cost::internal_area(tree), observer),
         }
     }
@@ -157,12 +170,14 @@ impl Search for Config {
         let mut next = 0;
         let mut best = Bvh::default();
         while next < self.trials && run.stopped().is_none() {
-            let end = self.trials.min(next.saturating_add(run.evaluations_left(construction).min(most)));
+            let end =
+                self.trials.min(next.saturating_add(run.evaluations_left(construction).min(most)));
             let limit = run.incumbent();
             let results = map_init((end - next) as usize, Default::default, |buffers, at| {
                 let (workspace, tree): &mut (Workspace, Bvh) = buffers;
                 let number = (seed, next + at as u64);
-                let mut trial = self.attempt(&scene, problem, number, (workspace, tree), observer)?;
+                let mut trial =
+                    self.attempt(&scene, problem, number, (workspace, tree), observer)?;
                 if let Some(trial) = trial.as_mut().filter(|trial| trial.cost < limit) {
                     trial.tree = Some(std::mem::take(tree));
                 }
@@ -214,7 +229,9 @@ impl SplitRule for Randomised {
             return node.best();
         }
         match *candidates {
-            Candidates::AxisBest if noise.is_none() => return node.axis_best(rng.random_range(0..3u8)),
+            Candidates::AxisBest if noise.is_none() => {
+                return node.axis_best(rng.random_range(0..3u8));
+            }
             Candidates::AxisBest => node.axis_bests(list),
             Candidates::KBest(k) => node.k_best(k as usize, list),
             Candidates::Within(alpha) => node.within(alpha, list),
@@ -233,14 +250,18 @@ mod tests {
     use bvh_core::validate;
 
     fn configs() -> [Config; 6] {
-        let config = |candidates, noise| Config { trials: 12, candidates, noise, ..Config::default() };
+        let config =
+            |candidates, noise| Config { trials: 12, candidates, noise, ..Config::default() };
         [
             config(Candidates::AxisBest, None),
             config(Candidates::AxisBest, Some(0.1)),
             config(Candidates::KBest(5), Some(0.1)),
             config(Candidates::KBest(5), None),
             config(Candidates::Within(0.05), Some(0.5)),
-            Config { local_search: LocalSearch::Treelet, ..config(Candidates::AxisBest, Some(0.1)) },
+            Config {
+                local_search: LocalSearch::Treelet,
+                ..config(Candidates::AxisBest, Some(0.1))
+            },
         ]
     }
 
@@ -248,12 +269,19 @@ mod tests {
     fn rules_that_leave_no_choice_construct_the_greedy_tree() {
         let boxes = scatter(700);
         let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
-        let every = [Candidates::AxisBest, Candidates::KBest(1), Candidates::KBest(9), Candidates::Within(0.0)];
-        for (candidates, noise) in every.map(|candidates| (candidates, Some(0.0))).into_iter().chain([
-            (Candidates::KBest(1), None),
-            (Candidates::KBest(1), Some(1.0)),
-            (Candidates::Within(0.0), None),
-        ]) {
+        let every = [
+            Candidates::AxisBest,
+            Candidates::KBest(1),
+            Candidates::KBest(9),
+            Candidates::Within(0.0),
+        ];
+        for (candidates, noise) in
+            every.map(|candidates| (candidates, Some(0.0))).into_iter().chain([
+                (Candidates::KBest(1), None),
+                (Candidates::KBest(1), Some(1.0)),
+                (Candidates::Within(0.0), None),
+            ])
+        {
             let config = Config { trials: 2, candidates, noise, ..Config::default() };
             let outcome = solve(&config, &Problem::new(&boxes), 7, Budget::UNLIMITED, &()).unwrap();
             assert_eq!(outcome.tree, greedy, "{config:?}");
@@ -262,7 +290,9 @@ mod tests {
 
     #[test]
     fn every_rule_constructs_valid_trees_whose_cost_is_the_recorded_one() {
-        for boxes in [scatter(300), scatter(1), scatter(2), scatter(3), vec![scatter(1)[0]; 100], vec![]] {
+        for boxes in
+            [scatter(300), scatter(1), scatter(2), scatter(3), vec![scatter(1)[0]; 100], vec![]]
+        {
             for config in configs() {
                 let problem = Problem::new(&boxes);
                 let outcome = solve(&config, &problem, 1, Budget::UNLIMITED, &()).unwrap();
@@ -283,15 +313,21 @@ mod tests {
             pool.install(|| solve(&config, &Problem::new(&boxes), 3, budget, &()).unwrap())
         };
         let plain = run(LocalSearch::None, 1, None);
-        for local_search in [LocalSearch::Rotation, LocalSearch::Treelet, LocalSearch::Reinsertion] {
+        for local_search in [LocalSearch::Rotation, LocalSearch::Treelet, LocalSearch::Reinsertion]
+        {
             let improved = run(local_search, 1, None);
             let pairs = plain.history.iter().zip(&improved.history);
-            assert!(pairs.clone().all(|(before, after)| after.cost < before.cost && after.work > before.work));
+            assert!(
+                pairs
+                    .clone()
+                    .all(|(before, after)| after.cost < before.cost && after.work > before.work)
+            );
             let cut = |threads| run(local_search, threads, Some(improved.work / 3));
             let (one, three) = (cut(1), cut(3));
             assert_eq!((&one.tree, &one.history), (&three.tree, &three.history));
             // The budget ends the search with the first trial that exceeds it.
-            let within = improved.history.iter().take_while(|event| event.work < improved.work / 3).count();
+            let within =
+                improved.history.iter().take_while(|event| event.work < improved.work / 3).count();
             assert_eq!(one.history, improved.history[..=within]);
         }
     }
@@ -306,7 +342,8 @@ mod tests {
         }
         let boxes = scatter(500);
         let config = Config { local_search: LocalSearch::Reinsertion, ..Config::default() };
-        let outcome = solve(&config, &Problem::new(&boxes), 3, Budget::UNLIMITED, &Cancelled).unwrap();
+        let outcome =
+            solve(&config, &Problem::new(&boxes), 3, Budget::UNLIMITED, &Cancelled).unwrap();
         let plain = Config { trials: 1, ..Config::default() };
         let plain = solve(&plain, &Problem::new(&boxes), 3, Budget::UNLIMITED, &()).unwrap();
         assert_eq!((outcome.tree, outcome.cost), (plain.tree, plain.cost));
@@ -316,7 +353,8 @@ mod tests {
     fn noise_makes_trials_differ() {
         let boxes = scatter(500);
         for config in configs() {
-            let history = solve(&config, &Problem::new(&boxes), 3, Budget::UNLIMITED, &()).unwrap().history;
+            let history =
+                solve(&config, &Problem::new(&boxes), 3, Budget::UNLIMITED, &()).unwrap().history;
             assert!(history.iter().any(|event| event.cost != history[0].cost), "{config:?}");
         }
     }

@@ -32,7 +32,13 @@ bvh_config::config! {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Found {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         let n = problem.boxes.len() as u64;
         let quota = run.left().at_most(self.work_per_object.saturating_mul(n));
@@ -43,7 +49,8 @@ impl Config {
         let kicks = ((self.strength * n as f64) as u64).max(1);
         let mut number = 0;
         while n > 2 && run.stopped().is_none() && !quota.is_reached(&total) {
-            let (mut other, mut rng, mut mover) = (tree.clone(), stream(seed, number), SingleMover::new(&kick));
+            let (mut other, mut rng, mut mover) =
+                (tree.clone(), stream(seed, number), SingleMover::new(&kick));
             number += 1;
             // At this temperature every move is accepted.
             let (mut tally, observer) = (Tally::default(), run.observer());
@@ -76,7 +83,8 @@ mod tests {
     fn perturbations_lead_below_the_first_local_optimum_and_never_above() {
         let boxes = crate::scatter::scatter(600);
         let problem = Problem::new(&boxes);
-        let first = solve(&reinsertion::Config::default(), &problem, 1, Budget::UNLIMITED, &()).unwrap();
+        let first =
+            solve(&reinsertion::Config::default(), &problem, 1, Budget::UNLIMITED, &()).unwrap();
         let config = Config { work_per_object: 3000, ..Config::default() };
         let found = solve(&config, &problem, 1, Budget::UNLIMITED, &()).unwrap();
         assert!(found.cost < first.cost, "{} {}", found.cost, first.cost);

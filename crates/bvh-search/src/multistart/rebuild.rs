@@ -14,7 +14,9 @@ use crate::local::initial::{Start, construction};
 use crate::local::pass::TOLERANCE;
 use crate::local::{LocalSearch, reinsertion};
 use crate::parallel;
-use crate::run::{Found, Observer, Problem, Quota, Run, SearchError, Stream, Tally, stream, watched};
+use crate::run::{
+    Found, Observer, Problem, Quota, Run, SearchError, Stream, Tally, stream, watched,
+};
 use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
 use bvh_build::top_down::Workspace;
 use bvh_build::{BuildError, Presorted, muller_fellner};
@@ -53,7 +55,13 @@ search_by_metric!(Config);
 
 impl Config {
     /// Rebuilds disjoint subtrees in parallel, each with a random stream of its own.
-    fn search_by<A: Metric>(&self, metric: A, problem: &Problem, seed: u64, run: &mut Run) -> Found {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Found {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         let n = tree.objects() as u64;
         if n < 3 {
@@ -80,10 +88,18 @@ impl Config {
                 let share = Quota { work: quota.work / (2 * BATCH), ..Quota::ENDLESS };
                 let construct = |at: usize| {
                     let rng = stream(seed, first + at as u64);
-                    self.construct((&tree, problem.measure), &subtrees[at], share, rng, run.observer())
+                    self.construct(
+                        (&tree, problem.measure),
+                        &subtrees[at],
+                        share,
+                        rng,
+                        run.observer(),
+                    )
                 };
                 let found =
-                    parallel::map(subtrees.len(), construct).into_iter().collect::<Result<Vec<_>, _>>()?;
+                    parallel::map(subtrees.len(), construct)
+                        .into_iter()
+                        .collect::<Result<Vec<_>, _>>()?;
                 number += subtrees.len() as u64;
                 let limit = Quota { work: quota.work / 2, ..Quota::ENDLESS };
                 round += replace(&mut tree, &subtrees, &found, limit, run.observer());
@@ -184,14 +200,18 @@ impl Config {
         rng: Stream,
         observer: &dyn Observer,
     ) -> Result<(Option<Working<A>>, Tally), SearchError> {
-        let boxes: Vec<Aabb> =
-            subtree.leaves.iter().map(|&leaf| Aabb::from(&tree.nodes[leaf as usize].aabb)).collect();
+        let boxes: Vec<Aabb> = subtree
+            .leaves
+            .iter()
+            .map(|&leaf| Aabb::from(&tree.nodes[leaf as usize].aabb))
+            .collect();
         let mut rule = Randomised::new(self.candidates, Some(self.noise), rng);
         let mut other = Bvh::default();
         let scene = Presorted::new(&boxes)?;
         let buffers = (&mut Workspace::default(), &mut other);
-        let constructed =
-            watched(observer, |watch| self.construction.construct(&scene, measure, &mut rule, buffers, watch));
+        let constructed = watched(observer, |watch| {
+            self.construction.construct(&scene, measure, &mut rule, buffers, watch)
+        });
         match constructed {
             Err(BuildError::Cancelled) => return Ok((None, Tally::default())),
             constructed => constructed?,
@@ -207,7 +227,11 @@ impl Config {
 /// The area of a node's children, 0 for a leaf.
 fn contribution(tree: &Working<impl Metric>, at: u32) -> f64 {
     let node = &tree.nodes[at as usize];
-    if node.is_leaf() { 0.0 } else { node.children.iter().map(|&child| tree.nodes[child as usize].area).sum() }
+    if node.is_leaf() {
+        0.0
+    } else {
+        node.children.iter().map(|&child| tree.nodes[child as usize].area).sum()
+    }
 }
 
 /// Replaces subtrees by the better ones, then tries all their nodes in all positions of the tree once.

@@ -53,7 +53,9 @@ impl Search for Config {
         let mut rng = stream(seed, 0);
         (..=MOST_ENTRIES / insertion.len().max(1)).check("population", &self.population)?;
         let mut population: Vec<Individual> = Vec::new();
-        while population.len() < self.population && (population.is_empty() || !run.observer().cancelled()) {
+        while population.len() < self.population
+            && (population.is_empty() || !run.observer().cancelled())
+        {
             let order = random_order(insertion.len(), &mut rng);
             population.push(Individual { order, cost: f64::INFINITY, evaluated: false });
         }
@@ -99,8 +101,10 @@ fn evaluate(
     population: &mut [Individual],
     run: &mut Run,
 ) -> Result<(Individual, Option<Bvh>), SearchError> {
-    let mut changed: Vec<&mut Individual> = population.iter_mut().filter(|i| !i.evaluated).collect();
-    let orders: Vec<&[u32]> = changed.iter().map(|individual| individual.order.as_slice()).collect();
+    let mut changed: Vec<&mut Individual> =
+        population.iter_mut().filter(|i| !i.evaluated).collect();
+    let orders: Vec<&[u32]> =
+        changed.iter().map(|individual| individual.order.as_slice()).collect();
     let Evaluated { costs, cheapest } = insertion.evaluate(&orders, run)?;
     let missing = costs.iter().filter(|cost| cost.is_none()).count();
     let work = (costs.len() - missing) as u64 * insertion.work();
@@ -147,7 +151,8 @@ fn cross(parents: &mut [Individual], probability: f64, marks: &mut [bool], rng: 
         }
         let [a, b] = pair else { continue };
         let cut = rng.random_range(0..=a.order.len() as u32) as usize;
-        let children = [child(&a.order, &b.order, cut, marks), child(&b.order, &a.order, cut, marks)];
+        let children =
+            [child(&a.order, &b.order, cut, marks), child(&b.order, &a.order, cut, marks)];
         for (parent, order) in [a, b].into_iter().zip(children) {
             if parent.order != order {
                 (parent.order, parent.evaluated) = (order, false);
@@ -227,8 +232,16 @@ mod tests {
         let boxes = scatter(80);
         let problem = Problem { objective: Objective::GoldsmithSalmon, ..Problem::new(&boxes) };
         for population in [1, 2, 3, 20] {
-            for (crossover, mutation) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.7, 0.05), (1.0, 1.0)] {
-                let config = Config { population, generations: 15, crossover, mutation, ..Config::default() };
+            for (crossover, mutation) in
+                [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.7, 0.05), (1.0, 1.0)]
+            {
+                let config = Config {
+                    population,
+                    generations: 15,
+                    crossover,
+                    mutation,
+                    ..Config::default()
+                };
                 let outcome = solve(&config, &problem, 3, Budget::UNLIMITED, &()).unwrap();
                 assert_eq!(outcome.history.len(), 16);
                 assert!(outcome.history.iter().all(|event| event.incumbent <= event.cost));
@@ -237,7 +250,11 @@ mod tests {
                     "{config:?}"
                 );
                 let cost = problem.objective.cost(&outcome.tree);
-                assert!((outcome.cost - cost).abs() <= 1e-12 * cost, "{config:?}: {} and {cost}", outcome.cost);
+                assert!(
+                    (outcome.cost - cost).abs() <= 1e-12 * cost,
+                    "{config:?}: {} and {cost}",
+                    outcome.cost
+                );
             }
         }
     }
@@ -251,7 +268,8 @@ mod tests {
         let history = solve(&config, &problem, 3, Budget::UNLIMITED, &()).unwrap().history;
         assert!(history.last().unwrap().incumbent < history[0].cost);
         for count in [1, 2, 7] {
-            let individual = |at: usize| Individual { order: vec![], cost: at as f64, evaluated: true };
+            let individual =
+                |at: usize| Individual { order: vec![], cost: at as f64, evaluated: true };
             let population: Vec<Individual> = (0..count).map(individual).collect();
             assert_eq!(select(&population, &mut stream(1, 0)).len(), count);
         }
@@ -277,7 +295,8 @@ mod tests {
         let boxes = scatter(200);
         let config = Config { population: 10, generations: 20, ..Config::default() };
         let depth = |judge: Option<&dyn Judge>| {
-            let problem = Problem { objective: Objective::GoldsmithSalmon, judge, ..Problem::new(&boxes) };
+            let problem =
+                Problem { objective: Objective::GoldsmithSalmon, judge, ..Problem::new(&boxes) };
             let outcome = solve(&config, &problem, 3, Budget::UNLIMITED, &()).unwrap();
             (outcome.tree.depth() as f64, outcome.cost)
         };

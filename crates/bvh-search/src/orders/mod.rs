@@ -40,8 +40,14 @@ impl<'p> Insertion<'p> {
     }
 
     /// The cost of the tree of one order, which must be a permutation of the objects; `None` if the observer cancels before.
-    fn cost(&self, order: &[u32], (workspace, tree): &mut Buffers, observer: &dyn Observer) -> Option<f64> {
-        let insert = |watch: &Watch| self.config.insert_watched(&self.scene, order, workspace, watch);
+    fn cost(
+        &self,
+        order: &[u32],
+        (workspace, tree): &mut Buffers,
+        observer: &dyn Observer,
+    ) -> Option<f64> {
+        let insert =
+            |watch: &Watch| self.config.insert_watched(&self.scene, order, workspace, watch);
         let goldsmith_salmon = match watched(observer, insert) {
             Ok(cost) => cost,
             Err(InvalidOrder::Cancelled) => return None,
@@ -62,7 +68,8 @@ impl<'p> Insertion<'p> {
     /// The tree of one order, unless the observer cancels before it is built.
     fn tree(&self, order: &[u32], observer: &dyn Observer) -> Option<Bvh> {
         let (mut workspace, mut tree) = Buffers::default();
-        let insert = |watch: &Watch| self.config.insert_watched(&self.scene, order, &mut workspace, watch);
+        let insert =
+            |watch: &Watch| self.config.insert_watched(&self.scene, order, &mut workspace, watch);
         watched(observer, insert).ok()?;
         workspace.write(&mut tree);
         Some(tree)
@@ -93,8 +100,8 @@ impl<'p> Insertion<'p> {
             for (at, evaluated) in evaluated.into_iter().enumerate() {
                 let (cost, tree) = evaluated.unzip();
                 found.costs.push(cost);
-                let is_cheapest =
-                    cost.is_some_and(|cost| found.cheapest.is_none() && cost <= limit || cost < limit);
+                let is_cheapest = cost
+                    .is_some_and(|cost| found.cheapest.is_none() && cost <= limit || cost < limit);
                 if let (Some(cost), Some(tree), true) = (cost, tree.flatten(), is_cheapest) {
                     limit = cost;
                     found.cheapest = Some((number * most + at, tree));

@@ -30,7 +30,9 @@ impl Search for Config {
         let mut next = 0;
         let mut best = Bvh::default();
         while next < self.trials && run.stopped().is_none() {
-            let end = self.trials.min(next.saturating_add(run.evaluations_left(insertion.work()).min(BATCH)));
+            let end = self
+                .trials
+                .min(next.saturating_add(run.evaluations_left(insertion.work()).min(BATCH)));
             let orders: Vec<Vec<u32>> = (next..end).map(order).collect();
             let orders: Vec<&[u32]> = orders.iter().map(Vec::as_slice).collect();
             let Evaluated { costs, cheapest } = insertion.evaluate(&orders, run)?;

@@ -5,7 +5,11 @@ use std::ops::AddAssign;
 /// Limits in machine-independent units; `None` is no limit. A limit in seconds is a [`Deadline`](crate::Deadline), or any other
 /// [`Observer`](crate::Observer) that cancels. There is no default: without any limit, [`best`](crate::best) takes hours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Budget {
     /// Maximum number of trees or moves to evaluate.
@@ -23,7 +27,11 @@ impl Budget {
 
 /// Why a search returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum StopReason {
     /// It did all that its configuration asks for.
@@ -85,6 +93,9 @@ impl Quota {
     /// What is left of the quota after `done`.
     #[must_use]
     pub fn less(&self, done: &Tally) -> Self {
-        Self { moves: self.moves.saturating_sub(done.moves), work: self.work.saturating_sub(done.work) }
+        Self {
+            moves: self.moves.saturating_sub(done.moves),
+            work: self.work.saturating_sub(done.work),
+        }
     }
 }

@@ -34,7 +34,9 @@ pub trait Search: Check {
 
 impl<B: Builder> Search for B {
     fn search(&self, problem: &Problem, _seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
-        let tree = watched(run.observer(), |watch| self.build_watched(problem.boxes, problem.measure, watch))?;
+        let tree = watched(run.observer(), |watch| {
+            self.build_watched(problem.boxes, problem.measure, watch)
+        })?;
         run.record(problem.cost(&tree), tree.nodes.len() as u64);
         Ok(tree)
     }
@@ -151,7 +153,8 @@ impl<'a> Run<'a> {
         if self.optimal.is_some() {
             return Quota { work: 0, moves: 0 };
         }
-        let left = |limit: Option<u64>, count| limit.map_or(u64::MAX, |limit| limit.saturating_sub(count));
+        let left =
+            |limit: Option<u64>, count| limit.map_or(u64::MAX, |limit| limit.saturating_sub(count));
         Quota {
             work: left(self.budget.max_work, self.work),
             moves: left(self.budget.max_evaluations, self.evaluations),

@@ -96,7 +96,11 @@ impl<'a> Problem<'a> {
 /// Work that some scenes do not need. No shortcut changes the cost of a tree that is built; a search that is ended early
 /// or replaced by the exact solver never returns a more expensive tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Shortcut {
     /// An axis that orders the objects as a lower axis does is neither scanned nor divided: its split candidates are

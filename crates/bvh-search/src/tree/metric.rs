@@ -52,7 +52,11 @@ impl<A: Metric> Metric for WithLeaves<A> {
     }
 
     fn internal(self, tree: &Bvh) -> f64 {
-        tree.nodes.iter().map(|node| self.0.of(&PackedAabb::from(&node.aabb))).collect::<Sum>().value()
+        tree.nodes
+            .iter()
+            .map(|node| self.0.of(&PackedAabb::from(&node.aabb)))
+            .collect::<Sum>()
+            .value()
     }
 }
 
@@ -60,7 +64,12 @@ impl<A: Metric> Metric for WithLeaves<A> {
 macro_rules! search_by_metric {
     ($config:ty) => {
         impl crate::run::Search for $config {
-            fn search(&self, problem: &crate::run::Problem, seed: u64, run: &mut Run) -> crate::run::Found {
+            fn search(
+                &self,
+                problem: &crate::run::Problem,
+                seed: u64,
+                run: &mut Run,
+            ) -> crate::run::Found {
                 match problem.measure {
                     Some(measure) => self.search_by(measure, problem, seed, run),
                     None => self.search_by(crate::tree::Area, problem, seed, run),

@@ -48,8 +48,14 @@ pub(crate) struct Node {
 }
 
 impl Node {
-    const ANCHOR: Self =
-        Self { aabb: PackedAabb::EMPTY, area: 0.0, stamp: 0, parent: NONE, children: [NONE; 2], index: NONE };
+    const ANCHOR: Self = Self {
+        aabb: PackedAabb::EMPTY,
+        area: 0.0,
+        stamp: 0,
+        parent: NONE,
+        children: [NONE; 2],
+        index: NONE,
+    };
 
     #[inline(always)]
     pub fn is_leaf(&self) -> bool {
@@ -286,7 +292,8 @@ impl<M: Metric> Working<M> {
         nodes.reserve(self.nodes.len());
         nodes.push(Node { stamp: 0, ..self.nodes[0] });
         // Pending nodes: old index, new parent, side.
-        let mut stack: Vec<(u32, u32, usize)> = self.root().map(|root| (root, ANCHOR, 0)).into_iter().collect();
+        let mut stack: Vec<(u32, u32, usize)> =
+            self.root().map(|root| (root, ANCHOR, 0)).into_iter().collect();
         let mut area = Sum::default();
         while let Some((old, parent, side)) = stack.pop() {
             let (at, node) = (nodes.len() as u32, self.nodes[old as usize]);

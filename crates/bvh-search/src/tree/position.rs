@@ -135,7 +135,12 @@ impl PositionSearch {
     ///
     /// Ancestors have their boxes *without* the node here, so that their present boxes are the unions with B.
     #[inline(always)]
-    pub fn attached<T: Linked>(&mut self, tree: &T, node: u32, tolerance: f64) -> (Option<Position>, f64) {
+    pub fn attached<T: Linked>(
+        &mut self,
+        tree: &T,
+        node: u32,
+        tolerance: f64,
+    ) -> (Option<Position>, f64) {
         let (aabb, area, parent) = (tree.aabb(node), tree.area(node), tree.parent(node));
         self.path.clear();
         let sibling = tree.other(parent, node);
@@ -228,7 +233,13 @@ fn pop(stack: &mut Vec<(u32, f64)>, area: f64, limit: f64) -> Option<(u32, f64)>
 
 /// Tries the position beside a node. Returns the growth of the node and all its ancestors, infinite for a leaf.
 #[inline(always)]
-fn try_position(tree: &impl Linked, at: u32, aabb: &PackedAabb, growth: f64, best: &mut Position) -> f64 {
+fn try_position(
+    tree: &impl Linked,
+    at: u32,
+    aabb: &PackedAabb,
+    growth: f64,
+    best: &mut Position,
+) -> f64 {
     let cost = growth + tree.size(&tree.aabb(at).union(aabb));
     if cost < best.cost {
         *best = Position { beside: at, cost };

@@ -68,7 +68,8 @@ impl Siblings {
     fn tighten(&mut self, mut at: u32) -> u64 {
         let mut visits = 0;
         while at != NONE {
-            let [left, right] = self.children(at).expect("an inner node").map(|child| self.node(child).aabb);
+            let [left, right] =
+                self.children(at).expect("an inner node").map(|child| self.node(child).aabb);
             visits += 1;
             let (aabb, node) = (left.union(&right), &mut self.tree.nodes[at as usize]);
             if aabb == node.aabb {
@@ -87,7 +88,8 @@ impl Siblings {
         let mut places = vec![0; sequence.len()];
         sequence.iter().zip(0..).for_each(|(&from, to)| places[from as usize] = to);
         let moved = |mut node: Node| {
-            let (NodeKind::Inner { first: before, .. } | NodeKind::Leaf { first: before, .. }) = node.kind();
+            let (NodeKind::Inner { first: before, .. } | NodeKind::Leaf { first: before, .. }) =
+                node.kind();
             let below = select_unpredictable(node.is_leaf(), 0, pair(before.max(1)));
             let after = 2 * places[below] + 1;
             node.set_first(select_unpredictable(node.is_leaf(), before, after));
@@ -95,7 +97,8 @@ impl Siblings {
         };
         // Late pairs are kept aside until it is their turn; the others move towards the front, if at all.
         let nodes = tree.nodes.as_mut_slice();
-        let aside: Vec<Node> = late.iter().flat_map(|&pair| &nodes[first(pair)..][..2]).copied().collect();
+        let aside: Vec<Node> =
+            late.iter().flat_map(|&pair| &nodes[first(pair)..][..2]).copied().collect();
         let (mut aside, mut next) = (aside.chunks_exact(2), 0);
         nodes[0] = moved(nodes[0]);
         for (to, from) in (0..).zip(sequence) {
@@ -125,7 +128,8 @@ impl PairOrder {
         const DONE: u32 = NONE - 1;
         // Per pair, the last entry of `waiting` that waits for it. An entry is a pair and the previous entry.
         let (mut last, mut waiting) = (vec![NONE; parents.len()], Vec::new());
-        let (mut sequence, mut late, mut ready) = (Vec::with_capacity(parents.len()), Vec::new(), Vec::new());
+        let (mut sequence, mut late, mut ready) =
+            (Vec::with_capacity(parents.len()), Vec::new(), Vec::new());
         for (number, &parent) in (0..).zip(parents) {
             if parent != 0 && last[pair(parent)] != DONE {
                 let entry = waiting.len() as u32;
@@ -208,15 +212,21 @@ mod tests {
     use rand::RngExt;
 
     fn starts(boxes: &[Aabb]) -> [Bvh; 2] {
-        [ploc::Config::default().build(boxes).unwrap(), muller_fellner::Config::default().build(boxes).unwrap()]
+        [
+            ploc::Config::default().build(boxes).unwrap(),
+            muller_fellner::Config::default().build(boxes).unwrap(),
+        ]
     }
 
     /// The positions that a node other than the root may be moved to.
     fn positions(tree: &Siblings, node: u32) -> Vec<u32> {
         let allowed = |&place: &u32| {
-            let mut above =
-                std::iter::successors(Some(place), |&at| Some(tree.parent(at)).filter(|&at| at != NONE));
-            place != tree.parent(node) && place != tree.other(NONE, node) && above.all(|at| at != node)
+            let mut above = std::iter::successors(Some(place), |&at| {
+                Some(tree.parent(at)).filter(|&at| at != NONE)
+            });
+            place != tree.parent(node)
+                && place != tree.other(NONE, node)
+                && above.all(|at| at != node)
         };
         (0..tree.len() as u32).filter(allowed).collect()
     }

@@ -19,14 +19,22 @@ impl Subsets {
     /// Room for so many leaves, at most 16.
     pub fn new(leaves: u32) -> Self {
         let subsets = 1 << leaves;
-        Self { boxes: vec![PackedAabb::EMPTY; subsets], cost: vec![0.0; subsets], side: vec![0; subsets] }
+        Self {
+            boxes: vec![PackedAabb::EMPTY; subsets],
+            cost: vec![0.0; subsets],
+            side: vec![0; subsets],
+        }
     }
 
     /// Finds the best divisions and returns the least internal area over all leaves. O(3ⁿ) for n leaves.
     ///
     /// Of equal divisions, the one is taken whose side with the lowest leaf is the least as a bit set.
     #[inline(always)]
-    pub fn solve(&mut self, leaves: impl ExactSizeIterator<Item = PackedAabb>, metric: impl Metric) -> f64 {
+    pub fn solve(
+        &mut self,
+        leaves: impl ExactSizeIterator<Item = PackedAabb>,
+        metric: impl Metric,
+    ) -> f64 {
         let all = (1usize << leaves.len()) - 1;
         for (position, aabb) in leaves.enumerate() {
             self.boxes[1 << position] = aabb;

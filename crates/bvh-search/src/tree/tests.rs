@@ -31,7 +31,10 @@ fn assert_tight(tree: &Working, boxes: &[Aabb]) {
     assert_eq!(bvh, tight);
     for at in tree.preorder() {
         let node = &tree.nodes[at as usize];
-        assert!(node.is_leaf() || node.children.iter().all(|&child| tree.nodes[child as usize].parent == at));
+        assert!(
+            node.is_leaf()
+                || node.children.iter().all(|&child| tree.nodes[child as usize].parent == at)
+        );
         assert_eq!(node.area, node.aabb.half_area());
     }
 }
@@ -110,7 +113,8 @@ fn assert_best_places(mut tree: Working<impl Metric>) {
         let least = costs.fold(f64::INFINITY, f64::min);
         let (aabb, area) = (tree.nodes[node as usize].aabb, tree.nodes[node as usize].area);
         for first in [sibling, NONE, any(&tree, &mut rng)] {
-            let place = search.detached(&tree, Scope::ALL, (&aabb, area), first, f64::INFINITY).unwrap();
+            let place =
+                search.detached(&tree, Scope::ALL, (&aabb, area), first, f64::INFINITY).unwrap();
             assert!((place.cost - least).abs() <= 1e-12 * least, "{} {least}", place.cost);
         }
         let below = least * (1.0 - 1e-9);
@@ -153,10 +157,12 @@ fn the_best_place_in_a_region_is_the_best_there_and_costs_what_it_adds() {
                 || tree.nodes[root as usize].aabb.union(&aabb) == tree.nodes[root as usize].aabb
         );
         let cost = |place| tree.clone().attach(node, place).0;
-        let [least, everywhere] = [tree.preorder().into_iter().filter(inside).collect(), tree.preorder()]
-            .map(|places: Vec<u32>| places.into_iter().map(cost).fold(f64::INFINITY, f64::min));
+        let [least, everywhere] =
+            [tree.preorder().into_iter().filter(inside).collect(), tree.preorder()]
+                .map(|places: Vec<u32>| places.into_iter().map(cost).fold(f64::INFINITY, f64::min));
         for first in [sibling, NONE] {
-            let place = search.detached(&tree, region, (&aabb, area), first, f64::INFINITY).unwrap();
+            let place =
+                search.detached(&tree, region, (&aabb, area), first, f64::INFINITY).unwrap();
             assert!(inside(&place.beside));
             assert!((place.cost - least).abs() <= 1e-12 * least, "{} {least}", place.cost);
         }

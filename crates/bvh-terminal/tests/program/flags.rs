@@ -26,7 +26,10 @@ fn flags(folder: &Path, command: &str) -> Vec<(String, Option<String>)> {
         Some((name, words.next().filter(|word| word.starts_with('<')).map(str::to_owned)))
     };
     let lines = help.lines().filter(|line| line.trim_start().starts_with('-'));
-    lines.filter_map(flag).filter(|(name, _)| !["--help", "--version"].contains(&name.as_str())).collect()
+    lines
+        .filter_map(flag)
+        .filter(|(name, _)| !["--help", "--version"].contains(&name.as_str()))
+        .collect()
 }
 
 /// Gives every flag of the commands values that it cannot take, each command with the arguments that it needs; each must be rejected
@@ -36,8 +39,13 @@ pub fn wrong_flags(at: &Path, commands: &[(&str, &[&str])]) -> usize {
     fs::write(at.join("file"), "").unwrap();
     let before = names(at);
     let help = said(at, &["--help"]);
-    let listed =
-        help.split_once("Commands:").unwrap().1.lines().skip(1).take_while(|line| !line.trim().is_empty());
+    let listed = help
+        .split_once("Commands:")
+        .unwrap()
+        .1
+        .lines()
+        .skip(1)
+        .take_while(|line| !line.trim().is_empty());
     let listed: BTreeSet<&str> = listed.filter_map(|line| line.split_whitespace().next()).collect();
     let tried: BTreeSet<&str> =
         commands.iter().map(|(name, _)| *name).chain(["help"]).filter(|n| !n.is_empty()).collect();
@@ -49,7 +57,9 @@ pub fn wrong_flags(at: &Path, commands: &[(&str, &[&str])]) -> usize {
             let wrong: &[&str] = match value.as_deref() {
                 None => &["3"],
                 Some("<DIR>") => &["file", "file/below", ""],
-                Some(file) if file.starts_with("<FILE") || file.ends_with(".csv>") => &["folder", ""],
+                Some(file) if file.starts_with("<FILE") || file.ends_with(".csv>") => {
+                    &["folder", ""]
+                }
                 Some(_) => &["no such thing", "-1", "nan", "99999999999999999999999", ""],
             };
             for wrong in wrong {
@@ -59,8 +69,8 @@ pub fn wrong_flags(at: &Path, commands: &[(&str, &[&str])]) -> usize {
                 args.retain(|arg| !arg.starts_with(&format!("{flag}=")));
                 args.push(&given);
                 let (code, said) = outcome(at, &args);
-                let named =
-                    said.contains(&flag) || (flag == "--scene" && said.contains(&format!("scene {wrong}")));
+                let named = said.contains(&flag)
+                    || (flag == "--scene" && said.contains(&format!("scene {wrong}")));
                 if code != Some(2) || !named {
                     found.push(format!("{args:?}: code {code:?}: {said}"));
                 }

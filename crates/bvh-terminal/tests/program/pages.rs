@@ -23,11 +23,14 @@ impl Block {
 
 /// The paths, within the project, of all pages but the changelog, which speaks of what was.
 pub fn pages() -> Vec<PathBuf> {
-    let below = |folder: &str| fs::read_dir(top().join(folder)).unwrap().map(|entry| entry.unwrap().path());
+    let below =
+        |folder: &str| fs::read_dir(top().join(folder)).unwrap().map(|entry| entry.unwrap().path());
     let readmes = below("crates").map(|folder| folder.join("README.md"));
-    let pages = below(".").chain(below("docs")).chain(readmes).chain([top().join("results/README.md")]);
-    let is_page =
-        |path: &PathBuf| path.extension().is_some_and(|extension| extension == "md") && path.is_file();
+    let pages =
+        below(".").chain(below("docs")).chain(readmes).chain([top().join("results/README.md")]);
+    let is_page = |path: &PathBuf| {
+        path.extension().is_some_and(|extension| extension == "md") && path.is_file()
+    };
     let mut pages: Vec<PathBuf> =
         pages.filter(is_page).filter(|path| !path.ends_with("CHANGELOG.md")).collect();
     pages.sort();
@@ -70,11 +73,14 @@ pub fn commands(text: &str, place: &str) -> Vec<Vec<String>> {
     for line in text.replace("\\\n", " ").lines() {
         let words = shlex::split(line).unwrap_or_else(|| panic!("{place}: `{line}` is no shell"));
         let is_variable = |word: &String| {
-            word.split_once('=')
-                .is_some_and(|(name, _)| name.bytes().all(|byte| byte == b'_' || byte.is_ascii_uppercase()))
+            word.split_once('=').is_some_and(|(name, _)| {
+                name.bytes().all(|byte| byte == b'_' || byte.is_ascii_uppercase())
+            })
         };
-        let command =
-            words.into_iter().skip_while(is_variable).take_while(|word| !["|", ":::"].contains(&word.as_str()));
+        let command = words
+            .into_iter()
+            .skip_while(is_variable)
+            .take_while(|word| !["|", ":::"].contains(&word.as_str()));
         // GNU parallel puts a number in the place of braces.
         let command: Vec<String> = command.map(|word| word.replace("{}", "1")).collect();
         match command.first().map(String::as_str) {
@@ -131,7 +137,9 @@ impl Called {
             let outside: String = text.split("```").step_by(2).collect();
             let place = page.display().to_string();
             let begins = format!("{} ", self.name);
-            for code in outside.split('`').skip(1).step_by(2).filter(|code| code.starts_with(&begins)) {
+            for code in
+                outside.split('`').skip(1).step_by(2).filter(|code| code.starts_with(&begins))
+            {
                 for command in commands(code, &place) {
                     let Some(mut arguments) = self.arguments(&command) else { continue };
                     arguments.push("--help");
@@ -151,7 +159,8 @@ pub const UNREADABLE: &str = "try '--help'";
 
 /// What a command says on standard error within two seconds.
 fn beginning(folder: &Path, arguments: &[&str]) -> String {
-    let mut child = program(folder, arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut child =
+        program(folder, arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let start = Instant::now();
     while child.try_wait().unwrap().is_none() && start.elapsed() < Duration::from_secs(2) {
         std::thread::sleep(Duration::from_millis(5));

@@ -20,7 +20,8 @@ pub fn boxes(bytes: &[u8]) {
     let mut boxes = Vec::new();
     while !bytes.0.is_empty() && boxes.len() < MOST {
         let (a, b) = (bytes.point(few), bytes.point(few));
-        let aabb = if sorted { Aabb { min: a.min(b), max: a.max(b) } } else { Aabb { min: a, max: b } };
+        let aabb =
+            if sorted { Aabb { min: a.min(b), max: a.max(b) } } else { Aabb { min: a, max: b } };
         boxes.extend((0..copies).map(|_| aabb));
     }
     let limit = Some(u64::from(budget & 127));
@@ -48,7 +49,8 @@ fn refused(boxes: &[Aabb], bad: usize, seed: u64, budget: Budget) {
         if matches!(method, Method::Exact(_)) && boxes.len() > EXACT_OBJECTS {
             continue;
         }
-        let error = solve(&method, &Problem::new(boxes), seed, budget, &()).expect_err(method.name());
+        let error =
+            solve(&method, &Problem::new(boxes), seed, budget, &()).expect_err(method.name());
         assert!(matches!(error, SearchError::Build(_)), "{}: {error:?}", method.name());
         named(method.name(), error.to_string());
     }
@@ -74,12 +76,22 @@ fn built(boxes: &[Aabb], seed: u64, budget: Budget) {
         };
         let solve = || solve(&method, &Problem::new(boxes), seed, budget, &());
         let outcome = solve().unwrap_or_else(|error| panic!("{}: {error}", method.name()));
-        check_outcome(boxes, &outcome).unwrap_or_else(|broken| panic!("{}: {broken}", method.name()));
+        check_outcome(boxes, &outcome)
+            .unwrap_or_else(|broken| panic!("{}: {broken}", method.name()));
         let again = solve().unwrap();
-        assert!(again.tree == outcome.tree && again.history == outcome.history, "{}", method.name());
-        let binary = outcome.tree.nodes.iter().all(|node| node.is_leaf() || node.children().len() == 2);
+        assert!(
+            again.tree == outcome.tree && again.history == outcome.history,
+            "{}",
+            method.name()
+        );
+        let binary =
+            outcome.tree.nodes.iter().all(|node| node.is_leaf() || node.children().len() == 2);
         if binary && !matches!(method, Method::Exact(_)) {
-            assert!(outcome.cost >= bound * (1.0 - ROUNDING), "{} is below the bound", method.name());
+            assert!(
+                outcome.cost >= bound * (1.0 - ROUNDING),
+                "{} is below the bound",
+                method.name()
+            );
         }
         converted(&outcome.tree, boxes);
     }
@@ -89,7 +101,9 @@ fn built(boxes: &[Aabb], seed: u64, budget: Budget) {
     let before = cost::internal_area(&greedy);
     let merged = collapse_leaves(&greedy, &SahConstants::default());
     for tree in [&greedy, &merged] {
-        let better = optimize(tree, &Problem::new(boxes), &best::Config::default(), seed, budget, &()).unwrap();
+        let better =
+            optimize(tree, &Problem::new(boxes), &best::Config::default(), seed, budget, &())
+                .unwrap();
         validate(&better.tree, boxes).unwrap();
         assert!(better.cost <= before * (1.0 + ROUNDING));
     }

@@ -3,7 +3,8 @@
 use super::bytes::Bytes;
 use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
 use bvh_core::{
-    Aabb, Hit, Primitives, Ray, Sphere, Triangle, any_hit_by, clip_to_box, nearest_hit_by, nearest_hit_of_all,
+    Aabb, Hit, Primitives, Ray, Sphere, Triangle, any_hit_by, clip_to_box, nearest_hit_by,
+    nearest_hit_of_all,
 };
 use bvh_scenes::trace::kd_tree;
 use glam::Vec3;
@@ -19,7 +20,8 @@ pub fn rays(bytes: &[u8]) {
     // A scene is finite.
     let finite = |at: Vec3| (at * scale).map(|c| if c.is_finite() { c } else { 0.0 });
     let mut corner = || finite(bytes.point(few));
-    let triangles: Vec<Triangle> = (0..count % 12).map(|_| Triangle([corner(), corner(), corner()])).collect();
+    let triangles: Vec<Triangle> =
+        (0..count % 12).map(|_| Triangle([corner(), corner(), corner()])).collect();
     let mut rays = Vec::new();
     while !bytes.0.is_empty() && rays.len() < 8 {
         let origin = bytes.point(few_in_rays) * if few_in_rays { scale } else { 1.0 };
@@ -59,7 +61,9 @@ fn over(boxes: &[Aabb], ray: &Ray, test: impl Fn(u32, f32) -> Option<f32>) {
     let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
     let expected = nearest_hit_of_all(boxes.len() as u32, ray, &test, &mut ());
     let any = |id: u32| test(id, ray.t_max()).is_some();
-    for builder in [&muller_fellner::Config::default() as &dyn Builder, &goldsmith_salmon::Config::default()] {
+    for builder in
+        [&muller_fellner::Config::default() as &dyn Builder, &goldsmith_salmon::Config::default()]
+    {
         let tree = builder.build(boxes).unwrap();
         assert_eq!(bits(nearest_hit_by(&tree, ray, &test, &mut ())), bits(expected), "{ray:?}");
         assert_eq!(any_hit_by(&tree, ray, any, &mut ()), expected.is_some(), "{ray:?}");

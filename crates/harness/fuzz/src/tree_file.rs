@@ -2,7 +2,9 @@
 
 use bvh_core::cost::{self, SahConstants};
 use bvh_core::file::{Header, TreeFile, load};
-use bvh_core::{Aabb, Bvh, Ray, TestCounts, Triangle, any_hit_by, collapse_leaves, nearest_hit_by, validate};
+use bvh_core::{
+    Aabb, Bvh, Ray, TestCounts, Triangle, any_hit_by, collapse_leaves, nearest_hit_by, validate,
+};
 use glam::Vec3;
 
 /// The first byte says what is mended; the rest is a file.
@@ -67,7 +69,10 @@ fn opened(bytes: &[u8]) {
     };
     let objects = file.header().objects;
     if let Ok(Some(visits)) = file.visits() {
-        assert!(visits.len() == file.header().nodes && visits.iter().all(|part| (0.0..=1.0).contains(part)));
+        assert!(
+            visits.len() == file.header().nodes
+                && visits.iter().all(|part| (0.0..=1.0).contains(part))
+        );
     }
     assert_eq!([file.tree().is_ok(), file.view().is_ok()], [file.tree().is_ok(); 2]);
     if let (Ok(tree), Ok(view)) = (file.tree(), file.view()) {
@@ -79,13 +84,19 @@ fn opened(bytes: &[u8]) {
 
 fn bits(nodes: &[bvh_core::Node]) -> Vec<[u32; 6]> {
     let corners = |node: &bvh_core::Node| [node.aabb.min.to_array(), node.aabb.max.to_array()];
-    nodes.iter().map(|node| corners(node).as_flattened().as_chunks::<6>().0[0].map(f32::to_bits)).collect()
+    nodes
+        .iter()
+        .map(|node| corners(node).as_flattened().as_chunks::<6>().0[0].map(f32::to_bits))
+        .collect()
 }
 
 fn rays() -> impl Iterator<Item = Ray> {
     let origins = [Vec3::ZERO, Vec3::new(0.5, 5.0, -3.0), Vec3::splat(-1e30)];
     let directions = [Vec3::X, Vec3::new(0.0, -1.0, 0.5), Vec3::ONE];
-    origins.into_iter().flat_map(move |from| directions.map(|to| Ray::half_line(from, to))).flatten()
+    origins
+        .into_iter()
+        .flat_map(move |from| directions.map(|to| Ray::half_line(from, to)))
+        .flatten()
 }
 
 /// Every traversal ends, tests only objects that there are, and none twice.
@@ -105,7 +116,8 @@ fn traced(tree: &Bvh, objects: usize) {
 /// Whatever the boxes are, costs, refitting and conversions do not fail.
 fn measured(mut tree: Bvh, objects: usize) {
     let constants = SahConstants::default();
-    let costs = [cost::internal_area(&tree), cost::goldsmith_salmon(&tree), cost::sah(&tree, &constants)];
+    let costs =
+        [cost::internal_area(&tree), cost::goldsmith_salmon(&tree), cost::sah(&tree, &constants)];
     assert!(cost::over_root_area(&tree, costs[0]).is_nan() || tree.depth() <= tree.nodes.len());
     let merged = collapse_leaves(&tree, &constants);
     assert_eq!(merged.prim_ids.len(), objects);

@@ -22,7 +22,10 @@ const TEMPLATE: &str = include_str!("new.toml");
 pub fn new(args: &NewArgs) -> Result<(), Error> {
     let file = &args.file;
     if file.extension().is_none_or(|extension| extension != "toml") {
-        return Err(Error::Usage(format!("{}: accepted: a name that ends with .toml", file.display())));
+        return Err(Error::Usage(format!(
+            "{}: accepted: a name that ends with .toml",
+            file.display()
+        )));
     }
     let mut new = File::create_new(file).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => Error::Usage(format!("{} is there already", file.display())),

@@ -7,7 +7,8 @@ use bvh_terminal::output::print_line;
 use std::path::PathBuf;
 
 /// The page of all results.
-const PAGE: FileKind = FileKind { name: "an HTML page", beginning: b"<!DOCTYPE html>", extension: "html" };
+const PAGE: FileKind =
+    FileKind { name: "an HTML page", beginning: b"<!DOCTYPE html>", extension: "html" };
 
 /// Write all results on one HTML page.
 #[derive(clap::Args, Clone, Debug)]

@@ -76,11 +76,16 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         quick: args.quick,
     };
     // All specs are checked before the first one is run.
-    let experiments =
-        args.specs.iter().map(|path| Experiment::read(path, &overrides)).collect::<Result<Vec<_>, _>>()?;
+    let experiments = args
+        .specs
+        .iter()
+        .map(|path| Experiment::read(path, &overrides))
+        .collect::<Result<Vec<_>, _>>()?;
     let mut folders = HashSet::new();
-    if let Some(twice) = experiments.iter().find(|experiment| !folders.insert(experiment.folder())) {
-        let message = format!("two specs are called {}; run them one by one, each with an --out", twice.name);
+    if let Some(twice) = experiments.iter().find(|experiment| !folders.insert(experiment.folder()))
+    {
+        let message =
+            format!("two specs are called {}; run them one by one, each with an --out", twice.name);
         return Err(Error::Usage(message));
     }
     let existing = match (args.resume, args.force) {
@@ -113,7 +118,8 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         }
         print_line(&format!("\n{}Results: {}", summary.text, summary.folder.display()));
         if let Some(kept) = &summary.beside {
-            let same = check::compare(&summary.folder, kept, &summary.left_out, !experiment.quick)?.is_empty();
+            let same = check::compare(&summary.folder, kept, &summary.left_out, !experiment.quick)?
+                .is_empty();
             let has = match same {
                 true if experiment.is_by_the_clock() => "is of the same spec",
                 true => "has the same rows",
@@ -137,9 +143,15 @@ fn said(args: &RunArgs) -> Said {
 
 /// Runs into a temporary folder and prints how the rows differ from the committed ones. Returns the number of
 /// differences.
-fn compare(args: &RunArgs, experiment: &Experiment, interrupted: &AtomicBool) -> Result<usize, Error> {
-    let temporary = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
-    let (fresh, committed) = (temporary.path().join(experiment.folder()), args.out.join(experiment.folder()));
+fn compare(
+    args: &RunArgs,
+    experiment: &Experiment,
+    interrupted: &AtomicBool,
+) -> Result<usize, Error> {
+    let temporary =
+        tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
+    let (fresh, committed) =
+        (temporary.path().join(experiment.folder()), args.out.join(experiment.folder()));
     reference::adopt(&committed, temporary.path())?;
     let extent = Extent { said: said(args), ..Extent::default() };
     let summary = execute(experiment, temporary.path(), extent, interrupted)?;

@@ -21,12 +21,18 @@ const TOLERANCE: f64 = 1e-4;
 
 /// Wrong answers of another library. Distances are compared with a tolerance, and objects are not: where two triangles
 /// share an edge, either is right.
-pub fn disagreements(right: &[Option<Hit>], found: &[Option<Hit>], tree: &Bvh, rays: &[Ray]) -> Disagreements {
+pub fn disagreements(
+    right: &[Option<Hit>],
+    found: &[Option<Hit>],
+    tree: &Bvh,
+    rays: &[Ray],
+) -> Disagreements {
     let diagonal = tree.root_aabb().map_or(0.0, |root| root.extent().length());
     compare(right, found, |index, right, found| {
         let length = rays.get(index).map_or(1.0, |ray| ray.direction().as_dvec3().length());
         // Any-hit queries have no distance.
-        right == &SOME_HIT || (f64::from(right.t) - f64::from(found.t)).abs() * length <= TOLERANCE * diagonal
+        right == &SOME_HIT
+            || (f64::from(right.t) - f64::from(found.t)).abs() * length <= TOLERANCE * diagonal
     })
 }
 

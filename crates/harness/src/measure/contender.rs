@@ -38,7 +38,9 @@ impl Tracer<'_> {
         let rays = batch.rays;
         match (self, batch.query) {
             (Self::Other(trace), _) => trace(batch, hits),
-            (Self::Own(own), Query::Any) => Ok(timed(rays, hits, |ray| own.any_hit(ray).then_some(SOME_HIT))),
+            (Self::Own(own), Query::Any) => {
+                Ok(timed(rays, hits, |ray| own.any_hit(ray).then_some(SOME_HIT)))
+            }
             (Self::Own(own), _) => Ok(timed(rays, hits, |ray| own.nearest_hit(ray))),
             (Self::Batches(wide), _) => Ok(in_batches(wide, batch, hits)),
         }
@@ -71,7 +73,11 @@ pub const PART: usize = 8192;
 
 /// Answers every ray and returns the seconds that each part of them took.
 #[inline(always)]
-pub fn timed<R>(rays: &[R], hits: &mut [Option<Hit>], mut answer: impl FnMut(&R) -> Option<Hit>) -> Vec<f64> {
+pub fn timed<R>(
+    rays: &[R],
+    hits: &mut [Option<Hit>],
+    mut answer: impl FnMut(&R) -> Option<Hit>,
+) -> Vec<f64> {
     let part = |(rays, hits): (&[R], &mut [Option<Hit>])| {
         let start = Instant::now();
         for (ray, hit) in rays.iter().zip(hits) {

@@ -87,7 +87,8 @@ pub fn measure(config: &Config, scene: &Scene, tree: &Bvh, seed: u64, row: RayRo
     };
     let sums = (0..chunks).into_par_iter().map(one_chunk).reduce(Sums::default, Sums::add);
     let (boxes_per_ray, boxes_standard_error) = estimate(sums.rays, sums.boxes, sums.boxes_squared);
-    let (objects_per_ray, objects_standard_error) = estimate(sums.rays, sums.objects, sums.objects_squared);
+    let (objects_per_ray, objects_standard_error) =
+        estimate(sums.rays, sums.objects, sums.objects_squared);
     RayRow {
         rays: sums.rays,
         hit_fraction: sums.hits as f64 / sums.rays as f64,
@@ -118,7 +119,10 @@ mod tests {
         let (row, tree) = measured(Family::Lines, Query::All, 40_000, 1);
         let expected = 1.0 + cost::goldsmith_salmon(&tree);
         // A tree's inner nodes have two children each, so this is 1 + 2 C / A(root). Four standard errors.
-        assert!((row.boxes_per_ray - expected).abs() < 4.0 * row.boxes_standard_error, "{row:?} {expected}");
+        assert!(
+            (row.boxes_per_ray - expected).abs() < 4.0 * row.boxes_standard_error,
+            "{row:?} {expected}"
+        );
     }
 
     #[test]

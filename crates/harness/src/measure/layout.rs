@@ -89,7 +89,11 @@ impl Layout {
 }
 
 /// The wide layout of a valid tree for rays that enter its nodes as often as `visits` says, else for random lines.
-pub fn widened(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) -> Result<WideBvh, InvalidBvh> {
+pub fn widened(
+    tree: &Bvh,
+    triangles: &[Triangle],
+    visits: Option<&[f32]>,
+) -> Result<WideBvh, InvalidBvh> {
     match visits {
         Some(visits) => WideBvh::for_rays(tree, triangles, visits),
         None => WideBvh::new(tree, triangles),

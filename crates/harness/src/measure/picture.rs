@@ -49,7 +49,12 @@ impl Config {
             let structure = structure::by_name(name, scene)?;
             structures.push((label, structure, 0, start.elapsed().as_secs_f64()));
         }
-        structures.push((&run.method, Structure::Tree(Cow::Borrowed(tree)), run.repetition, build_seconds));
+        structures.push((
+            &run.method,
+            Structure::Tree(Cow::Borrowed(tree)),
+            run.repetition,
+            build_seconds,
+        ));
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         let pool = pool.map_err(|error| Error::Usage(format!("cannot start a thread: {error}")))?;
         let (mut rows, mut times) = (Vec::new(), Vec::new());
@@ -89,7 +94,8 @@ impl Config {
             let start = Instant::now();
             let film = render(scene, accelerator, &options, &|| true);
             seconds.push(start.elapsed().as_secs_f64());
-            let done = seconds.iter().sum::<f64>() >= REPEAT_WITHIN || seconds.len() == MOST_REPEATS;
+            let done =
+                seconds.iter().sum::<f64>() >= REPEAT_WITHIN || seconds.len() == MOST_REPEATS;
             if let Some(film) = film.filter(|_| done) {
                 return (film, seconds);
             }

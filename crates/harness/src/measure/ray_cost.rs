@@ -8,8 +8,8 @@ use bvh_config::{OutOfRange, config};
 use bvh_core::{Bvh, Hit, Ray, RayDensity, TestCounts, WideBvh};
 use bvh_scenes::Scene;
 use bvh_scenes::rays::{
-    Family, Kind, OF_ANYTHING, Pose, RenderedRays, TRAINED, TracedRay, Viewpoint, check_count, density, in_box,
-    of_anything, of_inside, of_renderer, random_ray,
+    Family, Kind, OF_ANYTHING, Pose, RenderedRays, TRAINED, TracedRay, Viewpoint, check_count,
+    density, in_box, of_anything, of_inside, of_renderer, random_ray,
 };
 use bvh_search::Stream;
 use rand::SeedableRng;
@@ -75,7 +75,8 @@ pub struct Cameras {
 impl Default for Cameras {
     /// Two arcs around the scene, and a light above it.
     fn default() -> Self {
-        let around = |eyes: [[f64; 3]; 3]| eyes.map(|eye| Viewpoint { eye, target: [0.5; 3] }).to_vec();
+        let around =
+            |eyes: [[f64; 3]; 3]| eyes.map(|eye| Viewpoint { eye, target: [0.5; 3] }).to_vec();
         Self {
             same: around([[1.9, 1.3, 2.2], [2.4, 1.0, 0.9], [2.0, 1.5, -0.5]]),
             other: around([[-0.9, 1.2, -1.0], [-1.4, 0.8, 0.3], [-0.8, 0.6, 1.7]]),
@@ -100,7 +101,14 @@ impl Config {
     }
 
     /// A renderer's rays from one of the paths through a scene.
-    fn rendered(&self, scene: &Scene, tree: &Bvh, other: bool, count: u32, seed: u64) -> Vec<TracedRay> {
+    fn rendered(
+        &self,
+        scene: &Scene,
+        tree: &Bvh,
+        other: bool,
+        count: u32,
+        seed: u64,
+    ) -> Vec<TracedRay> {
         let cameras = self.cameras.get(&scene.name).cloned().unwrap_or_default();
         let Some(root) = tree.root_aabb() else { return Vec::new() };
         let place = |at: [f64; 3]| in_box(&root, at).to_array();
@@ -118,8 +126,15 @@ impl Config {
     }
 
     /// The density of the rays that a tree is trained on; `seed` draws them.
-    pub fn density(&self, trained: TrainedOn, scene: &Scene, seed: u64) -> Result<RayDensity, String> {
-        let tree = muller_fellner::Config::default().build(&scene.boxes).map_err(|error| error.to_string())?;
+    pub fn density(
+        &self,
+        trained: TrainedOn,
+        scene: &Scene,
+        seed: u64,
+    ) -> Result<RayDensity, String> {
+        let tree = muller_fellner::Config::default()
+            .build(&scene.boxes)
+            .map_err(|error| error.to_string())?;
         let rays = match trained {
             TrainedOn::Default => of_anything(self.trained, scene, &tree, seed),
             TrainedOn::Camera => self.rendered(scene, &tree, false, self.trained, seed),
@@ -176,8 +191,12 @@ impl TestRays {
                 wide.nearest_hit_counted(ray, &mut counts);
             }
         }
-        let per_ray = |tests: u64, of_each: u64| tests as f64 / (of_each as f64 * self.rays.len() as f64);
-        [per_ray(counts.boxes, WideBvh::BOXES_OF_NODE), per_ray(counts.objects, WideBvh::OBJECTS_OF_BLOCK)]
+        let per_ray =
+            |tests: u64, of_each: u64| tests as f64 / (of_each as f64 * self.rays.len() as f64);
+        [
+            per_ray(counts.boxes, WideBvh::BOXES_OF_NODE),
+            per_ray(counts.objects, WideBvh::OBJECTS_OF_BLOCK),
+        ]
     }
 
     /// Million rays per second through each of the layouts, which take turns, each part of the rays by its fastest turn.
@@ -187,7 +206,9 @@ impl TestRays {
         for _ in 0..rounds {
             for (wide, turns) in layouts.iter().zip(&mut turns) {
                 turns.push(if self.kind == Kind::Shadow {
-                    timed(&self.rays, &mut hits, |ray| wide.any_hit(ray).then_some(super::answers::SOME_HIT))
+                    timed(&self.rays, &mut hits, |ray| {
+                        wide.any_hit(ray).then_some(super::answers::SOME_HIT)
+                    })
                 } else {
                     timed(&self.rays, &mut hits, |ray| wide.nearest_hit(ray))
                 });
@@ -195,7 +216,8 @@ impl TestRays {
         }
         let fastest = |turns: &Vec<Vec<f64>>| {
             let parts = turns.first().map_or(0, Vec::len);
-            let seconds: f64 = (0..parts).filter_map(|part| minimum(turns.iter().map(|turn| turn[part]))).sum();
+            let seconds: f64 =
+                (0..parts).filter_map(|part| minimum(turns.iter().map(|turn| turn[part]))).sum();
             self.rays.len() as f64 / seconds / 1e6
         };
         turns.iter().map(fastest).collect()
@@ -207,7 +229,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rays_that_judge_are_others_than_those_of_the_training_and_a_layout_for_them_needs_fewer_tests() {
+    fn rays_that_judge_are_others_than_those_of_the_training_and_a_layout_for_them_needs_fewer_tests()
+     {
         let scene = Scene::load("escher:3000").unwrap();
         let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
         let config = Config { count: 5000, trained: 20_000, ..Config::default() };
@@ -216,10 +239,14 @@ mod tests {
         let plain = WideBvh::new(&tree, triangles).unwrap();
         let trained = WideBvh::for_rays(&tree, triangles, &density.visits(&tree)).unwrap();
         let test_rays = test_rays(&config, &scene, &tree, 2);
-        let kinds: Vec<_> = test_rays.iter().map(|test_rays| (test_rays.kind, test_rays.camera)).collect();
+        let kinds: Vec<_> =
+            test_rays.iter().map(|test_rays| (test_rays.kind, test_rays.camera)).collect();
         assert_eq!((kinds.len(), kinds[6]), (7, (Kind::Incoherent, "none")));
         let sum = |wide: &WideBvh| {
-            test_rays[..3].iter().map(|test_rays| test_rays.tests(wide).iter().sum::<f64>()).sum::<f64>()
+            test_rays[..3]
+                .iter()
+                .map(|test_rays| test_rays.tests(wide).iter().sum::<f64>())
+                .sum::<f64>()
         };
         assert!(sum(&trained) < sum(&plain), "{} {}", sum(&trained), sum(&plain));
         assert!(test_rays[0].speeds(&[&plain, &trained], 2).into_iter().all(|speed| speed > 0.0));

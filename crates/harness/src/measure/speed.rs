@@ -216,7 +216,8 @@ mod tests {
         let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
         let trained = crate::measure::ray_cost::Config { trained: 5000, ..Default::default() };
         let visits = trained.density(TrainedOn::Camera, &scene, 2).unwrap().visits(&tree);
-        let config: Config = toml::from_str("count = 5000\nrounds = 1\nrays = ['primary']").unwrap();
+        let config: Config =
+            toml::from_str("count = 5000\nrounds = 1\nrays = ['primary']").unwrap();
         let mut contenders = Vec::new();
         for (rays, visits) in [("lines", None), ("camera", Some(&visits[..]))] {
             let own = own_contenders(&config.layouts, &[], &scene, &tree, visits).unwrap();
@@ -224,7 +225,9 @@ mod tests {
         }
         let traced = measure(&config, &scene, &tree, &contenders, 1, || false).unwrap().unwrap();
         let rows: Vec<TraceRow> = traced.into_iter().map(|traced| traced.answers).collect();
-        assert!(rows.iter().all(|row| (row.missed_hits, row.false_hits, row.other_hits) == (0, 0, 0)));
+        assert!(
+            rows.iter().all(|row| (row.missed_hits, row.false_hits, row.other_hits) == (0, 0, 0))
+        );
         let tests = |rays: &str, layout: &str| {
             let row = rows.iter().find(|row| row.method == rays && row.layout == layout).unwrap();
             row.boxes_per_ray.unwrap() / 8.0 + row.objects_per_ray.unwrap() / 4.0

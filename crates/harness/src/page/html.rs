@@ -30,8 +30,13 @@ pub(super) fn reference(name: &str) -> String {
 /// The whole page.
 pub(super) fn page(sections: &[Section]) -> String {
     let list = |title: &str, of_paper: bool| {
-        let own: String = sections.iter().filter(|section| section.of_paper == of_paper).map(answer).collect();
-        if own.is_empty() { own } else { format!("<h2>{title}</h2>\n<ul class=\"answers\">{own}\n</ul>\n") }
+        let own: String =
+            sections.iter().filter(|section| section.of_paper == of_paper).map(answer).collect();
+        if own.is_empty() {
+            own
+        } else {
+            format!("<h2>{title}</h2>\n<ul class=\"answers\">{own}\n</ul>\n")
+        }
     };
     format!(
         "<!DOCTYPE html>
@@ -79,7 +84,10 @@ fn verdict(verdict: &Verdict) -> String {
     let (mark, text) = match verdict {
         Verdict::Paper(outcome, answer) => {
             let name = outcome.name();
-            (format!("<strong class=\"{}\">{name}</strong> ", name.replace(' ', "-")), answer.clone())
+            (
+                format!("<strong class=\"{}\">{name}</strong> ", name.replace(' ', "-")),
+                answer.clone(),
+            )
         }
         Verdict::Reading(reading) => (String::new(), reading.clone()),
         Verdict::None => (String::new(), "No verdict is stated.".into()),
@@ -97,13 +105,26 @@ fn experiment(section: &Section) -> String {
     };
     let shown: String = section.outputs.iter().map(|output| report(section, output)).collect();
     let known = |figure: &&Drawing| {
-        section.outputs.iter().any(|output| output.figures.iter().any(|(name, _)| *name == figure.name))
+        section
+            .outputs
+            .iter()
+            .any(|output| output.figures.iter().any(|(name, _)| *name == figure.name))
     };
-    let others: String =
-        section.figures.iter().filter(|figure| !known(figure)).map(|drawn| figure(section, drawn)).collect();
-    let Provenance { command, revision, rustc, cpu, threads, date, parts, .. } = &section.provenance;
-    let [command, revision, rustc, cpu, date] = [command, revision, rustc, cpu, date].map(|text| escaped(text));
-    let merged = if parts.is_empty() { String::new() } else { format!(", merged from {} parts", parts.len()) };
+    let others: String = section
+        .figures
+        .iter()
+        .filter(|figure| !known(figure))
+        .map(|drawn| figure(section, drawn))
+        .collect();
+    let Provenance { command, revision, rustc, cpu, threads, date, parts, .. } =
+        &section.provenance;
+    let [command, revision, rustc, cpu, date] =
+        [command, revision, rustc, cpu, date].map(|text| escaped(text));
+    let merged = if parts.is_empty() {
+        String::new()
+    } else {
+        format!(", merged from {} parts", parts.len())
+    };
     format!(
         "\n<section id=\"{name}\">\n<h2>{question}</h2>\n{verdict}
 <p class=\"files\">{title}: {specs}. Rows: {tables}. {stand_ins} <a href=\"#answer-{name}\">All answers</a></p>{shown}{others}
@@ -117,21 +138,28 @@ fn experiment(section: &Section) -> String {
 }
 
 fn links(links: &[Link]) -> String {
-    let link = |link: &Link| format!("<a href=\"{}\">{}</a>", escaped(&link.to), escaped(&link.name));
+    let link =
+        |link: &Link| format!("<a href=\"{}\">{}</a>", escaped(&link.to), escaped(&link.name));
     links.iter().map(link).collect::<Vec<_>>().join(", ")
 }
 
 /// One report: its reading, figures and tables.
 fn report(section: &Section, output: &Output) -> String {
-    let drawn =
-        section.figures.iter().filter(|drawn| output.figures.iter().any(|(name, _)| *name == drawn.name));
+    let drawn = section
+        .figures
+        .iter()
+        .filter(|drawn| output.figures.iter().any(|(name, _)| *name == drawn.name));
     let figures: String = drawn.map(|drawn| figure(section, drawn)).collect();
-    let tables: String = output.tables.iter().map(|(explanation, rows)| table(explanation, rows)).collect();
+    let tables: String =
+        output.tables.iter().map(|(explanation, rows)| table(explanation, rows)).collect();
     let reading = output.reading.trim();
     // The verdict above has said it already.
     let said = matches!(&section.verdict, Verdict::Reading(verdict) if verdict == reading);
-    let reading =
-        if reading.is_empty() || said { String::new() } else { format!("\n<p>{}</p>", escaped(reading)) };
+    let reading = if reading.is_empty() || said {
+        String::new()
+    } else {
+        format!("\n<p>{}</p>", escaped(reading))
+    };
     format!("\n<h3>{}</h3>{reading}{figures}{tables}", escaped(&output.heading))
 }
 
@@ -140,7 +168,11 @@ fn figure_id(section: &Section, figure: &Drawing) -> String {
 }
 
 fn figure(section: &Section, figure: &Drawing) -> String {
-    let svg = drawing(&figure.svg).replacen("<svg", &format!("<svg id=\"{}\"", figure_id(section, figure)), 1);
+    let svg = drawing(&figure.svg).replacen(
+        "<svg",
+        &format!("<svg id=\"{}\"", figure_id(section, figure)),
+        1,
+    );
     format!(
         "\n<figure><div class=\"wide sheet\" tabindex=\"0\">{svg}</div><figcaption>{}</figcaption></figure>",
         links(&figure.files)
@@ -157,14 +189,17 @@ fn drawing(svg: &str) -> &str {
 fn table(explanation: &str, table: &Table) -> String {
     let cells = |row: &Row| row.cell_iter().map(|cell| cell.content()).collect::<Vec<String>>();
     let header = table.header().map(cells).unwrap_or_default();
-    let header =
-        header.iter().map(|name| format!("<th scope=\"col\">{}</th>", escaped(&name.replace('_', " "))));
+    let header = header
+        .iter()
+        .map(|name| format!("<th scope=\"col\">{}</th>", escaped(&name.replace('_', " "))));
     let cell = |(at, text): (usize, &String)| match (at, is_number(text)) {
         (0, _) => format!("<th scope=\"row\">{}</th>", escaped(text)),
         (_, true) => format!("<td class=\"number\">{}</td>", escaped(text)),
         (_, false) => format!("<td>{}</td>", escaped(text)),
     };
-    let row = |row: &Row| format!("\n<tr>{}</tr>", cells(row).iter().enumerate().map(cell).collect::<String>());
+    let row = |row: &Row| {
+        format!("\n<tr>{}</tr>", cells(row).iter().enumerate().map(cell).collect::<String>())
+    };
     format!(
         "\n<div class=\"wide\" tabindex=\"0\"><table><caption><span>{}</span></caption>\n<thead><tr>{}</tr></thead>\n<tbody>{}\n</tbody></table></div>",
         escaped(explanation.trim_end_matches(':')),
@@ -197,7 +232,11 @@ mod tests {
             stand_ins: true,
             of_paper: false,
             outputs: vec![output],
-            figures: vec![Drawing { name: "f".into(), svg: svg.into(), files: vec![link("f&.svg")] }],
+            figures: vec![Drawing {
+                name: "f".into(),
+                svg: svg.into(),
+                files: vec![link("f&.svg")],
+            }],
             miniature: None,
             specs: vec![],
             tables: vec![],

@@ -62,9 +62,11 @@ struct Link {
 pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
     let mut names = files::names(results)?;
     names.retain(|name| results.join(name).join("resolved.toml").is_file());
-    let repeats = |name: &String| name.strip_suffix(".new").is_some_and(|kept| names.contains(kept));
+    let repeats =
+        |name: &String| name.strip_suffix(".new").is_some_and(|kept| names.contains(kept));
     let kept = names.iter().filter(|name| !repeats(name));
-    let mut sections = kept.map(|name| section(results, name, out)).collect::<Result<Vec<_>, _>>()?;
+    let mut sections =
+        kept.map(|name| section(results, name, out)).collect::<Result<Vec<_>, _>>()?;
     if sections.is_empty() {
         return Err(Error::Usage(format!(
             "{} holds no finished experiment; accepted: the --out of one",
@@ -88,16 +90,21 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
     let ending = |suffix: &'static str| {
         found.iter().filter_map(move |file| Some((file, file.strip_suffix(suffix)?.to_owned())))
     };
-    let drawn: Vec<&String> = outputs.iter().flat_map(|output| &output.figures).map(|(name, _)| name).collect();
+    let drawn: Vec<&String> =
+        outputs.iter().flat_map(|output| &output.figures).map(|(name, _)| name).collect();
     let mut figures = Vec::new();
     for (file, name) in ending(".svg") {
         let files = ["svg", "png", "csv"].map(|kind| format!("{name}.{kind}"));
-        let files = files.iter().filter(|file| found.contains(*file)).map(|file| link(file)).collect();
+        let files =
+            files.iter().filter(|file| found.contains(*file)).map(|file| link(file)).collect();
         figures.push(Drawing { svg: read(&folder.join(file))?, name, files });
     }
-    figures.sort_by_key(|figure| drawn.iter().position(|name| **name == figure.name).unwrap_or(drawn.len()));
+    figures.sort_by_key(|figure| {
+        drawn.iter().position(|name| **name == figure.name).unwrap_or(drawn.len())
+    });
     let first = outputs.iter().flat_map(|output| &output.figures).next();
-    let specs = spec_file(name, &provenance).map(|path| Link { name: "spec".into(), to: way(out, &path) });
+    let specs =
+        spec_file(name, &provenance).map(|path| Link { name: "spec".into(), to: way(out, &path) });
     let resolved = Link { name: "spec with all defaults".into(), ..link("resolved.toml") };
     Ok(Section {
         name: name.into(),
@@ -119,11 +126,13 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
 
 /// Returns the verdict and the answers where numbers are next to the paper's, otherwise the first report's reading of its own.
 fn verdict(outputs: &[Output]) -> Verdict {
-    let compared = outputs.iter().find_map(|output| Some((output.outcome?, output.answer.clone()?)));
+    let compared =
+        outputs.iter().find_map(|output| Some((output.outcome?, output.answer.clone()?)));
     if let Some((outcome, answer)) = compared {
         return Verdict::Paper(outcome, answer);
     }
-    let reading = outputs.iter().map(|output| output.reading.trim()).find(|reading| !reading.is_empty());
+    let reading =
+        outputs.iter().map(|output| output.reading.trim()).find(|reading| !reading.is_empty());
     reading.map_or(Verdict::None, |reading| Verdict::Reading(reading.into()))
 }
 
@@ -138,8 +147,12 @@ fn spec_file(name: &str, provenance: &Provenance) -> Option<PathBuf> {
 
 /// The way from the page to a file, as a relative reference of a URL.
 fn way(page: &Path, file: &Path) -> String {
-    let whole = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or_default();
-    let from = whole(page.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")));
+    let whole = |path: &Path| {
+        path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or_default()
+    };
+    let from = whole(
+        page.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")),
+    );
     let to = whole(file);
     let common = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
     let up = from.components().skip(common).map(|_| "..".into());

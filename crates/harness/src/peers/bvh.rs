@@ -123,7 +123,8 @@ pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
     };
     let trace = move |batch: &Batch, hits: &mut [Option<Hit>]| {
         // Distances along unit vectors are converted.
-        let theirs = |ray: &Ray| (self::ray(ray), ray.direction().length(), ray.t_min(), ray.t_max());
+        let theirs =
+            |ray: &Ray| (self::ray(ray), ray.direction().length(), ray.t_min(), ray.t_max());
         let rays: Vec<_> = batch.rays.iter().map(theirs).collect();
         Ok(timed(&rays, hits, |(ray, length, t_min, t_max)| {
             let mut nearest: Option<Hit> = None;
@@ -136,7 +137,10 @@ pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
                     if batch.query == Query::Any {
                         break;
                     }
-                } else if ray.intersection_slice_for_aabb(&shape.aabb).is_some_and(|(entry, _)| entry > high) {
+                } else if ray
+                    .intersection_slice_for_aabb(&shape.aabb)
+                    .is_some_and(|(entry, _)| entry > high)
+                {
                     break;
                 }
             }

@@ -37,7 +37,8 @@ impl Config {
 
     fn names_a_program(&self) -> Option<OutOfRange> {
         let is_empty = self.command.first().is_none_or(String::is_empty);
-        is_empty.then(|| OutOfRange::new("command", "empty", "a list of a program and its arguments"))
+        is_empty
+            .then(|| OutOfRange::new("command", "empty", "a list of a program and its arguments"))
     }
 
     /// The program's tree over `boxes`, those of the `objects`, and the seconds that it took, its start and files included. Ends the
@@ -50,14 +51,17 @@ impl Config {
         cancelled: &dyn Fn() -> bool,
     ) -> Result<(Bvh, f64), CommandFault> {
         let folder = tempfile::tempdir()?;
-        let [given, tree, said] = ["boxes", "tree.bvh", "stderr"].map(|name| folder.path().join(name));
-        let corners = boxes.iter().flat_map(|aabb| [aabb.min.to_array(), aabb.max.to_array()]).flatten();
+        let [given, tree, said] =
+            ["boxes", "tree.bvh", "stderr"].map(|name| folder.path().join(name));
+        let corners =
+            boxes.iter().flat_map(|aabb| [aabb.min.to_array(), aabb.max.to_array()]).flatten();
         fs::write(&given, corners.flat_map(f32::to_le_bytes).collect::<Vec<u8>>())?;
         let mut command = Command::new(&self.command[0]);
         command.args(&self.command[1..]).args([&given, &tree]).env("BVH_SEED", seed.to_string());
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(File::create(&said)?);
         let start = Instant::now();
-        let mut program = Program::start(&mut command, folder.path()).map_err(CommandFault::NotStarted)?;
+        let mut program =
+            Program::start(&mut command, folder.path()).map_err(CommandFault::NotStarted)?;
         let status = loop {
             if let Some(status) = program.status()? {
                 break status;
@@ -68,7 +72,9 @@ impl Config {
                 return Err(late.map_or(CommandFault::Interrupted, CommandFault::TimedOut));
             }
             // The wait is at most a fiftieth of what is measured.
-            std::thread::sleep((elapsed / 50).clamp(Duration::from_micros(200), Duration::from_millis(20)));
+            std::thread::sleep(
+                (elapsed / 50).clamp(Duration::from_micros(200), Duration::from_millis(20)),
+            );
         };
         let seconds = start.elapsed().as_secs_f64();
         drop(program);
@@ -101,5 +107,6 @@ fn last_line(path: &Path) -> io::Result<String> {
     file.read_to_end(&mut end)?;
     let end = String::from_utf8_lossy(&end);
     let last = end.lines().rfind(|line| !line.trim().is_empty());
-    Ok(last.map_or_else(|| "it says nothing on standard error".into(), |line| line.trim().to_owned()))
+    Ok(last
+        .map_or_else(|| "it says nothing on standard error".into(), |line| line.trim().to_owned()))
 }

@@ -62,7 +62,8 @@ pub fn speeds(
             turns: traced.turns.iter().map(|seconds| million / seconds).collect(),
         }
     };
-    let answers_well = |traced: &&Traced| wrong_answers(traced) * WRONG_AT_MOST_ONE_IN <= traced.answers.count;
+    let answers_well =
+        |traced: &&Traced| wrong_answers(traced) * WRONG_AT_MOST_ONE_IN <= traced.answers.count;
     traced.iter().filter(answers_well).map(speed).collect()
 }
 
@@ -78,7 +79,10 @@ pub fn rows(speeds: &[Speed]) -> Vec<PeerRayRow> {
     let scenes: BTreeSet<&str> = rows.iter().map(|row| row.scene.as_str()).collect();
     let mut groups: BTreeMap<[&str; 4], Vec<usize>> = BTreeMap::new();
     for (index, row) in rows.iter().enumerate() {
-        groups.entry([&row.instructions, &row.library, &row.mode, &row.rays]).or_default().push(index);
+        groups
+            .entry([&row.instructions, &row.library, &row.mode, &row.rays])
+            .or_default()
+            .push(index);
     }
     let mut complete: Vec<Vec<usize>> =
         groups.into_values().filter(|group| group.len() == scenes.len()).collect();
@@ -124,7 +128,10 @@ fn is_split_by_embree(row: &PeerRayRow) -> bool {
 pub fn ratios(speeds: &[Speed]) -> Vec<RayRatioRow> {
     let mut groups: BTreeMap<[&str; 3], Vec<&Speed>> = BTreeMap::new();
     let mut order = Vec::new();
-    for speed in speeds.iter().filter(|speed| speed.row.library == OURS && speed.row.instructions != COMPILED) {
+    for speed in speeds
+        .iter()
+        .filter(|speed| speed.row.library == OURS && speed.row.instructions != COMPILED)
+    {
         let key = [&speed.row.instructions, &speed.row.mode, &speed.row.rays].map(String::as_str);
         groups.entry(key).or_insert_with(|| {
             order.push(key);
@@ -135,8 +142,10 @@ pub fn ratios(speeds: &[Speed]) -> Vec<RayRatioRow> {
     let mut rows = Vec::new();
     for key in order {
         for (against, is_rival) in AGAINST {
-            let scenes: Vec<OverFastest> =
-                groups[&key].iter().filter_map(|own| over_fastest(own, speeds, against, is_rival)).collect();
+            let scenes: Vec<OverFastest> = groups[&key]
+                .iter()
+                .filter_map(|own| over_fastest(own, speeds, against, is_rival))
+                .collect();
             rows.extend(scenes.iter().map(|over| over.row.clone()));
             rows.extend(mean_ratio(&scenes));
         }
@@ -150,7 +159,12 @@ struct OverFastest {
     turns: Vec<f64>,
 }
 
-fn over_fastest(own: &Speed, speeds: &[Speed], against: &str, is_rival: IsRival) -> Option<OverFastest> {
+fn over_fastest(
+    own: &Speed,
+    speeds: &[Speed],
+    against: &str,
+    is_rival: IsRival,
+) -> Option<OverFastest> {
     let is_comparable = |rival: &&Speed| {
         rival.row.library != OURS
             && rival.row.scene == own.row.scene
@@ -160,7 +174,8 @@ fn over_fastest(own: &Speed, speeds: &[Speed], against: &str, is_rival: IsRival)
     };
     let by_speed = |a: &&Speed, b: &&Speed| a.row.million_per_s.total_cmp(&b.row.million_per_s);
     let fastest = speeds.iter().filter(is_comparable).max_by(by_speed)?;
-    let turns: Vec<f64> = own.turns.iter().zip(&fastest.turns).map(|(own, rival)| own / rival).collect();
+    let turns: Vec<f64> =
+        own.turns.iter().zip(&fastest.turns).map(|(own, rival)| own / rival).collect();
     let ratio = own.row.million_per_s / fastest.row.million_per_s;
     let (least_turn, greatest_turn) = range(turns.iter().copied()).unwrap_or((ratio, ratio));
     let row = RayRatioRow {
@@ -185,12 +200,16 @@ fn mean_ratio(scenes: &[OverFastest]) -> Option<RayRatioRow> {
     let by_ratio = |a: &&OverFastest, b: &&OverFastest| a.row.ratio.total_cmp(&b.row.ratio);
     let carrier = scenes.iter().max_by(by_ratio)?;
     let mean_of = |ratios: Vec<f64>| geometric_mean(&ratios);
-    let without: Vec<f64> =
-        scenes.iter().filter(|over| over.row.scene != carrier.row.scene).map(|over| over.row.ratio).collect();
+    let without: Vec<f64> = scenes
+        .iter()
+        .filter(|over| over.row.scene != carrier.row.scene)
+        .map(|over| over.row.ratio)
+        .collect();
     let ratio = mean_of(scenes.iter().map(|over| over.row.ratio).collect());
     let turn_count = scenes.iter().map(|over| over.turns.len()).min().unwrap_or(0);
     let mean_of_turn = |turn: usize| mean_of(scenes.iter().map(|over| over.turns[turn]).collect());
-    let (least_turn, greatest_turn) = range((0..turn_count).map(mean_of_turn)).unwrap_or((ratio, ratio));
+    let (least_turn, greatest_turn) =
+        range((0..turn_count).map(mean_of_turn)).unwrap_or((ratio, ratio));
     Some(RayRatioRow {
         scene: MEAN.into(),
         fastest: String::new(),
@@ -264,7 +283,9 @@ mod tests {
         let means: Vec<_> = rows
             .iter()
             .filter(|row| row.scene == MEAN)
-            .map(|row| (row.library.as_str(), row.million_per_s, row.build_seconds, row.disagreements))
+            .map(|row| {
+                (row.library.as_str(), row.million_per_s, row.build_seconds, row.disagreements)
+            })
             .collect();
         assert_eq!(rows.len(), 5 + 2, "a mode that not all scenes have has no mean: {means:?}");
         assert_eq!((means[0].0, means[1].0), (OURS, "embree"));
@@ -300,7 +321,10 @@ mod tests {
         assert_eq!((ratios[2].carried_by.as_str(), ratios[2].ratio_without), ("b", Some(0.5)));
         let slower = RayRatioRow { mode: "other".into(), ratio: 0.4, ..ratios[2].clone() };
         let text = text(&[vec![slower], ratios].concat());
-        assert!(text.contains("P, AVX2, primary: 1.00 (wide), least 0.50 on a"), "of our fastest mode: {text}");
+        assert!(
+            text.contains("P, AVX2, primary: 1.00 (wide), least 0.50 on a"),
+            "of our fastest mode: {text}"
+        );
     }
 
     #[test]

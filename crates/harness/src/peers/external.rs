@@ -53,14 +53,18 @@ fn modes(program: &Path) -> Result<Vec<Mode>, String> {
 
 /// A contender for every mode of the program, each with the name of its library. An error says what the program did not
 /// do.
-pub fn contenders(program: &Path, scene: &Scene) -> Result<Vec<(String, Contender<'static>)>, String> {
+pub fn contenders(
+    program: &Path,
+    scene: &Scene,
+) -> Result<Vec<(String, Contender<'static>)>, String> {
     let triangles = scene.triangles().map_err(|error| error.to_string())?;
     let mut contenders = Vec::new();
     for mode in modes(program)? {
         let argument = format!("{} {}", mode.library, mode.name);
         let command = format!("{} \"{argument}\"", program.display());
         let started = Process::start(program, &argument, triangles);
-        let (process, preparation_seconds) = started.map_err(|error| format!("{command}: {error}"))?;
+        let (process, preparation_seconds) =
+            started.map_err(|error| format!("{command}: {error}"))?;
         let process = RefCell::new(process);
         let trace = move |batch: &Batch, hits: &mut [Option<Hit>]| {
             process.borrow_mut().trace(batch, hits).map_err(|error| format!("{command}: {error}"))
@@ -82,7 +86,10 @@ pub fn contenders(program: &Path, scene: &Scene) -> Result<Vec<(String, Contende
 pub fn split_tree(program: &Path, scene: &Scene) -> Result<(Bvh, f64), String> {
     let triangles = scene.triangles().map_err(|error| error.to_string())?;
     let failed = |error: &dyn std::fmt::Display| {
-        format!("{} \"{SPLIT_TREE}\": {error}; scripts/ray-peers/build makes it anew", program.display())
+        format!(
+            "{} \"{SPLIT_TREE}\": {error}; scripts/ray-peers/build makes it anew",
+            program.display()
+        )
     };
     let (mut process, seconds) =
         Process::start(program, SPLIT_TREE, triangles).map_err(|error| failed(&error))?;
@@ -116,7 +123,8 @@ struct Process {
 impl Process {
     /// Starts the program and hands it the triangles. Returns the seconds that its build took, too.
     fn start(program: &Path, mode: &str, triangles: &[Triangle]) -> io::Result<(Self, f64)> {
-        let mut child = Command::new(program).arg(mode).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
+        let mut child =
+            Command::new(program).arg(mode).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
         let (Some(rays), Some(answers)) = (child.stdin.take(), child.stdout.take()) else {
             return Err(io::Error::other("the program has no pipes"));
         };
@@ -180,7 +188,10 @@ mod tests {
     #[test]
     fn a_line_of_the_list_of_modes_has_four_parts() {
         let mode = Mode::parse("AVX2\tembree\t4.4.0\thigh robust, coherent packets").unwrap();
-        assert_eq!((mode.library.as_str(), mode.name.as_str()), ("embree", "high robust, coherent packets"));
+        assert_eq!(
+            (mode.library.as_str(), mode.name.as_str()),
+            ("embree", "high robust, coherent packets")
+        );
         assert_eq!((mode.instructions.as_str(), mode.version.as_str()), ("AVX2", "4.4.0"));
         assert_eq!(Mode::parse("embree high"), None);
         assert_eq!(Mode::parse("AVX2\tembree\t4.4.0\thigh\tmore"), None);
@@ -190,7 +201,12 @@ mod tests {
     fn rays_go_out_as_described_and_answers_come_back_in_their_order() {
         let rays = [Ray::new([1.0, 2.0, 3.0], [0.0, 0.0, -1.0], 0.0, 7.0).unwrap(); 3];
         let mut sent = Vec::new();
-        let batch = Batch { query: Query::Any, coherence: Coherence::Coherent, in_squares: true, rays: &rays };
+        let batch = Batch {
+            query: Query::Any,
+            coherence: Coherence::Coherent,
+            in_squares: true,
+            rays: &rays,
+        };
         ask(&mut sent, &batch).unwrap();
         assert_eq!(sent.len(), 4 * 4 + 3 * 8 * 4);
         let words = sent.as_chunks::<4>().0;

@@ -107,7 +107,10 @@ impl Peer {
     pub const NAMES: &[&str] = &["bvh", "obvhs"];
 
     /// Reads the settings of the library called `name`; `None` if there is none of this name.
-    pub fn read<'de, D: Deserializer<'de>>(name: &str, settings: D) -> Result<Option<Self>, D::Error> {
+    pub fn read<'de, D: Deserializer<'de>>(
+        name: &str,
+        settings: D,
+    ) -> Result<Option<Self>, D::Error> {
         match name {
             "bvh" => NoSettings::deserialize(settings).map(|settings| Some(Self::Bvh(settings))),
             "obvhs" => Obvhs::deserialize(settings).map(|settings| Some(Self::Obvhs(settings))),
@@ -129,7 +132,10 @@ impl Peer {
     }
 
     /// Builds the tree over the scene's objects. An error says what the library cannot do.
-    #[cfg_attr(not(feature = "peers"), allow(unused_variables, reason = "there is nothing to build"))]
+    #[cfg_attr(
+        not(feature = "peers"),
+        allow(unused_variables, reason = "there is nothing to build")
+    )]
     pub fn build(&self, scene: &Scene) -> Result<Built, String> {
         match self {
             #[cfg(feature = "peers")]
@@ -151,7 +157,10 @@ impl Peer {
     }
 
     /// The library's ways to trace rays through the scene's triangles.
-    #[cfg_attr(not(feature = "peers"), allow(unused_variables, reason = "there is nothing to trace"))]
+    #[cfg_attr(
+        not(feature = "peers"),
+        allow(unused_variables, reason = "there is nothing to trace")
+    )]
     pub fn contenders<'a>(&self, scene: &'a Scene) -> Result<Vec<Contender<'a>>, String> {
         match self {
             #[cfg(feature = "peers")]
@@ -208,10 +217,16 @@ mod tests {
         let scene = Scene::load("escher:2000").unwrap();
         let tree = Peer::Bvh(NoSettings {}).build(&scene).unwrap().tree;
         let rays = rays(Kind::Incoherent, 4000, &scene, &tree, &Default::default(), 1);
-        let batch =
-            Batch { query: Query::Nearest, coherence: Coherence::Incoherent, in_squares: false, rays: &rays };
+        let batch = Batch {
+            query: Query::Nearest,
+            coherence: Coherence::Incoherent,
+            in_squares: false,
+            rays: &rays,
+        };
         let mut right = vec![None; rays.len()];
-        Tracer::Own(Accelerator::of_tree(&scene.primitives, &tree)).trace(&batch, &mut right).unwrap();
+        Tracer::Own(Accelerator::of_tree(&scene.primitives, &tree))
+            .trace(&batch, &mut right)
+            .unwrap();
         for peer in all() {
             for contender in peer.contenders(&scene).unwrap() {
                 let mut hits = vec![None; rays.len()];

@@ -30,7 +30,8 @@ fn parameters(config: &Obvhs) -> BvhBuildParams {
 }
 
 fn build_over(boxes: &[Aabb], parameters: BvhBuildParams) -> (Bvh2, Duration) {
-    let theirs: Vec<aabb::Aabb> = boxes.iter().map(|b| aabb::Aabb::new(b.min.into(), b.max.into())).collect();
+    let theirs: Vec<aabb::Aabb> =
+        boxes.iter().map(|b| aabb::Aabb::new(b.min.into(), b.max.into())).collect();
     let mut time = Duration::ZERO;
     (binary::build_bvh2(&theirs, parameters, &mut time), time)
 }
@@ -57,7 +58,8 @@ fn ray(ray: &Ray, t_max: f32) -> TheirRay {
 /// Builds over boxes, with one object per leaf and no split triangles. The library's own stopwatch leaves out
 /// conversions and checks.
 pub(super) fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
-    let parameters = BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..parameters(config) };
+    let parameters =
+        BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..parameters(config) };
     let (theirs, time) = build_over(boxes, parameters);
     Built::tight(to_ours(&theirs, boxes), time.as_secs_f64(), boxes)
 }
@@ -86,7 +88,11 @@ macro_rules! traced_by {
         move |batch: &Batch, hits: &mut [Option<Hit>]| {
             let traverse = |any, ray, hit: &mut RayHit| {
                 let test = |ray: &TheirRay, id: usize| triangles[id].intersect(ray);
-                if any { !$tree.ray_traverse_miss(ray, test) } else { $tree.ray_traverse(ray, hit, test) }
+                if any {
+                    !$tree.ray_traverse_miss(ray, test)
+                } else {
+                    $tree.ray_traverse(ray, hit, test)
+                }
             };
             Ok(trace(batch, hits, traverse, &$tree.primitive_indices))
         }
@@ -101,8 +107,9 @@ pub(super) fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contende
         .iter()
         .map(|&Triangle([a, b, c])| TheirTriangle { v0: corner(a), v1: corner(b), v2: corner(c) })
         .collect();
-    let in_order =
-        |ids: &[u32]| -> Vec<RtTriangle> { ids.iter().map(|&id| (&theirs[id as usize]).into()).collect() };
+    let in_order = |ids: &[u32]| -> Vec<RtTriangle> {
+        ids.iter().map(|&id| (&theirs[id as usize]).into()).collect()
+    };
     let (mut binary_time, mut wide_time) = (Duration::ZERO, Duration::ZERO);
     let tree = binary::build_bvh2_from_tris(&theirs, parameters(config), &mut binary_time);
     let trace_binary = traced_by!(tree, in_order(&tree.primitive_indices));
@@ -136,6 +143,7 @@ fn trace(
     }
     timed(&rays, hits, |&ray| {
         let mut hit = RayHit::none();
-        traverse(false, ray, &mut hit).then(|| Hit { t: hit.t, object: ids[hit.primitive_id as usize] })
+        traverse(false, ray, &mut hit)
+            .then(|| Hit { t: hit.t, object: ids[hit.primitive_id as usize] })
     })
 }

@@ -53,7 +53,8 @@ impl Config {
                 let Some(reference) = rows.reference(scene) else { continue };
                 let mut layers = Vec::new();
                 for method in &self.methods {
-                    let own = curve(scene, method, &series(rows, scene, method, axis), reference.cost);
+                    let own =
+                        curve(scene, method, &series(rows, scene, method, axis), reference.cost);
                     layers.extend(draw(method, &own));
                     points.extend(own);
                 }
@@ -69,23 +70,31 @@ impl Config {
 
     fn check_names(&self) -> impl Iterator<Item = OutOfRange> {
         let falls = !self.at_seconds.is_sorted_by(|a, b| a < b);
-        let falls =
-            falls.then(|| OutOfRange::new("at_seconds", format!("{:?}", self.at_seconds), "ascending numbers"));
+        let falls = falls.then(|| {
+            OutOfRange::new("at_seconds", format!("{:?}", self.at_seconds), "ascending numbers")
+        });
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         let is_odd = self.file.is_empty() || !self.file.chars().all(plain);
-        let is_odd =
-            is_odd.then(|| OutOfRange::new("file", format!("{:?}", self.file), "letters, digits, - and _"));
+        let is_odd = is_odd.then(|| {
+            OutOfRange::new("file", format!("{:?}", self.file), "letters, digits, - and _")
+        });
         falls.into_iter().chain(is_odd)
     }
 
     /// Which methods end lowest, on how many scenes, and how far below the greedy tree.
     fn reading(&self, rows: &Rows) -> String {
         let lowest = |scene: &&str| {
-            let ends = self.methods.iter().map(|method| (median(&rows.final_ratios(scene, method)), method));
-            ends.filter_map(|(cost, method)| Some((cost?, method))).min_by(|a, b| a.0.total_cmp(&b.0))
+            let ends = self
+                .methods
+                .iter()
+                .map(|method| (median(&rows.final_ratios(scene, method)), method));
+            ends.filter_map(|(cost, method)| Some((cost?, method)))
+                .min_by(|a, b| a.0.total_cmp(&b.0))
         };
         let lowest: Vec<(f64, &String)> = rows.scenes().iter().filter_map(lowest).collect();
-        let Some((low, high)) = range(lowest.iter().map(|(cost, _)| *cost)) else { return String::new() };
+        let Some((low, high)) = range(lowest.iter().map(|(cost, _)| *cost)) else {
+            return String::new();
+        };
         let count = |method| lowest.iter().filter(|(_, best)| *best == method).count();
         let counts = self.methods.iter().map(|method| (method.as_str(), count(method)));
         let counts = tally(counts.filter(|(_, count)| *count > 0), lowest.len(), "scenes");
@@ -97,7 +106,8 @@ impl Config {
 
     fn add_table(&self, output: &mut Output, rows: &Rows) {
         let seconds = self.at_seconds.iter().map(|seconds| format!("{seconds} s"));
-        let header: Vec<String> = ["scene".into(), "method".into()].into_iter().chain(seconds).collect();
+        let header: Vec<String> =
+            ["scene".into(), "method".into()].into_iter().chain(seconds).collect();
         let mut table = text_table(header.iter().map(String::as_str));
         for scene in rows.scenes() {
             for method in &self.methods {
@@ -121,7 +131,8 @@ fn percent(ratio: f64) -> String {
 
 /// What the incumbents of all runs cost then, the worst where a run has none yet: so their median never rises.
 fn incumbents(runs: &[Series], at: f64) -> Vec<f64> {
-    let incumbent = |run: &Series| run.iter().take_while(|(x, _)| *x <= at).last().map(|point| point.1);
+    let incumbent =
+        |run: &Series| run.iter().take_while(|(x, _)| *x <= at).last().map(|point| point.1);
     runs.iter().map(|run| incumbent(run).unwrap_or(Metric::WORST)).collect()
 }
 
@@ -133,7 +144,9 @@ fn curve<'a>(scene: &'a str, method: &'a str, runs: &[Series], reference: f64) -
         return Vec::new();
     }
     let steps = ((last / first).log10() * PER_DECADE).ceil().max(0.0) as u32;
-    let place = |step: u32| if step == steps { last } else { first * 10f64.powf(f64::from(step) / PER_DECADE) };
+    let place = |step: u32| {
+        if step == steps { last } else { first * 10f64.powf(f64::from(step) / PER_DECADE) }
+    };
     let point = |x: f64| {
         let [gap_quartile_1, gap_median, gap_quartile_3] =
             quartiles(&incumbents(runs, x)).map(|cost| ratio(cost, reference) - 1.0);
@@ -148,7 +161,8 @@ fn draw(method: &str, points: &[Point]) -> Vec<Layer> {
     if points.len() == 1 {
         return vec![Layer::new(method, Marks::Points(medians))];
     }
-    let band = points.iter().map(|point| (point.x, point.gap_quartile_1, point.gap_quartile_3)).collect();
+    let band =
+        points.iter().map(|point| (point.x, point.gap_quartile_1, point.gap_quartile_3)).collect();
     vec![Layer::new(method, Marks::StepBand(band)), Layer::new(method, Marks::Steps(medians))]
 }
 
@@ -159,7 +173,8 @@ mod tests {
     #[test]
     fn the_median_of_incumbents_never_rises() {
         // One run is early and good, two are late and worse.
-        let runs: Vec<Series> = vec![vec![(1.0, 5.0)], vec![(3.0, 9.0)], vec![(4.0, 8.0), (6.0, 6.0)]];
+        let runs: Vec<Series> =
+            vec![vec![(1.0, 5.0)], vec![(3.0, 9.0)], vec![(4.0, 8.0), (6.0, 6.0)]];
         let medians = [0.5, 1.0, 3.0, 4.0, 6.0].map(|at| median(&incumbents(&runs, at)).unwrap());
         assert!(medians[0].is_infinite() && medians[1].is_infinite());
         assert_eq!(medians[2..], [9.0, 8.0, 6.0]);

@@ -45,7 +45,9 @@ pub fn attempts<'a>(config: &'a Targets, rows: &'a Rows, axis: ProgressAxis) -> 
 /// The empirical distribution function that rises to each `(x, fraction)`, from 0 at the first to `end`. Empty if it
 /// never rises.
 pub fn staircase(rises: Vec<(f64, f64)>, end: f64) -> Vec<(f64, f64)> {
-    let (Some(&(first, _)), Some(&(last, fraction))) = (rises.first(), rises.last()) else { return rises };
+    let (Some(&(first, _)), Some(&(last, fraction))) = (rises.first(), rises.last()) else {
+        return rises;
+    };
     std::iter::once((first, 0.0)).chain(rises).chain([(end.max(last), fraction)]).collect()
 }
 

@@ -52,9 +52,12 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
         let own = lines.iter().find(|line| line.scene == scene && line.method == method);
         own.and_then(|line| line.collapsed_sah).unwrap_or(f64::NAN)
     };
-    let least = |scene: &str| minimum(methods.iter().map(|method| of(scene, method))).unwrap_or(f64::NAN);
-    let wins = |method: &str| scenes.iter().filter(|scene| of(scene, method) == least(scene)).count();
-    let counts = tally(methods.iter().map(|method| (*method, wins(method))), scenes.len(), "scenes");
+    let least =
+        |scene: &str| minimum(methods.iter().map(|method| of(scene, method))).unwrap_or(f64::NAN);
+    let wins =
+        |method: &str| scenes.iter().filter(|scene| of(scene, method) == least(scene)).count();
+    let counts =
+        tally(methods.iter().map(|method| (*method, wins(method))), scenes.len(), "scenes");
     output.reading = format!("Lowest median by the surface area heuristic: {counts}.");
     let bars = |method: &&str| {
         let values = scenes.iter().map(|scene| of(scene, method) / least(scene)).collect();
@@ -62,8 +65,7 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     };
     let layers = methods.iter().map(bars).collect();
     let x = Axis::categories("", scenes.iter().map(|scene| (*scene).to_owned()).collect());
-    let caption =
-        "Medians of runs that the clock ended, by the surface area heuristic, over the least of the scene.";
+    let caption = "Medians of runs that the clock ended, by the surface area heuristic, over the least of the scene.";
     let y = Axis::linear("cost / least of the scene");
     output.add_figure("timing_runs", caption, 1, vec![panel("", x, y, layers)]);
     Ok(output)
@@ -72,7 +74,8 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
 /// All runs of the scene and the method of `first`.
 fn line(first: &ClockedRow, runs: &[ClockedRow]) -> Line {
     let same = |run: &&ClockedRow| run.scene == first.scene && run.method == first.method;
-    let of = |value: fn(&ClockedRow) -> f64| runs.iter().filter(same).map(value).collect::<Vec<f64>>();
+    let of =
+        |value: fn(&ClockedRow) -> f64| runs.iter().filter(same).map(value).collect::<Vec<f64>>();
     let costs = of(|run| run.collapsed_sah);
     Line {
         scene: first.scene.clone(),

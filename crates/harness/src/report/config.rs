@@ -55,7 +55,10 @@ impl Labels for String {
 
 impl<L: Labels> Labels for [L] {
     fn labels(&self, key: &str) -> Vec<(String, &str)> {
-        self.iter().enumerate().flat_map(|(at, named)| named.labels(&format!("{key}[{at}]"))).collect()
+        self.iter()
+            .enumerate()
+            .flat_map(|(at, named)| named.labels(&format!("{key}[{at}]")))
+            .collect()
     }
 }
 

@@ -59,14 +59,16 @@ type Cost<'a> = (String, Box<dyn Fn(&RunRow) -> Option<f64> + 'a>);
 
 /// The costs by area, and the one by the density of each kind of rays.
 fn costs(rows: &Rows) -> Vec<Cost<'_>> {
-    let of_area =
-        Metric::COSTS.map(|cost| -> Cost { (cost.column().into(), Box::new(move |run| cost.of_run(run))) });
+    let of_area = Metric::COSTS
+        .map(|cost| -> Cost { (cost.column().into(), Box::new(move |run| cost.of_run(run))) });
     let of_rays = |rays| -> Cost {
         let own = move |run: &RunRow, row: &VisitRow| {
             (&row.scene, &row.method, row.repetition) == (&run.scene, &run.method, run.repetition)
                 && row.rays == rays
         };
-        let of = move |run: &RunRow| Some(rows.visits.iter().find(|row| own(run, row))?.goldsmith_salmon);
+        let of = move |run: &RunRow| {
+            Some(rows.visits.iter().find(|row| own(run, row))?.goldsmith_salmon)
+        };
         (format!("goldsmith_salmon_{rays}"), Box::new(of))
     };
     let rays = distinct(rows.visits.iter().map(|row| row.rays.as_str()));
@@ -77,7 +79,8 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     let mut correlations = Vec::new();
     let mut panels = Vec::new();
     let costs = costs(rows);
-    let of_layouts = distinct(rows.run_tests.iter().map(|row| (row.judged_on.as_str(), row.camera.as_str())));
+    let of_layouts =
+        distinct(rows.run_tests.iter().map(|row| (row.judged_on.as_str(), row.camera.as_str())));
     let random = rows.ray_kinds().len();
     for scene in rows.scenes() {
         for (number, kind) in rows.ray_kinds().into_iter().chain(of_layouts.clone()).enumerate() {
@@ -85,7 +88,8 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
             let mut drawn = Vec::new();
             for method in &config.methods {
                 let trees = trees(rows, scene, method, kind);
-                correlations.extend(costs.iter().map(|cost| correlate(scene, method, kind, cost, &trees)));
+                correlations
+                    .extend(costs.iter().map(|cost| correlate(scene, method, kind, cost, &trees)));
                 drawn.push((method.as_str(), trees));
             }
             if number < random {
@@ -131,7 +135,8 @@ impl Config {
                 Verdict::CannotBeTold
             };
             let quantity = "Pearson's correlation of cost and tests per ray over insertion orders";
-            let compared = PaperRow::new(&self.source, rows.shown(row.scene), quantity, &self.reason);
+            let compared =
+                PaperRow::new(&self.source, rows.shown(row.scene), quantity, &self.reason);
             let rule = format!(
                 "its 95 % interval lies from {} on; it differs if the interval lies below",
                 self.paper_from
@@ -145,13 +150,21 @@ impl Config {
 
 /// The method's trees through which rays of the kind were sent: random ones through the binary tree, others through its wide layout.
 fn trees<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) -> Vec<Tree<'a>> {
-    let random = rows.rays_of(scene, method, kind).into_iter().map(|row| (row.repetition, row.boxes_per_ray));
+    let random = rows
+        .rays_of(scene, method, kind)
+        .into_iter()
+        .map(|row| (row.repetition, row.boxes_per_ray));
     let own = |row: &&RunTestRow| {
-        row.scene == scene && row.method == method && (row.judged_on.as_str(), row.camera.as_str()) == kind
+        row.scene == scene
+            && row.method == method
+            && (row.judged_on.as_str(), row.camera.as_str()) == kind
     };
     let of_layouts = rows.run_tests.iter().filter(own).map(|row| (row.repetition, row.tests));
     let run = |repetition| rows.runs_of(scene, method).find(|run| run.repetition == repetition);
-    random.chain(of_layouts).filter_map(|(repetition, tests)| Some((run(repetition)?, tests))).collect()
+    random
+        .chain(of_layouts)
+        .filter_map(|(repetition, tests)| Some((run(repetition)?, tests)))
+        .collect()
 }
 
 fn correlate<'a>(
@@ -168,10 +181,26 @@ fn correlate<'a>(
         pearson.and_then(|pearson| pearson_interval(pearson, pairs.len())).unzip();
     let trees = pairs.len();
     let spearman = spearman(&pairs);
-    Correlation { scene, method, cost, family, query, trees, pearson, pearson_low, pearson_high, spearman }
+    Correlation {
+        scene,
+        method,
+        cost,
+        family,
+        query,
+        trees,
+        pearson,
+        pearson_low,
+        pearson_high,
+        spearman,
+    }
 }
 
-fn draw(scene: &str, (family, query): (&str, &str), methods: &[(&str, Vec<Tree>)], rank: Option<f64>) -> Panel {
+fn draw(
+    scene: &str,
+    (family, query): (&str, &str),
+    methods: &[(&str, Vec<Tree>)],
+    rank: Option<f64>,
+) -> Panel {
     let points = |(method, trees): &(&str, Vec<Tree>)| {
         let points = trees.iter().map(|(run, tests)| (run.goldsmith_salmon, *tests));
         Layer::new(*method, Marks::Points(points.collect()))
@@ -206,7 +235,9 @@ mod tests {
     fn two_families() -> Rows {
         let mut rows = Rows::default();
         for (method, level) in [("orders", 1.0), ("splits", 100.0)] {
-            for (repetition, (cost, tests)) in (0..).zip([(1.0, 2.0), (2.0, 1.0), (3.0, 1.0), (4.0, 2.0)]) {
+            for (repetition, (cost, tests)) in
+                (0..).zip([(1.0, 2.0), (2.0, 1.0), (3.0, 1.0), (4.0, 2.0)])
+            {
                 let goldsmith_salmon = level + cost;
                 rows.runs.push(RunRow { goldsmith_salmon, ..run(method, repetition, 1, 0) });
                 let (scene, method) = ("s".to_owned(), method.to_owned());
@@ -240,8 +271,9 @@ mod tests {
         let at = |name: &str| header.iter().position(|column| column == name).unwrap();
         let records: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
         let own = records.iter().filter(|record| &record[at("cost")] == "goldsmith_salmon");
-        let own: Vec<(&str, f64)> =
-            own.map(|record| (&record[at("method")], record[at("spearman")].parse().unwrap())).collect();
+        let own: Vec<(&str, f64)> = own
+            .map(|record| (&record[at("method")], record[at("spearman")].parse().unwrap()))
+            .collect();
         assert_eq!(own, [("orders", 0.0), ("splits", 0.0)]);
     }
 

@@ -3,8 +3,8 @@
 use crate::Error;
 use crate::measure::layout::{is_repeat, is_single};
 use crate::rows::{
-    self, BoundRow, ClockRow, HistoryRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row, RunRow,
-    RunTestRow, TestRow, TestTimeRow, TimingRow, TraceRow, TraceTimeRow, VisitRow,
+    self, BoundRow, ClockRow, HistoryRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row,
+    RunRow, RunTestRow, TestRow, TestTimeRow, TimingRow, TraceRow, TraceTimeRow, VisitRow,
 };
 use crate::statistics::{median, minimum};
 use bvh_scenes::SceneKind;
@@ -139,7 +139,8 @@ impl Rows {
     /// The costs of one method's trials on one scene over base, one list per repetition, in order.
     pub fn trials_over_base(&self, scene: &str, method: &str) -> Vec<Vec<f64>> {
         let base = self.base_cost(scene);
-        let over_base = |history: Vec<&HistoryRow>| history.iter().map(|row| ratio(row.cost, base)).collect();
+        let over_base =
+            |history: Vec<&HistoryRow>| history.iter().map(|row| ratio(row.cost, base)).collect();
         self.histories(scene, method).into_iter().map(over_base).collect()
     }
 
@@ -151,7 +152,9 @@ impl Rows {
     /// The measurements with random rays of one kind through the trees of one method on one scene.
     pub fn rays_of(&self, scene: &str, method: &str, kind: (&str, &str)) -> Vec<&RayRow> {
         let own = |row: &&RayRow| {
-            row.scene == scene && row.method == method && (row.family.as_str(), row.query.as_str()) == kind
+            row.scene == scene
+                && row.method == method
+                && (row.family.as_str(), row.query.as_str()) == kind
         };
         self.rays.iter().filter(own).collect()
     }
@@ -168,18 +171,19 @@ impl Rows {
 
     /// Nanoseconds per ray.
     pub fn ns_per_ray(&self, scene: &str, method: &str, layout: &str, rays: &str) -> Option<f64> {
-        let own = self
-            .trace_times
-            .iter()
-            .find(|row| row.scene == scene && row.method == method && row.layout == layout && row.rays == rays);
+        let own = self.trace_times.iter().find(|row| {
+            row.scene == scene && row.method == method && row.layout == layout && row.rays == rays
+        });
         own.filter(|row| row.count > 0).map(|row| 1e9 * row.seconds / row.count as f64)
     }
 
     /// The method's layout that is fastest for these rays by single calls, with its nanoseconds per ray. Libraries without
     /// batches can be compared so.
     pub fn fastest_layout(&self, scene: &str, method: &str, rays: &str) -> Option<(&str, f64)> {
-        let layouts = self.layouts().into_iter().filter(|layout| is_single(layout) && !is_repeat(layout));
-        let timed = layouts.filter_map(|layout| Some((layout, self.ns_per_ray(scene, method, layout, rays)?)));
+        let layouts =
+            self.layouts().into_iter().filter(|layout| is_single(layout) && !is_repeat(layout));
+        let timed = layouts
+            .filter_map(|layout| Some((layout, self.ns_per_ray(scene, method, layout, rays)?)));
         timed.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
@@ -187,7 +191,9 @@ impl Rows {
 /// A run on the scene `s` with nothing of note.
 #[cfg(test)]
 pub(super) fn run(method: &str, repetition: u32, evaluations: u64, work: u64) -> RunRow {
-    let row = format!("s,file,{method},0,{repetition},100,{evaluations},{work},completed,1,1,1,1,1,1,1,199,9");
+    let row = format!(
+        "s,file,{method},0,{repetition},100,{evaluations},{work},completed,1,1,1,1,1,1,1,199,9"
+    );
     csv::StringRecord::from_iter(row.split(',')).deserialize(None).unwrap()
 }
 

@@ -74,7 +74,11 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
         output.paper.extend(config.majority(rows, method));
     }
     output.answer = output.paper.first().map(|row| {
-        let kept = if row.verdict == Verdict::Agrees { "as the paper says" } else { "unlike in the paper" };
+        let kept = if row.verdict == Verdict::Agrees {
+            "as the paper says"
+        } else {
+            "unlike in the paper"
+        };
         format!("Of single trials {} lie where the paper finds the majority, {kept}.", row.ours)
     });
     output.add_csv("distribution", &summaries)?;
@@ -84,10 +88,12 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     let reading = each(&config.methods, |method| {
         let own = || summaries.iter().filter(|row| row.method == method);
         let of = |cost: fn(&Summary) -> f64| range(own().map(|row| cost(row) / row.base_cost));
-        let ((median, most), (lowest, least)) = (of(|row| row.median_cost)?, of(|row| row.lowest_cost)?);
+        let ((median, most), (lowest, least)) =
+            (of(|row| row.median_cost)?, of(|row| row.lowest_cost)?);
         Some(format!("‘{method}’ {median:.3} to {most:.3}, lowest {lowest:.3} to {least:.3}"))
     });
-    output.reading = format!("Costs of trials over Müller–Fellner's, over scenes: median of {reading}.");
+    output.reading =
+        format!("Costs of trials over Müller–Fellner's, over scenes: median of {reading}.");
     Ok(output)
 }
 
@@ -99,8 +105,10 @@ impl Config {
             let limit = (1.0 + within) * rows.base_cost(scene);
             fraction_below(&rows.trial_costs(scene, method), limit)
         };
-        let stand_ins =
-            rows.scenes().into_iter().filter(|scene| rows.kind(scene) == SceneKind::StandIn.to_string());
+        let stand_ins = rows
+            .scenes()
+            .into_iter()
+            .filter(|scene| rows.kind(scene) == SceneKind::StandIn.to_string());
         let (low, high) = range(stand_ins.map(fraction))?;
         let quantity = format!("{method}, fraction of trials within {} % of base", 100.0 * within);
         let row = PaperRow::new(&self.source, "all stand-ins", quantity, &self.reason);

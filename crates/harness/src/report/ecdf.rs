@@ -27,12 +27,19 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
     );
     for axis in ProgressAxis::of(rows, &config.methods) {
         let attempts = attempts(config, rows, axis);
-        let ends = rows.scenes().into_iter().map(|scene| longest_of_all(rows, scene, &config.methods, axis));
+        let ends = rows
+            .scenes()
+            .into_iter()
+            .map(|scene| longest_of_all(rows, scene, &config.methods, axis));
         let end = ends.fold(0.0, f64::max);
         let (mut steps, mut layers) = (Vec::new(), Vec::new());
         for method in &config.methods {
             let points = curve(&attempts, method, end);
-            steps.extend(points.iter().map(|&(x, solved_fraction)| Step { method, x, solved_fraction }));
+            steps.extend(points.iter().map(|&(x, solved_fraction)| Step {
+                method,
+                x,
+                solved_fraction,
+            }));
             layers.push(Layer::new(method, Marks::Steps(points)));
         }
         axis.add_csv(&mut output, "ecdf", &steps)?;

@@ -27,8 +27,10 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
         for method in &config.methods {
             let start = points.len();
             points.extend(measurements(rows, scene, method));
-            let mut line: Vec<(f64, f64)> =
-                points[start..].iter().map(|point| (point.rays as f64, point.relative_error)).collect();
+            let mut line: Vec<(f64, f64)> = points[start..]
+                .iter()
+                .map(|point| (point.rays as f64, point.relative_error))
+                .collect();
             line.sort_by(|a, b| a.0.total_cmp(&b.0));
             if let (true, Some(&(x, y))) = (layers.is_empty(), line.first()) {
                 let slope = line.iter().map(|point| (point.0, y * (x / point.0).sqrt())).collect();
@@ -41,25 +43,35 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
     }
     let mut output = Output::new(&config.source, &config.title);
     output.add_csv("estimator", &points)?;
-    let caption = "Rays from inside, any hit. Two stable digits need an error below half a percent.";
+    let caption =
+        "Rays from inside, any hit. Two stable digits need an error below half a percent.";
     output.add_figure("estimator", caption, 2, panels);
     output.reading = reading(&points);
     Ok(output)
 }
 
-fn measurements<'a>(rows: &'a Rows, scene: &'a str, method: &'a str) -> impl Iterator<Item = Point<'a>> {
+fn measurements<'a>(
+    rows: &'a Rows,
+    scene: &'a str,
+    method: &'a str,
+) -> impl Iterator<Item = Point<'a>> {
     let (family, query) = KIND;
-    rows.rays_of(scene, method, KIND).into_iter().filter(|row| row.repetition == 0).map(move |row| {
-        let relative_error = row.boxes_standard_error / row.boxes_per_ray;
-        Point { scene, method, family, query, rays: row.rays, relative_error }
-    })
+    rows.rays_of(scene, method, KIND).into_iter().filter(|row| row.repetition == 0).map(
+        move |row| {
+            let relative_error = row.boxes_standard_error / row.boxes_per_ray;
+            Point { scene, method, family, query, rays: row.rays, relative_error }
+        },
+    )
 }
 
 /// How the error falls with the number of rays, by the slope between the least and the greatest number.
 fn reading(points: &[Point]) -> String {
     let slope = |line: &[Point]| {
         let (first, last) = (line.first()?, line.last().filter(|last| last.rays > line[0].rays)?);
-        Some((last.relative_error / first.relative_error).ln() / (last.rays as f64 / first.rays as f64).ln())
+        Some(
+            (last.relative_error / first.relative_error).ln()
+                / (last.rays as f64 / first.rays as f64).ln(),
+        )
     };
     let lines = points.chunk_by(|a, b| (a.scene, a.method) == (b.scene, b.method));
     range(lines.filter_map(slope)).map_or_else(String::new, |(low, high)| {

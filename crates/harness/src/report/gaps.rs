@@ -88,16 +88,23 @@ impl Config {
 
     fn find<'a>(&self, rows: &'a Rows) -> Found<'a> {
         let optimal = rows.runs.iter().filter(|run| run.method == self.optimum);
-        let optima: BTreeMap<&str, f64> = optimal.map(|run| (run.scene.as_str(), run.cost)).collect();
-        let mut found = Found { gaps: BTreeMap::new(), bounds: BTreeMap::new(), optima: optima.len() };
+        let optima: BTreeMap<&str, f64> =
+            optimal.map(|run| (run.scene.as_str(), run.cost)).collect();
+        let mut found =
+            Found { gaps: BTreeMap::new(), bounds: BTreeMap::new(), optima: optima.len() };
         for run in rows.runs.iter().filter(|run| self.methods.contains(&run.method)) {
             if let Some(&optimum) = optima.get(run.scene.as_str()) {
                 let gap = if optimum > 0.0 { run.cost / optimum - 1.0 } else { run.cost };
-                found.gaps.entry((&run.method, part(&run.scene), run.objects)).or_default().push(gap);
+                found
+                    .gaps
+                    .entry((&run.method, part(&run.scene), run.objects))
+                    .or_default()
+                    .push(gap);
             }
         }
         for row in &rows.bounds {
-            if let Some(optimum) = optima.get(row.scene.as_str()).filter(|&&optimum| optimum > 0.0) {
+            if let Some(optimum) = optima.get(row.scene.as_str()).filter(|&&optimum| optimum > 0.0)
+            {
                 let same = found.bounds.entry((part(&row.scene), row.objects)).or_default();
                 same.push(row.lower_bound / optimum);
             }
@@ -106,16 +113,17 @@ impl Config {
     }
 
     fn summaries<'a>(&self, found: &Found<'a>) -> Vec<Gaps<'a>> {
-        let summary = |(&(method, part, objects), gaps): (&(&'a str, &'static str, usize), &Vec<f64>)| Gaps {
-            method,
-            part,
-            objects,
-            runs: gaps.len(),
-            solved_fraction: solved(gaps),
-            median_gap: at(gaps, 0.5),
-            quantile_90_gap: at(gaps, 0.9),
-            maximum_gap: at(gaps, 1.0),
-        };
+        let summary =
+            |(&(method, part, objects), gaps): (&(&'a str, &'static str, usize), &Vec<f64>)| Gaps {
+                method,
+                part,
+                objects,
+                runs: gaps.len(),
+                solved_fraction: solved(gaps),
+                median_gap: at(gaps, 0.5),
+                quantile_90_gap: at(gaps, 0.9),
+                maximum_gap: at(gaps, 1.0),
+            };
         let of = |method| found.gaps.iter().filter(move |((of, ..), _)| of == method);
         self.methods.iter().flat_map(of).map(summary).collect()
     }
@@ -125,7 +133,9 @@ impl Config {
         let parts: BTreeSet<&str> = summaries.iter().map(|summary| summary.part).collect();
         let draw = |part: &str, title: &str, y: Axis, value: fn(&Gaps) -> f64| {
             let line = |method: &String| {
-                let own = summaries.iter().filter(|summary| summary.part == part && summary.method == method);
+                let own = summaries
+                    .iter()
+                    .filter(|summary| summary.part == part && summary.method == method);
                 let points = own.map(|summary| (summary.objects as f64, value(summary))).collect();
                 Layer::new(method, Marks::Line(points))
             };

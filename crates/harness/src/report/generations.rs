@@ -91,7 +91,8 @@ impl Config {
         let caption = "Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the median and, of several runs, the \
                        range. Random picking: the exact expectation for as many orders, as far as so many were drawn.";
         output.add_figure("generations", caption, 1, panels);
-        let gains: Vec<PaperRow> = output.paper.iter().filter(|row| row.quantity == GAIN).cloned().collect();
+        let gains: Vec<PaperRow> =
+            output.paper.iter().filter(|row| row.quantity == GAIN).cloned().collect();
         output.answer = ratios(&gains);
         output.add_csv("generations", &generations)?;
         Ok(output)
@@ -100,7 +101,11 @@ impl Config {
     fn check_order(&self) -> impl Iterator<Item = OutOfRange> {
         let disordered = self.paper_final.iter().filter(|(_, [low, high])| low > high);
         disordered.map(|(scene, found)| {
-            OutOfRange::new(format!("paper_final.{scene}"), format!("{found:?}"), "the lower number first")
+            OutOfRange::new(
+                format!("paper_final.{scene}"),
+                format!("{found:?}"),
+                "the lower number first",
+            )
         })
     }
 
@@ -117,8 +122,10 @@ impl Config {
     fn compare(&self, shown: &str, runs: &Runs, end: &Final) -> Vec<PaperRow> {
         let row = |quantity: &str| PaperRow::new(&self.source, shown, quantity, &self.reason);
         let spread = self.paper_final.get(runs.scene).map(|&[low, high]| {
-            let [theirs, ours] = [(low, high), (end.low, end.high)].map(|(l, h)| 2.0 * (h - l) / (h + l));
-            let verdict = if (ours / theirs - 1.0).abs() <= 0.5 { Verdict::Agrees } else { Verdict::Differs };
+            let [theirs, ours] =
+                [(low, high), (end.low, end.high)].map(|(l, h)| 2.0 * (h - l) / (h + l));
+            let verdict =
+                if (ours / theirs - 1.0).abs() <= 0.5 { Verdict::Agrees } else { Verdict::Differs };
             let rule = "between half and one and a half times the paper's";
             row("spread of final costs over runs: (highest − lowest) / middle").compare(
                 format!("{theirs:.3}"),
@@ -133,7 +140,12 @@ impl Config {
         });
         let interval = (end.low / end.average, end.high / end.average);
         let gain = self.paper_gain.map(|paper| {
-            row(GAIN).compare_ratios(paper, end.median / end.average, Some(interval), GAIN_TOLERANCE)
+            row(GAIN).compare_ratios(
+                paper,
+                end.median / end.average,
+                Some(interval),
+                GAIN_TOLERANCE,
+            )
         });
         let ours = end.median / end.base;
         let over_base = PaperRow {
@@ -165,7 +177,10 @@ impl<'a> Runs<'a> {
     fn generations(&self) -> Vec<Generation<'a>> {
         let generation = |(generation, row): (usize, &&HistoryRow)| {
             // A run that has ended keeps its best tree.
-            let costs = self.runs.iter().filter_map(|run| Some(run.get(generation).or(run.last())?.incumbent));
+            let costs = self
+                .runs
+                .iter()
+                .filter_map(|run| Some(run.get(generation).or(run.last())?.incumbent));
             let (lowest_cost, highest_cost) = range(costs).unwrap_or((f64::NAN, f64::NAN));
             Generation {
                 scene: self.scene,
@@ -180,7 +195,8 @@ impl<'a> Runs<'a> {
     }
 
     fn end(&self, base: f64) -> Option<Final> {
-        let costs: Vec<f64> = self.runs.iter().filter_map(|run| Some(run.last()?.incumbent)).collect();
+        let costs: Vec<f64> =
+            self.runs.iter().filter_map(|run| Some(run.last()?.incumbent)).collect();
         let (low, high) = range(costs.iter().copied())?;
         let average = self.random.iter().sum::<f64>() / self.random.len() as f64;
         Some(Final { runs: costs.len(), low, median: median(&costs)?, high, average, base })

@@ -166,7 +166,10 @@ impl Report {
     /// Whether the report measures gaps.
     pub fn needs_references(&self) -> bool {
         use Report::{Anytime, Ecdf, Numbers, Profile, RunTimes, TimeToTarget};
-        matches!(self, Anytime(_) | RunTimes(_) | Ecdf(_) | Profile(_) | Numbers(_) | TimeToTarget(_))
+        matches!(
+            self,
+            Anytime(_) | RunTimes(_) | Ecdf(_) | Profile(_) | Numbers(_) | TimeToTarget(_)
+        )
     }
 }
 
@@ -176,7 +179,8 @@ pub const TEXT_FILE: &str = "timing_report.txt";
 /// Makes all reports from the CSV files in a folder, the paper's numbers beside ours last. Writes nothing.
 pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> {
     let rows = Rows::read(folder)?;
-    let mut outputs = reports.iter().map(|report| report.write(&rows)).collect::<Result<Vec<_>, _>>()?;
+    let mut outputs =
+        reports.iter().map(|report| report.write(&rows)).collect::<Result<Vec<_>, _>>()?;
     if reports.is_empty() {
         outputs.push(final_costs(&rows)?);
     }
@@ -186,8 +190,11 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
         let answers = answers(&outputs);
         outputs.push(beside_paper(&paper, &answers)?);
     }
-    let shown: Vec<_> =
-        outputs.iter().flat_map(|output| &output.figures).map(|(_, figure)| series(figure)).collect();
+    let shown: Vec<_> = outputs
+        .iter()
+        .flat_map(|output| &output.figures)
+        .map(|(_, figure)| series(figure))
+        .collect();
     let looks = looks(&rows.methods(), &shown);
     for (_, figure) in outputs.iter_mut().flat_map(|output| &mut output.figures) {
         figure.looks.extend(looks.iter().cloned());
@@ -236,7 +243,10 @@ fn final_costs(rows: &Rows) -> Result<Output, Error> {
         }
     };
     let methods = rows.methods();
-    let pairs = rows.scenes().into_iter().flat_map(|scene| methods.iter().map(move |method| (scene, *method)));
+    let pairs = rows
+        .scenes()
+        .into_iter()
+        .flat_map(|scene| methods.iter().map(move |method| (scene, *method)));
     let table: Vec<Row> = pairs.map(row).collect();
     let mut output = Output::new("", "Final costs");
     let columns = "scene method runs least_over_base median_over_base median_seconds";
@@ -255,12 +265,21 @@ fn series(figure: &Figure) -> BTreeSet<String> {
 fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, Look)> {
     let mut slots: Vec<usize> = Vec::new();
     for (index, method) in methods.iter().enumerate() {
-        let shared = |other: &str| figures.iter().any(|shown| shown.contains(*method) && shown.contains(other));
-        let taken = |slot: usize| methods.iter().zip(&slots).any(|(other, at)| *at == slot && shared(other));
-        let free = (0..Look::COLOURS).find(|&slot| !taken(slot)).filter(|_| methods.len() > Look::COLOURS);
+        let shared = |other: &str| {
+            figures.iter().any(|shown| shown.contains(*method) && shown.contains(other))
+        };
+        let taken = |slot: usize| {
+            methods.iter().zip(&slots).any(|(other, at)| *at == slot && shared(other))
+        };
+        let free =
+            (0..Look::COLOURS).find(|&slot| !taken(slot)).filter(|_| methods.len() > Look::COLOURS);
         slots.push(free.unwrap_or(index));
     }
-    methods.iter().zip(slots).map(|(method, slot)| ((*method).to_owned(), Look::Slot(slot))).collect()
+    methods
+        .iter()
+        .zip(slots)
+        .map(|(method, slot)| ((*method).to_owned(), Look::Slot(slot)))
+        .collect()
 }
 
 /// The answers of all reports, in their order.
@@ -289,7 +308,11 @@ fn beside_paper(rows: &[PaperRow], answers: &[Answer]) -> Result<Output, Error> 
     output.add_csv("answer", answers)?;
     output.add_csv("paper", rows)?;
     let columns = "scene quantity paper ours ours_low ours_high verdict";
-    output.show("What the paper says beside ours, which lies between low and high:", rows, columns)?;
+    output.show(
+        "What the paper says beside ours, which lies between low and high:",
+        rows,
+        columns,
+    )?;
     Ok(output)
 }
 
@@ -301,9 +324,12 @@ mod tests {
     fn methods_of_one_figure_share_no_colour_while_there_are_enough() {
         let methods: Vec<String> = (0..16).map(|index| format!("method {index}")).collect();
         let methods: Vec<&str> = methods.iter().map(String::as_str).collect();
-        let figure = |shown: &[usize]| shown.iter().map(|&index| methods[index].to_owned()).collect();
-        let figures: [BTreeSet<String>; 2] =
-            [figure(&[0, 1, 2, 3, 4, 7, 11, 12, 13, 14, 15]), figure(&[3, 4, 5, 6, 7, 8, 9, 10, 11, 14, 15])];
+        let figure =
+            |shown: &[usize]| shown.iter().map(|&index| methods[index].to_owned()).collect();
+        let figures: [BTreeSet<String>; 2] = [
+            figure(&[0, 1, 2, 3, 4, 7, 11, 12, 13, 14, 15]),
+            figure(&[3, 4, 5, 6, 7, 8, 9, 10, 11, 14, 15]),
+        ];
         let few = looks(&methods[..12], &figures);
         assert!(few.iter().enumerate().all(|(index, (_, look))| *look == Look::Slot(index)));
         let looks = looks(&methods, &figures);

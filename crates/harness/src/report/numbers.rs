@@ -71,12 +71,15 @@ impl Config {
         let (mut numbers, mut timing) = (Vec::new(), Vec::new());
         for scene in rows.scenes() {
             let Some(reference) = rows.reference(scene) else { continue };
-            let horizons = ProgressAxis::ALL.map(|axis| longest_of_all(rows, scene, &self.methods, axis));
+            let horizons =
+                ProgressAxis::ALL.map(|axis| longest_of_all(rows, scene, &self.methods, axis));
             for method in &self.methods {
                 let integral = |at: usize| {
                     let runs = series(rows, scene, method, ProgressAxis::ALL[at]);
-                    let integral = |run: &Series| primal_integral(run, reference.cost, horizons[at]);
-                    median(&runs.iter().filter_map(integral).collect::<Vec<_>>()).unwrap_or(f64::NAN)
+                    let integral =
+                        |run: &Series| primal_integral(run, reference.cost, horizons[at]);
+                    median(&runs.iter().filter_map(integral).collect::<Vec<_>>())
+                        .unwrap_or(f64::NAN)
                 };
                 let [primal_integral, evaluations, work] = [0, 1, 2].map(integral);
                 numbers.push(of_costs(rows, scene, method, reference, [evaluations, work]));
@@ -96,8 +99,7 @@ impl Config {
         let mut output = Output::new("", &self.title);
         output.add_csv("numbers", &numbers)?;
         output.add_csv("timing_numbers", &timing)?;
-        let explanation =
-            "Gaps are to the exact optimum or the best known cost; the lower bound is relative to that:";
+        let explanation = "Gaps are to the exact optimum or the best known cost; the lower bound is relative to that:";
         let columns = "scene method runs cost_over_base_median gap_quartile_1 gap_median gap_quartile_3 \
                        lower_bound_over_reference";
         output.show(explanation, &numbers, columns)?;
@@ -122,17 +124,27 @@ impl Config {
 
     /// The lower bound and every method's cost on every scene, over the least known cost.
     fn draw(&self, rows: &Rows, numbers: &[Numbers]) -> Panel {
-        let bound = |scene: &str| rows.reference(scene).and_then(|row| Some(ratio(row.lower_bound?, row.cost)));
-        let bounds = rows.scenes().into_iter().map(|scene| bound(scene).unwrap_or(f64::NAN)).collect();
+        let bound = |scene: &str| {
+            rows.reference(scene).and_then(|row| Some(ratio(row.lower_bound?, row.cost)))
+        };
+        let bounds =
+            rows.scenes().into_iter().map(|scene| bound(scene).unwrap_or(f64::NAN)).collect();
         let cost = |method: &String| {
-            let own = |scene: &str| numbers.iter().find(|row| row.scene == scene && row.method == method);
+            let own =
+                |scene: &str| numbers.iter().find(|row| row.scene == scene && row.method == method);
             let scenes = rows.scenes().into_iter();
-            let values = scenes.map(|scene| own(scene).map_or(f64::NAN, |row| 1.0 + row.gap_median));
+            let values =
+                scenes.map(|scene| own(scene).map_or(f64::NAN, |row| 1.0 + row.gap_median));
             Layer::bars(method, values.collect(), 0.0)
         };
         let bounds = Layer::bars("lower bound", bounds, 0.0);
         let layers = std::iter::once(bounds).chain(self.methods.iter().map(cost)).collect();
-        panel("", Axis::categories("", rows.all_shown()), Axis::linear("cost / least known"), layers)
+        panel(
+            "",
+            Axis::categories("", rows.all_shown()),
+            Axis::linear("cost / least known"),
+            layers,
+        )
     }
 }
 

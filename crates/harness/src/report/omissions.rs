@@ -66,7 +66,8 @@ pub(super) struct Times<'a> {
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let scenes = rows.scenes();
-        let problems = || self.pairs.iter().flat_map(|pair| scenes.iter().map(move |scene| (pair, scene)));
+        let problems =
+            || self.pairs.iter().flat_map(|pair| scenes.iter().map(move |scene| (pair, scene)));
         let compared: Vec<Compared> =
             problems().map(|(pair, scene)| pair.compare(rows, scene)).collect::<Result<_, _>>()?;
         let times: Vec<Times> = problems().map(|(pair, scene)| pair.times(rows, scene)).collect();
@@ -78,17 +79,25 @@ impl Config {
         let columns = "omission scene runs same_cost cost_ratio work_ratio";
         output.show("Cost and work with it left out over those without:", &compared, columns)?;
         let columns = "omission scene ratio_low ratio_median ratio_high";
-        output.show("Time with it left out over time without, median and quartiles:", &times, columns)?;
+        output.show(
+            "Time with it left out over time without, median and quartiles:",
+            &times,
+            columns,
+        )?;
         let other = compared.iter().filter(|row| !row.same_cost).count();
         let names = self.pairs.iter().map(|pair| pair.name.as_str());
         let saved = spans(names, &times, |row| row.omission, |row| Some(row.ratio_median), 2);
         let cost = match other {
             0 => "No cost changes".into(),
             other => {
-                format!("Costs are lower in {other} of {} comparisons, otherwise the same", compared.len())
+                format!(
+                    "Costs are lower in {other} of {} comparisons, otherwise the same",
+                    compared.len()
+                )
             }
         };
-        output.reading = format!("{cost}. Time over that without leaving out, medians over scenes: {saved}.");
+        output.reading =
+            format!("{cost}. Time over that without leaving out, medians over scenes: {saved}.");
         Ok(output)
     }
 
@@ -98,13 +107,19 @@ impl Config {
         let bars = |(index, pair): (usize, &Pair)| {
             let offset = 0.8 * ((index as f64 + 0.5) / pairs - 0.5);
             let own = times.iter().filter(|times| times.omission == pair.name).enumerate();
-            let points = own.map(|(at, t)| (at as f64 + offset, t.ratio_low, t.ratio_median, t.ratio_high));
+            let points =
+                own.map(|(at, t)| (at as f64 + offset, t.ratio_low, t.ratio_median, t.ratio_high));
             Layer::new(&pair.name, Marks::ErrorBars(points.collect()))
         };
         let mut layers: Vec<Layer> = self.pairs.iter().enumerate().map(bars).collect();
         layers.push(Layer::new("nothing left out", Marks::HLine(1.0)));
         let y = Axis::log("time / time without leaving it out");
-        panel("", Axis::categories("", rows.scenes().into_iter().map(str::to_owned).collect()), y, layers)
+        panel(
+            "",
+            Axis::categories("", rows.scenes().into_iter().map(str::to_owned).collect()),
+            y,
+            layers,
+        )
     }
 }
 
@@ -113,20 +128,29 @@ impl Pair {
         let pairs: Vec<(&RunRow, &RunRow)> =
             rows.runs_of(scene, &self.out).zip(rows.runs_of(scene, &self.kept)).collect();
         let same = |(out, kept): &(&RunRow, &RunRow)| out.cost.to_bits() == kept.cost.to_bits();
-        let allowed = |pair: &(&RunRow, &RunRow)| same(pair) || self.may_be_lower && pair.0.cost < pair.1.cost;
+        let allowed = |pair: &(&RunRow, &RunRow)| {
+            same(pair) || self.may_be_lower && pair.0.cost < pair.1.cost
+        };
         if let Some((out, kept)) = pairs.iter().find(|pair| !allowed(pair)) {
             return Err(Error::Ablation {
                 scene: scene.into(),
-                message: format!("{} left out: the cost is {}, and {} without", self.name, out.cost, kept.cost),
+                message: format!(
+                    "{} left out: the cost is {}, and {} without",
+                    self.name, out.cost, kept.cost
+                ),
             });
         }
-        let work = |side: fn(&(&RunRow, &RunRow)) -> u64| pairs.iter().map(side).sum::<u64>() as f64;
+        let work =
+            |side: fn(&(&RunRow, &RunRow)) -> u64| pairs.iter().map(side).sum::<u64>() as f64;
         Ok(Compared {
             scene,
             omission: &self.name,
             runs: pairs.len(),
             same_cost: pairs.iter().all(same),
-            cost_ratio: pairs.iter().map(|(out, kept)| ratio(out.cost, kept.cost)).fold(0.0, f64::max),
+            cost_ratio: pairs
+                .iter()
+                .map(|(out, kept)| ratio(out.cost, kept.cost))
+                .fold(0.0, f64::max),
             work_ratio: ratio(work(|pair| pair.0.work), work(|pair| pair.1.work)),
         })
     }

@@ -36,7 +36,8 @@ pub struct Output {
 impl Output {
     /// The empty output of a report with this title. The source may be empty.
     pub fn new(source: &str, title: &str) -> Self {
-        let heading = if source.is_empty() { title.to_owned() } else { format!("{source}: {title}") };
+        let heading =
+            if source.is_empty() { title.to_owned() } else { format!("{source}: {title}") };
         Self { heading, ..Self::default() }
     }
 
@@ -50,7 +51,11 @@ impl Output {
     }
 
     /// Adds the CSV file `name`, without its extension.
-    pub fn add_csv(&mut self, name: impl Into<String>, rows: &[impl Serialize]) -> Result<(), Error> {
+    pub fn add_csv(
+        &mut self,
+        name: impl Into<String>,
+        rows: &[impl Serialize],
+    ) -> Result<(), Error> {
         let name = name.into();
         let bytes = to_bytes(rows, Path::new(&name))?;
         self.csv.push((name, bytes));
@@ -66,7 +71,8 @@ impl Output {
         panels: Vec<Panel>,
     ) {
         let (title, looks) = (self.heading.clone(), vec![]);
-        self.figures.push((name.into(), Figure { title, caption: caption.into(), columns, panels, looks }));
+        self.figures
+            .push((name.into(), Figure { title, caption: caption.into(), columns, panels, looks }));
     }
 
     /// Makes `series` of the last figure what the others are compared with.
@@ -83,13 +89,20 @@ impl Output {
 
     /// Adds a table of some columns of a CSV file's rows, numbers with four digits. `columns` are their names with blanks
     /// between them.
-    pub fn show(&mut self, explanation: &str, rows: &[impl Serialize], columns: &str) -> Result<(), Error> {
+    pub fn show(
+        &mut self,
+        explanation: &str,
+        rows: &[impl Serialize],
+        columns: &str,
+    ) -> Result<(), Error> {
         let path = Path::new("table");
         let bytes = to_bytes(rows, path)?;
         let mut reader = csv::Reader::from_reader(bytes.as_slice());
         let header = reader.headers().map_err(Error::csv(path))?.clone();
-        let shown: Vec<usize> =
-            columns.split(' ').filter_map(|column| header.iter().position(|name| name == column)).collect();
+        let shown: Vec<usize> = columns
+            .split(' ')
+            .filter_map(|column| header.iter().position(|name| name == column))
+            .collect();
         let mut table = text_table(columns.split(' '));
         for record in reader.records() {
             let record = record.map_err(Error::csv(path))?;
@@ -157,7 +170,11 @@ pub fn spans<'n, R>(
 
 /// For how many of `total` cases something holds, by name: `‘a’, ‘b’ for all 7 scenes; ‘c’ for 3 of 7 scenes; ‘d’ for
 /// none`.
-pub fn tally<'a>(counts: impl IntoIterator<Item = (&'a str, usize)>, total: usize, cases: &str) -> String {
+pub fn tally<'a>(
+    counts: impl IntoIterator<Item = (&'a str, usize)>,
+    total: usize,
+    cases: &str,
+) -> String {
     let counts: Vec<_> = counts.into_iter().collect();
     let numbers: BTreeSet<usize> = counts.iter().map(|(_, count)| *count).collect();
     let same = |number: usize| {
@@ -178,9 +195,12 @@ mod tests {
 
     #[test]
     fn numbers_are_shown_with_four_digits_and_whole_ones_whole() {
-        let shown =
-            ["1.23456", "0.0123456", "12345.6", "1.5e-9", "0.0", "123456", "best", "-1.0"].map(four_digits);
-        assert_eq!(shown, ["1.235", "0.01235", "12346", "1.500e-9", "0", "123456", "best", "-1.000"]);
+        let shown = ["1.23456", "0.0123456", "12345.6", "1.5e-9", "0.0", "123456", "best", "-1.0"]
+            .map(four_digits);
+        assert_eq!(
+            shown,
+            ["1.235", "0.01235", "12346", "1.500e-9", "0", "123456", "best", "-1.000"]
+        );
     }
 
     #[test]
@@ -198,7 +218,9 @@ mod tests {
             gap: f64,
         }
         let mut output = Output::new("", "title");
-        output.show("Gaps:", &[Row { scene: "escher", hidden: 77, gap: 0.5 }], "gap scene").unwrap();
+        output
+            .show("Gaps:", &[Row { scene: "escher", hidden: 77, gap: 0.5 }], "gap scene")
+            .unwrap();
         let text = output.text();
         assert!(
             ["title\n\nGaps:\n", "gap", "0.5000", "escher"].iter().all(|part| text.contains(part)),

@@ -46,7 +46,12 @@ pub struct Answer {
 
 impl PaperRow {
     /// A row about what the paper has in `source`, without numbers.
-    pub fn new(source: &str, scene: impl Into<String>, quantity: impl Into<String>, reason: &str) -> Self {
+    pub fn new(
+        source: &str,
+        scene: impl Into<String>,
+        quantity: impl Into<String>,
+        reason: &str,
+    ) -> Self {
         Self {
             source: source.into(),
             scene: scene.into(),
@@ -78,7 +83,13 @@ impl PaperRow {
     /// The same row with a ratio to base of the paper's and ours, which lies in an interval where it depends on chance.
     /// They agree if the whole interval is within `tolerance` of the paper's, relatively, and on the same side of 1.
     #[must_use]
-    pub fn compare_ratios(self, paper: f64, ours: f64, interval: Option<(f64, f64)>, tolerance: f64) -> Self {
+    pub fn compare_ratios(
+        self,
+        paper: f64,
+        ours: f64,
+        interval: Option<(f64, f64)>,
+        tolerance: f64,
+    ) -> Self {
         let (low, high) = interval.unwrap_or((ours, ours));
         let verdicts = [low, ours, high].map(|ours| Verdict::of_ratios(paper, ours, tolerance));
         let same = verdicts.iter().all(|verdict| *verdict == verdicts[0]);
@@ -89,14 +100,22 @@ impl PaperRow {
             format!("within {} % of the paper's, and on the same side of 1", 100.0 * tolerance),
         );
         let (ours_low, ours_high) = interval.unzip();
-        Self { paper_over_base: Some(paper), ours_over_base: Some(ours), ours_low, ours_high, ..row }
+        Self {
+            paper_over_base: Some(paper),
+            ours_over_base: Some(ours),
+            ours_low,
+            ours_high,
+            ..row
+        }
     }
 }
 
 /// Returns a sentence for each quantity that is compared: ours, the paper's and the verdict, scene by scene. `None` if nothing is.
 pub fn ratios(rows: &[PaperRow]) -> Option<String> {
-    let compared: Vec<&PaperRow> = rows.iter().filter(|row| row.verdict != Verdict::NotInPaper).collect();
-    let sentences: Vec<String> = compared.chunk_by(|a, b| a.quantity == b.quantity).map(sentence).collect();
+    let compared: Vec<&PaperRow> =
+        rows.iter().filter(|row| row.verdict != Verdict::NotInPaper).collect();
+    let sentences: Vec<String> =
+        compared.chunk_by(|a, b| a.quantity == b.quantity).map(sentence).collect();
     (!sentences.is_empty()).then(|| sentences.join(" "))
 }
 
@@ -164,7 +183,8 @@ impl Verdict {
     /// the base.
     fn of_ratios(paper: f64, ours: f64, tolerance: f64) -> Self {
         // The paper prints four digits: closer to the base than this is on neither side.
-        let side = |ratio: f64| if (ratio - 1.0).abs() < 5e-4 { 0.0 } else { (ratio - 1.0).signum() };
+        let side =
+            |ratio: f64| if (ratio - 1.0).abs() < 5e-4 { 0.0 } else { (ratio - 1.0).signum() };
         let close = (ours / paper - 1.0).abs() <= tolerance;
         match (close, side(paper) * side(ours) < 0.0, ours > paper) {
             (true, false, _) => Self::Agrees,
@@ -194,7 +214,8 @@ pub struct Outcome {
 impl Outcome {
     /// Of all rows but those that only add to the others.
     pub fn of(rows: &[PaperRow]) -> Self {
-        let count = |wanted: fn(Verdict) -> bool| rows.iter().filter(|row| wanted(row.verdict)).count();
+        let count =
+            |wanted: fn(Verdict) -> bool| rows.iter().filter(|row| wanted(row.verdict)).count();
         let compared = count(|verdict| verdict != Verdict::NotInPaper);
         let agree = count(|verdict| verdict == Verdict::Agrees);
         let same_side = count(Verdict::is_same_direction);
@@ -225,7 +246,12 @@ impl fmt::Display for Outcome {
         ];
         let some = kinds.iter().filter(|(_, count)| *count > 0);
         let some: Vec<String> = some.map(|(kind, count)| format!("{kind}: {count}")).collect();
-        write!(f, "Comparisons with the paper: {} ({}).", agree + same_side + differ + untold, some.join("; "))
+        write!(
+            f,
+            "Comparisons with the paper: {} ({}).",
+            agree + same_side + differ + untold,
+            some.join("; ")
+        )
     }
 }
 
@@ -249,7 +275,9 @@ mod tests {
 
     #[test]
     fn the_verdict_on_all_is_what_those_that_can_be_told_have_in_common() {
-        use Verdict::{Agrees, CannotBeTold, Differs, DiffersLower, NotInPaper, SameDirectionLower};
+        use Verdict::{
+            Agrees, CannotBeTold, Differs, DiffersLower, NotInPaper, SameDirectionLower,
+        };
         let of = |verdicts: &[Verdict]| {
             let row = |&verdict: &Verdict| PaperRow { verdict, ..PaperRow::new("", "", "", "") };
             Outcome::of(&verdicts.iter().map(row).collect::<Vec<_>>()).name()

@@ -24,12 +24,16 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
     for scene in rows.scenes() {
         let mut own: Vec<Point> =
             config.methods.iter().filter_map(|method| point(rows, scene, method, kind)).collect();
-        let front = front(own.iter().map(|point| (point.build_seconds, point.cost_over_base)).collect());
+        let front =
+            front(own.iter().map(|point| (point.build_seconds, point.cost_over_base)).collect());
         for point in &mut own {
             point.on_front = front.contains(&(point.build_seconds, point.cost_over_base));
         }
-        let layer = |point: &Point, x| Layer::new(point.method, Marks::Points(vec![(x, point.cost_over_base)]));
-        let mut layers: Vec<Layer> = own.iter().map(|point| layer(point, point.build_seconds)).collect();
+        let layer = |point: &Point, x| {
+            Layer::new(point.method, Marks::Points(vec![(x, point.cost_over_base)]))
+        };
+        let mut layers: Vec<Layer> =
+            own.iter().map(|point| layer(point, point.build_seconds)).collect();
         layers.push(Layer::new("best so far", Marks::Steps(front)));
         let cost = || Metric::CostOverBase.axis();
         builds.push(panel(rows.shown(scene), Metric::BuildSeconds.axis(), cost(), layers));
@@ -39,23 +43,30 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
     }
     let mut output = Output::new(&config.source, &config.title);
     output.add_csv("timing_pareto", &points)?;
-    let caption =
-        "Cost is the total area of inner nodes over that of the greedy tree; one object per leaf, one thread.";
+    let caption = "Cost is the total area of inner nodes over that of the greedy tree; one object per leaf, one thread.";
     output.add_figure("pareto", caption, 2, builds);
     if let Some(kind) = kind {
-        let caption = format!("{caption} Rays: {kind}, each method by its fastest layout, ray by ray.");
+        let caption =
+            format!("{caption} Rays: {kind}, each method by its fastest layout, ray by ray.");
         output.add_figure("pareto_rays", caption, 2, rays);
     }
     Ok(output)
 }
 
-fn point<'a>(rows: &Rows, scene: &'a str, method: &'a str, kind: Option<&str>) -> Option<Point<'a>> {
+fn point<'a>(
+    rows: &Rows,
+    scene: &'a str,
+    method: &'a str,
+    kind: Option<&str>,
+) -> Option<Point<'a>> {
     Some(Point {
         scene,
         method,
         build_seconds: rows.build_seconds(scene, method)?,
         cost_over_base: Metric::CostOverBase.of_run(rows.runs_of(scene, method).next()?)?,
-        ns_per_ray: kind.and_then(|kind| rows.fastest_layout(scene, method, kind)).map(|(_, ns)| ns),
+        ns_per_ray: kind
+            .and_then(|kind| rows.fastest_layout(scene, method, kind))
+            .map(|(_, ns)| ns),
         on_front: false,
     })
 }

@@ -44,14 +44,20 @@ impl Config {
         let mut comparisons = Vec::new();
         for scene in rows.scenes() {
             for method in &self.methods {
-                comparisons.extend(kinds.iter().filter_map(|kind| self.compare(rows, scene, method, kind)));
+                comparisons.extend(
+                    kinds.iter().filter_map(|kind| self.compare(rows, scene, method, kind)),
+                );
             }
         }
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("timing_peers", &comparisons)?;
         let columns = "scene method build_seconds cost_over_base rays layout mrays_per_second ours_over_this \
                        missed_hits false_hits other_hits";
-        output.show("Each method by its fastest layout, ray by ray on one thread:", &comparisons, columns)?;
+        output.show(
+            "Each method by its fastest layout, ray by ray on one thread:",
+            &comparisons,
+            columns,
+        )?;
         output.reading = self.reading(&comparisons);
         Ok(output)
     }
@@ -92,7 +98,8 @@ impl Config {
         };
         let total = others.clone().map(|method| own(method).len()).max().unwrap_or(0);
         let faster = |method| own(method).iter().filter(|row| row.ours_over_this > 1.0).count();
-        let counts = tally(others.map(|method| (method.as_str(), faster(method))), total, "settings");
+        let counts =
+            tally(others.map(|method| (method.as_str(), faster(method))), total, "settings");
         format!(
             "Ours, ‘{}’, each by its fastest layout, traces more rays ray by ray per second than {counts}.",
             self.ours

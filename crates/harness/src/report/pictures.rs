@@ -66,7 +66,9 @@ const DOCUMENT: &str = "the document's";
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let scenes = rows.scenes();
-        let pictures = || scenes.iter().flat_map(|scene| self.structures().map(move |method| (*scene, method)));
+        let pictures = || {
+            scenes.iter().flat_map(|scene| self.structures().map(move |method| (*scene, method)))
+        };
         let tests: Vec<Tests> =
             pictures().filter_map(|(scene, method)| self.tests(rows, scene, method)).collect();
         let times: Vec<Times> =
@@ -96,7 +98,8 @@ impl Config {
     }
 
     fn tests<'a>(&self, rows: &Rows, scene: &'a str, method: &'a str) -> Option<Tests<'a>> {
-        let (brute, own) = (middle_picture(rows, scene, BRUTE_FORCE)?, middle_picture(rows, scene, method)?);
+        let (brute, own) =
+            (middle_picture(rows, scene, BRUTE_FORCE)?, middle_picture(rows, scene, method)?);
         Some(Tests {
             scene,
             method,
@@ -156,17 +159,23 @@ fn draw_tests(rows: &Rows, scene: &str, tests: &[Tests]) -> Panel {
         let values = own.iter().map(|row| value(row)).collect();
         Layer::bars(name, values, 0.1)
     };
-    let layers =
-        vec![bars("boxes or cells", |row| row.boxes_per_ray), bars("objects", |row| row.objects_per_ray)];
+    let layers = vec![
+        bars("boxes or cells", |row| row.boxes_per_ray),
+        bars("objects", |row| row.objects_per_ray),
+    ];
     let x = Axis::categories("", own.iter().map(|row| row.method.to_owned()).collect());
     panel(rows.shown(scene), x, Axis::log("tests per ray").starting_at(0.1), layers)
 }
 
 fn draw_times(rows: &Rows, scene: &str, times: &[Times]) -> Panel {
     let own: Vec<&Times> = times.iter().filter(|row| row.scene == scene).collect();
-    let theirs = own.iter().enumerate().filter_map(|(at, row)| Some((at as f64, row.document_speed_up?)));
+    let theirs =
+        own.iter().enumerate().filter_map(|(at, row)| Some((at as f64, row.document_speed_up?)));
     let values = own.iter().map(|row| row.speed_up).collect();
-    let layers = vec![Layer::bars("ours", values, 1.0), Layer::new(DOCUMENT, Marks::Points(theirs.collect()))];
+    let layers = vec![
+        Layer::bars("ours", values, 1.0),
+        Layer::new(DOCUMENT, Marks::Points(theirs.collect())),
+    ];
     let x = Axis::categories("", own.iter().map(|row| row.method.to_owned()).collect());
     panel(rows.shown(scene), x, Axis::log("speed-up over brute force"), layers)
 }
@@ -175,10 +184,15 @@ fn draw_times(rows: &Rows, scene: &str, times: &[Times]) -> Panel {
 fn reading(tests: &[Tests], times: &[Times]) -> String {
     let fastest = times.chunk_by(|a, b| a.scene == b.scene).filter_map(|scene| {
         let best = scene.iter().max_by(|a, b| a.speed_up.total_cmp(&b.speed_up))?;
-        Some(format!("{}: {}, {:.1} times faster than brute force", best.scene, best.method, best.speed_up))
+        Some(format!(
+            "{}: {}, {:.1} times faster than brute force",
+            best.scene, best.method, best.speed_up
+        ))
     });
     let same = match tests.iter().find(|row| !row.same_picture) {
-        Some(row) => format!("{}: {} gives ANOTHER PICTURE than brute force", row.scene, row.method),
+        Some(row) => {
+            format!("{}: {} gives ANOTHER PICTURE than brute force", row.scene, row.method)
+        }
         None => "All structures give the same picture of a scene, bit by bit".into(),
     };
     format!("{}. {same}.", fastest.collect::<Vec<_>>().join("; "))

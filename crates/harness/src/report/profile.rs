@@ -73,14 +73,18 @@ fn profile(ratios: &[f64], problems: usize, end: f64) -> Vec<(f64, f64)> {
     let fraction = |count: usize| count as f64 / problems as f64;
     let fastest = ratios.iter().filter(|ratio| **ratio <= 1.0).count();
     let mut steps = vec![(1.0, fraction(fastest))];
-    steps.extend(ratios.iter().zip(1..).skip(fastest).map(|(&ratio, count)| (ratio, fraction(count))));
+    steps.extend(
+        ratios.iter().zip(1..).skip(fastest).map(|(&ratio, count)| (ratio, fraction(count))),
+    );
     steps.push((end, fraction(ratios.len())));
     steps
 }
 
 fn reading(config: &Targets, table: &[Row], problems: usize) -> String {
     let solved = each(&config.methods, |method| {
-        let own = || table.iter().filter(|row| row.method == method).filter_map(|row| row.ratio_to_fastest);
+        let own = || {
+            table.iter().filter(|row| row.method == method).filter_map(|row| row.ratio_to_fastest)
+        };
         let fastest = own().filter(|ratio| *ratio <= 1.0).count();
         Some(format!("{method} {} ({fastest} as the fastest)", own().count()))
     });
@@ -93,7 +97,10 @@ mod tests {
 
     #[test]
     fn a_profile_begins_with_the_wins_and_ends_with_what_was_solved() {
-        assert_eq!(profile(&[1.0, 2.0, 2.5], 4, 3.0), [(1.0, 0.25), (2.0, 0.5), (2.5, 0.75), (3.0, 0.75)]);
+        assert_eq!(
+            profile(&[1.0, 2.0, 2.5], 4, 3.0),
+            [(1.0, 0.25), (2.0, 0.5), (2.5, 0.75), (3.0, 0.75)]
+        );
         assert_eq!(profile(&[], 4, 3.0), [(1.0, 0.0), (3.0, 0.0)]);
     }
 }

@@ -61,7 +61,12 @@ impl ProgressAxis {
     }
 
     /// Adds a CSV file of rows whose column `x` is measured along this axis, and is called after it.
-    pub fn add_csv(self, output: &mut Output, kind: &str, rows: &[impl Serialize]) -> Result<(), Error> {
+    pub fn add_csv(
+        self,
+        output: &mut Output,
+        kind: &str,
+        rows: &[impl Serialize],
+    ) -> Result<(), Error> {
         output.add_csv(self.file(kind), rows)?;
         if let Some((_, bytes)) = output.csv.last_mut() {
             let end = bytes.iter().position(|&byte| byte == b'\n').unwrap_or(bytes.len());
@@ -79,7 +84,11 @@ pub type Series = Vec<(f64, f64)>;
 
 /// The incumbents of every run of a method on a scene.
 pub fn series(rows: &Rows, scene: &str, method: &str, axis: ProgressAxis) -> Vec<Series> {
-    let own = rows.history.iter().enumerate().filter(|(_, row)| row.scene == scene && row.method == method);
+    let own = rows
+        .history
+        .iter()
+        .enumerate()
+        .filter(|(_, row)| row.scene == scene && row.method == method);
     let points = own.map(|(at, row)| {
         let x = match axis {
             ProgressAxis::Seconds => rows.clock.get(at).map_or(f64::NAN, |clock| clock.seconds),
@@ -89,14 +98,19 @@ pub fn series(rows: &Rows, scene: &str, method: &str, axis: ProgressAxis) -> Vec
         (row.repetition, (x, row.incumbent))
     });
     let points: Vec<(u32, (f64, f64))> = points.collect();
-    points.chunk_by(|a, b| a.0 == b.0).map(|run| run.iter().map(|(_, point)| *point).collect()).collect()
+    points
+        .chunk_by(|a, b| a.0 == b.0)
+        .map(|run| run.iter().map(|(_, point)| *point).collect())
+        .collect()
 }
 
 /// Where the longest run of a method on a scene ended; 0 if there is none.
 pub fn longest(rows: &Rows, scene: &str, method: &str, axis: ProgressAxis) -> f64 {
     let ends: Vec<f64> = match axis {
         ProgressAxis::Seconds => rows.seconds_of(scene, method),
-        ProgressAxis::Evaluations => rows.runs_of(scene, method).map(|run| run.evaluations as f64).collect(),
+        ProgressAxis::Evaluations => {
+            rows.runs_of(scene, method).map(|run| run.evaluations as f64).collect()
+        }
         ProgressAxis::Work => rows.runs_of(scene, method).map(|run| run.work as f64).collect(),
     };
     ends.into_iter().fold(0.0, f64::max)
@@ -114,7 +128,8 @@ pub fn reached(run: &Series, cost: f64) -> Option<f64> {
 
 /// When the median run had an incumbent of at most this cost, unsolved runs last; `None` if it never had.
 pub fn median_reached(runs: &[Series], cost: f64) -> Option<f64> {
-    let times: Vec<f64> = runs.iter().map(|run| reached(run, cost).unwrap_or(Metric::WORST)).collect();
+    let times: Vec<f64> =
+        runs.iter().map(|run| reached(run, cost).unwrap_or(Metric::WORST)).collect();
     // Between a number and infinity there is only infinity, and between two infinities there is NaN.
     median(&times).filter(|time| time.is_finite())
 }
@@ -148,7 +163,8 @@ mod tests {
 
     #[test]
     fn evaluations_are_no_axis_where_some_count_trees_and_others_moves() {
-        let runs = vec![run("trees", 0, 5, 995), run("tree", 0, 1, 199), run("moves", 0, 9000, 90_000)];
+        let runs =
+            vec![run("trees", 0, 5, 995), run("tree", 0, 1, 199), run("moves", 0, 9000, 90_000)];
         let rows = Rows { runs, ..Rows::default() };
         let axes = |methods: &[&str]| {
             ProgressAxis::of(&rows, &methods.iter().map(|&m| m.to_owned()).collect::<Vec<_>>())

@@ -84,10 +84,12 @@ impl Config {
         output.add_csv("ray_cost", &table)?;
         let caption = "Nodes and blocks of triangles that a ray is tested against in the wide layout, over those in the tree that \
                        is the best by area, below which trees gain. The rays are not those that trees were trained on.";
-        let panels = rows.scenes().into_iter().map(|scene| self.draw(rows.shown(scene), scene, &table));
+        let panels =
+            rows.scenes().into_iter().map(|scene| self.draw(rows.shown(scene), scene, &table));
         let panels = panels.chain([self.draw(ALL.into(), ALL, &table)]).collect();
         output.add_figure("ray_cost", caption, 2, panels);
-        let columns = "scene tree trained_on judged_on camera over_base_low tests_over_base over_base_high";
+        let columns =
+            "scene tree trained_on judged_on camera over_base_low tests_over_base over_base_high";
         output.show(&format!("Tests per ray over those of {}:", self.base), &table, columns)?;
         let speeds = self.speeds(rows);
         if !speeds.is_empty() {
@@ -183,7 +185,8 @@ fn compared<'a>(rows: &'a Rows, row: &'a TestRow, base: &str) -> Option<Compared
     let relative = row.tests_standard_error.zip(base.tests_standard_error);
     // The degrees of freedom of one mean: with those of both, intervals would be somewhat narrower.
     let factor = student(row.repetitions.min(base.repetitions));
-    let half = relative.zip(factor).map(|((a, b), factor)| factor * ratio * (a / own).hypot(b / other));
+    let half =
+        relative.zip(factor).map(|((a, b), factor)| factor * ratio * (a / own).hypot(b / other));
     Some(Compared {
         scene: &row.scene,
         tree: &row.tree,
@@ -208,8 +211,19 @@ fn paired<'a>(rows: &'a Rows, [first, second]: &'a [String; 2]) -> Vec<Paired<'a
             _ => Verdict::CannotBeTold,
         };
         let TestRow { scene, judged_on, camera, .. } = row;
-        let (method, against, tests_over_other) = (second.as_str(), first.as_str(), tests_over_base);
-        Some(Paired { scene, method, against, judged_on, camera, tests_over_other, low, high, verdict })
+        let (method, against, tests_over_other) =
+            (second.as_str(), first.as_str(), tests_over_base);
+        Some(Paired {
+            scene,
+            method,
+            against,
+            judged_on,
+            camera,
+            tests_over_other,
+            low,
+            high,
+            verdict,
+        })
     };
     rows.tests.iter().filter(|row| row.method == *second).filter_map(pair).collect()
 }
@@ -219,7 +233,10 @@ fn verdicts(paired: &[Paired], [first, second]: &[String; 2]) -> String {
     let own = || paired.iter().filter(|row| row.against == *first && row.method == *second);
     let count = |verdict| own().filter(|row| row.verdict == verdict).count();
     let (fewer, more) = (count(Verdict::Fewer), count(Verdict::More));
-    format!(" ‘{second}’ beside ‘{first}’: fewer in {fewer} of {} cells, more in {more}.", own().count())
+    format!(
+        " ‘{second}’ beside ‘{first}’: fewer in {fewer} of {} cells, more in {more}.",
+        own().count()
+    )
 }
 
 /// The geometric means over scenes of rows that agree in all else.
@@ -248,10 +265,13 @@ fn reading(table: &[Compared], base: &str) -> String {
         return String::new();
     };
     let trees = distinct(own().map(|row| tree_name(row.tree, row.trained_on)));
-    let of = |tree: &str| own().filter(|row| tree_name(row.tree, row.trained_on) == tree).collect::<Vec<_>>();
+    let of = |tree: &str| {
+        own().filter(|row| tree_name(row.tree, row.trained_on) == tree).collect::<Vec<_>>()
+    };
     let fewer = |tree: &str| of(tree).iter().filter(|row| row.tests_over_base < 1.0).count();
     let total = trees.iter().map(|tree| of(tree).len()).max().unwrap_or(0);
-    let counts = tally(trees.iter().map(|tree| (tree.as_str(), fewer(tree))), total, "kinds of rays");
+    let counts =
+        tally(trees.iter().map(|tree| (tree.as_str(), fewer(tree))), total, "kinds of rays");
     format!(
         "Fewer tests per ray than ‘{base}’, geometric means over scenes: {counts}. The least is {:.3} of its tests, ‘{}’ on \
          {} rays ({} camera).",

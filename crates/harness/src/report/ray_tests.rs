@@ -62,20 +62,22 @@ impl Config {
         for scene in rows.scenes() {
             for kind in rows.ray_kinds() {
                 let methods = self.methods.iter().enumerate();
-                table.extend(methods.filter_map(|(at, method)| self.measured(rows, scene, method, kind, at)));
+                table.extend(
+                    methods.filter_map(|(at, method)| self.measured(rows, scene, method, kind, at)),
+                );
             }
         }
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("ray_tests", &table)?;
         let caption = "Mean number of tests against boxes, whiskers the 95 % interval; of several runs the one of \
                        median tests. The paper's rays start inside and end at any hit.";
-        let panels = rows.scenes().into_iter().map(|scene| self.draw(rows, scene, &table)).collect();
+        let panels =
+            rows.scenes().into_iter().map(|scene| self.draw(rows, scene, &table)).collect();
         output.add_figure("ray_tests", caption, 2, panels);
         output.set_reference(PAPER);
         output.paper = self.compare(rows, &table);
         output.answer = ratios(&output.paper);
-        let columns =
-            "scene method family query boxes_low boxes_per_ray boxes_high boxes_over_first paper_boxes_per_ray";
+        let columns = "scene method family query boxes_low boxes_per_ray boxes_high boxes_over_first paper_boxes_per_ray";
         output.show("Box tests per ray with 95 % intervals:", &table, columns)?;
         output.reading = self.reading(&table);
         Ok(output)
@@ -94,7 +96,8 @@ impl Config {
         let run = rows.runs_of(scene, method).find(|run| run.repetition == own.repetition)?;
         let paper = self.paper.get(scene).filter(|_| kind == OF_PAPER);
         let [own_range, first_range] = [method, first(&self.methods)].map(|method| {
-            let boxes = most_rays(rows, scene, method, kind).into_iter().map(|row| row.boxes_per_ray);
+            let boxes =
+                most_rays(rows, scene, method, kind).into_iter().map(|row| row.boxes_per_ray);
             range(boxes).unwrap_or((f64::NAN, f64::NAN))
         });
         let over_first_low = own_range.0 / first_range.1;
@@ -120,27 +123,38 @@ impl Config {
     /// The paper's numbers beside ours, both over those of the first method, which itself is not compared.
     fn compare(&self, rows: &Rows, table: &[Measured]) -> Vec<PaperRow> {
         let compare = |row: &Measured| {
-            let of_first = |of: &&Measured| of.scene == row.scene && of.method == first(&self.methods);
+            let of_first =
+                |of: &&Measured| of.scene == row.scene && of.method == first(&self.methods);
             let base = table.iter().find(of_first)?.paper_boxes_per_ray?;
             let paper = row.paper_boxes_per_ray.filter(|_| row.method != first(&self.methods))?;
             let quantity = format!("tests per ray, {} over {}", row.method, first(&self.methods));
-            let compared = PaperRow::new(&self.source, rows.shown(row.scene), quantity, &self.reason);
+            let compared =
+                PaperRow::new(&self.source, rows.shown(row.scene), quantity, &self.reason);
             let interval = (row.over_first_low, row.over_first_high);
-            Some(compared.compare_ratios(paper / base, row.boxes_over_first, Some(interval), self.tolerance))
+            Some(compared.compare_ratios(
+                paper / base,
+                row.boxes_over_first,
+                Some(interval),
+                self.tolerance,
+            ))
         };
         table.iter().filter_map(compare).collect()
     }
 
     fn draw(&self, rows: &Rows, scene: &str, table: &[Measured]) -> Panel {
         let bars = |(family, query): (&str, &str)| {
-            let own = table.iter().filter(|row| (row.scene, row.family, row.query) == (scene, family, query));
+            let own = table
+                .iter()
+                .filter(|row| (row.scene, row.family, row.query) == (scene, family, query));
             let bar = |row: &Measured| (row.boxes_per_ray, (row.boxes_low, row.boxes_high));
             let (values, spread) = own.map(bar).collect();
             Layer::new(format!("{family}, {query}"), Marks::Bars { values, spread, base: 0.0 })
         };
         let paper = |kind: &(&str, &str)| {
             let paper = self.paper.get(scene).filter(|_| *kind == OF_PAPER)?;
-            let values = (0..self.methods.len()).map(|at| paper.get(at).copied().unwrap_or(f64::NAN)).collect();
+            let values = (0..self.methods.len())
+                .map(|at| paper.get(at).copied().unwrap_or(f64::NAN))
+                .collect();
             Some(Layer::bars(PAPER, values, 0.0))
         };
         // The paper's bars stand beside ours for the same kind of rays.
@@ -166,6 +180,11 @@ fn most_rays<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) 
 }
 
 /// Of a method's runs on a scene, the one of median tests per ray, the lower of two.
-fn middle_run<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) -> Option<&'a RayRow> {
+fn middle_run<'a>(
+    rows: &'a Rows,
+    scene: &str,
+    method: &str,
+    kind: (&str, &str),
+) -> Option<&'a RayRow> {
     middle(most_rays(rows, scene, method, kind), |row| row.boxes_per_ray)
 }

@@ -60,8 +60,11 @@ impl Config {
         let mut panels = Vec::new();
         for scene in rows.scenes() {
             for (camera, title) in PATHS {
-                let own: Vec<Point> =
-                    self.series.iter().flat_map(|series| self.line(rows, scene, series, camera)).collect();
+                let own: Vec<Point> = self
+                    .series
+                    .iter()
+                    .flat_map(|series| self.line(rows, scene, series, camera))
+                    .collect();
                 panels.push(self.draw(&format!("{}: {title}", rows.shown(scene)), &own));
                 points.extend(own);
             }
@@ -79,8 +82,17 @@ impl Config {
     }
 
     /// The points of one line of the figure, by time.
-    fn line<'a>(&self, rows: &'a Rows, scene: &'a str, series: &'a Series, camera: &'a str) -> Vec<Point<'a>> {
-        let points = series.methods.iter().filter_map(|method| self.point(rows, scene, series, method, camera));
+    fn line<'a>(
+        &self,
+        rows: &'a Rows,
+        scene: &'a str,
+        series: &'a Series,
+        camera: &'a str,
+    ) -> Vec<Point<'a>> {
+        let points = series
+            .methods
+            .iter()
+            .filter_map(|method| self.point(rows, scene, series, method, camera));
         let mut points: Vec<Point> = points.collect();
         points.sort_by(|a, b| a.build_seconds.total_cmp(&b.build_seconds));
         points
@@ -90,7 +102,8 @@ impl Config {
         let mut layers = Vec::new();
         for series in &self.series {
             let own = points.iter().filter(|point| point.series == series.name);
-            let line: Vec<_> = own.map(|point| (point.build_seconds, point.tests_over_base)).collect();
+            let line: Vec<_> =
+                own.map(|point| (point.build_seconds, point.tests_over_base)).collect();
             layers.push(Layer::new(&series.name, Marks::Line(line.clone())));
             layers.push(Layer::new(&series.name, Marks::Points(line)));
         }
@@ -104,12 +117,14 @@ impl Config {
             let best = each(&self.series, |series| {
                 let least = |scene: &&str| {
                     let own = points.iter().filter(|point| {
-                        (point.scene, point.series, point.camera) == (*scene, series.name.as_str(), camera)
+                        (point.scene, point.series, point.camera)
+                            == (*scene, series.name.as_str(), camera)
                     });
                     minimum(own.map(|point| point.tests_over_base))
                 };
                 let least: Vec<f64> = rows.scenes().iter().filter_map(least).collect();
-                (!least.is_empty()).then(|| format!("{:.3} ({})", geometric_mean(&least), series.name))
+                (!least.is_empty())
+                    .then(|| format!("{:.3} ({})", geometric_mean(&least), series.name))
             });
             Some(format!("{title}: {best}"))
         };
@@ -126,9 +141,13 @@ impl Config {
         camera: &'a str,
     ) -> Option<Point<'a>> {
         let of_path = |method: &str| -> Vec<f64> {
-            let own =
-                rows.tests.iter().filter(|row| (row.scene.as_str(), row.method.as_str()) == (scene, method));
-            own.filter(|row| row.camera == camera).map(|row| row.node_tests + row.block_tests).collect()
+            let own = rows
+                .tests
+                .iter()
+                .filter(|row| (row.scene.as_str(), row.method.as_str()) == (scene, method));
+            own.filter(|row| row.camera == camera)
+                .map(|row| row.node_tests + row.block_tests)
+                .collect()
         };
         let (own, base) = (of_path(method), of_path(&self.base));
         if own.is_empty() || own.len() != base.len() {

@@ -53,11 +53,16 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
     for axis in ProgressAxis::of(rows, &config.methods) {
         let attempts = attempts(config, rows, axis);
         let problems = attempts.chunks(config.methods.len().max(1));
-        let reached = problems.filter(|problem| problem.iter().any(|attempt| !attempt.solved.is_empty()));
+        let reached =
+            problems.filter(|problem| problem.iter().any(|attempt| !attempt.solved.is_empty()));
         let panels = reached.map(|problem| draw(problem, axis)).collect();
         output.add_figure(axis.file("run_times"), caption.as_str(), 2, panels);
         output.set_reference(FIT);
-        axis.add_csv(&mut output, "run_times", &attempts.iter().flat_map(steps).collect::<Vec<_>>())?;
+        axis.add_csv(
+            &mut output,
+            "run_times",
+            &attempts.iter().flat_map(steps).collect::<Vec<_>>(),
+        )?;
         let fits: Vec<Fit> = attempts.iter().map(fit).collect();
         axis.add_csv(&mut output, "run_times_fit", &fits)?;
         if axis == ProgressAxis::Seconds {
@@ -113,7 +118,11 @@ fn fit<'a>(attempt: &Attempt<'a>) -> Fit<'a> {
 fn draw(problem: &[Attempt], axis: ProgressAxis) -> Panel {
     let curve = |attempt: &Attempt| Layer::new(attempt.method, Marks::Steps(distribution(attempt)));
     let laws = problem.iter().filter_map(|Attempt { solved, runs, .. }| {
-        Some(fitted_curve(&ShiftedExponential::fit(solved, *runs)?, *solved.first()?, *solved.last()?))
+        Some(fitted_curve(
+            &ShiftedExponential::fit(solved, *runs)?,
+            *solved.first()?,
+            *solved.last()?,
+        ))
     });
     let layers = problem.iter().map(curve).chain(laws).collect();
     let title = format!("{}: {}", problem[0].scene, problem[0].target);

@@ -42,7 +42,8 @@ impl Sides {
         if above > 0 {
             sides.push(format!("more than greedy on {above}"));
         }
-        let untold = if untold > 0 { format!("; {untold} are inconclusive") } else { String::new() };
+        let untold =
+            if untold > 0 { format!("; {untold} are inconclusive") } else { String::new() };
         format!("The {name} costs {} of {scenes} scenes{untold}.", sides.join(" and "))
     }
 }
@@ -54,7 +55,10 @@ mod tests {
     #[test]
     fn an_interval_that_holds_the_base_is_on_neither_side() {
         let said = |intervals: &[(f64, f64)]| Sides::of(intervals.iter().copied()).say("best");
-        assert_eq!(said(&[(0.9, 0.95), (0.98, 0.99)]), "The best costs less than greedy on all 2 scenes.");
+        assert_eq!(
+            said(&[(0.9, 0.95), (0.98, 0.99)]),
+            "The best costs less than greedy on all 2 scenes."
+        );
         assert_eq!(
             said(&[(0.9, 1.01)]),
             "Whether the best costs more or less than greedy is inconclusive on all 1 scenes."

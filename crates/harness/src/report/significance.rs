@@ -86,9 +86,9 @@ impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let across = self.against.iter().filter_map(|against| self.across(rows, against)).collect();
         let scenes = rows.scenes();
-        let within = scenes
-            .iter()
-            .flat_map(|scene| self.against.iter().filter_map(move |against| self.within(rows, scene, against)));
+        let within = scenes.iter().flat_map(|scene| {
+            self.against.iter().filter_map(move |against| self.within(rows, scene, against))
+        });
         let mut table = self.judged(across);
         // Too few runs for so many comparisons could tell nothing, whatever they found.
         let within = self.judged(within.collect()).into_iter();
@@ -109,19 +109,25 @@ impl Config {
     fn across<'a>(&'a self, rows: &'a Rows, against: &'a str) -> Option<Row<'a>> {
         let (mut differences, mut effects) = (Vec::new(), Vec::new());
         for scene in rows.scenes() {
-            let [own, other] = [&self.method, against].map(|method| rows.final_ratios(scene, method));
+            let [own, other] =
+                [&self.method, against].map(|method| rows.final_ratios(scene, method));
             differences.extend(median(&own).zip(median(&other)).map(|(own, other)| own - other));
             effects.extend(a12(&other, &own));
         }
         let samples = differences.len();
         // Scenes on which both cost the same say nothing; if there are no others, nothing differs.
-        let test = wilcoxon_signed_rank(&differences).unwrap_or(Test { statistic: 0.0, p_value: 1.0 });
+        let test =
+            wilcoxon_signed_rank(&differences).unwrap_or(Test { statistic: 0.0, p_value: 1.0 });
         let others = differences.iter().filter(|difference| **difference != 0.0).count() as f64;
         let lower = test.statistic < others * (others + 1.0) / 4.0;
         let row = self.row(ALL, against, [samples; 2], &test);
         let a12 = effects.iter().sum::<f64>() / samples as f64;
         let work_ratio = median(
-            &rows.scenes().iter().filter_map(|scene| self.work_ratio(rows, scene, against)).collect::<Vec<_>>(),
+            &rows
+                .scenes()
+                .iter()
+                .filter_map(|scene| self.work_ratio(rows, scene, against))
+                .collect::<Vec<_>>(),
         );
         let verdict = Difference::of(lower);
         (samples > 0).then_some(Row { test: RankTest::Wilcoxon, a12, work_ratio, verdict, ..row })
@@ -173,7 +179,8 @@ impl Config {
 
     /// The rows of one test with their p-values corrected.
     fn judged<'a>(&self, mut table: Vec<Row<'a>>) -> Vec<Row<'a>> {
-        let corrected = |p_value: fn(&Row) -> f64| holm(&table.iter().map(p_value).collect::<Vec<_>>());
+        let corrected =
+            |p_value: fn(&Row) -> f64| holm(&table.iter().map(p_value).collect::<Vec<_>>());
         // If every test came out as clearly as it can.
         let least = corrected(|row| match row.test {
             RankTest::Wilcoxon => least_signed_rank(row.samples),
@@ -196,7 +203,8 @@ impl Config {
             let across = own().find(|row| row.scene == ALL);
             let verdict = across.map_or("untested", |row| row.verdict.name());
             let work = across.and_then(|row| row.work_ratio);
-            let work = work.map_or_else(String::new, |ratio| format!(", with {ratio:.1} times its work"));
+            let work =
+                work.map_or_else(String::new, |ratio| format!(", with {ratio:.1} times its work"));
             let within: Vec<&Row> = own().filter(|row| row.scene != ALL).collect();
             let count = |verdict| within.iter().filter(|row| row.verdict == verdict).count();
             let (lower, higher) = (count(Difference::Lower), count(Difference::Higher));

@@ -78,7 +78,9 @@ const MOST_OF_PAPER: f64 = 3.0;
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let scenes = rows.scenes();
-        let row = |&scene: &_| self.columns.iter().filter_map(move |column| self.cell(rows, scene, column));
+        let row = |&scene: &_| {
+            self.columns.iter().filter_map(move |column| self.cell(rows, scene, column))
+        };
         let cells: Vec<Cell> = scenes.iter().flat_map(row).collect();
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("table", &cells)?;
@@ -94,7 +96,9 @@ impl Config {
         let trials = rows.trials_over_base(scene, &column.method);
         let pool = trials.concat();
         let results: Vec<f64> = match column.best_of {
-            Some(m) => trials.iter().filter_map(|trials| minimum(trials.iter().copied().take(m))).collect(),
+            Some(m) => {
+                trials.iter().filter_map(|trials| minimum(trials.iter().copied().take(m))).collect()
+            }
             None => rows.final_ratios(scene, &column.method),
         };
         let interval = match column.best_of {
@@ -147,13 +151,15 @@ impl Config {
 
     /// A number of the paper next to the closest of the columns that read it in different ways.
     fn compare_readings(&self, rows: &Rows, scene: &str, cells: &[Cell]) -> Option<PaperRow> {
-        let distance =
-            |cell: &&Cell| cell.paper_over_base.map(|paper| (cell.cost_over_base / paper).ln().abs());
+        let distance = |cell: &&Cell| {
+            cell.paper_over_base.map(|paper| (cell.cost_over_base / paper).ln().abs())
+        };
         let base = &self.columns.first()?.name;
-        let read = cells
-            .iter()
-            .filter(|cell| cell.scene == scene && cell.column != base && cell.paper_over_base.is_some());
-        let closest = read.min_by(|a, b| distance(a).partial_cmp(&distance(b)).unwrap_or(Ordering::Equal))?;
+        let read = cells.iter().filter(|cell| {
+            cell.scene == scene && cell.column != base && cell.paper_over_base.is_some()
+        });
+        let closest =
+            read.min_by(|a, b| distance(a).partial_cmp(&distance(b)).unwrap_or(Ordering::Equal))?;
         let paper = closest.paper_over_base?;
         let close = is_close(closest, self.tolerance);
         let column = self.columns.iter().find(|column| column.name == closest.column)?;
@@ -173,7 +179,11 @@ impl Config {
                 100.0 * self.tolerance
             ),
         );
-        Some(PaperRow { paper_over_base: Some(paper), ours_over_base: Some(closest.cost_over_base), ..row })
+        Some(PaperRow {
+            paper_over_base: Some(paper),
+            ours_over_base: Some(closest.cost_over_base),
+            ..row
+        })
     }
 
     /// Whether the columns other than the base read one column of the paper in different ways.
@@ -181,7 +191,9 @@ impl Config {
         let mut others = self.columns.iter().skip(1);
         match others.next() {
             Some(first) => {
-                !first.paper.is_empty() && others.len() > 0 && others.all(|column| column.paper == first.paper)
+                !first.paper.is_empty()
+                    && others.len() > 0
+                    && others.all(|column| column.paper == first.paper)
             }
             None => false,
         }
@@ -204,12 +216,19 @@ impl Config {
     /// how many of the paper's ratios each reading comes close to.
     fn answer(&self, cells: &[Cell]) -> Option<String> {
         cells.iter().find(|cell| cell.paper_over_base.is_some())?;
-        let of = |column: &Column| cells.iter().filter(|cell| cell.column == column.name).collect::<Vec<_>>();
+        let of = |column: &Column| {
+            cells.iter().filter(|cell| cell.column == column.name).collect::<Vec<_>>()
+        };
         if self.are_readings() {
-            let papers = of(self.columns.get(1)?).iter().filter(|cell| cell.paper_over_base.is_some()).count();
-            let close =
-                |column: &Column| of(column).into_iter().filter(|cell| is_close(cell, self.tolerance)).count();
-            let counts = self.columns.iter().skip(1).map(|column| (column.name.as_str(), close(column)));
+            let papers = of(self.columns.get(1)?)
+                .iter()
+                .filter(|cell| cell.paper_over_base.is_some())
+                .count();
+            let close = |column: &Column| {
+                of(column).into_iter().filter(|cell| is_close(cell, self.tolerance)).count()
+            };
+            let counts =
+                self.columns.iter().skip(1).map(|column| (column.name.as_str(), close(column)));
             let best = counts.max_by_key(|(_, count)| *count)?;
             let percent = 100.0 * self.tolerance;
             return Some(if best.1 == papers {
@@ -229,7 +248,8 @@ impl Config {
             let ends = cell.low_over_base.zip(cell.high_over_base);
             ends.unwrap_or((cell.cost_over_base, cell.cost_over_base))
         };
-        let say = |column: &Column| Sides::of(of(column).into_iter().map(interval)).say(&column.name);
+        let say =
+            |column: &Column| Sides::of(of(column).into_iter().map(interval)).say(&column.name);
         let each = self.columns.iter().skip(1).map(say);
         Some(each.collect::<Vec<_>>().join(" "))
     }
@@ -237,7 +257,8 @@ impl Config {
     fn draw(&self, rows: &Rows, cells: &[Cell]) -> Panel {
         let columns = || self.columns.iter().skip(1);
         let bars = |name: String, column: &Column, value: &dyn Fn(&Cell) -> Option<f64>, spread| {
-            let values = rows.scenes().into_iter().map(|scene| find(cells, scene, column).and_then(value));
+            let values =
+                rows.scenes().into_iter().map(|scene| find(cells, scene, column).and_then(value));
             let values = values.map(|value| value.unwrap_or(f64::NAN)).collect();
             Layer::new(name, Marks::Bars { values, spread, base: 1.0 })
         };
@@ -246,7 +267,8 @@ impl Config {
         let mut layers = Vec::new();
         for (index, column) in columns().enumerate() {
             if !column.paper.is_empty() && (index == 0 || !readings) {
-                let name = if readings { "paper".into() } else { format!("{}, paper", column.name) };
+                let name =
+                    if readings { "paper".into() } else { format!("{}, paper", column.name) };
                 layers.push(bars(name, column, &|cell| cell.paper_over_base, vec![]));
             }
             let own = rows.scenes().into_iter().map(|scene| {
@@ -271,7 +293,10 @@ impl Config {
             let show = |column: &Column| {
                 let cell = find(cells, scene, column)?;
                 let ours = format!("{:.4}", cell.cost_over_base);
-                Some(cell.paper_over_base.map_or(ours.clone(), |paper| format!("{ours}  (paper {paper:.4})")))
+                Some(
+                    cell.paper_over_base
+                        .map_or(ours.clone(), |paper| format!("{ours}  (paper {paper:.4})")),
+                )
             };
             let shown = self.columns.iter().map(|column| show(column).unwrap_or_default());
             table.add_row(std::iter::once(rows.shown(scene)).chain(shown));
@@ -284,17 +309,21 @@ impl Config {
         let of = |column: &Column| -> Vec<&Cell> {
             cells.iter().filter(|cell| cell.column == column.name).collect()
         };
-        let below = |column: &Column| of(column).iter().filter(|cell| cell.cost_over_base < 1.0).count();
+        let below =
+            |column: &Column| of(column).iter().filter(|cell| cell.cost_over_base < 1.0).count();
         let others = || self.columns.iter().skip(1);
         let counts = others().map(|column| (column.name.as_str(), below(column)));
         let compared = others().flat_map(of);
-        let Some(least) = compared.min_by(|a, b| a.cost_over_base.total_cmp(&b.cost_over_base)) else {
+        let Some(least) = compared.min_by(|a, b| a.cost_over_base.total_cmp(&b.cost_over_base))
+        else {
             return String::new();
         };
         let scenes = self.columns.first().map_or(0, |base| of(base).len());
         let Cell { column, scene, cost_over_base, .. } = least;
         let counts = tally(counts, scenes, "scenes");
-        format!("Below base: {counts}. The least is {cost_over_base:.3} of base, ‘{column}’ on {scene}.")
+        format!(
+            "Below base: {counts}. The least is {cost_over_base:.3} of base, ‘{column}’ on {scene}."
+        )
     }
 }
 
@@ -336,7 +365,13 @@ mod tests {
 
     fn column(name: &str, paper: f64) -> Column {
         let paper = BTreeMap::from([("s".to_owned(), paper)]);
-        Column { name: name.into(), method: name.into(), paper, reason: "why".into(), ..Column::default() }
+        Column {
+            name: name.into(),
+            method: name.into(),
+            paper,
+            reason: "why".into(),
+            ..Column::default()
+        }
     }
 
     fn written(columns: Vec<Column>, costs: &[(&str, f64)]) -> Output {
@@ -350,7 +385,10 @@ mod tests {
         let near = written(readings(), &[("base", 1.0), ("sum", 500.0), ("difference", 1.9)]);
         let [row] = &near.paper[..] else { panic!("one number, one row: {:?}", near.paper) };
         // A reading that comes close may still not be the paper's.
-        assert_eq!((row.ours.as_str(), row.verdict), ("1.9000, by difference", Verdict::CannotBeTold));
+        assert_eq!(
+            (row.ours.as_str(), row.verdict),
+            ("1.9000, by difference", Verdict::CannotBeTold)
+        );
         assert!(near.answer.unwrap().contains("‘difference’ comes within 10 %"));
         let far = written(readings(), &[("base", 1.0), ("sum", 500.0), ("difference", 3.0)]);
         assert_eq!(far.paper[0].verdict, Verdict::Differs);
@@ -359,7 +397,8 @@ mod tests {
 
     #[test]
     fn columns_of_their_own_have_a_row_each_and_a_sentence_by_side() {
-        let columns = vec![column("base", 1.0), column("best of 10", 1.1), column("best of 100", 1.2)];
+        let columns =
+            vec![column("base", 1.0), column("best of 10", 1.1), column("best of 100", 1.2)];
         let output = written(columns, &[("base", 1.0), ("best of 10", 1.15), ("best of 100", 0.9)]);
         let verdicts: Vec<Verdict> = output.paper.iter().map(|row| row.verdict).collect();
         assert_eq!(verdicts, [Verdict::Agrees, Verdict::DiffersLower]);

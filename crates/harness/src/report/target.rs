@@ -17,7 +17,9 @@ bvh_config::config! { serde;
 }
 
 /// What a target is relative to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Of {
     /// The greedy Müller–Fellner tree.

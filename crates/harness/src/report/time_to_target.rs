@@ -55,7 +55,8 @@ fn reached<'a>(attempt: &Attempt<'a>) -> Reached<'a> {
 /// Which method is the first to reach each target, by scene.
 fn reading(config: &Targets, table: &[Reached]) -> String {
     let firsts = config.targets.iter().filter_map(|target| {
-        let rows: Vec<&Reached> = table.iter().filter(|row| row.target == target.to_string()).collect();
+        let rows: Vec<&Reached> =
+            table.iter().filter(|row| row.target == target.to_string()).collect();
         let first = |scene: &[&Reached]| {
             let timed = scene.iter().filter_map(|row| Some((row.median?, row.method)));
             let (seconds, method) = timed.min_by(|a, b| a.0.total_cmp(&b.0))?;

@@ -147,7 +147,10 @@ impl Config {
             let values = own.iter().map(|ratio| ratio.ratio_median).collect();
             let spread = own.iter().map(|ratio| (ratio.ratio_low, ratio.ratio_high)).collect();
             layers.push(Layer::new(method, Marks::Bars { values, spread, base: 1.0 }));
-            let paper = own.iter().enumerate().filter_map(|(at, ratio)| Some((at as f64, ratio.paper_ratio?)));
+            let paper = own
+                .iter()
+                .enumerate()
+                .filter_map(|(at, ratio)| Some((at as f64, ratio.paper_ratio?)));
             layers.push(Layer::new(format!("{method}, paper"), Marks::Points(paper.collect())));
         }
         let first = first(&self.methods);
@@ -186,7 +189,14 @@ mod tests {
             for (repetition, &seconds) in (0..).zip(seconds) {
                 rows.runs.push(run(method, repetition, 1, 0));
                 let (scene, method) = ("s".to_owned(), (*method).to_owned());
-                rows.timing.push(TimingRow { scene, method, seed: 0, repetition, threads: 1, seconds });
+                rows.timing.push(TimingRow {
+                    scene,
+                    method,
+                    seed: 0,
+                    repetition,
+                    threads: 1,
+                    seconds,
+                });
             }
         }
         rows

@@ -45,7 +45,8 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
                 let setting = [scene, layout, kind];
                 ranks.push(rank(setting, Metric::BoxesPerRay, &box_tests(config, rows, setting)));
                 let own = speeds_in(config, rows, setting);
-                let points: Vec<_> = own.iter().map(|speed| (speed.cost_over_base, speed.ns_per_ray)).collect();
+                let points: Vec<_> =
+                    own.iter().map(|speed| (speed.cost_over_base, speed.ns_per_ray)).collect();
                 timed_ranks.push(rank(setting, Metric::NsPerRay, &points));
                 let mut line = points.clone();
                 line.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -87,7 +88,9 @@ fn traces<'a>(
 }
 
 fn box_tests(config: &Methods, rows: &Rows, setting: Setting) -> Vec<(f64, f64)> {
-    traces(config, rows, setting).filter_map(|(cost, row)| Some((cost, row.boxes_per_ray?))).collect()
+    traces(config, rows, setting)
+        .filter_map(|(cost, row)| Some((cost, row.boxes_per_ray?)))
+        .collect()
 }
 
 fn speeds_in<'a>(config: &Methods, rows: &'a Rows, setting: Setting<'a>) -> Vec<Speed<'a>> {

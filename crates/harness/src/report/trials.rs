@@ -65,11 +65,13 @@ impl Config {
             let (mut single, mut expected, mut bands) = (Vec::new(), Vec::new(), Vec::new());
             for (name, curve) in self.methods.iter().zip(&curves) {
                 let x = |point: &Point| point.trials as f64;
-                let steps = curve.iter().map(|point| (x(point), point.single_run_over_base)).collect();
+                let steps =
+                    curve.iter().map(|point| (x(point), point.single_run_over_base)).collect();
                 single.push(Layer::new(name, Marks::Steps(steps)));
                 let line = curve.iter().map(|point| (x(point), point.expected_over_base)).collect();
                 expected.push(Layer::new(name, Marks::Line(line)));
-                let band = curve.iter().map(|point| (x(point), point.interval().0, point.interval().1));
+                let band =
+                    curve.iter().map(|point| (x(point), point.interval().0, point.interval().1));
                 bands.push(Layer::new(name, Marks::Band(band.collect())));
             }
             if curves.iter().flatten().any(|point| point.expected_low.is_some()) {
@@ -87,9 +89,14 @@ impl Config {
         let caption = "Lowest cost among so many trials, over that of the greedy tree. Left, one run, as in the paper; \
                        right, what is expected, with the 95 % interval of the mean over repetitions.";
         output.add_figure("trials", caption, 2, panels);
-        let last: Vec<&Point> = points.iter().filter(|point| point.trials == self.best_of).collect();
+        let last: Vec<&Point> =
+            points.iter().filter(|point| point.trials == self.best_of).collect();
         let columns = "scene method expected_over_base expected_low expected_high";
-        output.show(&format!("Expected best of {} trials over base:", self.best_of), &last, columns)?;
+        output.show(
+            &format!("Expected best of {} trials over base:", self.best_of),
+            &last,
+            columns,
+        )?;
         output.reading = self.reading(&last);
         output.answer = self.paper_best.as_ref().map(|paper| answer(&lists, &last, paper));
         output.add_csv("trials", &points)?;
@@ -128,7 +135,10 @@ impl Config {
         let count = |method: &str| scenes.iter().filter(|scene| is_best(scene, method)).count();
         let counts = self.methods.iter().map(|method| (method.as_str(), count(method)));
         let counts = tally(counts.filter(|(_, count)| *count > 0), scenes.len(), "scenes");
-        format!("No other has a lower expected best of {}, as far as can be told: {counts}.", self.best_of)
+        format!(
+            "No other has a lower expected best of {}, as far as can be told: {counts}.",
+            self.best_of
+        )
     }
 
     /// The methods that no other is below, by the expected best of as many trials as are compared, the lowest first.
@@ -189,11 +199,16 @@ fn answer(lists: &[(String, &str)], last: &[&Point], paper: &str) -> String {
     let of_paper = match with_paper {
         0 => format!("The paper's {paper} is not among the best on any scene"),
         all if all == lists.len() => format!("The paper's {paper} is among the best on all scenes"),
-        some => format!("The paper's {paper} is among the best on {some} of {} scenes", lists.len()),
+        some => {
+            format!("The paper's {paper} is among the best on {some} of {} scenes", lists.len())
+        }
     };
     let below = last.iter().filter(|point| point.interval().1 < 1.0).count();
-    let below =
-        if below == 0 { "no interval lies below greedy".into() } else { format!("{below} lie below greedy") };
+    let below = if below == 0 {
+        "no interval lies below greedy".into()
+    } else {
+        format!("{below} lie below greedy")
+    };
     format!("{of_paper}: best are {groups}; {below}.")
 }
 
@@ -249,14 +264,19 @@ mod tests {
 
     #[test]
     fn the_answer_names_the_best_by_scene_and_never_a_list_that_another_is_below() {
-        let lists = [("k = 2 or k = 30".to_owned(), "a"), ("k = 2".to_owned(), "b"), ("k = 2".to_owned(), "c")];
+        let lists = [
+            ("k = 2 or k = 30".to_owned(), "a"),
+            ("k = 2".to_owned(), "b"),
+            ("k = 2".to_owned(), "c"),
+        ];
         let said = answer(&lists, &[], "k = 5");
         assert_eq!(
             said,
             "The paper's k = 5 is not among the best on any scene: best are k = 2 or k = 30 on a, k = 2 on b and c; no interval lies below greedy."
         );
         assert!(
-            answer(&lists, &[], "k = 30").starts_with("The paper's k = 30 is among the best on 1 of 3 scenes")
+            answer(&lists, &[], "k = 30")
+                .starts_with("The paper's k = 30 is among the best on 1 of 3 scenes")
         );
     }
 }

@@ -45,7 +45,9 @@ pub(super) struct Variation<'a> {
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let of = |scene| self.methods.iter().filter_map(move |method| self.variation(rows, scene, method));
+        let of = |scene| {
+            self.methods.iter().filter_map(move |method| self.variation(rows, scene, method))
+        };
         let table: Vec<Variation> = rows.scenes().into_iter().flat_map(of).collect();
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("variations", &table)?;
@@ -53,14 +55,21 @@ impl Config {
         output.add_figure("variations", caption, 1, vec![self.draw(rows, &table)]);
         output.paper = table.iter().filter_map(|row| self.compare(rows, row)).collect();
         output.answer = ratios(&output.paper);
-        let columns = "scene method runs over_first_low cost_over_first over_first_high paper_over_first";
+        let columns =
+            "scene method runs over_first_low cost_over_first over_first_high paper_over_first";
         output.show("Final costs over those of the first:", &table, columns)?;
         output.reading = self.reading(&table);
         Ok(output)
     }
 
-    fn variation<'a>(&'a self, rows: &Rows, scene: &'a str, method: &'a str) -> Option<Variation<'a>> {
-        let costs = |method: &str| rows.runs_of(scene, method).map(|run| run.cost).collect::<Vec<f64>>();
+    fn variation<'a>(
+        &'a self,
+        rows: &Rows,
+        scene: &'a str,
+        method: &'a str,
+    ) -> Option<Variation<'a>> {
+        let costs =
+            |method: &str| rows.runs_of(scene, method).map(|run| run.cost).collect::<Vec<f64>>();
         let (own, of_first) = (costs(method), costs(first(&self.methods)));
         let ((lowest_cost, highest_cost), (first_low, first_high)) =
             (range(own.iter().copied())?, range(of_first.iter().copied())?);

@@ -52,8 +52,14 @@ const COMMON: &[(&str, &str)] = &[
         "goldsmith_salmon",
         "Goldsmith and Salmon's cost: boxes below the root that a random line through the root's box is tested against.",
     ),
-    ("collapsed_sah", "The surface area heuristic with both constants 1, after the best collapse of leaves."),
-    ("references_per_object", "Leaves that name an object, per object: more than 1 where objects are divided."),
+    (
+        "collapsed_sah",
+        "The surface area heuristic with both constants 1, after the best collapse of leaves.",
+    ),
+    (
+        "references_per_object",
+        "Leaves that name an object, per object: more than 1 where objects are divided.",
+    ),
     ("bytes_per_object", "Bytes over the number of objects."),
     ("internal_area", "Total half area of inner nodes, world units squared."),
     ("nodes", "Nodes of the tree."),
@@ -98,11 +104,13 @@ pub struct Columns {
 impl Columns {
     /// Those of a type of rows.
     pub fn of<R: JsonSchema>() -> Self {
-        let settings =
-            SchemaSettings::draft07().for_serialize().with(|settings| settings.inline_subschemas = true);
+        let settings = SchemaSettings::draft07()
+            .for_serialize()
+            .with(|settings| settings.inline_subschemas = true);
         let schema = settings.into_generator().into_root_schema_for::<R>().to_value();
-        let text =
-            |of: &Value, key: &str| of.get(key).and_then(Value::as_str).unwrap_or_default().replace('\n', " ");
+        let text = |of: &Value, key: &str| {
+            of.get(key).and_then(Value::as_str).unwrap_or_default().replace('\n', " ")
+        };
         let column = |name: &Value| {
             let name = name.as_str().unwrap_or_default();
             let own = text(&schema["properties"][name], "description");
@@ -111,9 +119,11 @@ impl Columns {
             // The words of an enum stand alone, or each beside its description.
             let of = &schema["properties"][name];
             let words = of["enum"].as_array().or(of["oneOf"].as_array()).into_iter().flatten();
-            let words = words.map(|word| word.as_str().map_or_else(|| text(word, "const"), str::to_owned));
+            let words =
+                words.map(|word| word.as_str().map_or_else(|| text(word, "const"), str::to_owned));
             let words: Vec<String> = words.map(|word| format!("`{word}`")).collect();
-            let meaning = if words.is_empty() { meaning } else { format!("{meaning} {}.", words.join(", ")) };
+            let meaning =
+                if words.is_empty() { meaning } else { format!("{meaning} {}.", words.join(", ")) };
             (name.to_owned(), meaning)
         };
         // In a schema of what is written every field is required, in the order of the declaration.
@@ -136,13 +146,18 @@ impl Columns {
         let same = |(found, (name, _)): (&&str, &(String, String))| {
             found == name || name == "x" && AXES.contains(found)
         };
-        let columns = header.len() == self.columns.len() && header.iter().zip(&self.columns).all(same);
+        let columns =
+            header.len() == self.columns.len() && header.iter().zip(&self.columns).all(same);
         columns && self.files().any(named)
     }
 
     /// The first column that nothing is said of, or a word for the file if it has no name.
     pub fn unsaid(&self) -> Option<&str> {
-        let unsaid = self.columns.iter().find(|(_, meaning)| meaning.is_empty()).map(|(name, _)| name.as_str());
+        let unsaid = self
+            .columns
+            .iter()
+            .find(|(_, meaning)| meaning.is_empty())
+            .map(|(name, _)| name.as_str());
         unsaid.or(self.files().next().is_none().then_some("the file's name"))
     }
 }
@@ -151,7 +166,12 @@ impl fmt::Display for Columns {
     /// The section of a page in Markdown.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let files: Vec<String> = self.files().map(|file| format!("`{file}`")).collect();
-        writeln!(f, "\n## {}\n\n{}\n\n| column | meaning |\n|---|---|", files.join(", "), self.about)?;
+        writeln!(
+            f,
+            "\n## {}\n\n{}\n\n| column | meaning |\n|---|---|",
+            files.join(", "),
+            self.about
+        )?;
         self.columns.iter().try_for_each(|(name, meaning)| {
             let name = if name == "x" { AXES.join("` or `") } else { name.clone() };
             writeln!(f, "| `{name}` | {} |", meaning.replace('|', "\\|"))

@@ -11,7 +11,9 @@ pub fn lock_folder(folder: &Path) -> Result<File, Error> {
     match lock.try_lock() {
         Ok(()) => Ok(lock),
         Err(fs::TryLockError::WouldBlock) => Err(Error::Busy(folder.to_owned())),
-        Err(fs::TryLockError::Error(source)) => Err(Error::Io { path, action: "lock the file", source }),
+        Err(fs::TryLockError::Error(source)) => {
+            Err(Error::Io { path, action: "lock the file", source })
+        }
     }
 }
 

@@ -43,7 +43,8 @@ impl FinishedRun {
         }
         let run = Self { files };
         let found = run.contents();
-        let [expected, found] = [&contents, &found].map(|text| text.lines().collect::<BTreeSet<&str>>());
+        let [expected, found] =
+            [&contents, &found].map(|text| text.lines().collect::<BTreeSet<&str>>());
         match expected.symmetric_difference(&found).next() {
             Some(line) => Err(damaged(line.split(' ').next().unwrap_or_default())),
             // Every run has rows.
@@ -121,8 +122,10 @@ impl Store {
             }
             _ => {
                 if partial.is_dir() {
-                    fs::rename(&partial, &removed).map_err(Error::io(&partial, "rename the folder"))?;
-                    fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))?;
+                    fs::rename(&partial, &removed)
+                        .map_err(Error::io(&partial, "rename the folder"))?;
+                    fs::remove_dir_all(&removed)
+                        .map_err(Error::io(&removed, "remove the folder"))?;
                 }
                 fs::create_dir_all(&partial).map_err(Error::io(&partial, "create the folder"))?;
                 files::write(&spec, resolved.as_bytes())?;
@@ -182,7 +185,8 @@ impl Store {
                 let path = part.join(name);
                 let bytes = fs::read(&path).map_err(Error::io(&path, "read the file"))?;
                 // Every part begins with the same header line.
-                let header = bytes.iter().position(|&byte| byte == b'\n').map_or(bytes.len(), |end| end + 1);
+                let header =
+                    bytes.iter().position(|&byte| byte == b'\n').map_or(bytes.len(), |end| end + 1);
                 joined.extend_from_slice(if joined.is_empty() { &bytes } else { &bytes[header..] });
             }
             files::write(&self.folder.join(name), &joined)?;
@@ -209,7 +213,8 @@ impl Store {
     pub fn finish(self) -> Result<(), Error> {
         // Renamed first, so that an interrupted removal leaves nothing that looks like finished runs.
         let removed = self.folder.join(REMOVED);
-        fs::rename(&self.partial, &removed).map_err(Error::io(&self.partial, "rename the folder"))?;
+        fs::rename(&self.partial, &removed)
+            .map_err(Error::io(&self.partial, "rename the folder"))?;
         fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))
     }
 }
@@ -235,7 +240,9 @@ mod tests {
 
     fn run() -> FinishedRun {
         let file = |name: &str, text: &str| (name.to_owned(), text.as_bytes().to_vec());
-        FinishedRun { files: [file("runs.csv", "a,b\n1,2\n"), file("history.csv", "a\n1\n")].into() }
+        FinishedRun {
+            files: [file("runs.csv", "a,b\n1,2\n"), file("history.csv", "a\n1\n")].into(),
+        }
     }
 
     #[test]
@@ -288,7 +295,8 @@ mod tests {
     fn a_file_where_the_folder_should_be_is_named() {
         let out = tempfile::tempdir().unwrap();
         fs::write(out.path().join("x"), "").unwrap();
-        let message = Store::open(&out.path().join("x"), "", Existing::Keep).unwrap_err().to_string();
+        let message =
+            Store::open(&out.path().join("x"), "", Existing::Keep).unwrap_err().to_string();
         assert!(message.contains("cannot create the folder"), "{message}");
     }
 }

@@ -29,7 +29,8 @@ pub fn path(results: &Path, scene: &str) -> PathBuf {
 /// Keeps the tree `file` of a scene, which the `command` has made, and records its cost there and among the best known ones. Refuses
 /// one that another of the archive, or the best known cost, is better than or equal to. Returns where it is kept.
 pub fn keep(results: &Path, scene: &Scene, file: &Path, command: &str) -> Result<PathBuf, Error> {
-    let refused = |message: String| Err(Error::Usage(format!("--keep: {}: {message}", file.display())));
+    let refused =
+        |message: String| Err(Error::Usage(format!("--keep: {}: {message}", file.display())));
     let bytes = tree_file::read(file)?;
     let (tree, header) = tree_file::load(file, scene)?;
     let objects = scene.boxes.len();
@@ -39,11 +40,17 @@ pub fn keep(results: &Path, scene: &Scene, file: &Path, command: &str) -> Result
     let internal_area = cost::internal_area(&tree);
     let _lock = wait_for_folder(results)?;
     let known = best_known(results, scene)?;
-    if let Some(known) = known.as_ref().filter(|known| internal_area > known.cost * (1.0 + ROUNDING)) {
-        return refused(format!("its cost is {internal_area}, and the best known is {}", known.cost));
+    if let Some(known) =
+        known.as_ref().filter(|known| internal_area > known.cost * (1.0 + ROUNDING))
+    {
+        return refused(format!(
+            "its cost is {internal_area}, and the best known is {}",
+            known.cost
+        ));
     }
     let mut rows = rows(results)?;
-    let (row_checksum, old) = (checksum(scene), rows.iter().position(|row| row.scene == scene.name));
+    let (row_checksum, old) =
+        (checksum(scene), rows.iter().position(|row| row.scene == scene.name));
     if let Some(old) = old.map(|at| rows.remove(at)).filter(|old| old.checksum == row_checksum)
         && internal_area >= old.internal_area * (1.0 - ROUNDING)
     {

@@ -30,7 +30,9 @@ pub fn compare(
     for name in names {
         let paths = [fresh.join(&name), committed.join(&name)];
         match [paths[0].is_file(), paths[1].is_file()] {
-            [true, true] => differences.extend(compare_files(&name, &paths[0], &paths[1], left_out)?),
+            [true, true] => {
+                differences.extend(compare_files(&name, &paths[0], &paths[1], left_out)?)
+            }
             [true, false] => differences.push(format!("{name} is not among the committed results")),
             _ => differences.push(format!("{name} is committed but is no longer written")),
         }
@@ -49,7 +51,9 @@ fn compare_figures(fresh: &Path, committed: &Path) -> Result<Vec<String>, Error>
         let read = |folder: &Path| fs::read(folder.join(&name)).ok();
         match (read(fresh), read(committed)) {
             (Some(now), Some(then)) if now == then => None,
-            (Some(_), Some(_)) => Some(format!("{name} is drawn otherwise than the committed figure")),
+            (Some(_), Some(_)) => {
+                Some(format!("{name} is drawn otherwise than the committed figure"))
+            }
             (Some(_), None) => Some(format!("{name} is not among the committed results")),
             (None, _) => Some(format!("{name} is committed but is no longer drawn")),
         }
@@ -58,12 +62,18 @@ fn compare_figures(fresh: &Path, committed: &Path) -> Result<Vec<String>, Error>
 }
 
 /// How the resolved specs differ.
-fn compare_specs(fresh: &Path, committed: &Path, left_out: &[String]) -> Result<Vec<String>, Error> {
+fn compare_specs(
+    fresh: &Path,
+    committed: &Path,
+    left_out: &[String],
+) -> Result<Vec<String>, Error> {
     let read = |folder: &Path| -> Result<Value, Error> {
         let path = folder.join("resolved.toml");
         let mut table: Table = toml::from_str(&read_text(&path)?).map_err(Error::toml(&path))?;
         if let Some(Value::Array(scenes)) = table.get_mut("scenes") {
-            let name = |scene: &Value| scene.get("name").and_then(Value::as_str).unwrap_or_default().to_owned();
+            let name = |scene: &Value| {
+                scene.get("name").and_then(Value::as_str).unwrap_or_default().to_owned()
+            };
             scenes.retain(|scene| !left_out.contains(&name(scene)));
         }
         Ok(Value::Table(table))
@@ -80,9 +90,15 @@ fn compare_values(key: &str, fresh: &Value, committed: &Value, differences: &mut
             for name in names {
                 let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
                 match (fresh.get(name), committed.get(name)) {
-                    (Some(fresh), Some(committed)) => compare_values(&key, fresh, committed, differences),
-                    (Some(fresh), None) => differences.push(format!("{key} is {fresh}, not committed")),
-                    (None, _) => differences.push(format!("{key} is committed, but is no key any more")),
+                    (Some(fresh), Some(committed)) => {
+                        compare_values(&key, fresh, committed, differences)
+                    }
+                    (Some(fresh), None) => {
+                        differences.push(format!("{key} is {fresh}, not committed"))
+                    }
+                    (None, _) => {
+                        differences.push(format!("{key} is committed, but is no key any more"))
+                    }
                 }
             }
         }
@@ -148,10 +164,12 @@ fn identity(header: &StringRecord, row: &StringRecord) -> String {
 }
 
 fn read(path: &Path, left_out: &[String]) -> Result<(StringRecord, Vec<StringRecord>), Error> {
-    let mut reader = csv::ReaderBuilder::new().flexible(true).from_path(path).map_err(Error::csv(path))?;
+    let mut reader =
+        csv::ReaderBuilder::new().flexible(true).from_path(path).map_err(Error::csv(path))?;
     let header = reader.headers().map_err(Error::csv(path))?.clone();
     let scene = header.iter().position(|column| column == "scene");
-    let rows: Vec<StringRecord> = reader.records().collect::<Result<_, _>>().map_err(Error::csv(path))?;
+    let rows: Vec<StringRecord> =
+        reader.records().collect::<Result<_, _>>().map_err(Error::csv(path))?;
     let is_left_out = |row: &StringRecord| {
         scene.and_then(|at| row.get(at)).is_some_and(|name| left_out.iter().any(|out| out == name))
     };
@@ -220,9 +238,14 @@ mod tests {
     #[test]
     fn a_stale_resolved_spec_is_named_by_its_keys() {
         let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
-        let write = |at: usize, text: &str| fs::write(folders[at].path().join("resolved.toml"), text).unwrap();
+        let write = |at: usize, text: &str| {
+            fs::write(folders[at].path().join("resolved.toml"), text).unwrap()
+        };
         write(0, "[experiment]\nseed = 1\nm = [{ a = 1 }]\n[[scenes]]\nname = 'x'\n");
-        write(1, "[experiment]\nold = 1\nm = [{ a = 2 }]\n[[scenes]]\nname = 'x'\n[[scenes]]\nname = 'y'\n");
+        write(
+            1,
+            "[experiment]\nold = 1\nm = [{ a = 2 }]\n[[scenes]]\nname = 'x'\n[[scenes]]\nname = 'y'\n",
+        );
         let found = compare(folders[0].path(), folders[1].path(), &["y".into()], true).unwrap();
         assert_eq!(
             found,

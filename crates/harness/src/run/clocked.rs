@@ -22,10 +22,13 @@ impl Measurement for ClockedPeers<'_> {
 fn cost_peers(program: &Path, scenes: &[Scene], store: &Store) -> Result<String, Error> {
     if !program.exists() {
         let program = program.display();
-        return Ok(format!("Without tinybvh: {program} is not there; scripts/ray-peers/build makes it.\n"));
+        return Ok(format!(
+            "Without tinybvh: {program} is not there; scripts/ray-peers/build makes it.\n"
+        ));
     }
     let row = |scene: &Scene| {
-        let failed = |message| Error::Library { scene: scene.name.clone(), library: "tinybvh", message };
+        let failed =
+            |message| Error::Library { scene: scene.name.clone(), library: "tinybvh", message };
         let (tree, seconds) = external::split_tree(program, scene).map_err(failed)?;
         Ok(ClockedPeerRow {
             scene: scene.name.clone(),

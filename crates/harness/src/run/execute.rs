@@ -82,7 +82,8 @@ fn run(
     let Extent { existing, shard, said } = extent;
     let (scenes, left_out) = load_scenes(experiment)?;
     let resolved = Resolved::new(experiment, &scenes);
-    let Target { folder, beside, is_finished } = Target::choose(out, &resolved, existing, shard.is_some())?;
+    let Target { folder, beside, is_finished } =
+        Target::choose(out, &resolved, existing, shard.is_some())?;
     if is_finished {
         return Ok(Summary { left_out, ..Summary::finished(folder) });
     }
@@ -124,6 +125,8 @@ fn run(
 fn progress(runs: u64) -> ProgressBar {
     let bar = ProgressBar::new(runs);
     let template = "{msg} {wide_bar} {pos}/{len} runs, {eta} left";
-    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.set_style(
+        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
     bar
 }

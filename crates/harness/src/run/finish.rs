@@ -97,7 +97,9 @@ pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     let found: Option<Resolved> = toml::from_str(&text).ok();
     let resolved = found.filter(|found| found.has_runs_of(experiment));
     let Some(Resolved { scenes, .. }) = resolved else {
-        return Err(refuse("the rows come from another spec, scene or seed; run it again without --redraw"));
+        return Err(refuse(
+            "the rows come from another spec, scene or seed; run it again without --redraw",
+        ));
     };
     let resolved = Resolved { experiment: experiment.clone(), scenes };
     let store = Store::open(&folder, &text, Existing::Keep)?;

@@ -45,10 +45,12 @@ impl<'a> Job<'a> {
 
     /// The density of the rays whose visits the run's method minimises, if it does; every repetition has its own rays.
     pub fn density(&self, experiment: &Experiment) -> Result<Option<RayDensity>, Error> {
-        let (Some(config), Some(trained)) = (&experiment.ray_cost, self.labelled.own.for_rays) else {
+        let (Some(config), Some(trained)) = (&experiment.ray_cost, self.labelled.own.for_rays)
+        else {
             return Ok(None);
         };
-        let seed = experiment.seed_of(&self.scene.name, "rays that trees are trained on", self.repetition);
+        let seed =
+            experiment.seed_of(&self.scene.name, "rays that trees are trained on", self.repetition);
         let failed = |message| Error::Tracing { scene: self.scene.name.clone(), message };
         config.density(trained, self.scene, seed).map(Some).map_err(failed)
     }

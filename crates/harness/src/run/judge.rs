@@ -23,6 +23,7 @@ pub(crate) struct RayJudge<'a> {
 
 impl Judge for RayJudge<'_> {
     fn judge(&self, tree: &Bvh) -> f64 {
-        empirical_cost::measure(self.rays, self.scene, tree, self.seed, RayRow::default()).boxes_per_ray
+        empirical_cost::measure(self.rays, self.scene, tree, self.seed, RayRow::default())
+            .boxes_per_ray
     }
 }

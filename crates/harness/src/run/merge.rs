@@ -29,7 +29,11 @@ const NAMED: usize = 5;
 ///
 /// Refuses parts of different specs, scenes or seeds, runs that two parts have with different results, parts that
 /// are being written, and missing runs, which it names.
-pub fn merge(folders: &[PathBuf], out: &Path, existing: Existing) -> Result<Vec<(String, PathBuf)>, Error> {
+pub fn merge(
+    folders: &[PathBuf],
+    out: &Path,
+    existing: Existing,
+) -> Result<Vec<(String, PathBuf)>, Error> {
     let mut experiments: BTreeMap<PathBuf, Vec<Part>> = BTreeMap::new();
     for folder in folders {
         let found = parts(folder)?;
@@ -57,7 +61,8 @@ fn parts(out: &Path) -> Result<Vec<(PathBuf, Part)>, Error> {
             if spec.is_file() {
                 // Locked until the end, so that no part changes meanwhile.
                 let lock = lock_folder(&path)?;
-                let resolved = fs::read_to_string(&spec).map_err(Error::io(&spec, "read the file"))?;
+                let resolved =
+                    fs::read_to_string(&spec).map_err(Error::io(&spec, "read the file"))?;
                 let name = path.strip_prefix(out).unwrap_or(&path).to_owned();
                 parts.push((name, Part { partial, resolved, _lock: lock }));
             }
@@ -67,11 +72,19 @@ fn parts(out: &Path) -> Result<Vec<(PathBuf, Part)>, Error> {
 }
 
 /// Joins the parts of the experiment whose folder is called `name`.
-fn join(name: &Path, parts: &[Part], out: &Path, existing: Existing) -> Result<(String, PathBuf), Error> {
+fn join(
+    name: &Path,
+    parts: &[Part],
+    out: &Path,
+    existing: Existing,
+) -> Result<(String, PathBuf), Error> {
     let fail = |message| Error::Merge { experiment: name.display().to_string(), message };
     let own = out.join(name).join(".partial").canonicalize().ok();
     if parts.iter().any(|part| own.is_some() && part.partial.canonicalize().ok() == own) {
-        return Err(Error::Usage(format!("--out {} is also one of the parts; choose another", out.display())));
+        return Err(Error::Usage(format!(
+            "--out {} is also one of the parts; choose another",
+            out.display()
+        )));
     }
     let resolved = common_spec(name, parts).map_err(fail)?;
     let owners = owners(&resolved, parts, fail)?;
@@ -99,7 +112,8 @@ fn common_spec(name: &Path, parts: &[Part]) -> Result<Resolved, String> {
         return Err(format!("{first} and {other} are parts of different specs, scenes or seeds"));
     }
     let bad = |message: String| format!("{}/resolved.toml: {message}", first.partial.display());
-    let resolved: Resolved = toml::from_str(&first.resolved).map_err(|error| bad(error.to_string()))?;
+    let resolved: Resolved =
+        toml::from_str(&first.resolved).map_err(|error| bad(error.to_string()))?;
     if resolved.experiment.folder() != name {
         return Err(bad(format!("name is {:?}; accepted: the folder's", resolved.experiment.name)));
     }
@@ -108,7 +122,11 @@ fn common_spec(name: &Path, parts: &[Part]) -> Result<Resolved, String> {
 }
 
 /// For every run a kept folder of it. Refuses runs of which there is none, of which one is damaged, or two differ.
-fn owners(resolved: &Resolved, parts: &[Part], fail: impl Fn(String) -> Error) -> Result<Vec<PathBuf>, Error> {
+fn owners(
+    resolved: &Resolved,
+    parts: &[Part],
+    fail: impl Fn(String) -> Error,
+) -> Result<Vec<PathBuf>, Error> {
     let of_scene: Vec<_> = resolved.experiment.runs().collect();
     let named = |index: usize| {
         let (labelled, repetition, _) = of_scene[index % of_scene.len()];
@@ -127,7 +145,10 @@ fn owners(resolved: &Resolved, parts: &[Part], fail: impl Fn(String) -> Error) -
         for other in others {
             if let Some(file) = run.difference(&FinishedRun::read(other)?) {
                 let (owner, other) = (owner.display(), other.display());
-                return Err(fail(format!("{owner} and {other} have different {file} of {}", named(index))));
+                return Err(fail(format!(
+                    "{owner} and {other} have different {file} of {}",
+                    named(index)
+                )));
             }
         }
         owners.push(owner.clone());

@@ -13,8 +13,8 @@ use bvh_core::cost::{Measure, Objective};
 use bvh_core::{Bvh, validate_references};
 use bvh_scenes::Scene;
 use bvh_search::{
-    Budget, Deadline, Event, Judge, Observer, Outcome, Problem, SearchError, Splits, StopReason, exact,
-    lower_bound, solve,
+    Budget, Deadline, Event, Judge, Observer, Outcome, Problem, SearchError, Splits, StopReason,
+    exact, lower_bound, solve,
 };
 use indicatif::ProgressBar;
 use std::sync::Mutex;
@@ -104,7 +104,8 @@ fn solve_or_build(
     match &labelled.method {
         Contestant::Ours(method) => {
             let ray_seed = experiment.seed_of(&scene.name, "rays of the judge", job.repetition);
-            let judge = labelled.own.judge.as_ref().map(|rays| RayJudge { rays, scene, seed: ray_seed });
+            let judge =
+                labelled.own.judge.as_ref().map(|rays| RayJudge { rays, scene, seed: ray_seed });
             let density = job.density(experiment)?;
             let problem = Problem {
                 objective: labelled.own.objective.unwrap_or(experiment.objective),
@@ -131,14 +132,13 @@ fn solve_or_build(
         }
         Contestant::External(program) => {
             let cancelled = || stopwatch.watch.cancelled();
-            let (tree, seconds) =
-                program.build(&scene.boxes, &scene.primitives, seed, &cancelled).map_err(|source| {
-                    Error::External {
-                        scene: scene.name.clone(),
-                        method: labelled.label.clone(),
-                        command: program.command.join(" "),
-                        source,
-                    }
+            let (tree, seconds) = program
+                .build(&scene.boxes, &scene.primitives, seed, &cancelled)
+                .map_err(|source| Error::External {
+                    scene: scene.name.clone(),
+                    method: labelled.label.clone(),
+                    command: program.command.join(" "),
+                    source,
                 })?;
             Ok(built(tree, seconds, &experiment.objective, stopwatch))
         }

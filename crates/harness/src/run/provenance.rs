@@ -36,7 +36,11 @@ impl Provenance {
         Self {
             // Arguments need not be UTF-8.
             command: std::iter::once("harness".into())
-                .chain(std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()))
+                .chain(
+                    std::env::args_os()
+                        .skip(1)
+                        .map(|argument| argument.to_string_lossy().into_owned()),
+                )
                 .collect::<Vec<_>>()
                 .join(" "),
             revision: env!("HARNESS_REVISION").into(),

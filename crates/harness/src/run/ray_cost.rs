@@ -42,7 +42,8 @@ fn judge(config: &Config, work: &Work) -> Result<(), Error> {
         let layouts = of_scene.par_iter().map(|(job, tree)| layout(experiment, job, tree));
         let layouts = layouts.collect::<Result<Vec<WideBvh>, Error>>()?;
         // By method, with all repetitions.
-        let methods: Vec<usize> = (0..of_scene.len()).step_by(experiment.repetitions as usize).collect();
+        let methods: Vec<usize> =
+            (0..of_scene.len()).step_by(experiment.repetitions as usize).collect();
         let first: Vec<&WideBvh> = methods.iter().map(|&at| &layouts[at]).collect();
         for &at in &methods {
             let range = at..at + experiment.repetitions as usize;
@@ -73,7 +74,8 @@ fn judge(config: &Config, work: &Work) -> Result<(), Error> {
                 let own = &tests[at..at + experiment.repetitions as usize];
                 let labelled = of_scene[at].0.labelled;
                 let plain = labelled.own.objective.is_none() && labelled.own.references.is_none();
-                let tree = if labelled.own.for_rays.is_some() && plain { RAYS } else { &labelled.label };
+                let tree =
+                    if labelled.own.for_rays.is_some() && plain { RAYS } else { &labelled.label };
                 let [node_tests, block_tests, tests] =
                     [mean(own, |t| t[0]), mean(own, |t| t[1]), mean(own, |t| t[0] + t[1])];
                 rows.push(TestRow {
@@ -123,7 +125,8 @@ fn costs(
     let scene = of_scene[0].0.scene;
     let seed = experiment.seed_of(&scene.name, "rays that costs are of", 0);
     let density = config.density(trained, scene, seed);
-    let density = density.map_err(|message| Error::Tracing { scene: scene.name.clone(), message })?;
+    let density =
+        density.map_err(|message| Error::Tracing { scene: scene.name.clone(), message })?;
     let row = |(job, tree): &(&Job, &Bvh)| VisitRow {
         scene: scene.name.clone(),
         method: job.labelled.label.clone(),
@@ -146,8 +149,9 @@ fn layout(experiment: &Experiment, job: &Job, tree: &Bvh) -> Result<WideBvh, Err
 fn size(runs: &[(&Job, &Bvh)], layouts: &[WideBvh]) -> LayoutRow {
     let job = runs[0].0;
     let objects = job.scene.boxes.len() as f64;
-    let mean =
-        |of: &dyn Fn(&Bvh) -> f64| runs.iter().map(|(_, tree)| of(tree)).sum::<f64>() / runs.len() as f64;
+    let mean = |of: &dyn Fn(&Bvh) -> f64| {
+        runs.iter().map(|(_, tree)| of(tree)).sum::<f64>() / runs.len() as f64
+    };
     let bytes: usize = layouts.iter().map(WideBvh::bytes).sum();
     LayoutRow {
         scene: job.scene.name.clone(),

@@ -58,8 +58,11 @@ pub(crate) fn update(
         let small = experiment.needs_optimum(scene.objects);
         // The optima of the hundreds of small scenes of experiments on optimality would be no news.
         if scene.objects > exact::MOST_OBJECTS || small {
-            let bound = bounds.iter().find(|row| row.scene == scene.name).map(|row| row.lower_bound);
-            let own = runs.iter().filter(|run| run.scene == scene.name && run.nodes + 1 == 2 * run.objects);
+            let bound =
+                bounds.iter().find(|row| row.scene == scene.name).map(|row| row.lower_bound);
+            let own = runs
+                .iter()
+                .filter(|run| run.scene == scene.name && run.nodes + 1 == 2 * run.objects);
             for found in own.flat_map(|run| finds(scene, &objective, run, bound)) {
                 offer(&mut known, ReferenceRow { revision: revision.to_owned(), ..found }, small);
             }
@@ -82,7 +85,11 @@ fn all_known(results: &Path) -> Result<Vec<ReferenceRow>, Error> {
 }
 
 /// Writes the best known costs if they are others than `before`.
-fn write_all_known(results: &Path, mut known: Vec<ReferenceRow>, before: &[ReferenceRow]) -> Result<(), Error> {
+fn write_all_known(
+    results: &Path,
+    mut known: Vec<ReferenceRow>,
+    before: &[ReferenceRow],
+) -> Result<(), Error> {
     known.sort_by(|a, b| key_of(a).cmp(&key_of(b)));
     let path = results.join(BEST_KNOWN);
     if known != before {
@@ -92,7 +99,12 @@ fn write_all_known(results: &Path, mut known: Vec<ReferenceRow>, before: &[Refer
 }
 
 /// Improves the best known costs of a scene by those of a binary tree with one object per leaf. The caller has locked the folder.
-pub(crate) fn improve(results: &Path, scene: &Scene, tree: &Bvh, header: &Header) -> Result<(), Error> {
+pub(crate) fn improve(
+    results: &Path,
+    scene: &Scene,
+    tree: &Bvh,
+    header: &Header,
+) -> Result<(), Error> {
     let before = all_known(results)?;
     let mut known = before.clone();
     let revision = Provenance::gather().revision;
@@ -156,7 +168,11 @@ fn finds(
     let root_area = run.internal_area / run.cost_over_root_area;
     let costs = [
         (name(&Objective::InternalArea), run.internal_area, bound),
-        (name(&Objective::GoldsmithSalmon), run.goldsmith_salmon, bound.map(|bound| 2.0 * bound / root_area)),
+        (
+            name(&Objective::GoldsmithSalmon),
+            run.goldsmith_salmon,
+            bound.map(|bound| 2.0 * bound / root_area),
+        ),
         (objective.to_owned(), run.cost, None),
     ];
     costs.into_iter().map(|(objective, cost, lower_bound)| ReferenceRow {
@@ -175,7 +191,9 @@ fn finds(
 /// Adds a row to the known ones, or keeps the better of it and the known row of the same key. The bound of an `optimum`
 /// is the cost, whether or not a run has found it.
 fn offer(known: &mut Vec<ReferenceRow>, mut found: ReferenceRow, optimum: bool) {
-    if let Some(least) = found.lower_bound.filter(|&bound| optimum && bound < found.cost * (1.0 - ROUNDING)) {
+    if let Some(least) =
+        found.lower_bound.filter(|&bound| optimum && bound < found.cost * (1.0 - ROUNDING))
+    {
         (found.cost, found.method, found.seed) = (least, "exact".into(), 0);
     }
     let Some(old) = known.iter_mut().find(|row| key_of(row) == key_of(&found)) else {
@@ -209,7 +227,9 @@ mod tests {
     #[test]
     fn the_lower_cost_and_the_higher_bound_are_kept() {
         let mut known = Vec::new();
-        for (cost, bound) in [(9.0, None), (7.0, Some(3.0)), (8.0, Some(4.0)), (7.0 - 1e-14, Some(2.0))] {
+        for (cost, bound) in
+            [(9.0, None), (7.0, Some(3.0)), (8.0, Some(4.0)), (7.0 - 1e-14, Some(2.0))]
+        {
             offer(&mut known, row("a", cost, bound), false);
         }
         assert_eq!(known, [row("a", 7.0, Some(4.0))]);

@@ -68,7 +68,8 @@ pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>),
     }
     let names = experiment.scenes.iter().flat_map(|name| subset::expand(name));
     let outside = OutsideFiles::from(experiment.outside_files);
-    let mut scenes = names.map(|name| Scene::load_with(&name, outside)).collect::<Result<Vec<_>, _>>()?;
+    let mut scenes =
+        names.map(|name| Scene::load_with(&name, outside)).collect::<Result<Vec<_>, _>>()?;
     let mut left_out = Vec::new();
     for name in &experiment.optional_scenes {
         match Scene::load_with(name, outside) {
@@ -78,12 +79,15 @@ pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>),
     }
     let mut names = HashSet::new();
     match scenes.iter().find(|scene| !names.insert(&scene.name)) {
-        Some(twice) => Err(Error::Usage(format!("two scenes are called {}; name each once", twice.name))),
+        Some(twice) => {
+            Err(Error::Usage(format!("two scenes are called {}; name each once", twice.name)))
+        }
         None => Ok((scenes, left_out)),
     }
 }
 
 /// `value` as TOML.
 pub(crate) fn to_toml(value: &impl Serialize) -> Result<String, Error> {
-    toml::to_string(value).map_err(|error| Error::Usage(format!("cannot be written as TOML: {error}")))
+    toml::to_string(value)
+        .map_err(|error| Error::Usage(format!("cannot be written as TOML: {error}")))
 }

@@ -106,7 +106,8 @@ impl Progress {
         let due = match said {
             Said::Bar => false,
             Said::Progress => {
-                bar.is_hidden() && (finished == self.all || last.elapsed() >= Duration::from_secs(1))
+                bar.is_hidden()
+                    && (finished == self.all || last.elapsed() >= Duration::from_secs(1))
             }
             Said::EveryRun => true,
         };

@@ -28,9 +28,9 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let parsed = text
-            .split_once('/')
-            .and_then(|(number, of)| Some(Self { number: number.parse().ok()?, of: of.parse().ok()? }));
+        let parsed = text.split_once('/').and_then(|(number, of)| {
+            Some(Self { number: number.parse().ok()?, of: of.parse().ok()? })
+        });
         parsed
             .filter(|shard| (1..=shard.of).contains(&shard.number))
             .ok_or_else(|| "accepted: I/N with I from 1 to N, as 2/8".into())

@@ -58,7 +58,16 @@ impl Solved<'_> {
         let row = |event: &Event| {
             let Event { evaluations, work, cost, incumbent } = *event;
             let (scene, method, repetition) = self.identity();
-            HistoryRow { scene, method, seed: self.seed, repetition, evaluations, work, cost, incumbent }
+            HistoryRow {
+                scene,
+                method,
+                seed: self.seed,
+                repetition,
+                evaluations,
+                work,
+                cost,
+                incumbent,
+            }
         };
         self.outcome.history.iter().map(row).collect()
     }

@@ -17,7 +17,8 @@ impl Measurement for Suite<'_> {
         let Work { experiment, store, watch, .. } = work;
         match self.0 {
             Measure::Stability(config) => {
-                config.execute(&experiment.scenes, &experiment.methods, store, &|| watch.cancelled())
+                config
+                    .execute(&experiment.scenes, &experiment.methods, store, &|| watch.cancelled())
             }
             Measure::Precision(config) => config.execute(store),
         }

@@ -31,10 +31,14 @@ impl Target {
         if existing == Existing::Replace || is_unfinished(&folder) || !recorded.is_file() {
             return Ok(Self { folder, beside: None, is_finished: false });
         }
-        let text = std::fs::read_to_string(&recorded).map_err(Error::io(&recorded, "read the file"))?;
+        let text =
+            std::fs::read_to_string(&recorded).map_err(Error::io(&recorded, "read the file"))?;
         if part || !toml::from_str(&text).is_ok_and(|found| resolved.repeats(&found)) {
-            let found =
-                if part { "has finished results" } else { "has the results of another spec, scene or seed" };
+            let found = if part {
+                "has finished results"
+            } else {
+                "has the results of another spec, scene or seed"
+            };
             return Err(Error::Usage(format!(
                 "{} {found}; --force replaces them, and with another --out they stay",
                 folder.display()

@@ -39,7 +39,8 @@ fn trace(config: &speed::Config, work: &Work) -> Result<String, Error> {
             programs.push(program);
         } else {
             let program = program.display();
-            text += &format!("Without {program}: it is not there; scripts/ray-peers/build makes it.\n");
+            text +=
+                &format!("Without {program}: it is not there; scripts/ray-peers/build makes it.\n");
         }
     }
     let mut traced = Vec::new();
@@ -54,28 +55,39 @@ fn trace(config: &speed::Config, work: &Work) -> Result<String, Error> {
                 Contestant::Peer(peer) => peer.contenders(scene),
                 Contestant::Ours(_) | Contestant::External(_) => {
                     let visits = job.visits(experiment, tree)?;
-                    own_contenders(&config.layouts, &config.instructions, scene, tree, visits.as_deref())
+                    own_contenders(
+                        &config.layouts,
+                        &config.instructions,
+                        scene,
+                        tree,
+                        visits.as_deref(),
+                    )
                 }
             };
             let made = made.map_err(failed)?;
-            contenders.extend(made.into_iter().map(|contender| (job.labelled.label.clone(), contender)));
+            contenders
+                .extend(made.into_iter().map(|contender| (job.labelled.label.clone(), contender)));
         }
         for program in &programs {
             for (library, contender) in external::contenders(program, scene).map_err(failed)? {
                 // A processor without AVX-512 makes all programs the same.
-                if !contenders.iter().any(|(known, other)| *known == library && other.is_called_as(&contender))
+                if !contenders
+                    .iter()
+                    .any(|(known, other)| *known == library && other.is_called_as(&contender))
                 {
                     contenders.push((library, contender));
                 }
             }
         }
         let seed = experiment.seed_of(&scene.name, "tracing", 0);
-        let measured = speed::measure(config, scene, of_scene[0].1, &contenders, seed, || watch.cancelled());
+        let measured =
+            speed::measure(config, scene, of_scene[0].1, &contenders, seed, || watch.cancelled());
         traced.extend(measured.map_err(failed)?.ok_or_else(|| work.interrupted())?);
     }
     if !config.ray_peers.is_empty() {
         let search_seconds = search_seconds(&first_runs, jobs, store)?;
-        let seconds_of = |scene: &str, label: &str| search_seconds[&(scene.to_owned(), label.to_owned())];
+        let seconds_of =
+            |scene: &str, label: &str| search_seconds[&(scene.to_owned(), label.to_owned())];
         let speeds = comparison::speeds(&traced, |label| library(experiment, label), seconds_of);
         store.write_rows(&comparison::rows(&speeds))?;
         let ratios = comparison::ratios(&speeds);
@@ -84,8 +96,9 @@ fn trace(config: &speed::Config, work: &Work) -> Result<String, Error> {
     }
     // Other rows are compared with committed ones. They must depend neither on a program that may be missing nor on the
     // instruction sets of this processor.
-    let is_ours =
-        |traced: &Traced| experiment.methods.iter().any(|method| method.label == traced.answers.method);
+    let is_ours = |traced: &Traced| {
+        experiment.methods.iter().any(|method| method.label == traced.answers.method)
+    };
     let mut seen = BTreeSet::new();
     traced.retain(|traced| {
         let TraceRow { scene, method, layout, rays, .. } = &traced.answers;
@@ -120,7 +133,8 @@ fn search_seconds(
 
 /// The library behind a label: ours, the library of a method, or else a library of the program.
 fn library(experiment: &Experiment, label: &str) -> String {
-    match experiment.methods.iter().find(|method| method.label == label).map(|found| &found.method) {
+    match experiment.methods.iter().find(|method| method.label == label).map(|found| &found.method)
+    {
         Some(Contestant::Ours(_)) => comparison::OURS.into(),
         Some(Contestant::Peer(peer)) => peer.name().into(),
         Some(Contestant::External(_)) | None => label.into(),

@@ -17,8 +17,9 @@ impl Experiment {
     /// Checks everything that types and the ranges of single keys leave open, but methods and the names in reports.
     pub(super) fn check_together(&self) -> Vec<Fault> {
         let is_unsaid = self.question.trim().is_empty();
-        let unsaid = is_unsaid
-            .then(|| OutOfRange::new("question", "empty", "what the experiment asks, for its readers"));
+        let unsaid = is_unsaid.then(|| {
+            OutOfRange::new("question", "empty", "what the experiment asks, for its readers")
+        });
         let others = [self.check_scenes().err(), self.check_run_count().err()];
         unsaid.into_iter().chain(others.into_iter().flatten()).map(Fault::from).collect()
     }
@@ -37,19 +38,27 @@ impl Experiment {
             return Err(OutOfRange::new("scenes", "empty", "at least one name or path"));
         }
         match self.scenes.iter().find(|name| subset::names(name) == 0) {
-            Some(none) => Err(OutOfRange::new("scenes", format!("{none:?}"), "A..B with A up to B")),
+            Some(none) => {
+                Err(OutOfRange::new("scenes", format!("{none:?}"), "A..B with A up to B"))
+            }
             None => Ok(()),
         }
     }
 
     /// Checks that there are runs, and not too many.
     pub(crate) fn check_run_count(&self) -> Result<(), OutOfRange> {
-        let scenes = self.scenes.iter().map(|name| subset::names(name)).fold(0, u64::saturating_add);
-        let runs =
-            [self.methods.len() as u64, self.repetitions.into()].into_iter().fold(scenes, u64::saturating_mul);
+        let scenes =
+            self.scenes.iter().map(|name| subset::names(name)).fold(0, u64::saturating_add);
+        let runs = [self.methods.len() as u64, self.repetitions.into()]
+            .into_iter()
+            .fold(scenes, u64::saturating_mul);
         if runs > MOST_RUNS {
             let product = "the product of the numbers of scenes, methods and repetitions";
-            return Err(OutOfRange::new(product, format!("{runs} runs"), format!("up to {MOST_RUNS}")));
+            return Err(OutOfRange::new(
+                product,
+                format!("{runs} runs"),
+                format!("up to {MOST_RUNS}"),
+            ));
         }
         if self.methods.is_empty() {
             return Err(OutOfRange::new("methods", "empty", "at least one table with a `method`"));
@@ -60,16 +69,19 @@ impl Experiment {
     /// What is wrong with methods beside the rest of the experiment; they stand at these places in the spec.
     pub(super) fn check_methods(&self, at: &[usize]) -> Vec<Fault> {
         let below = |at: &usize| format!("methods[{at}]");
-        let check =
-            |(at, labelled)| self.check_method(labelled).into_iter().map(move |fault| fault.below(&below(at)));
+        let check = |(at, labelled)| {
+            self.check_method(labelled).into_iter().map(move |fault| fault.below(&below(at)))
+        };
         at.iter().zip(&self.methods).flat_map(check).collect()
     }
 
     fn check_method(&self, labelled: &Labelled) -> Vec<Fault> {
         let Labelled { method, own, .. } = labelled;
         let Own { budget, max_seconds, keep, judge, for_rays, objective, references, .. } = own;
-        let (is_ours, is_best) =
-            (matches!(method, Contestant::Ours(_)), matches!(method, Contestant::Ours(Method::Best(_))));
+        let (is_ours, is_best) = (
+            matches!(method, Contestant::Ours(_)),
+            matches!(method, Contestant::Ours(Method::Best(_))),
+        );
         let judged = Labelled::JUDGED;
         let (ours, with_judged) = ("with a method of ours", format!("with {}", judged.join(", ")));
         let sized = "with a method of ours but median_cut, which compares no sizes of boxes";
@@ -97,13 +109,15 @@ impl Experiment {
         }
         let found = format!("{:?}", method.name());
         if self.suite.is_some() && !is_ours {
-            let accepted = "methods of ours; the suite runs the libraries that are compiled in by itself";
+            let accepted =
+                "methods of ours; the suite runs the libraries that are compiled in by itself";
             faults.push(Fault::new("method", format!("{found}, none of ours"), accepted));
         } else if let Contestant::Peer(peer) = method
             && let Some(feature) = peer.missing_feature()
         {
-            let needs =
-                format!("another library, which needs `cargo run --release -p harness --features {feature}`");
+            let needs = format!(
+                "another library, which needs `cargo run --release -p harness --features {feature}`"
+            );
             let accepted = format!("without it {}", Method::NAMES.join(", "));
             faults.push(Fault::new("method", format!("{found}, {needs}"), accepted));
         }
@@ -132,8 +146,12 @@ impl Experiment {
         );
         let accepted = "`budget = { max_work = 300_000_000 }`, some seconds on one thread, or `max_seconds = 10`, here or for all \
                         methods, or another `work_per_object`";
-        let own = at.iter().zip(&self.methods).filter(|(_, labelled)| goes_on(labelled) && !has_end(labelled));
-        let entries = own.map(|(at, _)| format!("methods[{at}]")).filter(|entry| !is_doubtful(entry));
+        let own = at
+            .iter()
+            .zip(&self.methods)
+            .filter(|(_, labelled)| goes_on(labelled) && !has_end(labelled));
+        let entries =
+            own.map(|(at, _)| format!("methods[{at}]")).filter(|entry| !is_doubtful(entry));
         entries.map(|entry| Fault::new(format!("{entry}.budget"), &found, accepted)).collect()
     }
 
@@ -150,8 +168,7 @@ impl Experiment {
             return alone.into_iter().collect();
         }
         let beside = |key: &str| format!("{key} beside `max_seconds`");
-        let accepted =
-            "none, or a budget of `max_work`: runs of so many seconds have rows in timing_runs.csv alone";
+        let accepted = "none, or a budget of `max_work`: runs of so many seconds have rows in timing_runs.csv alone";
         let repeatable = [
             ("suite", self.suite.is_some()),
             ("lower_bound", self.lower_bound.is_some()),
@@ -201,7 +218,11 @@ pub(super) fn unique(labels: &[Option<String>]) -> Vec<Fault> {
     let labels = labels.iter().enumerate().filter_map(|(at, label)| Some((at, label.as_ref()?)));
     let second = labels.filter(|(_, label)| !known.insert(*label));
     let fault = |(at, label)| {
-        Fault::new(format!("methods[{at}].label"), format!("{label:?} for the second time"), "unique labels")
+        Fault::new(
+            format!("methods[{at}].label"),
+            format!("{label:?} for the second time"),
+            "unique labels",
+        )
     };
     second.map(fault).collect()
 }

@@ -130,7 +130,8 @@ impl Experiment {
     /// The seconds that a method's runs may take.
     pub fn max_seconds_of(&self, labelled: &Labelled) -> Option<f64> {
         let is_ours = matches!(labelled.method, Contestant::Ours(_));
-        let limits = self.max_seconds.into_iter().filter(|_| is_ours).chain(labelled.own.max_seconds);
+        let limits =
+            self.max_seconds.into_iter().filter(|_| is_ours).chain(labelled.own.max_seconds);
         limits.reduce(f64::min)
     }
 
@@ -142,7 +143,8 @@ impl Experiment {
     /// The seed of one run, within 32 bits so that every spreadsheet keeps it exactly.
     pub fn seed_of(&self, scene: &str, label: &str, repetition: u32) -> u64 {
         let variant = if self.quick { "-quick" } else { "" };
-        let identity = format!("{}\0{}{variant}\0{scene}\0{label}\0{repetition}", self.seed, self.name);
+        let identity =
+            format!("{}\0{}{variant}\0{scene}\0{label}\0{repetition}", self.seed, self.name);
         let hash = fnv1a(identity.into_bytes());
         (hash ^ (hash >> 32)) & 0xffff_ffff
     }

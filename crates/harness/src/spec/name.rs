@@ -6,7 +6,16 @@ use std::fmt;
 /// A name that is safe as that of a folder among the results: it cannot lead elsewhere, and it is none of the names that
 /// the harness gives to files of its own there. Empty by default, in a spec that has not been given its file's name.
 #[derive(
-    Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema,
+    Clone,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    schemars::JsonSchema,
 )]
 #[serde(try_from = "String")]
 pub struct Name(String);
@@ -50,9 +59,19 @@ mod tests {
         for good in ["table4", "two words", "größe", "v1.2", "a..b"] {
             assert_eq!(Name::try_from(good.to_owned()).unwrap().as_str(), good);
         }
-        for wrong in
-            [".", "..", ".lock", ".partial", "a/b", "..\\x", "c:x", "x.new", "quick", "a\u{1b}[2J", "a\0"]
-        {
+        for wrong in [
+            ".",
+            "..",
+            ".lock",
+            ".partial",
+            "a/b",
+            "..\\x",
+            "c:x",
+            "x.new",
+            "quick",
+            "a\u{1b}[2J",
+            "a\0",
+        ] {
             assert!(Name::try_from(wrong.to_owned()).is_err(), "{wrong:?}");
         }
     }

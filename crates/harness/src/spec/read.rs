@@ -32,20 +32,25 @@ impl Experiment {
     /// Reads and checks a spec's text; `path` gives it its name.
     pub fn parse(path: &Path, text: &str, overrides: &Overrides) -> Result<Self, Error> {
         let refuse = |message: String| Error::Spec { file: path.to_owned(), message };
-        let table: Table = text.parse().map_err(|error: toml::de::Error| refuse(error.to_string()))?;
+        let table: Table =
+            text.parse().map_err(|error: toml::de::Error| refuse(error.to_string()))?;
         let name = path.file_stem().and_then(OsStr::to_str).ok_or("no UTF-8".to_owned());
         let name = name.and_then(|name| Name::try_from(name.to_owned()));
-        let name =
-            name.map_err(|message| refuse(format!("the file's name without its extension: {message}")))?;
+        let name = name.map_err(|message| {
+            refuse(format!("the file's name without its extension: {message}"))
+        })?;
         // A key that `quick` replaces stands there, not where it is read.
         let above = overrides.quick.then_some("quick");
         let mut experiment = Self::from_table(table, name, overrides)
             .map_err(|faults| refuse(fault::say(&faults, text, &path.to_string_lossy(), above)))?;
-        if let Some(folder) = path.parent().and_then(Path::to_str).filter(|_| overrides.scenes.is_empty()) {
+        if let Some(folder) =
+            path.parent().and_then(Path::to_str).filter(|_| overrides.scenes.is_empty())
+        {
             let scenes = experiment.scenes.iter_mut().chain(&mut experiment.optional_scenes);
             // Words are names.
-            let is_path =
-                |scene: &str| scene.split(':').next().is_some_and(|file| file.contains(['.', '/', '\\']));
+            let is_path = |scene: &str| {
+                scene.split(':').next().is_some_and(|file| file.contains(['.', '/', '\\']))
+            };
             for scene in scenes.filter(|scene| is_path(scene)) {
                 *scene = Path::new(folder).join(&*scene).to_string_lossy().into_owned();
             }
@@ -60,7 +65,11 @@ impl Experiment {
         match table.remove("quick") {
             Some(Value::Table(quick)) if overrides.quick => replace(&mut table, quick),
             None if overrides.quick => {
-                faults.push(Fault::new("quick", "missing", "with --quick, a table of keys to replace"));
+                faults.push(Fault::new(
+                    "quick",
+                    "missing",
+                    "with --quick, a table of keys to replace",
+                ));
             }
             None | Some(Value::Table(_)) => {}
             Some(found) => faults.push(Fault::new("quick", found, "a table of keys to replace")),
@@ -69,7 +78,12 @@ impl Experiment {
         // Serde forgets the path to an error within a table that says itself of which type it is.
         let (methods, methods_at) = list(&mut table, "methods", Labelled::read, &mut faults);
         let read = |table| {
-            fault::tagged(table, "kind", |kind, config| Report::read(kind, config), || Report::NAMES.join(", "))
+            fault::tagged(
+                table,
+                "kind",
+                |kind, config| Report::read(kind, config),
+                || Report::NAMES.join(", "),
+            )
         };
         let (reports, reports_at) = list(&mut table, "reports", read, &mut faults);
         let (experiment, of_others) = fault::deserialize::<Self>(table);
@@ -93,7 +107,8 @@ impl Experiment {
             labels = experiment.methods.iter().map(|method| Some(method.label.clone())).collect();
         }
         // What is refused already is missing, and a list empty, for no other reason.
-        let apart = |late: &Fault| !faults.iter().any(|fault| fault::is_within(&fault.key, &late.key));
+        let apart =
+            |late: &Fault| !faults.iter().any(|fault| fault::is_within(&fault.key, &late.key));
         let together = [
             experiment.check_together().into_iter().filter(apart).collect(),
             check::unique(&labels),
@@ -109,7 +124,8 @@ impl Experiment {
 
 /// The labels of the entries of `methods`, as far as they can be told.
 fn labels(methods: Option<&Value>) -> Vec<Option<String>> {
-    let label = |entry: &Value| Some(entry.get("label").or(entry.get("method"))?.as_str()?.to_owned());
+    let label =
+        |entry: &Value| Some(entry.get("label").or(entry.get("method"))?.as_str()?.to_owned());
     methods.and_then(Value::as_array).into_iter().flatten().map(label).collect()
 }
 

@@ -104,8 +104,9 @@ fn described(text: &str) -> String {
     let (text, mut plain) = (lines.join(" "), String::new());
     let mut rest = text.trim();
     while let Some((before, after)) = rest.split_once('[') {
-        let Some((name, after)) =
-            after.split_once(']').filter(|(name, after)| name.starts_with('`') || after.starts_with('('))
+        let Some((name, after)) = after
+            .split_once(']')
+            .filter(|(name, after)| name.starts_with('`') || after.starts_with('('))
         else {
             plain += &format!("{before}[");
             rest = after;
@@ -132,14 +133,19 @@ pub fn page() -> String {
         let mut rows = Vec::new();
         keys_of(table, "", hidden, &mut rows);
         if !rows.is_empty() {
-            text += &format!("| key | value | default | meaning |\n|---|---|---|---|\n{}", rows.concat());
+            text += &format!(
+                "| key | value | default | meaning |\n|---|---|---|---|\n{}",
+                rows.concat()
+            );
         }
     };
     section("## An experiment", &schema, &["methods", "reports", "quick"]);
-    let entries =
-        |key: &str| schema["properties"][key]["items"]["oneOf"].as_array().cloned().unwrap_or_default();
+    let entries = |key: &str| {
+        schema["properties"][key]["items"]["oneOf"].as_array().cloned().unwrap_or_default()
+    };
     let (methods, reports) = (entries("methods"), entries("reports"));
-    let own = properties(&methods[0]).into_iter().filter(|(key, _)| Own::KEYS.contains(&key.as_str()));
+    let own =
+        properties(&methods[0]).into_iter().filter(|(key, _)| Own::KEYS.contains(&key.as_str()));
     let own = json!({ "properties": own.collect::<Map<_, _>>(), "description": "Beside `method`, its name." });
     section("## Every entry of `methods`", &own, &[]);
     for (tag, tables) in [("method", methods), ("kind", reports)] {
@@ -153,14 +159,26 @@ pub fn page() -> String {
 
 /// A row for every key of a table, those of tables within it included.
 fn keys_of(table: &Value, above: &str, hidden: &[&str], rows: &mut Vec<String>) {
-    for (key, schema) in properties(table).iter().filter(|(key, _)| !hidden.contains(&key.as_str())) {
-        let text = |key: &str| schema.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();
+    for (key, schema) in properties(table).iter().filter(|(key, _)| !hidden.contains(&key.as_str()))
+    {
+        let text =
+            |key: &str| schema.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();
         let default = schema.get("default").map(Value::to_string).filter(|text| text.len() <= 40);
         let default = default.map_or_else(String::new, |text| format!("`{text}`"));
-        let cells = [format!("`{above}{key}`"), format!("`{}`", value(schema)), default, text("description")];
+        let cells = [
+            format!("`{above}{key}`"),
+            format!("`{}`", value(schema)),
+            default,
+            text("description"),
+        ];
         rows.push(format!("| {} |\n", cells.map(|cell| cell.replace('|', "\\|")).join(" | ")));
         keys_of(schema, &format!("{above}{key}."), &[], rows);
-        keys_of(schema.get("items").unwrap_or(&Value::Null), &format!("{above}{key}[]."), &[], rows);
+        keys_of(
+            schema.get("items").unwrap_or(&Value::Null),
+            &format!("{above}{key}[]."),
+            &[],
+            rows,
+        );
         for (name, inner) in choices(schema).into_iter().flatten().flat_map(properties) {
             keys_of(&inner, &format!("{above}{key}.{name}."), &[], rows);
         }

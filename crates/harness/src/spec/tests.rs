@@ -4,7 +4,8 @@ use super::*;
 use crate::peers::Peer;
 use std::collections::HashSet;
 
-const GOOD: &str = "question = 'q'\nscenes = ['escher']\nmethods = [{ method = 'grasp', noise = 0.1 }]\n";
+const GOOD: &str =
+    "question = 'q'\nscenes = ['escher']\nmethods = [{ method = 'grasp', noise = 0.1 }]\n";
 
 fn read(text: &str) -> Result<Experiment, String> {
     parse(text, &Overrides::default())
@@ -44,7 +45,10 @@ fn wrong_keys_and_values_are_named_with_what_would_be_accepted() {
         ("threads = 65535\n", &["threads is 65535", "1 to 1024"]),
         ("repetitions = 4294967295\n", &["repetitions", "4294967295 runs"]),
         ("optional_scenes = []\nscenes = ['a:0..4294967295']\n", &["scenes", "4294967296 runs"]),
-        ("scenes = ['a:0..9999:0..99999:0..4294967295']\n", &["scenes", "4294967296000000000 runs"]),
+        (
+            "scenes = ['a:0..9999:0..99999:0..4294967295']\n",
+            &["scenes", "4294967296000000000 runs"],
+        ),
         ("scenes = ['a:5..4']\n", &["scenes", "a:5..4", "A up to B"]),
         ("tracing = { count = 4294967295 }\n", &["tracing.count", "1 to 100000000"]),
         ("objective = { sah = { traversal = -1.0 } }\n", &["objective.sah.traversal: -1 is not"]),
@@ -104,11 +108,23 @@ fn finite_nonsense_in_reports_is_named_with_what_would_be_accepted() {
         ("significance", "level = 1", &["reports[0].level is 1", "above 0 and below 1"]),
         ("trials", "best_of = 0", &["reports[0].best_of is 0", "1 or more"]),
         ("ray_tests", "tolerance = -0.1", &["reports[0].tolerance is -0.1", "0 to 1"]),
-        ("ray_tests", "paper = { escher = [1, 2] }", &["reports[0].paper.escher is a list of 2", "up to 1"]),
+        (
+            "ray_tests",
+            "paper = { escher = [1, 2] }",
+            &["reports[0].paper.escher is a list of 2", "up to 1"],
+        ),
         ("times", "paper = { escher = [0.0] }", &["reports[0].paper.escher[0] is 0", "above 0"]),
         ("ecdf", "targets = []", &["reports[0].targets is empty", "one or more"]),
-        ("ecdf", "targets = [{ of = 'base', percent = -100 }]", &["targets[0].percent is -100", "above -100"]),
-        ("anytime", "at_seconds = [1, 10, 2]", &["reports[0].at_seconds is [1.0, 10.0, 2.0]", "ascending"]),
+        (
+            "ecdf",
+            "targets = [{ of = 'base', percent = -100 }]",
+            &["targets[0].percent is -100", "above -100"],
+        ),
+        (
+            "anytime",
+            "at_seconds = [1, 10, 2]",
+            &["reports[0].at_seconds is [1.0, 10.0, 2.0]", "ascending"],
+        ),
         ("anytime", "at_seconds = [0]", &["reports[0].at_seconds[0] is 0", "above 0"]),
         ("anytime", "file = '../../x'", &["reports[0].file is \"../../x\"", "letters, digits"]),
         ("generations", "paper_gain = 0", &["reports[0].paper_gain is 0", "above 0"]),
@@ -117,7 +133,11 @@ fn finite_nonsense_in_reports_is_named_with_what_would_be_accepted() {
             "paper_final = { e = [3, 2] }",
             &["paper_final.e is [3.0, 2.0]", "the lower number first"],
         ),
-        ("pictures", "document = { 'brute force' = -1 }", &["document.brute force is -1", "above 0"]),
+        (
+            "pictures",
+            "document = { 'brute force' = -1 }",
+            &["document.brute force is -1", "above 0"],
+        ),
         ("pareto", "methods = []", &["reports[0].methods is empty", "one or more"]),
     ] {
         let keys = match kind {
@@ -135,15 +155,23 @@ fn finite_nonsense_in_reports_is_named_with_what_would_be_accepted() {
 fn nonsense_beside_reports_is_named_with_what_would_be_accepted() {
     let view = "[{ eye = [0, 0, 0], target = [1, 1, 1] }]";
     let lights = |count| {
-        format!("cameras.escher = {{ same = {view}, other = {view}, lights = {:?} }}", vec![[1; 3]; count])
+        format!(
+            "cameras.escher = {{ same = {view}, other = {view}, lights = {:?} }}",
+            vec![[1; 3]; count]
+        )
     };
     let suite = |measure: &str| format!("question = 'q'\n[suite]\n{measure}\n");
     for (text, parts) in [
         (
-            suite("stability = { builders = 'few', work_per_object = 1, rays = 9223372036854775807 }"),
+            suite(
+                "stability = { builders = 'few', work_per_object = 1, rays = 9223372036854775807 }",
+            ),
             &["suite.stability.rays", "1 to 100000000"][..],
         ),
-        (suite("precision = { objects = 2, repetitions = 1 }"), &["suite.precision.objects is 2", "3 to"]),
+        (
+            suite("precision = { objects = 2, repetitions = 1 }"),
+            &["suite.precision.objects is 2", "3 to"],
+        ),
         (
             format!("{GOOD}[ray_cost]\ntrained = 200_000"),
             &["ray_cost.trained is 200000", "up to 174762", "6 rays"],
@@ -168,9 +196,18 @@ fn wrong_methods_are_named_with_what_would_be_accepted() {
         ("[{ method = 'grasp', noise = 1.5 }]", &["methods[0].noise is 1.5", "0 to 1"]),
         ("[{ method = 'grasp', label = 3 }]", &["methods[0].label", "3", "string"]),
         ("[{ method = 'grasp', budget = { max_seconds = 3 } }]", &["max_seconds", "max_work"]),
-        ("[{ method = 'grasp', judge = { count = 0 } }]", &["methods[0].judge.count is 0", "1 or more"]),
-        ("[{ method = 'best', judge = { count = 9 } }]", &["methods[0].judge is set for best", "genetic"]),
-        ("[{ method = 'best', for_rays = 'camera' }]", &["methods[0].for_rays is set without `ray_cost`"]),
+        (
+            "[{ method = 'grasp', judge = { count = 0 } }]",
+            &["methods[0].judge.count is 0", "1 or more"],
+        ),
+        (
+            "[{ method = 'best', judge = { count = 9 } }]",
+            &["methods[0].judge is set for best", "genetic"],
+        ),
+        (
+            "[{ method = 'best', for_rays = 'camera' }]",
+            &["methods[0].for_rays is set without `ray_cost`"],
+        ),
         (
             "[{ method = 'median_cut', for_rays = 'inside' }]",
             &["methods[0].for_rays", "median_cut, which compares"],
@@ -182,7 +219,10 @@ fn wrong_methods_are_named_with_what_would_be_accepted() {
                 "other layouts",
             ],
         ),
-        ("[{ method = 'obvhs', for_rays = 'inside' }]", &["methods[0].for_rays is set for obvhs", "of ours"]),
+        (
+            "[{ method = 'obvhs', for_rays = 'inside' }]",
+            &["methods[0].for_rays is set for obvhs", "of ours"],
+        ),
         ("[{ method = 'best', for_rays = 'all' }]", &["methods[0].for_rays", "all", "default"]),
         ("[{ method = 'grasp' }, { method = 'grasp' }]", &["methods[1].label", "second time"]),
     ] {
@@ -193,15 +233,20 @@ fn wrong_methods_are_named_with_what_would_be_accepted() {
 #[test]
 fn another_library_is_accepted_exactly_with_its_feature() {
     for name in Peer::NAMES {
-        let text = format!("question = 'q'\nscenes = ['escher']\nmethods = [{{ method = '{name}' }}]\n");
-        let Contestant::Peer(peer) = toml::from_str::<Experiment>(&text).unwrap().methods.remove(0).method
+        let text =
+            format!("question = 'q'\nscenes = ['escher']\nmethods = [{{ method = '{name}' }}]\n");
+        let Contestant::Peer(peer) =
+            toml::from_str::<Experiment>(&text).unwrap().methods.remove(0).method
         else {
             panic!("{name} is no library");
         };
         let read = read(&text);
         match peer.missing_feature() {
             Some(feature) => {
-                refused(&text, &["methods[0].method", name, "--features", feature, "muller_fellner"]);
+                refused(
+                    &text,
+                    &["methods[0].method", name, "--features", feature, "muller_fellner"],
+                );
             }
             None => assert!(read.is_ok(), "{read:?}"),
         }
@@ -258,9 +303,12 @@ fn seeds_differ_between_runs_and_follow_the_spec_alone() {
 #[test]
 fn naming_a_wrong_key_among_thousands_of_methods_takes_no_time() {
     let methods = "[[methods]]\nmethod = 'grasp'\nlabel = 'NUMBER'\n";
-    let many: String = (0..3000).map(|number| methods.replace("NUMBER", &number.to_string())).collect();
-    let text =
-        format!("question = 'q'\nscenes = ['escher']\n{}", many.replacen("'2900'", "'2900'\nnoise = 'x'", 1));
+    let many: String =
+        (0..3000).map(|number| methods.replace("NUMBER", &number.to_string())).collect();
+    let text = format!(
+        "question = 'q'\nscenes = ['escher']\n{}",
+        many.replacen("'2900'", "'2900'\nnoise = 'x'", 1)
+    );
     let start = std::time::Instant::now();
     let message = read(&text).unwrap_err();
     assert!(message.contains("methods[2900].noise"), "{message}");
@@ -303,7 +351,8 @@ file = '../x'
         let (place, rest) = line.split_once("spec.toml: ")?.1.split_once(": ")?;
         Some(format!("{} {}", place.strip_prefix("line ")?, rest.split([' ', ':']).next()?))
     };
-    let said: Vec<String> = message.lines().map(|line| key(line).unwrap_or_else(|| line.into())).collect();
+    let said: Vec<String> =
+        message.lines().map(|line| key(line).unwrap_or_else(|| line.into())).collect();
     let expected = [
         "1 question",
         "2 scenes[1]",
@@ -348,7 +397,12 @@ file = '../x'
     let said: Vec<String> = message.lines().filter_map(key).collect();
     assert_eq!(
         said,
-        ["4 methods[0].method", "7 methods[2].label", "11 reports[0].methods[2]", "11 reports[0].methods[3]"]
+        [
+            "4 methods[0].method",
+            "7 methods[2].label",
+            "11 reports[0].methods[2]",
+            "11 reports[0].methods[3]"
+        ]
     );
 }
 
@@ -359,9 +413,16 @@ fn a_search_that_would_go_on_for_hours_is_refused_unless_the_spec_says_when_it_e
         read(&format!("question = 'q'\nscenes = ['escher']\n{rest}\n{methods}\n"))
     };
     let message = spec("", "").unwrap_err();
-    let parts =
-        ["line 4: methods[1].budget is missing", "budget = { max_work = ", "max_seconds = ", "work_per_object"];
-    assert!(parts.iter().all(|part| message.contains(part)) && message.lines().count() == 1, "{message}");
+    let parts = [
+        "line 4: methods[1].budget is missing",
+        "budget = { max_work = ",
+        "max_seconds = ",
+        "work_per_object",
+    ];
+    assert!(
+        parts.iter().all(|part| message.contains(part)) && message.lines().count() == 1,
+        "{message}"
+    );
     for (rest, of_best) in [
         ("budget = { max_work = 9 }", ""),
         ("sequential = true\nmax_seconds = 9.0", ""),
@@ -383,8 +444,9 @@ fn quick_is_refused_where_nothing_says_what_it_is() {
 #[test]
 fn scenes_of_a_spec_are_found_from_its_folder_and_those_of_the_command_line_are_not() {
     let text = "question = 'q'\nscenes = ['escher:random:9:1..2', 'a/b:random:9:1', '/c.obj', 'd.ply']\n[[methods]]\nmethod = 'median_cut'\n";
-    let scenes =
-        |overrides: &Overrides| Experiment::parse("x/y/spec.toml".as_ref(), text, overrides).unwrap().scenes;
+    let scenes = |overrides: &Overrides| {
+        Experiment::parse("x/y/spec.toml".as_ref(), text, overrides).unwrap().scenes
+    };
     assert_eq!(
         scenes(&Overrides::default()),
         ["escher:random:9:1..2", "x/y/a/b:random:9:1", "/c.obj", "x/y/d.ply"]

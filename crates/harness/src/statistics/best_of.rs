@@ -137,12 +137,18 @@ mod tests {
         for (n, m) in [(400, 10), (400, 100), (500, 100), (100, 100), (40, 10)] {
             for (kind, draw) in light.into_iter().enumerate() {
                 let (below, above) = missed(draw, n, m);
-                assert!(below <= most && above <= most, "{kind}, best of {m} from {n}: {below} and {above}");
+                assert!(
+                    below <= most && above <= most,
+                    "{kind}, best of {m} from {n}: {below} and {above}"
+                );
             }
         }
         for (n, m) in [(400, 10), (400, 100), (500, 100)] {
             let (below, above) = missed(seldom_lower, n, m);
-            assert!(below <= most && above <= most, "seldom lower, best of {m} from {n}: {below} and {above}");
+            assert!(
+                below <= most && above <= most,
+                "seldom lower, best of {m} from {n}: {below} and {above}"
+            );
         }
     }
 

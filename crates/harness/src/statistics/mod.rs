@@ -123,8 +123,8 @@ pub fn student(values: usize) -> Option<f64> {
 /// The 97.5 % quantiles of Student's t for 1 to 20 degrees of freedom. With more, intervals by the last are somewhat
 /// wider than they need be.
 const STUDENT: [f64; 20] = [
-    12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131,
-    2.120, 2.110, 2.101, 2.093, 2.086,
+    12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160,
+    2.145, 2.131, 2.120, 2.110, 2.101, 2.093, 2.086,
 ];
 
 /// The primal integral (Berthold 2013) up to `horizon`, divided by it: the mean over that time of the primal gap
@@ -148,9 +148,11 @@ pub fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
     let n = pairs.len() as f64;
     let (mean_x, mean_y) =
         (pairs.iter().map(|p| p.0).sum::<f64>() / n, pairs.iter().map(|p| p.1).sum::<f64>() / n);
-    let product = |f: fn(f64, f64) -> f64| pairs.iter().map(|&(x, y)| f(x - mean_x, y - mean_y)).sum::<f64>();
+    let product =
+        |f: fn(f64, f64) -> f64| pairs.iter().map(|&(x, y)| f(x - mean_x, y - mean_y)).sum::<f64>();
     let (xx, yy) = (product(|x, _| x * x), product(|_, y| y * y));
-    (pairs.len() > 1 && xx > 0.0 && yy > 0.0).then(|| product(|x, y| x * y) / (xx.sqrt() * yy.sqrt()))
+    (pairs.len() > 1 && xx > 0.0 && yy > 0.0)
+        .then(|| product(|x, y| x * y) / (xx.sqrt() * yy.sqrt()))
 }
 
 /// Returns the 95 % interval of Pearson's correlation of so many pairs, by Fisher's transformation; `None` for fewer than four.
@@ -199,7 +201,10 @@ mod tests {
         for m in 1..=pool.len() {
             let minima: Vec<f64> = (0u32..1 << pool.len())
                 .filter(|set| set.count_ones() as usize == m)
-                .map(|set| minimum((0..pool.len()).filter(|i| set & (1 << i) != 0).map(|i| pool[i])).unwrap())
+                .map(|set| {
+                    minimum((0..pool.len()).filter(|i| set & (1 << i) != 0).map(|i| pool[i]))
+                        .unwrap()
+                })
                 .collect();
             let mean = minima.iter().sum::<f64>() / minima.len() as f64;
             assert!((expected_best_of(&pool, m).unwrap() - mean).abs() < 1e-12, "m = {m}");

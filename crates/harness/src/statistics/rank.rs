@@ -23,7 +23,8 @@ pub struct Test {
 /// Wilcoxon's signed-rank test (Wilcoxon 1945) of paired differences; those of 0 are left out. `None` if no others are
 /// left.
 pub fn wilcoxon_signed_rank(differences: &[f64]) -> Option<Test> {
-    let differences: Vec<f64> = differences.iter().copied().filter(|&difference| difference != 0.0).collect();
+    let differences: Vec<f64> =
+        differences.iter().copied().filter(|&difference| difference != 0.0).collect();
     (!differences.is_empty()).then(|| signed_ranks(&differences, differences.len() <= MOST_EXACT))
 }
 
@@ -123,7 +124,11 @@ fn two_sided(counts: &[f64], sum: f64) -> f64 {
 
 /// Σ t³ − t over groups of t equal ranks.
 fn ties(ranks: &[f64]) -> f64 {
-    sorted(ranks).chunk_by(|a, b| a == b).map(|group| group.len() as f64).map(|t| t * t * t - t).sum()
+    sorted(ranks)
+        .chunk_by(|a, b| a == b)
+        .map(|group| group.len() as f64)
+        .map(|t| t * t * t - t)
+        .sum()
 }
 
 /// Twice the tail beyond `deviation` less a half, of a normal distribution of this variance.
@@ -146,7 +151,8 @@ mod tests {
         // in the manual of R's wilcox.test: one-sided p-values 0.01953 and 0.1272.
         let before = [1.83, 0.50, 1.62, 2.48, 1.68, 1.88, 1.55, 3.06, 1.30];
         let after = [0.878, 0.647, 0.598, 2.05, 1.06, 1.29, 1.06, 3.14, 1.29];
-        let differences: Vec<f64> = before.iter().zip(after).map(|(before, after)| before - after).collect();
+        let differences: Vec<f64> =
+            before.iter().zip(after).map(|(before, after)| before - after).collect();
         let test = wilcoxon_signed_rank(&differences).unwrap();
         assert_eq!(test.statistic, 40.0);
         assert!((test.p_value / 2.0 - 0.01953).abs() < 5e-6, "{test:?}");
@@ -159,7 +165,11 @@ mod tests {
     }
 
     /// The smaller tail at `found`, doubled, of what `statistic` is over all of `sets`.
-    fn by_enumeration(sets: impl Iterator<Item = u32>, found: f64, statistic: impl Fn(u32) -> f64) -> f64 {
+    fn by_enumeration(
+        sets: impl Iterator<Item = u32>,
+        found: f64,
+        statistic: impl Fn(u32) -> f64,
+    ) -> f64 {
         let all: Vec<f64> = sets.map(statistic).collect();
         let tail = |count: usize| count as f64 / all.len() as f64;
         let below = tail(all.iter().filter(|&&value| value <= found).count());
@@ -172,7 +182,8 @@ mod tests {
         for n in 1..=values.len() {
             let values = &values[..n];
             let ranks = ranks(&values.iter().map(|value: &f64| value.abs()).collect::<Vec<_>>());
-            let sum = |set: u32| (0..n).filter(|i| set >> i & 1 == 1).map(|i| ranks[i]).sum::<f64>();
+            let sum =
+                |set: u32| (0..n).filter(|i| set >> i & 1 == 1).map(|i| ranks[i]).sum::<f64>();
             let test = wilcoxon_signed_rank(values).unwrap();
             let expected = by_enumeration(0..1 << n, test.statistic, sum);
             assert!((test.p_value - expected).abs() < 1e-12, "{n}: {test:?}, {expected}");
@@ -182,10 +193,14 @@ mod tests {
             let u = |set: u32| -> f64 {
                 let of = |side: u32| (0..values.len()).filter(move |i| set >> i & 1 == side);
                 let half = |a: f64, b: f64| if a == b { 0.5 } else { f64::from(u8::from(a > b)) };
-                of(1).flat_map(|i| of(0).map(move |j| (i, j))).map(|(i, j)| half(values[i], values[j])).sum()
+                of(1)
+                    .flat_map(|i| of(0).map(move |j| (i, j)))
+                    .map(|(i, j)| half(values[i], values[j]))
+                    .sum()
             };
             let test = mann_whitney(first, second).unwrap();
-            let sets = (0..1 << values.len()).filter(|set: &u32| set.count_ones() as usize == split);
+            let sets =
+                (0..1 << values.len()).filter(|set: &u32| set.count_ones() as usize == split);
             let expected = by_enumeration(sets, test.statistic, u);
             assert!((test.p_value - expected).abs() < 1e-12, "{split}: {test:?}, {expected}");
         }
@@ -206,7 +221,10 @@ mod tests {
         for shift in [0.3, 1.0, 2.6, 4.7] {
             near([true, false].map(|exact| signed_ranks(&values(MOST_EXACT, shift), exact)));
             let half = MOST_EXACT / 2;
-            near([true, false].map(|exact| rank_sum(&values(half, shift), &values(half, 0.0), exact)));
+            near(
+                [true, false]
+                    .map(|exact| rank_sum(&values(half, shift), &values(half, 0.0), exact)),
+            );
         }
     }
 

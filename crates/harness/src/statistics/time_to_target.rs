@@ -33,7 +33,8 @@ impl ShiftedExponential {
     /// The greatest difference between the fit and the distribution of these times (Kolmogorov–Smirnov).
     pub fn distance(&self, solved: &[f64], runs: usize) -> f64 {
         let steps = sorted(solved).into_iter().zip(0u32..).flat_map(|(time, before)| {
-            [before, before + 1].map(|count| (f64::from(count) / runs as f64 - self.probability(time)).abs())
+            [before, before + 1]
+                .map(|count| (f64::from(count) / runs as f64 - self.probability(time)).abs())
         });
         steps.fold(0.0, f64::max)
     }
@@ -47,7 +48,8 @@ fn standard_quantile(probability: f64) -> f64 {
 /// The time of this probability, the i-th of n runs standing at (i − ½) / n, linear in between.
 fn at(sorted: &[f64], runs: usize, probability: f64) -> Option<f64> {
     let position = (runs as f64 * probability - 0.5).max(0.0);
-    let (below, above) = (sorted.get(position.floor() as usize)?, sorted.get(position.ceil() as usize)?);
+    let (below, above) =
+        (sorted.get(position.floor() as usize)?, sorted.get(position.ceil() as usize)?);
     Some(below + (above - below) * position.fract())
 }
 

@@ -75,7 +75,9 @@ pub struct SceneCase {
 pub type Also = fn(&Method, &[Aabb], &Outcome) -> Verdict;
 
 /// How large a scene is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Size {
     /// For every method and every ray.
@@ -122,7 +124,9 @@ pub struct Effort {
 }
 
 /// Scenes for searches beyond those of few objects.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
 #[serde(deny_unknown_fields)]
 pub struct LargerScenes {
     /// Objects per scene; less where [`Size::Many`] is less.
@@ -139,9 +143,9 @@ impl SceneCase {
         let further = match method {
             Method::Exact(_) => return vec![(few.0.min(EXACT_OBJECTS), few.1)],
             builder if is_builder(builder) => Some((self.sizes[effort.builders as usize], few.1)),
-            _ => effort
-                .larger
-                .map(|larger| (larger.objects.min(self.sizes[Size::Many as usize]), larger.work_per_object)),
+            _ => effort.larger.map(|larger| {
+                (larger.objects.min(self.sizes[Size::Many as usize]), larger.work_per_object)
+            }),
         };
         [few].into_iter().chain(further.filter(|further| further.0 > few.0)).collect()
     }
@@ -162,13 +166,17 @@ pub fn methods() -> Vec<(String, Method)> {
         AreaOnly::Difference,
         AreaOnly::Product,
     ];
-    for heuristic in readings.map(Heuristic::AreaOnly).into_iter().chain([Heuristic::AreaTimesPower(0.9)]) {
+    for heuristic in
+        readings.map(Heuristic::AreaOnly).into_iter().chain([Heuristic::AreaTimesPower(0.9)])
+    {
         let config = muller_fellner::Config { heuristic, ..Default::default() };
         methods.push((format!("muller_fellner, {heuristic:?}"), Method::MullerFellner(config)));
     }
     let longest = median_cut::Config { axis: median_cut::CutAxis::Longest, ..Default::default() };
     methods.push(("median_cut, longest".into(), Method::MedianCut(longest)));
-    for (descent, pair_inner) in [(Descent::Cost, true), (Descent::Area, false), (Descent::Area, true)] {
+    for (descent, pair_inner) in
+        [(Descent::Cost, true), (Descent::Area, false), (Descent::Area, true)]
+    {
         let config = goldsmith_salmon::Config { descent, pair_inner };
         methods.push((format!("goldsmith_salmon, {config:?}"), Method::GoldsmithSalmon(config)));
     }

@@ -48,10 +48,14 @@ impl Case {
         let cells = self.checks.iter().filter_map(|check| match check {
             Check::Scene(scene) => {
                 let extents = scene.extents(method, effort).into_iter();
-                let examined =
-                    extents.map(|(objects, work)| examine::examine(self, scene, method, objects, work));
+                let examined = extents
+                    .map(|(objects, work)| examine::examine(self, scene, method, objects, work));
                 let all: Result<Vec<Examined>, Broken> = examined.collect();
-                Some(all.map_or_else(Cell::Broken, |mut all| Cell::Kept(all.pop().unwrap_or_default())))
+                Some(
+                    all.map_or_else(Cell::Broken, |mut all| {
+                        Cell::Kept(all.pop().unwrap_or_default())
+                    }),
+                )
             }
             Check::Refused { boxes, object } => {
                 let objects = if let Method::Exact(_) = method { EXACT_OBJECTS } else { 100 };

@@ -67,8 +67,8 @@ pub fn main(subject: &str, id: &str, objects: usize) -> Result<String, String> {
     let boxes = stiff::boxes(&triangles);
     drop(triangles);
     let before = status("VmRSS");
-    let outcome =
-        solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).map_err(|e| e.to_string())?;
+    let outcome = solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &())
+        .map_err(|e| e.to_string())?;
     let peak = status("VmHWM");
     drop(outcome);
     match (before, peak) {

@@ -75,7 +75,10 @@ mod tests {
     #[test]
     fn small_whole_areas_are_those_of_f64() {
         let tree = pair(Aabb::from(([-1.0, 2.0, 0.5], [3.0, 2.25, 8.0])));
-        assert_eq!(relative_error(bvh_core::cost::internal_area(&tree), &internal_area(&tree)), 0.0);
+        assert_eq!(
+            relative_error(bvh_core::cost::internal_area(&tree), &internal_area(&tree)),
+            0.0
+        );
     }
 
     #[test]

@@ -47,8 +47,13 @@ pub fn run(method: &Method, boxes: &[Aabb], work_per_object: u64) -> Result<Outc
     solved(method, boxes, budget)?.map_err(|error| P1.broken(format!("refused: {error}")))
 }
 
-fn solved(method: &Method, boxes: &[Aabb], budget: Budget) -> Result<Result<Outcome, SearchError>, Broken> {
-    let solved = catch_unwind(AssertUnwindSafe(|| solve(method, &Problem::new(boxes), 1, budget, &())));
+fn solved(
+    method: &Method,
+    boxes: &[Aabb],
+    budget: Budget,
+) -> Result<Result<Outcome, SearchError>, Broken> {
+    let solved =
+        catch_unwind(AssertUnwindSafe(|| solve(method, &Problem::new(boxes), 1, budget, &())));
     solved.map_err(|panic| {
         let text = panic.downcast_ref::<String>().cloned();
         let text = text.or_else(|| panic.downcast_ref::<&str>().map(|&text| text.into()));
@@ -102,7 +107,11 @@ pub fn on_threads<T: Send>(
     threads: usize,
     work: impl FnOnce() -> Result<T, Broken> + Send,
 ) -> Result<T, Broken> {
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Broken::case)?.install(work)
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(Broken::case)?
+        .install(work)
 }
 
 /// P4: the same tree and history on one thread and on three.
@@ -138,7 +147,9 @@ pub fn check_scale(
 /// The method refuses the boxes and names the object.
 pub fn refuses(method: &Method, boxes: &[Aabb], object: usize) -> Verdict {
     match solved(method, boxes, Budget::UNLIMITED)? {
-        Err(error @ SearchError::Build(_)) if error.to_string().contains(&format!("object {object} ")) => {
+        Err(error @ SearchError::Build(_))
+            if error.to_string().contains(&format!("object {object} ")) =>
+        {
             Ok(error.to_string())
         }
         Err(error) => Err(P1.broken(format!("the error names no object {object}: {error}"))),

@@ -41,7 +41,8 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
                     break;
                 }
             }
-            let nearest: Vec<_> = nearest.iter().map(|hit| (!hit.is_miss()).then_some(*hit)).collect();
+            let nearest: Vec<_> =
+                nearest.iter().map(|hit| (!hit.is_miss()).then_some(*hit)).collect();
             answers(&format!("{kernel:?}, {coherence:?}"), &nearest, &any)?;
             let (nearest, any) = by_component(&wide, rays, coherence);
             answers(&format!("{kernel:?}, {coherence:?}, by component"), &nearest, &any)?;
@@ -51,9 +52,14 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
 }
 
 /// The answers to one batch of rays, handed over by component.
-fn by_component(wide: &WideBvh, rays: &[Ray], coherence: Coherence) -> (Vec<Option<Hit>>, Vec<bool>) {
-    let component =
-        |of: fn(&Ray) -> Vec3, axis: usize| rays.iter().map(|ray| of(ray)[axis]).collect::<Vec<_>>();
+fn by_component(
+    wide: &WideBvh,
+    rays: &[Ray],
+    coherence: Coherence,
+) -> (Vec<Option<Hit>>, Vec<bool>) {
+    let component = |of: fn(&Ray) -> Vec3, axis: usize| {
+        rays.iter().map(|ray| of(ray)[axis]).collect::<Vec<_>>()
+    };
     let origins = [0, 1, 2].map(|axis| component(Ray::origin, axis));
     let directions = [0, 1, 2].map(|axis| component(Ray::direction, axis));
     let t_min: Vec<_> = rays.iter().map(Ray::t_min).collect();
@@ -87,12 +93,17 @@ pub fn adversarial(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> 
     let brute_force = Accelerator::new(&objects, Structure::Brute);
     let mut rng = Stream::seed_from_u64(seed);
     half_in_bundles(count, seed, |count| {
-        let draws = (0..20 * count).filter_map(|_| one_adversarial(triangles, &brute_force, &mut rng));
+        let draws =
+            (0..20 * count).filter_map(|_| one_adversarial(triangles, &brute_force, &mut rng));
         draws.take(count).collect()
     })
 }
 
-fn one_adversarial(triangles: &[Triangle], brute_force: &Accelerator, rng: &mut Stream) -> Option<Ray> {
+fn one_adversarial(
+    triangles: &[Triangle],
+    brute_force: &Accelerator,
+    rng: &mut Stream,
+) -> Option<Ray> {
     let nowhere = Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]);
     let triangle = triangles.choose(rng).unwrap_or(&nowhere);
     let (target, other) = (in_plane(triangle, rng), in_plane(triangle, rng));
@@ -155,7 +166,8 @@ fn half_in_bundles(count: usize, seed: u64, mut make: impl FnMut(usize) -> Vec<R
     let first = rays.len();
     for ray in make((count - first).div_ceil(BUNDLE)) {
         let spread = pick(&[0.0, 1e-7, 1e-3, 0.1], &mut rng);
-        let mut near = || Vec3::from([(); 3].map(|()| 1.0 + spread * rng.random_range(-1.0..1.0f32)));
+        let mut near =
+            || Vec3::from([(); 3].map(|()| 1.0 + spread * rng.random_range(-1.0..1.0f32)));
         for _ in 0..BUNDLE {
             // Factors, so that zeros stay what they are at every scale.
             let (origin, direction) = (ray.origin() * near(), ray.direction() * near());

@@ -80,7 +80,8 @@ mod compiled_in {
             let brute_force = Accelerator::new(&objects, Structure::Brute);
             let differs = |ray: &&Ray| {
                 let shear = Shear::new(ray);
-                let found = nearest(ray, &|id| triangles[id as usize].intersect(&shear, ray.t_max()));
+                let found =
+                    nearest(ray, &|id| triangles[id as usize].intersect(&shear, ray.t_max()));
                 found != brute_force.nearest_hit(ray).map(|hit| hit.t)
             };
             let misses = rays(triangles, RAYS, 1).iter().filter(differs).count();

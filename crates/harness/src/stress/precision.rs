@@ -120,9 +120,9 @@ fn best<N: Number>(boxes: &[Aabb], orders: &[Vec<u32>; 3]) -> Option<(N, Split)>
             aabb = aabb.union(&boxes[order[left - 1] as usize]);
             let cost = N::side(&aabb, left) + right;
             let imbalance = n.abs_diff(2 * left);
-            let better = best
-                .as_ref()
-                .is_none_or(|(least, balance, _)| cost < *least || (*least >= cost && imbalance < *balance));
+            let better = best.as_ref().is_none_or(|(least, balance, _)| {
+                cost < *least || (*least >= cost && imbalance < *balance)
+            });
             if cost.is_finite() && better {
                 best = Some((cost, imbalance, (axis, left)));
             }
@@ -142,7 +142,11 @@ fn exact_cost(boxes: &[Aabb], orders: &[Vec<u32>; 3], (axis, left): Split) -> Bi
 }
 
 /// The objects of both sides in the orders of all axes.
-fn divide(orders: &[Vec<u32>; 3], (axis, left): Split, goes_left: &mut [bool]) -> [[Vec<u32>; 3]; 2] {
+fn divide(
+    orders: &[Vec<u32>; 3],
+    (axis, left): Split,
+    goes_left: &mut [bool],
+) -> [[Vec<u32>; 3]; 2] {
     for (at, &object) in orders[axis].iter().enumerate() {
         goes_left[object as usize] = at < left;
     }
@@ -201,8 +205,8 @@ struct Decisions {
 fn decisions(boxes: &[Aabb]) -> Decisions {
     let mut found = Decisions::default();
     let tree = build(boxes, |orders| {
-        let (least, split) =
-            best::<BigInt>(boxes, orders).unwrap_or_else(|| (BigInt::zero(), (0, orders[0].len() / 2)));
+        let (least, split) = best::<BigInt>(boxes, orders)
+            .unwrap_or_else(|| (BigInt::zero(), (0, orders[0].len() / 2)));
         found.all += 1;
         let choices = [
             best::<f32>(boxes, orders).map(|(_, split)| split),
@@ -211,7 +215,8 @@ fn decisions(boxes: &[Aabb]) -> Decisions {
         for (kind, choice) in choices.into_iter().enumerate() {
             found.undecided[kind] += usize::from(choice.is_none());
             let choice = choice.unwrap_or((0, orders[0].len() / 2));
-            found.wrong[kind] += usize::from(choice != split && exact_cost(boxes, orders, choice) > least);
+            found.wrong[kind] +=
+                usize::from(choice != split && exact_cost(boxes, orders, choice) > least);
         }
         split
     });
@@ -246,8 +251,13 @@ impl Config {
             for (kind, (tree, seconds)) in measured.into_iter().enumerate() {
                 let (scene, method) = (scene.clone(), ["f32", "f64"][kind].to_owned());
                 let nanoseconds_per_object = seconds * 1e9 / boxes.len() as f64;
-                timing.push(Timing { scene: scene.clone(), method: method.clone(), nanoseconds_per_object });
-                let cost_over_exact = if area.is_zero() { 1.0 } else { ratio(&internal_area(&tree), &area) };
+                timing.push(Timing {
+                    scene: scene.clone(),
+                    method: method.clone(),
+                    nanoseconds_per_object,
+                });
+                let cost_over_exact =
+                    if area.is_zero() { 1.0 } else { ratio(&internal_area(&tree), &area) };
                 rows.push(Row {
                     scene,
                     method,
@@ -261,7 +271,10 @@ impl Config {
             }
         }
         store.write("precision.csv", &to_bytes(&rows, Path::new("precision.csv"))?)?;
-        store.write("timing_precision.csv", &to_bytes(&timing, Path::new("timing_precision.csv"))?)?;
+        store.write(
+            "timing_precision.csv",
+            &to_bytes(&timing, Path::new("timing_precision.csv"))?,
+        )?;
         let output = output(store.folder())?;
         output.draw(store)?;
         Ok(output.text())
@@ -315,11 +328,14 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     let mut output = Output::new("", "Areas in f32 and f64 against exact ones");
     let scenes = rows.iter().filter(|row| row.method == "f32").count();
     let of = |kind: &str| {
-        let wrong: Vec<&Row> = rows.iter().filter(|row| row.method == kind && row.wrong > 0).collect();
+        let wrong: Vec<&Row> =
+            rows.iter().filter(|row| row.method == kind && row.wrong > 0).collect();
         let worst = wrong.iter().map(|row| 100.0 * row.wrong_fraction).fold(0.0, f64::max);
         match wrong.len() {
             0 => format!("areas in {kind} on none"),
-            some => format!("areas in {kind} on {some} of {scenes} scenes, at up to {worst:.1} % of nodes"),
+            some => format!(
+                "areas in {kind} on {some} of {scenes} scenes, at up to {worst:.1} % of nodes"
+            ),
         }
     };
     let seconds = |kind: &str| -> f64 {

@@ -4,7 +4,9 @@ use std::fmt;
 use std::str::FromStr;
 
 /// What is promised of every method, traversal and reader, whatever its input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
 pub enum Promise {
     /// No panic, hang or abort: a tree, or a typed error naming the object.
     P1,
@@ -40,7 +42,10 @@ impl FromStr for Promise {
 
     fn from_str(name: &str) -> Result<Self, ()> {
         use Promise::{P1, P2, P3, P4, P5, P6, P7};
-        [P1, P2, P3, P4, P5, P6, P7].into_iter().find(|promise| promise.to_string() == name).ok_or(())
+        [P1, P2, P3, P4, P5, P6, P7]
+            .into_iter()
+            .find(|promise| promise.to_string() == name)
+            .ok_or(())
     }
 }
 
@@ -110,7 +115,9 @@ mod tests {
 
     #[test]
     fn a_broken_promise_is_read_as_it_was_shown() {
-        for broken in [Promise::P3.broken("2 of 9 rays: missed"), Broken::case("depth 7: 6 would do")] {
+        for broken in
+            [Promise::P3.broken("2 of 9 rays: missed"), Broken::case("depth 7: 6 would do")]
+        {
             assert_eq!(Broken::from(broken.to_string().as_str()), broken);
         }
     }

@@ -50,7 +50,8 @@ enum Class {
     Dead,
 }
 
-const CLASSES: [&str; 4] = ["as promised", "typed error, as promised", "promise broken", "crash or hang"];
+const CLASSES: [&str; 4] =
+    ["as promised", "typed error, as promised", "promise broken", "crash or hang"];
 
 /// One cell, as written to `cells.csv`, and for other libraries to `timing_third_party_cells.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -141,10 +142,13 @@ impl Row {
     /// What the heat map shows: the broken promises, or the depth.
     fn text(&self) -> String {
         match self.outcome {
-            Class::Kept | Class::Refused => self.depth.map_or_else(String::new, |depth| depth.to_string()),
+            Class::Kept | Class::Refused => {
+                self.depth.map_or_else(String::new, |depth| depth.to_string())
+            }
             Class::Broken | Class::Dead => {
                 let broken = self.note.split(BETWEEN).map(Broken::from);
-                let promises: BTreeSet<Promise> = broken.filter_map(|broken| broken.promise).collect();
+                let promises: BTreeSet<Promise> =
+                    broken.filter_map(|broken| broken.promise).collect();
                 let names: Vec<String> = promises.iter().map(Promise::to_string).collect();
                 if names.is_empty() { "!".into() } else { names.join(" ") }
             }
@@ -179,7 +183,9 @@ impl Config {
             for Labelled { label, method, .. } in methods {
                 let Contestant::Ours(method) = method else { continue };
                 let cell = case.of_method(method, &effort);
-                let Some((row, examined)) = cell.map(|cell| Row::new(case, label, cell)) else { continue };
+                let Some((row, examined)) = cell.map(|cell| Row::new(case, label, cell)) else {
+                    continue;
+                };
                 times.extend(examined.map(|Examined { objects, seconds, .. }| {
                     Timing {
                         scene: row.scene.clone(),
@@ -200,7 +206,9 @@ impl Config {
             });
             rows.extend(traversals);
             rows.extend(
-                Part::ALL.iter().filter_map(|&part| Some(Row::new(case, part.name(), case.of_part(part)?).0)),
+                Part::ALL
+                    .iter()
+                    .filter_map(|&part| Some(Row::new(case, part.name(), case.of_part(part)?).0)),
             );
             for peer in peers::NAMES {
                 peers.extend(case.scene().map(|scene| self.peer(case, scene, peer)));
@@ -233,7 +241,9 @@ impl Config {
                     last = Some(found);
                 }
                 Err(end) => {
-                    broken.push(Promise::P1.broken(format!("{end} on {objects} objects")).to_string());
+                    broken.push(
+                        Promise::P1.broken(format!("{end} on {objects} objects")).to_string(),
+                    );
                     return Row::of_peer(case, peer, Class::Dead, objects, last.as_ref(), &broken);
                 }
             }
@@ -264,10 +274,14 @@ fn heat_map(rows: &[Row]) -> HeatMap {
     let (scenes, columns) = (names(|row| &row.scene), names(|row| &row.method));
     let cell = |scene: &String, column: &String| {
         let row = rows.iter().find(|row| (&row.scene, &row.method) == (scene, column));
-        let shown = |row: &Row| figures::Cell { class: Some(row.outcome as usize), text: row.text() };
+        let shown =
+            |row: &Row| figures::Cell { class: Some(row.outcome as usize), text: row.text() };
         row.map(shown).unwrap_or_default()
     };
-    let cells = scenes.iter().flat_map(|scene| columns.iter().map(move |column| cell(scene, column))).collect();
+    let cells = scenes
+        .iter()
+        .flat_map(|scene| columns.iter().map(move |column| cell(scene, column)))
+        .collect();
     HeatMap {
         title: HEADING.into(),
         caption:

@@ -25,7 +25,9 @@ pub const TRAVERSALS: &[(&str, Traversal)] = &[
     ("wide, SIMD", |objects| over_wide_layouts(objects, Structure::Wide)),
     ("wide, portable", |objects| over_wide_layouts(objects, Structure::WidePortable)),
     ("KD-tree", |objects| {
-        let cells = kd_tree::Config::default().build(&objects.boxes()).map_err(|error| error.to_string())?;
+        let cells = kd_tree::Config::default()
+            .build(&objects.boxes())
+            .map_err(|error| error.to_string())?;
         Ok(vec![Accelerator::new(objects, Structure::KdTree(cells))])
     }),
 ];
@@ -106,10 +108,13 @@ pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
         let mut unit = || Vec3::from([(); 3].map(|()| rng.random::<f32>()));
         // Weighted, so that nothing overflows.
         let inside = |at: Vec3| bounds.min * (1.0 - at) + bounds.max * at;
-        let (somewhere, elsewhere, direction) = (inside(unit()), inside(unit()), unit() * 2.0 - 1.0);
-        let Triangle([a, b, c]) = triangles.choose(&mut rng).copied().unwrap_or(Triangle([somewhere; 3]));
+        let (somewhere, elsewhere, direction) =
+            (inside(unit()), inside(unit()), unit() * 2.0 - 1.0);
+        let Triangle([a, b, c]) =
+            triangles.choose(&mut rng).copied().unwrap_or(Triangle([somewhere; 3]));
         let along = [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z][attempt / 8 % 6];
-        let beside = |target: Vec3| target - along * (bounds.extent().max_element() as f32).min(1e38);
+        let beside =
+            |target: Vec3| target - along * (bounds.extent().max_element() as f32).min(1e38);
         let (origin, direction) = match attempt % 8 {
             0 => (somewhere, direction),
             1 => (somewhere, elsewhere - somewhere),
@@ -132,7 +137,12 @@ pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
         // Any length will do, but not every one is accepted.
         let length = direction.abs().max_element();
         let scaled = if length > 0.0 { direction / length } else { direction };
-        rays.extend(Ray::new(origin, if attempt % 3 == 0 { scaled } else { direction }, t_min, t_max));
+        rays.extend(Ray::new(
+            origin,
+            if attempt % 3 == 0 { scaled } else { direction },
+            t_min,
+            t_max,
+        ));
     }
     rays
 }

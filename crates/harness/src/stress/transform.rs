@@ -20,8 +20,10 @@ pub fn scaled_area(area: f64, k: i32) -> f64 {
 
 /// The k by which all coordinates can be scaled so that none overflows or becomes denormal; 0 is always among them.
 pub fn scale_range(boxes: &[Aabb]) -> RangeInclusive<i32> {
-    let coordinates = boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
-    let exponents = coordinates.filter(|&x| x != 0.0).map(|x| (x.to_bits() >> 23 & 0xff).max(1) as i32 - 127);
+    let coordinates =
+        boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
+    let exponents =
+        coordinates.filter(|&x| x != 0.0).map(|x| (x.to_bits() >> 23 & 0xff).max(1) as i32 - 127);
     let (low, high) = exponents.fold((127, -126), |(low, high), e| (low.min(e), high.max(e)));
     (-126 - low).min(0)..=(127 - high).max(0)
 }
@@ -30,8 +32,10 @@ pub fn scale_range(boxes: &[Aabb]) -> RangeInclusive<i32> {
 pub fn mirrored(boxes: &[Aabb], axis: usize) -> Vec<Aabb> {
     let mut sign = Vec3::ONE;
     sign[axis] = -1.0;
-    let mirror =
-        |b: &Aabb| Aabb { min: (b.min * sign).min(b.max * sign), max: (b.min * sign).max(b.max * sign) };
+    let mirror = |b: &Aabb| Aabb {
+        min: (b.min * sign).min(b.max * sign),
+        max: (b.min * sign).max(b.max * sign),
+    };
     boxes.iter().map(mirror).collect()
 }
 

@@ -18,8 +18,9 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_harness");
 /// The committed specs, each with its name and text, in the order of their names.
 pub fn experiments() -> Vec<(String, String)> {
     let folder = top().join("experiments");
-    let read =
-        |file: String| (file.trim_end_matches(".toml").into(), fs::read_to_string(folder.join(file)).unwrap());
+    let read = |file: String| {
+        (file.trim_end_matches(".toml").into(), fs::read_to_string(folder.join(file)).unwrap())
+    };
     names(&folder).into_iter().map(read).collect()
 }
 
@@ -41,7 +42,9 @@ pub fn assert_current(path: &Path, made: &str, by: &str) {
 pub fn reproducible(folder: &Path) -> Vec<(String, Vec<u8>)> {
     names(folder)
         .into_iter()
-        .filter(|name| (name.ends_with(".csv") && !name.starts_with("timing")) || name == "resolved.toml")
+        .filter(|name| {
+            (name.ends_with(".csv") && !name.starts_with("timing")) || name == "resolved.toml"
+        })
         .map(|name| (name.clone(), fs::read(folder.join(name)).unwrap()))
         .collect()
 }

@@ -27,8 +27,10 @@ pub type Row = BTreeMap<String, String>;
 fn paths(file: &str) -> Vec<PathBuf> {
     let results = top().join("results");
     let Some((before, after)) = file.split_once("/*/") else { return vec![results.join(file)] };
-    let folders = fs::read_dir(results.join(before)).unwrap_or_else(|error| panic!("{file}: {error}"));
-    let mut paths: Vec<PathBuf> = folders.map(|folder| folder.unwrap().path().join(after)).collect();
+    let folders =
+        fs::read_dir(results.join(before)).unwrap_or_else(|error| panic!("{file}: {error}"));
+    let mut paths: Vec<PathBuf> =
+        folders.map(|folder| folder.unwrap().path().join(after)).collect();
     paths.retain(|path| path.is_file());
     paths.sort();
     paths
@@ -38,7 +40,8 @@ fn paths(file: &str) -> Vec<PathBuf> {
 pub fn rows(file: &str, conditions: &str) -> Vec<Row> {
     let mut rows = Vec::new();
     for path in paths(file) {
-        let mut reader = csv::Reader::from_path(&path).unwrap_or_else(|error| panic!("{file}: {error}"));
+        let mut reader =
+            csv::Reader::from_path(&path).unwrap_or_else(|error| panic!("{file}: {error}"));
         rows.extend(reader.deserialize::<Row>().map(Result::unwrap));
     }
     let meets = |row: &Row| {
@@ -47,11 +50,13 @@ pub fn rows(file: &str, conditions: &str) -> Vec<Row> {
                 let condition = condition.replace(COMMA, ", ");
                 let (column, text, wanted) = match condition.split_once("!=") {
                     Some((column, text)) => (column, text, false),
-                    None => {
-                        condition.split_once('=').map(|(column, text)| (column, text, true)).expect(conditions)
-                    }
+                    None => condition
+                        .split_once('=')
+                        .map(|(column, text)| (column, text, true))
+                        .expect(conditions),
                 };
-                let cell = row.get(column).unwrap_or_else(|| panic!("{file} has no column {column}"));
+                let cell =
+                    row.get(column).unwrap_or_else(|| panic!("{file} has no column {column}"));
                 text.split(" or ").any(|text| cell == text) == wanted
             })
     };
@@ -66,7 +71,8 @@ fn aggregate(rows: &[&Row], what: &str) -> Option<f64> {
     if how == "count" {
         return Some(rows.len() as f64);
     }
-    let cell = |row: &&Row| row.get(column).unwrap_or_else(|| panic!("no column {column}")).parse().ok();
+    let cell =
+        |row: &&Row| row.get(column).unwrap_or_else(|| panic!("no column {column}")).parse().ok();
     let mut values: Vec<f64> = rows.iter().filter_map(cell).collect();
     values.sort_by(f64::total_cmp);
     let (first, last) = (*values.first()?, *values.last()?);
@@ -143,8 +149,8 @@ fn show(rows: &[&Row], what: &str, format: &str) -> String {
         None => (what, None),
     };
     let mut text = one(what).unwrap_or_default();
-    if let Some((low, high)) =
-        ends.and_then(|(low, high)| Some((one(&format!("min {low}"))?, one(&format!("max {high}"))?)))
+    if let Some((low, high)) = ends
+        .and_then(|(low, high)| Some((one(&format!("min {low}"))?, one(&format!("max {high}"))?)))
     {
         text += &format!(" [{low}, {high}]");
     }
@@ -162,8 +168,10 @@ pub fn pivot(rows: &[Row], axes: &str, what: &str, format: &str) -> String {
     let columns = distinct(rows, &[across]).concat();
     let header: Vec<String> =
         down.iter().map(|column| column.replace('_', " ")).chain(columns.clone()).collect();
-    let mut lines =
-        vec![format!("| {} |", header.iter().map(|cell| escape(cell)).collect::<Vec<_>>().join(" | "))];
+    let mut lines = vec![format!(
+        "| {} |",
+        header.iter().map(|cell| escape(cell)).collect::<Vec<_>>().join(" | ")
+    )];
     lines.push(format!("|{}", "---|".repeat(header.len())));
     // Lines that begin alike stand together.
     let groups = distinct(rows, &down[..1]);
@@ -175,7 +183,8 @@ pub fn pivot(rows: &[Row], axes: &str, what: &str, format: &str) -> String {
             .filter(|row| down.iter().zip(&names).all(|(column, name)| row[*column] == *name))
             .collect();
         let cell = |column: &String| {
-            let here: Vec<&Row> = of_line.iter().copied().filter(|row| row[across] == *column).collect();
+            let here: Vec<&Row> =
+                of_line.iter().copied().filter(|row| row[across] == *column).collect();
             show(&here, what, format)
         };
         let kind = of_line.iter().find_map(|row| row.get("scene_kind"));

@@ -98,7 +98,12 @@ impl Config {
     }
 
     /// As [`build`](Self::build), with at most so many references, at least one per object.
-    pub fn build_at_most(&self, most: usize, boxes: &[Aabb], objects: &dyn Clip) -> Result<Bvh, BuildError> {
+    pub fn build_at_most(
+        &self,
+        most: usize,
+        boxes: &[Aabb],
+        objects: &dyn Clip,
+    ) -> Result<Bvh, BuildError> {
         self.build_watched(most, boxes, objects, &Watch::default())
     }
 
@@ -155,7 +160,8 @@ impl Build<'_> {
         let root = union(&references);
         self.least_overlap = self.config.overlap * root.half_area();
         tree.nodes.push(Node::leaf(root, 0, 1));
-        let mut open = BinaryHeap::from([Open { area: root.half_area(), node: 0, references, stalls: 0 }]);
+        let mut open =
+            BinaryHeap::from([Open { area: root.half_area(), node: 0, references, stalls: 0 }]);
         while let Some(Open { node, references, mut stalls, .. }) = open.pop() {
             if pace.ends_after(references.len()) {
                 return Err(BuildError::Cancelled);
@@ -166,7 +172,8 @@ impl Build<'_> {
                 tree.prim_ids.push(one.object);
                 continue;
             }
-            let Sides { boxes, references: sides, .. } = self.split(&aabb, &references, &mut stalls)?;
+            let Sides { boxes, references: sides, .. } =
+                self.split(&aabb, &references, &mut stalls)?;
             self.watch.ensure_wanted()?;
             drop(references);
             let first = tree.nodes.len() as u32;
@@ -186,7 +193,12 @@ impl Build<'_> {
 
     /// Divides two references or more by the better of the best object split and the best spatial split, or in balance where the node
     /// is below so many splits that have stalled. Fails if the watch ends the division.
-    fn split(&mut self, aabb: &Aabb, references: &[Reference], stalled: &mut u8) -> Result<Sides, BuildError> {
+    fn split(
+        &mut self,
+        aabb: &Aabb,
+        references: &[Reference],
+        stalled: &mut u8,
+    ) -> Result<Sides, BuildError> {
         let extra = self.extra;
         let sides = self.cheapest_split(aabb, references)?;
         let node_area = aabb.half_area();
@@ -201,13 +213,18 @@ impl Build<'_> {
         Ok(sides)
     }
 
-    fn cheapest_split(&mut self, aabb: &Aabb, references: &[Reference]) -> Result<Sides, BuildError> {
+    fn cheapest_split(
+        &mut self,
+        aabb: &Aabb,
+        references: &[Reference],
+    ) -> Result<Sides, BuildError> {
         let by_objects = self.object_split(references, Candidates::All)?;
         let [left, right] = &by_objects.boxes;
         if self.extra == 0 || left.intersection(right).half_area() <= self.least_overlap {
             return Ok(by_objects);
         }
-        let spatial = self.best_plane(aabb, references).filter(|plane| plane.cost < by_objects.cost);
+        let spatial =
+            self.best_plane(aabb, references).filter(|plane| plane.cost < by_objects.cost);
         let spatial = spatial.and_then(|plane| self.spatial_split(references, plane));
         Ok(match spatial.filter(|spatial| spatial.cost < by_objects.cost) {
             Some(spatial) => {
@@ -234,10 +251,15 @@ mod tests {
 
     /// Long triangles in many directions, which cross each other.
     fn needles(n: u32) -> Vec<Triangle> {
-        let coordinate =
-            |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 4093) as f32 / 41.0;
-        let point = |i, salt| Vec3::new(coordinate(i, salt), coordinate(i, salt + 7), coordinate(i, salt + 13));
-        (0..n).map(|i| Triangle([point(i, 3), point(i, 5), point(i, 3) + Vec3::splat(0.5)])).collect()
+        let coordinate = |i: u32, salt: u32| {
+            (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 4093) as f32 / 41.0
+        };
+        let point = |i, salt| {
+            Vec3::new(coordinate(i, salt), coordinate(i, salt + 7), coordinate(i, salt + 13))
+        };
+        (0..n)
+            .map(|i| Triangle([point(i, 3), point(i, 5), point(i, 3) + Vec3::splat(0.5)]))
+            .collect()
     }
 
     #[test]
@@ -250,7 +272,10 @@ mod tests {
             let tree = Config { references, ..Config::default() }.build(&boxes, objects).unwrap();
             validate_references(&tree, &boxes, objects).unwrap();
             let count = tree.prim_ids.len();
-            assert!(count <= (references * 400.0) as usize && (count > 400) == (references > 1.0), "{count}");
+            assert!(
+                count <= (references * 400.0) as usize && (count > 400) == (references > 1.0),
+                "{count}"
+            );
             let cost = cost::total_area(&tree);
             assert!(cost <= before, "{cost} {before}");
             before = cost;
@@ -262,7 +287,9 @@ mod tests {
 
     #[test]
     fn scenes_of_points_of_one_object_and_of_none_are_built_and_bad_boxes_refused() {
-        for triangles in [vec![], needles(1), vec![Triangle([Vec3::ONE; 3]); 30], vec![needles(1)[0]; 3000]] {
+        for triangles in
+            [vec![], needles(1), vec![Triangle([Vec3::ONE; 3]); 30], vec![needles(1)[0]; 3000]]
+        {
             let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
             let tree = Config::default().build(&boxes, &triangles.as_slice()).unwrap();
             validate_references(&tree, &boxes, &triangles.as_slice()).unwrap();
@@ -271,6 +298,10 @@ mod tests {
         }
         let wrong = [Aabb::from([[f32::NAN; 3], [1.0; 3]])];
         assert!(Config::default().build(&wrong, &needles(1).as_slice()).is_err());
-        assert!(Config { references: 0.5, ..Config::default() }.build(&[], &needles(1).as_slice()).is_err());
+        assert!(
+            Config { references: 0.5, ..Config::default() }
+                .build(&[], &needles(1).as_slice())
+                .is_err()
+        );
     }
 }

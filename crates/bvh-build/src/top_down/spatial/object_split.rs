@@ -27,7 +27,9 @@ impl Axis {
     /// Sorts the references by their centres along the axis of this number, equal centres in their order.
     fn sort(&mut self, references: &[Reference], number: usize) {
         self.keys.clear();
-        self.keys.extend(references.iter().zip(0..).map(|(r, at)| (r.aabb.doubled_centroid()[number], at)));
+        self.keys.extend(
+            references.iter().zip(0..).map(|(r, at)| (r.aabb.doubled_centroid()[number], at)),
+        );
         if references.len() >= RADIX_SORTED {
             radsort::sort_by_key(&mut self.keys, |&(centre, _)| centre);
         } else {
@@ -36,7 +38,12 @@ impl Axis {
     }
 
     /// The least cost of the candidates and the number of references on the left side; of equal ones the first.
-    fn best(&mut self, references: &[Reference], powers: &[f64], candidates: Candidates) -> (f64, usize) {
+    fn best(
+        &mut self,
+        references: &[Reference],
+        powers: &[f64],
+        candidates: Candidates,
+    ) -> (f64, usize) {
         let count = references.len();
         let side_cost = |area: f64, side: usize| match candidates {
             Candidates::All => area * powers[side],
@@ -54,7 +61,8 @@ impl Axis {
         for (before, &(_, at)) in (1..count).zip(&self.keys) {
             aabb = aabb.union(&references[at as usize].aabb);
             let after = count - before;
-            let cost = side_cost(aabb.half_area(), before) + side_cost(self.areas[after - 1], after);
+            let cost =
+                side_cost(aabb.half_area(), before) + side_cost(self.areas[after - 1], after);
             if cost < best.0 && before.min(after) >= least_side {
                 best = (cost, before);
             }
@@ -92,7 +100,8 @@ impl Build<'_> {
             }
         }
         let keys = &self.axes[axis].keys;
-        let mut ordered: Vec<Reference> = keys.iter().map(|&(_, at)| references[at as usize]).collect();
+        let mut ordered: Vec<Reference> =
+            keys.iter().map(|&(_, at)| references[at as usize]).collect();
         if union(&ordered[..left]) == union(&ordered[left..]) {
             // Nothing is gained, and the power would take off one reference after the other.
             left = count / 2;

@@ -18,10 +18,18 @@ impl Build<'_> {
     pub(super) fn best_plane(&self, aabb: &Aabb, references: &[Reference]) -> Option<Plane> {
         let along = |axis| self.best_plane_along(axis, aabb, references);
         let found = in_parallel(references.len(), || along(0), || along(1), || along(2));
-        found.into_iter().flatten().reduce(|best, plane| if plane.cost < best.cost { plane } else { best })
+        found
+            .into_iter()
+            .flatten()
+            .reduce(|best, plane| if plane.cost < best.cost { plane } else { best })
     }
 
-    fn best_plane_along(&self, axis: usize, aabb: &Aabb, references: &[Reference]) -> Option<Plane> {
+    fn best_plane_along(
+        &self,
+        axis: usize,
+        aabb: &Aabb,
+        references: &[Reference],
+    ) -> Option<Plane> {
         let bins = self.config.bins as usize;
         let all = references.len();
         let low = f64::from(aabb.min[axis]);
@@ -35,7 +43,9 @@ impl Build<'_> {
             return None;
         }
         let mut parts = vec![(Aabb::EMPTY, 0usize, 0usize); bins];
-        let bins_of = |reference: &Reference| [reference.aabb.min[axis], reference.aabb.max[axis]].map(bin_of);
+        let bins_of = |reference: &Reference| {
+            [reference.aabb.min[axis], reference.aabb.max[axis]].map(bin_of)
+        };
         for [first, last] in references.iter().map(bins_of) {
             parts[first].1 += 1;
             parts[last].2 += 1;
@@ -81,7 +91,11 @@ impl Build<'_> {
             entered += parts[bin - 1].1;
             let (behind, left) = &after[bin];
             // A side with all references divides nothing.
-            if entered == 0 || *left == 0 || entered >= all || *left >= all || entered + left - all > self.extra
+            if entered == 0
+                || *left == 0
+                || entered >= all
+                || *left >= all
+                || entered + left - all > self.extra
             {
                 continue;
             }
@@ -139,11 +153,16 @@ impl Build<'_> {
         }
         let [left, right] = sides.each_ref().map(Vec::len);
         let all = references.len();
-        if left == 0 || right == 0 || left >= all || right >= all || left + right - all > self.extra {
+        if left == 0 || right == 0 || left >= all || right >= all || left + right - all > self.extra
+        {
             return None;
         }
         // Unsplitting may have left a side smaller than it was when the others were decided on.
         let boxes = sides.each_ref().map(|side| union(side));
-        Some(Sides { cost: self.cost(&boxes[0], left) + self.cost(&boxes[1], right), boxes, references: sides })
+        Some(Sides {
+            cost: self.cost(&boxes[0], left) + self.cost(&boxes[1], right),
+            boxes,
+            references: sides,
+        })
     }
 }

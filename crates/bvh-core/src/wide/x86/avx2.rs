@@ -41,7 +41,12 @@ pub(crate) unsafe fn trace<A: Answers>(
 
 /// As [`in_flight::trace`].
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-unsafe fn in_flight<A: Answers>(wide: &WideBvh, rays: impl Source, answers: &mut A, numbers: Range<usize>) {
+unsafe fn in_flight<A: Answers>(
+    wide: &WideBvh,
+    rays: impl Source,
+    answers: &mut A,
+    numbers: Range<usize>,
+) {
     // SAFETY: the caller's promises.
     unsafe { in_flight::trace::<Avx2, A>(wide, rays, answers, numbers) }
 }
@@ -89,7 +94,12 @@ impl Instructions for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn in_flight<A: Answers>(wide: &WideBvh, rays: impl Source, answers: &mut A, numbers: Range<usize>) {
+    unsafe fn in_flight<A: Answers>(
+        wide: &WideBvh,
+        rays: impl Source,
+        answers: &mut A,
+        numbers: Range<usize>,
+    ) {
         // SAFETY: the caller's promises.
         unsafe { in_flight(wide, rays, answers, numbers) }
     }
@@ -101,7 +111,10 @@ impl Instructions for Avx2 {
             let children = compress(_mm256_load_si256(node.children.as_ptr().cast()), mask);
             let to = to.cast::<__m256i>();
             _mm256_storeu_si256(to, _mm256_cvtepu32_epi64(_mm256_castsi256_si128(children)));
-            _mm256_storeu_si256(to.add(1), _mm256_cvtepu32_epi64(_mm256_extracti128_si256::<1>(children)));
+            _mm256_storeu_si256(
+                to.add(1),
+                _mm256_cvtepu32_epi64(_mm256_extracti128_si256::<1>(children)),
+            );
         }
     }
 
@@ -139,13 +152,15 @@ impl Instructions for Avx2 {
             let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
             let inverted = _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0);
             let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-            let entered = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(mask as i32), bits), bits);
+            let entered =
+                _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(mask as i32), bits), bits);
             let cut = _mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(entry));
             let cut = _mm256_blendv_epi8(_mm256_set1_epi32(-8), cut, entered);
             let keys = _mm256_or_si256(cut, inverted);
 
             // The nearest child first: the rest of the work is not on the way to it.
-            let least = _mm_min_epu32(_mm256_castsi256_si128(keys), _mm256_extracti128_si256::<1>(keys));
+            let least =
+                _mm_min_epu32(_mm256_castsi256_si128(keys), _mm256_extracti128_si256::<1>(keys));
             let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0x4e>(least));
             let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0xb1>(least));
             let nearest = *node.children.get_unchecked((!_mm_cvtsi128_si32(least) & 7) as usize);
@@ -153,7 +168,8 @@ impl Instructions for Avx2 {
             // A child's place is the number of keys greater than its own.
             let mut places = _mm256_setzero_si256();
             for turn in &TURNS {
-                let turned = _mm256_permutevar8x32_epi32(keys, _mm256_loadu_si256(turn.as_ptr().cast()));
+                let turned =
+                    _mm256_permutevar8x32_epi32(keys, _mm256_loadu_si256(turn.as_ptr().cast()));
                 places = _mm256_sub_epi32(places, _mm256_cmpgt_epi32(turned, keys));
             }
             // The inverse of that permutation, four bits per place, first gathered in all lanes and then shared out.
@@ -179,7 +195,9 @@ impl Instructions for Avx2 {
     unsafe fn compress(node: &WideNode, mask: u32, stack: *mut Child) {
         // SAFETY: the caller's promises; the stack has room for eight entries.
         unsafe {
-            let order = _mm256_cvtepu8_epi32(_mm_loadl_epi64(LANES_OF[mask as usize & 255].as_ptr().cast()));
+            let order = _mm256_cvtepu8_epi32(_mm_loadl_epi64(
+                LANES_OF[mask as usize & 255].as_ptr().cast(),
+            ));
             let children = _mm256_load_si256(node.children.as_ptr().cast());
             _mm256_storeu_si256(stack.cast(), _mm256_permutevar8x32_epi32(children, order));
         }
@@ -191,7 +209,8 @@ impl Instructions for Avx2 {
 unsafe fn compress(lanes: __m256i, mask: u32) -> __m256i {
     // SAFETY: the caller has AVX2.
     unsafe {
-        let order = _mm256_cvtepu8_epi32(_mm_loadl_epi64(LANES_OF[mask as usize & 255].as_ptr().cast()));
+        let order =
+            _mm256_cvtepu8_epi32(_mm_loadl_epi64(LANES_OF[mask as usize & 255].as_ptr().cast()));
         let count = _mm256_set1_epi32(mask.count_ones() as i32);
         let used = _mm256_cmpgt_epi32(count, _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
         _mm256_and_si256(used, _mm256_permutevar8x32_epi32(lanes, order))

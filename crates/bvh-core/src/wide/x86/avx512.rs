@@ -41,7 +41,12 @@ pub(crate) unsafe fn trace<A: Answers>(
 
 /// As [`in_flight::trace`].
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-unsafe fn in_flight<A: Answers>(wide: &WideBvh, rays: impl Source, answers: &mut A, numbers: Range<usize>) {
+unsafe fn in_flight<A: Answers>(
+    wide: &WideBvh,
+    rays: impl Source,
+    answers: &mut A,
+    numbers: Range<usize>,
+) {
     // SAFETY: the caller's promises.
     unsafe { in_flight::trace::<Avx512, A>(wide, rays, answers, numbers) }
 }
@@ -64,7 +69,12 @@ impl Instructions for Avx512 {
     #[inline(always)]
     unsafe fn compress_keys(entry: F32x8, mask: u32, to: *mut u32) {
         // SAFETY: the caller's promises.
-        unsafe { _mm256_storeu_si256(to.cast(), _mm256_maskz_compress_epi32(mask as u8, sort::keys(entry.0))) }
+        unsafe {
+            _mm256_storeu_si256(
+                to.cast(),
+                _mm256_maskz_compress_epi32(mask as u8, sort::keys(entry.0)),
+            )
+        }
     }
 
     #[inline(always)]
@@ -74,7 +84,12 @@ impl Instructions for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn in_flight<A: Answers>(wide: &WideBvh, rays: impl Source, answers: &mut A, numbers: Range<usize>) {
+    unsafe fn in_flight<A: Answers>(
+        wide: &WideBvh,
+        rays: impl Source,
+        answers: &mut A,
+        numbers: Range<usize>,
+    ) {
         // SAFETY: the caller's promises.
         unsafe { in_flight(wide, rays, answers, numbers) }
     }
@@ -118,7 +133,8 @@ impl Instructions for Avx512 {
             let children = _mm256_load_si256(node.children.as_ptr().cast());
             // The nearest child first: the rest of the work is not on the way to it.
             let least = _mm256_mask_mov_epi32(_mm256_set1_epi32(-1), mask as u8, keys);
-            let least = _mm_min_epu32(_mm256_castsi256_si128(least), _mm256_extracti128_si256::<1>(least));
+            let least =
+                _mm_min_epu32(_mm256_castsi256_si128(least), _mm256_extracti128_si256::<1>(least));
             let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0x4e>(least));
             let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0xb1>(least));
             let nearest = *node.children.get_unchecked((!_mm_cvtsi128_si32(least) & 7) as usize);

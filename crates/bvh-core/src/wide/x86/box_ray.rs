@@ -82,8 +82,8 @@ impl BoxRay {
             let size = _mm_max_ss(size, _mm_permute_ps::<0b10>(sizes));
             let size = _mm_cvtss_f32(size) + largest;
             let limit = ray.least_inverse() * Self::CLAMP;
-            let in_range =
-                (Self::LEAST_SIZE..Self::MOST_SIZE).contains(&size) & (size * limit < Self::MOST_SHIFT);
+            let in_range = (Self::LEAST_SIZE..Self::MOST_SIZE).contains(&size)
+                & (size * limit < Self::MOST_SHIFT);
             if !in_range {
                 return None;
             }
@@ -140,12 +140,14 @@ mod tests {
             let near_origin = origin * (1.0 + random() * 2.5e-6 * [1.0, 1e3][case / 4 % 2]);
             let bounds = Aabb::around([near_origin, size * 0.001, -origin]);
             // With the last exponent distances are denormal or vanish.
-            let direction =
-                Vec3::new(random(), random(), random()) * pow2([0, 30, -30, 0, 30, -30, 85][case % 7]);
+            let direction = Vec3::new(random(), random(), random())
+                * pow2([0, 30, -30, 0, 30, -30, 85][case % 7]);
             let Ok(ray) = Ray::half_line(origin, direction) else { continue };
             let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
             // SAFETY: this function has the features.
-            let Some(boxes) = (unsafe { BoxRay::with_margin(&ray, largest, own_margin, underflow) }) else {
+            let Some(boxes) =
+                (unsafe { BoxRay::with_margin(&ray, largest, own_margin, underflow) })
+            else {
                 continue;
             };
             let margin = margin(&ray, &bounds);
@@ -155,14 +157,18 @@ mod tests {
                 for plane in [bounds.min[axis], bounds.max[axis], near_origin[axis]] {
                     let (lower, upper) =
                         (origin[axis] + side * margin[axis], origin[axis] - side * margin[axis]);
-                    let (near, far) = ((plane - lower) * inverse, (plane - upper) * inverse * Slabs::FAR);
+                    let (near, far) =
+                        ((plane - lower) * inverse, (plane - upper) * inverse * Slabs::FAR);
                     let first = |lanes: __m256| _mm256_cvtss_f32(lanes);
-                    let own_near = plane.mul_add(first(boxes.near_scale[axis]), first(boxes.near_shift[axis]));
-                    let own_far = plane.mul_add(first(boxes.far_scale[axis]), first(boxes.far_shift[axis]));
+                    let own_near =
+                        plane.mul_add(first(boxes.near_scale[axis]), first(boxes.near_shift[axis]));
+                    let own_far =
+                        plane.mul_add(first(boxes.far_scale[axis]), first(boxes.far_shift[axis]));
                     // Distances beyond every hit need not be reached: step 4.
                     let most = 4.0 * (largest + origin.abs().max_element()) * ray.least_inverse();
-                    failures +=
-                        usize::from(own_near > near.max(0.0) || (far >= 0.0 && own_far < far.min(most)));
+                    failures += usize::from(
+                        own_near > near.max(0.0) || (far >= 0.0 && own_far < far.min(most)),
+                    );
                 }
             }
         }

@@ -303,7 +303,10 @@ impl DoubleLanes for F64x4 {
 unsafe fn narrow(mask: __m256d) -> Mask4 {
     unsafe {
         let mask = _mm256_castpd_ps(mask);
-        Mask4(_mm_shuffle_ps::<0b10_00_10_00>(_mm256_castps256_ps128(mask), _mm256_extractf128_ps::<1>(mask)))
+        Mask4(_mm_shuffle_ps::<0b10_00_10_00>(
+            _mm256_castps256_ps128(mask),
+            _mm256_extractf128_ps::<1>(mask),
+        ))
     }
 }
 

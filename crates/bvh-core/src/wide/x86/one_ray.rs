@@ -28,7 +28,8 @@ unsafe fn boxes(node: &WideNode, ray: &BoxRay, t_min: f32, t_max: f32) -> (F32x8
         let distance = |plane: usize, scale: __m256, shift: __m256| {
             _mm256_fmadd_ps(_mm256_load_ps(node.planes.as_ptr().add(plane).cast()), scale, shift)
         };
-        let near = |axis: usize| distance(ray.near[axis], ray.near_scale[axis], ray.near_shift[axis]);
+        let near =
+            |axis: usize| distance(ray.near[axis], ray.near_scale[axis], ray.near_shift[axis]);
         let far = |axis: usize| distance(ray.far[axis], ray.far_scale[axis], ray.far_shift[axis]);
         let entry = _mm256_max_ps(near(2), _mm256_set1_ps(t_min));
         let entry = _mm256_max_ps(_mm256_max_ps(near(0), near(1)), entry);
@@ -45,7 +46,10 @@ unsafe fn boxes(node: &WideNode, ray: &BoxRay, t_min: f32, t_max: f32) -> (F32x8
 /// The processor has the instructions of `K`, and the caller is compiled with them; the references of `wide` are
 /// sound and its `stack_need` is at most [`STACK`].
 #[inline(always)]
-pub(crate) unsafe fn nearest<K: Instructions<Boxes = F32x8>>(wide: &WideBvh, ray: &Ray) -> (f32, u32) {
+pub(crate) unsafe fn nearest<K: Instructions<Boxes = F32x8>>(
+    wide: &WideBvh,
+    ray: &Ray,
+) -> (f32, u32) {
     // SAFETY: the caller's promises.
     unsafe {
         let (Some(root), Some(box_ray)) = (wide.root, BoxRay::new(ray, wide.largest)) else {
@@ -85,7 +89,8 @@ pub(crate) unsafe fn nearest<K: Instructions<Boxes = F32x8>>(wide: &WideBvh, ray
                     while candidates != 0 {
                         // Four lanes at a time, those without candidates left out.
                         let first = candidates.trailing_zeros() as usize & !3;
-                        let (mut hits, t) = shear.assume_init_ref().decide(&*block, first, ray.t_min(), t_max);
+                        let (mut hits, t) =
+                            shear.assume_init_ref().decide(&*block, first, ray.t_min(), t_max);
                         candidates &= !(0b1111 << first);
                         if hits != 0 {
                             let t: [f32; 4] = core::mem::transmute(t);
@@ -174,7 +179,8 @@ pub(crate) unsafe fn any<K: Instructions<Boxes = F32x8>>(wide: &WideBvh, ray: &R
                     let mut candidates = shear.assume_init_ref().candidates(&*block);
                     while candidates != 0 {
                         let first = candidates.trailing_zeros() as usize & !3;
-                        if shear.assume_init_ref().decide(&*block, first, ray.t_min(), t_max).0 != 0 {
+                        if shear.assume_init_ref().decide(&*block, first, ray.t_min(), t_max).0 != 0
+                        {
                             return true;
                         }
                         candidates &= !(0b1111 << first);
@@ -229,12 +235,18 @@ impl Shear4 {
             let mut sheared = [[_mm_setzero_ps(); 3]; 3];
             for (corner, sheared) in block.corners.iter().zip(&mut sheared) {
                 let lanes = corner.as_ptr().cast::<f32>().add(lane);
-                let x =
-                    _mm_sub_ps(_mm_load_ps(lanes.add(kx * TriangleBlock::LANES)), _mm_set1_ps(self.origin[0]));
-                let y =
-                    _mm_sub_ps(_mm_load_ps(lanes.add(ky * TriangleBlock::LANES)), _mm_set1_ps(self.origin[1]));
-                let z =
-                    _mm_sub_ps(_mm_load_ps(lanes.add(kz * TriangleBlock::LANES)), _mm_set1_ps(self.origin[2]));
+                let x = _mm_sub_ps(
+                    _mm_load_ps(lanes.add(kx * TriangleBlock::LANES)),
+                    _mm_set1_ps(self.origin[0]),
+                );
+                let y = _mm_sub_ps(
+                    _mm_load_ps(lanes.add(ky * TriangleBlock::LANES)),
+                    _mm_set1_ps(self.origin[1]),
+                );
+                let z = _mm_sub_ps(
+                    _mm_load_ps(lanes.add(kz * TriangleBlock::LANES)),
+                    _mm_set1_ps(self.origin[2]),
+                );
                 sheared[0] = _mm_sub_ps(x, _mm_mul_ps(_mm_set1_ps(self.slope[0]), z));
                 sheared[1] = _mm_sub_ps(y, _mm_mul_ps(_mm_set1_ps(self.slope[1]), z));
                 sheared[2] = z;
@@ -273,9 +285,12 @@ impl Shear4 {
         // SAFETY: as the caller's.
         unsafe {
             let [a, b, c] = self.apply(block, lane);
-            let (ax, ay, az) = (_mm256_cvtps_pd(a[0]), _mm256_cvtps_pd(a[1]), _mm256_cvtps_pd(a[2]));
-            let (bx, by, bz) = (_mm256_cvtps_pd(b[0]), _mm256_cvtps_pd(b[1]), _mm256_cvtps_pd(b[2]));
-            let (cx, cy, cz) = (_mm256_cvtps_pd(c[0]), _mm256_cvtps_pd(c[1]), _mm256_cvtps_pd(c[2]));
+            let (ax, ay, az) =
+                (_mm256_cvtps_pd(a[0]), _mm256_cvtps_pd(a[1]), _mm256_cvtps_pd(a[2]));
+            let (bx, by, bz) =
+                (_mm256_cvtps_pd(b[0]), _mm256_cvtps_pd(b[1]), _mm256_cvtps_pd(b[2]));
+            let (cx, cy, cz) =
+                (_mm256_cvtps_pd(c[0]), _mm256_cvtps_pd(c[1]), _mm256_cvtps_pd(c[2]));
             // Products of two f32 are exact in f64: fused or not, the difference is the same.
             let u = _mm256_fmsub_pd(cx, by, _mm256_mul_pd(cy, bx));
             let v = _mm256_fmsub_pd(ax, cy, _mm256_mul_pd(ay, cx));
@@ -299,7 +314,8 @@ impl Shear4 {
             let mut relative = [[_mm_setzero_ps(); 2]; 3];
             let sign = _mm_set1_ps(-0.0);
             for (i, &axis) in self.axes.iter().enumerate() {
-                let lanes = block.corners.as_ptr().cast::<f32>().add(axis * TriangleBlock::LANES + lane);
+                let lanes =
+                    block.corners.as_ptr().cast::<f32>().add(axis * TriangleBlock::LANES + lane);
                 let (a, b) = (_mm_load_ps(lanes), _mm_load_ps(lanes.add(3 * TriangleBlock::LANES)));
                 let c = _mm_load_ps(lanes.add(6 * TriangleBlock::LANES));
                 let (min, max) = (_mm_min_ps(_mm_min_ps(a, b), c), _mm_max_ps(_mm_max_ps(a, b), c));
@@ -322,7 +338,8 @@ impl Shear4 {
             }
             let exit = _mm_mul_ps(exit, _mm_set1_ps(Slabs::FAR));
             let moved = _mm_add_ps(_mm_max_ps(_mm_min_ps(t, exit), entry), _mm_setzero_ps());
-            let in_range = _mm_and_ps(_mm_cmple_ps(entry, exit), _mm_cmple_ps(moved, _mm_set1_ps(t_max)));
+            let in_range =
+                _mm_and_ps(_mm_cmple_ps(entry, exit), _mm_cmple_ps(moved, _mm_set1_ps(t_max)));
             (inside & _mm_movemask_ps(in_range) as u32, moved)
         }
     }

@@ -24,10 +24,15 @@ pub fn triangles() -> Vec<Triangle> {
     scene.place(&ring(), &placed(lean, DVec3::new(0.0, 0.0, 1.12)));
     scene.place(&chain(44), &DAffine3::IDENTITY);
     cushion(&mut scene);
-    for (x, y, size, turns) in [(2.1, -1.6, 0.22, 0.02), (0.4, -0.9, 0.17, 0.11), (-0.7, 1.0, 0.26, 0.07)] {
+    for (x, y, size, turns) in
+        [(2.1, -1.6, 0.22, 0.02), (0.4, -0.9, 0.17, 0.11), (-0.7, 1.0, 0.26, 0.07)]
+    {
         // Loose stones lie on their pavilion: girdle and culet touch the cushion.
         let tilted = about_z(turns * 5.0) * about_y(0.39) * about_z(turns);
-        scene.place(&brilliant(), &placed(tilted * size, DVec3::new(x, y, padding(x, y) + 0.66 * size)));
+        scene.place(
+            &brilliant(),
+            &placed(tilted * size, DVec3::new(x, y, padding(x, y) + 0.66 * size)),
+        );
     }
     scene.finish(UNIT, DVec3::ZERO)
 }
@@ -71,8 +76,15 @@ fn ring() -> MeshBuilder {
     let halo: Vec<_> = [(0.56, 1.5), (0.56, 1.54), (0.74, 1.54), (0.74, 1.48), (0.56, 1.5)].into();
     ring.revolve(&halo, 56);
     for k in 0..6 {
-        let bent =
-            [(0.2, 1.05), (0.34, 1.25), (0.48, 1.48), (0.545, 1.62), (0.54, 1.68), (0.5, 1.71), (0.43, 1.73)];
+        let bent = [
+            (0.2, 1.05),
+            (0.34, 1.25),
+            (0.48, 1.48),
+            (0.545, 1.62),
+            (0.54, 1.68),
+            (0.5, 1.71),
+            (0.43, 1.73),
+        ];
         let path: Vec<_> = bent.map(|(r, z)| on_circle(r, fraction(k, 6) + 0.02, z)).into();
         let side = on_circle(1.0, fraction(k, 6) + 0.27, 0.0);
         ring.sweep(&path, side, &circle(0.045, 9), |i| 1.0 - 0.06 * i as f64);
@@ -174,8 +186,11 @@ fn chain(links: usize) -> MeshBuilder {
         spot.with_z(padding(spot.x, spot.y) + 0.05)
     };
     for k in 0..links {
-        let (before, here, after) =
-            (at(fraction(k, links)), at(fraction(2 * k + 1, 2 * links)), at(fraction(k + 1, links)));
+        let (before, here, after) = (
+            at(fraction(k, links)),
+            at(fraction(2 * k + 1, 2 * links)),
+            at(fraction(k + 1, links)),
+        );
         let along = (after - before).normalize();
         let across = DVec3::Z.cross(along).normalize();
         let heading = DMat3::from_cols(along, across, along.cross(across));
@@ -190,7 +205,8 @@ fn chain(links: usize) -> MeshBuilder {
 fn cushion(mesh: &mut MeshBuilder) {
     mesh.cuboid(DVec3::new(-CUSHION, -CUSHION, -0.9), DVec3::new(CUSHION, CUSHION, -0.35));
     mesh.grid(20, 20, |i, j| {
-        let (x, y) = (CUSHION * (2.0 * fraction(i, 20) - 1.0), CUSHION * (2.0 * fraction(j, 20) - 1.0));
+        let (x, y) =
+            (CUSHION * (2.0 * fraction(i, 20) - 1.0), CUSHION * (2.0 * fraction(j, 20) - 1.0));
         DVec3::new(x, y, padding(x, y))
     });
 }

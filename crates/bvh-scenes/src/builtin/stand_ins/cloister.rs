@@ -36,7 +36,10 @@ pub fn triangles() -> Vec<Triangle> {
     {
         // Each walk is built along +x with the court on its +y side, its corner vault at its far
         // end.
-        cloister.place(&walk(&parts, bays), &(upright(turns, 0.0, 0.0, 0.0) * upright(0.0, 0.0, -offset, 0.0)));
+        cloister.place(
+            &walk(&parts, bays),
+            &(upright(turns, 0.0, 0.0, 0.0) * upright(0.0, 0.0, -offset, 0.0)),
+        );
     }
     court(&mut cloister, half);
     cloister.place(&well(), &upright(0.037, 2.1, -1.4, 0.0));
@@ -73,8 +76,15 @@ fn column() -> MeshBuilder {
     square(&mut column, 0.17, 0.0, 0.12);
     // Attic base: torus, scotia, torus; then one long quad per side of the shaft, a necking, and
     // the bell.
-    let base =
-        [(0.17, 0.12), (0.175, 0.15), (0.165, 0.18), (0.135, 0.2), (0.13, 0.22), (0.145, 0.25), (0.12, 0.28)];
+    let base = [
+        (0.17, 0.12),
+        (0.175, 0.15),
+        (0.165, 0.18),
+        (0.135, 0.2),
+        (0.13, 0.22),
+        (0.145, 0.25),
+        (0.12, 0.28),
+    ];
     let bell = [(0.1, 1.8), (0.115, 1.83), (0.1, 1.86), (0.105, 2.0), (0.13, 2.1), (0.18, 2.18)];
     let profile: Vec<_> = base.into_iter().chain(bell).collect();
     column.revolve(&profile, 12);
@@ -108,7 +118,8 @@ fn arcade_arch() -> MeshBuilder {
             .map(|k| cos_sin(0.5 * fraction(k, 14)))
             .map(|(c, s)| DVec3::new(radius * c, face, radius * s))
             .collect();
-        let profile = [(0.0, 0.0), (0.0, 0.05), (-0.07, 0.09), (-0.12, 0.05), (-0.2, 0.07), (-0.24, 0.0)];
+        let profile =
+            [(0.0, 0.0), (0.0, 0.05), (-0.07, 0.09), (-0.12, 0.05), (-0.2, 0.07), (-0.24, 0.0)];
         let outwards = profile.map(|(x, y)| (x, if face > 0.0 { -y } else { y }));
         arch.sweep(&path, DVec3::Y, &outwards, |_| 1.0);
     }
@@ -223,8 +234,14 @@ fn paving(mesh: &mut MeshBuilder, x: f64, bay: usize) {
     let tiles = 3 + bay % 3;
     let (middle, half) = (DVec3::new(x + 0.5 * BAY, -0.5 * BAY - 0.1, 0.0), 0.5 * BAY - 0.3);
     for k in 0..4 {
-        let corner = |i: usize, reach: f64| middle + on_circle(reach * SQRT_2, fraction(2 * i + 1, 8), 0.0);
-        mesh.quad(corner(k, half), corner(k, half + 0.3), corner(k + 1, half + 0.3), corner(k + 1, half));
+        let corner =
+            |i: usize, reach: f64| middle + on_circle(reach * SQRT_2, fraction(2 * i + 1, 8), 0.0);
+        mesh.quad(
+            corner(k, half),
+            corner(k, half + 0.3),
+            corner(k + 1, half + 0.3),
+            corner(k + 1, half),
+        );
         let tip = middle + on_circle(half, fraction(k, 4), 0.0);
         let next = middle + on_circle(half, fraction(k + 1, 4), 0.0);
         mesh.triangle(tip, corner(k, half), next);
@@ -276,7 +293,9 @@ fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
 fn court(mesh: &mut MeshBuilder, half: DVec3) {
     let inner = half - DVec3::new(0.25, 0.25, 0.0);
     let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
-    mesh.grid(3, 2, |i, j| at(inner.x * (2.0 * fraction(i, 3) - 1.0), inner.y * (j as f64 - 1.0), -0.1));
+    mesh.grid(3, 2, |i, j| {
+        at(inner.x * (2.0 * fraction(i, 3) - 1.0), inner.y * (j as f64 - 1.0), -0.1)
+    });
     for (turns, length) in [(0.037, 14.0), (0.287, 11.0)] {
         let mut path = MeshBuilder::default();
         let stones = 18;
@@ -295,7 +314,10 @@ fn court(mesh: &mut MeshBuilder, half: DVec3) {
 /// The well: three octagonal steps, a carved round kerb, an iron yoke with chain and bucket.
 fn well() -> MeshBuilder {
     let mut well = MeshBuilder::default();
-    well.revolve(&[(2.0, -0.1), (2.0, 0.1), (1.65, 0.1), (1.65, 0.3), (1.3, 0.3), (1.3, 0.5), (0.7, 0.5)], 8);
+    well.revolve(
+        &[(2.0, -0.1), (2.0, 0.1), (1.65, 0.1), (1.65, 0.3), (1.3, 0.3), (1.3, 0.5), (0.7, 0.5)],
+        8,
+    );
     let kerb = [
         (0.95, 0.5),
         (0.98, 0.6),
@@ -312,7 +334,10 @@ fn well() -> MeshBuilder {
         // Blind arches around the kerb.
         let mut niche = MeshBuilder::default();
         niche.arch(0.13, 0.2, 0.19, 0.05, 8);
-        well.place(&niche, &(upright(fraction(k, 12), 0.0, 0.0, 0.0) * upright(0.25, 0.88, 0.0, 0.88)));
+        well.place(
+            &niche,
+            &(upright(fraction(k, 12), 0.0, 0.0, 0.0) * upright(0.25, 0.88, 0.0, 0.88)),
+        );
     }
     let yoke: Vec<_> = (0..=20)
         .map(|k| cos_sin(0.5 * fraction(k, 20)))

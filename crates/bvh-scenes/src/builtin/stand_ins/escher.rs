@@ -5,7 +5,9 @@
 //! floors are a few large polygons. World units are chosen so that the greedy MF tree costs about
 //! 4.8e5, as the original's did.
 
-use super::mesh_builder::{MeshBuilder, about_z, circle, cos_sin, fraction, on_circle, placed, upright};
+use super::mesh_builder::{
+    MeshBuilder, about_z, circle, cos_sin, fraction, on_circle, placed, upright,
+};
 use bvh_core::Triangle;
 use glam::{DMat3, DVec3};
 
@@ -88,9 +90,13 @@ fn storey(plan: &Plan) -> MeshBuilder {
     let (width, deep) = (plan.width, plan.width + 1.0);
     let (low, high) = (plan.first as f64 * RISE, (plan.first + plan.second) as f64 * RISE);
     let turn = plan.x + plan.first as f64;
-    storey.place(&flight(plan.first, width, plan.climbs_beneath), &upright(0.0, plan.x, plan.y, 0.0));
+    storey
+        .place(&flight(plan.first, width, plan.climbs_beneath), &upright(0.0, plan.x, plan.y, 0.0));
     landing(&mut storey, DVec3::new(turn, plan.y, low), deep, width);
-    storey.place(&flight(plan.second, width, false), &upright(0.25, turn + deep, plan.y + width, low));
+    storey.place(
+        &flight(plan.second, width, false),
+        &upright(0.25, turn + deep, plan.y + width, low),
+    );
     let gallery = plan.y + width + plan.second as f64;
     landing(&mut storey, DVec3::new(turn, gallery, high), deep, deep);
     let bearing = 0.5 + plan.oblique;
@@ -98,8 +104,10 @@ fn storey(plan: &Plan) -> MeshBuilder {
     let (c, s) = cos_sin(bearing);
     // The descending flight is an ascending one seen from its foot.
     let foot = DVec3::new(turn + 8.0 * c, gallery + 8.0 * s + width, down);
-    storey
-        .place(&flight(8, width, plan.climbs_beneath), &upright(plan.oblique, foot.x, foot.y - width, foot.z));
+    storey.place(
+        &flight(8, width, plan.climbs_beneath),
+        &upright(plan.oblique, foot.x, foot.y - width, foot.z),
+    );
     landing(&mut storey, foot + DVec3::new(-3.0, -width, 0.0), 3.0, width);
 
     // The arcade that carries the gallery, a doorway in the back wall, and a free-standing oblique
@@ -109,7 +117,10 @@ fn storey(plan: &Plan) -> MeshBuilder {
         storey.place(&gate(1.7, 2.2, high - 3.3, 9), &upright(0.0, x, gallery + deep, 0.0));
     }
     storey.place(&gate(1.9, 4.0, 4.2, 14), &upright(0.25, ROOM - 0.5, plan.y + 11.0, 0.0));
-    storey.place(&gate(1.4, 2.0, 3.1, 10), &upright(2.6 * plan.oblique, plan.x + 6.0, plan.y + 9.0, 0.0));
+    storey.place(
+        &gate(1.4, 2.0, 3.1, 10),
+        &upright(2.6 * plan.oblique, plan.x + 6.0, plan.y + 9.0, 0.0),
+    );
     storey
 }
 
@@ -124,7 +135,12 @@ fn flight(steps: usize, width: f64, climbs_beneath: bool) -> MeshBuilder {
         let x = k as f64;
         let (y0, y1) = (0.0, width);
         flight.quad(at(x, y0, x), at(x, y1, x), at(x, y1, x + 1.0), at(x, y0, x + 1.0));
-        flight.quad(at(x, y0, x + 1.0), at(x, y1, x + 1.0), at(x + 1.0, y1, x + 1.0), at(x + 1.0, y0, x + 1.0));
+        flight.quad(
+            at(x, y0, x + 1.0),
+            at(x, y1, x + 1.0),
+            at(x + 1.0, y1, x + 1.0),
+            at(x + 1.0, y0, x + 1.0),
+        );
         if climbs_beneath {
             let z = x - depth;
             flight.quad(at(x, y0, z), at(x, y1, z), at(x + 1.0, y1, z), at(x + 1.0, y0, z));
@@ -169,8 +185,9 @@ fn flight(steps: usize, width: f64, climbs_beneath: bool) -> MeshBuilder {
 fn landing(mesh: &mut MeshBuilder, corner: DVec3, length: f64, width: f64) {
     mesh.cuboid(corner - DVec3::Z * 0.8, corner + DVec3::new(length, width, 0.0));
     let posts = (length / 0.9) as usize;
-    let feet: Vec<_> =
-        (0..=posts).map(|k| corner + DVec3::new(0.2 + fraction(k, posts) * (length - 0.4), 0.2, 0.0)).collect();
+    let feet: Vec<_> = (0..=posts)
+        .map(|k| corner + DVec3::new(0.2 + fraction(k, posts) * (length - 0.4), 0.2, 0.0))
+        .collect();
     balustrade(mesh, &feet);
 }
 
@@ -186,11 +203,15 @@ fn balustrade(mesh: &mut MeshBuilder, feet: &[DVec3]) {
     let (Some(&first), Some(&last)) = (feet.first(), feet.last()) else {
         return;
     };
-    let rail = [(0.16, -0.08), (0.16, 0.06), (0.07, 0.14), (-0.07, 0.14), (-0.16, 0.06), (-0.16, -0.08)];
+    let rail =
+        [(0.16, -0.08), (0.16, 0.06), (0.07, 0.14), (-0.07, 0.14), (-0.16, 0.06), (-0.16, -0.08)];
     mesh.sweep(&[first + up, last + up], DVec3::Z, &rail, |_| 1.0);
     for (end, turns) in [(first, 0.03), (last, 0.07)] {
         let mut newel = MeshBuilder::default();
-        newel.revolve(&[(0.2, -0.4), (0.2, 2.2), (0.13, 2.4), (0.13, 2.8), (0.24, 3.0), (0.0, 3.3)], 5);
+        newel.revolve(
+            &[(0.2, -0.4), (0.2, 2.2), (0.13, 2.4), (0.13, 2.8), (0.24, 3.0), (0.0, 3.3)],
+            5,
+        );
         mesh.place(&newel, &upright(turns, end.x, end.y, end.z));
     }
 }
@@ -220,7 +241,14 @@ fn spiral(steps: usize) -> MeshBuilder {
     let (per_step, rise, radius) = (0.062, 0.9, 3.4);
     let height = steps as f64 * rise;
     spiral.revolve(
-        &[(0.7, 0.0), (0.7, 0.3), (0.45, 0.6), (0.45, height), (0.6, height + 0.3), (0.0, height + 1.2)],
+        &[
+            (0.7, 0.0),
+            (0.7, 0.3),
+            (0.45, 0.6),
+            (0.45, height),
+            (0.6, height + 0.3),
+            (0.0, height + 1.2),
+        ],
         12,
     );
     for k in 0..steps {
@@ -237,7 +265,9 @@ fn spiral(steps: usize) -> MeshBuilder {
         }
     }
     let rail: Vec<_> = (0..=steps)
-        .map(|k| on_circle(radius - 0.2, (k as f64 + 0.5) * per_step, k as f64 * rise + rise + RAIL))
+        .map(|k| {
+            on_circle(radius - 0.2, (k as f64 + 0.5) * per_step, k as f64 * rise + rise + RAIL)
+        })
         .collect();
     for (k, &top) in rail.iter().enumerate().take(steps) {
         let mut rod = MeshBuilder::default();

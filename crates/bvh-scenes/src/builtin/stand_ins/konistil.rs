@@ -4,7 +4,9 @@
 //! wires and lattice masts are long and thin; the terrain is one coarse sheet, fine only where the
 //! town stands. Ground, houses and trees are irregular by a small seeded jitter.
 
-use super::mesh_builder::{MeshBuilder, about_z, circle, cos_sin, fraction, jitter, placed, upright};
+use super::mesh_builder::{
+    MeshBuilder, about_z, circle, cos_sin, fraction, jitter, placed, upright,
+};
 use bvh_core::Triangle;
 use glam::{DMat3, DVec3};
 
@@ -90,7 +92,10 @@ fn terrain(mesh: &mut MeshBuilder) {
             let near = (corner.x - 1500.0).abs() < 620.0 && (-150.0..460.0).contains(&aside);
             let parts = if near { 4 } else { 1 };
             mesh.grid(parts, parts, |a, b| {
-                let (x, y) = (corner.x + size.x * fraction(a, parts), corner.y + size.y * fraction(b, parts));
+                let (x, y) = (
+                    corner.x + size.x * fraction(a, parts),
+                    corner.y + size.y * fraction(b, parts),
+                );
                 DVec3::new(x, y, ground(x, y))
             });
         }
@@ -112,7 +117,10 @@ fn railway(mesh: &mut MeshBuilder) {
     sleeper.cuboid(DVec3::new(-0.13, -1.3, -0.2), DVec3::new(0.13, 1.3, 0.0));
     for k in 0..110 {
         let x = 1428.0 + 1.3 * k as f64;
-        mesh.place(&sleeper, &placed(aligned(x), beside(x, if k % 2 == 0 { 2.05 } else { -2.05 }, TRACK)));
+        mesh.place(
+            &sleeper,
+            &placed(aligned(x), beside(x, if k % 2 == 0 { 2.05 } else { -2.05 }, TRACK)),
+        );
     }
     let spans = 48;
     for k in 0..spans {
@@ -120,8 +128,18 @@ fn railway(mesh: &mut MeshBuilder) {
         for side in [-1.0, 1.0] {
             let foot = beside(x, 4.6 * side, TRACK - 0.6);
             mesh.cuboid(foot - DVec3::new(0.15, 0.15, 0.0), foot + DVec3::new(0.15, 0.15, 8.0));
-            mesh.bar(beside(x, 4.6 * side, TRACK + 6.4), beside(x, 2.05 * side, TRACK + 6.0), 0.04, 4);
-            mesh.bar(beside(x, 2.05 * side, TRACK + 5.9), beside(next, 2.05 * side, TRACK + 5.9), 0.012, 3);
+            mesh.bar(
+                beside(x, 4.6 * side, TRACK + 6.4),
+                beside(x, 2.05 * side, TRACK + 6.0),
+                0.04,
+                4,
+            );
+            mesh.bar(
+                beside(x, 2.05 * side, TRACK + 5.9),
+                beside(next, 2.05 * side, TRACK + 5.9),
+                0.012,
+                3,
+            );
         }
     }
 }
@@ -155,11 +173,18 @@ fn station(mesh: &mut MeshBuilder) {
         let (c, s) = cos_sin(0.5 * t);
         DVec3::new(x, -reach * c, 7.0 + 0.62 * reach * s)
     };
-    station.grid(24, ribs - 1, |i, j| vault(fraction(i, 24), length * (fraction(j, ribs - 1) - 0.5), half));
+    station.grid(24, ribs - 1, |i, j| {
+        vault(fraction(i, 24), length * (fraction(j, ribs - 1) - 0.5), half)
+    });
     for j in 0..ribs {
         let x = length * (fraction(j, ribs - 1) - 0.5);
         let path: Vec<_> = (0..=18).map(|i| vault(fraction(i, 18), x, half - 0.3)).collect();
-        station.sweep(&path, DVec3::X, &[(-0.2, -0.12), (0.2, -0.12), (0.2, 0.12), (-0.2, 0.12)], |_| 1.0);
+        station.sweep(
+            &path,
+            DVec3::X,
+            &[(-0.2, -0.12), (0.2, -0.12), (0.2, 0.12), (-0.2, 0.12)],
+            |_| 1.0,
+        );
         for y in [-half, half] {
             let mut post = MeshBuilder::default();
             post.revolve(&[(0.45, 0.0), (0.25, 0.6), (0.2, 6.4), (0.5, 7.0)], 8);
@@ -227,7 +252,8 @@ fn house(length: f64, width: f64, wall: f64, gable: f64) -> MeshBuilder {
             );
         }
     }
-    house.cuboid(at(0.22 * x, 0.3 * y, wall), at(0.22 * x + 0.9, 0.3 * y + 0.9, wall + gable + 0.8));
+    house
+        .cuboid(at(0.22 * x, 0.3 * y, wall), at(0.22 * x + 0.9, 0.3 * y + 0.9, wall + gable + 0.8));
     house
 }
 
@@ -243,15 +269,21 @@ fn town(mesh: &mut MeshBuilder) {
             if yard.length() < 52.0 {
                 continue; // the churchyard
             }
-            let size =
-                (11.0 + 3.0 * jitter(22, index), 8.5 + 1.5 * jitter(23, index), 6.0 + 2.0 * jitter(24, index));
+            let size = (
+                11.0 + 3.0 * jitter(22, index),
+                8.5 + 1.5 * jitter(23, index),
+                6.0 + 2.0 * jitter(24, index),
+            );
             let turn = about_z(0.018 * jitter(25, index) + if index % 5 == 0 { 0.25 } else { 0.0 });
             let part = house(size.0, size.1, size.2, 0.42 * size.1);
             mesh.place(&part, &placed(aligned(x) * turn, spot + DVec3::Z * ground(spot.x, spot.y)));
         }
     }
     let spot = beside(1560.0, 225.0, 0.0);
-    mesh.place(&church(), &placed(aligned(1560.0) * about_z(0.043), spot + DVec3::Z * ground(spot.x, spot.y)));
+    mesh.place(
+        &church(),
+        &placed(aligned(1560.0) * about_z(0.043), spot + DVec3::Z * ground(spot.x, spot.y)),
+    );
 }
 
 /// A church with nave, round apse and a tower with an octagonal spire.
@@ -313,7 +345,12 @@ fn mast() -> MeshBuilder {
     for (reach, height) in [(8.0, 30.0), (6.0, 38.0)] {
         for y in [-0.6, 0.6] {
             for side in [-1.0, 1.0] {
-                mast.bar(DVec3::new(0.0, y, height + 2.0), DVec3::new(side * reach, 0.0, height), 0.06, 4);
+                mast.bar(
+                    DVec3::new(0.0, y, height + 2.0),
+                    DVec3::new(side * reach, 0.0, height),
+                    0.06,
+                    4,
+                );
             }
         }
     }
@@ -325,7 +362,8 @@ fn forest(mesh: &mut MeshBuilder) {
     for k in 0..520 {
         // Low-discrepancy spots (plastic number), left out where town and railway are.
         let unit = |step: f64| (0.5 + step * k as f64) - (0.5 + step * k as f64).floor();
-        let (x, y) = (SIZE.0 * unit(0.754_877_666_246_692_8), SIZE.1 * unit(0.569_840_290_998_053_2));
+        let (x, y) =
+            (SIZE.0 * unit(0.754_877_666_246_692_8), SIZE.1 * unit(0.569_840_290_998_053_2));
         let aside = y - course(x);
         if (-120.0..420.0).contains(&aside) {
             continue;

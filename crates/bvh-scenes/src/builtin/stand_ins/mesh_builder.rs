@@ -55,7 +55,13 @@ impl MeshBuilder {
     /// Sweeps a closed polygon along a path and closes both ends. The profile's first coordinate
     /// points along `side` × path, its second completes the frame; `side` must not be parallel to
     /// the path. The profile is multiplied by `scale(k)` at path point `k`.
-    pub fn sweep(&mut self, path: &[DVec3], side: DVec3, profile: &[(f64, f64)], scale: impl Fn(usize) -> f64) {
+    pub fn sweep(
+        &mut self,
+        path: &[DVec3],
+        side: DVec3,
+        profile: &[(f64, f64)],
+        scale: impl Fn(usize) -> f64,
+    ) {
         let Some(last) = path.len().checked_sub(1) else {
             return;
         };
@@ -80,10 +86,12 @@ impl MeshBuilder {
     /// Adds the 12 triangles of a box parallel to the axes.
     pub fn cuboid(&mut self, min: DVec3, max: DVec3) {
         let at = |i: usize| {
-            let pick = |bit: usize, low: f64, high: f64| if (i >> bit) & 1 == 0 { low } else { high };
+            let pick =
+                |bit: usize, low: f64, high: f64| if (i >> bit) & 1 == 0 { low } else { high };
             DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z))
         };
-        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let sides =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         for [a, b, c, d] in sides {
             self.quad(at(a), at(b), at(c), at(d));
         }
@@ -92,7 +100,14 @@ impl MeshBuilder {
     /// Adds a wall of the given thickness, pierced by a round arch that springs from z = 0 at x =
     /// ±`radius`: the two faces |x| <= `half_width`, z <= `top`, and the soffit between them, with
     /// `segments` steps around the arch.
-    pub fn arch(&mut self, radius: f64, half_width: f64, top: f64, thickness: f64, segments: usize) {
+    pub fn arch(
+        &mut self,
+        radius: f64,
+        half_width: f64,
+        top: f64,
+        thickness: f64,
+        segments: usize,
+    ) {
         let front = |i: usize, y: f64| {
             let (c, s) = cos_sin(fraction(i, segments) * 0.5);
             DVec3::new(radius * c, y, radius * s)
@@ -104,7 +119,11 @@ impl MeshBuilder {
             });
             for (inner, outer) in [(radius, half_width), (-half_width, -radius)] {
                 self.grid(1, 1, |i, j| {
-                    DVec3::new(if i == 0 { inner } else { outer }, y, if j == 0 { 0.0 } else { top })
+                    DVec3::new(
+                        if i == 0 { inner } else { outer },
+                        y,
+                        if j == 0 { 0.0 } else { top },
+                    )
                 });
             }
         }
@@ -202,7 +221,10 @@ mod tests {
 
     #[test]
     fn quarter_turns_are_exact_and_other_angles_lie_on_the_unit_circle() {
-        assert_eq!([0.0, 0.25, 0.5, -0.25].map(cos_sin), [(1.0, 0.0), (-0.0, 1.0), (-1.0, -0.0), (0.0, -1.0)]);
+        assert_eq!(
+            [0.0, 0.25, 0.5, -0.25].map(cos_sin),
+            [(1.0, 0.0), (-0.0, 1.0), (-1.0, -0.0), (0.0, -1.0)]
+        );
         for i in 0..97 {
             let (c, s) = cos_sin(fraction(i, 31) - 1.5);
             assert!((c * c + s * s - 1.0).abs() < 1e-15, "{i}");
@@ -235,6 +257,9 @@ mod tests {
     fn jitter_stays_in_range_and_is_balanced() {
         let draws: Vec<f64> = (0..1000).map(|i| jitter(7, i)).collect();
         assert!(draws.iter().all(|x| (-1.0..1.0).contains(x)));
-        assert!(draws.iter().sum::<f64>().abs() < 60.0, "three standard deviations of the sum are about 55");
+        assert!(
+            draws.iter().sum::<f64>().abs() < 60.0,
+            "three standard deviations of the sum are about 55"
+        );
     }
 }

@@ -87,8 +87,9 @@ mod tests {
 
     #[test]
     fn sizes_are_ordered_as_the_originals_were() {
-        let count =
-            |name: &str| STAND_INS.iter().find(|scene| scene.name == name).map(|scene| scene.triangle_count);
+        let count = |name: &str| {
+            STAND_INS.iter().find(|scene| scene.name == name).map(|scene| scene.triangle_count)
+        };
         let ascending = ["escher", "pinecon2", "bijou", "konistil", "cloister"].map(count);
         assert!(ascending.is_sorted() && ascending[0].is_some(), "{ascending:?}");
     }
@@ -104,8 +105,10 @@ mod tests {
         ];
         let made = STAND_INS.map(|scene| {
             let triangles = (scene.triangles)();
-            let coordinates =
-                triangles.iter().flat_map(|triangle| triangle.0).flat_map(|corner| corner.to_array());
+            let coordinates = triangles
+                .iter()
+                .flat_map(|triangle| triangle.0)
+                .flat_map(|corner| corner.to_array());
             (scene.name, fnv1a(coordinates.flat_map(f32::to_le_bytes)))
         });
         assert_eq!(made, pinned, "{made:#x?}");

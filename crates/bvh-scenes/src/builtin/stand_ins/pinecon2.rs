@@ -5,7 +5,9 @@
 //! seeded jitter. World units are chosen so that the greedy MF tree costs about 1.4e6, as the
 //! original's did.
 
-use super::mesh_builder::{MeshBuilder, about_x, about_y, about_z, circle, cos_sin, fraction, jitter, placed};
+use super::mesh_builder::{
+    MeshBuilder, about_x, about_y, about_z, circle, cos_sin, fraction, jitter, placed,
+};
 use bvh_core::Triangle;
 use glam::{DMat3, DVec3};
 
@@ -22,8 +24,10 @@ pub fn triangles() -> Vec<Triangle> {
     let core = [0.0, 0.0, 0.25, 0.5, 0.75, 1.0].map(|t| (0.6 * belly(t), 0.97 * t));
     let closed: Vec<_> = [(0.0, -0.04)].into_iter().chain(core).chain([(0.0, 1.0)]).collect();
     cone.revolve(&closed, 14);
-    let stem: Vec<DVec3> =
-        (0..=6).map(|k| fraction(k, 6)).map(|t| DVec3::new(0.07 * t * t, 0.02 * t, -0.25 * t)).collect();
+    let stem: Vec<DVec3> = (0..=6)
+        .map(|k| fraction(k, 6))
+        .map(|t| DVec3::new(0.07 * t * t, 0.02 * t, -0.25 * t))
+        .collect();
     cone.sweep(&stem, DVec3::Y, &circle(0.035, 8), |k| 1.0 - 0.07 * k as f64);
 
     for i in 0..SCALES {

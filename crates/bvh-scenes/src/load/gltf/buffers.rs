@@ -47,7 +47,8 @@ impl<'a> Buffers<'a> {
             .buffers
             .get(number)
             .ok_or_else(|| format!("no buffers[{number}]; expected one that exists"))?;
-        let bytes = self.read(number, buffer).map_err(|message| format!("buffers[{number}]: {message}"))?;
+        let bytes =
+            self.read(number, buffer).map_err(|message| format!("buffers[{number}]: {message}"))?;
         self.needed.insert(number, bytes);
         Ok(())
     }
@@ -71,7 +72,9 @@ impl<'a> Buffers<'a> {
             (None, Some(_)) => {
                 return Err("no URI; expected one, the binary chunk is that of buffers[0]".into());
             }
-            (None, None) => return Err("no URI; expected one, or a GLB file with a binary chunk".into()),
+            (None, None) => {
+                return Err("no URI; expected one, or a GLB file with a binary chunk".into());
+            }
         };
         match buffer.byte_length.0 > length as u64 {
             true => Err(format!("{length} bytes; expected {}", buffer.byte_length.0)),
@@ -126,7 +129,10 @@ impl<'a> Buffers<'a> {
     fn count(&mut self, bytes: usize) -> Result<(), String> {
         self.total += bytes as u64;
         match self.total > MOST_BYTES {
-            true => Err(format!("{} bytes with those before it; expected at most {MOST_BYTES}", self.total)),
+            true => Err(format!(
+                "{} bytes with those before it; expected at most {MOST_BYTES}",
+                self.total
+            )),
             false => Ok(()),
         }
     }

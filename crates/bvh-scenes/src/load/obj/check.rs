@@ -5,7 +5,10 @@ use super::statements::{MOST_CORNERS, shown, vertex_index};
 use std::str::FromStr;
 
 /// The words of a vertex that count: its coordinates, and its weight if it has one, but no colour.
-pub fn vertex<'a, 'b>(words: &'b [&'a [u8]], place: impl Fn() -> Place) -> Result<&'b [&'a [u8]], ObjError> {
+pub fn vertex<'a, 'b>(
+    words: &'b [&'a [u8]],
+    place: impl Fn() -> Place,
+) -> Result<&'b [&'a [u8]], ObjError> {
     if !matches!(words.len(), 3 | 4 | 6 | 7) {
         return Err(ObjError::VertexLength { place: place(), found: words.len() });
     }
@@ -26,7 +29,11 @@ pub fn vertex<'a, 'b>(words: &'b [&'a [u8]], place: impl Fn() -> Place) -> Resul
 }
 
 /// The highest index of a face that counts from the start of the file, or 0; `vertices` of them lie above the face.
-pub fn face(corners: &[&[u8]], vertices: usize, place: impl Fn() -> Place) -> Result<usize, ObjError> {
+pub fn face(
+    corners: &[&[u8]],
+    vertices: usize,
+    place: impl Fn() -> Place,
+) -> Result<usize, ObjError> {
     if corners.len() > MOST_CORNERS {
         return Err(ObjError::LongFace { place: place() });
     }

@@ -53,7 +53,9 @@ pub enum ObjError {
     #[error("{place}: face vertex {index}; expected at most {vertices}, the file's vertex count")]
     IndexAbove { place: Place, index: usize, vertices: usize },
     /// A face counts back to before the first vertex.
-    #[error("{place}: face vertex {index}; expected at least -{vertices}, the number of vertices above")]
+    #[error(
+        "{place}: face vertex {index}; expected at least -{vertices}, the number of vertices above"
+    )]
     IndexBelow { place: Place, index: isize, vertices: usize },
     /// `tobj` refused statements in which no fault was found here.
     #[error("{}: {source}; expected a Wavefront OBJ file", .path.display())]

@@ -58,7 +58,9 @@ impl<'a> Geometry<'a> {
         let ((index, line), vertices) = (self.highest, self.vertices);
         match self.fault.take() {
             Some(fault) => Err(fault),
-            None if index > vertices => Err(ObjError::IndexAbove { place: self.place(line), index, vertices }),
+            None if index > vertices => {
+                Err(ObjError::IndexAbove { place: self.place(line), index, vertices })
+            }
             None => Ok(()),
         }
     }
@@ -93,7 +95,11 @@ impl<'a> Geometry<'a> {
                 }
                 match self.words.len() {
                     0..3 => self.short_faces += 1,
-                    _ => add(b'f', self.words.iter().map(|corner| vertex_index(corner)), &mut self.block),
+                    _ => add(
+                        b'f',
+                        self.words.iter().map(|corner| vertex_index(corner)),
+                        &mut self.block,
+                    ),
                 }
             }
         }

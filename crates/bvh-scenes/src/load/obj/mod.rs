@@ -25,12 +25,17 @@ use std::path::Path;
 /// Reads the bytes of an OBJ file; `path` only names it in errors. O(bytes). Any bytes give a mesh or an error.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, ObjError> {
     let mut geometry = Geometry::new(bytes, path);
-    let options =
-        tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
     let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
     let loaded = tobj::load_obj_buf(&mut geometry, &options, no_materials);
     geometry.finish()?;
-    let (models, _) = loaded.map_err(|source| ObjError::Tobj { path: path.to_path_buf(), source })?;
+    let (models, _) =
+        loaded.map_err(|source| ObjError::Tobj { path: path.to_path_buf(), source })?;
     let mut triangles = Vec::new();
     let mut used = 0;
     for tobj::Model { mesh, .. } in models {

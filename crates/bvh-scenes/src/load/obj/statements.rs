@@ -116,7 +116,11 @@ mod tests {
         for text in ["f 1 2 3 4 5 6 7 8 9", "f 1 2 \\\n3 4 \\\n5 6 7 8 9"] {
             let mut words = Vec::new();
             let found = Statements::new(text.as_bytes()).next(&mut words, 4);
-            assert_eq!((found, words), (Some((Keyword::Face, 1)), vec![b"1", b"2", b"3", &b"4"[..]]), "{text}");
+            assert_eq!(
+                (found, words),
+                (Some((Keyword::Face, 1)), vec![b"1", b"2", b"3", &b"4"[..]]),
+                "{text}"
+            );
         }
     }
 }

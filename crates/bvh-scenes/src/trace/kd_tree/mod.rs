@@ -138,25 +138,31 @@ impl Config {
                 let own = frame.events[0].iter().filter(|event| event.kind != Kind::End);
                 tree.objects.extend(own.map(|event| event.object));
                 tree.objects[first..].sort_unstable();
-                tree.cells[frame.cell] = Cell::Leaf { first: first as u32, count: frame.count as u32 };
+                tree.cells[frame.cell] =
+                    Cell::Leaf { first: first as u32, count: frame.count as u32 };
                 continue;
             };
             let below = tree.cells.len();
             tree.cells.extend([placeholder; 2]);
             let (axis, position) = (split.axis, split.position);
-            tree.cells[frame.cell] = Cell::Inner { axis: axis as u8, position, below: below as u32 };
+            tree.cells[frame.cell] =
+                Cell::Inner { axis: axis as u8, position, below: below as u32 };
             for event in &frame.events[axis] {
                 sides[event.object as usize] = split.side(&boxes[event.object as usize]);
             }
             let part = |side: Side| {
-                let stays = |event: &&Event| [side, Side::Both].contains(&sides[event.object as usize]);
-                [0, 1, 2].map(|axis| frame.events[axis].iter().filter(stays).copied().collect::<Vec<_>>())
+                let stays =
+                    |event: &&Event| [side, Side::Both].contains(&sides[event.object as usize]);
+                [0, 1, 2].map(|axis| {
+                    frame.events[axis].iter().filter(stays).copied().collect::<Vec<_>>()
+                })
             };
             let (mut lower, mut upper) = (frame.bounds, frame.bounds);
             (lower.max[axis], upper.min[axis]) = (position, position);
             let depth = frame.depth + 1;
             let all = split.below + split.above;
-            let share = |count: usize| (frame.budget as u128 * count as u128 / all as u128) as usize;
+            let share =
+                |count: usize| (frame.budget as u128 * count as u128 / all as u128) as usize;
             let child = |cell, bounds, side, count| Frame {
                 cell,
                 bounds,

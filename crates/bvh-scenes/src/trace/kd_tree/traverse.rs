@@ -43,7 +43,12 @@ impl KdTree {
 
     /// Whether `ray` hits any object in its range; see [`bvh_core::any_hit_by`] and [`nearest_hit`](Self::nearest_hit).
     #[inline]
-    pub fn any_hit(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool, counter: &mut impl Counter) -> bool {
+    pub fn any_hit(
+        &self,
+        ray: &Ray,
+        mut test: impl FnMut(u32) -> bool,
+        counter: &mut impl Counter,
+    ) -> bool {
         let mut found = false;
         self.walk(ray, counter, |objects, _, counter| {
             for &object in objects {
@@ -96,7 +101,8 @@ impl KdTree {
                     let near = below as usize + usize::from(backwards[usize::from(axis)]);
                     let far = below as usize + usize::from(!backwards[usize::from(axis)]);
                     let (far_entry, near_exit) = (far_entry.max(entry), near_exit.min(exit));
-                    let (near_met, far_met) = (entry <= near_exit, far_entry <= exit && far_entry <= t_max);
+                    let (near_met, far_met) =
+                        (entry <= near_exit, far_entry <= exit && far_entry <= t_max);
                     if near_met {
                         if far_met {
                             stack[pending] = (far, far_entry, exit);
@@ -166,7 +172,8 @@ mod tests {
 
     #[test]
     fn apart_objects_are_told_apart_by_few_tests() {
-        let row = |i: i32| Aabb { min: Vec3::X * i as f32 * 2.0, max: Vec3::X * (i as f32 * 2.0) + 1.0 };
+        let row =
+            |i: i32| Aabb { min: Vec3::X * i as f32 * 2.0, max: Vec3::X * (i as f32 * 2.0) + 1.0 };
         let boxes: Vec<Aabb> = (0..64).map(row).collect();
         let tree = Config::default().build(&boxes).unwrap();
         assert_eq!(tree.references(), boxes.len());

@@ -15,7 +15,8 @@ pub fn degenerate_are_counted() -> Verdict {
     ensure!(degenerate == 30, "{degenerate} of 60 are degenerate");
     for ray in tracing::rays(&triangles, 2000, 17) {
         let shear = Shear::new(&ray);
-        let hit = triangles.iter().find(|t| t.is_degenerate() && t.intersect(&shear, f32::MAX).is_some());
+        let hit =
+            triangles.iter().find(|t| t.is_degenerate() && t.intersect(&shear, f32::MAX).is_some());
         ensure!(hit.is_none(), "{ray:?} hits {hit:?}");
     }
     let mesh = read(&to_obj(&triangles)).map_err(Broken::case)?;
@@ -38,7 +39,10 @@ fn read(text: &str) -> Result<Mesh, obj::ObjError> {
 fn refused_in_line(text: &str, line: usize) -> Verdict {
     let Err(error) = read(text) else { return Err(Broken::case("the file is accepted")) };
     let message = error.to_string();
-    ensure!(message.contains(&format!("scene.obj:{line}: ")), "the error names no line {line}: {message}");
+    ensure!(
+        message.contains(&format!("scene.obj:{line}: ")),
+        "the error names no line {line}: {message}"
+    );
     Ok(message)
 }
 
@@ -55,11 +59,15 @@ pub fn infinity_in_a_file() -> Verdict {
 
 /// S35: unused vertices do not count, relative indices and polygons are resolved, files without faces are refused.
 pub fn files_as_people_write_them() -> Verdict {
-    let mesh = read("v 9e9 0 0\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 -2 -1\n").map_err(Broken::case)?;
+    let mesh = read("v 9e9 0 0\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 -2 -1\n")
+        .map_err(Broken::case)?;
     ensure!((mesh.triangles.len(), mesh.unused_vertices) == (2, 1), "{mesh:?}");
     let boxes = Primitives::Triangles(mesh.triangles).boxes();
     let bounds = boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(b));
-    ensure!(bounds == Aabb::from(([0.0; 3], [1.0, 1.0, 0.0])), "an unused vertex counts: {bounds:?}");
+    ensure!(
+        bounds == Aabb::from(([0.0; 3], [1.0, 1.0, 0.0])),
+        "an unused vertex counts: {bounds:?}"
+    );
     ensure!(read("v 0 0 0\nv 1 0 0\n").is_err(), "a file without faces is accepted");
     refused_in_line("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", 4)?;
     refused_in_line("v 0 0 0\nv nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 3 4\n", 2)
@@ -72,7 +80,10 @@ pub fn damaged_tree_files() -> Verdict {
     let tree = muller_fellner::Config::default().build(&boxes).map_err(Broken::case)?;
     let whole = file::save(&tree, &boxes, &file::Origin::default()).map_err(Broken::case)?;
     let refused = |bytes: &[u8]| file::load(bytes, &boxes).is_err();
-    ensure!(file::load(&whole, &boxes).ok() == Some(tree), "an undamaged file is not the tree saved");
+    ensure!(
+        file::load(&whole, &boxes).ok() == Some(tree),
+        "an undamaged file is not the tree saved"
+    );
     for bit in 0..8 * whole.len() {
         let mut damaged = whole.clone();
         damaged[bit / 8] ^= 1 << (bit % 8);

@@ -7,7 +7,9 @@ use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
 use bvh_core::{Aabb, cost};
 use bvh_scenes::builtin::stiff;
 use bvh_search::grasp::{self, Candidates};
-use bvh_search::{Budget, Event, Method, Observer, Outcome, Problem, Search, annealing, exact, genetic, solve};
+use bvh_search::{
+    Budget, Event, Method, Observer, Outcome, Problem, Search, annealing, exact, genetic, solve,
+};
 use glam::Vec3;
 use std::time::{Duration, Instant};
 
@@ -15,16 +17,26 @@ fn boxes(n: usize) -> Vec<Aabb> {
     stiff::boxes(&stiff::uniform(n))
 }
 
-fn solved(search: &dyn Search, boxes: &[Aabb], seed: u64, budget: Budget) -> Result<Outcome, Broken> {
+fn solved(
+    search: &dyn Search,
+    boxes: &[Aabb],
+    seed: u64,
+    budget: Budget,
+) -> Result<Outcome, Broken> {
     solve(search, &Problem::new(boxes), seed, budget, &()).map_err(Broken::case)
 }
 
 /// Five scenes for P5: uniform, flat, a line, many ties, and very different sizes; coordinates between 2^-5 and 2^5.
 pub fn scaled_scenes(n: usize) -> [Vec<Aabb>; 5] {
-    let flat = |b: &Aabb| Aabb { min: b.min * Vec3::new(1.0, 1.0, 0.0), max: b.max * Vec3::new(1.0, 1.0, 0.0) };
+    let flat = |b: &Aabb| Aabb {
+        min: b.min * Vec3::new(1.0, 1.0, 0.0),
+        max: b.max * Vec3::new(1.0, 1.0, 0.0),
+    };
     let line = |b: &Aabb| Aabb { min: b.min * Vec3::Y, max: b.max * Vec3::Y };
-    let sized =
-        |(i, b): (usize, &Aabb)| Aabb { min: b.min, max: b.min + b.extent().as_vec3() / (1 + i % 9) as f32 };
+    let sized = |(i, b): (usize, &Aabb)| Aabb {
+        min: b.min,
+        max: b.min + b.extent().as_vec3() / (1 + i % 9) as f32,
+    };
     let uniform = boxes(n);
     [
         uniform.iter().map(flat).collect(),
@@ -88,7 +100,8 @@ pub fn budgets_end(method: &Method) -> Verdict {
     let watchers: [(Budget, &dyn Observer); 4] =
         [(nothing, &()), (one, &()), (free, &Deadline(None)), (free, &soon)];
     for (budget, observer) in watchers {
-        let outcome = solve(method, &Problem::new(&boxes), 1, budget, observer).map_err(Broken::case)?;
+        let outcome =
+            solve(method, &Problem::new(&boxes), 1, budget, observer).map_err(Broken::case)?;
         check_outcome(&boxes, &outcome)?;
     }
     Ok(String::new())
@@ -98,8 +111,16 @@ pub fn budgets_end(method: &Method) -> Verdict {
 /// best is never lost.
 pub fn genetic_edges(_: &Method) -> Verdict {
     let boxes = boxes(30);
-    for (population, mutation, crossover) in (0..8).map(|i| (1 + i % 2, (i / 2 % 2) as f64, (i / 4) as f64)) {
-        let config = genetic::Config { population, generations: 40, mutation, crossover, ..Default::default() };
+    for (population, mutation, crossover) in
+        (0..8).map(|i| (1 + i % 2, (i / 2 % 2) as f64, (i / 4) as f64))
+    {
+        let config = genetic::Config {
+            population,
+            generations: 40,
+            mutation,
+            crossover,
+            ..Default::default()
+        };
         let outcome = solved(&config, &boxes, 3, Budget::UNLIMITED)?;
         // The tree is valid only if its order was a permutation.
         check_outcome(&boxes, &outcome)?;
@@ -108,8 +129,13 @@ pub fn genetic_edges(_: &Method) -> Verdict {
         ensure!(incumbents.last() == Some(&outcome.cost), "the best was not returned");
     }
     // Cuts fall on both ends when there are two places only.
-    let config =
-        genetic::Config { population: 2, generations: 40, crossover: 1.0, mutation: 1.0, ..Default::default() };
+    let config = genetic::Config {
+        population: 2,
+        generations: 40,
+        crossover: 1.0,
+        mutation: 1.0,
+        ..Default::default()
+    };
     for n in 0..3 {
         check_outcome(&boxes[..n], &solved(&config, &boxes[..n], 3, Budget::UNLIMITED)?)?;
     }
@@ -151,10 +177,13 @@ pub fn a_million_moves(_: &Method) -> Verdict {
 /// S42: the cost that insertion keeps is the recomputed one.
 pub fn insertion_keeps_its_cost() -> Verdict {
     let mut largest: f64 = 0.0;
-    for make in [stiff::uniform, stiff::slivers, stiff::two_densities, stiff::enormous, stiff::denormal] {
+    for make in
+        [stiff::uniform, stiff::slivers, stiff::two_densities, stiff::enormous, stiff::denormal]
+    {
         let boxes = stiff::boxes(&make(2000));
         let scene = goldsmith_salmon::Scene::new(&boxes).map_err(Broken::case)?;
-        let (mut workspace, mut tree) = (goldsmith_salmon::Workspace::default(), Default::default());
+        let (mut workspace, mut tree) =
+            (goldsmith_salmon::Workspace::default(), Default::default());
         let order: Vec<u32> = (0..boxes.len() as u32).collect();
         let config = goldsmith_salmon::Config::default();
         let kept = config.insert_all(&scene, &order, &mut workspace).map_err(Broken::case)?;
@@ -170,7 +199,13 @@ pub fn insertion_keeps_its_cost() -> Verdict {
 pub fn above_the_optimum(method: &Method) -> Verdict {
     let exact = exact::Config::default();
     let mut largest: f64 = 0.0;
-    for make in [stiff::uniform, stiff::overlapping, stiff::slivers, stiff::planar_grid, stiff::two_densities] {
+    for make in [
+        stiff::uniform,
+        stiff::overlapping,
+        stiff::slivers,
+        stiff::planar_grid,
+        stiff::two_densities,
+    ] {
         for n in [3, 7, 10] {
             let boxes = stiff::boxes(&make(n));
             let optimum = solved(&exact, &boxes, 1, Budget::UNLIMITED)?.cost;

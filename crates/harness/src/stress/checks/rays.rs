@@ -14,8 +14,14 @@ use glam::Vec3;
 /// S15: zero, NaN and infinite directions and origins are refused before any traversal.
 pub fn no_such_rays() -> Verdict {
     let (nan, inf) = (f32::NAN, f32::INFINITY);
-    let directions =
-        [Vec3::ZERO, -Vec3::ZERO, Vec3::NAN, Vec3::X * nan, Vec3::Y * inf, Vec3::new(1.0, -inf, 0.0)];
+    let directions = [
+        Vec3::ZERO,
+        -Vec3::ZERO,
+        Vec3::NAN,
+        Vec3::X * nan,
+        Vec3::Y * inf,
+        Vec3::new(1.0, -inf, 0.0),
+    ];
     for bad in directions {
         ensure!(Ray::half_line(Vec3::ZERO, bad).is_err(), "direction {bad} is accepted");
     }
@@ -49,7 +55,10 @@ pub fn ranges_are_defined() -> Verdict {
         }
     }
     for (t_min, t_max) in [(f32::NAN, 1.0), (0.0, f32::NAN), (-1.0, 1.0)] {
-        ensure!(Ray::new(origin, Vec3::Z, t_min, t_max).is_err(), "range {t_min}..={t_max} is accepted");
+        ensure!(
+            Ray::new(origin, Vec3::Z, t_min, t_max).is_err(),
+            "range {t_min}..={t_max} is accepted"
+        );
     }
     Ok(String::new())
 }
@@ -60,18 +69,26 @@ pub fn ranges_are_defined() -> Verdict {
 pub fn denormal_distances() -> Verdict {
     let mut hits = 0;
     let mut check = |objects: &Primitives, rays: &[Ray]| {
-        hits += rays.iter().filter(|ray| Accelerator::new(objects, Structure::Brute).any_hit(ray)).count();
+        hits += rays
+            .iter()
+            .filter(|ray| Accelerator::new(objects, Structure::Brute).any_hit(ray))
+            .count();
         tracing::TRAVERSALS.iter().try_for_each(|(name, traversal)| {
-            tracing::check(*traversal, objects, rays).map(drop).map_err(|broken| broken.within(name))
+            tracing::check(*traversal, objects, rays)
+                .map(drop)
+                .map_err(|broken| broken.within(name))
         })
     };
-    let facing = Triangle([[-1.0, -1.0, 1e-30], [3.0, -1.0, 1e-30], [-1.0, 3.0, 1e-30]].map(Vec3::from));
+    let facing =
+        Triangle([[-1.0, -1.0, 1e-30], [3.0, -1.0, 1e-30], [-1.0, 3.0, 1e-30]].map(Vec3::from));
     let ray = Ray::new(Vec3::ZERO, Vec3::Z * 1e20, 0.0, 0.0).map_err(Broken::case)?;
     check(&Primitives::Triangles(vec![facing]), &[ray])?;
     for k in [-100, -60, -40, -20] {
         let scale = 2f32.powi(k);
-        let triangles: Vec<Triangle> =
-            stiff::uniform(60).into_iter().map(|triangle| Triangle(triangle.0.map(|p| p * scale))).collect();
+        let triangles: Vec<Triangle> = stiff::uniform(60)
+            .into_iter()
+            .map(|triangle| Triangle(triangle.0.map(|p| p * scale)))
+            .collect();
         let mut rays = Vec::new();
         for (ray, attempt) in tracing::rays(&triangles, 400, 22).iter().zip(0usize..) {
             let length = [1.0, 1e20, 1e25, 1e30][attempt % 4] / ray.direction().abs().max_element();
@@ -109,7 +126,10 @@ pub fn estimates_converge() -> Verdict {
         }
     }
     let ratios = [errors[0] / errors[1], errors[1] / errors[2]];
-    ensure!(ratios.iter().all(|ratio| (ratio - 2.0).abs() < 0.15), "standard errors fall by {ratios:?}");
+    ensure!(
+        ratios.iter().all(|ratio| (ratio - 2.0).abs() < 0.15),
+        "standard errors fall by {ratios:?}"
+    );
     // Fewer than 51 of 60 would happen once in a thousand times.
     ensure!(covered >= 51, "{covered} of {SEEDS} intervals cover {truth}");
     Ok(format!("{covered} of {SEEDS} intervals cover"))

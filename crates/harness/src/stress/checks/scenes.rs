@@ -73,7 +73,8 @@ pub fn shallow_at_no_cost(method: &Method, boxes: &[Aabb], outcome: &Outcome) ->
 /// S08: axes that order the objects alike are recognised, and the tree is the same.
 pub fn same_orders_change_nothing(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     let Method::MullerFellner(config) = method else { return Ok(String::new()) };
-    let config = muller_fellner::Config { skip_same_order: !config.skip_same_order, ..config.clone() };
+    let config =
+        muller_fellner::Config { skip_same_order: !config.skip_same_order, ..config.clone() };
     let other = run(&Method::MullerFellner(config), boxes, 0)?;
     ensure!(other.tree == outcome.tree, "another tree without the search for identical orders");
     Ok(String::new())
@@ -90,7 +91,9 @@ pub fn about_one_cover_per_level(method: &Method, boxes: &[Aabb], outcome: &Outc
 
 /// S27: a node near the root holds the teapot and nothing else.
 pub fn teapot_is_isolated(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
-    if !(is_greedy(method) || matches!(method, Method::Best(_) | Method::Reinsertion(_) | Method::Exact(_))) {
+    if !(is_greedy(method)
+        || matches!(method, Method::Best(_) | Method::Reinsertion(_) | Method::Exact(_)))
+    {
         return Ok(String::new());
     }
     let tree = &outcome.tree;
@@ -154,10 +157,12 @@ pub fn reflection_costs_the_same(method: &Method, boxes: &[Aabb], outcome: &Outc
 pub fn order_does_not_matter(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     const ORDERS: u64 = 20;
     if let Method::GoldsmithSalmon(_) = method {
-        let costs = (0..ORDERS).map(|seed| Ok(run(method, &shuffled(boxes, seed).0, 0)?.cost / outcome.cost));
+        let costs = (0..ORDERS)
+            .map(|seed| Ok(run(method, &shuffled(boxes, seed).0, 0)?.cost / outcome.cost));
         let mut costs = costs.collect::<Result<Vec<f64>, Broken>>()?;
         costs.sort_by(f64::total_cmp);
-        let [low, high] = [costs.first(), costs.last()].map(|cost| cost.copied().unwrap_or(f64::NAN));
+        let [low, high] =
+            [costs.first(), costs.last()].map(|cost| cost.copied().unwrap_or(f64::NAN));
         return Ok(format!("{ORDERS} orders: {low:.3} to {high:.3} of this cost"));
     }
     if !is_top_down(method) {
