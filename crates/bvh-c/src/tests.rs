@@ -18,7 +18,10 @@ fn corners(count: usize) -> Vec<f32> {
 
 fn last_error() -> String {
     // SAFETY: a string that is valid until the next failure.
-    unsafe { CStr::from_ptr(bvh_last_error()) }.to_str().unwrap().to_owned()
+    unsafe { CStr::from_ptr(bvh_last_error()) }
+        .to_str()
+        .unwrap()
+        .to_owned()
 }
 
 /// The tree over such triangles.
@@ -79,7 +82,12 @@ fn trees_and_hits_are_those_of_the_rust_crates() {
 
 fn bytes_as_triangles(corners: &[f32]) -> Vec<Triangle> {
     let (points, _) = corners.as_chunks::<3>();
-    points.as_chunks::<3>().0.iter().map(|&corners| Triangle::from(corners)).collect()
+    points
+        .as_chunks::<3>()
+        .0
+        .iter()
+        .map(|&corners| Triangle::from(corners))
+        .collect()
 }
 
 /// Whether it has been asked a thousand times.
@@ -152,7 +160,11 @@ fn a_save_puts_a_new_file_in_the_place_of_the_old_one_and_never_writes_into_it()
         bvh_tree_free(tree);
     }
     assert_eq!(std::fs::read(&link).unwrap(), b"precious");
-    assert!(std::fs::read(&path).unwrap().starts_with(b"\x89BVH"));
+    assert!(
+        std::fs::read(&path)
+            .unwrap()
+            .starts_with(b"\x89BVH")
+    );
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
 }
 

@@ -43,7 +43,9 @@ pub unsafe extern "C" fn bvh_tracer_new(tree: *const BvhTree) -> *mut BvhTracer 
         let owned = &unsafe { given("tree", tree) }?.owned;
         let refused = || Failure::invalid("tree is over boxes; accepted: a tree over triangles");
         let triangles = owned.triangles().ok_or_else(refused)?;
-        WideBvh::new(owned.tree(), triangles).map(BvhTracer).map_err(Failure::invalid)
+        WideBvh::new(owned.tree(), triangles)
+            .map(BvhTracer)
+            .map_err(Failure::invalid)
     })
 }
 
@@ -67,7 +69,9 @@ pub unsafe extern "C" fn bvh_tracer_nearest_hits(
         let mut found = [Hit::MISS; BATCH];
         in_batches(rays, |at, rays| {
             let found = &mut found[..rays.len()];
-            tracer.0.nearest_hits(rays, found, coherence(coherent));
+            tracer
+                .0
+                .nearest_hits(rays, found, coherence(coherent));
             for (to, &Hit { t, object }) in hits[at..].iter_mut().zip(&*found) {
                 *to = BvhHit { t, object };
             }
@@ -94,7 +98,9 @@ pub unsafe extern "C" fn bvh_tracer_any_hits(
         let mut found = [false; BATCH];
         in_batches(rays, |at, rays| {
             let found = &mut found[..rays.len()];
-            tracer.0.any_hits(rays, found, coherence(coherent));
+            tracer
+                .0
+                .any_hits(rays, found, coherence(coherent));
             for (to, &hit) in hits[at..].iter_mut().zip(&*found) {
                 *to = u8::from(hit);
             }

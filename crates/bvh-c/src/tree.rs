@@ -103,7 +103,9 @@ pub unsafe extern "C" fn bvh_tree_improve_until(
         // SAFETY: promised by the caller.
         let tree = unsafe { given_mut("tree", tree) }?;
         let until = Until { deadline: deadline(seconds)?, cancelled, context };
-        tree.owned.improve(&until).map_err(Failure::invalid)?;
+        tree.owned
+            .improve(&until)
+            .map_err(Failure::invalid)?;
         tree.nodes = nodes(&tree.owned);
         Ok(())
     })
@@ -123,7 +125,9 @@ impl Observer for Until {
     fn cancelled(&self) -> bool {
         // SAFETY: promised by the caller.
         self.deadline.has_passed()
-            || self.cancelled.is_some_and(|cancelled| unsafe { cancelled(self.context) } != 0)
+            || self
+                .cancelled
+                .is_some_and(|cancelled| unsafe { cancelled(self.context) } != 0)
     }
 
     fn progress(&self) -> Option<f64> {
@@ -147,7 +151,9 @@ pub unsafe extern "C" fn bvh_tree_cost(
             (BvhCost::Sah, Objective::Sah(SahConstants::default())),
             (BvhCost::Layout, Objective::Layout),
         ];
-        let found = kinds.iter().find(|(number, _)| *number as u32 == kind);
+        let found = kinds
+            .iter()
+            .find(|(number, _)| *number as u32 == kind);
         let refused = || Failure::invalid(format!("kind is {kind}; accepted: 0 to 3"));
         let (_, objective) = found.ok_or_else(refused)?;
         // SAFETY: promised by the caller.
@@ -243,17 +249,26 @@ fn whole(owned: OwnedTree) -> BvhTree {
 
 fn nodes(owned: &OwnedTree) -> Vec<BvhNode> {
     let node = |FirstCountNode { min, first, max, count }| BvhNode { min, first, max, count };
-    owned.tree().to_first_count_aligned().into_iter().map(node).collect()
+    owned
+        .tree()
+        .to_first_count_aligned()
+        .into_iter()
+        .map(node)
+        .collect()
 }
 
 fn found(objects: Objects, references: f64, seconds: f64) -> Result<BvhTree, Failure> {
-    OwnedTree::find(objects, references, &deadline(seconds)?).map(whole).map_err(Failure::invalid)
+    OwnedTree::find(objects, references, &deadline(seconds)?)
+        .map(whole)
+        .map_err(Failure::invalid)
 }
 
 fn loaded(path: &str, objects: Objects) -> Result<BvhTree, Failure> {
     let bytes = bvh_files::tree_file::read(path.as_ref())?;
     let loaded = OwnedTree::load(objects, &bytes);
-    loaded.map(whole).map_err(|error| Failure::invalid(format!("{path}: {error}")))
+    loaded
+        .map(whole)
+        .map_err(|error| Failure::invalid(format!("{path}: {error}")))
 }
 
 fn deadline(seconds: f64) -> Result<Deadline, Failure> {
@@ -280,5 +295,6 @@ unsafe fn triangles_of(first: *const f32, count: usize) -> Result<Objects, Failu
 unsafe fn text<'a>(path: *const c_char) -> Result<&'a str, Failure> {
     // SAFETY: promised by the caller.
     let path = unsafe { CStr::from_ptr(given("path", path)?) };
-    path.to_str().map_err(|_| Failure::invalid("path is not UTF-8"))
+    path.to_str()
+        .map_err(|_| Failure::invalid("path is not UTF-8"))
 }

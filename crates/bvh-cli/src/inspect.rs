@@ -52,19 +52,26 @@ struct Facts(Vec<(String, String, serde_json::Value)>);
 
 impl Facts {
     fn add(&mut self, what: &str, value: impl Display + Serialize) {
-        self.0.push((what.into(), value.to_string(), json!(value)));
+        self.0
+            .push((what.into(), value.to_string(), json!(value)));
     }
 }
 
 impl Display for Facts {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        self.0.iter().try_for_each(|(what, text, _)| writeln!(f, "{what}: {text}"))
+        self.0
+            .iter()
+            .try_for_each(|(what, text, _)| writeln!(f, "{what}: {text}"))
     }
 }
 
 impl Serialize for Facts {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(what, _, value)| (what, value)))
+        serializer.collect_map(
+            self.0
+                .iter()
+                .map(|(what, _, value)| (what, value)),
+        )
     }
 }
 
@@ -74,7 +81,11 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     if let Some(nodes) = &args.nodes {
         output_file("--nodes", nodes, &NODES)?;
     }
-    let scene = args.scene.as_deref().map(|name| args.files.load(name)).transpose()?;
+    let scene = args
+        .scene
+        .as_deref()
+        .map(|name| args.files.load(name))
+        .transpose()?;
     let (tree, facts) = examine(&args.file, scene.as_ref())?;
     if let Some(path) = &args.nodes {
         write_nodes(&tree, path)?;
@@ -115,7 +126,10 @@ fn print(facts: &Facts, as_json: bool) {
 fn examine(path: &Path, scene: Option<&Scene>) -> Result<(Bvh, Facts), Error> {
     let bytes = tree_file::read(path)?;
     let file = tree_file::open(path, &bytes)?;
-    scene.iter().filter_map(|scene| scene.remark.as_ref()).for_each(|remark| print_error(remark));
+    scene
+        .iter()
+        .filter_map(|scene| scene.remark.as_ref())
+        .for_each(|remark| print_error(remark));
     let mut facts = Facts::default();
     describe(file.header(), &bytes, &mut facts);
     let tree = file.tree().map_err(TreeFileError::of(path))?;
@@ -139,8 +153,9 @@ fn describe(header: &Header, bytes: &[u8], facts: &mut Facts) {
         }
     };
     // The magic comes first, then the version.
-    let version =
-        bytes[Header::MAGIC.len()..].first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+    let version = bytes[Header::MAGIC.len()..]
+        .first_chunk()
+        .map_or(0, |bytes| u32::from_le_bytes(*bytes));
     facts.add("version", version);
     facts.add("bytes", bytes.len());
     facts.add("method", &header.method);
@@ -178,8 +193,10 @@ fn measure(tree: &Bvh, facts: &mut Facts) {
 
 /// `2 × 100, 3 × 7`: sizes and how many have them.
 fn histogram(counts: &BTreeMap<u32, usize>) -> String {
-    let bins: Vec<String> =
-        counts.iter().map(|(size, count)| format!("{size} × {count}")).collect();
+    let bins: Vec<String> = counts
+        .iter()
+        .map(|(size, count)| format!("{size} × {count}"))
+        .collect();
     if bins.is_empty() { "none".into() } else { bins.join(", ") }
 }
 
@@ -216,7 +233,10 @@ fn end_point_overlap(tree: &Bvh, triangles: &[Triangle]) -> f64 {
         bar.inc(1);
         part
     };
-    let found: Vec<Overlap> = (0..parts.count()).into_par_iter().map(part).collect();
+    let found: Vec<Overlap> = (0..parts.count())
+        .into_par_iter()
+        .map(part)
+        .collect();
     bar.finish_and_clear();
     let mut sum = Overlap::default();
     found.iter().for_each(|part| sum.add(part));

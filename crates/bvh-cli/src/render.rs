@@ -86,10 +86,16 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 }
 
 fn point(text: &str) -> Result<DVec3, String> {
-    let numbers: Option<Vec<f64>> =
-        text.split(',').map(|number| number.trim().parse().ok()).collect();
+    let numbers: Option<Vec<f64>> = text
+        .split(',')
+        .map(|number| number.trim().parse().ok())
+        .collect();
     match numbers.as_deref() {
-        Some(&[x, y, z]) if [x, y, z].iter().all(|&number| (number as f32).is_finite()) => {
+        Some(&[x, y, z])
+            if [x, y, z]
+                .iter()
+                .all(|&number| (number as f32).is_finite()) =>
+        {
             Ok(DVec3::new(x, y, z))
         }
         _ => Err("accepted: three numbers as in 1.5,-2,0".into()),
@@ -106,7 +112,10 @@ fn angle(text: &str) -> Result<f64, String> {
 impl RenderArgs {
     fn options(&self, scene: &Scene) -> Options {
         let (width, height) = self.size;
-        let bounds = scene.boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
+        let bounds = scene
+            .boxes
+            .iter()
+            .fold(Aabb::EMPTY, |all, b| all.union(b));
         let automatic = framing::automatic(scene, &bounds, f64::from(width) / f64::from(height));
         let view = match (self.from, self.at) {
             (None, None) => View { fov: self.fov.unwrap_or(automatic.fov), ..automatic },
@@ -130,7 +139,10 @@ pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> 
     output_file("--out", &args.out, &PICTURE)?;
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;
-    scene.remark.iter().for_each(|remark| print_error(remark));
+    scene
+        .remark
+        .iter()
+        .for_each(|remark| print_error(remark));
     if args.heatmap && args.accel == "wide" {
         return Err(Error::Usage(
             "--heatmap: the wide layout counts no tests; accepted with it: --accel brute, kdtree, bvh, FILE.bvh".into(),

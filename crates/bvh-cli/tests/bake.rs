@@ -23,7 +23,9 @@ fn a_bake_of_work_writes_the_same_bytes_on_any_number_of_threads() {
     assert!(bytes[0] == bytes[1]);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "no other file is left");
     let scene = Scene::load("escher").unwrap();
-    let tree = tree_file::load(&folder.path().join("1.bvh"), &scene).unwrap().0;
+    let tree = tree_file::load(&folder.path().join("1.bvh"), &scene)
+        .unwrap()
+        .0;
     let facts = facts(&said(folder.path(), &["inspect", "1.bvh", "escher"]));
     assert_eq!(facts["internal area"], bvh_core::cost::internal_area(&tree).to_string());
     assert_eq!(
@@ -31,7 +33,12 @@ fn a_bake_of_work_writes_the_same_bytes_on_any_number_of_threads() {
         ("best", facts["internal area"].as_str())
     );
     assert_eq!(facts["version"], "2", "what older programs read");
-    assert!(facts["internal area over Müller–Fellner's"].parse::<f64>().unwrap() < 0.9);
+    assert!(
+        facts["internal area over Müller–Fellner's"]
+            .parse::<f64>()
+            .unwrap()
+            < 0.9
+    );
     assert!(facts["end-point overlap"].parse::<f64>().unwrap() > 0.0);
     assert!(facts["valid"].starts_with("yes"));
 }
@@ -58,8 +65,10 @@ fn a_bake_for_rays_keeps_how_often_they_visit_each_node() {
         });
         assert!(bytes[0] == bytes[1], "{rays}: the same bytes on any number of threads");
         let scene = Scene::load("escher").unwrap();
-        let file =
-            bvh_core::file::TreeFile::open(&bytes[0]).unwrap().for_boxes(&scene.boxes).unwrap();
+        let file = bvh_core::file::TreeFile::open(&bytes[0])
+            .unwrap()
+            .for_boxes(&scene.boxes)
+            .unwrap();
         assert_eq!(file.header().method, name);
         let (tree, visits) = (file.tree().unwrap(), file.visits().unwrap().unwrap());
         assert_eq!(visits[0], 1.0);
@@ -163,7 +172,10 @@ fn what_cannot_be_baked_or_inspected_is_said_and_nothing_is_lost() {
     fs::write(path("cut.bvh"), &good[..good.len() - 1]).unwrap();
     fs::write(
         path("flipped.bvh"),
-        good.iter().enumerate().map(|(at, b)| b ^ u8::from(at == 300)).collect::<Vec<_>>(),
+        good.iter()
+            .enumerate()
+            .map(|(at, b)| b ^ u8::from(at == 300))
+            .collect::<Vec<_>>(),
     )
     .unwrap();
     fs::write(path("file"), "").unwrap();
@@ -257,13 +269,26 @@ fn the_nodes_are_written_in_full_precision() {
         .0;
     let mut reader = csv::Reader::from_path(folder.path().join("nodes.csv")).unwrap();
     let columns = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
-    assert_eq!(reader.headers().unwrap().iter().collect::<Vec<_>>().join(","), columns);
+    assert_eq!(
+        reader
+            .headers()
+            .unwrap()
+            .iter()
+            .collect::<Vec<_>>()
+            .join(","),
+        columns
+    );
     let mut rows = 0;
     for (index, row) in reader.records().enumerate() {
         let row = row.unwrap();
         let node = &tree.nodes[index];
         let corners = [node.aabb.min.to_array(), node.aabb.max.to_array()].concat();
-        assert_eq!((5..11).map(|at| row[at].parse::<f32>().unwrap()).collect::<Vec<_>>(), corners);
+        assert_eq!(
+            (5..11)
+                .map(|at| row[at].parse::<f32>().unwrap())
+                .collect::<Vec<_>>(),
+            corners
+        );
         let kind = if node.is_leaf() { "leaf" } else { "inner" };
         assert_eq!((&row[0], &row[2]), (index.to_string().as_str(), kind));
         match row[1].parse::<usize>() {
@@ -305,7 +330,10 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_refuse_damage() {
         fs::write(at.join(format!("{index}.damaged")), bytes).unwrap();
     }
     let mut readers = Vec::new();
-    if Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success())
+    if Command::new("python3")
+        .arg("--version")
+        .output()
+        .is_ok_and(|output| output.status.success())
     {
         readers.push(("python3", vec![scripts.join("read_tree.py")]));
     }
@@ -320,8 +348,13 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_refuse_damage() {
     }
     for (name, args) in &readers {
         let program = if args.is_empty() { at.join(name).into_os_string() } else { name.into() };
-        let read =
-            |file: String| Command::new(&program).args(args).arg(at.join(file)).output().unwrap();
+        let read = |file: String| {
+            Command::new(&program)
+                .args(args)
+                .arg(at.join(file))
+                .output()
+                .unwrap()
+        };
         for index in 0..trees.len() {
             let inspected = facts(&said(at, &["inspect", &format!("{index}.bvh")]));
             agree(name, &read(format!("{index}.bvh")), &inspected);

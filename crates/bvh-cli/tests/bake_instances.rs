@@ -89,7 +89,12 @@ fn a_scene_of_instances_is_baked_mesh_by_mesh_and_answers_as_the_flat_one() {
     let mut hits = 0;
     for i in 0..2000 {
         // From a point of a lattice towards about the middle of a triangle.
-        let middle = (flat[7 * i as usize % flat.len()].0.iter().sum::<Vec3>() / 3.0).round();
+        let middle = (flat[7 * i as usize % flat.len()]
+            .0
+            .iter()
+            .sum::<Vec3>()
+            / 3.0)
+            .round();
         let away = Vec3::new(number(2 * i), number(2 * i + 1), 128.0);
         let ray = Ray::half_line((middle + away).to_array(), (-away / 128.0).to_array()).unwrap();
         let shear = Shear::new(&ray);
@@ -113,7 +118,10 @@ fn a_bake_of_instances_replaces_nobodys_files_and_says_what_it_cannot_do() {
     let (glb, _) = forest();
     fs::write(at.join("forest.glb"), &glb).unwrap();
     fs::write(at.join("one.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
-    let json_at = glb.windows(9).position(|bytes| bytes == b"[-1, 1, 1").unwrap();
+    let json_at = glb
+        .windows(9)
+        .position(|bytes| bytes == b"[-1, 1, 1")
+        .unwrap();
     let mut flat = glb.clone();
     flat[json_at..json_at + 9].copy_from_slice(b"[ 0, 1, 1");
     fs::write(at.join("flat.glb"), flat).unwrap();

@@ -76,7 +76,10 @@ fn a_file_whose_name_says_another_kind_is_not_begun() {
 fn pipes_devices_and_folders_are_refused_as_inputs() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let made = std::process::Command::new("mkfifo").arg("p.bvh").current_dir(at).status();
+    let made = std::process::Command::new("mkfifo")
+        .arg("p.bvh")
+        .current_dir(at)
+        .status();
     assert!(made.unwrap().success());
     fs::create_dir(at.join("folder.bvh")).unwrap();
     let no = |args: &[&str], parts: &[&str]| refused(at, args, 2, parts);
@@ -92,7 +95,10 @@ fn pipes_devices_and_folders_are_refused_as_inputs() {
 #[test]
 fn a_file_of_64_gigabytes_is_refused_by_its_header() {
     let folder = tempfile::tempdir().unwrap();
-    fs::File::create(folder.path().join("huge.bvh")).unwrap().set_len(64 << 30).unwrap();
+    fs::File::create(folder.path().join("huge.bvh"))
+        .unwrap()
+        .set_len(64 << 30)
+        .unwrap();
     refused(folder.path(), &["inspect", "huge.bvh"], 2, &["huge.bvh: not a tree file"]);
 }
 
@@ -100,11 +106,20 @@ fn a_file_of_64_gigabytes_is_refused_by_its_header() {
 #[test]
 fn what_cannot_be_said_is_an_error_and_a_reader_that_left_is_none() {
     let folder = tempfile::tempdir().unwrap();
-    let full = fs::File::options().write(true).open("/dev/full").unwrap();
-    let output = program(folder.path(), &["scenes"]).stdout(full).output().unwrap();
+    let full = fs::File::options()
+        .write(true)
+        .open("/dev/full")
+        .unwrap();
+    let output = program(folder.path(), &["scenes"])
+        .stdout(full)
+        .output()
+        .unwrap();
     ended(&output, 1, &["standard output"]);
     for args in [&["scenes"][..], &["--help"]] {
-        let mut child = program(folder.path(), args).stdout(Stdio::piped()).spawn().unwrap();
+        let mut child = program(folder.path(), args)
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
         drop(child.stdout.take());
         assert!(child.wait().unwrap().success(), "{args:?}");
     }

@@ -11,7 +11,10 @@ use support::{run, said, text};
 #[test]
 fn every_description_of_rays_is_baked_for_as_it_is_printed() {
     let mut descriptions = 0;
-    for block in blocks_in("toml").into_iter().filter(|block| block.text.contains("cameras = ")) {
+    for block in blocks_in("toml")
+        .into_iter()
+        .filter(|block| block.text.contains("cameras = "))
+    {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("rays.toml"), &block.text).unwrap();
         said(

@@ -79,8 +79,11 @@ fn tracked<T: Check>(
             Ok(value) => {
                 let ranges = value.faults().into_iter().map(Fault::from);
                 // A list is empty if an element was refused.
-                let apart =
-                    |late: &Fault| !faults.iter().any(|fault| is_within(&fault.key, &late.key));
+                let apart = |late: &Fault| {
+                    !faults
+                        .iter()
+                        .any(|fault| is_within(&fault.key, &late.key))
+                };
                 let ranges: Vec<Fault> = ranges.filter(apart).collect();
                 return (Some(value), [faults, ranges].concat());
             }
@@ -96,7 +99,9 @@ fn tracked<T: Check>(
         }
         let steps: Vec<&Segment> = path.iter().collect();
         // Elements of lists stay, lest others change their numbers.
-        let innermost = steps.iter().rposition(|step| matches!(step, Segment::Map { .. }));
+        let innermost = steps
+            .iter()
+            .rposition(|step| matches!(step, Segment::Map { .. }));
         match innermost.and_then(|last| leave_out(&mut table, &steps[..=last])) {
             Some(name) => left_out.push((key, name)),
             None => break,
@@ -126,9 +131,13 @@ fn leave_out(value: &mut Value, steps: &[&Segment]) -> Option<String> {
 ///
 /// Everything that is wrong with it, a line each.
 pub fn parse<T: DeserializeOwned + Check>(text: &str, file: &str) -> Result<T, String> {
-    let table: Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
+    let table: Table = text
+        .parse()
+        .map_err(|error: toml::de::Error| error.to_string())?;
     let (config, faults) = deserialize(table);
-    config.filter(|_| faults.is_empty()).ok_or_else(|| say(&faults, text, file, None))
+    config
+        .filter(|_| faults.is_empty())
+        .ok_or_else(|| say(&faults, text, file, None))
 }
 
 /// Deserialises a table.
@@ -145,7 +154,9 @@ pub fn tagged<T: Check>(
     accepted: impl FnOnce() -> String,
 ) -> Read<T> {
     let name = table.remove(tag);
-    let found = name.as_ref().map_or("missing".into(), Value::to_string);
+    let found = name
+        .as_ref()
+        .map_or("missing".into(), Value::to_string);
     let (known, faults) = match name {
         Some(Value::String(name)) => tracked(table, |deserializer| read(&name, deserializer)),
         _ => (Some(None), vec![]),
@@ -167,8 +178,10 @@ pub fn say(faults: &[Fault], text: &str, file: &str, above: Option<&str>) -> Str
         let replaced = replaced.filter(|_| replaced != of_table);
         replaced.or_else(|| start(&fault.key))
     };
-    let mut placed: Vec<(Option<usize>, &Fault)> =
-        faults.iter().map(|fault| (place(fault), fault)).collect();
+    let mut placed: Vec<(Option<usize>, &Fault)> = faults
+        .iter()
+        .map(|fault| (place(fault), fault))
+        .collect();
     placed.sort_by_key(|(at, _)| *at);
     let mut known = HashSet::new();
     placed.retain(|(_, fault)| known.insert(&fault.key));
@@ -176,15 +189,23 @@ pub fn say(faults: &[Fault], text: &str, file: &str, above: Option<&str>) -> Str
         Some(at) => format!("line {}: {fault}", text[..at].matches('\n').count() + 1),
         None => fault.to_string(),
     };
-    placed.into_iter().map(line).collect::<Vec<_>>().join(&format!("\n{file}: "))
+    placed
+        .into_iter()
+        .map(line)
+        .collect::<Vec<_>>()
+        .join(&format!("\n{file}: "))
 }
 
 fn in_table(table: &DeTable, key: &str) -> Option<Range<usize>> {
-    table.iter().find_map(|(name, value)| match key.strip_prefix(name.get_ref().as_ref())? {
-        "" => Some(name.span()),
-        rest if rest.starts_with(['.', '[']) => Some(in_value(value, rest).unwrap_or(name.span())),
-        _ => None,
-    })
+    table
+        .iter()
+        .find_map(|(name, value)| match key.strip_prefix(name.get_ref().as_ref())? {
+            "" => Some(name.span()),
+            rest if rest.starts_with(['.', '[']) => {
+                Some(in_value(value, rest).unwrap_or(name.span()))
+            }
+            _ => None,
+        })
 }
 
 fn in_value(value: &Spanned<DeValue>, key: &str) -> Option<Range<usize>> {

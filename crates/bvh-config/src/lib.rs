@@ -61,7 +61,10 @@ pub trait Check {
 
     /// Refuses the first parameter that is out of its range.
     fn check(&self) -> Result<(), OutOfRange> {
-        self.faults().into_iter().next().map_or(Ok(()), Err)
+        self.faults()
+            .into_iter()
+            .next()
+            .map_or(Ok(()), Err)
     }
 }
 
@@ -87,7 +90,10 @@ pub trait Accepts<V: ?Sized> {
 
     /// Refuses the value unless it is accepted.
     fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange> {
-        self.faults(key, found).into_iter().next().map_or(Ok(()), Err)
+        self.faults(key, found)
+            .into_iter()
+            .next()
+            .map_or(Ok(()), Err)
     }
 
     /// The accepted values in words, if there is more to say than their type does.
@@ -108,12 +114,16 @@ pub trait Keys {
 /// Adds what each field accepts to its description in the JSON schema of the configuration.
 #[cfg(feature = "schema")]
 pub fn describe_accepted<C: Keys>(schema: &mut schemars::Schema) {
-    let Some(fields) = schema.get_mut("properties").and_then(|fields| fields.as_object_mut())
+    let Some(fields) = schema
+        .get_mut("properties")
+        .and_then(|fields| fields.as_object_mut())
     else {
         return;
     };
     for (key, accepted) in C::KEYS.iter().zip(C::accepted()) {
-        let description = fields.get_mut(*key).and_then(|field| field.get_mut("description"));
+        let description = fields
+            .get_mut(*key)
+            .and_then(|field| field.get_mut("description"));
         if let (Some(words), Some(text)) = (accepted, description) {
             *text = format!("{}\nAccepted: {words}.", text.as_str().unwrap_or_default()).into();
         }
@@ -126,7 +136,11 @@ pub struct Itself;
 
 impl<C: Check> Accepts<C> for Itself {
     fn faults(&self, key: &str, found: &C) -> Vec<OutOfRange> {
-        found.faults().into_iter().map(|fault| fault.below(key)).collect()
+        found
+            .faults()
+            .into_iter()
+            .map(|fault| fault.below(key))
+            .collect()
     }
 }
 
@@ -179,8 +193,15 @@ fn in_words<N: Display>(range: &impl RangeBounds<N>) -> String {
 /// Adds what is wrong with several fields together, but for those fields that are out of their own range.
 #[doc(hidden)]
 pub fn add_together(faults: &mut Vec<OutOfRange>, together: impl IntoIterator<Item = OutOfRange>) {
-    let known: Vec<String> = faults.iter().map(|fault| fault.key.clone()).collect();
-    faults.extend(together.into_iter().filter(|late| !known.contains(&late.key)));
+    let known: Vec<String> = faults
+        .iter()
+        .map(|fault| fault.key.clone())
+        .collect();
+    faults.extend(
+        together
+            .into_iter()
+            .filter(|late| !known.contains(&late.key)),
+    );
 }
 
 /// Declares a configuration: a struct with public fields, each `name: type = default, in accepted;`.
@@ -354,7 +375,11 @@ mod tests {
             inner: vec![Inner { limit: 0.0 }],
             ..Outer::default()
         };
-        let keys: Vec<String> = outer.faults().into_iter().map(|fault| fault.key).collect();
+        let keys: Vec<String> = outer
+            .faults()
+            .into_iter()
+            .map(|fault| fault.key)
+            .collect();
         assert_eq!(keys, ["part", "sizes[0]", "sizes[2]", "inner[0].limit", "sizes"]);
     }
 }

@@ -54,9 +54,15 @@ pub fn collapse_leaves(tree: &Bvh, constants: &SahConstants) -> Bvh {
             Node::leaf(node.aabb, first as u32, (collapsed.prim_ids.len() - first) as u32)
         } else {
             let first = collapsed.nodes.len();
-            collapsed.nodes.extend_from_slice(&tree.nodes[node.children()]);
+            collapsed
+                .nodes
+                .extend_from_slice(&tree.nodes[node.children()]);
             // Reversed, so that the first child is popped first.
-            open.extend(node.children().zip(first..collapsed.nodes.len()).rev());
+            open.extend(
+                node.children()
+                    .zip(first..collapsed.nodes.len())
+                    .rev(),
+            );
             Node::inner(node.aabb, first as u32, node.children().len() as u32)
         };
     }
@@ -87,7 +93,11 @@ pub(crate) fn binary(tree: &Bvh) -> Cow<'_, Bvh> {
 /// Returns the [`binary`] tree and updates `visits`, which has one number per node. A new node gets
 /// the sum of the visits of its parts, but at most the visits of the node that was divided.
 pub(crate) fn binary_visited<'t>(tree: &'t Bvh, visits: &mut Vec<f32>) -> Cow<'t, Bvh> {
-    if tree.nodes.iter().all(|node| node.is_leaf() || node.children().len() == 2) {
+    if tree
+        .nodes
+        .iter()
+        .all(|node| node.is_leaf() || node.children().len() == 2)
+    {
         return Cow::Borrowed(tree);
     }
     let root = tree.nodes[0];
@@ -107,8 +117,9 @@ pub(crate) fn binary_visited<'t>(tree: &'t Bvh, visits: &mut Vec<f32>) -> Cow<'t
             }
             [node] => (node.aabb, node.children()),
             several => {
-                let aabb =
-                    several.iter().fold(Aabb::EMPTY, |around, node| around.union(&node.aabb));
+                let aabb = several
+                    .iter()
+                    .fold(Aabb::EMPTY, |around, node| around.union(&node.aabb));
                 (aabb, siblings)
             }
         };
@@ -155,8 +166,10 @@ pub(crate) mod tests {
                 let first = tree.nodes.len() as u32;
                 let middle = start + 1 + (seed + node as u32) % (end - start - 1);
                 tree.nodes[node] = Node::inner(Aabb::EMPTY, first, 2);
-                tree.nodes.push(Node::leaf(Aabb::EMPTY, start, middle - start));
-                tree.nodes.push(Node::leaf(Aabb::EMPTY, middle, end - middle));
+                tree.nodes
+                    .push(Node::leaf(Aabb::EMPTY, start, middle - start));
+                tree.nodes
+                    .push(Node::leaf(Aabb::EMPTY, middle, end - middle));
             }
             node += 1;
         }

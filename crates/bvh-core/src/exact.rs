@@ -230,7 +230,9 @@ impl Volumes {
     fn new(ray: &Ray, triangle: &[Vec3; 3]) -> Option<Self> {
         let [a, b, c] = *triangle;
         let (origin, direction) = (ray.origin(), ray.direction());
-        let is_finite = [a, b, c, origin, direction].iter().all(|point| point.is_finite());
+        let is_finite = [a, b, c, origin, direction]
+            .iter()
+            .all(|point| point.is_finite());
         is_finite.then(|| Self {
             direction,
             corners: [a, b, c].map(|corner| difference(corner, origin)),
@@ -311,7 +313,9 @@ fn middle_above(number: f32) -> f64 {
 /// The largest size of a number.
 #[inline(always)]
 fn largest(numbers: &[f64]) -> f64 {
-    numbers.iter().fold(0.0, |most, number| larger(most, number.abs()))
+    numbers
+        .iter()
+        .fold(0.0, |most, number| larger(most, number.abs()))
 }
 
 /// The larger of two numbers, the second if one is NaN.

@@ -84,8 +84,16 @@ impl Instance {
         if part.root.is_none() {
             return Err(InvalidInstances::Empty(instance));
         }
-        let matrix = self.transform.matrix3.to_cols_array().map(f64::from);
-        let translation = self.transform.translation.to_array().map(f64::from);
+        let matrix = self
+            .transform
+            .matrix3
+            .to_cols_array()
+            .map(f64::from);
+        let translation = self
+            .transform
+            .translation
+            .to_array()
+            .map(f64::from);
         let transform = DAffine3::from_mat3_translation(
             DMat3::from_cols_array(&matrix),
             DVec3::from_array(translation),
@@ -118,7 +126,9 @@ impl Instance {
 /// Prepares all instances for rays.
 fn place_all(instances: &[Instance], parts: &[WideBvh]) -> Result<Vec<Placed>, InvalidInstances> {
     let numbered = instances.iter().enumerate();
-    numbered.map(|(index, instance)| instance.place(index, parts)).collect()
+    numbered
+        .map(|(index, instance)| instance.place(index, parts))
+        .collect()
 }
 
 /// An instance that is prepared for rays.
@@ -134,8 +144,14 @@ impl Placed {
     /// direction vanish or overflow.
     #[inline(always)]
     fn local(&self, ray: &Ray, t_max: f32) -> Option<Ray> {
-        let origin = self.to_local.transform_point3(ray.origin().as_dvec3()).as_vec3();
-        let direction = self.to_local.transform_vector3(ray.direction().as_dvec3()).as_vec3();
+        let origin = self
+            .to_local
+            .transform_point3(ray.origin().as_dvec3())
+            .as_vec3();
+        let direction = self
+            .to_local
+            .transform_vector3(ray.direction().as_dvec3())
+            .as_vec3();
         Ray::new(origin, direction, ray.t_min(), t_max).ok()
     }
 }

@@ -81,8 +81,12 @@ impl<'a> EndPointOverlap<'a> {
     pub fn new(tree: &'a Bvh, triangles: &'a [Triangle], constants: &SahConstants) -> Self {
         let mut below = alloc::vec![0..0; tree.nodes.len()];
         let mut positions = Vec::with_capacity(tree.prim_ids.len());
-        let mut stack: Vec<(usize, bool)> =
-            tree.nodes.first().map(|_| (0, false)).into_iter().collect();
+        let mut stack: Vec<(usize, bool)> = tree
+            .nodes
+            .first()
+            .map(|_| (0, false))
+            .into_iter()
+            .collect();
         while let Some((at, children_done)) = stack.pop() {
             let node = &tree.nodes[at];
             if children_done {
@@ -99,7 +103,10 @@ impl<'a> EndPointOverlap<'a> {
         positions.sort_unstable();
         let mut objects: Vec<(u32, Range<u32>)> = Vec::with_capacity(triangles.len());
         for (at, &(object, _)) in (0..).zip(&positions) {
-            match objects.last_mut().filter(|(last, _)| *last == object) {
+            match objects
+                .last_mut()
+                .filter(|(last, _)| *last == object)
+            {
                 Some((_, range)) => range.end = at + 1,
                 None => objects.push((object, at..at + 1)),
             }
@@ -144,8 +151,9 @@ impl<'a> EndPointOverlap<'a> {
         open.push(0);
         while let Some(index) = open.pop() {
             let node = &self.tree.nodes[index];
-            let is_above =
-                positions.iter().any(|(_, position)| self.below[index].contains(position));
+            let is_above = positions
+                .iter()
+                .any(|(_, position)| self.below[index].contains(position));
             if !is_above {
                 let inside = polygon.area_inside(&node.aabb, &aabb, area);
                 if inside == 0.0 {
@@ -184,8 +192,9 @@ impl Polygon {
     /// The area, whole, not half.
     fn area(&self) -> f64 {
         let fan = self.corners[..self.len].windows(2).skip(1);
-        let doubled: DVec3 =
-            fan.map(|pair| (pair[0] - self.corners[0]).cross(pair[1] - self.corners[0])).sum();
+        let doubled: DVec3 = fan
+            .map(|pair| (pair[0] - self.corners[0]).cross(pair[1] - self.corners[0]))
+            .sum();
         libm::sqrt(doubled.length_squared()) / 2.0
     }
 
@@ -196,11 +205,19 @@ impl Polygon {
         for axis in 0..3 {
             if own.min[axis] < aabb.min[axis] {
                 let min = f64::from(aabb.min[axis]);
-                part = Some(part.as_ref().unwrap_or(self).cut(|p| p[axis] - min));
+                part = Some(
+                    part.as_ref()
+                        .unwrap_or(self)
+                        .cut(|p| p[axis] - min),
+                );
             }
             if own.max[axis] > aabb.max[axis] {
                 let max = f64::from(aabb.max[axis]);
-                part = Some(part.as_ref().unwrap_or(self).cut(|p| max - p[axis]));
+                part = Some(
+                    part.as_ref()
+                        .unwrap_or(self)
+                        .cut(|p| max - p[axis]),
+                );
             }
         }
         part.map_or(area, |part| part.area())

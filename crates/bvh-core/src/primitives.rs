@@ -93,5 +93,8 @@ impl Primitives {
 }
 
 fn select<T: Copy>(objects: &[T], indices: &[usize]) -> Vec<T> {
-    indices.iter().map(|&index| objects[index]).collect()
+    indices
+        .iter()
+        .map(|&index| objects[index])
+        .collect()
 }

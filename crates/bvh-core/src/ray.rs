@@ -79,7 +79,9 @@ impl Ray {
         t_max: f32,
     ) -> Self {
         let (origin, direction) = (origin.into(), direction.into());
-        let inverse = (1.0 / direction.extend(1.0)).max(Vec4::MIN).min(Vec4::MAX);
+        let inverse = (1.0 / direction.extend(1.0))
+            .max(Vec4::MIN)
+            .min(Vec4::MAX);
         let sizes = inverse.abs();
         let least = sizes.x.min(sizes.y).min(sizes.z);
         // A zero is +0, so that no kernel hands out another one.

@@ -84,7 +84,9 @@ impl Slabs {
 #[inline(always)]
 pub(crate) fn margin(ray: &Ray, bounds: &Aabb) -> Vec3 {
     let origin = ray.origin();
-    let reach = (bounds.min - origin).abs().max((bounds.max - origin).abs());
+    let reach = (bounds.min - origin)
+        .abs()
+        .max((bounds.max - origin).abs());
     // The second term covers the rounding of the sum with the origin, the third is for an origin and a reach of zero.
     reach.max_element() * Slabs::MARGIN + origin.abs() * f32::EPSILON + f32::MIN_POSITIVE
 }

@@ -106,8 +106,9 @@ impl Triangle {
     /// the plane.
     pub fn barycentrics(&self, ray: &Ray) -> Option<[f64; 3]> {
         let shear = Shear::new(ray);
-        let [[ax, ay, _], [bx, by, _], [cx, cy, _]] =
-            self.0.map(|corner| shear.apply(&corner).map(f64::from));
+        let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = self
+            .0
+            .map(|corner| shear.apply(&corner).map(f64::from));
         let weights = [cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax];
         let sum: f64 = weights.iter().sum();
         (sum != 0.0).then(|| weights.map(|weight| weight / sum))
@@ -119,7 +120,10 @@ impl Triangle {
         let [a, b, c] = self.0.map(Vec3::as_dvec3);
         // Edges of length about one: their product neither overflows nor vanishes.
         let scale = (b - a).abs().max((c - a).abs()).max_element();
-        ((b - a) / scale).cross((c - a) / scale).try_normalize().map(|normal| normal.as_vec3())
+        ((b - a) / scale)
+            .cross((c - a) / scale)
+            .try_normalize()
+            .map(|normal| normal.as_vec3())
     }
 
     /// Whether the corners coincide or are collinear: such a triangle is never hit. Exact as long as the differences

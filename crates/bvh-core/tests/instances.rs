@@ -53,7 +53,9 @@ impl Scene {
             let moved = DAffine3::from_mat3_translation(matrix, shift);
             for (id, triangle) in (0..).zip(&self.triangles[*part as usize]) {
                 flat.push(Triangle(
-                    triangle.0.map(|p| moved.transform_point3(p.as_dvec3()).as_vec3()),
+                    triangle
+                        .0
+                        .map(|p| moved.transform_point3(p.as_dvec3()).as_vec3()),
                 ));
                 names.push((instance, id));
             }
@@ -123,7 +125,13 @@ fn turned_scaled_and_sheared_instances_answer_as_the_flat_scene() {
                 differences += usize::from(error > 1e-5);
                 let local = scenes[0].local_ray(found.instance, &ray).unwrap();
                 let part = scene.instances[found.instance as usize].part as usize;
-                assert_eq!(scene.parts[part].nearest_hit(&local).unwrap().object, found.triangle);
+                assert_eq!(
+                    scene.parts[part]
+                        .nearest_hit(&local)
+                        .unwrap()
+                        .object,
+                    found.triangle
+                );
             }
             (found, expected) => differences += usize::from(found.is_some() != expected.is_some()),
         }

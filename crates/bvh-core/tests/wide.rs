@@ -14,10 +14,17 @@ use support::{
 /// The layouts of several trees over the triangles, for every kernel that this processor has.
 fn layouts(triangles: &[Triangle], random: &mut Random) -> Vec<(Kernel, WideBvh)> {
     let boxes = boxes(triangles);
-    let mut trees: Vec<_> = SHAPES.iter().map(|&shape| tree(&boxes, shape, random)).collect();
+    let mut trees: Vec<_> = SHAPES
+        .iter()
+        .map(|&shape| tree(&boxes, shape, random))
+        .collect();
     trees.push(collapse_leaves(&trees[0], &SahConstants::default()));
-    let layouts = trees.iter().map(|tree| WideBvh::new(tree, triangles).unwrap());
-    let kernels = Kernel::ALL.into_iter().filter(|kernel| kernel.is_available());
+    let layouts = trees
+        .iter()
+        .map(|tree| WideBvh::new(tree, triangles).unwrap());
+    let kernels = Kernel::ALL
+        .into_iter()
+        .filter(|kernel| kernel.is_available());
     let of_kernel = |wide: WideBvh| {
         kernels
             .clone()
@@ -29,7 +36,10 @@ fn layouts(triangles: &[Triangle], random: &mut Random) -> Vec<(Kernel, WideBvh)
 
 /// Checks all rays by all layouts: one by one, and in a batch. The number of rays that hit.
 fn check(name: &str, triangles: &[Triangle], layouts: &[(Kernel, WideBvh)], rays: &[Ray]) -> usize {
-    let expected: Vec<Option<Hit>> = rays.iter().map(|ray| brute_force(triangles, ray)).collect();
+    let expected: Vec<Option<Hit>> = rays
+        .iter()
+        .map(|ray| brute_force(triangles, ray))
+        .collect();
     for (kernel, wide) in layouts {
         for (ray, &expected) in rays.iter().zip(&expected) {
             let case = format!("{name}, {kernel:?}, {ray:?}");
@@ -121,10 +131,15 @@ fn batches_of_any_length_answer_as_their_rays_do() {
                     (vec![Hit::MISS; batch.len()], vec![false; batch.len()]);
                 wide.nearest_hits(&batch, &mut nearest, coherence);
                 wide.any_hits(&batch, &mut any, coherence);
-                let alone: Vec<Hit> =
-                    batch.iter().map(|ray| wide.nearest_hit(ray).unwrap_or(Hit::MISS)).collect();
+                let alone: Vec<Hit> = batch
+                    .iter()
+                    .map(|ray| wide.nearest_hit(ray).unwrap_or(Hit::MISS))
+                    .collect();
                 assert_eq!(nearest, alone, "{kernel:?}, {coherence:?}, {count}");
-                let alone: Vec<bool> = batch.iter().map(|ray| wide.any_hit(ray)).collect();
+                let alone: Vec<bool> = batch
+                    .iter()
+                    .map(|ray| wide.any_hit(ray))
+                    .collect();
                 assert_eq!(any, alone, "{kernel:?}, {coherence:?}, {count}");
             }
         }
@@ -244,8 +259,9 @@ fn a_filter_passes_over_hits_and_sees_all_of_them_if_it_accepts_none() {
         };
         let all: Vec<Hit> = (0..150).filter_map(hit).collect();
         let kept = all.iter().filter(|hit| hit.object % 3 > 0);
-        let nearest =
-            kept.min_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object))).copied();
+        let nearest = kept
+            .min_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object)))
+            .copied();
         for (_, layout) in &layouts {
             assert_eq!(layout.nearest_hit_where(&ray, |hit| hit.object % 3 > 0), nearest);
             assert_eq!(layout.any_hit_where(&ray, |hit| hit.object % 3 > 0), nearest.is_some());
@@ -308,11 +324,14 @@ fn triangles_without_area_are_left_out_and_never_hit() {
     let mut random = Random(4);
     let flat = |p: Vec3, q: Vec3| Triangle([p, q, (p + q) * 0.5]);
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE];
-    let mut triangles: Vec<Triangle> =
-        corners.iter().flat_map(|&p| corners.iter().map(move |&q| flat(p, q))).collect();
+    let mut triangles: Vec<Triangle> = corners
+        .iter()
+        .flat_map(|&p| corners.iter().map(move |&q| flat(p, q)))
+        .collect();
     let empty = layouts(&triangles, &mut random);
     assert!(empty.iter().all(|(_, wide)| {
-        wide.nearest_hit(&Ray::half_line(-Vec3::ONE, Vec3::ONE).unwrap()).is_none()
+        wide.nearest_hit(&Ray::half_line(-Vec3::ONE, Vec3::ONE).unwrap())
+            .is_none()
     }));
     triangles.push(Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]));
     let layouts = layouts(&triangles, &mut random);

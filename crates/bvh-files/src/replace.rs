@@ -33,7 +33,11 @@ const UNFINISHED: &str = ".unfinished";
 
 /// Removes the unfinished files of writers that were killed: those that nobody has locked.
 fn remove_leftovers(folder: &Path, prefix: &str) {
-    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+    for entry in fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .flatten()
+    {
         let name = entry.file_name().to_string_lossy().into_owned();
         let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
         if !(is_file && name.starts_with(prefix) && name.ends_with(UNFINISHED)) {
@@ -81,14 +85,18 @@ impl Reserved {
     pub fn new(path: &Path, bytes: usize) -> Result<Self, WriteError> {
         // A link stays, and its target is replaced.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        let name = path.file_name().filter(|_| path.is_file() || !path.exists());
+        let name = path
+            .file_name()
+            .filter(|_| path.is_file() || !path.exists());
         let Some(name) = name else {
             return Err(WriteError::of(&path, "replace the file")(io::Error::other(
                 "not a regular file",
             )));
         };
-        let folder =
-            path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = path
+            .parent()
+            .filter(|parent| !parent.as_os_str().is_empty())
+            .unwrap_or(Path::new("."));
         let prefix = format!("{}.", name.to_string_lossy());
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(UNFINISHED);
@@ -147,7 +155,10 @@ mod tests {
         assert_eq!((fs::read(&path).unwrap(), names()), (b"old".to_vec(), 2));
         drop(reserved);
         assert_eq!((fs::read(&path).unwrap(), names()), (b"old".to_vec(), 1));
-        Reserved::new(&path, 1000).unwrap().write(b"new").unwrap();
+        Reserved::new(&path, 1000)
+            .unwrap()
+            .write(b"new")
+            .unwrap();
         assert_eq!((fs::read(&path).unwrap(), names()), (b"new".to_vec(), 1));
     }
 
@@ -160,7 +171,12 @@ mod tests {
             fs::write(folder.path().join(name), "").unwrap();
         }
         write(&path, b"first").unwrap();
-        assert!(!folder.path().join("x.bvh.abc.unfinished").exists());
+        assert!(
+            !folder
+                .path()
+                .join("x.bvh.abc.unfinished")
+                .exists()
+        );
         reserved.write(b"second").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"second");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
@@ -169,8 +185,12 @@ mod tests {
     #[test]
     fn a_file_that_another_writer_removes_before_it_is_locked_is_created_anew() {
         let folder = tempfile::tempdir().unwrap();
-        let create =
-            || tempfile::Builder::new().prefix("x.").suffix(UNFINISHED).tempfile_in(folder.path());
+        let create = || {
+            tempfile::Builder::new()
+                .prefix("x.")
+                .suffix(UNFINISHED)
+                .tempfile_in(folder.path())
+        };
         let mut times = 0;
         let file = create_locked(|| {
             times += 1;
@@ -204,9 +224,13 @@ mod tests {
         let write_often =
             |writer: usize| (0..TIMES).try_for_each(|_| write(path, &[writer as u8; 100]));
         let results: Vec<Result<(), WriteError>> = std::thread::scope(|scope| {
-            let threads: Vec<_> =
-                (0..WRITERS).map(|writer| scope.spawn(move || write_often(writer))).collect();
-            threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+            let threads: Vec<_> = (0..WRITERS)
+                .map(|writer| scope.spawn(move || write_often(writer)))
+                .collect();
+            threads
+                .into_iter()
+                .map(|thread| thread.join().unwrap())
+                .collect()
         });
         assert!(results.iter().all(Result::is_ok), "{results:?}");
         let bytes = fs::read(path).unwrap();

@@ -37,13 +37,18 @@ pub fn read(path: &Path) -> Result<Vec<u8>, TreeFileError> {
     let failed = |source| ReadError::Failed { path: path.to_owned(), source };
     let mut file = File::open(path).map_err(failed)?;
     let mut bytes = Vec::new();
-    file.by_ref().take(Header::BYTES as u64).read_to_end(&mut bytes).map_err(failed)?;
+    file.by_ref()
+        .take(Header::BYTES as u64)
+        .read_to_end(&mut bytes)
+        .map_err(failed)?;
     Header::of_file(&bytes, length).map_err(TreeFileError::of(path))?;
     let rest = length.saturating_sub(bytes.len() as u64);
     bytes
         .try_reserve_exact(rest as usize)
         .map_err(|_| failed(io::ErrorKind::OutOfMemory.into()))?;
-    file.take(rest).read_to_end(&mut bytes).map_err(failed)?;
+    file.take(rest)
+        .read_to_end(&mut bytes)
+        .map_err(failed)?;
     Ok(bytes)
 }
 
@@ -86,7 +91,12 @@ mod tests {
             (tree(), FileError::Length { found: length, expected: tree().len() as u64 }),
         ] {
             fs::write(&path, beginning).unwrap();
-            File::options().write(true).open(&path).unwrap().set_len(length).unwrap();
+            File::options()
+                .write(true)
+                .open(&path)
+                .unwrap()
+                .set_len(length)
+                .unwrap();
             let refused = read(&path);
             assert!(
                 matches!(&refused, Err(TreeFileError::Invalid { source, .. }) if *source == expected),

@@ -27,14 +27,22 @@ fn floats<'py>(
     let numpy = py.import("numpy")?;
     let no_array =
         |error: PyErr| refused(format!("{name}: {}; accepted: {accepted}", error.value(py)));
-    let given = numpy.call_method1("asanyarray", (argument,)).map_err(no_array)?;
+    let given = numpy
+        .call_method1("asanyarray", (argument,))
+        .map_err(no_array)?;
     check_elements(name, &numpy, &given)?;
-    let array = numpy.call_method("asarray", (given,), Some(&how)).map_err(no_array)?;
+    let array = numpy
+        .call_method("asarray", (given,), Some(&how))
+        .map_err(no_array)?;
     let array: PyReadonlyArrayDyn<f32> = array.extract()?;
     if accepts(array.shape()) {
         return Ok(array);
     }
-    let sizes: Vec<String> = array.shape().iter().map(usize::to_string).collect();
+    let sizes: Vec<String> = array
+        .shape()
+        .iter()
+        .map(usize::to_string)
+        .collect();
     Err(refused(format!("{name} has shape ({}); accepted: {accepted}", sizes.join(", "))))
 }
 
@@ -46,7 +54,11 @@ fn check_elements(name: &str, numpy: &Bound<PyModule>, array: &Bound<PyAny>) -> 
     if !REAL_NUMBERS.contains(&kind) {
         return Err(refused(format!("{name} has dtype {}; accepted: real numbers", dtype.str()?)));
     }
-    if numpy.getattr("ma")?.call_method1("is_masked", (array,))?.is_truthy()? {
+    if numpy
+        .getattr("ma")?
+        .call_method1("is_masked", (array,))?
+        .is_truthy()?
+    {
         return Err(refused(format!("{name} has masked elements; accepted: none")));
     }
     Ok(())

@@ -43,11 +43,17 @@ impl Tracer {
         let rays = rays(origins, directions, t_min, t_max)?;
         let (t, object) = py.detach(|| {
             let mut hits = vec![Hit::MISS; rays.len()];
-            let batches = rays.par_chunks(BATCH).zip(hits.par_chunks_mut(BATCH));
-            batches
-                .for_each(|(rays, hits)| self.wide.nearest_hits(rays, hits, coherence(coherent)));
+            let batches = rays
+                .par_chunks(BATCH)
+                .zip(hits.par_chunks_mut(BATCH));
+            batches.for_each(|(rays, hits)| {
+                self.wide
+                    .nearest_hits(rays, hits, coherence(coherent))
+            });
             // The number of no object becomes −1.
-            hits.iter().map(|hit| (hit.t, hit.object as i32)).unzip::<_, _, Vec<_>, Vec<_>>()
+            hits.iter()
+                .map(|hit| (hit.t, hit.object as i32))
+                .unzip::<_, _, Vec<_>, Vec<_>>()
         });
         Ok((t.into_pyarray(py), object.into_pyarray(py)))
     }
@@ -66,8 +72,13 @@ impl Tracer {
         let rays = rays(origins, directions, t_min, t_max)?;
         let hits = py.detach(|| {
             let mut hits = vec![false; rays.len()];
-            let batches = rays.par_chunks(BATCH).zip(hits.par_chunks_mut(BATCH));
-            batches.for_each(|(rays, hits)| self.wide.any_hits(rays, hits, coherence(coherent)));
+            let batches = rays
+                .par_chunks(BATCH)
+                .zip(hits.par_chunks_mut(BATCH));
+            batches.for_each(|(rays, hits)| {
+                self.wide
+                    .any_hits(rays, hits, coherence(coherent))
+            });
             hits
         });
         Ok(hits.into_pyarray(py))

@@ -30,7 +30,9 @@ impl Tree {
 
     /// The tree as it is now. After a panic it is as before: it is replaced whole.
     pub fn owned(&self) -> RwLockReadGuard<'_, OwnedTree> {
-        self.owned.read().unwrap_or_else(PoisonError::into_inner)
+        self.owned
+            .read()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -70,7 +72,9 @@ impl Tree {
             }
         };
         let bytes = tree_file::read(&path).map_err(unread)?;
-        OwnedTree::load(objects, &bytes).map(Self::new).map_err(|error| at("path", error))
+        OwnedTree::load(objects, &bytes)
+            .map(Self::new)
+            .map_err(|error| at("path", error))
     }
 
     /// Writes the tree to a file. One that is there is replaced when the new one is complete: after a failure it is the old one.
@@ -91,7 +95,10 @@ impl Tree {
         let (improvement, raised) =
             searched(py, seconds, |observer| self.owned().improvement(observer))?;
         let improvement = improvement.map_err(refused)?;
-        self.owned.write().unwrap_or_else(PoisonError::into_inner).apply(improvement);
+        self.owned
+            .write()
+            .unwrap_or_else(PoisonError::into_inner)
+            .apply(improvement);
         raised
     }
 
@@ -118,8 +125,12 @@ impl Tree {
         let words: Vec<u32> = bytemuck::cast_slice(&self.owned().tree().to_first_count()).to_vec();
         let (point, number) = ("3f4", "u4");
         let fields = [("min", point), ("first", number), ("max", point), ("count", number)];
-        let kind = py.import("numpy")?.call_method1("dtype", (fields.to_vec(),))?;
-        words.into_pyarray(py).call_method1("view", (kind,))
+        let kind = py
+            .import("numpy")?
+            .call_method1("dtype", (fields.to_vec(),))?;
+        words
+            .into_pyarray(py)
+            .call_method1("view", (kind,))
     }
 
     /// The object ids that leaves name by position.
@@ -152,7 +163,9 @@ fn found(
     let (found, raised) =
         searched(py, seconds, |observer| OwnedTree::find(objects, references, observer))?;
     raised?;
-    found.map(Tree::new).map_err(|error| at(name, error))
+    found
+        .map(Tree::new)
+        .map_err(|error| at(name, error))
 }
 
 /// What is wrong with an argument.

@@ -101,14 +101,20 @@ impl Scene {
     }
 
     fn load_whole(name: &str, outside: OutsideFiles) -> Result<Self, SceneError> {
-        if let Some(stand_in) = stand_ins::STAND_INS.iter().find(|scene| scene.name == name) {
+        if let Some(stand_in) = stand_ins::STAND_INS
+            .iter()
+            .find(|scene| scene.name == name)
+        {
             return Ok(Self::new(
                 name,
                 SceneKind::StandIn,
                 Primitives::Triangles((stand_in.triangles)()),
             ));
         }
-        if let Some(&(_, count)) = SPHERES.iter().find(|(spheres, _)| *spheres == name) {
+        if let Some(&(_, count)) = SPHERES
+            .iter()
+            .find(|(spheres, _)| *spheres == name)
+        {
             return Ok(Self::new(
                 name,
                 SceneKind::Procedural,
@@ -133,7 +139,9 @@ impl Scene {
         let stem = path
             .file_stem()
             .map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
-        let remark = mesh.remark().map(|remark| format!("scene {stem}: {remark}"));
+        let remark = mesh
+            .remark()
+            .map(|remark| format!("scene {stem}: {remark}"));
         Ok(Self {
             remark,
             ..Self::new(&stem, SceneKind::File, Primitives::Triangles(mesh.triangles))
@@ -164,7 +172,9 @@ impl Scene {
             let message = format!("a subset has 1 to {all} of this scene's objects");
             return Err(SceneError { name, message });
         }
-        let primitives = self.primitives.select(&subset.choose(&self.boxes));
+        let primitives = self
+            .primitives
+            .select(&subset.choose(&self.boxes));
         Ok(Self { remark: self.remark, ..Self::new(&name, self.kind, primitives) })
     }
 
@@ -186,8 +196,12 @@ impl Scene {
 
     /// A hash of all boxes, by which results tell whether they belong to this very scene.
     pub fn checksum(&self) -> u64 {
-        let coordinates =
-            self.boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
+        let coordinates = self.boxes.iter().flat_map(|b| {
+            b.min
+                .to_array()
+                .into_iter()
+                .chain(b.max.to_array())
+        });
         fnv1a(coordinates.flat_map(f32::to_le_bytes))
     }
 }
@@ -204,8 +218,12 @@ pub fn fetched_path(name: &str) -> Option<PathBuf> {
 
 /// The names that are accepted, as a part of an error message.
 fn known_scenes() -> String {
-    let names = stand_ins::STAND_INS.iter().map(|scene| scene.name);
-    let names = names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name));
+    let names = stand_ins::STAND_INS
+        .iter()
+        .map(|scene| scene.name);
+    let names = names
+        .chain(SPHERES.map(|(name, _)| name))
+        .chain(FETCHED.map(|(name, _)| name));
     format!(
         "accepted: {}, the path of an OBJ, PLY, STL or glTF file, a case of the suite with a number of objects such as S34:20000, or \
          either of the others with `:COUNT`, `:random:COUNT:SEED` or `:cluster:COUNT:SEED` for a subset",
@@ -232,7 +250,13 @@ mod tests {
         assert_eq!((scene.name.as_str(), scene.boxes.len()), ("spheres75:30", 30));
         assert!((1..30).all(|i| scene.boxes[i] != scene.boxes[i - 1]));
         for wrong in ["spheres75:0", "spheres75:76"] {
-            assert!(Scene::load(wrong).unwrap_err().to_string().contains("1 to 75"), "{wrong}");
+            assert!(
+                Scene::load(wrong)
+                    .unwrap_err()
+                    .to_string()
+                    .contains("1 to 75"),
+                "{wrong}"
+            );
         }
     }
 

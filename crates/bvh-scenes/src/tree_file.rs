@@ -14,7 +14,9 @@ use std::path::Path;
 /// [valid](validate_references) over these objects.
 pub fn load(path: &Path, scene: &Scene) -> Result<(Bvh, Header), TreeFileError> {
     let bytes = read(path)?;
-    let file = open(path, &bytes)?.for_boxes(&scene.boxes).map_err(TreeFileError::of(path))?;
+    let file = open(path, &bytes)?
+        .for_boxes(&scene.boxes)
+        .map_err(TreeFileError::of(path))?;
     let tree = file.tree().map_err(TreeFileError::of(path))?;
     let header = file.header().clone();
     validate_references(&tree, &scene.boxes, &scene.primitives)

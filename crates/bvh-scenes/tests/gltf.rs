@@ -13,7 +13,11 @@ use std::path::Path;
 const CORNERS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
 fn corner_bytes() -> Vec<u8> {
-    CORNERS.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect()
+    CORNERS
+        .as_flattened()
+        .iter()
+        .flat_map(|x| x.to_le_bytes())
+        .collect()
 }
 
 fn triangle() -> Mesh {
@@ -79,9 +83,13 @@ fn a_buffer_without_uri_is_the_binary_chunk_only_if_it_is_the_first() {
         glb(json, &corner_bytes())
     };
     assert_eq!(parse(&bytes(0), Path::new("a.glb")).unwrap(), triangle());
-    let message = parse(&bytes(1), Path::new("a.glb")).unwrap_err().to_string();
+    let message = parse(&bytes(1), Path::new("a.glb"))
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("buffers[1]: no URI"), "{message}");
-    let message = parse(&bytes(2), Path::new("a.glb")).unwrap_err().to_string();
+    let message = parse(&bytes(2), Path::new("a.glb"))
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("no buffers[2]"), "{message}");
 }
 
@@ -90,8 +98,9 @@ fn extras_of_any_kind_are_passed_over_wherever_they_are() {
     let text = json(CHUNK, "");
     // Attributes are names of accessors, nothing else.
     let places = text.match_indices('{').map(|(place, _)| place);
-    let places: Vec<usize> =
-        places.filter(|&place| !text[place..].starts_with(r#"{"POSITION"#)).collect();
+    let places: Vec<usize> = places
+        .filter(|&place| !text[place..].starts_with(r#"{"POSITION"#))
+        .collect();
     for extras in [r#""a text""#, "5", "-1.5e300", "true", "null", "[1, {}]", r#"{"a": [null]}"#] {
         for &place in &places {
             let mut text = text.clone();
@@ -124,7 +133,12 @@ fn a_buffer_outside_the_folder_of_the_scene_is_refused_unless_it_is_allowed() {
     let file = outside.path().join("outside.bin");
     fs::write(&file, corner_bytes()).unwrap();
     let absolute = file.to_str().unwrap();
-    let folder_name = outside.path().file_name().unwrap().to_str().unwrap();
+    let folder_name = outside
+        .path()
+        .file_name()
+        .unwrap()
+        .to_str()
+        .unwrap();
     for name in [
         absolute.to_owned(),
         format!("../{folder_name}/outside.bin"),
@@ -137,8 +151,13 @@ fn a_buffer_outside_the_folder_of_the_scene_is_refused_unless_it_is_allowed() {
         assert_outside(folder.path());
     }
     // A file that is not there is not told from one that is.
-    let message =
-        load(&folder("../no_such_file").path().join("scene.gltf")).unwrap_err().to_string();
+    let message = load(
+        &folder("../no_such_file")
+            .path()
+            .join("scene.gltf"),
+    )
+    .unwrap_err()
+    .to_string();
     assert!(message.contains("`../no_such_file` is outside"), "{message}");
     #[cfg(unix)]
     {

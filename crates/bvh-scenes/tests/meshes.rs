@@ -20,7 +20,10 @@ fn square() -> Vec<Triangle> {
 }
 
 fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
-    values.into_iter().flat_map(f32::to_le_bytes).collect()
+    values
+        .into_iter()
+        .flat_map(f32::to_le_bytes)
+        .collect()
 }
 
 fn ply_text() -> Vec<u8> {
@@ -28,7 +31,9 @@ fn ply_text() -> Vec<u8> {
                     property float z\nproperty uchar red\nelement face 1\nproperty list uchar int vertex_indices\n\
                     end_header\n"
         .to_string();
-    CORNERS.iter().for_each(|[x, y, z]| text += &format!("{x} {y} {z} 255\n"));
+    CORNERS
+        .iter()
+        .for_each(|[x, y, z]| text += &format!("{x} {y} {z} 255\n"));
     (text + "4 0 1 2 3\n").into_bytes()
 }
 
@@ -40,7 +45,12 @@ fn ply_binary(big: bool) -> Vec<u8> {
     )
     .into_bytes();
     let word = |x: u32| if big { x.to_be_bytes() } else { x.to_le_bytes() };
-    bytes.extend(CORNERS.as_flattened().iter().flat_map(|x| word(x.to_bits())));
+    bytes.extend(
+        CORNERS
+            .as_flattened()
+            .iter()
+            .flat_map(|x| word(x.to_bits())),
+    );
     for face in FACES {
         bytes.push(3);
         bytes.extend(face.into_iter().flat_map(word));
@@ -53,7 +63,10 @@ fn stl_text() -> Vec<u8> {
     // Two solids, of which the second has no name.
     for (solid, triangle) in ["solid a square", "solid"].iter().zip(square()) {
         text += &format!("{solid}\r\n facet normal 0 0 1\r\n  outer loop\r\n");
-        triangle.0.iter().for_each(|p| text += &format!("   vertex {} {:e} {}\r\n", p.x, p.y, p.z));
+        triangle
+            .0
+            .iter()
+            .for_each(|p| text += &format!("   vertex {} {:e} {}\r\n", p.x, p.y, p.z));
         text += "  endloop\r\n endfacet\r\nendsolid\r\n";
     }
     text.into_bytes()
@@ -88,8 +101,14 @@ fn gltf_json(uri: &str, nodes: &str, primitive: &str) -> String {
 const INDEXED: &str = r#", "indices": 1"#;
 
 fn buffer() -> Vec<u8> {
-    let indices = FACES.as_flattened().iter().flat_map(|&index| (index as u16).to_le_bytes());
-    floats(CORNERS.as_flattened().iter().copied()).into_iter().chain(indices).collect()
+    let indices = FACES
+        .as_flattened()
+        .iter()
+        .flat_map(|&index| (index as u16).to_le_bytes());
+    floats(CORNERS.as_flattened().iter().copied())
+        .into_iter()
+        .chain(indices)
+        .collect()
 }
 
 fn data_uri() -> String {
@@ -123,12 +142,17 @@ fn samples() -> [(&'static str, Format, Vec<u8>); 8] {
 }
 
 fn refusal(bytes: impl AsRef<[u8]>, name: &str) -> String {
-    parse(bytes.as_ref(), Path::new(name)).unwrap_err().to_string()
+    parse(bytes.as_ref(), Path::new(name))
+        .unwrap_err()
+        .to_string()
 }
 
 /// The bytes with one text in place of another.
 fn with(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
-    let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).expect(from);
+    let at = bytes
+        .windows(from.len())
+        .position(|window| window == from.as_bytes())
+        .expect(from);
     [&bytes[..at], to.as_bytes(), &bytes[at + from.len()..]].concat()
 }
 
@@ -194,7 +218,10 @@ fn nodes_move_their_meshes_and_what_hangs_on_them() {
         {"mesh": 0, "matrix": [0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1]}"#;
     let mesh = parse(&gltf(nodes, INDEXED), Path::new("a.gltf")).unwrap();
     let moved = |by: &dyn Fn(Vec3) -> Vec3| {
-        square().into_iter().map(|t| Triangle(t.0.map(by))).collect::<Vec<_>>()
+        square()
+            .into_iter()
+            .map(|t| Triangle(t.0.map(by)))
+            .collect::<Vec<_>>()
     };
     let scaled = moved(&|p| p * 2.0 + Vec3::X * 10.0);
     let turned = moved(&|p| Vec3::new(10.0 - p.y, p.x, p.z + 5.0));
@@ -211,7 +238,12 @@ fn strips_fans_and_lists_without_indices_are_triangles_and_lines_are_not() {
     assert_eq!(triangles(r#", "mode": 5"#).unwrap(), of([[0, 1, 2], [1, 3, 2]]));
     assert_eq!(triangles(r#", "mode": 6"#).unwrap(), of([[0, 1, 2], [0, 2, 3]]));
     assert_eq!(triangles(r#", "mode": 4"#).unwrap(), of([[0, 1, 2]; 2])[..1]);
-    assert!(triangles(r#", "mode": 1"#).unwrap_err().to_string().contains("no triangle"));
+    assert!(
+        triangles(r#", "mode": 1"#)
+            .unwrap_err()
+            .to_string()
+            .contains("no triangle")
+    );
 }
 
 #[test]
@@ -227,7 +259,12 @@ fn buffers_are_files_beside_the_one_that_names_them() {
     std::fs::write(folder.path().join("my buffer.bin"), buffer()).unwrap();
     assert_eq!(load(&path).unwrap().triangles, square());
     std::fs::write(folder.path().join("my buffer.bin"), &buffer()[..50]).unwrap();
-    assert!(load(&path).unwrap_err().to_string().contains("buffers[0]: 50 bytes; expected 60"));
+    assert!(
+        load(&path)
+            .unwrap_err()
+            .to_string()
+            .contains("buffers[0]: 50 bytes; expected 60")
+    );
     let remote =
         refusal(gltf_json("http://example.org/a.bin", r#"{"mesh": 0}"#, INDEXED), "a.gltf");
     assert!(remote.contains("a file beside this one"), "{remote}");
@@ -286,7 +323,9 @@ fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
     ];
     for (bytes, name, parts) in cases {
         let message = refusal(bytes, name);
-        parts.iter().for_each(|part| assert!(message.contains(part), "{part}: {message}"));
+        parts
+            .iter()
+            .for_each(|part| assert!(message.contains(part), "{part}: {message}"));
         assert!(message.len() < 400 && !message.contains('\n'), "{message}");
     }
 }
@@ -343,7 +382,12 @@ fn cut_files_give_a_mesh_or_an_error() {
 fn check(bytes: &[u8], name: &str) {
     if let Ok(mesh) = parse(bytes, Path::new(name)) {
         assert!(!mesh.triangles.is_empty());
-        assert!(mesh.triangles.iter().flat_map(|t| t.0).all(|corner| corner.is_finite()));
+        assert!(
+            mesh.triangles
+                .iter()
+                .flat_map(|t| t.0)
+                .all(|corner| corner.is_finite())
+        );
     }
 }
 

@@ -19,7 +19,10 @@ fn sheet(time: f32) -> Vec<[f32; 3]> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let corners = |i: u32| [[i, i + 1, i + 65], [i + 66, i + 65, i + 1]];
-    let indices: Vec<[u32; 3]> = (0..64 * 65).filter(|i| i % 65 < 64).flat_map(corners).collect();
+    let indices: Vec<[u32; 3]> = (0..64 * 65)
+        .filter(|i| i % 65 < 64)
+        .flat_map(corners)
+        .collect();
     let mut triangles = Triangle::from_mesh(&sheet(0.3), &indices)?;
     let mut tree = bake(&boxes(&triangles), Duration::from_millis(200))?.tree;
     let mut wide = WideBvh::new(&tree, &triangles)?;

@@ -92,7 +92,9 @@ fn one_reference_per_leaf(tree: &Bvh, problem: &Problem) -> Bvh {
         }
         at += 1;
     }
-    let split = problem.splits.filter(|_| tree.prim_ids.len() > problem.boxes.len());
+    let split = problem
+        .splits
+        .filter(|_| tree.prim_ids.len() > problem.boxes.len());
     for at in (0..single.nodes.len()).rev() {
         let node = single.nodes[at];
         let below = single.nodes[node.children()].iter();
@@ -104,7 +106,9 @@ fn one_reference_per_leaf(tree: &Bvh, problem: &Problem) -> Bvh {
                 problem.boxes[single.prim_ids[first as usize] as usize]
             }
             (NodeKind::Leaf { first, .. }, Some(splits)) => {
-                let part = splits.objects.clip(single.prim_ids[first as usize], &node.aabb);
+                let part = splits
+                    .objects
+                    .clip(single.prim_ids[first as usize], &node.aabb);
                 // A reference to nothing does no harm.
                 if part == Aabb::EMPTY { node.aabb } else { part }
             }
@@ -139,6 +143,7 @@ impl From<'_> {
         seed: u64,
         run: &mut Run,
     ) -> Found {
-        self.config.improved((self.tree.clone(), None), metric, problem, seed, run)
+        self.config
+            .improved((self.tree.clone(), None), metric, problem, seed, run)
     }
 }

@@ -14,12 +14,17 @@ pub(crate) fn map_init<S, T: Send>(
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        (0..count).into_par_iter().map_init(init, task).collect()
+        (0..count)
+            .into_par_iter()
+            .map_init(init, task)
+            .collect()
     }
     #[cfg(not(feature = "rayon"))]
     {
         let mut state = init();
-        (0..count).map(|number| task(&mut state, number)).collect()
+        (0..count)
+            .map(|number| task(&mut state, number))
+            .collect()
     }
 }
 
@@ -28,7 +33,11 @@ pub(crate) fn map<T: Send>(count: usize, task: impl Fn(usize) -> T + Send + Sync
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        (0..count).into_par_iter().with_max_len(1).map(task).collect()
+        (0..count)
+            .into_par_iter()
+            .with_max_len(1)
+            .map(task)
+            .collect()
     }
     #[cfg(not(feature = "rayon"))]
     (0..count).map(task).collect()

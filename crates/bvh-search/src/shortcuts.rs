@@ -29,8 +29,13 @@ impl Facts {
         let sorted = Presorted::new(boxes)?;
         Ok(Self {
             objects: boxes.len(),
-            repeated: boxes.windows(2).filter(|pair| pair[0] == pair[1]).count(),
-            bounds: boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b)),
+            repeated: boxes
+                .windows(2)
+                .filter(|pair| pair[0] == pair[1])
+                .count(),
+            bounds: boxes
+                .iter()
+                .fold(Aabb::EMPTY, |all, b| all.union(b)),
             flat: Presorted::without_area(boxes),
             in_order: sorted.in_order(),
             same_orders: sorted.same_orders(),

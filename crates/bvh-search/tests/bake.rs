@@ -15,7 +15,9 @@ fn scene() -> Vec<Aabb> {
 #[test]
 fn a_bake_of_a_moment_beats_the_greedy_tree_and_ends_in_time() {
     let boxes = scene();
-    let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
+    let greedy = muller_fellner::Config::default()
+        .build(&boxes)
+        .unwrap();
     let start = Instant::now();
     let baked = bake(&boxes, Duration::from_millis(400)).unwrap();
     // Other tests share the machine.
@@ -33,9 +35,22 @@ fn a_bake_of_a_moment_beats_the_greedy_tree_and_ends_in_time() {
 fn a_time_of_zero_still_gives_a_tree() {
     let boxes = scene();
     validate(&bake(&boxes, Duration::ZERO).unwrap().tree, &boxes).unwrap();
-    let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
-    assert!(improve(&greedy, &boxes, Duration::ZERO).unwrap().cost <= cost::internal_area(&greedy));
-    assert!(bake(&[], Duration::ZERO).unwrap().tree.nodes.is_empty());
+    let greedy = muller_fellner::Config::default()
+        .build(&boxes)
+        .unwrap();
+    assert!(
+        improve(&greedy, &boxes, Duration::ZERO)
+            .unwrap()
+            .cost
+            <= cost::internal_area(&greedy)
+    );
+    assert!(
+        bake(&[], Duration::ZERO)
+            .unwrap()
+            .tree
+            .nodes
+            .is_empty()
+    );
 }
 
 #[test]

@@ -23,7 +23,9 @@ impl Observer for Polls {
 fn boxes(n: u32) -> Vec<Aabb> {
     let at = |i: u32, k: u32| (i.wrapping_mul(2_654_435_761).rotate_left(k) >> 16) as f32;
     let low = |i| [at(i, 3), at(i, 11), at(i, 19)];
-    (0..n).map(|i| Aabb::from((low(i), low(i).map(|c| c + 50.0)))).collect()
+    (0..n)
+        .map(|i| Aabb::from((low(i), low(i).map(|c| c + 50.0))))
+        .collect()
 }
 
 #[test]
@@ -87,7 +89,9 @@ fn the_observer_is_polled_between_moves_however_long_they_are() {
 #[test]
 fn numbers_that_no_poll_could_interrupt_are_refused() {
     let refused = |method: Method, boxes: &[Aabb]| {
-        solve(&method, &Problem::new(boxes), 1, Budget::UNLIMITED, &()).unwrap_err().to_string()
+        solve(&method, &Problem::new(boxes), 1, Budget::UNLIMITED, &())
+            .unwrap_err()
+            .to_string()
     };
     let tournament = rebuild::Config { tournament: 1 << 31, ..Default::default() };
     assert_eq!(
@@ -107,15 +111,21 @@ fn numbers_that_no_poll_could_interrupt_are_refused() {
 
 /// Methods whose first tree is a construction over all objects.
 fn constructing() -> impl Iterator<Item = Method> {
-    Method::all().into_iter().filter(|method| method.name() != "exact")
+    Method::all()
+        .into_iter()
+        .filter(|method| method.name() != "exact")
 }
 
 #[test]
 fn a_search_that_is_cancelled_during_its_first_construction_returns_the_known_tree_or_that_of_the_fastest_builder()
  {
     let boxes = boxes(100_000);
-    let known = median_cut::Config::default().build(&boxes).unwrap();
-    let fastest = ploc::Config { radius: 1, near_rounds: 0 }.build(&boxes).unwrap();
+    let known = median_cut::Config::default()
+        .build(&boxes)
+        .unwrap();
+    let fastest = ploc::Config { radius: 1, near_rounds: 0 }
+        .build(&boxes)
+        .unwrap();
     for method in constructing() {
         for (known, expected) in [(Some(&known), &known), (None, &fastest)] {
             let polls = Polls { polled: 0.into(), until: 0 };

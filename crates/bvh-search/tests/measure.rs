@@ -23,17 +23,22 @@ impl Measure for AlongX {
 fn boxes(n: u32) -> Vec<Aabb> {
     let at = |i: u32, k: u32| (i.wrapping_mul(2_654_435_761).rotate_left(k) >> 16) as f32;
     let low = |i| [at(i, 3), at(i, 11), at(i, 19)];
-    (0..n).map(|i| Aabb::from((low(i), low(i).map(|c| c + at(i, 25) / 16.0)))).collect()
+    (0..n)
+        .map(|i| Aabb::from((low(i), low(i).map(|c| c + at(i, 25) / 16.0))))
+        .collect()
 }
 
 /// All methods; `best` without its search by area within milliseconds.
 fn methods() -> impl Iterator<Item = Method> {
-    Method::all().into_iter().filter(|method| method.name() != "exact").map(|method| match method {
-        Method::Best(config) => {
-            Method::Best(best::Config { start: Some(Start::default()), ..config })
-        }
-        other => other,
-    })
+    Method::all()
+        .into_iter()
+        .filter(|method| method.name() != "exact")
+        .map(|method| match method {
+            Method::Best(config) => {
+                Method::Best(best::Config { start: Some(Start::default()), ..config })
+            }
+            other => other,
+        })
 }
 
 fn run(method: &Method, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Outcome {
@@ -90,7 +95,9 @@ fn builders_and_searches_go_by_the_measure_and_report_every_objective_by_it() {
 #[test]
 fn local_searches_begin_with_a_tree_by_the_measure() {
     let boxes = boxes(700);
-    let begun = Start::default().build_by(&boxes, Some(&AlongX)).unwrap();
+    let begun = Start::default()
+        .build_by(&boxes, Some(&AlongX))
+        .unwrap();
     let by_area = Start::default().build(&boxes).unwrap();
     let [begun, by_area] = [begun, by_area].map(|tree| cost::internal_measure(&tree, &AlongX));
     assert!(begun < 0.99 * by_area, "{begun} {by_area}");
@@ -141,7 +148,9 @@ fn no_search_goes_below_the_exact_optimum_of_the_measure_and_best_reaches_it() {
 #[test]
 fn trees_for_a_sample_of_rays_are_entered_less_often_than_trees_by_area() {
     let boxes = boxes(2000);
-    let bounds = boxes.iter().fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
+    let bounds = boxes
+        .iter()
+        .fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
     let at = |i: u32, k: u32| {
         (i.wrapping_mul(2_246_822_519).rotate_left(k) >> 8) as f32 / (1 << 24) as f32
     };

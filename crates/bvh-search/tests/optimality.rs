@@ -15,7 +15,9 @@ fn sheet() -> Vec<Aabb> {
         [0.4 + f32::from(i % 7) * 0.3, 0.2 + f32::from(i % 5) * 0.5, f32::from(i % 3) * 0.4]
     };
     let high = |i| std::array::from_fn(|axis| low(i)[axis] + size(i)[axis]);
-    (0..1600).map(|i| Aabb::from((low(i), high(i)))).collect()
+    (0..1600)
+        .map(|i| Aabb::from((low(i), high(i))))
+        .collect()
 }
 
 /// Clusters and random subsets of 6 to 12 objects.
@@ -32,7 +34,9 @@ fn instances(count: usize) -> Vec<Vec<Aabb>> {
             nearest.truncate(n);
             nearest
         } else {
-            (0..n).map(|k| all[draw(number * 16 + k)]).collect()
+            (0..n)
+                .map(|k| all[draw(number * 16 + k)])
+                .collect()
         }
     };
     (0..count).map(instance).collect()
@@ -46,8 +50,9 @@ fn no_method_goes_below_the_optimum_the_bound_neither_above_and_the_best_reaches
     let mut reached = 0;
     for (number, boxes) in instances.iter().enumerate() {
         let problem = Problem::new(boxes);
-        let optimum =
-            solve(&exact::Config::default(), &problem, 1, Budget::UNLIMITED, &()).unwrap().cost;
+        let optimum = solve(&exact::Config::default(), &problem, 1, Budget::UNLIMITED, &())
+            .unwrap()
+            .cost;
         assert!(lower_bound::internal_area(boxes, 8, &()).unwrap() <= optimum, "instance {number}");
         for method in Method::all() {
             let outcome = solve(&method, &problem, 1, budget, &()).unwrap();

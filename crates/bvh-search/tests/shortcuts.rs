@@ -16,7 +16,9 @@ fn number(i: usize, salt: usize) -> f32 {
 }
 
 fn scattered(n: usize) -> Vec<Aabb> {
-    (0..n).map(|i| cube([number(i, 1), number(i, 2), number(i, 3)], number(i, 4) / 9.0)).collect()
+    (0..n)
+        .map(|i| cube([number(i, 1), number(i, 2), number(i, 3)], number(i, 4) / 9.0))
+        .collect()
 }
 
 /// All of one box; one inside the next; segments along each axis, in and out of order.
@@ -85,8 +87,10 @@ fn a_tiny_scene_gets_the_optimum_in_place_of_a_search() {
 #[test]
 fn no_tree_is_below_the_bound_and_stiff_scenes_meet_it() {
     for n in 2..=9 {
-        for (boxes, met) in
-            stiff(n).into_iter().map(|boxes| (boxes, true)).chain([(scattered(n), false)])
+        for (boxes, met) in stiff(n)
+            .into_iter()
+            .map(|boxes| (boxes, true))
+            .chain([(scattered(n), false)])
         {
             let exact =
                 solve(&exact::Config {}, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap();
@@ -101,14 +105,22 @@ fn no_tree_is_below_the_bound_and_stiff_scenes_meet_it() {
 #[test]
 fn a_scene_says_what_it_does_not_need() {
     let of = |boxes: &[Aabb]| -> Vec<Shortcut> {
-        Facts::of(boxes).unwrap().shortcuts().into_iter().map(|(shortcut, _)| shortcut).collect()
+        Facts::of(boxes)
+            .unwrap()
+            .shortcuts()
+            .into_iter()
+            .map(|(shortcut, _)| shortcut)
+            .collect()
     };
     assert_eq!(of(&scattered(1)), []);
     assert_eq!(of(&scattered(500)), [Shortcut::BoundMet]);
     assert_eq!(of(&scattered(12)), [Shortcut::Tiny, Shortcut::BoundMet]);
     let line = &stiff(50)[3];
     assert_eq!(of(line), [Shortcut::Flat, Shortcut::BoundMet]);
-    let repeated: Vec<Aabb> = scattered(5).into_iter().flat_map(|b| [b; 10]).collect();
+    let repeated: Vec<Aabb> = scattered(5)
+        .into_iter()
+        .flat_map(|b| [b; 10])
+        .collect();
     assert_eq!(Facts::of(&repeated).unwrap().repeated, 45);
 }
 
@@ -118,11 +130,16 @@ fn a_flat_axis_that_orders_like_no_other_may_have_the_best_split() {
     // Two crossing rows of flat tiles, one after the other, and the same tiles in turns.
     let tile = |x: f32, y: f32| Aabb::from(([x, y, 0.0], [x + 1.0, y + 1.0, 0.0]));
     let at = |i: usize| 2.0 * i as f32;
-    let (row, column): (Vec<_>, Vec<_>) =
-        (0..9).map(|i| (tile(at(i), 8.0), tile(8.0, at(i)))).unzip();
+    let (row, column): (Vec<_>, Vec<_>) = (0..9)
+        .map(|i| (tile(at(i), 8.0), tile(8.0, at(i))))
+        .unzip();
     let cost = |boxes: &[Aabb]| internal_area(&Config::default().build(boxes).unwrap());
     let one_by_one: Vec<Aabb> = row.iter().chain(&column).copied().collect();
-    let in_turns: Vec<Aabb> = row.iter().zip(&column).flat_map(|(a, b)| [*a, *b]).collect();
+    let in_turns: Vec<Aabb> = row
+        .iter()
+        .zip(&column)
+        .flat_map(|(a, b)| [*a, *b])
+        .collect();
     assert!(cost(&one_by_one) < cost(&in_turns));
 }
 
@@ -131,9 +148,12 @@ fn a_flat_axis_that_orders_like_no_other_may_have_the_best_split() {
 #[test]
 fn a_tie_may_part_equal_boxes_so_that_merging_them_would_change_the_cost() {
     let (large, small) = (cube([0.0; 3], 4.0), cube([1.0; 3], 2.0));
-    let apart = Config::default().build(&[large, small, small, small, small, large]).unwrap();
-    let merged =
-        Config::default().build_weighted(&[large, small, large], &[1.0, 4.0, 1.0]).unwrap();
+    let apart = Config::default()
+        .build(&[large, small, small, small, small, large])
+        .unwrap();
+    let merged = Config::default()
+        .build_weighted(&[large, small, large], &[1.0, 4.0, 1.0])
+        .unwrap();
     let expanded = internal_area(&merged) + 3.0 * small.half_area();
     assert_eq!(internal_area(&apart), 3.0 * large.half_area() + 2.0 * small.half_area());
     assert_eq!(expanded, 2.0 * large.half_area() + 3.0 * small.half_area());

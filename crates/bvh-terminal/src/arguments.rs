@@ -89,7 +89,9 @@ pub fn output_file(flag: &str, path: &Path, kind: &FileKind) -> Result<(), Error
 
 /// The folder that a file is in.
 fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+    path.parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."))
 }
 
 /// A folder to be written into: one that is there, or can be made because nothing on the way to it is a file.

@@ -22,5 +22,8 @@ pub fn names(folder: &Path) -> Result<BTreeSet<String>, Error> {
     let entries = fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))?;
     let name =
         |entry: io::Result<fs::DirEntry>| Ok(entry?.file_name().to_string_lossy().into_owned());
-    entries.map(name).collect::<io::Result<_>>().map_err(Error::io(folder, "read the folder"))
+    entries
+        .map(name)
+        .collect::<io::Result<_>>()
+        .map_err(Error::io(folder, "read the folder"))
 }

@@ -58,7 +58,10 @@ fn plain(text: &str) -> Cow<'_, str> {
     }
     let spelled =
         |c: char| if commands(c) { c.escape_default().to_string() } else { c.to_string() };
-    text.chars().map(spelled).collect::<String>().into()
+    text.chars()
+        .map(spelled)
+        .collect::<String>()
+        .into()
 }
 
 #[cfg(test)]

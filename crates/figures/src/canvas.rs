@@ -84,7 +84,9 @@ pub(super) fn font(style: Type, colour: RGBColor) -> TextStyle<'static> {
 /// The text without control characters, which XML has not even escaped.
 pub(super) fn printable(text: &str) -> String {
     let legal = |c: char| !c.is_control() && c != '\u{fffe}' && c != '\u{ffff}';
-    text.chars().map(|c| if legal(c) { c } else { ' ' }).collect()
+    text.chars()
+        .map(|c| if legal(c) { c } else { ' ' })
+        .collect()
 }
 
 impl<B: DrawingBackend> Sheet<B> {
@@ -108,8 +110,11 @@ impl<B: DrawingBackend> Sheet<B> {
             Align::UpCenter => (HPos::Center, FontTransform::Rotate270),
             Align::UpTo => (HPos::Right, FontTransform::Rotate270),
         };
-        let style = font(style, colour).pos(Pos::new(side, VPos::Center)).transform(turn);
-        self.0.draw_text(&printable(text), &style, (steps(x), steps(y)))
+        let style = font(style, colour)
+            .pos(Pos::new(side, VPos::Center))
+            .transform(turn);
+        self.0
+            .draw_text(&printable(text), &style, (steps(x), steps(y)))
     }
 
     /// Draws lines of text below each other, the first just below `top`.
@@ -152,11 +157,15 @@ pub(super) fn svg(picture: &impl Picture) -> Result<String, FigureError> {
             title: picture.title().to_owned(),
             reason: fault.to_string(),
         };
-        layout.draw(&Sheet(area.clone())).map_err(refused)?;
+        layout
+            .draw(&Sheet(area.clone()))
+            .map_err(refused)?;
         area.present().map_err(refused)?;
     }
-    let title =
-        printable(picture.title()).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    let title = printable(picture.title())
+        .replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;");
     let mut document = String::new();
     let _ = write!(
         document,
@@ -176,7 +185,9 @@ fn joined(svg: &str) -> String {
     let mut joined = String::with_capacity(svg.len());
     let mut open: Option<&str> = None;
     for line in svg.lines() {
-        let path = line.strip_prefix("<polyline ").and_then(|rest| rest.split_once(" points=\""));
+        let path = line
+            .strip_prefix("<polyline ")
+            .and_then(|rest| rest.split_once(" points=\""));
         if open.is_some() && open != path.map(|(style, _)| style) {
             joined.push_str("\"/>\n");
             open = None;

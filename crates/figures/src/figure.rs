@@ -63,7 +63,10 @@ impl Picture for Figure {
         let strokes = Strokes::new(self);
         let legend = Legend::new(self, &strokes, WIDTH - 2.0 * BORDER, fonts);
         let head = Head::new(&self.title, &self.caption, fonts);
-        let columns = self.columns.clamp(1, HEIGHTS.len()).min(self.panels.len().max(1));
+        let columns = self
+            .columns
+            .clamp(1, HEIGHTS.len())
+            .min(self.panels.len().max(1));
         Ok(Plan::new(
             head,
             strokes,
@@ -96,7 +99,12 @@ impl From<&Figure> for Miniature {
             layers: panel.layers.clone(),
         };
         Self(Figure {
-            panels: figure.panels.first().map(panel).into_iter().collect(),
+            panels: figure
+                .panels
+                .first()
+                .map(panel)
+                .into_iter()
+                .collect(),
             ..figure.clone()
         })
     }
@@ -127,11 +135,18 @@ impl<'a> Plan<'a> {
     ) -> Self {
         let room = whole - 2.0 * BORDER;
         // What stands beside the plots leaves their width, and that decides on what stands below them.
-        let mut plots: Vec<Plot> =
-            panels.iter().map(|panel| Plot::new(panel, height, fonts)).collect();
-        let beside = plots.iter().map(|plot| plot.left).fold(0.0, f64::max);
+        let mut plots: Vec<Plot> = panels
+            .iter()
+            .map(|panel| Plot::new(panel, height, fonts))
+            .collect();
+        let beside = plots
+            .iter()
+            .map(|plot| plot.left)
+            .fold(0.0, f64::max);
         let width = (room / columns as f64 - beside - GUTTER.0).max(60.0);
-        plots.iter_mut().for_each(|plot| plot.fit_width(width, fonts));
+        plots
+            .iter_mut()
+            .for_each(|plot| plot.fit_width(width, fonts));
         for upper in 0..plots.len().saturating_sub(columns) {
             let (above, below) = plots.split_at_mut(upper + 1);
             above[upper].share_x_label(&below[columns - 1]);
@@ -161,7 +176,10 @@ impl Layout for Plan<'_> {
 
     fn draw<B: DrawingBackend>(&self, sheet: &Sheet<B>) -> Result<(), Fault<B>> {
         self.head.draw(sheet)?;
-        self.legend.draw(sheet, (BORDER, self.head.bottom))?;
-        self.panels.iter().try_for_each(|(plot, frame)| plot.draw(sheet, *frame, &self.strokes))
+        self.legend
+            .draw(sheet, (BORDER, self.head.bottom))?;
+        self.panels
+            .iter()
+            .try_for_each(|(plot, frame)| plot.draw(sheet, *frame, &self.strokes))
     }
 }

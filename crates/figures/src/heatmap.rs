@@ -69,23 +69,46 @@ impl Picture for HeatMap {
             return Err(FigureError::CellCount { title: self.title.clone(), rows, columns, cells });
         }
         let head = Head::new(&self.title, &self.caption, fonts);
-        let classes = self.classes.iter().cloned().zip((0..).map(|class| colour_of(Some(class))));
+        let classes = self
+            .classes
+            .iter()
+            .cloned()
+            .zip((0..).map(|class| colour_of(Some(class))));
         let key = Legend::of_areas(classes, WIDTH - 2.0 * BORDER, fonts);
-        let columns: Vec<String> =
-            self.columns.iter().map(|name| fonts.shorten(name, LONGEST, SMALL)).collect();
-        let rows: Vec<_> =
-            self.rows.iter().map(|name| fonts.fit(name, LONGEST, &NAME_SIZES)).collect();
-        let beside = rows.iter().map(|(lines, kind)| fonts.widest(lines, *kind));
-        let left = BORDER + beside.fold(fonts.width(&self.row_label, SMALL), f64::max).ceil() + 8.0;
+        let columns: Vec<String> = self
+            .columns
+            .iter()
+            .map(|name| fonts.shorten(name, LONGEST, SMALL))
+            .collect();
+        let rows: Vec<_> = self
+            .rows
+            .iter()
+            .map(|name| fonts.fit(name, LONGEST, &NAME_SIZES))
+            .collect();
+        let beside = rows
+            .iter()
+            .map(|(lines, kind)| fonts.widest(lines, *kind));
+        let left = BORDER
+            + beside
+                .fold(fonts.width(&self.row_label, SMALL), f64::max)
+                .ceil()
+            + 8.0;
         let cell = ((WIDTH - left - BORDER) / columns.len().max(1) as f64).clamp(2.0, CELL);
         let widest = fonts.widest(&columns, SMALL);
         let upright = widest + 6.0 > cell;
         let above = if upright { widest + 8.0 } else { SMALL.line() + 4.0 };
         let top = head.bottom + key.height() + 10.0 + above;
-        let texts: Vec<_> =
-            self.cells.iter().map(|each| fonts.fit(&each.text, cell - 2.0, &CELL_SIZES)).collect();
+        let texts: Vec<_> = self
+            .cells
+            .iter()
+            .map(|each| fonts.fit(&each.text, cell - 2.0, &CELL_SIZES))
+            .collect();
         let height = |(lines, kind): &(Vec<String>, Type)| kind.line() * lines.len() as f64;
-        let row = rows.iter().chain(&texts).map(height).fold(ROW, f64::max);
+        let row = rows
+            .iter()
+            .chain(&texts)
+            .map(height)
+            .fold(ROW, f64::max);
         Ok(Table { map: self, head, key, left, top, cell, row, columns, upright, rows, texts })
     }
 }
@@ -120,7 +143,10 @@ impl Layout for Table<'_> {
             let (row, column) = (index / self.columns.len(), index % self.columns.len());
             let (left, top) =
                 (self.left + self.cell * column as f64, self.top + self.row * row as f64);
-            let colour = colour_of(cell.class.filter(|&class| class < self.map.classes.len()));
+            let colour = colour_of(
+                cell.class
+                    .filter(|&class| class < self.map.classes.len()),
+            );
             let inner = Frame {
                 left: left + 0.5,
                 top: top + 0.5,

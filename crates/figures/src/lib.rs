@@ -68,7 +68,12 @@ mod tests {
             Layer::new("steps", Marks::StepBand(bands())),
             Layer::new(
                 "bars",
-                Marks::ErrorBars(points.iter().map(|&(x, y)| (x, y, y, x)).collect()),
+                Marks::ErrorBars(
+                    points
+                        .iter()
+                        .map(|&(x, y)| (x, y, y, x))
+                        .collect(),
+                ),
             ),
             Layer::new("bars", Marks::Bars { values, spread: points.to_vec(), base: x }),
             Layer::new("level", Marks::HLine(y)),
@@ -77,7 +82,11 @@ mod tests {
     }
 
     fn axes() -> Vec<Axis> {
-        let names = |count: usize| (0..count).map(|i| format!("category {i}")).collect();
+        let names = |count: usize| {
+            (0..count)
+                .map(|i| format!("category {i}"))
+                .collect()
+        };
         vec![
             Axis::linear("x"),
             Axis::log(""),
@@ -93,7 +102,12 @@ mod tests {
     fn whatever_the_data_there_is_a_picture() {
         let mut data: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
         data.extend(NASTY.iter().map(|&value| vec![(value, value)]));
-        data.push(NASTY.iter().flat_map(|&x| NASTY.iter().map(move |&y| (x, y))).collect());
+        data.push(
+            NASTY
+                .iter()
+                .flat_map(|&x| NASTY.iter().map(move |&y| (x, y)))
+                .collect(),
+        );
         for points in data {
             for (kind, x) in axes().into_iter().enumerate() {
                 let panel = |(index, layer): (usize, Layer)| Panel {
@@ -102,7 +116,11 @@ mod tests {
                     y: axes().swap_remove(index % 5),
                     layers: if index == 0 { all_layers(&points) } else { vec![layer] },
                 };
-                let panels = all_layers(&points).into_iter().enumerate().map(panel).collect();
+                let panels = all_layers(&points)
+                    .into_iter()
+                    .enumerate()
+                    .map(panel)
+                    .collect();
                 let figure = Figure { columns: points.len() % 6, panels, ..Figure::default() };
                 let picture = svg(&figure).unwrap();
                 assert!(
@@ -127,7 +145,9 @@ mod tests {
         let says = |layers: Vec<Layer>| {
             let panel =
                 Panel { title: String::new(), x: Axis::log("x"), y: Axis::log("y"), layers };
-            svg(&Figure { panels: vec![panel], ..Figure::default() }).unwrap().contains("no data")
+            svg(&Figure { panels: vec![panel], ..Figure::default() })
+                .unwrap()
+                .contains("no data")
         };
         let line = |points| vec![Layer::new("", Marks::Line(points))];
         assert!(
@@ -138,8 +158,9 @@ mod tests {
 
     #[test]
     fn the_same_figure_gives_the_same_bytes() {
-        let points: Vec<(f64, f64)> =
-            (0..50).map(|i| (f64::from(i), f64::from(i * i % 17))).collect();
+        let points: Vec<(f64, f64)> = (0..50)
+            .map(|i| (f64::from(i), f64::from(i * i % 17)))
+            .collect();
         let panel = Panel {
             title: "t".to_owned(),
             x: Axis::linear("x"),
@@ -184,7 +205,9 @@ mod tests {
                     title: "a heat map".to_owned(),
                     caption: String::new(),
                     row_label: "row".to_owned(),
-                    rows: (0..rows).map(|i| "long name ".repeat(i)).collect(),
+                    rows: (0..rows)
+                        .map(|i| "long name ".repeat(i))
+                        .collect(),
                     columns: (0..columns).map(|i| "name ".repeat(i)).collect(),
                     cells: (0..rows * columns).map(cell).collect(),
                     classes: classes.clone(),

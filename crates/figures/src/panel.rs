@@ -75,7 +75,8 @@ impl<'a> Plot<'a> {
         if let Scale::Category(names) = &self.panel.x.scale {
             let room = width / names.len().max(1) as f64;
             let fits = |name: &String| {
-                name.split_whitespace().all(|word| fonts.width(word, SMALL) <= room - 6.0)
+                name.split_whitespace()
+                    .all(|word| fonts.width(word, SMALL) <= room - 6.0)
             };
             self.upright = !names.iter().all(fits);
             let every = if self.upright { (SMALL.line() / room).ceil() as usize } else { 1 };
@@ -83,7 +84,9 @@ impl<'a> Plot<'a> {
                 if self.upright { vec![name] } else { fonts.wrap(&name, room - 6.0, SMALL) }
             };
             let named = names.iter().zip(0..).step_by(every);
-            self.names = named.map(|(name, at)| (f64::from(at), lines(name.clone()))).collect();
+            self.names = named
+                .map(|(name, at)| (f64::from(at), lines(name.clone())))
+                .collect();
             let size = |(_, lines): &(f64, Vec<String>)| {
                 if self.upright {
                     fonts.widest(lines, SMALL)
@@ -152,10 +155,13 @@ impl<'a> Plot<'a> {
         }
         let below = bottom + self.below - BODY.line() * self.x_label.len() as f64;
         sheet.lines((centre, below), &self.x_label, BODY, INK, Align::Center)?;
-        self.y_label.iter().zip(0..).try_for_each(|(line, index)| {
-            let beside = left - self.left + BODY.line() * (f64::from(index) + 0.5);
-            sheet.text((beside, middle), line, BODY, INK, Align::UpCenter)
-        })
+        self.y_label
+            .iter()
+            .zip(0..)
+            .try_for_each(|(line, index)| {
+                let beside = left - self.left + BODY.line() * (f64::from(index) + 0.5);
+                sheet.text((beside, middle), line, BODY, INK, Align::UpCenter)
+            })
     }
 }
 
@@ -170,10 +176,16 @@ struct Layers<'a, B: DrawingBackend> {
 impl<B: DrawingBackend> Layers<'_, B> {
     fn draw(&self) -> Result<(), Fault<B>> {
         let layers = &self.plot.panel.layers;
-        layers.iter().try_for_each(|layer| self.band(layer))?;
+        layers
+            .iter()
+            .try_for_each(|layer| self.band(layer))?;
         self.bars()?;
-        layers.iter().try_for_each(|layer| self.reference(layer))?;
-        layers.iter().try_for_each(|layer| self.line(layer))?;
+        layers
+            .iter()
+            .try_for_each(|layer| self.reference(layer))?;
+        layers
+            .iter()
+            .try_for_each(|layer| self.line(layer))?;
         self.points()
     }
 
@@ -187,12 +199,17 @@ impl<B: DrawingBackend> Layers<'_, B> {
         for run in runs(points.iter().map(at)) {
             let side = |height: fn(&(f64, f64, f64)) -> f64| {
                 self.thinned(&stepped(
-                    run.iter().map(|point| (point.0, height(point))).collect(),
+                    run.iter()
+                        .map(|point| (point.0, height(point)))
+                        .collect(),
                     stairs,
                 ))
             };
             let upper = side(|point| point.2).into_iter().rev();
-            let outline: Vec<Point> = side(|point| point.1).into_iter().chain(upper).collect();
+            let outline: Vec<Point> = side(|point| point.1)
+                .into_iter()
+                .chain(upper)
+                .collect();
             self.area
                 .draw(&Polygon::new(outline, self.strokes.of(&layer.name).1.colour.mix(0.2)))?;
         }
@@ -203,13 +220,19 @@ impl<B: DrawingBackend> Layers<'_, B> {
     fn bars(&self) -> Result<(), Fault<B>> {
         let (x, y) = (&self.plot.x, &self.plot.y);
         let layers = || {
-            self.plot.panel.layers.iter().filter(|layer| matches!(layer.marks, Marks::Bars { .. }))
+            self.plot
+                .panel
+                .layers
+                .iter()
+                .filter(|layer| matches!(layer.marks, Marks::Bars { .. }))
         };
         let width = 0.8 / layers().count().max(1) as f64;
         let mut whiskers = Vec::new();
         for (order, layer) in layers().enumerate() {
             let Marks::Bars { values, spread, base } = &layer.marks else { continue };
-            let base = y.coordinate(*base).map_or(y.low, |base| base.clamp(y.low, y.high));
+            let base = y
+                .coordinate(*base)
+                .map_or(y.low, |base| base.clamp(y.low, y.high));
             for (index, &value) in values.iter().enumerate() {
                 let left = index as f64 - 0.4 + width * order as f64;
                 let Some((_, tip)) = x.shown(index as f64).zip(y.coordinate(value)) else {
@@ -222,21 +245,31 @@ impl<B: DrawingBackend> Layers<'_, B> {
                     corners,
                     self.strokes.of(&layer.name).1.colour.filled(),
                 ))?;
-                whiskers
-                    .extend(spread.get(index).map(|&(low, high)| (left + width / 2.0, low, high)));
+                whiskers.extend(
+                    spread
+                        .get(index)
+                        .map(|&(low, high)| (left + width / 2.0, low, high)),
+                );
             }
         }
-        whiskers.into_iter().try_for_each(|(at, low, high)| self.whisker(at, low, high, INK))
+        whiskers
+            .into_iter()
+            .try_for_each(|(at, low, high)| self.whisker(at, low, high, INK))
     }
 
     /// Draws an upright bar with caps at the ends that are inside the panel.
     fn whisker(&self, x: f64, low: f64, high: f64, colour: RGBColor) -> Result<(), Fault<B>> {
         let (y, style) = (&self.plot.y, pen(colour, THIN));
         let Some((from, to)) = y.nearest(low).zip(y.nearest(high)) else { return Ok(()) };
-        self.area.draw(&PathElement::new(vec![(x, from), (x, to)], style))?;
-        for end in [low, high].into_iter().filter_map(|end| y.shown(end)) {
+        self.area
+            .draw(&PathElement::new(vec![(x, from), (x, to)], style))?;
+        for end in [low, high]
+            .into_iter()
+            .filter_map(|end| y.shown(end))
+        {
             let cap = PathElement::new(vec![(steps(-3.5), 0), (steps(3.5), 0)], style);
-            self.area.draw(&(EmptyElement::at((x, end)) + cap))?;
+            self.area
+                .draw(&(EmptyElement::at((x, end)) + cap))?;
         }
         Ok(())
     }
@@ -244,8 +277,12 @@ impl<B: DrawingBackend> Layers<'_, B> {
     fn reference(&self, layer: &Layer) -> Result<(), Fault<B>> {
         let (x, y) = (&self.plot.x, &self.plot.y);
         let ends = match layer.marks {
-            Marks::HLine(at) => y.shown(at).map(|at| vec![(x.low, at), (x.high, at)]),
-            Marks::VLine(at) => x.shown(at).map(|at| vec![(at, y.low), (at, y.high)]),
+            Marks::HLine(at) => y
+                .shown(at)
+                .map(|at| vec![(x.low, at), (x.high, at)]),
+            Marks::VLine(at) => x
+                .shown(at)
+                .map(|at| vec![(at, y.low), (at, y.high)]),
             _ => None,
         };
         ends.map_or(Ok(()), |ends| self.stroke(ends, REFERENCE_LINE, THIN))
@@ -261,7 +298,9 @@ impl<B: DrawingBackend> Layers<'_, B> {
                 Vec::new()
             };
             self.stroke(path, stroke, LINE)?;
-            markers.into_iter().try_for_each(|at| self.marker(at, stroke, 3.5, 0.7))?;
+            markers
+                .into_iter()
+                .try_for_each(|at| self.marker(at, stroke, 3.5, 0.7))?;
         }
         Ok(())
     }
@@ -271,7 +310,8 @@ impl<B: DrawingBackend> Layers<'_, B> {
         match stroke.dash {
             None => self.area.draw(&PathElement::new(path, style)),
             Some((on, off)) => {
-                self.area.draw(&DashedPathElement::new(path, steps(on), steps(off), style))
+                self.area
+                    .draw(&DashedPathElement::new(path, steps(on), steps(off), style))
             }
         }
     }
@@ -308,7 +348,10 @@ impl<B: DrawingBackend> Layers<'_, B> {
                     }
                 }
                 _ => {
-                    let alone = self.paths(layer).into_iter().filter(|path| path.len() == 1);
+                    let alone = self
+                        .paths(layer)
+                        .into_iter()
+                        .filter(|path| path.len() == 1);
                     all.extend(alone.flatten().map(|at| (name, at)));
                 }
             }
@@ -334,7 +377,8 @@ impl<B: DrawingBackend> Layers<'_, B> {
         let (Marks::Line(points) | Marks::Steps(points)) = &layer.marks else { return Vec::new() };
         let stairs = matches!(layer.marks, Marks::Steps(_));
         let shown = |axis: &Ruled, value| {
-            axis.nearest(value).filter(|_| stairs || axis.coordinate(value).is_some())
+            axis.nearest(value)
+                .filter(|_| stairs || axis.coordinate(value).is_some())
         };
         let at =
             |point: &Point| Some((shown(&self.plot.x, point.0)?, shown(&self.plot.y, point.1)?));
@@ -353,7 +397,10 @@ impl<B: DrawingBackend> Layers<'_, B> {
         for points in path.chunk_by(|one, next| column(one) == column(next)) {
             let by_height = |one: &&Point, other: &&Point| one.1.total_cmp(&other.1);
             let (low, high) = (points.iter().min_by(by_height), points.iter().max_by(by_height));
-            for &point in [points.first(), low, high, points.last()].into_iter().flatten() {
+            for &point in [points.first(), low, high, points.last()]
+                .into_iter()
+                .flatten()
+            {
                 if let [.., before, middle] = kept[..]
                     && [before.1, middle.1] == [point.1; 2]
                     && (before.0 <= middle.0) == (middle.0 <= point.0)
@@ -400,8 +447,12 @@ impl<B: DrawingBackend> Layers<'_, B> {
 /// The unbroken parts of a sequence.
 fn runs<T: Copy>(placed: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
     let placed: Vec<Option<T>> = placed.collect();
-    let parts = placed.split(Option::is_none).map(|part| part.iter().copied().flatten().collect());
-    parts.filter(|part: &Vec<T>| !part.is_empty()).collect()
+    let parts = placed
+        .split(Option::is_none)
+        .map(|part| part.iter().copied().flatten().collect());
+    parts
+        .filter(|part: &Vec<T>| !part.is_empty())
+        .collect()
 }
 
 /// The path itself, or with each y held until the next x.
@@ -409,6 +460,8 @@ fn stepped(path: Vec<Point>, stairs: bool) -> Vec<Point> {
     if !stairs {
         return path;
     }
-    let corners = path.windows(2).flat_map(|ends| [ends[0], (ends[1].0, ends[0].1)]);
+    let corners = path
+        .windows(2)
+        .flat_map(|ends| [ends[0], (ends[1].0, ends[0].1)]);
     corners.chain(path.last().copied()).collect()
 }

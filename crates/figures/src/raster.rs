@@ -88,13 +88,17 @@ impl DrawingBackend for Raster<'_> {
         path: I,
         style: &S,
     ) -> Drawn {
-        let points: Vec<(f64, f64)> =
-            path.into_iter().map(|(x, y)| (f64::from(x), f64::from(y))).collect();
+        let points: Vec<(f64, f64)> = path
+            .into_iter()
+            .map(|(x, y)| (f64::from(x), f64::from(y)))
+            .collect();
         let half = f64::from(style.stroke_width()) / 2.0;
         let joint = |index: usize| if index > 0 && index + 1 < points.len() { 1.0 } else { 0.0 };
         for (index, ends) in points.windows(2).enumerate() {
             let [(x0, y0), (x1, y1)] = [ends[0], ends[1]];
-            let length = ((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0)).sqrt().max(1e-9);
+            let length = ((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0))
+                .sqrt()
+                .max(1e-9);
             let (dx, dy) = ((x1 - x0) / length * half, (y1 - y0) / length * half);
             let (before, after) = (joint(index), joint(index + 1));
             let corner = |x: f64, y: f64, part: f64, side: f64| {
@@ -138,10 +142,11 @@ impl DrawingBackend for Raster<'_> {
         };
         let (colour, turned) =
             (style.color(), matches!(style.transform(), FontTransform::Rotate270));
-        self.fonts.rasterise(text, kind, (start, baseline), |right, down, coverage| {
-            let (right, down) = if turned { (down, -1 - right) } else { (right, down) };
-            self.blend(x + right, y + down, colour.mix(coverage));
-        });
+        self.fonts
+            .rasterise(text, kind, (start, baseline), |right, down, coverage| {
+                let (right, down) = if turned { (down, -1 - right) } else { (right, down) };
+                self.blend(x + right, y + down, colour.mix(coverage));
+            });
         Ok(())
     }
 }
@@ -162,14 +167,20 @@ fn pixels(picture: &impl Picture) -> Result<Pixels, FigureError> {
     let mut white = vec![255; across * down * 3];
     let (fine, _) = white.as_chunks_mut();
     let raster = Raster { width: across as i32, height: down as i32, colours: fine, fonts: &fonts };
-    layout.draw(&Sheet(raster.into_drawing_area())).map_err(|fault| FigureError::Draw {
-        title: picture.title().to_owned(),
-        reason: fault.to_string(),
-    })?;
+    layout
+        .draw(&Sheet(raster.into_drawing_area()))
+        .map_err(|fault| FigureError::Draw {
+            title: picture.title().to_owned(),
+            reason: fault.to_string(),
+        })?;
     // By how much the samples of each pixel are darker than white, which most of a figure is: runs of it are only compared.
     let mut dark = vec![[0; 3]; width * height];
     let blank = [255; RUN * SAMPLES * 3];
-    for (y, row) in fine.chunks(across).take(height * SAMPLES).enumerate() {
+    for (y, row) in fine
+        .chunks(across)
+        .take(height * SAMPLES)
+        .enumerate()
+    {
         let pixels = dark[y / SAMPLES * width..][..width].chunks_mut(RUN);
         for (pixels, samples) in pixels.zip(row.chunks(RUN * SAMPLES)) {
             if samples.as_flattened() == &blank[..samples.len() * 3] {
@@ -185,8 +196,10 @@ fn pixels(picture: &impl Picture) -> Result<Pixels, FigureError> {
         }
     }
     let mean = |dark: usize| ((255 * SAMPLES * SAMPLES - dark) / (SAMPLES * SAMPLES)) as u8;
-    let colours =
-        dark.into_iter().map(|[red, green, blue]| [mean(red), mean(green), mean(blue)]).collect();
+    let colours = dark
+        .into_iter()
+        .map(|[red, green, blue]| [mean(red), mean(green), mean(blue)])
+        .collect();
     Ok(Pixels { width, height, colours })
 }
 
@@ -201,7 +214,9 @@ pub fn png(picture: &impl Picture) -> Result<Vec<u8>, FigureError> {
     let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
     encoder.set_color(png::ColorType::Rgb);
     let mut writer = encoder.write_header().map_err(failed)?;
-    writer.write_image_data(colours.as_flattened()).map_err(failed)?;
+    writer
+        .write_image_data(colours.as_flattened())
+        .map_err(failed)?;
     writer.finish().map_err(failed)?;
     Ok(bytes)
 }
@@ -222,10 +237,15 @@ mod tests {
     #[test]
     fn the_png_is_twice_as_large_as_the_svg_up_to_a_limit() {
         let picture = figure("title", 1);
-        let decoded =
-            png::Decoder::new(std::io::Cursor::new(png(&picture).unwrap())).read_info().unwrap();
+        let decoded = png::Decoder::new(std::io::Cursor::new(png(&picture).unwrap()))
+            .read_info()
+            .unwrap();
         let (width, height) = (decoded.info().width / PNG_SCALE, decoded.info().height / PNG_SCALE);
-        assert!(svg(&picture).unwrap().contains(&format!("width=\"{width}\" height=\"{height}\"")));
+        assert!(
+            svg(&picture)
+                .unwrap()
+                .contains(&format!("width=\"{width}\" height=\"{height}\""))
+        );
         assert!(matches!(png(&figure("", 100)), Err(FigureError::TooLarge { width: 1600, .. })));
     }
 
@@ -233,7 +253,11 @@ mod tests {
     fn text_is_drawn_with_the_embedded_font() {
         let dark = |title: &str| {
             let picture = pixels(&figure(title, 0)).unwrap();
-            picture.colours.iter().filter(|colour| colour[0] < 100).count()
+            picture
+                .colours
+                .iter()
+                .filter(|colour| colour[0] < 100)
+                .count()
         };
         // Fourteen letters of 17 pixels: some hundred dark pixels each at twice the size.
         assert!(dark("Error and time") > 14 * 40, "{} dark pixels", dark("Error and time"));

@@ -109,19 +109,34 @@ pub(super) struct Strokes {
 
 impl Strokes {
     pub fn new(figure: &Figure) -> Self {
-        let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
+        let layers = || {
+            figure
+                .panels
+                .iter()
+                .flat_map(|panel| &panel.layers)
+        };
         let shown = |name: &str| layers().any(|layer| layer.series() == Some(name));
         let set = |name: &str| {
-            figure.looks.iter().find(|(known, _)| known == name).map(|&(_, look)| look)
+            figure
+                .looks
+                .iter()
+                .find(|(known, _)| known == name)
+                .map(|&(_, look)| look)
         };
-        let taken =
-            |slot| figure.looks.iter().any(|(name, look)| *look == Look::Slot(slot) && shown(name));
+        let taken = |slot| {
+            figure
+                .looks
+                .iter()
+                .any(|(name, look)| *look == Look::Slot(slot) && shown(name))
+        };
         let mut free = (0..).filter(|&slot| !taken(slot)).map(Look::Slot);
         let (mut series, mut lines): (Vec<(String, Stroke)>, Vec<&str>) = (Vec::new(), Vec::new());
         for layer in layers() {
             let Some(name) = layer.series().filter(|name| !name.is_empty()) else { continue };
             if series.iter().all(|(known, _)| known != name) {
-                let look = set(name).or_else(|| free.next()).unwrap_or(Look::Reference);
+                let look = set(name)
+                    .or_else(|| free.next())
+                    .unwrap_or(Look::Reference);
                 series.push((name.to_owned(), Stroke::of(look)));
             }
             if layer.is_line() && set(name) != Some(Look::Reference) && !lines.contains(&name) {
@@ -138,7 +153,10 @@ impl Strokes {
 
     /// The named series' place in the order of appearance, and its stroke; solid grey for the one without a name.
     pub fn of(&self, name: &str) -> (usize, Stroke) {
-        let place = self.series.iter().position(|(known, _)| known == name);
+        let place = self
+            .series
+            .iter()
+            .position(|(known, _)| known == name);
         place.map_or((0, UNNAMED), |place| (place, self.series[place].1))
     }
 }
@@ -150,7 +168,11 @@ mod tests {
 
     fn strokes(names: &[String], looks: Vec<(String, Look)>) -> Strokes {
         let line = |name: &String| Layer::new(name, Marks::Line(Vec::new()));
-        let layers = names.iter().chain(names.iter().rev()).map(line).collect();
+        let layers = names
+            .iter()
+            .chain(names.iter().rev())
+            .map(line)
+            .collect();
         let panel = Panel { layers, ..Panel::default() };
         Strokes::new(&Figure { panels: vec![panel], looks, ..Figure::default() })
     }

@@ -83,17 +83,26 @@ impl Fonts {
 
     fn advance(&self, character: char, style: Type) -> f64 {
         let Face { font, advances } = self.face(style);
-        style.size * advances.get(&character).copied().unwrap_or_else(|| advance(font, character))
+        style.size
+            * advances
+                .get(&character)
+                .copied()
+                .unwrap_or_else(|| advance(font, character))
     }
 
     /// Width of a line of text in pixels, without kerning.
     pub fn width(&self, text: &str, style: Type) -> f64 {
-        text.chars().map(|character| self.advance(character, style)).sum()
+        text.chars()
+            .map(|character| self.advance(character, style))
+            .sum()
     }
 
     /// The largest width among lines of text, in pixels.
     pub fn widest<'a>(&self, lines: impl IntoIterator<Item = &'a String>, style: Type) -> f64 {
-        lines.into_iter().map(|line| self.width(line, style)).fold(0.0, f64::max)
+        lines
+            .into_iter()
+            .map(|line| self.width(line, style))
+            .fold(0.0, f64::max)
     }
 
     /// Breaks a text at blanks into lines of at most `width` pixels. A word that is wider is broken anywhere. An
@@ -164,8 +173,9 @@ impl Fonts {
             style.size as f32 * font.height_unscaled() / font.units_per_em().unwrap_or(1.0),
         );
         for character in text.chars() {
-            let glyph =
-                font.glyph_id(character).with_scale_and_position(scale, point(x as f32, y as f32));
+            let glyph = font
+                .glyph_id(character)
+                .with_scale_and_position(scale, point(x as f32, y as f32));
             if let Some(outline) = font.outline_glyph(glyph) {
                 let corner = outline.px_bounds().min;
                 outline.draw(|right, down, coverage| {
@@ -193,7 +203,9 @@ mod tests {
         assert!(lines.len() > 1 && fonts.widest(&lines, BODY) <= 120.0);
         assert_eq!(lines.join(" "), words);
         assert_eq!(
-            fonts.wrap("incomprehensibilities", 60.0, BODY).concat(),
+            fonts
+                .wrap("incomprehensibilities", 60.0, BODY)
+                .concat(),
             "incomprehensibilities"
         );
         assert_eq!((fonts.wrap("", 60.0, BODY).len(), fonts.wrap("ab", 0.0, BODY).len()), (0, 2));
@@ -201,7 +213,9 @@ mod tests {
         assert!(short.ends_with('…') && fonts.width(&short, SMALL) <= 80.0);
         assert_eq!(fonts.shorten("jewel", 80.0, SMALL), "jewel");
         assert_eq!(
-            fonts.fit("S14 origins at corners", 100.0, &[12.0, 10.0]).0,
+            fonts
+                .fit("S14 origins at corners", 100.0, &[12.0, 10.0])
+                .0,
             ["S14 origins at", "corners"]
         );
         assert_eq!(fonts.fit("119", 18.0, &[12.0, 9.0]).1.size, 9.0);

@@ -26,12 +26,21 @@ fn main() {
 
 /// Evaluates the boxes of a greedy tree in the tree's order, and pairs of neighbours in it, as a search for places joins them.
 fn evaluate(scene: &Scene) {
-    let tree = muller_fellner::Config::default().build(&scene.boxes).expect("finite boxes");
-    let density =
-        Config::default().density(TrainedOn::Default, scene, 1).expect("rays that meet the scene");
-    let nodes: Vec<PackedAabb> =
-        tree.nodes.iter().map(|node| PackedAabb::from(&node.aabb)).collect();
-    let joined: Vec<PackedAabb> = nodes.windows(2).map(|pair| pair[0].union(&pair[1])).collect();
+    let tree = muller_fellner::Config::default()
+        .build(&scene.boxes)
+        .expect("finite boxes");
+    let density = Config::default()
+        .density(TrainedOn::Default, scene, 1)
+        .expect("rays that meet the scene");
+    let nodes: Vec<PackedAabb> = tree
+        .nodes
+        .iter()
+        .map(|node| PackedAabb::from(&node.aabb))
+        .collect();
+    let joined: Vec<PackedAabb> = nodes
+        .windows(2)
+        .map(|pair| pair[0].union(&pair[1]))
+        .collect();
     for (which, boxes) in [("boxes of nodes", &nodes), ("boxes of two nodes", &joined)] {
         let contenders: Vec<Contender> = vec![
             ("half area", Box::new(|| total(&Area, boxes))),
@@ -51,6 +60,11 @@ fn evaluate(scene: &Scene) {
 
 fn total<M: Measure + ?Sized>(measure: &M, boxes: &[PackedAabb]) {
     for _ in 0..REPEATS {
-        black_box(boxes.iter().map(|aabb| measure.of(black_box(aabb))).sum::<f64>());
+        black_box(
+            boxes
+                .iter()
+                .map(|aabb| measure.of(black_box(aabb)))
+                .sum::<f64>(),
+        );
     }
 }

@@ -32,16 +32,23 @@ type Contender<'a> = (String, Box<dyn FnMut() -> f64 + 'a>);
 
 fn main() {
     // Cargo adds `--bench`.
-    let arguments: Vec<String> =
-        std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|argument| argument != "--bench")
+        .collect();
     let scene = Scene::load(arguments.first().map_or("cloister", |name| name)).expect("a scene");
     let triangles = scene.triangles().expect("a scene of triangles");
-    let tree = muller_fellner::Config::default().build(&scene.boxes).expect("finite boxes");
+    let tree = muller_fellner::Config::default()
+        .build(&scene.boxes)
+        .expect("finite boxes");
     let wide = &WideBvh::new(&tree, triangles).expect("a valid tree");
     let rays = &rays_that_miss(&tree.root_aabb().expect("triangles"))[..];
     assert!(rays.iter().all(|ray| !wide.any_hit(ray)));
 
-    let parts: Vec<(Vec3, Vec3)> = rays.iter().map(|ray| (ray.origin(), ray.direction())).collect();
+    let parts: Vec<(Vec3, Vec3)> = rays
+        .iter()
+        .map(|ray| (ray.origin(), ray.direction()))
+        .collect();
     let others = arguments
         .get(1)
         .map(|program| external::contenders(Path::new(program), &scene).expect("the program"));
@@ -72,7 +79,10 @@ fn main() {
             let mut hits = vec![None; rays.len()];
             let batch = Batch { query, coherence: Coherence::Incoherent, in_squares: false, rays };
             let trace = move || {
-                let seconds = contender.tracer.trace(&batch, &mut hits).expect("answers");
+                let seconds = contender
+                    .tracer
+                    .trace(&batch, &mut hits)
+                    .expect("answers");
                 assert!(hits.iter().all(Option::is_none));
                 seconds.iter().sum()
             };
@@ -90,7 +100,10 @@ fn main() {
             }
         }
     }
-    let medians: Vec<f64> = nanoseconds.iter().filter_map(|rounds| median(rounds)).collect();
+    let medians: Vec<f64> = nanoseconds
+        .iter()
+        .filter_map(|rounds| median(rounds))
+        .collect();
     println!(
         "{}, {} triangles, {} rays, {ROUNDS} rounds; {alone}: {:.2} ns",
         scene.name,
@@ -107,7 +120,9 @@ fn main() {
 fn timed<'a, T>(items: &'a [T], mut answer: impl FnMut(&T) + 'a) -> Box<dyn FnMut() -> f64 + 'a> {
     Box::new(move || {
         let start = Instant::now();
-        items.iter().for_each(|item| answer(black_box(item)));
+        items
+            .iter()
+            .for_each(|item| answer(black_box(item)));
         start.elapsed().as_secs_f64()
     })
 }

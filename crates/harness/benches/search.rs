@@ -51,7 +51,9 @@ fn main() {
 }
 
 fn measure(scene: &Scene, seconds: &[f64], threads: &[usize], seed: u64) {
-    let greedy = muller_fellner::Config::default().build(&scene.boxes).expect("finite boxes");
+    let greedy = muller_fellner::Config::default()
+        .build(&scene.boxes)
+        .expect("finite boxes");
     let base = cost::internal_area(&greedy);
     for &limit in seconds {
         for &threads in threads {

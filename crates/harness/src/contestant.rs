@@ -105,7 +105,10 @@ impl Labelled {
 
     /// Reads an entry, and finds everything that is wrong with it by itself.
     pub(crate) fn read(mut table: Table) -> Read<Self> {
-        let own = Own::KEYS.iter().filter_map(|key| table.remove_entry(*key)).collect();
+        let own = Own::KEYS
+            .iter()
+            .filter_map(|key| table.remove_entry(*key))
+            .collect();
         let (own, mut faults) = fault::deserialize::<Own>(own);
         let (ours, libraries) = (Method::NAMES.join(", "), Peer::NAMES.join(", "));
         let accepted =
@@ -118,7 +121,10 @@ impl Labelled {
         );
         faults.extend(of_method);
         let labelled = own.zip(method).map(|(mut own, method)| {
-            let label = own.label.take().unwrap_or_else(|| method.name().into());
+            let label = own
+                .label
+                .take()
+                .unwrap_or_else(|| method.name().into());
             Self { label, method, own }
         });
         (labelled, faults)
@@ -128,9 +134,16 @@ impl Labelled {
 impl<'de> Deserialize<'de> for Labelled {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let (read, faults) = Self::read(Table::deserialize(deserializer)?);
-        let wrong =
-            || serde::de::Error::custom(faults.iter().map(Fault::to_string).collect::<String>());
-        read.filter(|_| faults.is_empty()).ok_or_else(wrong)
+        let wrong = || {
+            serde::de::Error::custom(
+                faults
+                    .iter()
+                    .map(Fault::to_string)
+                    .collect::<String>(),
+            )
+        };
+        read.filter(|_| faults.is_empty())
+            .ok_or_else(wrong)
     }
 }
 

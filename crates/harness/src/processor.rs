@@ -17,12 +17,18 @@ impl Processor {
     /// Reads the text in which Linux describes processors. Of other texts the architecture remains.
     fn parse(info: &str) -> Self {
         let value = |key: &str| {
-            let lines = info.lines().filter_map(|line| line.split_once(':'));
+            let lines = info
+                .lines()
+                .filter_map(|line| line.split_once(':'));
             let mut found = lines.filter(|(name, _)| name.trim() == key);
-            found.next().map(|(_, value)| value.trim().to_owned())
+            found
+                .next()
+                .map(|(_, value)| value.trim().to_owned())
         };
         let name = value("model name").unwrap_or_else(|| std::env::consts::ARCH.into());
-        let model = value("cpu family").zip(value("model")).map(|(family, model)| [family, model]);
+        let model = value("cpu family")
+            .zip(value("model"))
+            .map(|(family, model)| [family, model]);
         Self { name, model }
     }
 
@@ -37,10 +43,15 @@ impl Processor {
     /// The name for folders, for example `amd-epyc-25-17`: lower-case letters and digits with single hyphens between.
     pub fn folder(&self) -> String {
         let model = self.model.iter().flatten().map(String::as_str);
-        let words: Vec<&str> = std::iter::once(self.name.as_str()).chain(model).collect();
+        let words: Vec<&str> = std::iter::once(self.name.as_str())
+            .chain(model)
+            .collect();
         let lower = words.join(" ").to_lowercase();
         let parts = lower.split(|letter: char| !letter.is_ascii_alphanumeric());
-        parts.filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-")
+        parts
+            .filter(|part| !part.is_empty())
+            .collect::<Vec<_>>()
+            .join("-")
     }
 }
 

@@ -17,7 +17,9 @@ fn every_tree_of_the_archive_is_valid_costs_what_is_written_and_is_the_best_know
     let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../results");
     let rows = archive::rows(&results).unwrap();
     assert_eq!(
-        fs::read_dir(results.join("trees")).unwrap().count(),
+        fs::read_dir(results.join("trees"))
+            .unwrap()
+            .count(),
         rows.len() + 1,
         "a row for every file"
     );
@@ -29,7 +31,9 @@ fn every_tree_of_the_archive_is_valid_costs_what_is_written_and_is_the_best_know
             (row.objects, row.checksum),
             (scene.boxes.len(), format!("{:016x}", scene.checksum()))
         );
-        let known = reference::best_known(&results, &scene).unwrap().unwrap();
+        let known = reference::best_known(&results, &scene)
+            .unwrap()
+            .unwrap();
         assert!(
             row.internal_area <= known.cost * (1.0 + 1e-12),
             "{}: {} is known",
@@ -42,7 +46,9 @@ fn every_tree_of_the_archive_is_valid_costs_what_is_written_and_is_the_best_know
 
 /// A tree of the scene, and a better one.
 fn trees(scene: &Scene) -> [Bvh; 2] {
-    let poor = median_cut::Config::default().build(&scene.boxes).unwrap();
+    let poor = median_cut::Config::default()
+        .build(&scene.boxes)
+        .unwrap();
     let budget = Budget { max_work: Some(200_000), ..Budget::UNLIMITED };
     let config = best::Config::default();
     let found = optimize(&poor, &Problem::new(&scene.boxes), &config, 1, budget, &()).unwrap();
@@ -99,7 +105,12 @@ fn only_a_better_tree_comes_into_the_archive_and_becomes_the_best_known() {
         let (tree, _) = tree_file::load(&at.join(file), &scene).unwrap();
         let cost = cost::internal_area(&tree).to_string();
         assert!(trees.contains(&format!("made {file}")) && trees.lines().count() == 2, "{trees}");
-        assert!([known, trees].iter().all(|rows| rows.contains(&cost)), "{cost}");
+        assert!(
+            [known, trees]
+                .iter()
+                .all(|rows| rows.contains(&cost)),
+            "{cost}"
+        );
     }
     let before = files();
     for worse in ["poor.bvh", "good.bvh"] {

@@ -15,11 +15,17 @@ type Module = Vec<String>;
 
 /// The code of every module of a crate, without comments and unit tests.
 fn modules(folder: &Path, at: &Module, found: &mut BTreeMap<Module, String>) {
-    let mut entries: Vec<PathBuf> =
-        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut entries: Vec<PathBuf> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
     entries.sort();
     for path in entries {
-        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        let name = path
+            .file_stem()
+            .unwrap()
+            .to_string_lossy()
+            .into_owned();
         let module = match name.as_str() {
             "lib" | "main" | "mod" => at.clone(),
             _ => [&at[..], &[name]].concat(),
@@ -28,7 +34,9 @@ fn modules(folder: &Path, at: &Module, found: &mut BTreeMap<Module, String>) {
             modules(&path, &module, found);
         } else if is_source(&path) {
             let text = fs::read_to_string(&path).unwrap();
-            let lines = text.lines().take_while(|line| *line != "#[cfg(test)]");
+            let lines = text
+                .lines()
+                .take_while(|line| *line != "#[cfg(test)]");
             let code = lines
                 .map(|line| line.split("//").next().unwrap_or_default())
                 .collect::<Vec<_>>()
@@ -41,7 +49,9 @@ fn modules(folder: &Path, at: &Module, found: &mut BTreeMap<Module, String>) {
 /// Whether a file is code of its crate: no unit tests, and no program beside a library.
 fn is_source(path: &Path) -> bool {
     let is_beside_a_library = path.ends_with("main.rs") && path.with_file_name("lib.rs").exists();
-    let is_rust = path.extension().is_some_and(|extension| extension == "rs");
+    let is_rust = path
+        .extension()
+        .is_some_and(|extension| extension == "rs");
     is_rust && !path.ends_with("tests.rs") && !is_beside_a_library
 }
 
@@ -54,8 +64,10 @@ fn paths(tree: &str) -> Vec<Module> {
         .map(|name| name.split_whitespace().next().unwrap_or(""))
         .map(Into::into)
         .collect();
-    let head: Module =
-        head.into_iter().filter(|name| !name.is_empty() && name != "self" && name != "*").collect();
+    let head: Module = head
+        .into_iter()
+        .filter(|name| !name.is_empty() && name != "self" && name != "*")
+        .collect();
     let (mut depth, mut start, mut found) = (0, 0, Vec::new());
     for (at, character) in rest.char_indices() {
         match character {
@@ -68,11 +80,17 @@ fn paths(tree: &str) -> Vec<Module> {
             _ => {}
         }
     }
-    let below: Vec<Module> =
-        found.into_iter().filter(|tree| !tree.trim().is_empty()).flat_map(paths).collect();
+    let below: Vec<Module> = found
+        .into_iter()
+        .filter(|tree| !tree.trim().is_empty())
+        .flat_map(paths)
+        .collect();
     match below.is_empty() {
         true => vec![head],
-        false => below.into_iter().map(|tail| [&head[..], &tail].concat()).collect(),
+        false => below
+            .into_iter()
+            .map(|tail| [&head[..], &tail].concat())
+            .collect(),
     }
 }
 
@@ -80,15 +98,24 @@ fn paths(tree: &str) -> Vec<Module> {
 fn used(module: &Module, code: &str, known: &BTreeMap<Module, String>) -> [Vec<Module>; 2] {
     let mut found = [Vec::new(), Vec::new()];
     for statement in code.split(';') {
-        let (code, tree) = statement.rsplit_once("use ").unwrap_or((statement, ""));
+        let (code, tree) = statement
+            .rsplit_once("use ")
+            .unwrap_or((statement, ""));
         let is_path = |c: char| c.is_alphanumeric() || "_:".contains(c);
         let inline = code
             .split(|c| !is_path(c))
             .filter(|word| word.starts_with("crate::") || word.starts_with("super::"));
         let exported = code.trim_end().ends_with("pub") || code.trim_end().ends_with("pub(crate)");
         let inline = inline.flat_map(paths).map(|path| (false, path));
-        for (exported, path) in paths(tree).into_iter().map(|path| (exported, path)).chain(inline) {
-            let ups = path.iter().take_while(|name| *name == "super").count();
+        for (exported, path) in paths(tree)
+            .into_iter()
+            .map(|path| (exported, path))
+            .chain(inline)
+        {
+            let ups = path
+                .iter()
+                .take_while(|name| *name == "super")
+                .count();
             let whole = match path.first().map(String::as_str) {
                 Some("crate") => path[1..].to_vec(),
                 _ => [&module[..module.len() - ups.min(module.len())], &path[ups..]].concat(),
@@ -107,11 +134,16 @@ fn used(module: &Module, code: &str, known: &BTreeMap<Module, String>) -> [Vec<M
 
 /// The module that defines what a path names.
 fn resolve(path: &Module, exports: &BTreeMap<Module, Vec<Module>>, depth: usize) -> Module {
-    let length =
-        (0..=path.len()).rev().find(|&length| exports.contains_key(&path[..length])).unwrap_or(0);
+    let length = (0..=path.len())
+        .rev()
+        .find(|&length| exports.contains_key(&path[..length]))
+        .unwrap_or(0);
     let module = path[..length].to_vec();
     let Some(name) = path.get(length).filter(|_| depth < 9) else { return module };
-    match exports[&module].iter().find(|exported| exported.last() == Some(name)) {
+    match exports[&module]
+        .iter()
+        .find(|exported| exported.last() == Some(name))
+    {
         Some(exported) => resolve(exported, exports, depth + 1),
         None => module,
     }
@@ -121,13 +153,19 @@ fn resolve(path: &Module, exports: &BTreeMap<Module, Vec<Module>>, depth: usize)
 fn edges(folder: &Path) -> BTreeSet<(Module, Module)> {
     let mut known = BTreeMap::new();
     modules(folder, &Module::new(), &mut known);
-    let found: BTreeMap<_, _> =
-        known.iter().map(|(module, code)| (module, used(module, code, &known))).collect();
-    let exports =
-        found.iter().map(|(module, [exports, _])| ((*module).clone(), exports.clone())).collect();
+    let found: BTreeMap<_, _> = known
+        .iter()
+        .map(|(module, code)| (module, used(module, code, &known)))
+        .collect();
+    let exports = found
+        .iter()
+        .map(|(module, [exports, _])| ((*module).clone(), exports.clone()))
+        .collect();
     let mut edges = BTreeSet::new();
     for (module, [_, paths]) in &found {
-        let targets = paths.iter().map(|path| resolve(path, &exports, 0));
+        let targets = paths
+            .iter()
+            .map(|path| resolve(path, &exports, 0));
         // What a module defines is open to the files of its own folder.
         let others = targets.filter(|target| !module.starts_with(target));
         edges.extend(others.map(|target| ((*module).clone(), target)));
@@ -137,13 +175,24 @@ fn edges(folder: &Path) -> BTreeSet<(Module, Module)> {
 
 /// The crates whose rooms ARCHITECTURE.md lists, each with its floors from the top down.
 fn floors(page: &str) -> Vec<(String, Vec<Vec<String>>)> {
-    let block = page.split("```floors\n").nth(1).unwrap().split("```").next().unwrap();
+    let block = page
+        .split("```floors\n")
+        .nth(1)
+        .unwrap()
+        .split("```")
+        .next()
+        .unwrap();
     // A line that is indented goes on with the crate above.
     let lines = block.replace("\n ", " ");
     let floor = |names: &str| {
-        names.split_whitespace().map(|name| name.trim_end_matches(',').to_owned()).collect()
+        names
+            .split_whitespace()
+            .map(|name| name.trim_end_matches(',').to_owned())
+            .collect()
     };
-    let crates = lines.lines().map(|line| line.split_once(' ').unwrap());
+    let crates = lines
+        .lines()
+        .map(|line| line.split_once(' ').unwrap());
     crates
         .map(|(name, floors)| (name.to_owned(), floors.split(" → ").map(floor).collect()))
         .collect()
@@ -153,12 +202,19 @@ fn floors(page: &str) -> Vec<(String, Vec<Vec<String>>)> {
 fn rooms(folder: &Path) -> BTreeSet<String> {
     let mut found = BTreeMap::new();
     modules(folder, &Module::new(), &mut found);
-    found.into_keys().filter_map(|module| module.first().cloned()).collect()
+    found
+        .into_keys()
+        .filter_map(|module| module.first().cloned())
+        .collect()
 }
 
 /// All imports that lead from a room to one that is not on a lower floor.
 fn rising(edges: &BTreeSet<(Module, Module)>, floors: &[Vec<String>]) -> Vec<String> {
-    let floor = |module: &Module| floors.iter().position(|rooms| rooms.contains(&module[0]));
+    let floor = |module: &Module| {
+        floors
+            .iter()
+            .position(|rooms| rooms.contains(&module[0]))
+    };
     let rises = |(from, to): &&(Module, Module)| {
         // The root of a crate is no room.
         let are_rooms = !to.is_empty() && !from.is_empty();
@@ -186,11 +242,20 @@ fn rooms_import_only_rooms_on_lower_floors() {
     // Every crate of the workspace is listed.
     let manifest = fs::read_to_string(top().join("Cargo.toml")).unwrap();
     let manifest: toml::Table = manifest.parse().unwrap();
-    let members = manifest["workspace"]["members"].as_array().unwrap();
-    let members =
-        members.iter().map(|member| member.as_str().unwrap().trim_start_matches("crates/"));
+    let members = manifest["workspace"]["members"]
+        .as_array()
+        .unwrap();
+    let members = members.iter().map(|member| {
+        member
+            .as_str()
+            .unwrap()
+            .trim_start_matches("crates/")
+    });
     assert_eq!(
-        listed.iter().map(|(name, _)| name.as_str()).collect::<BTreeSet<_>>(),
+        listed
+            .iter()
+            .map(|(name, _)| name.as_str())
+            .collect::<BTreeSet<_>>(),
         members.collect()
     );
 }
@@ -212,7 +277,11 @@ fn an_import_of_a_room_above_is_found() {
 fn no_file_uses_a_file_that_uses_it() {
     for crate_folder in fs::read_dir(top().join("crates")).unwrap() {
         let folder = crate_folder.unwrap().path();
-        let name = folder.file_name().unwrap().to_string_lossy().into_owned();
+        let name = folder
+            .file_name()
+            .unwrap()
+            .to_string_lossy()
+            .into_owned();
         let mut edges = edges(&folder.join("src"));
         // What nothing uses, or what uses nothing, is in no circle.
         loop {
@@ -223,8 +292,10 @@ fn no_file_uses_a_file_that_uses_it() {
                 break;
             }
         }
-        let circle: Vec<String> =
-            edges.iter().map(|(a, b)| format!("{} uses {}", a.join("/"), b.join("/"))).collect();
+        let circle: Vec<String> = edges
+            .iter()
+            .map(|(a, b)| format!("{} uses {}", a.join("/"), b.join("/")))
+            .collect();
         assert!(circle.is_empty(), "{name}:\n{}", circle.join("\n"));
     }
 }

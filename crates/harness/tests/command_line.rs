@@ -63,9 +63,15 @@ fn a_run_writes_rows_figures_and_provenance_and_prints_the_table() {
     assert!(!results.join(".partial").exists());
     let runs = fs::read_to_string(results.join("runs.csv")).unwrap();
     assert_eq!(runs.lines().count(), 1 + 2 * 3 * 3);
-    assert!(!reproducible(&results).iter().any(|(_, bytes)| text(bytes).contains("seconds")));
-    let provenance: toml::Table =
-        fs::read_to_string(results.join("provenance.toml")).unwrap().parse().unwrap();
+    assert!(
+        !reproducible(&results)
+            .iter()
+            .any(|(_, bytes)| text(bytes).contains("seconds"))
+    );
+    let provenance: toml::Table = fs::read_to_string(results.join("provenance.toml"))
+        .unwrap()
+        .parse()
+        .unwrap();
     let (build, assertions) = (provenance["build"].as_str().unwrap(), cfg!(debug_assertions));
     let (profile, on) =
         if assertions { ("debug, opt-level ", "on") } else { ("release, opt-level ", "off") };
@@ -90,8 +96,9 @@ fn any_number_of_threads_writes_the_same_bytes() {
 #[cfg(unix)]
 #[test]
 fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
-    let spec =
-        SPEC.replace("repetitions = 3", "repetitions = 40").replace("trials = 12", "trials = 100");
+    let spec = SPEC
+        .replace("repetitions = 3", "repetitions = 40")
+        .replace("trials = 12", "trials = 100");
     let folder = folder_with("spec.toml", &spec);
     let child = begin(folder.path(), &["spec.toml"]);
     wait_for(&folder.path().join("results/spec/.partial/000000"));
@@ -101,7 +108,12 @@ fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
         130,
         &["of 240 runs are kept, `--resume` does the rest"],
     );
-    assert!(folder.path().join("results/spec/.partial/000000").is_dir());
+    assert!(
+        folder
+            .path()
+            .join("results/spec/.partial/000000")
+            .is_dir()
+    );
 }
 
 #[cfg(unix)]
@@ -125,7 +137,10 @@ fn check_passes_on_equal_results_and_names_an_altered_number() {
     said(folder.path(), &["spec.toml", "--check"]);
     let path = folder.path().join("results/spec/runs.csv");
     let runs = fs::read_to_string(&path).unwrap();
-    let line = runs.lines().find(|line| line.contains("pinecon2,stand-in,noise")).unwrap();
+    let line = runs
+        .lines()
+        .find(|line| line.contains("pinecon2,stand-in,noise"))
+        .unwrap();
     let cost = line.split(',').nth(9).unwrap();
     fs::write(&path, runs.replace(cost, "12345.5")).unwrap();
     let output = run(folder.path(), &["spec.toml", "--check"]);
@@ -134,7 +149,12 @@ fn check_passes_on_equal_results_and_names_an_altered_number() {
     for part in ["scene pinecon2", "method noise", &format!("cost is {cost}, committed 12345.5")] {
         assert!(said.contains(part), "{part} in {said}");
     }
-    assert!(fs::read_to_string(&path).unwrap().contains("12345.5"), "a check writes nothing");
+    assert!(
+        fs::read_to_string(&path)
+            .unwrap()
+            .contains("12345.5"),
+        "a check writes nothing"
+    );
 }
 
 #[test]
@@ -221,15 +241,25 @@ fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_di
     assert_eq!(provenance.matches("[[parts]]").count(), 4);
     fs::remove_dir_all(folder.path().join("merged")).unwrap();
 
-    let kept = folder.path().join("again/spec/.partial/000001/runs.csv");
-    fs::write(&kept, fs::read_to_string(&kept).unwrap().replace("escher", "esther")).unwrap();
+    let kept = folder
+        .path()
+        .join("again/spec/.partial/000001/runs.csv");
+    fs::write(
+        &kept,
+        fs::read_to_string(&kept)
+            .unwrap()
+            .replace("escher", "esther"),
+    )
+    .unwrap();
     let differs = ["again/spec/.partial/000001", "runs.csv is damaged"];
     refused(&[&folders[..], &["merged"]].concat(), 1, &differs);
     said(folder.path(), &["spec.toml", "--seed", "9", "--shard", "2/3", "--out", "two", "--force"]);
     refused(&["merge", "one", "two", "three", "--out", "merged"], 1, &["different specs"]);
     refused(&["merge", "one", "--out", "one"], 2, &["--out one"]);
 
-    let resolved = folder.path().join("one/spec/.partial/resolved.toml");
+    let resolved = folder
+        .path()
+        .join("one/spec/.partial/resolved.toml");
     let edited = fs::read_to_string(&resolved)
         .unwrap()
         .replace("repetitions = 3", "repetitions = 4294967295");
@@ -257,7 +287,10 @@ methods = ['greedy', 'search']
 /// The column of the first row of the scene and method.
 fn cell(path: &Path, scene: &str, method: &str, column: &str) -> f64 {
     let rows = rows(path);
-    let row = rows.iter().find(|row| row["scene"] == scene && row["method"] == method).unwrap();
+    let row = rows
+        .iter()
+        .find(|row| row["scene"] == scene && row["method"] == method)
+        .unwrap();
     row[column].parse().unwrap()
 }
 
@@ -298,7 +331,9 @@ fn without_reports_there_is_a_table_and_without_a_terminal_a_line_for_the_last_r
     let output = run(folder.path(), &["plain.toml"]);
     let (out, err) = (text(&output.stdout), text(&output.stderr));
     assert!(
-        ["spheres75", "median_cut", "least_over_base"].iter().all(|part| out.contains(part)),
+        ["spheres75", "median_cut", "least_over_base"]
+            .iter()
+            .all(|part| out.contains(part)),
         "{out}"
     );
     assert!(err.contains("plain: 3 of 3 runs") && err.contains("median_cut on spheres75"), "{err}");
@@ -353,7 +388,13 @@ fn runs_that_the_clock_ends_leave_rows_among_the_timings_alone_and_checks_do_not
     assert!((0.05..20.0).contains(&seconds), "{seconds}");
 
     // Other costs are no difference, another spec is.
-    fs::write(&runs, fs::read_to_string(&runs).unwrap().replace('1', "2")).unwrap();
+    fs::write(
+        &runs,
+        fs::read_to_string(&runs)
+            .unwrap()
+            .replace('1', "2"),
+    )
+    .unwrap();
     let check = said(folder.path(), &["--check", "clock.toml"]);
     assert!(check.contains("cannot be compared"), "{check}");
     fs::write(folder.path().join("clock.toml"), spec.replace("1.2", "1.3")).unwrap();

@@ -20,10 +20,17 @@ use support::{assert_current, experiments, top};
 /// The text with every value and table as the committed results have it.
 fn renewed(text: &str) -> String {
     let (mut out, mut rest) = (String::new(), text);
-    while let Some(start) =
-        rest.find("<!-- value ").into_iter().chain(rest.find("<!-- pivot ")).min()
+    while let Some(start) = rest
+        .find("<!-- value ")
+        .into_iter()
+        .chain(rest.find("<!-- pivot "))
+        .min()
     {
-        let open = start + rest[start..].find(" -->").expect("a comment ends") + 4;
+        let open = start
+            + rest[start..]
+                .find(" -->")
+                .expect("a comment ends")
+            + 4;
         let close = open
             + rest[open..]
                 .find("<!-- end -->")
@@ -49,8 +56,15 @@ fn renewed(text: &str) -> String {
 /// The README and every page of `docs/` and `results/`.
 fn pages() -> Vec<PathBuf> {
     let mut pages = vec![top().join("README.md"), top().join("results/README.md")];
-    pages.extend(fs::read_dir(top().join("docs")).unwrap().map(|entry| entry.unwrap().path()));
-    pages.retain(|page| page.extension().is_some_and(|extension| extension == "md"));
+    pages.extend(
+        fs::read_dir(top().join("docs"))
+            .unwrap()
+            .map(|entry| entry.unwrap().path()),
+    );
+    pages.retain(|page| {
+        page.extension()
+            .is_some_and(|extension| extension == "md")
+    });
     pages.sort();
     pages
 }
@@ -66,7 +80,11 @@ fn the_documentation_shows_the_committed_numbers() {
 fn every_link_of_the_documentation_leads_somewhere() {
     for page in pages() {
         let text = fs::read_to_string(&page).unwrap();
-        for (link, _) in text.split("](").skip(1).filter_map(|rest| rest.split_once(')')) {
+        for (link, _) in text
+            .split("](")
+            .skip(1)
+            .filter_map(|rest| rest.split_once(')'))
+        {
             let target = link.split('#').next().unwrap_or_default();
             if !target.is_empty() && !target.contains("://") {
                 assert!(page.parent().unwrap().join(target).exists(), "{}: {link}", page.display());
@@ -89,7 +107,9 @@ fn the_index_of_results_has_every_experiment_with_its_question() {
 #[test]
 fn every_experiment_is_checked_on_every_commit() {
     let run = fs::read_to_string(top().join(".ci/run")).unwrap();
-    let words: BTreeSet<&str> = run.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+    let words: BTreeSet<&str> = run
+        .split(|c: char| !c.is_alphanumeric() && c != '_')
+        .collect();
     for (name, text) in experiments() {
         // CI does not build other libraries.
         let needs_libraries = text.contains("method = \"obvhs\"");
@@ -108,14 +128,27 @@ fn every_column_of_every_committed_table_is_on_the_page_of_columns() {
     assert_current(&top().join("docs/COLUMNS.md"), &harness::cli::columns::page(), "docs");
     let (mut folders, mut found) = (vec![top().join("results")], 0);
     while let Some(folder) = folders.pop() {
-        for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        for path in fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+        {
             if path.is_dir() {
                 folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "csv") {
+            } else if path
+                .extension()
+                .is_some_and(|extension| extension == "csv")
+            {
                 let name = path.file_name().unwrap().to_str().unwrap();
-                let header = csv::Reader::from_path(&path).unwrap().headers().unwrap().clone();
+                let header = csv::Reader::from_path(&path)
+                    .unwrap()
+                    .headers()
+                    .unwrap()
+                    .clone();
                 let header: Vec<&str> = header.iter().collect();
-                let of = declared.iter().filter(|file| file.are_of(name, &header)).count();
+                let of = declared
+                    .iter()
+                    .filter(|file| file.are_of(name, &header))
+                    .count();
                 assert_eq!(of, 1, "{}: docs/COLUMNS.md lacks {header:?}", path.display());
                 found += 1;
             }

@@ -21,7 +21,9 @@ fn folder(script: &str, more: &str) -> tempfile::TempDir {
     let folder = folder_with("spec.toml", &spec);
     fs::write(folder.path().join("peer.sh"), script).unwrap();
     let scene = Scene::load("spheres75").unwrap();
-    let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+    let tree = muller_fellner::Config::default()
+        .build(&scene.boxes)
+        .unwrap();
     save(&tree, &scene, &folder.path().join("good.bvh"));
     folder
 }
@@ -29,7 +31,9 @@ fn folder(script: &str, more: &str) -> tempfile::TempDir {
 /// These columns of a finished run's rows.
 fn columns(at: &Path, columns: [&str; 4]) -> Vec<[String; 4]> {
     let rows = rows(&at.join("results/spec/runs.csv"));
-    rows.iter().map(|row| columns.map(|column| row[column].clone())).collect()
+    rows.iter()
+        .map(|row| columns.map(|column| row[column].clone()))
+        .collect()
 }
 
 #[test]
@@ -41,7 +45,12 @@ fn the_tree_of_a_program_is_costed_by_us_and_every_run_has_its_seed_and_the_boxe
     said(at, &["spec.toml", "--jobs=1"]);
     let rows = columns(at, ["method", "cost", "work", "seed"]);
     let (ours, theirs) = rows.split_at(2);
-    assert!(theirs.iter().all(|row| row[0] == "theirs" && row[1..3] == ours[0][1..3]), "{rows:?}");
+    assert!(
+        theirs
+            .iter()
+            .all(|row| row[0] == "theirs" && row[1..3] == ours[0][1..3]),
+        "{rows:?}"
+    );
     assert!(theirs[0][3] != theirs[1][3]);
     let seeds = fs::read_to_string(at.join("seeds")).unwrap();
     assert!(seeds.lines().eq(theirs.iter().map(|row| &row[3])), "{seeds} for {theirs:?}");
@@ -94,7 +103,10 @@ fn commands_that_cannot_be_started_or_are_none_are_refused() {
 fn a_signal_ends_a_program_and_what_it_has_started_within_a_second() {
     let folder = folder("sleep 60 & echo $! > pid.new; mv pid.new pid; wait", "");
     let at = folder.path();
-    let mut child = program(at, &["spec.toml", "--jobs=1"]).stderr(Stdio::null()).spawn().unwrap();
+    let mut child = program(at, &["spec.toml", "--jobs=1"])
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
     wait_for(&at.join("pid"));
     let start = Instant::now();
     send("-TERM", &child);

@@ -32,7 +32,9 @@ fn folder() -> tempfile::TempDir {
 /// What is killed or goes on in the background: nobody reads what it says.
 fn command(folder: &Path, args: &[&str]) -> Command {
     let mut command = program(folder, args);
-    command.stdout(Stdio::null()).stderr(Stdio::null());
+    command
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
     command
 }
 
@@ -53,7 +55,10 @@ fn whole(folder: &Path) -> Vec<(String, Vec<u8>)> {
 fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
     let folder = folder();
     let whole = whole(folder.path());
-    let kills: u32 = std::env::var("KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(20);
+    let kills: u32 = std::env::var("KILLS")
+        .ok()
+        .and_then(|kills| kills.parse().ok())
+        .unwrap_or(20);
     let (mut killed, mut finished, mut state) = (0, 0, 1u32);
     let mut out = "out0".to_owned();
     while killed < kills {
@@ -61,7 +66,9 @@ fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
             command(folder.path(), &["spec.toml", "--resume", "--jobs=2", "--out", &out])
                 .spawn()
                 .unwrap();
-        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        state = state
+            .wrapping_mul(747_796_405)
+            .wrapping_add(2_891_336_453);
         std::thread::sleep(Duration::from_micros(u64::from(state >> 8) % 60_000));
         if child.try_wait().unwrap().is_none() {
             child.kill().unwrap();
@@ -78,10 +85,17 @@ fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
     said(folder.path(), &["spec.toml", "--resume", "--out", &out]);
     let found = results(&folder.path().join(&out));
     let names = |files: &[(String, Vec<u8>)]| {
-        files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>()
+        files
+            .iter()
+            .map(|(name, _)| name.clone())
+            .collect::<Vec<_>>()
     };
-    let differ: Vec<&String> =
-        found.iter().zip(&whole).filter(|(a, b)| a != b).map(|(a, _)| &a.0).collect();
+    let differ: Vec<&String> = found
+        .iter()
+        .zip(&whole)
+        .filter(|(a, b)| a != b)
+        .map(|(a, _)| &a.0)
+        .collect();
     assert!(found == whole, "{differ:?}, {:?} and {:?}", names(&found), names(&whole));
     eprintln!("{killed} kills, {} experiments finished", finished + 1);
 }
@@ -98,7 +112,11 @@ fn a_second_harness_on_the_same_folder_is_refused_and_disturbs_nothing() {
     let folder = folder();
     let long = SPEC.replace("trials = 60", "trials = 1000000");
     fs::write(folder.path().join("long.toml"), long).unwrap();
-    let first = Killed(command(folder.path(), &["long.toml"]).spawn().unwrap());
+    let first = Killed(
+        command(folder.path(), &["long.toml"])
+            .spawn()
+            .unwrap(),
+    );
     wait_for(&folder.path().join("results/long/.partial/000000"));
     for more in [&[][..], &["--resume"], &["--seed=3"], &["--shard=1/2"]] {
         let args = [&["long.toml"], more].concat();
@@ -106,7 +124,12 @@ fn a_second_harness_on_the_same_folder_is_refused_and_disturbs_nothing() {
     }
     // Other folders are free, and the kept run is still there.
     said(folder.path(), &["spec.toml"]);
-    assert!(folder.path().join("results/long/.partial/000000/runs.csv").is_file());
+    assert!(
+        folder
+            .path()
+            .join("results/long/.partial/000000/runs.csv")
+            .is_file()
+    );
     drop(first);
     // The lock died with its owner.
     refused(
@@ -127,7 +150,13 @@ fn a_full_disk_is_reported_and_what_was_finished_is_kept() {
         let args = format!("spec.toml --jobs 2 --out {out}");
         let output = run_on_a_small_disk(folder.path(), &args, blocks);
         ended(&output, 1, &[&format!("{out}/spec"), "cannot write the file"]);
-        assert!(!folder.path().join(&out).join("spec/runs.csv").exists());
+        assert!(
+            !folder
+                .path()
+                .join(&out)
+                .join("spec/runs.csv")
+                .exists()
+        );
         said(folder.path(), &["spec.toml", "--resume", "--out", &out]);
         assert!(results(&folder.path().join(&out)) == whole);
     }

@@ -16,10 +16,16 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// The files of a folder, in the order of their names.
 fn files(folder: &Path) -> Vec<Vec<u8>> {
-    let mut paths: Vec<_> =
-        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut paths: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
     paths.sort();
-    paths.into_iter().filter(|path| path.is_file()).map(|path| fs::read(path).unwrap()).collect()
+    paths
+        .into_iter()
+        .filter(|path| path.is_file())
+        .map(|path| fs::read(path).unwrap())
+        .collect()
 }
 
 /// One to eight changes: bits, bytes, words that matter, numbers, and pieces cut, repeated, or taken from another
@@ -52,25 +58,48 @@ fn mutated(inputs: &[Vec<u8>], rng: &mut Stream) -> Vec<u8> {
             3 => {
                 let other = inputs.choose(rng).cloned().unwrap_or_default();
                 let from = rng.random_range(0..=other.len());
-                bytes.splice(at..end, other[from..other.len().min(from + 40)].iter().copied());
+                bytes.splice(
+                    at..end,
+                    other[from..other.len().min(from + 40)]
+                        .iter()
+                        .copied(),
+                );
             }
             4 => {
-                let word = WORDS.choose(rng).copied().unwrap_or_default().to_le_bytes();
-                bytes.iter_mut().skip(at).zip(word).for_each(|(old, new)| *old = new);
+                let word = WORDS
+                    .choose(rng)
+                    .copied()
+                    .unwrap_or_default()
+                    .to_le_bytes();
+                bytes
+                    .iter_mut()
+                    .skip(at)
+                    .zip(word)
+                    .for_each(|(old, new)| *old = new);
             }
             5 => {
-                let digit =
-                    bytes.iter().skip(at).position(u8::is_ascii_digit).map(|from| at + from);
-                let number =
-                    *["-1", "0", "nan", "1e39", "18446744073709551616"].choose(rng).unwrap();
-                digit.into_iter().for_each(|at| drop(bytes.splice(at..at + 1, number.bytes())));
+                let digit = bytes
+                    .iter()
+                    .skip(at)
+                    .position(u8::is_ascii_digit)
+                    .map(|from| at + from);
+                let number = *["-1", "0", "nan", "1e39", "18446744073709551616"]
+                    .choose(rng)
+                    .unwrap();
+                digit
+                    .into_iter()
+                    .for_each(|at| drop(bytes.splice(at..at + 1, number.bytes())));
             }
             6 => bytes
                 .iter_mut()
                 .skip(at)
                 .take(1)
                 .for_each(|byte| *byte ^= 1 << rng.random_range(0..8)),
-            _ => bytes.iter_mut().skip(at).take(4).for_each(|byte| *byte = rng.random()),
+            _ => bytes
+                .iter_mut()
+                .skip(at)
+                .take(4)
+                .for_each(|byte| *byte = rng.random()),
         }
     }
     bytes
@@ -78,7 +107,10 @@ fn mutated(inputs: &[Vec<u8>], rng: &mut Stream) -> Vec<u8> {
 
 /// Runs a target over what is kept and `count` mutations, or for as long as `FUZZ_SECONDS` says.
 fn run(name: &str, count: usize, further: Vec<Vec<u8>>) {
-    let (_, target) = targets::TARGETS.into_iter().find(|(known, _)| *known == name).unwrap();
+    let (_, target) = targets::TARGETS
+        .into_iter()
+        .find(|(known, _)| *known == name)
+        .unwrap();
     let holds = |bytes: &[u8]| {
         if let Err(panic) = catch_unwind(AssertUnwindSafe(|| target(bytes))) {
             eprintln!(
@@ -89,13 +121,20 @@ fn run(name: &str, count: usize, further: Vec<Vec<u8>>) {
             resume_unwind(panic);
         }
     };
-    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(name);
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("fuzz/corpus")
+        .join(name);
     let inputs = [files(&corpus), further, vec![Vec::new()]].concat();
     inputs.iter().for_each(|input| holds(input));
-    let seconds = std::env::var("FUZZ_SECONDS").ok().and_then(|seconds| seconds.parse().ok());
+    let seconds = std::env::var("FUZZ_SECONDS")
+        .ok()
+        .and_then(|seconds| seconds.parse().ok());
     let (start, seed) = (Instant::now(), SystemTime::now().duration_since(SystemTime::UNIX_EPOCH));
-    let mut rng =
-        Stream::seed_from_u64(seconds.and(seed.ok()).map_or(1, |since| since.as_nanos() as u64));
+    let mut rng = Stream::seed_from_u64(
+        seconds
+            .and(seed.ok())
+            .map_or(1, |since| since.as_nanos() as u64),
+    );
     let mut executions = 0;
     while seconds.map_or(executions < count, |s: u64| start.elapsed() < Duration::from_secs(s)) {
         holds(&mutated(&inputs, &mut rng));
@@ -141,9 +180,13 @@ fn every_target_has_inputs_and_a_fuzzer() {
         let inputs = files(&folder.join("corpus").join(name));
         assert!(!inputs.is_empty(), "{name}");
         bytes += inputs.iter().map(Vec::len).sum::<usize>();
-        let fuzzer =
-            fs::read_to_string(folder.join("fuzz_targets").join(name).with_extension("rs"))
-                .unwrap();
+        let fuzzer = fs::read_to_string(
+            folder
+                .join("fuzz_targets")
+                .join(name)
+                .with_extension("rs"),
+        )
+        .unwrap();
         assert!(fuzzer.contains(&format!("targets::{name}(bytes)")));
     }
     assert!(bytes < 20_000, "the kept inputs are small: {bytes} bytes");

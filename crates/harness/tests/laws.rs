@@ -55,7 +55,9 @@ fn named(name: &str) -> Method {
 
 /// The methods that look at areas and indices only.
 fn insertion_and_exact() -> Vec<Method> {
-    ["goldsmith_salmon", "random_orders", "genetic", "exact"].map(named).into()
+    ["goldsmith_salmon", "random_orders", "genetic", "exact"]
+        .map(named)
+        .into()
 }
 
 /// Axis i becomes axis `to[i]`.
@@ -65,7 +67,10 @@ fn with_axes(boxes: &[Aabb], to: [usize; 3]) -> Vec<Aabb> {
         (0..3).for_each(|axis| turned[to[axis]] = p[axis]);
         turned
     };
-    boxes.iter().map(|b| Aabb { min: turn(b.min), max: turn(b.max) }).collect()
+    boxes
+        .iter()
+        .map(|b| Aabb { min: turn(b.min), max: turn(b.max) })
+        .collect()
 }
 
 /// All boxes moved; `None` unless every coordinate is exact afterwards.
@@ -76,14 +81,20 @@ fn translated(boxes: &[Aabb], by: Vec3) -> Option<Vec<Aabb>> {
         (sum.as_vec3().as_dvec3() == sum && sum - by.as_dvec3() == p.as_dvec3())
             .then(|| sum.as_vec3())
     };
-    boxes.iter().map(|b| Some(Aabb { min: exact(b.min)?, max: exact(b.max)? })).collect()
+    boxes
+        .iter()
+        .map(|b| Some(Aabb { min: exact(b.min)?, max: exact(b.max)? }))
+        .collect()
 }
 
 /// Whether no two boxes have the same centre along any axis: then no order depends on indices.
 fn distinct_centres(boxes: &[Aabb]) -> bool {
     (0..3).all(|axis| {
-        let mut keys: Vec<f64> =
-            boxes.iter().map(Aabb::doubled_centroid).map(|c: DVec3| c[axis]).collect();
+        let mut keys: Vec<f64> = boxes
+            .iter()
+            .map(Aabb::doubled_centroid)
+            .map(|c: DVec3| c[axis])
+            .collect();
         keys.sort_by(f64::total_cmp);
         keys.windows(2).all(|pair| pair[0] < pair[1])
     })
@@ -125,7 +136,10 @@ fn close(a: f64, b: f64) -> bool {
 
 /// Scenes per law: few in the quick tier, as many as `PROPTEST_CASES` says in the slow one.
 fn cases() -> u32 {
-    std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(60)
+    std::env::var("PROPTEST_CASES")
+        .ok()
+        .and_then(|cases| cases.parse().ok())
+        .unwrap_or(60)
 }
 
 proptest! {

@@ -41,8 +41,9 @@ fn split(text: &str) -> (Vec<&str>, Vec<&str>) {
     let mut names = Vec::new();
     let mut rest = text;
     while let Some((before, after)) = rest.split_once('{') {
-        let (name, behind) =
-            after.split_once('}').unwrap_or_else(|| panic!("{text}: a brace is not closed"));
+        let (name, behind) = after
+            .split_once('}')
+            .unwrap_or_else(|| panic!("{text}: a brace is not closed"));
         fixed.push(before);
         names.push(name);
         rest = behind;
@@ -58,14 +59,19 @@ fn length_of_match(page: &str, fixed: &str) -> Option<usize> {
     while let Some(character) = characters.next() {
         let rest = &page[at..];
         if character.is_whitespace() {
-            while characters.next_if(|next| next.is_whitespace()).is_some() {}
+            while characters
+                .next_if(|next| next.is_whitespace())
+                .is_some()
+            {}
             let space = rest.len() - rest.trim_start().len();
             if space == 0 {
                 return None;
             }
             at += space;
         } else {
-            at += rest.strip_prefix(character).map(|_| character.len_utf8())?;
+            at += rest
+                .strip_prefix(character)
+                .map(|_| character.len_utf8())?;
         }
     }
     Some(at)
@@ -74,7 +80,9 @@ fn length_of_match(page: &str, fixed: &str) -> Option<usize> {
 /// Where the numbers between the fixed parts are on the page; nothing if the text is not there.
 fn find(page: &str, fixed: &[&str]) -> Option<Vec<Range<usize>>> {
     let starts = page.char_indices().map(|(start, _)| start);
-    starts.filter_map(|start| numbers_at(page, fixed, start)).next()
+    starts
+        .filter_map(|start| numbers_at(page, fixed, start))
+        .next()
 }
 
 fn numbers_at(page: &str, fixed: &[&str], start: usize) -> Option<Vec<Range<usize>>> {
@@ -83,8 +91,9 @@ fn numbers_at(page: &str, fixed: &[&str], start: usize) -> Option<Vec<Range<usiz
     for part in &fixed[1..] {
         let is_of_number =
             |character: char| character.is_ascii_digit() || ".-−".contains(character);
-        let length =
-            page[at..].find(|character| !is_of_number(character)).unwrap_or(page.len() - at);
+        let length = page[at..]
+            .find(|character| !is_of_number(character))
+            .unwrap_or(page.len() - at);
         // A full stop behind the number belongs to the sentence.
         let number = page[at..at + length].trim_end_matches('.');
         if number.is_empty() {
@@ -111,7 +120,10 @@ fn the_prose_shows_the_committed_numbers() {
                 query.unwrap_or_else(|| panic!("docs/numbers.toml: {text}: no query for {name}"));
             made.replace_range(place, &value(query));
         }
-        let unused: Vec<_> = queries.keys().filter(|key| !names.contains(&key.as_str())).collect();
+        let unused: Vec<_> = queries
+            .keys()
+            .filter(|key| !names.contains(&key.as_str()))
+            .collect();
         assert!(unused.is_empty(), "docs/numbers.toml: {text}: nobody needs {unused:?}");
         assert_current(&path, &made, "numbers");
     }
@@ -122,7 +134,12 @@ fn a_text_is_found_across_lines_and_its_numbers_are_told_from_its_full_stops() {
     let page = "Trees are 8 to\n25 % cheaper. So are 7.5.";
     let numbers = |text: &str| {
         let places = find(page, &split(text).0)?;
-        Some(places.into_iter().map(|place| &page[place]).collect::<Vec<_>>())
+        Some(
+            places
+                .into_iter()
+                .map(|place| &page[place])
+                .collect::<Vec<_>>(),
+        )
     };
     assert_eq!(numbers("are {low} to {high} % cheaper"), Some(vec!["8", "25"]));
     assert_eq!(numbers("So are {more}."), Some(vec!["7.5"]));

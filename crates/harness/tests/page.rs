@@ -30,7 +30,10 @@ scenes = ['escher']
 
 /// The texts between `before` and `after` in the page.
 fn between<'a>(page: &'a str, before: &str, after: &str) -> Vec<&'a str> {
-    page.split(before).skip(1).map(|rest| rest.split(after).next().unwrap()).collect()
+    page.split(before)
+        .skip(1)
+        .map(|rest| rest.split(after).next().unwrap())
+        .collect()
 }
 
 #[test]

@@ -223,8 +223,10 @@ fn pipes_and_devices_are_refused_as_inputs_and_links_are_not_written_through() {
     use std::os::unix::fs::symlink;
     let folder = folder("spec.toml");
     let at = folder.path();
-    let made =
-        std::process::Command::new("mkfifo").args(["p.toml", "p.obj"]).current_dir(at).status();
+    let made = std::process::Command::new("mkfifo")
+        .args(["p.toml", "p.obj"])
+        .current_dir(at)
+        .status();
     assert!(made.unwrap().success());
     refused(at, &["p.toml"], &["p.toml", "not a regular file"]);
     refused(at, &["spec.toml", "--scene=p.obj"], &["p.obj"]);
@@ -251,10 +253,18 @@ fn arguments_need_not_be_utf_8() {
     use std::os::unix::ffi::OsStrExt;
     let folder = folder("spec.toml");
     let out = OsStr::from_bytes(b"out\xff");
-    let output = program(folder.path(), &["spec.toml", "--out"]).arg(out).output().unwrap();
+    let output = program(folder.path(), &["spec.toml", "--out"])
+        .arg(out)
+        .output()
+        .unwrap();
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let provenance =
-        fs::read_to_string(folder.path().join(out).join("spec/provenance.toml")).unwrap();
+    let provenance = fs::read_to_string(
+        folder
+            .path()
+            .join(out)
+            .join("spec/provenance.toml"),
+    )
+    .unwrap();
     assert!(provenance.contains("harness spec.toml --out out"), "{provenance}");
 }
 
@@ -266,8 +276,10 @@ fn the_first_signal_ends_even_a_program_that_waits_for_another() {
     fs::create_dir(at.join("results")).unwrap();
     let lock = fs::File::create(at.join("results/.lock")).unwrap();
     lock.lock().unwrap();
-    let mut child =
-        program(at, &["spec.toml"]).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let mut child = program(at, &["spec.toml"])
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
     // All runs are finished, and the best known costs are in use by us.
     wait_for(&at.join("results/spec/runs.csv"));
     let start = Instant::now();

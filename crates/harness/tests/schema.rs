@@ -11,13 +11,25 @@ use support::{assert_current, experiments, refused, said, top};
 /// The first place where a value is not what the schema accepts: as far as schemas of specs go, of draft 7.
 fn fault(root: &Value, schema: &Value, value: &Value, at: &str) -> Option<String> {
     if let Some(path) = schema.get("$ref") {
-        return fault(root, root.pointer(&path.as_str().unwrap()[1..]).unwrap(), value, at);
+        return fault(
+            root,
+            root.pointer(&path.as_str().unwrap()[1..])
+                .unwrap(),
+            value,
+            at,
+        );
     }
     let refused = |is_right: bool, why: &str| (!is_right).then(|| format!("{at}: {value} {why}"));
     let list = |key: &str| schema.get(key).and_then(Value::as_array);
     if let Some(choices) = list("oneOf").or(list("anyOf")) {
-        let faults: Vec<_> = choices.iter().map(|choice| fault(root, choice, value, at)).collect();
-        let right = faults.iter().filter(|fault| fault.is_none()).count();
+        let faults: Vec<_> = choices
+            .iter()
+            .map(|choice| fault(root, choice, value, at))
+            .collect();
+        let right = faults
+            .iter()
+            .filter(|fault| fault.is_none())
+            .count();
         let exact = right == 1 || schema.get("anyOf").is_some() && right > 1;
         return (!exact).then(|| format!("{at}: {right} choices accept it: {faults:?}"));
     }
@@ -38,27 +50,34 @@ fn fault(root: &Value, schema: &Value, value: &Value, at: &str) -> Option<String
         return refused(false, &format!("is not {schema:.80}"));
     }
     let none = Map::new();
-    let properties = schema.get("properties").and_then(Value::as_object).unwrap_or(&none);
+    let properties = schema
+        .get("properties")
+        .and_then(Value::as_object)
+        .unwrap_or(&none);
     let (fields, items) = (value.as_object().unwrap_or(&none), schema.get("items"));
     let missing = list("required")
         .into_iter()
         .flatten()
         .find(|key| !fields.contains_key(key.as_str().unwrap()));
-    missing.map(|key| format!("{at}: {key} is missing")).or_else(|| {
-        let field = |(key, value): (&String, &Value)| match (
-            properties.get(key),
-            schema.get("additionalProperties"),
-        ) {
-            (Some(schema), _) => fault(root, schema, value, &format!("{at}.{key}")),
-            (None, Some(Value::Bool(false))) => Some(format!("{at}.{key} is no key")),
-            (None, Some(schema)) => fault(root, schema, value, &format!("{at}.{key}")),
-            (None, None) => None,
-        };
-        let elements = value.as_array().into_iter().flatten();
-        fields.iter().find_map(field).or_else(|| {
-            elements.zip(items.into_iter().cycle()).find_map(|(v, s)| fault(root, s, v, at))
+    missing
+        .map(|key| format!("{at}: {key} is missing"))
+        .or_else(|| {
+            let field = |(key, value): (&String, &Value)| match (
+                properties.get(key),
+                schema.get("additionalProperties"),
+            ) {
+                (Some(schema), _) => fault(root, schema, value, &format!("{at}.{key}")),
+                (None, Some(Value::Bool(false))) => Some(format!("{at}.{key} is no key")),
+                (None, Some(schema)) => fault(root, schema, value, &format!("{at}.{key}")),
+                (None, None) => None,
+            };
+            let elements = value.as_array().into_iter().flatten();
+            fields.iter().find_map(field).or_else(|| {
+                elements
+                    .zip(items.into_iter().cycle())
+                    .find_map(|(v, s)| fault(root, s, v, at))
+            })
         })
-    })
 }
 
 #[test]
@@ -72,8 +91,9 @@ fn the_schema_accepts_every_committed_spec_and_refuses_a_mistyped_key_anywhere()
         // The same spec with one more letter in any key that is not a name.
         for key in ["question", "methods", "trials", "kind", "title", "max_work", "quick", "label"]
         {
-            let mistyped =
-                spec.to_string().replace(&format!("\"{key}\":"), &format!("\"{key}z\":"));
+            let mistyped = spec
+                .to_string()
+                .replace(&format!("\"{key}\":"), &format!("\"{key}z\":"));
             let mistyped: Value = serde_json::from_str(&mistyped).unwrap();
             let accepted = fault(&schema, &schema, &mistyped, "").is_none();
             assert!(mistyped == spec || !accepted, "{name}: {key}");
@@ -117,8 +137,14 @@ fn a_new_spec_runs_as_it_is_and_replaces_no_file() {
 #[test]
 fn a_name_of_a_table_stands_for_one_set_of_columns() {
     let declared = harness::cli::columns::all();
-    let mut names: Vec<&str> = declared.iter().flat_map(|columns| columns.files()).collect();
+    let mut names: Vec<&str> = declared
+        .iter()
+        .flat_map(|columns| columns.files())
+        .collect();
     names.sort_unstable();
-    let twice: Vec<_> = names.windows(2).filter(|pair| pair[0] == pair[1]).collect();
+    let twice: Vec<_> = names
+        .windows(2)
+        .filter(|pair| pair[0] == pair[1])
+        .collect();
     assert!(twice.is_empty(), "{twice:?}");
 }

@@ -41,8 +41,16 @@ fn broken(case: &Case, subject: &str, cell: Option<Cell>) -> Option<String> {
 
 #[test]
 fn every_case_from_s01_to_s45_is_there_and_checked() {
-    let ids: Vec<String> = CASES.iter().map(|case| case.id.to_owned()).collect();
-    assert_eq!(ids, (1..=45).map(|i| format!("S{i:02}")).collect::<Vec<_>>());
+    let ids: Vec<String> = CASES
+        .iter()
+        .map(|case| case.id.to_owned())
+        .collect();
+    assert_eq!(
+        ids,
+        (1..=45)
+            .map(|i| format!("S{i:02}"))
+            .collect::<Vec<_>>()
+    );
     for case in &CASES {
         assert!(!case.checks.is_empty(), "{} has no check", case.id);
         // A check of a method or a part that does not exist would never be made.
@@ -69,14 +77,24 @@ fn every_scene_has_the_size_it_is_asked_for() {
             assert!(scene.sizes.is_sorted(), "{}", case.id);
         }
     }
-    assert_eq!(STIFF.len(), CASES.iter().filter(|case| case.scene().is_some()).count());
+    assert_eq!(
+        STIFF.len(),
+        CASES
+            .iter()
+            .filter(|case| case.scene().is_some())
+            .count()
+    );
 }
 
 /// Every case with every one of these methods.
 fn check_methods(methods: &[(String, Method)], effort: Effort) {
-    let found = methods.par_iter().flat_map_iter(|(label, method)| {
-        CASES.iter().filter_map(move |case| broken(case, label, case.of_method(method, &effort)))
-    });
+    let found = methods
+        .par_iter()
+        .flat_map_iter(|(label, method)| {
+            CASES
+                .iter()
+                .filter_map(move |case| broken(case, label, case.of_method(method, &effort)))
+        });
     assert_kept(found.collect());
 }
 
@@ -122,7 +140,9 @@ fn every_traversal_answers_a_million_rays_as_brute_force() {
     let clusters =
         ["escher", "bijou", "konistil", "pinecon2"].map(|name| format!("{name}:cluster:200:1"));
     let meshes = clusters.map(|name| Scene::load(&name).unwrap().primitives);
-    let meshes = meshes.into_iter().chain([Primitives::Triangles(stiff::closed_box(192))]);
+    let meshes = meshes
+        .into_iter()
+        .chain([Primitives::Triangles(stiff::closed_box(192))]);
     let mut jobs = Vec::new();
     for objects in meshes {
         jobs.extend((0..20).map(|seed| (objects.clone(), seed)));
@@ -132,10 +152,12 @@ fn every_traversal_answers_a_million_rays_as_brute_force() {
         .flat_map_iter(|(objects, seed)| {
             let Primitives::Triangles(triangles) = objects else { unreachable!("all are meshes") };
             let rays = tracing::rays(triangles, 10_000, *seed);
-            TRAVERSALS.iter().filter_map(move |(name, traversal)| {
-                let broken = tracing::check(*traversal, objects, &rays).err()?;
-                Some(format!("{name}, seed {seed}: {broken}"))
-            })
+            TRAVERSALS
+                .iter()
+                .filter_map(move |(name, traversal)| {
+                    let broken = tracing::check(*traversal, objects, &rays).err()?;
+                    Some(format!("{name}, seed {seed}: {broken}"))
+                })
         })
         .collect();
     assert_kept(broken);
@@ -166,8 +188,9 @@ fn scenes(most: usize) -> impl Iterator<Item = (&'static Case, Vec<Triangle>)> {
 fn check_kernels(random: usize, adversarial: usize) {
     let mut jobs = Vec::new();
     for (case, triangles) in scenes(TESTED) {
-        let scaled =
-            SCALES.into_iter().filter_map(|by| Some((case, by, kernels::scaled(&triangles, by)?)));
+        let scaled = SCALES
+            .into_iter()
+            .filter_map(|by| Some((case, by, kernels::scaled(&triangles, by)?)));
         let scaled: Vec<Scaled> = scaled.collect();
         let pieces = random.div_ceil(PIECE * scaled.len()) * scaled.len();
         jobs.extend((0..pieces).map(|piece| (pieces, scaled[piece % scaled.len()].clone())));
@@ -180,9 +203,18 @@ fn check_kernels(random: usize, adversarial: usize) {
         assert_eq!(rays.len(), random + adversarial, "{name}");
         kernels::check(&triangles, &rays).map_err(|broken| format!("{name}, {broken}"))
     };
-    let checked: Vec<Result<usize, String>> = jobs.into_par_iter().enumerate().map(check).collect();
+    let checked: Vec<Result<usize, String>> = jobs
+        .into_par_iter()
+        .enumerate()
+        .map(check)
+        .collect();
     let hits: usize = checked.iter().flatten().sum();
-    assert_kept(checked.into_iter().filter_map(Result::err).collect());
+    assert_kept(
+        checked
+            .into_iter()
+            .filter_map(Result::err)
+            .collect(),
+    );
     let rays = STIFF.len() * (random + adversarial);
     assert!(hits > rays / 10, "{hits} of {rays} rays hit");
 }
@@ -213,9 +245,15 @@ fn the_rays_of_the_suite_hit_miss_and_cover_every_kind() {
     assert_eq!(rays.len(), 1500);
     let objects = Primitives::Triangles(triangles);
     let brute_force = Accelerator::new(&objects, Structure::Brute);
-    let hits = rays.iter().filter(|ray| brute_force.any_hit(ray)).count();
+    let hits = rays
+        .iter()
+        .filter(|ray| brute_force.any_hit(ray))
+        .count();
     assert!((300..1200).contains(&hits), "{hits}");
-    let zeros = rays.iter().flat_map(|ray| ray.direction().to_array()).filter(|&d| d == 0.0);
+    let zeros = rays
+        .iter()
+        .flat_map(|ray| ray.direction().to_array())
+        .filter(|&d| d == 0.0);
     let signs: BTreeSet<u32> = zeros.map(f32::to_bits).collect();
     assert_eq!(signs.len(), 2, "zeros of both signs");
     assert!(
@@ -269,14 +307,22 @@ fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
     let (mut searched, mut refused) = (0, 0);
     for (case, triangles) in scenes(2000) {
         let boxes = stiff::boxes(&triangles);
-        let bounds = boxes.iter().fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
+        let bounds = boxes
+            .iter()
+            .fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
         let segments: Vec<Segment> = tracing::rays(&triangles, 3000, 1)
             .iter()
             .map(|ray| Segment {
                 from: ray.origin().to_array(),
                 to: ray.at(ray.t_max().min(1e30)).to_array(),
             })
-            .filter(|segment| segment.from.iter().chain(&segment.to).all(|c| c.is_finite()))
+            .filter(|segment| {
+                segment
+                    .from
+                    .iter()
+                    .chain(&segment.to)
+                    .all(|c| c.is_finite())
+            })
             .collect();
         let Ok(density) = RayDensity::of_rays(&bounds, &segments, 0.1) else {
             refused += 1;
@@ -284,7 +330,9 @@ fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
         };
         searched += 1;
         let problem = Problem { measure: Some(&density), ..Problem::new(&boxes) };
-        let start = muller_fellner::Config::default().build(&boxes).unwrap();
+        let start = muller_fellner::Config::default()
+            .build(&boxes)
+            .unwrap();
         let budget = examine::budget(&method, boxes.len(), WORK);
         let outcome = optimize(&start, &problem, &Default::default(), 1, budget, &()).unwrap();
         validate(&outcome.tree, &boxes).unwrap();
@@ -298,7 +346,14 @@ fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
             &file::Origin { visits: &visits, ..Default::default() },
         );
         let bytes = bytes.unwrap_or_else(|error| panic!("{}: {error}", case.id));
-        assert_eq!(file::TreeFile::open(&bytes).unwrap().visits().unwrap().unwrap(), visits);
+        assert_eq!(
+            file::TreeFile::open(&bytes)
+                .unwrap()
+                .visits()
+                .unwrap()
+                .unwrap(),
+            visits
+        );
         let wide = WideBvh::for_rays(&outcome.tree, &triangles, &visits).unwrap();
         let plain = WideBvh::new(&start, &triangles).unwrap();
         assert_same_answers(case, &wide, &plain, &triangles);
@@ -332,7 +387,9 @@ fn every_case_holds_with_divided_objects_and_with_the_cost_of_the_layout() {
                 assert!(outcome.tree.prim_ids.len() <= most.max(boxes.len()), "{}", case.id);
                 divided += usize::from(outcome.tree.prim_ids.len() > boxes.len());
                 assert_reported(case.id, outcome.cost, problem.cost(&outcome.tree));
-                let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
+                let greedy = muller_fellner::Config::default()
+                    .build(&boxes)
+                    .unwrap();
                 let bytes = file::save_references(
                     &outcome.tree,
                     &boxes,
@@ -373,11 +430,15 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
         // By spatial splits, and searched by both costs.
         let trees = |k: i32| {
             let scale = |p: Vec3| (p.as_dvec3() * libm::exp2(k.into())).as_vec3();
-            let scaled: Vec<Triangle> =
-                triangles.iter().map(|t| Triangle(t.0.map(scale))).collect();
+            let scaled: Vec<Triangle> = triangles
+                .iter()
+                .map(|t| Triangle(t.0.map(scale)))
+                .collect();
             let (boxes, objects) = (stiff::boxes(&scaled), Primitives::Triangles(scaled));
             let most = boxes.len() * 3 / 2;
-            let built = spatial::Config::default().build_at_most(most, &boxes, &objects).unwrap();
+            let built = spatial::Config::default()
+                .build_at_most(most, &boxes, &objects)
+                .unwrap();
             let searched = [Objective::Layout, Objective::InternalArea].map(|objective| {
                 let splits = Splits::at_most(most, &boxes, &objects);
                 let problem = Problem { objective, splits, ..Problem::new(&boxes) };
@@ -385,11 +446,16 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
                 let outcome = solve(&method, &problem, 1, budget, &()).unwrap();
                 (outcome.cost, outcome.tree)
             });
-            searched.into_iter().chain([(total_area(&built), built)]).collect::<Vec<_>>()
+            searched
+                .into_iter()
+                .chain([(total_area(&built), built)])
+                .collect::<Vec<_>>()
         };
         let expected = trees(0);
-        divided +=
-            expected.iter().filter(|(_, tree)| tree.prim_ids.len() > triangles.len()).count();
+        divided += expected
+            .iter()
+            .filter(|(_, tree)| tree.prim_ids.len() > triangles.len())
+            .count();
         for threads in [1, 3] {
             let others = examine::on_threads(threads, || Ok(trees(0))).unwrap();
             assert!(others == expected, "{}: another tree on {threads} threads", case.id);
@@ -398,8 +464,12 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
             for ((expected_cost, expected), (cost, tree)) in expected.iter().zip(trees(k)) {
                 let same = same_topology(&tree, expected);
                 assert!(same, "{}: another tree at scale 2^{k}", case.id);
-                let [parts, others] = [expected, &tree]
-                    .map(|tree| tree.nodes.iter().map(|node| node.aabb).collect::<Vec<Aabb>>());
+                let [parts, others] = [expected, &tree].map(|tree| {
+                    tree.nodes
+                        .iter()
+                        .map(|node| node.aabb)
+                        .collect::<Vec<Aabb>>()
+                });
                 assert_eq!(others, scaled(&parts, k), "{}: other parts at scale 2^{k}", case.id);
                 assert_eq!(cost, scaled_area(*expected_cost, k), "{}: scale 2^{k}", case.id);
             }

@@ -35,7 +35,9 @@ fn tables(value: &Value, path: &[Step], found: &mut Vec<Vec<Step>>) {
     match value {
         Value::Table(table) => {
             found.push(path.to_vec());
-            table.iter().for_each(|(key, value)| tables(value, &on(Step::Key(key.clone())), found));
+            table
+                .iter()
+                .for_each(|(key, value)| tables(value, &on(Step::Key(key.clone())), found));
         }
         Value::Array(array) => {
             array
@@ -50,7 +52,11 @@ fn tables(value: &Value, path: &[Step], found: &mut Vec<Vec<Step>>) {
 /// A spec with the value at a key of the table at `path`.
 fn with(spec: &Value, path: &[Step], key: &str, value: Value) -> Value {
     let mut spec = spec.clone();
-    path.iter().fold(&mut spec, follow).as_table_mut().unwrap().insert(key.into(), value);
+    path.iter()
+        .fold(&mut spec, follow)
+        .as_table_mut()
+        .unwrap()
+        .insert(key.into(), value);
     spec
 }
 
@@ -64,7 +70,12 @@ fn read(spec: &Value) -> Result<Experiment, (u8, String)> {
 /// The names that a message gives as accepted.
 fn accepted(message: &str) -> Vec<String> {
     let Some((_, names)) = message.split_once("expected ") else { return Vec::new() };
-    names.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+    names
+        .split('`')
+        .skip(1)
+        .step_by(2)
+        .map(str::to_owned)
+        .collect()
 }
 
 /// Where a table is, whatever its number: arrays' elements are told by their method or kind.
@@ -73,8 +84,10 @@ fn place(spec: &Value, path: &[Step]) -> String {
     let mut place = String::new();
     for step in path {
         at = follow(&mut at, step).clone();
-        let tag =
-            ["kind", "method"].iter().find_map(|tag| at.get(tag)?.as_str()).unwrap_or_default();
+        let tag = ["kind", "method"]
+            .iter()
+            .find_map(|tag| at.get(tag)?.as_str())
+            .unwrap_or_default();
         match step {
             Step::Key(key) => place += &format!(".{key}"),
             Step::Index(_) => place += &format!("[{tag}]"),
@@ -90,9 +103,17 @@ fn specs() -> Vec<Value> {
         let mut spec: Table = text.parse().unwrap();
         spec.remove("quick");
         // Other libraries may not be compiled in; any method may stand for them.
-        for method in spec.get_mut("methods").and_then(Value::as_array_mut).into_iter().flatten() {
+        for method in spec
+            .get_mut("methods")
+            .and_then(Value::as_array_mut)
+            .into_iter()
+            .flatten()
+        {
             if Peer::NAMES.contains(&method["method"].as_str().unwrap()) {
-                let label = method.get("label").unwrap_or(&method["method"]).clone();
+                let label = method
+                    .get("label")
+                    .unwrap_or(&method["method"])
+                    .clone();
                 *method = Value::Table(Table::from_iter([
                     ("label".into(), label),
                     ("method".into(), "median_cut".into()),
@@ -102,12 +123,17 @@ fn specs() -> Vec<Value> {
         let experiment: Experiment = Value::Table(spec).try_into().unwrap();
         specs.push(Value::try_from(&experiment).unwrap());
     }
-    let methods: Vec<Table> =
-        Method::all().iter().map(|method| Table::try_from(method).unwrap()).collect();
+    let methods: Vec<Table> = Method::all()
+        .iter()
+        .map(|method| Table::try_from(method).unwrap())
+        .collect();
     let question = Value::from("Which keys has every method?");
     let all =
         [("question", question), ("scenes", vec!["escher"].into()), ("methods", methods.into())];
-    let mut all: Table = all.map(|(key, value)| (key.to_owned(), value)).into_iter().collect();
+    let mut all: Table = all
+        .map(|(key, value)| (key.to_owned(), value))
+        .into_iter()
+        .collect();
     let text = "
 budget = { max_work = 5 }
 objective = { sah = { traversal = 1.0, intersection = 2.0 } }
@@ -149,12 +175,21 @@ fn a_wrong_value_under_any_key_of_a_spec_is_refused_by_name() {
         for path in paths {
             let place = place(&spec, &path);
             let mut table = spec.clone();
-            let table = path.iter().fold(&mut table, follow).as_table().unwrap().clone();
+            let table = path
+                .iter()
+                .fold(&mut table, follow)
+                .as_table()
+                .unwrap()
+                .clone();
             // A key that no table has makes the parser list those that it would accept.
             let unknown = read(&with(&spec, &path, "unheard_of", 1.into()));
             let listed = unknown.map_or_else(|(_, message)| accepted(&message), |_| Vec::new());
             for key in table.keys().cloned().chain(listed) {
-                if key == "unheard_of" || seen.insert(format!("{place}.{key}"), ()).is_some() {
+                if key == "unheard_of"
+                    || seen
+                        .insert(format!("{place}.{key}"), ())
+                        .is_some()
+                {
                     continue;
                 }
                 let try_value = |value: &Value| match read(&with(&spec, &path, &key, value.clone()))
@@ -165,8 +200,11 @@ fn a_wrong_value_under_any_key_of_a_spec_is_refused_by_name() {
                         // Nothing is wrong with a label but that a report names another. What a table may hold
                         // can be for the key above to say.
                         let other = key == "label" && message.contains("names method");
-                        let above =
-                            path.iter().rev().filter(|_| value.is_table()).any(|step| match step {
+                        let above = path
+                            .iter()
+                            .rev()
+                            .filter(|_| value.is_table())
+                            .any(|step| match step {
                                 Step::Key(above) => message.contains(above),
                                 Step::Index(_) => false,
                             });

@@ -20,8 +20,9 @@ fn scene() -> Result<Vec<Triangle>, Box<dyn Error>> {
     };
     let positions: Vec<[f32; 3]> = (0..2 * 81 * 81).map(point).collect();
     let cells = (0..positions.len() as u32).filter(|i| i % 81 < 80 && i / 81 % 81 < 80);
-    let indices: Vec<[u32; 3]> =
-        cells.flat_map(|i| [[i, i + 1, i + 81], [i + 82, i + 81, i + 1]]).collect();
+    let indices: Vec<[u32; 3]> = cells
+        .flat_map(|i| [[i, i + 1, i + 81], [i + 82, i + 81, i + 1]])
+        .collect();
     Ok(Triangle::from_mesh(&positions, &indices)?)
 }
 
@@ -31,7 +32,9 @@ fn rays() -> Result<Vec<Ray>, Box<dyn Error>> {
         let (x, y) = (f32::from(i % 256) / 257.3 - 0.51, 0.49 - f32::from(i / 256) / 258.1);
         Ray::half_line([-20.0, 30.0, -20.0], [1.0 - x, y - 0.5, 1.0 + x])
     };
-    Ok((0..=u16::MAX).map(ray).collect::<Result<_, _>>()?)
+    Ok((0..=u16::MAX)
+        .map(ray)
+        .collect::<Result<_, _>>()?)
 }
 
 /// The hits of `rays` by a shader, as distances and objects.
@@ -62,7 +65,10 @@ fn trace(
         .iter()
         .map(|bytes| buffer(bytes.len(), BufferUsages::STORAGE | BufferUsages::COPY_DST))
         .collect();
-    buffers.iter().zip(data).for_each(|(buffer, bytes)| queue.write_buffer(buffer, 0, bytes));
+    buffers
+        .iter()
+        .zip(data)
+        .for_each(|(buffer, bytes)| queue.write_buffer(buffer, 0, bytes));
     buffers.push(buffer(8 * count, BufferUsages::STORAGE | BufferUsages::COPY_SRC));
     let read = buffer(8 * count, BufferUsages::COPY_DST | BufferUsages::MAP_READ);
     let entries: Vec<BindGroupEntry> = (0..)
@@ -83,10 +89,14 @@ fn trace(
     }
     encoder.copy_buffer_to_buffer(&buffers[4], 0, &read, 0, 8 * count as u64);
     queue.submit([encoder.finish()]);
-    read.slice(..).map_async(wgpu::MapMode::Read, |mapped| mapped.expect("a mapped buffer"));
+    read.slice(..)
+        .map_async(wgpu::MapMode::Read, |mapped| mapped.expect("a mapped buffer"));
     device.poll(PollType::wait_indefinitely())?;
     let words: Vec<[u32; 2]> = bytemuck::pod_collect_to_vec(&read.slice(..).get_mapped_range()?);
-    Ok(words.into_iter().map(|[t, object]| (f32::from_bits(t), object)).collect())
+    Ok(words
+        .into_iter()
+        .map(|[t, object]| (f32::from_bits(t), object))
+        .collect())
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -100,13 +110,22 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (triangles, rays) = (scene()?, rays()?);
     let boxes = boxes(&triangles);
     let tree = bake(&boxes, Duration::from_millis(500))?.tree;
-    let expected: Vec<Option<Hit>> =
-        rays.iter().map(|ray| nearest_hit(&tree, &triangles, ray)).collect();
-    let corners: Vec<f32> =
-        triangles.iter().flat_map(|t| t.0).flat_map(|corner| corner.to_array()).collect();
+    let expected: Vec<Option<Hit>> = rays
+        .iter()
+        .map(|ray| nearest_hit(&tree, &triangles, ray))
+        .collect();
+    let corners: Vec<f32> = triangles
+        .iter()
+        .flat_map(|t| t.0)
+        .flat_map(|corner| corner.to_array())
+        .collect();
     let of_ray =
         |ray: &Ray| [ray.origin().extend(ray.t_min()), ray.direction().extend(ray.t_max())];
-    let of_rays: Vec<f32> = rays.iter().flat_map(of_ray).flat_map(|v| v.to_array()).collect();
+    let of_rays: Vec<f32> = rays
+        .iter()
+        .flat_map(of_ray)
+        .flat_map(|v| v.to_array())
+        .collect();
 
     let (nodes, compressed) = (tree.to_first_count(), CompressedBvh::new(&tree, &boxes)?);
     let pairs = tree.to_aila_laine();
@@ -136,7 +155,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             Some(hit) => (t - hit.t).abs() <= 1e-5 * hit.t,
             None => *object == u32::MAX,
         };
-        let others = found.iter().zip(&expected).filter(|pair| !same(*pair)).count();
+        let others = found
+            .iter()
+            .zip(&expected)
+            .filter(|pair| !same(*pair))
+            .count();
         let hits = expected.iter().flatten().count();
         println!(
             "{name}: {} bytes, {hits} of {} rays hit, {others} decided otherwise",

@@ -176,7 +176,12 @@ fn find_stop<R: Rule>(
     while inherited + object.area < stop.increase {
         let (mut least, mut next) = (f64::INFINITY, Grown { node: NONE, area: 0.0 });
         examined += count.div_ceil(LANES);
-        for (at, block) in blocks.iter().enumerate().skip(first).take(count.div_ceil(LANES)) {
+        for (at, block) in blocks
+            .iter()
+            .enumerate()
+            .skip(first)
+            .take(count.div_ceil(LANES))
+        {
             // Only leaves follow, each of which adds at least twice the object's area.
             if block.is_leaf(0) {
                 let beaten = !R::BY_AREA && least <= 2.0 * object.area;

@@ -176,7 +176,8 @@ impl Config {
         watch: &Watch,
     ) -> Result<f64, InvalidOrder> {
         check_order(order, scene.len(), &mut workspace.named)?;
-        self.insert_valid(scene, order, workspace, watch).ok_or(InvalidOrder::Cancelled)
+        self.insert_valid(scene, order, workspace, watch)
+            .ok_or(InvalidOrder::Cancelled)
     }
 
     /// `None` if the `watch` ends the insertion.
@@ -230,7 +231,8 @@ impl Builder for Config {
         let order: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut workspace = Workspace::default();
         let mut tree = Bvh::default();
-        self.insert_valid(&scene, &order, &mut workspace, watch).ok_or(BuildError::Cancelled)?;
+        self.insert_valid(&scene, &order, &mut workspace, watch)
+            .ok_or(BuildError::Cancelled)?;
         workspace.write(&mut tree);
         Ok(tree)
     }

@@ -78,9 +78,10 @@ impl Clusters {
         #[cfg(feature = "rayon")]
         if nearest.len() * radius >= PARALLEL_PAIRS && rayon::current_num_threads() > 1 {
             use rayon::prelude::*;
-            nearest.par_chunks_mut(CHUNK).enumerate().for_each_init(
-                Scratch::default,
-                |scratch, (number, found)| {
+            nearest
+                .par_chunks_mut(CHUNK)
+                .enumerate()
+                .for_each_init(Scratch::default, |scratch, (number, found)| {
                     if ends_at(number) {
                         return;
                     }
@@ -93,8 +94,7 @@ impl Clusters {
                         found,
                         scratch,
                     );
-                },
-            );
+                });
             return;
         }
         for (number, found) in nearest.chunks_mut(CHUNK).enumerate() {
@@ -159,7 +159,11 @@ impl Clusters {
             pair[1].write(node((boxes[other], below[other])));
             (boxes[at], below[at]) = (boxes[at].union(&boxes[other]), self.free as u32);
         }
-        for (to, at) in kept[..left].iter().map(|&at| at as usize).enumerate() {
+        for (to, at) in kept[..left]
+            .iter()
+            .map(|&at| at as usize)
+            .enumerate()
+        {
             (boxes[to], below[to]) = (boxes[at], below[at]);
         }
         self.joined_few = pairs < count.div_ceil(FEW);

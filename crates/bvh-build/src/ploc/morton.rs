@@ -7,14 +7,23 @@ use bvh_core::{PackedAabb, with_vector_instructions};
 /// grid of 2^21 points along the longest side of the box around all centres, with the same spacing along the others.
 pub(super) fn order(boxes: &[PackedAabb]) -> Vec<u32> {
     let codes = codes(boxes);
-    let mut order: Vec<(u32, u32)> =
-        codes.iter().zip(0..).map(|(&code, index)| (high(code), index)).collect();
+    let mut order: Vec<(u32, u32)> = codes
+        .iter()
+        .zip(0..)
+        .map(|(&code, index)| (high(code), index))
+        .collect();
     // The lower halves are compared only where the upper halves are equal, which is rare.
     radsort::sort_by_key(&mut order, |&(high, _)| high);
-    for equal in order.chunk_by_mut(|a, b| a.0 == b.0).filter(|equal| equal.len() > 1) {
+    for equal in order
+        .chunk_by_mut(|a, b| a.0 == b.0)
+        .filter(|equal| equal.len() > 1)
+    {
         equal.sort_by_key(|&(_, index)| codes[index as usize]);
     }
-    order.into_iter().map(|(_, index)| index).collect()
+    order
+        .into_iter()
+        .map(|(_, index)| index)
+        .collect()
 }
 
 /// The upper 32 bits of a code of 63 bits.

@@ -53,8 +53,9 @@ fn find_plain(
         plane[..offset].fill(f32::INFINITY);
         plane[offset + last - first..].fill(f32::INFINITY);
     }
-    let [a, b, c, d, e, f] =
-        planes.each_mut().map(|plane| &mut plane[offset..offset + last - first]);
+    let [a, b, c, d, e, f] = planes
+        .each_mut()
+        .map(|plane| &mut plane[offset..offset + last - first]);
     for (at, aabb) in boxes[first..last].iter().enumerate() {
         let [low, high] = aabb
             .planes()
@@ -62,7 +63,9 @@ fn find_plain(
         [a[at], b[at], c[at]] = [low[0], low[1], low[2]];
         [d[at], e[at], f[at]] = [high[0], high[1], high[2]];
     }
-    sides.iter_mut().for_each(|side| side.resize(len + radius, 0.0));
+    sides
+        .iter_mut()
+        .for_each(|side| side.resize(len + radius, 0.0));
     least.clear();
     least.resize(len, i32::MAX);
     before.resize(len, 0);

@@ -70,7 +70,9 @@ impl Builder for Config {
                 return Err(BuildError::Cancelled);
             }
             let ids = &mut prim_ids[start..start + len];
-            let aabb = ids.iter().fold(Aabb::EMPTY, |b, &id| b.union(&boxes[id as usize]));
+            let aabb = ids
+                .iter()
+                .fold(Aabb::EMPTY, |b, &id| b.union(&boxes[id as usize]));
             if len <= max_leaf {
                 ids.sort_unstable();
                 nodes[node] = Node::leaf(aabb, start as u32, len as u32);
@@ -108,7 +110,9 @@ mod tests {
     /// Unit cubes at x = 0, 2, 4, … and y = 0, 100, 0, 100, …
     fn zigzag(n: usize) -> Vec<Aabb> {
         let at = |i: usize| [2.0 * i as f32, 100.0 * (i % 2) as f32, 0.0];
-        (0..n).map(|i| Aabb::from((at(i), at(i).map(|c| c + 1.0)))).collect()
+        (0..n)
+            .map(|i| Aabb::from((at(i), at(i).map(|c| c + 1.0))))
+            .collect()
     }
 
     #[test]
@@ -120,8 +124,9 @@ mod tests {
 
     #[test]
     fn the_longest_axis_is_cut_when_asked_for() {
-        let tree =
-            Config { axis: CutAxis::Longest, ..Config::default() }.build(&zigzag(4)).unwrap();
+        let tree = Config { axis: CutAxis::Longest, ..Config::default() }
+            .build(&zigzag(4))
+            .unwrap();
         assert_eq!(tree.prim_ids, [0, 2, 1, 3]);
     }
 
@@ -131,10 +136,13 @@ mod tests {
             let tree = Config { axis: CutAxis::Longest, leaf_fraction: fraction }
                 .build(&zigzag(75))
                 .unwrap();
-            let largest = tree.nodes.iter().filter_map(|node| match node.kind() {
-                NodeKind::Leaf { count, .. } => Some(count),
-                NodeKind::Inner { .. } => None,
-            });
+            let largest = tree
+                .nodes
+                .iter()
+                .filter_map(|node| match node.kind() {
+                    NodeKind::Leaf { count, .. } => Some(count),
+                    NodeKind::Inner { .. } => None,
+                });
             assert!(largest.max().unwrap() <= expected, "fraction {fraction}");
         }
     }

@@ -56,7 +56,13 @@ impl Presorted {
             if !(in_order && skip_sorted) {
                 radsort::sort_by_key(&mut keyed, |&(key, _)| key);
             }
-            (keyed.into_iter().map(|(_, index)| index).collect::<Vec<u32>>(), in_order)
+            (
+                keyed
+                    .into_iter()
+                    .map(|(_, index)| index)
+                    .collect::<Vec<u32>>(),
+                in_order,
+            )
         };
         let sorted = || {
             if x_without_area && Self::without_area(boxes) {
@@ -73,7 +79,11 @@ impl Presorted {
 
     /// Whether the box around all objects has no area, so that every tree costs nothing; true without boxes. O(n).
     pub fn without_area(boxes: &[Aabb]) -> bool {
-        boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b)).half_area() == 0.0
+        boxes
+            .iter()
+            .fold(Aabb::EMPTY, |all, b| all.union(b))
+            .half_area()
+            == 0.0
     }
 
     /// Per axis, whether the objects came in order and needed no sorting, as along an axis on which all box centres

@@ -267,7 +267,12 @@ impl<C: SplitCost> Sweep<'_, C> {
             let lowest = value_block(boxes, *split_cost, objects, block, &mut costs);
             bound = if BEST { bound.min(lowest) } else { bound };
             if lowest <= bound {
-                for (left, &cost) in costs.iter().enumerate().take(objects.len()).skip(1) {
+                for (left, &cost) in costs
+                    .iter()
+                    .enumerate()
+                    .take(objects.len())
+                    .skip(1)
+                {
                     if cost <= bound {
                         bound = visit(candidate(cost, index * size + left));
                     }
@@ -289,8 +294,12 @@ impl<C: SplitCost> Sweep<'_, C> {
         let start = left / BLOCK * BLOCK;
         let end = order.len().min(start + BLOCK);
         [
-            block.left.union(&union_of(self.boxes, &order[start..left])),
-            block.right.union(&union_of(self.boxes, &order[left..end])),
+            block
+                .left
+                .union(&union_of(self.boxes, &order[start..left])),
+            block
+                .right
+                .union(&union_of(self.boxes, &order[left..end])),
         ]
     }
 }
@@ -306,7 +315,9 @@ fn gather_blocks<C: SplitCost>(
     blocks.clear();
     // Each block's own box is kept where the box of all objects before it goes later.
     blocks.extend(
-        order.chunks(BLOCK).map(|objects| Block { left: union_of(boxes, objects), ..Block::NONE }),
+        order
+            .chunks(BLOCK)
+            .map(|objects| Block { left: union_of(boxes, objects), ..Block::NONE }),
     );
     let (mut aabb, mut load) = (PackedAabb::EMPTY, 0.0);
     for (block, objects) in blocks.iter_mut().zip(order.chunks(BLOCK)).rev() {
@@ -347,7 +358,10 @@ fn value_block<C: SplitCost>(
     }
     let (mut aabb, mut load) = (block.left, block.left_load);
     let mut lowest = f64::INFINITY;
-    for (&object, cost) in objects[..objects.len() - 1].iter().zip(&mut costs[1..]) {
+    for (&object, cost) in objects[..objects.len() - 1]
+        .iter()
+        .zip(&mut costs[1..])
+    {
         aabb.grow(&boxes[object as usize]);
         load += split_cost.load(object);
         *cost = split_cost.join(split_cost.side(split_cost.size(&aabb), load), *cost);

@@ -42,12 +42,20 @@ impl FromStr for Effort {
                     "G" => Some(1_000_000_000),
                     _ => None,
                 };
-                unit.and_then(|unit| digits.trim_end().parse::<u64>().ok()?.checked_mul(unit))
-                    .map(Self::Work)
+                unit.and_then(|unit| {
+                    digits
+                        .trim_end()
+                        .parse::<u64>()
+                        .ok()?
+                        .checked_mul(unit)
+                })
+                .map(Self::Work)
             }
             // `5M` would be five months.
             None if text.contains('M') => None,
-            None => humantime::parse_duration(text).ok().map(Self::Time),
+            None => humantime::parse_duration(text)
+                .ok()
+                .map(Self::Time),
         };
         effort.ok_or_else(|| {
             "expected a time such as 10s, 500ms or 1h30m, or work such as 50Mwork (units k, M, G)".into()

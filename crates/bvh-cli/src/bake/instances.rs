@@ -35,7 +35,11 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let plan = args.plan()?;
     let path = Path::new(&args.scene);
     let parts = parts(path, args.files.outside())?;
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let stem = path
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
     let part = |(mesh, triangles): (&usize, &Vec<Triangle>)| {
         let name = format!("{stem}, mesh {mesh}");
         Scene::new(&name, SceneKind::File, Primitives::Triangles(triangles.clone()))
@@ -46,11 +50,22 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     fs::create_dir_all(&args.out).map_err(Error::io(&args.out, "create the folder"))?;
     files::write(&args.out.join(INSTANCES), table(&instances, &parts).as_bytes())?;
 
-    let objects: usize = scenes.iter().chain([&top]).map(|scene| scene.boxes.len()).sum();
+    let objects: usize = scenes
+        .iter()
+        .chain([&top])
+        .map(|scene| scene.boxes.len())
+        .sum();
     // Every leaf of the top tree is a box and whole, and the tree is not laid out.
     let plan_of_top = Plan { references: 1.0, objective: Objective::InternalArea, ..plan.clone() };
-    let names = parts.meshes.keys().map(|mesh| format!("mesh_{mesh}.bvh")).chain([TOP.into()]);
-    let given = scenes.iter().map(|scene| (scene, &plan)).chain([(&top, &plan_of_top)]);
+    let names = parts
+        .meshes
+        .keys()
+        .map(|mesh| format!("mesh_{mesh}.bvh"))
+        .chain([TOP.into()]);
+    let given = scenes
+        .iter()
+        .map(|scene| (scene, &plan))
+        .chain([(&top, &plan_of_top)]);
     for (name, (scene, plan)) in names.zip(given) {
         let part = scene.boxes.len() as f64 / objects as f64;
         let plan = Plan { effort: plan.effort.share(part), ..plan.clone() };
@@ -73,7 +88,9 @@ fn bake_part(
 ) -> Result<(), Error> {
     let bake = plan.begin(scene, None, interrupted)?;
     let baked = bake.search(interrupted)?;
-    let bytes = bake.file(&baked).map_err(TreeFileError::of(path))?;
+    let bytes = bake
+        .file(&baked)
+        .map_err(TreeFileError::of(path))?;
     files::write(path, &bytes)?;
     let count = scene.boxes.len();
     let cost = baked.outcome.cost;
@@ -135,13 +152,18 @@ fn top(
     let name = format!("{stem}, instances");
     let failed = |message: String| Error::from(SceneError { name: name.clone(), message });
     let layout = |scene: &Scene| {
-        let triangles = scene.triangles().map_err(|error| failed(error.to_string()))?;
+        let triangles = scene
+            .triangles()
+            .map_err(|error| failed(error.to_string()))?;
         let tree = median_cut::Config::default().build(&scene.boxes);
         let tree = tree.map_err(|error| failed(error.to_string()))?;
         WideBvh::new(&tree, triangles).map_err(|error| failed(error.to_string()))
     };
     // The box of a part is the same in any tree.
-    let layouts = scenes.iter().map(layout).collect::<Result<Vec<_>, Error>>()?;
+    let layouts = scenes
+        .iter()
+        .map(layout)
+        .collect::<Result<Vec<_>, Error>>()?;
     let boxes = Instance::boxes(instances, &layouts).map_err(|invalid| match invalid {
         InvalidInstances::Transform(at) => {
             let (node, mesh) = (parts.places[at].node, parts.places[at].mesh);
@@ -153,7 +175,10 @@ fn top(
         other => failed(other.to_string()),
     })?;
     // Triangles with these boxes: only boxes are looked at.
-    let triangles = boxes.iter().map(|aabb| Triangle([aabb.min, aabb.max, aabb.min])).collect();
+    let triangles = boxes
+        .iter()
+        .map(|aabb| Triangle([aabb.min, aabb.max, aabb.min]))
+        .collect();
     Ok(Scene::new(&name, SceneKind::File, Primitives::Triangles(triangles)))
 }
 

@@ -114,7 +114,9 @@ impl BakeArgs {
     /// The method that was named. Rejects one that cannot start from a tree if a tree is given.
     fn method(&self) -> Result<Method, Error> {
         let name = &self.method;
-        let found = Method::all().into_iter().find(|method| method.name() == name);
+        let found = Method::all()
+            .into_iter()
+            .find(|method| method.name() == name);
         match found {
             None => {
                 let accepted = Method::NAMES.join(", ");
@@ -170,7 +172,10 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let plan = args.plan()?;
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;
-    scene.remark.iter().for_each(|remark| print_error(remark));
+    scene
+        .remark
+        .iter()
+        .for_each(|remark| print_error(remark));
     if args.explain {
         let text = explain::scene(&scene).map_err(Error::search(&scene.name, "--explain"))?;
         print_line(&text);
@@ -190,7 +195,9 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         );
     }
     let baked = bake.search(interrupted)?;
-    let bytes = bake.file(&baked).map_err(TreeFileError::of(&args.out))?;
+    let bytes = bake
+        .file(&baked)
+        .map_err(TreeFileError::of(&args.out))?;
     reserved.write(&bytes)?;
     if interrupted.load(Relaxed) {
         return Err(Error::Stopped { path: args.out.clone(), cost: baked.outcome.cost });

@@ -98,7 +98,10 @@ impl Bake<'_> {
         let problem = Problem {
             objective: self.plan.objective,
             splits: self.division.splits(),
-            measure: self.density.as_ref().map(|density| density as &dyn Measure),
+            measure: self
+                .density
+                .as_ref()
+                .map(|density| density as &dyn Measure),
             known: Some(&self.greedy),
             ..Problem::new(&self.scene.boxes)
         };
@@ -144,7 +147,10 @@ impl Bake<'_> {
     pub fn file(&self, baked: &Baked) -> Result<Vec<u8>, FileError> {
         let tree = &baked.outcome.tree;
         let spent = self.start.map_or(0, |start| start.work);
-        let visits = self.density.as_ref().map_or_else(Vec::new, |density| density.visits(tree));
+        let visits = self
+            .density
+            .as_ref()
+            .map_or_else(Vec::new, |density| density.visits(tree));
         let origin = Origin {
             method: &self.plan.name,
             seed: self.plan.seed,

@@ -61,16 +61,28 @@ impl<'a> Watch<'a> {
         let elapsed = self.deadline.elapsed();
         let (now, before) = (elapsed.as_millis() as u64, self.shown.load(Relaxed));
         let due = now >= before + REFRESH_MILLISECONDS;
-        if !due || self.shown.compare_exchange(before, now, Relaxed, Relaxed).is_err() {
+        if !due
+            || self
+                .shown
+                .compare_exchange(before, now, Relaxed, Relaxed)
+                .is_err()
+        {
             return;
         }
-        let Some(event) = *self.last.lock().unwrap_or_else(PoisonError::into_inner) else { return };
+        let Some(event) = *self
+            .last
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+        else {
+            return;
+        };
         let seconds = elapsed.as_secs_f64().max(1e-9);
         let done = match self.effort {
             Effort::Time(_) => self.deadline.fraction(),
             Effort::Work(work) => self.work.load(Relaxed) as f64 / work.max(1) as f64,
         };
-        self.bar.set_position((1000.0 * done.min(1.0)) as u64);
+        self.bar
+            .set_position((1000.0 * done.min(1.0)) as u64);
         self.bar.set_message(format!(
             "{:.6e}, {} MF, {:.2} M moves/s, {:.0} s left",
             event.incumbent,
@@ -83,7 +95,10 @@ impl<'a> Watch<'a> {
 
 impl Observer for Watch<'_> {
     fn event(&self, event: &Event) {
-        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(*event);
+        *self
+            .last
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner) = Some(*event);
     }
 
     fn counted(&self, evaluations: u64, work: u64) {

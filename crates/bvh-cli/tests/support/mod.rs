@@ -23,5 +23,7 @@ pub fn facts(text: &str) -> BTreeMap<String, String> {
 
 /// The internal area of the tree in a file, as `inspect` has it.
 pub fn cost(folder: &Path, file: &str) -> f64 {
-    facts(&said(folder, &["inspect", file]))["internal area"].parse().unwrap()
+    facts(&said(folder, &["inspect", file]))["internal area"]
+        .parse()
+        .unwrap()
 }

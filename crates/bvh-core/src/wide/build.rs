@@ -111,7 +111,10 @@ fn promise(tree: &Bvh, triangles: &[Triangle], visits: &[f32], decisions: &[Deci
     for (index, node) in tree.nodes.iter().enumerate().rev() {
         // A leaf tests all of a triangle, though only a part of it may be in its box.
         let own = |&id: &u32| triangles[id as usize].area();
-        areas[index] = tree.prim_ids[node.prims()].iter().map(own).sum::<f64>()
+        areas[index] = tree.prim_ids[node.prims()]
+            .iter()
+            .map(own)
+            .sum::<f64>()
             + areas[node.children()].iter().sum::<f64>();
     }
     let promise = |(index, node): (usize, &crate::Node)| {
@@ -120,14 +123,21 @@ fn promise(tree: &Bvh, triangles: &[Triangle], visits: &[f32], decisions: &[Deci
         let time = decisions[index].costs[0] / visits[index].max(f32::MIN_POSITIVE);
         (stopped / f64::from(time).max(f64::MIN_POSITIVE)) as f32
     };
-    tree.nodes.iter().enumerate().map(promise).collect()
+    tree.nodes
+        .iter()
+        .enumerate()
+        .map(promise)
+        .collect()
 }
 
 /// The part of the lines through the root's box that meet each node's.
 pub(crate) fn areas(tree: &Bvh) -> Vec<f32> {
     let root_area = tree.nodes[0].aabb.half_area();
     let scale = if root_area > 0.0 { 1.0 / root_area } else { 0.0 };
-    tree.nodes.iter().map(|node| (node.aabb.half_area() * scale) as f32).collect()
+    tree.nodes
+        .iter()
+        .map(|node| (node.aabb.half_area() * scale) as f32)
+        .collect()
 }
 
 /// The wide layout of least expected cost for rays that enter the nodes of `tree` as often as `visits` says, by default for
@@ -144,7 +154,11 @@ pub(crate) fn widen(
         root: None,
         nodes: Vec::new(),
         blocks: Vec::new(),
-        largest: bounds.min.abs().max(bounds.max.abs()).max_element(),
+        largest: bounds
+            .min
+            .abs()
+            .max(bounds.max.abs())
+            .max_element(),
         kernel: Kernel::Portable,
         stack_need: 0,
     };
@@ -185,7 +199,8 @@ pub(crate) fn widen(
             if ids.is_empty() {
                 continue;
             }
-            wide.blocks.extend(TriangleBlock::chain(&ids, triangles));
+            wide.blocks
+                .extend(TriangleBlock::chain(&ids, triangles));
             child
         } else {
             let index = wide.nodes.len();
@@ -219,13 +234,19 @@ mod tests {
         let blocks = |child: Child| match child.is_node() {
             true => 0,
             false => {
-                1 + wide.blocks[child.index()..].iter().take_while(|block| !block.is_last()).count()
+                1 + wide.blocks[child.index()..]
+                    .iter()
+                    .take_while(|block| !block.is_last())
+                    .count()
             }
         };
         let root = wide.root.map(|root| (wide.bounds, blocks(root)));
-        root.into_iter().chain(wide.nodes.iter().flat_map(move |node| {
-            (0..8).filter_map(move |lane| Some((node.lane_box(lane)?, blocks(node.children[lane]))))
-        }))
+        root.into_iter()
+            .chain(wide.nodes.iter().flat_map(move |node| {
+                (0..8).filter_map(move |lane| {
+                    Some((node.lane_box(lane)?, blocks(node.children[lane])))
+                })
+            }))
     }
 
     #[test]
@@ -245,8 +266,11 @@ mod tests {
         };
         for seed in 0..6 {
             let (triangles, tree) = scene(11, seed);
-            let visits: Vec<f32> =
-                tree.nodes.iter().map(|node| along_x(&node.aabb) as f32).collect();
+            let visits: Vec<f32> = tree
+                .nodes
+                .iter()
+                .map(|node| along_x(&node.aabb) as f32)
+                .collect();
             let wide = WideBvh::for_rays(&tree, &triangles, &visits).unwrap();
             check_optimal(&tree, &wide, along_x);
         }
@@ -300,7 +324,10 @@ mod tests {
             let at = f32::from(i % 3);
             Triangle::from([[at, at, 1.0 + at], [at + 0.1, at, 1.0 + at], [at, at + 0.1, 1.0 + at]])
         };
-        let triangles: Vec<Triangle> = [wall].into_iter().chain((0..24).map(speck)).collect();
+        let triangles: Vec<Triangle> = [wall]
+            .into_iter()
+            .chain((0..24).map(speck))
+            .collect();
         let halves =
             [[[0.0; 3], [1.1, 2.0, 0.0]], [[1.0, 0.0, 0.0], [2.0, 1.1, 0.0]]].map(Aabb::from);
         let scattered = Aabb::from([[0.0, 0.0, 1.0], [2.1, 2.1, 3.0]]);
@@ -312,11 +339,15 @@ mod tests {
         ];
         for (leaves, parts) in [(whole, 1), (divided, 2)] {
             let root = Aabb::from([[0.0; 3], [2.1, 2.1, 3.0]]);
-            let prim_ids = core::iter::repeat_n(0, parts).chain(1..25).collect();
+            let prim_ids = core::iter::repeat_n(0, parts)
+                .chain(1..25)
+                .collect();
             let mut tree = Bvh { nodes: vec![Node::inner(root, 1, leaves.len() as u32)], prim_ids };
             tree.nodes.extend(leaves);
             let wide = WideBvh::new(&tree, &triangles).unwrap();
-            let lanes = (0..8).filter_map(|lane| wide.nodes[0].lane_box(lane)).collect::<Vec<_>>();
+            let lanes = (0..8)
+                .filter_map(|lane| wide.nodes[0].lane_box(lane))
+                .collect::<Vec<_>>();
             assert_eq!(lanes[0], scattered, "the last of {}", lanes.len());
             let ray = crate::Ray::half_line([0.1, 0.1, -1.0], [0.0, 0.0, 1.0]).unwrap();
             let mut counts = crate::TestCounts::default();
@@ -344,10 +375,20 @@ mod tests {
         let (triangles, _) = scene(9, 1);
         let mut tree =
             Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, 9)], prim_ids: (0..9).rev().collect() };
-        tree.refit(&triangles.iter().map(Triangle::aabb).collect::<Vec<_>>());
+        tree.refit(
+            &triangles
+                .iter()
+                .map(Triangle::aabb)
+                .collect::<Vec<_>>(),
+        );
         let wide = WideBvh::new(&tree, &triangles).unwrap();
         assert_eq!((wide.nodes.len(), wide.blocks.len()), (0, 3));
-        assert_eq!(WideBvh::new(&Bvh::default(), &[]).unwrap().bytes(), 0);
+        assert_eq!(
+            WideBvh::new(&Bvh::default(), &[])
+                .unwrap()
+                .bytes(),
+            0
+        );
         assert!(WideBvh::new(&tree, &triangles[1..]).is_err());
     }
 }

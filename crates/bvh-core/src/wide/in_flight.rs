@@ -196,7 +196,12 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             traversal.object = u32::MAX;
             traversal.child = self.wide.root.unwrap_or(END);
             traversal.stack.0[0].write(u64::from(END.bits()));
-            traversal.top = traversal.stack.0.as_mut_ptr().cast::<Pending>().add(1);
+            traversal.top = traversal
+                .stack
+                .0
+                .as_mut_ptr()
+                .cast::<Pending>()
+                .add(1);
             self.enlist(traversal);
         }
     }
@@ -224,9 +229,11 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             let number = from + lane as usize;
             others &= others - 1;
             if in_range >> lane & 1 == 0 {
-                self.answers.alone(number, self.wide, &self.rays.ray(number));
+                self.answers
+                    .alone(number, self.wide, &self.rays.ray(number));
             } else {
-                self.answers.write(number, f32::INFINITY, u32::MAX);
+                self.answers
+                    .write(number, f32::INFINITY, u32::MAX);
             }
         }
     }
@@ -238,7 +245,8 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
         // SAFETY: every list has a place for every traversal.
         unsafe {
             self.at_nodes.append(traversal, child.is_node());
-            self.at_leaves.append(traversal, !child.is_node() & (child != END));
+            self.at_leaves
+                .append(traversal, !child.is_node() & (child != END));
             self.at_end.append(traversal, child == END);
         }
     }
@@ -251,7 +259,11 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             self.at_nodes.count = 0;
             for i in 0..count {
                 let traversal = &mut *self.at_nodes.get(i);
-                let node = &*self.wide.nodes.as_ptr().add(traversal.child.index());
+                let node = &*self
+                    .wide
+                    .nodes
+                    .as_ptr()
+                    .add(traversal.child.index());
                 let (entry, mask) = boxes::<K::Boxes>(node, &traversal.ray, traversal.t);
                 if A::ANY {
                     K::compress_pending(node, mask, traversal.top);
@@ -299,9 +311,16 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
                 let traversal = &mut *self.at_leaves.get(i);
                 let block = traversal.child.index();
                 *traversal.top = u64::from(Child::leaf(block as u32 + 1).bits());
-                traversal.top = traversal.top.add(usize::from(!(*blocks.add(block)).is_last()));
+                traversal.top = traversal
+                    .top
+                    .add(usize::from(!(*blocks.add(block)).is_last()));
                 if A::ANY {
-                    let bottom = traversal.stack.0.as_mut_ptr().cast::<Pending>().add(1);
+                    let bottom = traversal
+                        .stack
+                        .0
+                        .as_mut_ptr()
+                        .cast::<Pending>()
+                        .add(1);
                     traversal.top =
                         if traversal.object == u32::MAX { traversal.top } else { bottom };
                 }
@@ -321,7 +340,8 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             for i in 0..count {
                 let traversal = self.at_end.get(i);
                 let Traversal { ray, t, object, .. } = &*traversal;
-                self.answers.write(first + ray.number as usize, *t, *object);
+                self.answers
+                    .write(first + ray.number as usize, *t, *object);
                 self.start(first, traversal);
             }
         }
@@ -334,12 +354,19 @@ unsafe fn boxes<L: Lanes>(node: &WideNode, ray: &Prepared, t_max: f32) -> (L, u3
     // SAFETY: the caller's promises; loads are of whole, aligned planes, which the ray names.
     unsafe {
         let distance = |plane: u32, scale: f32, shift: f32| {
-            let plane = node.planes.as_ptr().cast::<u8>().add(plane as usize).cast();
+            let plane = node
+                .planes
+                .as_ptr()
+                .cast::<u8>()
+                .add(plane as usize)
+                .cast();
             L::load(plane).mul_add(L::splat(scale), L::splat(shift))
         };
         let near = |axis: usize| distance(ray.near[axis], ray.scale[axis], ray.near_shift[axis]);
         let far = |axis: usize| distance(ray.far[axis], ray.scale[axis], ray.far_shift[axis]);
-        let entry = near(0).max(near(1)).max(near(2).max(L::splat(ray.t_min)));
+        let entry = near(0)
+            .max(near(1))
+            .max(near(2).max(L::splat(ray.t_min)));
         // Of a NaN and a number the second: unused lanes stay NaN.
         let exit = L::splat(t_max).min(far(0).min(far(1)).min(far(2)));
         (entry, entry.le(RayLanes::beyond(exit)).bits())
@@ -364,7 +391,9 @@ unsafe fn corners<L: Lanes>(
             let traversal = &*four[i];
             let axis = AXES[traversal.ray.largest_axis as usize % 3][axis];
             let block = blocks.wrapping_add(traversal.child.index());
-            block.cast::<f32>().wrapping_add((3 * corner + axis) * TriangleBlock::LANES)
+            block
+                .cast::<f32>()
+                .wrapping_add((3 * corner + axis) * TriangleBlock::LANES)
         };
         let of = |corner: usize, axis: usize| {
             L::load_quarters([
@@ -392,7 +421,11 @@ unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4], blocks: *const TriangleBlo
         let before = L::load_quarters([row(0), row(1), row(2), row(3)]);
         let t_max = before.spread::<0>();
         let (inside, t) = Prepared::pairs::<L>(rays_of(four)).decide(&corners(four, blocks), t_max);
-        let ids = |i: usize| (*blocks.wrapping_add((*four[i]).child.index())).ids().cast();
+        let ids = |i: usize| {
+            (*blocks.wrapping_add((*four[i]).child.index()))
+                .ids()
+                .cast()
+        };
         let ids = L::load_quarters([ids(0), ids(1), ids(2), ids(3)])
             & L::splat_bits(!TriangleBlock::LAST);
         let none = L::splat_bits(u32::MAX);

@@ -304,7 +304,10 @@ impl<K: Instructions> Packet<K> {
     unsafe fn enter(&self, vector: usize, planes: &[[f32; 2]; 3]) -> u32 {
         // SAFETY: the caller's promise: the vector is counted.
         unsafe {
-            let vector = self.vectors.get_unchecked(vector).assume_init_ref();
+            let vector = self
+                .vectors
+                .get_unchecked(vector)
+                .assume_init_ref();
             let (mut entry, mut exit) = (vector.t_min, vector.t);
             for (axis, &[near, far]) in planes.iter().enumerate() {
                 let near = K::Rays::splat(near).mul_add(vector.scale[axis], vector.shift[axis]);
@@ -326,9 +329,14 @@ impl<K: Instructions> Packet<K> {
     ) -> bool {
         // SAFETY: the caller's promises; a block that is not its leaf's last is followed by another.
         unsafe {
-            let vector = self.vectors.get_unchecked_mut(vector).assume_init_mut();
+            let vector = self
+                .vectors
+                .get_unchecked_mut(vector)
+                .assume_init_mut();
             if !vector.is_sheared {
-                vector.pairs.write(vector.rays.sheared(vector.axes));
+                vector
+                    .pairs
+                    .write(vector.rays.sheared(vector.axes));
                 vector.is_sheared = true;
             }
             let pairs = vector.pairs.assume_init_ref();

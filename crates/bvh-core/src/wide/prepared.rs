@@ -124,7 +124,9 @@ impl Prepared {
     /// Four lanes of it.
     #[inline(always)]
     fn row(&self, row: usize) -> *const f32 {
-        (&raw const *self).cast::<f32>().wrapping_add(4 * row)
+        (&raw const *self)
+            .cast::<f32>()
+            .wrapping_add(4 * row)
     }
 
     /// A ray for every quarter of the lanes, as triangles are tested with it.
@@ -172,7 +174,10 @@ unsafe fn write_row<L: Lanes>(to: *mut Prepared, row: usize, [a, b, c]: [L; 3], 
     // SAFETY: the caller's promises.
     unsafe {
         let to = to.cast::<f32>().wrapping_add(4 * row);
-        for (i, row) in L::transpose_quarters([a, b, c, d]).into_iter().enumerate() {
+        for (i, row) in L::transpose_quarters([a, b, c, d])
+            .into_iter()
+            .enumerate()
+        {
             let to = to.wrapping_add(i * NEXT);
             row.store_quarters([
                 to,

@@ -24,13 +24,15 @@ impl TriangleBlock {
     /// The blocks of one leaf of at least one triangle, none degenerate.
     pub(crate) fn chain(ids: &[u32], triangles: &[Triangle]) -> impl Iterator<Item = Self> {
         let blocks = ids.len().div_ceil(Self::LANES);
-        (1..).zip(ids.chunks(Self::LANES)).map(move |(number, ids)| {
-            let mut block = Self { ids: [Self::UNUSED; Self::LANES], ..Self::zeroed() };
-            block.ids[..ids.len()].copy_from_slice(ids);
-            block.ids[0] |= if number == blocks { Self::LAST } else { 0 };
-            block.move_to(triangles);
-            block
-        })
+        (1..)
+            .zip(ids.chunks(Self::LANES))
+            .map(move |(number, ids)| {
+                let mut block = Self { ids: [Self::UNUSED; Self::LANES], ..Self::zeroed() };
+                block.ids[..ids.len()].copy_from_slice(ids);
+                block.ids[0] |= if number == blocks { Self::LAST } else { 0 };
+                block.move_to(triangles);
+                block
+            })
     }
 
     /// Writes the corners of the triangles that the ids name.
@@ -39,7 +41,11 @@ impl TriangleBlock {
         for lane in 0..Self::LANES {
             // Unused lanes repeat the last triangle: what they find, that one finds too, and its id is less.
             last = if self.id(lane) == Self::UNUSED { last } else { self.id(lane) };
-            for (lanes, corner) in self.corners.iter_mut().zip(triangles[last as usize].0) {
+            for (lanes, corner) in self
+                .corners
+                .iter_mut()
+                .zip(triangles[last as usize].0)
+            {
                 (0..3).for_each(|axis| lanes[axis][lane] = corner[axis]);
             }
         }
@@ -66,7 +72,9 @@ impl TriangleBlock {
     /// How many lanes are used; they are the first.
     #[inline(always)]
     pub(crate) fn len(&self) -> usize {
-        1 + (1..Self::LANES).map(|lane| usize::from(self.ids[lane] != Self::UNUSED)).sum::<usize>()
+        1 + (1..Self::LANES)
+            .map(|lane| usize::from(self.ids[lane] != Self::UNUSED))
+            .sum::<usize>()
     }
 
     /// Whether this is a leaf's last block.

@@ -73,9 +73,13 @@ pub fn tree(boxes: &[Aabb], shape: Shape, random: &mut Random) -> Bvh {
         }
         let arity = (2 + random.below(shape.arity - 1)).min(range.len());
         let mut cuts: Vec<usize> = if shape.sorted {
-            (1..arity).map(|i| range.start + i * range.len() / arity).collect()
+            (1..arity)
+                .map(|i| range.start + i * range.len() / arity)
+                .collect()
         } else {
-            (1..arity).map(|_| range.start + 1 + random.below(range.len() - 1)).collect()
+            (1..arity)
+                .map(|_| range.start + 1 + random.below(range.len() - 1))
+                .collect()
         };
         cuts.extend([range.start, range.end]);
         cuts.sort_unstable();
@@ -174,13 +178,18 @@ pub fn ball(levels: usize) -> Vec<Triangle> {
 }
 
 pub fn scaled(triangles: &[Triangle], factor: f32) -> Vec<Triangle> {
-    triangles.iter().map(|t| Triangle(t.0.map(|p| p * factor))).collect()
+    triangles
+        .iter()
+        .map(|t| Triangle(t.0.map(|p| p * factor)))
+        .collect()
 }
 
 /// Rays that look for trouble: axis-parallel with both zeros, in face planes, along edges, through vertices, edges and
 /// centres, from inside, from a corner, of short and of zero-length range.
 pub fn rays(triangles: &[Triangle], n: usize, random: &mut Random) -> Vec<Ray> {
-    let bounds = boxes(triangles).iter().fold(Aabb::EMPTY, |a, b| a.union(b));
+    let bounds = boxes(triangles)
+        .iter()
+        .fold(Aabb::EMPTY, |a, b| a.union(b));
     let size = bounds.extent().max_element() as f32;
     let unit = Vec3::splat(size);
     let mut rays = Vec::new();

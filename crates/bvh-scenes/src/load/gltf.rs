@@ -135,11 +135,18 @@ fn document<'a>(bytes: &'a [u8], path: &Path) -> Result<(Root, Option<&'a [u8]>)
         true => chunks(bytes).ok_or_else(|| {
             fault("no chunk of JSON in version 2; expected a GLB file, and whole".into())
         })?,
-        false => (bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), None),
+        false => (
+            bytes
+                .strip_prefix(b"\xef\xbb\xbf")
+                .unwrap_or(bytes),
+            None,
+        ),
     };
     let root = Root::from_slice(json).map_err(|error| fault(error.to_string()))?;
-    if let Some(unknown) =
-        root.extensions_required.iter().find(|name| !HARMLESS.contains(&name.as_str()))
+    if let Some(unknown) = root
+        .extensions_required
+        .iter()
+        .find(|name| !HARMLESS.contains(&name.as_str()))
     {
         let place = Place::Element("extensionsRequired".into());
         let message = format!(
@@ -155,9 +162,13 @@ fn chunks(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
     let chunk = |at: usize, kind: &[u8; 4]| {
         let head = bytes.get(at..)?.first_chunk::<8>()?;
         let length = u32::from_le_bytes(*head.first_chunk()?) as usize;
-        (head[4..] == *kind).then(|| bytes.get(at + 8..)?.get(..length)).flatten()
+        (head[4..] == *kind)
+            .then(|| bytes.get(at + 8..)?.get(..length))
+            .flatten()
     };
-    let json = (bytes.get(4..8)? == [2, 0, 0, 0]).then(|| chunk(12, b"JSON")).flatten()?;
+    let json = (bytes.get(4..8)? == [2, 0, 0, 0])
+        .then(|| chunk(12, b"JSON"))
+        .flatten()?;
     Some((json, chunk(20 + json.len(), b"BIN\0")))
 }
 
@@ -208,32 +219,45 @@ impl<'a> Scene<'a> {
         let fault =
             |place: String, message: String| Fault::new(path, Place::Element(place), message);
         let scene = match self.root.scene {
-            Some(index) => {
-                Some(self.get(index, "scenes").map_err(|message| fault("scene".into(), message))?)
-            }
+            Some(index) => Some(
+                self.get(index, "scenes")
+                    .map_err(|message| fault("scene".into(), message))?,
+            ),
             None => self.root.scenes.first(),
         };
         let mut places = Vec::new();
         let mut reached = vec![false; self.root.nodes.len()];
         let mut open: Vec<(Index<Node>, DMat4)> = Vec::new();
         open.extend(
-            scene.iter().flat_map(|scene| &scene.nodes).rev().map(|&node| (node, DMat4::IDENTITY)),
+            scene
+                .iter()
+                .flat_map(|scene| &scene.nodes)
+                .rev()
+                .map(|&node| (node, DMat4::IDENTITY)),
         );
         while let Some((index, parent)) = open.pop() {
             let place = || format!("nodes[{}]", index.value());
             let number = index.value();
-            let node =
-                self.get(index, "nodes").map_err(|message| fault("scene".into(), message))?;
+            let node = self
+                .get(index, "nodes")
+                .map_err(|message| fault("scene".into(), message))?;
             if std::mem::replace(&mut reached[index.value()], true) {
                 let message = "reached twice; expected a tree of nodes, each with one parent";
                 return Err(fault(place(), message.into()));
             }
             let transform = parent * transform(node);
             if let Some(index) = node.mesh {
-                self.get(index, "meshes").map_err(|message| fault(place(), message))?;
+                self.get(index, "meshes")
+                    .map_err(|message| fault(place(), message))?;
                 places.push(Placed { node: number, mesh: index.value(), transform });
             }
-            open.extend(node.children.iter().flatten().rev().map(|&child| (child, transform)));
+            open.extend(
+                node.children
+                    .iter()
+                    .flatten()
+                    .rev()
+                    .map(|&child| (child, transform)),
+            );
         }
         Ok(places)
     }
@@ -241,11 +265,16 @@ impl<'a> Scene<'a> {
     /// Adds the triangles of a node's mesh, moved.
     fn place(&mut self, place: &Placed, transform: &DMat4) -> Result<(), Fault> {
         let Placed { node, mesh, .. } = *place;
-        for (number, primitive) in self.root.meshes[mesh].primitives.iter().enumerate() {
-            self.add(primitive, transform).map_err(|message| {
-                let place = format!("meshes[{mesh}].primitives[{number}] at nodes[{node}]");
-                Fault::new(self.path, Place::Element(place), message)
-            })?;
+        for (number, primitive) in self.root.meshes[mesh]
+            .primitives
+            .iter()
+            .enumerate()
+        {
+            self.add(primitive, transform)
+                .map_err(|message| {
+                    let place = format!("meshes[{mesh}].primitives[{number}] at nodes[{node}]");
+                    Fault::new(self.path, Place::Element(place), message)
+                })?;
         }
         Ok(())
     }
@@ -269,7 +298,9 @@ impl<'a> Scene<'a> {
                 .first_chunk()
                 .map_or([f32::NAN; 3], |x| x.map(f32::from_le_bytes));
             let point = Vec3::from(point);
-            let moved = transform.transform_point3(point.as_dvec3()).as_vec3();
+            let moved = transform
+                .transform_point3(point.as_dvec3())
+                .as_vec3();
             if !moved.is_finite() {
                 return Err(format!(
                     "position {} is {point}, moved {moved}; expected finite numbers",
@@ -283,12 +314,20 @@ impl<'a> Scene<'a> {
             None => (0..points.len() as u32).collect(),
             Some(accessor) => {
                 let index = |bytes: &[u8]| {
-                    bytes.iter().rev().fold(0, |index, &byte| index << 8 | u32::from(byte))
+                    bytes
+                        .iter()
+                        .rev()
+                        .fold(0, |index, &byte| index << 8 | u32::from(byte))
                 };
-                self.items(accessor, Type::Scalar, &types)?.map(index).collect()
+                self.items(accessor, Type::Scalar, &types)?
+                    .map(index)
+                    .collect()
             }
         };
-        if let Some(index) = indices.iter().find(|&&index| index as usize >= points.len()) {
+        if let Some(index) = indices
+            .iter()
+            .find(|&&index| index as usize >= points.len())
+        {
             return Err(format!("index {index}; expected 0 to below {}", points.len()));
         }
         let count = if mode == Mode::Triangles {
@@ -335,7 +374,8 @@ impl<'a> Scene<'a> {
             format!("{place} has no buffer view; expected one (compressed meshes cannot be read)")
         })?;
         let view = self.get(view, "bufferViews")?;
-        self.buffers.need(self.root, view.buffer.value())?;
+        self.buffers
+            .need(self.root, view.buffer.value())?;
         let size = component.size() * type_.multiplicity();
         let stride = view.byte_stride.map_or(size, |stride| stride.0);
         let bytes = (|| {
@@ -345,8 +385,12 @@ impl<'a> Scene<'a> {
             let bytes = bytes.get(..number(view.byte_length.0)?)?;
             let bytes = bytes.get(number(accessor.byte_offset.map_or(0, |offset| offset.0))?..)?;
             let count = number(accessor.count.0)?;
-            let need = stride.checked_mul(count.checked_sub(1)?)?.checked_add(size)?;
-            (stride >= size).then(|| bytes.get(..need)).flatten()
+            let need = stride
+                .checked_mul(count.checked_sub(1)?)?
+                .checked_add(size)?;
+            (stride >= size)
+                .then(|| bytes.get(..need))
+                .flatten()
         })();
         let count = accessor.count.0;
         let bytes = bytes.ok_or_else(|| {

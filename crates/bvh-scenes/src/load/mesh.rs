@@ -46,14 +46,17 @@ impl Mesh {
             (count > 0)
                 .then(|| if count == 1 { format!("1 {one}") } else { format!("{count} {many}") })
         };
-        let unknown = self.unknown.as_ref().and_then(|(count, line, word)| {
-            let lines = counted(
-                *count,
-                "line with an unknown keyword was",
-                "lines with unknown keywords were",
-            )?;
-            Some(format!("{lines} ignored (`{word}` in line {line})"))
-        });
+        let unknown = self
+            .unknown
+            .as_ref()
+            .and_then(|(count, line, word)| {
+                let lines = counted(
+                    *count,
+                    "line with an unknown keyword was",
+                    "lines with unknown keywords were",
+                )?;
+                Some(format!("{lines} ignored (`{word}` in line {line})"))
+            });
         let parts = [
             counted(
                 self.unused_vertices,
@@ -100,7 +103,11 @@ impl Fault {
     /// A fault of the file at `path`.
     pub fn new(path: &Path, place: Place, message: impl fmt::Display) -> Self {
         // Other libraries' messages may span lines and quote the file.
-        let words = message.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+        let words = message
+            .to_string()
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ");
         let message = if words.len() > 300 {
             format!("{}…", words.chars().take(280).collect::<String>())
         } else {

@@ -46,7 +46,10 @@ pub enum Format {
 impl Format {
     /// The format of a file with these bytes at this path. OBJ has no mark of its own: it is what all else is taken for.
     pub fn of(bytes: &[u8], path: &Path) -> Self {
-        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+        let text = bytes
+            .strip_prefix(b"\xef\xbb\xbf")
+            .unwrap_or(bytes)
+            .trim_ascii_start();
         if bytes.starts_with(b"glTF") || text.starts_with(b"{") {
             return Self::Gltf;
         }
@@ -56,8 +59,9 @@ impl Format {
         if stl::is_binary(bytes) || stl::is_text(text) {
             return Self::Stl;
         }
-        let extension =
-            path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        let extension = path
+            .extension()
+            .map(|extension| extension.to_string_lossy().to_lowercase());
         match extension.as_deref() {
             Some("ply") => Self::Ply,
             Some("stl") => Self::Stl,

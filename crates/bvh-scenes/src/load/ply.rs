@@ -18,7 +18,10 @@ impl PropertyAccess for Vertex {
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == name) else {
+        let Some(axis) = ["x", "y", "z"]
+            .iter()
+            .position(|axis| *axis == name)
+        else {
             return PropertyAccessResult::Ignored;
         };
         match property.to_f32_lossy() {
@@ -103,7 +106,9 @@ fn elements<E: PropertyAccess>(
     path: &Path,
 ) -> Result<Vec<E>, Fault> {
     let told = |error| told(path, Some((element, header)), &error);
-    Parser::<E>::new().read_payload_for_element(reader, element, header).map_err(told)
+    Parser::<E>::new()
+        .read_payload_for_element(reader, element, header)
+        .map_err(told)
 }
 
 /// The library's error: with its line where there are lines, else with its element.
@@ -144,8 +149,9 @@ fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault>
     for (number, Face(indices)) in faces.iter().enumerate() {
         let mut corners = Vec::with_capacity(indices.len());
         for &index in indices {
-            let Some(Vertex(position)) =
-                usize::try_from(index).ok().and_then(|index| vertices.get(index))
+            let Some(Vertex(position)) = usize::try_from(index)
+                .ok()
+                .and_then(|index| vertices.get(index))
             else {
                 return fault(
                     "face",
@@ -161,9 +167,14 @@ fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault>
         };
         short_faces += usize::from(rest.len() < 2);
         if rest.len() >= 2 {
-            indices.iter().for_each(|&index| used[index as usize] = true);
+            indices
+                .iter()
+                .for_each(|&index| used[index as usize] = true);
         }
-        triangles.extend(rest.windows(2).map(|pair| Triangle([*first, pair[0], pair[1]])));
+        triangles.extend(
+            rest.windows(2)
+                .map(|pair| Triangle([*first, pair[0], pair[1]])),
+        );
     }
     if triangles.is_empty() || triangles.len() > MOST_TRIANGLES {
         let found = format!("{} vertices and {} triangles", vertices.len(), triangles.len());

@@ -25,9 +25,12 @@ pub fn is_binary(bytes: &[u8]) -> bool {
 
 /// Whether text begins as an STL file does: `solid`, and a facet soon.
 pub fn is_text(text: &[u8]) -> bool {
-    let mut words =
-        text[..text.len().min(4096)].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-    words.next().is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+    let mut words = text[..text.len().min(4096)]
+        .split(u8::is_ascii_whitespace)
+        .filter(|word| !word.is_empty());
+    words
+        .next()
+        .is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
         && words.any(|word| {
             word.eq_ignore_ascii_case(b"facet") || word.eq_ignore_ascii_case(b"endsolid")
         })
@@ -35,7 +38,9 @@ pub fn is_text(text: &[u8]) -> bool {
 
 /// Reads the bytes of an STL file; `path` only names it in errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let text = bytes
+        .strip_prefix(b"\xef\xbb\xbf")
+        .unwrap_or(bytes);
     let is_text = !is_binary(bytes) && is_text(text.trim_ascii_start());
     let triangles = if is_text { of_text(text, path)? } else { of_binary(bytes, path)? };
     match triangles.is_empty() {
@@ -75,7 +80,10 @@ fn of_binary(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
             }
         }
     };
-    body.take(facets).enumerate().map(triangle).collect()
+    body.take(facets)
+        .enumerate()
+        .map(triangle)
+        .collect()
 }
 
 /// The corners of every loop, three at a time. All keywords but `vertex` and `endloop` are passed over.
@@ -88,7 +96,11 @@ fn of_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
         let fault = |message: String| Err(Fault::new(path, Place::Line(line), message));
         let text = String::from_utf8_lossy(text);
         let mut words = text.split_whitespace();
-        match words.next().map(str::to_ascii_lowercase).as_deref() {
+        match words
+            .next()
+            .map(str::to_ascii_lowercase)
+            .as_deref()
+        {
             Some("vertex") => {
                 let found: Vec<&str> = words.collect();
                 let numbers: Vec<f32> = found

@@ -28,8 +28,10 @@ impl View {
 /// The directions of right and top in a picture seen in the direction `forward`.
 pub fn frame(forward: DVec3, up: DVec3) -> [DVec3; 2] {
     // Seen straight up or down, any direction may be the right one.
-    let right =
-        forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
+    let right = forward
+        .cross(up)
+        .try_normalize()
+        .unwrap_or_else(|| forward.any_orthonormal_vector());
     [right, right.cross(forward)]
 }
 
@@ -47,7 +49,9 @@ pub struct Camera {
 impl Camera {
     /// The camera of a picture of this size in pixels. A view from the point that it looks at looks along −z.
     pub fn new(view: &View, up: DVec3, width: u32, height: u32) -> Self {
-        let forward = (view.at - view.from).try_normalize().unwrap_or(DVec3::NEG_Z);
+        let forward = (view.at - view.from)
+            .try_normalize()
+            .unwrap_or(DVec3::NEG_Z);
         let [right, top] = frame(forward, up);
         let pixel = 2.0 * libm::tan(view.fov.to_radians() / 2.0) / f64::from(height);
         let steps = [right * pixel, -top * pixel];
@@ -70,7 +74,12 @@ mod tests {
         for at in [DVec3::X, DVec3::Y, DVec3::new(1.0, -2.0, 0.3)] {
             let camera =
                 Camera::new(&View { from: DVec3::ZERO, at, fov: 60.0 }, DVec3::Y, 640, 480);
-            assert!(camera.direction(320.0, 240.0).distance(at.normalize()) < 1e-12);
+            assert!(
+                camera
+                    .direction(320.0, 240.0)
+                    .distance(at.normalize())
+                    < 1e-12
+            );
         }
     }
 }

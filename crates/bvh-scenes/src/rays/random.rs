@@ -45,7 +45,9 @@ pub fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> 
             (origin, on_sphere(rng) + normal)
         }
     };
-    let origin = (low + origin * size).as_vec3().clamp(root.min, root.max);
+    let origin = (low + origin * size)
+        .as_vec3()
+        .clamp(root.min, root.max);
     Ray::half_line(origin, direction.as_vec3()).ok()
 }
 
@@ -148,7 +150,9 @@ pub fn rays(
     match kind {
         Kind::Incoherent => {
             let mut rng = Stream::seed_from_u64(seed);
-            (0..count).filter_map(|_| random_ray(Family::Inside, &root, &mut rng)).collect()
+            (0..count)
+                .filter_map(|_| random_ray(Family::Inside, &root, &mut rng))
+                .collect()
         }
         Kind::Primary => primary_rays(count, &root, viewpoint),
         Kind::Bounce => {
@@ -156,7 +160,12 @@ pub fn rays(
             let points =
                 hit_points(&primary_rays(count, &root, viewpoint), scene, tree, JUST_BEFORE);
             let ray = |&origin: &Vec3| Ray::half_line(origin, on_sphere(&mut rng).as_vec3()).ok();
-            points.iter().cycle().take(count as usize).filter_map(ray).collect()
+            points
+                .iter()
+                .cycle()
+                .take(count as usize)
+                .filter_map(ray)
+                .collect()
         }
         Kind::Shadow => {
             let points = hit_points(&primary_rays(count, &root, viewpoint), scene, tree, 1.0);
@@ -183,7 +192,11 @@ pub fn in_box(root: &Aabb, at: [f64; 3]) -> DVec3 {
 /// The points at this fraction of the way to the nearest hits of rays.
 fn hit_points(rays: &[Ray], scene: &Scene, tree: &Bvh, fraction: f32) -> Vec<Vec3> {
     let accelerator = Accelerator::of_tree(&scene.primitives, tree);
-    let point = |ray: &Ray| accelerator.nearest_hit(ray).map(|hit| ray.at(fraction * hit.t));
+    let point = |ray: &Ray| {
+        accelerator
+            .nearest_hit(ray)
+            .map(|hit| ray.at(fraction * hit.t))
+    };
     rays.iter().filter_map(point).collect()
 }
 
@@ -211,7 +224,9 @@ fn primary_rays(count: u32, root: &Aabb, viewpoint: &Viewpoint) -> Vec<Ray> {
 
 /// Pixels per row of a picture with `count` pixels and as many rows as columns; the last row may lack some.
 fn picture_side(count: u32) -> u32 {
-    (1..=count).find(|side| side.saturating_mul(*side) >= count).unwrap_or(count)
+    (1..=count)
+        .find(|side| side.saturating_mul(*side) >= count)
+        .unwrap_or(count)
 }
 
 /// The column and the row of the first `count` pixels of a square picture, counted row by row, in Morton order.
@@ -226,7 +241,9 @@ fn pixels(side: u32, count: u32) -> impl Iterator<Item = [u32; 2]> {
 
 /// The number that the bits of a Morton code at even places make.
 fn even_bits(code: u64) -> u32 {
-    (0..32).map(|bit| ((code >> (2 * bit) & 1) as u32) << bit).sum()
+    (0..32)
+        .map(|bit| ((code >> (2 * bit) & 1) as u32) << bit)
+        .sum()
 }
 
 /// To the light, from a thousandth of the way on: a library without a shortest distance would hit the surface that the
@@ -253,8 +270,10 @@ mod tests {
                 continue;
             }
             for square in found.chunks(256) {
-                let corners: BTreeSet<[u32; 2]> =
-                    square.iter().map(|[x, y]| [x / 16, y / 16]).collect();
+                let corners: BTreeSet<[u32; 2]> = square
+                    .iter()
+                    .map(|[x, y]| [x / 16, y / 16])
+                    .collect();
                 assert_eq!(corners.len(), 1, "{side}: {corners:?}");
             }
         }

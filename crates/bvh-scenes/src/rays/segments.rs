@@ -44,8 +44,11 @@ config! {
 
 impl RenderedRays {
     fn check_cameras(&self) -> Option<OutOfRange> {
-        let numbers =
-            self.cameras.iter().flat_map(|pose| [pose.eye, pose.target]).chain(self.lights.clone());
+        let numbers = self
+            .cameras
+            .iter()
+            .flat_map(|pose| [pose.eye, pose.target])
+            .chain(self.lights.clone());
         if self.cameras.is_empty() {
             return Some(OutOfRange::new(
                 "cameras",
@@ -53,7 +56,9 @@ impl RenderedRays {
                 "at least one table with `eye` and `target`",
             ));
         }
-        let wrong = numbers.flatten().find(|number| !number.is_finite());
+        let wrong = numbers
+            .flatten()
+            .find(|number| !number.is_finite());
         let wrong =
             wrong.map(|wrong| OutOfRange::new("cameras and lights", wrong, "finite coordinates"));
         wrong.or_else(|| {
@@ -105,7 +110,10 @@ pub fn of_renderer(config: &RenderedRays, scene: &Scene, tree: &Bvh) -> Vec<Trac
         let direction = camera.direction(x, tracing.rng.random());
         let mut hit = tracing.nearest(Kind::Primary, camera.origin.as_vec3(), direction);
         if let Some(point) = hit {
-            config.lights.iter().for_each(|&light| tracing.shadow(point, light.into()));
+            config
+                .lights
+                .iter()
+                .for_each(|&light| tracing.shadow(point, light.into()));
         }
         for _ in 0..config.bounces {
             let Some(point) = hit else { break };
@@ -139,8 +147,9 @@ pub fn of_anything(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<Trac
 pub fn of_inside(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, seed);
     for _ in 0..count {
-        let ray =
-            tree.root_aabb().and_then(|root| random_ray(Family::Inside, &root, &mut tracing.rng));
+        let ray = tree
+            .root_aabb()
+            .and_then(|root| random_ray(Family::Inside, &root, &mut tracing.rng));
         let Some(ray) = ray else { continue };
         tracing.nearest(Kind::Incoherent, ray.origin(), ray.direction().as_dvec3());
     }
@@ -189,8 +198,9 @@ impl<'a> Tracing<'a> {
 
     /// A distance at which the ray is outside the scene.
     fn beyond(&self, ray: &Ray) -> f32 {
-        let reach =
-            (self.bounds.min - ray.origin()).abs().max((self.bounds.max - ray.origin()).abs());
+        let reach = (self.bounds.min - ray.origin())
+            .abs()
+            .max((self.bounds.max - ray.origin()).abs());
         2.0 * reach.length() / ray.direction().length()
     }
 }

@@ -60,7 +60,10 @@ pub fn render(
     options: &Options,
     tile_done: &(dyn Fn() -> bool + Sync),
 ) -> Option<Film> {
-    let bounds = scene.boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
+    let bounds = scene
+        .boxes
+        .iter()
+        .fold(Aabb::EMPTY, |all, b| all.union(b));
     let (width, height) = (options.width, options.height);
     let up = scene.up();
     let aspect = f64::from(width) / f64::from(height);
@@ -105,7 +108,10 @@ mod tests {
         for (width, height) in [(1, 1), (16, 16), (17, 33), (5, 40)] {
             let options = Options { width, height, samples: 1, ..Options::default() };
             let films = [1, 3].map(|threads| {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let pool = rayon::ThreadPoolBuilder::new()
+                    .num_threads(threads)
+                    .build()
+                    .unwrap();
                 pool.install(|| picture(&scene, &options))
             });
             assert_eq!(films[0].pixels.len(), (width * height) as usize);

@@ -30,7 +30,9 @@ impl Film {
                 film.tests.extend(&tile.tests[line]);
             }
         }
-        tiles.iter().for_each(|tile| film.count(tile.counts, tile.rays));
+        tiles
+            .iter()
+            .for_each(|tile| film.count(tile.counts, tile.rays));
         film
     }
 

@@ -80,7 +80,9 @@ mod tests {
                     scaled.dot(camera.steps[axis]) / camera.steps[axis].length_squared()
                 };
                 assert!(place(0).abs() < 150.0 && place(1).abs() < 100.0, "{bounds:?}");
-                widest = widest.max(place(0).abs() / 150.0).max(place(1).abs() / 100.0);
+                widest = widest
+                    .max(place(0).abs() / 150.0)
+                    .max(place(1).abs() / 100.0);
             }
             assert!(widest > 0.9, "{bounds:?}: {widest}");
         }

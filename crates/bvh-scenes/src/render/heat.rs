@@ -42,7 +42,9 @@ pub fn range(film: &Film, rays_per_pixel: u32) -> Range {
     let mut sorted = film.tests.clone();
     sorted.sort_unstable();
     let at = |index: usize| {
-        sorted.get(index).map_or(0.0, |&tests| tests as f64 / f64::from(rays_per_pixel))
+        sorted
+            .get(index)
+            .map_or(0.0, |&tests| tests as f64 / f64::from(rays_per_pixel))
     };
     let last = sorted.len().saturating_sub(1);
     Range { min: at(0), median: at(last / 2), top: at(last - last / 200), max: at(last) }
@@ -52,9 +54,14 @@ pub fn range(film: &Film, rays_per_pixel: u32) -> Range {
 pub fn map(film: &Film, rays_per_pixel: u32) -> Result<Vec<[u8; 3]>, BadFont> {
     let range = range(film, rays_per_pixel);
     let top = range.top.max(f64::MIN_POSITIVE) * f64::from(rays_per_pixel);
-    let mut pixels: Vec<[u8; 3]> =
-        film.tests.iter().map(|&tests| colour(tests as f64 / top)).collect();
-    let colours: Vec<[u8; 3]> = (0..=255).map(|part| colour(f64::from(part) / 255.0)).collect();
+    let mut pixels: Vec<[u8; 3]> = film
+        .tests
+        .iter()
+        .map(|&tests| colour(tests as f64 / top))
+        .collect();
+    let colours: Vec<[u8; 3]> = (0..=255)
+        .map(|part| colour(f64::from(part) / 255.0))
+        .collect();
     pixels.extend(key::draw(film.width, &colours, &labels(&range))?);
     Ok(pixels)
 }
@@ -101,7 +108,9 @@ mod tests {
         let luminance = |[r, g, b]: [u8; 3]| {
             0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
         };
-        let shades: Vec<f64> = (0..=64).map(|i| luminance(colour(f64::from(i) / 64.0))).collect();
+        let shades: Vec<f64> = (0..=64)
+            .map(|i| luminance(colour(f64::from(i) / 64.0)))
+            .collect();
         assert!(shades.is_sorted_by(|a, b| a < b), "{shades:?}");
         for width in [64, 65] {
             let pixels = map(&film(width, (0..u64::from(width) * 8).collect()), 1).unwrap();
@@ -113,7 +122,9 @@ mod tests {
     #[test]
     fn a_picture_without_tests_has_a_heat_map_too() {
         assert!(
-            map(&film(40, vec![0; 40]), 1).unwrap()[..40].iter().all(|&pixel| pixel == INFERNO[0])
+            map(&film(40, vec![0; 40]), 1).unwrap()[..40]
+                .iter()
+                .all(|&pixel| pixel == INFERNO[0])
         );
     }
 }

@@ -24,7 +24,10 @@ impl Light {
     /// ones.
     pub fn white(positions: &[DVec3]) -> Vec<Self> {
         let colour = DVec3::splat(1.3 / positions.len().max(1) as f64);
-        positions.iter().map(|&position| Self { position, colour, reach: f64::INFINITY }).collect()
+        positions
+            .iter()
+            .map(|&position| Self { position, colour, reach: f64::INFINITY })
+            .collect()
     }
 
     /// The light that arrives at a distance.
@@ -123,8 +126,10 @@ impl<'a> World<'a> {
                         sum += image::expose(self.radiance(camera.origin, direction, &mut tally));
                     }
                 }
-                tile.pixels.push(image::encode(sum / f64::from(samples * samples)));
-                tile.tests.push(tally.counts.boxes + tally.counts.objects);
+                tile.pixels
+                    .push(image::encode(sum / f64::from(samples * samples)));
+                tile.tests
+                    .push(tally.counts.boxes + tally.counts.objects);
                 tile.count(tally.counts, tally.rays);
             }
         }
@@ -163,10 +168,14 @@ impl<'a> World<'a> {
     fn meet(&self, origin: DVec3, direction: DVec3, tally: &mut Tally) -> Option<Surface> {
         tally.rays += 1;
         let ray = Ray::half_line(origin.as_vec3(), direction.as_vec3());
-        let hit =
-            ray.ok().and_then(|ray| self.accelerator.nearest_hit_counted(&ray, &mut tally.counts));
-        let ground =
-            self.ground.as_ref().and_then(|ground| Some((ground, ground.meet(origin, direction)?)));
+        let hit = ray.ok().and_then(|ray| {
+            self.accelerator
+                .nearest_hit_counted(&ray, &mut tally.counts)
+        });
+        let ground = self
+            .ground
+            .as_ref()
+            .and_then(|ground| Some((ground, ground.meet(origin, direction)?)));
         match (hit, ground) {
             (Some(hit), ground)
                 if ground.is_none_or(|(_, distance)| f64::from(hit.t) <= distance) =>
@@ -181,7 +190,11 @@ impl<'a> World<'a> {
     /// A point just in front of the surface, from which a ray does not meet the same surface again. Rounding moves a
     /// hit by a few units in the last place of the largest coordinate at hand; this moves it by a few dozen.
     fn lifted(&self, surface: &Surface, seen_from: DVec3) -> DVec3 {
-        let size = surface.point.abs().max(seen_from.abs()).max_element();
+        let size = surface
+            .point
+            .abs()
+            .max(seen_from.abs())
+            .max_element();
         surface.point + surface.normal * (size * (64.0 * f64::from(f32::EPSILON)))
     }
 
@@ -227,7 +240,10 @@ impl<'a> World<'a> {
     fn is_shadowed(&self, start: DVec3, towards: DVec3, distance: f64, tally: &mut Tally) -> bool {
         tally.rays += 1;
         let ray = Ray::new(start.as_vec3(), towards.as_vec3(), 0.0, distance as f32);
-        ray.is_ok_and(|ray| self.accelerator.any_hit_counted(&ray, &mut tally.counts))
+        ray.is_ok_and(|ray| {
+            self.accelerator
+                .any_hit_counted(&ray, &mut tally.counts)
+        })
     }
 
     /// The light from a direction in which there is nothing.

@@ -60,14 +60,18 @@ pub fn by_name(name: &str, scene: &Scene) -> Result<Structure<'static>, Structur
             Ok(Structure::Tree(Cow::Owned(tree)))
         }
         "wide" => {
-            let triangles = scene.triangles().map_err(StructureError::Spheres)?;
+            let triangles = scene
+                .triangles()
+                .map_err(StructureError::Spheres)?;
             let tree = greedy(scene).map_err(failed)?;
             let layout = WideBvh::new(&tree, triangles);
-            layout.map(Structure::Wide).map_err(|source| StructureError::Layout {
-                scene: scene.name.clone(),
-                name: name.into(),
-                source,
-            })
+            layout
+                .map(Structure::Wide)
+                .map_err(|source| StructureError::Layout {
+                    scene: scene.name.clone(),
+                    name: name.into(),
+                    source,
+                })
         }
         _ if name.ends_with(".bvh") => {
             let (tree, _) = tree_file::load(Path::new(name), scene)?;

@@ -191,11 +191,13 @@ impl<'a> Accelerator<'a> {
             Primitives::Triangles(triangles) => {
                 let shear = Shear::new(ray);
                 let test = |id: u32| note(triangles[id as usize].intersect(&shear, ray.t_max()));
-                self.structure.any_hit(triangles.len(), ray, test, counter);
+                self.structure
+                    .any_hit(triangles.len(), ray, test, counter);
             }
             Primitives::Spheres(spheres) => {
                 let test = |id: u32| note(spheres[id as usize].intersect(ray, ray.t_max()));
-                self.structure.any_hit(spheres.len(), ray, test, counter);
+                self.structure
+                    .any_hit(spheres.len(), ray, test, counter);
             }
         }
         found

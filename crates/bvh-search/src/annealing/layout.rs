@@ -35,7 +35,8 @@ impl Layout {
     #[inline(never)]
     pub fn fill(&mut self, tree: &Working<impl Metric>) {
         self.rows.clear();
-        self.rows.resize(tree.nodes.len(), LayoutCost::leaf(0.0, 0));
+        self.rows
+            .resize(tree.nodes.len(), LayoutCost::leaf(0.0, 0));
         self.marks.clear();
         self.marks.resize(tree.nodes.len(), 0);
         self.change = 0;
@@ -51,12 +52,15 @@ impl Layout {
         if node.is_leaf() {
             return LayoutCost::leaf(node.area, 1);
         }
-        let [left, right] = node.children.map(|child| &self.rows[child as usize]);
+        let [left, right] = node
+            .children
+            .map(|child| &self.rows[child as usize]);
         LayoutCost::join(node.area, left, right)
     }
 
     fn root(&self, tree: &Working<impl Metric>) -> f64 {
-        tree.root().map_or(0.0, |root| self.rows[root as usize].value())
+        tree.root()
+            .map_or(0.0, |root| self.rows[root as usize].value())
     }
 
     /// The cost of the tree as it is now.
@@ -76,7 +80,8 @@ impl Layout {
     pub fn accepts(&mut self, tree: &Working<impl Metric>, most: f64) -> bool {
         if self.rows.len() < tree.nodes.len() {
             // Leaves that were added since.
-            self.rows.resize(tree.nodes.len(), LayoutCost::leaf(0.0, 0));
+            self.rows
+                .resize(tree.nodes.len(), LayoutCost::leaf(0.0, 0));
             self.marks.resize(tree.nodes.len(), 0);
         }
         self.replaced.clear();
@@ -90,7 +95,8 @@ impl Layout {
             }
         }
         self.stack.clear();
-        self.stack.extend(tree.root().map(|root| (root, false)));
+        self.stack
+            .extend(tree.root().map(|root| (root, false)));
         while let Some((at, children_done)) = self.stack.pop() {
             let node = &tree.nodes[at as usize];
             if !children_done && !node.is_leaf() {
@@ -99,7 +105,8 @@ impl Layout {
                     .children
                     .into_iter()
                     .filter(|&child| self.marks[child as usize] == self.change);
-                self.stack.extend(marked.map(|child| (child, false)));
+                self.stack
+                    .extend(marked.map(|child| (child, false)));
                 continue;
             }
             self.visits += 1;

@@ -54,7 +54,9 @@ impl<'a> Divider<'a> {
         observer: &dyn Observer,
     ) -> Tally {
         self.tie(tree);
-        self.layout.iter_mut().for_each(|layout| layout.fill(tree));
+        self.layout
+            .iter_mut()
+            .for_each(|layout| layout.fill(tree));
         let tally = change(self, tree, quota, rng, observer);
         tree.sort_in_preorder();
         tally
@@ -62,7 +64,12 @@ impl<'a> Divider<'a> {
 
     /// Nodes visited so far.
     fn work(&self) -> u64 {
-        self.visits + self.search.visits + self.layout.as_ref().map_or(0, |layout| layout.visits)
+        self.visits
+            + self.search.visits
+            + self
+                .layout
+                .as_ref()
+                .map_or(0, |layout| layout.visits)
     }
 
     /// Ties the leaves of every object to a ring. O(nodes).
@@ -71,8 +78,16 @@ impl<'a> Divider<'a> {
         self.ring.resize(tree.nodes.len(), NONE);
         self.spares.clear();
         self.count = tree.objects();
-        let leaves = || (0..).zip(&tree.nodes).skip(1).filter(|(_, node)| node.is_leaf());
-        let objects = leaves().map(|(_, node)| node.children[1] as usize + 1).max().unwrap_or(0);
+        let leaves = || {
+            (0..)
+                .zip(&tree.nodes)
+                .skip(1)
+                .filter(|(_, node)| node.is_leaf())
+        };
+        let objects = leaves()
+            .map(|(_, node)| node.children[1] as usize + 1)
+            .max()
+            .unwrap_or(0);
         let mut last = vec![NONE; objects];
         for (at, node) in leaves() {
             let last = &mut last[node.children[1] as usize];
@@ -93,7 +108,10 @@ impl<'a> Divider<'a> {
             return false;
         }
         let object = a.children[1];
-        let whole = self.splits.objects.clip(object, &Aabb::from(&a.aabb.union(&b.aabb)));
+        let whole = self
+            .splits
+            .objects
+            .clip(object, &Aabb::from(&a.aabb.union(&b.aabb)));
         if whole == Aabb::EMPTY {
             return false;
         }
@@ -114,7 +132,10 @@ impl<'a> Divider<'a> {
         tree.resize_leaf(other, object, PackedAabb::EMPTY, 0.0);
         tree.resize_leaf(leaf, object, whole, area);
         let position = (area < limit)
-            .then(|| self.search.detached(tree, Scope::ALL, (&whole, area), sibling, limit))
+            .then(|| {
+                self.search
+                    .detached(tree, Scope::ALL, (&whole, area), sibling, limit)
+            })
             .flatten();
         let Some(position) = position else {
             tree.undo();
@@ -178,7 +199,8 @@ impl<'a> Divider<'a> {
             // The other part costs its own area at least.
             let rest = if side == 0 { areas[1] } else { 0.0 };
             let Some(position) =
-                self.search.detached(tree, Scope::ALL, (&part, area), sibling, limit - rest)
+                self.search
+                    .detached(tree, Scope::ALL, (&part, area), sibling, limit - rest)
             else {
                 tree.undo();
                 return false;
@@ -200,7 +222,10 @@ impl<'a> Divider<'a> {
     /// that the cost is for, so that a division which saves next to nothing is no gain.
     #[inline(always)]
     fn price(&self, tree: &Working<impl Metric>) -> f64 {
-        let cost = self.layout.as_ref().map_or(tree.area(), Layout::current);
+        let cost = self
+            .layout
+            .as_ref()
+            .map_or(tree.area(), Layout::current);
         PRICE_OF_A_REFERENCE * cost / self.count as f64
     }
 
@@ -213,7 +238,10 @@ impl<'a> Divider<'a> {
     /// Whether the layout, if there is one, gets dearer by less than `most`; undoes the change if it does not.
     #[inline(always)]
     fn accepts(&mut self, tree: &mut Working<impl Metric>, most: f64) -> bool {
-        let accepted = self.layout.as_mut().is_none_or(|layout| layout.accepts(tree, most));
+        let accepted = self
+            .layout
+            .as_mut()
+            .is_none_or(|layout| layout.accepts(tree, most));
         if !accepted {
             tree.undo();
         }
@@ -285,8 +313,9 @@ fn change_plain<A: Metric>(
     };
     let mut sums = Vec::with_capacity(tree.nodes.len());
     let mut sum = 0.0;
-    let leaves: Vec<u32> =
-        (1..tree.nodes.len() as u32).filter(|&at| tree.nodes[at as usize].is_leaf()).collect();
+    let leaves: Vec<u32> = (1..tree.nodes.len() as u32)
+        .filter(|&at| tree.nodes[at as usize].is_leaf())
+        .collect();
     for &leaf in &leaves {
         // Of two leaves, the one that comes later in the ring is the one that goes.
         loop {
@@ -310,7 +339,9 @@ fn change_plain<A: Metric>(
     while !leaves.is_empty() && divider.count < divider.splits.most && !is_over(divider, &mut done)
     {
         let drawn = rng.random::<f64>() * sum;
-        let leaf = leaves[sums.partition_point(|&sum| sum <= drawn).min(leaves.len() - 1)];
+        let leaf = leaves[sums
+            .partition_point(|&sum| sum <= drawn)
+            .min(leaves.len() - 1)];
         done.moves += 1;
         divider.visits += 1;
         if divider.ring[leaf as usize] != NONE {
@@ -348,7 +379,9 @@ mod tests {
         for by_layout in [false, true] {
             let cost =
                 |tree: &bvh_core::Bvh| if by_layout { layout_area(tree) } else { total_area(tree) };
-            let start = muller_fellner::Config::default().build(&boxes).unwrap();
+            let start = muller_fellner::Config::default()
+                .build(&boxes)
+                .unwrap();
             let mut before = cost(&start);
             let mut tree = Working::from_bvh(&start, total_area(&start), WithLeaves(Area)).unwrap();
             let mut most_seen = 0;

@@ -184,7 +184,9 @@ impl<'a> RuinMover<'a> {
         if tree.nodes[top as usize].is_leaf() {
             return;
         }
-        self.work += self.side.find(tree, top, thickness, most as usize, rng);
+        self.work += self
+            .side
+            .find(tree, top, thickness, most as usize, rng);
         for &node in &self.side.roots {
             if scope.root(tree) != node {
                 self.work += self.removed.take(tree, node);
@@ -195,7 +197,12 @@ impl<'a> RuinMover<'a> {
 
 impl Mover for RuinMover<'_> {
     fn work(&self) -> u64 {
-        self.work + self.search.visits + self.layout.as_ref().map_or(0, |layout| layout.visits)
+        self.work
+            + self.search.visits
+            + self
+                .layout
+                .as_ref()
+                .map_or(0, |layout| layout.visits)
     }
 
     fn sampler(&mut self) -> &mut NodeSampler {
@@ -250,7 +257,9 @@ impl Mover for RuinMover<'_> {
             let item = &tree.nodes[node as usize];
             let (aabb, area) = (item.aabb, item.area);
             limit += area;
-            let Some(position) = self.search.detached(tree, positions, (&aabb, area), first, limit)
+            let Some(position) = self
+                .search
+                .detached(tree, positions, (&aabb, area), first, limit)
             else {
                 tree.undo();
                 return false;
@@ -259,7 +268,11 @@ impl Mover for RuinMover<'_> {
             limit -= position.cost;
         }
         let most = LAYOUT_HEAT * worse;
-        if self.layout.as_mut().is_some_and(|layout| !layout.accepts(tree, most)) {
+        if self
+            .layout
+            .as_mut()
+            .is_some_and(|layout| !layout.accepts(tree, most))
+        {
             tree.undo();
             return false;
         }

@@ -36,7 +36,8 @@ impl Side {
         let (begin, end) = span(top);
         let limit = end - thickness * rng.random::<f64>() * (end - begin);
         let mut visits = 0;
-        self.stack.extend(tree.nodes[top as usize].children);
+        self.stack
+            .extend(tree.nodes[top as usize].children);
         while let Some(at) = self.stack.pop() {
             let (node, (near, far)) = (&tree.nodes[at as usize], span(at));
             visits += 1;

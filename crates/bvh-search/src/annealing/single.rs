@@ -46,7 +46,10 @@ bvh_config::config! {
 impl Config {
     fn check_together(&self) -> impl Iterator<Item = OutOfRange> {
         // Specs call the step a move.
-        Itself.faults("move", &self.step).into_iter().chain(check_fall(self.hot, self.cold))
+        Itself
+            .faults("move", &self.step)
+            .into_iter()
+            .chain(check_fall(self.hot, self.cold))
     }
 }
 

@@ -32,7 +32,10 @@ pub(crate) fn cool<M: Mover>(
         let smaller = SMALLEST_SUBTREES + (1.0 - SMALLEST_SUBTREES) * rng.random::<f64>();
         let (subtrees, starts) =
             cut(tree, smaller / f64::from(count), |at| node_sampler::weight(tree, at));
-        let all: f64 = subtrees.iter().map(|subtree| subtree.weight).sum();
+        let all: f64 = subtrees
+            .iter()
+            .map(|subtree| subtree.weight)
+            .sum();
         let share = |subtree: &Subtree| {
             let work = quota.work as f64 * (1.0 - WHOLE_TREE) * (subtree.weight / all);
             Quota { work: work as u64, moves: quota.moves / (subtrees.len() as u64 + 1) }
@@ -106,7 +109,10 @@ fn cut(
         }
         totals[at] = total;
     }
-    let most = most * tree.root().map_or(0.0, |root| totals[root as usize].1);
+    let most = most
+        * tree
+            .root()
+            .map_or(0.0, |root| totals[root as usize].1);
     // The level in a subtree, 1 for its root; 0 outside of subtrees.
     let mut depths = vec![0u8; tree.nodes.len()];
     let (mut subtrees, mut starts) = (vec![], vec![]);
@@ -135,7 +141,9 @@ impl Subtree {
         let mut nodes = Vec::with_capacity(range.len() + 1);
         nodes.push(Node { children: [1, NONE], ..tree.nodes[ANCHOR as usize] });
         nodes.extend(
-            tree.nodes[range].iter().map(|node| moved(node, |at| at.wrapping_sub(self.root - 1))),
+            tree.nodes[range]
+                .iter()
+                .map(|node| moved(node, |at| at.wrapping_sub(self.root - 1))),
         );
         nodes[1].parent = ANCHOR;
         Working::from_nodes(nodes, tree.metric())
@@ -183,9 +191,17 @@ mod tests {
         tree.sort_in_preorder();
         for most in [0.007, 0.03, 0.3, 0.99] {
             let (subtrees, starts) = cut(&tree, most, |_| 1.0);
-            assert!(subtrees.windows(2).all(|pair| pair[0].root + pair[0].nodes <= pair[1].root));
-            assert!(subtrees.iter().all(|subtree| f64::from(subtree.nodes) <= most * 5999.0
-                && starts.contains(&subtree.root)));
+            assert!(
+                subtrees
+                    .windows(2)
+                    .all(|pair| pair[0].root + pair[0].nodes <= pair[1].root)
+            );
+            assert!(
+                subtrees
+                    .iter()
+                    .all(|subtree| f64::from(subtree.nodes) <= most * 5999.0
+                        && starts.contains(&subtree.root))
+            );
             assert!(
                 subtrees
                     .iter()

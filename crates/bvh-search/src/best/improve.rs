@@ -35,7 +35,9 @@ pub(crate) fn improve<A: Metric>(
     }
     let (horizon, work) = config.horizon(n, run);
     let by_layout = problem.objective == Objective::Layout;
-    let divider = problem.splits.map(|splits| Divider::new(splits, by_layout));
+    let divider = problem
+        .splits
+        .map(|splits| Divider::new(splits, by_layout));
     let mut search = Improvement {
         config,
         seed,
@@ -131,9 +133,10 @@ impl Improvement<'_, '_, '_, '_> {
 
     /// Reinsertion to a local optimum, which is offered to the incumbent.
     fn reinsert(&mut self, tree: &mut Working<impl Metric>) {
-        self.best.improve(tree, u32::MAX, self.run, |tree, _, quota, observer| {
-            reinsertion::pass_by_area(tree, quota, observer)
-        });
+        self.best
+            .improve(tree, u32::MAX, self.run, |tree, _, quota, observer| {
+                reinsertion::pass_by_area(tree, quota, observer)
+            });
     }
 
     /// Long before the heat has paid, whoever stops a search by the clock is to get no less than plain reinsertion gives. The plan goes
@@ -159,7 +162,10 @@ impl Improvement<'_, '_, '_, '_> {
         let began = observer.progress().unwrap_or(0.0);
         let work = match horizon {
             Horizon::Known if observer.progress().is_some() => {
-                let quota = self.run.left().at_most(self.left.min(PROBE * self.n));
+                let quota = self
+                    .run
+                    .left()
+                    .at_most(self.left.min(PROBE * self.n));
                 let (tally, in_time) = self.probe(tree, stream(self.seed, 0), quota);
                 self.run.count(tally);
                 self.secure(tree.metric(), in_time / n);

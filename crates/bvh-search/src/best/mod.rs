@@ -91,7 +91,10 @@ pub fn unless_behind(found: Outcome, fallback: Option<Outcome>) -> Outcome {
 /// The division with spatial splits, if the problem allows them: the one that the caller has, or a new one, unless the observer
 /// cancels before it is made.
 fn division(problem: &Problem, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
-    let Some(splits) = problem.splits.filter(|splits| splits.most > problem.boxes.len()) else {
+    let Some(splits) = problem
+        .splits
+        .filter(|splits| splits.most > problem.boxes.len())
+    else {
         return Ok(None);
     };
     if let Some(division) = splits.division {

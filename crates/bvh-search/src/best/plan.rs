@@ -15,7 +15,9 @@ pub(super) struct Planned {
 /// follow it.
 pub(super) fn plan(config: &Config, length: f64, n: u64) -> (Vec<Planned>, f64) {
     let longest = config.longest.min(WORK_PER_PAIR * n as f64);
-    let equal = (length / longest).ceil().clamp(1.0, MOST_GENERATIONS as f64);
+    let equal = (length / longest)
+        .ceil()
+        .clamp(1.0, MOST_GENERATIONS as f64);
     let length = length / equal;
     let hot = config.hot(length);
     let reheats = if length < config.reheats_from { 0 } else { config.reheats };

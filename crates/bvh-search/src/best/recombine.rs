@@ -45,7 +45,9 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
         let cost = if node.is_leaf() {
             A::LEAF * node.area
         } else {
-            let [left, right] = node.children.map(|child| best[clades[child as usize] as usize].0);
+            let [left, right] = node
+                .children
+                .map(|child| best[clades[child as usize] as usize].0);
             node.area + left + right
         };
         let best = &mut best[clades[at as usize] as usize];
@@ -54,7 +56,9 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
         }
     }
     let mut nodes = vec![trees[0].nodes[ANCHOR as usize]];
-    let root = trees[0].root().map(|root| (clade_of[0][root as usize], ANCHOR, 0));
+    let root = trees[0]
+        .root()
+        .map(|root| (clade_of[0][root as usize], ANCHOR, 0));
     let mut stack: Vec<(u32, u32, usize)> = root.into_iter().collect();
     while let Some((clade, parent, side)) = stack.pop() {
         let (_, which, at) = best[clade as usize];
@@ -77,9 +81,13 @@ fn key_of_leaf<A: Metric>(node: &Node) -> u128 {
         return object;
     }
     let [low, high] = node.aabb.planes();
-    [low[0], low[1], low[2], high[0], high[1], high[2]].into_iter().fold(object, |sum, plane| {
-        sum.rotate_left(21).wrapping_mul(0x2d99_787926d46932a4c1f32680f70c55) ^ key(plane.to_bits())
-    })
+    [low[0], low[1], low[2], high[0], high[1], high[2]]
+        .into_iter()
+        .fold(object, |sum, plane| {
+            sum.rotate_left(21)
+                .wrapping_mul(0x2d99_787926d46932a4c1f32680f70c55)
+                ^ key(plane.to_bits())
+        })
 }
 
 /// A key for an object, scattered over 128 bits: SplitMix64 (Steele, Lea & Flood 2014) twice.

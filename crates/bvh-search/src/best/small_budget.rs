@@ -56,7 +56,10 @@ pub(super) fn search<'p, A: Metric>(
         {
             return Ok(SmallBudget::Large(Some(morton)));
         }
-        if let Some((_, config)) = BUILDS.into_iter().find(|(enough, _)| times < *enough) {
+        if let Some((_, config)) = BUILDS
+            .into_iter()
+            .find(|(enough, _)| times < *enough)
+        {
             let tree = Incumbent::begin_unbounded(morton.build(&config)?, problem, run).tree;
             return Ok(SmallBudget::Tree(tree));
         }
@@ -128,8 +131,10 @@ fn top_down_may_be_better(
     let (mut divided, mut clustered) = (0.0, 0.0);
     for stretch in order.chunks(order.len().div_ceil(SAMPLES)) {
         let objects = &stretch[..stretch.len() / SAMPLED_PART];
-        let boxes: Vec<Aabb> =
-            objects.iter().map(|&object| problem.boxes[object as usize]).collect();
+        let boxes: Vec<Aabb> = objects
+            .iter()
+            .map(|&object| problem.boxes[object as usize])
+            .collect();
         let Some(tree) = self::divided(&boxes, run)? else { return Ok(false) };
         divided += cost::internal_area(&tree);
         clustered += cost::internal_area(&CLUSTERING.build(&boxes)?);
@@ -242,7 +247,9 @@ mod tests {
         let config = best::Config { start: Some(start), ..Default::default() };
         let budget = Budget { max_work: Some(1), ..Budget::UNLIMITED };
         let found = solve(&config, &Problem::new(&boxes), 1, budget, &()).unwrap();
-        let named = bvh_build::muller_fellner::Config::default().build(&boxes).unwrap();
+        let named = bvh_build::muller_fellner::Config::default()
+            .build(&boxes)
+            .unwrap();
         assert_eq!(found.cost, cost::internal_area(&named));
     }
 

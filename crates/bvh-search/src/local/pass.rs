@@ -9,7 +9,11 @@ pub(crate) const TOLERANCE: f64 = 1e-12;
 
 /// Sorts nodes by area, the largest first, and nodes of equal area in the order given.
 pub(super) fn sort_by_area(tree: &Working<impl Metric>, order: &mut [u32]) {
-    order.sort_by(|&a, &b| tree.nodes[b as usize].area.total_cmp(&tree.nodes[a as usize].area));
+    order.sort_by(|&a, &b| {
+        tree.nodes[b as usize]
+            .area
+            .total_cmp(&tree.nodes[a as usize].area)
+    });
 }
 
 /// Repeats a pass until it keeps no move, the quota is used up, or the observer cancels.

@@ -146,8 +146,10 @@ impl Solver {
             *place = node.children[0];
             self.leaves.push(node.children[1]);
         }
-        let last =
-            self.leaves.iter().fold(last, |last, &leaf| last.max(tree.nodes[leaf as usize].stamp));
+        let last = self
+            .leaves
+            .iter()
+            .fold(last, |last, &leaf| last.max(tree.nodes[leaf as usize].stamp));
         let solved = self.solved[root as usize];
         solved == NEVER || last > solved
     }
@@ -155,10 +157,17 @@ impl Solver {
     /// Finds the best shape. Returns whether it is better than the present one.
     #[inline(always)]
     fn solve(&mut self, tree: &Working<impl Metric>) -> bool {
-        let least = self
-            .subsets
-            .solve(self.leaves.iter().map(|&leaf| tree.nodes[leaf as usize].aabb), tree.metric());
-        let before: f64 = self.inner.iter().map(|&node| tree.nodes[node as usize].area).sum();
+        let least = self.subsets.solve(
+            self.leaves
+                .iter()
+                .map(|&leaf| tree.nodes[leaf as usize].aabb),
+            tree.metric(),
+        );
+        let before: f64 = self
+            .inner
+            .iter()
+            .map(|&node| tree.nodes[node as usize].area)
+            .sum();
         least < before * (1.0 - TOLERANCE)
     }
 

@@ -91,9 +91,13 @@ pub fn internal_area(
             }
             let mut areas = vec![nearest[at]; classes.first.len()];
             for band in &bands {
-                let class = classes.first.partition_point(|&first| first < band.from);
+                let class = classes
+                    .first
+                    .partition_point(|&first| first < band.from);
                 let area = band.area(at);
-                areas[class..].iter_mut().for_each(|least| *least = least.max(area));
+                areas[class..]
+                    .iter_mut()
+                    .for_each(|least| *least = least.max(area));
             }
             *areas.last_mut().unwrap_or(&mut 0.0) = clusters.area();
             weights[at] as f64 * classes.least_path(weights[at], &areas)
@@ -126,7 +130,9 @@ pub fn of_largest(boxes: &[Aabb]) -> f64 {
         sum.add(area);
     }
     let root = root.half_area();
-    [root, -least, -most].into_iter().for_each(|area| sum.add(area));
+    [root, -least, -most]
+        .into_iter()
+        .for_each(|area| sum.add(area));
     sum.value().max(root)
 }
 
@@ -173,15 +179,26 @@ impl Classes {
             (size < total).then_some(total.min(size + step))
         };
         let first: Vec<u64> = std::iter::successors(Some(LEAST_WEIGHT), next).collect();
-        let last = |class: usize| first.get(class + 1).map_or(total, |next| next - 1);
-        let leads =
-            |to: usize| first.partition_point(|&from| from + LEAST_WEIGHT <= last(to)).min(to);
+        let last = |class: usize| {
+            first
+                .get(class + 1)
+                .map_or(total, |next| next - 1)
+        };
+        let leads = |to: usize| {
+            first
+                .partition_point(|&from| from + LEAST_WEIGHT <= last(to))
+                .min(to)
+        };
         let rate = |from: usize, to: usize| {
             let y = last(from).min(last(to) - LEAST_WEIGHT);
             let x = first[to].max(y + LEAST_WEIGHT);
             share(y as f64 / x as f64) / y as f64
         };
-        let row = |to: usize| (0..leads(to)).map(|from| rate(from, to)).collect();
+        let row = |to: usize| {
+            (0..leads(to))
+                .map(|from| rate(from, to))
+                .collect()
+        };
         let rates = (0..first.len()).map(row).collect();
         Self { first, rates }
     }
@@ -193,8 +210,9 @@ impl Classes {
         least[start] = 0.0;
         for to in start + 1..least.len() {
             let steps = least.iter().zip(&self.rates[to]).skip(start);
-            least[to] =
-                steps.map(|(before, rate)| before + rate * areas[to]).fold(f64::INFINITY, f64::min);
+            least[to] = steps
+                .map(|(before, rate)| before + rate * areas[to])
+                .fold(f64::INFINITY, f64::min);
         }
         least.last().copied().unwrap_or(0.0)
     }
@@ -233,7 +251,9 @@ mod tests {
     }
 
     fn optimum(boxes: &[Aabb]) -> f64 {
-        solve(&exact::Config {}, &Problem::new(boxes), 1, Budget::UNLIMITED, &()).unwrap().cost
+        solve(&exact::Config {}, &Problem::new(boxes), 1, Budget::UNLIMITED, &())
+            .unwrap()
+            .cost
     }
 
     proptest! {
@@ -287,7 +307,9 @@ mod tests {
         struct After(AtomicU64);
         impl Observer for After {
             fn cancelled(&self) -> bool {
-                self.0.fetch_update(Relaxed, Relaxed, |left| Some(left.saturating_sub(1))) == Ok(0)
+                self.0
+                    .fetch_update(Relaxed, Relaxed, |left| Some(left.saturating_sub(1)))
+                    == Ok(0)
             }
         }
         let boxes = crate::scatter::scatter(3000);
@@ -303,12 +325,19 @@ mod tests {
     fn bad_boxes_are_refused_and_extreme_ones_are_not() {
         let mut boxes = crate::scatter::scatter(50);
         for factor in [2f32.powi(-140), 2f32.powi(100)] {
-            let scaled: Vec<Aabb> =
-                boxes.iter().map(|b| Aabb { min: b.min * factor, max: b.max * factor }).collect();
+            let scaled: Vec<Aabb> = boxes
+                .iter()
+                .map(|b| Aabb { min: b.min * factor, max: b.max * factor })
+                .collect();
             let bound = internal_area(&scaled, 4, &()).unwrap();
             assert!(bound > 0.0 && bound.is_finite());
         }
         boxes[7].min.y = f32::NAN;
-        assert!(internal_area(&boxes, 4, &()).unwrap_err().to_string().contains("object 7"));
+        assert!(
+            internal_area(&boxes, 4, &())
+                .unwrap_err()
+                .to_string()
+                .contains("object 7")
+        );
     }
 }

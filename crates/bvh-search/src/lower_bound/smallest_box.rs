@@ -91,12 +91,17 @@ impl Clusters {
     /// A tree of objects with weight 1 each. Refuses boxes that builders refuse. O(n log n).
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
         let tree = Config { axis: CutAxis::Longest, ..Config::default() }.build(boxes)?;
-        let reaches: Vec<Reach> =
-            tree.prim_ids.iter().map(|&id| Reach::from(&boxes[id as usize])).collect();
+        let reaches: Vec<Reach> = tree
+            .prim_ids
+            .iter()
+            .map(|&id| Reach::from(&boxes[id as usize]))
+            .collect();
         let nodes = nodes(&tree, &reaches);
         let mut leaves = vec![0; boxes.len()];
-        for (index, cluster) in
-            nodes.iter().enumerate().filter(|(_, cluster)| cluster.children == 0)
+        for (index, cluster) in nodes
+            .iter()
+            .enumerate()
+            .filter(|(_, cluster)| cluster.children == 0)
         {
             leaves[cluster.objects.start] = index;
         }
@@ -122,7 +127,9 @@ impl Clusters {
 
     /// Half area of the box around all.
     pub fn area(&self) -> f64 {
-        self.nodes.first().map_or(0.0, |root| root.half_area)
+        self.nodes
+            .first()
+            .map_or(0.0, |root| root.half_area)
     }
 
     /// The cluster of a single object.
@@ -151,7 +158,14 @@ impl Clusters {
     /// The areas of groups, to be looked up by object.
     pub fn grouped(&self, from: u64, groups: &[usize], areas: &[f64]) -> Grouped {
         let end = |&group: &usize| self.nodes[group].objects.end;
-        Grouped { from, groups: groups.iter().map(end).zip(areas.iter().copied()).collect() }
+        Grouped {
+            from,
+            groups: groups
+                .iter()
+                .map(end)
+                .zip(areas.iter().copied())
+                .collect(),
+        }
     }
 
     /// A lower bound of the half area of every box that contains an object of the cluster `seed` and weighs at least `weight`,
@@ -229,13 +243,21 @@ impl Region {
         known: &mut f64,
     ) -> Option<Self> {
         let with = |member: Member| {
-            let area = must.union(&clusters.nodes[member.cluster as usize].reach).half_area();
+            let area = must
+                .union(&clusters.nodes[member.cluster as usize].reach)
+                .half_area();
             Member { area, ..member }
         };
-        let mut members: Vec<Member> =
-            members.map(with).filter(|member| member.area < *known).collect();
-        let weigh =
-            |members: &[Member]| members.iter().map(|member| u64::from(member.weight)).sum::<u64>();
+        let mut members: Vec<Member> = members
+            .map(with)
+            .filter(|member| member.area < *known)
+            .collect();
+        let weigh = |members: &[Member]| {
+            members
+                .iter()
+                .map(|member| u64::from(member.weight))
+                .sum::<u64>()
+        };
         if weigh(&members) < weight {
             return None;
         }
@@ -243,8 +265,11 @@ impl Region {
         let (mut low, mut high, mut missing) = (0, members.len(), weight);
         while high - low > 1 {
             let half = (high - low) / 2;
-            let by_area =
-                |a: &Member, b: &Member| a.area.total_cmp(&b.area).then(a.cluster.cmp(&b.cluster));
+            let by_area = |a: &Member, b: &Member| {
+                a.area
+                    .total_cmp(&b.area)
+                    .then(a.cluster.cmp(&b.cluster))
+            };
             members[low..high].select_nth_unstable_by(half, by_area);
             let lower = weigh(&members[low..low + half]);
             if lower >= missing {
@@ -271,7 +296,8 @@ impl Region {
     /// The box around them: a good box of the region.
     #[inline(always)]
     fn around(&self, clusters: &Clusters) -> Reach {
-        self.nearest(clusters).fold(self.must, |union, reach| union.union(reach))
+        self.nearest(clusters)
+            .fold(self.must, |union, reach| union.union(reach))
     }
 
     /// Where to divide the region: the face whose move from `must` to that box costs most area, at the median of the
@@ -322,9 +348,14 @@ fn search_plain(
     let members = neighbours(clusters, &must, weight / CLUSTERS_PER_SIZE, known);
     // Regions without smaller boxes have been dropped; the others together contain all smaller boxes.
     let mut regions: Vec<Region> =
-        Region::new(clusters, must, members.into_iter(), weight, &mut known).into_iter().collect();
-    let mut left =
-        regions.iter().map(|region| region.members.len() as u64).sum::<u64>() * u64::from(effort);
+        Region::new(clusters, must, members.into_iter(), weight, &mut known)
+            .into_iter()
+            .collect();
+    let mut left = regions
+        .iter()
+        .map(|region| region.members.len() as u64)
+        .sum::<u64>()
+        * u64::from(effort);
     loop {
         let least =
             (0..regions.len()).min_by(|&a, &b| regions[a].bound.total_cmp(&regions[b].bound));

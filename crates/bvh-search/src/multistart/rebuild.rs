@@ -96,10 +96,9 @@ impl Config {
                         run.observer(),
                     )
                 };
-                let found =
-                    parallel::map(subtrees.len(), construct)
-                        .into_iter()
-                        .collect::<Result<Vec<_>, _>>()?;
+                let found = parallel::map(subtrees.len(), construct)
+                    .into_iter()
+                    .collect::<Result<Vec<_>, _>>()?;
                 number += subtrees.len() as u64;
                 let limit = Quota { work: quota.work / 2, ..Quota::ENDLESS };
                 round += replace(&mut tree, &subtrees, &found, limit, run.observer());
@@ -184,7 +183,10 @@ impl Config {
             let Some(subtree) = found.filter(|subtree| subtree.leaves.len() >= 3) else { continue };
             // Of two subtrees with a common leaf, one contains the root of the other.
             let holds = |one: &Subtree, other: &Subtree| one.inner.contains(&other.inner[0]);
-            if !subtrees.iter().any(|other| holds(other, &subtree) || holds(&subtree, other)) {
+            if !subtrees
+                .iter()
+                .any(|other| holds(other, &subtree) || holds(&subtree, other))
+            {
                 subtrees.push(subtree);
             }
         }
@@ -210,14 +212,17 @@ impl Config {
         let scene = Presorted::new(&boxes)?;
         let buffers = (&mut Workspace::default(), &mut other);
         let constructed = watched(observer, |watch| {
-            self.construction.construct(&scene, measure, &mut rule, buffers, watch)
+            self.construction
+                .construct(&scene, measure, &mut rule, buffers, watch)
         });
         match constructed {
             Err(BuildError::Cancelled) => return Ok((None, Tally::default())),
             constructed => constructed?,
         }
         let mut other = Working::from_bvh(&other, tree.metric().internal(&other), tree.metric())?;
-        let mut tally = self.local_search.improve(&mut other, quota, observer);
+        let mut tally = self
+            .local_search
+            .improve(&mut other, quota, observer);
         tally = Tally { moves: 0, kept: 0, work: tally.work + 2 * boxes.len() as u64 };
         let better = other.area() < subtree.area * (1.0 - TOLERANCE);
         Ok((better.then_some(other), tally))
@@ -230,7 +235,10 @@ fn contribution(tree: &Working<impl Metric>, at: u32) -> f64 {
     if node.is_leaf() {
         0.0
     } else {
-        node.children.iter().map(|&child| tree.nodes[child as usize].area).sum()
+        node.children
+            .iter()
+            .map(|&child| tree.nodes[child as usize].area)
+            .sum()
     }
 }
 
@@ -328,13 +336,19 @@ mod tests {
         let mut several = 0;
         for _ in 0..200 {
             let subtrees = config.select(&tree, &mut rng, 8, &mut Tally::default());
-            let mut leaves: Vec<u32> =
-                subtrees.iter().flat_map(|subtree| subtree.leaves.iter().copied()).collect();
+            let mut leaves: Vec<u32> = subtrees
+                .iter()
+                .flat_map(|subtree| subtree.leaves.iter().copied())
+                .collect();
             let count = leaves.len();
             leaves.sort_unstable();
             leaves.dedup();
             assert_eq!(leaves.len(), count);
-            assert!(subtrees.iter().all(|subtree| (3..=30).contains(&subtree.leaves.len())));
+            assert!(
+                subtrees
+                    .iter()
+                    .all(|subtree| (3..=30).contains(&subtree.leaves.len()))
+            );
             several += usize::from(subtrees.len() > 1);
         }
         assert!(several > 100);

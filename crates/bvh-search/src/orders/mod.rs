@@ -46,8 +46,10 @@ impl<'p> Insertion<'p> {
         (workspace, tree): &mut Buffers,
         observer: &dyn Observer,
     ) -> Option<f64> {
-        let insert =
-            |watch: &Watch| self.config.insert_watched(&self.scene, order, workspace, watch);
+        let insert = |watch: &Watch| {
+            self.config
+                .insert_watched(&self.scene, order, workspace, watch)
+        };
         let goldsmith_salmon = match watched(observer, insert) {
             Ok(cost) => cost,
             Err(InvalidOrder::Cancelled) => return None,
@@ -68,8 +70,10 @@ impl<'p> Insertion<'p> {
     /// The tree of one order, unless the observer cancels before it is built.
     fn tree(&self, order: &[u32], observer: &dyn Observer) -> Option<Bvh> {
         let (mut workspace, mut tree) = Buffers::default();
-        let insert =
-            |watch: &Watch| self.config.insert_watched(&self.scene, order, &mut workspace, watch);
+        let insert = |watch: &Watch| {
+            self.config
+                .insert_watched(&self.scene, order, &mut workspace, watch)
+        };
         watched(observer, insert).ok()?;
         workspace.write(&mut tree);
         Some(tree)

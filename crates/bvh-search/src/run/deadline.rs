@@ -37,7 +37,9 @@ impl Deadline {
     /// The fraction of the limit that has passed, 0 to 1.
     pub fn fraction(&self) -> f64 {
         // An elapsed time of zero over a limit of zero is NaN, and the smaller of NaN and 1 is 1.
-        self.elapsed().div_duration_f64(self.limit).min(1.0)
+        self.elapsed()
+            .div_duration_f64(self.limit)
+            .min(1.0)
     }
 }
 

@@ -104,7 +104,11 @@ impl<'a> Run<'a> {
     /// Keeps a tree that the search has built and does not follow: if it ends up as the cheapest of all, it is the outcome. O(nodes).
     pub fn keep_aside(&mut self, problem: &Problem, tree: Bvh) {
         let cost = problem.cost(&tree);
-        if self.aside.as_ref().is_none_or(|(least, _)| cost < *least) {
+        if self
+            .aside
+            .as_ref()
+            .is_none_or(|(least, _)| cost < *least)
+        {
             self.aside = Some((cost, tree));
         }
     }
@@ -187,7 +191,9 @@ impl<'a> Run<'a> {
     /// How many evaluations of `work` nodes each are left in the budget, at least one before the first.
     pub fn evaluations_left(&self, work: u64) -> u64 {
         let left = self.left();
-        left.moves.min(left.work.div_ceil(work.max(1))).max(u64::from(self.evaluations == 0))
+        left.moves
+            .min(left.work.div_ceil(work.max(1)))
+            .max(u64::from(self.evaluations == 0))
     }
 }
 
@@ -238,7 +244,9 @@ pub fn solve(
     };
     search.check()?;
     // A cancelled search has no time for that at its end.
-    let known = problem.known.map(|tree| (problem.cost(tree), tree));
+    let known = problem
+        .known
+        .map(|tree| (problem.cost(tree), tree));
     let found = search.search(problem, seed, &mut run);
     let tree = run.cheapest(found, problem, known)?;
     let stop = run.stopped().unwrap_or(StopReason::Completed);

@@ -120,7 +120,11 @@ impl<M: Metric> Working<M> {
 
     /// [`area`](Self::area), recomputed. O(n).
     pub fn internal_area(&self) -> f64 {
-        self.nodes.iter().filter_map(|node| Self::part(node)).collect::<Sum>().value()
+        self.nodes
+            .iter()
+            .filter_map(|node| Self::part(node))
+            .collect::<Sum>()
+            .value()
     }
 
     /// What a node adds to the area of the tree, if its kind adds anything.
@@ -234,8 +238,10 @@ impl<M: Metric> Working<M> {
     /// Adds a leaf that is not in the tree, with a parent of its own, so that it can be attached. The boxes are empty.
     pub fn push_spare(&mut self, object: u32) -> u32 {
         let leaf = self.nodes.len() as u32;
-        self.nodes.push(Node { parent: leaf + 1, children: [NONE, object], ..Node::ANCHOR });
-        self.nodes.push(Node { children: [leaf; 2], ..Node::ANCHOR });
+        self.nodes
+            .push(Node { parent: leaf + 1, children: [NONE, object], ..Node::ANCHOR });
+        self.nodes
+            .push(Node { children: [leaf; 2], ..Node::ANCHOR });
         leaf
     }
 
@@ -251,7 +257,9 @@ impl<M: Metric> Working<M> {
     /// The box around two nodes.
     #[inline(always)]
     pub fn union_of(&self, [left, right]: [u32; 2]) -> PackedAabb {
-        self.nodes[left as usize].aabb.union(&self.nodes[right as usize].aabb)
+        self.nodes[left as usize]
+            .aabb
+            .union(&self.nodes[right as usize].aabb)
     }
 
     /// Gives the inner node `at` these children and makes its box tight. Its ancestors are not updated: where several
@@ -260,7 +268,9 @@ impl<M: Metric> Working<M> {
     pub fn join(&mut self, at: u32, children: [u32; 2]) {
         let aabb = self.union_of(children);
         let area = self.metric.of(&aabb);
-        children.into_iter().for_each(|child| self.write(child).parent = at);
+        children
+            .into_iter()
+            .for_each(|child| self.write(child).parent = at);
         let node = self.write(at);
         let before = node.area;
         (node.children, node.aabb, node.area) = (children, aabb, area);
@@ -292,8 +302,11 @@ impl<M: Metric> Working<M> {
         nodes.reserve(self.nodes.len());
         nodes.push(Node { stamp: 0, ..self.nodes[0] });
         // Pending nodes: old index, new parent, side.
-        let mut stack: Vec<(u32, u32, usize)> =
-            self.root().map(|root| (root, ANCHOR, 0)).into_iter().collect();
+        let mut stack: Vec<(u32, u32, usize)> = self
+            .root()
+            .map(|root| (root, ANCHOR, 0))
+            .into_iter()
+            .collect();
         let mut area = Sum::default();
         while let Some((old, parent, side)) = stack.pop() {
             let (at, node) = (nodes.len() as u32, self.nodes[old as usize]);

@@ -120,7 +120,8 @@ impl PositionSearch {
             }
             let node = &tree.nodes[at as usize];
             let joint = tree.metric().of(&node.aabb.union(item.0));
-            self.path.push(Step { node: at, below, joint, growth: joint - node.area });
+            self.path
+                .push(Step { node: at, below, joint, growth: joint - node.area });
             (below, at) = (at, node.parent);
         }
         let mut best = Position { beside: NONE, cost: limit };
@@ -146,12 +147,14 @@ impl PositionSearch {
         let sibling = tree.other(parent, node);
         let (mut rest, rest_area) = (tree.aabb(sibling), tree.area(sibling));
         let (joint, mut at) = (tree.area(parent), tree.parent(parent));
-        self.path.push(Step { node: sibling, below: NONE, joint, growth: joint - rest_area });
+        self.path
+            .push(Step { node: sibling, below: NONE, joint, growth: joint - rest_area });
         let mut below = parent;
         while at != T::ABOVE {
             let area = tree.area(at);
             rest.grow(&tree.aabb(tree.other(at, below)));
-            self.path.push(Step { node: at, below, joint: area, growth: area - tree.size(&rest) });
+            self.path
+                .push(Step { node: at, below, joint: area, growth: area - tree.size(&rest) });
             (below, at) = (at, tree.parent(at));
         }
         let mut best = Position { beside: NONE, cost: f64::INFINITY };

@@ -32,7 +32,11 @@ fn first(pair: u32) -> usize {
 impl Siblings {
     /// Takes over a tight binary tree of two objects or more, whose siblings are adjacent. O(n).
     pub fn new(tree: Bvh) -> Self {
-        debug_assert!(tree.nodes.iter().all(|node| node.is_leaf() || node.children().len() == 2));
+        debug_assert!(
+            tree.nodes
+                .iter()
+                .all(|node| node.is_leaf() || node.children().len() == 2)
+        );
         let pairs = tree.nodes.len() / 2;
         // One dummy slot for leaves, so that the store is branch-free: which nodes are leaves is unpredictable.
         let mut parents = vec![0; pairs + 1];
@@ -68,8 +72,10 @@ impl Siblings {
     fn tighten(&mut self, mut at: u32) -> u64 {
         let mut visits = 0;
         while at != NONE {
-            let [left, right] =
-                self.children(at).expect("an inner node").map(|child| self.node(child).aabb);
+            let [left, right] = self
+                .children(at)
+                .expect("an inner node")
+                .map(|child| self.node(child).aabb);
             visits += 1;
             let (aabb, node) = (left.union(&right), &mut self.tree.nodes[at as usize]);
             if aabb == node.aabb {
@@ -86,7 +92,10 @@ impl Siblings {
         let Self { mut tree, parents } = self;
         let PairOrder { sequence, late } = PairOrder::of(&parents);
         let mut places = vec![0; sequence.len()];
-        sequence.iter().zip(0..).for_each(|(&from, to)| places[from as usize] = to);
+        sequence
+            .iter()
+            .zip(0..)
+            .for_each(|(&from, to)| places[from as usize] = to);
         let moved = |mut node: Node| {
             let (NodeKind::Inner { first: before, .. } | NodeKind::Leaf { first: before, .. }) =
                 node.kind();
@@ -97,8 +106,11 @@ impl Siblings {
         };
         // Late pairs are kept aside until it is their turn; the others move towards the front, if at all.
         let nodes = tree.nodes.as_mut_slice();
-        let aside: Vec<Node> =
-            late.iter().flat_map(|&pair| &nodes[first(pair)..][..2]).copied().collect();
+        let aside: Vec<Node> = late
+            .iter()
+            .flat_map(|&pair| &nodes[first(pair)..][..2])
+            .copied()
+            .collect();
         let (mut aside, mut next) = (aside.chunks_exact(2), 0);
         nodes[0] = moved(nodes[0]);
         for (to, from) in (0..).zip(sequence) {
@@ -214,7 +226,9 @@ mod tests {
     fn starts(boxes: &[Aabb]) -> [Bvh; 2] {
         [
             ploc::Config::default().build(boxes).unwrap(),
-            muller_fellner::Config::default().build(boxes).unwrap(),
+            muller_fellner::Config::default()
+                .build(boxes)
+                .unwrap(),
         ]
     }
 

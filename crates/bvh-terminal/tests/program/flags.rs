@@ -21,11 +21,21 @@ fn call<'a>(command: &'a str, args: &[&'a str]) -> Vec<&'a str> {
 fn flags(folder: &Path, command: &str) -> Vec<(String, Option<String>)> {
     let help = said(folder, &call(command, &["--help"]));
     let flag = |line: &str| {
-        let mut words = line.split_whitespace().skip_while(|word| !word.starts_with("--"));
+        let mut words = line
+            .split_whitespace()
+            .skip_while(|word| !word.starts_with("--"));
         let name = words.next()?.trim_end_matches(',').to_owned();
-        Some((name, words.next().filter(|word| word.starts_with('<')).map(str::to_owned)))
+        Some((
+            name,
+            words
+                .next()
+                .filter(|word| word.starts_with('<'))
+                .map(str::to_owned),
+        ))
     };
-    let lines = help.lines().filter(|line| line.trim_start().starts_with('-'));
+    let lines = help
+        .lines()
+        .filter(|line| line.trim_start().starts_with('-'));
     lines
         .filter_map(flag)
         .filter(|(name, _)| !["--help", "--version"].contains(&name.as_str()))
@@ -46,9 +56,15 @@ pub fn wrong_flags(at: &Path, commands: &[(&str, &[&str])]) -> usize {
         .lines()
         .skip(1)
         .take_while(|line| !line.trim().is_empty());
-    let listed: BTreeSet<&str> = listed.filter_map(|line| line.split_whitespace().next()).collect();
-    let tried: BTreeSet<&str> =
-        commands.iter().map(|(name, _)| *name).chain(["help"]).filter(|n| !n.is_empty()).collect();
+    let listed: BTreeSet<&str> = listed
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
+    let tried: BTreeSet<&str> = commands
+        .iter()
+        .map(|(name, _)| *name)
+        .chain(["help"])
+        .filter(|n| !n.is_empty())
+        .collect();
     assert_eq!(listed, tried);
     let (mut count, mut found) = (0, Vec::new());
     for &(command, needed) in commands {

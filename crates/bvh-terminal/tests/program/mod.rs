@@ -38,7 +38,10 @@ pub fn names(folder: &Path) -> Vec<String> {
 /// The program in a folder, without input.
 pub fn program(folder: &Path, args: &[&str]) -> Command {
     let mut command = Command::new(PROGRAM);
-    command.current_dir(folder).args(args).stdin(Stdio::null());
+    command
+        .current_dir(folder)
+        .args(args)
+        .stdin(Stdio::null());
     command
 }
 
@@ -50,7 +53,11 @@ pub fn run(folder: &Path, args: &[&str]) -> Output {
 /// [`run`] where no file may grow beyond so many blocks of 512 bytes; past the limit a write fails as on a full disk.
 pub fn run_on_a_small_disk(folder: &Path, args: &str, blocks: u32) -> Output {
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec '{PROGRAM}' {args}");
-    Command::new("sh").args(["-c", &script]).current_dir(folder).output().unwrap()
+    Command::new("sh")
+        .args(["-c", &script])
+        .current_dir(folder)
+        .output()
+        .unwrap()
 }
 
 /// Waits until a file or folder is there.
@@ -76,8 +83,14 @@ pub fn said(folder: &Path, args: &[&str]) -> String {
 /// A command whose output is lost ends with an error, and without one otherwise.
 #[cfg(target_os = "linux")]
 pub fn unsaid(folder: &Path, args: &[&str]) {
-    let full = fs::File::options().write(true).open("/dev/full").unwrap();
-    let output = program(folder, args).stdout(full).output().unwrap();
+    let full = fs::File::options()
+        .write(true)
+        .open("/dev/full")
+        .unwrap();
+    let output = program(folder, args)
+        .stdout(full)
+        .output()
+        .unwrap();
     ended(&output, 1, &["could not be written to standard output"]);
     said(folder, args);
 }
@@ -91,17 +104,29 @@ pub fn refused(folder: &Path, args: &[&str], code: i32, parts: &[&str]) {
 pub fn ended(output: &Output, code: i32, parts: &[&str]) {
     let said = text(&output.stderr);
     assert_eq!(output.status.code(), Some(code), "{parts:?}: {said}");
-    parts.iter().for_each(|part| assert!(said.contains(part), "{part} in {said}"));
+    parts
+        .iter()
+        .for_each(|part| assert!(said.contains(part), "{part} in {said}"));
 }
 
 /// The program at work in the background; what it says on standard error is kept.
 pub fn begin(folder: &Path, args: &[&str]) -> Child {
-    program(folder, args).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+    program(folder, args)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
 }
 
 /// Sends a signal, such as `-INT`.
 pub fn send(signal: &str, to: &Child) {
-    assert!(Command::new("kill").args([signal, &to.id().to_string()]).status().unwrap().success());
+    assert!(
+        Command::new("kill")
+            .args([signal, &to.id().to_string()])
+            .status()
+            .unwrap()
+            .success()
+    );
 }
 
 /// A glTF scene of one triangle, [`outside_buffer`], in the file that a URI names.

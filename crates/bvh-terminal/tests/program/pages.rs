@@ -23,16 +23,25 @@ impl Block {
 
 /// The paths, within the project, of all pages but the changelog, which speaks of what was.
 pub fn pages() -> Vec<PathBuf> {
-    let below =
-        |folder: &str| fs::read_dir(top().join(folder)).unwrap().map(|entry| entry.unwrap().path());
-    let readmes = below("crates").map(|folder| folder.join("README.md"));
-    let pages =
-        below(".").chain(below("docs")).chain(readmes).chain([top().join("results/README.md")]);
-    let is_page = |path: &PathBuf| {
-        path.extension().is_some_and(|extension| extension == "md") && path.is_file()
+    let below = |folder: &str| {
+        fs::read_dir(top().join(folder))
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
     };
-    let mut pages: Vec<PathBuf> =
-        pages.filter(is_page).filter(|path| !path.ends_with("CHANGELOG.md")).collect();
+    let readmes = below("crates").map(|folder| folder.join("README.md"));
+    let pages = below(".")
+        .chain(below("docs"))
+        .chain(readmes)
+        .chain([top().join("results/README.md")]);
+    let is_page = |path: &PathBuf| {
+        path.extension()
+            .is_some_and(|extension| extension == "md")
+            && path.is_file()
+    };
+    let mut pages: Vec<PathBuf> = pages
+        .filter(is_page)
+        .filter(|path| !path.ends_with("CHANGELOG.md"))
+        .collect();
     pages.sort();
     pages
 }
@@ -42,7 +51,11 @@ pub fn blocks() -> Vec<Block> {
     let mut blocks: Vec<Block> = Vec::new();
     for page in pages() {
         let mut is_open = false;
-        for (number, line) in fs::read_to_string(&page).unwrap().lines().enumerate() {
+        for (number, line) in fs::read_to_string(&page)
+            .unwrap()
+            .lines()
+            .enumerate()
+        {
             match line.strip_prefix("```") {
                 Some(_) if is_open => is_open = false,
                 Some(language) => {
@@ -74,7 +87,8 @@ pub fn commands(text: &str, place: &str) -> Vec<Vec<String>> {
         let words = shlex::split(line).unwrap_or_else(|| panic!("{place}: `{line}` is no shell"));
         let is_variable = |word: &String| {
             word.split_once('=').is_some_and(|(name, _)| {
-                name.bytes().all(|byte| byte == b'_' || byte.is_ascii_uppercase())
+                name.bytes()
+                    .all(|byte| byte == b'_' || byte.is_ascii_uppercase())
             })
         };
         let command = words
@@ -82,7 +96,9 @@ pub fn commands(text: &str, place: &str) -> Vec<Vec<String>> {
             .skip_while(is_variable)
             .take_while(|word| !["|", ":::"].contains(&word.as_str()));
         // GNU parallel puts a number in the place of braces.
-        let command: Vec<String> = command.map(|word| word.replace("{}", "1")).collect();
+        let command: Vec<String> = command
+            .map(|word| word.replace("{}", "1"))
+            .collect();
         match command.first().map(String::as_str) {
             None => {}
             Some("parallel") => commands.push(command[1..].to_vec()),
@@ -106,7 +122,9 @@ impl Called {
         match (&words[..], end) {
             ([name, ..], _) if *name == self.name => Some(words[1..].to_vec()),
             (["cargo", "run", ..], Some(end)) => {
-                let is_called = words[..end].windows(2).any(|pair| pair == ["-p", self.package]);
+                let is_called = words[..end]
+                    .windows(2)
+                    .any(|pair| pair == ["-p", self.package]);
                 is_called.then(|| words[end + 1..].to_vec())
             }
             _ => None,
@@ -137,8 +155,11 @@ impl Called {
             let outside: String = text.split("```").step_by(2).collect();
             let place = page.display().to_string();
             let begins = format!("{} ", self.name);
-            for code in
-                outside.split('`').skip(1).step_by(2).filter(|code| code.starts_with(&begins))
+            for code in outside
+                .split('`')
+                .skip(1)
+                .step_by(2)
+                .filter(|code| code.starts_with(&begins))
             {
                 for command in commands(code, &place) {
                     let Some(mut arguments) = self.arguments(&command) else { continue };
@@ -159,8 +180,11 @@ pub const UNREADABLE: &str = "try '--help'";
 
 /// What a command says on standard error within two seconds.
 fn beginning(folder: &Path, arguments: &[&str]) -> String {
-    let mut child =
-        program(folder, arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut child = program(folder, arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
     let start = Instant::now();
     while child.try_wait().unwrap().is_none() && start.elapsed() < Duration::from_secs(2) {
         std::thread::sleep(Duration::from_millis(5));

@@ -22,7 +22,11 @@ impl<'a> ReadOnly<'a> {
 
     fn set(&self, mode: &str, attribute: &str) {
         for (program, argument) in [("chattr", "-i"), ("chmod", mode), ("chattr", attribute)] {
-            let _ = Command::new(program).arg(argument).arg(self.0).stderr(Stdio::null()).status();
+            let _ = Command::new(program)
+                .arg(argument)
+                .arg(self.0)
+                .stderr(Stdio::null())
+                .status();
         }
     }
 }

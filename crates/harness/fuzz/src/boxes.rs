@@ -55,13 +55,26 @@ fn refused(boxes: &[Aabb], bad: usize, seed: u64, budget: Budget) {
         named(method.name(), error.to_string());
     }
     named("check", check_boxes(boxes).unwrap_err().to_string());
-    named("KD-tree", kd_tree::Config::default().build(boxes).unwrap_err().to_string());
-    named("bound", lower_bound::internal_area(boxes, 1, &()).unwrap_err().to_string());
+    named(
+        "KD-tree",
+        kd_tree::Config::default()
+            .build(boxes)
+            .unwrap_err()
+            .to_string(),
+    );
+    named(
+        "bound",
+        lower_bound::internal_area(boxes, 1, &())
+            .unwrap_err()
+            .to_string(),
+    );
     let config = best::Config::default();
     let tree = Bvh::default();
     named(
         "optimize",
-        optimize(&tree, &Problem::new(boxes), &config, seed, budget, &()).unwrap_err().to_string(),
+        optimize(&tree, &Problem::new(boxes), &config, seed, budget, &())
+            .unwrap_err()
+            .to_string(),
     );
 }
 
@@ -84,8 +97,11 @@ fn built(boxes: &[Aabb], seed: u64, budget: Budget) {
             "{}",
             method.name()
         );
-        let binary =
-            outcome.tree.nodes.iter().all(|node| node.is_leaf() || node.children().len() == 2);
+        let binary = outcome
+            .tree
+            .nodes
+            .iter()
+            .all(|node| node.is_leaf() || node.children().len() == 2);
         if binary && !matches!(method, Method::Exact(_)) {
             assert!(
                 outcome.cost >= bound * (1.0 - ROUNDING),
@@ -97,7 +113,9 @@ fn built(boxes: &[Aabb], seed: u64, budget: Budget) {
     }
     let kd_tree = kd_tree::Config::default().build(boxes).unwrap();
     assert!(kd_tree.references() >= kd_tree.cells().min(1));
-    let greedy = muller_fellner::Config::default().build(boxes).unwrap();
+    let greedy = muller_fellner::Config::default()
+        .build(boxes)
+        .unwrap();
     let before = cost::internal_area(&greedy);
     let merged = collapse_leaves(&greedy, &SahConstants::default());
     for tree in [&greedy, &merged] {
@@ -117,7 +135,11 @@ fn converted(tree: &Bvh, boxes: &[Aabb]) {
     assert!(cost::sah(&merged, &constants) <= cost::sah(tree, &constants) * (1.0 + ROUNDING));
     let bytes = file::save(tree, boxes, &file::Origin::default()).unwrap();
     assert_eq!(file::load(&bytes, boxes).as_ref(), Ok(tree));
-    if tree.nodes.iter().all(|node| node.is_leaf() || node.children().len() == 2) {
+    if tree
+        .nodes
+        .iter()
+        .all(|node| node.is_leaf() || node.children().len() == 2)
+    {
         let other = Bvh::from_first_count(&tree.to_first_count(), &tree.prim_ids).unwrap();
         validate(&other, boxes).unwrap();
     }

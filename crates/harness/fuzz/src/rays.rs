@@ -20,8 +20,9 @@ pub fn rays(bytes: &[u8]) {
     // A scene is finite.
     let finite = |at: Vec3| (at * scale).map(|c| if c.is_finite() { c } else { 0.0 });
     let mut corner = || finite(bytes.point(few));
-    let triangles: Vec<Triangle> =
-        (0..count % 12).map(|_| Triangle([corner(), corner(), corner()])).collect();
+    let triangles: Vec<Triangle> = (0..count % 12)
+        .map(|_| Triangle([corner(), corner(), corner()]))
+        .collect();
     let mut rays = Vec::new();
     while !bytes.0.is_empty() && rays.len() < 8 {
         let origin = bytes.point(few_in_rays) * if few_in_rays { scale } else { 1.0 };
@@ -47,8 +48,10 @@ pub fn rays(bytes: &[u8]) {
         check(*traversal, &objects, &rays).unwrap_or_else(|broken| panic!("{name}: {broken}"));
     }
     let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
-    let spheres: Vec<Sphere> =
-        triangles.iter().map(|t| Sphere::new(t.0[0] / 4.0, t.0[1].x.abs() / 4.0)).collect();
+    let spheres: Vec<Sphere> = triangles
+        .iter()
+        .map(|t| Sphere::new(t.0[0] / 4.0, t.0[1].x.abs() / 4.0))
+        .collect();
     let around: Vec<Aabb> = spheres.iter().map(Sphere::aabb).collect();
     for ray in &rays {
         over(&boxes, ray, |id, t_max| clip_to_box(ray, &boxes[id as usize], ray.t_min(), t_max));

@@ -32,7 +32,10 @@ pub struct CompareArgs {
 /// Prints the costs of the tree and of the best known one, which is a binary tree with one object per leaf.
 pub fn compare(args: &CompareArgs) -> Result<(), Error> {
     let file = &args.file;
-    let results = args.results.as_deref().unwrap_or(Path::new("results"));
+    let results = args
+        .results
+        .as_deref()
+        .unwrap_or(Path::new("results"));
     if args.results.is_some() {
         input_folder("--results", results)?;
     }

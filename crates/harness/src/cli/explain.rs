@@ -18,18 +18,27 @@ pub fn experiment(experiment: &Experiment) -> Result<String, Error> {
         (experiment.tracing.is_some(), "wide layouts and timed rays"),
         (experiment.lower_bound.is_some(), "lower bounds"),
         (
-            experiment.reports.iter().any(|report| report.needs_references()),
+            experiment
+                .reports
+                .iter()
+                .any(|report| report.needs_references()),
             "references and the clock of every event",
         ),
         (!experiment.reports.is_empty(), "tables and figures"),
     ];
-    let not_asked: Vec<_> =
-        asked.iter().filter(|(asked, _)| !asked).map(|&(_, what)| what).collect();
+    let not_asked: Vec<_> = asked
+        .iter()
+        .filter(|(asked, _)| !asked)
+        .map(|&(_, what)| what)
+        .collect();
     if !not_asked.is_empty() {
         text += &format!("left out, not asked for: {}\n", not_asked.join(", "));
     }
-    let labels: Vec<_> =
-        experiment.methods.iter().map(|labelled| labelled.label.as_str()).collect();
+    let labels: Vec<_> = experiment
+        .methods
+        .iter()
+        .map(|labelled| labelled.label.as_str())
+        .collect();
     let (times, labels) = (experiment.repetitions, labels.join("; "));
     text += &match experiment.suite {
         Some(_) => format!("to run: the suite of cases with {labels}\n"),

@@ -82,7 +82,9 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         .map(|path| Experiment::read(path, &overrides))
         .collect::<Result<Vec<_>, _>>()?;
     let mut folders = HashSet::new();
-    if let Some(twice) = experiments.iter().find(|experiment| !folders.insert(experiment.folder()))
+    if let Some(twice) = experiments
+        .iter()
+        .find(|experiment| !folders.insert(experiment.folder()))
     {
         let message =
             format!("two specs are called {}; run them one by one, each with an --out", twice.name);
@@ -108,7 +110,10 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         } else {
             execute(experiment, &args.out, extent, interrupted)?
         };
-        summary.remarks.iter().for_each(|remark| print_error(remark));
+        summary
+            .remarks
+            .iter()
+            .for_each(|remark| print_error(remark));
         if args.quiet {
             continue;
         }

@@ -85,7 +85,10 @@ pub fn timed<R>(
         }
         start.elapsed().as_secs_f64()
     };
-    rays.chunks(PART).zip(hits.chunks_mut(PART)).map(part).collect()
+    rays.chunks(PART)
+        .zip(hits.chunks_mut(PART))
+        .map(part)
+        .collect()
 }
 
 /// Rays that the wide layout is handed at once: their answers stay in the first cache.
@@ -111,7 +114,13 @@ fn in_batches(wide: &WideBvh, batch: &Batch, hits: &mut [Option<Hit>]) -> Vec<f6
         seconds
     };
     let part = |(rays, hits): (&[Ray], &mut [Option<Hit>])| {
-        rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)).map(&mut batch).sum()
+        rays.chunks(BATCH)
+            .zip(hits.chunks_mut(BATCH))
+            .map(&mut batch)
+            .sum()
     };
-    rays.chunks(PART).zip(hits.chunks_mut(PART)).map(part).collect()
+    rays.chunks(PART)
+        .zip(hits.chunks_mut(PART))
+        .map(part)
+        .collect()
 }

@@ -85,7 +85,10 @@ pub fn measure(config: &Config, scene: &Scene, tree: &Bvh, seed: u64, row: RayRo
             })
         })
     };
-    let sums = (0..chunks).into_par_iter().map(one_chunk).reduce(Sums::default, Sums::add);
+    let sums = (0..chunks)
+        .into_par_iter()
+        .map(one_chunk)
+        .reduce(Sums::default, Sums::add);
     let (boxes_per_ray, boxes_standard_error) = estimate(sums.rays, sums.boxes, sums.boxes_squared);
     let (objects_per_ray, objects_standard_error) =
         estimate(sums.rays, sums.objects, sums.objects_squared);
@@ -110,7 +113,9 @@ mod tests {
 
     fn measured(family: Family, query: Query, count: u64, seed: u64) -> (RayRow, Bvh) {
         let scene = Scene::load("escher:2000").unwrap();
-        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+        let tree = muller_fellner::Config::default()
+            .build(&scene.boxes)
+            .unwrap();
         (measure(&Config { family, query, count }, &scene, &tree, seed, RayRow::default()), tree)
     }
 
@@ -127,8 +132,11 @@ mod tests {
 
     #[test]
     fn any_hit_asks_less_than_nearest_and_nearest_less_than_all() {
-        let boxes = [Query::Any, Query::Nearest, Query::All]
-            .map(|query| measured(Family::Inside, query, 5_000, 4).0.boxes_per_ray);
+        let boxes = [Query::Any, Query::Nearest, Query::All].map(|query| {
+            measured(Family::Inside, query, 5_000, 4)
+                .0
+                .boxes_per_ray
+        });
         assert!(boxes[0] < boxes[1] && boxes[1] < boxes[2], "{boxes:?}");
     }
 }

@@ -61,7 +61,9 @@ pub fn is_repeat(layout: &str) -> bool {
 
 /// Whether a layout of this name is called ray by ray.
 pub fn is_single(layout: &str) -> bool {
-    !["batches", "packets", "blocks"].iter().any(|word| layout.contains(word))
+    !["batches", "packets", "blocks"]
+        .iter()
+        .any(|word| layout.contains(word))
 }
 
 /// The name of a kernel's instruction set in tables.
@@ -127,8 +129,12 @@ fn kernels(layout: Layout, instructions: &[Instructions]) -> Vec<Kernel> {
     if instructions.is_empty() {
         return vec![Kernel::best()];
     }
-    let asked = instructions.iter().map(|instructions| instructions.kernel());
-    asked.filter(|kernel| kernel.is_available()).collect()
+    let asked = instructions
+        .iter()
+        .map(|instructions| instructions.kernel());
+    asked
+        .filter(|kernel| kernel.is_available())
+        .collect()
 }
 
 fn own_contender<'a>(
@@ -138,12 +144,15 @@ fn own_contender<'a>(
     tree: &'a Bvh,
     visits: Option<&[f32]>,
 ) -> Result<Contender<'a>, String> {
-    let triangles = scene.triangles().map_err(|error| error.to_string())?;
+    let triangles = scene
+        .triangles()
+        .map_err(|error| error.to_string())?;
     let accelerator = |structure| Tracer::Own(Accelerator::new(&scene.primitives, structure));
     let start = Instant::now();
     let held = |wide: Result<WideBvh, InvalidBvh>| {
         let wide = wide.map_err(|error| error.to_string())?;
-        wide.with_kernel(kernel).ok_or_else(|| format!("{kernel:?} is not available"))
+        wide.with_kernel(kernel)
+            .ok_or_else(|| format!("{kernel:?} is not available"))
     };
     let wide = || held(widened(tree, triangles, visits));
     let blocks = |cost| held(WideBvh::with_block_cost(tree, triangles, cost));

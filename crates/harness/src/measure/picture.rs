@@ -55,7 +55,9 @@ impl Config {
             run.repetition,
             build_seconds,
         ));
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build();
         let pool = pool.map_err(|error| Error::Usage(format!("cannot start a thread: {error}")))?;
         let (mut rows, mut times) = (Vec::new(), Vec::new());
         for (method, structure, repetition, build_seconds) in structures {

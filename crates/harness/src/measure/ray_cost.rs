@@ -75,8 +75,10 @@ pub struct Cameras {
 impl Default for Cameras {
     /// Two arcs around the scene, and a light above it.
     fn default() -> Self {
-        let around =
-            |eyes: [[f64; 3]; 3]| eyes.map(|eye| Viewpoint { eye, target: [0.5; 3] }).to_vec();
+        let around = |eyes: [[f64; 3]; 3]| {
+            eyes.map(|eye| Viewpoint { eye, target: [0.5; 3] })
+                .to_vec()
+        };
         Self {
             same: around([[1.9, 1.3, 2.2], [2.4, 1.0, 0.9], [2.0, 1.5, -0.5]]),
             other: around([[-0.9, 1.2, -1.0], [-1.4, 0.8, 0.3], [-0.8, 0.6, 1.7]]),
@@ -88,16 +90,29 @@ impl Default for Cameras {
 impl Config {
     fn check_rays(&self) -> impl Iterator<Item = OutOfRange> {
         // A primary ray, one that it reflects, and one to every light.
-        let rendered = self.cameras.values().map(|cameras| 2 + cameras.lights.len());
+        let rendered = self
+            .cameras
+            .values()
+            .map(|cameras| 2 + cameras.lights.len());
         let too_many = check_count("trained", self.trained, rendered.fold(OF_ANYTHING, usize::max));
         let paths = |(scene, cameras): (&String, &Cameras)| {
             [("same", &cameras.same, true), ("other", &cameras.other, self.count > 0)]
                 .map(|(name, path, is_used)| (scene.clone(), name, is_used && path.is_empty()))
         };
-        let empty = self.cameras.iter().flat_map(paths).filter(|(.., is_empty)| *is_empty);
-        too_many.into_iter().chain(empty.map(|(scene, name, _)| {
-            OutOfRange::new(format!("cameras.{scene}.{name}"), "empty", "at least one viewpoint")
-        }))
+        let empty = self
+            .cameras
+            .iter()
+            .flat_map(paths)
+            .filter(|(.., is_empty)| *is_empty);
+        too_many
+            .into_iter()
+            .chain(empty.map(|(scene, name, _)| {
+                OutOfRange::new(
+                    format!("cameras.{scene}.{name}"),
+                    "empty",
+                    "at least one viewpoint",
+                )
+            }))
     }
 
     /// A renderer's rays from one of the paths through a scene.
@@ -109,12 +124,20 @@ impl Config {
         count: u32,
         seed: u64,
     ) -> Vec<TracedRay> {
-        let cameras = self.cameras.get(&scene.name).cloned().unwrap_or_default();
+        let cameras = self
+            .cameras
+            .get(&scene.name)
+            .cloned()
+            .unwrap_or_default();
         let Some(root) = tree.root_aabb() else { return Vec::new() };
         let place = |at: [f64; 3]| in_box(&root, at).to_array();
         let path = if other { &cameras.other } else { &cameras.same };
         let pose = |view: &Viewpoint| Pose { eye: place(view.eye), target: place(view.target) };
-        let lights = cameras.lights.iter().map(|&light| place(light)).collect();
+        let lights = cameras
+            .lights
+            .iter()
+            .map(|&light| place(light))
+            .collect();
         let rays = RenderedRays {
             cameras: path.iter().map(pose).collect(),
             lights,
@@ -207,7 +230,8 @@ impl TestRays {
             for (wide, turns) in layouts.iter().zip(&mut turns) {
                 turns.push(if self.kind == Kind::Shadow {
                     timed(&self.rays, &mut hits, |ray| {
-                        wide.any_hit(ray).then_some(super::answers::SOME_HIT)
+                        wide.any_hit(ray)
+                            .then_some(super::answers::SOME_HIT)
                     })
                 } else {
                     timed(&self.rays, &mut hits, |ray| wide.nearest_hit(ray))
@@ -216,8 +240,9 @@ impl TestRays {
         }
         let fastest = |turns: &Vec<Vec<f64>>| {
             let parts = turns.first().map_or(0, Vec::len);
-            let seconds: f64 =
-                (0..parts).filter_map(|part| minimum(turns.iter().map(|turn| turn[part]))).sum();
+            let seconds: f64 = (0..parts)
+                .filter_map(|part| minimum(turns.iter().map(|turn| turn[part])))
+                .sum();
             self.rays.len() as f64 / seconds / 1e6
         };
         turns.iter().map(fastest).collect()
@@ -232,15 +257,21 @@ mod tests {
     fn rays_that_judge_are_others_than_those_of_the_training_and_a_layout_for_them_needs_fewer_tests()
      {
         let scene = Scene::load("escher:3000").unwrap();
-        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+        let tree = muller_fellner::Config::default()
+            .build(&scene.boxes)
+            .unwrap();
         let config = Config { count: 5000, trained: 20_000, ..Config::default() };
-        let density = config.density(TrainedOn::Camera, &scene, 1).unwrap();
+        let density = config
+            .density(TrainedOn::Camera, &scene, 1)
+            .unwrap();
         let triangles = scene.triangles().unwrap();
         let plain = WideBvh::new(&tree, triangles).unwrap();
         let trained = WideBvh::for_rays(&tree, triangles, &density.visits(&tree)).unwrap();
         let test_rays = test_rays(&config, &scene, &tree, 2);
-        let kinds: Vec<_> =
-            test_rays.iter().map(|test_rays| (test_rays.kind, test_rays.camera)).collect();
+        let kinds: Vec<_> = test_rays
+            .iter()
+            .map(|test_rays| (test_rays.kind, test_rays.camera))
+            .collect();
         assert_eq!((kinds.len(), kinds[6]), (7, (Kind::Incoherent, "none")));
         let sum = |wide: &WideBvh| {
             test_rays[..3]
@@ -249,6 +280,11 @@ mod tests {
                 .sum::<f64>()
         };
         assert!(sum(&trained) < sum(&plain), "{} {}", sum(&trained), sum(&plain));
-        assert!(test_rays[0].speeds(&[&plain, &trained], 2).into_iter().all(|speed| speed > 0.0));
+        assert!(
+            test_rays[0]
+                .speeds(&[&plain, &trained], 2)
+                .into_iter()
+                .all(|speed| speed > 0.0)
+        );
     }
 }

@@ -18,20 +18,30 @@ const RULE: &str = "Every verdict is made from the rows. Where the paper has num
 
 /// Text as it stands in HTML, between tags and in attributes.
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
 }
 
 /// A name as it stands in a URL.
 pub(super) fn reference(name: &str) -> String {
-    const KEPT: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
+    const KEPT: &AsciiSet = &NON_ALPHANUMERIC
+        .remove(b'-')
+        .remove(b'.')
+        .remove(b'_')
+        .remove(b'~');
     utf8_percent_encode(name, KEPT).to_string()
 }
 
 /// The whole page.
 pub(super) fn page(sections: &[Section]) -> String {
     let list = |title: &str, of_paper: bool| {
-        let own: String =
-            sections.iter().filter(|section| section.of_paper == of_paper).map(answer).collect();
+        let own: String = sections
+            .iter()
+            .filter(|section| section.of_paper == of_paper)
+            .map(answer)
+            .collect();
         if own.is_empty() {
             own
         } else {
@@ -103,12 +113,18 @@ fn experiment(section: &Section) -> String {
     } else {
         ""
     };
-    let shown: String = section.outputs.iter().map(|output| report(section, output)).collect();
+    let shown: String = section
+        .outputs
+        .iter()
+        .map(|output| report(section, output))
+        .collect();
     let known = |figure: &&Drawing| {
-        section
-            .outputs
-            .iter()
-            .any(|output| output.figures.iter().any(|(name, _)| *name == figure.name))
+        section.outputs.iter().any(|output| {
+            output
+                .figures
+                .iter()
+                .any(|(name, _)| *name == figure.name)
+        })
     };
     let others: String = section
         .figures
@@ -140,18 +156,29 @@ fn experiment(section: &Section) -> String {
 fn links(links: &[Link]) -> String {
     let link =
         |link: &Link| format!("<a href=\"{}\">{}</a>", escaped(&link.to), escaped(&link.name));
-    links.iter().map(link).collect::<Vec<_>>().join(", ")
+    links
+        .iter()
+        .map(link)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// One report: its reading, figures and tables.
 fn report(section: &Section, output: &Output) -> String {
-    let drawn = section
-        .figures
+    let drawn = section.figures.iter().filter(|drawn| {
+        output
+            .figures
+            .iter()
+            .any(|(name, _)| *name == drawn.name)
+    });
+    let figures: String = drawn
+        .map(|drawn| figure(section, drawn))
+        .collect();
+    let tables: String = output
+        .tables
         .iter()
-        .filter(|drawn| output.figures.iter().any(|(name, _)| *name == drawn.name));
-    let figures: String = drawn.map(|drawn| figure(section, drawn)).collect();
-    let tables: String =
-        output.tables.iter().map(|(explanation, rows)| table(explanation, rows)).collect();
+        .map(|(explanation, rows)| table(explanation, rows))
+        .collect();
     let reading = output.reading.trim();
     // The verdict above has said it already.
     let said = matches!(&section.verdict, Verdict::Reading(verdict) if verdict == reading);
@@ -187,7 +214,11 @@ fn drawing(svg: &str) -> &str {
 /// A table in a box of its own, which scrolls where the page would become too wide or the table too long. The first cell of
 /// a row names it.
 fn table(explanation: &str, table: &Table) -> String {
-    let cells = |row: &Row| row.cell_iter().map(|cell| cell.content()).collect::<Vec<String>>();
+    let cells = |row: &Row| {
+        row.cell_iter()
+            .map(|cell| cell.content())
+            .collect::<Vec<String>>()
+    };
     let header = table.header().map(cells).unwrap_or_default();
     let header = header
         .iter()
@@ -198,7 +229,14 @@ fn table(explanation: &str, table: &Table) -> String {
         (_, false) => format!("<td>{}</td>", escaped(text)),
     };
     let row = |row: &Row| {
-        format!("\n<tr>{}</tr>", cells(row).iter().enumerate().map(cell).collect::<String>())
+        format!(
+            "\n<tr>{}</tr>",
+            cells(row)
+                .iter()
+                .enumerate()
+                .map(cell)
+                .collect::<String>()
+        )
     };
     format!(
         "\n<div class=\"wide\" tabindex=\"0\"><table><caption><span>{}</span></caption>\n<thead><tr>{}</tr></thead>\n<tbody>{}\n</tbody></table></div>",
@@ -209,7 +247,10 @@ fn table(explanation: &str, table: &Table) -> String {
 }
 
 fn is_number(text: &str) -> bool {
-    text.trim_end_matches(" %").trim_start_matches('+').parse::<f64>().is_ok()
+    text.trim_end_matches(" %")
+        .trim_start_matches('+')
+        .parse::<f64>()
+        .is_ok()
 }
 
 #[cfg(test)]

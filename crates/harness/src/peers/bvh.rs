@@ -103,7 +103,10 @@ pub(super) fn raw(boxes: &[Aabb]) -> Raw {
     let tree = to_ours(&theirs, boxes);
     let nearest = move |ray: &Ray, test: &dyn Fn(u32) -> Option<f32>| {
         let found = theirs.traverse(&self::ray(ray), &shapes);
-        found.iter().filter_map(|shape| test(shape.object)).min_by(f32::total_cmp)
+        found
+            .iter()
+            .filter_map(|shape| test(shape.object))
+            .min_by(f32::total_cmp)
     };
     Raw { tree, nearest: Box::new(nearest) }
 }
@@ -112,7 +115,11 @@ pub(super) fn raw(boxes: &[Aabb]) -> Raw {
 /// that is ordered and works at any depth. Its triangle test sees front sides only, so each triangle is tested both
 /// ways round.
 pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
-    let mut shapes = shapes(triangles.iter().map(|triangle| (triangle.aabb(), triangle.0)));
+    let mut shapes = shapes(
+        triangles
+            .iter()
+            .map(|triangle| (triangle.aabb(), triangle.0)),
+    );
     let start = Instant::now();
     let tree = TheirBvh::build(&mut shapes);
     let preparation_seconds = start.elapsed().as_secs_f64();

@@ -53,12 +53,25 @@ impl Config {
         let folder = tempfile::tempdir()?;
         let [given, tree, said] =
             ["boxes", "tree.bvh", "stderr"].map(|name| folder.path().join(name));
-        let corners =
-            boxes.iter().flat_map(|aabb| [aabb.min.to_array(), aabb.max.to_array()]).flatten();
-        fs::write(&given, corners.flat_map(f32::to_le_bytes).collect::<Vec<u8>>())?;
+        let corners = boxes
+            .iter()
+            .flat_map(|aabb| [aabb.min.to_array(), aabb.max.to_array()])
+            .flatten();
+        fs::write(
+            &given,
+            corners
+                .flat_map(f32::to_le_bytes)
+                .collect::<Vec<u8>>(),
+        )?;
         let mut command = Command::new(&self.command[0]);
-        command.args(&self.command[1..]).args([&given, &tree]).env("BVH_SEED", seed.to_string());
-        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(File::create(&said)?);
+        command
+            .args(&self.command[1..])
+            .args([&given, &tree])
+            .env("BVH_SEED", seed.to_string());
+        command
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(File::create(&said)?);
         let start = Instant::now();
         let mut program =
             Program::start(&mut command, folder.path()).map_err(CommandFault::NotStarted)?;
@@ -67,7 +80,9 @@ impl Config {
                 break status;
             }
             let elapsed = start.elapsed();
-            let late = self.timeout_seconds.filter(|limit| elapsed.as_secs_f64() > *limit);
+            let late = self
+                .timeout_seconds
+                .filter(|limit| elapsed.as_secs_f64() > *limit);
             if late.is_some() || cancelled() {
                 return Err(late.map_or(CommandFault::Interrupted, CommandFault::TimedOut));
             }

@@ -59,12 +59,20 @@ pub fn speeds(
                 build_seconds,
                 disagreements: wrong_answers(traced),
             },
-            turns: traced.turns.iter().map(|seconds| million / seconds).collect(),
+            turns: traced
+                .turns
+                .iter()
+                .map(|seconds| million / seconds)
+                .collect(),
         }
     };
     let answers_well =
         |traced: &&Traced| wrong_answers(traced) * WRONG_AT_MOST_ONE_IN <= traced.answers.count;
-    traced.iter().filter(answers_well).map(speed).collect()
+    traced
+        .iter()
+        .filter(answers_well)
+        .map(speed)
+        .collect()
 }
 
 fn wrong_answers(traced: &Traced) -> u64 {
@@ -75,8 +83,14 @@ fn wrong_answers(traced: &Traced) -> u64 {
 /// The rows of `timing_rays.csv`: all speeds, and for every contender and kind of rays that all scenes have, the geometric
 /// mean of the speeds and all disagreements.
 pub fn rows(speeds: &[Speed]) -> Vec<PeerRayRow> {
-    let rows: Vec<PeerRayRow> = speeds.iter().map(|speed| speed.row.clone()).collect();
-    let scenes: BTreeSet<&str> = rows.iter().map(|row| row.scene.as_str()).collect();
+    let rows: Vec<PeerRayRow> = speeds
+        .iter()
+        .map(|speed| speed.row.clone())
+        .collect();
+    let scenes: BTreeSet<&str> = rows
+        .iter()
+        .map(|row| row.scene.as_str())
+        .collect();
     let mut groups: BTreeMap<[&str; 4], Vec<usize>> = BTreeMap::new();
     for (index, row) in rows.iter().enumerate() {
         groups
@@ -84,12 +98,17 @@ pub fn rows(speeds: &[Speed]) -> Vec<PeerRayRow> {
             .or_default()
             .push(index);
     }
-    let mut complete: Vec<Vec<usize>> =
-        groups.into_values().filter(|group| group.len() == scenes.len()).collect();
+    let mut complete: Vec<Vec<usize>> = groups
+        .into_values()
+        .filter(|group| group.len() == scenes.len())
+        .collect();
     complete.sort();
     let mean = |group: &Vec<usize>| {
         let of_group: Vec<&PeerRayRow> = group.iter().map(|&index| &rows[index]).collect();
-        let speeds: Vec<f64> = of_group.iter().map(|row| row.million_per_s).collect();
+        let speeds: Vec<f64> = of_group
+            .iter()
+            .map(|row| row.million_per_s)
+            .collect();
         PeerRayRow {
             scene: MEAN.into(),
             million_per_s: geometric_mean(&speeds),
@@ -137,7 +156,9 @@ pub fn ratios(speeds: &[Speed]) -> Vec<RayRatioRow> {
             order.push(key);
             Vec::new()
         });
-        groups.entry(key).and_modify(|group| group.push(speed));
+        groups
+            .entry(key)
+            .and_modify(|group| group.push(speed));
     }
     let mut rows = Vec::new();
     for key in order {
@@ -172,10 +193,21 @@ fn over_fastest(
             && [COMPILED, own.row.instructions.as_str()].contains(&rival.row.instructions.as_str())
             && is_rival(&rival.row)
     };
-    let by_speed = |a: &&Speed, b: &&Speed| a.row.million_per_s.total_cmp(&b.row.million_per_s);
-    let fastest = speeds.iter().filter(is_comparable).max_by(by_speed)?;
-    let turns: Vec<f64> =
-        own.turns.iter().zip(&fastest.turns).map(|(own, rival)| own / rival).collect();
+    let by_speed = |a: &&Speed, b: &&Speed| {
+        a.row
+            .million_per_s
+            .total_cmp(&b.row.million_per_s)
+    };
+    let fastest = speeds
+        .iter()
+        .filter(is_comparable)
+        .max_by(by_speed)?;
+    let turns: Vec<f64> = own
+        .turns
+        .iter()
+        .zip(&fastest.turns)
+        .map(|(own, rival)| own / rival)
+        .collect();
     let ratio = own.row.million_per_s / fastest.row.million_per_s;
     let (least_turn, greatest_turn) = range(turns.iter().copied()).unwrap_or((ratio, ratio));
     let row = RayRatioRow {
@@ -206,8 +238,19 @@ fn mean_ratio(scenes: &[OverFastest]) -> Option<RayRatioRow> {
         .map(|over| over.row.ratio)
         .collect();
     let ratio = mean_of(scenes.iter().map(|over| over.row.ratio).collect());
-    let turn_count = scenes.iter().map(|over| over.turns.len()).min().unwrap_or(0);
-    let mean_of_turn = |turn: usize| mean_of(scenes.iter().map(|over| over.turns[turn]).collect());
+    let turn_count = scenes
+        .iter()
+        .map(|over| over.turns.len())
+        .min()
+        .unwrap_or(0);
+    let mean_of_turn = |turn: usize| {
+        mean_of(
+            scenes
+                .iter()
+                .map(|over| over.turns[turn])
+                .collect(),
+        )
+    };
     let (least_turn, greatest_turn) =
         range((0..turn_count).map(mean_of_turn)).unwrap_or((ratio, ratio));
     Some(RayRatioRow {
@@ -226,8 +269,10 @@ fn mean_ratio(scenes: &[OverFastest]) -> Option<RayRatioRow> {
 /// Lines for the terminal: for every instruction set and kind of rays our fastest mode, over the fastest of other libraries.
 pub fn text(ratios: &[RayRatioRow]) -> String {
     let mut text = String::from("Speeds over those of the fastest mode of any other library:\n");
-    let groups: BTreeSet<[&str; 2]> =
-        ratios.iter().map(|row| [row.processor.as_str(), row.rays.as_str()]).collect();
+    let groups: BTreeSet<[&str; 2]> = ratios
+        .iter()
+        .map(|row| [row.processor.as_str(), row.rays.as_str()])
+        .collect();
     for [processor, kind] in groups {
         let of_group = || {
             let is_of_group = |row: &&RayRatioRow| row.processor == processor && row.rays == kind;
@@ -235,8 +280,14 @@ pub fn text(ratios: &[RayRatioRow]) -> String {
             of_group.filter(|row| row.against == AGAINST[0].0 && !is_repeat(&row.mode))
         };
         let by_ratio = |a: &&RayRatioRow, b: &&RayRatioRow| a.ratio.total_cmp(&b.ratio);
-        let best_mean = of_group().filter(|row| row.scene == MEAN).max_by(by_ratio);
-        let least_of_mode = |mode: &str| of_group().filter(|row| row.mode == mode).min_by(by_ratio);
+        let best_mean = of_group()
+            .filter(|row| row.scene == MEAN)
+            .max_by(by_ratio);
+        let least_of_mode = |mode: &str| {
+            of_group()
+                .filter(|row| row.mode == mode)
+                .min_by(by_ratio)
+        };
         if let Some(mean) = best_mean
             && let Some(least) = least_of_mode(&mean.mode)
         {
@@ -307,7 +358,8 @@ mod tests {
         let ratios = ratios(&measured);
         let of = |against: &str| -> Vec<(&str, f64)> {
             let of = ratios.iter().filter(|row| row.against == against);
-            of.map(|row| (row.scene.as_str(), row.ratio)).collect()
+            of.map(|row| (row.scene.as_str(), row.ratio))
+                .collect()
         };
         assert_eq!(of("any mode"), [("a", 0.5), ("b", 2.0), (MEAN, 1.0)]);
         assert_eq!(of("single calls")[..2], [("a", 2.0), ("b", 2.0)]);

@@ -27,14 +27,19 @@ impl Mode {
         let mut parts = line.split('\t').map(str::to_owned);
         let [instructions, library, version, name] =
             [parts.next()?, parts.next()?, parts.next()?, parts.next()?];
-        parts.next().is_none().then_some(Self { instructions, library, version, name })
+        parts
+            .next()
+            .is_none()
+            .then_some(Self { instructions, library, version, name })
     }
 }
 
 /// The modes that the program lists.
 fn modes(program: &Path) -> Result<Vec<Mode>, String> {
     let shown = program.display();
-    let listed = Command::new(program).output().map_err(|error| format!("{shown}: {error}"))?;
+    let listed = Command::new(program)
+        .output()
+        .map_err(|error| format!("{shown}: {error}"))?;
     let text = String::from_utf8_lossy(&listed.stdout);
     let parse = |line| {
         Mode::parse(line).ok_or_else(|| {
@@ -44,7 +49,10 @@ fn modes(program: &Path) -> Result<Vec<Mode>, String> {
             )
         })
     };
-    let modes: Vec<Mode> = text.lines().map(parse).collect::<Result<_, _>>()?;
+    let modes: Vec<Mode> = text
+        .lines()
+        .map(parse)
+        .collect::<Result<_, _>>()?;
     if modes.is_empty() {
         return Err(format!("{shown}: it lists no mode; expected one per line"));
     }
@@ -57,7 +65,9 @@ pub fn contenders(
     program: &Path,
     scene: &Scene,
 ) -> Result<Vec<(String, Contender<'static>)>, String> {
-    let triangles = scene.triangles().map_err(|error| error.to_string())?;
+    let triangles = scene
+        .triangles()
+        .map_err(|error| error.to_string())?;
     let mut contenders = Vec::new();
     for mode in modes(program)? {
         let argument = format!("{} {}", mode.library, mode.name);
@@ -67,7 +77,10 @@ pub fn contenders(
             started.map_err(|error| format!("{command}: {error}"))?;
         let process = RefCell::new(process);
         let trace = move |batch: &Batch, hits: &mut [Option<Hit>]| {
-            process.borrow_mut().trace(batch, hits).map_err(|error| format!("{command}: {error}"))
+            process
+                .borrow_mut()
+                .trace(batch, hits)
+                .map_err(|error| format!("{command}: {error}"))
         };
         let contender = Contender {
             layout: mode.name,
@@ -84,7 +97,9 @@ pub fn contenders(
 /// tinybvh's tree with spatial splits over the scene's triangles, with its own leaves and boxes, and the seconds that its build took.
 /// An error says what the program did not do.
 pub fn split_tree(program: &Path, scene: &Scene) -> Result<(Bvh, f64), String> {
-    let triangles = scene.triangles().map_err(|error| error.to_string())?;
+    let triangles = scene
+        .triangles()
+        .map_err(|error| error.to_string())?;
     let failed = |error: &dyn std::fmt::Display| {
         format!(
             "{} \"{SPLIT_TREE}\": {error}; scripts/ray-peers/build makes it anew",
@@ -123,8 +138,11 @@ struct Process {
 impl Process {
     /// Starts the program and hands it the triangles. Returns the seconds that its build took, too.
     fn start(program: &Path, mode: &str, triangles: &[Triangle]) -> io::Result<(Self, f64)> {
-        let mut child =
-            Command::new(program).arg(mode).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
+        let mut child = Command::new(program)
+            .arg(mode)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()?;
         let (Some(rays), Some(answers)) = (child.stdin.take(), child.stdout.take()) else {
             return Err(io::Error::other("the program has no pipes"));
         };
@@ -210,13 +228,23 @@ mod tests {
         ask(&mut sent, &batch).unwrap();
         assert_eq!(sent.len(), 4 * 4 + 3 * 8 * 4);
         let words = sent.as_chunks::<4>().0;
-        let counts: Vec<u32> = words[..4].iter().map(|word| u32::from_le_bytes(*word)).collect();
+        let counts: Vec<u32> = words[..4]
+            .iter()
+            .map(|word| u32::from_le_bytes(*word))
+            .collect();
         assert_eq!(counts, [1, 1, 3, PART as u32]);
-        let ray: Vec<f32> = words[4..12].iter().map(|word| f32::from_le_bytes(*word)).collect();
+        let ray: Vec<f32> = words[4..12]
+            .iter()
+            .map(|word| f32::from_le_bytes(*word))
+            .collect();
         assert_eq!(ray, [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, -1.0, 7.0]);
 
         let mut received = 0.25f64.to_le_bytes().to_vec();
-        received.extend([2.5, f32::INFINITY, 0.0].map(f32::to_le_bytes).as_flattened());
+        received.extend(
+            [2.5, f32::INFINITY, 0.0]
+                .map(f32::to_le_bytes)
+                .as_flattened(),
+        );
         let mut hits = [None; 3];
         assert_eq!(answer(&mut &received[..], &mut hits).unwrap(), [0.25]);
         let hit = |t| Some(Hit { t, object: 0 });
@@ -234,7 +262,9 @@ mod tests {
         ];
         let tree = Bvh { nodes, prim_ids: vec![1, 0, 1] };
         let (nodes, ids) = (tree.to_first_count_aligned(), &tree.prim_ids);
-        let mut sent = [nodes.len() as u32, ids.len() as u32].map(u32::to_le_bytes).concat();
+        let mut sent = [nodes.len() as u32, ids.len() as u32]
+            .map(u32::to_le_bytes)
+            .concat();
         sent.extend_from_slice(bytemuck::cast_slice(&nodes));
         sent.extend_from_slice(bytemuck::cast_slice(ids));
         let (nodes, ids) = super::nodes(&mut &sent[..]).unwrap();

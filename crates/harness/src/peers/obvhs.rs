@@ -30,8 +30,10 @@ fn parameters(config: &Obvhs) -> BvhBuildParams {
 }
 
 fn build_over(boxes: &[Aabb], parameters: BvhBuildParams) -> (Bvh2, Duration) {
-    let theirs: Vec<aabb::Aabb> =
-        boxes.iter().map(|b| aabb::Aabb::new(b.min.into(), b.max.into())).collect();
+    let theirs: Vec<aabb::Aabb> = boxes
+        .iter()
+        .map(|b| aabb::Aabb::new(b.min.into(), b.max.into()))
+        .collect();
     let mut time = Duration::ZERO;
     (binary::build_bvh2(&theirs, parameters, &mut time), time)
 }
@@ -108,7 +110,9 @@ pub(super) fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contende
         .map(|&Triangle([a, b, c])| TheirTriangle { v0: corner(a), v1: corner(b), v2: corner(c) })
         .collect();
     let in_order = |ids: &[u32]| -> Vec<RtTriangle> {
-        ids.iter().map(|&id| (&theirs[id as usize]).into()).collect()
+        ids.iter()
+            .map(|&id| (&theirs[id as usize]).into())
+            .collect()
     };
     let (mut binary_time, mut wide_time) = (Duration::ZERO, Duration::ZERO);
     let tree = binary::build_bvh2_from_tris(&theirs, parameters(config), &mut binary_time);
@@ -135,7 +139,11 @@ fn trace(
     traverse: impl Fn(bool, TheirRay, &mut RayHit) -> bool,
     ids: &[u32],
 ) -> Vec<f64> {
-    let rays: Vec<TheirRay> = batch.rays.iter().map(|ray| self::ray(ray, ray.t_max())).collect();
+    let rays: Vec<TheirRay> = batch
+        .rays
+        .iter()
+        .map(|ray| self::ray(ray, ray.t_max()))
+        .collect();
     if batch.query == Query::Any {
         return timed(&rays, hits, |&ray| {
             traverse(true, ray, &mut RayHit::none()).then_some(Hit { t: 0.0, object: 0 })

@@ -82,12 +82,17 @@ mod marked {
     }
 
     fn processes(variable: &[u8]) -> Vec<Pid> {
-        let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
+        let entries = fs::read_dir("/proc")
+            .into_iter()
+            .flatten()
+            .flatten();
         let process = |entry: fs::DirEntry| {
             let number = entry.file_name().to_str()?.parse().ok()?;
             // Those of other users cannot be read.
             let environment = fs::read(entry.path().join("environ")).ok()?;
-            let is_marked = environment.split(|&byte| byte == 0).any(|found| found == variable);
+            let is_marked = environment
+                .split(|&byte| byte == 0)
+                .any(|found| found == variable);
             is_marked.then(|| Pid::from_raw(number))
         };
         entries.filter_map(process).collect()

@@ -95,8 +95,16 @@ impl Config {
         let Some((low, high)) = range(lowest.iter().map(|(cost, _)| *cost)) else {
             return String::new();
         };
-        let count = |method| lowest.iter().filter(|(_, best)| *best == method).count();
-        let counts = self.methods.iter().map(|method| (method.as_str(), count(method)));
+        let count = |method| {
+            lowest
+                .iter()
+                .filter(|(_, best)| *best == method)
+                .count()
+        };
+        let counts = self
+            .methods
+            .iter()
+            .map(|method| (method.as_str(), count(method)));
         let counts = tally(counts.filter(|(_, count)| *count > 0), lowest.len(), "scenes");
         let (low, high) = (percent(low), percent(high));
         format!(
@@ -105,9 +113,14 @@ impl Config {
     }
 
     fn add_table(&self, output: &mut Output, rows: &Rows) {
-        let seconds = self.at_seconds.iter().map(|seconds| format!("{seconds} s"));
-        let header: Vec<String> =
-            ["scene".into(), "method".into()].into_iter().chain(seconds).collect();
+        let seconds = self
+            .at_seconds
+            .iter()
+            .map(|seconds| format!("{seconds} s"));
+        let header: Vec<String> = ["scene".into(), "method".into()]
+            .into_iter()
+            .chain(seconds)
+            .collect();
         let mut table = text_table(header.iter().map(String::as_str));
         for scene in rows.scenes() {
             for method in &self.methods {
@@ -117,7 +130,10 @@ impl Config {
                     cost.map_or_else(String::new, |cost| percent(cost / rows.base_cost(scene)))
                 };
                 let name = [rows.shown(scene), method.clone()];
-                table.add_row(name.into_iter().chain(self.at_seconds.iter().map(cell)));
+                table.add_row(
+                    name.into_iter()
+                        .chain(self.at_seconds.iter().map(cell)),
+                );
             }
         }
         output.add_table("Median cost against the greedy tree's, after so many seconds:", table);
@@ -131,19 +147,33 @@ fn percent(ratio: f64) -> String {
 
 /// What the incumbents of all runs cost then, the worst where a run has none yet: so their median never rises.
 fn incumbents(runs: &[Series], at: f64) -> Vec<f64> {
-    let incumbent =
-        |run: &Series| run.iter().take_while(|(x, _)| *x <= at).last().map(|point| point.1);
-    runs.iter().map(|run| incumbent(run).unwrap_or(Metric::WORST)).collect()
+    let incumbent = |run: &Series| {
+        run.iter()
+            .take_while(|(x, _)| *x <= at)
+            .last()
+            .map(|point| point.1)
+    };
+    runs.iter()
+        .map(|run| incumbent(run).unwrap_or(Metric::WORST))
+        .collect()
 }
 
 /// Median and quartiles of the gap from the first x at which every run has an incumbent to the last event.
 fn curve<'a>(scene: &'a str, method: &'a str, runs: &[Series], reference: f64) -> Vec<Point<'a>> {
-    let first = runs.iter().filter_map(|run| Some(run.first()?.0)).fold(0.0, f64::max);
-    let last = runs.iter().filter_map(|run| Some(run.last()?.0)).fold(0.0, f64::max);
+    let first = runs
+        .iter()
+        .filter_map(|run| Some(run.first()?.0))
+        .fold(0.0, f64::max);
+    let last = runs
+        .iter()
+        .filter_map(|run| Some(run.last()?.0))
+        .fold(0.0, f64::max);
     if first <= 0.0 || !last.is_finite() {
         return Vec::new();
     }
-    let steps = ((last / first).log10() * PER_DECADE).ceil().max(0.0) as u32;
+    let steps = ((last / first).log10() * PER_DECADE)
+        .ceil()
+        .max(0.0) as u32;
     let place = |step: u32| {
         if step == steps { last } else { first * 10f64.powf(f64::from(step) / PER_DECADE) }
     };
@@ -157,12 +187,17 @@ fn curve<'a>(scene: &'a str, method: &'a str, runs: &[Series], reference: f64) -
 
 /// A staircase with its band, or a marker for a single point.
 fn draw(method: &str, points: &[Point]) -> Vec<Layer> {
-    let medians: Vec<(f64, f64)> = points.iter().map(|point| (point.x, point.gap_median)).collect();
+    let medians: Vec<(f64, f64)> = points
+        .iter()
+        .map(|point| (point.x, point.gap_median))
+        .collect();
     if points.len() == 1 {
         return vec![Layer::new(method, Marks::Points(medians))];
     }
-    let band =
-        points.iter().map(|point| (point.x, point.gap_quartile_1, point.gap_quartile_3)).collect();
+    let band = points
+        .iter()
+        .map(|point| (point.x, point.gap_quartile_1, point.gap_quartile_3))
+        .collect();
     vec![Layer::new(method, Marks::StepBand(band)), Layer::new(method, Marks::Steps(medians))]
 }
 

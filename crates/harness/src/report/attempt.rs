@@ -33,7 +33,10 @@ pub fn attempts<'a>(config: &'a Targets, rows: &'a Rows, axis: ProgressAxis) -> 
         for target in &config.targets {
             let Some(cost) = target.cost(rows, scene) else { continue };
             attempts.extend(methods.iter().map(|(method, runs, end)| {
-                let solved: Vec<f64> = runs.iter().filter_map(|run| reached(run, cost)).collect();
+                let solved: Vec<f64> = runs
+                    .iter()
+                    .filter_map(|run| reached(run, cost))
+                    .collect();
                 let (solved, median) = (sorted(&solved), median_reached(runs, cost));
                 Attempt { scene, target, cost, method, runs: runs.len(), solved, median, end: *end }
             }));
@@ -48,7 +51,10 @@ pub fn staircase(rises: Vec<(f64, f64)>, end: f64) -> Vec<(f64, f64)> {
     let (Some(&(first, _)), Some(&(last, fraction))) = (rises.first(), rises.last()) else {
         return rises;
     };
-    std::iter::once((first, 0.0)).chain(rises).chain([(end.max(last), fraction)]).collect()
+    std::iter::once((first, 0.0))
+        .chain(rises)
+        .chain([(end.max(last), fraction)])
+        .collect()
 }
 
 #[cfg(test)]

@@ -24,7 +24,9 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     let runs: Vec<ClockedRow> = rows::read_if_any(folder)?;
     let peers: Vec<ClockedPeerRow> = rows::read_if_any(folder)?;
     let mut seen = BTreeSet::new();
-    let first = runs.iter().filter(|run| seen.insert((&run.scene, &run.method)));
+    let first = runs
+        .iter()
+        .filter(|run| seen.insert((&run.scene, &run.method)));
     let mut lines: Vec<Line> = first.map(|run| line(run, &runs)).collect();
     lines.extend(peers.into_iter().map(|peer| Line {
         scene: peer.scene,
@@ -36,8 +38,15 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
         collapsed_sah: Some(peer.collapsed_sah),
         least_collapsed_sah: Some(peer.collapsed_sah),
     }));
-    let order: Vec<&str> = runs.iter().map(|run| run.scene.as_str()).collect();
-    lines.sort_by_key(|line| order.iter().position(|scene| *scene == line.scene));
+    let order: Vec<&str> = runs
+        .iter()
+        .map(|run| run.scene.as_str())
+        .collect();
+    lines.sort_by_key(|line| {
+        order
+            .iter()
+            .position(|scene| *scene == line.scene)
+    });
     let mut output = Output::new("", "After so many seconds");
     let explanation = "Medians of runs that the clock ended; the surface area heuristic has both constants 1 and the best \
                        leaves:";
@@ -49,22 +58,43 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     let (scenes, methods) =
         (distinct(order.into_iter()), distinct(lines.iter().map(|line| line.method.as_str())));
     let of = |scene: &str, method: &str| {
-        let own = lines.iter().find(|line| line.scene == scene && line.method == method);
-        own.and_then(|line| line.collapsed_sah).unwrap_or(f64::NAN)
+        let own = lines
+            .iter()
+            .find(|line| line.scene == scene && line.method == method);
+        own.and_then(|line| line.collapsed_sah)
+            .unwrap_or(f64::NAN)
     };
     let least =
         |scene: &str| minimum(methods.iter().map(|method| of(scene, method))).unwrap_or(f64::NAN);
-    let wins =
-        |method: &str| scenes.iter().filter(|scene| of(scene, method) == least(scene)).count();
-    let counts =
-        tally(methods.iter().map(|method| (*method, wins(method))), scenes.len(), "scenes");
+    let wins = |method: &str| {
+        scenes
+            .iter()
+            .filter(|scene| of(scene, method) == least(scene))
+            .count()
+    };
+    let counts = tally(
+        methods
+            .iter()
+            .map(|method| (*method, wins(method))),
+        scenes.len(),
+        "scenes",
+    );
     output.reading = format!("Lowest median by the surface area heuristic: {counts}.");
     let bars = |method: &&str| {
-        let values = scenes.iter().map(|scene| of(scene, method) / least(scene)).collect();
+        let values = scenes
+            .iter()
+            .map(|scene| of(scene, method) / least(scene))
+            .collect();
         Layer::bars(*method, values, 1.0)
     };
     let layers = methods.iter().map(bars).collect();
-    let x = Axis::categories("", scenes.iter().map(|scene| (*scene).to_owned()).collect());
+    let x = Axis::categories(
+        "",
+        scenes
+            .iter()
+            .map(|scene| (*scene).to_owned())
+            .collect(),
+    );
     let caption = "Medians of runs that the clock ended, by the surface area heuristic, over the least of the scene.";
     let y = Axis::linear("cost / least of the scene");
     output.add_figure("timing_runs", caption, 1, vec![panel("", x, y, layers)]);
@@ -74,8 +104,12 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
 /// All runs of the scene and the method of `first`.
 fn line(first: &ClockedRow, runs: &[ClockedRow]) -> Line {
     let same = |run: &&ClockedRow| run.scene == first.scene && run.method == first.method;
-    let of =
-        |value: fn(&ClockedRow) -> f64| runs.iter().filter(same).map(value).collect::<Vec<f64>>();
+    let of = |value: fn(&ClockedRow) -> f64| {
+        runs.iter()
+            .filter(same)
+            .map(value)
+            .collect::<Vec<f64>>()
+    };
     let costs = of(|run| run.collapsed_sah);
     Line {
         scene: first.scene.clone(),

@@ -71,7 +71,9 @@ impl Labels for [String; 2] {
 /// Refuses lists of the paper's numbers for a scene that are longer than `methods`, which they follow.
 pub fn one_for_each(paper: &BTreeMap<String, Vec<f64>>, methods: &[String]) -> Vec<OutOfRange> {
     let accepted = format!("up to {}, one for each of methods", methods.len());
-    let long = paper.iter().filter(|(_, numbers)| numbers.len() > methods.len());
+    let long = paper
+        .iter()
+        .filter(|(_, numbers)| numbers.len() > methods.len());
     let fault = |(scene, numbers): (&String, &Vec<f64>)| {
         let found = format!("a list of {} numbers", numbers.len());
         OutOfRange::new(format!("paper.{scene}"), found, &accepted)

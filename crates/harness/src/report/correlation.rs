@@ -67,29 +67,48 @@ fn costs(rows: &Rows) -> Vec<Cost<'_>> {
                 && row.rays == rays
         };
         let of = move |run: &RunRow| {
-            Some(rows.visits.iter().find(|row| own(run, row))?.goldsmith_salmon)
+            Some(
+                rows.visits
+                    .iter()
+                    .find(|row| own(run, row))?
+                    .goldsmith_salmon,
+            )
         };
         (format!("goldsmith_salmon_{rays}"), Box::new(of))
     };
     let rays = distinct(rows.visits.iter().map(|row| row.rays.as_str()));
-    of_area.into_iter().chain(rays.into_iter().map(of_rays)).collect()
+    of_area
+        .into_iter()
+        .chain(rays.into_iter().map(of_rays))
+        .collect()
 }
 
 pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     let mut correlations = Vec::new();
     let mut panels = Vec::new();
     let costs = costs(rows);
-    let of_layouts =
-        distinct(rows.run_tests.iter().map(|row| (row.judged_on.as_str(), row.camera.as_str())));
+    let of_layouts = distinct(
+        rows.run_tests
+            .iter()
+            .map(|row| (row.judged_on.as_str(), row.camera.as_str())),
+    );
     let random = rows.ray_kinds().len();
     for scene in rows.scenes() {
-        for (number, kind) in rows.ray_kinds().into_iter().chain(of_layouts.clone()).enumerate() {
+        for (number, kind) in rows
+            .ray_kinds()
+            .into_iter()
+            .chain(of_layouts.clone())
+            .enumerate()
+        {
             let start = correlations.len();
             let mut drawn = Vec::new();
             for method in &config.methods {
                 let trees = trees(rows, scene, method, kind);
-                correlations
-                    .extend(costs.iter().map(|cost| correlate(scene, method, kind, cost, &trees)));
+                correlations.extend(
+                    costs
+                        .iter()
+                        .map(|cost| correlate(scene, method, kind, cost, &trees)),
+                );
                 drawn.push((method.as_str(), trees));
             }
             if number < random {
@@ -144,7 +163,11 @@ impl Config {
             let compared = compared.compare(says, format!("{pearson:.2}"), verdict, rule);
             Some(PaperRow { ours_low: Some(low), ours_high: Some(high), ..compared })
         };
-        correlations.iter().filter(is_of_paper).filter_map(compare).collect()
+        correlations
+            .iter()
+            .filter(is_of_paper)
+            .filter_map(compare)
+            .collect()
     }
 }
 
@@ -159,8 +182,15 @@ fn trees<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) -> V
             && row.method == method
             && (row.judged_on.as_str(), row.camera.as_str()) == kind
     };
-    let of_layouts = rows.run_tests.iter().filter(own).map(|row| (row.repetition, row.tests));
-    let run = |repetition| rows.runs_of(scene, method).find(|run| run.repetition == repetition);
+    let of_layouts = rows
+        .run_tests
+        .iter()
+        .filter(own)
+        .map(|row| (row.repetition, row.tests));
+    let run = |repetition| {
+        rows.runs_of(scene, method)
+            .find(|run| run.repetition == repetition)
+    };
     random
         .chain(of_layouts)
         .filter_map(|(repetition, tests)| Some((run(repetition)?, tests)))
@@ -177,8 +207,9 @@ fn correlate<'a>(
     let pair = |(run, tests): &Tree| Some((of(run)?, *tests));
     let pairs: Vec<(f64, f64)> = trees.iter().filter_map(pair).collect();
     let pearson = pearson(&pairs);
-    let (pearson_low, pearson_high) =
-        pearson.and_then(|pearson| pearson_interval(pearson, pairs.len())).unzip();
+    let (pearson_low, pearson_high) = pearson
+        .and_then(|pearson| pearson_interval(pearson, pairs.len()))
+        .unzip();
     let trees = pairs.len();
     let spearman = spearman(&pairs);
     Correlation {
@@ -202,7 +233,9 @@ fn draw(
     rank: Option<f64>,
 ) -> Panel {
     let points = |(method, trees): &(&str, Vec<Tree>)| {
-        let points = trees.iter().map(|(run, tests)| (run.goldsmith_salmon, *tests));
+        let points = trees
+            .iter()
+            .map(|(run, tests)| (run.goldsmith_salmon, *tests));
         Layer::new(*method, Marks::Points(points.collect()))
     };
     let rank = rank.map_or_else(String::new, |rank| format!(", ρ = {rank:.3}"));
@@ -213,7 +246,10 @@ fn draw(
 /// How well every cost ranks the trees of each method, over scenes and kinds of rays.
 fn reading(rows: &[Correlation], methods: &[String], costs: &[Cost]) -> String {
     let of_method = |method: &String| {
-        let own: Vec<&Correlation> = rows.iter().filter(|row| row.method == method).collect();
+        let own: Vec<&Correlation> = rows
+            .iter()
+            .filter(|row| row.method == method)
+            .collect();
         let costs = costs.iter().map(|(cost, _)| cost.as_str());
         let costs = spans(costs, &own, |row| row.cost, |row| row.spearman, 2);
         Some(format!("{method}: {costs}"))
@@ -239,7 +275,8 @@ mod tests {
                 (0..).zip([(1.0, 2.0), (2.0, 1.0), (3.0, 1.0), (4.0, 2.0)])
             {
                 let goldsmith_salmon = level + cost;
-                rows.runs.push(RunRow { goldsmith_salmon, ..run(method, repetition, 1, 0) });
+                rows.runs
+                    .push(RunRow { goldsmith_salmon, ..run(method, repetition, 1, 0) });
                 let (scene, method) = ("s".to_owned(), method.to_owned());
                 let (family, query) = (OF_PAPER.0.to_owned(), OF_PAPER.1.to_owned());
                 let boxes_per_ray = level + tests;
@@ -268,9 +305,16 @@ mod tests {
         let csv = String::from_utf8(output.csv[0].1.clone()).unwrap();
         let mut reader = csv::Reader::from_reader(csv.as_bytes());
         let header = reader.headers().unwrap().clone();
-        let at = |name: &str| header.iter().position(|column| column == name).unwrap();
+        let at = |name: &str| {
+            header
+                .iter()
+                .position(|column| column == name)
+                .unwrap()
+        };
         let records: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
-        let own = records.iter().filter(|record| &record[at("cost")] == "goldsmith_salmon");
+        let own = records
+            .iter()
+            .filter(|record| &record[at("cost")] == "goldsmith_salmon");
         let own: Vec<(&str, f64)> = own
             .map(|record| (&record[at("method")], record[at("spearman")].parse().unwrap()))
             .collect();

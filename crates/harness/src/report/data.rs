@@ -79,7 +79,10 @@ impl Rows {
 
     /// The scene's kind, as in `runs.csv`.
     pub fn kind(&self, scene: &str) -> &str {
-        self.runs.iter().find(|run| run.scene == scene).map_or("", |run| run.scene_kind.as_str())
+        self.runs
+            .iter()
+            .find(|run| run.scene == scene)
+            .map_or("", |run| run.scene_kind.as_str())
     }
 
     /// The scene's name, followed by its kind unless it is a file: how tables and figures show it.
@@ -90,32 +93,47 @@ impl Rows {
 
     /// The names of all scenes, as [`Rows::shown`].
     pub fn all_shown(&self) -> Vec<String> {
-        self.scenes().into_iter().map(|scene| self.shown(scene)).collect()
+        self.scenes()
+            .into_iter()
+            .map(|scene| self.shown(scene))
+            .collect()
     }
 
     /// The cost of the scene's greedy tree.
     pub fn base_cost(&self, scene: &str) -> f64 {
-        self.runs.iter().find(|run| run.scene == scene).map_or(f64::NAN, |run| run.base_cost)
+        self.runs
+            .iter()
+            .find(|run| run.scene == scene)
+            .map_or(f64::NAN, |run| run.base_cost)
     }
 
     /// What gaps on the scene are measured from.
     pub fn reference(&self, scene: &str) -> Option<&ReferenceRow> {
-        self.references.iter().find(|row| row.scene == scene)
+        self.references
+            .iter()
+            .find(|row| row.scene == scene)
     }
 
     /// The runs of one method on one scene.
     pub fn runs_of(&self, scene: &str, method: &str) -> impl Iterator<Item = &RunRow> {
-        self.runs.iter().filter(move |run| run.scene == scene && run.method == method)
+        self.runs
+            .iter()
+            .filter(move |run| run.scene == scene && run.method == method)
     }
 
     /// The costs over base with which the runs of one method on one scene ended.
     pub fn final_ratios(&self, scene: &str, method: &str) -> Vec<f64> {
-        self.runs_of(scene, method).map(|run| ratio(run.cost, run.base_cost)).collect()
+        self.runs_of(scene, method)
+            .map(|run| ratio(run.cost, run.base_cost))
+            .collect()
     }
 
     /// The seconds of the runs of one method on one scene.
     pub fn seconds_of(&self, scene: &str, method: &str) -> Vec<f64> {
-        let own = self.timing.iter().filter(|row| row.scene == scene && row.method == method);
+        let own = self
+            .timing
+            .iter()
+            .filter(|row| row.scene == scene && row.method == method);
         own.map(|row| row.seconds).collect()
     }
 
@@ -128,25 +146,42 @@ impl Rows {
     pub fn histories(&self, scene: &str, method: &str) -> Vec<Vec<&HistoryRow>> {
         let own = |row: &&HistoryRow| row.scene == scene && row.method == method;
         let rows: Vec<&HistoryRow> = self.history.iter().filter(own).collect();
-        rows.chunk_by(|a, b| a.repetition == b.repetition).map(<[_]>::to_vec).collect()
+        rows.chunk_by(|a, b| a.repetition == b.repetition)
+            .map(<[_]>::to_vec)
+            .collect()
     }
 
     /// The costs of all trials of one method on one scene, over all repetitions.
     pub fn trial_costs(&self, scene: &str, method: &str) -> Vec<f64> {
-        self.histories(scene, method).concat().iter().map(|row| row.cost).collect()
+        self.histories(scene, method)
+            .concat()
+            .iter()
+            .map(|row| row.cost)
+            .collect()
     }
 
     /// The costs of one method's trials on one scene over base, one list per repetition, in order.
     pub fn trials_over_base(&self, scene: &str, method: &str) -> Vec<Vec<f64>> {
         let base = self.base_cost(scene);
-        let over_base =
-            |history: Vec<&HistoryRow>| history.iter().map(|row| ratio(row.cost, base)).collect();
-        self.histories(scene, method).into_iter().map(over_base).collect()
+        let over_base = |history: Vec<&HistoryRow>| {
+            history
+                .iter()
+                .map(|row| ratio(row.cost, base))
+                .collect()
+        };
+        self.histories(scene, method)
+            .into_iter()
+            .map(over_base)
+            .collect()
     }
 
     /// The kinds of random rays sent: where they come from and what they ask.
     pub fn ray_kinds(&self) -> Vec<(&str, &str)> {
-        distinct(self.rays.iter().map(|row| (row.family.as_str(), row.query.as_str())))
+        distinct(
+            self.rays
+                .iter()
+                .map(|row| (row.family.as_str(), row.query.as_str())),
+        )
     }
 
     /// The measurements with random rays of one kind through the trees of one method on one scene.
@@ -174,14 +209,17 @@ impl Rows {
         let own = self.trace_times.iter().find(|row| {
             row.scene == scene && row.method == method && row.layout == layout && row.rays == rays
         });
-        own.filter(|row| row.count > 0).map(|row| 1e9 * row.seconds / row.count as f64)
+        own.filter(|row| row.count > 0)
+            .map(|row| 1e9 * row.seconds / row.count as f64)
     }
 
     /// The method's layout that is fastest for these rays by single calls, with its nanoseconds per ray. Libraries without
     /// batches can be compared so.
     pub fn fastest_layout(&self, scene: &str, method: &str, rays: &str) -> Option<(&str, f64)> {
-        let layouts =
-            self.layouts().into_iter().filter(|layout| is_single(layout) && !is_repeat(layout));
+        let layouts = self
+            .layouts()
+            .into_iter()
+            .filter(|layout| is_single(layout) && !is_repeat(layout));
         let timed = layouts
             .filter_map(|layout| Some((layout, self.ns_per_ray(scene, method, layout, rays)?)));
         timed.min_by(|a, b| a.1.total_cmp(&b.1))
@@ -194,7 +232,9 @@ pub(super) fn run(method: &str, repetition: u32, evaluations: u64, work: u64) ->
     let row = format!(
         "s,file,{method},0,{repetition},100,{evaluations},{work},completed,1,1,1,1,1,1,1,199,9"
     );
-    csv::StringRecord::from_iter(row.split(',')).deserialize(None).unwrap()
+    csv::StringRecord::from_iter(row.split(','))
+        .deserialize(None)
+        .unwrap()
 }
 
 /// A ratio of costs; 1 when the denominator is 0, as in `runs.csv`.
@@ -204,9 +244,15 @@ pub fn ratio(cost: f64, base: f64) -> f64 {
 
 /// The row whose value is the median, the lower of two.
 pub(super) fn middle<R>(rows: Vec<&R>, value: impl Fn(&R) -> f64) -> Option<&R> {
-    let median = median(&rows.iter().map(|row| value(row)).collect::<Vec<_>>())?;
+    let median = median(
+        &rows
+            .iter()
+            .map(|row| value(row))
+            .collect::<Vec<_>>(),
+    )?;
     let distance = |row: &R| (value(row) - median).abs();
-    rows.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    rows.into_iter()
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// The distinct items, in the order in which they first occur.

@@ -60,8 +60,14 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
 
 /// When a method's runs reached what they did, sorted, and how many runs there were over all problems.
 fn solved(attempts: &[Attempt], method: &str) -> (Vec<f64>, usize) {
-    let own = || attempts.iter().filter(|attempt| attempt.method == method);
-    let mut solved: Vec<f64> = own().flat_map(|attempt| attempt.solved.iter().copied()).collect();
+    let own = || {
+        attempts
+            .iter()
+            .filter(|attempt| attempt.method == method)
+    };
+    let mut solved: Vec<f64> = own()
+        .flat_map(|attempt| attempt.solved.iter().copied())
+        .collect();
     solved.sort_by(f64::total_cmp);
     (solved, own().map(|attempt| attempt.runs).sum())
 }

@@ -33,7 +33,10 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
                 .collect();
             line.sort_by(|a, b| a.0.total_cmp(&b.0));
             if let (true, Some(&(x, y))) = (layers.is_empty(), line.first()) {
-                let slope = line.iter().map(|point| (point.0, y * (x / point.0).sqrt())).collect();
+                let slope = line
+                    .iter()
+                    .map(|point| (point.0, y * (x / point.0).sqrt()))
+                    .collect();
                 layers.push(Layer::new("slope −1/2", Marks::Line(slope)));
             }
             layers.push(Layer::new(method, Marks::Points(line)));
@@ -56,18 +59,23 @@ fn measurements<'a>(
     method: &'a str,
 ) -> impl Iterator<Item = Point<'a>> {
     let (family, query) = KIND;
-    rows.rays_of(scene, method, KIND).into_iter().filter(|row| row.repetition == 0).map(
-        move |row| {
+    rows.rays_of(scene, method, KIND)
+        .into_iter()
+        .filter(|row| row.repetition == 0)
+        .map(move |row| {
             let relative_error = row.boxes_standard_error / row.boxes_per_ray;
             Point { scene, method, family, query, rays: row.rays, relative_error }
-        },
-    )
+        })
 }
 
 /// How the error falls with the number of rays, by the slope between the least and the greatest number.
 fn reading(points: &[Point]) -> String {
     let slope = |line: &[Point]| {
-        let (first, last) = (line.first()?, line.last().filter(|last| last.rays > line[0].rays)?);
+        let (first, last) = (
+            line.first()?,
+            line.last()
+                .filter(|last| last.rays > line[0].rays)?,
+        );
         Some(
             (last.relative_error / first.relative_error).ln()
                 / (last.rays as f64 / first.rays as f64).ln(),

@@ -86,20 +86,29 @@ impl Config {
             generations.extend(own);
             let Some(end) = runs.end(rows.base_cost(scene)) else { continue };
             output.reading += &end.reading(&rows.shown(scene));
-            output.paper.extend(self.compare(&rows.shown(scene), &runs, &end));
+            output
+                .paper
+                .extend(self.compare(&rows.shown(scene), &runs, &end));
         }
         let caption = "Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the median and, of several runs, the \
                        range. Random picking: the exact expectation for as many orders, as far as so many were drawn.";
         output.add_figure("generations", caption, 1, panels);
-        let gains: Vec<PaperRow> =
-            output.paper.iter().filter(|row| row.quantity == GAIN).cloned().collect();
+        let gains: Vec<PaperRow> = output
+            .paper
+            .iter()
+            .filter(|row| row.quantity == GAIN)
+            .cloned()
+            .collect();
         output.answer = ratios(&gains);
         output.add_csv("generations", &generations)?;
         Ok(output)
     }
 
     fn check_order(&self) -> impl Iterator<Item = OutOfRange> {
-        let disordered = self.paper_final.iter().filter(|(_, [low, high])| low > high);
+        let disordered = self
+            .paper_final
+            .iter()
+            .filter(|(_, [low, high])| low > high);
         disordered.map(|(scene, found)| {
             OutOfRange::new(
                 format!("paper_final.{scene}"),
@@ -111,7 +120,11 @@ impl Config {
 
     fn runs<'a>(&self, rows: &'a Rows, scene: &'a str) -> Option<Runs<'a>> {
         let runs = rows.histories(scene, &self.method);
-        let last = |run: usize| runs[run].last().map_or(f64::INFINITY, |row| row.incumbent);
+        let last = |run: usize| {
+            runs[run]
+                .last()
+                .map_or(f64::INFINITY, |row| row.incumbent)
+        };
         let mut order: Vec<usize> = (0..runs.len()).collect();
         order.sort_by(|&a, &b| last(a).total_cmp(&last(b)));
         let middle = *order.get(order.len().checked_sub(1)? / 2)?;
@@ -121,19 +134,25 @@ impl Config {
     /// Our final costs next to the paper's spread and gain, as far as the spec has them.
     fn compare(&self, shown: &str, runs: &Runs, end: &Final) -> Vec<PaperRow> {
         let row = |quantity: &str| PaperRow::new(&self.source, shown, quantity, &self.reason);
-        let spread = self.paper_final.get(runs.scene).map(|&[low, high]| {
-            let [theirs, ours] =
-                [(low, high), (end.low, end.high)].map(|(l, h)| 2.0 * (h - l) / (h + l));
-            let verdict =
-                if (ours / theirs - 1.0).abs() <= 0.5 { Verdict::Agrees } else { Verdict::Differs };
-            let rule = "between half and one and a half times the paper's";
-            row("spread of final costs over runs: (highest − lowest) / middle").compare(
-                format!("{theirs:.3}"),
-                format!("{ours:.3}"),
-                verdict,
-                rule,
-            )
-        });
+        let spread = self
+            .paper_final
+            .get(runs.scene)
+            .map(|&[low, high]| {
+                let [theirs, ours] =
+                    [(low, high), (end.low, end.high)].map(|(l, h)| 2.0 * (h - l) / (h + l));
+                let verdict = if (ours / theirs - 1.0).abs() <= 0.5 {
+                    Verdict::Agrees
+                } else {
+                    Verdict::Differs
+                };
+                let rule = "between half and one and a half times the paper's";
+                row("spread of final costs over runs: (highest − lowest) / middle").compare(
+                    format!("{theirs:.3}"),
+                    format!("{ours:.3}"),
+                    verdict,
+                    rule,
+                )
+            });
         let says = self.paper_says.as_ref().map(|says| {
             let ours = format!("{:.3}", end.median / end.average);
             row(GAIN).compare(says, ours, Verdict::CannotBeTold, "the paper gives no number")
@@ -153,16 +172,28 @@ impl Config {
             ours_over_base: Some(ours),
             ..row("final cost over Müller–Fellner's, both Goldsmith–Salmon")
         };
-        [gain, says, spread, Some(over_base)].into_iter().flatten().collect()
+        [gain, says, spread, Some(over_base)]
+            .into_iter()
+            .flatten()
+            .collect()
     }
 }
 
 /// The paper's costs are of other scenes and in no unit that it names, so that they are not drawn.
 fn draw(shown: &str, runs: usize, generations: &[Generation]) -> Panel {
     let at = |generation: &Generation| generation.generation as f64;
-    let median: Vec<_> = generations.iter().map(|g| (at(g), g.median_run_cost)).collect();
-    let range = generations.iter().map(|g| (at(g), g.lowest_cost, g.highest_cost)).collect();
-    let random = generations.iter().filter_map(|g| Some((at(g), g.random_picking_cost?))).collect();
+    let median: Vec<_> = generations
+        .iter()
+        .map(|g| (at(g), g.median_run_cost))
+        .collect();
+    let range = generations
+        .iter()
+        .map(|g| (at(g), g.lowest_cost, g.highest_cost))
+        .collect();
+    let random = generations
+        .iter()
+        .filter_map(|g| Some((at(g), g.random_picking_cost?)))
+        .collect();
     let mut layers = vec![Layer::new("random picking", Marks::Line(random))];
     if runs > 1 {
         layers.insert(0, Layer::new("median run", Marks::Line(median)));
@@ -191,12 +222,19 @@ impl<'a> Runs<'a> {
                 random_picking_cost: expected_best_of(&self.random, row.evaluations as usize),
             }
         };
-        self.runs[self.middle].iter().enumerate().map(generation).collect()
+        self.runs[self.middle]
+            .iter()
+            .enumerate()
+            .map(generation)
+            .collect()
     }
 
     fn end(&self, base: f64) -> Option<Final> {
-        let costs: Vec<f64> =
-            self.runs.iter().filter_map(|run| Some(run.last()?.incumbent)).collect();
+        let costs: Vec<f64> = self
+            .runs
+            .iter()
+            .filter_map(|run| Some(run.last()?.incumbent))
+            .collect();
         let (low, high) = range(costs.iter().copied())?;
         let average = self.random.iter().sum::<f64>() / self.random.len() as f64;
         Some(Final { runs: costs.len(), low, median: median(&costs)?, high, average, base })

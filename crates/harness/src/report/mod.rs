@@ -179,13 +179,17 @@ pub const TEXT_FILE: &str = "timing_report.txt";
 /// Makes all reports from the CSV files in a folder, the paper's numbers beside ours last. Writes nothing.
 pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> {
     let rows = Rows::read(folder)?;
-    let mut outputs =
-        reports.iter().map(|report| report.write(&rows)).collect::<Result<Vec<_>, _>>()?;
+    let mut outputs = reports
+        .iter()
+        .map(|report| report.write(&rows))
+        .collect::<Result<Vec<_>, _>>()?;
     if reports.is_empty() {
         outputs.push(final_costs(&rows)?);
     }
-    let paper: Vec<PaperRow> =
-        outputs.iter_mut().flat_map(|output| std::mem::take(&mut output.paper)).collect();
+    let paper: Vec<PaperRow> = outputs
+        .iter_mut()
+        .flat_map(|output| std::mem::take(&mut output.paper))
+        .collect();
     if !paper.is_empty() {
         let answers = answers(&outputs);
         outputs.push(beside_paper(&paper, &answers)?);
@@ -196,7 +200,10 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
         .map(|(_, figure)| series(figure))
         .collect();
     let looks = looks(&rows.methods(), &shown);
-    for (_, figure) in outputs.iter_mut().flat_map(|output| &mut output.figures) {
+    for (_, figure) in outputs
+        .iter_mut()
+        .flat_map(|output| &mut output.figures)
+    {
         figure.looks.extend(looks.iter().cloned());
     }
     Ok(outputs)
@@ -256,8 +263,14 @@ fn final_costs(rows: &Rows) -> Result<Output, Error> {
 
 /// The names of the series that a figure shows.
 fn series(figure: &Figure) -> BTreeSet<String> {
-    let layers = figure.panels.iter().flat_map(|panel| &panel.layers);
-    layers.filter_map(Layer::series).map(str::to_owned).collect()
+    let layers = figure
+        .panels
+        .iter()
+        .flat_map(|panel| &panel.layers);
+    layers
+        .filter_map(Layer::series)
+        .map(str::to_owned)
+        .collect()
 }
 
 /// The looks of an experiment's methods, the same in all its figures. If there are more methods than colours, those that share
@@ -266,13 +279,19 @@ fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, Look)> 
     let mut slots: Vec<usize> = Vec::new();
     for (index, method) in methods.iter().enumerate() {
         let shared = |other: &str| {
-            figures.iter().any(|shown| shown.contains(*method) && shown.contains(other))
+            figures
+                .iter()
+                .any(|shown| shown.contains(*method) && shown.contains(other))
         };
         let taken = |slot: usize| {
-            methods.iter().zip(&slots).any(|(other, at)| *at == slot && shared(other))
+            methods
+                .iter()
+                .zip(&slots)
+                .any(|(other, at)| *at == slot && shared(other))
         };
-        let free =
-            (0..Look::COLOURS).find(|&slot| !taken(slot)).filter(|_| methods.len() > Look::COLOURS);
+        let free = (0..Look::COLOURS)
+            .find(|&slot| !taken(slot))
+            .filter(|_| methods.len() > Look::COLOURS);
         slots.push(free.unwrap_or(index));
     }
     methods
@@ -295,15 +314,25 @@ fn answers(outputs: &[Output]) -> Vec<Answer> {
 /// The comparisons of all reports of an experiment with the paper. A number of the paper that several of ours are
 /// compared with is one number.
 fn beside_paper(rows: &[PaperRow], answers: &[Answer]) -> Result<Output, Error> {
-    let numbers = rows.iter().filter(|row| row.paper_over_base.is_some());
-    let numbers: BTreeSet<_> = numbers.map(|row| (&row.source, &row.scene, &row.paper)).collect();
-    let reasons: BTreeSet<&str> = rows.iter().map(|row| row.reason.as_str()).collect();
+    let numbers = rows
+        .iter()
+        .filter(|row| row.paper_over_base.is_some());
+    let numbers: BTreeSet<_> = numbers
+        .map(|row| (&row.source, &row.scene, &row.paper))
+        .collect();
+    let reasons: BTreeSet<&str> = rows
+        .iter()
+        .map(|row| row.reason.as_str())
+        .collect();
     let mut output = Output::new("", "Ng & Trifonov 2003 beside our results");
     let outcome = Outcome::of(rows);
     let reasons = reasons.into_iter().collect::<Vec<_>>().join(" ");
     output.reading = format!("Numbers of the paper: {}. {outcome} {reasons}", numbers.len());
     output.outcome = Some(outcome);
-    let sentences: Vec<&str> = answers.iter().map(|answer| answer.answer.as_str()).collect();
+    let sentences: Vec<&str> = answers
+        .iter()
+        .map(|answer| answer.answer.as_str())
+        .collect();
     output.answer = Some(sentences.join(" "));
     output.add_csv("answer", answers)?;
     output.add_csv("paper", rows)?;
@@ -322,16 +351,26 @@ mod tests {
 
     #[test]
     fn methods_of_one_figure_share_no_colour_while_there_are_enough() {
-        let methods: Vec<String> = (0..16).map(|index| format!("method {index}")).collect();
+        let methods: Vec<String> = (0..16)
+            .map(|index| format!("method {index}"))
+            .collect();
         let methods: Vec<&str> = methods.iter().map(String::as_str).collect();
-        let figure =
-            |shown: &[usize]| shown.iter().map(|&index| methods[index].to_owned()).collect();
+        let figure = |shown: &[usize]| {
+            shown
+                .iter()
+                .map(|&index| methods[index].to_owned())
+                .collect()
+        };
         let figures: [BTreeSet<String>; 2] = [
             figure(&[0, 1, 2, 3, 4, 7, 11, 12, 13, 14, 15]),
             figure(&[3, 4, 5, 6, 7, 8, 9, 10, 11, 14, 15]),
         ];
         let few = looks(&methods[..12], &figures);
-        assert!(few.iter().enumerate().all(|(index, (_, look))| *look == Look::Slot(index)));
+        assert!(
+            few.iter()
+                .enumerate()
+                .all(|(index, (_, look))| *look == Look::Slot(index))
+        );
         let looks = looks(&methods, &figures);
         for shown in &figures {
             let colours: BTreeSet<usize> = looks

@@ -66,11 +66,17 @@ pub(super) struct Times<'a> {
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let scenes = rows.scenes();
-        let problems =
-            || self.pairs.iter().flat_map(|pair| scenes.iter().map(move |scene| (pair, scene)));
-        let compared: Vec<Compared> =
-            problems().map(|(pair, scene)| pair.compare(rows, scene)).collect::<Result<_, _>>()?;
-        let times: Vec<Times> = problems().map(|(pair, scene)| pair.times(rows, scene)).collect();
+        let problems = || {
+            self.pairs
+                .iter()
+                .flat_map(|pair| scenes.iter().map(move |scene| (pair, scene)))
+        };
+        let compared: Vec<Compared> = problems()
+            .map(|(pair, scene)| pair.compare(rows, scene))
+            .collect::<Result<_, _>>()?;
+        let times: Vec<Times> = problems()
+            .map(|(pair, scene)| pair.times(rows, scene))
+            .collect();
         let mut output = Output::new("", &self.title);
         output.add_csv("omissions", &compared)?;
         output.add_csv("timing_omissions", &times)?;
@@ -84,7 +90,10 @@ impl Config {
             &times,
             columns,
         )?;
-        let other = compared.iter().filter(|row| !row.same_cost).count();
+        let other = compared
+            .iter()
+            .filter(|row| !row.same_cost)
+            .count();
         let names = self.pairs.iter().map(|pair| pair.name.as_str());
         let saved = spans(names, &times, |row| row.omission, |row| Some(row.ratio_median), 2);
         let cost = match other {
@@ -106,7 +115,10 @@ impl Config {
         // Pairs stand beside each other within the place of a scene.
         let bars = |(index, pair): (usize, &Pair)| {
             let offset = 0.8 * ((index as f64 + 0.5) / pairs - 0.5);
-            let own = times.iter().filter(|times| times.omission == pair.name).enumerate();
+            let own = times
+                .iter()
+                .filter(|times| times.omission == pair.name)
+                .enumerate();
             let points =
                 own.map(|(at, t)| (at as f64 + offset, t.ratio_low, t.ratio_median, t.ratio_high));
             Layer::new(&pair.name, Marks::ErrorBars(points.collect()))
@@ -116,7 +128,13 @@ impl Config {
         let y = Axis::log("time / time without leaving it out");
         panel(
             "",
-            Axis::categories("", rows.scenes().into_iter().map(str::to_owned).collect()),
+            Axis::categories(
+                "",
+                rows.scenes()
+                    .into_iter()
+                    .map(str::to_owned)
+                    .collect(),
+            ),
             y,
             layers,
         )
@@ -125,8 +143,10 @@ impl Config {
 
 impl Pair {
     fn compare<'a>(&'a self, rows: &Rows, scene: &'a str) -> Result<Compared<'a>, Error> {
-        let pairs: Vec<(&RunRow, &RunRow)> =
-            rows.runs_of(scene, &self.out).zip(rows.runs_of(scene, &self.kept)).collect();
+        let pairs: Vec<(&RunRow, &RunRow)> = rows
+            .runs_of(scene, &self.out)
+            .zip(rows.runs_of(scene, &self.kept))
+            .collect();
         let same = |(out, kept): &(&RunRow, &RunRow)| out.cost.to_bits() == kept.cost.to_bits();
         let allowed = |pair: &(&RunRow, &RunRow)| {
             same(pair) || self.may_be_lower && pair.0.cost < pair.1.cost
@@ -157,7 +177,11 @@ impl Pair {
 
     fn times<'a>(&'a self, rows: &Rows, scene: &'a str) -> Times<'a> {
         let [out, kept] = [&self.out, &self.kept].map(|label| rows.seconds_of(scene, label));
-        let ratios: Vec<f64> = out.iter().zip(kept).map(|(out, kept)| out / kept).collect();
+        let ratios: Vec<f64> = out
+            .iter()
+            .zip(kept)
+            .map(|(out, kept)| out / kept)
+            .collect();
         let [ratio_low, ratio_median, ratio_high] = quartiles(&ratios);
         Times { scene, omission: &self.name, ratio_low, ratio_median, ratio_high }
     }

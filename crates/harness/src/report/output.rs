@@ -78,7 +78,9 @@ impl Output {
     /// Makes `series` of the last figure what the others are compared with.
     pub fn set_reference(&mut self, series: &str) {
         if let Some((_, figure)) = self.figures.last_mut() {
-            figure.looks.push((series.into(), Look::Reference));
+            figure
+                .looks
+                .push((series.into(), Look::Reference));
         }
     }
 
@@ -98,7 +100,10 @@ impl Output {
         let path = Path::new("table");
         let bytes = to_bytes(rows, path)?;
         let mut reader = csv::Reader::from_reader(bytes.as_slice());
-        let header = reader.headers().map_err(Error::csv(path))?.clone();
+        let header = reader
+            .headers()
+            .map_err(Error::csv(path))?
+            .clone();
         let shown: Vec<usize> = columns
             .split(' ')
             .filter_map(|column| header.iter().position(|name| name == column))
@@ -117,8 +122,11 @@ impl Output {
         let table = |(explanation, table): &(String, Table)| format!("{explanation}\n{table}\n");
         let tables: String = self.tables.iter().map(table).collect();
         let blocks = [&self.heading, self.reading.trim_end(), &tables];
-        let some = blocks.into_iter().filter(|block| !block.is_empty());
-        some.map(|block| format!("{}\n\n", block.trim_end())).collect()
+        let some = blocks
+            .into_iter()
+            .filter(|block| !block.is_empty());
+        some.map(|block| format!("{}\n\n", block.trim_end()))
+            .collect()
     }
 }
 
@@ -139,7 +147,9 @@ fn four_digits(text: &str) -> String {
 /// An empty table for the terminal.
 pub fn text_table<'a>(header: impl IntoIterator<Item = &'a str>) -> Table {
     let mut table = Table::new();
-    table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(header);
+    table
+        .load_preset(presets::UTF8_FULL_CONDENSED)
+        .set_header(header);
     table
 }
 
@@ -150,7 +160,11 @@ pub fn panel(title: impl Into<String>, x: Axis, y: Axis, layers: Vec<Layer>) -> 
 
 /// What `say` has to say of each item, separated by commas.
 pub fn each<T>(items: impl IntoIterator<Item = T>, say: impl FnMut(T) -> Option<String>) -> String {
-    items.into_iter().filter_map(say).collect::<Vec<_>>().join(", ")
+    items
+        .into_iter()
+        .filter_map(say)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// From where to where the values of the rows of each name go, to so many decimals: `a 0.91 to 1.20, b 1.02 to 1.10`.
@@ -163,7 +177,11 @@ pub fn spans<'n, R>(
     decimals: usize,
 ) -> String {
     each(names, |name| {
-        let (low, high) = range(rows.iter().filter(|row| name_of(row) == name).filter_map(&value))?;
+        let (low, high) = range(
+            rows.iter()
+                .filter(|row| name_of(row) == name)
+                .filter_map(&value),
+        )?;
         Some(format!("{name} {low:.decimals$} to {high:.decimals$}"))
     })
 }
@@ -178,15 +196,25 @@ pub fn tally<'a>(
     let counts: Vec<_> = counts.into_iter().collect();
     let numbers: BTreeSet<usize> = counts.iter().map(|(_, count)| *count).collect();
     let same = |number: usize| {
-        let own = counts.iter().filter(|(_, count)| *count == number);
-        let names = own.map(|(name, _)| format!("‘{name}’")).collect::<Vec<_>>().join(", ");
+        let own = counts
+            .iter()
+            .filter(|(_, count)| *count == number);
+        let names = own
+            .map(|(name, _)| format!("‘{name}’"))
+            .collect::<Vec<_>>()
+            .join(", ");
         match number {
             0 => format!("{names} for none"),
             all if all == total => format!("{names} for all {total} {cases}"),
             some => format!("{names} for {some} of {total} {cases}"),
         }
     };
-    numbers.into_iter().rev().map(same).collect::<Vec<_>>().join("; ")
+    numbers
+        .into_iter()
+        .rev()
+        .map(same)
+        .collect::<Vec<_>>()
+        .join("; ")
 }
 
 #[cfg(test)]
@@ -223,7 +251,9 @@ mod tests {
             .unwrap();
         let text = output.text();
         assert!(
-            ["title\n\nGaps:\n", "gap", "0.5000", "escher"].iter().all(|part| text.contains(part)),
+            ["title\n\nGaps:\n", "gap", "0.5000", "escher"]
+                .iter()
+                .all(|part| text.contains(part)),
             "{text}"
         );
         assert!(!text.contains("77") && !text.contains("hidden"), "{text}");

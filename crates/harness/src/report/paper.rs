@@ -92,7 +92,9 @@ impl PaperRow {
     ) -> Self {
         let (low, high) = interval.unwrap_or((ours, ours));
         let verdicts = [low, ours, high].map(|ours| Verdict::of_ratios(paper, ours, tolerance));
-        let same = verdicts.iter().all(|verdict| *verdict == verdicts[0]);
+        let same = verdicts
+            .iter()
+            .all(|verdict| *verdict == verdicts[0]);
         let row = self.compare(
             format!("{paper:.4}"),
             format!("{ours:.4}"),
@@ -112,10 +114,14 @@ impl PaperRow {
 
 /// Returns a sentence for each quantity that is compared: ours, the paper's and the verdict, scene by scene. `None` if nothing is.
 pub fn ratios(rows: &[PaperRow]) -> Option<String> {
-    let compared: Vec<&PaperRow> =
-        rows.iter().filter(|row| row.verdict != Verdict::NotInPaper).collect();
-    let sentences: Vec<String> =
-        compared.chunk_by(|a, b| a.quantity == b.quantity).map(sentence).collect();
+    let compared: Vec<&PaperRow> = rows
+        .iter()
+        .filter(|row| row.verdict != Verdict::NotInPaper)
+        .collect();
+    let sentences: Vec<String> = compared
+        .chunk_by(|a, b| a.quantity == b.quantity)
+        .map(sentence)
+        .collect();
     (!sentences.is_empty()).then(|| sentences.join(" "))
 }
 
@@ -214,8 +220,11 @@ pub struct Outcome {
 impl Outcome {
     /// Of all rows but those that only add to the others.
     pub fn of(rows: &[PaperRow]) -> Self {
-        let count =
-            |wanted: fn(Verdict) -> bool| rows.iter().filter(|row| wanted(row.verdict)).count();
+        let count = |wanted: fn(Verdict) -> bool| {
+            rows.iter()
+                .filter(|row| wanted(row.verdict))
+                .count()
+        };
         let compared = count(|verdict| verdict != Verdict::NotInPaper);
         let agree = count(|verdict| verdict == Verdict::Agrees);
         let same_side = count(Verdict::is_same_direction);
@@ -245,7 +254,9 @@ impl fmt::Display for Outcome {
             ("cannot be told", untold),
         ];
         let some = kinds.iter().filter(|(_, count)| *count > 0);
-        let some: Vec<String> = some.map(|(kind, count)| format!("{kind}: {count}")).collect();
+        let some: Vec<String> = some
+            .map(|(kind, count)| format!("{kind}: {count}"))
+            .collect();
         write!(
             f,
             "Comparisons with the paper: {} ({}).",
@@ -260,7 +271,9 @@ mod tests {
     use super::*;
 
     fn verdict(paper: f64, ours: f64, interval: Option<(f64, f64)>) -> Verdict {
-        PaperRow::new("", "", "", "").compare_ratios(paper, ours, interval, 0.02).verdict
+        PaperRow::new("", "", "", "")
+            .compare_ratios(paper, ours, interval, 0.02)
+            .verdict
     }
 
     #[test]

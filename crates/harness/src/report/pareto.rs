@@ -22,22 +22,33 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
     let kind = rows.traced_kinds().first().copied();
     let (mut points, mut builds, mut rays) = (Vec::new(), Vec::new(), Vec::new());
     for scene in rows.scenes() {
-        let mut own: Vec<Point> =
-            config.methods.iter().filter_map(|method| point(rows, scene, method, kind)).collect();
-        let front =
-            front(own.iter().map(|point| (point.build_seconds, point.cost_over_base)).collect());
+        let mut own: Vec<Point> = config
+            .methods
+            .iter()
+            .filter_map(|method| point(rows, scene, method, kind))
+            .collect();
+        let front = front(
+            own.iter()
+                .map(|point| (point.build_seconds, point.cost_over_base))
+                .collect(),
+        );
         for point in &mut own {
             point.on_front = front.contains(&(point.build_seconds, point.cost_over_base));
         }
         let layer = |point: &Point, x| {
             Layer::new(point.method, Marks::Points(vec![(x, point.cost_over_base)]))
         };
-        let mut layers: Vec<Layer> =
-            own.iter().map(|point| layer(point, point.build_seconds)).collect();
+        let mut layers: Vec<Layer> = own
+            .iter()
+            .map(|point| layer(point, point.build_seconds))
+            .collect();
         layers.push(Layer::new("best so far", Marks::Steps(front)));
         let cost = || Metric::CostOverBase.axis();
         builds.push(panel(rows.shown(scene), Metric::BuildSeconds.axis(), cost(), layers));
-        let traced = own.iter().filter_map(|point| Some(layer(point, point.ns_per_ray?))).collect();
+        let traced = own
+            .iter()
+            .filter_map(|point| Some(layer(point, point.ns_per_ray?)))
+            .collect();
         rays.push(panel(rows.shown(scene), Metric::NsPerRay.axis(), cost(), traced));
         points.extend(own);
     }

@@ -45,7 +45,9 @@ impl Config {
         for scene in rows.scenes() {
             for method in &self.methods {
                 comparisons.extend(
-                    kinds.iter().filter_map(|kind| self.compare(rows, scene, method, kind)),
+                    kinds
+                        .iter()
+                        .filter_map(|kind| self.compare(rows, scene, method, kind)),
                 );
             }
         }
@@ -92,12 +94,27 @@ impl Config {
 
     /// In how many comparisons ours is the faster one.
     fn reading(&self, comparisons: &[Comparison]) -> String {
-        let others = self.methods.iter().filter(|method| **method != self.ours);
+        let others = self
+            .methods
+            .iter()
+            .filter(|method| **method != self.ours);
         let own = |method: &String| -> Vec<&Comparison> {
-            comparisons.iter().filter(|row| row.method == *method).collect()
+            comparisons
+                .iter()
+                .filter(|row| row.method == *method)
+                .collect()
         };
-        let total = others.clone().map(|method| own(method).len()).max().unwrap_or(0);
-        let faster = |method| own(method).iter().filter(|row| row.ours_over_this > 1.0).count();
+        let total = others
+            .clone()
+            .map(|method| own(method).len())
+            .max()
+            .unwrap_or(0);
+        let faster = |method| {
+            own(method)
+                .iter()
+                .filter(|row| row.ours_over_this > 1.0)
+                .count()
+        };
         let counts =
             tally(others.map(|method| (method.as_str(), faster(method))), total, "settings");
         format!(

@@ -67,21 +67,33 @@ impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let scenes = rows.scenes();
         let pictures = || {
-            scenes.iter().flat_map(|scene| self.structures().map(move |method| (*scene, method)))
+            scenes.iter().flat_map(|scene| {
+                self.structures()
+                    .map(move |method| (*scene, method))
+            })
         };
-        let tests: Vec<Tests> =
-            pictures().filter_map(|(scene, method)| self.tests(rows, scene, method)).collect();
-        let times: Vec<Times> =
-            tests.iter().map(|row| self.times(rows, row.scene, row.method, row.rays)).collect();
+        let tests: Vec<Tests> = pictures()
+            .filter_map(|(scene, method)| self.tests(rows, scene, method))
+            .collect();
+        let times: Vec<Times> = tests
+            .iter()
+            .map(|row| self.times(rows, row.scene, row.method, row.rays))
+            .collect();
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("pictures", &tests)?;
         output.add_csv("timing_pictures", &times)?;
         let caption = "Mean number of tests over all rays of one picture: through pixels, to lights, and mirrored. The \
                        picture is the same, bit by bit, whatever it is made with.";
-        let panels = scenes.iter().map(|scene| draw_tests(rows, scene, &tests)).collect();
+        let panels = scenes
+            .iter()
+            .map(|scene| draw_tests(rows, scene, &tests))
+            .collect();
         output.add_figure("pictures", caption, 3, panels);
         let caption = "Seconds of brute force over seconds, one thread, each the least of several.";
-        let panels = scenes.iter().map(|scene| draw_times(rows, scene, &times)).collect();
+        let panels = scenes
+            .iter()
+            .map(|scene| draw_times(rows, scene, &times))
+            .collect();
         output.add_figure("timing_pictures", caption, 3, panels);
         output.set_reference(DOCUMENT);
         let columns = "scene method boxes_per_ray objects_per_ray brute_force_over_tests";
@@ -94,7 +106,10 @@ impl Config {
 
     /// The labels of all that is compared, in order.
     fn structures(&self) -> impl Iterator<Item = &str> {
-        BASELINES.iter().map(|(label, _)| *label).chain(self.methods.iter().map(String::as_str))
+        BASELINES
+            .iter()
+            .map(|(label, _)| *label)
+            .chain(self.methods.iter().map(String::as_str))
     }
 
     fn tests<'a>(&self, rows: &Rows, scene: &'a str, method: &'a str) -> Option<Tests<'a>> {
@@ -128,7 +143,10 @@ impl Config {
     }
 
     fn document_seconds(&self, scene: &str, method: &str) -> Option<f64> {
-        self.document.get(method).filter(|_| scene == self.scene).copied()
+        self.document
+            .get(method)
+            .filter(|_| scene == self.scene)
+            .copied()
     }
 
     fn document_speed_up(&self, scene: &str, method: &str) -> Option<f64> {
@@ -142,19 +160,28 @@ fn tests_per_ray(row: &RenderRow) -> f64 {
 
 /// Of a structure's pictures of a scene, the one of median tests, the lower of two.
 fn middle_picture<'a>(rows: &'a Rows, scene: &str, method: &str) -> Option<&'a RenderRow> {
-    let own = rows.renders.iter().filter(|row| row.scene == scene && row.method == method);
+    let own = rows
+        .renders
+        .iter()
+        .filter(|row| row.scene == scene && row.method == method);
     middle(own.collect(), tests_per_ray)
 }
 
 /// Seconds to build and to draw, of the repetition that drew fastest.
 fn seconds(rows: &Rows, scene: &str, method: &str) -> (f64, f64) {
-    let own = rows.render_times.iter().filter(|row| row.scene == scene && row.method == method);
+    let own = rows
+        .render_times
+        .iter()
+        .filter(|row| row.scene == scene && row.method == method);
     let fastest = own.min_by(|a, b| a.render_seconds.total_cmp(&b.render_seconds));
     fastest.map_or((f64::NAN, f64::NAN), |row| (row.build_seconds, row.render_seconds))
 }
 
 fn draw_tests(rows: &Rows, scene: &str, tests: &[Tests]) -> Panel {
-    let own: Vec<&Tests> = tests.iter().filter(|row| row.scene == scene).collect();
+    let own: Vec<&Tests> = tests
+        .iter()
+        .filter(|row| row.scene == scene)
+        .collect();
     let bars = |name: &str, value: fn(&Tests) -> f64| {
         let values = own.iter().map(|row| value(row)).collect();
         Layer::bars(name, values, 0.1)
@@ -163,32 +190,51 @@ fn draw_tests(rows: &Rows, scene: &str, tests: &[Tests]) -> Panel {
         bars("boxes or cells", |row| row.boxes_per_ray),
         bars("objects", |row| row.objects_per_ray),
     ];
-    let x = Axis::categories("", own.iter().map(|row| row.method.to_owned()).collect());
+    let x = Axis::categories(
+        "",
+        own.iter()
+            .map(|row| row.method.to_owned())
+            .collect(),
+    );
     panel(rows.shown(scene), x, Axis::log("tests per ray").starting_at(0.1), layers)
 }
 
 fn draw_times(rows: &Rows, scene: &str, times: &[Times]) -> Panel {
-    let own: Vec<&Times> = times.iter().filter(|row| row.scene == scene).collect();
-    let theirs =
-        own.iter().enumerate().filter_map(|(at, row)| Some((at as f64, row.document_speed_up?)));
+    let own: Vec<&Times> = times
+        .iter()
+        .filter(|row| row.scene == scene)
+        .collect();
+    let theirs = own
+        .iter()
+        .enumerate()
+        .filter_map(|(at, row)| Some((at as f64, row.document_speed_up?)));
     let values = own.iter().map(|row| row.speed_up).collect();
     let layers = vec![
         Layer::bars("ours", values, 1.0),
         Layer::new(DOCUMENT, Marks::Points(theirs.collect())),
     ];
-    let x = Axis::categories("", own.iter().map(|row| row.method.to_owned()).collect());
+    let x = Axis::categories(
+        "",
+        own.iter()
+            .map(|row| row.method.to_owned())
+            .collect(),
+    );
     panel(rows.shown(scene), x, Axis::log("speed-up over brute force"), layers)
 }
 
 /// The fastest structure of every scene, and whether all have drawn the same picture.
 fn reading(tests: &[Tests], times: &[Times]) -> String {
-    let fastest = times.chunk_by(|a, b| a.scene == b.scene).filter_map(|scene| {
-        let best = scene.iter().max_by(|a, b| a.speed_up.total_cmp(&b.speed_up))?;
-        Some(format!(
-            "{}: {}, {:.1} times faster than brute force",
-            best.scene, best.method, best.speed_up
-        ))
-    });
+    let fastest = times
+        .chunk_by(|a, b| a.scene == b.scene)
+        .filter_map(|scene| {
+            let best = scene
+                .iter()
+                .max_by(|a, b| a.speed_up.total_cmp(&b.speed_up))?;
+            Some(format!(
+                "{}: {}, {:.1} times faster than brute force",
+                best.scene, best.method, best.speed_up
+            ))
+        });
     let same = match tests.iter().find(|row| !row.same_picture) {
         Some(row) => {
             format!("{}: {} gives ANOTHER PICTURE than brute force", row.scene, row.method)

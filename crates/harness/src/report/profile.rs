@@ -43,23 +43,35 @@ fn ratios<'a>(config: &'a Targets, rows: &'a Rows, axis: ProgressAxis) -> Vec<Ro
     let attempts = attempts(config, rows, axis);
     let problems = attempts.chunks(config.methods.len().max(1));
     let of_problem = problems.flat_map(|attempts| {
-        let fastest = attempts.iter().filter_map(|attempt| attempt.median).reduce(f64::min);
+        let fastest = attempts
+            .iter()
+            .filter_map(|attempt| attempt.median)
+            .reduce(f64::min);
         attempts.iter().map(move |attempt| Row {
             scene: attempt.scene,
             target: attempt.target.to_string(),
             method: attempt.method,
             x: attempt.median,
-            ratio_to_fastest: attempt.median.zip(fastest).map(|(x, fastest)| x / fastest),
+            ratio_to_fastest: attempt
+                .median
+                .zip(fastest)
+                .map(|(x, fastest)| x / fastest),
         })
     });
     of_problem.collect()
 }
 
 fn draw(config: &Targets, table: &[Row], problems: usize, axis: ProgressAxis) -> Panel {
-    let end = table.iter().filter_map(|row| row.ratio_to_fastest).fold(1.0, f64::max) * 1.2;
+    let end = table
+        .iter()
+        .filter_map(|row| row.ratio_to_fastest)
+        .fold(1.0, f64::max)
+        * 1.2;
     let layer = |method: &String| {
         let own = table.iter().filter(|row| row.method == method);
-        let mut ratios: Vec<f64> = own.filter_map(|row| row.ratio_to_fastest).collect();
+        let mut ratios: Vec<f64> = own
+            .filter_map(|row| row.ratio_to_fastest)
+            .collect();
         ratios.sort_by(f64::total_cmp);
         Layer::new(method, Marks::Steps(profile(&ratios, problems, end)))
     };
@@ -71,10 +83,17 @@ fn draw(config: &Targets, table: &[Row], problems: usize, axis: ProgressAxis) ->
 /// The fraction of the problems whose sorted ratio is at most x, from 1 to `end`.
 fn profile(ratios: &[f64], problems: usize, end: f64) -> Vec<(f64, f64)> {
     let fraction = |count: usize| count as f64 / problems as f64;
-    let fastest = ratios.iter().filter(|ratio| **ratio <= 1.0).count();
+    let fastest = ratios
+        .iter()
+        .filter(|ratio| **ratio <= 1.0)
+        .count();
     let mut steps = vec![(1.0, fraction(fastest))];
     steps.extend(
-        ratios.iter().zip(1..).skip(fastest).map(|(&ratio, count)| (ratio, fraction(count))),
+        ratios
+            .iter()
+            .zip(1..)
+            .skip(fastest)
+            .map(|(&ratio, count)| (ratio, fraction(count))),
     );
     steps.push((end, fraction(ratios.len())));
     steps
@@ -83,7 +102,10 @@ fn profile(ratios: &[f64], problems: usize, end: f64) -> Vec<(f64, f64)> {
 fn reading(config: &Targets, table: &[Row], problems: usize) -> String {
     let solved = each(&config.methods, |method| {
         let own = || {
-            table.iter().filter(|row| row.method == method).filter_map(|row| row.ratio_to_fastest)
+            table
+                .iter()
+                .filter(|row| row.method == method)
+                .filter_map(|row| row.ratio_to_fastest)
         };
         let fastest = own().filter(|ratio| *ratio <= 1.0).count();
         Some(format!("{method} {} ({fastest} as the fastest)", own().count()))

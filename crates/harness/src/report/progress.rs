@@ -26,11 +26,17 @@ impl ProgressAxis {
     /// The axes along which these methods can be compared. Where some count whole trees and others single moves, evaluations
     /// are not among them: a run that builds a tree with every evaluation visits at least as many nodes as there are objects.
     pub fn of(rows: &Rows, methods: &[String]) -> Vec<Self> {
-        let own = rows.runs.iter().filter(|run| methods.contains(&run.method));
+        let own = rows
+            .runs
+            .iter()
+            .filter(|run| methods.contains(&run.method));
         let mut trees = own.map(|run| run.work >= run.evaluations * run.objects as u64);
         let first = trees.next();
         let alike = trees.all(|of_run| Some(of_run) == first);
-        Self::ALL.into_iter().filter(|&axis| axis != Self::Evaluations || alike).collect()
+        Self::ALL
+            .into_iter()
+            .filter(|&axis| axis != Self::Evaluations || alike)
+            .collect()
     }
 
     /// The name of a column of a CSV file, and what stands along an axis of a figure.
@@ -69,7 +75,10 @@ impl ProgressAxis {
     ) -> Result<(), Error> {
         output.add_csv(self.file(kind), rows)?;
         if let Some((_, bytes)) = output.csv.last_mut() {
-            let end = bytes.iter().position(|&byte| byte == b'\n').unwrap_or(bytes.len());
+            let end = bytes
+                .iter()
+                .position(|&byte| byte == b'\n')
+                .unwrap_or(bytes.len());
             let header = String::from_utf8_lossy(&bytes[..end]).into_owned();
             let named = |column| if column == "x" { self.names().0 } else { column };
             let columns: Vec<&str> = header.split(',').map(named).collect();
@@ -91,7 +100,10 @@ pub fn series(rows: &Rows, scene: &str, method: &str, axis: ProgressAxis) -> Vec
         .filter(|(_, row)| row.scene == scene && row.method == method);
     let points = own.map(|(at, row)| {
         let x = match axis {
-            ProgressAxis::Seconds => rows.clock.get(at).map_or(f64::NAN, |clock| clock.seconds),
+            ProgressAxis::Seconds => rows
+                .clock
+                .get(at)
+                .map_or(f64::NAN, |clock| clock.seconds),
             ProgressAxis::Evaluations => row.evaluations as f64,
             ProgressAxis::Work => row.work as f64,
         };
@@ -108,28 +120,39 @@ pub fn series(rows: &Rows, scene: &str, method: &str, axis: ProgressAxis) -> Vec
 pub fn longest(rows: &Rows, scene: &str, method: &str, axis: ProgressAxis) -> f64 {
     let ends: Vec<f64> = match axis {
         ProgressAxis::Seconds => rows.seconds_of(scene, method),
-        ProgressAxis::Evaluations => {
-            rows.runs_of(scene, method).map(|run| run.evaluations as f64).collect()
-        }
-        ProgressAxis::Work => rows.runs_of(scene, method).map(|run| run.work as f64).collect(),
+        ProgressAxis::Evaluations => rows
+            .runs_of(scene, method)
+            .map(|run| run.evaluations as f64)
+            .collect(),
+        ProgressAxis::Work => rows
+            .runs_of(scene, method)
+            .map(|run| run.work as f64)
+            .collect(),
     };
     ends.into_iter().fold(0.0, f64::max)
 }
 
 /// Where the longest run of any of these methods on a scene ended.
 pub fn longest_of_all(rows: &Rows, scene: &str, methods: &[String], axis: ProgressAxis) -> f64 {
-    methods.iter().map(|method| longest(rows, scene, method, axis)).fold(0.0, f64::max)
+    methods
+        .iter()
+        .map(|method| longest(rows, scene, method, axis))
+        .fold(0.0, f64::max)
 }
 
 /// When a run first had an incumbent of at most this cost; `None` if it never had.
 pub fn reached(run: &Series, cost: f64) -> Option<f64> {
-    run.iter().find(|(_, incumbent)| *incumbent <= cost).map(|(x, _)| *x)
+    run.iter()
+        .find(|(_, incumbent)| *incumbent <= cost)
+        .map(|(x, _)| *x)
 }
 
 /// When the median run had an incumbent of at most this cost, unsolved runs last; `None` if it never had.
 pub fn median_reached(runs: &[Series], cost: f64) -> Option<f64> {
-    let times: Vec<f64> =
-        runs.iter().map(|run| reached(run, cost).unwrap_or(Metric::WORST)).collect();
+    let times: Vec<f64> = runs
+        .iter()
+        .map(|run| reached(run, cost).unwrap_or(Metric::WORST))
+        .collect();
     // Between a number and infinity there is only infinity, and between two infinities there is NaN.
     median(&times).filter(|time| time.is_finite())
 }
@@ -141,7 +164,12 @@ mod tests {
 
     #[test]
     fn a_method_reaches_what_its_median_run_does() {
-        let runs = |times: &[f64]| times.iter().map(|&time| vec![(time, 1.0)]).collect::<Vec<_>>();
+        let runs = |times: &[f64]| {
+            times
+                .iter()
+                .map(|&time| vec![(time, 1.0)])
+                .collect::<Vec<_>>()
+        };
         assert_eq!(median_reached(&runs(&[3.0, 1.0, 2.0]), 1.0), Some(2.0));
         let one_of_two = vec![vec![(1.0, 1.0)], vec![(1.0, 5.0)]];
         assert_eq!([median_reached(&one_of_two, 1.0), median_reached(&[], 1.0)], [None, None]);
@@ -155,7 +183,9 @@ mod tests {
             x: f64,
         }
         let mut output = Output::default();
-        ProgressAxis::Work.add_csv(&mut output, "a", &[Row { scene: "x", x: 2.0 }]).unwrap();
+        ProgressAxis::Work
+            .add_csv(&mut output, "a", &[Row { scene: "x", x: 2.0 }])
+            .unwrap();
         assert_eq!(output.csv, [("a_work".to_owned(), b"scene,work\nx,2.0\n".to_vec())]);
         let files = ProgressAxis::ALL.map(|axis| axis.file("a"));
         assert_eq!(files, ["timing_a", "a_evaluations", "a_work"]);
@@ -167,7 +197,13 @@ mod tests {
             vec![run("trees", 0, 5, 995), run("tree", 0, 1, 199), run("moves", 0, 9000, 90_000)];
         let rows = Rows { runs, ..Rows::default() };
         let axes = |methods: &[&str]| {
-            ProgressAxis::of(&rows, &methods.iter().map(|&m| m.to_owned()).collect::<Vec<_>>())
+            ProgressAxis::of(
+                &rows,
+                &methods
+                    .iter()
+                    .map(|&m| m.to_owned())
+                    .collect::<Vec<_>>(),
+            )
         };
         assert_eq!(axes(&["trees", "tree"]), ProgressAxis::ALL);
         assert_eq!(axes(&["moves"]), ProgressAxis::ALL);

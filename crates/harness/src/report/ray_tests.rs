@@ -71,8 +71,11 @@ impl Config {
         output.add_csv("ray_tests", &table)?;
         let caption = "Mean number of tests against boxes, whiskers the 95 % interval; of several runs the one of \
                        median tests. The paper's rays start inside and end at any hit.";
-        let panels =
-            rows.scenes().into_iter().map(|scene| self.draw(rows, scene, &table)).collect();
+        let panels = rows
+            .scenes()
+            .into_iter()
+            .map(|scene| self.draw(rows, scene, &table))
+            .collect();
         output.add_figure("ray_tests", caption, 2, panels);
         output.set_reference(PAPER);
         output.paper = self.compare(rows, &table);
@@ -93,11 +96,14 @@ impl Config {
     ) -> Option<Measured<'a>> {
         let of_first = middle_run(rows, scene, first(&self.methods), kind)?;
         let own = middle_run(rows, scene, method, kind)?;
-        let run = rows.runs_of(scene, method).find(|run| run.repetition == own.repetition)?;
+        let run = rows
+            .runs_of(scene, method)
+            .find(|run| run.repetition == own.repetition)?;
         let paper = self.paper.get(scene).filter(|_| kind == OF_PAPER);
         let [own_range, first_range] = [method, first(&self.methods)].map(|method| {
-            let boxes =
-                most_rays(rows, scene, method, kind).into_iter().map(|row| row.boxes_per_ray);
+            let boxes = most_rays(rows, scene, method, kind)
+                .into_iter()
+                .map(|row| row.boxes_per_ray);
             range(boxes).unwrap_or((f64::NAN, f64::NAN))
         });
         let over_first_low = own_range.0 / first_range.1;
@@ -126,7 +132,9 @@ impl Config {
             let of_first =
                 |of: &&Measured| of.scene == row.scene && of.method == first(&self.methods);
             let base = table.iter().find(of_first)?.paper_boxes_per_ray?;
-            let paper = row.paper_boxes_per_ray.filter(|_| row.method != first(&self.methods))?;
+            let paper = row
+                .paper_boxes_per_ray
+                .filter(|_| row.method != first(&self.methods))?;
             let quantity = format!("tests per ray, {} over {}", row.method, first(&self.methods));
             let compared =
                 PaperRow::new(&self.source, rows.shown(row.scene), quantity, &self.reason);
@@ -151,7 +159,10 @@ impl Config {
             Layer::new(format!("{family}, {query}"), Marks::Bars { values, spread, base: 0.0 })
         };
         let paper = |kind: &(&str, &str)| {
-            let paper = self.paper.get(scene).filter(|_| *kind == OF_PAPER)?;
+            let paper = self
+                .paper
+                .get(scene)
+                .filter(|_| *kind == OF_PAPER)?;
             let values = (0..self.methods.len())
                 .map(|at| paper.get(at).copied().unwrap_or(f64::NAN))
                 .collect();
@@ -159,7 +170,11 @@ impl Config {
         };
         // The paper's bars stand beside ours for the same kind of rays.
         let with_paper = |kind: (&'_ str, &'_ str)| std::iter::once(bars(kind)).chain(paper(&kind));
-        let layers = rows.ray_kinds().into_iter().flat_map(with_paper).collect();
+        let layers = rows
+            .ray_kinds()
+            .into_iter()
+            .flat_map(with_paper)
+            .collect();
         let x = Axis::categories("", self.methods.clone());
         panel(rows.shown(scene), x, Metric::BoxesPerRay.axis(), layers)
     }

@@ -101,9 +101,12 @@ impl Config {
     fn draw(&self, title: &str, points: &[Point]) -> Panel {
         let mut layers = Vec::new();
         for series in &self.series {
-            let own = points.iter().filter(|point| point.series == series.name);
-            let line: Vec<_> =
-                own.map(|point| (point.build_seconds, point.tests_over_base)).collect();
+            let own = points
+                .iter()
+                .filter(|point| point.series == series.name);
+            let line: Vec<_> = own
+                .map(|point| (point.build_seconds, point.tests_over_base))
+                .collect();
             layers.push(Layer::new(&series.name, Marks::Line(line.clone())));
             layers.push(Layer::new(&series.name, Marks::Points(line)));
         }
@@ -128,7 +131,11 @@ impl Config {
             });
             Some(format!("{title}: {best}"))
         };
-        let paths = PATHS.into_iter().filter_map(of_path).collect::<Vec<_>>().join("; ");
+        let paths = PATHS
+            .into_iter()
+            .filter_map(of_path)
+            .collect::<Vec<_>>()
+            .join("; ");
         format!("Tests per ray over ‘{}’ at best, geometric means over scenes. {paths}.", self.base)
     }
 
@@ -153,7 +160,11 @@ impl Config {
         if own.is_empty() || own.len() != base.len() {
             return None;
         }
-        let ratios: Vec<f64> = own.iter().zip(&base).map(|(own, base)| own / base).collect();
+        let ratios: Vec<f64> = own
+            .iter()
+            .zip(&base)
+            .map(|(own, base)| own / base)
+            .collect();
         Some(Point {
             scene,
             series: &series.name,

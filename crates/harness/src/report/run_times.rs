@@ -53,15 +53,23 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
     for axis in ProgressAxis::of(rows, &config.methods) {
         let attempts = attempts(config, rows, axis);
         let problems = attempts.chunks(config.methods.len().max(1));
-        let reached =
-            problems.filter(|problem| problem.iter().any(|attempt| !attempt.solved.is_empty()));
-        let panels = reached.map(|problem| draw(problem, axis)).collect();
+        let reached = problems.filter(|problem| {
+            problem
+                .iter()
+                .any(|attempt| !attempt.solved.is_empty())
+        });
+        let panels = reached
+            .map(|problem| draw(problem, axis))
+            .collect();
         output.add_figure(axis.file("run_times"), caption.as_str(), 2, panels);
         output.set_reference(FIT);
         axis.add_csv(
             &mut output,
             "run_times",
-            &attempts.iter().flat_map(steps).collect::<Vec<_>>(),
+            &attempts
+                .iter()
+                .flat_map(steps)
+                .collect::<Vec<_>>(),
         )?;
         let fits: Vec<Fit> = attempts.iter().map(fit).collect();
         axis.add_csv(&mut output, "run_times_fit", &fits)?;
@@ -77,7 +85,12 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
 /// The fraction of runs solved, at every time at which it grows and at the end.
 fn distribution(attempt: &Attempt) -> Vec<(f64, f64)> {
     let fraction = |count: u32| f64::from(count) / attempt.runs as f64;
-    let rises = attempt.solved.iter().zip(1..).map(|(&x, count)| (x, fraction(count))).collect();
+    let rises = attempt
+        .solved
+        .iter()
+        .zip(1..)
+        .map(|(&x, count)| (x, fraction(count)))
+        .collect();
     staircase(rises, attempt.end)
 }
 
@@ -117,13 +130,15 @@ fn fit<'a>(attempt: &Attempt<'a>) -> Fit<'a> {
 /// All methods on one problem, with the fitted distributions on top.
 fn draw(problem: &[Attempt], axis: ProgressAxis) -> Panel {
     let curve = |attempt: &Attempt| Layer::new(attempt.method, Marks::Steps(distribution(attempt)));
-    let laws = problem.iter().filter_map(|Attempt { solved, runs, .. }| {
-        Some(fitted_curve(
-            &ShiftedExponential::fit(solved, *runs)?,
-            *solved.first()?,
-            *solved.last()?,
-        ))
-    });
+    let laws = problem
+        .iter()
+        .filter_map(|Attempt { solved, runs, .. }| {
+            Some(fitted_curve(
+                &ShiftedExponential::fit(solved, *runs)?,
+                *solved.first()?,
+                *solved.last()?,
+            ))
+        });
     let layers = problem.iter().map(curve).chain(laws).collect();
     let title = format!("{}: {}", problem[0].scene, problem[0].target);
     panel(title, axis.axis(), Axis::linear("P(solved)").range(0.0, 1.02), layers)
@@ -133,7 +148,10 @@ fn draw(problem: &[Attempt], axis: ProgressAxis) -> Panel {
 fn fitted_curve(law: &ShiftedExponential, first: f64, last: f64) -> Layer {
     const POINTS: u32 = 60;
     let place = |step: u32| first * (last / first).powf(f64::from(step) / f64::from(POINTS));
-    let points = (0..=POINTS).map(place).map(|x| (x, law.probability(x))).collect();
+    let points = (0..=POINTS)
+        .map(place)
+        .map(|x| (x, law.probability(x)))
+        .collect();
     Layer::new(FIT, Marks::Line(points))
 }
 
@@ -141,7 +159,10 @@ fn fitted_curve(law: &ShiftedExponential, first: f64, last: f64) -> Layer {
 fn reading(config: &Targets, fits: &[Fit]) -> String {
     let Some(last) = config.targets.last().map(ToString::to_string) else { return String::new() };
     let methods = each(&config.methods, |method| {
-        let own = || fits.iter().filter(|fit| fit.method == method && fit.target == last);
+        let own = || {
+            fits.iter()
+                .filter(|fit| fit.method == method && fit.target == last)
+        };
         let (solved, runs): (usize, usize) =
             (own().map(|fit| fit.solved).sum(), own().map(|fit| fit.runs).sum());
         Some(format!("{method} in {solved} of {runs} runs"))

@@ -84,10 +84,16 @@ enum Difference {
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let across = self.against.iter().filter_map(|against| self.across(rows, against)).collect();
+        let across = self
+            .against
+            .iter()
+            .filter_map(|against| self.across(rows, against))
+            .collect();
         let scenes = rows.scenes();
         let within = scenes.iter().flat_map(|scene| {
-            self.against.iter().filter_map(move |against| self.within(rows, scene, against))
+            self.against
+                .iter()
+                .filter_map(move |against| self.within(rows, scene, against))
         });
         let mut table = self.judged(across);
         // Too few runs for so many comparisons could tell nothing, whatever they found.
@@ -111,14 +117,21 @@ impl Config {
         for scene in rows.scenes() {
             let [own, other] =
                 [&self.method, against].map(|method| rows.final_ratios(scene, method));
-            differences.extend(median(&own).zip(median(&other)).map(|(own, other)| own - other));
+            differences.extend(
+                median(&own)
+                    .zip(median(&other))
+                    .map(|(own, other)| own - other),
+            );
             effects.extend(a12(&other, &own));
         }
         let samples = differences.len();
         // Scenes on which both cost the same say nothing; if there are no others, nothing differs.
         let test =
             wilcoxon_signed_rank(&differences).unwrap_or(Test { statistic: 0.0, p_value: 1.0 });
-        let others = differences.iter().filter(|difference| **difference != 0.0).count() as f64;
+        let others = differences
+            .iter()
+            .filter(|difference| **difference != 0.0)
+            .count() as f64;
         let lower = test.statistic < others * (others + 1.0) / 4.0;
         let row = self.row(ALL, against, [samples; 2], &test);
         let a12 = effects.iter().sum::<f64>() / samples as f64;
@@ -146,7 +159,10 @@ impl Config {
     /// The method's median work on a scene over the other's.
     fn work_ratio(&self, rows: &Rows, scene: &str, against: &str) -> Option<f64> {
         let work = |method: &str| {
-            let work: Vec<f64> = rows.runs_of(scene, method).map(|run| run.work as f64).collect();
+            let work: Vec<f64> = rows
+                .runs_of(scene, method)
+                .map(|run| run.work as f64)
+                .collect();
             median(&work).filter(|&work| work > 0.0)
         };
         Some(work(&self.method)? / work(against)?)
@@ -206,7 +222,12 @@ impl Config {
             let work =
                 work.map_or_else(String::new, |ratio| format!(", with {ratio:.1} times its work"));
             let within: Vec<&Row> = own().filter(|row| row.scene != ALL).collect();
-            let count = |verdict| within.iter().filter(|row| row.verdict == verdict).count();
+            let count = |verdict| {
+                within
+                    .iter()
+                    .filter(|row| row.verdict == verdict)
+                    .count()
+            };
             let (lower, higher) = (count(Difference::Lower), count(Difference::Higher));
             let within = match within.len() {
                 0 => "too few runs to compare within scenes".into(),

@@ -79,7 +79,9 @@ impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let scenes = rows.scenes();
         let row = |&scene: &_| {
-            self.columns.iter().filter_map(move |column| self.cell(rows, scene, column))
+            self.columns
+                .iter()
+                .filter_map(move |column| self.cell(rows, scene, column))
         };
         let cells: Vec<Cell> = scenes.iter().flat_map(row).collect();
         let mut output = Output::new(&self.source, &self.title);
@@ -96,9 +98,10 @@ impl Config {
         let trials = rows.trials_over_base(scene, &column.method);
         let pool = trials.concat();
         let results: Vec<f64> = match column.best_of {
-            Some(m) => {
-                trials.iter().filter_map(|trials| minimum(trials.iter().copied().take(m))).collect()
-            }
+            Some(m) => trials
+                .iter()
+                .filter_map(|trials| minimum(trials.iter().copied().take(m)))
+                .collect(),
             None => rows.final_ratios(scene, &column.method),
         };
         let interval = match column.best_of {
@@ -113,7 +116,9 @@ impl Config {
             method: &column.method,
             best_of: column.best_of,
             cost_over_base: median(&results)?,
-            expected_over_base: column.best_of.and_then(|m| expected_best_of(&pool, m)),
+            expected_over_base: column
+                .best_of
+                .and_then(|m| expected_best_of(&pool, m)),
             low_over_base,
             high_over_base,
             paper_over_base: self.paper_ratio(column, scene),
@@ -127,7 +132,10 @@ impl Config {
         if cells.iter().any(|cell| cell.best_of.is_some()) {
             caption += " Whiskers: at least nine of ten repetitions of as many fresh trials end between them.";
         }
-        if cells.iter().any(|cell| cell.paper_over_base.is_some()) {
+        if cells
+            .iter()
+            .any(|cell| cell.paper_over_base.is_some())
+        {
             caption += " Ours on stand-in scenes, the paper's on the originals: compare ratios within a column, not bar by bar.";
         }
         if is_cut(cells) {
@@ -152,17 +160,24 @@ impl Config {
     /// A number of the paper next to the closest of the columns that read it in different ways.
     fn compare_readings(&self, rows: &Rows, scene: &str, cells: &[Cell]) -> Option<PaperRow> {
         let distance = |cell: &&Cell| {
-            cell.paper_over_base.map(|paper| (cell.cost_over_base / paper).ln().abs())
+            cell.paper_over_base
+                .map(|paper| (cell.cost_over_base / paper).ln().abs())
         };
         let base = &self.columns.first()?.name;
         let read = cells.iter().filter(|cell| {
             cell.scene == scene && cell.column != base && cell.paper_over_base.is_some()
         });
-        let closest =
-            read.min_by(|a, b| distance(a).partial_cmp(&distance(b)).unwrap_or(Ordering::Equal))?;
+        let closest = read.min_by(|a, b| {
+            distance(a)
+                .partial_cmp(&distance(b))
+                .unwrap_or(Ordering::Equal)
+        })?;
         let paper = closest.paper_over_base?;
         let close = is_close(closest, self.tolerance);
-        let column = self.columns.iter().find(|column| column.name == closest.column)?;
+        let column = self
+            .columns
+            .iter()
+            .find(|column| column.name == closest.column)?;
         let row = PaperRow::new(
             &self.source,
             rows.shown(scene),
@@ -203,21 +218,35 @@ impl Config {
     fn compare_all(&self, rows: &Rows, cells: &[Cell]) -> Vec<PaperRow> {
         if self.are_readings() {
             let scenes = rows.scenes().into_iter();
-            return scenes.filter_map(|scene| self.compare_readings(rows, scene, cells)).collect();
+            return scenes
+                .filter_map(|scene| self.compare_readings(rows, scene, cells))
+                .collect();
         }
         let of_column = |column: &Column| {
-            let own = cells.iter().filter(|cell| cell.column == column.name);
-            own.filter_map(|cell| self.compare(rows, column, cell)).collect::<Vec<_>>()
+            let own = cells
+                .iter()
+                .filter(|cell| cell.column == column.name);
+            own.filter_map(|cell| self.compare(rows, column, cell))
+                .collect::<Vec<_>>()
         };
-        self.columns.iter().skip(1).flat_map(of_column).collect()
+        self.columns
+            .iter()
+            .skip(1)
+            .flat_map(of_column)
+            .collect()
     }
 
     /// The sentence that answers for the paper: how many scenes each column is above and below the base on, by whole intervals, or
     /// how many of the paper's ratios each reading comes close to.
     fn answer(&self, cells: &[Cell]) -> Option<String> {
-        cells.iter().find(|cell| cell.paper_over_base.is_some())?;
+        cells
+            .iter()
+            .find(|cell| cell.paper_over_base.is_some())?;
         let of = |column: &Column| {
-            cells.iter().filter(|cell| cell.column == column.name).collect::<Vec<_>>()
+            cells
+                .iter()
+                .filter(|cell| cell.column == column.name)
+                .collect::<Vec<_>>()
         };
         if self.are_readings() {
             let papers = of(self.columns.get(1)?)
@@ -225,10 +254,16 @@ impl Config {
                 .filter(|cell| cell.paper_over_base.is_some())
                 .count();
             let close = |column: &Column| {
-                of(column).into_iter().filter(|cell| is_close(cell, self.tolerance)).count()
+                of(column)
+                    .into_iter()
+                    .filter(|cell| is_close(cell, self.tolerance))
+                    .count()
             };
-            let counts =
-                self.columns.iter().skip(1).map(|column| (column.name.as_str(), close(column)));
+            let counts = self
+                .columns
+                .iter()
+                .skip(1)
+                .map(|column| (column.name.as_str(), close(column)));
             let best = counts.max_by_key(|(_, count)| *count)?;
             let percent = 100.0 * self.tolerance;
             return Some(if best.1 == papers {
@@ -257,9 +292,13 @@ impl Config {
     fn draw(&self, rows: &Rows, cells: &[Cell]) -> Panel {
         let columns = || self.columns.iter().skip(1);
         let bars = |name: String, column: &Column, value: &dyn Fn(&Cell) -> Option<f64>, spread| {
-            let values =
-                rows.scenes().into_iter().map(|scene| find(cells, scene, column).and_then(value));
-            let values = values.map(|value| value.unwrap_or(f64::NAN)).collect();
+            let values = rows
+                .scenes()
+                .into_iter()
+                .map(|scene| find(cells, scene, column).and_then(value));
+            let values = values
+                .map(|value| value.unwrap_or(f64::NAN))
+                .collect();
             Layer::new(name, Marks::Bars { values, spread, base: 1.0 })
         };
         // Columns that are readings of one column of the paper share its bars.
@@ -287,7 +326,10 @@ impl Config {
     }
 
     fn add_table(&self, output: &mut Output, rows: &Rows, cells: &[Cell]) {
-        let names = self.columns.iter().map(|column| column.name.as_str());
+        let names = self
+            .columns
+            .iter()
+            .map(|column| column.name.as_str());
         let mut table = text_table(std::iter::once("scene").chain(names));
         for scene in rows.scenes() {
             let show = |column: &Column| {
@@ -298,7 +340,10 @@ impl Config {
                         .map_or(ours.clone(), |paper| format!("{ours}  (paper {paper:.4})")),
                 )
             };
-            let shown = self.columns.iter().map(|column| show(column).unwrap_or_default());
+            let shown = self
+                .columns
+                .iter()
+                .map(|column| show(column).unwrap_or_default());
             table.add_row(std::iter::once(rows.shown(scene)).chain(shown));
         }
         output.add_table("Cost over base, ours (and the paper's, on its own scenes):", table);
@@ -307,10 +352,17 @@ impl Config {
     /// On how many scenes each column but the base is below the base, and the least ratio of all.
     fn reading(&self, cells: &[Cell]) -> String {
         let of = |column: &Column| -> Vec<&Cell> {
-            cells.iter().filter(|cell| cell.column == column.name).collect()
+            cells
+                .iter()
+                .filter(|cell| cell.column == column.name)
+                .collect()
         };
-        let below =
-            |column: &Column| of(column).iter().filter(|cell| cell.cost_over_base < 1.0).count();
+        let below = |column: &Column| {
+            of(column)
+                .iter()
+                .filter(|cell| cell.cost_over_base < 1.0)
+                .count()
+        };
         let others = || self.columns.iter().skip(1);
         let counts = others().map(|column| (column.name.as_str(), below(column)));
         let compared = others().flat_map(of);
@@ -318,7 +370,10 @@ impl Config {
         else {
             return String::new();
         };
-        let scenes = self.columns.first().map_or(0, |base| of(base).len());
+        let scenes = self
+            .columns
+            .first()
+            .map_or(0, |base| of(base).len());
         let Cell { column, scene, cost_over_base, .. } = least;
         let counts = tally(counts, scenes, "scenes");
         format!(
@@ -329,23 +384,32 @@ impl Config {
 
 /// The paper's highest ratio, and at least 1.
 fn highest_of_paper(cells: &[Cell]) -> f64 {
-    cells.iter().filter_map(|cell| cell.paper_over_base).fold(1.0, f64::max)
+    cells
+        .iter()
+        .filter_map(|cell| cell.paper_over_base)
+        .fold(1.0, f64::max)
 }
 
 /// Whether the figure ends below some bars.
 fn is_cut(cells: &[Cell]) -> bool {
     let theirs = highest_of_paper(cells);
-    theirs > 1.0 && cells.iter().any(|cell| cell.cost_over_base > MOST_OF_PAPER * theirs)
+    theirs > 1.0
+        && cells
+            .iter()
+            .any(|cell| cell.cost_over_base > MOST_OF_PAPER * theirs)
 }
 
 /// Whether the ratio is within the tolerance of the paper's.
 fn is_close(cell: &Cell, tolerance: f64) -> bool {
-    cell.paper_over_base.is_some_and(|paper| (cell.cost_over_base / paper - 1.0).abs() <= tolerance)
+    cell.paper_over_base
+        .is_some_and(|paper| (cell.cost_over_base / paper - 1.0).abs() <= tolerance)
 }
 
 /// The cell of a column on a scene.
 fn find<'c, 'a>(cells: &'c [Cell<'a>], scene: &str, column: &Column) -> Option<&'c Cell<'a>> {
-    cells.iter().find(|cell| cell.scene == scene && cell.column == column.name)
+    cells
+        .iter()
+        .find(|cell| cell.scene == scene && cell.column == column.name)
 }
 
 #[cfg(test)]
@@ -358,7 +422,8 @@ mod tests {
     fn rows(methods: &[(&str, f64)]) -> Rows {
         let mut rows = Rows::default();
         for &(method, cost) in methods {
-            rows.runs.push(RunRow { cost, base_cost: 1.0, ..run(method, 0, 1, 0) });
+            rows.runs
+                .push(RunRow { cost, base_cost: 1.0, ..run(method, 0, 1, 0) });
         }
         rows
     }
@@ -389,10 +454,18 @@ mod tests {
             (row.ours.as_str(), row.verdict),
             ("1.9000, by difference", Verdict::CannotBeTold)
         );
-        assert!(near.answer.unwrap().contains("‘difference’ comes within 10 %"));
+        assert!(
+            near.answer
+                .unwrap()
+                .contains("‘difference’ comes within 10 %")
+        );
         let far = written(readings(), &[("base", 1.0), ("sum", 500.0), ("difference", 3.0)]);
         assert_eq!(far.paper[0].verdict, Verdict::Differs);
-        assert!(far.answer.unwrap().starts_with("None of 2 readings comes within 10 %"));
+        assert!(
+            far.answer
+                .unwrap()
+                .starts_with("None of 2 readings comes within 10 %")
+        );
     }
 
     #[test]
@@ -400,7 +473,11 @@ mod tests {
         let columns =
             vec![column("base", 1.0), column("best of 10", 1.1), column("best of 100", 1.2)];
         let output = written(columns, &[("base", 1.0), ("best of 10", 1.15), ("best of 100", 0.9)]);
-        let verdicts: Vec<Verdict> = output.paper.iter().map(|row| row.verdict).collect();
+        let verdicts: Vec<Verdict> = output
+            .paper
+            .iter()
+            .map(|row| row.verdict)
+            .collect();
         assert_eq!(verdicts, [Verdict::Agrees, Verdict::DiffersLower]);
         let answer = output.answer.unwrap();
         assert_eq!(

@@ -67,7 +67,10 @@ mod tests {
 
     #[test]
     fn targets_are_named_as_in_the_field() {
-        let names: Vec<String> = Target::usual().iter().map(Target::to_string).collect();
+        let names: Vec<String> = Target::usual()
+            .iter()
+            .map(Target::to_string)
+            .collect();
         assert_eq!(names, ["base", "base −1 %", "best known +1 %", "best known +0.1 %"]);
     }
 }

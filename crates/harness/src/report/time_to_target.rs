@@ -25,7 +25,10 @@ pub(super) struct Reached<'a> {
 pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
     let mut output = Output::new(&config.source, &config.title);
     for axis in [ProgressAxis::Seconds, ProgressAxis::Work] {
-        let table: Vec<Reached> = attempts(config, rows, axis).iter().map(reached).collect();
+        let table: Vec<Reached> = attempts(config, rows, axis)
+            .iter()
+            .map(reached)
+            .collect();
         axis.add_csv(&mut output, "to_target", &table)?;
         let explanation = format!("{} until the target is reached, over all runs:", axis.label());
         let columns = "scene target method runs solved median quantile_90";
@@ -55,10 +58,14 @@ fn reached<'a>(attempt: &Attempt<'a>) -> Reached<'a> {
 /// Which method is the first to reach each target, by scene.
 fn reading(config: &Targets, table: &[Reached]) -> String {
     let firsts = config.targets.iter().filter_map(|target| {
-        let rows: Vec<&Reached> =
-            table.iter().filter(|row| row.target == target.to_string()).collect();
+        let rows: Vec<&Reached> = table
+            .iter()
+            .filter(|row| row.target == target.to_string())
+            .collect();
         let first = |scene: &[&Reached]| {
-            let timed = scene.iter().filter_map(|row| Some((row.median?, row.method)));
+            let timed = scene
+                .iter()
+                .filter_map(|row| Some((row.median?, row.method)));
             let (seconds, method) = timed.min_by(|a, b| a.0.total_cmp(&b.0))?;
             Some(format!("{method} on {} ({seconds:.2} s)", scene[0].scene))
         };

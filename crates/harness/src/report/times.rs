@@ -56,7 +56,9 @@ impl Config {
         let methods = self.methods.iter().enumerate();
         let ratios: Vec<Ratio> = methods
             .flat_map(|(index, method)| {
-                scenes.iter().map(move |scene| self.compare(rows, scene, index, method))
+                scenes
+                    .iter()
+                    .map(move |scene| self.compare(rows, scene, index, method))
             })
             .collect();
         let mut output = Output::new(&self.source, &self.title);
@@ -86,17 +88,26 @@ impl Config {
         let seconds = rows.seconds_of(scene, &self.methods[index]);
         let Some(again) = self.again.get(index) else { return seconds };
         let second = rows.seconds_of(scene, again);
-        seconds.iter().zip(&second).map(|(first, second)| first + second).collect()
+        seconds
+            .iter()
+            .zip(&second)
+            .map(|(first, second)| first + second)
+            .collect()
     }
 
     fn compare<'a>(&self, rows: &Rows, scene: &'a str, index: usize, method: &'a str) -> Ratio<'a> {
         let base = self.seconds(rows, scene, 0);
         let own = self.seconds(rows, scene, index);
-        let pairs: Vec<f64> = own.iter().zip(&base).map(|(own, base)| own / base).collect();
+        let pairs: Vec<f64> = own
+            .iter()
+            .zip(&base)
+            .map(|(own, base)| own / base)
+            .collect();
         let (ratio_low, ratio_high) = median_interval(&pairs).unwrap_or((f64::NAN, f64::NAN));
         let paper = self.paper.get(scene);
-        let paper_ratio =
-            paper.and_then(|paper| Some(paper.get(index)? / paper.first()?)).filter(|_| index > 0);
+        let paper_ratio = paper
+            .and_then(|paper| Some(paper.get(index)? / paper.first()?))
+            .filter(|_| index > 0);
         Ratio {
             scene,
             method,
@@ -108,8 +119,11 @@ impl Config {
             noise: self.again.first().and_then(|again| {
                 let firsts = rows.seconds_of(scene, first(&self.methods));
                 let seconds = rows.seconds_of(scene, again);
-                let ratios: Vec<f64> =
-                    seconds.iter().zip(&firsts).map(|(second, first)| second / first).collect();
+                let ratios: Vec<f64> = seconds
+                    .iter()
+                    .zip(&firsts)
+                    .map(|(second, first)| second / first)
+                    .collect();
                 median(&ratios)
             }),
             paper_ratio,
@@ -121,10 +135,19 @@ impl Config {
     fn reading(&self, ratios: &[Ratio]) -> String {
         let first = first(&self.methods);
         let of = |method: &String| {
-            let own: Vec<&Ratio> = ratios.iter().filter(|ratio| ratio.method == method).collect();
+            let own: Vec<&Ratio> = ratios
+                .iter()
+                .filter(|ratio| ratio.method == method)
+                .collect();
             let (low, high) = range(own.iter().map(|ratio| ratio.ratio_median))?;
-            let faster = own.iter().filter(|ratio| ratio.ratio_high < 1.0).count();
-            let slower = own.iter().filter(|ratio| ratio.ratio_low > 1.0).count();
+            let faster = own
+                .iter()
+                .filter(|ratio| ratio.ratio_high < 1.0)
+                .count();
+            let slower = own
+                .iter()
+                .filter(|ratio| ratio.ratio_low > 1.0)
+                .count();
             let scenes = own.len();
             let sides = match (faster, slower) {
                 (0, 0) => format!("within noise on all {scenes} scenes"),
@@ -137,15 +160,30 @@ impl Config {
                 "'{method}' is {sides}: it takes {low:.3} to {high:.3} times as long as '{first}', median by scene"
             ))
         };
-        self.methods.iter().skip(1).filter_map(of).collect::<Vec<_>>().join("; ") + "."
+        self.methods
+            .iter()
+            .skip(1)
+            .filter_map(of)
+            .collect::<Vec<_>>()
+            .join("; ")
+            + "."
     }
 
     fn draw(&self, rows: &Rows, ratios: &[Ratio]) -> Panel {
         let mut layers = Vec::new();
         for method in self.methods.iter().skip(1) {
-            let own: Vec<_> = ratios.iter().filter(|ratio| ratio.method == method).collect();
-            let values = own.iter().map(|ratio| ratio.ratio_median).collect();
-            let spread = own.iter().map(|ratio| (ratio.ratio_low, ratio.ratio_high)).collect();
+            let own: Vec<_> = ratios
+                .iter()
+                .filter(|ratio| ratio.method == method)
+                .collect();
+            let values = own
+                .iter()
+                .map(|ratio| ratio.ratio_median)
+                .collect();
+            let spread = own
+                .iter()
+                .map(|ratio| (ratio.ratio_low, ratio.ratio_high))
+                .collect();
             layers.push(Layer::new(method, Marks::Bars { values, spread, base: 1.0 }));
             let paper = own
                 .iter()
@@ -204,7 +242,9 @@ mod tests {
 
     /// The seconds of ten repetitions, each a little different.
     fn around(seconds: f64) -> Vec<f64> {
-        (0..10).map(|index| seconds * (1.0 + 0.001 * f64::from(index))).collect()
+        (0..10)
+            .map(|index| seconds * (1.0 + 0.001 * f64::from(index)))
+            .collect()
     }
 
     #[test]
@@ -224,7 +264,13 @@ mod tests {
         let said = config.write(&rows(&timed)).unwrap().reading;
         assert!(said.contains("within noise on all 1 scenes"), "{said}");
         let alone = Config { again: vec![], ..config };
-        assert!(alone.write(&rows(&timed)).unwrap().reading.contains("faster on 1"));
+        assert!(
+            alone
+                .write(&rows(&timed))
+                .unwrap()
+                .reading
+                .contains("faster on 1")
+        );
     }
 
     #[test]

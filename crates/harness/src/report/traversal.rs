@@ -45,8 +45,10 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
                 let setting = [scene, layout, kind];
                 ranks.push(rank(setting, Metric::BoxesPerRay, &box_tests(config, rows, setting)));
                 let own = speeds_in(config, rows, setting);
-                let points: Vec<_> =
-                    own.iter().map(|speed| (speed.cost_over_base, speed.ns_per_ray)).collect();
+                let points: Vec<_> = own
+                    .iter()
+                    .map(|speed| (speed.cost_over_base, speed.ns_per_ray))
+                    .collect();
                 timed_ranks.push(rank(setting, Metric::NsPerRay, &points));
                 let mut line = points.clone();
                 line.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -81,7 +83,11 @@ fn traces<'a>(
     [scene, layout, kind]: Setting<'a>,
 ) -> impl Iterator<Item = (f64, &'a TraceRow)> {
     let own = move |row: &&TraceRow| row.scene == scene && row.layout == layout && row.rays == kind;
-    let traces = rows.traces.iter().filter(own).filter(|row| config.methods.contains(&row.method));
+    let traces = rows
+        .traces
+        .iter()
+        .filter(own)
+        .filter(|row| config.methods.contains(&row.method));
     traces.filter_map(move |row| {
         Some((Metric::CostOverBase.of_run(rows.runs_of(scene, &row.method).next()?)?, row))
     })
@@ -100,7 +106,9 @@ fn speeds_in<'a>(config: &Methods, rows: &'a Rows, setting: Setting<'a>) -> Vec<
         let (method, mrays_per_second) = (row.method.as_str(), 1e3 / ns_per_ray);
         Some(Speed { scene, method, layout, rays, cost_over_base, ns_per_ray, mrays_per_second })
     };
-    traces(config, rows, setting).filter_map(speed).collect()
+    traces(config, rows, setting)
+        .filter_map(speed)
+        .collect()
 }
 
 fn rank<'a>([scene, layout, rays]: Setting<'a>, measure: Metric, pairs: &[(f64, f64)]) -> Rank<'a> {
@@ -112,7 +120,12 @@ fn rank<'a>([scene, layout, rays]: Setting<'a>, measure: Metric, pairs: &[(f64, 
 fn reading(speeds: &[Speed], ranks: &[Rank]) -> String {
     let layouts: BTreeSet<&str> = speeds.iter().map(|row| row.layout).collect();
     let layouts = spans(layouts, speeds, |row| row.layout, |row| Some(row.mrays_per_second), 2);
-    let correlation = median(&ranks.iter().filter_map(|rank| rank.spearman).collect::<Vec<_>>());
+    let correlation = median(
+        &ranks
+            .iter()
+            .filter_map(|rank| rank.spearman)
+            .collect::<Vec<_>>(),
+    );
     let correlation = correlation.map_or_else(String::new, |median| {
         format!(" Rank correlation of cost and time per ray over trees: {median:.2} (median over scenes, layouts and \
                  rays).")

@@ -46,14 +46,19 @@ pub(super) struct Variation<'a> {
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let of = |scene| {
-            self.methods.iter().filter_map(move |method| self.variation(rows, scene, method))
+            self.methods
+                .iter()
+                .filter_map(move |method| self.variation(rows, scene, method))
         };
         let table: Vec<Variation> = rows.scenes().into_iter().flat_map(of).collect();
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("variations", &table)?;
         let caption = "Median final cost over that of the first, whiskers over all pairs of runs.";
         output.add_figure("variations", caption, 1, vec![self.draw(rows, &table)]);
-        output.paper = table.iter().filter_map(|row| self.compare(rows, row)).collect();
+        output.paper = table
+            .iter()
+            .filter_map(|row| self.compare(rows, row))
+            .collect();
         output.answer = ratios(&output.paper);
         let columns =
             "scene method runs over_first_low cost_over_first over_first_high paper_over_first";
@@ -68,8 +73,11 @@ impl Config {
         scene: &'a str,
         method: &'a str,
     ) -> Option<Variation<'a>> {
-        let costs =
-            |method: &str| rows.runs_of(scene, method).map(|run| run.cost).collect::<Vec<f64>>();
+        let costs = |method: &str| {
+            rows.runs_of(scene, method)
+                .map(|run| run.cost)
+                .collect::<Vec<f64>>()
+        };
         let (own, of_first) = (costs(method), costs(first(&self.methods)));
         let ((lowest_cost, highest_cost), (first_low, first_high)) =
             (range(own.iter().copied())?, range(of_first.iter().copied())?);
@@ -105,7 +113,9 @@ impl Config {
         let bars = |scene: &str| {
             let own = || table.iter().filter(move |row| row.scene == scene);
             let values = own().map(|row| row.cost_over_first).collect();
-            let spread = own().map(|row| (row.over_first_low, row.over_first_high)).collect();
+            let spread = own()
+                .map(|row| (row.over_first_low, row.over_first_high))
+                .collect();
             Layer::new(rows.shown(scene), Marks::Bars { values, spread, base: 1.0 })
         };
         let layers = rows.scenes().into_iter().map(bars).collect();

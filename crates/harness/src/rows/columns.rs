@@ -107,34 +107,59 @@ impl Columns {
         let settings = SchemaSettings::draft07()
             .for_serialize()
             .with(|settings| settings.inline_subschemas = true);
-        let schema = settings.into_generator().into_root_schema_for::<R>().to_value();
+        let schema = settings
+            .into_generator()
+            .into_root_schema_for::<R>()
+            .to_value();
         let text = |of: &Value, key: &str| {
-            of.get(key).and_then(Value::as_str).unwrap_or_default().replace('\n', " ")
+            of.get(key)
+                .and_then(Value::as_str)
+                .unwrap_or_default()
+                .replace('\n', " ")
         };
         let column = |name: &Value| {
             let name = name.as_str().unwrap_or_default();
             let own = text(&schema["properties"][name], "description");
-            let common = COMMON.iter().find(|(common, _)| own.is_empty() && *common == name);
+            let common = COMMON
+                .iter()
+                .find(|(common, _)| own.is_empty() && *common == name);
             let meaning = common.map_or(own, |(_, meaning)| (*meaning).to_owned());
             // The words of an enum stand alone, or each beside its description.
             let of = &schema["properties"][name];
-            let words = of["enum"].as_array().or(of["oneOf"].as_array()).into_iter().flatten();
-            let words =
-                words.map(|word| word.as_str().map_or_else(|| text(word, "const"), str::to_owned));
+            let words = of["enum"]
+                .as_array()
+                .or(of["oneOf"].as_array())
+                .into_iter()
+                .flatten();
+            let words = words.map(|word| {
+                word.as_str()
+                    .map_or_else(|| text(word, "const"), str::to_owned)
+            });
             let words: Vec<String> = words.map(|word| format!("`{word}`")).collect();
             let meaning =
                 if words.is_empty() { meaning } else { format!("{meaning} {}.", words.join(", ")) };
             (name.to_owned(), meaning)
         };
         // In a schema of what is written every field is required, in the order of the declaration.
-        let columns = schema["required"].as_array().into_iter().flatten().map(column).collect();
+        let columns = schema["required"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .map(column)
+            .collect();
         Self { about: text(&schema, "description"), columns }
     }
 
     /// Returns the names of the files that hold such rows: all that the documentation names before it says what they hold.
     pub fn files(&self) -> impl Iterator<Item = &str> {
-        let names = self.about.split([':', ';']).next().unwrap_or_default();
-        names.split('`').filter(|word| word.ends_with(".csv") && !word.contains(' '))
+        let names = self
+            .about
+            .split([':', ';'])
+            .next()
+            .unwrap_or_default();
+        names
+            .split('`')
+            .filter(|word| word.ends_with(".csv") && !word.contains(' '))
     }
 
     /// Whether a file of this name and with this header is one of these.
@@ -158,31 +183,43 @@ impl Columns {
             .iter()
             .find(|(_, meaning)| meaning.is_empty())
             .map(|(name, _)| name.as_str());
-        unsaid.or(self.files().next().is_none().then_some("the file's name"))
+        unsaid.or(self
+            .files()
+            .next()
+            .is_none()
+            .then_some("the file's name"))
     }
 }
 
 impl fmt::Display for Columns {
     /// The section of a page in Markdown.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let files: Vec<String> = self.files().map(|file| format!("`{file}`")).collect();
+        let files: Vec<String> = self
+            .files()
+            .map(|file| format!("`{file}`"))
+            .collect();
         writeln!(
             f,
             "\n## {}\n\n{}\n\n| column | meaning |\n|---|---|",
             files.join(", "),
             self.about
         )?;
-        self.columns.iter().try_for_each(|(name, meaning)| {
-            let name = if name == "x" { AXES.join("` or `") } else { name.clone() };
-            writeln!(f, "| `{name}` | {} |", meaning.replace('|', "\\|"))
-        })
+        self.columns
+            .iter()
+            .try_for_each(|(name, meaning)| {
+                let name = if name == "x" { AXES.join("` or `") } else { name.clone() };
+                writeln!(f, "| `{name}` | {} |", meaning.replace('|', "\\|"))
+            })
     }
 }
 
 /// Reads all rows of a CSV file.
 pub fn read<R: DeserializeOwned>(path: &Path) -> Result<Vec<R>, Error> {
     let mut reader = csv::Reader::from_path(path).map_err(Error::csv(path))?;
-    reader.deserialize().collect::<Result<_, _>>().map_err(Error::csv(path))
+    reader
+        .deserialize()
+        .collect::<Result<_, _>>()
+        .map_err(Error::csv(path))
 }
 
 /// The bytes of a CSV file with a header and these rows; the header alone needs at least one row.

@@ -20,7 +20,8 @@ pub fn lock_folder(folder: &Path) -> Result<File, Error> {
 /// As [`lock_folder`], but waits for another harness, which holds this lock for moments only.
 pub fn wait_for_folder(folder: &Path) -> Result<File, Error> {
     let (path, lock) = lock_file(folder)?;
-    lock.lock().map_err(Error::io(&path, "lock the file"))?;
+    lock.lock()
+        .map_err(Error::io(&path, "lock the file"))?;
     Ok(lock)
 }
 
@@ -31,7 +32,11 @@ fn lock_file(folder: &Path) -> Result<(PathBuf, File), Error> {
         let source = io::Error::other("it is not a regular file; remove it");
         return Err(Error::Io { path, action: "create the file", source });
     }
-    let lock = File::options().write(true).create(true).truncate(false).open(&path);
+    let lock = File::options()
+        .write(true)
+        .create(true)
+        .truncate(false)
+        .open(&path);
     let lock = lock.map_err(Error::io(&path, "create the file"))?;
     Ok((path, lock))
 }

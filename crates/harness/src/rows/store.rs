@@ -27,7 +27,8 @@ impl FinishedRun {
     /// Adds rows of one kind, once per kind; none leave no file.
     pub fn add<R: Row>(&mut self, rows: &[R]) -> Result<(), Error> {
         if !rows.is_empty() {
-            self.files.insert(R::FILE.into(), to_bytes(rows, Path::new(R::FILE))?);
+            self.files
+                .insert(R::FILE.into(), to_bytes(rows, Path::new(R::FILE))?);
         }
         Ok(())
     }
@@ -37,7 +38,10 @@ impl FinishedRun {
         let damaged = |file: &str| Error::Damaged { part: part.to_owned(), file: file.to_owned() };
         let contents = fs::read_to_string(part.join(CONTENTS)).map_err(|_| damaged(CONTENTS))?;
         let mut files = BTreeMap::new();
-        for name in files::names(part)?.into_iter().filter(|name| name != CONTENTS) {
+        for name in files::names(part)?
+            .into_iter()
+            .filter(|name| name != CONTENTS)
+        {
             let path = part.join(&name);
             files.insert(name, fs::read(&path).map_err(Error::io(&path, "read the file"))?);
         }
@@ -63,7 +67,11 @@ impl FinishedRun {
 
     /// The first file, other than those with seconds, in which two runs differ.
     pub fn difference<'a>(&'a self, other: &'a Self) -> Option<&'a str> {
-        let names = self.files.keys().chain(other.files.keys()).map(String::as_str);
+        let names = self
+            .files
+            .keys()
+            .chain(other.files.keys())
+            .map(String::as_str);
         names
             .filter(|name| !name.starts_with("timing"))
             .find(|&name| self.files.get(name) != other.files.get(name))
@@ -177,16 +185,24 @@ impl Store {
             .map(|index| self.part(index))
             .map(|part| Ok((part.clone(), files::names(&part)?)))
             .collect::<Result<_, Error>>()?;
-        let names: BTreeSet<&String> = parts.iter().flat_map(|(_, names)| names).collect();
+        let names: BTreeSet<&String> = parts
+            .iter()
+            .flat_map(|(_, names)| names)
+            .collect();
         let names = names.into_iter().filter(|name| *name != CONTENTS);
         for name in names {
             let mut joined = Vec::new();
-            for (part, _) in parts.iter().filter(|(_, names)| names.contains(name)) {
+            for (part, _) in parts
+                .iter()
+                .filter(|(_, names)| names.contains(name))
+            {
                 let path = part.join(name);
                 let bytes = fs::read(&path).map_err(Error::io(&path, "read the file"))?;
                 // Every part begins with the same header line.
-                let header =
-                    bytes.iter().position(|&byte| byte == b'\n').map_or(bytes.len(), |end| end + 1);
+                let header = bytes
+                    .iter()
+                    .position(|&byte| byte == b'\n')
+                    .map_or(bytes.len(), |end| end + 1);
                 joined.extend_from_slice(if joined.is_empty() { &bytes } else { &bytes[header..] });
             }
             files::write(&self.folder.join(name), &joined)?;
@@ -259,11 +275,24 @@ mod tests {
     fn finished_runs_are_resumed_by_the_same_spec_only_and_discarded_only_if_asked() {
         let out = tempfile::tempdir().unwrap();
         let open = |resolved, existing| Store::open(&out.path().join("x"), resolved, existing);
-        open("a", Existing::Keep).unwrap().keep(0, &run()).unwrap();
+        open("a", Existing::Keep)
+            .unwrap()
+            .keep(0, &run())
+            .unwrap();
         assert!(matches!(open("b", Existing::Resume), Err(Error::Usage(_))));
         assert!(matches!(open("a", Existing::Keep), Err(Error::Usage(_))));
-        assert!(open("a", Existing::Resume).unwrap().has(0).unwrap());
-        assert!(!open("a", Existing::Replace).unwrap().has(0).unwrap());
+        assert!(
+            open("a", Existing::Resume)
+                .unwrap()
+                .has(0)
+                .unwrap()
+        );
+        assert!(
+            !open("a", Existing::Replace)
+                .unwrap()
+                .has(0)
+                .unwrap()
+        );
     }
 
     #[test]
@@ -295,8 +324,9 @@ mod tests {
     fn a_file_where_the_folder_should_be_is_named() {
         let out = tempfile::tempdir().unwrap();
         fs::write(out.path().join("x"), "").unwrap();
-        let message =
-            Store::open(&out.path().join("x"), "", Existing::Keep).unwrap_err().to_string();
+        let message = Store::open(&out.path().join("x"), "", Existing::Keep)
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("cannot create the folder"), "{message}");
     }
 }

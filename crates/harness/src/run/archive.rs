@@ -23,7 +23,9 @@ pub fn rows(results: &Path) -> Result<Vec<TreeRow>, Error> {
 
 /// Where the archive keeps the tree of a scene.
 pub fn path(results: &Path, scene: &str) -> PathBuf {
-    results.join(FOLDER).join(format!("{}.bvh", scene.replace(':', "-")))
+    results
+        .join(FOLDER)
+        .join(format!("{}.bvh", scene.replace(':', "-")))
 }
 
 /// Keeps the tree `file` of a scene, which the `command` has made, and records its cost there and among the best known ones. Refuses
@@ -40,8 +42,9 @@ pub fn keep(results: &Path, scene: &Scene, file: &Path, command: &str) -> Result
     let internal_area = cost::internal_area(&tree);
     let _lock = wait_for_folder(results)?;
     let known = best_known(results, scene)?;
-    if let Some(known) =
-        known.as_ref().filter(|known| internal_area > known.cost * (1.0 + ROUNDING))
+    if let Some(known) = known
+        .as_ref()
+        .filter(|known| internal_area > known.cost * (1.0 + ROUNDING))
     {
         return refused(format!(
             "its cost is {internal_area}, and the best known is {}",
@@ -49,9 +52,14 @@ pub fn keep(results: &Path, scene: &Scene, file: &Path, command: &str) -> Result
         ));
     }
     let mut rows = rows(results)?;
-    let (row_checksum, old) =
-        (checksum(scene), rows.iter().position(|row| row.scene == scene.name));
-    if let Some(old) = old.map(|at| rows.remove(at)).filter(|old| old.checksum == row_checksum)
+    let (row_checksum, old) = (
+        checksum(scene),
+        rows.iter()
+            .position(|row| row.scene == scene.name),
+    );
+    if let Some(old) = old
+        .map(|at| rows.remove(at))
+        .filter(|old| old.checksum == row_checksum)
         && internal_area >= old.internal_area * (1.0 - ROUNDING)
     {
         return refused(format!(

@@ -72,7 +72,11 @@ fn compare_specs(
         let mut table: Table = toml::from_str(&read_text(&path)?).map_err(Error::toml(&path))?;
         if let Some(Value::Array(scenes)) = table.get_mut("scenes") {
             let name = |scene: &Value| {
-                scene.get("name").and_then(Value::as_str).unwrap_or_default().to_owned()
+                scene
+                    .get("name")
+                    .and_then(Value::as_str)
+                    .unwrap_or_default()
+                    .to_owned()
             };
             scenes.retain(|scene| !left_out.contains(&name(scene)));
         }
@@ -119,7 +123,10 @@ fn shortened(file: &str, mut differences: Vec<String>) -> Vec<String> {
     if more > 0 {
         differences.push(format!("and {more} more"));
     }
-    differences.into_iter().map(|difference| format!("{file}: {difference}")).collect()
+    differences
+        .into_iter()
+        .map(|difference| format!("{file}: {difference}"))
+        .collect()
 }
 
 /// The files of a folder whose names end so, without those that hold seconds, as their names say.
@@ -145,9 +152,11 @@ fn compare_files(
         .zip(&committed)
         .flat_map(|(fresh, committed)| {
             let columns = header.iter().zip(fresh.iter().zip(committed));
-            columns.filter(|(_, (now, then))| now != then).map(|(column, (now, then))| {
-                format!("{}: {column} is {now}, committed {then}", identity(&header, committed))
-            })
+            columns
+                .filter(|(_, (now, then))| now != then)
+                .map(|(column, (now, then))| {
+                    format!("{}: {column} is {now}, committed {then}", identity(&header, committed))
+                })
         })
         .collect();
     if fresh.len() != committed.len() {
@@ -159,21 +168,41 @@ fn compare_files(
 /// What a row is about: its scene, method and so on.
 fn identity(header: &StringRecord, row: &StringRecord) -> String {
     let keys = ["scene", "method", "column", "quantity", "repetition", "trials", "evaluations"];
-    let values = header.iter().zip(row).filter(|(column, _)| keys.contains(column));
-    values.map(|(column, value)| format!("{column} {value}")).collect::<Vec<_>>().join(", ")
+    let values = header
+        .iter()
+        .zip(row)
+        .filter(|(column, _)| keys.contains(column));
+    values
+        .map(|(column, value)| format!("{column} {value}"))
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 fn read(path: &Path, left_out: &[String]) -> Result<(StringRecord, Vec<StringRecord>), Error> {
-    let mut reader =
-        csv::ReaderBuilder::new().flexible(true).from_path(path).map_err(Error::csv(path))?;
-    let header = reader.headers().map_err(Error::csv(path))?.clone();
+    let mut reader = csv::ReaderBuilder::new()
+        .flexible(true)
+        .from_path(path)
+        .map_err(Error::csv(path))?;
+    let header = reader
+        .headers()
+        .map_err(Error::csv(path))?
+        .clone();
     let scene = header.iter().position(|column| column == "scene");
-    let rows: Vec<StringRecord> =
-        reader.records().collect::<Result<_, _>>().map_err(Error::csv(path))?;
+    let rows: Vec<StringRecord> = reader
+        .records()
+        .collect::<Result<_, _>>()
+        .map_err(Error::csv(path))?;
     let is_left_out = |row: &StringRecord| {
-        scene.and_then(|at| row.get(at)).is_some_and(|name| left_out.iter().any(|out| out == name))
+        scene
+            .and_then(|at| row.get(at))
+            .is_some_and(|name| left_out.iter().any(|out| out == name))
     };
-    Ok((header, rows.into_iter().filter(|row| !is_left_out(row)).collect()))
+    Ok((
+        header,
+        rows.into_iter()
+            .filter(|row| !is_left_out(row))
+            .collect(),
+    ))
 }
 
 #[cfg(test)]

@@ -38,7 +38,10 @@ fn cost_peers(program: &Path, scenes: &[Scene], store: &Store) -> Result<String,
             collapsed_sah: collapsed_sah(&tree),
         })
     };
-    let rows = scenes.iter().map(row).collect::<Result<Vec<_>, Error>>()?;
+    let rows = scenes
+        .iter()
+        .map(row)
+        .collect::<Result<Vec<_>, Error>>()?;
     store.write_rows(&rows)?;
     Ok(String::new())
 }

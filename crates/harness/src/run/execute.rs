@@ -43,13 +43,17 @@ pub fn execute(
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
     let measurements = measurements(experiment);
-    let whole_only = measurements.iter().find_map(|measurement| measurement.whole_only());
+    let whole_only = measurements
+        .iter()
+        .find_map(|measurement| measurement.whole_only());
     if let Some(why) = whole_only.filter(|_| extent.shard.is_some()) {
         return Err(Error::Usage(format!("{}: {why}", experiment.name)));
     }
     let run = || run(experiment, &measurements, out, extent, interrupted);
     let Some(threads) = experiment.threads else { return run() };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.into())
+        .build();
     let pool = pool.map_err(|error| Error::Usage(format!("threads = {threads}: {error}")))?;
     pool.install(run)
 }
@@ -92,7 +96,10 @@ fn run(
     let is_own = |index: &usize| shard.is_none_or(|shard| shard.has(*index));
     let own: Vec<usize> = (0..jobs.len()).filter(is_own).collect();
     let runs = own.len();
-    let mut remarks: Vec<String> = scenes.iter().filter_map(|scene| scene.remark.clone()).collect();
+    let mut remarks: Vec<String> = scenes
+        .iter()
+        .filter_map(|scene| scene.remark.clone())
+        .collect();
     remarks.dedup();
     let mut work = Work {
         experiment,

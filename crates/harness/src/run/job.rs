@@ -23,23 +23,36 @@ pub(crate) struct Job<'a> {
 impl<'a> Job<'a> {
     /// All runs of an experiment, scene by scene, in the order of the spec.
     pub fn all(experiment: &'a Experiment, scenes: &'a [Scene]) -> Result<Vec<Self>, Error> {
-        let bases = scenes.par_iter().map(|scene| base_cost(scene, &experiment.objective));
+        let bases = scenes
+            .par_iter()
+            .map(|scene| base_cost(scene, &experiment.objective));
         let bases = bases.collect::<Result<Vec<_>, _>>()?;
         let of_scene = |(scene, base): (&'a Scene, f64)| {
-            experiment.runs().map(move |(labelled, repetition, first_of_scene)| Self {
-                scene,
-                base,
-                labelled,
-                repetition,
-                first_of_scene,
-            })
+            experiment
+                .runs()
+                .map(move |(labelled, repetition, first_of_scene)| Self {
+                    scene,
+                    base,
+                    labelled,
+                    repetition,
+                    first_of_scene,
+                })
         };
-        Ok(scenes.iter().zip(bases).flat_map(of_scene).collect())
+        Ok(scenes
+            .iter()
+            .zip(bases)
+            .flat_map(of_scene)
+            .collect())
     }
 
     /// The seed of the run.
     pub fn seed(&self, experiment: &Experiment) -> u64 {
-        let seeds = self.labelled.own.seed_as.as_ref().unwrap_or(&self.labelled.label);
+        let seeds = self
+            .labelled
+            .own
+            .seed_as
+            .as_ref()
+            .unwrap_or(&self.labelled.label);
         experiment.seed_of(&self.scene.name, seeds, self.repetition)
     }
 
@@ -52,12 +65,17 @@ impl<'a> Job<'a> {
         let seed =
             experiment.seed_of(&self.scene.name, "rays that trees are trained on", self.repetition);
         let failed = |message| Error::Tracing { scene: self.scene.name.clone(), message };
-        config.density(trained, self.scene, seed).map(Some).map_err(failed)
+        config
+            .density(trained, self.scene, seed)
+            .map(Some)
+            .map_err(failed)
     }
 
     /// How often those rays enter the nodes of the run's tree, which decides how it is laid out.
     pub fn visits(&self, experiment: &Experiment, tree: &Bvh) -> Result<Option<Vec<f32>>, Error> {
-        Ok(self.density(experiment)?.map(|density| density.visits(tree)))
+        Ok(self
+            .density(experiment)?
+            .map(|density| density.visits(tree)))
     }
 }
 

@@ -44,7 +44,12 @@ pub(crate) struct Work<'a> {
 impl Work<'_> {
     /// Rebuilds those of the wanted trees that are missing, because their runs were kept from an interrupted experiment.
     pub fn complete_trees(&mut self, wanted: impl Fn(&Job) -> bool) -> Result<(), Error> {
-        for (index, job) in self.jobs.iter().enumerate().filter(|(_, job)| wanted(job)) {
+        for (index, job) in self
+            .jobs
+            .iter()
+            .enumerate()
+            .filter(|(_, job)| wanted(job))
+        {
             if let Entry::Vacant(missing) = self.trees.entry(index) {
                 let performed = perform(self.experiment, job, &self.watch)?;
                 let (_, tree) = performed.ok_or(all_finished(self.jobs))?;

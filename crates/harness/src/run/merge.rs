@@ -47,15 +47,24 @@ pub fn merge(
             experiments.entry(name).or_default().push(part);
         }
     }
-    experiments.iter().map(|(name, parts)| join(name, parts, out, existing)).collect()
+    experiments
+        .iter()
+        .map(|(name, parts)| join(name, parts, out, existing))
+        .collect()
 }
 
 /// The parts in one `--out`, of whole experiments and of quick ones, by the names of their folders in it.
 fn parts(out: &Path) -> Result<Vec<(PathBuf, Part)>, Error> {
     let quick = out.join("quick");
     let mut parts = Vec::new();
-    for folder in [Some(out), quick.is_dir().then_some(quick.as_path())].into_iter().flatten() {
-        for path in files::names(folder)?.into_iter().map(|name| folder.join(name)) {
+    for folder in [Some(out), quick.is_dir().then_some(quick.as_path())]
+        .into_iter()
+        .flatten()
+    {
+        for path in files::names(folder)?
+            .into_iter()
+            .map(|name| folder.join(name))
+        {
             let partial = path.join(".partial");
             let spec = partial.join("resolved.toml");
             if spec.is_file() {
@@ -79,8 +88,15 @@ fn join(
     existing: Existing,
 ) -> Result<(String, PathBuf), Error> {
     let fail = |message| Error::Merge { experiment: name.display().to_string(), message };
-    let own = out.join(name).join(".partial").canonicalize().ok();
-    if parts.iter().any(|part| own.is_some() && part.partial.canonicalize().ok() == own) {
+    let own = out
+        .join(name)
+        .join(".partial")
+        .canonicalize()
+        .ok();
+    if parts
+        .iter()
+        .any(|part| own.is_some() && part.partial.canonicalize().ok() == own)
+    {
         return Err(Error::Usage(format!(
             "--out {} is also one of the parts; choose another",
             out.display()
@@ -97,7 +113,9 @@ fn join(
     for part in parts {
         let path = part.partial.join("provenance.toml");
         if let Ok(text) = fs::read_to_string(&path) {
-            provenance.parts.push(toml::from_str(&text).map_err(Error::toml(&path))?);
+            provenance
+                .parts
+                .push(toml::from_str(&text).map_err(Error::toml(&path))?);
         }
     }
     let best_known = if beside.is_some() { BestKnown::Read(out) } else { BestKnown::Improve(out) };
@@ -107,7 +125,10 @@ fn join(
 /// What all parts were made of. Somebody may have edited it, so it is checked as far as the merging relies on it.
 fn common_spec(name: &Path, parts: &[Part]) -> Result<Resolved, String> {
     let (first, others) = parts.split_first().ok_or("no parts")?;
-    if let Some(other) = others.iter().find(|part| part.resolved != first.resolved) {
+    if let Some(other) = others
+        .iter()
+        .find(|part| part.resolved != first.resolved)
+    {
         let (first, other) = (first.partial.display(), other.partial.display());
         return Err(format!("{first} and {other} are parts of different specs, scenes or seeds"));
     }
@@ -117,7 +138,10 @@ fn common_spec(name: &Path, parts: &[Part]) -> Result<Resolved, String> {
     if resolved.experiment.folder() != name {
         return Err(bad(format!("name is {:?}; accepted: the folder's", resolved.experiment.name)));
     }
-    resolved.experiment.check_run_count().map_err(|error| bad(error.to_string()))?;
+    resolved
+        .experiment
+        .check_run_count()
+        .map_err(|error| bad(error.to_string()))?;
     Ok(resolved)
 }
 
@@ -135,7 +159,9 @@ fn owners(
     };
     let (mut owners, mut missing) = (Vec::new(), Vec::new());
     for index in 0..resolved.run_count() {
-        let kept = parts.iter().map(|part| part.partial.join(store::part_name(index)));
+        let kept = parts
+            .iter()
+            .map(|part| part.partial.join(store::part_name(index)));
         let kept: Vec<PathBuf> = kept.filter(|kept| kept.is_dir()).collect();
         let Some((owner, others)) = kept.split_first() else {
             missing.push(index);
@@ -156,7 +182,12 @@ fn owners(
     if missing.is_empty() {
         return Ok(owners);
     }
-    let first: Vec<String> = missing.iter().take(NAMED).copied().map(named).collect();
+    let first: Vec<String> = missing
+        .iter()
+        .take(NAMED)
+        .copied()
+        .map(named)
+        .collect();
     let more = if missing.len() > NAMED { "; and more" } else { "" };
     let (count, all) = (missing.len(), resolved.run_count());
     Err(fail(format!("{count} of {all} runs are missing: {}{more}", first.join("; "))))

@@ -47,7 +47,9 @@ pub(crate) fn perform(
     }
     let Job { scene, labelled, .. } = *job;
     let seed = job.seed(experiment);
-    let limit = experiment.max_seconds_of(labelled).map(Duration::from_secs_f64);
+    let limit = experiment
+        .max_seconds_of(labelled)
+        .map(Duration::from_secs_f64);
     let stopwatch = Stopwatch {
         watch,
         start: Instant::now(),
@@ -105,12 +107,21 @@ fn solve_or_build(
         Contestant::Ours(method) => {
             let ray_seed = experiment.seed_of(&scene.name, "rays of the judge", job.repetition);
             let judge =
-                labelled.own.judge.as_ref().map(|rays| RayJudge { rays, scene, seed: ray_seed });
+                labelled
+                    .own
+                    .judge
+                    .as_ref()
+                    .map(|rays| RayJudge { rays, scene, seed: ray_seed });
             let density = job.density(experiment)?;
             let problem = Problem {
-                objective: labelled.own.objective.unwrap_or(experiment.objective),
+                objective: labelled
+                    .own
+                    .objective
+                    .unwrap_or(experiment.objective),
                 splits: splits(labelled, scene),
-                measure: density.as_ref().map(|density| density as &dyn Measure),
+                measure: density
+                    .as_ref()
+                    .map(|density| density as &dyn Measure),
                 judge: judge.as_ref().map(|judge| judge as &dyn Judge),
                 disabled: &labelled.own.keep,
                 ..Problem::new(&scene.boxes)
@@ -186,12 +197,18 @@ struct Stopwatch<'a> {
 
 impl Stopwatch<'_> {
     fn note(&self, seconds: f64) {
-        self.events.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(seconds);
+        self.events
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner)
+            .push(seconds);
     }
 
     /// When each event so far happened, in seconds since the start.
     fn seconds(&self) -> Vec<f64> {
-        self.events.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
+        self.events
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner)
+            .clone()
     }
 }
 
@@ -202,7 +219,10 @@ impl Observer for Stopwatch<'_> {
     }
 
     fn cancelled(&self) -> bool {
-        self.watch.cancelled() || self.deadline.is_some_and(|deadline| deadline.has_passed())
+        self.watch.cancelled()
+            || self
+                .deadline
+                .is_some_and(|deadline| deadline.has_passed())
     }
 
     fn progress(&self) -> Option<f64> {

@@ -36,14 +36,20 @@ fn judge(config: &Config, work: &Work) -> Result<(), Error> {
     let Work { experiment, jobs, trees, store, watch, .. } = work;
     let (mut rows, mut times, mut sizes) = (Vec::new(), Vec::new(), Vec::new());
     let (mut visits, mut of_runs) = (Vec::new(), Vec::new());
-    let runs: Vec<(&Job, &Bvh)> = trees.iter().map(|(&index, tree)| (&jobs[index], tree)).collect();
+    let runs: Vec<(&Job, &Bvh)> = trees
+        .iter()
+        .map(|(&index, tree)| (&jobs[index], tree))
+        .collect();
     for of_scene in runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
         let scene = of_scene[0].0.scene;
-        let layouts = of_scene.par_iter().map(|(job, tree)| layout(experiment, job, tree));
+        let layouts = of_scene
+            .par_iter()
+            .map(|(job, tree)| layout(experiment, job, tree));
         let layouts = layouts.collect::<Result<Vec<WideBvh>, Error>>()?;
         // By method, with all repetitions.
-        let methods: Vec<usize> =
-            (0..of_scene.len()).step_by(experiment.repetitions as usize).collect();
+        let methods: Vec<usize> = (0..of_scene.len())
+            .step_by(experiment.repetitions as usize)
+            .collect();
         let first: Vec<&WideBvh> = methods.iter().map(|&at| &layouts[at]).collect();
         for &at in &methods {
             let range = at..at + experiment.repetitions as usize;
@@ -57,7 +63,10 @@ fn judge(config: &Config, work: &Work) -> Result<(), Error> {
             if watch.cancelled() {
                 return Err(work.interrupted());
             }
-            let tests: Vec<[f64; 2]> = layouts.par_iter().map(|wide| rays.tests(wide)).collect();
+            let tests: Vec<[f64; 2]> = layouts
+                .par_iter()
+                .map(|wide| rays.tests(wide))
+                .collect();
             let of_run = |((job, _), tests): (&(&Job, &Bvh), &[f64; 2])| RunTestRow {
                 scene: scene.name.clone(),
                 method: job.labelled.label.clone(),
@@ -140,7 +149,10 @@ fn costs(
 /// The layout of a run's tree: for the rays that it was trained on, else for random lines.
 fn layout(experiment: &Experiment, job: &Job, tree: &Bvh) -> Result<WideBvh, Error> {
     let failed = |message| Error::Tracing { scene: job.scene.name.clone(), message };
-    let triangles = job.scene.triangles().map_err(|error| failed(error.to_string()))?;
+    let triangles = job
+        .scene
+        .triangles()
+        .map_err(|error| failed(error.to_string()))?;
     let visits = job.visits(experiment, tree)?;
     widened(tree, triangles, visits.as_deref()).map_err(|error| failed(error.to_string()))
 }
@@ -168,6 +180,9 @@ fn size(runs: &[(&Job, &Bvh)], layouts: &[WideBvh]) -> LayoutRow {
 fn mean(tests: &[[f64; 2]], of: impl Fn(&[f64; 2]) -> f64) -> (f64, Option<f64>) {
     let n = tests.len() as f64;
     let mean = tests.iter().map(&of).sum::<f64>() / n;
-    let squares: f64 = tests.iter().map(|tests| (of(tests) - mean).powi(2)).sum();
+    let squares: f64 = tests
+        .iter()
+        .map(|tests| (of(tests) - mean).powi(2))
+        .sum();
     (mean, (tests.len() > 1).then(|| (squares / (n - 1.0) / n).sqrt()))
 }

@@ -58,8 +58,10 @@ pub(crate) fn update(
         let small = experiment.needs_optimum(scene.objects);
         // The optima of the hundreds of small scenes of experiments on optimality would be no news.
         if scene.objects > exact::MOST_OBJECTS || small {
-            let bound =
-                bounds.iter().find(|row| row.scene == scene.name).map(|row| row.lower_bound);
+            let bound = bounds
+                .iter()
+                .find(|row| row.scene == scene.name)
+                .map(|row| row.lower_bound);
             let own = runs
                 .iter()
                 .filter(|run| run.scene == scene.name && run.nodes + 1 == 2 * run.objects);
@@ -68,12 +70,21 @@ pub(crate) fn update(
             }
         }
         let key = (scene.name.as_str(), scene.objects, scene.checksum.as_str(), objective.as_str());
-        references.extend(known.iter().find(|row| key_of(row) == key).cloned());
+        references.extend(
+            known
+                .iter()
+                .find(|row| key_of(row) == key)
+                .cloned(),
+        );
     }
     if matches!(best_known, BestKnown::Improve(_)) {
         write_all_known(out, known, &before)?;
     }
-    if experiment.reports.iter().any(Report::needs_references) {
+    if experiment
+        .reports
+        .iter()
+        .any(Report::needs_references)
+    {
         store.write_rows(&references)?;
     }
     Ok(())
@@ -139,7 +150,9 @@ pub fn adopt(folder: &Path, out: &Path) -> Result<(), Error> {
 pub fn best_known(results: &Path, scene: &Scene) -> Result<Option<ReferenceRow>, Error> {
     let (checksum, objective) = (checksum(scene), name(&Objective::InternalArea));
     let key = (scene.name.as_str(), scene.boxes.len(), checksum.as_str(), objective.as_str());
-    Ok(all_known(results)?.into_iter().find(|row| key_of(row) == key))
+    Ok(all_known(results)?
+        .into_iter()
+        .find(|row| key_of(row) == key))
 }
 
 /// What a reference is of: scene, number of its objects, checksum of its boxes, and objective.
@@ -175,31 +188,41 @@ fn finds(
         ),
         (objective.to_owned(), run.cost, None),
     ];
-    costs.into_iter().map(|(objective, cost, lower_bound)| ReferenceRow {
-        scene: scene.name.clone(),
-        objects: scene.objects,
-        checksum: scene.checksum.clone(),
-        objective,
-        cost,
-        method: run.method.clone(),
-        seed: run.seed,
-        revision: String::new(),
-        lower_bound: lower_bound.filter(|bound| bound.is_finite()),
-    })
+    costs
+        .into_iter()
+        .map(|(objective, cost, lower_bound)| ReferenceRow {
+            scene: scene.name.clone(),
+            objects: scene.objects,
+            checksum: scene.checksum.clone(),
+            objective,
+            cost,
+            method: run.method.clone(),
+            seed: run.seed,
+            revision: String::new(),
+            lower_bound: lower_bound.filter(|bound| bound.is_finite()),
+        })
 }
 
 /// Adds a row to the known ones, or keeps the better of it and the known row of the same key. The bound of an `optimum`
 /// is the cost, whether or not a run has found it.
 fn offer(known: &mut Vec<ReferenceRow>, mut found: ReferenceRow, optimum: bool) {
-    if let Some(least) =
-        found.lower_bound.filter(|&bound| optimum && bound < found.cost * (1.0 - ROUNDING))
+    if let Some(least) = found
+        .lower_bound
+        .filter(|&bound| optimum && bound < found.cost * (1.0 - ROUNDING))
     {
         (found.cost, found.method, found.seed) = (least, "exact".into(), 0);
     }
-    let Some(old) = known.iter_mut().find(|row| key_of(row) == key_of(&found)) else {
+    let Some(old) = known
+        .iter_mut()
+        .find(|row| key_of(row) == key_of(&found))
+    else {
         return known.push(found);
     };
-    let lower_bound = old.lower_bound.into_iter().chain(found.lower_bound).reduce(f64::max);
+    let lower_bound = old
+        .lower_bound
+        .into_iter()
+        .chain(found.lower_bound)
+        .reduce(f64::max);
     if found.cost < old.cost * (1.0 - ROUNDING) {
         *old = found;
     }
@@ -240,7 +263,13 @@ mod tests {
         let mut known = vec![row("a", 1.0, None)];
         offer(&mut known, ReferenceRow { checksum: "1".into(), ..row("a", 9.0, None) }, false);
         offer(&mut known, ReferenceRow { objects: 99, ..row("a", 8.0, None) }, false);
-        assert_eq!(known.iter().map(|row| row.cost).collect::<Vec<_>>(), [1.0, 9.0, 8.0]);
+        assert_eq!(
+            known
+                .iter()
+                .map(|row| row.cost)
+                .collect::<Vec<_>>(),
+            [1.0, 9.0, 8.0]
+        );
     }
 
     #[test]

@@ -50,8 +50,14 @@ impl Resolved {
     pub fn repeats(&self, found: &Self) -> bool {
         let optional = |name: &String| self.experiment.optional_scenes.contains(name);
         found.has_runs_of(&self.experiment)
-            && self.scenes.iter().all(|scene| found.scenes.contains(scene))
-            && found.scenes.iter().all(|scene| self.scenes.contains(scene) || optional(&scene.name))
+            && self
+                .scenes
+                .iter()
+                .all(|scene| found.scenes.contains(scene))
+            && found
+                .scenes
+                .iter()
+                .all(|scene| self.scenes.contains(scene) || optional(&scene.name))
     }
 
     /// Number of runs over all scenes.
@@ -66,10 +72,14 @@ pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>),
     if experiment.suite.is_some() {
         return Ok(Default::default());
     }
-    let names = experiment.scenes.iter().flat_map(|name| subset::expand(name));
+    let names = experiment
+        .scenes
+        .iter()
+        .flat_map(|name| subset::expand(name));
     let outside = OutsideFiles::from(experiment.outside_files);
-    let mut scenes =
-        names.map(|name| Scene::load_with(&name, outside)).collect::<Result<Vec<_>, _>>()?;
+    let mut scenes = names
+        .map(|name| Scene::load_with(&name, outside))
+        .collect::<Result<Vec<_>, _>>()?;
     let mut left_out = Vec::new();
     for name in &experiment.optional_scenes {
         match Scene::load_with(name, outside) {
@@ -78,7 +88,10 @@ pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>),
         }
     }
     let mut names = HashSet::new();
-    match scenes.iter().find(|scene| !names.insert(&scene.name)) {
+    match scenes
+        .iter()
+        .find(|scene| !names.insert(&scene.name))
+    {
         Some(twice) => {
             Err(Error::Usage(format!("two scenes are called {}; name each once", twice.name)))
         }

@@ -32,7 +32,10 @@ impl Measurement for Runs {
         match progress.finished.into_inner() {
             finished if finished < runs => Err(Error::Interrupted { finished, runs }),
             _ => {
-                work.trees = progress.trees.into_inner().unwrap_or_else(PoisonError::into_inner);
+                work.trees = progress
+                    .trees
+                    .into_inner()
+                    .unwrap_or_else(PoisonError::into_inner);
                 Ok(String::new())
             }
         }
@@ -46,7 +49,9 @@ fn todo(work: &mut Work) -> Result<Vec<usize>, Error> {
         match work.store.has(index) {
             Ok(true) => continue,
             Ok(false) => {}
-            Err(damaged) => work.remarks.push(format!("done again: {damaged}")),
+            Err(damaged) => work
+                .remarks
+                .push(format!("done again: {damaged}")),
         }
         todo.push(index);
     }
@@ -70,7 +75,9 @@ struct Progress {
 
 impl Progress {
     fn new(work: &Work, finished: usize) -> Self {
-        work.watch.bar.set_message(work.experiment.name.to_string());
+        work.watch
+            .bar
+            .set_message(work.experiment.name.to_string());
         work.watch.bar.set_position(finished as u64);
         work.watch.bar.reset_eta();
         Self {
@@ -90,7 +97,10 @@ impl Progress {
         let Some((run, tree)) = perform(experiment, job, &work.watch)? else { return Ok(()) };
         work.store.keep(index, &run)?;
         if experiment.judges().is_some() || experiment.tracing.is_some() && job.repetition == 0 {
-            self.trees.lock().unwrap_or_else(PoisonError::into_inner).insert(index, tree);
+            self.trees
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .insert(index, tree);
         }
         let finished = self.finished.fetch_add(1, Relaxed) + 1;
         work.watch.bar.inc(1);
@@ -100,7 +110,10 @@ impl Progress {
 
     /// Prints the line about a finished run, if one is due.
     fn say(&self, work: &Work, job: &Job, finished: usize, took: Duration) {
-        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut last = self
+            .last
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         let Work { experiment, said, .. } = *work;
         let bar: &ProgressBar = &work.watch.bar;
         let due = match said {

@@ -44,9 +44,17 @@ mod tests {
     #[test]
     fn every_run_belongs_to_one_part() {
         for of in 1..=7 {
-            let parts: Vec<Shard> = (1..=of).map(|number| Shard { number, of }).collect();
+            let parts: Vec<Shard> = (1..=of)
+                .map(|number| Shard { number, of })
+                .collect();
             for index in 0..30 {
-                assert_eq!(parts.iter().filter(|part| part.has(index)).count(), 1);
+                assert_eq!(
+                    parts
+                        .iter()
+                        .filter(|part| part.has(index))
+                        .count(),
+                    1
+                );
             }
         }
     }
@@ -55,7 +63,13 @@ mod tests {
     fn parts_are_written_as_they_are_read_and_wrong_ones_are_refused() {
         assert_eq!("2/8".parse::<Shard>().unwrap().to_string(), "2/8");
         for wrong in ["0/3", "4/3", "1/0", "1", "a/b", "-1/2", ""] {
-            assert!(wrong.parse::<Shard>().unwrap_err().contains("I/N"), "{wrong}");
+            assert!(
+                wrong
+                    .parse::<Shard>()
+                    .unwrap_err()
+                    .contains("I/N"),
+                "{wrong}"
+            );
         }
     }
 }

@@ -98,14 +98,23 @@ impl Solved<'_> {
 
     /// When each event happened, if a report asks for it; `event_seconds` are these times.
     pub fn clock_rows(&self, event_seconds: Vec<f64>) -> Vec<ClockRow> {
-        if !self.experiment.reports.iter().any(Report::needs_clock) {
+        if !self
+            .experiment
+            .reports
+            .iter()
+            .any(Report::needs_clock)
+        {
             return vec![];
         }
         let row = |(event, seconds)| {
             let (scene, method, repetition) = self.identity();
             ClockRow { scene, method, repetition, event, seconds }
         };
-        event_seconds.into_iter().enumerate().map(row).collect()
+        event_seconds
+            .into_iter()
+            .enumerate()
+            .map(row)
+            .collect()
     }
 
     pub fn ray_rows(&self) -> Vec<RayRow> {

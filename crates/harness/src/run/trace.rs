@@ -44,8 +44,12 @@ fn trace(config: &speed::Config, work: &Work) -> Result<String, Error> {
         }
     }
     let mut traced = Vec::new();
-    let first_runs = trees.iter().map(|(&index, tree)| (&jobs[index], tree));
-    let first_runs: Vec<(&Job, &Bvh)> = first_runs.filter(|(job, _)| job.repetition == 0).collect();
+    let first_runs = trees
+        .iter()
+        .map(|(&index, tree)| (&jobs[index], tree));
+    let first_runs: Vec<(&Job, &Bvh)> = first_runs
+        .filter(|(job, _)| job.repetition == 0)
+        .collect();
     for of_scene in first_runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
         let scene = of_scene[0].0.scene;
         let failed = |message| Error::Tracing { scene: scene.name.clone(), message };
@@ -65,8 +69,10 @@ fn trace(config: &speed::Config, work: &Work) -> Result<String, Error> {
                 }
             };
             let made = made.map_err(failed)?;
-            contenders
-                .extend(made.into_iter().map(|contender| (job.labelled.label.clone(), contender)));
+            contenders.extend(
+                made.into_iter()
+                    .map(|contender| (job.labelled.label.clone(), contender)),
+            );
         }
         for program in &programs {
             for (library, contender) in external::contenders(program, scene).map_err(failed)? {
@@ -82,7 +88,11 @@ fn trace(config: &speed::Config, work: &Work) -> Result<String, Error> {
         let seed = experiment.seed_of(&scene.name, "tracing", 0);
         let measured =
             speed::measure(config, scene, of_scene[0].1, &contenders, seed, || watch.cancelled());
-        traced.extend(measured.map_err(failed)?.ok_or_else(|| work.interrupted())?);
+        traced.extend(
+            measured
+                .map_err(failed)?
+                .ok_or_else(|| work.interrupted())?,
+        );
     }
     if !config.ray_peers.is_empty() {
         let search_seconds = search_seconds(&first_runs, jobs, store)?;
@@ -97,15 +107,20 @@ fn trace(config: &speed::Config, work: &Work) -> Result<String, Error> {
     // Other rows are compared with committed ones. They must depend neither on a program that may be missing nor on the
     // instruction sets of this processor.
     let is_ours = |traced: &Traced| {
-        experiment.methods.iter().any(|method| method.label == traced.answers.method)
+        experiment
+            .methods
+            .iter()
+            .any(|method| method.label == traced.answers.method)
     };
     let mut seen = BTreeSet::new();
     traced.retain(|traced| {
         let TraceRow { scene, method, layout, rays, .. } = &traced.answers;
         is_ours(traced) && seen.insert([scene, method, layout, rays].map(String::clone))
     });
-    let (rows, times): (Vec<TraceRow>, Vec<TraceTimeRow>) =
-        traced.into_iter().map(|traced| (traced.answers, traced.times)).unzip();
+    let (rows, times): (Vec<TraceRow>, Vec<TraceTimeRow>) = traced
+        .into_iter()
+        .map(|traced| (traced.answers, traced.times))
+        .unzip();
     store.write_rows(&rows)?;
     store.write_rows(&times)?;
     Ok(text)
@@ -120,12 +135,18 @@ fn search_seconds(
     let mut seconds: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
     for index in 0..jobs.len() {
         for TimingRow { scene, method, seconds: of_run, .. } in store.rows::<TimingRow>(index)? {
-            seconds.entry((scene, method)).or_default().push(of_run);
+            seconds
+                .entry((scene, method))
+                .or_default()
+                .push(of_run);
         }
     }
     let of_run = |(job, _): &(&Job, &Bvh)| {
         let run = (job.scene.name.clone(), job.labelled.label.clone());
-        let middle = seconds.get(&run).and_then(|seconds| median(seconds)).unwrap_or(f64::NAN);
+        let middle = seconds
+            .get(&run)
+            .and_then(|seconds| median(seconds))
+            .unwrap_or(f64::NAN);
         (run, middle)
     };
     Ok(first_runs.iter().map(of_run).collect())
@@ -133,7 +154,11 @@ fn search_seconds(
 
 /// The library behind a label: ours, the library of a method, or else a library of the program.
 fn library(experiment: &Experiment, label: &str) -> String {
-    match experiment.methods.iter().find(|method| method.label == label).map(|found| &found.method)
+    match experiment
+        .methods
+        .iter()
+        .find(|method| method.label == label)
+        .map(|found| &found.method)
     {
         Some(Contestant::Ours(_)) => comparison::OURS.into(),
         Some(Contestant::Peer(peer)) => peer.name().into(),

@@ -21,13 +21,21 @@ impl Experiment {
             OutOfRange::new("question", "empty", "what the experiment asks, for its readers")
         });
         let others = [self.check_scenes().err(), self.check_run_count().err()];
-        unsaid.into_iter().chain(others.into_iter().flatten()).map(Fault::from).collect()
+        unsaid
+            .into_iter()
+            .chain(others.into_iter().flatten())
+            .map(Fault::from)
+            .collect()
     }
 
     /// Checks the scenes' names; whether the scenes are there is found when they are loaded.
     fn check_scenes(&self) -> Result<(), OutOfRange> {
         if self.suite.is_some() {
-            if let Some(unknown) = self.scenes.iter().find(|id| stress::by_id(id).is_none()) {
+            if let Some(unknown) = self
+                .scenes
+                .iter()
+                .find(|id| stress::by_id(id).is_none())
+            {
                 return Err(OutOfRange::new(
                     "scenes",
                     format!("{unknown:?}"),
@@ -37,7 +45,11 @@ impl Experiment {
         } else if self.scenes.is_empty() {
             return Err(OutOfRange::new("scenes", "empty", "at least one name or path"));
         }
-        match self.scenes.iter().find(|name| subset::names(name) == 0) {
+        match self
+            .scenes
+            .iter()
+            .find(|name| subset::names(name) == 0)
+        {
             Some(none) => {
                 Err(OutOfRange::new("scenes", format!("{none:?}"), "A..B with A up to B"))
             }
@@ -47,8 +59,11 @@ impl Experiment {
 
     /// Checks that there are runs, and not too many.
     pub(crate) fn check_run_count(&self) -> Result<(), OutOfRange> {
-        let scenes =
-            self.scenes.iter().map(|name| subset::names(name)).fold(0, u64::saturating_add);
+        let scenes = self
+            .scenes
+            .iter()
+            .map(|name| subset::names(name))
+            .fold(0, u64::saturating_add);
         let runs = [self.methods.len() as u64, self.repetitions.into()]
             .into_iter()
             .fold(scenes, u64::saturating_mul);
@@ -70,9 +85,14 @@ impl Experiment {
     pub(super) fn check_methods(&self, at: &[usize]) -> Vec<Fault> {
         let below = |at: &usize| format!("methods[{at}]");
         let check = |(at, labelled)| {
-            self.check_method(labelled).into_iter().map(move |fault| fault.below(&below(at)))
+            self.check_method(labelled)
+                .into_iter()
+                .map(move |fault| fault.below(&below(at)))
         };
-        at.iter().zip(&self.methods).flat_map(check).collect()
+        at.iter()
+            .zip(&self.methods)
+            .flat_map(check)
+            .collect()
     }
 
     fn check_method(&self, labelled: &Labelled) -> Vec<Fault> {
@@ -94,16 +114,26 @@ impl Experiment {
             ("references", references.is_some(), is_best, "with best"),
             ("judge", judge.is_some(), judged.contains(&method.name()), &with_judged),
         ];
-        let misplaced = of_some_methods.iter().filter(|(_, is_set, takes, _)| *is_set && !takes);
+        let misplaced = of_some_methods
+            .iter()
+            .filter(|(_, is_set, takes, _)| *is_set && !takes);
         let set_for = format!("set for {}", method.name());
-        let mut faults: Vec<Fault> =
-            misplaced.map(|(key, .., accepted)| Fault::new(key, &set_for, accepted)).collect();
+        let mut faults: Vec<Fault> = misplaced
+            .map(|(key, .., accepted)| Fault::new(key, &set_for, accepted))
+            .collect();
         if for_rays.is_some() && is_ours && self.ray_cost.is_none() {
             let accepted = "with the experiment's `ray_cost`";
             faults.push(Fault::new("for_rays", "set without `ray_cost`", accepted));
         }
-        let layouts = self.tracing.iter().flat_map(|tracing| &tracing.layouts);
-        if for_rays.is_some() && layouts.into_iter().any(|layout| layout.is_for_lines()) {
+        let layouts = self
+            .tracing
+            .iter()
+            .flat_map(|tracing| &tracing.layouts);
+        if for_rays.is_some()
+            && layouts
+                .into_iter()
+                .any(|layout| layout.is_for_lines())
+        {
             let found = "set beside `tracing.layouts` with another cost of blocks";
             faults.push(Fault::new("for_rays", found, "with other layouts, which can be for rays"));
         }
@@ -138,8 +168,14 @@ impl Experiment {
         };
         let is_doubtful = |entry: &str| {
             let keys = ["budget", "max_seconds", "work_per_object"];
-            let keys = keys.iter().flat_map(|key| [(*key).to_owned(), format!("{entry}.{key}")]);
-            keys.into_iter().any(|key| faults.iter().any(|fault| is_within(&fault.key, &key)))
+            let keys = keys
+                .iter()
+                .flat_map(|key| [(*key).to_owned(), format!("{entry}.{key}")]);
+            keys.into_iter().any(|key| {
+                faults
+                    .iter()
+                    .any(|fault| is_within(&fault.key, &key))
+            })
         };
         let found = format!(
             "missing for best, which would take {endless} nodes of work per object: hours on a large scene"
@@ -150,9 +186,12 @@ impl Experiment {
             .iter()
             .zip(&self.methods)
             .filter(|(_, labelled)| goes_on(labelled) && !has_end(labelled));
-        let entries =
-            own.map(|(at, _)| format!("methods[{at}]")).filter(|entry| !is_doubtful(entry));
-        entries.map(|entry| Fault::new(format!("{entry}.budget"), &found, accepted)).collect()
+        let entries = own
+            .map(|(at, _)| format!("methods[{at}]"))
+            .filter(|entry| !is_doubtful(entry));
+        entries
+            .map(|entry| Fault::new(format!("{entry}.budget"), &found, accepted))
+            .collect()
     }
 
     /// What is asked for that runs which the clock ends cannot have: everything that is to be the same whenever it is made again.
@@ -193,12 +232,19 @@ impl Experiment {
     /// The labels in reports, which stand at these places in the spec, that no method has.
     pub(super) fn check_reports(&self, labels: &[Option<String>], at: &[usize]) -> Vec<Fault> {
         // A label that cannot be told may be any.
-        let Some(known) = labels.iter().map(Option::as_deref).collect::<Option<Vec<&str>>>() else {
+        let Some(known) = labels
+            .iter()
+            .map(Option::as_deref)
+            .collect::<Option<Vec<&str>>>()
+        else {
             return vec![];
         };
         let accepted = known.join(", ");
         let fault = |(at, report): (&usize, &Report)| {
-            let unknown = report.labels().into_iter().filter(|(_, label)| !known.contains(label));
+            let unknown = report
+                .labels()
+                .into_iter()
+                .filter(|(_, label)| !known.contains(label));
             let fault = |(key, label): (String, &str)| {
                 Fault::new(
                     format!("reports[{at}].{key}"),
@@ -208,14 +254,20 @@ impl Experiment {
             };
             unknown.map(fault).collect::<Vec<Fault>>()
         };
-        at.iter().zip(&self.reports).flat_map(fault).collect()
+        at.iter()
+            .zip(&self.reports)
+            .flat_map(fault)
+            .collect()
     }
 }
 
 /// Labels that another entry of `methods` has already.
 pub(super) fn unique(labels: &[Option<String>]) -> Vec<Fault> {
     let mut known = HashSet::new();
-    let labels = labels.iter().enumerate().filter_map(|(at, label)| Some((at, label.as_ref()?)));
+    let labels = labels
+        .iter()
+        .enumerate()
+        .filter_map(|(at, label)| Some((at, label.as_ref()?)));
     let second = labels.filter(|(_, label)| !known.insert(*label));
     let fault = |(at, label)| {
         Fault::new(

@@ -109,7 +109,9 @@ impl Experiment {
 
     /// The rays that judge its trees, if any do.
     pub fn judges(&self) -> Option<&ray_cost::Config> {
-        self.ray_cost.as_ref().filter(|config| config.count > 0)
+        self.ray_cost
+            .as_ref()
+            .filter(|config| config.count > 0)
     }
 
     /// Whether gaps are measured on scenes of so many objects from their exact optimum.
@@ -130,14 +132,19 @@ impl Experiment {
     /// The seconds that a method's runs may take.
     pub fn max_seconds_of(&self, labelled: &Labelled) -> Option<f64> {
         let is_ours = matches!(labelled.method, Contestant::Ours(_));
-        let limits =
-            self.max_seconds.into_iter().filter(|_| is_ours).chain(labelled.own.max_seconds);
+        let limits = self
+            .max_seconds
+            .into_iter()
+            .filter(|_| is_ours)
+            .chain(labelled.own.max_seconds);
         limits.reduce(f64::min)
     }
 
     /// Whether the clock ends some of the runs, so that nothing but `timing*.csv` may have rows of them.
     pub fn is_by_the_clock(&self) -> bool {
-        self.methods.iter().any(|labelled| self.max_seconds_of(labelled).is_some())
+        self.methods
+            .iter()
+            .any(|labelled| self.max_seconds_of(labelled).is_some())
     }
 
     /// The seed of one run, within 32 bits so that every spreadsheet keeps it exactly.

@@ -32,9 +32,13 @@ impl Experiment {
     /// Reads and checks a spec's text; `path` gives it its name.
     pub fn parse(path: &Path, text: &str, overrides: &Overrides) -> Result<Self, Error> {
         let refuse = |message: String| Error::Spec { file: path.to_owned(), message };
-        let table: Table =
-            text.parse().map_err(|error: toml::de::Error| refuse(error.to_string()))?;
-        let name = path.file_stem().and_then(OsStr::to_str).ok_or("no UTF-8".to_owned());
+        let table: Table = text
+            .parse()
+            .map_err(|error: toml::de::Error| refuse(error.to_string()))?;
+        let name = path
+            .file_stem()
+            .and_then(OsStr::to_str)
+            .ok_or("no UTF-8".to_owned());
         let name = name.and_then(|name| Name::try_from(name.to_owned()));
         let name = name.map_err(|message| {
             refuse(format!("the file's name without its extension: {message}"))
@@ -43,16 +47,27 @@ impl Experiment {
         let above = overrides.quick.then_some("quick");
         let mut experiment = Self::from_table(table, name, overrides)
             .map_err(|faults| refuse(fault::say(&faults, text, &path.to_string_lossy(), above)))?;
-        if let Some(folder) =
-            path.parent().and_then(Path::to_str).filter(|_| overrides.scenes.is_empty())
+        if let Some(folder) = path
+            .parent()
+            .and_then(Path::to_str)
+            .filter(|_| overrides.scenes.is_empty())
         {
-            let scenes = experiment.scenes.iter_mut().chain(&mut experiment.optional_scenes);
+            let scenes = experiment
+                .scenes
+                .iter_mut()
+                .chain(&mut experiment.optional_scenes);
             // Words are names.
             let is_path = |scene: &str| {
-                scene.split(':').next().is_some_and(|file| file.contains(['.', '/', '\\']))
+                scene
+                    .split(':')
+                    .next()
+                    .is_some_and(|file| file.contains(['.', '/', '\\']))
             };
             for scene in scenes.filter(|scene| is_path(scene)) {
-                *scene = Path::new(folder).join(&*scene).to_string_lossy().into_owned();
+                *scene = Path::new(folder)
+                    .join(&*scene)
+                    .to_string_lossy()
+                    .into_owned();
             }
         }
         Ok(experiment)
@@ -103,14 +118,28 @@ impl Experiment {
             experiment.optional_scenes.clear();
         }
         if experiment.suite.is_some() && labels.is_empty() {
-            experiment.methods = Method::all().into_iter().map(Labelled::new).collect();
-            labels = experiment.methods.iter().map(|method| Some(method.label.clone())).collect();
+            experiment.methods = Method::all()
+                .into_iter()
+                .map(Labelled::new)
+                .collect();
+            labels = experiment
+                .methods
+                .iter()
+                .map(|method| Some(method.label.clone()))
+                .collect();
         }
         // What is refused already is missing, and a list empty, for no other reason.
-        let apart =
-            |late: &Fault| !faults.iter().any(|fault| fault::is_within(&fault.key, &late.key));
+        let apart = |late: &Fault| {
+            !faults
+                .iter()
+                .any(|fault| fault::is_within(&fault.key, &late.key))
+        };
         let together = [
-            experiment.check_together().into_iter().filter(apart).collect(),
+            experiment
+                .check_together()
+                .into_iter()
+                .filter(apart)
+                .collect(),
             check::unique(&labels),
             experiment.check_methods(&methods_at),
             experiment.check_ends(&methods_at, &faults),
@@ -124,9 +153,21 @@ impl Experiment {
 
 /// The labels of the entries of `methods`, as far as they can be told.
 fn labels(methods: Option<&Value>) -> Vec<Option<String>> {
-    let label =
-        |entry: &Value| Some(entry.get("label").or(entry.get("method"))?.as_str()?.to_owned());
-    methods.and_then(Value::as_array).into_iter().flatten().map(label).collect()
+    let label = |entry: &Value| {
+        Some(
+            entry
+                .get("label")
+                .or(entry.get("method"))?
+                .as_str()?
+                .to_owned(),
+        )
+    };
+    methods
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten()
+        .map(label)
+        .collect()
 }
 
 /// Takes the list of tables under `key` out of a spec, and reads each table by `read`. Returns what could be read with its place in
@@ -150,10 +191,18 @@ fn list<T>(
             Value::Table(entry) => read(entry),
             found => (None, vec![Fault::new("", found, "a table")]),
         };
-        faults.extend(of_entry.into_iter().map(|fault| fault.below(&format!("{key}[{at}]"))));
+        faults.extend(
+            of_entry
+                .into_iter()
+                .map(|fault| fault.below(&format!("{key}[{at}]"))),
+        );
         Some((value?, at))
     };
-    entries.into_iter().enumerate().filter_map(&mut read).unzip()
+    entries
+        .into_iter()
+        .enumerate()
+        .filter_map(&mut read)
+        .unzip()
 }
 
 /// Takes out what no key takes: numbers that are infinite or NaN, and dates.

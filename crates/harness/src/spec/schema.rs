@@ -23,31 +23,45 @@ impl JsonSchema for Labelled {
             all.extend(own.clone());
             table["properties"] = all.into();
         }
-        json!({ "oneOf": tables }).try_into().unwrap_or_default()
+        json!({ "oneOf": tables })
+            .try_into()
+            .unwrap_or_default()
     }
 }
 
 /// What a schema lets one choose from, if it does.
 fn choices(schema: &Value) -> Option<&Vec<Value>> {
-    schema.get("oneOf").or(schema.get("anyOf"))?.as_array()
+    schema
+        .get("oneOf")
+        .or(schema.get("anyOf"))?
+        .as_array()
 }
 
 /// The tables among which a schema lets one choose, however nested the choice is.
 fn flatten(schema: &Value, tables: &mut Vec<Value>) {
     match choices(schema) {
-        Some(choices) => choices.iter().for_each(|choice| flatten(choice, tables)),
+        Some(choices) => choices
+            .iter()
+            .for_each(|choice| flatten(choice, tables)),
         None => tables.push(schema.clone()),
     }
 }
 
 fn properties(schema: &Value) -> Map<String, Value> {
-    schema.get("properties").and_then(Value::as_object).cloned().unwrap_or_default()
+    schema
+        .get("properties")
+        .and_then(Value::as_object)
+        .cloned()
+        .unwrap_or_default()
 }
 
 /// The JSON schema of specs.
 pub fn schema() -> Value {
     let settings = SchemaSettings::draft07().with(|settings| settings.inline_subschemas = true);
-    let mut schema = settings.into_generator().into_root_schema_for::<Experiment>().to_value();
+    let mut schema = settings
+        .into_generator()
+        .into_root_schema_for::<Experiment>()
+        .to_value();
     tidy(&mut schema);
     let mut keys = properties(&schema);
     // The file has the name, and what says that it is the quick variant is the command line.
@@ -78,7 +92,11 @@ fn tidy(schema: &mut Value) {
                 }
             }
             if let Some(Value::Array(any)) = map.get_mut("anyOf") {
-                any.retain(|choice| choice.get("type").is_none_or(|kind| kind != "null"));
+                any.retain(|choice| {
+                    choice
+                        .get("type")
+                        .is_none_or(|kind| kind != "null")
+                });
                 if let [Value::Object(one)] = &mut any[..] {
                     let one = std::mem::take(one);
                     map.remove("anyOf");
@@ -100,7 +118,10 @@ fn tidy(schema: &mut Value) {
 /// A description without links, and without the line in which rustdoc says default and range as they stand in the code.
 fn described(text: &str) -> String {
     let of_code = |line: &str| line.starts_with("Default `") || line.starts_with("Accepted: `");
-    let lines: Vec<&str> = text.lines().filter(|line| !line.is_empty() && !of_code(line)).collect();
+    let lines: Vec<&str> = text
+        .lines()
+        .filter(|line| !line.is_empty() && !of_code(line))
+        .collect();
     let (text, mut plain) = (lines.join(" "), String::new());
     let mut rest = text.trim();
     while let Some((before, after)) = rest.split_once('[') {
@@ -113,7 +134,9 @@ fn described(text: &str) -> String {
             continue;
         };
         plain += &format!("{before}{name}");
-        let target = after.strip_prefix('(').and_then(|after| after.split_once(')'));
+        let target = after
+            .strip_prefix('(')
+            .and_then(|after| after.split_once(')'));
         rest = target.map_or(after, |(_, after)| after);
     }
     plain + rest
@@ -128,7 +151,10 @@ pub fn page() -> String {
                     [How specs are written and run](EXPERIMENTS.md).\n"
             .to_owned();
     let mut section = |heading: &str, table: &Value, hidden: &[&str]| {
-        let description = table.get("description").and_then(Value::as_str).unwrap_or_default();
+        let description = table
+            .get("description")
+            .and_then(Value::as_str)
+            .unwrap_or_default();
         text += &format!("\n{heading}\n\n{description}\n\n");
         let mut rows = Vec::new();
         keys_of(table, "", hidden, &mut rows);
@@ -141,16 +167,22 @@ pub fn page() -> String {
     };
     section("## An experiment", &schema, &["methods", "reports", "quick"]);
     let entries = |key: &str| {
-        schema["properties"][key]["items"]["oneOf"].as_array().cloned().unwrap_or_default()
+        schema["properties"][key]["items"]["oneOf"]
+            .as_array()
+            .cloned()
+            .unwrap_or_default()
     };
     let (methods, reports) = (entries("methods"), entries("reports"));
-    let own =
-        properties(&methods[0]).into_iter().filter(|(key, _)| Own::KEYS.contains(&key.as_str()));
+    let own = properties(&methods[0])
+        .into_iter()
+        .filter(|(key, _)| Own::KEYS.contains(&key.as_str()));
     let own = json!({ "properties": own.collect::<Map<_, _>>(), "description": "Beside `method`, its name." });
     section("## Every entry of `methods`", &own, &[]);
     for (tag, tables) in [("method", methods), ("kind", reports)] {
         for table in &tables {
-            let name = table["properties"][tag]["const"].as_str().unwrap_or_default();
+            let name = table["properties"][tag]["const"]
+                .as_str()
+                .unwrap_or_default();
             section(&format!("## `{tag} = \"{name}\"`"), table, &[Own::KEYS, &[tag]].concat());
         }
     }
@@ -159,11 +191,21 @@ pub fn page() -> String {
 
 /// A row for every key of a table, those of tables within it included.
 fn keys_of(table: &Value, above: &str, hidden: &[&str], rows: &mut Vec<String>) {
-    for (key, schema) in properties(table).iter().filter(|(key, _)| !hidden.contains(&key.as_str()))
+    for (key, schema) in properties(table)
+        .iter()
+        .filter(|(key, _)| !hidden.contains(&key.as_str()))
     {
-        let text =
-            |key: &str| schema.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();
-        let default = schema.get("default").map(Value::to_string).filter(|text| text.len() <= 40);
+        let text = |key: &str| {
+            schema
+                .get(key)
+                .and_then(Value::as_str)
+                .unwrap_or_default()
+                .to_owned()
+        };
+        let default = schema
+            .get("default")
+            .map(Value::to_string)
+            .filter(|text| text.len() <= 40);
         let default = default.map_or_else(String::new, |text| format!("`{text}`"));
         let cells = [
             format!("`{above}{key}`"),
@@ -171,7 +213,12 @@ fn keys_of(table: &Value, above: &str, hidden: &[&str], rows: &mut Vec<String>) 
             default,
             text("description"),
         ];
-        rows.push(format!("| {} |\n", cells.map(|cell| cell.replace('|', "\\|")).join(" | ")));
+        rows.push(format!(
+            "| {} |\n",
+            cells
+                .map(|cell| cell.replace('|', "\\|"))
+                .join(" | ")
+        ));
         keys_of(schema, &format!("{above}{key}."), &[], rows);
         keys_of(
             schema.get("items").unwrap_or(&Value::Null),
@@ -179,7 +226,11 @@ fn keys_of(table: &Value, above: &str, hidden: &[&str], rows: &mut Vec<String>) 
             &[],
             rows,
         );
-        for (name, inner) in choices(schema).into_iter().flatten().flat_map(properties) {
+        for (name, inner) in choices(schema)
+            .into_iter()
+            .flatten()
+            .flat_map(properties)
+        {
             keys_of(&inner, &format!("{above}{key}.{name}."), &[], rows);
         }
     }
@@ -188,7 +239,10 @@ fn keys_of(table: &Value, above: &str, hidden: &[&str], rows: &mut Vec<String>) 
 /// What values a schema accepts, as in TOML.
 fn value(schema: &Value) -> String {
     let choice = |all: &Vec<Value>, word: &dyn Fn(&Value) -> String| {
-        all.iter().map(word).collect::<Vec<_>>().join(" or ")
+        all.iter()
+            .map(word)
+            .collect::<Vec<_>>()
+            .join(" or ")
     };
     if let Some(one) = schema.get("const") {
         return one.to_string();
@@ -199,7 +253,9 @@ fn value(schema: &Value) -> String {
     if let Some(all) = choices(schema) {
         return choice(all, &value);
     }
-    let named = schema.get("additionalProperties").filter(|of| of.is_object());
+    let named = schema
+        .get("additionalProperties")
+        .filter(|of| of.is_object());
     match schema.get("type").and_then(Value::as_str) {
         Some("array") => format!("[{}, …]", value(schema.get("items").unwrap_or(&Value::Null))),
         Some("object") => match (named, schema.get("required")) {

@@ -23,7 +23,9 @@ fn parse(text: &str, overrides: &Overrides) -> Result<Experiment, String> {
 /// The spec is refused by a message with all these parts.
 fn refused(text: &str, parts: &[&str]) {
     let message = read(text).unwrap_err();
-    parts.iter().for_each(|part| assert!(message.contains(part), "{part} in {message} for {text}"));
+    parts
+        .iter()
+        .for_each(|part| assert!(message.contains(part), "{part} in {message} for {text}"));
 }
 
 #[test]
@@ -96,7 +98,11 @@ fn the_lower_of_both_budgets_in_seconds_holds_and_only_for_methods_of_ours() {
         "question = 'q'\nscenes = ['escher']\nsequential = true\nmax_seconds = 1.0\nmethods = {methods}\n"
     );
     let spec = read(&spec).unwrap();
-    let limits: Vec<_> = spec.methods.iter().map(|method| spec.max_seconds_of(method)).collect();
+    let limits: Vec<_> = spec
+        .methods
+        .iter()
+        .map(|method| spec.max_seconds_of(method))
+        .collect();
     assert_eq!(limits, [Some(0.2), Some(1.0), None]);
 }
 
@@ -235,8 +241,11 @@ fn another_library_is_accepted_exactly_with_its_feature() {
     for name in Peer::NAMES {
         let text =
             format!("question = 'q'\nscenes = ['escher']\nmethods = [{{ method = '{name}' }}]\n");
-        let Contestant::Peer(peer) =
-            toml::from_str::<Experiment>(&text).unwrap().methods.remove(0).method
+        let Contestant::Peer(peer) = toml::from_str::<Experiment>(&text)
+            .unwrap()
+            .methods
+            .remove(0)
+            .method
         else {
             panic!("{name} is no library");
         };
@@ -292,8 +301,9 @@ fn of_two_limits_the_lower_one_counts() {
 #[test]
 fn seeds_differ_between_runs_and_follow_the_spec_alone() {
     let experiment = read(GOOD).unwrap();
-    let mut seeds: Vec<u64> =
-        (0..100).map(|repetition| experiment.seed_of("escher", "grasp", repetition)).collect();
+    let mut seeds: Vec<u64> = (0..100)
+        .map(|repetition| experiment.seed_of("escher", "grasp", repetition))
+        .collect();
     seeds.push(experiment.seed_of("bijou", "grasp", 0));
     let distinct: HashSet<_> = seeds.iter().collect();
     assert_eq!(distinct.len(), seeds.len());
@@ -303,8 +313,9 @@ fn seeds_differ_between_runs_and_follow_the_spec_alone() {
 #[test]
 fn naming_a_wrong_key_among_thousands_of_methods_takes_no_time() {
     let methods = "[[methods]]\nmethod = 'grasp'\nlabel = 'NUMBER'\n";
-    let many: String =
-        (0..3000).map(|number| methods.replace("NUMBER", &number.to_string())).collect();
+    let many: String = (0..3000)
+        .map(|number| methods.replace("NUMBER", &number.to_string()))
+        .collect();
     let text = format!(
         "question = 'q'\nscenes = ['escher']\n{}",
         many.replacen("'2900'", "'2900'\nnoise = 'x'", 1)
@@ -348,11 +359,16 @@ file = '../x'
 ";
     let message = read(text).unwrap_err();
     let key = |line: &str| {
-        let (place, rest) = line.split_once("spec.toml: ")?.1.split_once(": ")?;
+        let (place, rest) = line
+            .split_once("spec.toml: ")?
+            .1
+            .split_once(": ")?;
         Some(format!("{} {}", place.strip_prefix("line ")?, rest.split([' ', ':']).next()?))
     };
-    let said: Vec<String> =
-        message.lines().map(|line| key(line).unwrap_or_else(|| line.into())).collect();
+    let said: Vec<String> = message
+        .lines()
+        .map(|line| key(line).unwrap_or_else(|| line.into()))
+        .collect();
     let expected = [
         "1 question",
         "2 scenes[1]",
@@ -445,7 +461,9 @@ fn quick_is_refused_where_nothing_says_what_it_is() {
 fn scenes_of_a_spec_are_found_from_its_folder_and_those_of_the_command_line_are_not() {
     let text = "question = 'q'\nscenes = ['escher:random:9:1..2', 'a/b:random:9:1', '/c.obj', 'd.ply']\n[[methods]]\nmethod = 'median_cut'\n";
     let scenes = |overrides: &Overrides| {
-        Experiment::parse("x/y/spec.toml".as_ref(), text, overrides).unwrap().scenes
+        Experiment::parse("x/y/spec.toml".as_ref(), text, overrides)
+            .unwrap()
+            .scenes
     };
     assert_eq!(
         scenes(&Overrides::default()),

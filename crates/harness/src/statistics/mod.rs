@@ -109,15 +109,24 @@ pub fn mean_interval(values: &[f64]) -> Option<(f64, Option<(f64, f64)>)> {
     let mean = values.iter().sum::<f64>() / n;
     let freedom = values.len().checked_sub(1)?;
     let Some(factor) = student(values.len()) else { return Some((mean, None)) };
-    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / freedom as f64;
+    let variance = values
+        .iter()
+        .map(|value| (value - mean).powi(2))
+        .sum::<f64>()
+        / freedom as f64;
     let half = factor * (variance / n).sqrt();
     Some((mean, Some((mean - half, mean + half))))
 }
 
 /// Half the width of the 95 % interval of a mean of so many values, in standard errors; `None` of fewer than two.
 pub fn student(values: usize) -> Option<f64> {
-    let freedom = values.checked_sub(1).filter(|&freedom| freedom > 0)?;
-    STUDENT.get(freedom - 1).or(STUDENT.last()).copied()
+    let freedom = values
+        .checked_sub(1)
+        .filter(|&freedom| freedom > 0)?;
+    STUDENT
+        .get(freedom - 1)
+        .or(STUDENT.last())
+        .copied()
 }
 
 /// The 97.5 % quantiles of Student's t for 1 to 20 degrees of freedom. With more, intervals by the last are somewhat
@@ -136,7 +145,10 @@ pub fn primal_integral(incumbents: &[(f64, f64)], reference: f64, horizon: f64) 
         if greater > 0.0 { (cost - reference).abs() / greater } else { 0.0 }
     };
     let (mut since, mut current, mut integral) = (0.0, 1.0, 0.0);
-    for &(time, cost) in incumbents.iter().take_while(|(time, _)| *time < horizon) {
+    for &(time, cost) in incumbents
+        .iter()
+        .take_while(|(time, _)| *time < horizon)
+    {
         integral += current * (time - since);
         (since, current) = (time, gap(cost));
     }
@@ -148,8 +160,12 @@ pub fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
     let n = pairs.len() as f64;
     let (mean_x, mean_y) =
         (pairs.iter().map(|p| p.0).sum::<f64>() / n, pairs.iter().map(|p| p.1).sum::<f64>() / n);
-    let product =
-        |f: fn(f64, f64) -> f64| pairs.iter().map(|&(x, y)| f(x - mean_x, y - mean_y)).sum::<f64>();
+    let product = |f: fn(f64, f64) -> f64| {
+        pairs
+            .iter()
+            .map(|&(x, y)| f(x - mean_x, y - mean_y))
+            .sum::<f64>()
+    };
     let (xx, yy) = (product(|x, _| x * x), product(|_, y| y * y));
     (pairs.len() > 1 && xx > 0.0 && yy > 0.0)
         .then(|| product(|x, y| x * y) / (xx.sqrt() * yy.sqrt()))
@@ -157,7 +173,9 @@ pub fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
 
 /// Returns the 95 % interval of Pearson's correlation of so many pairs, by Fisher's transformation; `None` for fewer than four.
 pub fn pearson_interval(correlation: f64, pairs: usize) -> Option<(f64, f64)> {
-    let freedom = pairs.checked_sub(3).filter(|&freedom| freedom > 0)?;
+    let freedom = pairs
+        .checked_sub(3)
+        .filter(|&freedom| freedom > 0)?;
     let half = NORMAL_95 / (freedom as f64).sqrt();
     let transformed = correlation.atanh();
     Some(((transformed - half).tanh(), (transformed + half).tanh()))
@@ -166,7 +184,12 @@ pub fn pearson_interval(correlation: f64, pairs: usize) -> Option<(f64, f64)> {
 /// Spearman's rank correlation of pairs: Pearson's of the ranks, equal values sharing their mean rank.
 pub fn spearman(pairs: &[(f64, f64)]) -> Option<f64> {
     let of = |side: fn(&(f64, f64)) -> f64| ranks(&pairs.iter().map(side).collect::<Vec<_>>());
-    pearson(&of(|p| p.0).into_iter().zip(of(|p| p.1)).collect::<Vec<_>>())
+    pearson(
+        &of(|p| p.0)
+            .into_iter()
+            .zip(of(|p| p.1))
+            .collect::<Vec<_>>(),
+    )
 }
 
 /// The rank of every value, from 1, equal values sharing their mean rank.
@@ -202,8 +225,12 @@ mod tests {
             let minima: Vec<f64> = (0u32..1 << pool.len())
                 .filter(|set| set.count_ones() as usize == m)
                 .map(|set| {
-                    minimum((0..pool.len()).filter(|i| set & (1 << i) != 0).map(|i| pool[i]))
-                        .unwrap()
+                    minimum(
+                        (0..pool.len())
+                            .filter(|i| set & (1 << i) != 0)
+                            .map(|i| pool[i]),
+                    )
+                    .unwrap()
                 })
                 .collect();
             let mean = minima.iter().sum::<f64>() / minima.len() as f64;
@@ -267,9 +294,13 @@ mod tests {
 
     #[test]
     fn correlations_are_one_for_what_rises_together() {
-        let line: Vec<_> = (0..9).map(|i| (f64::from(i), 3.0 - 2.0 * f64::from(i))).collect();
+        let line: Vec<_> = (0..9)
+            .map(|i| (f64::from(i), 3.0 - 2.0 * f64::from(i)))
+            .collect();
         assert!((pearson(&line).unwrap() + 1.0).abs() < 1e-12);
-        let cubes: Vec<_> = (0..9).map(|i| (f64::from(i), f64::from(i * i * i))).collect();
+        let cubes: Vec<_> = (0..9)
+            .map(|i| (f64::from(i), f64::from(i * i * i)))
+            .collect();
         assert!((spearman(&cubes).unwrap() - 1.0).abs() < 1e-12 && pearson(&cubes).unwrap() < 0.95);
         assert_eq!(ranks(&[2.0, 1.0, 2.0, 5.0]), [2.5, 1.0, 2.5, 4.0]);
         assert_eq!(pearson(&[(1.0, 2.0), (1.0, 3.0)]), None);

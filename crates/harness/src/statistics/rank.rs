@@ -23,14 +23,25 @@ pub struct Test {
 /// Wilcoxon's signed-rank test (Wilcoxon 1945) of paired differences; those of 0 are left out. `None` if no others are
 /// left.
 pub fn wilcoxon_signed_rank(differences: &[f64]) -> Option<Test> {
-    let differences: Vec<f64> =
-        differences.iter().copied().filter(|&difference| difference != 0.0).collect();
+    let differences: Vec<f64> = differences
+        .iter()
+        .copied()
+        .filter(|&difference| difference != 0.0)
+        .collect();
     (!differences.is_empty()).then(|| signed_ranks(&differences, differences.len() <= MOST_EXACT))
 }
 
 fn signed_ranks(differences: &[f64], exact: bool) -> Test {
-    let ranks = ranks(&differences.iter().map(|difference| difference.abs()).collect::<Vec<_>>());
-    let positive = ranks.iter().zip(differences).filter(|(_, difference)| **difference > 0.0);
+    let ranks = ranks(
+        &differences
+            .iter()
+            .map(|difference| difference.abs())
+            .collect::<Vec<_>>(),
+    );
+    let positive = ranks
+        .iter()
+        .zip(differences)
+        .filter(|(_, difference)| **difference > 0.0);
     let statistic: f64 = positive.map(|(rank, _)| rank).sum();
     let n = ranks.len() as f64;
     let p_value = if exact {
@@ -77,7 +88,9 @@ pub fn least_signed_rank(samples: usize) -> f64 {
 
 /// The least p-value that the Mann–Whitney test can give with samples of these sizes: 2 / C(m + n, m).
 pub fn least_rank_sum(first: usize, second: usize) -> f64 {
-    let sets = (1..=first).map(|i| (second + i) as f64 / i as f64).product::<f64>();
+    let sets = (1..=first)
+        .map(|i| (second + i) as f64 / i as f64)
+        .product::<f64>();
     (2.0 / sets).min(1.0)
 }
 
@@ -89,7 +102,9 @@ pub fn holm(p_values: &[f64]) -> Vec<f64> {
     let mut corrected = vec![0.0; p_values.len()];
     let mut highest = 0.0f64;
     for (done, at) in order.into_iter().enumerate() {
-        highest = highest.max((p_values.len() - done) as f64 * p_values[at]).min(1.0);
+        highest = highest
+            .max((p_values.len() - done) as f64 * p_values[at])
+            .min(1.0);
         corrected[at] = highest;
     }
     corrected
@@ -98,7 +113,10 @@ pub fn holm(p_values: &[f64]) -> Vec<f64> {
 /// How many subsets of the ranks, of `size` if that is given, have the sum s / 2, for every s. Ranks are multiples of a
 /// half. O(n · size · s).
 fn subsets_by_sum(ranks: &[f64], size: Option<usize>) -> Vec<f64> {
-    let doubled: Vec<usize> = ranks.iter().map(|rank| (2.0 * rank) as usize).collect();
+    let doubled: Vec<usize> = ranks
+        .iter()
+        .map(|rank| (2.0 * rank) as usize)
+        .collect();
     let sums = doubled.iter().sum::<usize>() + 1;
     // Without a size, all sizes are counted together.
     let mut counts = vec![vec![0.0; sums]; size.unwrap_or(0) + 1];
@@ -151,8 +169,11 @@ mod tests {
         // in the manual of R's wilcox.test: one-sided p-values 0.01953 and 0.1272.
         let before = [1.83, 0.50, 1.62, 2.48, 1.68, 1.88, 1.55, 3.06, 1.30];
         let after = [0.878, 0.647, 0.598, 2.05, 1.06, 1.29, 1.06, 3.14, 1.29];
-        let differences: Vec<f64> =
-            before.iter().zip(after).map(|(before, after)| before - after).collect();
+        let differences: Vec<f64> = before
+            .iter()
+            .zip(after)
+            .map(|(before, after)| before - after)
+            .collect();
         let test = wilcoxon_signed_rank(&differences).unwrap();
         assert_eq!(test.statistic, 40.0);
         assert!((test.p_value / 2.0 - 0.01953).abs() < 5e-6, "{test:?}");
@@ -172,8 +193,17 @@ mod tests {
     ) -> f64 {
         let all: Vec<f64> = sets.map(statistic).collect();
         let tail = |count: usize| count as f64 / all.len() as f64;
-        let below = tail(all.iter().filter(|&&value| value <= found).count());
-        (2.0 * below.min(tail(all.iter().filter(|&&value| value >= found).count()))).min(1.0)
+        let below = tail(
+            all.iter()
+                .filter(|&&value| value <= found)
+                .count(),
+        );
+        (2.0 * below.min(tail(
+            all.iter()
+                .filter(|&&value| value >= found)
+                .count(),
+        )))
+        .min(1.0)
     }
 
     #[test]
@@ -181,9 +211,18 @@ mod tests {
         let values = [3.0, -1.0, 2.0, 2.0, -3.0, 5.0, 1.0, 4.0, 3.0, 8.0];
         for n in 1..=values.len() {
             let values = &values[..n];
-            let ranks = ranks(&values.iter().map(|value: &f64| value.abs()).collect::<Vec<_>>());
-            let sum =
-                |set: u32| (0..n).filter(|i| set >> i & 1 == 1).map(|i| ranks[i]).sum::<f64>();
+            let ranks = ranks(
+                &values
+                    .iter()
+                    .map(|value: &f64| value.abs())
+                    .collect::<Vec<_>>(),
+            );
+            let sum = |set: u32| {
+                (0..n)
+                    .filter(|i| set >> i & 1 == 1)
+                    .map(|i| ranks[i])
+                    .sum::<f64>()
+            };
             let test = wilcoxon_signed_rank(values).unwrap();
             let expected = by_enumeration(0..1 << n, test.statistic, sum);
             assert!((test.p_value - expected).abs() < 1e-12, "{n}: {test:?}, {expected}");
@@ -209,7 +248,9 @@ mod tests {
     #[test]
     fn the_normal_approximation_is_near_the_exact_values_where_it_takes_over() {
         let values = |count: usize, shift: f64| -> Vec<f64> {
-            (0..count).map(|i| ((i * 37) % 23) as f64 - 11.0 + shift).collect()
+            (0..count)
+                .map(|i| ((i * 37) % 23) as f64 - 11.0 + shift)
+                .collect()
         };
         let near = |[exact, approximate]: [Test; 2]| {
             let difference = (exact.p_value - approximate.p_value).abs();
@@ -232,10 +273,14 @@ mod tests {
     fn the_least_p_values_are_those_of_samples_without_overlap() {
         for n in 1..9 {
             let differences: Vec<f64> = (1..=n).map(f64::from).collect();
-            let found = wilcoxon_signed_rank(&differences).unwrap().p_value;
+            let found = wilcoxon_signed_rank(&differences)
+                .unwrap()
+                .p_value;
             assert!((found - least_signed_rank(differences.len())).abs() < 1e-12, "{n}");
             let above: Vec<f64> = (0..7).map(|i| 100.0 + f64::from(i)).collect();
-            let found = mann_whitney(&differences, &above).unwrap().p_value;
+            let found = mann_whitney(&differences, &above)
+                .unwrap()
+                .p_value;
             assert!((found - least_rank_sum(differences.len(), above.len())).abs() < 1e-12, "{n}");
         }
     }
@@ -243,7 +288,12 @@ mod tests {
     #[test]
     fn nothing_differs_from_itself() {
         assert_eq!(wilcoxon_signed_rank(&[0.0; 5]), None);
-        assert_eq!(mann_whitney(&[1.0; 4], &[1.0; 70]).unwrap().p_value, 1.0);
+        assert_eq!(
+            mann_whitney(&[1.0; 4], &[1.0; 70])
+                .unwrap()
+                .p_value,
+            1.0
+        );
         assert_eq!(
             (a12(&[1.0; 4], &[1.0; 7]), a12(&[2.0], &[1.0]), a12(&[], &[1.0])),
             (Some(0.5), Some(1.0), None)
@@ -253,7 +303,10 @@ mod tests {
     #[test]
     fn holm_multiplies_the_least_by_their_number_and_keeps_the_order() {
         let corrected = holm(&[0.01, 0.04, 0.03, 0.005, 0.9]);
-        for (found, expected) in corrected.iter().zip([0.04, 0.09, 0.09, 0.025, 0.9]) {
+        for (found, expected) in corrected
+            .iter()
+            .zip([0.04, 0.09, 0.09, 0.025, 0.9])
+        {
             assert!((found - expected).abs() < 1e-15, "{corrected:?}");
         }
     }

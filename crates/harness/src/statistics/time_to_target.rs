@@ -32,10 +32,13 @@ impl ShiftedExponential {
 
     /// The greatest difference between the fit and the distribution of these times (Kolmogorov–Smirnov).
     pub fn distance(&self, solved: &[f64], runs: usize) -> f64 {
-        let steps = sorted(solved).into_iter().zip(0u32..).flat_map(|(time, before)| {
-            [before, before + 1]
-                .map(|count| (f64::from(count) / runs as f64 - self.probability(time)).abs())
-        });
+        let steps = sorted(solved)
+            .into_iter()
+            .zip(0u32..)
+            .flat_map(|(time, before)| {
+                [before, before + 1]
+                    .map(|count| (f64::from(count) / runs as f64 - self.probability(time)).abs())
+            });
         steps.fold(0.0, f64::max)
     }
 }
@@ -60,7 +63,9 @@ mod tests {
     /// Times that stand exactly where the distribution has its i-th of n.
     fn times(law: ShiftedExponential, runs: u32) -> Vec<f64> {
         let quantile = |probability| law.shift + law.mean * standard_quantile(probability);
-        (0..runs).map(|i| quantile((f64::from(i) + 0.5) / f64::from(runs))).collect()
+        (0..runs)
+            .map(|i| quantile((f64::from(i) + 0.5) / f64::from(runs)))
+            .collect()
     }
 
     #[test]

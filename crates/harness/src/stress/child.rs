@@ -24,7 +24,10 @@ fn ask(arguments: [&str; 3], limit: Duration) -> Result<String, String> {
         .map_err(|error| error.to_string())?;
     // What is printed fits into the pipe.
     loop {
-        match child.try_wait().map_err(|error| error.to_string())? {
+        match child
+            .try_wait()
+            .map_err(|error| error.to_string())?
+        {
             Some(_) => break,
             None if start.elapsed() > limit => {
                 // It may have ended meanwhile.
@@ -35,7 +38,9 @@ fn ask(arguments: [&str; 3], limit: Duration) -> Result<String, String> {
             None => std::thread::sleep(Duration::from_millis(5)),
         }
     }
-    let output = child.wait_with_output().map_err(|error| error.to_string())?;
+    let output = child
+        .wait_with_output()
+        .map_err(|error| error.to_string())?;
     match output.status.success() {
         true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
         false if output.status.code() == Some(101) => Err("panic".into()),
@@ -80,6 +85,15 @@ pub fn main(subject: &str, id: &str, objects: usize) -> Result<String, String> {
 /// A size in bytes from the process status of Linux.
 fn status(key: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(':'))?;
-    Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix(key)?.strip_prefix(':'))?;
+    Some(
+        line.trim()
+            .strip_suffix("kB")?
+            .trim()
+            .parse::<u64>()
+            .ok()?
+            * 1024,
+    )
 }

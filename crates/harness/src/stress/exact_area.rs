@@ -57,7 +57,10 @@ pub fn relative_error(cost: f64, exact: &BigUint) -> f64 {
 /// a / b for b above 0.
 pub fn ratio(a: &BigUint, b: &BigUint) -> f64 {
     // In units of 2^-200: far below any rounding of a ratio that is not tiny.
-    ((a << 200u32) / b).to_f64().unwrap_or(f64::INFINITY) / 2f64.powi(200)
+    ((a << 200u32) / b)
+        .to_f64()
+        .unwrap_or(f64::INFINITY)
+        / 2f64.powi(200)
 }
 
 #[cfg(test)]

@@ -17,7 +17,10 @@ const LENGTHS: [usize; 12] = [1, 3, 16, 15, 17, 33, 7, 23, 25, 65, 257, 1023];
 pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
     let objects = Primitives::Triangles(triangles.to_vec());
     let brute_force = Accelerator::new(&objects, Structure::Brute);
-    let expected: Vec<_> = rays.iter().map(|ray| brute_force.nearest_hit(ray)).collect();
+    let expected: Vec<_> = rays
+        .iter()
+        .map(|ray| brute_force.nearest_hit(ray))
+        .collect();
     let answers = |how: &str, nearest: &[Option<Hit>], any: &[bool]| {
         for (i, expected) in expected.iter().enumerate() {
             let same = bits(nearest[i]) == bits(*expected) && any[i] == expected.is_some();
@@ -26,7 +29,10 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
         Ok(())
     };
     for (kernel, wide) in wide_layouts(triangles).map_err(Broken::case)? {
-        let nearest: Vec<_> = rays.iter().map(|ray| wide.nearest_hit(ray)).collect();
+        let nearest: Vec<_> = rays
+            .iter()
+            .map(|ray| wide.nearest_hit(ray))
+            .collect();
         let any: Vec<_> = rays.iter().map(|ray| wide.any_hit(ray)).collect();
         answers(&format!("{kernel:?}"), &nearest, &any)?;
         for coherence in [Coherence::Coherent, Coherence::Incoherent] {
@@ -41,8 +47,10 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
                     break;
                 }
             }
-            let nearest: Vec<_> =
-                nearest.iter().map(|hit| (!hit.is_miss()).then_some(*hit)).collect();
+            let nearest: Vec<_> = nearest
+                .iter()
+                .map(|hit| (!hit.is_miss()).then_some(*hit))
+                .collect();
             answers(&format!("{kernel:?}, {coherence:?}"), &nearest, &any)?;
             let (nearest, any) = by_component(&wide, rays, coherence);
             answers(&format!("{kernel:?}, {coherence:?}, by component"), &nearest, &any)?;
@@ -58,7 +66,9 @@ fn by_component(
     coherence: Coherence,
 ) -> (Vec<Option<Hit>>, Vec<bool>) {
     let component = |of: fn(&Ray) -> Vec3, axis: usize| {
-        rays.iter().map(|ray| of(ray)[axis]).collect::<Vec<_>>()
+        rays.iter()
+            .map(|ray| of(ray)[axis])
+            .collect::<Vec<_>>()
     };
     let origins = [0, 1, 2].map(|axis| component(Ray::origin, axis));
     let directions = [0, 1, 2].map(|axis| component(Ray::direction, axis));
@@ -75,7 +85,10 @@ fn by_component(
     let mut any = vec![false; rays.len()];
     wide.nearest_hits_by_component(&components, &mut distances, &mut objects, coherence);
     wide.any_hits_by_component(&components, &mut any, coherence);
-    let hits = distances.into_iter().zip(objects).map(|(t, object)| Hit { t, object });
+    let hits = distances
+        .into_iter()
+        .zip(objects)
+        .map(|(t, object)| Hit { t, object });
     let nearest = hits.map(|hit| if hit.is_miss() { None } else { Some(hit) });
     (nearest.collect(), any)
 }
@@ -182,6 +195,12 @@ fn half_in_bundles(count: usize, seed: u64, mut make: impl FnMut(usize) -> Vec<R
 pub fn scaled(triangles: &[Triangle], exponent: i32) -> Option<Vec<Triangle>> {
     // In two steps, as 2^-140 itself has few bits.
     let step = 2f32.powi(exponent / 2);
-    let scaled: Vec<_> = triangles.iter().map(|t| Triangle(t.0.map(|p| p * step * step))).collect();
-    scaled.iter().all(|t| t.aabb().check().is_ok()).then_some(scaled)
+    let scaled: Vec<_> = triangles
+        .iter()
+        .map(|t| Triangle(t.0.map(|p| p * step * step)))
+        .collect();
+    scaled
+        .iter()
+        .all(|t| t.aabb().check().is_ok())
+        .then_some(scaled)
 }

@@ -84,7 +84,10 @@ mod compiled_in {
                     nearest(ray, &|id| triangles[id as usize].intersect(&shear, ray.t_max()));
                 found != brute_force.nearest_hit(ray).map(|hit| hit.t)
             };
-            let misses = rays(triangles, RAYS, 1).iter().filter(differs).count();
+            let misses = rays(triangles, RAYS, 1)
+                .iter()
+                .filter(differs)
+                .count();
             if misses > 0 {
                 broken.push(P3.broken(format!("{misses} of {RAYS} rays differ from brute force")));
             }

@@ -135,7 +135,9 @@ fn best<N: Number>(boxes: &[Aabb], orders: &[Vec<u32>; 3]) -> Option<(N, Split)>
 fn exact_cost(boxes: &[Aabb], orders: &[Vec<u32>; 3], (axis, left): Split) -> BigInt {
     let (l, r) = orders[axis].split_at(left);
     let [l, r] = [l, r].map(|side| {
-        let aabb = side.iter().fold(Aabb::EMPTY, |b, &object| b.union(&boxes[object as usize]));
+        let aabb = side
+            .iter()
+            .fold(Aabb::EMPTY, |b, &object| b.union(&boxes[object as usize]));
         BigInt::side(&aabb, side.len())
     });
     l + r
@@ -152,7 +154,11 @@ fn divide(
     }
     [true, false].map(|side| {
         [0, 1, 2].map(|axis: usize| {
-            orders[axis].iter().copied().filter(|&o| goes_left[o as usize] == side).collect()
+            orders[axis]
+                .iter()
+                .copied()
+                .filter(|&o| goes_left[o as usize] == side)
+                .collect()
         })
     })
 }
@@ -288,7 +294,9 @@ impl Config {
             (tree, start.elapsed().as_secs_f64())
         };
         let builds = (0..self.repetitions.max(1)).map(once);
-        builds.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
+        builds
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .unwrap_or_default()
     }
 }
 
@@ -299,12 +307,30 @@ fn figure(rows: &[Row], timing: &[Timing]) -> Figure {
         title: title.into(),
         x: Axis::categories("", scenes.clone()),
         y: Axis::linear(label),
-        layers: ["f32", "f64"].map(|kind| Layer::bars(kind, value(kind), 0.0)).into(),
+        layers: ["f32", "f64"]
+            .map(|kind| Layer::bars(kind, value(kind), 0.0))
+            .into(),
     };
-    let wrong = |kind| of(kind).map(|row| 100.0 * row.wrong_fraction).collect();
-    let cost = |kind| of(kind).map(|row| 100.0 * (row.cost_over_exact - 1.0)).collect();
-    let own_time = |kind: &'static str| timing.iter().filter(move |row| row.method == kind);
-    let time = |kind| own_time(kind).map(|row| row.nanoseconds_per_object / 1000.0).collect();
+    let wrong = |kind| {
+        of(kind)
+            .map(|row| 100.0 * row.wrong_fraction)
+            .collect()
+    };
+    let cost = |kind| {
+        of(kind)
+            .map(|row| 100.0 * (row.cost_over_exact - 1.0))
+            .collect()
+    };
+    let own_time = |kind: &'static str| {
+        timing
+            .iter()
+            .filter(move |row| row.method == kind)
+    };
+    let time = |kind| {
+        own_time(kind)
+            .map(|row| row.nanoseconds_per_object / 1000.0)
+            .collect()
+    };
     Figure {
         title: "What f32 areas cost: Müller–Fellner's choices against exact arithmetic".into(),
         caption: "Stiff scenes of the suite. Above, how often the chosen split is not the best one, at the nodes of \
@@ -326,11 +352,19 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     let rows: Vec<Row> = read(&folder.join("precision.csv"))?;
     let timing: Vec<Timing> = read(&folder.join("timing_precision.csv"))?;
     let mut output = Output::new("", "Areas in f32 and f64 against exact ones");
-    let scenes = rows.iter().filter(|row| row.method == "f32").count();
+    let scenes = rows
+        .iter()
+        .filter(|row| row.method == "f32")
+        .count();
     let of = |kind: &str| {
-        let wrong: Vec<&Row> =
-            rows.iter().filter(|row| row.method == kind && row.wrong > 0).collect();
-        let worst = wrong.iter().map(|row| 100.0 * row.wrong_fraction).fold(0.0, f64::max);
+        let wrong: Vec<&Row> = rows
+            .iter()
+            .filter(|row| row.method == kind && row.wrong > 0)
+            .collect();
+        let worst = wrong
+            .iter()
+            .map(|row| 100.0 * row.wrong_fraction)
+            .fold(0.0, f64::max);
         match wrong.len() {
             0 => format!("areas in {kind} on none"),
             some => format!(
@@ -339,7 +373,11 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
         }
     };
     let seconds = |kind: &str| -> f64 {
-        timing.iter().filter(|row| row.method == kind).map(|row| row.nanoseconds_per_object).sum()
+        timing
+            .iter()
+            .filter(|row| row.method == kind)
+            .map(|row| row.nanoseconds_per_object)
+            .sum()
     };
     let saved = 100.0 * (1.0 - seconds("f32") / seconds("f64"));
     output.reading = format!(
@@ -349,7 +387,9 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     );
     let columns = "scene method decisions wrong undecided cost_over_exact";
     output.show("Decisions at the nodes of the exact tree:", &rows, columns)?;
-    output.figures.push(("timing_precision".into(), figure(&rows, &timing)));
+    output
+        .figures
+        .push(("timing_precision".into(), figure(&rows, &timing)));
     Ok(output)
 }
 
@@ -363,7 +403,9 @@ mod tests {
         for make in [stiff::uniform, stiff::overlapping, stiff::planar_grid, stiff::two_densities] {
             let boxes = stiff::boxes(&make(200));
             let plain = build(&boxes, |orders| chosen::<f64>(&boxes, orders));
-            let built = muller_fellner::Config::default().build(&boxes).unwrap();
+            let built = muller_fellner::Config::default()
+                .build(&boxes)
+                .unwrap();
             assert_eq!(internal_area(&plain), internal_area(&built));
         }
     }

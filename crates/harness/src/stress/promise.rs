@@ -81,7 +81,10 @@ impl fmt::Display for Broken {
 
 impl From<&str> for Broken {
     fn from(text: &str) -> Self {
-        match text.split_once(": ").map(|(name, what)| (name.parse(), what)) {
+        match text
+            .split_once(": ")
+            .map(|(name, what)| (name.parse(), what))
+        {
             Some((Ok(promise), what)) => Self { promise: Some(promise), what: what.into() },
             _ => Self::case(text),
         }

@@ -142,13 +142,14 @@ impl Row {
     /// What the heat map shows: the broken promises, or the depth.
     fn text(&self) -> String {
         match self.outcome {
-            Class::Kept | Class::Refused => {
-                self.depth.map_or_else(String::new, |depth| depth.to_string())
-            }
+            Class::Kept | Class::Refused => self
+                .depth
+                .map_or_else(String::new, |depth| depth.to_string()),
             Class::Broken | Class::Dead => {
                 let broken = self.note.split(BETWEEN).map(Broken::from);
-                let promises: BTreeSet<Promise> =
-                    broken.filter_map(|broken| broken.promise).collect();
+                let promises: BTreeSet<Promise> = broken
+                    .filter_map(|broken| broken.promise)
+                    .collect();
                 let names: Vec<String> = promises.iter().map(Promise::to_string).collect();
                 if names.is_empty() { "!".into() } else { names.join(" ") }
             }
@@ -201,9 +202,11 @@ impl Config {
                 }));
                 rows.push(row);
             }
-            let traversals = tracing::TRAVERSALS.iter().filter_map(|(name, traversal)| {
-                Some(Row::new(case, name, case.of_traversal(*traversal, self.rays)?).0)
-            });
+            let traversals = tracing::TRAVERSALS
+                .iter()
+                .filter_map(|(name, traversal)| {
+                    Some(Row::new(case, name, case.of_traversal(*traversal, self.rays)?).0)
+                });
             rows.extend(traversals);
             rows.extend(
                 Part::ALL
@@ -211,7 +214,10 @@ impl Config {
                     .filter_map(|&part| Some(Row::new(case, part.name(), case.of_part(part)?).0)),
             );
             for peer in peers::NAMES {
-                peers.extend(case.scene().map(|scene| self.peer(case, scene, peer)));
+                peers.extend(
+                    case.scene()
+                        .map(|scene| self.peer(case, scene, peer)),
+                );
             }
         }
         store.write("cells.csv", &to_bytes(&rows, Path::new("cells.csv"))?)?;
@@ -242,7 +248,9 @@ impl Config {
                 }
                 Err(end) => {
                     broken.push(
-                        Promise::P1.broken(format!("{end} on {objects} objects")).to_string(),
+                        Promise::P1
+                            .broken(format!("{end} on {objects} objects"))
+                            .to_string(),
                     );
                     return Row::of_peer(case, peer, Class::Dead, objects, last.as_ref(), &broken);
                 }
@@ -273,14 +281,20 @@ fn heat_map(rows: &[Row]) -> HeatMap {
     };
     let (scenes, columns) = (names(|row| &row.scene), names(|row| &row.method));
     let cell = |scene: &String, column: &String| {
-        let row = rows.iter().find(|row| (&row.scene, &row.method) == (scene, column));
+        let row = rows
+            .iter()
+            .find(|row| (&row.scene, &row.method) == (scene, column));
         let shown =
             |row: &Row| figures::Cell { class: Some(row.outcome as usize), text: row.text() };
         row.map(shown).unwrap_or_default()
     };
     let cells = scenes
         .iter()
-        .flat_map(|scene| columns.iter().map(move |column| cell(scene, column)))
+        .flat_map(|scene| {
+            columns
+                .iter()
+                .map(move |column| cell(scene, column))
+        })
         .collect();
     HeatMap {
         title: HEADING.into(),
@@ -304,8 +318,15 @@ const HEADING: &str = "Stiff and extreme cases";
 pub fn output(folder: &Path) -> Result<Output, Error> {
     let [own, peers] = rows(folder)?;
     let is_bad = |row: &&Row| matches!(row.outcome, Class::Broken | Class::Dead);
-    let count = |class| own.iter().filter(|row| row.outcome == class).count();
-    let worst = own.iter().filter_map(|row| row.relative_error).fold(0.0, f64::max);
+    let count = |class| {
+        own.iter()
+            .filter(|row| row.outcome == class)
+            .count()
+    };
+    let worst = own
+        .iter()
+        .filter_map(|row| row.relative_error)
+        .fold(0.0, f64::max);
     let mut output = Output::new("", HEADING);
     output.reading = format!(
         "{} cells: {} as promised, {} with the error promised, {} broken. Largest error of a cost: {worst:.1e}. Other \

@@ -30,7 +30,11 @@ const fn plain(sizes: [usize; 3]) -> Check {
 /// The uniform scene with one damaged box.
 fn with_bad_object(n: usize, damage: fn(&mut Aabb)) -> Vec<Aabb> {
     let mut boxes = stiff::boxes(&stiff::uniform(n));
-    boxes.iter_mut().skip(BAD).take(1).for_each(damage);
+    boxes
+        .iter_mut()
+        .skip(BAD)
+        .take(1)
+        .for_each(damage);
     boxes
 }
 

@@ -33,7 +33,9 @@ pub const TRAVERSALS: &[(&str, Traversal)] = &[
 ];
 
 fn build(objects: &Primitives, builder: &dyn Builder) -> Result<Bvh, String> {
-    builder.build(&objects.boxes()).map_err(|error| error.to_string())
+    builder
+        .build(&objects.boxes())
+        .map_err(|error| error.to_string())
 }
 
 /// With one object per leaf, with the leaves that the surface area heuristic merges, and with a tenth of all objects in
@@ -43,7 +45,9 @@ fn over_binary_trees(objects: &Primitives) -> Result<Vec<Accelerator<'_>>, Strin
     let merged = collapse_leaves(&greedy, &SahConstants::default());
     let tenths = median_cut::Config { leaf_fraction: 0.1, ..Default::default() };
     let trees = [greedy, merged, build(objects, &tenths)?];
-    Ok(trees.map(|tree| Accelerator::new(objects, Structure::Tree(Cow::Owned(tree)))).into())
+    Ok(trees
+        .map(|tree| Accelerator::new(objects, Structure::Tree(Cow::Owned(tree))))
+        .into())
 }
 
 fn over_wide_layouts(
@@ -54,7 +58,9 @@ fn over_wide_layouts(
         return Err("only triangles have a wide layout".into());
     };
     let layouts = wide_layouts(triangles)?.into_iter();
-    Ok(layouts.map(|(_, wide)| Accelerator::new(objects, structure(wide))).collect())
+    Ok(layouts
+        .map(|(_, wide)| Accelerator::new(objects, structure(wide)))
+        .collect())
 }
 
 /// Of a binary tree and of one with many children per node, for every kernel that this processor has.
@@ -64,7 +70,9 @@ pub fn wide_layouts(triangles: &[Triangle]) -> Result<Vec<(Kernel, WideBvh)>, St
         [&muller_fellner::Config::default(), &goldsmith_salmon::Config::default()];
     let mut layouts = Vec::new();
     for builder in builders {
-        let tree = builder.build(&boxes).map_err(|error| error.to_string())?;
+        let tree = builder
+            .build(&boxes)
+            .map_err(|error| error.to_string())?;
         let wide = WideBvh::new(&tree, triangles).map_err(|error| error.to_string())?;
         let of_kernel = |kernel| Some((kernel, wide.clone().with_kernel(kernel)?));
         layouts.extend(Kernel::ALL.into_iter().filter_map(of_kernel));
@@ -98,7 +106,9 @@ pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Verdic
 /// the planes of faces of boxes, from inside, from corners, and over short, empty and single-point ranges.
 pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
     let mut rng = Stream::seed_from_u64(seed);
-    let bounds = triangles.iter().fold(Aabb::EMPTY, |b, t| b.union(&t.aabb()));
+    let bounds = triangles
+        .iter()
+        .fold(Aabb::EMPTY, |b, t| b.union(&t.aabb()));
     let bounds = if bounds.check().is_ok() { bounds } else { Aabb::from(([0.0; 3], [1.0; 3])) };
     let mut rays = Vec::with_capacity(count);
     for attempt in 0..20 * count {
@@ -110,8 +120,10 @@ pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
         let inside = |at: Vec3| bounds.min * (1.0 - at) + bounds.max * at;
         let (somewhere, elsewhere, direction) =
             (inside(unit()), inside(unit()), unit() * 2.0 - 1.0);
-        let Triangle([a, b, c]) =
-            triangles.choose(&mut rng).copied().unwrap_or(Triangle([somewhere; 3]));
+        let Triangle([a, b, c]) = triangles
+            .choose(&mut rng)
+            .copied()
+            .unwrap_or(Triangle([somewhere; 3]));
         let along = [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z][attempt / 8 % 6];
         let beside =
             |target: Vec3| target - along * (bounds.extent().max_element() as f32).min(1e38);

@@ -10,7 +10,10 @@ use std::ops::RangeInclusive;
 /// All coordinates times 2^k; exact for the k of [`scale_range`].
 pub fn scaled(boxes: &[Aabb], k: i32) -> Vec<Aabb> {
     let scale = |p: Vec3| (p.as_dvec3() * libm::exp2(k.into())).as_vec3();
-    boxes.iter().map(|b| Aabb { min: scale(b.min), max: scale(b.max) }).collect()
+    boxes
+        .iter()
+        .map(|b| Aabb { min: scale(b.min), max: scale(b.max) })
+        .collect()
 }
 
 /// A cost in units of area after the scene was scaled by 2^k.
@@ -20,10 +23,15 @@ pub fn scaled_area(area: f64, k: i32) -> f64 {
 
 /// The k by which all coordinates can be scaled so that none overflows or becomes denormal; 0 is always among them.
 pub fn scale_range(boxes: &[Aabb]) -> RangeInclusive<i32> {
-    let coordinates =
-        boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
-    let exponents =
-        coordinates.filter(|&x| x != 0.0).map(|x| (x.to_bits() >> 23 & 0xff).max(1) as i32 - 127);
+    let coordinates = boxes.iter().flat_map(|b| {
+        b.min
+            .to_array()
+            .into_iter()
+            .chain(b.max.to_array())
+    });
+    let exponents = coordinates
+        .filter(|&x| x != 0.0)
+        .map(|x| (x.to_bits() >> 23 & 0xff).max(1) as i32 - 127);
     let (low, high) = exponents.fold((127, -126), |(low, high), e| (low.min(e), high.max(e)));
     (-126 - low).min(0)..=(127 - high).max(0)
 }
@@ -48,7 +56,12 @@ pub fn shuffled(boxes: &[Aabb], seed: u64) -> (Vec<Aabb>, Vec<u32>) {
 
 /// The same tree, but for the boxes: the same nodes over the same objects.
 pub fn same_topology(a: &Bvh, b: &Bvh) -> bool {
-    let kinds = |tree: &Bvh| tree.nodes.iter().map(|node| node.kind()).collect::<Vec<_>>();
+    let kinds = |tree: &Bvh| {
+        tree.nodes
+            .iter()
+            .map(|node| node.kind())
+            .collect::<Vec<_>>()
+    };
     a.prim_ids == b.prim_ids && kinds(a) == kinds(b)
 }
 

@@ -30,7 +30,10 @@ pub fn assert_current(path: &Path, made: &str, by: &str) {
         fs::write(path, made).unwrap();
     }
     let text = fs::read_to_string(path).unwrap_or_default();
-    let differs = text.lines().zip(made.lines()).find(|(now, then)| now != then);
+    let differs = text
+        .lines()
+        .zip(made.lines())
+        .find(|(now, then)| now != then);
     let stale = path.display();
     assert!(
         text == made,
@@ -51,7 +54,11 @@ pub fn reproducible(folder: &Path) -> Vec<(String, Vec<u8>)> {
 
 /// The rows of a CSV file by column names.
 pub fn rows(path: &Path) -> Vec<BTreeMap<String, String>> {
-    csv::Reader::from_path(path).unwrap().deserialize().map(Result::unwrap).collect()
+    csv::Reader::from_path(path)
+        .unwrap()
+        .deserialize()
+        .map(Result::unwrap)
+        .collect()
 }
 
 /// Saves a tree over the scene's objects in a file.

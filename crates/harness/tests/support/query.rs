@@ -29,8 +29,9 @@ fn paths(file: &str) -> Vec<PathBuf> {
     let Some((before, after)) = file.split_once("/*/") else { return vec![results.join(file)] };
     let folders =
         fs::read_dir(results.join(before)).unwrap_or_else(|error| panic!("{file}: {error}"));
-    let mut paths: Vec<PathBuf> =
-        folders.map(|folder| folder.unwrap().path().join(after)).collect();
+    let mut paths: Vec<PathBuf> = folders
+        .map(|folder| folder.unwrap().path().join(after))
+        .collect();
     paths.retain(|path| path.is_file());
     paths.sort();
     paths
@@ -46,19 +47,23 @@ pub fn rows(file: &str, conditions: &str) -> Vec<Row> {
     }
     let meets = |row: &Row| {
         conditions == "*"
-            || conditions.replace("\\, ", COMMA).split(", ").all(|condition| {
-                let condition = condition.replace(COMMA, ", ");
-                let (column, text, wanted) = match condition.split_once("!=") {
-                    Some((column, text)) => (column, text, false),
-                    None => condition
-                        .split_once('=')
-                        .map(|(column, text)| (column, text, true))
-                        .expect(conditions),
-                };
-                let cell =
-                    row.get(column).unwrap_or_else(|| panic!("{file} has no column {column}"));
-                text.split(" or ").any(|text| cell == text) == wanted
-            })
+            || conditions
+                .replace("\\, ", COMMA)
+                .split(", ")
+                .all(|condition| {
+                    let condition = condition.replace(COMMA, ", ");
+                    let (column, text, wanted) = match condition.split_once("!=") {
+                        Some((column, text)) => (column, text, false),
+                        None => condition
+                            .split_once('=')
+                            .map(|(column, text)| (column, text, true))
+                            .expect(conditions),
+                    };
+                    let cell = row
+                        .get(column)
+                        .unwrap_or_else(|| panic!("{file} has no column {column}"));
+                    text.split(" or ").any(|text| cell == text) == wanted
+                })
     };
     rows.retain(meets);
     assert!(!rows.is_empty(), "{file}: no row with {conditions}");
@@ -71,8 +76,12 @@ fn aggregate(rows: &[&Row], what: &str) -> Option<f64> {
     if how == "count" {
         return Some(rows.len() as f64);
     }
-    let cell =
-        |row: &&Row| row.get(column).unwrap_or_else(|| panic!("no column {column}")).parse().ok();
+    let cell = |row: &&Row| {
+        row.get(column)
+            .unwrap_or_else(|| panic!("no column {column}"))
+            .parse()
+            .ok()
+    };
     let mut values: Vec<f64> = rows.iter().filter_map(cell).collect();
     values.sort_by(f64::total_cmp);
     let (first, last) = (*values.first()?, *values.last()?);
@@ -105,7 +114,10 @@ fn write(value: f64, format: &str) -> String {
 fn distinct(rows: &[Row], columns: &[&str]) -> Vec<Vec<String>> {
     let mut found: Vec<Vec<String>> = Vec::new();
     for row in rows {
-        let cells: Vec<String> = columns.iter().map(|column| row[*column].clone()).collect();
+        let cells: Vec<String> = columns
+            .iter()
+            .map(|column| row[*column].clone())
+            .collect();
         if !found.contains(&cells) {
             found.push(cells);
         }
@@ -115,8 +127,11 @@ fn distinct(rows: &[Row], columns: &[&str]) -> Vec<Vec<String>> {
 
 /// The one value of a column, a number in the format and a text as it is; nothing if all cells are empty.
 fn beside_of(rows: &[&Row], column: &str, format: &str) -> Option<String> {
-    let texts: BTreeSet<&String> =
-        rows.iter().map(|row| &row[column]).filter(|text| !text.is_empty()).collect();
+    let texts: BTreeSet<&String> = rows
+        .iter()
+        .map(|row| &row[column])
+        .filter(|text| !text.is_empty())
+        .collect();
     let text = texts.first()?;
     match text.parse::<f64>() {
         Ok(_) if format != "text" => {
@@ -133,10 +148,15 @@ fn beside_of(rows: &[&Row], column: &str, format: &str) -> Option<String> {
 fn show(rows: &[&Row], what: &str, format: &str) -> String {
     let one = |what: &str| {
         if format == "text" {
-            let column = what.strip_prefix("only ").expect("texts are not aggregated");
+            let column = what
+                .strip_prefix("only ")
+                .expect("texts are not aggregated");
             let texts: BTreeSet<&String> = rows.iter().map(|row| &row[column]).collect();
             assert!(texts.len() <= 1, "{column} is not one text: {texts:?}");
-            return texts.first().filter(|text| !text.is_empty()).map(|text| (*text).clone());
+            return texts
+                .first()
+                .filter(|text| !text.is_empty())
+                .map(|text| (*text).clone());
         }
         aggregate(rows, what).map(|value| write(value, format))
     };
@@ -166,34 +186,57 @@ pub fn pivot(rows: &[Row], axes: &str, what: &str, format: &str) -> String {
     let down: Vec<&str> = down.split(" + ").collect();
     let escape = |text: &str| text.replace('|', "\\|");
     let columns = distinct(rows, &[across]).concat();
-    let header: Vec<String> =
-        down.iter().map(|column| column.replace('_', " ")).chain(columns.clone()).collect();
+    let header: Vec<String> = down
+        .iter()
+        .map(|column| column.replace('_', " "))
+        .chain(columns.clone())
+        .collect();
     let mut lines = vec![format!(
         "| {} |",
-        header.iter().map(|cell| escape(cell)).collect::<Vec<_>>().join(" | ")
+        header
+            .iter()
+            .map(|cell| escape(cell))
+            .collect::<Vec<_>>()
+            .join(" | ")
     )];
     lines.push(format!("|{}", "---|".repeat(header.len())));
     // Lines that begin alike stand together.
     let groups = distinct(rows, &down[..1]);
     let mut names_of_lines = distinct(rows, &down);
-    names_of_lines.sort_by_key(|names| groups.iter().position(|group| group[0] == names[0]));
+    names_of_lines.sort_by_key(|names| {
+        groups
+            .iter()
+            .position(|group| group[0] == names[0])
+    });
     for names in names_of_lines {
         let of_line: Vec<&Row> = rows
             .iter()
-            .filter(|row| down.iter().zip(&names).all(|(column, name)| row[*column] == *name))
+            .filter(|row| {
+                down.iter()
+                    .zip(&names)
+                    .all(|(column, name)| row[*column] == *name)
+            })
             .collect();
         let cell = |column: &String| {
-            let here: Vec<&Row> =
-                of_line.iter().copied().filter(|row| row[across] == *column).collect();
+            let here: Vec<&Row> = of_line
+                .iter()
+                .copied()
+                .filter(|row| row[across] == *column)
+                .collect();
             show(&here, what, format)
         };
-        let kind = of_line.iter().find_map(|row| row.get("scene_kind"));
+        let kind = of_line
+            .iter()
+            .find_map(|row| row.get("scene_kind"));
         let note = match kind {
             Some(kind) if down == ["scene"] && kind != "file" => format!(" ({kind})"),
             _ => String::new(),
         };
-        let names: Vec<String> =
-            down.iter().zip(&names).map(|(column, name)| escape(&heading(column, name))).collect();
+        let names: Vec<String> = down
+            .iter()
+            .zip(&names)
+            .map(|(column, name)| escape(&heading(column, name)))
+            .collect();
         let cells: Vec<String> = columns.iter().map(cell).collect();
         lines.push(format!("| {}{note} | {} |", names.join(" | "), cells.join(" | ")));
     }

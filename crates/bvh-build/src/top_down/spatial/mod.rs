@@ -52,7 +52,9 @@ struct Open {
 
 impl Ord for Open {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.area.total_cmp(&other.area).then(other.node.cmp(&self.node))
+        self.area
+            .total_cmp(&other.area)
+            .then(other.node.cmp(&self.node))
     }
 }
 
@@ -154,9 +156,14 @@ impl Build<'_> {
             return Ok(tree);
         }
         let mut pace = Pace::new(self.watch);
-        self.powers = (0..=boxes.len()).map(|n| libm::pow(n as f64, self.config.power)).collect();
-        let references: Vec<Reference> =
-            boxes.iter().zip(0..).map(|(&aabb, object)| Reference { aabb, object }).collect();
+        self.powers = (0..=boxes.len())
+            .map(|n| libm::pow(n as f64, self.config.power))
+            .collect();
+        let references: Vec<Reference> = boxes
+            .iter()
+            .zip(0..)
+            .map(|(&aabb, object)| Reference { aabb, object })
+            .collect();
         let root = union(&references);
         self.least_overlap = self.config.overlap * root.half_area();
         tree.nodes.push(Node::leaf(root, 0, 1));
@@ -223,8 +230,9 @@ impl Build<'_> {
         if self.extra == 0 || left.intersection(right).half_area() <= self.least_overlap {
             return Ok(by_objects);
         }
-        let spatial =
-            self.best_plane(aabb, references).filter(|plane| plane.cost < by_objects.cost);
+        let spatial = self
+            .best_plane(aabb, references)
+            .filter(|plane| plane.cost < by_objects.cost);
         let spatial = spatial.and_then(|plane| self.spatial_split(references, plane));
         Ok(match spatial.filter(|spatial| spatial.cost < by_objects.cost) {
             Some(spatial) => {
@@ -239,7 +247,9 @@ impl Build<'_> {
 
 /// The box around the references.
 fn union(references: &[Reference]) -> Aabb {
-    references.iter().fold(Aabb::EMPTY, |aabb, reference| aabb.union(&reference.aabb))
+    references
+        .iter()
+        .fold(Aabb::EMPTY, |aabb, reference| aabb.union(&reference.aabb))
 }
 
 #[cfg(test)]
@@ -269,7 +279,9 @@ mod tests {
         let objects = &triangles.as_slice();
         let mut before = f64::INFINITY;
         for references in [1.0, 1.1, 1.5, 3.0] {
-            let tree = Config { references, ..Config::default() }.build(&boxes, objects).unwrap();
+            let tree = Config { references, ..Config::default() }
+                .build(&boxes, objects)
+                .unwrap();
             validate_references(&tree, &boxes, objects).unwrap();
             let count = tree.prim_ids.len();
             assert!(
@@ -280,7 +292,9 @@ mod tests {
             assert!(cost <= before, "{cost} {before}");
             before = cost;
         }
-        let whole = muller_fellner::Config::default().build(&boxes).unwrap();
+        let whole = muller_fellner::Config::default()
+            .build(&boxes)
+            .unwrap();
         let whole = cost::total_area(&whole);
         assert!(before < 0.97 * whole, "{before} of {whole}");
     }
@@ -291,13 +305,19 @@ mod tests {
             [vec![], needles(1), vec![Triangle([Vec3::ONE; 3]); 30], vec![needles(1)[0]; 3000]]
         {
             let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
-            let tree = Config::default().build(&boxes, &triangles.as_slice()).unwrap();
+            let tree = Config::default()
+                .build(&boxes, &triangles.as_slice())
+                .unwrap();
             validate_references(&tree, &boxes, &triangles.as_slice()).unwrap();
             assert_eq!(tree.prim_ids.len(), triangles.len(), "there is nothing to split");
             assert!(tree.depth() <= 12, "objects in one place are not halved: {}", tree.depth());
         }
         let wrong = [Aabb::from([[f32::NAN; 3], [1.0; 3]])];
-        assert!(Config::default().build(&wrong, &needles(1).as_slice()).is_err());
+        assert!(
+            Config::default()
+                .build(&wrong, &needles(1).as_slice())
+                .is_err()
+        );
         assert!(
             Config { references: 0.5, ..Config::default() }
                 .build(&[], &needles(1).as_slice())

@@ -28,12 +28,16 @@ impl Axis {
     fn sort(&mut self, references: &[Reference], number: usize) {
         self.keys.clear();
         self.keys.extend(
-            references.iter().zip(0..).map(|(r, at)| (r.aabb.doubled_centroid()[number], at)),
+            references
+                .iter()
+                .zip(0..)
+                .map(|(r, at)| (r.aabb.doubled_centroid()[number], at)),
         );
         if references.len() >= RADIX_SORTED {
             radsort::sort_by_key(&mut self.keys, |&(centre, _)| centre);
         } else {
-            self.keys.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            self.keys
+                .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         }
     }
 
@@ -100,8 +104,10 @@ impl Build<'_> {
             }
         }
         let keys = &self.axes[axis].keys;
-        let mut ordered: Vec<Reference> =
-            keys.iter().map(|&(_, at)| references[at as usize]).collect();
+        let mut ordered: Vec<Reference> = keys
+            .iter()
+            .map(|&(_, at)| references[at as usize])
+            .collect();
         if union(&ordered[..left]) == union(&ordered[left..]) {
             // Nothing is gained, and the power would take off one reference after the other.
             left = count / 2;

@@ -163,7 +163,9 @@ impl Instructions for Avx2 {
                 _mm_min_epu32(_mm256_castsi256_si128(keys), _mm256_extracti128_si256::<1>(keys));
             let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0x4e>(least));
             let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0xb1>(least));
-            let nearest = *node.children.get_unchecked((!_mm_cvtsi128_si32(least) & 7) as usize);
+            let nearest = *node
+                .children
+                .get_unchecked((!_mm_cvtsi128_si32(least) & 7) as usize);
 
             // A child's place is the number of keys greater than its own.
             let mut places = _mm256_setzero_si256();

@@ -137,7 +137,9 @@ impl Instructions for Avx512 {
                 _mm_min_epu32(_mm256_castsi256_si128(least), _mm256_extracti128_si256::<1>(least));
             let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0x4e>(least));
             let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0xb1>(least));
-            let nearest = *node.children.get_unchecked((!_mm_cvtsi128_si32(least) & 7) as usize);
+            let nearest = *node
+                .children
+                .get_unchecked((!_mm_cvtsi128_si32(least) & 7) as usize);
 
             let keys = _mm256_maskz_compress_epi32(mask as u8, keys);
             if mask.count_ones() <= 4 {
@@ -172,8 +174,13 @@ impl Instructions for Avx512 {
                 let mut i = 0;
                 while i < n {
                     let key = sorted[i & 7];
-                    let child = node.children.get_unchecked((!key & 7) as usize).bits();
-                    stack.add(i).write(u64::from(key) << 32 | u64::from(child));
+                    let child = node
+                        .children
+                        .get_unchecked((!key & 7) as usize)
+                        .bits();
+                    stack
+                        .add(i)
+                        .write(u64::from(key) << 32 | u64::from(child));
                     i += 1;
                 }
             }

@@ -127,7 +127,9 @@ mod tests {
     fn planes_too_far(own_margin: f32, underflow: f32) -> usize {
         let mut state = 1u32;
         let mut random = || {
-            state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+            state = state
+                .wrapping_mul(747_796_405)
+                .wrapping_add(2_891_336_453);
             let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
             (word >> 8) as f32 / (1 << 23) as f32 - 1.0
         };
@@ -143,7 +145,11 @@ mod tests {
             let direction = Vec3::new(random(), random(), random())
                 * pow2([0, 30, -30, 0, 30, -30, 85][case % 7]);
             let Ok(ray) = Ray::half_line(origin, direction) else { continue };
-            let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+            let largest = bounds
+                .min
+                .abs()
+                .max(bounds.max.abs())
+                .max_element();
             // SAFETY: this function has the features.
             let Some(boxes) =
                 (unsafe { BoxRay::with_margin(&ray, largest, own_margin, underflow) })

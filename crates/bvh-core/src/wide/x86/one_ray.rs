@@ -72,7 +72,9 @@ pub(crate) unsafe fn nearest<K: Instructions<Boxes = F32x8>>(
                     if mask == 0 {
                         break;
                     }
-                    child = *node.children.get_unchecked(mask.trailing_zeros() as usize);
+                    child = *node
+                        .children
+                        .get_unchecked(mask.trailing_zeros() as usize);
                     continue;
                 }
                 child = K::sort(node, entry, mask, top);
@@ -90,7 +92,9 @@ pub(crate) unsafe fn nearest<K: Instructions<Boxes = F32x8>>(
                         // Four lanes at a time, those without candidates left out.
                         let first = candidates.trailing_zeros() as usize & !3;
                         let (mut hits, t) =
-                            shear.assume_init_ref().decide(&*block, first, ray.t_min(), t_max);
+                            shear
+                                .assume_init_ref()
+                                .decide(&*block, first, ray.t_min(), t_max);
                         candidates &= !(0b1111 << first);
                         if hits != 0 {
                             let t: [f32; 4] = core::mem::transmute(t);
@@ -179,7 +183,11 @@ pub(crate) unsafe fn any<K: Instructions<Boxes = F32x8>>(wide: &WideBvh, ray: &R
                     let mut candidates = shear.assume_init_ref().candidates(&*block);
                     while candidates != 0 {
                         let first = candidates.trailing_zeros() as usize & !3;
-                        if shear.assume_init_ref().decide(&*block, first, ray.t_min(), t_max).0 != 0
+                        if shear
+                            .assume_init_ref()
+                            .decide(&*block, first, ray.t_min(), t_max)
+                            .0
+                            != 0
                         {
                             return true;
                         }
@@ -314,8 +322,11 @@ impl Shear4 {
             let mut relative = [[_mm_setzero_ps(); 2]; 3];
             let sign = _mm_set1_ps(-0.0);
             for (i, &axis) in self.axes.iter().enumerate() {
-                let lanes =
-                    block.corners.as_ptr().cast::<f32>().add(axis * TriangleBlock::LANES + lane);
+                let lanes = block
+                    .corners
+                    .as_ptr()
+                    .cast::<f32>()
+                    .add(axis * TriangleBlock::LANES + lane);
                 let (a, b) = (_mm_load_ps(lanes), _mm_load_ps(lanes.add(3 * TriangleBlock::LANES)));
                 let c = _mm_load_ps(lanes.add(6 * TriangleBlock::LANES));
                 let (min, max) = (_mm_min_ps(_mm_min_ps(a, b), c), _mm_max_ps(_mm_max_ps(a, b), c));

@@ -133,15 +133,24 @@ impl MeshBuilder {
     /// Adds a copy of `part`, moved by `placement`.
     pub fn place(&mut self, part: &MeshBuilder, placement: &DAffine3) {
         let moved = |corner: DVec3| placement.transform_point3(corner);
-        self.triangles.extend(part.triangles.iter().map(|triangle| triangle.map(moved)));
+        self.triangles.extend(
+            part.triangles
+                .iter()
+                .map(|triangle| triangle.map(moved)),
+        );
     }
 
     /// Multiplies by `unit`, adds `origin`, rounds to f32 and drops the triangles without area (a quadrilateral at a
     /// pole gives one).
     pub fn finish(self, unit: f64, origin: DVec3) -> Vec<Triangle> {
         let rounded = |corner: DVec3| (corner * unit + origin).as_vec3();
-        let triangles = self.triangles.into_iter().map(|corners| Triangle(corners.map(rounded)));
-        triangles.filter(|triangle| !triangle.is_degenerate()).collect()
+        let triangles = self
+            .triangles
+            .into_iter()
+            .map(|corners| Triangle(corners.map(rounded)));
+        triangles
+            .filter(|triangle| !triangle.is_degenerate())
+            .collect()
     }
 }
 
@@ -168,7 +177,10 @@ pub fn on_circle(radius: f64, turns: f64, z: f64) -> DVec3 {
 
 /// A regular polygon of `sides` corners as a profile for [`MeshBuilder::sweep`].
 pub fn circle(radius: f64, sides: usize) -> Vec<(f64, f64)> {
-    (0..sides).map(|i| cos_sin(fraction(i, sides))).map(|(c, s)| (radius * c, radius * s)).collect()
+    (0..sides)
+        .map(|i| cos_sin(fraction(i, sides)))
+        .map(|(c, s)| (radius * c, radius * s))
+        .collect()
 }
 
 /// `i / n`, the parameter of the i-th of n steps.
@@ -234,7 +246,11 @@ mod tests {
     #[test]
     fn a_cuboid_and_a_closed_sweep_enclose_their_volume() {
         let volume = |mesh: &MeshBuilder| {
-            let six: f64 = mesh.triangles.iter().map(|[a, b, c]| a.cross(*b).dot(*c)).sum();
+            let six: f64 = mesh
+                .triangles
+                .iter()
+                .map(|[a, b, c]| a.cross(*b).dot(*c))
+                .sum();
             (six / 6.0).abs()
         };
         let mut cuboid = MeshBuilder::default();

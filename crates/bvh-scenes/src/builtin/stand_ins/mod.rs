@@ -88,7 +88,10 @@ mod tests {
     #[test]
     fn sizes_are_ordered_as_the_originals_were() {
         let count = |name: &str| {
-            STAND_INS.iter().find(|scene| scene.name == name).map(|scene| scene.triangle_count)
+            STAND_INS
+                .iter()
+                .find(|scene| scene.name == name)
+                .map(|scene| scene.triangle_count)
         };
         let ascending = ["escher", "pinecon2", "bijou", "konistil", "cloister"].map(count);
         assert!(ascending.is_sorted() && ascending[0].is_some(), "{ascending:?}");

@@ -44,7 +44,9 @@ impl<'a> Geometry<'a> {
 
     /// Lines so far that begin with no keyword, the number of the first and its first word.
     pub fn unknown(&self) -> Option<(usize, usize, String)> {
-        self.statements.unknown.map(|(count, line, word)| (count, line, shown(word)))
+        self.statements
+            .unknown
+            .map(|(count, line, word)| (count, line, shown(word)))
     }
 
     /// Reads on to the end of the file.
@@ -74,7 +76,10 @@ impl<'a> Geometry<'a> {
         if self.fault.is_some() {
             return false;
         }
-        let Some((keyword, line)) = self.statements.next(&mut self.words, MOST_CORNERS + 1) else {
+        let Some((keyword, line)) = self
+            .statements
+            .next(&mut self.words, MOST_CORNERS + 1)
+        else {
             return false;
         };
         self.fault = self.add_checked(keyword, line).err();
@@ -97,7 +102,9 @@ impl<'a> Geometry<'a> {
                     0..3 => self.short_faces += 1,
                     _ => add(
                         b'f',
-                        self.words.iter().map(|corner| vertex_index(corner)),
+                        self.words
+                            .iter()
+                            .map(|corner| vertex_index(corner)),
                         &mut self.block,
                     ),
                 }

@@ -43,7 +43,11 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, ObjError> {
         let (corners, _) = mesh.positions.as_chunks::<3>();
         let (faces, _) = mesh.indices.as_chunks::<3>();
         let corner = |index: u32| Vec3::from_array(corners[index as usize]);
-        triangles.extend(faces.iter().map(|face| Triangle(face.map(corner))));
+        triangles.extend(
+            faces
+                .iter()
+                .map(|face| Triangle(face.map(corner))),
+        );
         used += corners.len();
     }
     if triangles.is_empty() {

@@ -118,7 +118,9 @@ impl Config {
         check_scene(boxes)?;
         self.check()?;
         let n = boxes.len();
-        let bounds = boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
+        let bounds = boxes
+            .iter()
+            .fold(Aabb::EMPTY, |all, b| all.union(b));
         let mut tree = KdTree { bounds, cells: vec![], objects: vec![], depth: 0 };
         if n == 0 {
             return Ok(tree);
@@ -127,7 +129,9 @@ impl Config {
         let mut sides = vec![Side::Both; n];
         let placeholder = Cell::Leaf { first: 0, count: 0 };
         tree.cells.push(placeholder);
-        let budget = n.saturating_mul(Self::MAX_REFERENCES).min(u32::MAX as usize);
+        let budget = n
+            .saturating_mul(Self::MAX_REFERENCES)
+            .min(u32::MAX as usize);
         let events = [0, 1, 2].map(|axis| events(boxes, axis));
         let mut stack = vec![Frame { cell: 0, bounds, events, count: n, depth: 0, budget }];
         while let Some(frame) = stack.pop() {
@@ -135,7 +139,9 @@ impl Config {
             let split = if frame.depth < max_depth { self.best_split(&frame) } else { None };
             let Some(split) = split else {
                 let first = tree.objects.len();
-                let own = frame.events[0].iter().filter(|event| event.kind != Kind::End);
+                let own = frame.events[0]
+                    .iter()
+                    .filter(|event| event.kind != Kind::End);
                 tree.objects.extend(own.map(|event| event.object));
                 tree.objects[first..].sort_unstable();
                 tree.cells[frame.cell] =
@@ -154,7 +160,11 @@ impl Config {
                 let stays =
                     |event: &&Event| [side, Side::Both].contains(&sides[event.object as usize]);
                 [0, 1, 2].map(|axis| {
-                    frame.events[axis].iter().filter(stays).copied().collect::<Vec<_>>()
+                    frame.events[axis]
+                        .iter()
+                        .filter(stays)
+                        .copied()
+                        .collect::<Vec<_>>()
                 })
             };
             let (mut lower, mut upper) = (frame.bounds, frame.bounds);
@@ -251,6 +261,10 @@ fn events(boxes: &[Aabb], axis: usize) -> Vec<Event> {
             events.push(Event { position: max, kind: Kind::End, object });
         }
     }
-    events.sort_by(|a, b| a.position.total_cmp(&b.position).then(a.kind.cmp(&b.kind)));
+    events.sort_by(|a, b| {
+        a.position
+            .total_cmp(&b.position)
+            .then(a.kind.cmp(&b.kind))
+    });
     events
 }

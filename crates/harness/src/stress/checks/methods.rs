@@ -124,7 +124,11 @@ pub fn genetic_edges(_: &Method) -> Verdict {
         let outcome = solved(&config, &boxes, 3, Budget::UNLIMITED)?;
         // The tree is valid only if its order was a permutation.
         check_outcome(&boxes, &outcome)?;
-        let incumbents: Vec<f64> = outcome.history.iter().map(|event| event.incumbent).collect();
+        let incumbents: Vec<f64> = outcome
+            .history
+            .iter()
+            .map(|event| event.incumbent)
+            .collect();
         ensure!(incumbents.is_sorted_by(|a, b| a >= b), "the best was lost");
         ensure!(incumbents.last() == Some(&outcome.cost), "the best was not returned");
     }
@@ -145,7 +149,9 @@ pub fn genetic_edges(_: &Method) -> Verdict {
 /// S41: without noise, and with one candidate, GRASP is greedy, bit by bit; more candidates than there are do no harm.
 pub fn grasp_edges(_: &Method) -> Verdict {
     let boxes = boxes(150);
-    let greedy = muller_fellner::Config::default().build(&boxes).map_err(Broken::case)?;
+    let greedy = muller_fellner::Config::default()
+        .build(&boxes)
+        .map_err(Broken::case)?;
     for (candidates, noise, equal) in [
         (Candidates::AxisBest, Some(0.0), true),
         (Candidates::KBest(5), Some(0.0), true),
@@ -186,7 +192,9 @@ pub fn insertion_keeps_its_cost() -> Verdict {
             (goldsmith_salmon::Workspace::default(), Default::default());
         let order: Vec<u32> = (0..boxes.len() as u32).collect();
         let config = goldsmith_salmon::Config::default();
-        let kept = config.insert_all(&scene, &order, &mut workspace).map_err(Broken::case)?;
+        let kept = config
+            .insert_all(&scene, &order, &mut workspace)
+            .map_err(Broken::case)?;
         workspace.write(&mut tree);
         let recomputed = cost::goldsmith_salmon(&tree);
         largest = largest.max((kept - recomputed).abs() / recomputed);
@@ -211,7 +219,12 @@ pub fn above_the_optimum(method: &Method) -> Verdict {
             let optimum = solved(&exact, &boxes, 1, Budget::UNLIMITED)?.cost;
             let outcome = run(method, &boxes, 2000)?;
             check_outcome(&boxes, &outcome)?;
-            if outcome.tree.nodes.iter().any(|node| node.children().len() > 2) {
+            if outcome
+                .tree
+                .nodes
+                .iter()
+                .any(|node| node.children().len() > 2)
+            {
                 return Ok("wide nodes: another class of trees".into());
             }
             let gap = outcome.cost / optimum - 1.0;
