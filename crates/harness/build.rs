@@ -16,8 +16,9 @@ fn main() {
     });
     println!("cargo:rustc-env=HARNESS_RUSTC={}", version.as_deref().unwrap_or("unknown"));
     let set = |name| std::env::var(name).unwrap_or_else(|_| "unknown".into());
-    let (profile, level, features) =
-        (set("PROFILE"), set("OPT_LEVEL"), set("CARGO_CFG_TARGET_FEATURE"));
+    let profile = set("PROFILE");
+    let level = set("OPT_LEVEL");
+    let features = set("CARGO_CFG_TARGET_FEATURE");
     println!(
         "cargo:rustc-env=HARNESS_BUILD={profile}, opt-level {level}, target features {features}"
     );

@@ -87,7 +87,8 @@ fn every_builder_ends_when_its_watch_says_so_whenever_that_is() {
     };
     assert_eq!(asked(2, divide), (Err(BuildError::Cancelled), 2));
     let scene = Presorted::new(&boxes).unwrap();
-    let (mut workspace, mut tree) = (Workspace::default(), Bvh::default());
+    let mut workspace = Workspace::default();
+    let mut tree = Bvh::default();
     let buffers = (&mut workspace, &mut tree);
     let construct =
         |watch: &Watch| power(0.9).construct(&scene, None, &mut TakeBest, buffers, watch);

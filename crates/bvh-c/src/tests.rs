@@ -42,7 +42,9 @@ fn trees_and_hits_are_those_of_the_rust_crates() {
         t_max: f32::INFINITY,
     };
     let rays: Vec<BvhRay> = (0..1500).map(|i| ray(i as f32 * 0.03)).collect();
-    let (mut count, mut ids, mut cost) = (0, 0, 0.0);
+    let mut count = 0;
+    let mut ids = 0;
+    let mut cost = 0.0;
     let mut hits = vec![BvhHit { t: 0.0, object: 0 }; rays.len()];
     let mut any = vec![9u8; rays.len()];
     // SAFETY: the arrays have the lengths that are given, and the nodes are used before the tree is improved.
@@ -103,7 +105,9 @@ fn a_search_of_hours_ends_when_the_caller_says_so_and_keeps_what_it_found() {
     let corners: Vec<f32> = (0..9 * 3000).map(number).collect();
     // SAFETY: nine floats per triangle.
     let tree = unsafe { bvh_tree_from_triangles(corners.as_ptr(), 3000, 0.0, 1.0) };
-    let (mut asked, mut before, mut after) = (AtomicU64::new(0), 0.0, 0.0);
+    let mut asked = AtomicU64::new(0);
+    let mut before = 0.0;
+    let mut after = 0.0;
     let start = std::time::Instant::now();
     // SAFETY: a tree, numbers, and a function that counts atomically.
     unsafe {

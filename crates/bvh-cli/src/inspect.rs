@@ -148,7 +148,8 @@ fn describe(header: &Header, bytes: &[u8], facts: &mut Facts) {
         Objective::GoldsmithSalmon => "Goldsmith–Salmon".to_owned(),
         Objective::Layout => "cost of the wide layout, by area".to_owned(),
         Objective::Sah(constants) => {
-            let (traversal, intersection) = (constants.traversal(), constants.intersection());
+            let traversal = constants.traversal();
+            let intersection = constants.intersection();
             format!("surface area heuristic, traversal {traversal}, intersection {intersection}")
         }
     };
@@ -179,7 +180,8 @@ fn measure(tree: &Bvh, facts: &mut Facts) {
     facts.add("internal area over root area", cost::over_root_area(tree, area));
     facts.add("Goldsmith–Salmon cost", cost::goldsmith_salmon(tree));
     facts.add("surface area heuristic", cost::sah(tree, &SahConstants::default()));
-    let (mut arities, mut leaves) = (BTreeMap::new(), BTreeMap::new());
+    let mut arities = BTreeMap::new();
+    let mut leaves = BTreeMap::new();
     for node in &tree.nodes {
         let (histogram, count) = match node.kind() {
             NodeKind::Inner { count, .. } => (&mut arities, count),

@@ -126,7 +126,9 @@ impl RenderArgs {
             },
         };
         let lights = (self.no_lights || !self.lights.is_empty()).then(|| self.lights.clone());
-        let (samples, depth, ground) = (self.samples, self.depth, !self.no_ground);
+        let samples = self.samples;
+        let depth = self.depth;
+        let ground = !self.no_ground;
         Options { width, height, samples, depth, view: Some(view), lights, ground }
     }
 }

@@ -70,7 +70,8 @@ fn a_bake_for_rays_keeps_how_often_they_visit_each_node() {
             .for_boxes(&scene.boxes)
             .unwrap();
         assert_eq!(file.header().method, name);
-        let (tree, visits) = (file.tree().unwrap(), file.visits().unwrap().unwrap());
+        let tree = file.tree().unwrap();
+        let visits = file.visits().unwrap().unwrap();
         assert_eq!(visits[0], 1.0);
         bvh_core::WideBvh::for_rays(&tree, scene.triangles().unwrap(), &visits).unwrap();
         assert_eq!(facts(&said(at, &["inspect", "x.bvh", "escher"]))["method"], name);

@@ -52,7 +52,8 @@ fn a_bake_that_is_interrupted_early_is_not_behind_plain_reinsertion() {
     ];
     said(folder.path(), &args);
     // Long enough for reinsertion and the starts that precede it, on a busy machine too; the heat of a long search has not paid by then.
-    let (plain, after) = (cost("plain.bvh"), Duration::from_secs(1) + 8 * begin.elapsed());
+    let plain = cost("plain.bvh");
+    let after = Duration::from_secs(1) + 8 * begin.elapsed();
     for more in [
         &["--budget", "1h"][..],
         &["--budget", "1000Gwork"],

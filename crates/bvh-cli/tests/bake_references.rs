@@ -24,7 +24,8 @@ fn a_bake_divides_objects_where_that_pays_and_searches_by_the_cost_of_the_layout
         said_split.contains("area of all nodes") && said_split.contains(" references to "),
         "{said_split}"
     );
-    let (objects, references) = (number(&split, "objects"), number(&split, "references"));
+    let objects = number(&split, "objects");
+    let references = number(&split, "references");
     assert_eq!(number(&whole, "references"), objects);
     assert!(references > objects && references <= 1.3 * objects, "{references} of {objects}");
     assert!(number(&split, "surface area heuristic") < number(&whole, "surface area heuristic"));

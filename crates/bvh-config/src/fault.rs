@@ -70,8 +70,9 @@ fn tracked<T: Check>(
     table: Table,
     read: impl Fn(Tracked) -> Result<T, toml::de::Error>,
 ) -> Read<T> {
-    let (mut faults, mut left_out, mut table) =
-        (Vec::<Fault>::new(), Vec::new(), Value::Table(table));
+    let mut faults = Vec::<Fault>::new();
+    let mut left_out = Vec::new();
+    let mut table = Value::Table(table);
     while faults.len() < MOST_FAULTS {
         let mut track = Track::new();
         let error = match read(Deserializer::new(table.clone(), &mut track)) {

@@ -110,7 +110,8 @@ const ERROR: f64 = 1.0 / (1_u64 << 47) as f64;
 impl Line {
     /// Prepares a ray.
     pub(crate) fn new(ray: &Ray) -> Self {
-        let (origin, direction) = (ray.origin(), ray.direction());
+        let origin = ray.origin();
+        let direction = ray.direction();
         let size = direction.abs();
         let largest = if size.z > size.x.max(size.y) { 2 } else { usize::from(size.y > size.x) };
         let axes = [(largest + 1) % 3, (largest + 2) % 3, largest];
@@ -166,7 +167,8 @@ impl Line {
         let dz = self.direction[2];
         let reach = largest(corners.as_flattened());
         let determinant = u + v + w;
-        let (b_depth, c_depth) = (bz - az, cz - az);
+        let b_depth = bz - az;
+        let c_depth = cz - az;
         let t = (az * determinant + (v * b_depth + w * c_depth)) / (determinant * dz);
         let depth = larger(b_depth.abs(), c_depth.abs());
         let slack = (16.0 * edge_error * depth / determinant.abs() + reach * ERROR) / dz.abs();
@@ -175,7 +177,8 @@ impl Line {
         if high < 0.0 {
             return Verdict::Miss;
         }
-        let (low_rounded, high_rounded) = (low as f32, high as f32);
+        let low_rounded = low as f32;
+        let high_rounded = high as f32;
         if low >= 0.0 && low_rounded == high_rounded {
             return if high_rounded.is_finite() {
                 Verdict::Hit(high_rounded)
@@ -229,7 +232,8 @@ impl Volumes {
     /// Prepares exact values; `None` if a coordinate is not finite.
     fn new(ray: &Ray, triangle: &[Vec3; 3]) -> Option<Self> {
         let [a, b, c] = *triangle;
-        let (origin, direction) = (ray.origin(), ray.direction());
+        let origin = ray.origin();
+        let direction = ray.direction();
         let is_finite = [a, b, c, origin, direction]
             .iter()
             .all(|point| point.is_finite());

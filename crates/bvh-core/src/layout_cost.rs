@@ -56,7 +56,8 @@ impl LayoutCost {
         let one = if as_leaf < as_node { as_leaf } else { as_node };
         let mut as_children = [one; 7];
         for k in 1..7 {
-            let (fewer, own) = (as_children[k - 1], split[k - 1]);
+            let fewer = as_children[k - 1];
+            let own = split[k - 1];
             as_children[k] = if own < fewer { own } else { fewer };
         }
         Self { as_children, objects }

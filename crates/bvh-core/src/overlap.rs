@@ -232,8 +232,10 @@ impl Polygon {
             kept.len += 1;
         };
         for at in 0..self.len {
-            let (from, to) = (self.corners[at], self.corners[(at + 1) % self.len]);
-            let (low, high) = (height(from), height(to));
+            let from = self.corners[at];
+            let to = self.corners[(at + 1) % self.len];
+            let low = height(from);
+            let high = height(to);
             if low >= 0.0 {
                 keep(from);
             }

@@ -56,7 +56,8 @@ impl Ray {
         t_min: f32,
         t_max: f32,
     ) -> Result<Self, InvalidRay> {
-        let (origin, direction) = (origin.into(), direction.into());
+        let origin = origin.into();
+        let direction = direction.into();
         // One comparison for all lanes; a NaN fails each.
         let sizes = direction.extend(1.0).abs();
         let longest = sizes.truncate().max_element();
@@ -78,7 +79,8 @@ impl Ray {
         t_min: f32,
         t_max: f32,
     ) -> Self {
-        let (origin, direction) = (origin.into(), direction.into());
+        let origin = origin.into();
+        let direction = direction.into();
         let inverse = (1.0 / direction.extend(1.0))
             .max(Vec4::MIN)
             .min(Vec4::MAX);

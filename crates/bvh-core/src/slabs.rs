@@ -38,7 +38,8 @@ impl Slabs {
     /// Prepares `ray` for boxes inside `bounds`, which may be a scene's root box or one object's.
     #[inline]
     pub fn new(ray: &Ray, bounds: &Aabb) -> Self {
-        let (origin, margin) = (ray.origin(), margin(ray, bounds));
+        let origin = ray.origin();
+        let margin = margin(ray, bounds);
         Self {
             lower: (origin + margin).extend(0.0),
             upper: (origin - margin).extend(0.0),
@@ -55,8 +56,10 @@ impl Slabs {
         // Two overlapping loads and a rotation; the fourth lane is not used.
         let min = Vec4::new(min.x, min.y, min.z, max.x);
         let max = Vec4::new(aabb.min.z, max.x, max.y, max.z).yzwx();
-        let (low, high) = ((min - self.lower) * self.inverse, (max - self.upper) * self.inverse);
-        let (near, far) = (low.min(high), low.max(high));
+        let low = (min - self.lower) * self.inverse;
+        let high = (max - self.upper) * self.inverse;
+        let near = low.min(high);
+        let far = low.max(high);
         let entry = larger(larger(near.x, near.y), larger(near.z, self.t_min));
         (entry, smaller(smaller(far.x, far.y), far.z) * Self::FAR)
     }
@@ -180,7 +183,8 @@ mod tests {
                 let slabs = Slabs::new(&ray, &b);
                 let (entry, exit) = slabs.interval(&b);
                 for axis in 0..3 {
-                    let (mut near, mut far) = (b.min[axis], b.max[axis]);
+                    let mut near = b.min[axis];
+                    let mut far = b.max[axis];
                     if ray.inverse_direction()[axis] < 0.0 {
                         (near, far) = (far, near);
                     }

@@ -38,7 +38,8 @@ impl Shear {
     /// Prepares a ray.
     #[inline(always)]
     pub fn new(ray: &Ray) -> Self {
-        let (origin, direction) = (ray.origin().to_array(), ray.direction().to_array());
+        let origin = ray.origin().to_array();
+        let direction = ray.direction().to_array();
         let size = direction.map(f32::abs);
         // The lowest axis on ties; without a branch, which could not be predicted.
         let z = usize::from(size[1] > size[0]);
@@ -58,8 +59,11 @@ impl Shear {
     #[inline(always)]
     fn apply(&self, p: &Vec3) -> [f32; 3] {
         let p: &[f32; 3] = p.as_ref();
-        let ([kx, ky, kz], [ox, oy, oz]) = (self.axes, self.origin);
-        let (x, y, z) = (p[kx] - ox, p[ky] - oy, p[kz] - oz);
+        let [kx, ky, kz] = self.axes;
+        let [ox, oy, oz] = self.origin;
+        let x = p[kx] - ox;
+        let y = p[ky] - oy;
+        let z = p[kz] - oz;
         [x - self.slope[0] * z, y - self.slope[1] * z, z]
     }
 }
@@ -175,10 +179,13 @@ impl Triangle {
     #[inline]
     pub fn intersect(&self, shear: &Shear, t_max: f32) -> Option<f32> {
         let [a, b, c] = &self.0;
-        let ([ax, ay, _], [bx, by, _], [cx, cy, _]) =
-            (shear.apply(a), shear.apply(b), shear.apply(c));
+        let [ax, ay, _] = shear.apply(a);
+        let [bx, by, _] = shear.apply(b);
+        let [cx, cy, _] = shear.apply(c);
         // Rounding is monotone: the sign of a difference of rounded products is right, or the difference is 0.
-        let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
         if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
             return None;
         }
@@ -190,10 +197,13 @@ impl Triangle {
     pub(crate) fn decide(&self, shear: &Shear, t_max: f32) -> Option<f32> {
         let [a, b, c] = &self.0;
         let double = |[x, y, z]: [f32; 3]| (f64::from(x), f64::from(y), f64::from(z));
-        let ((ax, ay, az), (bx, by, bz)) = (double(shear.apply(a)), double(shear.apply(b)));
+        let (ax, ay, az) = double(shear.apply(a));
+        let (bx, by, bz) = double(shear.apply(b));
         let (cx, cy, cz) = double(shear.apply(c));
         // Products of two f32 are exact in f64.
-        let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
         if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
             return None;
         }
@@ -289,7 +299,8 @@ mod tests {
     #[test]
     fn triangles_without_area_are_never_hit() {
         // Steps of eighths: the multiples below are exact, the corners truly collinear.
-        let (a, b) = (Vec3::new(0.125, 0.75, 0.375), Vec3::new(0.875, -0.5, 2.0));
+        let a = Vec3::new(0.125, 0.75, 0.375);
+        let b = Vec3::new(0.875, -0.5, 2.0);
         for corners in
             [[a; 3], [a, a, b], [a, b, a], [b, a, a], [a, (a + b) / 2.0, b], [a, 3.0 * a, 7.0 * a]]
         {
@@ -314,7 +325,8 @@ mod tests {
             Vec3::new(1.7, 0.3, 2.5),
             Vec3::new(0.4, 1.9, 2.2),
         ]);
-        let (origin, direction) = (Vec3::new(0.1, -0.2, 0.3), Vec3::new(0.2, 0.3, 1.0));
+        let origin = Vec3::new(0.1, -0.2, 0.3);
+        let direction = Vec3::new(0.2, 0.3, 1.0);
         let distance = hit(triangle, origin, direction).unwrap();
         for k in [-100, -60, 60, 100] {
             let s = libm::exp2f(k as f32);

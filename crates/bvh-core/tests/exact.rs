@@ -29,7 +29,8 @@ fn power(k: i32) -> BigRational {
 /// The exact value of a finite number.
 fn exact(x: f32) -> BigRational {
     let bits = x.to_bits();
-    let (fraction, exponent) = (i64::from(bits & 0x7f_ffff), (bits >> 23 & 0xff) as i32);
+    let fraction = i64::from(bits & 0x7f_ffff);
+    let exponent = (bits >> 23 & 0xff) as i32;
     let size = match exponent {
         0 => integer(fraction) * power(-149),
         _ => integer(fraction | 1 << 23) * power(exponent - 150),
@@ -57,8 +58,10 @@ fn dot(p: &Vector, q: &Vector) -> BigRational {
 /// 1997): other products than the library's.
 fn cramer(ray: &Ray, triangle: &Triangle) -> Option<[BigRational; 3]> {
     let [a, b, c] = triangle.0.map(point);
-    let (origin, direction) = (point(ray.origin()), point(ray.direction()));
-    let (p, q) = (minus(&b, &a), minus(&c, &a));
+    let origin = point(ray.origin());
+    let direction = point(ray.direction());
+    let p = minus(&b, &a);
+    let q = minus(&c, &a);
     let height = cross(&direction, &q);
     let determinant = dot(&p, &height);
     if determinant == zero() {
@@ -240,7 +243,8 @@ fn hard_triangle(random: &mut Random) -> Triangle {
         1 => [grid(random), grid(random), grid(random)],
         // Nearly degenerate.
         2 => {
-            let (a, b) = (random.point(), random.point());
+            let a = random.point();
+            let b = random.point();
             [a, b, a + (b - a) * random.unit()]
         }
         3 => {

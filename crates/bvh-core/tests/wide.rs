@@ -47,7 +47,8 @@ fn check(name: &str, triangles: &[Triangle], layouts: &[(Kernel, WideBvh)], rays
             assert_eq!(wide.any_hit(ray), expected.is_some(), "{case}");
         }
         for coherence in [Coherence::Coherent, Coherence::Incoherent] {
-            let (mut nearest, mut any) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+            let mut nearest = vec![Hit::MISS; rays.len()];
+            let mut any = vec![false; rays.len()];
             wide.nearest_hits(rays, &mut nearest, coherence);
             wide.any_hits(rays, &mut any, coherence);
             for (i, (ray, &expected)) in rays.iter().zip(&expected).enumerate() {
@@ -75,10 +76,12 @@ fn bundles(triangles: &[Triangle], count: usize, random: &mut Random) -> Vec<Ray
             .flat_map(|t| t.0)
             .fold(0.0f32, |size, p| size.max(p.abs().max_element()));
         let target = random.of(&[a, (a + b) * 0.5, (a + b + c) / 3.0]);
-        let (far, inside, close) =
-            (random.point() * 3.0, random.point(), target + random.point() * size * 1e-3);
+        let far = random.point() * 3.0;
+        let inside = random.point();
+        let close = target + random.point() * size * 1e-3;
         let origin = random.of(&[far * size, inside * size, close]);
-        let (spread, shift) = (random.of(&[0.0, 1e-7, 1e-3, 0.1]), random.of(&[0.0, 1e-7, 1e-2]));
+        let spread = random.of(&[0.0, 1e-7, 1e-3, 0.1]);
+        let shift = random.of(&[0.0, 1e-7, 1e-2]);
         for _ in 0..16 {
             let from = origin + random.point() * (shift * size);
             let mut to = target + random.point() * (spread * size) - from;
@@ -127,8 +130,8 @@ fn batches_of_any_length_answer_as_their_rays_do() {
             let mut batch = rays(&triangles, count, &mut random);
             batch.truncate(count);
             for coherence in [Coherence::Coherent, Coherence::Incoherent] {
-                let (mut nearest, mut any) =
-                    (vec![Hit::MISS; batch.len()], vec![false; batch.len()]);
+                let mut nearest = vec![Hit::MISS; batch.len()];
+                let mut any = vec![false; batch.len()];
                 wide.nearest_hits(&batch, &mut nearest, coherence);
                 wide.any_hits(&batch, &mut any, coherence);
                 let alone: Vec<Hit> = batch
@@ -251,7 +254,8 @@ fn a_filter_passes_over_hits_and_sees_all_of_them_if_it_accepts_none() {
     let mut random = Random(9);
     let triangles = soup(150, &mut random);
     let layouts = layouts(&triangles, &mut random);
-    let (mut found, mut several) = (0, 0);
+    let mut found = 0;
+    let mut several = 0;
     for ray in rays(&triangles, 2000, &mut random) {
         let shear = Shear::new(&ray);
         let hit = |id: u32| {
@@ -294,7 +298,8 @@ fn a_refitted_layout_costs_no_less_than_a_new_one_of_the_refitted_tree() {
     layout.refit(&moved).unwrap();
     tree.refit(&boxes(&moved));
     let new = WideBvh::new(&tree, &moved).unwrap();
-    let (refitted, new) = (layout.expected_visits(), new.expected_visits());
+    let refitted = layout.expected_visits();
+    let new = new.expected_visits();
     assert!(refitted > new && refitted < 2.0 * new, "{refitted} {new}");
 }
 
@@ -308,7 +313,8 @@ fn a_layout_whose_triangles_cannot_be_followed_says_so_and_stays_as_it_was() {
         changed[at] = triangle;
         changed
     };
-    let (flat, new) = (Triangle([Vec3::ONE; 3]), Triangle([Vec3::X, Vec3::Y, Vec3::Z]));
+    let flat = Triangle([Vec3::ONE; 3]);
+    let new = Triangle([Vec3::X, Vec3::Y, Vec3::Z]);
     let infinite = Triangle([Vec3::X, Vec3::Y, Vec3::INFINITY]);
     for (_, layout) in &mut layouts {
         assert_eq!(layout.refit(&with(3, flat)), Err(RefitError::Lost(3)));

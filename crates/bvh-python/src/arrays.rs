@@ -97,12 +97,15 @@ pub fn rays(
         let range = floats(name, argument, &accepted, |shape| shape.is_empty() || shape == [rays])?;
         Ok(range.as_slice()?.to_vec())
     };
-    let (t_min, t_max) = (range("t_min", t_min, 0.0)?, range("t_max", t_max, f32::INFINITY)?);
+    let t_min = range("t_min", t_min, 0.0)?;
+    let t_max = range("t_max", t_max, f32::INFINITY)?;
     let of = |range: &[f32], index: usize| if range.len() == 1 { range[0] } else { range[index] };
-    let (origins, directions) = (origins.as_slice()?, directions.as_slice()?);
+    let origins = origins.as_slice()?;
+    let directions = directions.as_slice()?;
     let points = |values: &[f32], index: usize| -> [f32; 3] { values.as_chunks().0[index] };
     let ray = |index: usize| {
-        let (origin, direction) = (points(origins, index), points(directions, index));
+        let origin = points(origins, index);
+        let direction = points(directions, index);
         Ray::new(origin, direction, of(&t_min, index), of(&t_max, index))
             .map_err(|error| refused(format!("ray {index}: {error}")))
     };

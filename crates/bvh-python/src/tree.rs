@@ -123,7 +123,8 @@ impl Tree {
     /// children begin at `first`; else the node is a leaf, whose objects are `object_ids()[first:first + count]`.
     fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let words: Vec<u32> = bytemuck::cast_slice(&self.owned().tree().to_first_count()).to_vec();
-        let (point, number) = ("3f4", "u4");
+        let point = "3f4";
+        let number = "u4";
         let fields = [("min", point), ("first", number), ("max", point), ("count", number)];
         let kind = py
             .import("numpy")?

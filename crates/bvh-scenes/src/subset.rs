@@ -23,7 +23,8 @@ impl Subset {
         let seeded = || {
             let (before, count) = before.rsplit_once(':')?;
             let (whole, kind) = before.rsplit_once(':')?;
-            let (count, seed) = (count.parse().ok()?, last.parse().ok()?);
+            let count = count.parse().ok()?;
+            let seed = last.parse().ok()?;
             match kind {
                 "random" => Some((whole, Self::Random(count, seed))),
                 "cluster" => Some((whole, Self::Cluster(count, seed))),

@@ -272,7 +272,9 @@ fn buffers_are_files_beside_the_one_that_names_them() {
 
 #[test]
 fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
-    let (ply, stl, node) = (ply_text(), stl_text(), r#"{"mesh": 0}"#);
+    let ply = ply_text();
+    let stl = stl_text();
+    let node = r#"{"mesh": 0}"#;
     let json = String::from_utf8(gltf(node, INDEXED)).unwrap();
     let change = |from: &str, to: &str| with(json.as_bytes(), from, to);
     let mut nan = stl_binary();

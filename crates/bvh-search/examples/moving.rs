@@ -10,7 +10,8 @@ const DRIFT: f64 = 1.15;
 /// A sheet of triangles that is wound up, a little more with `time`.
 fn sheet(time: f32) -> Vec<[f32; 3]> {
     let point = |i: u16| {
-        let (u, v) = (f32::from(i % 65) / 8.0 - 4.0, f32::from(i / 65) / 8.0 - 4.0);
+        let u = f32::from(i % 65) / 8.0 - 4.0;
+        let v = f32::from(i / 65) / 8.0 - 4.0;
         let angle = time * (u * u + v * v).sqrt();
         [u * angle.cos() - v * angle.sin(), u * angle.sin() + v * angle.cos(), (time * u * v).sin()]
     };
@@ -26,7 +27,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut triangles = Triangle::from_mesh(&sheet(0.3), &indices)?;
     let mut tree = bake(&boxes(&triangles), Duration::from_millis(200))?.tree;
     let mut wide = WideBvh::new(&tree, &triangles)?;
-    let (mut fresh, mut improved) = (wide.expected_visits(), 0);
+    let mut fresh = wide.expected_visits();
+    let mut improved = 0;
     for frame in 1..=12u8 {
         triangles = Triangle::from_mesh(&sheet(0.3 + f32::from(frame) * 0.04), &indices)?;
         wide.refit(&triangles)?;

@@ -10,7 +10,8 @@ fn spiral() -> Vec<Aabb> {
     (0..3000u16)
         .map(f32::from)
         .map(|i| {
-            let (angle, size) = (i * 0.05, 0.2 + (i * 0.37) % 1.5);
+            let angle = i * 0.05;
+            let size = 0.2 + (i * 0.37) % 1.5;
             let center = [angle.cos() * i * 0.01, i * 0.004, angle.sin() * i * 0.01];
             Aabb::from([center.map(|c| c - size), center.map(|c| c + size)])
         })
@@ -25,7 +26,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     // `improve(&tree, &boxes, Duration::from_secs(1))` does the same in silence.
     let deadline = Deadline::after(Duration::from_secs(1));
     let watched = deadline.watched(|event| {
-        let (ms, part) = (deadline.elapsed().as_millis(), event.incumbent / before);
+        let ms = deadline.elapsed().as_millis();
+        let part = event.incumbent / before;
         println!("{ms:4} ms: {part:.4} of the original after {} moves", event.evaluations);
     });
     let problem = Problem::new(&boxes);

@@ -37,7 +37,8 @@ pub fn optimize(
         return solve(&From { tree, config }, problem, seed, budget, observer);
     }
     // To the search, every leaf is one object with the box of the leaf.
-    let (mut tight, mut leaves) = (tree.clone(), Vec::new());
+    let mut tight = tree.clone();
+    let mut leaves = Vec::new();
     tight.refit(boxes);
     for node in &mut tight.nodes {
         if let NodeKind::Leaf { .. } = node.kind() {

@@ -64,12 +64,14 @@ fn the_observer_hears_of_moves_that_improve_nothing() {
             self.calls.fetch_add(1, Relaxed);
         }
     }
-    let (boxes, counts) = (boxes(300), Counts::default());
+    let boxes = boxes(300);
+    let counts = Counts::default();
     let budget = Budget { max_work: Some(10_000_000), ..Budget::UNLIMITED };
     let outcome =
         solve(&best::Config::default(), &Problem::new(&boxes), 1, budget, &counts).unwrap();
     assert_eq!(counts.evaluations.into_inner(), outcome.evaluations);
-    let (calls, events) = (counts.calls.into_inner(), counts.events.into_inner());
+    let calls = counts.calls.into_inner();
+    let events = counts.events.into_inner();
     assert!(calls > 2 * events, "{calls} calls, {events} events");
 }
 

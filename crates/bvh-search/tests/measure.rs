@@ -54,7 +54,8 @@ fn run(method: &Method, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Outcom
 fn the_area_as_a_measure_gives_the_same_history_as_the_area() {
     let boxes = boxes(700);
     for method in methods() {
-        let (area, measure) = (run(&method, &boxes, None), run(&method, &boxes, Some(&cost::Area)));
+        let area = run(&method, &boxes, None);
+        let measure = run(&method, &boxes, Some(&cost::Area));
         assert_eq!(area.tree, measure.tree, "{}", method.name());
         assert_eq!(area.history, measure.history, "{}", method.name());
     }
@@ -67,7 +68,8 @@ fn builders_and_searches_go_by_the_measure_and_report_every_objective_by_it() {
         [Objective::GoldsmithSalmon, Objective::Sah(Default::default()), Objective::Layout];
     for method in methods() {
         let name = method.name();
-        let (by_area, found) = (run(&method, &boxes, None), run(&method, &boxes, Some(&AlongX)));
+        let by_area = run(&method, &boxes, None);
+        let found = run(&method, &boxes, Some(&AlongX));
         assert_eq!(found.cost, cost::internal_measure(&found.tree, &AlongX), "{name}");
         let before = cost::internal_measure(&by_area.tree, &AlongX);
         // Boxes are not compared by median cut.
@@ -164,7 +166,8 @@ fn trees_for_a_sample_of_rays_are_entered_less_often_than_trees_by_area() {
         .collect();
     let density = RayDensity::new(&bounds, &segments, 0.1).unwrap();
     let method = Method::Best(best::Config { start: Some(Start::default()), ..Default::default() });
-    let (area, rays) = (run(&method, &boxes, None), run(&method, &boxes, Some(&density)));
+    let area = run(&method, &boxes, None);
+    let rays = run(&method, &boxes, Some(&density));
     assert!(rays.cost < 0.97 * cost::internal_measure(&area.tree, &density), "{}", rays.cost);
     assert!(cost::internal_area(&rays.tree) >= cost::internal_area(&area.tree));
 }

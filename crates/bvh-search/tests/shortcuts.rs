@@ -63,7 +63,8 @@ fn best(boxes: &[Aabb], disabled: &[Shortcut]) -> Outcome {
 #[test]
 fn a_search_that_meets_the_bound_stops_with_the_cost_of_one_that_goes_on() {
     for boxes in stiff(60) {
-        let (stopped, all) = (best(&boxes, &[]), best(&boxes, &[Shortcut::BoundMet]));
+        let stopped = best(&boxes, &[]);
+        let all = best(&boxes, &[Shortcut::BoundMet]);
         assert_eq!(stopped.cost, all.cost);
         assert_eq!((stopped.stop, all.stop), (StopReason::Optimal, StopReason::Completed));
         assert!(stopped.work < all.work);
@@ -74,8 +75,8 @@ fn a_search_that_meets_the_bound_stops_with_the_cost_of_one_that_goes_on() {
 fn a_tiny_scene_gets_the_optimum_in_place_of_a_search() {
     for n in 3..=10 {
         let boxes = scattered(n);
-        let (optimum, searched) =
-            (best(&boxes, &[]), best(&boxes, &[Shortcut::Tiny, Shortcut::BoundMet]));
+        let optimum = best(&boxes, &[]);
+        let searched = best(&boxes, &[Shortcut::Tiny, Shortcut::BoundMet]);
         let exact =
             solve(&exact::Config {}, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap();
         assert_eq!(optimum.tree, exact.tree);
@@ -147,7 +148,8 @@ fn a_flat_axis_that_orders_like_no_other_may_have_the_best_split() {
 /// the ends of the run; but one may be as good, and more balanced.
 #[test]
 fn a_tie_may_part_equal_boxes_so_that_merging_them_would_change_the_cost() {
-    let (large, small) = (cube([0.0; 3], 4.0), cube([1.0; 3], 2.0));
+    let large = cube([0.0; 3], 4.0);
+    let small = cube([1.0; 3], 2.0);
     let apart = Config::default()
         .build(&[large, small, small, small, small, large])
         .unwrap();

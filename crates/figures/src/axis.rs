@@ -30,7 +30,8 @@ pub(super) struct Ruled {
 /// Both axes of a panel, without ticks, and whether any series has something to show.
 pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
     let any = (Ruled::new(&panel.x, &[], 0.0), Ruled::new(&panel.y, &[], 0.0));
-    let (mut xs, mut ys) = (Vec::new(), Vec::new());
+    let mut xs = Vec::new();
+    let mut ys = Vec::new();
     let mut add = |x: f64, heights: &[f64]| {
         for &y in heights
             .iter()
@@ -40,7 +41,9 @@ pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
             ys.push(y);
         }
     };
-    let (mut other_xs, mut other_ys, mut marked) = (Vec::new(), Vec::new(), false);
+    let mut other_xs = Vec::new();
+    let mut other_ys = Vec::new();
+    let mut marked = false;
     for layer in &panel.layers {
         marked |= layer.is_marked();
         match &layer.marks {
@@ -96,8 +99,8 @@ impl Ruled {
                 .iter()
                 .filter_map(|&value| any.coordinate(value))
         };
-        let (least, most) =
-            (shown().reduce(f64::min).unwrap_or(0.0), shown().reduce(f64::max).unwrap_or(1.0));
+        let least = shown().reduce(f64::min).unwrap_or(0.0);
+        let most = shown().reduce(f64::max).unwrap_or(1.0);
         // A single value stands in the middle of a range of its own size, or of one decade.
         let alone = if log || least == 0.0 { 0.5 } else { 0.1 * least.abs() };
         let margin = if most > least { margin * (most - least) } else { alone };
@@ -169,7 +172,8 @@ impl Ruled {
             (first..first + 3).flat_map(|power| [1, 2, 5].map(|mantissa| (power, mantissa)))
         {
             let step = f64::from(mantissa) * libm::exp10(f64::from(power));
-            let (from, to) = ((low / step - 1e-6).ceil(), (high / step + 1e-6).floor());
+            let from = (low / step - 1e-6).ceil();
+            let to = (high / step + 1e-6).floor();
             if to - from < most as f64 {
                 let digits = (factor - power).clamp(0, 11) as usize;
                 let ticks = (0..=(to - from) as i64).filter_map(|index| {
@@ -187,7 +191,8 @@ impl Ruled {
 
     /// Ticks at powers of ten, and at multiples of them where they are few; false if there are too few of both.
     fn rule_decades(&mut self, most: usize) -> bool {
-        let (first, last) = ((self.low - 1e-9).ceil() as i32, (self.high + 1e-9).floor() as i32);
+        let first = (self.low - 1e-9).ceil() as i32;
+        let last = (self.high + 1e-9).floor() as i32;
         let plain = first >= -3 && last < 5;
         let at = |power: i32, mantissa: i32| f64::from(power) + libm::log10(f64::from(mantissa));
         let marks = |mantissas: &'static [i32]| -> Vec<(i32, i32)> {

@@ -148,7 +148,8 @@ pub(super) fn svg(picture: &impl Picture) -> Result<String, FigureError> {
     let fonts = Fonts::new()?;
     let layout = picture.lay_out(&fonts)?;
     let (width, height) = layout.size();
-    let (across, down) = (steps(width.ceil()), steps(height.ceil()));
+    let across = steps(width.ceil());
+    let down = steps(height.ceil());
     let mut body = String::new();
     {
         let area =

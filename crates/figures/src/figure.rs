@@ -31,7 +31,8 @@ pub(super) struct Head {
 impl Head {
     pub fn new(title: &str, caption: &str, fonts: &Fonts) -> Self {
         let room = WIDTH - 2.0 * BORDER;
-        let (title, caption) = (fonts.wrap(title, room, TITLE), fonts.wrap(caption, room, BODY));
+        let title = fonts.wrap(title, room, TITLE);
+        let caption = fonts.wrap(caption, room, BODY);
         let lines = TITLE.line() * title.len() as f64 + BODY.line() * caption.len() as f64;
         Self { title, caption, bottom: BORDER + lines + 8.0 }
     }
@@ -157,7 +158,8 @@ impl<'a> Plan<'a> {
         while !plots.is_empty() {
             let row: Vec<Plot> = plots.drain(..columns.min(plots.len())).collect();
             let deepest = |depth: fn(&Plot) -> f64| row.iter().map(depth).fold(0.0, f64::max);
-            let (above, below) = (deepest(|plot| plot.above), deepest(|plot| plot.below));
+            let above = deepest(|plot| plot.above);
+            let below = deepest(|plot| plot.below);
             top += above;
             for (column, plot) in row.into_iter().enumerate() {
                 let left = BORDER + room / columns as f64 * column as f64 + beside;

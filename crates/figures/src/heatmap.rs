@@ -64,7 +64,9 @@ impl Picture for HeatMap {
     }
 
     fn lay_out<'a>(&'a self, fonts: &'a Fonts) -> Result<impl Layout + 'a, FigureError> {
-        let (rows, columns, cells) = (self.rows.len(), self.columns.len(), self.cells.len());
+        let rows = self.rows.len();
+        let columns = self.columns.len();
+        let cells = self.cells.len();
         if rows.checked_mul(columns) != Some(cells) {
             return Err(FigureError::CellCount { title: self.title.clone(), rows, columns, cells });
         }
@@ -140,9 +142,10 @@ impl Layout for Table<'_> {
             sheet.lines((self.left - 6.0, first), lines, *kind, INK, Align::Right)?;
         }
         for (index, (cell, (lines, kind))) in self.map.cells.iter().zip(&self.texts).enumerate() {
-            let (row, column) = (index / self.columns.len(), index % self.columns.len());
-            let (left, top) =
-                (self.left + self.cell * column as f64, self.top + self.row * row as f64);
+            let row = index / self.columns.len();
+            let column = index % self.columns.len();
+            let left = self.left + self.cell * column as f64;
+            let top = self.top + self.row * row as f64;
             let colour = colour_of(
                 cell.class
                     .filter(|&class| class < self.map.classes.len()),
@@ -178,7 +181,8 @@ mod tests {
         };
         for class in (0..CLASSES.len()).map(Some).chain([None]) {
             let colour = colour_of(class);
-            let (one, other) = (luminance(colour) + 0.05, luminance(readable_on(colour)) + 0.05);
+            let one = luminance(colour) + 0.05;
+            let other = luminance(readable_on(colour)) + 0.05;
             assert!(one.max(other) / one.min(other) >= 4.0, "{colour:?}");
         }
     }

@@ -56,7 +56,8 @@ impl Legend {
                 .iter()
                 .all(|entry| entry.name != layer.name);
             if layer.series().is_none() && !layer.name.trim().is_empty() && is_new {
-                let (name, stroke) = (layer.name.clone(), REFERENCE_LINE);
+                let name = layer.name.clone();
+                let stroke = REFERENCE_LINE;
                 entries.push(Entry { name, stroke, line: true, marker: false, area: false });
             }
         }
@@ -122,7 +123,8 @@ impl Entry {
         left: f64,
         middle: f64,
     ) -> Result<(), Fault<B>> {
-        let (colour, style) = (self.stroke.colour, pen(self.stroke.colour, 2.0));
+        let colour = self.stroke.colour;
+        let style = pen(self.stroke.colour, 2.0);
         let ends = [left, left + SAMPLE].map(|x| (steps(x), steps(middle)));
         if self.area {
             sheet.rectangle(
@@ -137,7 +139,8 @@ impl Entry {
                 .draw(&DashedPathElement::new(ends, steps(on), steps(off), style))?;
         }
         if self.marker {
-            let (x, y) = (steps(left + SAMPLE / 2.0), steps(middle));
+            let x = steps(left + SAMPLE / 2.0);
+            let y = steps(middle);
             let corners: Vec<_> = self
                 .stroke
                 .outline(4.0)

@@ -52,7 +52,9 @@ impl<'a> Plot<'a> {
         let y_label = fonts.wrap(&format!("{} {}", panel.y.label, y.factor), height, BODY);
         let widest = fonts.widest(y.major.iter().map(|tick| &tick.1), SMALL);
         let left = (2.0 * TICK + widest + LABEL + BODY.line() * y_label.len() as f64).ceil();
-        let (names, title, x_label) = (Vec::new(), Vec::new(), Vec::new());
+        let names = Vec::new();
+        let title = Vec::new();
+        let x_label = Vec::new();
         Self {
             panel,
             x,
@@ -140,7 +142,9 @@ impl<'a> Plot<'a> {
         Layers { plot: self, area: chart.plotting_area(), strokes, frame }.draw()?;
 
         sheet.lines((left, top - self.above), &self.title, HEADING, INK, Align::Left)?;
-        let (centre, middle, bottom) = (left + width / 2.0, top + height / 2.0, top + height);
+        let centre = left + width / 2.0;
+        let middle = top + height / 2.0;
+        let bottom = top + height;
         if !self.has_data {
             sheet.text((centre, middle), "no data", BODY, GREY, Align::Center)?;
         }
@@ -192,7 +196,8 @@ impl<B: DrawingBackend> Layers<'_, B> {
     fn band(&self, layer: &Layer) -> Result<(), Fault<B>> {
         let (Marks::Band(points) | Marks::StepBand(points)) = &layer.marks else { return Ok(()) };
         let stairs = matches!(layer.marks, Marks::StepBand(_));
-        let (x, y) = (&self.plot.x, &self.plot.y);
+        let x = &self.plot.x;
+        let y = &self.plot.y;
         let at = |&(at, low, high): &(f64, f64, f64)| {
             Some((x.nearest(at)?, y.nearest(low)?, y.nearest(high)?))
         };
@@ -218,7 +223,8 @@ impl<B: DrawingBackend> Layers<'_, B> {
 
     /// Draws the bars of all series beside each other, and then their whiskers.
     fn bars(&self) -> Result<(), Fault<B>> {
-        let (x, y) = (&self.plot.x, &self.plot.y);
+        let x = &self.plot.x;
+        let y = &self.plot.y;
         let layers = || {
             self.plot
                 .panel
@@ -259,7 +265,8 @@ impl<B: DrawingBackend> Layers<'_, B> {
 
     /// Draws an upright bar with caps at the ends that are inside the panel.
     fn whisker(&self, x: f64, low: f64, high: f64, colour: RGBColor) -> Result<(), Fault<B>> {
-        let (y, style) = (&self.plot.y, pen(colour, THIN));
+        let y = &self.plot.y;
+        let style = pen(colour, THIN);
         let Some((from, to)) = y.nearest(low).zip(y.nearest(high)) else { return Ok(()) };
         self.area
             .draw(&PathElement::new(vec![(x, from), (x, to)], style))?;
@@ -275,7 +282,8 @@ impl<B: DrawingBackend> Layers<'_, B> {
     }
 
     fn reference(&self, layer: &Layer) -> Result<(), Fault<B>> {
-        let (x, y) = (&self.plot.x, &self.plot.y);
+        let x = &self.plot.x;
+        let y = &self.plot.y;
         let ends = match layer.marks {
             Marks::HLine(at) => y
                 .shown(at)
@@ -328,7 +336,8 @@ impl<B: DrawingBackend> Layers<'_, B> {
     /// Draws points and error bars: smaller where there are many, and one marker for those that nobody could tell
     /// apart. Lines of a single point, which would not show, have a marker too.
     fn points(&self) -> Result<(), Fault<B>> {
-        let (x, y) = (&self.plot.x, &self.plot.y);
+        let x = &self.plot.x;
+        let y = &self.plot.y;
         let mut all: Vec<(&str, Point)> = Vec::new();
         for layer in &self.plot.panel.layers {
             let name = layer.name.as_str();
@@ -396,7 +405,8 @@ impl<B: DrawingBackend> Layers<'_, B> {
         let mut kept: Vec<Point> = Vec::new();
         for points in path.chunk_by(|one, next| column(one) == column(next)) {
             let by_height = |one: &&Point, other: &&Point| one.1.total_cmp(&other.1);
-            let (low, high) = (points.iter().min_by(by_height), points.iter().max_by(by_height));
+            let low = points.iter().min_by(by_height);
+            let high = points.iter().max_by(by_height);
             for &point in [points.first(), low, high, points.last()]
                 .into_iter()
                 .flatten()
@@ -426,15 +436,17 @@ impl<B: DrawingBackend> Layers<'_, B> {
         let lengths: Vec<f64> = path
             .windows(2)
             .map(|ends| {
-                let (one, next) = (pixel(&ends[0]), pixel(&ends[1]));
+                let one = pixel(&ends[0]);
+                let next = pixel(&ends[1]);
                 ((next.0 - one.0) * (next.0 - one.0) + (next.1 - one.1) * (next.1 - one.1)).sqrt()
             })
             .collect();
-        let (mut missing, mut places) =
-            ((10.0 + offset % APART).min(lengths.iter().sum::<f64>() / 2.0), Vec::new());
+        let mut missing = (10.0 + offset % APART).min(lengths.iter().sum::<f64>() / 2.0);
+        let mut places = Vec::new();
         for (ends, &length) in path.windows(2).zip(&lengths) {
             while missing < length {
-                let (part, (one, next)) = (missing / length, (ends[0], ends[1]));
+                let part = missing / length;
+                let (one, next) = (ends[0], ends[1]);
                 places.push((one.0 + part * (next.0 - one.0), one.1 + part * (next.1 - one.1)));
                 missing += APART;
             }

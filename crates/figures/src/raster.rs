@@ -99,8 +99,10 @@ impl DrawingBackend for Raster<'_> {
             let length = ((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0))
                 .sqrt()
                 .max(1e-9);
-            let (dx, dy) = ((x1 - x0) / length * half, (y1 - y0) / length * half);
-            let (before, after) = (joint(index), joint(index + 1));
+            let dx = (x1 - x0) / length * half;
+            let dy = (y1 - y0) / length * half;
+            let before = joint(index);
+            let after = joint(index + 1);
             let corner = |x: f64, y: f64, part: f64, side: f64| {
                 (
                     (x + dx * part - dy * side).round() as i32,
@@ -140,8 +142,8 @@ impl DrawingBackend for Raster<'_> {
             VPos::Center => 0.5 * LOWER_CASE * kind.size,
             VPos::Bottom => -0.5 * LOWER_CASE * kind.size,
         };
-        let (colour, turned) =
-            (style.color(), matches!(style.transform(), FontTransform::Rotate270));
+        let colour = style.color();
+        let turned = matches!(style.transform(), FontTransform::Rotate270);
         self.fonts
             .rasterise(text, kind, (start, baseline), |right, down, coverage| {
                 let (right, down) = if turned { (down, -1 - right) } else { (right, down) };
@@ -159,8 +161,10 @@ fn pixels(picture: &impl Picture) -> Result<Pixels, FigureError> {
     let fonts = Fonts::new()?;
     let layout = picture.lay_out(&fonts)?;
     let (width, height) = layout.size();
-    let (across, down) = (steps(width.ceil()) as usize, steps(height.ceil()) as usize);
-    let (width, height) = (across / SAMPLES, down / SAMPLES);
+    let across = steps(width.ceil()) as usize;
+    let down = steps(height.ceil()) as usize;
+    let width = across / SAMPLES;
+    let height = down / SAMPLES;
     if width as u64 * height as u64 > LARGEST {
         return Err(FigureError::TooLarge { width, height });
     }
@@ -240,7 +244,8 @@ mod tests {
         let decoded = png::Decoder::new(std::io::Cursor::new(png(&picture).unwrap()))
             .read_info()
             .unwrap();
-        let (width, height) = (decoded.info().width / PNG_SCALE, decoded.info().height / PNG_SCALE);
+        let width = decoded.info().width / PNG_SCALE;
+        let height = decoded.info().height / PNG_SCALE;
         assert!(
             svg(&picture)
                 .unwrap()

@@ -83,10 +83,8 @@ impl Stroke {
         let (points, inner, first) = self.marker;
         let outer = radius * (1.6 - 0.6 * inner);
         let corner = |index: u32| {
-            let (turn, part) = (
-                f64::from(index) / f64::from(2 * points),
-                if index.is_multiple_of(2) { 1.0 } else { inner },
-            );
+            let turn = f64::from(index) / f64::from(2 * points);
+            let part = if index.is_multiple_of(2) { 1.0 } else { inner };
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * (first + turn));
             (steps(outer * part * cos), steps(outer * part * sin))
         };

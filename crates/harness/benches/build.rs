@@ -53,9 +53,10 @@ fn one_thread(scene: &Scene) {
     let mut contenders: Vec<Contender> =
         vec![("Müller–Fellner, one object per leaf", Box::new(|| drop(config.build(boxes))))];
     let insertion = goldsmith_salmon::Config::default();
-    let (objects, order) =
-        (goldsmith_salmon::Scene::new(boxes).expect("finite boxes"), shuffled(boxes.len() as u32));
-    let (mut workspace, mut tree) = (goldsmith_salmon::Workspace::default(), Bvh::default());
+    let objects = goldsmith_salmon::Scene::new(boxes).expect("finite boxes");
+    let order = shuffled(boxes.len() as u32);
+    let mut workspace = goldsmith_salmon::Workspace::default();
+    let mut tree = Bvh::default();
     contenders.push((
         "Goldsmith–Salmon, a random order",
         Box::new(move || {
@@ -72,7 +73,8 @@ fn one_thread(scene: &Scene) {
     const TRIALS: u64 = 20;
     let greedy = || {
         let scene = Presorted::new(boxes).expect("finite boxes");
-        let (mut workspace, mut tree) = (Workspace::default(), Bvh::default());
+        let mut workspace = Workspace::default();
+        let mut tree = Bvh::default();
         for _ in 0..TRIALS {
             let buffers = (&mut workspace, &mut tree);
             let rule = &mut bvh_build::top_down::TakeBest;
@@ -132,7 +134,8 @@ fn peers(boxes: &[Aabb]) -> Vec<Contender<'_>> {
 }
 
 fn two_threads(boxes: &[Aabb]) {
-    let (one, two) = (pool(1), pool(2));
+    let one = pool(1);
+    let two = pool(2);
     let config = muller_fellner::Config::default();
     let contenders: Vec<Contender> = vec![
         ("one thread", Box::new(|| one.install(|| drop(config.build(boxes))))),

@@ -34,7 +34,8 @@ fn main() {
 }
 
 fn loads(scene: &Scene, path: &Path) {
-    let (boxes, config) = (&scene.boxes, muller_fellner::Config::default());
+    let boxes = &scene.boxes;
+    let config = muller_fellner::Config::default();
     let tree = config.build(boxes).expect("finite boxes");
     fs::write(path, file::save(&tree, boxes, &Origin::default()).expect("a valid tree"))
         .expect("a file");

@@ -54,13 +54,15 @@ fn measure(experiment: &Experiment, scene: &Scene, rows: &mut Vec<MemoryRow>) {
             solve(method, &problem, seed, experiment.budget_of(labelled), &())
                 .expect("finite boxes"),
         );
-        let (peak_bytes, objects) = (ALLOCATED.peak_usage() - before, scene.boxes.len());
+        let peak_bytes = ALLOCATED.peak_usage() - before;
+        let objects = scene.boxes.len();
         let bytes_per_object = peak_bytes as f64 / objects as f64;
         println!(
             "{:<10} {:<24} {bytes_per_object:>9.1} bytes per object",
             scene.name, labelled.label
         );
-        let (scene, method) = (scene.name.clone(), labelled.label.clone());
+        let scene = scene.name.clone();
+        let method = labelled.label.clone();
         rows.push(MemoryRow { scene, objects, method, peak_bytes, bytes_per_object });
     }
 }

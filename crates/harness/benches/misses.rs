@@ -60,7 +60,8 @@ fn main() {
         ("any_hit".into(), timed(rays, |ray| _ = black_box(wide.any_hit(ray)))),
     ];
     for hint in [Coherence::Coherent, Coherence::Incoherent] {
-        let (mut hits, mut any) = ([Hit::MISS; BATCH], [false; BATCH]);
+        let mut hits = [Hit::MISS; BATCH];
+        let mut any = [false; BATCH];
         let nearest =
             move |rays: &[Ray; BATCH]| wide.nearest_hits(rays, black_box(&mut hits), hint);
         contenders
@@ -131,15 +132,17 @@ fn timed<'a, T>(items: &'a [T], mut answer: impl FnMut(&T) + 'a) -> Box<dyn FnMu
 fn rays_that_miss(root: &Aabb) -> Vec<Ray> {
     let mut rng = Stream::seed_from_u64(1);
     let mut point = || DVec3::from([(); 3].map(|()| rng.random_range(-1.0..1.0)));
-    let (low, high) = (root.min.as_dvec3(), root.max.as_dvec3());
+    let low = root.min.as_dvec3();
+    let high = root.max.as_dvec3();
     let mut rays = Vec::new();
     while rays.len() < PART {
-        let (origin, direction) =
-            ((low + high) / 2.0 + point() * 2.0 * root.extent().length(), point().normalize());
+        let origin = (low + high) / 2.0 + point() * 2.0 * root.extent().length();
+        let direction = point().normalize();
         let Ok(ray) = Ray::half_line(origin.as_vec3(), direction.as_vec3()) else { continue };
         let [enter, leave] = [low, high]
             .map(|corner| (corner - ray.origin().as_dvec3()) / ray.direction().as_dvec3());
-        let (first, last) = (enter.min(leave).max_element(), enter.max(leave).min_element());
+        let first = enter.min(leave).max_element();
+        let last = enter.max(leave).min_element();
         if first > last || last < 0.0 {
             rays.push(ray);
         }

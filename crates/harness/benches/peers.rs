@@ -84,7 +84,8 @@ fn measure(scene: &Scene, rounds: usize) {
         let mut least = (0..3)
             .map(|_| theirs().seconds)
             .fold(f64::INFINITY, f64::min);
-        let (mut their_cost, mut ours) = (f64::INFINITY, Vec::new());
+        let mut their_cost = f64::INFINITY;
+        let mut ours = Vec::new();
         for round in 0..rounds {
             let built = theirs();
             least = least.min(built.seconds);

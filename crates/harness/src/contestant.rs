@@ -110,7 +110,8 @@ impl Labelled {
             .filter_map(|key| table.remove_entry(*key))
             .collect();
         let (own, mut faults) = fault::deserialize::<Own>(own);
-        let (ours, libraries) = (Method::NAMES.join(", "), Peer::NAMES.join(", "));
+        let ours = Method::NAMES.join(", ");
+        let libraries = Peer::NAMES.join(", ");
         let accepted =
             || format!("{ours}, the libraries {libraries}, or {}", command::Config::NAME);
         let (method, of_method) = fault::tagged(

@@ -136,7 +136,8 @@ impl Error {
 
     /// For `map_err` on builders and searches: names the scene and the method.
     pub fn search<E: Into<SearchError>>(scene: &str, method: &str) -> impl FnOnce(E) -> Self {
-        let (scene, method) = (scene.to_owned(), method.to_owned());
+        let scene = scene.to_owned();
+        let method = method.to_owned();
         move |source| Self::Search { scene, method, source: Box::new(source.into()) }
     }
 

@@ -68,7 +68,9 @@ fn paths(tree: &str) -> Vec<Module> {
         .into_iter()
         .filter(|name| !name.is_empty() && name != "self" && name != "*")
         .collect();
-    let (mut depth, mut start, mut found) = (0, 0, Vec::new());
+    let mut depth = 0;
+    let mut start = 0;
+    let mut found = Vec::new();
     for (at, character) in rest.char_indices() {
         match character {
             '{' => depth += 1,

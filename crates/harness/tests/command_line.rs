@@ -72,7 +72,8 @@ fn a_run_writes_rows_figures_and_provenance_and_prints_the_table() {
         .unwrap()
         .parse()
         .unwrap();
-    let (build, assertions) = (provenance["build"].as_str().unwrap(), cfg!(debug_assertions));
+    let build = provenance["build"].as_str().unwrap();
+    let assertions = cfg!(debug_assertions);
     let (profile, on) =
         if assertions { ("debug, opt-level ", "on") } else { ("release, opt-level ", "off") };
     assert!(
@@ -329,7 +330,8 @@ fn without_reports_there_is_a_table_and_without_a_terminal_a_line_for_the_last_r
     let spec = "question = 'q'\nscenes = ['spheres75']\nrepetitions = 3\nmethods = [{ method = 'median_cut' }]\n";
     let folder = folder_with("plain.toml", spec);
     let output = run(folder.path(), &["plain.toml"]);
-    let (out, err) = (text(&output.stdout), text(&output.stderr));
+    let out = text(&output.stdout);
+    let err = text(&output.stderr);
     assert!(
         ["spheres75", "median_cut", "least_over_base"]
             .iter()

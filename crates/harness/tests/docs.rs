@@ -19,7 +19,8 @@ use support::{assert_current, experiments, top};
 
 /// The text with every value and table as the committed results have it.
 fn renewed(text: &str) -> String {
-    let (mut out, mut rest) = (String::new(), text);
+    let mut out = String::new();
+    let mut rest = text;
     while let Some(start) = rest
         .find("<!-- value ")
         .into_iter()
@@ -126,7 +127,8 @@ fn every_column_of_every_committed_table_is_on_the_page_of_columns() {
         .collect();
     assert!(unsaid.is_empty(), "without a meaning: {unsaid:#?}");
     assert_current(&top().join("docs/COLUMNS.md"), &harness::cli::columns::page(), "docs");
-    let (mut folders, mut found) = (vec![top().join("results")], 0);
+    let mut folders = vec![top().join("results")];
+    let mut found = 0;
     while let Some(folder) = folders.pop() {
         for path in fs::read_dir(folder)
             .unwrap()

@@ -59,7 +59,9 @@ fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
         .ok()
         .and_then(|kills| kills.parse().ok())
         .unwrap_or(20);
-    let (mut killed, mut finished, mut state) = (0, 0, 1u32);
+    let mut killed = 0;
+    let mut finished = 0;
+    let mut state = 1u32;
     let mut out = "out0".to_owned();
     while killed < kills {
         let mut child =

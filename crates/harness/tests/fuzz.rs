@@ -129,7 +129,8 @@ fn run(name: &str, count: usize, further: Vec<Vec<u8>>) {
     let seconds = std::env::var("FUZZ_SECONDS")
         .ok()
         .and_then(|seconds| seconds.parse().ok());
-    let (start, seed) = (Instant::now(), SystemTime::now().duration_since(SystemTime::UNIX_EPOCH));
+    let start = Instant::now();
+    let seed = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     let mut rng = Stream::seed_from_u64(
         seconds
             .and(seed.ok())

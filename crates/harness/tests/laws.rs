@@ -101,7 +101,8 @@ fn distinct_centres(boxes: &[Aabb]) -> bool {
 }
 
 fn box_of([a, b]: [[f32; 3]; 2]) -> Aabb {
-    let (a, b) = (Vec3::from(a), Vec3::from(b));
+    let a = Vec3::from(a);
+    let b = Vec3::from(b);
     Aabb { min: a.min(b), max: a.max(b) }
 }
 
@@ -224,7 +225,8 @@ proptest! {
             if !matches!(method, Method::MullerFellner(_) | Method::MedianCut(_)) {
                 continue;
             }
-            let (one, mut other) = (solved(&method, &boxes), solved(&method, &permuted));
+            let one = solved(&method, &boxes);
+            let mut other = solved(&method, &permuted);
             other.tree.prim_ids.iter_mut().for_each(|id| *id = order[*id as usize]);
             prop_assert!(one.tree == other.tree && one.cost == other.cost, "{}", label);
         }
@@ -243,7 +245,8 @@ proptest! {
         let boxes = &boxes[..boxes.len().min(6)];
         let twice: Vec<Aabb> = boxes.iter().flat_map(|b| [*b; 2]).collect();
         let exact = named("exact");
-        let (once, both) = (solved(&exact, boxes).cost, solved(&exact, &twice).cost);
+        let once = solved(&exact, boxes).cost;
+        let both = solved(&exact, &twice).cost;
         let most: f64 = once + boxes.iter().map(Aabb::half_area).sum::<f64>();
         prop_assert!(once <= both * (1.0 + ROUNDING) && both <= most * (1.0 + ROUNDING), "{once} {both} {most}");
         for (label, method) in methods() {
@@ -261,7 +264,8 @@ proptest! {
         let inside = Aabb { min: around.min, max: around.min };
         let more = [boxes, &[inside]].concat();
         let exact = named("exact");
-        let (before, after) = (solved(&exact, boxes).cost, solved(&exact, &more).cost);
+        let before = solved(&exact, boxes).cost;
+        let after = solved(&exact, &more).cost;
         let most = before + around.half_area();
         prop_assert!(before <= after * (1.0 + ROUNDING) && after <= most * (1.0 + ROUNDING), "{before} {after}");
         let insertion = named("goldsmith_salmon");

@@ -160,7 +160,8 @@ fn a_damaged_finished_run_is_named_and_done_again_or_refused() {
         },
     ];
     for (number, damage) in damages.into_iter().enumerate() {
-        let (one, two) = (format!("one{number}"), format!("two{number}"));
+        let one = format!("one{number}");
+        let two = format!("two{number}");
         said(at, &["spec.toml", "--shard=1/2", "--out", &one]);
         said(at, &["spec.toml", "--shard=2/2", "--out", &two]);
         damage(&at.join(&one).join("spec/.partial/000002"));

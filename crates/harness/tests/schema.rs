@@ -54,7 +54,8 @@ fn fault(root: &Value, schema: &Value, value: &Value, at: &str) -> Option<String
         .get("properties")
         .and_then(Value::as_object)
         .unwrap_or(&none);
-    let (fields, items) = (value.as_object().unwrap_or(&none), schema.get("items"));
+    let fields = value.as_object().unwrap_or(&none);
+    let items = schema.get("items");
     let missing = list("required")
         .into_iter()
         .flatten()

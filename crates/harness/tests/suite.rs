@@ -196,7 +196,8 @@ fn check_kernels(random: usize, adversarial: usize) {
         jobs.extend((0..pieces).map(|piece| (pieces, scaled[piece % scaled.len()].clone())));
     }
     let check = |(seed, (pieces, (case, scale, triangles))): (usize, (usize, Scaled))| {
-        let (random, adversarial) = (random.div_ceil(pieces), adversarial.div_ceil(pieces));
+        let random = random.div_ceil(pieces);
+        let adversarial = adversarial.div_ceil(pieces);
         let mut rays = kernels::random(&triangles, random, seed as u64);
         rays.extend(kernels::adversarial(&triangles, adversarial, seed as u64));
         let name = format!("{} ({}) * 2^{scale}, seed {seed}", case.id, case.name);
@@ -304,7 +305,8 @@ fn every_objective_is_what_its_method_reports() {
 #[test]
 fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
     let method = best();
-    let (mut searched, mut refused) = (0, 0);
+    let mut searched = 0;
+    let mut refused = 0;
     for (case, triangles) in scenes(2000) {
         let boxes = stiff::boxes(&triangles);
         let bounds = boxes
@@ -366,7 +368,8 @@ fn every_case_holds_with_divided_objects_and_with_the_cost_of_the_layout() {
     let method = best();
     let mut divided = 0;
     for (case, triangles) in scenes(2000) {
-        let (boxes, objects) = (stiff::boxes(&triangles), Primitives::Triangles(triangles.clone()));
+        let boxes = stiff::boxes(&triangles);
+        let objects = Primitives::Triangles(triangles.clone());
         let budget = examine::budget(&method, boxes.len(), WORK);
         for objective in [Objective::Layout, Objective::InternalArea] {
             for references in [1.0, 1.5] {
@@ -434,7 +437,8 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
                 .iter()
                 .map(|t| Triangle(t.0.map(scale)))
                 .collect();
-            let (boxes, objects) = (stiff::boxes(&scaled), Primitives::Triangles(scaled));
+            let boxes = stiff::boxes(&scaled);
+            let objects = Primitives::Triangles(scaled);
             let most = boxes.len() * 3 / 2;
             let built = spatial::Config::default()
                 .build_at_most(most, &boxes, &objects)

@@ -11,7 +11,8 @@ use wgpu::{BindGroupEntry, BufferUsages, PollType, ShaderSource};
 /// Hills of triangles, and a sheet above one half of them.
 fn scene() -> Result<Vec<Triangle>, Box<dyn Error>> {
     let point = |i: u32| {
-        let (x, z) = ((i % 81) as f32, (i / 81 % 81) as f32);
+        let x = (i % 81) as f32;
+        let z = (i / 81 % 81) as f32;
         if i < 81 * 81 {
             [x, 3.0 * (x * 0.3).sin() * (z * 0.2).cos(), z]
         } else {
@@ -29,7 +30,8 @@ fn scene() -> Result<Vec<Triangle>, Box<dyn Error>> {
 /// Rays of a picture of 256 × 256 pixels, from a corner above the scene.
 fn rays() -> Result<Vec<Ray>, Box<dyn Error>> {
     let ray = |i: u16| {
-        let (x, y) = (f32::from(i % 256) / 257.3 - 0.51, 0.49 - f32::from(i / 256) / 258.1);
+        let x = f32::from(i % 256) / 257.3 - 0.51;
+        let y = 0.49 - f32::from(i / 256) / 258.1;
         Ray::half_line([-20.0, 30.0, -20.0], [1.0 - x, y - 0.5, 1.0 + x])
     };
     Ok((0..=u16::MAX)
@@ -107,7 +109,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     println!("{}", adapter.get_info().name);
     let device = pollster::block_on(adapter.request_device(&Default::default()))?;
-    let (triangles, rays) = (scene()?, rays()?);
+    let triangles = scene()?;
+    let rays = rays()?;
     let boxes = boxes(&triangles);
     let tree = bake(&boxes, Duration::from_millis(500))?.tree;
     let expected: Vec<Option<Hit>> = rays
@@ -127,7 +130,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         .flat_map(|v| v.to_array())
         .collect();
 
-    let (nodes, compressed) = (tree.to_first_count(), CompressedBvh::new(&tree, &boxes)?);
+    let nodes = tree.to_first_count();
+    let compressed = CompressedBvh::new(&tree, &boxes)?;
     let pairs = tree.to_aila_laine();
     let wgsl = |text: &'static str| ShaderSource::Wgsl(text.into());
     let glsl = ShaderSource::Glsl {

@@ -11,8 +11,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut triangles = Vec::new();
     for model in tobj::load_obj(std::env::args().nth(1).unwrap_or(knot), &tobj::GPU_LOAD_OPTIONS)?.0
     {
-        let (positions, indices) =
-            (model.mesh.positions.as_chunks::<3>().0, model.mesh.indices.as_chunks().0);
+        let positions = model.mesh.positions.as_chunks::<3>().0;
+        let indices = model.mesh.indices.as_chunks().0;
         triangles.extend(Triangle::from_mesh(positions, indices)?);
     }
     let boxes = boxes(&triangles);
@@ -30,7 +30,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let size = bounds.max - bounds.min;
     let rays = (0..1_000_000u32).map(|i| {
         let part = |k: u32| (i.wrapping_mul(k) >> 8) as f32 / (1 << 24) as f32;
-        let (z, angle) = (2.0 * part(2_654_435_769) - 1.0, 6.283 * part(3_242_174_889));
+        let z = 2.0 * part(2_654_435_769) - 1.0;
+        let angle = 6.283 * part(3_242_174_889);
         let around =
             Vec3::new(angle.cos() * (1.0 - z * z).sqrt(), angle.sin() * (1.0 - z * z).sqrt(), z);
         let from = bounds.min + 0.5 * size + size.length() * around;
@@ -39,7 +40,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         Ray::half_line(from, to - from)
     });
     let rays: Vec<Ray> = rays.collect::<Result<_, _>>()?;
-    let (mut hits, start) = (vec![Hit::MISS; rays.len()], Instant::now());
+    let mut hits = vec![Hit::MISS; rays.len()];
+    let start = Instant::now();
     wide.nearest_hits(&rays, &mut hits, Coherence::Incoherent);
     let met = hits.iter().filter(|hit| !hit.is_miss()).count();
     println!("{met} of a million rays hit, in {:.0} ms", start.elapsed().as_secs_f64() * 1e3);

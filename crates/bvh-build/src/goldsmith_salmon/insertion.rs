@@ -174,7 +174,8 @@ fn find_stop<R: Rule>(
     let mut examined = 0;
     // Every stop further down adds at least the growth of the nodes above it and the object's own area.
     while inherited + object.area < stop.increase {
-        let (mut least, mut next) = (f64::INFINITY, Grown { node: NONE, area: 0.0 });
+        let mut least = f64::INFINITY;
+        let mut next = Grown { node: NONE, area: 0.0 };
         examined += count.div_ceil(LANES);
         for (at, block) in blocks
             .iter()
@@ -207,7 +208,8 @@ fn find_stop<R: Rule>(
         }
         grown.push(next);
         let (block, lane) = place(node);
-        let (is_leaf, above) = (blocks[block].is_leaf(lane), inherited);
+        let is_leaf = blocks[block].is_leaf(lane);
+        let above = inherited;
         if !is_leaf {
             inherited +=
                 if R::BY_AREA { least * f64::from(blocks[block].count[lane]) } else { least };
@@ -249,7 +251,8 @@ fn attach<R: Rule>(blocks: &mut Vec<Block>, stop: &Stop, object: &Object, id: u3
             while !blocks[front].is_leaf(front_lane) {
                 front_lane += 1;
             }
-            let (leaf, other) = (blocks[block], blocks[front]);
+            let leaf = blocks[block];
+            let other = blocks[front];
             blocks[block].copy(lane, &other, front_lane);
             blocks[front].copy(front_lane, &leaf, lane);
             (block, lane) = (front, front_lane);

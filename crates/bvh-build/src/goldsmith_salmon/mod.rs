@@ -88,7 +88,8 @@ impl<'a> Scene<'a> {
     pub fn by(boxes: &[Aabb], measure: Option<&'a dyn Measure>) -> Result<Self, BuildError> {
         check_scene(boxes)?;
         let pack = |b: &Aabb| {
-            let (min, max) = (-b.min, b.max);
+            let min = -b.min;
+            let max = b.max;
             let area =
                 measure.map_or_else(|| b.half_area(), |measure| measure.of(&PackedAabb::from(b)));
             Object { bounds: [min.x, min.y, min.z, max.x, max.y, max.z], area }

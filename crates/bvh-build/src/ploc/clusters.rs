@@ -71,7 +71,8 @@ impl Clusters {
         measure: Option<&dyn Measure>,
         watch: &Watch,
     ) {
-        let (scale, nearest) = (self.scale, &mut self.nearest[..self.boxes.len()]);
+        let scale = self.scale;
+        let nearest = &mut self.nearest[..self.boxes.len()];
         let chunks_per_poll = OBJECTS_PER_POLL / CHUNK;
         let ends_at =
             |number: usize| number % chunks_per_poll == chunks_per_poll - 1 && watch.is_cancelled();
@@ -138,10 +139,12 @@ impl Clusters {
             self.pair_the_rest();
         }
         let count = self.boxes.len();
-        let (nearest, joined, kept) =
-            (&self.nearest[..count], &mut self.joined[..count], &mut self.kept[..count]);
+        let nearest = &self.nearest[..count];
+        let joined = &mut self.joined[..count];
+        let kept = &mut self.kept[..count];
         // Whether a cluster is joined is unpredictable, so no branch depends on it.
-        let (mut pairs, mut left) = (0, 0);
+        let mut pairs = 0;
+        let mut left = 0;
         for at in 0..count {
             let far = nearest[at];
             let other = at.wrapping_add_signed(far as isize);
@@ -150,7 +153,8 @@ impl Clusters {
             pairs += usize::from(mutual & (far > 0));
             left += usize::from(!mutual | (far > 0));
         }
-        let (boxes, below) = (&mut self.boxes[..count], &mut self.below[..count]);
+        let boxes = &mut self.boxes[..count];
+        let below = &mut self.below[..count];
         for at in joined[..pairs].iter().map(|&at| at as usize) {
             let other = at.wrapping_add_signed(nearest[at] as isize);
             self.free -= 2;
@@ -184,6 +188,7 @@ impl Clusters {
 #[inline(always)]
 fn node((aabb, below): (PackedAabb, u32)) -> Node {
     let aabb = Aabb::from(&aabb);
-    let (leaf, inner) = (Node::leaf(aabb, below & !LEAF, 1), Node::inner(aabb, below, 2));
+    let leaf = Node::leaf(aabb, below & !LEAF, 1);
+    let inner = Node::inner(aabb, below, 2);
     if below & LEAF != 0 { leaf } else { inner }
 }

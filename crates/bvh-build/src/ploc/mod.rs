@@ -190,7 +190,8 @@ mod tests {
             .into_iter()
             .map(|id| (boxes[id as usize], vec![id]))
             .collect();
-        let (mut joined, mut few) = (Vec::new(), false);
+        let mut joined = Vec::new();
+        let mut few = false;
         for round in 0.. {
             let n = current.len();
             if n == 1 {

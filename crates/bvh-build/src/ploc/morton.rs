@@ -38,7 +38,8 @@ with_vector_instructions! {
 
 #[inline(always)]
 fn codes_plain(boxes: &[PackedAabb]) -> Vec<u64> {
-    let (mut low, mut high) = (DVec4::INFINITY, DVec4::NEG_INFINITY);
+    let mut low = DVec4::INFINITY;
+    let mut high = DVec4::NEG_INFINITY;
     for centre in boxes.iter().map(PackedAabb::doubled_centroid) {
         (low, high) = (low.min(centre), high.max(centre));
     }

@@ -46,7 +46,8 @@ fn find_plain(
     let len = found.len();
     let Scratch { planes, sides, least, before } = scratch;
     // Position p of the chunk is stored at radius + p. Beyond the ends lie boxes at infinity, whose areas never win.
-    let (first, last) = (start.saturating_sub(radius), (start + len + radius).min(boxes.len()));
+    let first = start.saturating_sub(radius);
+    let last = (start + len + radius).min(boxes.len());
     let offset = first + radius - start;
     for plane in planes.iter_mut() {
         plane.resize(len + 2 * radius, f32::INFINITY);
@@ -136,15 +137,19 @@ fn take_nearer(
     found: &mut [i32],
 ) {
     let len = found.len();
-    let (before, after) = (&areas[..len], &areas[distance..][..len]);
-    let (least, known) = (&mut least[..len], &known[..len]);
+    let before = &areas[..len];
+    let after = &areas[distance..][..len];
+    let least = &mut least[..len];
+    let known = &known[..len];
     let far = distance as i32;
     for at in 0..len {
-        let (before, after) = (before[at].to_bits() as i32, after[at].to_bits() as i32);
+        let before = before[at].to_bits() as i32;
+        let after = after[at].to_bits() as i32;
         let position = (start + at) as i32;
         let bits = |on: i32| position ^ (position + on);
         let backwards = is_less([before, bits(-far)], [after, bits(far)]);
-        let (area, on) = (after.min(before), (far ^ backwards) - backwards);
+        let area = after.min(before);
+        let on = (far ^ backwards) - backwards;
         let nearer = is_less([area, bits(on)], [least[at], bits(known[at])]);
         least[at] = area.min(least[at]);
         found[at] = known[at] ^ (known[at] ^ on) & nearer;

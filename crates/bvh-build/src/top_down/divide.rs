@@ -341,7 +341,8 @@ fn split_node<C: SplitCost, R: SplitRule>(
         }
     }
     let known = side_boxes.map(|aabb| Known { aabb, same_as, stalls: known_stalls });
-    let (axis, left) = (split.axis as usize, split.left as usize);
+    let axis = split.axis as usize;
+    let left = split.left as usize;
     let orders = [x, y, z];
     if (0..3).any(|other| other != axis && same_as[other] as usize == other) {
         let (to_left, to_right) = orders[axis].split_at(left);
@@ -367,7 +368,8 @@ fn partition(order: &mut [u32], goes_right: &mut Vec<u32>, goes_left: &[u8]) {
         goes_right.resize(order.len(), 0);
     }
     let goes_right = &mut goes_right[..order.len()];
-    let (mut left, mut right) = (0, 0);
+    let mut left = 0;
+    let mut right = 0;
     for at in 0..order.len() {
         let object = order[at];
         let side = usize::from(goes_left[object as usize]);

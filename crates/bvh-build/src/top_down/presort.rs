@@ -73,7 +73,8 @@ impl Presorted {
         };
         let [x, y, z] = sorted();
         watch.ensure_wanted()?;
-        let (orders, in_order) = ([x.0, y.0, z.0], [x.1, y.1, z.1]);
+        let orders = [x.0, y.0, z.0];
+        let in_order = [x.1, y.1, z.1];
         Ok(Self { boxes: boxes.iter().map(PackedAabb::from).collect(), orders, in_order })
     }
 
@@ -134,7 +135,8 @@ pub(super) fn in_parallel<T: Send>(
 #[inline(always)]
 pub(super) fn note_same_orders(orders: [&[u32]; 3], same_as: &mut [u8; 3]) {
     for (low, high) in [(0u8, 1u8), (0, 2), (1, 2)] {
-        let (a, b) = (low as usize, high as usize);
+        let a = low as usize;
+        let b = high as usize;
         // The first elements usually differ, which saves the call that compares the rest.
         if same_as[a] == low
             && same_as[b] == high

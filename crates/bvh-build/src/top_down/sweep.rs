@@ -109,7 +109,8 @@ impl<C: SplitCost> Sweep<'_, C> {
         let split_cost = &Linear(self.split_cost);
         let &mut Sweep { boxes, orders, same_as, aabb, ref mut blocks, .. } = self;
         let mut linear = Sweep { boxes, split_cost, orders, same_as, aabb, blocks };
-        let (all, mut best) = (linear.len() as u32, Split::NONE);
+        let all = linear.len() as u32;
+        let mut best = Split::NONE;
         for axis in linear.distinct_axes() {
             linear.scan::<false>(axis, best.cost, |candidate| {
                 let least = candidate.left.min(all - candidate.left);
@@ -284,7 +285,8 @@ impl<C: SplitCost> Sweep<'_, C> {
     /// The boxes of both sides of a candidate that one of this sweep's methods returned. O(1) but for small nodes.
     #[inline(always)]
     pub(super) fn side_boxes(&self, split: &Split) -> [PackedAabb; 2] {
-        let (axis, left) = (split.axis as usize, split.left as usize);
+        let axis = split.axis as usize;
+        let left = split.left as usize;
         let order = self.orders[axis];
         if order.len() <= 2 * BLOCK {
             let (left, right) = order.split_at(left);
@@ -319,7 +321,8 @@ fn gather_blocks<C: SplitCost>(
             .chunks(BLOCK)
             .map(|objects| Block { left: union_of(boxes, objects), ..Block::NONE }),
     );
-    let (mut aabb, mut load) = (PackedAabb::EMPTY, 0.0);
+    let mut aabb = PackedAabb::EMPTY;
+    let mut load = 0.0;
     for (block, objects) in blocks.iter_mut().zip(order.chunks(BLOCK)).rev() {
         if aabb != PackedAabb::EMPTY {
             block.right_value = split_cost.side(split_cost.size(&aabb), load);
@@ -328,7 +331,8 @@ fn gather_blocks<C: SplitCost>(
         aabb.grow(&block.left);
         load += split_cost.total_load(objects);
     }
-    let (mut aabb, mut load) = (PackedAabb::EMPTY, 0.0);
+    let mut aabb = PackedAabb::EMPTY;
+    let mut load = 0.0;
     for (block, objects) in blocks.iter_mut().zip(order.chunks(BLOCK)) {
         if aabb != PackedAabb::EMPTY {
             block.left_value = split_cost.side(split_cost.size(&aabb), load);
@@ -350,13 +354,15 @@ fn value_block<C: SplitCost>(
     block: &Block,
     costs: &mut [f64; 2 * BLOCK],
 ) -> f64 {
-    let (mut aabb, mut load) = (block.right, block.right_load);
+    let mut aabb = block.right;
+    let mut load = block.right_load;
     for (&object, value) in objects.iter().zip(costs.iter_mut()).skip(1).rev() {
         aabb.grow(&boxes[object as usize]);
         load += split_cost.load(object);
         *value = split_cost.side(split_cost.size(&aabb), load);
     }
-    let (mut aabb, mut load) = (block.left, block.left_load);
+    let mut aabb = block.left;
+    let mut load = block.left_load;
     let mut lowest = f64::INFINITY;
     for (&object, cost) in objects[..objects.len() - 1]
         .iter()

@@ -74,7 +74,8 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     if interrupted.load(Relaxed) {
         return Err(Error::StoppedInstances { path: args.out.clone() });
     }
-    let (places, path) = (instances.len(), args.out.join(INSTANCES));
+    let places = instances.len();
+    let path = args.out.join(INSTANCES);
     print_line(&format!("{}: {places} instances of {} meshes", path.display(), scenes.len()));
     Ok(())
 }
@@ -166,7 +167,8 @@ fn top(
         .collect::<Result<Vec<_>, Error>>()?;
     let boxes = Instance::boxes(instances, &layouts).map_err(|invalid| match invalid {
         InvalidInstances::Transform(at) => {
-            let (node, mesh) = (parts.places[at].node, parts.places[at].mesh);
+            let node = parts.places[at].node;
+            let mesh = parts.places[at].mesh;
             let found = "its transform has no inverse, or its box is not finite";
             failed(format!(
                 "nodes[{node}] places meshes[{mesh}]: {found}; expected an invertible one"

@@ -59,7 +59,8 @@ impl<'a> Watch<'a> {
             return;
         }
         let elapsed = self.deadline.elapsed();
-        let (now, before) = (elapsed.as_millis() as u64, self.shown.load(Relaxed));
+        let now = elapsed.as_millis() as u64;
+        let before = self.shown.load(Relaxed);
         let due = now >= before + REFRESH_MILLISECONDS;
         if !due
             || self

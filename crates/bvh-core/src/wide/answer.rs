@@ -16,7 +16,8 @@ pub(crate) trait Answers {
     #[inline(always)]
     fn write_lanes<L: Lanes>(&mut self, first: usize, t: L, object: L) {
         const { assert!(L::N <= 16) };
-        let (mut distances, mut objects) = ([0.0; 16], [0.0; 16]);
+        let mut distances = [0.0; 16];
+        let mut objects = [0.0; 16];
         // SAFETY: there is room for sixteen.
         unsafe {
             t.store(distances.as_mut_ptr());
@@ -75,7 +76,8 @@ impl Answers for (&mut [f32], &mut [u32]) {
 
     #[inline(always)]
     fn write_lanes<L: Lanes>(&mut self, first: usize, t: L, object: L) {
-        let (distances, objects) = (&mut self.0[first..][..L::N], &mut self.1[first..][..L::N]);
+        let distances = &mut self.0[first..][..L::N];
+        let objects = &mut self.1[first..][..L::N];
         // SAFETY: values exist; there is room for as many as there are lanes.
         unsafe {
             let none = L::splat_bits(u32::MAX);

@@ -43,7 +43,8 @@ pub(crate) fn decide(
                 let objects = a.objects + b.objects;
                 let mut decision = Decision { objects, ..nothing };
                 for slots in 2..=8 {
-                    let (mut least, mut split) = (f32::INFINITY, 0);
+                    let mut least = f32::INFINITY;
+                    let mut split = 0;
                     for first in 1..slots {
                         let cost = a.costs[first - 1] + b.costs[slots - first - 1];
                         if cost < least {
@@ -52,8 +53,8 @@ pub(crate) fn decide(
                     }
                     (decision.costs[slots - 1], decision.slots[slots - 1]) = (least, split as u8);
                 }
-                let (as_node, as_leaf) =
-                    (decision.costs[7] + visits * NODE_COST, leaf_cost(objects));
+                let as_node = decision.costs[7] + visits * NODE_COST;
+                let as_leaf = leaf_cost(objects);
                 decision.leaf = as_leaf < as_node
                     || (as_leaf == as_node && objects <= TriangleBlock::LANES as u32);
                 decision.costs[0] = if decision.leaf { as_leaf } else { as_node };
@@ -79,7 +80,8 @@ pub(crate) fn decide(
 pub(crate) fn children(tree: &Bvh, decisions: &[Decision], subtree: usize) -> ([usize; 8], usize) {
     // At most 8 slots are shared out: no more than 8 parts wait at any time.
     let mut parts = [(subtree, decisions[subtree].slots[7]); 8];
-    let (mut count, mut lanes) = (1, 0);
+    let mut count = 1;
+    let mut lanes = 0;
     let mut children = [0; 8];
     while count > 0 {
         count -= 1;
@@ -118,7 +120,8 @@ fn promise(tree: &Bvh, triangles: &[Triangle], visits: &[f32], decisions: &[Deci
             + areas[node.children()].iter().sum::<f64>();
     }
     let promise = |(index, node): (usize, &crate::Node)| {
-        let (area, half_area) = (areas[index], node.aabb.half_area());
+        let area = areas[index];
+        let half_area = node.aabb.half_area();
         let stopped = if area > 0.0 { area / (area + half_area) } else { 0.0 };
         let time = decisions[index].costs[0] / visits[index].max(f32::MIN_POSITIVE);
         (stopped / f64::from(time).max(f64::MIN_POSITIVE)) as f32
@@ -283,7 +286,8 @@ mod tests {
         };
         // States: wide node, left out, or leaf; the root is not left out.
         let least = exhaustive(tree, 3, |choice| {
-            let (mut total, mut open) = (0.0, vec![0]);
+            let mut total = 0.0;
+            let mut open = vec![0];
             while let Some(node) = open.pop() {
                 let aabb = &tree.nodes[node].aabb;
                 if tree.nodes[node].is_leaf() || choice[node] == 2 {
@@ -291,7 +295,8 @@ mod tests {
                     continue;
                 }
                 total += size(aabb) * f64::from(NODE_COST);
-                let (mut children, mut parts) = (0, Vec::from_iter(tree.nodes[node].children()));
+                let mut children = 0;
+                let mut parts = Vec::from_iter(tree.nodes[node].children());
                 while let Some(part) = parts.pop() {
                     if choice[part] == 1 && !tree.nodes[part].is_leaf() {
                         parts.extend(tree.nodes[part].children());

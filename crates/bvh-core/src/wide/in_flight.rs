@@ -437,7 +437,8 @@ unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4], blocks: *const TriangleBlo
         let ids = lower(ids, own);
         let ids = lower(ids, ids.swap_twos());
         let ids = lower(ids, ids.swap_ones());
-        let (mut distances, mut objects) = ([0.0; 16], [0.0; 16]);
+        let mut distances = [0.0; 16];
+        let mut objects = [0.0; 16];
         least.store(distances.as_mut_ptr());
         ids.store(objects.as_mut_ptr());
         for (i, &traversal) in four.iter().enumerate().take(L::N / 4) {

@@ -158,7 +158,8 @@ impl<K: Instructions> Packet<K> {
     ) {
         // SAFETY: the references of the layout are sound, and its stacks large enough.
         unsafe {
-            let (nodes, blocks) = (wide.nodes.as_ptr(), wide.blocks.as_ptr());
+            let nodes = wide.nodes.as_ptr();
+            let blocks = wide.blocks.as_ptr();
             let mut farthest = self.bounds.end();
             let mut end = key_of(farthest);
             if !root.is_node() {
@@ -259,7 +260,8 @@ impl<K: Instructions> Packet<K> {
     ) -> (K::Boxes, u32) {
         // SAFETY: the caller's promises; loads are of whole, aligned planes.
         unsafe {
-            let (mut entry, mut exit) = (culling.begin, K::Boxes::splat(farthest));
+            let mut entry = culling.begin;
+            let mut exit = K::Boxes::splat(farthest);
             for axis in 0..3 {
                 let near = K::Boxes::load(node.planes.as_ptr().add(self.near[axis]).cast());
                 let near = near - culling.near_origin[axis];
@@ -308,7 +310,8 @@ impl<K: Instructions> Packet<K> {
                 .vectors
                 .get_unchecked(vector)
                 .assume_init_ref();
-            let (mut entry, mut exit) = (vector.t_min, vector.t);
+            let mut entry = vector.t_min;
+            let mut exit = vector.t;
             for (axis, &[near, far]) in planes.iter().enumerate() {
                 let near = K::Rays::splat(near).mul_add(vector.scale[axis], vector.shift[axis]);
                 let far = K::Rays::splat(far).mul_add(vector.scale[axis], vector.shift[axis]);

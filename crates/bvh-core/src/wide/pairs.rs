@@ -53,7 +53,9 @@ impl<L: Lanes> Pairs<L> {
         let mut reach = splat(0.0);
         let mut extent = [[reach; 2]; 3];
         for axis in 0..3 {
-            let (a, b, c) = (corners[0][axis], corners[1][axis], corners[2][axis]);
+            let a = corners[0][axis];
+            let b = corners[1][axis];
+            let c = corners[2][axis];
             let min = a.min(b).min(c);
             let max = a.max(b).max(c);
             let origin = self.origin[axis];
@@ -61,7 +63,8 @@ impl<L: Lanes> Pairs<L> {
             extent[axis] = [min, max];
         }
         let reach = reach * splat(Slabs::MARGIN);
-        let (mut entry, mut exit) = (self.t_min, splat(f32::INFINITY));
+        let mut entry = self.t_min;
+        let mut exit = splat(f32::INFINITY);
         for (axis, [min, max]) in extent.into_iter().enumerate() {
             let origin = self.origin[axis];
             let margin = reach + origin.abs() * splat(f32::EPSILON) + splat(f32::MIN_POSITIVE);
@@ -82,9 +85,15 @@ impl<L: Lanes> Pairs<L> {
         let [ax, ay, az] = self.relative(&corners[0]);
         let [bx, by, bz] = self.relative(&corners[1]);
         let [cx, cy, cz] = self.relative(&corners[2]);
-        let (ax, ay, az) = (ax.double(), ay.double(), az.double());
-        let (bx, by, bz) = (bx.double(), by.double(), bz.double());
-        let (cx, cy, cz) = (cx.double(), cy.double(), cz.double());
+        let ax = ax.double();
+        let ay = ay.double();
+        let az = az.double();
+        let bx = bx.double();
+        let by = by.double();
+        let bz = bz.double();
+        let cx = cx.double();
+        let cy = cy.double();
+        let cz = cz.double();
         // Products of two f32 are exact in f64.
         let u = cx * by - cy * bx;
         let v = ax * cy - ay * cx;

@@ -29,7 +29,8 @@ struct WideRay {
 impl WideRay {
     #[inline(always)]
     fn new(ray: &Ray, bounds: &Aabb) -> Self {
-        let (origin, inverse) = (ray.origin(), ray.inverse_direction());
+        let origin = ray.origin();
+        let inverse = ray.inverse_direction();
         let margin = margin(ray, bounds).copysign(inverse);
         let backwards = inverse
             .to_array()
@@ -54,9 +55,11 @@ impl WideRay {
         t_max: f32,
         others: &mut [Pending; 8],
     ) -> Option<(Child, usize)> {
-        let (mut entry, mut exit) = ([self.t_min; 8], [f32::INFINITY; 8]);
+        let mut entry = [self.t_min; 8];
+        let mut exit = [f32::INFINITY; 8];
         for axis in 0..3 {
-            let (near, far) = (&node.planes[self.near[axis]], &node.planes[self.far[axis]]);
+            let near = &node.planes[self.near[axis]];
+            let far = &node.planes[self.far[axis]];
             for lane in 0..8 {
                 let t = (near[lane] - self.near_origin[axis]) * self.inverse[axis];
                 entry[lane] = if t > entry[lane] { t } else { entry[lane] };
@@ -92,7 +95,8 @@ pub(crate) fn walk<const ANY: bool>(
     mut accept: impl FnMut(Hit) -> bool,
 ) -> Option<Hit> {
     let mut child = wide.root?;
-    let (shear, wide_ray) = (Shear::new(ray), WideRay::new(ray, &wide.bounds));
+    let shear = Shear::new(ray);
+    let wide_ray = WideRay::new(ray, &wide.bounds);
     let mut nearest: Option<Hit> = None;
     let mut t_max = ray.t_max();
     let mut stack = Stack::<Pending, 32>::new(Pending { entry: 0.0, child: Child::node(0) });

@@ -49,7 +49,8 @@ impl<L: Lanes> Ready<L> {
         let (in_range, size, scale) = rays.bounded(largest);
         // SAFETY: values exist.
         unsafe {
-            let (zero, sign) = (L::splat(0.0), L::splat(-0.0));
+            let zero = L::splat(0.0);
+            let sign = L::splat(-0.0);
             let margin = size * L::splat(RayLanes::<L>::MARGIN);
             let mut near_shift = [zero; 3];
             let mut far_shift = [zero; 3];
@@ -65,7 +66,8 @@ impl<L: Lanes> Ready<L> {
     /// A bit per ray that may meet something within `bounds`.
     #[inline(always)]
     pub(crate) fn enter(&self, bounds: &Aabb) -> u32 {
-        let (mut entry, mut exit) = (self.rays.t_min, self.rays.t_max);
+        let mut entry = self.rays.t_min;
+        let mut exit = self.rays.t_max;
         for axis in 0..3 {
             // SAFETY: values exist.
             let (low, high) = unsafe { (L::splat(bounds.min[axis]), L::splat(bounds.max[axis])) };
@@ -102,7 +104,8 @@ impl<L: Lanes> Ready<L> {
             let mut near = [bits(0); 3];
             let mut far = [bits(0); 3];
             for i in 0..3 {
-                let (lower, upper) = (bits(32 * i as u32), bits(32 * (i as u32 + 3)));
+                let lower = bits(32 * i as u32);
+                let upper = bits(32 * (i as u32 + 3));
                 near[i] = L::select(self.backwards(i), upper, lower);
                 far[i] = L::select(self.backwards(i), lower, upper);
             }
@@ -145,7 +148,10 @@ impl Prepared {
                     rays[3].row(row),
                 ])
             };
-            let (begin, far, origin, inverse) = (row(0), row(2), row(3), row(4));
+            let begin = row(0);
+            let far = row(2);
+            let origin = row(3);
+            let inverse = row(4);
             Pairs {
                 origin: [origin.spread::<0>(), origin.spread::<1>(), origin.spread::<2>()],
                 inverse: [inverse.spread::<0>(), inverse.spread::<1>(), inverse.spread::<2>()],

@@ -65,7 +65,9 @@ impl<L: Lanes> RayLanes<L> {
     #[inline(always)]
     pub(crate) fn largest(&self) -> (L::Mask, L::Mask) {
         let [x, y, z] = self.direction;
-        let (x, y, z) = (x.abs(), y.abs(), z.abs());
+        let x = x.abs();
+        let y = y.abs();
+        let z = z.abs();
         let third = x.max(y).lt(z);
         (x.lt(y).and_not(third), third)
     }

@@ -89,7 +89,8 @@ impl Source for &RayComponents<'_> {
                 Distances::Each(distances) => component(distances),
             };
             let direction = [component(dx), component(dy), component(dz)];
-            let (one, most) = (L::splat(1.0), L::splat(f32::MAX));
+            let one = L::splat(1.0);
+            let most = L::splat(f32::MAX);
             let least = L::splat(f32::MIN);
             // As `Ray` does.
             let inverse = |direction: L| (one / direction).max(least).min(most);

@@ -89,7 +89,8 @@ impl TriangleBlock {
     pub(crate) fn candidates(&self, shear: &Shear) -> u32 {
         let [kx, ky, kz] = shear.axes;
         let sheared = |corner: &[[f32; Self::LANES]; 3]| {
-            let (mut x, mut y) = ([0.0; Self::LANES], [0.0; Self::LANES]);
+            let mut x = [0.0; Self::LANES];
+            let mut y = [0.0; Self::LANES];
             for lane in 0..Self::LANES {
                 let z = corner[kz][lane] - shear.origin[2];
                 x[lane] = (corner[kx][lane] - shear.origin[0]) - shear.slope[0] * z;
@@ -98,10 +99,13 @@ impl TriangleBlock {
             (x, y)
         };
         let [a, b, c] = &self.corners;
-        let ((ax, ay), (bx, by), (cx, cy)) = (sheared(a), sheared(b), sheared(c));
+        let (ax, ay) = sheared(a);
+        let (bx, by) = sheared(b);
+        let (cx, cy) = sheared(c);
         let mut candidates = 0;
         for i in 0..Self::LANES {
-            let (u, v) = (cx[i] * by[i] - cy[i] * bx[i], ax[i] * cy[i] - ay[i] * cx[i]);
+            let u = cx[i] * by[i] - cy[i] * bx[i];
+            let v = ax[i] * cy[i] - ay[i] * cx[i];
             let w = bx[i] * ay[i] - by[i] * ax[i];
             let negative = (u < 0.0) | (v < 0.0) | (w < 0.0);
             let positive = (u > 0.0) | (v > 0.0) | (w > 0.0);

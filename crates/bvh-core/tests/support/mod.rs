@@ -121,8 +121,10 @@ pub fn boxes(triangles: &[Triangle]) -> Vec<Aabb> {
 pub fn soup(n: usize, random: &mut Random) -> Vec<Triangle> {
     let mut triangles: Vec<Triangle> = Vec::new();
     for i in 0..n {
-        let (a, size) = (random.point(), random.of(&[0.02, 0.1, 0.5]));
-        let (b, c) = (a + size * random.point(), a + size * random.point());
+        let a = random.point();
+        let size = random.of(&[0.02, 0.1, 0.5]);
+        let b = a + size * random.point();
+        let c = a + size * random.point();
         triangles.push(match i % 10 {
             7 => Triangle([a, a, b]),
             8 => Triangle([a, a + Vec3::X, a + Vec3::X * 3.0]),
@@ -169,7 +171,9 @@ pub fn ball(levels: usize) -> Vec<Triangle> {
         triangles = (triangles.iter())
             .flat_map(|&Triangle([a, b, c])| {
                 // The same sum whichever way an edge runs.
-                let (ab, bc, ca) = ((a + b).normalize(), (b + c).normalize(), (c + a).normalize());
+                let ab = (a + b).normalize();
+                let bc = (b + c).normalize();
+                let ca = (c + a).normalize();
                 [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]].map(Triangle)
             })
             .collect();

@@ -166,12 +166,16 @@ pub fn closed_box(n: usize) -> Vec<Triangle> {
     let mut triangles = Vec::new();
     for face in 0..6 {
         let corner = |u: usize, v: usize| {
-            let (u, v, w) = (at(u), at(v), if face < 3 { -1.0 } else { 1.0 });
+            let u = at(u);
+            let v = at(v);
+            let w = if face < 3 { -1.0 } else { 1.0 };
             [Vec3::new(w, u, v), Vec3::new(v, w, u), Vec3::new(u, v, w)][face % 3]
         };
         for (u, v) in (0..cells * cells).map(|i| (i % cells, i / cells)) {
-            let (a, b, c, d) =
-                (corner(u, v), corner(u + 1, v), corner(u + 1, v + 1), corner(u, v + 1));
+            let a = corner(u, v);
+            let b = corner(u + 1, v);
+            let c = corner(u + 1, v + 1);
+            let d = corner(u, v + 1);
             triangles.extend([Triangle([a, b, c]), Triangle([a, c, d])]);
         }
     }
@@ -183,7 +187,9 @@ pub fn degenerate(n: usize) -> Vec<Triangle> {
     many(n, 17, |rng, i| {
         // Eighths: multiples are exact, the corners truly collinear.
         let mut corner = || (point(rng, 64.0)).round() / 8.0;
-        let (a, b, c) = (corner(), corner(), corner());
+        let a = corner();
+        let b = corner();
+        let c = corner();
         match i % 6 {
             1 => Triangle([a; 3]),
             3 => Triangle([a, b, a]),
@@ -272,7 +278,9 @@ pub fn giant_over_small(n: usize) -> Vec<Triangle> {
 /// S29: triangles a million times as long as wide, in all directions.
 pub fn slivers(n: usize) -> Vec<Triangle> {
     many(n, 29, |rng, _| {
-        let (a, along, across) = (point(rng, 100.0), point(rng, 2.0) - 1.0, point(rng, 2.0) - 1.0);
+        let a = point(rng, 100.0);
+        let along = point(rng, 2.0) - 1.0;
+        let across = point(rng, 2.0) - 1.0;
         let length = 100.0;
         Triangle([
             a,

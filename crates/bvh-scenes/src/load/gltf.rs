@@ -108,7 +108,8 @@ pub struct Placed {
 pub fn parts(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Parts, Fault> {
     let (root, chunk) = document(bytes, path)?;
     let mut scene = Scene::new(path, &root, Buffers::new(path, outside, chunk));
-    let (mut places, mut meshes) = (scene.places()?, BTreeMap::new());
+    let mut places = scene.places()?;
+    let mut meshes = BTreeMap::new();
     for place in &places {
         if let Entry::Vacant(first) = meshes.entry(place.mesh) {
             scene.place(place, &DMat4::IDENTITY)?;

@@ -72,7 +72,8 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     let header = Parser::<Other>::new()
         .read_header(&mut reader)
         .map_err(|error| told(path, None, &error))?;
-    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    let mut vertices = Vec::new();
+    let mut faces = Vec::new();
     for element in header.elements.values() {
         let place = || Place::Element(format!("element {}", element.name));
         // Every element has a byte or a line at least; without this a header of a line could ask for endless memory.
@@ -145,7 +146,8 @@ fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault>
         return fault("vertex", number, format!("position {found:?}; expected finite x, y and z"));
     }
     let mut used = vec![false; vertices.len()];
-    let (mut triangles, mut short_faces) = (Vec::new(), 0);
+    let mut triangles = Vec::new();
+    let mut short_faces = 0;
     for (number, Face(indices)) in faces.iter().enumerate() {
         let mut corners = Vec::with_capacity(indices.len());
         for &index in indices {

@@ -90,7 +90,8 @@ fn of_binary(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
 fn of_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
     let mut triangles = Vec::new();
     let mut corners: Vec<Vec3> = Vec::new();
-    let (mut line, mut inside) = (0, false);
+    let mut line = 0;
+    let mut inside = false;
     for text in bytes.split(|&byte| byte == b'\n') {
         line += 1;
         let fault = |message: String| Err(Fault::new(path, Place::Line(line), message));

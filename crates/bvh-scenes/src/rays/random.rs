@@ -25,7 +25,8 @@ pub enum Family {
 
 /// A random ray of a family; `None` if the box is so small or so large that no ray can be made.
 pub fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> {
-    let (low, size) = (root.min.as_dvec3(), root.extent());
+    let low = root.min.as_dvec3();
+    let size = root.extent();
     let mut unit = || rng.random::<f64>();
     let inside = DVec3::new(unit(), unit(), unit());
     let (origin, direction) = match family {

@@ -70,7 +70,8 @@ impl RenderedRays {
     fn camera(&self, place: f64, up: DVec3) -> Camera {
         let at = place * (self.cameras.len() - 1) as f64;
         let first = (at as usize).min(self.cameras.len() - 1);
-        let (a, b) = (&self.cameras[first], &self.cameras[(first + 1).min(self.cameras.len() - 1)]);
+        let a = &self.cameras[first];
+        let b = &self.cameras[(first + 1).min(self.cameras.len() - 1)];
         let between = |a: [f64; 3], b: [f64; 3]| DVec3::from(a).lerp(b.into(), at - first as f64);
         let view =
             View { from: between(a.eye, b.eye), at: between(a.target, b.target), fov: self.fov };
@@ -189,7 +190,8 @@ impl<'a> Tracing<'a> {
     }
 
     fn keep(&mut self, kind: Kind, ray: Ray, end: f32) {
-        let (from, to) = (ray.origin(), ray.at(end));
+        let from = ray.origin();
+        let to = ray.at(end);
         if to.is_finite() {
             let segment = Segment { from: from.to_array(), to: to.to_array() };
             self.rays.push(TracedRay { kind, ray, segment });

@@ -64,7 +64,8 @@ pub fn render(
         .boxes
         .iter()
         .fold(Aabb::EMPTY, |all, b| all.union(b));
-    let (width, height) = (options.width, options.height);
+    let width = options.width;
+    let height = options.height;
     let up = scene.up();
     let aspect = f64::from(width) / f64::from(height);
     let automatic = || framing::automatic(scene, &bounds, aspect);
@@ -79,7 +80,8 @@ pub fn render(
     let finished: Option<Vec<Film>> = (0..tiles(options) as u32)
         .into_par_iter()
         .map(|index| {
-            let (x, y) = (index % columns * TILE, index / columns * TILE);
+            let x = index % columns * TILE;
+            let y = index / columns * TILE;
             let tile = world.tile(
                 &camera,
                 x..(x + TILE).min(width),

@@ -70,7 +70,8 @@ pub fn map(film: &Film, rays_per_pixel: u32) -> Result<Vec<[u8; 3]>, BadFont> {
 fn colour(at: f64) -> [u8; 3] {
     let at = at.clamp(0.0, 1.0) * (INFERNO.len() - 1) as f64;
     let index = (at as usize).min(INFERNO.len() - 2);
-    let (low, high) = (INFERNO[index], INFERNO[index + 1]);
+    let low = INFERNO[index];
+    let high = INFERNO[index + 1];
     let part = at - index as f64;
     [0, 1, 2]
         .map(|c| (f64::from(low[c]) + (f64::from(high[c]) - f64::from(low[c])) * part + 0.5) as u8)

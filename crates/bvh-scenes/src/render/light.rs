@@ -117,7 +117,8 @@ impl<'a> World<'a> {
         let offset = |sample: u32| (f64::from(sample) + 0.5) / f64::from(samples);
         for y in y {
             for x in x.clone() {
-                let (mut sum, mut tally) = (DVec3::ZERO, Tally::default());
+                let mut sum = DVec3::ZERO;
+                let mut tally = Tally::default();
                 for v in 0..samples {
                     for u in 0..samples {
                         let direction =

@@ -40,7 +40,8 @@ impl Surface {
             Primitives::Triangles(triangles) => {
                 let [a, b, c] = triangles[id].0.map(|corner| corner.as_dvec3());
                 // Edges are normalised first, so that tiny triangles have a normal.
-                let (ab, ac) = ((b - a).normalize_or_zero(), (c - a).normalize_or_zero());
+                let ab = (b - a).normalize_or_zero();
+                let ac = (c - a).normalize_or_zero();
                 (met, ab.cross(ac).normalize_or(-direction), PLASTER, 0.0)
             }
             Primitives::Spheres(spheres) => {
@@ -83,7 +84,8 @@ impl Ground {
 
     /// The distance at which the ray meets the ground; `None` unless it comes from above.
     pub fn meet(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        let (above, descent) = (origin.dot(self.up) - self.height, -direction.dot(self.up));
+        let above = origin.dot(self.up) - self.height;
+        let descent = -direction.dot(self.up);
         (above > 0.0 && descent > 0.0).then(|| above / descent)
     }
 

@@ -138,12 +138,15 @@ mod tests {
     #[test]
     fn rows_that_follow_moves_are_those_that_are_made_anew() {
         let mut tree = built(&muller_fellner::Config::default(), &scatter(120));
-        let (mut rng, mut layout) = (stream(3, 0), Layout::default());
+        let mut rng = stream(3, 0);
+        let mut layout = Layout::default();
         layout.prepare(&tree);
-        let (mut accepted, mut refused) = (0, 0);
+        let mut accepted = 0;
+        let mut refused = 0;
         for _ in 0..4000 {
             let draw = |rng: &mut crate::run::Stream| rng.random_range(1..tree.nodes.len() as u32);
-            let (node, beside) = (draw(&mut rng), draw(&mut rng));
+            let node = draw(&mut rng);
+            let beside = draw(&mut rng);
             let mut above = beside;
             while above != ANCHOR && above != node {
                 above = tree.nodes[above as usize].parent;
@@ -163,7 +166,8 @@ mod tests {
                 refused += 1;
                 assert_eq!((layout.cost, tree.to_bvh()), before);
             }
-            let (followed, anew) = (layout.cost, Layout::default().cost(&tree));
+            let followed = layout.cost;
+            let anew = Layout::default().cost(&tree);
             assert_eq!(followed, anew);
             assert!((anew - layout_area(&tree.to_bvh())).abs() <= 1e-12 * anew);
         }

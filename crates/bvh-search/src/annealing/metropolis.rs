@@ -36,7 +36,8 @@ fn cool_plain<M: Mover>(
     rng: &mut Stream,
     observer: &dyn Observer,
 ) -> Tally {
-    let (mut tally, before) = (Tally::default(), mover.work());
+    let mut tally = Tally::default();
+    let before = mover.work();
     let mut temperature = hot;
     loop {
         let work = mover.work() - before;

@@ -121,7 +121,8 @@ mod tests {
 
     /// How often each node was drawn.
     fn drawn(sampler: &mut NodeSampler, tree: &Working, times: u32) -> Vec<u32> {
-        let (mut counts, mut rng) = (vec![0; tree.nodes.len()], stream(6, 0));
+        let mut counts = vec![0; tree.nodes.len()];
+        let mut rng = stream(6, 0);
         (0..times).for_each(|_| counts[sampler.draw(tree, &mut rng) as usize] += 1);
         counts
     }
@@ -137,7 +138,8 @@ mod tests {
                     .area
                     .sqrt()
             };
-            let (total, times) = (nodes.iter().map(weight).sum::<f64>(), 400_000);
+            let total = nodes.iter().map(weight).sum::<f64>();
+            let times = 400_000;
             let counts = drawn(&mut NodeSampler::among(only), &tree, times);
             assert_eq!(
                 counts.iter().sum::<u32>(),

@@ -194,7 +194,8 @@ impl<'a> Divider<'a> {
             spare
         });
         for (side, leaf) in [leaf, spare].into_iter().enumerate() {
-            let (part, area) = (parts[side], areas[side]);
+            let part = parts[side];
+            let area = areas[side];
             tree.resize_leaf(leaf, object, part, area);
             // The other part costs its own area at least.
             let rest = if side == 0 { areas[1] } else { 0.0 };
@@ -254,7 +255,8 @@ impl<'a> Divider<'a> {
         let item = tree.nodes[leaf as usize].aabb;
         let [negated_low, high] = item.planes();
         self.planes.clear();
-        let (mut below, mut at) = (leaf, tree.nodes[leaf as usize].parent);
+        let mut below = leaf;
+        let mut at = tree.nodes[leaf as usize].parent;
         let mut rest = PackedAabb::EMPTY;
         for _ in 0..LEVELS_OF_PLANES {
             if at == ANCHOR || rest.union(&item) == rest {
@@ -301,7 +303,8 @@ fn change_plain<A: Metric>(
     rng: &mut Stream,
     observer: &dyn Observer,
 ) -> Tally {
-    let (mut done, before) = (Tally::default(), divider.work());
+    let mut done = Tally::default();
+    let before = divider.work();
     let mut poll = WORK_PER_POLL;
     let mut is_over = |divider: &Divider, done: &mut Tally| {
         done.work = divider.work() - before;
@@ -402,10 +405,8 @@ mod tests {
                     assert!((tree.area() - total_area(&flat)).abs() <= 1e-9 * tree.area());
                     let after = cost(&flat);
                     // Every reference that was added has saved its price, and none that went cost more.
-                    let (gone, price) = (
-                        references as f64 - flat.prim_ids.len() as f64,
-                        PRICE_OF_A_REFERENCE * before,
-                    );
+                    let gone = references as f64 - flat.prim_ids.len() as f64;
+                    let price = PRICE_OF_A_REFERENCE * before;
                     let least_leave = if gone > 0.0 { gone / 150.0 } else { gone / 200.0 };
                     assert!(
                         after <= before * (1.0 + 1e-9) + price * least_leave,

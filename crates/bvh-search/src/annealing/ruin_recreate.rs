@@ -255,7 +255,8 @@ impl Mover for RuinMover<'_> {
             *saved + if self.layout.is_some() { DEARER_BY_AREA * worse } else { worse } - *least;
         for &(node, first) in &*roots {
             let item = &tree.nodes[node as usize];
-            let (aabb, area) = (item.aabb, item.area);
+            let aabb = item.aabb;
+            let area = item.area;
             limit += area;
             let Some(position) = self
                 .search

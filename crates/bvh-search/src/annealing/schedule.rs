@@ -63,10 +63,8 @@ impl AnnealingRun<'_> {
             self.work_per_object
                 .saturating_mul(problem.boxes.len() as u64),
         );
-        let (schedule, observer) = (
-            Schedule { hot, cold, quota, end: 1.0, subtrees: 1, to_local_optimum: true },
-            run.observer(),
-        );
+        let schedule = Schedule { hot, cold, quota, end: 1.0, subtrees: 1, to_local_optimum: true };
+        let observer = run.observer();
         anneal(mover, &schedule, &mut tree, [seed, 0], observer, &mut |tree, tally| {
             run.count(tally);
             best.offer(tree, run);
@@ -94,7 +92,8 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     observer: &dyn Observer,
     round: &mut dyn FnMut(&mut Working<A>, Tally),
 ) {
-    let (n, Quota { work, moves }) = (tree.objects() as u64, schedule.quota);
+    let n = tree.objects() as u64;
+    let Quota { work, moves } = schedule.quota;
     if n < 3 {
         return;
     }
@@ -102,7 +101,8 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     let final_passes =
         if schedule.to_local_optimum { (work / FINAL_PASSES_PART).min(final_passes) } else { 0 };
     let work = work - final_passes;
-    let (mut done, mut streams) = (Tally::default(), first);
+    let mut done = Tally::default();
+    let mut streams = first;
     let factor = schedule.cold / schedule.hot;
     let temperature = |fraction: f64| schedule.hot * libm::pow(factor, fraction.min(1.0));
     let began = observer.progress();
@@ -112,7 +112,8 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
         next = next.min(short);
     }
     // The fraction of the work or time that is done, and the fraction per unit of work.
-    let (mut fraction, mut rate) = (0.0, 1.0 / work as f64);
+    let mut fraction = 0.0;
+    let mut rate = 1.0 / work as f64;
     tree.sort_in_preorder();
     while fraction < 1.0 {
         let step = rate * next as f64;

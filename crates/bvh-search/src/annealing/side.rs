@@ -27,7 +27,8 @@ impl Side {
     ) -> u64 {
         self.roots.clear();
         self.stack.clear();
-        let (side, axis) = (rng.random_range(0..2), rng.random_range(0..3));
+        let side = rng.random_range(0..2);
+        let axis = rng.random_range(0..3);
         // The interval of a node along the axis, towards the side. In f64, so that the scale of the scene has no effect.
         let span = |at: u32| {
             let planes = tree.nodes[at as usize].aabb.planes();
@@ -39,7 +40,8 @@ impl Side {
         self.stack
             .extend(tree.nodes[top as usize].children);
         while let Some(at) = self.stack.pop() {
-            let (node, (near, far)) = (&tree.nodes[at as usize], span(at));
+            let node = &tree.nodes[at as usize];
+            let (near, far) = span(at);
             visits += 1;
             if far <= limit {
                 continue;
@@ -70,7 +72,9 @@ mod tests {
     fn a_box_shrinks_when_one_side_of_it_is_removed() {
         let boxes = scatter(300);
         let mut tree = built(&muller_fellner::Config::default(), &boxes);
-        let (mut rng, mut removed, mut found) = (stream(8, 0), Side::default(), 0);
+        let mut rng = stream(8, 0);
+        let mut removed = Side::default();
+        let mut found = 0;
         for _ in 0..2000 {
             let top = rng.random_range(1..tree.nodes.len() as u32);
             let Some(above) =

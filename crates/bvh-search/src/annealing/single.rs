@@ -113,7 +113,8 @@ impl<'a> SingleMover<'a> {
         [top, sibling]: [u32; 2],
         limit: f64,
     ) -> Option<u32> {
-        let (mut best, mut least) = (None, limit);
+        let mut best = None;
+        let mut least = limit;
         let mut visits = 1;
         let mut look = |at: u32, growth: f64, least: &mut f64, stack: &mut Vec<(u32, f64)>| {
             let node = &tree.nodes[at as usize];
@@ -191,7 +192,8 @@ impl Mover for SingleMover<'_> {
             }
             Target::Best => {
                 let item = &tree.nodes[node as usize];
-                let (aabb, area) = (item.aabb, item.area);
+                let aabb = item.aabb;
+                let area = item.area;
                 self.best(tree, (&aabb, area), [top, sibling], limit)
             }
         };

@@ -26,7 +26,9 @@ pub(crate) fn cool<M: Mover>(
     [seed, first]: [u64; 2],
     observer: &dyn Observer,
 ) -> Tally {
-    let (mut rng, mut whole, mut done) = (stream(seed, first), mover(), Tally::default());
+    let mut rng = stream(seed, first);
+    let mut whole = mover();
+    let mut done = Tally::default();
     if count > 1 && tree.objects() as f64 >= f64::from(count) * f64::from(LEAST_SUBTREE) {
         // Of another size in every round, so that the borders are elsewhere.
         let smaller = SMALLEST_SUBTREES + (1.0 - SMALLEST_SUBTREES) * rng.random::<f64>();
@@ -42,8 +44,8 @@ pub(crate) fn cool<M: Mover>(
         };
         let found = parallel::map(subtrees.len(), |number| {
             let mut small = subtrees[number].take(tree);
-            let (rng, quota) =
-                (&mut stream(seed, first + 1 + number as u64), share(&subtrees[number]));
+            let rng = &mut stream(seed, first + 1 + number as u64);
+            let quota = share(&subtrees[number]);
             let tally = metropolis::cool(&mut mover(), &mut small, heat, quota, rng, observer);
             small.sort_in_preorder();
             (small, tally)
@@ -115,7 +117,8 @@ fn cut(
             .map_or(0.0, |root| totals[root as usize].1);
     // The level in a subtree, 1 for its root; 0 outside of subtrees.
     let mut depths = vec![0u8; tree.nodes.len()];
-    let (mut subtrees, mut starts) = (vec![], vec![]);
+    let mut subtrees = vec![];
+    let mut starts = vec![];
     for (at, node) in (0..).zip(&tree.nodes).skip(1) {
         let above = depths[node.parent as usize];
         let (nodes, weight) = totals[at as usize];

@@ -72,7 +72,8 @@ pub enum Horizon {
 impl Config {
     /// What the search knows of its end, and the work until then, for `n` objects.
     pub(super) fn horizon(&self, n: u64, run: &Run) -> (Horizon, u64) {
-        let (own, left) = (self.work_per_object.saturating_mul(n), run.left().work);
+        let own = self.work_per_object.saturating_mul(n);
+        let left = run.left().work;
         let timed = run.observer().progress().is_some();
         match self.horizon {
             Some(Horizon::Known) if timed || left < u64::MAX => (Horizon::Known, left),

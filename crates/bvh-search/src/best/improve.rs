@@ -82,7 +82,8 @@ struct Improvement<'a, 'p, 'r, 's> {
 impl Improvement<'_, '_, '_, '_> {
     /// The plan of annealing runs, each due at a fraction of the work or of the time.
     fn until_known_end(&mut self, tree: &mut Working<impl Metric>) {
-        let (n, observer) = (self.n, self.run.observer());
+        let n = self.n;
+        let observer = self.run.observer();
         let timed = observer.progress().is_some();
         let mut length = self.left as f64 / n as f64;
         // The progress at which to be done, so that there is time for the conversion.
@@ -97,7 +98,8 @@ impl Improvement<'_, '_, '_, '_> {
             length = length.min(in_time / n as f64);
             self.secure(tree.metric(), length);
         }
-        let (all, began) = (self.left, observer.progress().unwrap_or(0.0));
+        let all = self.left;
+        let began = observer.progress().unwrap_or(0.0);
         // Short runs are worth their work where they can be recombined, which layouts cannot.
         let config = if self.by_layout {
             &Config { reheats: 0, ..self.config.clone() }
@@ -158,7 +160,8 @@ impl Improvement<'_, '_, '_, '_> {
         mut other: Working<A>,
         horizon: Horizon,
     ) {
-        let (n, observer) = (self.n as f64, self.run.observer());
+        let n = self.n as f64;
+        let observer = self.run.observer();
         let began = observer.progress().unwrap_or(0.0);
         let work = match horizon {
             Horizon::Known if observer.progress().is_some() => {
@@ -221,12 +224,15 @@ impl Improvement<'_, '_, '_, '_> {
             return;
         }
         let observer: &dyn Observer = &Until { observer: self.run.observer(), end: schedule.end };
-        let (mut done, mut rounds) = (Tally::default(), 0);
+        let mut done = Tally::default();
+        let mut rounds = 0;
         // Every run has room for 2⁴⁰ random streams: those of 2¹⁶ rounds. Stream 0 is the probe's, the last are the divider's.
         let streams = [self.seed, 1 + (number << 40)];
         let mut division = stream(self.seed, (1 << 63) + number);
         let ruin = self.config.ruin(length);
-        let (best, run, by_layout) = (&mut *self.best, &mut *self.run, self.by_layout);
+        let best = &mut *self.best;
+        let run = &mut *self.run;
+        let by_layout = self.by_layout;
         // Trees with different references cannot be recombined. So only the first run, which is not recombined, changes them as it
         // goes; the others do so before they begin.
         if let Some(divider) = self.divider.as_mut().filter(|_| !first) {
@@ -289,7 +295,8 @@ impl Improvement<'_, '_, '_, '_> {
         mut rng: Stream,
         quota: Quota,
     ) -> (Tally, f64) {
-        let (observer, heat) = (self.run.observer(), [self.config.cold; 2]);
+        let observer = self.run.observer();
+        let heat = [self.config.cold; 2];
         let began = observer.progress();
         let mut mover = RuinMover::new(&self.config.ruin, PROBE as f64, self.by_layout);
         let tally = cool(&mut mover, tree, heat, quota, &mut rng, observer);

@@ -99,7 +99,8 @@ fn key(object: u32) -> u128 {
     };
     const GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
     let at = 2 * u64::from(object) + 1;
-    let (low, high) = (scatter(at.wrapping_mul(GAMMA)), scatter((at + 1).wrapping_mul(GAMMA)));
+    let low = scatter(at.wrapping_mul(GAMMA));
+    let high = scatter((at + 1).wrapping_mul(GAMMA));
     u128::from(high) << 64 | u128::from(low)
 }
 
@@ -140,7 +141,8 @@ mod tests {
             }
             tree
         };
-        let (a, b) = (spoilt(left), spoilt(right));
+        let a = spoilt(left);
+        let b = spoilt(right);
         let found = recombine(&[&a, &b]);
         validate(&found.to_bvh(), &boxes).unwrap();
         assert!(a.area() > good.area() && b.area() > good.area());

@@ -37,13 +37,16 @@ pub(super) fn search<'p, A: Metric>(
     metric: A,
     run: &mut Run,
 ) -> Result<SmallBudget<'p, A>, SearchError> {
-    let (observer, n) = (run.observer(), problem.boxes.len());
-    let (began, work) = (observer.progress(), run.left().work / n.max(1) as u64);
+    let observer = run.observer();
+    let n = problem.boxes.len();
+    let began = observer.progress();
+    let work = run.left().work / n.max(1) as u64;
     if n < 3 || began.is_none() && work >= ANNEAL_FROM_WORK {
         return Ok(SmallBudget::Large(None));
     }
     let morton = MortonOrder::new(problem.boxes)?;
-    let (mut two_starts, mut end) = (false, f64::INFINITY);
+    let mut two_starts = false;
+    let mut end = f64::INFINITY;
     if let (Some(began), Some(sorted)) = (began, observer.progress()) {
         let sort = (sorted - began).max(1e-9);
         let times = (1.0 - began) / sort;
@@ -66,7 +69,8 @@ pub(super) fn search<'p, A: Metric>(
         (two_starts, end) = (times >= two_starts_from, 1.0 - FINISH_TIME * sort);
     }
     let two_starts = two_starts && top_down_may_be_better(&morton, problem, run)?;
-    let (mut start, mut front) = (morton.build(&CLUSTERING)?, FRONT);
+    let mut start = morton.build(&CLUSTERING)?;
+    let mut front = FRONT;
     if two_starts && let Some(divided) = divided(problem.boxes, run)? {
         run.count(Tally { moves: 1, kept: 0, work: divided.nodes.len() as u64 });
         if cost::internal_area(&divided) < cost::internal_area(&start) {
@@ -128,7 +132,8 @@ fn top_down_may_be_better(
     if order.len() < SAMPLED_FROM {
         return Ok(true);
     }
-    let (mut divided, mut clustered) = (0.0, 0.0);
+    let mut divided = 0.0;
+    let mut clustered = 0.0;
     for stretch in order.chunks(order.len().div_ceil(SAMPLES)) {
         let objects = &stretch[..stretch.len() / SAMPLED_PART];
         let boxes: Vec<Aabb> = objects
@@ -147,7 +152,8 @@ fn top_down_may_be_better(
 /// a local optimum came first.
 fn reinsert_largest(tree: &mut Siblings, front: usize, end: f64, run: &mut Run) -> bool {
     let observer: &dyn Observer = run.observer();
-    let (mut part, mut order) = (FIRST_PASS, Vec::new());
+    let mut part = FIRST_PASS;
+    let mut order = Vec::new();
     loop {
         largest(tree, part, front, &mut order);
         let mut kept = 0;

@@ -99,7 +99,8 @@ fn pass_plain<T: Linked>(
     observer: &dyn Observer,
 ) -> Tally {
     let mut done = Tally::default();
-    let (mut search, mut poll) = (PositionSearch::default(), WORK_PER_POLL);
+    let mut search = PositionSearch::default();
+    let mut poll = WORK_PER_POLL;
     for &node in order {
         let so_far = Tally { work: done.work + search.visits, ..done };
         if quota.is_reached(&so_far) {

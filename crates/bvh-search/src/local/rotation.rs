@@ -134,7 +134,8 @@ fn best(tree: &Working<impl Metric>, top: u32) -> Option<Rotation> {
     let area = |children| tree.metric().of(&tree.union_of(children));
     let node = |at: u32| &tree.nodes[at as usize];
     let sides = node(top).children;
-    let (mut most, mut best) = (TOLERANCE * node(top).area, None);
+    let mut most = TOLERANCE * node(top).area;
+    let mut best = None;
     for [from, other] in [sides, [sides[1], sides[0]]] {
         if node(from).is_leaf() {
             continue;
@@ -150,7 +151,8 @@ fn best(tree: &Working<impl Metric>, top: u32) -> Option<Rotation> {
     }
     let [left, right] = sides;
     if !node(left).is_leaf() && !node(right).is_leaf() {
-        let ([a, b], pair) = (node(left).children, node(right).children);
+        let [a, b] = node(left).children;
+        let pair = node(right).children;
         for [c, d] in [pair, [pair[1], pair[0]]] {
             let saved = node(left).area + node(right).area - area([a, c]) - area([b, d]);
             if saved > most {

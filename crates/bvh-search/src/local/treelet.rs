@@ -209,7 +209,8 @@ mod tests {
         for size in [3, 5, 7, 12] {
             let boxes = scatter(150);
             let mut tree = built(&median_cut::Config::default(), &boxes);
-            let (mut solver, start) = (Solver::new(size, &tree), tree.area());
+            let mut solver = Solver::new(size, &tree);
+            let start = tree.area();
             repeat(Quota::ENDLESS, &(), |quota| {
                 let done = pass(&mut tree, &mut solver, quota, &());
                 let area = tree.internal_area();

@@ -121,8 +121,10 @@ pub fn of_largest(boxes: &[Aabb]) -> f64 {
     if boxes.len() < 2 {
         return 0.0;
     }
-    let (mut least, mut most, mut root, mut sum) =
-        (f64::INFINITY, 0.0f64, PackedAabb::EMPTY, Sum::default());
+    let mut least = f64::INFINITY;
+    let mut most = 0.0f64;
+    let mut root = PackedAabb::EMPTY;
+    let mut sum = Sum::default();
     for aabb in boxes.iter().map(PackedAabb::from) {
         let area = aabb.half_area();
         (least, most) = (least.min(area), most.max(area));
@@ -222,7 +224,8 @@ impl Classes {
 fn share(part: f64) -> f64 {
     // 1 / h, without cancellation: 1 − p = (1 − p^¼)(1 + p^¼)(1 + p^½).
     let over_secant = |p: f64| (1.0 + p.sqrt().sqrt()) * (1.0 + p.sqrt());
-    let (own, other) = (over_secant(part), over_secant(1.0 - part));
+    let own = over_secant(part);
+    let other = over_secant(1.0 - part);
     other / (own + other)
 }
 
@@ -263,7 +266,8 @@ mod tests {
             boxes in (0usize..=9, 0usize..3).prop_flat_map(|(n, flat)| scene(n, flat)),
             effort in 0u32..40,
         ) {
-            let (bound, optimum) = (internal_area(&boxes, effort, &()).unwrap(), optimum(&boxes));
+            let bound = internal_area(&boxes, effort, &()).unwrap();
+            let optimum = optimum(&boxes);
             prop_assert!((0.0..=optimum).contains(&bound), "{bound} {optimum}");
         }
     }

@@ -143,7 +143,8 @@ impl Clusters {
 
     /// The largest clusters that weigh at most `most` or are single objects, in tree order.
     pub fn groups(&self, most: u64) -> Vec<usize> {
-        let (mut groups, mut stack) = (vec![], vec![0]);
+        let mut groups = vec![];
+        let mut stack = vec![0];
         while let Some(index) = stack.pop() {
             let cluster = &self.nodes[index];
             if cluster.children == 0 || self.weight_of(&cluster.objects) <= most {
@@ -202,7 +203,8 @@ fn nodes(tree: &Bvh, reaches: &[Reach]) -> Vec<Cluster> {
     for index in (0..nodes.len()).rev() {
         let first = nodes[index].children;
         if first != 0 {
-            let (left, right) = (&nodes[first], &nodes[first + 1]);
+            let left = &nodes[first];
+            let right = &nodes[first + 1];
             let objects = left.objects.start..right.objects.end;
             let reach = left.reach.common(&right.reach);
             nodes[first].parent = index;
@@ -262,7 +264,9 @@ impl Region {
             return None;
         }
         // The smallest prefix that weighs enough ends within `low..high`.
-        let (mut low, mut high, mut missing) = (0, members.len(), weight);
+        let mut low = 0;
+        let mut high = members.len();
+        let mut missing = weight;
         while high - low > 1 {
             let half = (high - low) / 2;
             let by_area = |a: &Member, b: &Member| {
@@ -379,7 +383,8 @@ fn search_plain(
 /// The clusters that need less area than `known` together with `must`: single objects, or clusters that weigh at most `most`.
 #[inline(always)]
 fn neighbours(clusters: &Clusters, must: &Reach, most: u64, known: f64) -> Vec<Member> {
-    let (mut found, mut stack) = (vec![], vec![0]);
+    let mut found = vec![];
+    let mut stack = vec![0];
     while let Some(index) = stack.pop() {
         let cluster = &clusters.nodes[index];
         let area = must.union(&cluster.reach).half_area();

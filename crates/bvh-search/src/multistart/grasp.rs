@@ -334,7 +334,8 @@ mod tests {
                     .all(|(before, after)| after.cost < before.cost && after.work > before.work)
             );
             let cut = |threads| run(local_search, threads, Some(improved.work / 3));
-            let (one, three) = (cut(1), cut(3));
+            let one = cut(1);
+            let three = cut(3);
             assert_eq!((&one.tree, &one.history), (&three.tree, &three.history));
             // The budget ends the search with the first trial that exceeds it.
             let within = improved

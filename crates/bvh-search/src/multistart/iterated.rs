@@ -53,11 +53,13 @@ impl Config {
         let kicks = ((self.strength * n as f64) as u64).max(1);
         let mut number = 0;
         while n > 2 && run.stopped().is_none() && !quota.is_reached(&total) {
-            let (mut other, mut rng, mut mover) =
-                (tree.clone(), stream(seed, number), SingleMover::new(&kick));
+            let mut other = tree.clone();
+            let mut rng = stream(seed, number);
+            let mut mover = SingleMover::new(&kick);
             number += 1;
             // At this temperature every move is accepted.
-            let (mut tally, observer) = (Tally::default(), run.observer());
+            let mut tally = Tally::default();
+            let observer = run.observer();
             while tally.moves < kicks && (tally.moves % 1024 > 0 || !observer.cancelled()) {
                 tally.kept += u64::from(mover.step(&mut other, f64::MAX, &mut rng));
                 tally.moves += 1;

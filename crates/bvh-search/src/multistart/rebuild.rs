@@ -69,7 +69,8 @@ impl Config {
         }
         run.count(reinsertion::to_local_optimum(&mut tree, run.left(), run.observer()));
         best.offer(&tree, run);
-        let (mut rng, mut number) = (stream(seed, 0), 0);
+        let mut rng = stream(seed, 0);
+        let mut number = 0;
         let mut own = self.work_per_object.saturating_mul(n);
         // The work that a batch may take: it is not begun with less.
         let enough = BATCH * WORK_PER_OBJECT * n.min(self.objects.into());
@@ -250,7 +251,8 @@ fn replace<A: Metric>(
     quota: Quota,
     observer: &dyn Observer,
 ) -> Tally {
-    let (mut total, mut order) = (Tally::default(), Vec::new());
+    let mut total = Tally::default();
+    let mut order = Vec::new();
     for (subtree, (other, tally)) in subtrees.iter().zip(found) {
         total += *tally;
         if let Some(other) = other {
@@ -297,8 +299,10 @@ mod tests {
     fn grafting_changes_the_subtree_alone_and_areas_stay_exact() {
         let boxes = scatter(400);
         let mut tree = built(&median_cut::Config::default(), &boxes);
-        let (config, mut rng) = (Config { objects: 50, ..Config::default() }, stream(1, 0));
-        let (mut kept, begin) = (0, tree.area());
+        let config = Config { objects: 50, ..Config::default() };
+        let mut rng = stream(1, 0);
+        let mut kept = 0;
+        let begin = tree.area();
         for number in 0..300 {
             let subtrees = config.select(&tree, &mut rng, 4, &mut Tally::default());
             let before = tree.area();
@@ -332,7 +336,8 @@ mod tests {
     fn subtrees_of_one_batch_have_no_leaf_in_common() {
         let boxes = scatter(100);
         let tree = built(&Config::default().start, &boxes);
-        let (config, mut rng) = (Config { objects: 30, ..Config::default() }, stream(1, 0));
+        let config = Config { objects: 30, ..Config::default() };
+        let mut rng = stream(1, 0);
         let mut several = 0;
         for _ in 0..200 {
             let subtrees = config.select(&tree, &mut rng, 8, &mut Tally::default());

@@ -133,8 +133,10 @@ fn evaluate(
 fn select(population: &[Individual], rng: &mut Stream) -> Vec<Individual> {
     let count = population.len() as u32;
     let mut tournament = |_| {
-        let (a, b) = (rng.random_range(0..count) as usize, rng.random_range(0..count) as usize);
-        let (a, b) = (&population[a], &population[b]);
+        let a = rng.random_range(0..count) as usize;
+        let b = rng.random_range(0..count) as usize;
+        let a = &population[a];
+        let b = &population[b];
         if b.cost < a.cost { b } else { a }.clone()
     };
     (0..count).map(&mut tournament).collect()
@@ -222,7 +224,9 @@ mod tests {
             n in 1..60usize, seed: u64, cut in 0..=60usize,
         ) {
             let mut rng = stream(seed, 0);
-            let (a, b, cut) = (random_order(n, &mut rng), random_order(n, &mut rng), cut.min(n));
+            let a = random_order(n, &mut rng);
+            let b = random_order(n, &mut rng);
+            let cut = cut.min(n);
             let mut marks = vec![false; n];
             let child = child(&a, &b, cut, &mut marks);
             prop_assert!(is_permutation(&child, n));

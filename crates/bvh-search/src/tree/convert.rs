@@ -25,7 +25,8 @@ impl<M: Metric> Working<M> {
             let object = tree.prim_ids[if leaf { first as usize } else { 0 }];
             let children = if leaf { [NONE, object] } else { [first + 1, first + 2] };
             let aabb = PackedAabb::from(&node.aabb);
-            let (area, parent) = (metric.of(&aabb), parents[index]);
+            let area = metric.of(&aabb);
+            let parent = parents[index];
             nodes.push(Node { aabb, area, parent, children, ..Node::ANCHOR });
         }
         if nodes.len() > 1 {

@@ -189,7 +189,9 @@ impl<M: Metric> Working<M> {
         let sibling = self.nodes[parent as usize].other(node);
         self.write(parent).parent = NONE;
         self.replace_child(above, parent, sibling);
-        let (mut saved, mut at, mut visits) = (area, above, 2);
+        let mut saved = area;
+        let mut at = above;
+        let mut visits = 2;
         while at != ANCHOR {
             let aabb = self.union_of(self.nodes[at as usize].children);
             visits += 1;
@@ -218,7 +220,9 @@ impl<M: Metric> Working<M> {
         let area = self.metric.of(&aabb);
         let joint = self.write(parent);
         (joint.children, joint.aabb, joint.area) = ([position, node], aabb, area);
-        let (mut added, mut at, mut visits) = (area, above, 2);
+        let mut added = area;
+        let mut at = above;
+        let mut visits = 2;
         while at != ANCHOR {
             let grown = self.nodes[at as usize].aabb.union(&added_box);
             visits += 1;
@@ -309,7 +313,8 @@ impl<M: Metric> Working<M> {
             .collect();
         let mut area = Sum::default();
         while let Some((old, parent, side)) = stack.pop() {
-            let (at, node) = (nodes.len() as u32, self.nodes[old as usize]);
+            let at = nodes.len() as u32;
+            let node = self.nodes[old as usize];
             nodes.push(Node { parent, stamp: 0, ..node });
             nodes[parent as usize].children[side] = at;
             if let Some(part) = Self::part(&node) {

@@ -112,7 +112,8 @@ impl PositionSearch {
         limit: f64,
     ) -> Option<Position> {
         self.path.clear();
-        let (mut at, mut below) = (first, NONE);
+        let mut at = first;
+        let mut below = NONE;
         while at != scope.above {
             if at == NONE {
                 self.path.clear();
@@ -142,11 +143,15 @@ impl PositionSearch {
         node: u32,
         tolerance: f64,
     ) -> (Option<Position>, f64) {
-        let (aabb, area, parent) = (tree.aabb(node), tree.area(node), tree.parent(node));
+        let aabb = tree.aabb(node);
+        let area = tree.area(node);
+        let parent = tree.parent(node);
         self.path.clear();
         let sibling = tree.other(parent, node);
-        let (mut rest, rest_area) = (tree.aabb(sibling), tree.area(sibling));
-        let (joint, mut at) = (tree.area(parent), tree.parent(parent));
+        let mut rest = tree.aabb(sibling);
+        let rest_area = tree.area(sibling);
+        let joint = tree.area(parent);
+        let mut at = tree.parent(parent);
         self.path
             .push(Step { node: sibling, below: NONE, joint, growth: joint - rest_area });
         let mut below = parent;

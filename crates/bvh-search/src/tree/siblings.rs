@@ -77,7 +77,8 @@ impl Siblings {
                 .expect("an inner node")
                 .map(|child| self.node(child).aabb);
             visits += 1;
-            let (aabb, node) = (left.union(&right), &mut self.tree.nodes[at as usize]);
+            let aabb = left.union(&right);
+            let node = &mut self.tree.nodes[at as usize];
             if aabb == node.aabb {
                 break;
             }
@@ -111,7 +112,8 @@ impl Siblings {
             .flat_map(|&pair| &nodes[first(pair)..][..2])
             .copied()
             .collect();
-        let (mut aside, mut next) = (aside.chunks_exact(2), 0);
+        let mut aside = aside.chunks_exact(2);
+        let mut next = 0;
         nodes[0] = moved(nodes[0]);
         for (to, from) in (0..).zip(sequence) {
             let (to, from, late) = (first(to), first(from), from < next);
@@ -139,9 +141,11 @@ impl PairOrder {
     fn of(parents: &[u32]) -> Self {
         const DONE: u32 = NONE - 1;
         // Per pair, the last entry of `waiting` that waits for it. An entry is a pair and the previous entry.
-        let (mut last, mut waiting) = (vec![NONE; parents.len()], Vec::new());
-        let (mut sequence, mut late, mut ready) =
-            (Vec::with_capacity(parents.len()), Vec::new(), Vec::new());
+        let mut last = vec![NONE; parents.len()];
+        let mut waiting = Vec::new();
+        let mut sequence = Vec::with_capacity(parents.len());
+        let mut late = Vec::new();
+        let mut ready = Vec::new();
         for (number, &parent) in (0..).zip(parents) {
             if parent != 0 && last[pair(parent)] != DONE {
                 let entry = waiting.len() as u32;
@@ -203,8 +207,10 @@ impl Linked for Siblings {
 
     #[inline(always)]
     fn reinsert(&mut self, node: u32, position: u32) -> u64 {
-        let (parent, sibling) = (self.parent(node), self.other(NONE, node));
-        let (rest, displaced) = (*self.node(sibling), *self.node(position));
+        let parent = self.parent(node);
+        let sibling = self.other(NONE, node);
+        let rest = *self.node(sibling);
+        let displaced = *self.node(position);
         let joint = self.node(node).aabb.union(&displaced.aabb);
         self.put(sibling, displaced);
         self.put(parent, rest);

@@ -48,7 +48,9 @@ impl Subsets {
             let lowest = set ^ rest;
             self.boxes[set] = self.boxes[rest].union(&self.boxes[lowest]);
             // `side` never has the lowest leaf, so that every division is tried once.
-            let (mut side, mut least, mut best) = (rest, f64::INFINITY, 0);
+            let mut side = rest;
+            let mut least = f64::INFINITY;
+            let mut best = 0;
             while side > 0 {
                 let cost = self.cost[side] + self.cost[set ^ side];
                 if cost < least {

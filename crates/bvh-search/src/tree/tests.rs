@@ -119,7 +119,8 @@ fn assert_best_places(mut tree: Working<impl Metric>) {
             tree.attach(node, place).0
         });
         let least = costs.fold(f64::INFINITY, f64::min);
-        let (aabb, area) = (tree.nodes[node as usize].aabb, tree.nodes[node as usize].area);
+        let aabb = tree.nodes[node as usize].aabb;
+        let area = tree.nodes[node as usize].area;
         for first in [sibling, NONE, any(&tree, &mut rng)] {
             let place = search
                 .detached(&tree, Scope::ALL, (&aabb, area), first, f64::INFINITY)
@@ -142,7 +143,9 @@ fn assert_best_places(mut tree: Working<impl Metric>) {
 #[test]
 fn the_best_place_in_a_region_is_the_best_there_and_costs_what_it_adds() {
     let (_, tree) = scene(60);
-    let (mut rng, mut search, mut elsewhere) = (stream(5, 0), PositionSearch::default(), 0);
+    let mut rng = stream(5, 0);
+    let mut search = PositionSearch::default();
+    let mut elsewhere = 0;
     for _ in 0..200 {
         let mut tree = tree.clone();
         // At random, so that the best place often is far away.
@@ -154,7 +157,8 @@ fn the_best_place_in_a_region_is_the_best_there_and_costs_what_it_adds() {
         }
         let node = any(&tree, &mut rng);
         let (_, sibling, _) = tree.detach(node);
-        let (aabb, area) = (tree.nodes[node as usize].aabb, tree.nodes[node as usize].area);
+        let aabb = tree.nodes[node as usize].aabb;
+        let area = tree.nodes[node as usize].area;
         let above = tree.nodes[sibling as usize].parent;
         let region = Scope::of(&tree, above, sibling).around(&tree, &aabb);
         let root = region.root(&tree);

@@ -66,7 +66,8 @@ pub fn wrong_flags(at: &Path, commands: &[(&str, &[&str])]) -> usize {
         .filter(|n| !n.is_empty())
         .collect();
     assert_eq!(listed, tried);
-    let (mut count, mut found) = (0, Vec::new());
+    let mut count = 0;
+    let mut found = Vec::new();
     for &(command, needed) in commands {
         for (flag, value) in flags(at, command) {
             count += 1;

@@ -59,7 +59,8 @@ pub fn blocks() -> Vec<Block> {
             match line.strip_prefix("```") {
                 Some(_) if is_open => is_open = false,
                 Some(language) => {
-                    let (page, language) = (page.clone(), language.to_owned());
+                    let page = page.clone();
+                    let language = language.to_owned();
                     blocks.push(Block { page, line: number + 2, language, text: String::new() });
                     is_open = true;
                 }

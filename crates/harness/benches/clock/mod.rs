@@ -8,7 +8,8 @@ use std::time::Duration;
 /// The seconds that `best` takes when it may plan with `seconds`, and the internal area of its tree, which is valid.
 pub fn best(scene: &Scene, seconds: f64, seed: u64) -> (f64, f64) {
     let deadline = Deadline::after(Duration::from_secs_f64(seconds));
-    let (config, problem) = (bvh_search::best::Config::default(), Problem::new(&scene.boxes));
+    let config = bvh_search::best::Config::default();
+    let problem = Problem::new(&scene.boxes);
     let outcome = solve(&config, &problem, seed, Budget::UNLIMITED, &deadline);
     let taken = deadline.elapsed().as_secs_f64();
     let tree = outcome.expect("finite boxes").tree;

@@ -16,10 +16,13 @@ const MOST: usize = 20;
 pub fn boxes(bytes: &[u8]) {
     let mut bytes = Bytes(bytes);
     let [mode, seed, budget] = bytes.take();
-    let (sorted, few, copies) = (mode & 1 == 0, mode & 2 == 0, if mode & 4 == 0 { 1 } else { 2 });
+    let sorted = mode & 1 == 0;
+    let few = mode & 2 == 0;
+    let copies = if mode & 4 == 0 { 1 } else { 2 };
     let mut boxes = Vec::new();
     while !bytes.0.is_empty() && boxes.len() < MOST {
-        let (a, b) = (bytes.point(few), bytes.point(few));
+        let a = bytes.point(few);
+        let b = bytes.point(few);
         let aabb =
             if sorted { Aabb { min: a.min(b), max: a.max(b) } } else { Aabb { min: a, max: b } };
         boxes.extend((0..copies).map(|_| aabb));
@@ -31,7 +34,8 @@ pub fn boxes(bytes: &[u8]) {
         Budget { max_evaluations: None, max_work: limit.map(|limit| limit * 40) }
     };
     let bad = boxes.iter().position(|b| {
-        let (min, max) = (b.min.to_array(), b.max.to_array());
+        let min = b.min.to_array();
+        let max = b.max.to_array();
         !(0..3).all(|axis| min[axis].is_finite() && max[axis].is_finite() && min[axis] <= max[axis])
     });
     match bad {

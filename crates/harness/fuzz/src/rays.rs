@@ -14,7 +14,8 @@ use harness::stress::tracing::{TRAVERSALS, check};
 pub fn rays(bytes: &[u8]) {
     let mut bytes = Bytes(bytes);
     let [mode, count, exponent] = bytes.take();
-    let (few, few_in_rays) = (mode & 1 == 0, mode & 2 == 0);
+    let few = mode & 1 == 0;
+    let few_in_rays = mode & 2 == 0;
     let scale = f32::from_bits(u32::from(exponent.clamp(1, 254)) << 23);
     let scale = if mode & 4 == 0 { 1.0 } else { scale };
     // A scene is finite.
@@ -26,8 +27,9 @@ pub fn rays(bytes: &[u8]) {
     let mut rays = Vec::new();
     while !bytes.0.is_empty() && rays.len() < 8 {
         let origin = bytes.point(few_in_rays) * if few_in_rays { scale } else { 1.0 };
-        let (direction, t_min, t_max) =
-            (bytes.point(few_in_rays), bytes.number(few_in_rays), bytes.number(few_in_rays));
+        let direction = bytes.point(few_in_rays);
+        let t_min = bytes.number(few_in_rays);
+        let t_max = bytes.number(few_in_rays);
         let range = if mode & 8 == 0 { (0.0, f32::INFINITY) } else { (t_min, t_max) };
         match Ray::new(origin, direction, range.0, range.1) {
             Ok(ray) => rays.push(ray),

@@ -27,7 +27,8 @@ pub fn tree_file(bytes: &[u8]) {
             line.0[..part.len()].copy_from_slice(part);
         }
     }
-    let (lines, len) = (held.len(), flat.len());
+    let lines = held.len();
+    let len = flat.len();
     // SAFETY: `Line` is an array of bytes, so `lines` of them are 64 times as many initialised bytes, and `len` is no
     // more.
     let aligned = unsafe { std::slice::from_raw_parts(held.as_ptr().cast::<u8>(), lines * 64) };

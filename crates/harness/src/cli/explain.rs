@@ -39,7 +39,8 @@ pub fn experiment(experiment: &Experiment) -> Result<String, Error> {
         .iter()
         .map(|labelled| labelled.label.as_str())
         .collect();
-    let (times, labels) = (experiment.repetitions, labels.join("; "));
+    let times = experiment.repetitions;
+    let labels = labels.join("; ");
     text += &match experiment.suite {
         Some(_) => format!("to run: the suite of cases with {labels}\n"),
         None => format!("to run: {} scenes, {times} times each of {labels}\n", scenes.len()),

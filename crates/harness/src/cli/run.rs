@@ -155,8 +155,8 @@ fn compare(
 ) -> Result<usize, Error> {
     let temporary =
         tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
-    let (fresh, committed) =
-        (temporary.path().join(experiment.folder()), args.out.join(experiment.folder()));
+    let fresh = temporary.path().join(experiment.folder());
+    let committed = args.out.join(experiment.folder());
     reference::adopt(&committed, temporary.path())?;
     let extent = Extent { said: said(args), ..Extent::default() };
     let summary = execute(experiment, temporary.path(), extent, interrupted)?;

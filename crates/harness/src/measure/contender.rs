@@ -97,9 +97,11 @@ const BATCH: usize = 1024;
 /// Answers every ray by batches and returns the seconds that each part of them took.
 fn in_batches(wide: &WideBvh, batch: &Batch, hits: &mut [Option<Hit>]) -> Vec<f64> {
     let &Batch { query, coherence, rays, .. } = batch;
-    let (mut nearest, mut any) = ([Hit::MISS; BATCH], [false; BATCH]);
+    let mut nearest = [Hit::MISS; BATCH];
+    let mut any = [false; BATCH];
     let mut batch = |(rays, hits): (&[Ray], &mut [Option<Hit>])| {
-        let (nearest, any) = (&mut nearest[..rays.len()], &mut any[..rays.len()]);
+        let nearest = &mut nearest[..rays.len()];
+        let any = &mut any[..rays.len()];
         let start = Instant::now();
         if query == Query::Any {
             wide.any_hits(rays, any, coherence);

@@ -52,7 +52,8 @@ impl Sums {
 
 /// Mean and standard error of `n` numbers from their sum and sum of squares.
 fn estimate(n: u64, sum: u64, squares: u128) -> (f64, f64) {
-    let (n, sum) = (n as f64, sum as f64);
+    let n = n as f64;
+    let sum = sum as f64;
     let variance = ((squares as f64 - sum * sum / n) / (n - 1.0).max(1.0)).max(0.0);
     (sum / n, (variance / n).sqrt())
 }

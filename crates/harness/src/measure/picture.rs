@@ -59,12 +59,14 @@ impl Config {
             .num_threads(1)
             .build();
         let pool = pool.map_err(|error| Error::Usage(format!("cannot start a thread: {error}")))?;
-        let (mut rows, mut times) = (Vec::new(), Vec::new());
+        let mut rows = Vec::new();
+        let mut times = Vec::new();
         for (method, structure, repetition, build_seconds) in structures {
             let accelerator = Accelerator::new(&scene.primitives, structure);
             let (film, seconds) = pool.install(|| self.draw(scene, &accelerator));
             let per_ray = |tests: u64| tests as f64 / film.rays as f64;
-            let (boxes, objects) = (film.counts.boxes, film.counts.objects);
+            let boxes = film.counts.boxes;
+            let objects = film.counts.objects;
             rows.push(RenderRow {
                 scene: scene.name.clone(),
                 method: method.into(),

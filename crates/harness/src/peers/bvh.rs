@@ -68,7 +68,8 @@ fn to_ours(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
     let corner = |p: Point3<f32>| Vec3::new(p.x, p.y, p.z);
     let aabb = |b: TheirAabb<f32, 3>| Aabb { min: corner(b.min), max: corner(b.max) };
     let unknown = Node::leaf(Aabb::EMPTY, 0, 0);
-    let (mut nodes, mut prim_ids) = (vec![unknown; boxes.len().min(1)], Vec::new());
+    let mut nodes = vec![unknown; boxes.len().min(1)];
+    let mut prim_ids = Vec::new();
     let mut open = vec![(0, 0); nodes.len()];
     while let Some((from, to)) = open.pop() {
         nodes[to] = match theirs.nodes[from] {
@@ -135,7 +136,8 @@ pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
         let rays: Vec<_> = batch.rays.iter().map(theirs).collect();
         Ok(timed(&rays, hits, |(ray, length, t_min, t_max)| {
             let mut nearest: Option<Hit> = None;
-            let (low, mut high) = (t_min * length, t_max * length);
+            let low = t_min * length;
+            let mut high = t_max * length;
             for shape in tree.nearest_traverse_iterator(ray, &shapes) {
                 let distance = meets(shape, ray);
                 if distance >= low && distance <= high {

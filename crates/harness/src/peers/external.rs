@@ -121,7 +121,8 @@ fn nodes(from: &mut impl Read) -> io::Result<(Vec<FirstCountNode>, Vec<u32>)> {
     let mut counts = [0u32; 2];
     from.read_exact(bytemuck::cast_slice_mut(&mut counts))?;
     let [nodes, ids] = counts.map(|count| count as usize);
-    let (mut nodes, mut ids) = (vec![FirstCountNode::default(); nodes], vec![0u32; ids]);
+    let mut nodes = vec![FirstCountNode::default(); nodes];
+    let mut ids = vec![0u32; ids];
     from.read_exact(bytemuck::cast_slice_mut(&mut nodes))?;
     from.read_exact(bytemuck::cast_slice_mut(&mut ids))?;
     Ok((nodes, ids))
@@ -146,7 +147,8 @@ impl Process {
         let (Some(rays), Some(answers)) = (child.stdin.take(), child.stdout.take()) else {
             return Err(io::Error::other("the program has no pipes"));
         };
-        let (mut rays, mut answers) = (BufWriter::new(rays), BufReader::new(answers));
+        let mut rays = BufWriter::new(rays);
+        let mut answers = BufReader::new(answers);
         rays.write_all(&(triangles.len() as u32).to_le_bytes())?;
         rays.write_all(bytemuck::cast_slice(triangles))?;
         rays.flush()?;
@@ -178,7 +180,8 @@ fn ask(program: &mut impl Write, batch: &Batch) -> io::Result<()> {
         program.write_all(&number.to_le_bytes())?;
     }
     for ray in batch.rays {
-        let ([x, y, z], [dx, dy, dz]) = (ray.origin().to_array(), ray.direction().to_array());
+        let [x, y, z] = ray.origin().to_array();
+        let [dx, dy, dz] = ray.direction().to_array();
         for number in [x, y, z, ray.t_min(), dx, dy, dz, ray.t_max()] {
             program.write_all(&number.to_le_bytes())?;
         }
@@ -261,7 +264,8 @@ mod tests {
             bvh_core::Node::leaf(aabb, 2, 1),
         ];
         let tree = Bvh { nodes, prim_ids: vec![1, 0, 1] };
-        let (nodes, ids) = (tree.to_first_count_aligned(), &tree.prim_ids);
+        let nodes = tree.to_first_count_aligned();
+        let ids = &tree.prim_ids;
         let mut sent = [nodes.len() as u32, ids.len() as u32]
             .map(u32::to_le_bytes)
             .concat();

@@ -114,7 +114,8 @@ pub(super) fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contende
             .map(|&id| (&theirs[id as usize]).into())
             .collect()
     };
-    let (mut binary_time, mut wide_time) = (Duration::ZERO, Duration::ZERO);
+    let mut binary_time = Duration::ZERO;
+    let mut wide_time = Duration::ZERO;
     let tree = binary::build_bvh2_from_tris(&theirs, parameters(config), &mut binary_time);
     let trace_binary = traced_by!(tree, in_order(&tree.primitive_indices));
     let compressed = wide::build_cwbvh_from_tris(&theirs, parameters(config), &mut wide_time);

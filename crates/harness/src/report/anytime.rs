@@ -48,7 +48,8 @@ impl Config {
         let caption = "Cost of the incumbent over the best known cost of the scene, minus 1: median and quartiles over \
                        repetitions. Points are builders. A curve falls through the floor where it is the best known.";
         for axis in ProgressAxis::of(rows, &self.methods) {
-            let (mut points, mut panels) = (Vec::new(), Vec::new());
+            let mut points = Vec::new();
+            let mut panels = Vec::new();
             for scene in rows.scenes() {
                 let Some(reference) = rows.reference(scene) else { continue };
                 let mut layers = Vec::new();
@@ -106,7 +107,8 @@ impl Config {
             .iter()
             .map(|method| (method.as_str(), count(method)));
         let counts = tally(counts.filter(|(_, count)| *count > 0), lowest.len(), "scenes");
-        let (low, high) = (percent(low), percent(high));
+        let low = percent(low);
+        let high = percent(high);
         format!(
             "Lowest median cost at the end of the runs: {counts}; against the greedy tree's {low} to {high}."
         )

@@ -37,7 +37,8 @@ pub fn attempts<'a>(config: &'a Targets, rows: &'a Rows, axis: ProgressAxis) -> 
                     .iter()
                     .filter_map(|run| reached(run, cost))
                     .collect();
-                let (solved, median) = (sorted(&solved), median_reached(runs, cost));
+                let solved = sorted(&solved);
+                let median = median_reached(runs, cost);
                 Attempt { scene, target, cost, method, runs: runs.len(), solved, median, end: *end }
             }));
         }

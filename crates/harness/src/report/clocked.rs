@@ -55,8 +55,8 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
         &lines,
         "scene method runs seconds references_per_object cost_over_base collapsed_sah least_collapsed_sah",
     )?;
-    let (scenes, methods) =
-        (distinct(order.into_iter()), distinct(lines.iter().map(|line| line.method.as_str())));
+    let scenes = distinct(order.into_iter());
+    let methods = distinct(lines.iter().map(|line| line.method.as_str()));
     let of = |scene: &str, method: &str| {
         let own = lines
             .iter()

@@ -145,7 +145,9 @@ impl Config {
                 && (row.family, row.query) == OF_PAPER
         };
         let compare = |row: &Correlation| {
-            let (pearson, low, high) = (row.pearson?, row.pearson_low?, row.pearson_high?);
+            let pearson = row.pearson?;
+            let low = row.pearson_low?;
+            let high = row.pearson_high?;
             let verdict = if low >= self.paper_from {
                 Verdict::Agrees
             } else if high < self.paper_from {
@@ -239,7 +241,8 @@ fn draw(
         Layer::new(*method, Marks::Points(points.collect()))
     };
     let rank = rank.map_or_else(String::new, |rank| format!(", ρ = {rank:.3}"));
-    let (x, y) = (Metric::GoldsmithSalmon.axis(), Metric::BoxesPerRay.axis());
+    let x = Metric::GoldsmithSalmon.axis();
+    let y = Metric::BoxesPerRay.axis();
     panel(format!("{scene}: {family}, {query}{rank}"), x, y, methods.iter().map(points).collect())
 }
 
@@ -277,8 +280,10 @@ mod tests {
                 let goldsmith_salmon = level + cost;
                 rows.runs
                     .push(RunRow { goldsmith_salmon, ..run(method, repetition, 1, 0) });
-                let (scene, method) = ("s".to_owned(), method.to_owned());
-                let (family, query) = (OF_PAPER.0.to_owned(), OF_PAPER.1.to_owned());
+                let scene = "s".to_owned();
+                let method = method.to_owned();
+                let family = OF_PAPER.0.to_owned();
+                let query = OF_PAPER.1.to_owned();
                 let boxes_per_ray = level + tests;
                 rows.rays.push(RayRow {
                     scene,

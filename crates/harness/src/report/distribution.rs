@@ -50,7 +50,8 @@ pub(super) struct Summary<'a> {
 
 pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     let mut output = Output::new(&config.source, &config.title);
-    let (mut summaries, mut panels) = (Vec::new(), Vec::new());
+    let mut summaries = Vec::new();
+    let mut panels = Vec::new();
     for scene in rows.scenes() {
         let base_cost = rows.base_cost(scene);
         let mut layers = Vec::new();
@@ -98,8 +99,8 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
                 .filter(|row| row.method == method)
         };
         let of = |cost: fn(&Summary) -> f64| range(own().map(|row| cost(row) / row.base_cost));
-        let ((median, most), (lowest, least)) =
-            (of(|row| row.median_cost)?, of(|row| row.lowest_cost)?);
+        let (median, most) = of(|row| row.median_cost)?;
+        let (lowest, least) = of(|row| row.lowest_cost)?;
         Some(format!("‘{method}’ {median:.3} to {most:.3}, lowest {lowest:.3} to {least:.3}"))
     });
     output.reading =

@@ -32,7 +32,8 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
             .into_iter()
             .map(|scene| longest_of_all(rows, scene, &config.methods, axis));
         let end = ends.fold(0.0, f64::max);
-        let (mut steps, mut layers) = (Vec::new(), Vec::new());
+        let mut steps = Vec::new();
+        let mut layers = Vec::new();
         for method in &config.methods {
             let points = curve(&attempts, method, end);
             steps.extend(points.iter().map(|&(x, solved_fraction)| Step {

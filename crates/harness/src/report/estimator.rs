@@ -21,7 +21,8 @@ pub(super) struct Point<'a> {
 const KIND: (&str, &str) = ("inside", "any");
 
 pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
-    let (mut points, mut panels) = (Vec::new(), Vec::new());
+    let mut points = Vec::new();
+    let mut panels = Vec::new();
     for scene in rows.scenes() {
         let mut layers = Vec::new();
         for method in &config.methods {
@@ -41,7 +42,8 @@ pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
             }
             layers.push(Layer::new(method, Marks::Points(line)));
         }
-        let (x, y) = (Axis::log("number of rays"), Axis::log("standard error / mean"));
+        let x = Axis::log("number of rays");
+        let y = Axis::log("standard error / mean");
         panels.push(panel(rows.shown(scene), x, y, layers));
     }
     let mut output = Output::new(&config.source, &config.title);
@@ -71,11 +73,10 @@ fn measurements<'a>(
 /// How the error falls with the number of rays, by the slope between the least and the greatest number.
 fn reading(points: &[Point]) -> String {
     let slope = |line: &[Point]| {
-        let (first, last) = (
-            line.first()?,
-            line.last()
-                .filter(|last| last.rays > line[0].rays)?,
-        );
+        let first = line.first()?;
+        let last = line
+            .last()
+            .filter(|last| last.rays > line[0].rays)?;
         Some(
             (last.relative_error / first.relative_error).ln()
                 / (last.rays as f64 / first.rays as f64).ln(),

@@ -78,7 +78,8 @@ const GAIN_TOLERANCE: f64 = 0.05;
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let mut output = Output::new(&self.source, &self.title);
-        let (mut generations, mut panels) = (Vec::new(), Vec::new());
+        let mut generations = Vec::new();
+        let mut panels = Vec::new();
         for scene in rows.scenes() {
             let Some(runs) = self.runs(rows, scene) else { continue };
             let own = runs.generations();

@@ -68,7 +68,8 @@ pub(super) struct Timing<'a> {
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let (mut numbers, mut timing) = (Vec::new(), Vec::new());
+        let mut numbers = Vec::new();
+        let mut timing = Vec::new();
         for scene in rows.scenes() {
             let Some(reference) = rows.reference(scene) else { continue };
             let horizons =

@@ -70,7 +70,8 @@ impl Output {
         columns: usize,
         panels: Vec<Panel>,
     ) {
-        let (title, looks) = (self.heading.clone(), vec![]);
+        let title = self.heading.clone();
+        let looks = vec![];
         self.figures
             .push((name.into(), Figure { title, caption: caption.into(), columns, panels, looks }));
     }

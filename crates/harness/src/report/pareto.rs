@@ -20,7 +20,9 @@ pub(super) struct Point<'a> {
 
 pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
     let kind = rows.traced_kinds().first().copied();
-    let (mut points, mut builds, mut rays) = (Vec::new(), Vec::new(), Vec::new());
+    let mut points = Vec::new();
+    let mut builds = Vec::new();
+    let mut rays = Vec::new();
     for scene in rows.scenes() {
         let mut own: Vec<Point> = config
             .methods

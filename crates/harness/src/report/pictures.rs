@@ -113,8 +113,8 @@ impl Config {
     }
 
     fn tests<'a>(&self, rows: &Rows, scene: &'a str, method: &'a str) -> Option<Tests<'a>> {
-        let (brute, own) =
-            (middle_picture(rows, scene, BRUTE_FORCE)?, middle_picture(rows, scene, method)?);
+        let brute = middle_picture(rows, scene, BRUTE_FORCE)?;
+        let own = middle_picture(rows, scene, method)?;
         Some(Tests {
             scene,
             method,

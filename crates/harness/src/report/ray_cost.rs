@@ -234,8 +234,9 @@ fn paired<'a>(rows: &'a Rows, [first, second]: &'a [String; 2]) -> Vec<Paired<'a
             _ => Verdict::CannotBeTold,
         };
         let TestRow { scene, judged_on, camera, .. } = row;
-        let (method, against, tests_over_other) =
-            (second.as_str(), first.as_str(), tests_over_base);
+        let method = second.as_str();
+        let against = first.as_str();
+        let tests_over_other = tests_over_base;
         Some(Paired {
             scene,
             method,
@@ -263,7 +264,8 @@ fn verdicts(paired: &[Paired], [first, second]: &[String; 2]) -> String {
             .filter(|row| row.against == *first && row.method == *second)
     };
     let count = |verdict| own().filter(|row| row.verdict == verdict).count();
-    let (fewer, more) = (count(Verdict::Fewer), count(Verdict::More));
+    let fewer = count(Verdict::Fewer);
+    let more = count(Verdict::More);
     format!(
         " ‘{second}’ beside ‘{first}’: fewer in {fewer} of {} cells, more in {more}.",
         own().count()
@@ -282,7 +284,9 @@ fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
             .iter()
             .map(|row| row.tests_over_base)
             .collect();
-        let (tests, over_base_low, over_base_high) = (None, None, None);
+        let tests = None;
+        let over_base_low = None;
+        let over_base_high = None;
         Compared {
             scene: ALL,
             tests,

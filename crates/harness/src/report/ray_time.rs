@@ -156,7 +156,8 @@ impl Config {
                 .map(|row| row.node_tests + row.block_tests)
                 .collect()
         };
-        let (own, base) = (of_path(method), of_path(&self.base));
+        let own = of_path(method);
+        let base = of_path(&self.base);
         if own.is_empty() || own.len() != base.len() {
             return None;
         }

@@ -113,7 +113,8 @@ impl Config {
 
     /// The signed-rank test of the medians on all scenes.
     fn across<'a>(&'a self, rows: &'a Rows, against: &'a str) -> Option<Row<'a>> {
-        let (mut differences, mut effects) = (Vec::new(), Vec::new());
+        let mut differences = Vec::new();
+        let mut effects = Vec::new();
         for scene in rows.scenes() {
             let [own, other] =
                 [&self.method, against].map(|method| rows.final_ratios(scene, method));
@@ -149,7 +150,8 @@ impl Config {
     /// The test of the runs on one scene; `None` if either method has only one, which says nothing about others.
     fn within<'a>(&'a self, rows: &'a Rows, scene: &'a str, against: &'a str) -> Option<Row<'a>> {
         let [own, other] = [&self.method, against].map(|method| rows.final_ratios(scene, method));
-        let (test, a12) = (mann_whitney(&own, &other)?, a12(&other, &own)?);
+        let test = mann_whitney(&own, &other)?;
+        let a12 = a12(&other, &own)?;
         let row = self.row(scene, against, [own.len(), other.len()], &test);
         let several = own.len() > 1 && other.len() > 1;
         let work_ratio = self.work_ratio(rows, scene, against);
@@ -228,7 +230,8 @@ impl Config {
                     .filter(|row| row.verdict == verdict)
                     .count()
             };
-            let (lower, higher) = (count(Difference::Lower), count(Difference::Higher));
+            let lower = count(Difference::Lower);
+            let higher = count(Difference::Higher);
             let within = match within.len() {
                 0 => "too few runs to compare within scenes".into(),
                 scenes => format!("lower on {lower} and higher on {higher} of {scenes} scenes"),
@@ -236,7 +239,9 @@ impl Config {
             format!("{against}: {verdict} across scenes{work}; {within}")
         };
         let all: Vec<String> = self.against.iter().map(of).collect();
-        let (method, level, all) = (&self.method, self.level, all.join("; against "));
+        let method = &self.method;
+        let level = self.level;
+        let all = all.join("; against ");
         format!("Costs of {method} after Holm's correction at {level}, against {all}.")
     }
 }

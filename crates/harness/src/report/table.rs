@@ -150,7 +150,8 @@ impl Config {
 
     /// A number of the paper beside ours.
     fn compare(&self, rows: &Rows, column: &Column, cell: &Cell) -> Option<PaperRow> {
-        let (paper, ours) = (cell.paper_over_base?, cell.cost_over_base);
+        let paper = cell.paper_over_base?;
+        let ours = cell.cost_over_base;
         let quantity = format!("{}, cost over base", column.name);
         let row = PaperRow::new(&self.source, rows.shown(cell.scene), quantity, &column.reason);
         let interval = cell.low_over_base.zip(cell.high_over_base);

@@ -204,7 +204,8 @@ const TOLERANCE: f64 = 0.01;
 /// Compares the interval with the paper's ratio: agrees if all of it is close to the paper's, differs if none of it is.
 fn verdict(paper: Option<f64>, low: f64, high: f64) -> Verdict {
     let Some(paper) = paper else { return Verdict::NotInPaper };
-    let (least, most) = (paper * (1.0 - TOLERANCE), paper * (1.0 + TOLERANCE));
+    let least = paper * (1.0 - TOLERANCE);
+    let most = paper * (1.0 + TOLERANCE);
     if least <= low && high <= most {
         Verdict::Agrees
     } else if high < least || most < low {
@@ -226,7 +227,8 @@ mod tests {
         for (method, seconds) in methods {
             for (repetition, &seconds) in (0..).zip(seconds) {
                 rows.runs.push(run(method, repetition, 1, 0));
-                let (scene, method) = ("s".to_owned(), (*method).to_owned());
+                let scene = "s".to_owned();
+                let method = (*method).to_owned();
                 rows.timing.push(TimingRow {
                     scene,
                     method,

@@ -36,7 +36,9 @@ pub(super) struct Speed<'a> {
 type Setting<'a> = [&'a str; 3];
 
 pub(super) fn write(config: &Methods, rows: &Rows) -> Result<Output, Error> {
-    let (mut speeds, mut ranks, mut timed_ranks) = (Vec::new(), Vec::new(), Vec::new());
+    let mut speeds = Vec::new();
+    let mut ranks = Vec::new();
+    let mut timed_ranks = Vec::new();
     let mut panels = Vec::new();
     for scene in rows.scenes() {
         for kind in rows.traced_kinds() {
@@ -103,7 +105,8 @@ fn speeds_in<'a>(config: &Methods, rows: &'a Rows, setting: Setting<'a>) -> Vec<
     let [scene, layout, rays] = setting;
     let speed = |(cost_over_base, row): (f64, &'a TraceRow)| {
         let ns_per_ray = rows.ns_per_ray(scene, &row.method, layout, rays)?;
-        let (method, mrays_per_second) = (row.method.as_str(), 1e3 / ns_per_ray);
+        let method = row.method.as_str();
+        let mrays_per_second = 1e3 / ns_per_ray;
         Some(Speed { scene, method, layout, rays, cost_over_base, ns_per_ray, mrays_per_second })
     };
     traces(config, rows, setting)
@@ -112,7 +115,8 @@ fn speeds_in<'a>(config: &Methods, rows: &'a Rows, setting: Setting<'a>) -> Vec<
 }
 
 fn rank<'a>([scene, layout, rays]: Setting<'a>, measure: Metric, pairs: &[(f64, f64)]) -> Rank<'a> {
-    let (pearson, spearman) = (pearson(pairs), spearman(pairs));
+    let pearson = pearson(pairs);
+    let spearman = spearman(pairs);
     Rank { scene, layout, rays, measure: measure.column(), trees: pairs.len(), pearson, spearman }
 }
 

@@ -65,7 +65,9 @@ impl Config {
                 .iter()
                 .map(|method| self.curve(rows, scene, method))
                 .collect();
-            let (mut single, mut expected, mut bands) = (Vec::new(), Vec::new(), Vec::new());
+            let mut single = Vec::new();
+            let mut expected = Vec::new();
+            let mut bands = Vec::new();
             for (name, curve) in self.methods.iter().zip(&curves) {
                 let x = |point: &Point| point.trials as f64;
                 let steps = curve
@@ -92,7 +94,8 @@ impl Config {
             }
             for (what, mut layers) in [("one run", single), ("expected", expected)] {
                 layers.push(Layer::new("greedy", Marks::HLine(1.0)));
-                let (x, y) = (Axis::log("number of trials"), Axis::linear("best cost / base"));
+                let x = Axis::log("number of trials");
+                let y = Axis::linear("best cost / base");
                 panels.push(panel(format!("{}, {what}", rows.shown(scene)), x, y, layers));
             }
             self.compare(&rows.shown(scene), &curves, &mut output);

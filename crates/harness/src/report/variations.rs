@@ -78,10 +78,12 @@ impl Config {
                 .map(|run| run.cost)
                 .collect::<Vec<f64>>()
         };
-        let (own, of_first) = (costs(method), costs(first(&self.methods)));
-        let ((lowest_cost, highest_cost), (first_low, first_high)) =
-            (range(own.iter().copied())?, range(of_first.iter().copied())?);
-        let (median_cost, first_median) = (median(&own)?, median(&of_first)?);
+        let own = costs(method);
+        let of_first = costs(first(&self.methods));
+        let (lowest_cost, highest_cost) = range(own.iter().copied())?;
+        let (first_low, first_high) = range(of_first.iter().copied())?;
+        let median_cost = median(&own)?;
+        let first_median = median(&of_first)?;
         Some(Variation {
             scene,
             method,

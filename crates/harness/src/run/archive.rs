@@ -52,11 +52,10 @@ pub fn keep(results: &Path, scene: &Scene, file: &Path, command: &str) -> Result
         ));
     }
     let mut rows = rows(results)?;
-    let (row_checksum, old) = (
-        checksum(scene),
-        rows.iter()
-            .position(|row| row.scene == scene.name),
-    );
+    let row_checksum = checksum(scene);
+    let old = rows
+        .iter()
+        .position(|row| row.scene == scene.name);
     if let Some(old) = old
         .map(|at| rows.remove(at))
         .filter(|old| old.checksum == row_checksum)

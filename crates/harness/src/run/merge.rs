@@ -129,7 +129,8 @@ fn common_spec(name: &Path, parts: &[Part]) -> Result<Resolved, String> {
         .iter()
         .find(|part| part.resolved != first.resolved)
     {
-        let (first, other) = (first.partial.display(), other.partial.display());
+        let first = first.partial.display();
+        let other = other.partial.display();
         return Err(format!("{first} and {other} are parts of different specs, scenes or seeds"));
     }
     let bad = |message: String| format!("{}/resolved.toml: {message}", first.partial.display());
@@ -157,7 +158,8 @@ fn owners(
         let scene = &resolved.scenes[index / of_scene.len()].name;
         format!("scene {scene}, method {}, repetition {repetition}", labelled.label)
     };
-    let (mut owners, mut missing) = (Vec::new(), Vec::new());
+    let mut owners = Vec::new();
+    let mut missing = Vec::new();
     for index in 0..resolved.run_count() {
         let kept = parts
             .iter()
@@ -170,7 +172,8 @@ fn owners(
         let run = FinishedRun::read(owner)?;
         for other in others {
             if let Some(file) = run.difference(&FinishedRun::read(other)?) {
-                let (owner, other) = (owner.display(), other.display());
+                let owner = owner.display();
+                let other = other.display();
                 return Err(fail(format!(
                     "{owner} and {other} have different {file} of {}",
                     named(index)
@@ -189,6 +192,7 @@ fn owners(
         .map(named)
         .collect();
     let more = if missing.len() > NAMED { "; and more" } else { "" };
-    let (count, all) = (missing.len(), resolved.run_count());
+    let count = missing.len();
+    let all = resolved.run_count();
     Err(fail(format!("{count} of {all} runs are missing: {}{more}", first.join("; "))))
 }

@@ -136,7 +136,8 @@ fn solve_or_build(
             Ok((outcome, seconds))
         }
         Contestant::Peer(peer) => {
-            let (scene_name, library) = (scene.name.clone(), peer.name());
+            let scene_name = scene.name.clone();
+            let library = peer.name();
             let refused = |message| Error::Library { scene: scene_name, library, message };
             let Built { tree, seconds } = peer.build(scene).map_err(refused)?;
             Ok(built(tree, seconds, &experiment.objective, stopwatch))
@@ -164,7 +165,8 @@ fn splits<'a>(labelled: &Labelled, scene: &'a Scene) -> Option<Splits<'a>> {
 
 /// A tree by others, as a search of one evaluation, and the seconds of the building alone.
 fn built(tree: Bvh, seconds: f64, objective: &Objective, stopwatch: &Stopwatch) -> (Outcome, f64) {
-    let (cost, work) = (objective.cost(&tree), tree.nodes.len() as u64);
+    let cost = objective.cost(&tree);
+    let work = tree.nodes.len() as u64;
     let event = Event { evaluations: 1, work, cost, incumbent: cost };
     stopwatch.note(seconds);
     let stop = StopReason::Completed;

@@ -34,8 +34,11 @@ impl Measurement for Judging<'_> {
 /// takes the time of those in the trees of first runs.
 fn judge(config: &Config, work: &Work) -> Result<(), Error> {
     let Work { experiment, jobs, trees, store, watch, .. } = work;
-    let (mut rows, mut times, mut sizes) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut visits, mut of_runs) = (Vec::new(), Vec::new());
+    let mut rows = Vec::new();
+    let mut times = Vec::new();
+    let mut sizes = Vec::new();
+    let mut visits = Vec::new();
+    let mut of_runs = Vec::new();
     let runs: Vec<(&Job, &Bvh)> = trees
         .iter()
         .map(|(&index, tree)| (&jobs[index], tree))

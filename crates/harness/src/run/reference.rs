@@ -148,7 +148,8 @@ pub fn adopt(folder: &Path, out: &Path) -> Result<(), Error> {
 
 /// The tree of least internal area that is known of this very scene.
 pub fn best_known(results: &Path, scene: &Scene) -> Result<Option<ReferenceRow>, Error> {
-    let (checksum, objective) = (checksum(scene), name(&Objective::InternalArea));
+    let checksum = checksum(scene);
+    let objective = name(&Objective::InternalArea);
     let key = (scene.name.as_str(), scene.boxes.len(), checksum.as_str(), objective.as_str());
     Ok(all_known(results)?
         .into_iter()

@@ -98,12 +98,11 @@ impl Experiment {
     fn check_method(&self, labelled: &Labelled) -> Vec<Fault> {
         let Labelled { method, own, .. } = labelled;
         let Own { budget, max_seconds, keep, judge, for_rays, objective, references, .. } = own;
-        let (is_ours, is_best) = (
-            matches!(method, Contestant::Ours(_)),
-            matches!(method, Contestant::Ours(Method::Best(_))),
-        );
+        let is_ours = matches!(method, Contestant::Ours(_));
+        let is_best = matches!(method, Contestant::Ours(Method::Best(_)));
         let judged = Labelled::JUDGED;
-        let (ours, with_judged) = ("with a method of ours", format!("with {}", judged.join(", ")));
+        let ours = "with a method of ours";
+        let with_judged = format!("with {}", judged.join(", "));
         let sized = "with a method of ours but median_cut, which compares no sizes of boxes";
         let of_some_methods = [
             ("budget", budget.is_some(), is_ours, ours),

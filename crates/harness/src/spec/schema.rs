@@ -16,7 +16,8 @@ impl JsonSchema for Labelled {
 
     /// One table per method, with its parameters and the keys that every entry has.
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let (mut tables, own) = (Vec::new(), properties(Own::json_schema(generator).as_value()));
+        let mut tables = Vec::new();
+        let own = properties(Own::json_schema(generator).as_value());
         flatten(Contestant::json_schema(generator).as_value(), &mut tables);
         for table in &mut tables {
             let mut all = properties(table);
@@ -122,7 +123,8 @@ fn described(text: &str) -> String {
         .lines()
         .filter(|line| !line.is_empty() && !of_code(line))
         .collect();
-    let (text, mut plain) = (lines.join(" "), String::new());
+    let text = lines.join(" ");
+    let mut plain = String::new();
     let mut rest = text.trim();
     while let Some((before, after)) = rest.split_once('[') {
         let Some((name, after)) = after
@@ -172,7 +174,8 @@ pub fn page() -> String {
             .cloned()
             .unwrap_or_default()
     };
-    let (methods, reports) = (entries("methods"), entries("reports"));
+    let methods = entries("methods");
+    let reports = entries("reports");
     let own = properties(&methods[0])
         .into_iter()
         .filter(|(key, _)| Own::KEYS.contains(&key.as_str()));

@@ -293,7 +293,8 @@ fn of_two_limits_the_lower_one_counts() {
         let experiment = read(&format!("{good}budget = {of_all}\n")).unwrap();
         experiment.budget_of(&experiment.methods[0])
     };
-    let (max_evaluations, max_work) = (Some(3), Some(5));
+    let max_evaluations = Some(3);
+    let max_work = Some(5);
     assert_eq!(budget("{ max_work = 5 }"), Budget { max_work, max_evaluations: None });
     assert_eq!(budget("{ max_evaluations = 3 }"), Budget { max_evaluations, max_work: Some(9) });
 }

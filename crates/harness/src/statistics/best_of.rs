@@ -126,7 +126,8 @@ mod tests {
     /// The fractions of fresh best-of-`m` values below and above the intervals that pools of `n` predict.
     fn missed(draw: Draw, n: usize, m: usize) -> (f64, f64) {
         let mut rng = ChaCha8Rng::seed_from_u64(33);
-        let (mut below, mut above) = (0, 0);
+        let mut below = 0;
+        let mut above = 0;
         for _ in 0..POOLS {
             let pool: Vec<f64> = (0..n).map(|_| draw(&mut rng)).collect();
             let (low, high) = predicted_best(&pool, m).unwrap();

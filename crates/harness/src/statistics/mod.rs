@@ -15,7 +15,8 @@ pub fn sorted(values: &[f64]) -> Vec<f64> {
 pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
     let sorted = sorted(values);
     let position = q * (sorted.len().checked_sub(1)? as f64);
-    let (below, above) = (sorted[position.floor() as usize], sorted[position.ceil() as usize]);
+    let below = sorted[position.floor() as usize];
+    let above = sorted[position.ceil() as usize];
     // Between two infinite values there is no number to interpolate by.
     Some(if below == above { below } else { below + (above - below) * position.fract() })
 }
@@ -144,7 +145,9 @@ pub fn primal_integral(incumbents: &[(f64, f64)], reference: f64, horizon: f64) 
         let greater = cost.max(reference);
         if greater > 0.0 { (cost - reference).abs() / greater } else { 0.0 }
     };
-    let (mut since, mut current, mut integral) = (0.0, 1.0, 0.0);
+    let mut since = 0.0;
+    let mut current = 1.0;
+    let mut integral = 0.0;
     for &(time, cost) in incumbents
         .iter()
         .take_while(|(time, _)| *time < horizon)
@@ -158,15 +161,16 @@ pub fn primal_integral(incumbents: &[(f64, f64)], reference: f64, horizon: f64) 
 /// Pearson's correlation of pairs; `None` of fewer than two, or if either side is constant.
 pub fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
     let n = pairs.len() as f64;
-    let (mean_x, mean_y) =
-        (pairs.iter().map(|p| p.0).sum::<f64>() / n, pairs.iter().map(|p| p.1).sum::<f64>() / n);
+    let mean_x = pairs.iter().map(|p| p.0).sum::<f64>() / n;
+    let mean_y = pairs.iter().map(|p| p.1).sum::<f64>() / n;
     let product = |f: fn(f64, f64) -> f64| {
         pairs
             .iter()
             .map(|&(x, y)| f(x - mean_x, y - mean_y))
             .sum::<f64>()
     };
-    let (xx, yy) = (product(|x, _| x * x), product(|_, y| y * y));
+    let xx = product(|x, _| x * x);
+    let yy = product(|_, y| y * y);
     (pairs.len() > 1 && xx > 0.0 && yy > 0.0)
         .then(|| product(|x, y| x * y) / (xx.sqrt() * yy.sqrt()))
 }

@@ -61,7 +61,8 @@ pub fn mann_whitney(first: &[f64], second: &[f64]) -> Option<Test> {
 
 fn rank_sum(first: &[f64], second: &[f64], exact: bool) -> Test {
     let ranks = ranks(&[first, second].concat());
-    let (m, n) = (first.len() as f64, second.len() as f64);
+    let m = first.len() as f64;
+    let n = second.len() as f64;
     let sum: f64 = ranks[..first.len()].iter().sum();
     let statistic = sum - m * (m + 1.0) / 2.0;
     let p_value = if exact {

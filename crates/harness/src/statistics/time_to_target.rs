@@ -20,7 +20,8 @@ impl ShiftedExponential {
     /// quartiles are equal.
     pub fn fit(solved: &[f64], runs: usize) -> Option<Self> {
         let sorted = sorted(solved);
-        let (lower, upper) = (at(&sorted, runs, 0.25)?, at(&sorted, runs, 0.75)?);
+        let lower = at(&sorted, runs, 0.25)?;
+        let upper = at(&sorted, runs, 0.75)?;
         let mean = (upper - lower) / (standard_quantile(0.75) - standard_quantile(0.25));
         (mean > 0.0).then(|| Self { shift: lower - mean * standard_quantile(0.25), mean })
     }
@@ -51,8 +52,8 @@ fn standard_quantile(probability: f64) -> f64 {
 /// The time of this probability, the i-th of n runs standing at (i − ½) / n, linear in between.
 fn at(sorted: &[f64], runs: usize, probability: f64) -> Option<f64> {
     let position = (runs as f64 * probability - 0.5).max(0.0);
-    let (below, above) =
-        (sorted.get(position.floor() as usize)?, sorted.get(position.ceil() as usize)?);
+    let below = sorted.get(position.floor() as usize)?;
+    let above = sorted.get(position.ceil() as usize)?;
     Some(below + (above - below) * position.fract())
 }
 

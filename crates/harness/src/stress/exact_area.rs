@@ -12,7 +12,8 @@ const UNIT_F64: u32 = 1074;
 /// A finite number in units of 2^-149.
 fn whole(x: f32) -> BigInt {
     let bits = x.to_bits();
-    let (exponent, fraction) = (bits >> 23 & 0xff, bits & 0x7f_ffff);
+    let exponent = bits >> 23 & 0xff;
+    let fraction = bits & 0x7f_ffff;
     let size = if exponent == 0 { fraction } else { fraction | 1 << 23 };
     let size = BigInt::from(size) << (exponent.max(1) - 1);
     if x.is_sign_negative() { -size } else { size }
@@ -30,7 +31,9 @@ pub fn internal_area(tree: &Bvh) -> BigUint {
 /// The half area of a box that is not empty, exact, in units of 2^-298.
 pub fn half_area(aabb: &bvh_core::Aabb) -> BigInt {
     let side = |axis: usize| whole(aabb.max[axis]) - whole(aabb.min[axis]);
-    let (x, y, z) = (side(0), side(1), side(2));
+    let x = side(0);
+    let y = side(1);
+    let z = side(2);
     &x * &y + &y * &z + &z * &x
 }
 
@@ -40,8 +43,10 @@ pub fn relative_error(cost: f64, exact: &BigUint) -> f64 {
     if !(cost.is_finite() && cost >= 0.0) {
         return f64::INFINITY;
     }
-    let (bits, exact) = (cost.to_bits(), exact << (UNIT_F64 - UNIT));
-    let (exponent, fraction) = (bits >> 52, bits & ((1 << 52) - 1));
+    let bits = cost.to_bits();
+    let exact = exact << (UNIT_F64 - UNIT);
+    let exponent = bits >> 52;
+    let fraction = bits & ((1 << 52) - 1);
     let size = if exponent == 0 { fraction } else { fraction | 1 << 52 };
     let cost = BigUint::from(size) << (exponent.max(1) - 1);
     let difference = if cost > exact { &cost - &exact } else { &exact - &cost };

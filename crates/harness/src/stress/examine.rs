@@ -81,7 +81,8 @@ pub fn examine(
     if boxes.len() <= REPEATED {
         check_threads(method, &boxes, work_per_object, &outcome)?;
         let range = scale_range(&boxes);
-        let (low, high) = (*range.start().max(&-120), *range.end().min(&120));
+        let low = *range.start().max(&-120);
+        let high = *range.end().min(&120);
         for k in [low, low / 7, high / 7, high] {
             check_scale(method, &boxes, work_per_object, &outcome, k)?;
         }
@@ -89,7 +90,8 @@ pub fn examine(
     let note = scene
         .also
         .map_or(Ok(String::new()), |also| also(method, &boxes, &outcome))?;
-    let (depth, cost) = (outcome.tree.depth(), outcome.cost);
+    let depth = outcome.tree.depth();
+    let cost = outcome.cost;
     Ok(Examined { objects: boxes.len(), depth, cost, relative_error, seconds, note })
 }
 
@@ -148,7 +150,8 @@ pub fn check_scale(
 ) -> Result<(), Broken> {
     let other = run(method, &scaled(boxes, k), work_per_object)?;
     ensure!(same_topology(&other.tree, &outcome.tree), P5: "another tree at scale 2^{k}");
-    let (expected, found) = (scaled_area(outcome.cost, k), other.cost);
+    let expected = scaled_area(outcome.cost, k);
+    let found = other.cost;
     ensure!(found == expected, P5: "the cost at scale 2^{k} is {found}, not {expected}");
     Ok(())
 }

@@ -36,7 +36,8 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
         let any: Vec<_> = rays.iter().map(|ray| wide.any_hit(ray)).collect();
         answers(&format!("{kernel:?}"), &nearest, &any)?;
         for coherence in [Coherence::Coherent, Coherence::Incoherent] {
-            let (mut nearest, mut any) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+            let mut nearest = vec![Hit::MISS; rays.len()];
+            let mut any = vec![false; rays.len()];
             let mut done = 0;
             for length in LENGTHS.into_iter().cycle() {
                 let batch = done..rays.len().min(done + length);
@@ -81,7 +82,8 @@ fn by_component(
         Distances::Each(&t_max),
     );
     let components = components.expect("rays");
-    let (mut distances, mut objects) = (vec![0.0; rays.len()], vec![0; rays.len()]);
+    let mut distances = vec![0.0; rays.len()];
+    let mut objects = vec![0; rays.len()];
     let mut any = vec![false; rays.len()];
     wide.nearest_hits_by_component(&components, &mut distances, &mut objects, coherence);
     wide.any_hits_by_component(&components, &mut any, coherence);
@@ -119,7 +121,8 @@ fn one_adversarial(
 ) -> Option<Ray> {
     let nowhere = Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]);
     let triangle = triangles.choose(rng).unwrap_or(&nowhere);
-    let (target, other) = (in_plane(triangle, rng), in_plane(triangle, rng));
+    let target = in_plane(triangle, rng);
+    let other = in_plane(triangle, rng);
     let mut along = Vec3::from([(); 3].map(|()| if rng.random() { 0.0 } else { -0.0 }));
     along[rng.random_range(0..3)] = if rng.random() { 1.0 } else { -1.0 };
     if rng.random() {
@@ -183,7 +186,8 @@ fn half_in_bundles(count: usize, seed: u64, mut make: impl FnMut(usize) -> Vec<R
             || Vec3::from([(); 3].map(|()| 1.0 + spread * rng.random_range(-1.0..1.0f32)));
         for _ in 0..BUNDLE {
             // Factors, so that zeros stay what they are at every scale.
-            let (origin, direction) = (ray.origin() * near(), ray.direction() * near());
+            let origin = ray.origin() * near();
+            let direction = ray.direction() * near();
             rays.push(Ray::new(origin, direction, ray.t_min(), ray.t_max()).unwrap_or(ray));
         }
     }

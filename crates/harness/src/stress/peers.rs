@@ -68,7 +68,8 @@ mod compiled_in {
         if let Err(error) = &valid {
             broken.push(P2.broken(error));
         }
-        let (mut depth, mut area) = (0, f64::NAN);
+        let mut depth = 0;
+        let mut area = f64::NAN;
         if valid.is_ok() {
             (depth, area) = (tree.depth(), cost::internal_area(&tree));
             if exact_area::relative_error(area, &exact_area::internal_area(&tree)) > ROUNDING {

@@ -250,12 +250,14 @@ fn scenes(n: usize) -> Vec<(String, Vec<Aabb>)> {
 impl Config {
     /// Measures everything and writes the CSV files and the figure.
     pub fn execute(&self, store: &Store) -> Result<String, Error> {
-        let (mut rows, mut timing) = (Vec::new(), Vec::new());
+        let mut rows = Vec::new();
+        let mut timing = Vec::new();
         for (scene, boxes) in scenes(self.objects) {
             let Decisions { area, all, wrong, undecided } = decisions(&boxes);
             let measured = [self.timed::<f32>(&boxes), self.timed::<f64>(&boxes)];
             for (kind, (tree, seconds)) in measured.into_iter().enumerate() {
-                let (scene, method) = (scene.clone(), ["f32", "f64"][kind].to_owned());
+                let scene = scene.clone();
+                let method = ["f32", "f64"][kind].to_owned();
                 let nanoseconds_per_object = seconds * 1e9 / boxes.len() as f64;
                 timing.push(Timing {
                     scene: scene.clone(),

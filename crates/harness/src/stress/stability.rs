@@ -117,7 +117,9 @@ impl Row {
             Cell::Broken(broken) => (row(Class::Broken, broken.to_string()), None),
             Cell::Kept(examined) if case.scene().is_some() && examined.seconds > 0.0 => {
                 let Examined { objects, depth, cost, relative_error, .. } = examined;
-                let (depth, cost, relative_error) = (Some(depth), Some(cost), Some(relative_error));
+                let depth = Some(depth);
+                let cost = Some(cost);
+                let relative_error = Some(relative_error);
                 let kept = row(Class::Kept, examined.note.clone());
                 (Self { objects, depth, cost, relative_error, ..kept }, Some(examined))
             }
@@ -134,7 +136,8 @@ impl Row {
         found: Option<&Found>,
         broken: &[String],
     ) -> Self {
-        let (depth, cost) = (found.map(|found| found.depth), found.map(|found| found.cost));
+        let depth = found.map(|found| found.depth);
+        let cost = found.map(|found| found.cost);
         let cost = cost.filter(|cost| cost.is_finite());
         Self { objects, depth, cost, ..Self::bare(case, peer, outcome, broken.join(BETWEEN)) }
     }
@@ -176,7 +179,9 @@ impl Config {
             work_per_object: self.work_per_object,
             larger: self.larger_searches,
         };
-        let (mut rows, mut times, mut peers) = (Vec::new(), Vec::new(), Vec::<Row>::new());
+        let mut rows = Vec::new();
+        let mut times = Vec::new();
+        let mut peers = Vec::<Row>::new();
         for (done, case) in cases.iter().enumerate() {
             if interrupted() {
                 return Err(Error::Interrupted { finished: done, runs: cases.len() });
@@ -238,7 +243,8 @@ impl Config {
     /// Another library on a case: few objects with all checks, then many.
     fn peer(&self, case: &Case, scene: &SceneCase, peer: &str) -> Row {
         let limit = Duration::from_secs(self.seconds_per_peer.max(1));
-        let (mut last, mut broken) = (None, Vec::new());
+        let mut last = None;
+        let mut broken = Vec::new();
         let [few, many, _] = scene.sizes;
         for objects in [few, many] {
             match child::examine(peer, case.id, objects, limit) {
@@ -279,7 +285,8 @@ fn heat_map(rows: &[Row]) -> HeatMap {
         }
         names
     };
-    let (scenes, columns) = (names(|row| &row.scene), names(|row| &row.method));
+    let scenes = names(|row| &row.scene);
+    let columns = names(|row| &row.method);
     let cell = |scene: &String, column: &String| {
         let row = rows
             .iter()

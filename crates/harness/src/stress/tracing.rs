@@ -94,7 +94,8 @@ pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Verdic
         let expected = brute_force.nearest_hit(ray);
         hits += usize::from(expected.is_some());
         for accelerator in &accelerators {
-            let (nearest, any) = (accelerator.nearest_hit(ray), accelerator.any_hit(ray));
+            let nearest = accelerator.nearest_hit(ray);
+            let any = accelerator.any_hit(ray);
             let same = bits(nearest) == bits(expected) && any == expected.is_some();
             ensure!(same, P3: "{ray:?} gives {nearest:?} and {any}, testing every object {expected:?}");
         }
@@ -118,8 +119,9 @@ pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
         let mut unit = || Vec3::from([(); 3].map(|()| rng.random::<f32>()));
         // Weighted, so that nothing overflows.
         let inside = |at: Vec3| bounds.min * (1.0 - at) + bounds.max * at;
-        let (somewhere, elsewhere, direction) =
-            (inside(unit()), inside(unit()), unit() * 2.0 - 1.0);
+        let somewhere = inside(unit());
+        let elsewhere = inside(unit());
+        let direction = unit() * 2.0 - 1.0;
         let Triangle([a, b, c]) = triangles
             .choose(&mut rng)
             .copied()

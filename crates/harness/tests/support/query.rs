@@ -84,7 +84,8 @@ fn aggregate(rows: &[&Row], what: &str) -> Option<f64> {
     };
     let mut values: Vec<f64> = rows.iter().filter_map(cell).collect();
     values.sort_by(f64::total_cmp);
-    let (first, last) = (*values.first()?, *values.last()?);
+    let first = *values.first()?;
+    let last = *values.last()?;
     match how {
         "only" => {
             assert!(first == last, "{column} is from {first} to {last}, not one value");

@@ -97,7 +97,9 @@ impl Build<'_> {
         };
         let found = in_parallel(count, || best(x, 0), || best(y, 1), || best(z, 2));
         watch.ensure_wanted()?;
-        let (mut least, mut axis, mut left) = (f64::INFINITY, 0, 1);
+        let mut least = f64::INFINITY;
+        let mut axis = 0;
+        let mut left = 1;
         for (number, (cost, position)) in found.into_iter().enumerate() {
             if cost < least {
                 (least, axis, left) = (cost, number, position);

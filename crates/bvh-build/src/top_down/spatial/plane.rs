@@ -51,7 +51,8 @@ impl Build<'_> {
             parts[last].2 += 1;
         }
         // Where every plane cuts all that is on one side of it, there are no parts to look at.
-        let (mut entered, mut gone) = (0, 0);
+        let mut entered = 0;
+        let mut gone = 0;
         let divides = parts[..bins - 1].iter().any(|part| {
             (entered, gone) = (entered + part.1, gone + part.2);
             (1..all).contains(&entered) && (1..all).contains(&(all - gone))
@@ -92,7 +93,8 @@ impl Build<'_> {
             after[bin] = (after[bin + 1].0.union(&parts[bin].0), after[bin + 1].1 + parts[bin].2);
         }
         let mut best: Option<Plane> = None;
-        let (mut before, mut entered) = (Aabb::EMPTY, 0);
+        let mut before = Aabb::EMPTY;
+        let mut entered = 0;
         for bin in 1..bins {
             before = before.union(&parts[bin - 1].0);
             entered += parts[bin - 1].1;
@@ -121,7 +123,8 @@ impl Build<'_> {
         references: &[Reference],
         Plane { axis, at, .. }: Plane,
     ) -> Option<Sides> {
-        let (mut sides, mut cut) = ([Vec::new(), Vec::new()], Vec::new());
+        let mut sides = [Vec::new(), Vec::new()];
+        let mut cut = Vec::new();
         for reference in references {
             if reference.aabb.max[axis] <= at {
                 sides[0].push(*reference);

@@ -56,7 +56,8 @@ static LANES_OF: [[u8; 8]; 256] = {
     let mut lanes_of = [[0; 8]; 256];
     let mut mask = 0;
     while mask < 256 {
-        let (mut lane, mut count) = (0, 0);
+        let mut lane = 0;
+        let mut count = 0;
         while lane < 8 {
             if mask >> lane & 1 == 1 {
                 lanes_of[mask][count] = lane;
@@ -123,7 +124,8 @@ impl Instructions for Avx2 {
         // SAFETY: the stack is between its ends.
         unsafe {
             let last = last_pending(nearest);
-            let (mut from, mut to) = (base, base);
+            let mut from = base;
+            let mut to = base;
             while from < top {
                 let pending = *from;
                 *to = pending;

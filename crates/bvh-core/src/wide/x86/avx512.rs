@@ -109,7 +109,8 @@ impl Instructions for Avx512 {
         // SAFETY: the stack has room for a register more than it holds, and is aligned.
         unsafe {
             let nearest = _mm512_set1_epi64(last_pending(nearest) as i64);
-            let (mut from, mut to) = (base, base);
+            let mut from = base;
+            let mut to = base;
             while from < top {
                 let pending = _mm512_load_si512(from.cast());
                 let held = (0xff_u32 >> (8 - (top.offset_from(from) as usize).min(8))) as u8;
@@ -163,7 +164,8 @@ impl Instructions for Avx512 {
                 let mut sorted = keys;
                 let mut i = 1;
                 while i < n {
-                    let (key, mut at) = (keys[i & 7], i);
+                    let key = keys[i & 7];
+                    let mut at = i;
                     while at > 0 && sorted[(at - 1) & 7] < key {
                         sorted[at & 7] = sorted[(at - 1) & 7];
                         at -= 1;

@@ -75,7 +75,8 @@ impl BoxRay {
         // SAFETY: a ray is three vectors of four lanes; the rest is the caller's promise.
         unsafe {
             let lanes: *const f32 = (&raw const *ray).cast();
-            let (origin, inverse) = (_mm_load_ps(lanes), _mm_load_ps(lanes.add(8)));
+            let origin = _mm_load_ps(lanes);
+            let inverse = _mm_load_ps(lanes.add(8));
             let sign = _mm_set1_ps(-0.0);
             let sizes = _mm_andnot_ps(sign, origin);
             let size = _mm_max_ps(sizes, _mm_permute_ps::<0b01>(sizes));
@@ -161,10 +162,10 @@ mod tests {
                 let inverse = ray.inverse_direction()[axis];
                 let side = 1.0f32.copysign(inverse);
                 for plane in [bounds.min[axis], bounds.max[axis], near_origin[axis]] {
-                    let (lower, upper) =
-                        (origin[axis] + side * margin[axis], origin[axis] - side * margin[axis]);
-                    let (near, far) =
-                        ((plane - lower) * inverse, (plane - upper) * inverse * Slabs::FAR);
+                    let lower = origin[axis] + side * margin[axis];
+                    let upper = origin[axis] - side * margin[axis];
+                    let near = (plane - lower) * inverse;
+                    let far = (plane - upper) * inverse * Slabs::FAR;
                     let first = |lanes: __m256| _mm256_cvtss_f32(lanes);
                     let own_near =
                         plane.mul_add(first(boxes.near_scale[axis]), first(boxes.near_shift[axis]));

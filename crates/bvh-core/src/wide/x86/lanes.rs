@@ -63,8 +63,10 @@ macro_rules! quarters {
         #[inline(always)]
         fn transpose_quarters([a, b, c, d]: [Self; 4]) -> [Self; 4] {
             unsafe {
-                let (ab, cd) = ($low(a.0, b.0), $low(c.0, d.0));
-                let (ab_high, cd_high) = ($high(a.0, b.0), $high(c.0, d.0));
+                let ab = $low(a.0, b.0);
+                let cd = $low(c.0, d.0);
+                let ab_high = $high(a.0, b.0);
+                let cd_high = $high(c.0, d.0);
                 [
                     Self($shuffle::<0b01_00_01_00>(ab, cd)),
                     Self($shuffle::<0b11_10_11_10>(ab, cd)),
@@ -168,7 +170,8 @@ impl Lanes for F32x4 {
             _mm_cvtss_f32(_mm_max_ss(two, _mm_permute_ps::<0b01>(two)))
         };
         below(a, b) -> Mask4 = {
-            let (a, b) = (_mm_castps_si128(a.0), _mm_castps_si128(b.0));
+            let a = _mm_castps_si128(a.0);
+            let b = _mm_castps_si128(b.0);
             let not_below = _mm_cmpeq_epi32(_mm_max_epu32(a, b), a);
             Mask4(_mm_castsi128_ps(_mm_xor_si128(not_below, _mm_set1_epi32(-1))))
         };
@@ -215,7 +218,8 @@ impl Lanes for F32x8 {
             F64x4(_mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a.0))),
         );
         below(a, b) -> Mask8 = {
-            let (a, b) = (_mm256_castps_si256(a.0), _mm256_castps_si256(b.0));
+            let a = _mm256_castps_si256(a.0);
+            let b = _mm256_castps_si256(b.0);
             let not_below = _mm256_cmpeq_epi32(_mm256_max_epu32(a, b), a);
             Mask8(_mm256_castsi256_ps(_mm256_xor_si256(not_below, _mm256_set1_epi32(-1))))
         };

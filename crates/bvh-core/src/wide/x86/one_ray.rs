@@ -56,13 +56,15 @@ pub(crate) unsafe fn nearest<K: Instructions<Boxes = F32x8>>(
             return nearest_portable(wide, ray);
         };
         let box_ray = &box_ray;
-        let (nodes, blocks) = (wide.nodes.as_ptr(), wide.blocks.as_ptr());
+        let nodes = wide.nodes.as_ptr();
+        let blocks = wide.blocks.as_ptr();
         let mut stack = MaybeUninit::<Aligned<[Pending; STACK + 8]>>::uninit();
         let base = stack.as_mut_ptr().cast::<Pending>();
         let mut top = base;
         let mut shear = MaybeUninit::<Shear4>::uninit();
         let mut sheared = false;
-        let (mut t_max, mut object) = (ray.t_max(), u32::MAX);
+        let mut t_max = ray.t_max();
+        let mut object = u32::MAX;
         let mut child = root;
         loop {
             while child.is_node() {
@@ -152,13 +154,15 @@ pub(crate) unsafe fn any<K: Instructions<Boxes = F32x8>>(wide: &WideBvh, ray: &R
             return any_portable(wide, ray);
         };
         let box_ray = &box_ray;
-        let (nodes, blocks) = (wide.nodes.as_ptr(), wide.blocks.as_ptr());
+        let nodes = wide.nodes.as_ptr();
+        let blocks = wide.blocks.as_ptr();
         let mut stack = MaybeUninit::<Aligned<[Child; STACK + 8]>>::uninit();
         let base = stack.as_mut_ptr().cast::<Child>();
         let mut top = base;
         let mut shear = MaybeUninit::<Shear4>::uninit();
         let mut sheared = false;
-        let (t_min, t_max) = (ray.t_min(), ray.t_max());
+        let t_min = ray.t_min();
+        let t_max = ray.t_max();
         let mut child = root;
         loop {
             while child.is_node() {
@@ -293,12 +297,15 @@ impl Shear4 {
         // SAFETY: as the caller's.
         unsafe {
             let [a, b, c] = self.apply(block, lane);
-            let (ax, ay, az) =
-                (_mm256_cvtps_pd(a[0]), _mm256_cvtps_pd(a[1]), _mm256_cvtps_pd(a[2]));
-            let (bx, by, bz) =
-                (_mm256_cvtps_pd(b[0]), _mm256_cvtps_pd(b[1]), _mm256_cvtps_pd(b[2]));
-            let (cx, cy, cz) =
-                (_mm256_cvtps_pd(c[0]), _mm256_cvtps_pd(c[1]), _mm256_cvtps_pd(c[2]));
+            let ax = _mm256_cvtps_pd(a[0]);
+            let ay = _mm256_cvtps_pd(a[1]);
+            let az = _mm256_cvtps_pd(a[2]);
+            let bx = _mm256_cvtps_pd(b[0]);
+            let by = _mm256_cvtps_pd(b[1]);
+            let bz = _mm256_cvtps_pd(b[2]);
+            let cx = _mm256_cvtps_pd(c[0]);
+            let cy = _mm256_cvtps_pd(c[1]);
+            let cz = _mm256_cvtps_pd(c[2]);
             // Products of two f32 are exact in f64: fused or not, the difference is the same.
             let u = _mm256_fmsub_pd(cx, by, _mm256_mul_pd(cy, bx));
             let v = _mm256_fmsub_pd(ax, cy, _mm256_mul_pd(ay, cx));
@@ -310,7 +317,9 @@ impl Shear4 {
             let negative = _mm256_cmp_pd::<_CMP_LT_OQ>(least, zero);
             let outside = _mm256_and_pd(negative, _mm256_cmp_pd::<_CMP_GT_OQ>(most, zero));
             let outside = _mm256_or_pd(outside, _mm256_cmp_pd::<_CMP_EQ_OQ>(determinant, zero));
-            let (u, v, w) = (_mm256_mul_pd(u, az), _mm256_mul_pd(v, bz), _mm256_mul_pd(w, cz));
+            let u = _mm256_mul_pd(u, az);
+            let v = _mm256_mul_pd(v, bz);
+            let w = _mm256_mul_pd(w, cz);
             let sum = _mm256_add_pd(_mm256_add_pd(u, v), w);
             let t = _mm256_div_pd(sum, _mm256_mul_pd(determinant, _mm256_set1_pd(self.depth)));
             let after = _mm256_cmp_pd::<_CMP_GE_OQ>(t, _mm256_set1_pd(f64::from(t_min)));
@@ -327,9 +336,11 @@ impl Shear4 {
                     .as_ptr()
                     .cast::<f32>()
                     .add(axis * TriangleBlock::LANES + lane);
-                let (a, b) = (_mm_load_ps(lanes), _mm_load_ps(lanes.add(3 * TriangleBlock::LANES)));
+                let a = _mm_load_ps(lanes);
+                let b = _mm_load_ps(lanes.add(3 * TriangleBlock::LANES));
                 let c = _mm_load_ps(lanes.add(6 * TriangleBlock::LANES));
-                let (min, max) = (_mm_min_ps(_mm_min_ps(a, b), c), _mm_max_ps(_mm_max_ps(a, b), c));
+                let min = _mm_min_ps(_mm_min_ps(a, b), c);
+                let max = _mm_max_ps(_mm_max_ps(a, b), c);
                 let origin = _mm_set1_ps(self.origin[i]);
                 let low = _mm_andnot_ps(sign, _mm_sub_ps(min, origin));
                 let high = _mm_andnot_ps(sign, _mm_sub_ps(max, origin));
@@ -337,11 +348,13 @@ impl Shear4 {
                 relative[i] = [min, max];
             }
             let margin = _mm_mul_ps(reach, _mm_set1_ps(Slabs::MARGIN));
-            let (mut entry, mut exit) = (_mm_set1_ps(t_min), _mm_set1_ps(f32::INFINITY));
+            let mut entry = _mm_set1_ps(t_min);
+            let mut exit = _mm_set1_ps(f32::INFINITY);
             for (i, [min, max]) in relative.into_iter().enumerate() {
                 let margin = _mm_add_ps(margin, _mm_set1_ps(self.origin_margin[i]));
                 let margin = _mm_add_ps(margin, _mm_set1_ps(f32::MIN_POSITIVE));
-                let (origin, inverse) = (_mm_set1_ps(self.origin[i]), _mm_set1_ps(self.inverse[i]));
+                let origin = _mm_set1_ps(self.origin[i]);
+                let inverse = _mm_set1_ps(self.inverse[i]);
                 let low = _mm_mul_ps(_mm_sub_ps(min, _mm_add_ps(origin, margin)), inverse);
                 let high = _mm_mul_ps(_mm_sub_ps(max, _mm_sub_ps(origin, margin)), inverse);
                 entry = _mm_max_ps(entry, _mm_min_ps(low, high));

@@ -45,7 +45,9 @@ fn brilliant() -> MeshBuilder {
     let star = |k: usize| on_circle(0.78, eighth(k) + 1.0 / 16.0, 0.2);
     let girdle = |j: usize, z: f64| on_circle(1.0, fraction(j, 16), z);
     let pavilion = |k: usize| on_circle(0.3, eighth(k) + 1.0 / 16.0, -0.66);
-    let (upper, lower, culet) = (0.02, -0.02, DVec3::new(0.0, 0.0, -0.88));
+    let upper = 0.02;
+    let lower = -0.02;
+    let culet = DVec3::new(0.0, 0.0, -0.88);
     let corners: Vec<_> = (0..8).map(table).collect();
     stone.polygon(&corners);
     for k in 0..8 {
@@ -105,7 +107,8 @@ fn ring() -> MeshBuilder {
     for row in [-1.0, 0.0, 1.0] {
         for k in 0..34 {
             // Stones run from 0.09 to 0.25 turns away from the head, smaller as the shank tapers.
-            let (half, i) = (if k < 17 { 1.0 } else { -1.0 }, k % 17);
+            let half = if k < 17 { 1.0 } else { -1.0 };
+            let i = k % 17;
             let away = half * (0.082 + 0.0105 * i as f64 + 0.002 * row);
             let size = 0.042 - 0.0009 * i as f64;
             let seat = |away: f64, across: f64| {
@@ -188,11 +191,9 @@ fn chain(links: usize) -> MeshBuilder {
         spot.with_z(padding(spot.x, spot.y) + 0.05)
     };
     for k in 0..links {
-        let (before, here, after) = (
-            at(fraction(k, links)),
-            at(fraction(2 * k + 1, 2 * links)),
-            at(fraction(k + 1, links)),
-        );
+        let before = at(fraction(k, links));
+        let here = at(fraction(2 * k + 1, 2 * links));
+        let after = at(fraction(k + 1, links));
         let along = (after - before).normalize();
         let across = DVec3::Z.cross(along).normalize();
         let heading = DMat3::from_cols(along, across, along.cross(across));
@@ -207,14 +208,15 @@ fn chain(links: usize) -> MeshBuilder {
 fn cushion(mesh: &mut MeshBuilder) {
     mesh.cuboid(DVec3::new(-CUSHION, -CUSHION, -0.9), DVec3::new(CUSHION, CUSHION, -0.35));
     mesh.grid(20, 20, |i, j| {
-        let (x, y) =
-            (CUSHION * (2.0 * fraction(i, 20) - 1.0), CUSHION * (2.0 * fraction(j, 20) - 1.0));
+        let x = CUSHION * (2.0 * fraction(i, 20) - 1.0);
+        let y = CUSHION * (2.0 * fraction(j, 20) - 1.0);
         DVec3::new(x, y, padding(x, y))
     });
 }
 
 /// Height of the cushion's top; its middle, under the ring, is dented.
 fn padding(x: f64, y: f64) -> f64 {
-    let (u, v) = (x * x / (CUSHION * CUSHION), y * y / (CUSHION * CUSHION));
+    let u = x * x / (CUSHION * CUSHION);
+    let v = y * y / (CUSHION * CUSHION);
     0.36 * (1.0 - u * u) * (1.0 - v * v) - 0.35 - 0.12 / (1.0 + 12.0 * (u + v))
 }

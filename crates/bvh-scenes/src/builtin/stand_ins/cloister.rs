@@ -28,7 +28,8 @@ const EAVES: f64 = 5.4;
 pub fn triangles() -> Vec<Triangle> {
     let mut cloister = MeshBuilder::default();
     // Court sides in bays: long walks along x, short ones along y.
-    let (long, short) = (9, 7);
+    let long = 9;
+    let short = 7;
     let half = DVec3::new(long as f64, short as f64, 0.0) * (0.5 * BAY);
     let parts = Parts::new();
     for (turns, bays, offset) in
@@ -95,7 +96,8 @@ fn column() -> MeshBuilder {
         let (low, tall) = if k % 2 == 0 { (1.87, 0.22) } else { (1.93, 0.24) };
         let mut leaf = MeshBuilder::default();
         leaf.grid(2, 4, |i, j| {
-            let (u, v) = (fraction(i, 2) - 0.5, fraction(j, 4));
+            let u = fraction(i, 2) - 0.5;
+            let v = fraction(j, 4);
             let width = 0.085 * (1.0 - v * v * v) + 0.012;
             DVec3::new(
                 0.108 + 0.085 * v * v * v + 0.01 * (1.0 - 4.0 * u * u),
@@ -232,7 +234,8 @@ fn buttress(mesh: &mut MeshBuilder, x: f64) {
 /// changes from bay to bay.
 fn paving(mesh: &mut MeshBuilder, x: f64, bay: usize) {
     let tiles = 3 + bay % 3;
-    let (middle, half) = (DVec3::new(x + 0.5 * BAY, -0.5 * BAY - 0.1, 0.0), 0.5 * BAY - 0.3);
+    let middle = DVec3::new(x + 0.5 * BAY, -0.5 * BAY - 0.1, 0.0);
+    let half = 0.5 * BAY - 0.3;
     for k in 0..4 {
         let corner =
             |i: usize, reach: f64| middle + on_circle(reach * SQRT_2, fraction(2 * i + 1, 8), 0.0);
@@ -247,7 +250,8 @@ fn paving(mesh: &mut MeshBuilder, x: f64, bay: usize) {
         mesh.triangle(tip, corner(k, half), next);
     }
     mesh.grid(tiles, tiles, |i, j| {
-        let (u, v) = (fraction(i, tiles) - 0.5, fraction(j, tiles) - 0.5);
+        let u = fraction(i, tiles) - 0.5;
+        let v = fraction(j, tiles) - 0.5;
         middle + DVec3::new((u - v) * half, (u + v) * half, 0.0)
     });
 }
@@ -255,12 +259,14 @@ fn paving(mesh: &mut MeshBuilder, x: f64, bay: usize) {
 /// The lean-to roof over a walk, `half` its arcade's half length: rafters below, boarding in five
 /// panels, rows of barrel tiles above; mitred at both corners.
 fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
-    let (eaves, ridge) = (DVec3::new(0.0, 0.7, EAVES), DVec3::new(0.0, -BAY - 0.25, EAVES + 1.5));
+    let eaves = DVec3::new(0.0, 0.7, EAVES);
+    let ridge = DVec3::new(0.0, -BAY - 0.25, EAVES + 1.5);
     let slope = (ridge - eaves).length();
     let up = (ridge - eaves) / slope;
     let normal = up.cross(DVec3::X);
     let along = |x: f64| DVec3::X * x;
-    let (low, high) = (half - eaves.y, half - ridge.y);
+    let low = half - eaves.y;
+    let high = half - ridge.y;
     mesh.grid(5, 1, |i, j| {
         let side = 2.0 * fraction(i, 5) - 1.0;
         if j == 0 { eaves + along(side * low) } else { ridge + along(side * high) }

@@ -87,8 +87,10 @@ fn storey(plan: &Plan) -> MeshBuilder {
 
     // First flight along x to a landing, second along y to a gallery, third down at an angle of its
     // own.
-    let (width, deep) = (plan.width, plan.width + 1.0);
-    let (low, high) = (plan.first as f64 * RISE, (plan.first + plan.second) as f64 * RISE);
+    let width = plan.width;
+    let deep = plan.width + 1.0;
+    let low = plan.first as f64 * RISE;
+    let high = (plan.first + plan.second) as f64 * RISE;
     let turn = plan.x + plan.first as f64;
     storey
         .place(&flight(plan.first, width, plan.climbs_beneath), &upright(0.0, plan.x, plan.y, 0.0));
@@ -133,7 +135,8 @@ fn flight(steps: usize, width: f64, climbs_beneath: bool) -> MeshBuilder {
     let depth = 2.5;
     for k in 0..steps {
         let x = k as f64;
-        let (y0, y1) = (0.0, width);
+        let y0 = 0.0;
+        let y1 = width;
         flight.quad(at(x, y0, x), at(x, y1, x), at(x, y1, x + 1.0), at(x, y0, x + 1.0));
         flight.quad(
             at(x, y0, x + 1.0),
@@ -240,7 +243,9 @@ fn gate(radius: f64, half_width: f64, pier: f64, segments: usize) -> MeshBuilder
 /// A spiral stair of `steps` wedges about a column, with a winding handrail.
 fn spiral(steps: usize) -> MeshBuilder {
     let mut spiral = MeshBuilder::default();
-    let (per_step, rise, radius) = (0.062, 0.9, 3.4);
+    let per_step = 0.062;
+    let rise = 0.9;
+    let radius = 3.4;
     let height = steps as f64 * rise;
     spiral.revolve(
         &[
@@ -261,7 +266,8 @@ fn spiral(steps: usize) -> MeshBuilder {
             spiral.polygon(&corners);
             corners
         };
-        let (top, bottom) = (wedge(0.0), wedge(0.25));
+        let top = wedge(0.0);
+        let bottom = wedge(0.25);
         for (i, j) in [(0, 1), (1, 2), (2, 3)] {
             spiral.quad(top[i], top[j], bottom[j], bottom[i]);
         }

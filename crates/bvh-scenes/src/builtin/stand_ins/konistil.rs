@@ -43,16 +43,19 @@ fn ground(x: f64, y: f64) -> f64 {
         noise += 0.055 * cell * value_noise(octave as u32, x / cell, y / cell);
     }
     // Level ground around station and town.
-    let (dx, dy) = ((x - 1500.0) / 700.0, (y - course(x) - 190.0) / 260.0);
+    let dx = (x - 1500.0) / 700.0;
+    let dy = (y - course(x) - 190.0) / 260.0;
     let wild = 1.0 - 0.85 / (1.0 + dx * dx * dx * dx + dy * dy * dy * dy);
     60.0 + slope * wild + noise * wild
 }
 
 /// Smooth noise in [−1, 1): jittered values on the integer lattice, interpolated with a cubic ease.
 fn value_noise(stream: u32, x: f64, y: f64) -> f64 {
-    let (i, j) = (x.floor(), y.floor());
+    let i = x.floor();
+    let j = y.floor();
     let ease = |t: f64| t * t * (3.0 - 2.0 * t);
-    let (u, v) = (ease(x - i), ease(y - j));
+    let u = ease(x - i);
+    let v = ease(y - j);
     let at = |a: f64, b: f64| jitter(stream, ((i + a + 64.0) * 512.0 + j + b + 64.0) as usize);
     let low = at(0.0, 0.0) * (1.0 - u) + at(1.0, 0.0) * u;
     let high = at(0.0, 1.0) * (1.0 - u) + at(1.0, 1.0) * u;
@@ -92,10 +95,8 @@ fn terrain(mesh: &mut MeshBuilder) {
             let near = (corner.x - 1500.0).abs() < 620.0 && (-150.0..460.0).contains(&aside);
             let parts = if near { 4 } else { 1 };
             mesh.grid(parts, parts, |a, b| {
-                let (x, y) = (
-                    corner.x + size.x * fraction(a, parts),
-                    corner.y + size.y * fraction(b, parts),
-                );
+                let x = corner.x + size.x * fraction(a, parts);
+                let y = corner.y + size.y * fraction(b, parts);
                 DVec3::new(x, y, ground(x, y))
             });
         }
@@ -126,7 +127,8 @@ fn railway(mesh: &mut MeshBuilder) {
     }
     let spans = 48;
     for k in 0..spans {
-        let (x, next) = (SIZE.0 * fraction(k, spans), SIZE.0 * fraction(k + 1, spans));
+        let x = SIZE.0 * fraction(k, spans);
+        let next = SIZE.0 * fraction(k + 1, spans);
         for side in [-1.0, 1.0] {
             let foot = beside(x, 4.6 * side, TRACK - 0.6);
             mesh.cuboid(foot - DVec3::new(0.15, 0.15, 0.0), foot + DVec3::new(0.15, 0.15, 8.0));
@@ -148,7 +150,8 @@ fn railway(mesh: &mut MeshBuilder) {
 
 /// A viaduct that crosses valley and main line: round arches on tall tapered piers.
 fn viaduct(mesh: &mut MeshBuilder) {
-    let (spans, span) = (28, 24.0);
+    let spans = 28;
+    let span = 24.0;
     let mut bay = MeshBuilder::default();
     let mut arch = MeshBuilder::default();
     arch.arch(9.5, 12.0, 12.5, 7.0, 14);
@@ -170,7 +173,9 @@ fn viaduct(mesh: &mut MeshBuilder) {
 /// tower.
 fn station(mesh: &mut MeshBuilder) {
     let mut station = MeshBuilder::default();
-    let (length, half, ribs) = (140.0, 19.0, 15);
+    let length = 140.0;
+    let half = 19.0;
+    let ribs = 15;
     let vault = |t: f64, x: f64, reach: f64| {
         let (c, s) = cos_sin(0.5 * t);
         DVec3::new(x, -reach * c, 7.0 + 0.62 * reach * s)
@@ -219,7 +224,8 @@ fn station(mesh: &mut MeshBuilder) {
 /// sunk a little.
 fn house(length: f64, width: f64, wall: f64, gable: f64) -> MeshBuilder {
     let mut house = MeshBuilder::default();
-    let (x, y) = (0.5 * length, 0.5 * width);
+    let x = 0.5 * length;
+    let y = 0.5 * width;
     let at = |i: f64, j: f64, z: f64| DVec3::new(i, j, z);
     for side in [-1.0, 1.0] {
         house.quad(
@@ -307,7 +313,8 @@ fn church() -> MeshBuilder {
 fn power_line(mesh: &mut MeshBuilder) {
     let masts = 10;
     let foot = |k: usize| {
-        let (x, y) = (70.0 + 255.0 * k as f64, 220.0 + 26.0 * k as f64);
+        let x = 70.0 + 255.0 * k as f64;
+        let y = 220.0 + 26.0 * k as f64;
         DVec3::new(x, y, ground(x, y))
     };
     let mast = mast();
@@ -366,8 +373,8 @@ fn forest(mesh: &mut MeshBuilder) {
     for k in 0..520 {
         // Low-discrepancy spots (plastic number), left out where town and railway are.
         let unit = |step: f64| (0.5 + step * k as f64) - (0.5 + step * k as f64).floor();
-        let (x, y) =
-            (SIZE.0 * unit(0.754_877_666_246_692_8), SIZE.1 * unit(0.569_840_290_998_053_2));
+        let x = SIZE.0 * unit(0.754_877_666_246_692_8);
+        let y = SIZE.1 * unit(0.569_840_290_998_053_2);
         let aside = y - course(x);
         if (-120.0..420.0).contains(&aside) {
             continue;

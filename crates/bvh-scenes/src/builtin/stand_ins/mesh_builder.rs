@@ -159,7 +159,8 @@ pub fn cos_sin(turns: f64) -> (f64, f64) {
     let within = turns - turns.floor();
     let quarters = (within * 4.0).floor();
     let rest = (within - quarters * 0.25) * std::f64::consts::TAU;
-    let (c, s) = (libm::cos(rest), libm::sin(rest));
+    let c = libm::cos(rest);
+    let s = libm::sin(rest);
     match quarters as u32 {
         1 => (-s, c),
         2 => (-c, -s),

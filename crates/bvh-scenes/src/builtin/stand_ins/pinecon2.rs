@@ -61,7 +61,8 @@ fn scale(index: usize) -> MeshBuilder {
         // The same spiral once more, on the upper half of the blade's face.
         let radius = 0.34 * libm::sqrt(fraction(2 * k + 1, 2 * SUB_SCALES));
         let (c, s) = cos_sin(k as f64 * GOLDEN + 0.5 * jitter(5, index));
-        let (u, v) = (radius * c, 0.62 + radius * s);
+        let u = radius * c;
+        let v = 0.62 + radius * s;
         let tilt = about_y(0.1 + 0.02 * jitter(6, index * SUB_SCALES + k)) * about_x(-0.12 * u);
         let mut sub = MeshBuilder::default();
         blade(&mut sub, 2, 1, 0.0);

@@ -57,7 +57,8 @@ impl<'a> Geometry<'a> {
     /// file, since faces may name vertices below them, and comes last.
     pub fn finish(&mut self) -> Result<(), ObjError> {
         while self.add_statement() {}
-        let ((index, line), vertices) = (self.highest, self.vertices);
+        let (index, line) = self.highest;
+        let vertices = self.vertices;
         match self.fault.take() {
             Some(fault) => Err(fault),
             None if index > vertices => {

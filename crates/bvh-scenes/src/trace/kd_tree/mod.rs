@@ -150,7 +150,8 @@ impl Config {
             };
             let below = tree.cells.len();
             tree.cells.extend([placeholder; 2]);
-            let (axis, position) = (split.axis, split.position);
+            let axis = split.axis;
+            let position = split.position;
             tree.cells[frame.cell] =
                 Cell::Inner { axis: axis as u8, position, below: below as u32 };
             for event in &frame.events[axis] {
@@ -167,7 +168,8 @@ impl Config {
                         .collect::<Vec<_>>()
                 })
             };
-            let (mut lower, mut upper) = (frame.bounds, frame.bounds);
+            let mut lower = frame.bounds;
+            let mut upper = frame.bounds;
             (lower.max[axis], upper.min[axis]) = (position, position);
             let depth = frame.depth + 1;
             let all = split.below + split.above;
@@ -194,14 +196,17 @@ impl Config {
         let area = frame.bounds.half_area();
         let extent = frame.bounds.extent();
         for axis in 0..3 {
-            let (low, high) = (frame.bounds.min[axis], frame.bounds.max[axis]);
-            let (u, v) = (extent[(axis + 1) % 3], extent[(axis + 2) % 3]);
+            let low = frame.bounds.min[axis];
+            let high = frame.bounds.max[axis];
+            let u = extent[(axis + 1) % 3];
+            let v = extent[(axis + 2) % 3];
             // The probability that a line through the cell meets the part of this length, or the part's share of the
             // length if the cell has no area.
             let chance = |length: f64| {
                 if area > 0.0 { (u * v + length * (u + v)) / area } else { length / extent[axis] }
             };
-            let (mut below, mut above) = (0, frame.count);
+            let mut below = 0;
+            let mut above = frame.count;
             for group in frame.events[axis].chunk_by(|a, b| a.position == b.position) {
                 let position = group[0].position;
                 let ends = group.partition_point(|event| event.kind == Kind::End);
@@ -235,7 +240,8 @@ impl Config {
 
 impl Split {
     fn side(&self, object: &Aabb) -> Side {
-        let (min, max) = (object.min[self.axis], object.max[self.axis]);
+        let min = object.min[self.axis];
+        let max = object.max[self.axis];
         if min == max && min == self.position {
             if self.planar_below { Side::Below } else { Side::Above }
         } else if max <= self.position {
@@ -253,7 +259,8 @@ fn events(boxes: &[Aabb], axis: usize) -> Vec<Event> {
     let mut events = Vec::with_capacity(2 * boxes.len());
     for (b, object) in boxes.iter().zip(0..) {
         // −0 and +0 are one position.
-        let (min, max) = (b.min[axis] + 0.0, b.max[axis] + 0.0);
+        let min = b.min[axis] + 0.0;
+        let max = b.max[axis] + 0.0;
         if min == max {
             events.push(Event { position: min, kind: Kind::Planar, object });
         } else {

@@ -103,9 +103,10 @@ impl KdTree {
                     let (far_entry, near_exit) = slabs.crossing(axis.into(), position);
                     let near = below as usize + usize::from(backwards[usize::from(axis)]);
                     let far = below as usize + usize::from(!backwards[usize::from(axis)]);
-                    let (far_entry, near_exit) = (far_entry.max(entry), near_exit.min(exit));
-                    let (near_met, far_met) =
-                        (entry <= near_exit, far_entry <= exit && far_entry <= t_max);
+                    let far_entry = far_entry.max(entry);
+                    let near_exit = near_exit.min(exit);
+                    let near_met = entry <= near_exit;
+                    let far_met = far_entry <= exit && far_entry <= t_max;
                     if near_met {
                         if far_met {
                             stack[pending] = (far, far_entry, exit);

@@ -188,8 +188,8 @@ pub fn insertion_keeps_its_cost() -> Verdict {
     {
         let boxes = stiff::boxes(&make(2000));
         let scene = goldsmith_salmon::Scene::new(&boxes).map_err(Broken::case)?;
-        let (mut workspace, mut tree) =
-            (goldsmith_salmon::Workspace::default(), Default::default());
+        let mut workspace = goldsmith_salmon::Workspace::default();
+        let mut tree = Default::default();
         let order: Vec<u32> = (0..boxes.len() as u32).collect();
         let config = goldsmith_salmon::Config::default();
         let kept = config

@@ -13,7 +13,8 @@ use glam::Vec3;
 
 /// S15: zero, NaN and infinite directions and origins are refused before any traversal.
 pub fn no_such_rays() -> Verdict {
-    let (nan, inf) = (f32::NAN, f32::INFINITY);
+    let nan = f32::NAN;
+    let inf = f32::INFINITY;
     let directions = [
         Vec3::ZERO,
         -Vec3::ZERO,
@@ -48,7 +49,8 @@ pub fn ranges_are_defined() -> Verdict {
         let ray = Ray::new(origin, Vec3::Z, t_min, t_max).map_err(Broken::case)?;
         for (name, traversal) in tracing::TRAVERSALS {
             for accelerator in traversal(&triangle).map_err(Broken::case)? {
-                let (nearest, any) = (accelerator.nearest_hit(&ray), accelerator.any_hit(&ray));
+                let nearest = accelerator.nearest_hit(&ray);
+                let any = accelerator.any_hit(&ray);
                 let agree = nearest.is_some() == expected && any == expected;
                 ensure!(agree, "{name}: range {t_min}..={t_max} gives {nearest:?} and {any}");
             }

@@ -73,7 +73,8 @@ pub fn balanced_at_no_cost(method: &Method, boxes: &[Aabb], outcome: &Outcome) -
 /// S10: the cost is 0, and the top-down builders' trees are as shallow as can be.
 pub fn shallow_at_no_cost(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     ensure!(outcome.cost == 0.0, P7: "segments on a line cost {}", outcome.cost);
-    let (depth, least) = (outcome.tree.depth(), levels(boxes.len()));
+    let depth = outcome.tree.depth();
+    let least = levels(boxes.len());
     ensure!(!is_top_down(method) || depth == least, "depth {depth}, {least} would do");
     Ok(String::new())
 }
@@ -106,7 +107,8 @@ pub fn teapot_is_isolated(method: &Method, boxes: &[Aabb], outcome: &Outcome) ->
     }
     let tree = &outcome.tree;
     let teapot = boxes.len().saturating_sub(STADIUM);
-    let (mut level, mut at) = (0, (!tree.nodes.is_empty()).then_some(0));
+    let mut level = 0;
+    let mut at = (!tree.nodes.is_empty()).then_some(0);
     // Down to where most of the teapot is.
     while let Some(node) = at {
         let below = objects_below(tree, node);
@@ -132,7 +134,8 @@ pub fn teapot_is_isolated(method: &Method, boxes: &[Aabb], outcome: &Outcome) ->
 }
 
 fn objects_below(tree: &Bvh, node: usize) -> Vec<u32> {
-    let (mut ids, mut open) = (Vec::new(), vec![node]);
+    let mut ids = Vec::new();
+    let mut open = vec![node];
     while let Some(node) = open.pop() {
         ids.extend_from_slice(&tree.prim_ids[tree.nodes[node].prims()]);
         open.extend(tree.nodes[node].children());
@@ -149,7 +152,8 @@ pub fn both_costs(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
         .map(|node| node.children().len())
         .max()
         .unwrap_or(0);
-    let (area, gs) = (cost::over_root_area(tree, outcome.cost), cost::goldsmith_salmon(tree));
+    let area = cost::over_root_area(tree, outcome.cost);
+    let gs = cost::goldsmith_salmon(tree);
     Ok(format!("{area:.3} root areas, Goldsmith–Salmon {gs:.3}, up to {widest} children"))
 }
 
