@@ -1,9 +1,7 @@
-//! The chart engine: data series in, SVG and PNG out. It knows no BVH, no files and no clock.
+//! The chart engine: data series in, SVG out. It knows no BVH, no files and no clock.
 //!
-//! A [`Figure`] or [`HeatMap`] says what is shown, in data units. [`svg`] and [`png()`] lay it out and draw
-//! it with plotters, once on its SVG backend and once into pixels, with fonts that are part of the program. The same
-//! picture gives the same bytes of SVG on every machine, and the same bytes of PNG on machines of the same processor
-//! architecture.
+//! A [`Figure`] or [`HeatMap`] holds the data, in data units. [`svg`] lays it out and draws it with plotters, in text
+//! widths of embedded fonts. The same picture gives the same bytes on every machine.
 //!
 //! Figures are 800 pixels wide with text of 12 pixels and more, as a README shows them. Series differ in colour and in
 //! dash or marker, so that they survive printing in grey.
@@ -15,14 +13,12 @@ mod heatmap;
 mod legend;
 mod model;
 mod panel;
-mod raster;
 mod style;
 mod text;
 
 pub use canvas::Picture;
 pub use figure::Miniature;
 pub use model::{Axis, Cell, Figure, FigureError, HeatMap, Layer, Look, Marks, Panel, Scale};
-pub use raster::{PNG_SCALE, png};
 
 /// Draws a picture as an SVG document.
 ///
@@ -109,7 +105,7 @@ mod tests {
                 .collect(),
         );
         for points in data {
-            for (kind, x) in axes().into_iter().enumerate() {
+            for x in axes() {
                 let panel = |(index, layer): (usize, Layer)| Panel {
                     title: "title ".repeat(index),
                     x: x.clone(),
@@ -127,9 +123,6 @@ mod tests {
                     !picture.contains("NaN") && !picture.contains("inf"),
                     "{points:?} on {x:?}"
                 );
-                if points.len() > 1 && kind == 0 {
-                    png(&figure).unwrap();
-                }
                 let miniature = svg(&Miniature::from(&figure)).unwrap();
                 assert!(
                     !miniature.contains("category") && !miniature.contains("<&>"),
@@ -137,7 +130,6 @@ mod tests {
                 );
             }
         }
-        png(&Figure::default()).unwrap();
     }
 
     #[test]
@@ -169,7 +161,6 @@ mod tests {
         };
         let figure = Figure { columns: 2, panels: vec![panel; 3], ..Figure::default() };
         assert_eq!(svg(&figure).unwrap(), svg(&figure.clone()).unwrap());
-        assert_eq!(png(&figure).unwrap(), png(&figure.clone()).unwrap());
     }
 
     #[test]
@@ -213,7 +204,6 @@ mod tests {
                     classes: classes.clone(),
                 };
                 svg(&map).unwrap();
-                png(&map).unwrap();
                 let missing = HeatMap {
                     rows: vec![String::new(); rows + 1],
                     columns: vec![String::new(); 2],

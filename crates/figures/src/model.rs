@@ -214,18 +214,10 @@ pub enum FigureError {
         "heat map '{title}' has {rows} rows of {columns} cells, and {cells} cells instead of their product"
     )]
     CellCount { title: String, rows: usize, columns: usize, cells: usize },
-    /// The drawing library refused something.
+    /// The drawing library failed.
     #[error("figure '{title}' could not be drawn: {reason}")]
     Draw { title: String, reason: String },
     /// One of the fonts in the program could not be read.
     #[error("the embedded font could not be read: {reason}")]
     Font { reason: String },
-    /// More pixels than a PNG should have.
-    #[error(
-        "a picture of {width} × {height} pixels is too large for a PNG; show fewer panels or rows"
-    )]
-    TooLarge { width: usize, height: usize },
-    /// The PNG encoder failed.
-    #[error("the PNG could not be encoded: {reason}")]
-    Png { reason: String },
 }

@@ -1,8 +1,8 @@
-//! Measures, wraps and rasterises text in the embedded fonts, so that no figure depends on the machine's fonts.
+//! Measures and wraps text in the embedded fonts, so that no figure depends on the machine's fonts.
 
 use std::collections::HashMap;
 
-use ab_glyph::{Font, FontRef, PxScale, point};
+use ab_glyph::{Font, FontRef};
 
 use super::model::FigureError;
 
@@ -157,37 +157,6 @@ impl Fonts {
             }
         }
         (vec![self.shorten(text, width, style)], style)
-    }
-
-    /// Calls `pixel(x, y, coverage)` for every pixel that a line of text covers, the start of its baseline at
-    /// `(x, y)`. A character that the fonts lack is an empty box.
-    pub fn rasterise(
-        &self,
-        text: &str,
-        style: Type,
-        (mut x, y): (f64, f64),
-        mut pixel: impl FnMut(i32, i32, f64),
-    ) {
-        let font = &self.face(style).font;
-        let scale = PxScale::from(
-            style.size as f32 * font.height_unscaled() / font.units_per_em().unwrap_or(1.0),
-        );
-        for character in text.chars() {
-            let glyph = font
-                .glyph_id(character)
-                .with_scale_and_position(scale, point(x as f32, y as f32));
-            if let Some(outline) = font.outline_glyph(glyph) {
-                let corner = outline.px_bounds().min;
-                outline.draw(|right, down, coverage| {
-                    pixel(
-                        corner.x as i32 + right as i32,
-                        corner.y as i32 + down as i32,
-                        f64::from(coverage),
-                    );
-                });
-            }
-            x += self.advance(character, style);
-        }
     }
 }
 

@@ -55,7 +55,6 @@ fn a_run_writes_rows_figures_and_provenance_and_prints_the_table() {
         "paper.csv",
         "table.csv",
         "table.svg",
-        "table.png",
         "provenance.toml",
     ] {
         assert!(results.join(name).is_file(), "{name}");
@@ -382,7 +381,7 @@ fn runs_that_the_clock_ends_leave_rows_among_the_timings_alone_and_checks_do_not
     let results = folder.path().join("results/clock");
     let mut names = names(&results);
     names.retain(|name| !name.starts_with('.'));
-    let timings = ["timing_report.txt", "timing_runs.csv", "timing_runs.png", "timing_runs.svg"];
+    let timings = ["timing_report.txt", "timing_runs.csv", "timing_runs.svg"];
     assert_eq!(names, [&["provenance.toml", "resolved.toml"][..], &timings].concat());
     let runs = results.join("timing_runs.csv");
     let seconds: f64 = rows(&runs)[0]["seconds"].parse().unwrap();

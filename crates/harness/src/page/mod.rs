@@ -102,7 +102,7 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
         .collect();
     let mut figures = Vec::new();
     for (file, name) in ending(".svg") {
-        let files = ["svg", "png", "csv"].map(|kind| format!("{name}.{kind}"));
+        let files = ["svg", "csv"].map(|kind| format!("{name}.{kind}"));
         let files = files
             .iter()
             .filter(|file| found.contains(*file))

@@ -41,11 +41,10 @@ impl Output {
         Self { heading, ..Self::default() }
     }
 
-    /// Writes the figures into the store's folder, as SVG and as PNG.
+    /// Writes the figures into the store's folder, as SVG.
     pub fn draw(&self, store: &Store) -> Result<(), Error> {
         for (name, figure) in &self.figures {
             store.write(&format!("{name}.svg"), figures::svg(figure)?.as_bytes())?;
-            store.write(&format!("{name}.png"), &figures::png(figure)?)?;
         }
         Ok(())
     }

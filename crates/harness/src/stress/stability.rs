@@ -236,7 +236,6 @@ impl Config {
         // Like the file of the other libraries: what is drawn depends on which are compiled in.
         let map = heat_map(&self::rows(store.folder())?.concat());
         store.write("timing_stability.svg", figures::svg(&map)?.as_bytes())?;
-        store.write("timing_stability.png", &figures::png(&map)?)?;
         Ok(output(store.folder())?.text())
     }
 
