@@ -1,0 +1,41 @@
+//! Everything that a release publishes has one version, and the oldest Rust is declared once.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// Returns the value of the first line of `file` that begins with `key`, without quotes.
+fn value(file: &str, key: &str) -> String {
+    let text = fs::read_to_string(root().join(file)).unwrap();
+    let line = text.lines().find_map(|line| line.strip_prefix(key));
+    let line = line.unwrap_or_else(|| panic!("{file} has no line that begins with `{key}`"));
+    line.trim().trim_matches('"').to_owned()
+}
+
+#[test]
+fn whatever_is_published_has_the_version_of_the_workspace() {
+    let version = value("Cargo.toml", "version = ");
+    for file in [
+        "crates/bvh-c/Cargo.toml",
+        "crates/bvh-python/Cargo.toml",
+        "crates/bvh-python/pyproject.toml",
+    ] {
+        assert_eq!(value(file, "version = "), version, "{file}");
+    }
+    assert_eq!(value("CITATION.cff", "version: "), version);
+    let workspace = fs::read_to_string(root().join("Cargo.toml")).unwrap();
+    for line in workspace.lines().filter(|line| line.contains("path = \"crates/bvh-")) {
+        assert!(line.contains(&format!("version = \"{version}\"")), "{line}");
+    }
+}
+
+#[test]
+fn the_bindings_need_no_newer_rust_than_the_workspace() {
+    let oldest = value("Cargo.toml", "rust-version = ");
+    for file in ["crates/bvh-c/Cargo.toml", "crates/bvh-python/Cargo.toml"] {
+        assert_eq!(value(file, "rust-version = "), oldest, "{file}");
+    }
+}
