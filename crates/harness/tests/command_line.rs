@@ -50,7 +50,7 @@ fn a_run_writes_rows_figures_and_provenance_and_prints_the_table() {
     let results = folder.path().join("results/spec");
     for name in [
         "runs.csv",
-        "history.csv",
+        "trial_costs.csv",
         "timing.csv",
         "paper.csv",
         "table.csv",

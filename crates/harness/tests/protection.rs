@@ -152,7 +152,7 @@ fn a_damaged_finished_run_is_named_and_done_again_or_refused() {
     let whole = reproducible(&at.join("whole/spec"));
     let damages: [fn(&Path); 3] = [
         |part| fs::remove_file(part.join("runs.csv")).unwrap(),
-        |part| fs::write(part.join("history.csv"), "").unwrap(),
+        |part| fs::write(part.join("timing.csv"), "").unwrap(),
         |part| {
             let rows = fs::read_to_string(part.join("runs.csv")).unwrap();
             fs::write(part.join("runs.csv"), rows.split_once('\n').unwrap().0.to_owned() + "\n")

@@ -27,9 +27,9 @@ bvh_config::config! { serde;
     check Self::check_names;
 }
 
-/// One point of a curve, as written to `timing_FILE.csv`, `FILE_evaluations.csv` and
+/// One corner of a curve, which is flat up to the next, or its end, as written to `timing_FILE.csv`, `FILE_evaluations.csv` and
 /// `FILE_work.csv`, where FILE is `anytime` unless the report says otherwise.
-#[derive(Serialize, JsonSchema)]
+#[derive(Clone, Copy, Serialize, JsonSchema)]
 pub(super) struct Point<'a> {
     scene: &'a str,
     method: &'a str,
@@ -37,6 +37,12 @@ pub(super) struct Point<'a> {
     gap_quartile_1: f64,
     gap_median: f64,
     gap_quartile_3: f64,
+}
+
+impl Point<'_> {
+    fn gaps(&self) -> [f64; 3] {
+        [self.gap_quartile_1, self.gap_median, self.gap_quartile_3]
+    }
 }
 
 /// Points per factor of ten along a curve.
@@ -62,7 +68,7 @@ impl Config {
                 panels.push(panel(rows.shown(scene), axis.axis(), Metric::Gap.axis(), layers));
             }
             output.add_figure(axis.file(&self.file), caption, self.panels_per_row, panels);
-            axis.add_csv(&mut output, &self.file, &points)?;
+            axis.add_csv(&mut output, &self.file, &corners(&points))?;
         }
         self.add_table(&mut output, rows);
         output.reading = self.reading(rows);
@@ -185,6 +191,20 @@ fn curve<'a>(scene: &'a str, method: &'a str, runs: &[Series], reference: f64) -
         Point { scene, method, x, gap_quartile_1, gap_median, gap_quartile_3 }
     };
     (0..=steps).map(place).map(point).collect()
+}
+
+/// The first and last points of every curve, and those that differ from the one before.
+fn corners<'a>(points: &[Point<'a>]) -> Vec<Point<'a>> {
+    let mut kept = Vec::new();
+    for curve in points.chunk_by(|a, b| (a.scene, a.method) == (b.scene, b.method)) {
+        for (index, point) in curve.iter().enumerate() {
+            let is_end = index == 0 || index + 1 == curve.len();
+            if is_end || point.gaps() != curve[index - 1].gaps() {
+                kept.push(*point);
+            }
+        }
+    }
+    kept
 }
 
 /// A staircase with its band, or a marker for a single point.

@@ -4,7 +4,8 @@ use crate::Error;
 use crate::measure::layout::{is_repeat, is_single};
 use crate::rows::{
     self, BoundRow, ClockRow, HistoryRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row,
-    RunRow, RunTestRow, TestRow, TestTimeRow, TimingRow, TraceRow, TraceTimeRow, VisitRow,
+    RunRow, RunTestRow, TestRow, TestTimeRow, TimingRow, TraceRow, TraceTimeRow, TrialRow,
+    VisitRow,
 };
 use crate::statistics::{median, minimum};
 use bvh_scenes::SceneKind;
@@ -15,8 +16,10 @@ use std::path::Path;
 pub struct Rows {
     /// Of `runs.csv`.
     pub runs: Vec<RunRow>,
-    /// Of `history.csv`.
+    /// Of `history.csv`; none if no report reads them.
     pub history: Vec<HistoryRow>,
+    /// Of `trial_costs.csv`; none if no report reads them.
+    pub trials: Vec<TrialRow>,
     /// Of `timing.csv`.
     pub timing: Vec<TimingRow>,
     /// Of `rays.csv`; none if rays were not asked for.
@@ -51,6 +54,7 @@ impl Rows {
         Ok(Self {
             runs: rows::read(&folder.join(RunRow::FILE))?,
             history: rows::read_if_any(folder)?,
+            trials: rows::read_if_any(folder)?,
             timing: rows::read_if_any(folder)?,
             rays: rows::read_if_any(folder)?,
             bounds: rows::read_if_any(folder)?,
@@ -142,10 +146,10 @@ impl Rows {
         minimum(self.seconds_of(scene, method))
     }
 
-    /// The histories of one method on one scene, one per repetition.
-    pub fn histories(&self, scene: &str, method: &str) -> Vec<Vec<&HistoryRow>> {
-        let own = |row: &&HistoryRow| row.scene == scene && row.method == method;
-        let rows: Vec<&HistoryRow> = self.history.iter().filter(own).collect();
+    /// The trials of one method on one scene, one list per repetition.
+    pub fn trials_of(&self, scene: &str, method: &str) -> Vec<Vec<&TrialRow>> {
+        let own = |row: &&TrialRow| row.scene == scene && row.method == method;
+        let rows: Vec<&TrialRow> = self.trials.iter().filter(own).collect();
         rows.chunk_by(|a, b| a.repetition == b.repetition)
             .map(<[_]>::to_vec)
             .collect()
@@ -153,7 +157,7 @@ impl Rows {
 
     /// The costs of all trials of one method on one scene, over all repetitions.
     pub fn trial_costs(&self, scene: &str, method: &str) -> Vec<f64> {
-        self.histories(scene, method)
+        self.trials_of(scene, method)
             .concat()
             .iter()
             .map(|row| row.cost)
@@ -163,13 +167,13 @@ impl Rows {
     /// The costs of one method's trials on one scene over base, one list per repetition, in order.
     pub fn trials_over_base(&self, scene: &str, method: &str) -> Vec<Vec<f64>> {
         let base = self.base_cost(scene);
-        let over_base = |history: Vec<&HistoryRow>| {
-            history
+        let over_base = |trials: Vec<&TrialRow>| {
+            trials
                 .iter()
                 .map(|row| ratio(row.cost, base))
                 .collect()
         };
-        self.histories(scene, method)
+        self.trials_of(scene, method)
             .into_iter()
             .map(over_base)
             .collect()

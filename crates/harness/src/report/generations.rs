@@ -2,7 +2,7 @@
 
 use super::paper::{PaperRow, Verdict, ratios};
 use super::prelude::*;
-use crate::rows::HistoryRow;
+use crate::rows::TrialRow;
 use crate::statistics::{expected_best_of, median, range};
 use bvh_config::{OutOfRange, above};
 use std::collections::BTreeMap;
@@ -48,13 +48,20 @@ pub(super) struct Generation<'a> {
     random_picking_cost: Option<f64>,
 }
 
-/// The histories of all runs on a scene, and the costs of random orders.
+/// The generations of all runs on a scene, and the costs of random orders.
 struct Runs<'a> {
     scene: &'a str,
-    runs: Vec<Vec<&'a HistoryRow>>,
+    runs: Vec<Vec<Progress>>,
     /// Which of them has the median final cost, the lower of two.
     middle: usize,
     random: Vec<f64>,
+}
+
+/// How far a run has come with one generation.
+struct Progress {
+    evaluations: u64,
+    /// The lowest cost so far.
+    incumbent: f64,
 }
 
 /// Where the runs on a scene end.
@@ -120,7 +127,11 @@ impl Config {
     }
 
     fn runs<'a>(&self, rows: &'a Rows, scene: &'a str) -> Option<Runs<'a>> {
-        let runs = rows.histories(scene, &self.method);
+        let runs: Vec<Vec<Progress>> = rows
+            .trials_of(scene, &self.method)
+            .iter()
+            .map(|run| progress(run))
+            .collect();
         let last = |run: usize| {
             runs[run]
                 .last()
@@ -180,6 +191,17 @@ impl Config {
     }
 }
 
+/// The incumbents of a run, generation by generation.
+fn progress(run: &[&TrialRow]) -> Vec<Progress> {
+    let mut incumbent = f64::INFINITY;
+    let mut generations = Vec::new();
+    for row in run {
+        incumbent = incumbent.min(row.cost);
+        generations.push(Progress { evaluations: row.evaluations, incumbent });
+    }
+    generations
+}
+
 /// The paper's costs are of other scenes and in no unit that it names, so that they are not drawn.
 fn draw(shown: &str, runs: usize, generations: &[Generation]) -> Panel {
     let at = |generation: &Generation| generation.generation as f64;
@@ -207,7 +229,7 @@ fn draw(shown: &str, runs: usize, generations: &[Generation]) -> Panel {
 
 impl<'a> Runs<'a> {
     fn generations(&self) -> Vec<Generation<'a>> {
-        let generation = |(generation, row): (usize, &&HistoryRow)| {
+        let generation = |(generation, row): (usize, &Progress)| {
             // A run that has ended keeps its best tree.
             let costs = self
                 .runs

@@ -163,6 +163,25 @@ impl Report {
         self.needs_references()
     }
 
+    /// The labels of the methods whose single trials the report reads; `history.csv` suffices for all others.
+    pub fn trial_methods(&self) -> Vec<&str> {
+        match self {
+            Self::Trials(config) => config
+                .methods
+                .iter()
+                .map(String::as_str)
+                .collect(),
+            Self::Distribution(config) => config
+                .methods
+                .iter()
+                .map(String::as_str)
+                .collect(),
+            Self::Generations(config) => vec![&config.method, &config.baseline],
+            Self::Table(config) => config.trial_methods(),
+            _ => vec![],
+        }
+    }
+
     /// Whether the report measures gaps.
     pub fn needs_references(&self) -> bool {
         use Report::{Anytime, Ecdf, Numbers, Profile, RunTimes, TimeToTarget};

@@ -94,6 +94,15 @@ impl Config {
         Ok(output)
     }
 
+    /// The labels of the methods of which some column shows the best of some trials.
+    pub(super) fn trial_methods(&self) -> Vec<&str> {
+        self.columns
+            .iter()
+            .filter(|column| column.best_of.is_some())
+            .map(|column| column.method.as_str())
+            .collect()
+    }
+
     fn cell<'a>(&'a self, rows: &'a Rows, scene: &'a str, column: &'a Column) -> Option<Cell<'a>> {
         let trials = rows.trials_over_base(scene, &column.method);
         let pool = trials.concat();

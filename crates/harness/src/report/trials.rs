@@ -264,7 +264,7 @@ fn answer(lists: &[(String, &str)], last: &[&Point], paper: &str) -> String {
 mod tests {
     use super::*;
     use crate::report::data::run;
-    use crate::rows::HistoryRow;
+    use crate::rows::TrialRow;
 
     /// Rows of two methods, each with the costs of its trials by repetition.
     fn rows(methods: [(&str, [[f64; 3]; 4]); 2]) -> Rows {
@@ -272,15 +272,12 @@ mod tests {
         for (method, repetitions) in methods {
             for (repetition, costs) in (0..).zip(repetitions) {
                 rows.runs.push(run(method, repetition, 3, 0));
-                rows.history.extend(costs.map(|cost| HistoryRow {
+                rows.trials.extend(costs.map(|cost| TrialRow {
                     scene: "s".into(),
                     method: method.into(),
-                    seed: 0,
                     repetition,
                     evaluations: 0,
-                    work: 0,
                     cost,
-                    incumbent: cost,
                 }));
             }
         }

@@ -64,20 +64,29 @@ rows! {
         depth: usize,
     }
 
-    /// One row of `history.csv`: one trial, generation or improvement of a run.
+    /// One row of `history.csv`: the first event of a run, an improvement, or the last event. The file is there if a report
+    /// reads it or the spec has no reports.
     HistoryRow in "history.csv" {
         scene: String,
         method: String,
-        seed: u64,
         repetition: u32,
         /// Trees or moves evaluated so far.
         evaluations: u64,
         /// Nodes made or visited so far.
         work: u64,
-        /// The objective's value found now.
-        cost: f64,
-        /// The lowest value so far.
+        /// The objective's lowest value so far.
         incumbent: f64,
+    }
+
+    /// One row of `trial_costs.csv`: one trial or generation of a run, of methods whose trials a report reads.
+    TrialRow in "trial_costs.csv" {
+        scene: String,
+        method: String,
+        repetition: u32,
+        /// Trees evaluated so far.
+        evaluations: u64,
+        /// The objective's value for this trial's tree, or for the best one of the generation.
+        cost: f64,
     }
 
     /// One row of `timing.csv`: how long a run took.
@@ -119,12 +128,12 @@ rows! {
         collapsed_sah: f64,
     }
 
-    /// One row of `timing_history.csv`: when the event of the same row of `history.csv` happened.
+    /// One row of `timing_history.csv`: the time of the event in the same row of `history.csv`.
     ClockRow in "timing_history.csv" {
         scene: String,
         method: String,
         repetition: u32,
-        /// Number of the event within its run, from 0.
+        /// Number of the row within its run, from 0.
         event: usize,
         /// Wall time since the run began.
         seconds: f64,
@@ -284,7 +293,7 @@ rows! {
         /// The fastest of them on this scene; empty for means.
         fastest: String,
         rays: String,
-        /// Our speed over the fastest of theirs; more than 1 is faster.
+        /// Our speed over the fastest of theirs, to six decimals like all ratios here; more than 1 is faster.
         ratio: f64,
         /// The least ratio of one turn.
         least_turn: f64,

@@ -96,11 +96,16 @@ pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     let text = read_text(&folder.join("resolved.toml"))?;
     let found: Option<Resolved> = toml::from_str(&text).ok();
     let resolved = found.filter(|found| found.has_runs_of(experiment));
-    let Some(Resolved { scenes, .. }) = resolved else {
+    let Some(Resolved { experiment: old, scenes }) = resolved else {
         return Err(refuse(
             "the rows come from another spec, scene or seed; run it again without --redraw",
         ));
     };
+    if !old.keeps_rows_for(&experiment.reports) {
+        return Err(refuse(
+            "a new report reads trials or times of events, which were not kept; run it again without --redraw",
+        ));
+    }
     let resolved = Resolved { experiment: experiment.clone(), scenes };
     let store = Store::open(&folder, &text, Existing::Keep)?;
     // The rows stay those of the program that produced them, so its provenance is kept.

@@ -86,9 +86,10 @@ pub(crate) fn perform(
     }
     finished.add(&[run])?;
     finished.add(&solved.history_rows())?;
+    finished.add(&solved.trial_rows())?;
     finished.add(&[solved.timing_row()])?;
     finished.add(&solved.ray_rows())?;
-    finished.add(&solved.clock_rows(stopwatch.seconds()))?;
+    finished.add(&solved.clock_rows(&stopwatch.seconds()))?;
     finished.add(bounds.as_slice())?;
     finished.add(&renders)?;
     finished.add(&render_times)?;

@@ -3,8 +3,7 @@
 use super::job::Job;
 use crate::measure::empirical_cost;
 use crate::measure::layout::collapsed_sah;
-use crate::report::Report;
-use crate::rows::{ClockRow, ClockedRow, HistoryRow, RayRow, RunRow, TimingRow};
+use crate::rows::{ClockRow, ClockedRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow};
 use crate::spec::Experiment;
 use bvh_core::cost::{self, SahConstants};
 use bvh_scenes::rays::Family;
@@ -54,22 +53,35 @@ impl Solved<'_> {
         }
     }
 
+    /// Returns the first event, every improvement and the last event, if a report reads them.
     pub fn history_rows(&self) -> Vec<HistoryRow> {
-        let row = |event: &Event| {
-            let Event { evaluations, work, cost, incumbent } = *event;
+        let mut rows = Vec::new();
+        if !self.experiment.keeps_history() {
+            return rows;
+        }
+        for (_, event) in milestones(&self.outcome.history) {
+            let Event { evaluations, work, incumbent, .. } = *event;
             let (scene, method, repetition) = self.identity();
-            HistoryRow {
-                scene,
-                method,
-                seed: self.seed,
-                repetition,
-                evaluations,
-                work,
-                cost,
-                incumbent,
-            }
-        };
-        self.outcome.history.iter().map(row).collect()
+            rows.push(HistoryRow { scene, method, repetition, evaluations, work, incumbent });
+        }
+        rows
+    }
+
+    /// Returns the costs of all trials, if a report reads them.
+    pub fn trial_rows(&self) -> Vec<TrialRow> {
+        let mut rows = Vec::new();
+        if !self
+            .experiment
+            .keeps_trials_of(&self.job.labelled.label)
+        {
+            return rows;
+        }
+        for event in &self.outcome.history {
+            let Event { evaluations, cost, .. } = *event;
+            let (scene, method, repetition) = self.identity();
+            rows.push(TrialRow { scene, method, repetition, evaluations, cost });
+        }
+        rows
     }
 
     pub fn timing_row(&self) -> TimingRow {
@@ -96,25 +108,17 @@ impl Solved<'_> {
         }
     }
 
-    /// When each event happened, if a report asks for it; `event_seconds` are these times.
-    pub fn clock_rows(&self, event_seconds: Vec<f64>) -> Vec<ClockRow> {
-        if !self
-            .experiment
-            .reports
-            .iter()
-            .any(Report::needs_clock)
-        {
-            return vec![];
+    /// Returns the time of every row of the history, if a report needs it; `event_seconds` are the times of all events.
+    pub fn clock_rows(&self, event_seconds: &[f64]) -> Vec<ClockRow> {
+        let mut rows = Vec::new();
+        if !self.experiment.keeps_clock() {
+            return rows;
         }
-        let row = |(event, seconds)| {
+        for (event, (index, _)) in milestones(&self.outcome.history).enumerate() {
             let (scene, method, repetition) = self.identity();
-            ClockRow { scene, method, repetition, event, seconds }
-        };
-        event_seconds
-            .into_iter()
-            .enumerate()
-            .map(row)
-            .collect()
+            rows.push(ClockRow { scene, method, repetition, event, seconds: event_seconds[index] });
+        }
+        rows
     }
 
     pub fn ray_rows(&self) -> Vec<RayRow> {
@@ -144,5 +148,38 @@ impl Solved<'_> {
             empirical_cost::measure(config, scene, &self.outcome.tree, ray_seed, named)
         };
         experiment.rays.iter().map(row).collect()
+    }
+}
+
+/// The events that `history.csv` keeps, each with its index: the first, every improvement, and the last.
+fn milestones(history: &[Event]) -> impl Iterator<Item = (usize, &Event)> {
+    history
+        .iter()
+        .enumerate()
+        .filter(|&(index, event)| {
+            let is_end = index == 0 || index + 1 == history.len();
+            is_end || event.incumbent < history[index - 1].incumbent
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_history_keeps_the_first_event_every_improvement_and_the_last() {
+        let incumbents = [9.0, 9.0, 7.0, 7.0, 6.0, 6.0, 6.0];
+        let history = incumbents.map(|incumbent| Event {
+            evaluations: 1,
+            work: 1,
+            cost: incumbent,
+            incumbent,
+        });
+        let kept: Vec<usize> = milestones(&history)
+            .map(|(index, _)| index)
+            .collect();
+        assert_eq!(kept, [0, 2, 4, 6]);
+        assert_eq!(milestones(&history[..1]).count(), 1);
+        assert_eq!(milestones(&[]).count(), 0);
     }
 }

@@ -119,6 +119,37 @@ impl Experiment {
         objects <= exact::MOST_OBJECTS && self.reports.iter().any(Report::needs_references)
     }
 
+    /// Whether a run of the method with this label keeps the cost of every trial: if a report reads them.
+    pub fn keeps_trials_of(&self, label: &str) -> bool {
+        self.reports
+            .iter()
+            .any(|report| report.trial_methods().contains(&label))
+    }
+
+    /// Whether runs keep their improvements: if a report reads them, or if there is none that says what is read.
+    pub fn keeps_history(&self) -> bool {
+        self.reports.is_empty() || self.keeps_clock()
+    }
+
+    /// Whether runs keep the times of their improvements: if a report reads them.
+    pub fn keeps_clock(&self) -> bool {
+        self.reports.iter().any(Report::needs_clock)
+    }
+
+    /// Whether the rows of this experiment suffice for other reports.
+    pub fn keeps_rows_for(&self, reports: &[Report]) -> bool {
+        let lacks_trials = |report: &Report| {
+            report
+                .trial_methods()
+                .iter()
+                .any(|label| !self.keeps_trials_of(label))
+        };
+        let lacks_clock = |report: &Report| report.needs_clock() && !self.keeps_clock();
+        !reports
+            .iter()
+            .any(|report| lacks_trials(report) || lacks_clock(report))
+    }
+
     /// The limits of a method's runs.
     pub fn budget_of(&self, labelled: &Labelled) -> Budget {
         let own = labelled.own.budget.unwrap_or(Budget::UNLIMITED);
