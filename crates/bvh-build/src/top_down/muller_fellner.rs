@@ -25,7 +25,8 @@ bvh_config::config! {
     pub struct Config {
         /// The cost of a split. The default is the original's.
         heuristic: Heuristic = Heuristic::AreaTimesCount, in Itself;
-        /// Whether axes that order a node's objects identically are scanned once. Changes no tree.
+        /// Whether axes that order a node's objects identically are scanned once. Greedy trees stay the
+        /// same; candidate lists of GRASP lose their duplicates, which may change its trees.
         skip_same_order: bool = true;
         /// Whether an axis along which the objects came in order is not sorted again. Changes no tree.
         skip_sorted: bool = true;
