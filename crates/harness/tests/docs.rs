@@ -1,8 +1,8 @@
-//! Every number in the README and in `docs/` that can come from a committed CSV does. Tables have their query in a comment, and
-//! numbers in running prose theirs in `docs/numbers.toml`; `UPDATE_DOCS=1 cargo test -p harness --test docs` writes the values.
+//! Every number in the README and in `docs/` that can come from a committed CSV does. Tables have
+//! their query in a comment, numbers in running prose in `docs/numbers.toml`, which the test
+//! `numbers` reads. `UPDATE_DOCS=1 cargo test -p harness --test docs` writes the tables.
 //!
 //! ```text
-//! <!-- value QUERY -->0.988<!-- end -->
 //! <!-- pivot QUERY -->
 //! (a Markdown table)
 //! <!-- end -->
@@ -14,19 +14,17 @@ mod support;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
-use support::query::{pivot, rows, value};
+use support::query::{pivot, rows};
 use support::{assert_current, experiments, top};
 
-/// The text with every value and table as the committed results have it.
+/// The beginning of a table's comment.
+const OPENING: &str = "<!-- pivot ";
+
+/// Returns the text with every table as the committed results have it.
 fn renewed(text: &str) -> String {
     let mut out = String::new();
     let mut rest = text;
-    while let Some(start) = rest
-        .find("<!-- value ")
-        .into_iter()
-        .chain(rest.find("<!-- pivot "))
-        .min()
-    {
+    while let Some(start) = rest.find(OPENING) {
         let open = start
             + rest[start..]
                 .find(" -->")
@@ -36,32 +34,27 @@ fn renewed(text: &str) -> String {
             + rest[open..]
                 .find("<!-- end -->")
                 .unwrap_or_else(|| panic!("no end: {}", &rest[start..open]));
-        let directive = &rest[start + 5..open - 4];
-        let fields: Vec<&str> = directive[6..].split(" | ").collect();
+        // A long query goes on in the next line.
+        let words: Vec<&str> = rest[start + OPENING.len()..open - 4]
+            .split_whitespace()
+            .collect();
+        let query = words.join(" ");
+        let fields: Vec<&str> = query.split(" | ").collect();
+        let [file, conditions, axes, what, format] = fields[..] else { panic!("{query}") };
         out.push_str(&rest[..open]);
-        match fields[..] {
-            [_, _, _, _] => out.push_str(&value(&directive[6..])),
-            [file, conditions, axes, what, format] => {
-                out.push_str(&format!(
-                    "\n{}\n",
-                    pivot(&rows(file, conditions), axes, what, format)
-                ));
-            }
-            _ => panic!("{directive}"),
-        }
+        out.push_str(&format!("\n{}\n", pivot(&rows(file, conditions), axes, what, format)));
         rest = &rest[close..];
     }
     out + rest
 }
 
-/// The README and every page of `docs/` and `results/`.
+/// The pages at the top, of `docs/`, and of `results/`.
 fn pages() -> Vec<PathBuf> {
-    let mut pages = vec![top().join("README.md"), top().join("results/README.md")];
-    pages.extend(
-        fs::read_dir(top().join("docs"))
-            .unwrap()
-            .map(|entry| entry.unwrap().path()),
-    );
+    let mut pages = vec![top().join("results/README.md")];
+    for folder in [top(), top().join("docs")] {
+        let entries = fs::read_dir(folder).unwrap();
+        pages.extend(entries.map(|entry| entry.unwrap().path()));
+    }
     pages.retain(|page| {
         page.extension()
             .is_some_and(|extension| extension == "md")
@@ -74,6 +67,29 @@ fn pages() -> Vec<PathBuf> {
 fn the_documentation_shows_the_committed_numbers() {
     for page in pages() {
         assert_current(&page, &renewed(&fs::read_to_string(&page).unwrap()), "docs");
+    }
+}
+
+/// The greatest width of a line of prose, in characters.
+const WIDTH: usize = 100;
+
+#[test]
+fn the_prose_of_the_documentation_is_wrapped() {
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        let is_generated = page.ends_with("KEYS.md") || page.ends_with("COLUMNS.md");
+        let mut is_example = false;
+        for (number, line) in text.lines().enumerate() {
+            is_example ^= line.starts_with("```");
+            let is_free = is_generated
+                || is_example
+                || ["|", "!["]
+                    .iter()
+                    .any(|start| line.starts_with(start));
+            let width = line.chars().count();
+            let place = format!("{}:{}", page.display(), number + 1);
+            assert!(is_free || width <= WIDTH, "{place}: {width} characters; accepted: {WIDTH}");
+        }
     }
 }
 
