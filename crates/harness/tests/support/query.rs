@@ -238,7 +238,10 @@ pub fn pivot(rows: &[Row], axes: &str, what: &str, format: &str) -> String {
             .zip(&names)
             .map(|(column, name)| escape(&heading(column, name)))
             .collect();
-        let cells: Vec<String> = columns.iter().map(cell).collect();
+        let cells: Vec<String> = columns
+            .iter()
+            .map(|column| escape(&cell(column)))
+            .collect();
         lines.push(format!("| {}{note} | {} |", names.join(" | "), cells.join(" | ")));
     }
     lines.join("\n")
