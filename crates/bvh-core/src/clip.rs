@@ -19,6 +19,7 @@
 //! region is.
 
 use crate::aabb::round_down;
+use crate::polygon::{Plane, Polygon};
 use crate::{Aabb, Primitives, Triangle};
 use core::fmt::Debug;
 use glam::{DVec3, Vec3};
@@ -95,23 +96,20 @@ fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
     let error = DVec3::splat(f64::from(largest) * (slack * (64.0 * f64::EPSILON)));
     let low = region.min.as_dvec3() - error;
     let high = region.max.as_dvec3() + error;
-    // Each of six cuts adds at most one corner.
-    let mut corners = [DVec3::ZERO; 9];
-    let mut len = 3;
-    corners[..3].copy_from_slice(&triangle.0.map(Vec3::as_dvec3));
+    let mut polygon = Polygon::new(triangle.0.map(Vec3::as_dvec3));
     for axis in 0..3 {
         // Planes that miss the triangle cut nothing off.
         if full.min[axis] < region.min[axis] {
-            len = cut(&mut corners, len, axis, low[axis], 1.0);
+            polygon = cut(&polygon, Plane { axis, position: low[axis], side: 1.0 });
         }
         if full.max[axis] > region.max[axis] {
-            len = cut(&mut corners, len, axis, high[axis], -1.0);
+            polygon = cut(&polygon, Plane { axis, position: high[axis], side: -1.0 });
         }
     }
-    if len == 0 {
+    let kept = polygon.corners();
+    if kept.is_empty() {
         return Aabb::EMPTY;
     }
-    let kept = &corners[..len];
     let min = kept
         .iter()
         .fold(DVec3::INFINITY, |min, corner| min.min(*corner))
@@ -127,34 +125,13 @@ fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
     part.intersection(&common)
 }
 
-/// Keeps the part of a convex polygon on one side of a plane across `axis`: the upper side if
-/// `side` is 1, the lower side if it is −1. Returns the number of corners that are left.
+/// Cuts a polygon, and puts the new corners exactly on the plane.
 #[inline]
-fn cut(corners: &mut [DVec3; 9], len: usize, axis: usize, plane: f64, side: f64) -> usize {
-    let polygon = *corners;
-    let mut kept = 0;
-    // A convex polygon has room for all its corners. `get_mut` instead of an index, because
-    // rounding could make the polygon slightly concave.
-    let mut add = |corner: DVec3| {
-        if let Some(place) = corners.get_mut(kept) {
-            *place = corner;
-            kept += 1;
-        }
-    };
-    for (index, &to) in polygon[..len].iter().enumerate() {
-        let from = polygon[if index == 0 { len - 1 } else { index - 1 }];
-        let [before, after] = [from, to].map(|corner| side * (corner[axis] - plane));
-        if (before < 0.0) != (after < 0.0) {
-            let mut corner = from + (to - from) * (before / (before - after));
-            // Exactly on the plane, whatever the rounding of the line above.
-            corner[axis] = plane;
-            add(corner);
-        }
-        if after >= 0.0 {
-            add(to);
-        }
-    }
-    kept
+fn cut(polygon: &Polygon, plane: Plane) -> Polygon {
+    polygon.cut(plane, |mut corner| {
+        corner[plane.axis] = plane.position;
+        corner
+    })
 }
 
 #[cfg(test)]
@@ -189,7 +166,10 @@ mod tests {
     proptest! {
         #[test]
         fn a_part_holds_every_point_of_the_triangle_in_the_region(
-            corners in [point(), point(), point()], region in region(), weights in prop::array::uniform3(0.0f64..1.0)) {
+            corners in [point(), point(), point()],
+            region in region(),
+            weights in prop::array::uniform3(0.0f64..1.0),
+        ) {
             let triangles = scene(corners);
             let part = triangles.as_slice().clip(0, &region);
             let tight = triangles.as_slice().clip_tightly(0, &region);
@@ -205,7 +185,11 @@ mod tests {
 
         #[test]
         fn parts_of_smaller_regions_are_smaller(
-            corners in [point(), point(), point()], outer in region(), cut in coordinate(), axis in 0usize..3) {
+            corners in [point(), point(), point()],
+            outer in region(),
+            cut in coordinate(),
+            axis in 0usize..3,
+        ) {
             let triangles = scene(corners);
             let mut inner = outer;
             inner.max[axis] = cut.clamp(outer.min[axis], outer.max[axis]);

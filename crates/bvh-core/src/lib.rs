@@ -20,6 +20,7 @@ mod layout_cost;
 mod mesh;
 mod overlap;
 mod packed;
+mod polygon;
 mod primitives;
 pub mod query;
 mod ray;

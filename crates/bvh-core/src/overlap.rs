@@ -1,58 +1,63 @@
-//! End-point overlap: the surface that a node's box holds and the node does not.
+//! End-point overlap: the surface inside a node's box that does not belong to the node.
 
 use crate::cost::{SahConstants, Sum};
+use crate::polygon::{Plane, Polygon};
 use crate::{Aabb, Bvh, NodeKind, Triangle};
 use alloc::vec::Vec;
 use core::ops::Range;
-use glam::DVec3;
 
-/// The end-point overlap, EPO = Σ over nodes of C(node) · A((S \ Q(node)) ∩ box(node)) / A(S), where S is the surface
-/// of all triangles, Q(node) that of the triangles below the node, and C the traversal constant for an inner node, the
-/// intersection constant times the number of objects for a leaf. Dimensionless multiple of the constants' unit: the
-/// expected cost of nodes that a ray enters although it ends on a surface elsewhere. Together with the surface area
-/// heuristic it predicts times better than that alone.
+/// Computes the end-point overlap, EPO = Σ over nodes of C(node) · A((S \ Q(node)) ∩ box(node)) /
+/// A(S). S is the surface of all triangles, Q(node) is the surface of the triangles below the node,
+/// and C is the traversal constant for an inner node, and the intersection constant times the number
+/// of objects for a leaf.
 ///
-/// Areas are of triangles clipped against boxes, in f64, by Sutherland & Hodgman's algorithm, plane by plane: exact but
-/// for rounding. Boxes are closed: a triangle within a face of a box counts. 0 by definition for triangles without
-/// area.
+/// The result is the expected cost, in the constants' unit, of nodes that a ray enters although it
+/// ends on a surface elsewhere. Together with the surface area heuristic it predicts times better
+/// than the heuristic alone.
 ///
-/// Time: O(Σ over triangles of the nodes whose boxes they meet), some n log n on common scenes and n² at most; memory
-/// O(n).
+/// Triangles are clipped against boxes in f64, so that areas are exact except for rounding. Boxes are
+/// closed: a triangle within a face of a box counts. Triangles without area have the overlap 0 by
+/// definition.
 ///
-/// Source: Aila, Karras & Laine 2013, 'On quality metrics of bounding volume hierarchies', section 4.2. Differs from
-/// the paper: constants 1 and 1 by default, there 1.2 and 1.
+/// Takes O(Σ over triangles of the nodes whose boxes they meet) time, which is about n log n on common
+/// scenes and n² at most, and O(n) memory.
+///
+/// Source: Aila, Karras & Laine 2013, 'On quality metrics of bounding volume hierarchies', section
+/// 4.2. Differs from the paper: both constants are 1 by default; the paper has 1.2 and 1.
 ///
 /// # Panics
-/// May panic on a tree that [`validate`](crate::validate()) refuses for the triangles' boxes.
+/// May panic on a tree that [`validate`](crate::validate()) rejects for the triangles' boxes.
 pub fn end_point_overlap(tree: &Bvh, triangles: &[Triangle], constants: &SahConstants) -> f64 {
     let parts = EndPointOverlap::new(tree, triangles, constants);
     let mut sum = Overlap::default();
-    (0..parts.count()).for_each(|number| sum.add(&parts.part(number)));
+    for number in 0..parts.count() {
+        sum.add(&parts.part(number));
+    }
     sum.value()
 }
 
 /// The [`end_point_overlap`] in parts, which can be computed in any order or in parallel.
 ///
-/// Added in their order, they give the same bits as the whole.
+/// The sum of the parts in their order has the same bits as the result of [`end_point_overlap`].
 #[derive(Clone, Debug)]
 pub struct EndPointOverlap<'a> {
     tree: &'a Bvh,
     triangles: &'a [Triangle],
     constants: SahConstants,
-    /// Per node, the range of the object ids below it, by their positions from the first leaf to the last.
+    /// For each node, the range of the object ids below it, counted from the first leaf to the last.
     below: Vec<Range<u32>>,
     /// Pairs of an object and one of its positions, sorted.
     positions: Vec<(u32, u32)>,
-    /// Every object once, neighbours in the tree next to each other, with the range of its `positions`.
+    /// Every object once, with the range of its `positions`. Neighbours in the tree are adjacent.
     objects: Vec<(u32, Range<u32>)>,
 }
 
-/// What some triangles contribute to the end-point overlap.
+/// The contribution of some triangles to the end-point overlap.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Overlap {
-    /// Their area.
+    /// The triangles' area.
     surface: Sum,
-    /// Their area in nodes that they do not belong to, times the costs of these nodes.
+    /// The triangles' area in foreign nodes, times the costs of these nodes.
     weighted: Sum,
 }
 
@@ -63,7 +68,7 @@ impl Overlap {
         self.weighted.add_sum(&other.weighted);
     }
 
-    /// The end-point overlap if all triangles have contributed.
+    /// Returns the end-point overlap if all triangles have contributed.
     pub fn value(&self) -> f64 {
         let surface = self.surface.value();
         if surface > 0.0 { self.weighted.value() / surface } else { 0.0 }
@@ -71,13 +76,13 @@ impl Overlap {
 }
 
 impl<'a> EndPointOverlap<'a> {
-    /// Triangles per part.
+    /// The number of triangles per part.
     const PART: usize = 4096;
 
     /// Prepares the parts. O(nodes + n log n).
     ///
     /// # Panics
-    /// May panic on a tree that [`validate`](crate::validate()) refuses for the triangles' boxes.
+    /// May panic on a tree that [`validate`](crate::validate()) rejects for the triangles' boxes.
     pub fn new(tree: &'a Bvh, triangles: &'a [Triangle], constants: &SahConstants) -> Self {
         let mut below = alloc::vec![0..0; tree.nodes.len()];
         let mut positions = Vec::with_capacity(tree.prim_ids.len());
@@ -87,49 +92,48 @@ impl<'a> EndPointOverlap<'a> {
             .map(|_| (0, false))
             .into_iter()
             .collect();
-        while let Some((at, children_done)) = stack.pop() {
-            let node = &tree.nodes[at];
+        // A node is on the stack twice: before its children, and again when they are done.
+        while let Some((index, children_done)) = stack.pop() {
+            let node = &tree.nodes[index];
             if children_done {
-                below[at].end = positions.len() as u32;
+                below[index].end = positions.len() as u32;
                 continue;
             }
-            below[at].start = positions.len() as u32;
+            below[index].start = positions.len() as u32;
             for &object in &tree.prim_ids[node.prims()] {
                 positions.push((object, positions.len() as u32));
             }
-            stack.push((at, true));
+            stack.push((index, true));
             stack.extend(node.children().rev().map(|child| (child, false)));
         }
         positions.sort_unstable();
         let mut objects: Vec<(u32, Range<u32>)> = Vec::with_capacity(triangles.len());
-        for (at, &(object, _)) in (0..).zip(&positions) {
-            match objects
-                .last_mut()
-                .filter(|(last, _)| *last == object)
-            {
-                Some((_, range)) => range.end = at + 1,
-                None => objects.push((object, at..at + 1)),
+        for (index, &(object, _)) in (0..).zip(&positions) {
+            match objects.last_mut() {
+                Some((last, range)) if *last == object => range.end = index + 1,
+                _ => objects.push((object, index..index + 1)),
             }
         }
+        // Objects in the order of the leaves visit the same nodes one after the other.
         objects.sort_unstable_by_key(|(_, range)| positions[range.start as usize].1);
         Self { tree, triangles, constants: *constants, below, positions, objects }
     }
 
-    /// Number of parts.
+    /// Returns the number of parts.
     pub fn count(&self) -> usize {
         self.objects.len().div_ceil(Self::PART)
     }
 
-    /// The contribution of the triangles of one part.
+    /// Returns the contribution of the triangles of one part.
     ///
     /// # Panics
-    /// If there is no part of this number.
+    /// Panics if `number` is not below [`count`](Self::count).
     pub fn part(&self, number: usize) -> Overlap {
         let mut sum = Overlap::default();
         let mut open = Vec::new();
         let start = number * Self::PART;
-        for (object, positions) in &self.objects[start..self.objects.len().min(start + Self::PART)]
-        {
+        let end = self.objects.len().min(start + Self::PART);
+        for (object, positions) in &self.objects[start..end] {
             let positions = &self.positions[positions.start as usize..positions.end as usize];
             self.visit(&self.triangles[*object as usize], positions, &mut open, &mut sum);
         }
@@ -155,9 +159,9 @@ impl<'a> EndPointOverlap<'a> {
                 .iter()
                 .any(|(_, position)| self.below[index].contains(position));
             if !is_above {
-                let inside = polygon.area_inside(&node.aabb, &aabb, area);
+                let inside = area_inside(&polygon, &node.aabb, &aabb, area);
                 if inside == 0.0 {
-                    // Nor is anything with an area inside a box below.
+                    // The boxes of all descendants are inside this box, and contain no area either.
                     continue;
                 }
                 let cost = match node.kind() {
@@ -166,85 +170,33 @@ impl<'a> EndPointOverlap<'a> {
                 };
                 sum.weighted.add(inside * cost);
             }
-            let meets = |child: &usize| {
-                let child = &self.tree.nodes[*child].aabb;
+            open.extend(node.children().filter(|&child| {
+                let child = &self.tree.nodes[child].aabb;
                 !(child.min.cmpgt(aabb.max) | child.max.cmplt(aabb.min)).any()
-            };
-            open.extend(node.children().filter(meets));
+            }));
         }
     }
 }
 
-/// A convex planar polygon: a triangle cut by up to six planes, each of which adds one corner at most.
-#[derive(Clone, Copy)]
-struct Polygon {
-    corners: [DVec3; 9],
-    len: usize,
-}
-
-impl Polygon {
-    fn new([a, b, c]: [DVec3; 3]) -> Self {
-        let mut corners = [DVec3::ZERO; 9];
-        corners[..3].copy_from_slice(&[a, b, c]);
-        Self { corners, len: 3 }
-    }
-
-    /// The area, whole, not half.
-    fn area(&self) -> f64 {
-        let fan = self.corners[..self.len].windows(2).skip(1);
-        let doubled: DVec3 = fan
-            .map(|pair| (pair[0] - self.corners[0]).cross(pair[1] - self.corners[0]))
-            .sum();
-        libm::sqrt(doubled.length_squared()) / 2.0
-    }
-
-    /// The area inside a box, if `area` is that of the whole and `own` is the box around it. Planes that do not cut it are skipped,
-    /// which changes no bit.
-    fn area_inside(&self, aabb: &Aabb, own: &Aabb, area: f64) -> f64 {
-        let mut part: Option<Self> = None;
-        for axis in 0..3 {
-            if own.min[axis] < aabb.min[axis] {
-                let min = f64::from(aabb.min[axis]);
-                part = Some(
-                    part.as_ref()
-                        .unwrap_or(self)
-                        .cut(|p| p[axis] - min),
-                );
-            }
-            if own.max[axis] > aabb.max[axis] {
-                let max = f64::from(aabb.max[axis]);
-                part = Some(
-                    part.as_ref()
-                        .unwrap_or(self)
-                        .cut(|p| max - p[axis]),
-                );
-            }
+/// Returns the area of a polygon inside a box. `bounds` is the box around the polygon, and `area` is
+/// its whole area.
+fn area_inside(polygon: &Polygon, aabb: &Aabb, bounds: &Aabb, area: f64) -> f64 {
+    let mut part = *polygon;
+    let mut is_cut = false;
+    for axis in 0..3 {
+        // Planes that do not cut the polygon are skipped, which changes no bit.
+        if bounds.min[axis] < aabb.min[axis] {
+            let position = f64::from(aabb.min[axis]);
+            part = part.cut(Plane { axis, position, side: 1.0 }, |corner| corner);
+            is_cut = true;
         }
-        part.map_or(area, |part| part.area())
-    }
-
-    /// The part where `height` is not negative.
-    #[inline(always)]
-    fn cut(&self, height: impl Fn(DVec3) -> f64) -> Self {
-        let mut kept = Self { len: 0, corners: [DVec3::ZERO; 9] };
-        let mut keep = |corner| {
-            kept.corners[kept.len] = corner;
-            kept.len += 1;
-        };
-        for at in 0..self.len {
-            let from = self.corners[at];
-            let to = self.corners[(at + 1) % self.len];
-            let low = height(from);
-            let high = height(to);
-            if low >= 0.0 {
-                keep(from);
-            }
-            if (low < 0.0) != (high < 0.0) && low != 0.0 && high != 0.0 {
-                keep(from + (to - from) * (low / (low - high)));
-            }
+        if bounds.max[axis] > aabb.max[axis] {
+            let position = f64::from(aabb.max[axis]);
+            part = part.cut(Plane { axis, position, side: -1.0 }, |corner| corner);
+            is_cut = true;
         }
-        kept
     }
+    if is_cut { part.area() } else { area }
 }
 
 #[cfg(test)]
@@ -252,8 +204,10 @@ mod tests {
     use super::*;
     use crate::Node;
     use alloc::vec;
+    use glam::DVec3;
 
-    /// Two unit right triangles side by side in the plane z = 0, the second moved by `x`, each in a leaf of its own.
+    /// Returns two right triangles with legs of length 1 in the plane z = 0, the second moved by `x`, and
+    /// a tree with one leaf for each.
     fn pair(x: f32) -> (Vec<Triangle>, Bvh) {
         let triangle = |x: f32| Triangle::from([[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x, 1.0, 0.0]]);
         let triangles = vec![triangle(0.0), triangle(x)];
@@ -263,21 +217,14 @@ mod tests {
     }
 
     #[test]
-    fn overlap_is_what_the_hand_computes() {
-        let overlap = |x| {
+    fn the_overlap_of_two_triangles_equals_the_result_by_hand() {
+        let constants = SahConstants { traversal: 1.0, intersection: 2.0 };
+        // At 0.5 the first box contains the second triangle without its corner, 1/2 − 1/8, and the
+        // second box contains 1/8 of the first triangle. At 0 each box contains both triangles.
+        for (x, expected) in [(2.0, 0.0), (0.5, 2.0 * (0.375 + 0.125) / 1.0), (0.0, 2.0)] {
             let (triangles, tree) = pair(x);
-            end_point_overlap(
-                &tree,
-                &triangles,
-                &SahConstants { traversal: 1.0, intersection: 2.0 },
-            )
-        };
-        assert_eq!(overlap(2.0), 0.0);
-        // Half of the first one's box holds the second without its corner, 1/2 − 1/8; the second's holds 1/8 of the
-        // first.
-        assert_eq!(overlap(0.5), 2.0 * (0.375 + 0.125) / 1.0);
-        // Each holds the other.
-        assert_eq!(overlap(0.0), 2.0);
+            assert_eq!(end_point_overlap(&tree, &triangles, &constants), expected, "{x}");
+        }
     }
 
     #[test]
@@ -285,12 +232,12 @@ mod tests {
         let corners =
             [DVec3::new(-0.3, 0.1, 2.2), DVec3::new(4.1, 3.3, -0.4), DVec3::new(1.0, 3.9, 3.7)];
         let whole = Polygon::new(corners);
-        let own = Triangle(corners.map(|corner| corner.as_vec3())).aabb();
+        let bounds = Triangle(corners.map(|corner| corner.as_vec3())).aabb();
         let mut sum = 0.0;
         for cell in 0..6 * 6 * 6u8 {
             let min = [cell % 6, cell / 6 % 6, cell / 36].map(|i| f32::from(i) - 1.0);
             let cell = Aabb::from([min, min.map(|x| x + 1.0)]);
-            sum += whole.area_inside(&cell, &own, whole.area());
+            sum += area_inside(&whole, &cell, &bounds, whole.area());
         }
         assert!((sum - whole.area()).abs() < 1e-12 * whole.area(), "{sum} {}", whole.area());
     }
@@ -302,7 +249,9 @@ mod tests {
         let tree = Bvh { nodes: vec![Node::leaf(root, 0, 2)], prim_ids: vec![0, 1] };
         assert_eq!(end_point_overlap(&tree, &triangles, &SahConstants::default()), 0.0);
         let (mut triangles, tree) = pair(0.5);
-        triangles.iter_mut().for_each(|t| t.0[2] = t.0[1]);
+        for triangle in &mut triangles {
+            triangle.0[2] = triangle.0[1];
+        }
         assert_eq!(end_point_overlap(&tree, &triangles, &SahConstants::default()), 0.0);
         assert_eq!(end_point_overlap(&Bvh::default(), &[], &SahConstants::default()), 0.0);
     }

@@ -1,0 +1,115 @@
+//! Parts of triangles: convex planar polygons, cut by planes across the axes (Sutherland & Hodgman
+//! 1974).
+
+use glam::DVec3;
+
+/// A triangle cut by up to six planes. Each cut of a convex polygon adds at most one corner.
+#[derive(Clone, Copy)]
+pub(crate) struct Polygon {
+    corners: [DVec3; 9],
+    len: usize,
+}
+
+/// A plane across an axis. The part above it is kept if `side` is 1, the part below it if `side` is
+/// −1.
+#[derive(Clone, Copy)]
+pub(crate) struct Plane {
+    pub axis: usize,
+    pub position: f64,
+    pub side: f64,
+}
+
+impl Plane {
+    #[inline(always)]
+    fn height(&self, point: DVec3) -> f64 {
+        self.side * (point[self.axis] - self.position)
+    }
+}
+
+impl Polygon {
+    /// Creates a polygon with the corners of a triangle.
+    #[inline]
+    pub fn new([a, b, c]: [DVec3; 3]) -> Self {
+        let mut corners = [DVec3::ZERO; 9];
+        corners[..3].copy_from_slice(&[a, b, c]);
+        Self { corners, len: 3 }
+    }
+
+    #[inline]
+    pub fn corners(&self) -> &[DVec3] {
+        &self.corners[..self.len]
+    }
+
+    /// Returns the whole area, not half of it.
+    pub fn area(&self) -> f64 {
+        let fan = self.corners().windows(2).skip(1);
+        let doubled: DVec3 = fan
+            .map(|pair| (pair[0] - self.corners[0]).cross(pair[1] - self.corners[0]))
+            .sum();
+        libm::sqrt(doubled.length_squared()) / 2.0
+    }
+
+    /// Returns the part on the kept side of a plane. `crossing` receives each new corner, and may
+    /// correct its rounding errors.
+    ///
+    /// Rounding can make a polygon slightly concave, and a plane could then add more corners than
+    /// there is room for. The result is in that case the polygon without this cut: too large by
+    /// rounding errors, but never too small.
+    #[inline(always)]
+    pub fn cut(&self, plane: Plane, crossing: impl Fn(DVec3) -> DVec3) -> Self {
+        let mut kept = Self { corners: [DVec3::ZERO; 9], len: 0 };
+        for (index, &from) in self.corners().iter().enumerate() {
+            let next = if index + 1 == self.len { 0 } else { index + 1 };
+            let to = self.corners[next];
+            let before = plane.height(from);
+            let after = plane.height(to);
+            if before >= 0.0 && !kept.add(from) {
+                return *self;
+            }
+            // A corner in the plane is kept above, and would be its own crossing.
+            let crosses = (before < 0.0) != (after < 0.0) && before != 0.0 && after != 0.0;
+            if crosses && !kept.add(crossing(from + (to - from) * (before / (before - after)))) {
+                return *self;
+            }
+        }
+        kept
+    }
+
+    /// Adds a corner. Returns false if there is no room.
+    #[inline(always)]
+    fn add(&mut self, corner: DVec3) -> bool {
+        let Some(place) = self.corners.get_mut(self.len) else { return false };
+        *place = corner;
+        self.len += 1;
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cut_without_room_for_its_corners_drops_none() {
+        // Rounding never makes a polygon as concave as this zigzag, which crosses the plane at every
+        // edge but one.
+        let mut zigzag = Polygon { corners: [DVec3::ZERO; 9], len: 9 };
+        for (index, corner) in zigzag.corners.iter_mut().enumerate() {
+            let height = if index % 2 == 0 { 1.0 } else { -1.0 };
+            *corner = DVec3::new(index as f64, height, 0.0);
+        }
+        let plane = Plane { axis: 1, position: 0.0, side: 1.0 };
+        assert_eq!(zigzag.cut(plane, |corner| corner).corners(), zigzag.corners());
+    }
+
+    #[test]
+    fn a_corner_in_the_plane_is_kept_once() {
+        let triangle = Polygon::new([DVec3::ZERO, DVec3::X, DVec3::Y]);
+        let upper = Plane { axis: 0, position: 0.0, side: 1.0 };
+        let lower = Plane { side: -1.0, ..upper };
+        assert_eq!(triangle.cut(upper, |corner| corner).corners(), triangle.corners());
+        assert_eq!(triangle.cut(lower, |corner| corner).corners(), [DVec3::ZERO, DVec3::Y]);
+        let middle = Plane { position: 0.25, ..upper };
+        assert_eq!(triangle.cut(middle, |corner| corner).area(), 0.28125);
+    }
+}
