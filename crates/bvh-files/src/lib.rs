@@ -1,6 +1,7 @@
-//! Files of trees and of results: read only where they are regular, replaced whole or not at all.
+//! Reads regular files only, and replaces files as a whole or not at all.
 //!
-//! The one place in which programs and bindings touch files, so that the libraries of trees, builders and searches do no input or output.
+//! Programs and bindings touch files only through this crate. The libraries of trees, builders and
+//! searches do no input or output.
 
 mod read;
 mod replace;

@@ -1,33 +1,34 @@
-//! Whole files, or why there is none: nothing is read that might never end.
+//! Reads regular files completely. Pipes and devices, which might never end, are rejected.
 
 use std::io;
 use std::path::{Path, PathBuf};
 use std::str::Utf8Error;
 use thiserror::Error;
 
-/// Why a file could not be read.
+/// The reason why a file cannot be read.
 #[derive(Debug, Error)]
-#[allow(missing_docs, reason = "each message says what its fields are")]
+#[allow(missing_docs, reason = "each message describes its fields")]
 pub enum ReadError {
-    /// Nothing at this path.
+    /// The path does not exist.
     #[error("{}: no such file", .path.display())]
     NotFound { path: PathBuf },
-    /// A folder at this path.
+    /// The path is a folder.
     #[error("{}: a folder; accepted: a file", .path.display())]
     Folder { path: PathBuf },
-    /// A device, pipe or socket at this path, which might never end.
+    /// The path is a device, pipe or socket, which might never end.
     #[error("{}: not a regular file; accepted: a file", .path.display())]
     NotRegular { path: PathBuf },
-    /// A file of text that is not UTF-8.
+    /// The text is not UTF-8.
     #[error("{}: {source}; accepted: UTF-8", .path.display())]
     NotUtf8 { path: PathBuf, source: Utf8Error },
-    /// The file exists and could not be read.
+    /// The file exists, but the system cannot read it.
     #[error("{} could not be read: {source}", .path.display())]
     Failed { path: PathBuf, source: io::Error },
 }
 
 impl ReadError {
-    /// The kind of error that the operating system would report, by which bindings choose an exception.
+    /// Returns the kind of error that the operating system would report. Bindings choose their exception
+    /// by it.
     pub fn kind(&self) -> io::ErrorKind {
         match self {
             Self::NotFound { .. } => io::ErrorKind::NotFound,
@@ -38,7 +39,7 @@ impl ReadError {
         }
     }
 
-    /// Whether another path would mend it, as opposed to a fault of the system.
+    /// Returns whether the path is at fault and not the system.
     pub fn is_of_the_path(&self) -> bool {
         !matches!(self, Self::Failed { .. })
     }
@@ -52,14 +53,14 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
     })
 }
 
-/// Returns the bytes of the regular file at `path`. Anything else is rejected unread: a pipe could keep the program waiting for
-/// ever, and a device need not end.
+/// Returns the bytes of the regular file at `path`. Rejects anything else unread, because a pipe could
+/// block the program and a device might never end.
 pub fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
     regular(path)?;
     std::fs::read(path).map_err(|source| failed(path, source))
 }
 
-/// The number of bytes of the regular file at `path`.
+/// Returns the number of bytes of the regular file at `path`.
 pub(crate) fn regular(path: &Path) -> Result<u64, ReadError> {
     let file = std::fs::metadata(path).map_err(|source| failed(path, source))?;
     match file.is_file() {
@@ -83,7 +84,7 @@ mod tests {
     use crate::tree_file;
 
     #[test]
-    fn what_is_no_file_is_rejected_unread() {
+    fn folders_devices_and_missing_files_are_rejected_unread() {
         let folder = tempfile::tempdir().unwrap();
         let missing = folder.path().join("x");
         assert!(matches!(read(folder.path()), Err(ReadError::Folder { .. })));

@@ -1,4 +1,4 @@
-//! Replaces files whole: what is new is written beside the old file, synced, and renamed.
+//! Replaces files as a whole: the new file is written next to the old one, synced, and renamed.
 
 use std::fs::{self, File};
 use std::io::{self, Seek, Write};
@@ -13,7 +13,7 @@ pub struct WriteError {
     pub path: PathBuf,
     /// The operation, after 'cannot'.
     pub action: &'static str,
-    /// Why it failed.
+    /// The system's error.
     pub source: io::Error,
 }
 
@@ -23,21 +23,20 @@ impl WriteError {
     }
 }
 
-/// Replaces the file at `path` by `bytes`: at any moment it is the old file or the whole new one.
+/// Replaces the contents of the file at `path` by `bytes`. At any moment the file is the old one or the
+/// complete new one.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     Reserved::new(path, 0)?.write(bytes)
 }
 
-/// How the names of files end that are not finished yet. Such a file is locked by its writer.
+/// The suffix of unfinished files. The writer of such a file has locked it.
 const UNFINISHED: &str = ".unfinished";
 
-/// Removes the unfinished files of writers that were killed: those that nobody has locked.
+/// Removes the unfinished files of killed writers, which no process has locked.
 fn remove_leftovers(folder: &Path, prefix: &str) {
-    for entry in fs::read_dir(folder)
-        .into_iter()
-        .flatten()
-        .flatten()
-    {
+    // A leftover does no harm, so failures are ignored.
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
         let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
         if !(is_file && name.starts_with(prefix) && name.ends_with(UNFINISHED)) {
@@ -45,22 +44,23 @@ fn remove_leftovers(folder: &Path, prefix: &str) {
         }
         let Ok(leftover) = File::open(entry.path()) else { continue };
         if leftover.try_lock().is_ok() {
-            // Removed under the lock: see `create_locked`.
+            // The lock must still be held here; `create_locked` explains why.
             let _ = fs::remove_file(entry.path());
         }
     }
 }
 
-/// A new file that no other writer removes, by `create`, which makes one under a name that there was not.
+/// Creates a file that no other writer removes; `create` makes a file with an unused name.
 ///
-/// Between its creation and its lock another writer may take the file for a leftover. That writer removes it under the lock, so that
-/// whoever has the lock afterwards knows: where the name is gone, so is the file, and where it is still there, nobody removes it.
+/// Between the creation and the lock another writer may mistake the file for a leftover. That writer
+/// removes the file while it holds the lock. After this writer gets the lock, it can therefore rely on
+/// the name: if the name is gone, so is the file; if it exists, no writer will remove it.
 fn create_locked(
     mut create: impl FnMut() -> io::Result<NamedTempFile>,
 ) -> io::Result<NamedTempFile> {
     loop {
         let file = create()?;
-        // Where files cannot be locked, nobody removes any.
+        // On a file system without locks no writer removes any file.
         let _ = file.as_file().lock();
         if file.path().exists() {
             return Ok(file);
@@ -68,12 +68,12 @@ fn create_locked(
     }
 }
 
-/// Bytes of a reserved file written at a time. In large pieces, because the kernel caches large writes in large pages,
-/// which it maps faster than many small ones.
+/// The number of bytes of a reserved file that are written at a time. The kernel caches large writes in
+/// large pages, which it maps faster than many small ones.
 const PIECE: usize = 1 << 21;
 
-/// A file to be written later whose space on the disk is taken now: a search of hours learns at its beginning, not at
-/// its end, that its result cannot be kept. Leaves nothing behind if it is dropped unwritten.
+/// A file whose space on the disk is reserved before its contents exist. A search of hours thus learns at
+/// its beginning and not at its end that its result cannot be saved. Dropping it leaves no file behind.
 #[derive(Debug)]
 pub struct Reserved {
     path: PathBuf,
@@ -81,9 +81,9 @@ pub struct Reserved {
 }
 
 impl Reserved {
-    /// Takes `bytes` bytes in a file of another name beside `path`.
+    /// Reserves `bytes` bytes in a file with a temporary name next to `path`.
     pub fn new(path: &Path, bytes: usize) -> Result<Self, WriteError> {
-        // A link stays, and its target is replaced.
+        // Renaming onto a symbolic link would replace the link instead of its target.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let name = path
             .file_name()
@@ -100,45 +100,52 @@ impl Reserved {
         let prefix = format!("{}.", name.to_string_lossy());
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(UNFINISHED);
-        // The permissions of any new file, within the user's mask.
+        // Temporary files are private by default; this one becomes an ordinary file.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let mut unfinished = create_locked(|| builder.tempfile_in(folder))
             .map_err(WriteError::of(&path, "write the file: cannot create a file there"))?;
         remove_leftovers(folder, &prefix);
+        // Written zeros reserve space on every file system; a mere length may be a hole.
         let zeros = vec![0; bytes.min(PIECE)];
         (0..bytes)
             .step_by(PIECE)
-            .try_for_each(|at| unfinished.write_all(&zeros[..zeros.len().min(bytes - at)]))
+            .map(|start| zeros.len().min(bytes - start))
+            .try_for_each(|length| unfinished.write_all(&zeros[..length]))
             .and_then(|()| if bytes > 0 { unfinished.as_file().sync_all() } else { Ok(()) })
             .map_err(WriteError::of(&path, "reserve the file's space"))?;
         Ok(Self { path, unfinished })
     }
 
-    /// Writes the bytes, synced, and renames: at any moment there is the old file or the whole new one.
+    /// Writes the bytes, syncs the file, and renames it. At any moment the file at the path is the old one
+    /// or the complete new one.
     pub fn write(self, bytes: &[u8]) -> Result<(), WriteError> {
         let Self { path, mut unfinished } = self;
-        // Somebody else may have removed the file during hours of search.
+        // The user may have removed the file during hours of search.
         if !unfinished.path().exists() {
             unfinished = Self::new(&path, 0)?.unfinished;
         }
-        let write = |file: &mut File| {
-            file.rewind()?;
-            file.write_all(bytes)?;
-            file.set_len(bytes.len() as u64)?;
-            file.sync_all()
-        };
-        write(unfinished.as_file_mut()).map_err(WriteError::of(&path, "write the file"))?;
+        overwrite(unfinished.as_file_mut(), bytes)
+            .map_err(WriteError::of(&path, "write the file"))?;
         let folder = path.parent().map(Path::to_owned);
         unfinished
             .persist(&path)
-            .map_err(|refused| WriteError::of(&path, "replace the file")(refused.error))?;
-        // Where folders can be synced, the new name outlasts a loss of power, too; the file is safe in any case.
+            .map_err(|failed| WriteError::of(&path, "replace the file")(failed.error))?;
+        // Syncing the folder makes the new name outlast a loss of power. Where that is impossible, the old
+        // file may come back, complete.
         if let Some(folder) = folder.and_then(|folder| File::open(folder).ok()) {
             let _ = folder.sync_all();
         }
         Ok(())
     }
+}
+
+fn overwrite(file: &mut File, bytes: &[u8]) -> io::Result<()> {
+    file.rewind()?;
+    file.write_all(bytes)?;
+    // The reserved space may be larger than the contents.
+    file.set_len(bytes.len() as u64)?;
+    file.sync_all()
 }
 
 #[cfg(test)]
@@ -150,16 +157,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.bvh");
         fs::write(&path, "old").unwrap();
-        let names = || fs::read_dir(folder.path()).unwrap().count();
         let reserved = Reserved::new(&path, 1000).unwrap();
-        assert_eq!((fs::read(&path).unwrap(), names()), (b"old".to_vec(), 2));
+        assert_eq!((fs::read(&path).unwrap(), count(&folder)), (b"old".to_vec(), 2));
         drop(reserved);
-        assert_eq!((fs::read(&path).unwrap(), names()), (b"old".to_vec(), 1));
-        Reserved::new(&path, 1000)
-            .unwrap()
-            .write(b"new")
-            .unwrap();
-        assert_eq!((fs::read(&path).unwrap(), names()), (b"new".to_vec(), 1));
+        assert_eq!((fs::read(&path).unwrap(), count(&folder)), (b"old".to_vec(), 1));
+        let reserved = Reserved::new(&path, 1000).unwrap();
+        reserved.write(b"new").unwrap();
+        assert_eq!((fs::read(&path).unwrap(), count(&folder)), (b"new".to_vec(), 1));
+    }
+
+    fn count(folder: &tempfile::TempDir) -> usize {
+        fs::read_dir(folder.path()).unwrap().count()
     }
 
     #[test]
@@ -171,30 +179,22 @@ mod tests {
             fs::write(folder.path().join(name), "").unwrap();
         }
         write(&path, b"first").unwrap();
-        assert!(
-            !folder
-                .path()
-                .join("x.bvh.abc.unfinished")
-                .exists()
-        );
+        let leftover = folder.path().join("x.bvh.abc.unfinished");
+        assert!(!leftover.exists());
         reserved.write(b"second").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"second");
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+        assert_eq!(count(&folder), 3);
     }
 
     #[test]
-    fn a_file_that_another_writer_removes_before_it_is_locked_is_created_anew() {
+    fn a_file_that_another_writer_removes_before_the_lock_is_created_again() {
         let folder = tempfile::tempdir().unwrap();
-        let create = || {
-            tempfile::Builder::new()
-                .prefix("x.")
-                .suffix(UNFINISHED)
-                .tempfile_in(folder.path())
-        };
+        let mut builder = tempfile::Builder::new();
+        builder.prefix("x.").suffix(UNFINISHED);
         let mut times = 0;
         let file = create_locked(|| {
             times += 1;
-            let file = create();
+            let file = builder.tempfile_in(folder.path());
             if times == 1 {
                 remove_leftovers(folder.path(), "x.");
             }
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reserved_file_that_somebody_removes_is_written_all_the_same() {
+    fn a_reserved_file_that_the_user_removes_is_written_nevertheless() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.bvh");
         let reserved = Reserved::new(&path, 1000).unwrap();
@@ -221,21 +221,19 @@ mod tests {
         const TIMES: usize = 200;
         let folder = tempfile::tempdir().unwrap();
         let path = &folder.path().join("x.bvh");
-        let write_often =
-            |writer: usize| (0..TIMES).try_for_each(|_| write(path, &[writer as u8; 100]));
-        let results: Vec<Result<(), WriteError>> = std::thread::scope(|scope| {
-            let threads: Vec<_> = (0..WRITERS)
-                .map(|writer| scope.spawn(move || write_often(writer)))
-                .collect();
-            threads
-                .into_iter()
-                .map(|thread| thread.join().unwrap())
-                .collect()
+        // The scope joins the threads and panics if one of them has.
+        std::thread::scope(|scope| {
+            for writer in 0..WRITERS {
+                scope.spawn(move || {
+                    for _ in 0..TIMES {
+                        write(path, &[writer as u8; 100]).unwrap();
+                    }
+                });
+            }
         });
-        assert!(results.iter().all(Result::is_ok), "{results:?}");
         let bytes = fs::read(path).unwrap();
         assert!(bytes.len() == 100 && bytes.iter().all(|byte| *byte == bytes[0]), "{bytes:?}");
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert_eq!(count(&folder), 1);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Tree files: read whole, opened by name.
+//! Reads and opens tree files, whose errors name the file.
 
 use crate::ReadError;
 use crate::read::regular;
@@ -7,18 +7,18 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// Why a file gave no tree.
+/// The reason why a file gave no tree.
 #[derive(Debug, thiserror::Error)]
 pub enum TreeFileError {
-    /// There is no file, or it cannot be read.
+    /// The file does not exist or cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The file is damaged, or for another scene.
+    /// The file is damaged or belongs to a different scene.
     #[error("{}: {source}", .path.display())]
     Invalid {
         /// The file.
         path: PathBuf,
-        /// Why it is rejected.
+        /// The fault of its contents.
         source: FileError,
     },
 }
@@ -30,8 +30,8 @@ impl TreeFileError {
     }
 }
 
-/// Returns the bytes of the tree file at `path`. Rejects a file by its header, before it reads the rest, where the header is none of a
-/// tree file or asks for another length.
+/// Returns the bytes of the tree file at `path`. If the header is invalid or does not match the file's
+/// length, rejects the file before it reads the rest.
 pub fn read(path: &Path) -> Result<Vec<u8>, TreeFileError> {
     let length = regular(path)?;
     let failed = |source| ReadError::Failed { path: path.to_owned(), source };
@@ -43,6 +43,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, TreeFileError> {
         .map_err(failed)?;
     Header::of_file(&bytes, length).map_err(TreeFileError::of(path))?;
     let rest = length.saturating_sub(bytes.len() as u64);
+    // An intact file may still be larger than the memory, which is an error and no abort.
     bytes
         .try_reserve_exact(rest as usize)
         .map_err(|_| failed(io::ErrorKind::OutOfMemory.into()))?;
@@ -72,17 +73,17 @@ mod tests {
     }
 
     #[test]
-    fn a_tree_file_is_read_whole() {
+    fn a_tree_file_is_read_completely() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.bvh");
         fs::write(&path, tree()).unwrap();
         assert_eq!(read(&path).unwrap(), tree());
     }
 
-    // Where files have holes, so that this one takes no space.
+    // Linux stores holes of files, so that this file needs no space on the disk.
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_file_of_64_gigabytes_is_refused_by_its_header() {
+    fn a_file_of_64_gigabytes_is_rejected_by_its_header() {
         let length = 64 << 30;
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("huge.bvh");
@@ -91,17 +92,12 @@ mod tests {
             (tree(), FileError::Length { found: length, expected: tree().len() as u64 }),
         ] {
             fs::write(&path, beginning).unwrap();
-            File::options()
-                .write(true)
-                .open(&path)
-                .unwrap()
-                .set_len(length)
-                .unwrap();
-            let refused = read(&path);
-            assert!(
-                matches!(&refused, Err(TreeFileError::Invalid { source, .. }) if *source == expected),
-                "{refused:?}"
-            );
+            let file = File::options().write(true).open(&path).unwrap();
+            file.set_len(length).unwrap();
+            let Err(TreeFileError::Invalid { source, .. }) = read(&path) else {
+                panic!("no fault of the contents")
+            };
+            assert_eq!(source, expected);
         }
     }
 }
