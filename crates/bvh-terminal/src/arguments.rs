@@ -1,20 +1,21 @@
-//! Arguments that several commands have, and the refusal of paths of the wrong kind before any work.
+//! Arguments of several commands, and the check of paths before any work.
 
 use crate::Error;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// How many threads the program uses.
+/// The limit on the program's threads.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
 pub struct Jobs {
-    /// Number of threads, by default one per processor. Changes no result but times and what a budget of time buys.
+    /// Number of threads; the default is one per processor. It changes only times, and the results of
+    /// budgets of time.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
 }
 
 impl Jobs {
-    /// Limits the program to this number of threads; to be called once.
+    /// Limits the program to this number of threads. Call it once.
     pub fn apply(self) -> Result<(), Error> {
         let Some(jobs) = self.jobs else { return Ok(()) };
         rayon::ThreadPoolBuilder::new()
@@ -24,97 +25,93 @@ impl Jobs {
     }
 }
 
-fn refuse(flag: &str, path: &Path, found: &str, accepted: &str) -> Result<(), Error> {
+fn reject(flag: &str, path: &Path, found: &str, accepted: &str) -> Result<(), Error> {
     Err(Error::Usage(format!("{flag}: {} is {found}; accepted: {accepted}", path.display())))
 }
 
 /// A kind of files that a command writes.
 #[derive(Clone, Copy, Debug)]
 pub struct FileKind {
-    /// Its name in messages, with an article.
+    /// The name in messages, with an article.
     pub name: &'static str,
-    /// The bytes with which every file of this kind begins.
+    /// The first bytes of every file of this kind.
     pub beginning: &'static [u8],
-    /// How their names end.
+    /// The extension of their names.
     pub extension: &'static str,
 }
 
-/// A file to be written: a new one, or one of the same kind to be replaced. Anything else stays: folders, devices, and
-/// files that somebody needs otherwise, such as the command's own input.
+/// Checks the path of a file to write: a new file, or a file of the same kind, which is replaced. Rejects
+/// folders, devices and files of other kinds, such as the command's own input.
 pub fn output_file(flag: &str, path: &Path, kind: &FileKind) -> Result<(), Error> {
     let accepted = "the path of a file to write";
     if path.as_os_str().is_empty() {
-        return refuse(flag, path, "empty", accepted);
+        return reject(flag, path, "empty", accepted);
     }
     match std::fs::metadata(path) {
         Err(_) if !folder_of(path).is_dir() => {
-            refuse(flag, folder_of(path), "no folder", "a path in a folder that is there")
+            reject(flag, folder_of(path), "no folder", "a path in a folder that is there")
         }
         Err(_) => match path.extension() {
-            // A file under the name of another kind would be taken for one.
-            Some(found) if !found.eq_ignore_ascii_case(kind.extension) => {
+            // Users would mistake the new file for a file of the other kind.
+            Some(extension) if !extension.eq_ignore_ascii_case(kind.extension) => {
+                let found = format!("a name that ends with `.{}`", extension.display());
                 let accepted = format!(
                     "{}, by a name that ends with `.{}` or has no ending",
                     kind.name, kind.extension
                 );
-                refuse(
-                    flag,
-                    path,
-                    &format!("a name that ends with `.{}`", found.display()),
-                    &accepted,
-                )
+                reject(flag, path, &found, &accepted)
             }
             _ => Ok(()),
         },
-        Ok(found) if found.is_dir() => refuse(flag, path, "a folder", accepted),
-        Ok(found) if !found.is_file() => refuse(flag, path, "not a regular file", accepted),
+        Ok(found) if found.is_dir() => reject(flag, path, "a folder", accepted),
+        Ok(found) if !found.is_file() => reject(flag, path, "not a regular file", accepted),
         Ok(_) => {
             let mut beginning = Vec::new();
-            let length = kind.beginning.len() as u64;
-            let file =
-                File::open(path).and_then(|file| file.take(length).read_to_end(&mut beginning));
-            file.map_err(Error::io(path, "read the file"))?;
+            File::open(path)
+                .map(|file| file.take(kind.beginning.len() as u64))
+                .and_then(|mut file| file.read_to_end(&mut beginning))
+                .map_err(Error::io(path, "read the file"))?;
+            // An empty file has nothing to lose; `mktemp` makes one.
             if beginning.is_empty() || beginning == kind.beginning {
                 return Ok(());
             }
-            refuse(
-                flag,
-                path,
-                &format!("a file, but not {}", kind.name),
-                "a new file, or one of that kind",
-            )
+            let found = format!("a file, but not {}", kind.name);
+            reject(flag, path, &found, "a new file, or one of that kind")
         }
     }
 }
 
-/// The folder that a file is in.
+/// Returns the folder of a file.
 fn folder_of(path: &Path) -> &Path {
     path.parent()
         .filter(|folder| !folder.as_os_str().is_empty())
         .unwrap_or(Path::new("."))
 }
 
-/// A folder to be written into: one that is there, or can be made because nothing on the way to it is a file.
+/// Checks the path of a folder to write into: an existing folder, or one that can be created because no
+/// part of its path is a file.
 pub fn output_folder(flag: &str, path: &Path) -> Result<(), Error> {
     if path.as_os_str().is_empty() {
-        return refuse(flag, path, "empty", "the path of a folder");
+        return reject(flag, path, "empty", "the path of a folder");
     }
     match path.ancestors().find(|above| above.exists()) {
-        Some(above) if !above.is_dir() => refuse(flag, above, "a file", "the path of a folder"),
+        Some(above) if !above.is_dir() => reject(flag, above, "a file", "the path of a folder"),
         _ => Ok(()),
     }
 }
 
-/// A folder to be read.
+/// Checks the path of a folder to read.
 pub fn input_folder(flag: &str, path: &Path) -> Result<(), Error> {
-    if path.is_dir() { Ok(()) } else { refuse(flag, path, "no folder", "a folder that is there") }
+    if path.is_dir() { Ok(()) } else { reject(flag, path, "no folder", "a folder that is there") }
 }
 
-/// A file to be read.
+/// Checks the path of a file to read.
 pub fn input_file(flag: &str, path: &Path) -> Result<(), Error> {
-    match path {
-        _ if path.is_dir() => refuse(flag, path, "a folder", "a file that is there"),
-        _ if path.exists() => Ok(()),
-        _ => Err(Error::Usage(format!("{flag}: {}: no such file", path.display()))),
+    if path.is_dir() {
+        return reject(flag, path, "a folder", "a file that is there");
     }
+    if !path.exists() {
+        return Err(Error::Usage(format!("{flag}: {}: no such file", path.display())));
+    }
+    Ok(())
 }

@@ -1,4 +1,4 @@
-//! The failures at a program's edge.
+//! The failures at a program's interface.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 /// A failure of an argument, a file or a folder.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A command line that asks for something that cannot be done.
+    /// The command line has an invalid value.
     #[error("{0}")]
     Usage(String),
-    /// A file or folder that could not be read or written.
+    /// A file or folder cannot be read or written.
     #[error("{}: cannot {action}: {source}", .path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
         /// The operation, after 'cannot'.
         action: &'static str,
-        /// Why it failed.
+        /// The system's error.
         source: io::Error,
     },
 }

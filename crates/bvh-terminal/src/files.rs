@@ -1,4 +1,4 @@
-//! Files that are replaced whole, by `bvh_files`, and folders.
+//! Files that `bvh_files` replaces as a whole, and folders.
 
 use crate::Error;
 pub use bvh_files::{Reserved, WriteError, write};
@@ -9,21 +9,21 @@ use std::path::Path;
 
 /// Writes a new file and waits until it is on the disk.
 pub fn write_synced(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let write = |path: &Path| {
-        let mut file = File::create(path)?;
-        file.write_all(bytes)?;
-        file.sync_all()
-    };
-    write(path).map_err(Error::io(path, "write the file"))
+    create_synced(path, bytes).map_err(Error::io(path, "write the file"))
 }
 
-/// The names of what a folder holds.
+fn create_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = File::create(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
+/// Returns the names of a folder's entries.
 pub fn names(folder: &Path) -> Result<BTreeSet<String>, Error> {
-    let entries = fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))?;
-    let name =
-        |entry: io::Result<fs::DirEntry>| Ok(entry?.file_name().to_string_lossy().into_owned());
-    entries
-        .map(name)
-        .collect::<io::Result<_>>()
-        .map_err(Error::io(folder, "read the folder"))
+    let mut names = BTreeSet::new();
+    for entry in fs::read_dir(folder).map_err(Error::io(folder, "read the folder"))? {
+        let entry = entry.map_err(Error::io(folder, "read the folder"))?;
+        names.insert(entry.file_name().to_string_lossy().into_owned());
+    }
+    Ok(names)
 }

@@ -1,29 +1,30 @@
-//! Ctrl-C and SIGTERM: the first one ends a command in order, soon; the second one at once.
+//! Ctrl-C and SIGTERM. The first signal lets a command end in order; the second ends it at once.
 
 use crate::output::print_error;
 use std::process::exit;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
 
-/// Set by the first signal.
+/// True after the first signal.
 pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// Set while what was found so far is not on the disk yet, so that the command must be waited for.
+/// True while the result is not on the disk yet, so that the command must not be ended by force.
 static HELD: AtomicBool = AtomicBool::new(false);
 
 /// The exit code after a signal.
 const CODE: u8 = 130;
 
-/// How long a command has to end in order. After that it is ended: at no moment does this damage a file or lose a
-/// finished run.
+/// The time that a command has to end in order. The end by force after that time damages no file and
+/// loses no finished run.
 const GRACE: Duration = Duration::from_millis(800);
 
-/// Begins to listen to signals. Prints `message` where the first one ends the program by force.
+/// Begins to listen to signals. Prints `message` if the program is ended by force.
 pub fn listen(message: &'static str) {
     let handler = ctrlc::set_handler(move || {
         if INTERRUPTED.swap(true, Relaxed) {
             exit(CODE.into());
         }
+        // The handler must return at once, so that a second signal is heard.
         std::thread::spawn(move || {
             std::thread::sleep(GRACE);
             if !HELD.load(Relaxed) {
@@ -37,12 +38,12 @@ pub fn listen(message: &'static str) {
     }
 }
 
-/// Returns whether the command must be waited for.
+/// Returns whether the first signal leaves the command running until it ends in order.
 pub fn holds() -> bool {
     HELD.load(Relaxed)
 }
 
-/// From now on the first signal never ends the program by force, because its result is kept at the end.
+/// Forbids the end by force after the first signal, because the command saves its result at the end.
 pub fn hold() {
     HELD.store(true, Relaxed);
 }

@@ -1,5 +1,5 @@
-//! The edge of the programs: arguments that several commands have, lines for the terminal, signals, and files that are
-//! replaced whole.
+//! The interface of the programs to their users: arguments of several commands, lines for the terminal,
+//! signals, and files that are replaced as a whole.
 
 pub mod arguments;
 mod error;

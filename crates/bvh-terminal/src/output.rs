@@ -1,20 +1,20 @@
-//! Writes to the terminal, and remembers whether that failed.
+//! Writes to the terminal, and records failures.
 
 use std::borrow::Cow;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// Set as soon as something could not be written to standard output.
+/// True after a failed write to standard output.
 pub static STDOUT_FAILED: AtomicBool = AtomicBool::new(false);
 
-/// Prints text to standard output, and ends the line. A reader that closes the pipe early, as `head` does, is no error,
-/// because the results are in files.
+/// Prints text to standard output, and ends the line. A reader that closes the pipe early, like `head`,
+/// causes no error, because the results are in files.
 pub fn print_line(text: &str) {
     print_bytes(format!("{}\n", plain(text.trim_end())).as_bytes());
 }
 
-/// As [`print_line`], for a file of ours that another program is to read.
+/// Prints the contents of a generated file for another program, with the errors of [`print_line`].
 pub fn print_bytes(bytes: &[u8]) {
     let mut out = std::io::stdout();
     let written = out.write_all(bytes).and_then(|()| out.flush());
@@ -25,10 +25,12 @@ pub fn print_bytes(bytes: &[u8]) {
 
 /// Prints a line to standard error.
 pub fn print_error(line: &str) {
+    // Without standard error there is no place to report the failure.
     let _ = writeln!(std::io::stderr(), "{}", plain(line));
 }
 
-/// Returns the exit code of a command that did what it was asked for: a failure, and a message, if some of its output was lost.
+/// Returns the exit code of a command that has succeeded. If output was lost, prints a message and
+/// returns a failure.
 pub fn succeeded() -> ExitCode {
     if STDOUT_FAILED.load(Relaxed) {
         print_error("error: some of the output could not be written to standard output");
@@ -37,7 +39,7 @@ pub fn succeeded() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// Prints what arguments are answered with, help and version or what is wrong with them. Returns the exit code.
+/// Prints the parser's answer to the arguments: help, version, or their fault. Returns the exit code.
 pub fn answered(answer: &clap::Error) -> ExitCode {
     const USAGE: u8 = 2;
     let text = answer.render().to_string();
@@ -49,25 +51,31 @@ pub fn answered(answer: &clap::Error) -> ExitCode {
     succeeded()
 }
 
-/// The text with control characters spelled out, but for the ends of lines: names of files and keys of specs are the
-/// user's, and must not command the terminal.
+/// Escapes control characters except ends of lines. Names of files and keys of specs come from the user
+/// and must not control the terminal.
 fn plain(text: &str) -> Cow<'_, str> {
-    let commands = |c: char| c.is_control() && c != '\n';
-    if !text.contains(commands) {
+    if !text.contains(is_command) {
         return text.into();
     }
-    let spelled =
-        |c: char| if commands(c) { c.escape_default().to_string() } else { c.to_string() };
-    text.chars()
-        .map(spelled)
-        .collect::<String>()
-        .into()
+    let mut escaped = String::new();
+    for c in text.chars() {
+        if is_command(c) {
+            escaped.extend(c.escape_default());
+        } else {
+            escaped.push(c);
+        }
+    }
+    escaped.into()
+}
+
+fn is_command(c: char) -> bool {
+    c.is_control() && c != '\n'
 }
 
 #[cfg(test)]
 mod tests {
     #[test]
-    fn control_characters_are_spelled_out() {
+    fn control_characters_are_escaped() {
         assert_eq!(super::plain("key \u{1b}[2J\nis 1"), "key \\u{1b}[2J\nis 1");
         assert_eq!(super::plain("Müller–Fellner\n"), "Müller–Fellner\n");
     }

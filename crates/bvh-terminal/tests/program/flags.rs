@@ -5,66 +5,60 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-/// The exit code, and all that is said.
+/// Runs a command, and returns its exit code and all its output.
 fn outcome(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
     let output = run(folder, args);
     (output.status.code(), text(&[output.stdout, output.stderr].concat()))
 }
 
-/// The arguments of a command; the one without a name runs specs.
+/// Returns the arguments of a command. The command that runs specs has no name.
 fn call<'a>(command: &'a str, args: &[&'a str]) -> Vec<&'a str> {
     let name: &[&str] = if command.is_empty() { &[] } else { &[command] };
     [name, args].concat()
 }
 
-/// The flags of a command with the name of their value, as its help lists them.
+/// Lists the flags in the help of a command, each with the name of its value.
 fn flags(folder: &Path, command: &str) -> Vec<(String, Option<String>)> {
     let help = said(folder, &call(command, &["--help"]));
-    let flag = |line: &str| {
-        let mut words = line
-            .split_whitespace()
-            .skip_while(|word| !word.starts_with("--"));
-        let name = words.next()?.trim_end_matches(',').to_owned();
-        Some((
-            name,
-            words
-                .next()
-                .filter(|word| word.starts_with('<'))
-                .map(str::to_owned),
-        ))
-    };
-    let lines = help
-        .lines()
-        .filter(|line| line.trim_start().starts_with('-'));
-    lines
-        .filter_map(flag)
-        .filter(|(name, _)| !["--help", "--version"].contains(&name.as_str()))
-        .collect()
+    let mut flags = Vec::new();
+    for line in help.lines() {
+        let mut words = line.split_whitespace();
+        // Other lines explain a flag, and may mention further ones.
+        if !line.trim_start().starts_with('-') {
+            continue;
+        }
+        let Some(word) = words.find(|word| word.starts_with("--")) else { continue };
+        let name = word.trim_end_matches(',').to_owned();
+        let value = words
+            .next()
+            .filter(|word| word.starts_with('<'))
+            .map(str::to_owned);
+        if !["--help", "--version"].contains(&name.as_str()) {
+            flags.push((name, value));
+        }
+    }
+    flags
 }
 
-/// Gives every flag of the commands values that it cannot take, each command with the arguments that it needs; each must be rejected
-/// by name, and nothing written. Returns the number of flags.
+/// Gives every flag of the commands invalid values, together with the arguments that the command needs.
+/// Asserts that the message names the flag and that no file is written. Returns the number of flags.
 pub fn wrong_flags(at: &Path, commands: &[(&str, &[&str])]) -> usize {
     fs::create_dir(at.join("folder")).unwrap();
     fs::write(at.join("file"), "").unwrap();
     let before = names(at);
     let help = said(at, &["--help"]);
-    let listed = help
-        .split_once("Commands:")
-        .unwrap()
-        .1
+    let (_, list) = help.split_once("Commands:").unwrap();
+    let lines = list
         .lines()
         .skip(1)
         .take_while(|line| !line.trim().is_empty());
-    let listed: BTreeSet<&str> = listed
+    let listed: BTreeSet<&str> = lines
         .filter_map(|line| line.split_whitespace().next())
         .collect();
-    let tried: BTreeSet<&str> = commands
-        .iter()
-        .map(|(name, _)| *name)
-        .chain(["help"])
-        .filter(|n| !n.is_empty())
-        .collect();
+    let mut tried: BTreeSet<&str> = commands.iter().map(|(name, _)| *name).collect();
+    tried.insert("help");
+    tried.remove("");
+    // A new command must be added to the caller's list.
     assert_eq!(listed, tried);
     let mut count = 0;
     let mut found = Vec::new();
@@ -80,9 +74,9 @@ pub fn wrong_flags(at: &Path, commands: &[(&str, &[&str])]) -> usize {
                 Some(_) => &["no such thing", "-1", "nan", "99999999999999999999999", ""],
             };
             for wrong in wrong {
-                // A seed may be any number, and work may be much.
                 let given = format!("{flag}={wrong}");
                 let mut args = call(command, needed);
+                // A flag may not be given twice.
                 args.retain(|arg| !arg.starts_with(&format!("{flag}=")));
                 args.push(&given);
                 let (code, said) = outcome(at, &args);

@@ -1,4 +1,5 @@
-//! A program as a child process, and what it leaves in a folder; `PROGRAM` of the module above is its path.
+//! A program as a child process, and the files that it leaves. `PROGRAM` in the parent module is its
+//! path.
 #![allow(dead_code)] // each test file uses some of it
 
 mod flags;
@@ -13,19 +14,19 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// The project's folder.
+/// Returns the project's folder.
 pub fn top() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// A new folder with a spec of this name in it.
+/// Creates a folder with a spec of this name.
 pub fn folder_with(spec: &str, text: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join(spec), text).unwrap();
     folder
 }
 
-/// The names of what a folder holds, in order.
+/// Returns the sorted names of a folder's entries.
 pub fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(folder)
         .unwrap()
@@ -35,7 +36,7 @@ pub fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// The program in a folder, without input.
+/// Prepares the program in a folder, without input.
 pub fn program(folder: &Path, args: &[&str]) -> Command {
     let mut command = Command::new(PROGRAM);
     command
@@ -45,13 +46,15 @@ pub fn program(folder: &Path, args: &[&str]) -> Command {
     command
 }
 
-/// What it says and how it ends.
+/// Runs the program, and returns its output and exit code.
 pub fn run(folder: &Path, args: &[&str]) -> Output {
     program(folder, args).output().unwrap()
 }
 
-/// [`run`] where no file may grow beyond so many blocks of 512 bytes; past the limit a write fails as on a full disk.
+/// Runs the program where no file may be larger than `blocks` blocks of 512 bytes. Larger writes fail as
+/// they do on a full disk.
 pub fn run_on_a_small_disk(folder: &Path, args: &str, blocks: u32) -> Output {
+    // Without the trap the signal would kill the program before the write fails.
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec '{PROGRAM}' {args}");
     Command::new("sh")
         .args(["-c", &script])
@@ -60,7 +63,7 @@ pub fn run_on_a_small_disk(folder: &Path, args: &str, blocks: u32) -> Output {
         .unwrap()
 }
 
-/// Waits until a file or folder is there.
+/// Waits until a file or folder exists.
 pub fn wait_for(path: &Path) {
     let start = Instant::now();
     while !path.exists() {
@@ -73,14 +76,14 @@ pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// Standard output of a command that must succeed.
+/// Runs a command that must succeed, and returns its standard output.
 pub fn said(folder: &Path, args: &[&str]) -> String {
     let output = run(folder, args);
     assert!(output.status.success(), "{args:?}: {}{}", text(&output.stdout), text(&output.stderr));
     text(&output.stdout)
 }
 
-/// A command whose output is lost ends with an error, and without one otherwise.
+/// Asserts that a command fails if its output is lost, and succeeds otherwise.
 #[cfg(target_os = "linux")]
 pub fn unsaid(folder: &Path, args: &[&str]) {
     let full = fs::File::options()
@@ -95,21 +98,21 @@ pub fn unsaid(folder: &Path, args: &[&str]) {
     said(folder, args);
 }
 
-/// Runs a command that must end with this code, and say each of the parts on standard error.
+/// Runs a command that must end with this code, with each of the parts on standard error.
 pub fn refused(folder: &Path, args: &[&str], code: i32, parts: &[&str]) {
     ended(&run(folder, args), code, parts);
 }
 
-/// What a command must have ended with, and what it must have said on standard error.
+/// Asserts the exit code of a command, and the parts of its message on standard error.
 pub fn ended(output: &Output, code: i32, parts: &[&str]) {
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{parts:?}: {said}");
-    parts
-        .iter()
-        .for_each(|part| assert!(said.contains(part), "{part} in {said}"));
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{parts:?}: {message}");
+    for part in parts {
+        assert!(message.contains(part), "{part} in {message}");
+    }
 }
 
-/// The program at work in the background; what it says on standard error is kept.
+/// Starts the program in the background with a pipe from its standard error.
 pub fn begin(folder: &Path, args: &[&str]) -> Child {
     program(folder, args)
         .stdout(Stdio::null())
@@ -120,26 +123,24 @@ pub fn begin(folder: &Path, args: &[&str]) -> Child {
 
 /// Sends a signal, such as `-INT`.
 pub fn send(signal: &str, to: &Child) {
-    assert!(
-        Command::new("kill")
-            .args([signal, &to.id().to_string()])
-            .status()
-            .unwrap()
-            .success()
-    );
+    let status = Command::new("kill")
+        .args([signal, &to.id().to_string()])
+        .status();
+    assert!(status.unwrap().success());
 }
 
-/// A glTF scene of one triangle, [`outside_buffer`], in the file that a URI names.
+/// Returns a glTF scene of one triangle, whose corners, [`outside_buffer`], are in the file at `uri`.
 pub fn outside_scene(uri: &str) -> String {
     format!(
         r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0}}],
         "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}],
         "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}}],
-        "bufferViews": [{{"buffer": 0, "byteLength": 36}}], "buffers": [{{"uri": "{uri}", "byteLength": 36}}]}}"#
+        "bufferViews": [{{"buffer": 0, "byteLength": 36}}],
+        "buffers": [{{"uri": "{uri}", "byteLength": 36}}]}}"#
     )
 }
 
-/// The corners of a triangle.
+/// Returns the bytes of a triangle's corners.
 pub fn outside_buffer() -> Vec<u8> {
     [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
         .into_iter()

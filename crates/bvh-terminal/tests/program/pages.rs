@@ -1,4 +1,4 @@
-//! The examples in the documentation, and the commands in it that call a program.
+//! The examples in the documentation, and its commands that call a program.
 
 use super::support::{program, run, text, top};
 use std::fs;
@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 /// A block of code on a page.
 pub struct Block {
     pub page: PathBuf,
-    /// The number of its first line, from 1.
+    /// The number of the block's first line, counted from 1.
     pub line: usize,
     pub language: String,
     pub text: String,
@@ -21,41 +21,38 @@ impl Block {
     }
 }
 
-/// The paths, within the project, of all pages but the changelog, which speaks of what was.
+/// Lists the paths of all pages except the changelog, whose old commands may be invalid today.
 pub fn pages() -> Vec<PathBuf> {
-    let below = |folder: &str| {
-        fs::read_dir(top().join(folder))
-            .unwrap()
-            .map(|entry| entry.unwrap().path())
-    };
-    let readmes = below("crates").map(|folder| folder.join("README.md"));
-    let pages = below(".")
-        .chain(below("docs"))
-        .chain(readmes)
-        .chain([top().join("results/README.md")]);
-    let is_page = |path: &PathBuf| {
-        path.extension()
-            .is_some_and(|extension| extension == "md")
-            && path.is_file()
-    };
-    let mut pages: Vec<PathBuf> = pages
-        .filter(is_page)
-        .filter(|path| !path.ends_with("CHANGELOG.md"))
-        .collect();
+    let mut pages = entries(".");
+    pages.extend(entries("docs"));
+    for folder in entries("crates") {
+        pages.push(folder.join("README.md"));
+    }
+    pages.push(top().join("results/README.md"));
+    pages.retain(|path| {
+        let is_markdown = path
+            .extension()
+            .is_some_and(|extension| extension == "md");
+        is_markdown && path.is_file() && !path.ends_with("CHANGELOG.md")
+    });
     pages.sort();
     pages
 }
 
-/// The blocks of all pages.
+fn entries(folder: &str) -> Vec<PathBuf> {
+    fs::read_dir(top().join(folder))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect()
+}
+
+/// Returns the blocks of all pages.
 pub fn blocks() -> Vec<Block> {
     let mut blocks: Vec<Block> = Vec::new();
     for page in pages() {
         let mut is_open = false;
-        for (number, line) in fs::read_to_string(&page)
-            .unwrap()
-            .lines()
-            .enumerate()
-        {
+        let text = fs::read_to_string(&page).unwrap();
+        for (number, line) in text.lines().enumerate() {
             match line.strip_prefix("```") {
                 Some(_) if is_open => is_open = false,
                 Some(language) => {
@@ -73,7 +70,7 @@ pub fn blocks() -> Vec<Block> {
     blocks
 }
 
-/// The blocks in a language; at least one.
+/// Returns the blocks in a language, at least one.
 pub fn blocks_in(language: &str) -> Vec<Block> {
     let mut blocks = blocks();
     blocks.retain(|block| block.language.split(',').next() == Some(language));
@@ -81,23 +78,17 @@ pub fn blocks_in(language: &str) -> Vec<Block> {
     blocks
 }
 
-/// The commands of a shell's text, word by word: without comments, and what is behind a pipe or before the variables' ends.
+/// Splits shell text into the words of its commands, without comments, leading variables, and the parts
+/// after a pipe.
 pub fn commands(text: &str, place: &str) -> Vec<Vec<String>> {
     let mut commands = Vec::new();
     for line in text.replace("\\\n", " ").lines() {
         let words = shlex::split(line).unwrap_or_else(|| panic!("{place}: `{line}` is no shell"));
-        let is_variable = |word: &String| {
-            word.split_once('=').is_some_and(|(name, _)| {
-                name.bytes()
-                    .all(|byte| byte == b'_' || byte.is_ascii_uppercase())
-            })
-        };
-        let command = words
-            .into_iter()
-            .skip_while(is_variable)
-            .take_while(|word| !["|", ":::"].contains(&word.as_str()));
-        // GNU parallel puts a number in the place of braces.
-        let command: Vec<String> = command
+        // GNU parallel replaces braces by a number.
+        let command: Vec<String> = words
+            .iter()
+            .skip_while(|word| is_variable(word))
+            .take_while(|word| !["|", ":::"].contains(&word.as_str()))
             .map(|word| word.replace("{}", "1"))
             .collect();
         match command.first().map(String::as_str) {
@@ -109,14 +100,21 @@ pub fn commands(text: &str, place: &str) -> Vec<Vec<String>> {
     commands
 }
 
-/// A program by its name and by that of its package.
+/// Returns whether a word sets a variable of the environment.
+fn is_variable(word: &str) -> bool {
+    let Some((name, _)) = word.split_once('=') else { return false };
+    name.bytes()
+        .all(|byte| byte == b'_' || byte.is_ascii_uppercase())
+}
+
+/// The names of a program and of its package.
 pub struct Called {
     pub name: &'static str,
     pub package: &'static str,
 }
 
 impl Called {
-    /// The program's arguments in a command, if it calls the program.
+    /// Returns the program's arguments in a command, if the command calls the program.
     fn arguments<'a>(&self, command: &'a [String]) -> Option<Vec<&'a str>> {
         let words: Vec<&str> = command.iter().map(String::as_str).collect();
         let end = words.iter().position(|&word| word == "--");
@@ -132,9 +130,10 @@ impl Called {
         }
     }
 
-    /// Asserts that the program reads the arguments of all commands in blocks. Returns how many there are.
+    /// Asserts that the program accepts the arguments of all commands in blocks. Returns the number of
+    /// commands.
     pub fn reads_blocks(&self) -> usize {
-        // An empty folder, so that whatever can be read ends soon: nothing that is named is there.
+        // In an empty folder valid commands end soon, because the files that they name do not exist.
         let empty = tempfile::tempdir().unwrap();
         let mut read = 0;
         for block in blocks_in("sh") {
@@ -148,26 +147,24 @@ impl Called {
         read
     }
 
-    /// Asserts that the program has the commands and flags that sentences name. Returns how many commands there are.
+    /// Asserts that the program has the commands and flags that sentences name. Returns the number of
+    /// commands.
     pub fn knows_sentences(&self) -> usize {
         let mut read = 0;
         for page in pages() {
             let text = fs::read_to_string(&page).unwrap();
+            // Every second part is a block.
             let outside: String = text.split("```").step_by(2).collect();
             let place = page.display().to_string();
             let begins = format!("{} ", self.name);
-            for code in outside
-                .split('`')
-                .skip(1)
-                .step_by(2)
-                .filter(|code| code.starts_with(&begins))
-            {
+            let inline_code = outside.split('`').skip(1).step_by(2);
+            for code in inline_code.filter(|code| code.starts_with(&begins)) {
                 for command in commands(code, &place) {
                     let Some(mut arguments) = self.arguments(&command) else { continue };
                     arguments.push("--help");
                     let answer = run(Path::new("."), &arguments);
-                    let said = super::support::text(&answer.stderr);
-                    assert_eq!(answer.status.code(), Some(0), "{place}: `{code}`: {said}");
+                    let message = super::support::text(&answer.stderr);
+                    assert_eq!(answer.status.code(), Some(0), "{place}: `{code}`: {message}");
                     read += 1;
                 }
             }
@@ -176,10 +173,10 @@ impl Called {
     }
 }
 
-/// How a program begins to answer what it cannot read.
+/// The part of a program's message about invalid arguments.
 pub const UNREADABLE: &str = "try '--help'";
 
-/// What a command says on standard error within two seconds.
+/// Returns the messages of a command on standard error within two seconds.
 fn beginning(folder: &Path, arguments: &[&str]) -> String {
     let mut child = program(folder, arguments)
         .stdout(Stdio::null())

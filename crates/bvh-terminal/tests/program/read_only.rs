@@ -1,26 +1,28 @@
-//! Folders that cannot be written into.
+//! Folders without permission to write.
 
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// Makes a folder unwritable, for root too where the file system can; undone when dropped.
+/// A folder without permission to write until the value is dropped.
 #[cfg(unix)]
 pub struct ReadOnly<'a>(&'a Path);
 
 #[cfg(unix)]
 impl<'a> ReadOnly<'a> {
-    /// `None` if this user can write there all the same.
+    /// Removes the permission to write; `None` if this user can still write there.
     pub fn new(folder: &'a Path) -> Option<Self> {
         let this = Self(folder);
+        // Modes do not stop root, but the attribute `immutable` does where the file system has it.
         this.set("555", "+i");
         let probe = folder.join("probe");
-        let refused = fs::write(&probe, "").is_err();
+        let is_read_only = fs::write(&probe, "").is_err();
         let _ = fs::remove_file(probe);
-        refused.then_some(this)
+        is_read_only.then_some(this)
     }
 
     fn set(&self, mode: &str, attribute: &str) {
+        // An immutable folder's mode cannot be changed, so the attribute is removed first.
         for (program, argument) in [("chattr", "-i"), ("chmod", mode), ("chattr", attribute)] {
             let _ = Command::new(program)
                 .arg(argument)
