@@ -1,11 +1,11 @@
-//! Lists, before the work, what a scene does not need, which is left out.
+//! Lists, before the work begins, the steps that a scene does not need and that are skipped.
 
 use crate::Scene;
 use bvh_build::BuildError;
 use bvh_core::Primitives;
 use bvh_search::shortcuts::Facts;
 
-/// What is left out of a scene, one line each.
+/// Lists the skipped steps of a scene, one line each.
 pub fn scene(scene: &Scene) -> Result<String, BuildError> {
     let facts = Facts::of(&scene.boxes)?;
     let kind = match scene.primitives {
@@ -19,14 +19,13 @@ pub fn scene(scene: &Scene) -> Result<String, BuildError> {
         text += &format!("  {remark}\n");
     }
     for (_, why) in facts.shortcuts() {
-        text += &format!("  left out: {why}\n");
+        text += &format!("  skipped: {why}\n");
     }
-    text += &format!(
-        "  left out: tests of anything but {kind}: there is a traversal for these alone\n"
-    );
+    text += &format!("  skipped: tests of other shapes: a traversal for {kind} exists\n");
     if facts.repeated > 0 {
         text += &format!(
-            "  not left out: {} objects with the box of the one before; between them a split may be as good as any\n",
+            "  not skipped: {} objects with the same box as the object before; \
+             a split between them may be as good as any\n",
             facts.repeated
         );
     }
@@ -42,10 +41,10 @@ mod tests {
     }
 
     #[test]
-    fn every_scene_is_told_what_it_does_not_need() {
+    fn the_steps_that_a_scene_does_not_need_are_listed() {
         for (name, parts) in [
             ("escher:12", &["12 triangles", "the optimum takes no more", "no tree has less"][..]),
-            ("spheres75", &["75 spheres", "tests of anything but spheres"]),
+            ("spheres75", &["75 spheres", "a traversal for spheres exists"]),
             (
                 "S08:50",
                 &[
@@ -55,7 +54,7 @@ mod tests {
                 ],
             ),
             ("S10:50", &["splits along y and z", "an internal area of 0"]),
-            ("S34:50", &["45 objects with the box of the one before"]),
+            ("S34:50", &["45 objects with the same box as the object before"]),
         ] {
             let text = explained(name);
             assert!(parts.iter().all(|part| text.contains(part)), "{name}: {text}");

@@ -1,13 +1,15 @@
-//! Scenes for bounding volume hierarchies: by name or from a mesh file, with their rays and their pictures.
+//! Scenes for bounding volume hierarchies, loaded by name or from a mesh file, with rays and
+//! pictures.
 //!
 //! ```
 //! let scene = bvh_scenes::Scene::load("escher:100").unwrap();
 //! assert_eq!(scene.boxes.len(), 100);
 //! ```
 //!
-//! [`load`] reads OBJ, PLY, STL and glTF files, and [`builtin`] generates scenes in code; a [`Scene`] is either, or a
-//! [`subset`] of one. [`trace`] finds the objects on a ray by any structure, [`rays`] has the rays of measurements and of
-//! renderers with their density, and [`render`] draws a picture.
+//! [`load`] reads OBJ, PLY, STL and glTF files, and [`builtin`] generates scenes in code; a
+//! [`Scene`] is either, or a [`subset`] of one. [`trace`] finds the objects on a ray with any
+//! acceleration structure, [`rays`] generates rays for measurements and renderers and estimates
+//! their density, and [`render`] draws a picture.
 
 pub mod builtin;
 pub mod explain;

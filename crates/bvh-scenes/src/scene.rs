@@ -1,4 +1,4 @@
-//! One loaded scene, and how its name says where it comes from.
+//! A loaded scene, and the names that select one.
 
 use crate::builtin::{spheres, stand_ins, stiff};
 use crate::load::OutsideFiles;
@@ -9,14 +9,14 @@ use glam::DVec3;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Where a scene comes from. Tables name it beside every scene that is not from a file.
+/// The origin of a scene. Tables print it next to every scene that is not from a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum SceneKind {
-    /// Made in code in place of an original that is no longer distributed.
+    /// Generated in code to replace an original that is no longer distributed.
     #[cfg_attr(feature = "serde", serde(rename = "stand-in"))]
     StandIn,
-    /// Made in code: spheres, and the stiff and extreme scenes.
+    /// Generated in code: spheres, and the stiff and extreme scenes.
     #[cfg_attr(feature = "serde", serde(rename = "procedural"))]
     Procedural,
     /// Read from a mesh file.
@@ -34,62 +34,73 @@ impl fmt::Display for SceneKind {
     }
 }
 
-/// A scene, loaded.
+/// A loaded scene.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// Its name in tables: a built-in name, or the file's name without extension.
+    /// The name in tables: a built-in name, or the file's name without extension.
     pub name: String,
-    /// Where it comes from.
+    /// The origin.
     pub kind: SceneKind,
-    /// Its objects.
+    /// The objects.
     pub primitives: Primitives,
     /// One box per object.
     pub boxes: Vec<Aabb>,
-    /// One line for the user about what its file contains besides plain triangles; none if nothing.
+    /// One line for the user about anything in the file besides plain triangles.
     pub remark: Option<String>,
 }
 
-/// A scene that is neither built in, nor fetched, nor a readable mesh file.
+/// The name of a scene that is neither built in, nor fetched, nor a readable mesh file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("scene {name}: {message}")]
 pub struct SceneError {
-    /// The scene, as it was named.
+    /// The name that the caller gave.
     pub name: String,
     /// The fault, and the accepted names or contents.
     pub message: String,
 }
 
-/// Triangles are needed, and the scene of this name has none.
+impl SceneError {
+    fn new(name: &str, message: impl ToString) -> Self {
+        Self { name: name.into(), message: message.to_string() }
+    }
+}
+
+/// Reports that the caller needs triangles and the scene of this name has none.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0} has spheres; accepted: scenes of triangles")]
 pub struct NoTriangles(pub String);
 
-/// Meshes that `scripts/fetch-scenes` puts under `scenes/`: name, and the Rust package that ships it.
+/// Meshes that `scripts/fetch-scenes` puts into `scenes/`: the name, and the Rust package that
+/// contains the mesh.
 pub const FETCHED: [(&str, &str); 3] = [("sponza", "bvh"), ("kitchen", "obvhs"), ("spot", "meshx")];
 
-/// The second document's sphere scenes: name and number of spheres.
+/// The second document's sphere scenes: the name and the number of spheres.
 pub const SPHERES: [(&str, usize); 3] =
     [("spheres75", 75), ("spheres750", 750), ("spheres7500", 7500)];
 
-/// The largest number of objects of a stiff scene: with boxes and a tree they take ten gigabytes.
+/// The largest number of objects of a stiff scene. Together with boxes and a tree they need ten
+/// gigabytes.
 const MOST_STIFF: usize = 100_000_000;
 
 impl Scene {
     /// Loads a scene by name.
     ///
-    /// `name` is a stand-in, one of [`SPHERES`], one of [`FETCHED`] or the path of a mesh file, and may end like a
-    /// [`Subset`]; or it is a stiff scene with its number of objects, such as `S34:20000`.
+    /// `name` is a stand-in, one of [`SPHERES`], one of [`FETCHED`] or the path of a mesh file,
+    /// each optionally followed by a [`Subset`]; or it is a stiff scene with its number of objects,
+    /// such as `S34:20000`.
     ///
     /// # Errors
     ///
-    /// [`SceneError`] says what is wrong with the name or the file, and which names are accepted.
+    /// [`SceneError`] reports the fault of the name or of the file, and the accepted names.
     pub fn load(name: &str) -> Result<Self, SceneError> {
-        Self::load_with(name, OutsideFiles::Refused)
+        Self::load_with(name, OutsideFiles::Rejected)
     }
 
-    /// As [`load`](Self::load); `outside` says whether a glTF file may refer to files outside its folder.
+    /// Loads a scene as [`load`](Self::load) does. `outside` decides whether a glTF file may refer
+    /// to files outside its folder.
     pub fn load_with(name: &str, outside: OutsideFiles) -> Result<Self, SceneError> {
         match Subset::parse(name) {
+            // A stiff scene has no size of its own, so its count is generated and not a subset.
             Some((id, Subset::Spaced(objects))) if stiff::by_id(id).is_some() => {
                 Self::stiff(id, name, objects)
             }
@@ -121,21 +132,25 @@ impl Scene {
                 Primitives::Spheres(spheres::spheres(count)),
             ));
         }
-        let refused = |message: String| SceneError { name: name.into(), message };
-        let path = match FETCHED.iter().find(|(fetched, _)| *fetched == name) {
+        let path = match FETCHED
+            .iter()
+            .find(|(fetched, _)| *fetched == name)
+        {
             Some((_, package)) => fetched_path(name).ok_or_else(|| {
-                refused(format!(
-                    "not fetched yet; run scripts/fetch-scenes, which copies it from the Rust package `{package}` \
-                     to scenes/{name}.obj"
-                ))
+                let message = format!(
+                    "not fetched yet; run scripts/fetch-scenes, which copies it from the Rust \
+                     package `{package}` to scenes/{name}.obj"
+                );
+                SceneError::new(name, message)
             })?,
             None => PathBuf::from(name),
         };
-        // A word is a scene's name; with an extension or a folder it is a path, and the reader says what is wrong with it.
+        // A single word without an extension was meant as a scene's name, so that the error lists
+        // the names. Anything else is a path, and the reader reports its fault.
         if path.extension().is_none() && path.components().count() == 1 && !path.exists() {
-            return Err(refused(format!("no such scene; {}", known_scenes())));
+            return Err(SceneError::new(name, format!("no such scene; {}", known_scenes())));
         }
-        let mesh = load::load_with(&path, outside).map_err(|error| refused(error.to_string()))?;
+        let mesh = load::load_with(&path, outside).map_err(|error| SceneError::new(name, error))?;
         let stem = path
             .file_stem()
             .map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
@@ -148,23 +163,24 @@ impl Scene {
         })
     }
 
-    /// The stiff scene `id` of about `objects` objects: of exactly as many where such a scene exists.
+    /// Generates the stiff scene `id` with `objects` objects, or nearly as many where the generator
+    /// cannot make exactly that number.
     fn stiff(id: &str, name: &str, objects: usize) -> Result<Self, SceneError> {
         let generator = stiff::by_id(id).filter(|_| (1..=MOST_STIFF).contains(&objects));
         let triangles = generator.map_or_else(Vec::new, |triangles| triangles(objects));
         if triangles.is_empty() {
             let message = format!("a case of the suite has 1 to {MOST_STIFF} objects");
-            return Err(SceneError { name: name.into(), message });
+            return Err(SceneError::new(name, message));
         }
         Ok(Self::new(name, SceneKind::Procedural, Primitives::Triangles(triangles)))
     }
 
-    /// A scene of these objects, without remark.
+    /// Creates a scene of these objects without a remark.
     pub fn new(name: &str, kind: SceneKind, primitives: Primitives) -> Self {
         Self { name: name.into(), kind, boxes: primitives.boxes(), primitives, remark: None }
     }
 
-    /// A subset of the scene's objects, called by the scene's name and `suffix`.
+    /// Returns a subset of the scene's objects, named by the scene's name and `suffix`.
     fn subset(self, subset: Subset, suffix: &str) -> Result<Self, SceneError> {
         let name = self.name + suffix;
         let all = self.boxes.len();
@@ -178,7 +194,7 @@ impl Scene {
         Ok(Self { remark: self.remark, ..Self::new(&name, self.kind, primitives) })
     }
 
-    /// Its triangles.
+    /// Returns the triangles.
     pub fn triangles(&self) -> Result<&[Triangle], NoTriangles> {
         match &self.primitives {
             Primitives::Triangles(triangles) => Ok(triangles),
@@ -186,7 +202,8 @@ impl Scene {
         }
     }
 
-    /// The direction that is up: z in the stand-ins, elsewhere y, as most modellers have it.
+    /// Returns the direction that is up: z in the stand-ins, and y otherwise, which most modellers
+    /// use.
     pub fn up(&self) -> DVec3 {
         match self.kind {
             SceneKind::StandIn => DVec3::Z,
@@ -194,7 +211,7 @@ impl Scene {
         }
     }
 
-    /// A hash of all boxes, by which results tell whether they belong to this very scene.
+    /// Returns a hash of all boxes, which identifies the scene in results.
     pub fn checksum(&self) -> u64 {
         let coordinates = self.boxes.iter().flat_map(|b| {
             b.min
@@ -206,7 +223,8 @@ impl Scene {
     }
 }
 
-/// The path of a fetched scene: in `scenes/` of the current folder, else of the repository.
+/// Returns the path of a fetched scene: in `scenes/` of the current folder, or otherwise of the
+/// repository.
 pub fn fetched_path(name: &str) -> Option<PathBuf> {
     let file = format!("{name}.obj");
     let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -216,7 +234,7 @@ pub fn fetched_path(name: &str) -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
-/// The names that are accepted, as a part of an error message.
+/// Lists the accepted names, as a part of an error message.
 fn known_scenes() -> String {
     let names = stand_ins::STAND_INS
         .iter()
@@ -225,8 +243,9 @@ fn known_scenes() -> String {
         .chain(SPHERES.map(|(name, _)| name))
         .chain(FETCHED.map(|(name, _)| name));
     format!(
-        "accepted: {}, the path of an OBJ, PLY, STL or glTF file, a case of the suite with a number of objects such as S34:20000, or \
-         either of the others with `:COUNT`, `:random:COUNT:SEED` or `:cluster:COUNT:SEED` for a subset",
+        "accepted: {}, the path of an OBJ, PLY, STL or glTF file, either of them with `:COUNT`, \
+         `:random:COUNT:SEED` or `:cluster:COUNT:SEED` for a subset, or a case of the suite with a \
+         number of objects such as S34:20000",
         names.collect::<Vec<_>>().join(", ")
     )
 }
@@ -270,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_named_by_its_stem_and_what_it_has_besides_triangles_is_remarked() {
+    fn a_file_is_named_by_its_stem_and_a_remark_lists_its_other_contents() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("one.obj");
         std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2\n").unwrap();

@@ -5,44 +5,50 @@ use bvh_search::Stream;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 
-/// Which objects of a scene to take, as the end of its name says.
+/// A selection of a scene's objects, which the end of the scene's name specifies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Subset {
-    /// `:COUNT`: this many, evenly spaced in the scene's order.
+    /// `:COUNT`: this many objects, evenly spaced in the scene's order.
     Spaced(usize),
-    /// `:random:COUNT:SEED`: this many, drawn without replacement.
+    /// `:random:COUNT:SEED`: this many objects, drawn without replacement.
     Random(usize, u64),
-    /// `:cluster:COUNT:SEED`: this many around a random object, those with the nearest box centres.
+    /// `:cluster:COUNT:SEED`: this many objects, whose box centres are nearest to the centre of a
+    /// random object's box.
     Cluster(usize, u64),
 }
 
 impl Subset {
-    /// The scene's name and the subset, if `name` ends like one.
+    /// Splits `name` into the scene's name and the subset, if it ends in a subset.
     pub fn parse(name: &str) -> Option<(&str, Self)> {
-        let (before, last) = name.rsplit_once(':')?;
-        let seeded = || {
-            let (before, count) = before.rsplit_once(':')?;
-            let (whole, kind) = before.rsplit_once(':')?;
-            let count = count.parse().ok()?;
-            let seed = last.parse().ok()?;
-            match kind {
-                "random" => Some((whole, Self::Random(count, seed))),
-                "cluster" => Some((whole, Self::Cluster(count, seed))),
-                _ => None,
-            }
-        };
-        seeded().or_else(|| Some((before, Self::Spaced(last.parse().ok()?))))
+        // The longer form comes first, because its last word is a number as well.
+        Self::parse_seeded(name).or_else(|| {
+            let (whole, count) = name.rsplit_once(':')?;
+            Some((whole, Self::Spaced(count.parse().ok()?)))
+        })
     }
 
-    /// Number of objects.
+    fn parse_seeded(name: &str) -> Option<(&str, Self)> {
+        let (before_seed, seed) = name.rsplit_once(':')?;
+        let (before_count, count) = before_seed.rsplit_once(':')?;
+        let (whole, kind) = before_count.rsplit_once(':')?;
+        let count = count.parse().ok()?;
+        let seed = seed.parse().ok()?;
+        match kind {
+            "random" => Some((whole, Self::Random(count, seed))),
+            "cluster" => Some((whole, Self::Cluster(count, seed))),
+            _ => None,
+        }
+    }
+
+    /// Returns the number of objects.
     pub fn count(&self) -> usize {
         match *self {
             Self::Spaced(count) | Self::Random(count, _) | Self::Cluster(count, _) => count,
         }
     }
 
-    /// The objects' indices in ascending order. The count must be 1 to the number of boxes. O(n log n) for a cluster,
-    /// else O(n).
+    /// Returns the objects' indices in ascending order. The count must be 1 to the number of boxes.
+    /// O(n log n) for a cluster, otherwise O(n).
     pub fn choose(&self, boxes: &[Aabb]) -> Vec<usize> {
         let all = boxes.len();
         let mut chosen = match *self {
@@ -57,12 +63,15 @@ impl Subset {
                     .to_vec()
             }
             Self::Cluster(count, seed) => {
-                let center =
-                    boxes[Stream::seed_from_u64(seed).random_range(0..all)].doubled_centroid();
-                let distance =
-                    |&object: &usize| (boxes[object].doubled_centroid() - center).length_squared();
+                let middle = Stream::seed_from_u64(seed).random_range(0..all);
+                let center = boxes[middle].doubled_centroid();
+                let distances: Vec<_> = boxes
+                    .iter()
+                    .map(|b| (b.doubled_centroid() - center).length_squared())
+                    .collect();
                 let mut nearest: Vec<usize> = (0..all).collect();
-                nearest.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+                // The sort is stable: of equally near objects, those with lower indices are chosen.
+                nearest.sort_by(|&a, &b| distances[a].total_cmp(&distances[b]));
                 nearest.truncate(count);
                 nearest
             }
@@ -72,21 +81,23 @@ impl Subset {
     }
 }
 
-/// Number of names that [`expand`] makes of this one.
+/// Returns the number of names that [`expand`] makes of `name`, without making them.
 pub fn names(name: &str) -> u64 {
+    // The first word is the scene, whose path may contain two dots.
     let ranges = name.split(':').skip(1).filter_map(range);
     ranges
         .map(|(low, high)| (u64::from(high) + 1).saturating_sub(low.into()))
         .fold(1, u64::saturating_mul)
 }
 
-/// The ends of `A..B`.
+/// Returns the ends of `A..B`.
 fn range(word: &str) -> Option<(u32, u32)> {
     let (low, high) = word.split_once("..")?;
     Some((low.parse().ok()?, high.parse().ok()?))
 }
 
-/// `name` with every `A..B` after a colon replaced by A, A + 1, …, B: many subsets of a scene on one line of a spec.
+/// Replaces every `A..B` after a colon of `name` by A, A + 1, …, B. One line of a spec can thus name
+/// many subsets of a scene.
 pub fn expand(name: &str) -> Vec<String> {
     let mut names = vec![String::new()];
     for (index, word) in name.split(':').enumerate() {
@@ -97,13 +108,15 @@ pub fn expand(name: &str) -> Vec<String> {
             None => vec![word.to_owned()],
         };
         let colon = if index > 0 { ":" } else { "" };
-        let longer = |name: &String| {
-            words
-                .iter()
-                .map(|word| format!("{name}{colon}{word}"))
-                .collect::<Vec<_>>()
-        };
-        names = names.iter().flat_map(longer).collect();
+        let mut longer = Vec::new();
+        for name in &names {
+            longer.extend(
+                words
+                    .iter()
+                    .map(|word| format!("{name}{colon}{word}")),
+            );
+        }
+        names = longer;
     }
     names
 }
@@ -113,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn subsets_are_told_by_what_follows_the_name() {
+    fn a_suffix_of_the_name_selects_a_subset() {
         assert_eq!(Subset::parse("a:30"), Some(("a", Subset::Spaced(30))));
         assert_eq!(Subset::parse("a:random:12:7"), Some(("a", Subset::Random(12, 7))));
         assert_eq!(
@@ -137,8 +150,11 @@ mod tests {
 
     #[test]
     fn chosen_objects_are_distinct_and_a_cluster_is_around_one_of_them() {
-        let cube = |x: f32| Aabb::from(([x * x, 0.0, 0.0], [x * x + 1.0, 1.0, 1.0]));
-        let boxes: Vec<Aabb> = (0..100u8).map(f32::from).map(cube).collect();
+        // The distance between neighbours grows, so that the nearest objects are consecutive.
+        let boxes: Vec<Aabb> = (0..100u8)
+            .map(f32::from)
+            .map(|x| Aabb::from(([x * x, 0.0, 0.0], [x * x + 1.0, 1.0, 1.0])))
+            .collect();
         for seed in 0..20 {
             let random = Subset::Random(30, seed).choose(&boxes);
             assert!(random.is_sorted_by(|a, b| a < b) && random.len() == 30);

@@ -1,4 +1,4 @@
-//! Tree files of scenes: read whole, checked against the scene's objects.
+//! Tree files of scenes, read completely and checked against the scene's objects.
 
 use crate::Scene;
 use bvh_core::file::{FileError, Header};
@@ -6,7 +6,7 @@ use bvh_core::{Bvh, validate_references};
 pub use bvh_files::tree_file::{TreeFileError, open, read};
 use std::path::Path;
 
-/// Reads the tree over a scene's objects in the file at `path`, and its header.
+/// Reads the tree over a scene's objects from the file at `path`, and the file's header.
 ///
 /// # Errors
 ///
@@ -19,6 +19,7 @@ pub fn load(path: &Path, scene: &Scene) -> Result<(Bvh, Header), TreeFileError> 
         .map_err(TreeFileError::of(path))?;
     let tree = file.tree().map_err(TreeFileError::of(path))?;
     let header = file.header().clone();
+    // The checksums prove only that the file is intact: a forged tree can have right ones.
     validate_references(&tree, &scene.boxes, &scene.primitives)
         .map_err(FileError::Tree)
         .map_err(TreeFileError::of(path))?;

@@ -247,7 +247,7 @@ fn strips_fans_and_lists_without_indices_are_triangles_and_lines_are_not() {
 }
 
 #[test]
-fn buffers_are_files_beside_the_one_that_names_them() {
+fn buffers_are_files_in_the_folder_of_the_file_that_names_them() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.gltf");
     std::fs::write(&path, gltf_json("my%20buffer.bin", r#"{"mesh": 0}"#, INDEXED)).unwrap();
@@ -267,7 +267,7 @@ fn buffers_are_files_beside_the_one_that_names_them() {
     );
     let remote =
         refusal(gltf_json("http://example.org/a.bin", r#"{"mesh": 0}"#, INDEXED), "a.gltf");
-    assert!(remote.contains("a file beside this one"), "{remote}");
+    assert!(remote.contains("a file in this folder"), "{remote}");
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Triangles from glTF 2.0 files, JSON or GLB, with the transforms of their nodes applied.
 //!
-//! `gltf-json` has the names and types of the format. References and ranges are checked here: its own check, and the readers of the
-//! crate `gltf`, panic on files made for it. Materials, cameras, animations and skins are ignored: meshes stand as their nodes put them.
+//! `gltf-json` declares the names and types of the format. This module checks references and ranges
+//! itself, because the check in `gltf-json` and the readers in `gltf` panic on forged files.
+//! Materials, cameras, animations and skins are ignored: nodes alone place the meshes.
 
 mod buffers;
 
@@ -10,6 +11,7 @@ use buffers::Buffers;
 use bvh_core::Triangle;
 use glam::{DMat4, DQuat, DVec3, Vec3};
 use gltf_json::accessor::{ComponentType, Type};
+use gltf_json::buffer::View;
 use gltf_json::mesh::{Mode, Primitive, Semantic};
 use gltf_json::root::Get;
 use gltf_json::scene::Node;
@@ -19,12 +21,15 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::Path;
 
-/// The most bytes of all buffers, and the most positions and indices: what [`MOST_TRIANGLES`] take without sharing any.
+/// The largest total size of all buffers: [`MOST_TRIANGLES`] with three positions and three indices
+/// each.
 const MOST_BYTES: u64 = 48 * MOST_TRIANGLES as u64;
+/// The largest number of positions and indices: [`MOST_TRIANGLES`] that share no position.
 const MOST_ITEMS: u64 = 6 * MOST_TRIANGLES as u64;
 
-/// Extensions that a file may require, because none of them changes its triangles: lights, materials, textures, metadata, and other types
-/// of positions, which are refused where a mesh has them.
+/// Extensions that a file may require, because none of them changes its triangles: lights,
+/// materials, textures, metadata, and other types of positions, which [`Loader::items`] rejects
+/// where a mesh uses them.
 const HARMLESS: [&str; 25] = [
     "EXT_texture_avif",
     "EXT_texture_webp",
@@ -53,69 +58,73 @@ const HARMLESS: [&str; 25] = [
     "MSFT_texture_dds",
 ];
 
-/// Whether a file may name buffers outside its own folder: somebody else's file then decides what is read.
+/// The treatment of buffers outside the file's folder. Reading them lets the author of the file
+/// decide which files of the user are opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OutsideFiles {
-    /// They are refused by name.
+    /// The loader rejects them and names them.
     #[default]
-    Refused,
-    /// They are read.
+    Rejected,
+    /// The loader reads them.
     Allowed,
 }
 
 impl From<bool> for OutsideFiles {
-    /// Allowed if true.
+    /// Returns `Allowed` for true.
     fn from(allowed: bool) -> Self {
-        if allowed { Self::Allowed } else { Self::Refused }
+        if allowed { Self::Allowed } else { Self::Rejected }
     }
 }
 
-/// Reads the bytes of a glTF or GLB file, and the buffers that its meshes refer to, beside `path`.
+/// Reads the bytes of a glTF or GLB file, and the buffers that its meshes refer to from the folder
+/// of `path`.
 pub fn parse(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Mesh, Fault> {
     let (root, chunk) = document(bytes, path)?;
-    let mut scene = Scene::new(path, &root, Buffers::new(path, outside, chunk));
-    for place in scene.places()? {
-        scene.place(&place, &place.transform)?;
+    let mut loader = Loader::new(path, &root, Buffers::new(path, outside, chunk));
+    for place in loader.places()? {
+        loader.place(&place, &place.transform)?;
     }
-    match scene.triangles.is_empty() {
+    match loader.triangles.is_empty() {
         true => Err(no_triangle(path)),
-        false => Ok(Mesh::new(scene.triangles)),
+        false => Ok(Mesh::new(loader.triangles)),
     }
 }
 
-/// The meshes of a file, each once, and where its nodes put them. In the order of both, with all transforms applied, they are what
-/// [`parse`] gives.
+/// The meshes of a file, each once, and their places. The meshes in the order of the places, with
+/// all transforms applied, are the triangles that [`parse`] returns.
 #[derive(Clone, Debug)]
 pub struct Parts {
-    /// Triangles in the mesh's own coordinates, by the mesh's number in the file: those meshes that have any and are placed.
+    /// Triangles in the mesh's own coordinates, by the mesh's number in the file. Contains only
+    /// meshes with a place and at least one triangle.
     pub meshes: BTreeMap<usize, Vec<Triangle>>,
-    /// Where they stand.
+    /// The places of the meshes, in the order of the file's nodes.
     pub places: Vec<Placed>,
 }
 
-/// A mesh, put somewhere by a node.
+/// A mesh that a node places in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
     /// The node's number in the file.
     pub node: usize,
     /// The mesh's number in the file.
     pub mesh: usize,
-    /// From the mesh's coordinates to the scene's.
+    /// The transform from the mesh's coordinates to the scene's.
     pub transform: DMat4,
 }
 
-/// As [`parse`], with every mesh once.
+/// Reads a file as [`parse`] does, but returns every mesh once.
 pub fn parts(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Parts, Fault> {
     let (root, chunk) = document(bytes, path)?;
-    let mut scene = Scene::new(path, &root, Buffers::new(path, outside, chunk));
-    let mut places = scene.places()?;
+    let mut loader = Loader::new(path, &root, Buffers::new(path, outside, chunk));
+    let mut places = loader.places()?;
     let mut meshes = BTreeMap::new();
     for place in &places {
         if let Entry::Vacant(first) = meshes.entry(place.mesh) {
-            scene.place(place, &DMat4::IDENTITY)?;
-            first.insert(std::mem::take(&mut scene.triangles));
+            loader.place(place, &DMat4::IDENTITY)?;
+            first.insert(std::mem::take(&mut loader.triangles));
         }
     }
+    // A mesh of points or lines gives no triangles, and a tree needs at least one object.
     meshes.retain(|_, triangles| !triangles.is_empty());
     places.retain(|place| meshes.contains_key(&place.mesh));
     if places.is_empty() { Err(no_triangle(path)) } else { Ok(Parts { meshes, places }) }
@@ -129,12 +138,12 @@ fn no_triangle(path: &Path) -> Fault {
     )
 }
 
-/// What a file says, and the bytes of the binary chunk of a GLB file.
+/// Reads a file's JSON, and returns the bytes of the binary chunk of a GLB file with it.
 fn document<'a>(bytes: &'a [u8], path: &Path) -> Result<(Root, Option<&'a [u8]>), Fault> {
-    let fault = |message: String| Fault::new(path, Place::File, message);
     let (json, chunk) = match bytes.starts_with(b"glTF") {
         true => chunks(bytes).ok_or_else(|| {
-            fault("no chunk of JSON in version 2; expected a GLB file, and whole".into())
+            let message = "no chunk of JSON in version 2; expected a GLB file, and whole";
+            Fault::new(path, Place::File, message)
         })?,
         false => (
             bytes
@@ -143,7 +152,7 @@ fn document<'a>(bytes: &'a [u8], path: &Path) -> Result<(Root, Option<&'a [u8]>)
             None,
         ),
     };
-    let root = Root::from_slice(json).map_err(|error| fault(error.to_string()))?;
+    let root = Root::from_slice(json).map_err(|error| Fault::new(path, Place::File, error))?;
     if let Some(unknown) = root
         .extensions_required
         .iter()
@@ -158,23 +167,28 @@ fn document<'a>(bytes: &'a [u8], path: &Path) -> Result<(Root, Option<&'a [u8]>)
     Ok((root, chunk))
 }
 
-/// The chunks of JSON and of binary data of a GLB file of version 2: each has its length and its kind before it.
+/// Returns the JSON chunk and the binary chunk of a GLB file of version 2.
 fn chunks(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
-    let chunk = |at: usize, kind: &[u8; 4]| {
-        let head = bytes.get(at..)?.first_chunk::<8>()?;
-        let length = u32::from_le_bytes(*head.first_chunk()?) as usize;
-        (head[4..] == *kind)
-            .then(|| bytes.get(at + 8..)?.get(..length))
-            .flatten()
-    };
-    let json = (bytes.get(4..8)? == [2, 0, 0, 0])
-        .then(|| chunk(12, b"JSON"))
-        .flatten()?;
-    Some((json, chunk(20 + json.len(), b"BIN\0")))
+    if bytes.get(4..8)? != [2, 0, 0, 0] {
+        return None;
+    }
+    // The file's header has 12 bytes, and each chunk's header has 8.
+    let json = chunk(bytes, 12, b"JSON")?;
+    Some((json, chunk(bytes, 20 + json.len(), b"BIN\0")))
+}
+
+/// Returns the contents of the chunk whose header begins at `offset`, if it has this kind.
+fn chunk<'a>(bytes: &'a [u8], offset: usize, kind: &[u8; 4]) -> Option<&'a [u8]> {
+    let (header, rest) = bytes.get(offset..)?.split_first_chunk::<8>()?;
+    let length = u32::from_le_bytes(*header.first_chunk()?) as usize;
+    if header[4..] != *kind {
+        return None;
+    }
+    rest.get(..length)
 }
 
 /// A file while its nodes are followed.
-struct Scene<'a> {
+struct Loader<'a> {
     path: &'a Path,
     root: &'a Root,
     buffers: Buffers<'a>,
@@ -183,28 +197,33 @@ struct Scene<'a> {
     items: u64,
 }
 
-/// The transform of a node into its parent's coordinates.
+/// Returns the transform of a node into its parent's coordinates.
 fn transform(node: &Node) -> DMat4 {
+    // The format allows a matrix or its three parts, never both.
     if let Some(matrix) = node.matrix {
         return DMat4::from_cols_array(&matrix.map(f64::from));
     }
-    let vector = |of: Option<[f32; 3]>, or: DVec3| of.map_or(or, |v| DVec3::from(v.map(f64::from)));
-    let turn = node
+    // Exporters round quaternions to f32, which would scale the mesh by a little.
+    let rotation = node
         .rotation
         .map_or(DQuat::IDENTITY, |turn| DQuat::from_array(turn.0.map(f64::from)).normalize());
     DMat4::from_scale_rotation_translation(
         vector(node.scale, DVec3::ONE),
-        turn,
+        rotation,
         vector(node.translation, DVec3::ZERO),
     )
 }
 
-impl<'a> Scene<'a> {
+fn vector(found: Option<[f32; 3]>, default: DVec3) -> DVec3 {
+    found.map_or(default, |vector| DVec3::from(vector.map(f64::from)))
+}
+
+impl<'a> Loader<'a> {
     fn new(path: &'a Path, root: &'a Root, buffers: Buffers<'a>) -> Self {
         Self { path, root, buffers, triangles: Vec::new(), items: 0 }
     }
 
-    /// What an index refers to.
+    /// Returns the element with this index.
     fn get<T>(&self, index: Index<T>, name: &str) -> Result<&'a T, String>
     where
         Root: Get<T>,
@@ -214,20 +233,22 @@ impl<'a> Scene<'a> {
             .ok_or_else(|| format!("no {name}[{}]; expected one that exists", index.value()))
     }
 
-    /// Follows the default scene, or the first one, from its roots. A node has one parent, so that none is reached twice.
+    fn fault(&self, place: String, message: impl std::fmt::Display) -> Fault {
+        Fault::new(self.path, Place::Element(place), message)
+    }
+
+    /// Follows the default scene, or the first one, from its roots. Rejects a node with two parents.
     fn places(&self) -> Result<Vec<Placed>, Fault> {
-        let path = self.path;
-        let fault =
-            |place: String, message: String| Fault::new(path, Place::Element(place), message);
         let scene = match self.root.scene {
             Some(index) => Some(
                 self.get(index, "scenes")
-                    .map_err(|message| fault("scene".into(), message))?,
+                    .map_err(|message| self.fault("scene".into(), message))?,
             ),
             None => self.root.scenes.first(),
         };
         let mut places = Vec::new();
         let mut reached = vec![false; self.root.nodes.len()];
+        // Nodes are pushed in reverse, so that the stack returns them in the order of the file.
         let mut open: Vec<(Index<Node>, DMat4)> = Vec::new();
         open.extend(
             scene
@@ -237,20 +258,20 @@ impl<'a> Scene<'a> {
                 .map(|&node| (node, DMat4::IDENTITY)),
         );
         while let Some((index, parent)) = open.pop() {
-            let place = || format!("nodes[{}]", index.value());
             let number = index.value();
             let node = self
                 .get(index, "nodes")
-                .map_err(|message| fault("scene".into(), message))?;
-            if std::mem::replace(&mut reached[index.value()], true) {
+                .map_err(|message| self.fault("scene".into(), message))?;
+            // A forged file could have a circle of nodes, which would never end.
+            if std::mem::replace(&mut reached[number], true) {
                 let message = "reached twice; expected a tree of nodes, each with one parent";
-                return Err(fault(place(), message.into()));
+                return Err(self.fault(format!("nodes[{number}]"), message));
             }
             let transform = parent * transform(node);
-            if let Some(index) = node.mesh {
-                self.get(index, "meshes")
-                    .map_err(|message| fault(place(), message))?;
-                places.push(Placed { node: number, mesh: index.value(), transform });
+            if let Some(mesh) = node.mesh {
+                self.get(mesh, "meshes")
+                    .map_err(|message| self.fault(format!("nodes[{number}]"), message))?;
+                places.push(Placed { node: number, mesh: mesh.value(), transform });
             }
             open.extend(
                 node.children
@@ -263,7 +284,7 @@ impl<'a> Scene<'a> {
         Ok(places)
     }
 
-    /// Adds the triangles of a node's mesh, moved.
+    /// Adds the transformed triangles of a node's mesh.
     fn place(&mut self, place: &Placed, transform: &DMat4) -> Result<(), Fault> {
         let Placed { node, mesh, .. } = *place;
         for (number, primitive) in self.root.meshes[mesh]
@@ -274,13 +295,13 @@ impl<'a> Scene<'a> {
             self.add(primitive, transform)
                 .map_err(|message| {
                     let place = format!("meshes[{mesh}].primitives[{number}] at nodes[{node}]");
-                    Fault::new(self.path, Place::Element(place), message)
+                    self.fault(place, message)
                 })?;
         }
         Ok(())
     }
 
-    /// Adds the triangles of a primitive; points and lines have none.
+    /// Adds the transformed triangles of a primitive. Points and lines have none.
     fn add(&mut self, primitive: &Primitive, transform: &DMat4) -> Result<(), String> {
         let Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) =
             primitive.mode
@@ -313,18 +334,12 @@ impl<'a> Scene<'a> {
         let types = [ComponentType::U8, ComponentType::U16, ComponentType::U32];
         let indices: Vec<u32> = match primitive.indices {
             None => (0..points.len() as u32).collect(),
-            Some(accessor) => {
-                let index = |bytes: &[u8]| {
-                    bytes
-                        .iter()
-                        .rev()
-                        .fold(0, |index, &byte| index << 8 | u32::from(byte))
-                };
-                self.items(accessor, Type::Scalar, &types)?
-                    .map(index)
-                    .collect()
-            }
+            Some(accessor) => self
+                .items(accessor, Type::Scalar, &types)?
+                .map(little_endian)
+                .collect(),
         };
+        // Checked before any use, because the indices come from the file.
         if let Some(index) = indices
             .iter()
             .find(|&&index| index as usize >= points.len())
@@ -339,19 +354,19 @@ impl<'a> Scene<'a> {
         if self.triangles.len() + count > MOST_TRIANGLES {
             return Err(format!("more than {MOST_TRIANGLES} triangles in all; expected no more"));
         }
-        self.triangles.extend((0..count).map(|at| {
+        self.triangles.extend((0..count).map(|i| {
             let corners = match mode {
-                Mode::Triangles => [3 * at, 3 * at + 1, 3 * at + 2],
-                Mode::TriangleFan => [0, at + 1, at + 2],
-                // Every second triangle of a strip is turned.
-                _ => [at, at + 1 + at % 2, at + 2 - at % 2],
+                Mode::Triangles => [3 * i, 3 * i + 1, 3 * i + 2],
+                Mode::TriangleFan => [0, i + 1, i + 2],
+                // Every second triangle of a strip is turned, so that all have one orientation.
+                _ => [i, i + 1 + i % 2, i + 2 - i % 2],
             };
             Triangle(corners.map(|corner| points[indices[corner] as usize]))
         }));
         Ok(())
     }
 
-    /// The bytes of every item of an accessor.
+    /// Returns the bytes of every item of an accessor.
     fn items(
         &mut self,
         accessor: Index<Accessor>,
@@ -362,7 +377,7 @@ impl<'a> Scene<'a> {
         let accessor = self.get(accessor, "accessors")?;
         let component = components
             .iter()
-            .find(|&&wanted| matches!(accessor.component_type, Valid(of) if of.0 == wanted));
+            .find(|&&wanted| matches!(accessor.component_type, Valid(found) if found.0 == wanted));
         let (Some(component), true, None) =
             (component, accessor.type_ == Valid(type_), &accessor.sparse)
         else {
@@ -379,24 +394,14 @@ impl<'a> Scene<'a> {
             .need(self.root, view.buffer.value())?;
         let size = component.size() * type_.multiplicity();
         let stride = view.byte_stride.map_or(size, |stride| stride.0);
-        let bytes = (|| {
-            let number = |number: u64| usize::try_from(number).ok();
-            let buffer = self.buffers.bytes(view.buffer.value())?;
-            let bytes = buffer.get(number(view.byte_offset.map_or(0, |offset| offset.0))?..)?;
-            let bytes = bytes.get(..number(view.byte_length.0)?)?;
-            let bytes = bytes.get(number(accessor.byte_offset.map_or(0, |offset| offset.0))?..)?;
-            let count = number(accessor.count.0)?;
-            let need = stride
-                .checked_mul(count.checked_sub(1)?)?
-                .checked_add(size)?;
-            (stride >= size)
-                .then(|| bytes.get(..need))
-                .flatten()
-        })();
+        let buffer = self.buffers.bytes(view.buffer.value());
         let count = accessor.count.0;
-        let bytes = bytes.ok_or_else(|| {
-            format!("{place} reaches beyond its buffer; expected {count} items in it")
-        })?;
+        let bytes = buffer
+            .and_then(|buffer| window(buffer, view, accessor, stride, size))
+            .ok_or_else(|| {
+                format!("{place} reaches beyond its buffer; expected {count} items in it")
+            })?;
+        // A few accessors over the same bytes can stand for any number of items.
         self.items += count;
         if self.items > MOST_ITEMS {
             return Err(format!(
@@ -406,4 +411,35 @@ impl<'a> Scene<'a> {
         }
         Ok((0..count as usize).map(move |item| &bytes[item * stride..][..size]))
     }
+}
+
+/// Returns the bytes of a buffer from an accessor's first item to its last one.
+fn window<'a>(
+    buffer: &'a [u8],
+    view: &View,
+    accessor: &Accessor,
+    stride: usize,
+    size: usize,
+) -> Option<&'a [u8]> {
+    if stride < size {
+        return None;
+    }
+    // Every number comes from the file, so each step checks for overflow and for the buffer's end.
+    let view_start = usize::try_from(view.byte_offset.map_or(0, |offset| offset.0)).ok()?;
+    let view_length = usize::try_from(view.byte_length.0).ok()?;
+    let start = usize::try_from(accessor.byte_offset.map_or(0, |offset| offset.0)).ok()?;
+    let gaps = usize::try_from(accessor.count.0)
+        .ok()?
+        .checked_sub(1)?;
+    // The last item needs no padding after it.
+    let length = stride.checked_mul(gaps)?.checked_add(size)?;
+    let view_bytes = buffer.get(view_start..)?.get(..view_length)?;
+    view_bytes.get(start..)?.get(..length)
+}
+
+fn little_endian(bytes: &[u8]) -> u32 {
+    bytes
+        .iter()
+        .rev()
+        .fold(0, |number, &byte| number << 8 | u32::from(byte))
 }

@@ -1,32 +1,34 @@
-//! What every mesh file gives, and how every format names a fault.
+//! The contents of a mesh file, and the faults of all formats.
 
 use bvh_core::Triangle;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// The largest number of triangles that one file may stand for: with boxes and a tree they take ten gigabytes. A small file can
-/// name one mesh many times.
+/// The largest number of triangles that one file may contain. Together with boxes and a tree they
+/// need ten gigabytes. The limit matters because a small file can name one mesh many times.
 pub const MOST_TRIANGLES: usize = 100_000_000;
 
 /// The triangles of one file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
-    /// In world units with finite corners, in the order of the file across its objects and groups. A face of n ≥ 3
-    /// vertices gives the n − 2 triangles of the fan around its first vertex: exact for convex faces, while the fan of
-    /// a concave one can reach outside it.
+    /// The triangles in world units with finite corners, in the order of the file across its
+    /// objects and groups. A face of n ≥ 3 vertices becomes the n − 2 triangles of the fan around
+    /// its first vertex. The fan is exact for convex faces; for a concave face it can reach outside.
     pub triangles: Vec<Triangle>,
-    /// Vertices that are a corner of no triangle. They must be finite, and count for nothing else.
+    /// The number of vertices that are a corner of no triangle. They must be finite.
     pub unused_vertices: usize,
-    /// Faces left out because they have fewer than three vertices.
+    /// The number of faces that were skipped because they have fewer than three vertices.
     pub short_faces: usize,
-    /// Triangles without area (collinear or repeated corners). They are kept in `triangles`.
+    /// The number of triangles without area (collinear or repeated corners). `triangles` contains
+    /// them.
     pub degenerate_triangles: usize,
-    /// Lines that begin with no keyword of the format, and the first of them: its number from 1 and its first word.
+    /// The number of lines that begin with no keyword of the format, with the first such line's
+    /// number, counted from 1, and its first word.
     pub unknown: Option<(usize, usize, String)>,
 }
 
 impl Mesh {
-    /// These triangles, with nothing beside them.
+    /// Creates a mesh of these triangles and nothing else.
     pub fn new(triangles: Vec<Triangle>) -> Self {
         Self {
             degenerate_triangles: triangles
@@ -40,12 +42,8 @@ impl Mesh {
         }
     }
 
-    /// What the file contains besides plain triangles, as one sentence; none if nothing does.
+    /// Describes the file's contents besides plain triangles in one sentence, if there are any.
     pub fn remark(&self) -> Option<String> {
-        let counted = |count: usize, one: &str, many: &str| {
-            (count > 0)
-                .then(|| if count == 1 { format!("1 {one}") } else { format!("{count} {many}") })
-        };
         let unknown = self
             .unknown
             .as_ref()
@@ -65,8 +63,8 @@ impl Mesh {
             ),
             counted(
                 self.short_faces,
-                "face has fewer than three vertices and was left out",
-                "faces have fewer than three vertices and were left out",
+                "face has fewer than three vertices and was skipped",
+                "faces have fewer than three vertices and were skipped",
             ),
             counted(self.degenerate_triangles, "triangle has no area", "triangles have no area"),
             unknown,
@@ -76,33 +74,42 @@ impl Mesh {
     }
 }
 
-/// Where in a file a fault is.
+/// Returns `count` with the noun and verb for one or for many; nothing for none.
+fn counted(count: usize, one: &str, many: &str) -> Option<String> {
+    match count {
+        0 => None,
+        1 => Some(format!("1 {one}")),
+        _ => Some(format!("{count} {many}")),
+    }
+}
+
+/// The place of a fault in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// In the file as a whole.
+    /// The whole file.
     File,
-    /// In a line, counted from 1.
+    /// A line, counted from 1.
     Line(usize),
-    /// In a part of the file that its format gives a name or a number.
+    /// A part of the file, with the name or number that its format gives it.
     Element(String),
 }
 
-/// Why a file was refused, in the words of its format.
+/// The reason why a file was rejected, in the words of its format.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}{place}: {message}", .path.display())]
 pub struct Fault {
-    /// The file, as it was given.
+    /// The file's path as the caller gave it.
     pub path: PathBuf,
-    /// Where in it.
+    /// The place in the file.
     pub place: Place,
-    /// What was found, and what would be accepted.
+    /// The contents that were found, and the contents that would be accepted.
     pub message: String,
 }
 
 impl Fault {
-    /// A fault of the file at `path`.
+    /// Creates a fault of the file at `path`.
     pub fn new(path: &Path, place: Place, message: impl fmt::Display) -> Self {
-        // Other libraries' messages may span lines and quote the file.
+        // Messages of third-party parsers may span lines and quote the file at any length.
         let words = message
             .to_string()
             .split_whitespace()

@@ -1,4 +1,4 @@
-//! Mesh files of every kind: the kind is told by the bytes, and where they do not tell by the name.
+//! Mesh files of every format. The bytes decide the format, and the name does where they do not.
 
 pub mod gltf;
 pub mod mesh;
@@ -13,19 +13,19 @@ use obj::ObjError;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Why a file gave no triangles.
+/// The reason why a file gave no triangles.
 #[derive(Debug, Error)]
 pub enum MeshError {
-    /// There is no file, or it cannot be read.
+    /// The file does not exist or cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// No bytes, or only blanks.
+    /// The file has no bytes, or only blanks.
     #[error("{} is empty; expected an OBJ, PLY, STL or glTF file", .0.display())]
     Empty(PathBuf),
-    /// The OBJ file is wrong.
+    /// The OBJ file is invalid.
     #[error(transparent)]
     Obj(#[from] ObjError),
-    /// The PLY, STL or glTF file is wrong.
+    /// The PLY, STL or glTF file is invalid.
     #[error(transparent)]
     Fault(#[from] Fault),
 }
@@ -35,16 +35,17 @@ pub enum MeshError {
 pub enum Format {
     /// Wavefront OBJ.
     Obj,
-    /// Polygon File Format, of text or binary.
+    /// Polygon File Format, text or binary.
     Ply,
-    /// Stereolithography, of text or binary.
+    /// Stereolithography, text or binary.
     Stl,
     /// glTF 2.0, as JSON or as one binary file (GLB).
     Gltf,
 }
 
 impl Format {
-    /// The format of a file with these bytes at this path. OBJ has no mark of its own: it is what all else is taken for.
+    /// Returns the format of a file with these bytes at this path. OBJ has no signature, so every
+    /// file without another format's signature or extension counts as OBJ.
     pub fn of(bytes: &[u8], path: &Path) -> Self {
         let text = bytes
             .strip_prefix(b"\xef\xbb\xbf")
@@ -71,20 +72,22 @@ impl Format {
     }
 }
 
-/// Reads the mesh file at `path`. O(bytes) in time; memory is a few hundred bytes per triangle besides the file. Whatever the
-/// file's bytes are, the outcome is a mesh with at least one triangle or an error.
+/// Reads the mesh file at `path`. Any bytes give a mesh with at least one triangle or an error.
+/// Takes O(bytes) time, and a few hundred bytes of memory per triangle besides the file.
 pub fn load(path: &Path) -> Result<Mesh, MeshError> {
-    load_with(path, OutsideFiles::Refused)
+    load_with(path, OutsideFiles::Rejected)
 }
 
-/// As [`load`]; `outside` says whether a glTF file may refer to files outside its folder.
+/// Reads a mesh file as [`load`] does. `outside` decides whether a glTF file may refer to files
+/// outside its folder.
 pub fn load_with(path: &Path, outside: OutsideFiles) -> Result<Mesh, MeshError> {
     parse_with(&read(path)?, path, outside)
 }
 
-/// Reads the bytes of a mesh file. `path` names it in errors, and says where the files are that a glTF file refers to.
+/// Reads the bytes of a mesh file. `path` names the file in errors, and a glTF file's references are
+/// relative to its folder.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
-    parse_with(bytes, path, OutsideFiles::Refused)
+    parse_with(bytes, path, OutsideFiles::Rejected)
 }
 
 fn parse_with(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Mesh, MeshError> {

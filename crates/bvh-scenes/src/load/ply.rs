@@ -1,4 +1,4 @@
-//! Triangles from PLY files, of text or binary, as `ply-rs-bw` reads them.
+//! Triangles from PLY files, text or binary, which `ply-rs-bw` parses.
 
 use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place};
 use bvh_core::Triangle;
@@ -9,7 +9,7 @@ use ply_rs_bw::ply::{
 };
 use std::path::Path;
 
-/// A position; NaN where the file has none.
+/// A position, with NaN where the file has no coordinate.
 struct Vertex([f32; 3]);
 
 impl PropertyAccess for Vertex {
@@ -32,7 +32,7 @@ impl PropertyAccess for Vertex {
     }
 }
 
-/// The positions' indices of one polygon.
+/// The indices of one polygon's positions.
 struct Face(Vec<i64>);
 
 impl PropertyAccess for Face {
@@ -57,7 +57,7 @@ impl PropertyAccess for Face {
     }
 }
 
-/// An element that is neither.
+/// An element that is neither a vertex nor a face.
 struct Other;
 
 impl PropertyAccess for Other {
@@ -71,12 +71,12 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     let mut reader = Reader::new(bytes);
     let header = Parser::<Other>::new()
         .read_header(&mut reader)
-        .map_err(|error| told(path, None, &error))?;
+        .map_err(|error| fault(path, None, &error))?;
     let mut vertices = Vec::new();
     let mut faces = Vec::new();
     for element in header.elements.values() {
-        let place = || Place::Element(format!("element {}", element.name));
-        // Every element has a byte or a line at least; without this a header of a line could ask for endless memory.
+        // Every element has at least a byte or a line. Without this check a header of one line could
+        // ask for any amount of memory.
         if element.properties.is_empty() || element.count > bytes.len() {
             let found = format!(
                 "{} of {} properties in a file of {} bytes",
@@ -86,34 +86,34 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
             );
             return Err(Fault::new(
                 path,
-                place(),
-                format!("{found}; expected no more than it has room for"),
+                Place::Element(format!("element {}", element.name)),
+                format!("{found}; expected no more than the file has room for"),
             ));
         }
         match element.name.as_str() {
             "vertex" => vertices = elements::<Vertex>(&mut reader, element, &header, path)?,
             "face" => faces = elements::<Face>(&mut reader, element, &header, path)?,
+            // Other elements must be read as well, because their length is not known in advance.
             _ => drop(elements::<Other>(&mut reader, element, &header, path)?),
         }
     }
     mesh(&vertices, &faces, path)
 }
 
-/// All elements of one kind.
+/// Reads all elements of one kind.
 fn elements<E: PropertyAccess>(
     reader: &mut Reader<&[u8]>,
     element: &ElementDef,
     header: &Header,
     path: &Path,
 ) -> Result<Vec<E>, Fault> {
-    let told = |error| told(path, Some((element, header)), &error);
     Parser::<E>::new()
         .read_payload_for_element(reader, element, header)
-        .map_err(told)
+        .map_err(|error| fault(path, Some((element, header)), &error))
 }
 
-/// The library's error: with its line where there are lines, else with its element.
-fn told(path: &Path, within: Option<(&ElementDef, &Header)>, error: &ParseError) -> Fault {
+/// Converts the parser's error: with its line if the file has lines, otherwise with its element.
+fn fault(path: &Path, within: Option<(&ElementDef, &Header)>, error: &ParseError) -> Fault {
     let place = match (within, error.line()) {
         (Some((element, header)), _) if header.encoding != Encoding::Ascii => {
             Place::Element(format!("element {}", element.name))
@@ -121,29 +121,28 @@ fn told(path: &Path, within: Option<(&ElementDef, &Header)>, error: &ParseError)
         (_, Some(line)) => Place::Line(line),
         _ => Place::File,
     };
-    let message = error.to_string();
+    let full = error.to_string();
+    // The place already names the line.
     let message = error
         .line()
-        .and_then(|line| message.strip_prefix(&format!("Line {line}: ")))
-        .unwrap_or(&message);
+        .and_then(|line| full.strip_prefix(&format!("Line {line}: ")))
+        .unwrap_or(&full);
     Fault::new(path, place, message)
 }
 
-/// The fans of all faces.
+fn element_fault(path: &Path, element: &str, number: usize, message: String) -> Fault {
+    Fault::new(path, Place::Element(format!("{element} {number}, counted from 0")), message)
+}
+
+/// Makes the fans of all faces.
 fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault> {
-    let fault = |element, number: usize, message| {
-        Err(Fault::new(
-            path,
-            Place::Element(format!("{element} {number}, counted from 0")),
-            message,
-        ))
-    };
     if let Some((number, Vertex(found))) = vertices
         .iter()
         .enumerate()
         .find(|(_, Vertex(position))| position.iter().any(|x| !x.is_finite()))
     {
-        return fault("vertex", number, format!("position {found:?}; expected finite x, y and z"));
+        let message = format!("position {found:?}; expected finite x, y and z");
+        return Err(element_fault(path, "vertex", number, message));
     }
     let mut used = vec![false; vertices.len()];
     let mut triangles = Vec::new();
@@ -155,11 +154,8 @@ fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault>
                 .ok()
                 .and_then(|index| vertices.get(index))
             else {
-                return fault(
-                    "face",
-                    number,
-                    format!("vertex {index}; expected 0 to below {}", vertices.len()),
-                );
+                let message = format!("vertex {index}; expected 0 to below {}", vertices.len());
+                return Err(element_fault(path, "face", number, message));
             };
             corners.push(Vec3::from(*position));
         }
@@ -167,16 +163,17 @@ fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault>
             short_faces += 1;
             continue;
         };
-        short_faces += usize::from(rest.len() < 2);
-        if rest.len() >= 2 {
-            indices
-                .iter()
-                .for_each(|&index| used[index as usize] = true);
+        if rest.len() < 2 {
+            short_faces += 1;
+            continue;
         }
-        triangles.extend(
-            rest.windows(2)
-                .map(|pair| Triangle([*first, pair[0], pair[1]])),
-        );
+        // The loop above has checked every index.
+        for &index in indices {
+            used[index as usize] = true;
+        }
+        for pair in rest.windows(2) {
+            triangles.push(Triangle([*first, pair[0], pair[1]]));
+        }
     }
     if triangles.is_empty() || triangles.len() > MOST_TRIANGLES {
         let found = format!("{} vertices and {} triangles", vertices.len(), triangles.len());

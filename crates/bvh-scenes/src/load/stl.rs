@@ -1,29 +1,31 @@
-//! Triangles from STL files, of text or binary.
+//! Triangles from STL files, text or binary.
 //!
-//! Read here and not by `stl_io` 0.11, which stops at the first of several solids, takes `solid` without a name for a binary file,
-//! and names no line.
+//! This module does not use `stl_io` 0.11, because `stl_io` stops after the first of several solids,
+//! mistakes `solid` without a name for a binary file, and names no line.
 
 use super::mesh::{Fault, Mesh, Place};
 use bvh_core::Triangle;
 use glam::Vec3;
 use std::path::Path;
 
-/// Bytes before the triangles of a binary file: a comment, and the number of triangles.
+/// The number of bytes before the triangles of a binary file: a comment of 80 bytes, and the number
+/// of triangles.
 const HEADER: usize = 84;
-/// Bytes of a triangle: a normal, three corners, and two bytes that mean nothing.
+/// The number of bytes of a triangle: a normal, three corners, and two bytes without a meaning.
 const FACET: usize = 50;
 
-/// The number of triangles that a binary file promises.
+/// Returns the number of triangles in a binary file's header.
 fn promised(bytes: &[u8]) -> Option<usize> {
     Some(u32::from_le_bytes(*bytes.get(80..)?.first_chunk()?) as usize)
 }
 
-/// Whether the bytes are as many as a binary file of so many triangles has, which may well begin with `solid`.
+/// Returns whether the number of bytes matches the header of a binary file.
 pub fn is_binary(bytes: &[u8]) -> bool {
+    // The first bytes do not decide, because the comment of a binary file may begin with `solid`.
     promised(bytes).is_some_and(|facets| facets > 0 && bytes.len() == HEADER + FACET * facets)
 }
 
-/// Whether text begins as an STL file does: `solid`, and a facet soon.
+/// Returns whether text begins like an STL file: with `solid`, and a facet within 4096 bytes.
 pub fn is_text(text: &[u8]) -> bool {
     let mut words = text[..text.len().min(4096)]
         .split(u8::is_ascii_whitespace)
@@ -42,16 +44,15 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
         .strip_prefix(b"\xef\xbb\xbf")
         .unwrap_or(bytes);
     let is_text = !is_binary(bytes) && is_text(text.trim_ascii_start());
-    let triangles = if is_text { of_text(text, path)? } else { of_binary(bytes, path)? };
-    match triangles.is_empty() {
-        true => {
-            Err(Fault::new(path, Place::File, "no facet; expected an STL file with at least one"))
-        }
-        false => Ok(Mesh::new(triangles)),
+    let triangles = if is_text { parse_text(text, path)? } else { parse_binary(bytes, path)? };
+    if triangles.is_empty() {
+        let message = "no facet; expected an STL file with at least one";
+        return Err(Fault::new(path, Place::File, message));
     }
+    Ok(Mesh::new(triangles))
 }
 
-fn of_binary(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
+fn parse_binary(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
     let facets = promised(bytes).ok_or_else(|| {
         let message =
             format!("{} bytes; expected the {HEADER} of a binary STL file's header", bytes.len());
@@ -65,36 +66,30 @@ fn of_binary(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
         );
         return Err(Fault::new(path, Place::File, message));
     }
-    let triangle = |(number, facet): (usize, &[u8])| {
+    let mut triangles = Vec::new();
+    for (number, facet) in body.take(facets).enumerate() {
+        // The normal in the first 12 bytes is ignored: many programs write zeros there.
         let (words, _) = facet[12..48].as_chunks();
-        let corners: [f32; 9] = std::array::from_fn(|at| f32::from_le_bytes(words[at]));
-        match corners.iter().find(|x| !x.is_finite()) {
-            None => Ok(Triangle::from(corners)),
-            Some(found) => {
-                let place = Place::Element(format!("facet {number}, counted from 0"));
-                Err(Fault::new(
-                    path,
-                    place,
-                    format!("coordinate {found}; expected a finite number"),
-                ))
-            }
+        let corners: [f32; 9] = std::array::from_fn(|i| f32::from_le_bytes(words[i]));
+        if let Some(found) = corners.iter().find(|x| !x.is_finite()) {
+            let place = Place::Element(format!("facet {number}, counted from 0"));
+            let message = format!("coordinate {found}; expected a finite number");
+            return Err(Fault::new(path, place, message));
         }
-    };
-    body.take(facets)
-        .enumerate()
-        .map(triangle)
-        .collect()
+        triangles.push(Triangle::from(corners));
+    }
+    Ok(triangles)
 }
 
-/// The corners of every loop, three at a time. All keywords but `vertex` and `endloop` are passed over.
-fn of_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
+/// Reads the corners of every loop, three at a time. Normals and names are ignored.
+fn parse_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
     let mut triangles = Vec::new();
     let mut corners: Vec<Vec3> = Vec::new();
     let mut line = 0;
     let mut inside = false;
     for text in bytes.split(|&byte| byte == b'\n') {
         line += 1;
-        let fault = |message: String| Err(Fault::new(path, Place::Line(line), message));
+        let place = Place::Line(line);
         let text = String::from_utf8_lossy(text);
         let mut words = text.split_whitespace();
         match words
@@ -112,29 +107,33 @@ fn of_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
                 match *numbers {
                     [x, y, z] if found.len() == 3 => corners.push(Vec3::new(x, y, z)),
                     _ => {
-                        return fault(format!(
-                            "vertex `{}`; expected three finite numbers",
-                            found.join(" ")
-                        ));
+                        let found = found.join(" ");
+                        let message = format!("vertex `{found}`; expected three finite numbers");
+                        return Err(Fault::new(path, place, message));
                     }
                 }
                 if corners.len() > 3 {
-                    return fault("a fourth vertex in a loop; expected three".into());
+                    let message = "a fourth vertex in a loop; expected three";
+                    return Err(Fault::new(path, place, message));
                 }
             }
+            // `endfacet` closes a loop as well, because some programs omit `endloop`.
             Some("endloop" | "endfacet") if !corners.is_empty() => match *corners {
                 [a, b, c] => {
                     triangles.push(Triangle([a, b, c]));
                     corners.clear();
                 }
-                _ => return fault(format!("a loop of {} vertices; expected three", corners.len())),
+                _ => {
+                    let message = format!("a loop of {} vertices; expected three", corners.len());
+                    return Err(Fault::new(path, place, message));
+                }
             },
             Some("facet") => inside = true,
             Some("endfacet") => inside = false,
             Some("solid" | "endsolid" | "outer" | "endloop") | None => {}
             Some(word) => {
                 let expected = "expected a keyword of an STL file, such as facet or vertex";
-                return fault(format!("`{word}`; {expected}"));
+                return Err(Fault::new(path, place, format!("`{word}`; {expected}")));
             }
         }
     }

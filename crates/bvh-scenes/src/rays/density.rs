@@ -1,13 +1,15 @@
-//! The density of rays through a scene, by which trees are searched in place of area.
+//! The density of rays through a scene, which a search can minimise instead of area.
 
 use super::segments::TracedRay;
 use bvh_core::{Bvh, DensityError, RayDensity, Segment};
 
-/// The number of primary rays that trees are trained on by default; without a camera, of rays of each family.
+/// The default number of primary rays that train a tree; without a camera, the number of rays of each
+/// family.
 pub const TRAINED: u32 = 100_000;
 
-/// The part of a box's measure that is its area, so that boxes which none of the sampled rays enters are not free. Between 0.02 and 0.3
-/// trees for a camera differ by less than their seeds do; without a camera, 0.3 loses half of the gain in interiors.
+/// The share of area in a box's measure. Without it a box that no sampled ray enters would be free.
+/// For a camera, shares from 0.02 to 0.3 change trees by less than seeds do; without a camera, 0.3
+/// loses half of the gain in interiors.
 const AREA_WEIGHT: f64 = 0.1;
 
 /// Returns the density of rays through the scene of a tree.

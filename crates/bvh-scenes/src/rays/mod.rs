@@ -1,4 +1,5 @@
-//! The rays of measurements and of renderers, their parts up to the hit, and the density of these parts.
+//! The rays of measurements and of renderers, their segments up to the hit, and the density of these
+//! segments.
 
 mod camera;
 mod density;

@@ -1,4 +1,4 @@
-//! The rays of every measurement: random ones, and those that a renderer sends. The same on every machine.
+//! The rays of every measurement, random or from a renderer. They are the same on every machine.
 
 use super::camera::{Camera, View};
 use crate::Scene;
@@ -17,23 +17,22 @@ use rand::{RngExt, SeedableRng};
 )]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Family {
-    /// Origin uniform in the box, direction uniform: the paper's.
+    /// The paper's rays: the origin is uniform in the box, and the direction is uniform.
     Inside,
     /// Lines that meet the box, uniform in the measure that is proportional to surface area.
     Lines,
 }
 
-/// A random ray of a family; `None` if the box is so small or so large that no ray can be made.
+/// Returns a random ray of a family; `None` if the box is too small or too large for a ray.
 pub fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> {
     let low = root.min.as_dvec3();
     let size = root.extent();
-    let mut unit = || rng.random::<f64>();
-    let inside = DVec3::new(unit(), unit(), unit());
+    let inside = DVec3::from_array(rng.random());
     let (origin, direction) = match family {
         Family::Inside => (inside, on_sphere(rng)),
         Family::Lines => {
-            // A uniform point on the surface and a direction inwards with the density of the cosine make a line that
-            // is uniform among all lines that meet the box.
+            // A uniform point on the surface and an inward direction with cosine density make a line
+            // that is uniform among all lines through the box.
             let areas = [size.y * size.z, size.z * size.x, size.x * size.y];
             let pick = rng.random::<f64>() * areas.iter().sum::<f64>();
             let axis =
@@ -43,29 +42,33 @@ pub fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> 
             origin[axis] = f64::from(u8::from(far));
             let mut normal = DVec3::ZERO;
             normal[axis] = if far { -1.0 } else { 1.0 };
+            // A unit normal plus a uniform unit vector has cosine density (Lambert).
             (origin, on_sphere(rng) + normal)
         }
     };
+    // Rounding to f32 may leave the box by one step.
     let origin = (low + origin * size)
         .as_vec3()
         .clamp(root.min, root.max);
     Ray::half_line(origin, direction.as_vec3()).ok()
 }
 
-/// A uniform point on the unit sphere. It is the direction of a uniform point of the unit ball, which needs no function
-/// that differs between machines.
+/// Returns a uniform point on the unit sphere: the direction of a uniform point in the unit ball, which
+/// needs no function that differs between machines.
 pub(super) fn on_sphere(rng: &mut Stream) -> DVec3 {
     loop {
-        let mut coordinate = || rng.random::<f64>() * 2.0 - 1.0;
-        let point = DVec3::new(coordinate(), coordinate(), coordinate());
+        let unit = DVec3::from_array(rng.random());
+        let point = unit * 2.0 - 1.0;
         let squared = point.length_squared();
+        // Near the centre rounding would make some directions more likely than others.
         if squared <= 1.0 && squared > 1e-6 {
             return point / squared.sqrt();
         }
     }
 }
 
-/// A kind of rays that a renderer sends. All directions are unit vectors and all rays begin at distance 0.
+/// A kind of rays that a renderer traces. All directions are unit vectors and all rays begin at
+/// distance 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -74,30 +77,32 @@ pub(super) fn on_sphere(rng: &mut Stream) -> DVec3 {
 )]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Kind {
-    /// Origins uniform in the root's box, directions uniform; nearest hit.
+    /// Rays with uniform origins in the root's box and uniform directions; nearest hit.
     Incoherent,
-    /// From a pinhole camera, pixels in Morton order, its field of view 60 degrees wide; nearest hit.
+    /// Rays from a pinhole camera with an angle of view of 60 degrees, pixels in Morton order; nearest
+    /// hit.
     Primary,
-    /// From the hits of the primary rays, in turn, in random directions; nearest hit.
+    /// Rays from the hits of the primary rays, in their order, in random directions; nearest hit.
     Bounce,
-    /// From the hits of the primary rays, in turn, to a light under the middle of the box's upper side; any hit.
+    /// Rays from the hits of the primary rays, in their order, to a light below the middle of the box's
+    /// upper side; any hit.
     Shadow,
 }
 
 impl Kind {
-    /// What the rays ask.
+    /// Returns the query of these rays.
     pub fn query(self) -> Query {
         if self == Self::Shadow { Query::Any } else { Query::Nearest }
     }
 
-    /// Whether `count` rays of this kind go through all pixels of squares of 16 × 16, one square after the other, in Morton
-    /// order.
+    /// Returns whether `count` rays of this kind cover squares of 16 × 16 pixels completely, one square
+    /// after the other, each in Morton order.
     pub fn is_in_squares(self, count: u32) -> bool {
         let side = picture_side(count);
         self == Self::Primary && side.is_multiple_of(16) && side * side == count
     }
 
-    /// Whether consecutive rays begin close to each other and run the same way.
+    /// Returns whether consecutive rays begin close to each other and have similar directions.
     pub fn coherence(self) -> Coherence {
         match self {
             Self::Primary | Self::Shadow => Coherence::Coherent,
@@ -105,7 +110,7 @@ impl Kind {
         }
     }
 
-    /// The kind's name in tables.
+    /// Returns the kind's name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Incoherent => "incoherent",
@@ -116,7 +121,8 @@ impl Kind {
     }
 }
 
-/// Where the primary rays of a scene come from, in fractions of the root's box: 0 is its lower corner, 1 the upper one.
+/// The camera of a scene's primary rays, in fractions of the root's box: 0 is the lower corner and 1 the
+/// upper corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -127,7 +133,7 @@ impl Kind {
 pub struct Viewpoint {
     /// The camera's position.
     pub eye: [f64; 3],
-    /// The point that it looks at.
+    /// The point in the middle of the picture.
     pub target: [f64; 3],
 }
 
@@ -137,8 +143,8 @@ impl Default for Viewpoint {
     }
 }
 
-/// Rays of a kind through `tree`, which must be valid over the scene. There are fewer than `count` only where there are
-/// none: without a primary hit there is no shadow ray.
+/// Returns `count` rays of a kind through `tree`, which must be valid over the scene. Bounce and shadow
+/// rays need a primary hit; without one the result is empty.
 pub fn rays(
     kind: Kind,
     count: u32,
@@ -158,20 +164,20 @@ pub fn rays(
         Kind::Primary => primary_rays(count, &root, viewpoint),
         Kind::Bounce => {
             let mut rng = Stream::seed_from_u64(seed);
-            let points =
-                hit_points(&primary_rays(count, &root, viewpoint), scene, tree, JUST_BEFORE);
-            let ray = |&origin: &Vec3| Ray::half_line(origin, on_sphere(&mut rng).as_vec3()).ok();
-            points
+            let primary = primary_rays(count, &root, viewpoint);
+            // Many primary rays miss. Repeating the hits keeps the number of rays, which times are
+            // compared over.
+            hit_points(&primary, scene, tree, JUST_BEFORE)
                 .iter()
                 .cycle()
                 .take(count as usize)
-                .filter_map(ray)
+                .filter_map(|&origin| Ray::half_line(origin, on_sphere(&mut rng).as_vec3()).ok())
                 .collect()
         }
         Kind::Shadow => {
-            let points = hit_points(&primary_rays(count, &root, viewpoint), scene, tree, 1.0);
+            let primary = primary_rays(count, &root, viewpoint);
             let light = in_box(&root, [0.5, 0.95, 0.5]);
-            points
+            hit_points(&primary, scene, tree, 1.0)
                 .iter()
                 .cycle()
                 .take(count as usize)
@@ -181,29 +187,30 @@ pub fn rays(
     }
 }
 
-/// The part of the way to a hit at which the next ray begins, because a library without a shortest distance would hit the surface
-/// that the ray starts from.
+/// The fraction of the distance to a hit at which the next ray begins. A library without a minimum
+/// distance would otherwise hit the surface that the ray starts from.
 pub(super) const JUST_BEFORE: f32 = 1.0 - 1.0 / 2048.0;
 
-/// A point given in fractions of the root's box.
-pub fn in_box(root: &Aabb, at: [f64; 3]) -> DVec3 {
-    root.min.as_dvec3() + DVec3::from(at) * root.extent()
+/// Converts fractions of the root's box into a point.
+pub fn in_box(root: &Aabb, fractions: [f64; 3]) -> DVec3 {
+    root.min.as_dvec3() + DVec3::from(fractions) * root.extent()
 }
 
-/// The points at this fraction of the way to the nearest hits of rays.
+/// Returns the points at this fraction of the distance to the nearest hits of rays.
 fn hit_points(rays: &[Ray], scene: &Scene, tree: &Bvh, fraction: f32) -> Vec<Vec3> {
     let accelerator = Accelerator::of_tree(&scene.primitives, tree);
-    let point = |ray: &Ray| {
-        accelerator
-            .nearest_hit(ray)
-            .map(|hit| ray.at(fraction * hit.t))
-    };
-    rays.iter().filter_map(point).collect()
+    let mut points = Vec::new();
+    for ray in rays {
+        if let Some(hit) = accelerator.nearest_hit(ray) {
+            points.push(ray.at(fraction * hit.t));
+        }
+    }
+    points
 }
 
-/// Rays through the centres of the pixels of a square picture, in Morton order.
+/// Returns rays through the centres of the pixels of a square picture, in Morton order.
 ///
-/// Tracers of packets want consecutive rays to be close to each other in both directions of the picture:
+/// Packet tracers need consecutive rays to be close to each other in both directions of the picture:
 ///
 /// ```text
 ///  0  1 │  4  5
@@ -217,42 +224,51 @@ fn primary_rays(count: u32, root: &Aabb, viewpoint: &Viewpoint) -> Vec<Ray> {
         View { from: in_box(root, viewpoint.eye), at: in_box(root, viewpoint.target), fov: 60.0 };
     let side = picture_side(count);
     let camera = Camera::new(&view, DVec3::Y, side, side);
-    let centre = |pixel: u32| f64::from(pixel) + 0.5;
-    let direction = |[x, y]: [u32; 2]| camera.direction(centre(x), centre(y));
-    let ray = |pixel| Ray::half_line(camera.origin.as_vec3(), direction(pixel).as_vec3()).ok();
-    pixels(side, count).filter_map(ray).collect()
+    let mut rays = Vec::new();
+    for [x, y] in pixels(side, count) {
+        let direction = camera.direction(f64::from(x) + 0.5, f64::from(y) + 0.5);
+        rays.extend(Ray::half_line(camera.origin.as_vec3(), direction.as_vec3()));
+    }
+    rays
 }
 
-/// Pixels per row of a picture with `count` pixels and as many rows as columns; the last row may lack some.
+/// Returns the side of the smallest square picture with at least `count` pixels. Its last rows may be
+/// incomplete.
 fn picture_side(count: u32) -> u32 {
     (1..=count)
         .find(|side| side.saturating_mul(*side) >= count)
         .unwrap_or(count)
 }
 
-/// The column and the row of the first `count` pixels of a square picture, counted row by row, in Morton order.
+/// Returns the column and the row of the first `count` pixels of a square picture, counted row by row,
+/// in Morton order.
 fn pixels(side: u32, count: u32) -> impl Iterator<Item = [u32; 2]> {
+    // Morton codes fill a square whose side is a power of two; the pixels outside the picture go.
     let codes = u64::from(side.next_power_of_two()).pow(2);
-    let pixel = |code: u64| [even_bits(code), even_bits(code >> 1)];
-    let is_in_picture = move |[x, y]: &[u32; 2]| {
-        *x < side && u64::from(*y) * u64::from(side) + u64::from(*x) < u64::from(count)
-    };
-    (0..codes).map(pixel).filter(is_in_picture)
+    (0..codes)
+        .map(|code| [even_bits(code), even_bits(code >> 1)])
+        .filter(move |&[x, y]| {
+            let index = u64::from(y) * u64::from(side) + u64::from(x);
+            x < side && index < u64::from(count)
+        })
 }
 
-/// The number that the bits of a Morton code at even places make.
+/// Returns the number that the bits at even positions of a Morton code form.
 fn even_bits(code: u64) -> u32 {
     (0..32)
         .map(|bit| ((code >> (2 * bit) & 1) as u32) << bit)
         .sum()
 }
 
-/// To the light, from a thousandth of the way on: a library without a shortest distance would hit the surface that the
-/// ray starts from.
+/// Returns the ray from a point to the light.
 fn shadow_ray(point: Vec3, light: DVec3) -> Option<Ray> {
     let way = light - point.as_dvec3();
+    // A library without a minimum distance would hit the surface that the ray starts from.
     let origin = (point.as_dvec3() + 1e-3 * way).as_vec3();
-    Ray::new(origin, way.normalize_or_zero().as_vec3(), 0.0, (0.998 * way.length()) as f32).ok()
+    let direction = way.normalize_or_zero().as_vec3();
+    // The ray ends as far from the light as it begins from the surface.
+    let length = (0.998 * way.length()) as f32;
+    Ray::new(origin, direction, 0.0, length).ok()
 }
 
 #[cfg(test)]
@@ -261,7 +277,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn a_picture_has_every_pixel_once_and_its_squares_one_after_the_other() {
+    fn a_picture_has_every_pixel_once_and_its_squares_in_sequence() {
         for (side, count) in [(1, 1), (3, 7), (16, 256), (48, 2304)] {
             assert_eq!(picture_side(count), side);
             let found: Vec<[u32; 2]> = pixels(side, count).collect();

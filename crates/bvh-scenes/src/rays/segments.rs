@@ -1,4 +1,5 @@
-//! The rays that a tree is searched for, with their parts up to the hit: a renderer's, or any through a scene.
+//! The rays that train a tree, with their segments up to the hit: from a renderer, or any through a
+//! scene.
 
 use super::camera::{Camera, View};
 use super::random::{Family, JUST_BEFORE, Kind, in_box, on_sphere, random_ray};
@@ -12,28 +13,29 @@ use rand::{RngExt, SeedableRng};
 use std::ops::Bound::Excluded;
 
 config! {
-    /// The rays of a renderer, as the file of `bake --rays FILE.toml` describes them. All coordinates are in world units.
+    /// The rays of a renderer: the contents of the file of `bake --rays FILE.toml`. All coordinates are
+    /// in world units.
     pub struct RenderedRays {
-        /// The poses of the camera on its path, at least one; the camera moves straight from each to the next.
+        /// The poses of the camera on its path, at least one. The camera moves in straight lines.
         cameras: Vec<Pose>;
-        /// Angle of view from the lower edge of the picture to the upper one, degrees.
+        /// The angle between the lower and the upper edge of the picture, in degrees.
         fov: f64 = 60.0, in (Excluded(0.0), Excluded(180.0));
-        /// Width of the picture over its height.
+        /// The picture's width divided by its height.
         aspect: f64 = 1.0, in above(0.0);
-        /// Diffuse reflections that follow every primary ray, one after the other.
+        /// The number of diffuse reflections that follow every primary ray.
         bounces: u32 = 1, in 0..=100;
-        /// Positions of lights: a shadow ray goes from the hit of every primary ray to each of them.
+        /// The positions of lights. The hit of every primary ray sends a shadow ray to each light.
         lights: Vec<[f64; 3]>;
-        /// Number of primary rays.
+        /// The number of primary rays.
         count: u32 = 50_000, in 1..=1_000_000;
-        /// Draws the pixels and the directions.
+        /// The seed of the pixels and of the directions.
         seed: u64 = 1;
     }
     check Self::check_cameras;
 }
 
 config! {
-    /// Where a camera is, and what it looks at, in world units.
+    /// The position and the target of a camera, in world units.
     pub struct Pose {
         /// The eye.
         eye: [f64; 3];
@@ -56,65 +58,73 @@ impl RenderedRays {
                 "at least one table with `eye` and `target`",
             ));
         }
-        let wrong = numbers
+        if let Some(wrong) = numbers
             .flatten()
-            .find(|number| !number.is_finite());
-        let wrong =
-            wrong.map(|wrong| OutOfRange::new("cameras and lights", wrong, "finite coordinates"));
-        wrong.or_else(|| {
-            check_count("count", self.count, 1 + self.bounces as usize + self.lights.len())
-        })
+            .find(|number| !number.is_finite())
+        {
+            return Some(OutOfRange::new("cameras and lights", wrong, "finite coordinates"));
+        }
+        check_count("count", self.count, 1 + self.bounces as usize + self.lights.len())
     }
 
-    /// The camera at a place on its path, 0 at the first pose and 1 at the last; its picture is one unit high.
-    fn camera(&self, place: f64, up: DVec3) -> Camera {
-        let at = place * (self.cameras.len() - 1) as f64;
-        let first = (at as usize).min(self.cameras.len() - 1);
+    /// Returns the camera at a position on its path, 0 at the first pose and 1 at the last. Its picture
+    /// is one unit high.
+    fn camera(&self, position: f64, up: DVec3) -> Camera {
+        let last = self.cameras.len() - 1;
+        let place = position * last as f64;
+        let first = (place as usize).min(last);
+        let fraction = place - first as f64;
         let a = &self.cameras[first];
-        let b = &self.cameras[(first + 1).min(self.cameras.len() - 1)];
-        let between = |a: [f64; 3], b: [f64; 3]| DVec3::from(a).lerp(b.into(), at - first as f64);
-        let view =
-            View { from: between(a.eye, b.eye), at: between(a.target, b.target), fov: self.fov };
+        let b = &self.cameras[(first + 1).min(last)];
+        let view = View {
+            from: DVec3::from(a.eye).lerp(b.eye.into(), fraction),
+            at: DVec3::from(a.target).lerp(b.target.into(), fraction),
+            fov: self.fov,
+        };
         Camera::new(&view, up, 1, 1)
     }
 }
 
-/// Rays without a camera that [`of_anything`] makes of each one counted, at most.
+/// The largest number of rays that [`of_anything`] makes per unit of its count.
 pub const OF_ANYTHING: usize = 6;
 
-/// Refuses more rays than a density counts, where each of so many leads to `rays` in all.
+/// Rejects a count if that many rays, each leading to `rays` in total, exceed the limit of a density.
 pub fn check_count(key: &str, count: u32, rays: usize) -> Option<OutOfRange> {
     let most = RayDensity::MOST_SEGMENTS / rays;
-    let accepted = || format!("up to {most}, each with {rays} rays in all");
-    (count as usize > most).then(|| OutOfRange::new(key, count, accepted()))
+    if count as usize <= most {
+        return None;
+    }
+    Some(OutOfRange::new(key, count, format!("up to {most}, each with {rays} rays in all")))
 }
 
-/// A ray as it is traced: its kind, and its part up to what it hits.
+/// A traced ray with its kind and its segment up to the hit.
 pub struct TracedRay {
-    /// Why it is sent.
+    /// The purpose of the ray.
     pub kind: Kind,
-    /// From a surface or a camera on.
+    /// The ray, which begins at a surface or a camera.
     pub ray: Ray,
-    /// Up to the nearest hit. All of a shadow ray, which may meet anything on its way before what is nearest.
+    /// The segment up to the nearest hit. A shadow ray has its full length, because any object on its
+    /// way may end its traversal.
     pub segment: Segment,
 }
 
-/// The rays of a renderer through `scene`, of which `tree` is any valid tree: through random places of the pictures, from their
-/// hits in random directions as often as `bounces` says, and from the hits of primary rays to every light.
+/// Returns the rays of a renderer through `scene`: primary rays through random points of the pictures,
+/// `bounces` reflections in random directions, and shadow rays from primary hits to every light. `tree`
+/// is any valid tree over the scene.
 pub fn of_renderer(config: &RenderedRays, scene: &Scene, tree: &Bvh) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, config.seed);
     let up = scene.up();
     for index in 0..config.count {
-        let place = (f64::from(index) + tracing.rng.random::<f64>()) / f64::from(config.count);
-        let camera = config.camera(place, up);
+        // One random position in each of `count` equal parts of the path covers it evenly.
+        let position = (f64::from(index) + tracing.rng.random::<f64>()) / f64::from(config.count);
+        let camera = config.camera(position, up);
         let x = 0.5 + (tracing.rng.random::<f64>() - 0.5) * config.aspect;
         let direction = camera.direction(x, tracing.rng.random());
         let mut hit = tracing.nearest(Kind::Primary, camera.origin.as_vec3(), direction);
         if let Some(point) = hit {
-            config
-                .lights
-                .iter()
-                .for_each(|&light| tracing.shadow(point, light.into()));
+            for &light in &config.lights {
+                tracing.shadow(point, light.into());
+            }
         }
         for _ in 0..config.bounces {
             let Some(point) = hit else { break };
@@ -125,8 +135,8 @@ pub fn of_renderer(config: &RenderedRays, scene: &Scene, tree: &Bvh) -> Vec<Trac
     tracing.rays
 }
 
-/// Rays that need no camera: `count` from anywhere in the scene and as many through it from outside; and from the hits of both
-/// one in any direction and one to a point anywhere in the scene.
+/// Returns rays that need no camera: `count` rays from random points in the scene, `count` rays through
+/// it from outside, and from each hit one ray in a random direction and one to a random point.
 pub fn of_anything(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, seed);
     let Some(root) = tree.root_aabb() else { return Vec::new() };
@@ -144,7 +154,7 @@ pub fn of_anything(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<Trac
     tracing.rays
 }
 
-/// The paper's random rays, `count` of them, up to their nearest hits.
+/// Returns `count` of the paper's random rays, up to their nearest hits.
 pub fn of_inside(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, seed);
     for _ in 0..count {
@@ -172,11 +182,12 @@ impl<'a> Tracing<'a> {
         Self { accelerator, bounds, rng: Stream::seed_from_u64(seed), rays: Vec::new() }
     }
 
-    /// Keeps a ray that looks for its nearest hit. Returns a point just before the hit, from which further rays may begin.
+    /// Keeps a ray that needs its nearest hit. Returns a point just before the hit, where further rays
+    /// may begin.
     fn nearest(&mut self, kind: Kind, origin: Vec3, direction: DVec3) -> Option<Vec3> {
         let ray = Ray::half_line(origin, direction.as_vec3()).ok()?;
         let hit = self.accelerator.nearest_hit(&ray);
-        // A ray that hits nothing ends where it has left the scene.
+        // A ray without a hit ends outside the scene, because a density needs finite segments.
         let length = hit.map_or_else(|| self.beyond(&ray), |hit| hit.t);
         self.keep(kind, ray, length);
         hit.map(|hit| ray.at(hit.t * JUST_BEFORE))
@@ -192,13 +203,14 @@ impl<'a> Tracing<'a> {
     fn keep(&mut self, kind: Kind, ray: Ray, end: f32) {
         let from = ray.origin();
         let to = ray.at(end);
+        // In the largest scenes the end of a ray may overflow.
         if to.is_finite() {
             let segment = Segment { from: from.to_array(), to: to.to_array() };
             self.rays.push(TracedRay { kind, ray, segment });
         }
     }
 
-    /// A distance at which the ray is outside the scene.
+    /// Returns a distance at which the ray is outside the scene.
     fn beyond(&self, ray: &Ray) -> f32 {
         let reach = (self.bounds.min - ray.origin())
             .abs()
@@ -213,16 +225,13 @@ mod tests {
     use bvh_config::Check;
 
     #[test]
-    fn more_rays_than_a_density_counts_are_refused_before_they_are_traced() {
+    fn more_rays_than_a_density_counts_are_rejected_before_they_are_traced() {
         let pose = Pose { eye: [0.0; 3], target: [1.0; 3] };
-        let rays = |count| RenderedRays {
-            cameras: vec![pose.clone()],
-            bounces: 2,
-            count,
-            ..Default::default()
-        };
-        assert_eq!(rays(349_525).check(), Ok(()));
-        let refused = rays(349_526).check().unwrap_err().to_string();
-        assert_eq!(refused, "count is 349526; accepted: up to 349525, each with 3 rays in all");
+        let mut rays =
+            RenderedRays { cameras: vec![pose], bounces: 2, count: 349_525, ..Default::default() };
+        assert_eq!(rays.check(), Ok(()));
+        rays.count += 1;
+        let message = rays.check().unwrap_err().to_string();
+        assert_eq!(message, "count is 349526; accepted: up to 349525, each with 3 rays in all");
     }
 }

@@ -1,4 +1,5 @@
-//! From a scene and a view to a picture: tiles in parallel, the same bytes on any number of threads.
+//! Draws a picture of a scene from a view. Tiles are drawn in parallel, and the picture has the same
+//! bytes for any number of threads.
 
 use super::film::Film;
 use super::framing;
@@ -10,23 +11,23 @@ use bvh_core::Aabb;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// What is drawn, and how finely.
+/// The contents and the resolution of a picture.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Pixels per row.
+    /// The number of pixels per row.
     pub width: u32,
-    /// Rows.
+    /// The number of rows.
     pub height: u32,
-    /// `samples`² rays go through each pixel, on a grid; 1 or more.
+    /// The square root of the number of rays per pixel, which form a grid; 1 or more.
     pub samples: u32,
-    /// The number of mirror reflections that are followed one after the other.
+    /// The largest number of successive mirror reflections.
     pub depth: u32,
-    /// The view; without one, the whole scene is framed.
+    /// The view. The default shows the whole scene.
     pub view: Option<View>,
-    /// Lights in place of those that fit the view. If the list is empty, surfaces are lit from the eye and no shadow
-    /// ray is sent.
+    /// The lights. The default suits the view. With an empty list, surfaces are lit from the eye
+    /// without shadow rays.
     pub lights: Option<Vec<DVec3>>,
-    /// Whether there is a ground below a scene that is seen from outside.
+    /// True to draw a ground below a scene that is seen from outside.
     pub ground: bool,
 }
 
@@ -44,16 +45,16 @@ impl Default for Options {
     }
 }
 
-/// Pixels on a tile's side. A thread reports progress after every tile.
+/// The side of a tile in pixels. A thread reports progress after every tile.
 const TILE: u32 = 16;
 
-/// Number of tiles that [`render`] reports.
+/// Returns the number of tiles that [`render`] reports.
 pub fn tiles(options: &Options) -> u64 {
     u64::from(options.width.div_ceil(TILE)) * u64::from(options.height.div_ceil(TILE))
 }
 
-/// Draws the scene on all threads of the current rayon pool. `tile_done` is called after every tile; once it returns
-/// false, the picture is abandoned and `None` returned.
+/// Draws the scene on all threads of the current rayon pool. Calls `tile_done` after every tile; once
+/// it returns false, abandons the picture and returns `None`.
 pub fn render(
     scene: &Scene,
     accelerator: &Accelerator,
@@ -68,8 +69,10 @@ pub fn render(
     let height = options.height;
     let up = scene.up();
     let aspect = f64::from(width) / f64::from(height);
-    let automatic = || framing::automatic(scene, &bounds, aspect);
-    let view = options.view.clone().unwrap_or_else(automatic);
+    let view = match &options.view {
+        Some(view) => view.clone(),
+        None => framing::automatic(scene, &bounds, aspect),
+    };
     let camera = Camera::new(&view, up, width, height);
     let lights = match &options.lights {
         Some(positions) => Light::white(positions),
@@ -127,9 +130,9 @@ mod tests {
         let options =
             Options { width: 32, height: 18, samples: 1, ground: false, ..Options::default() };
         let dark = Options { lights: Some(vec![]), ..options.clone() };
-        let rays = |options: &Options| picture(&scene, options).rays;
-        assert_eq!(rays(&dark), 32 * 18, "triangles mirror nothing");
-        assert!(rays(&options) > rays(&dark));
+        let dark_rays = picture(&scene, &dark).rays;
+        assert_eq!(dark_rays, 32 * 18, "triangles mirror nothing");
+        assert!(picture(&scene, &options).rays > dark_rays);
     }
 
     #[test]

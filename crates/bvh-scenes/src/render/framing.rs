@@ -1,26 +1,27 @@
-//! Finds a view that shows a whole scene.
+//! Finds a view of a whole scene.
 
 use crate::Scene;
 use crate::rays::{View, frame};
 use bvh_core::{Aabb, Primitives};
 use glam::DVec3;
 
-/// Views of scenes that should be seen from inside: name, eye, middle of the picture, angle.
+/// Views of scenes that should be seen from inside: the name, the eye, the point in the middle of the
+/// picture, and the angle.
 const INSIDE: [(&str, [f64; 3], [f64; 3], f64); 1] =
     [("sponza", [-11.3, 1.9, -0.9], [3.0, 4.4, 0.5], 62.0)];
 
-/// A view of a scene: a known good one, or else from outside, from above and a little from the side, at the distance at
-/// which the whole box just fits.
+/// Returns a view of a scene: the view in [`INSIDE`], or otherwise a view from outside, from above and
+/// a little from the side, whose distance just fits the whole box.
 pub fn automatic(scene: &Scene, bounds: &Aabb, aspect: f64) -> View {
     if let Some((_, from, at, fov)) = INSIDE.iter().find(|view| view.0 == scene.name) {
         let view = View { from: (*from).into(), at: (*at).into(), fov: *fov };
-        // Another scene may have the same name.
+        // A different scene may have the same name.
         if view.is_inside(bounds) {
             return view;
         }
     }
     let up = scene.up();
-    // Meshes are seen from further above, because their floor would otherwise be seen edge on.
+    // Meshes are seen from higher above, because their floor would otherwise be edge on.
     let (side, height) = match scene.primitives {
         Primitives::Triangles(_) => (0.62, 0.58),
         Primitives::Spheres(_) => (0.20, 0.17),
@@ -29,8 +30,8 @@ pub fn automatic(scene: &Scene, bounds: &Aabb, aspect: f64) -> View {
     framing(bounds, up.cross(front) * side + up * height + front, up, aspect, View::FOV)
 }
 
-/// The view of a box from the direction `towards_eye`, at the least distance at which the whole box is inside the
-/// picture, with a small border. An empty box and a single point are seen from one unit away.
+/// Returns the view of a box from the direction `towards_eye`, at the smallest distance that shows the
+/// whole box with a small border. An empty box and a single point are seen from one unit away.
 fn framing(bounds: &Aabb, towards_eye: DVec3, up: DVec3, aspect: f64, fov: f64) -> View {
     let (center, half) = match bounds.check() {
         Ok(()) => (bounds.doubled_centroid() * 0.5, bounds.extent() * 0.5),
@@ -38,11 +39,13 @@ fn framing(bounds: &Aabb, towards_eye: DVec3, up: DVec3, aspect: f64, fov: f64) 
     };
     let back = towards_eye.normalize();
     let [right, top] = frame(-back, up);
+    // The border is 6 % of the picture.
     let slope = libm::tan(fov.to_radians() / 2.0) / 1.06;
     let mut distance: f64 = 0.0;
-    for corner in 0..8 {
-        let sign = |bit: i32| f64::from((corner >> bit & 1) * 2 - 1);
-        let corner = half * DVec3::new(sign(0), sign(1), sign(2));
+    for number in 0..8 {
+        // The bits of the number choose the corner's side along each axis.
+        let signs = [0, 1, 2].map(|bit| f64::from((number >> bit & 1) * 2 - 1));
+        let corner = half * DVec3::from_array(signs);
         let needed = (corner.dot(right).abs() / aspect).max(corner.dot(top).abs()) / slope;
         distance = distance.max(needed + corner.dot(back));
     }
@@ -69,20 +72,20 @@ mod tests {
             let view = framing(&bounds, towards, DVec3::Y, 1.5, 40.0);
             let camera = Camera::new(&view, DVec3::Y, 300, 200);
             let mut widest: f64 = 0.0;
-            for corner in 0..8 {
-                let pick = |bit: usize| {
-                    if corner >> bit & 1 == 1 { bounds.max[bit] } else { bounds.min[bit] }
-                };
-                let to = DVec3::from([0, 1, 2].map(|bit| f64::from(pick(bit)))) - camera.origin;
+            for number in 0..8 {
+                let corner = DVec3::from([0, 1, 2].map(|axis| {
+                    let side = if number >> axis & 1 == 1 { bounds.max } else { bounds.min };
+                    f64::from(side[axis])
+                }));
+                let to = corner - camera.origin;
                 let forward = camera.corner + camera.steps[0] * 150.0 + camera.steps[1] * 100.0;
                 let scaled = to / to.dot(forward) - forward;
-                let place = |axis: usize| {
-                    scaled.dot(camera.steps[axis]) / camera.steps[axis].length_squared()
-                };
-                assert!(place(0).abs() < 150.0 && place(1).abs() < 100.0, "{bounds:?}");
-                widest = widest
-                    .max(place(0).abs() / 150.0)
-                    .max(place(1).abs() / 100.0);
+                // The corner's distance from the middle of the picture, in pixels.
+                let [x, y] = camera
+                    .steps
+                    .map(|step| (scaled.dot(step) / step.length_squared()).abs());
+                assert!(x < 150.0 && y < 100.0, "{bounds:?}");
+                widest = widest.max(x / 150.0).max(y / 100.0);
             }
             assert!(widest > 0.9, "{bounds:?}: {widest}");
         }

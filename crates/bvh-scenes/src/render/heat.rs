@@ -1,9 +1,10 @@
-//! The heat map: how many tests each pixel took, as a colour, with a key below.
+//! The heat map: the number of tests of each pixel as a colour, with a key below.
 
 use super::film::Film;
 use super::key::{self, BadFont};
 
-/// 'inferno' of matplotlib (van der Walt & Smith 2015; CC0), every sixteenth part: evenly brighter to the eye.
+/// Every sixteenth colour of matplotlib's 'inferno' (van der Walt & Smith 2015; CC0), whose brightness
+/// increases evenly to the eye.
 const INFERNO: [[u8; 3]; 17] = [
     [0, 0, 4],
     [11, 7, 36],
@@ -24,35 +25,38 @@ const INFERNO: [[u8; 3]; 17] = [
     [252, 255, 164],
 ];
 
-/// The numbers of a heat map: tests per ray through a pixel, with all that follows from the ray.
+/// The distribution of a heat map's values: tests per ray through a pixel, with the tests of the rays
+/// that follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// Of the pixel with the fewest.
+    /// The smallest value.
     pub min: f64,
-    /// Of the pixel in the middle.
+    /// The median.
     pub median: f64,
-    /// What one pixel in two hundred exceeds: the top of the colours, so that a few do not darken all others.
+    /// The value that one pixel in two hundred exceeds. The colours end here, because a few extreme
+    /// pixels would darken all others.
     pub top: f64,
-    /// Of the pixel with the most.
+    /// The largest value.
     pub max: f64,
 }
 
-/// The distribution of tests over the pixels of a film with this many rays through each pixel.
+/// Returns the distribution of tests over the pixels of a film with this many rays through each pixel.
 pub fn range(film: &Film, rays_per_pixel: u32) -> Range {
     let mut sorted = film.tests.clone();
     sorted.sort_unstable();
-    let at = |index: usize| {
-        sorted
-            .get(index)
-            .map_or(0.0, |&tests| tests as f64 / f64::from(rays_per_pixel))
-    };
+    // A film without pixels has zeros.
     let last = sorted.len().saturating_sub(1);
-    Range { min: at(0), median: at(last / 2), top: at(last - last / 200), max: at(last) }
+    let [min, median, top, max] = [0, last / 2, last - last / 200, last].map(|index| {
+        let tests = sorted.get(index).copied().unwrap_or(0);
+        tests as f64 / f64::from(rays_per_pixel)
+    });
+    Range { min, median, top, max }
 }
 
-/// A film's heat map: its width, its pixels, and the key below them.
+/// Returns the pixels of a film's heat map and of the key below it.
 pub fn map(film: &Film, rays_per_pixel: u32) -> Result<Vec<[u8; 3]>, BadFont> {
     let range = range(film, rays_per_pixel);
+    // A picture without tests has the top 0, by which nothing can be divided.
     let top = range.top.max(f64::MIN_POSITIVE) * f64::from(rays_per_pixel);
     let mut pixels: Vec<[u8; 3]> = film
         .tests
@@ -66,18 +70,19 @@ pub fn map(film: &Film, rays_per_pixel: u32) -> Result<Vec<[u8; 3]>, BadFont> {
     Ok(pixels)
 }
 
-/// The colour at a part of the range, 0 to 1; what is beyond has the last one's.
-fn colour(at: f64) -> [u8; 3] {
-    let at = at.clamp(0.0, 1.0) * (INFERNO.len() - 1) as f64;
-    let index = (at as usize).min(INFERNO.len() - 2);
-    let low = INFERNO[index];
-    let high = INFERNO[index + 1];
-    let part = at - index as f64;
-    [0, 1, 2]
-        .map(|c| (f64::from(low[c]) + (f64::from(high[c]) - f64::from(low[c])) * part + 0.5) as u8)
+/// Returns the colour of a value relative to the range, 0 to 1. Larger values have the last colour.
+fn colour(value: f64) -> [u8; 3] {
+    let place = value.clamp(0.0, 1.0) * (INFERNO.len() - 1) as f64;
+    let index = (place as usize).min(INFERNO.len() - 2);
+    let part = place - index as f64;
+    [0, 1, 2].map(|channel| {
+        let low = f64::from(INFERNO[index][channel]);
+        let high = f64::from(INFERNO[index + 1][channel]);
+        (low + (high - low) * part + 0.5) as u8
+    })
 }
 
-/// The texts below the left end of the key, its middle and its right end.
+/// Returns the labels below the left end of the key, its middle and its right end.
 fn labels(range: &Range) -> [String; 3] {
     [
         "0".into(),
@@ -95,10 +100,10 @@ mod tests {
     }
 
     #[test]
-    fn the_range_is_that_of_the_pixels_whatever_few_of_them_take() {
+    fn a_few_extreme_pixels_change_only_the_maximum() {
         let mut tests: Vec<u64> = (0..1000).collect();
         tests[500] = 1_000_000;
-        // 499 is now the five hundredth of a thousand.
+        // 499 is now the five hundredth of a thousand values.
         let range = range(&film(10, tests), 4);
         assert_eq!((range.min, range.median, range.max), (0.0, 499.0 / 4.0, 250_000.0));
         assert!(range.top > 240.0 && range.top < 250.0, "{range:?}");
@@ -106,15 +111,14 @@ mod tests {
 
     #[test]
     fn more_tests_are_brighter_and_the_key_is_below() {
-        let luminance = |[r, g, b]: [u8; 3]| {
-            0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
-        };
         let shades: Vec<f64> = (0..=64)
-            .map(|i| luminance(colour(f64::from(i) / 64.0)))
+            .map(|i| colour(f64::from(i) / 64.0).map(f64::from))
+            .map(|[r, g, b]| 0.2126 * r + 0.7152 * g + 0.0722 * b)
             .collect();
         assert!(shades.is_sorted_by(|a, b| a < b), "{shades:?}");
         for width in [64, 65] {
-            let pixels = map(&film(width, (0..u64::from(width) * 8).collect()), 1).unwrap();
+            let tests = (0..u64::from(width) * 8).collect();
+            let pixels = map(&film(width, tests), 1).unwrap();
             assert_eq!(pixels.len() % width as usize, 0);
             assert_eq!((pixels[0], pixels[width as usize * 8]), (INFERNO[0], [255; 3]));
         }
@@ -122,10 +126,7 @@ mod tests {
 
     #[test]
     fn a_picture_without_tests_has_a_heat_map_too() {
-        assert!(
-            map(&film(40, vec![0; 40]), 1).unwrap()[..40]
-                .iter()
-                .all(|&pixel| pixel == INFERNO[0])
-        );
+        let pixels = map(&film(40, vec![0; 40]), 1).unwrap();
+        assert_eq!(pixels[..40], [INFERNO[0]; 40]);
     }
 }

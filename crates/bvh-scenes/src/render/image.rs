@@ -1,21 +1,23 @@
-//! Turns linear light into the bytes of a PNG file.
+//! Converts linear light into the bytes of a PNG file.
 
 use glam::DVec3;
 
-/// Exposure by which a white surface in the automatic light comes out just below white.
+/// The exposure that makes a white surface in the automatic light just darker than white.
 const EXPOSURE: f64 = 0.66;
 
-/// Maps linear light of any strength to 0..1, as film does: overexposed light loses its colour but not its shape.
+/// Maps linear light of any strength to 0..1 like film: overexposed light loses its colour but not its
+/// shape.
 ///
 /// Source: Narkowicz 2015, 'ACES filmic tone mapping curve'.
 pub fn expose(light: DVec3) -> DVec3 {
     light.map(|x| {
+        // Larger values would overflow to ∞ / ∞, and are white long before.
         let x = (EXPOSURE * x).min(1e6);
         ((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)).min(1.0)
     })
 }
 
-/// Exposed light to sRGB bytes (IEC 61966-2-1).
+/// Converts exposed light to sRGB bytes (IEC 61966-2-1).
 pub fn encode(light: DVec3) -> [u8; 3] {
     light.to_array().map(|x| {
         let x = x.clamp(0.0, 1.0);
@@ -25,7 +27,7 @@ pub fn encode(light: DVec3) -> [u8; 3] {
     })
 }
 
-/// Encodes pixels, row by row from the top, as a PNG file, compressed as far as it goes.
+/// Encodes pixels, row by row from the top, as a PNG file with the highest compression.
 pub fn png(width: u32, pixels: &[[u8; 3]]) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, pixels.len() as u32 / width);
@@ -51,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_encoded_is_decoded_again() {
+    fn decoded_pixels_equal_the_encoded_ones() {
         let pixels = [[1, 2, 3], [255, 0, 128], [9, 9, 9], [0, 0, 0], [7, 70, 250], [4, 5, 6]];
         let bytes = png(3, &pixels).unwrap();
         let mut reader = png::Decoder::new(std::io::Cursor::new(bytes))

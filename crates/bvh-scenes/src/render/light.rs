@@ -1,4 +1,5 @@
-//! Computes the light that reaches a pixel, by rays through it, to the lights, and along mirror reflections.
+//! Computes the light that reaches a pixel with rays through the pixel, to the lights, and along mirror
+//! reflections.
 
 use super::film::Film;
 use super::image;
@@ -15,13 +16,17 @@ pub struct Light {
     position: DVec3,
     /// Linear red, green and blue at distance 0.
     colour: DVec3,
-    /// The distance at which half of the light is left.
+    /// The distance at which the light has half its strength.
     reach: f64,
 }
 
 impl Light {
-    /// White lights at these positions. They do not fade with distance; together they are as bright as the automatic
-    /// ones.
+    fn new(position: DVec3, colour: [f64; 3], reach: f64) -> Self {
+        Self { position, colour: colour.into(), reach }
+    }
+
+    /// Returns white lights at these positions. They do not fade with distance, and together they are as
+    /// bright as the automatic lights.
     pub fn white(positions: &[DVec3]) -> Vec<Self> {
         let colour = DVec3::splat(1.3 / positions.len().max(1) as f64);
         positions
@@ -30,8 +35,9 @@ impl Light {
             .collect()
     }
 
-    /// The light that arrives at a distance.
+    /// Returns the light that arrives at a distance.
     fn at(&self, distance: f64) -> DVec3 {
+        // A distance of ∞ over a reach of ∞ would be NaN.
         if self.reach.is_finite() {
             let relative = distance / self.reach;
             self.colour / (1.0 + relative * relative)
@@ -41,8 +47,9 @@ impl Light {
     }
 }
 
-/// Lights that suit a view. A scene seen from outside has a warm light at the upper left and a weak cool one at the
-/// right; a scene seen from inside has a sun overhead, sunlight reflected by the floor, and a weak lamp near the eye.
+/// Returns lights that suit a view. A scene seen from outside has a warm light at the upper left and a
+/// weak cool light at the right. A scene seen from inside has a sun overhead, sunlight reflected by the
+/// floor, and a weak lamp near the eye.
 pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     if bounds.check().is_err() {
         return vec![];
@@ -51,28 +58,27 @@ pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     let radius = bounds.extent().length() / 2.0;
     let forward = (view.at - view.from).normalize_or(DVec3::NEG_Z);
     let right = forward.cross(up).normalize_or_zero();
-    let light =
-        |position, colour: [f64; 3], reach| Light { position, colour: colour.into(), reach };
     if view.is_inside(bounds) {
         let sun = center + up * (4.0 * radius) + right * (0.85 * radius) + forward * (0.6 * radius);
         let lamp = view.from + up * (0.05 * radius) - right * (0.04 * radius);
-        // Stands for the sunlight that falls on the floor here and is reflected to walls and vaults.
+        // The renderer has no diffuse reflection. This light replaces the sunlight that the floor would
+        // reflect to walls and vaults.
         let floor = view.at - up * (0.15 * radius) + right * (0.05 * radius);
         return vec![
-            light(sun, [2.0, 1.72, 1.3], f64::INFINITY),
-            light(lamp, [0.50, 0.34, 0.19], 0.3 * radius),
-            light(floor, [0.95, 0.74, 0.48], 0.3 * radius),
+            Light::new(sun, [2.0, 1.72, 1.3], f64::INFINITY),
+            Light::new(lamp, [0.50, 0.34, 0.19], 0.3 * radius),
+            Light::new(floor, [0.95, 0.74, 0.48], 0.3 * radius),
         ];
     }
     let key = center + up * (2.2 * radius) - right * (1.5 * radius) - forward * (1.4 * radius);
     let fill = center + up * (1.2 * radius) + right * (2.2 * radius) - forward * (1.2 * radius);
     vec![
-        light(key, [1.25, 1.16, 1.02], f64::INFINITY),
-        light(fill, [0.20, 0.24, 0.32], f64::INFINITY),
+        Light::new(key, [1.25, 1.16, 1.02], f64::INFINITY),
+        Light::new(fill, [0.20, 0.24, 0.32], f64::INFINITY),
     ]
 }
 
-/// Everything that a ray can meet, and the light on it.
+/// All surfaces that a ray can meet, and the lights.
 pub struct World<'a> {
     accelerator: &'a Accelerator<'a>,
     up: DVec3,
@@ -81,7 +87,7 @@ pub struct World<'a> {
     depth: u32,
 }
 
-/// The number of rays of a pixel, and of their tests.
+/// The number of rays of a pixel, and the number of their tests.
 #[derive(Default)]
 struct Tally {
     counts: TestCounts,
@@ -90,9 +96,9 @@ struct Tally {
 
 const HORIZON: DVec3 = DVec3::new(0.58, 0.66, 0.76);
 const ZENITH: DVec3 = DVec3::new(0.11, 0.24, 0.50);
-/// Light from below, reflected by everything around.
+/// Ambient light from below, which the surroundings reflect.
 const BELOW: DVec3 = DVec3::new(0.22, 0.20, 0.18);
-/// The fraction of the surrounding light that reaches a surface.
+/// The fraction of the ambient light that reaches a surface.
 const AMBIENT: f64 = 0.42;
 
 impl<'a> World<'a> {
@@ -105,26 +111,36 @@ impl<'a> World<'a> {
         ground: bool,
         depth: u32,
     ) -> Self {
-        // A scene that is seen from inside is its own ground.
-        let ground = (ground && !view.is_inside(bounds))
-            .then(|| Ground::below(accelerator.objects(), bounds, up));
-        Self { accelerator, up, lights, ground: ground.flatten(), depth }
+        // An interior has its own floor.
+        let ground = if ground && !view.is_inside(bounds) {
+            Ground::below(accelerator.objects(), bounds, up)
+        } else {
+            None
+        };
+        Self { accelerator, up, lights, ground, depth }
     }
 
-    /// A tile of the picture, `samples`² rays per pixel.
-    pub fn tile(&self, camera: &Camera, x: Range<u32>, y: Range<u32>, samples: u32) -> Film {
-        let mut tile = Film { width: x.end - x.start, ..Film::default() };
-        let offset = |sample: u32| (f64::from(sample) + 0.5) / f64::from(samples);
-        for y in y {
-            for x in x.clone() {
+    /// Draws a tile of the picture with `samples`² rays per pixel.
+    pub fn tile(
+        &self,
+        camera: &Camera,
+        columns: Range<u32>,
+        rows: Range<u32>,
+        samples: u32,
+    ) -> Film {
+        let mut tile = Film { width: columns.end - columns.start, ..Film::default() };
+        for y in rows {
+            for x in columns.clone() {
                 let mut sum = DVec3::ZERO;
                 let mut tally = Tally::default();
                 for v in 0..samples {
                     for u in 0..samples {
-                        let direction =
-                            camera.direction(f64::from(x) + offset(u), f64::from(y) + offset(v));
-                        // Samples are exposed before they are averaged, which keeps the edges of highlights smooth.
-                        sum += image::expose(self.radiance(camera.origin, direction, &mut tally));
+                        let right = f64::from(x) + (f64::from(u) + 0.5) / f64::from(samples);
+                        let down = f64::from(y) + (f64::from(v) + 0.5) / f64::from(samples);
+                        let direction = camera.direction(right, down);
+                        let light = self.radiance(camera.origin, direction, &mut tally);
+                        // Exposure before the average keeps the edges of highlights smooth.
+                        sum += image::expose(light);
                     }
                 }
                 tile.pixels
@@ -137,7 +153,8 @@ impl<'a> World<'a> {
         tile
     }
 
-    /// The light that comes from `direction`. Reflections are followed in a loop, as each surface has only one.
+    /// Returns the light from `direction`. A loop follows reflections, because each surface has only
+    /// one.
     fn radiance(&self, mut origin: DVec3, mut direction: DVec3, tally: &mut Tally) -> DVec3 {
         let mut light = DVec3::ZERO;
         let mut weight = 1.0;
@@ -154,9 +171,10 @@ impl<'a> World<'a> {
             };
             let reflected = direction + surface.normal * (2.0 * facing);
             let start = self.lifted(&surface, origin);
-            let own = self.direct(&surface, start, reflected, mirror, facing, tally);
-            light += weight * (own * (1.0 - surface.haze) + HORIZON * surface.haze);
+            let direct = self.direct(&surface, start, reflected, mirror, facing, tally);
+            light += weight * (direct * (1.0 - surface.haze) + HORIZON * surface.haze);
             weight *= mirror * (1.0 - surface.haze);
+            // A smaller weight changes no byte of a pixel.
             if weight < 1.0 / 256.0 {
                 return light;
             }
@@ -165,32 +183,28 @@ impl<'a> World<'a> {
         light + weight * self.sky(direction)
     }
 
-    /// The first surface that the ray meets, the ground included.
+    /// Returns the first surface that the ray meets, the ground included.
     fn meet(&self, origin: DVec3, direction: DVec3, tally: &mut Tally) -> Option<Surface> {
         tally.rays += 1;
-        let ray = Ray::half_line(origin.as_vec3(), direction.as_vec3());
-        let hit = ray.ok().and_then(|ray| {
-            self.accelerator
-                .nearest_hit_counted(&ray, &mut tally.counts)
-        });
-        let ground = self
-            .ground
-            .as_ref()
-            .and_then(|ground| Some((ground, ground.meet(origin, direction)?)));
-        match (hit, ground) {
-            (Some(hit), ground)
-                if ground.is_none_or(|(_, distance)| f64::from(hit.t) <= distance) =>
-            {
-                Some(Surface::of_object(self.accelerator.objects(), &hit, origin, direction))
-            }
-            (_, Some((ground, distance))) => Some(ground.surface(origin, direction, distance)),
-            (_, None) => None,
+        let hit = Ray::half_line(origin.as_vec3(), direction.as_vec3())
+            .ok()
+            .and_then(|ray| {
+                self.accelerator
+                    .nearest_hit_counted(&ray, &mut tally.counts)
+            });
+        if let Some(ground) = &self.ground
+            && let Some(distance) = ground.meet(origin, direction)
+            && hit.is_none_or(|hit| f64::from(hit.t) > distance)
+        {
+            return Some(ground.surface(origin, direction, distance));
         }
+        hit.map(|hit| Surface::of_object(self.accelerator.objects(), &hit, origin, direction))
     }
 
-    /// A point just in front of the surface, from which a ray does not meet the same surface again. Rounding moves a
-    /// hit by a few units in the last place of the largest coordinate at hand; this moves it by a few dozen.
+    /// Returns a point just in front of the surface, from which a ray does not meet the surface again.
     fn lifted(&self, surface: &Surface, seen_from: DVec3) -> DVec3 {
+        // Rounding moves a hit by a few units in the last place of the largest coordinate involved, and
+        // 64 units are a safe multiple.
         let size = surface
             .point
             .abs()
@@ -199,7 +213,7 @@ impl<'a> World<'a> {
         surface.point + surface.normal * (size * (64.0 * f64::from(f32::EPSILON)))
     }
 
-    /// The light that the surface sends to the eye from lights and surroundings, without its mirror reflection.
+    /// Returns the light that the surface sends to the eye without its mirror reflection.
     fn direct(
         &self,
         surface: &Surface,
@@ -220,7 +234,7 @@ impl<'a> World<'a> {
             let distance = to_light.length();
             let towards = to_light / distance;
             let cosine = surface.normal.dot(towards);
-            // The cosine is NaN where the light lies on the surface.
+            // The cosine is NaN if the light is exactly at this point.
             if cosine.is_nan() || cosine <= 0.0 || self.is_shadowed(start, towards, distance, tally)
             {
                 continue;
@@ -229,6 +243,7 @@ impl<'a> World<'a> {
             diffuse += arriving * cosine;
             if mirror > 0.0 {
                 let mut gloss = reflected.dot(towards).max(0.0);
+                // Seven squarings give Phong's exponent 128 without a function of the platform.
                 for _ in 0..7 {
                     gloss *= gloss;
                 }
@@ -247,7 +262,7 @@ impl<'a> World<'a> {
         })
     }
 
-    /// The light from a direction in which there is nothing.
+    /// Returns the light from a direction without any surface.
     fn sky(&self, direction: DVec3) -> DVec3 {
         HORIZON + (ZENITH - HORIZON) * direction.dot(self.up).clamp(0.0, 1.0)
     }

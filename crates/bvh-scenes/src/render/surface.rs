@@ -1,4 +1,4 @@
-//! The surface at the end of a ray: its place, its orientation and its looks.
+//! The surface at the end of a ray: its position, orientation and appearance.
 
 use bvh_core::{Aabb, Hit, Primitives};
 use glam::DVec3;
@@ -8,20 +8,21 @@ use glam::DVec3;
 pub struct Surface {
     /// The point, in world units.
     pub point: DVec3,
-    /// The unit normal on the side that is seen.
+    /// The unit normal on the visible side.
     pub normal: DVec3,
-    /// The fraction of light that it scatters evenly.
+    /// The fraction of light that the surface scatters evenly.
     pub colour: DVec3,
-    /// The fraction that it mirrors when seen from straight above, 0 to 1. It mirrors more at grazing angles, unless 0.
+    /// The fraction of light that the surface mirrors at normal incidence, 0 to 1. A surface with 0
+    /// mirrors nothing; all others mirror more at grazing angles.
     pub mirror: f64,
-    /// The fraction of its light that haze hides, 0 to 1.
+    /// The fraction of the surface's light that haze hides, 0 to 1.
     pub haze: f64,
 }
 
-/// The colour of triangles, plaster: meshes come without colours.
+/// The colour of all triangles, because loaders read no colours.
 const PLASTER: DVec3 = DVec3::new(0.80, 0.73, 0.64);
 
-/// The colours of spheres, in turn.
+/// The colours of spheres, in rotation.
 const COLOURS: [DVec3; 6] = [
     DVec3::new(0.78, 0.16, 0.10),
     DVec3::new(0.90, 0.52, 0.08),
@@ -32,7 +33,7 @@ const COLOURS: [DVec3; 6] = [
 ];
 
 impl Surface {
-    /// The surface of the object that the ray from `origin` in `direction` has hit.
+    /// Returns the surface of the object that the ray from `origin` in `direction` has hit.
     pub fn of_object(objects: &Primitives, hit: &Hit, origin: DVec3, direction: DVec3) -> Self {
         let id = hit.object as usize;
         let met = origin + direction * f64::from(hit.t);
@@ -47,6 +48,7 @@ impl Surface {
             Primitives::Spheres(spheres) => {
                 let center = spheres[id].center.as_dvec3();
                 let normal = (met - center).normalize_or(-direction);
+                // The distance has f32 precision; the point on the sphere is exact to f64.
                 let point = center + normal * f64::from(spheres[id].radius);
                 (point, normal, COLOURS[id % COLOURS.len()], 0.05)
             }
@@ -56,7 +58,8 @@ impl Surface {
     }
 }
 
-/// The plane that the scene stands on or hovers over. No structure contains it: one division finds it.
+/// The plane below the scene. No acceleration structure contains it, because one division intersects
+/// it.
 #[derive(Clone, Debug)]
 pub struct Ground {
     up: DVec3,
@@ -64,15 +67,16 @@ pub struct Ground {
     center: DVec3,
     /// Half the diagonal of the scene's box.
     radius: f64,
-    /// Whether it is checkered, as it is under spheres, which have no floor of their own to judge distances by.
+    /// True under spheres, whose distances would be hard to judge without a pattern.
     checkered: bool,
 }
 
 impl Ground {
-    /// The ground under objects with these bounds; `None` under nothing and under a single point.
+    /// Returns the ground under objects with these bounds. No objects and a single point have none.
     pub fn below(objects: &Primitives, bounds: &Aabb, up: DVec3) -> Option<Self> {
         bounds.check().ok()?;
         let checkered = matches!(objects, Primitives::Spheres(_));
+        // A gap keeps the ground apart from floors that are at the bottom of a mesh.
         let gap = if checkered { 0.05 } else { 1e-3 };
         let radius = bounds.extent().length() / 2.0;
         if radius == 0.0 {
@@ -82,23 +86,28 @@ impl Ground {
         Some(Self { up, height, center: bounds.doubled_centroid() / 2.0, radius, checkered })
     }
 
-    /// The distance at which the ray meets the ground; `None` unless it comes from above.
+    /// Returns the distance at which the ray meets the ground; `None` unless it comes from above.
     pub fn meet(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
         let above = origin.dot(self.up) - self.height;
         let descent = -direction.dot(self.up);
         (above > 0.0 && descent > 0.0).then(|| above / descent)
     }
 
-    /// The surface at this distance.
+    /// Returns the surface at this distance.
     pub fn surface(&self, origin: DVec3, direction: DVec3, distance: f64) -> Surface {
         let point = origin + direction * distance;
         let away = (point - self.center) / self.radius;
         let aside = away.cross(self.up);
         let squared = aside.length_squared();
+        // Haze hides the horizon, where the pattern would be finer than a pixel.
         let haze = squared / (squared + 20.0);
-        let tile = |x: f64| (x * 3.0).floor() as i64 & 1;
-        let flat = [0, 1, 2].map(|axis| if self.up[axis] == 0.0 { tile(aside[axis]) } else { 0 });
-        let dark = self.checkered && (flat[0] + flat[1] + flat[2]) & 1 == 1;
+        let mut tiles = 0;
+        for axis in 0..3 {
+            if self.up[axis] == 0.0 {
+                tiles += (aside[axis] * 3.0).floor() as i64 & 1;
+            }
+        }
+        let dark = self.checkered && tiles & 1 == 1;
         let colour =
             if dark { DVec3::new(0.045, 0.05, 0.065) } else { DVec3::new(0.24, 0.25, 0.27) };
         Surface {

@@ -1,4 +1,5 @@
-//! Finds the objects on a ray: one interface over every structure, with and without counting tests.
+//! Finds the objects on a ray through one interface over every acceleration structure, with and without
+//! counting tests.
 
 use super::kd_tree::KdTree;
 use bvh_core::{
@@ -7,7 +8,7 @@ use bvh_core::{
 };
 use std::borrow::Cow;
 
-/// What a ray asks.
+/// The question that a ray answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -16,27 +17,27 @@ use std::borrow::Cow;
 )]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Query {
-    /// Whether it hits anything: the paper's shadow rays.
+    /// Does the ray hit any object? The paper's shadow rays ask this.
     Any,
-    /// What it hits first.
+    /// Which object does the ray hit first?
     Nearest,
-    /// Everything on its way: no hit ends it.
+    /// Which objects are on the ray? No hit ends the traversal.
     All,
 }
 
-/// What narrows down the objects that a ray may hit.
+/// A structure that narrows down the objects that a ray may hit.
 #[derive(Clone, Debug)]
 pub enum Structure<'a> {
-    /// Nothing does: every object is tested.
+    /// No structure: every object is tested.
     Brute,
     /// A KD-tree.
     KdTree(KdTree),
     /// A hierarchy.
     Tree(Cow<'a, Bvh>),
-    /// A hierarchy of triangles in the wide layout, traced with the best instructions of this machine, which count no
-    /// tests.
+    /// A hierarchy of triangles in the wide layout, traced with the best instructions of this machine,
+    /// which count no tests.
     Wide(WideBvh),
-    /// The same, traced with portable code.
+    /// A hierarchy of triangles in the wide layout, traced with portable code.
     WidePortable(WideBvh),
 }
 
@@ -72,7 +73,7 @@ impl Structure<'_> {
     }
 }
 
-/// Objects with a structure over them. Every structure gives the same answers, bit by bit.
+/// Objects with a structure over them. Every structure gives the same answers, bit for bit.
 #[derive(Clone, Debug)]
 pub struct Accelerator<'a> {
     objects: &'a Primitives,
@@ -80,22 +81,24 @@ pub struct Accelerator<'a> {
 }
 
 impl<'a> Accelerator<'a> {
-    /// `structure` must have been built over these objects; otherwise rays may panic or be answered wrongly.
+    /// Combines objects with a structure, which must have been built over these objects. Otherwise rays
+    /// may panic or return wrong answers.
     pub fn new(objects: &'a Primitives, structure: Structure<'a>) -> Self {
         Self { objects, structure }
     }
 
-    /// A hierarchy as it is.
+    /// Uses a hierarchy without any other layout.
     pub fn of_tree(objects: &'a Primitives, tree: &'a Bvh) -> Self {
         Self::new(objects, Structure::Tree(Cow::Borrowed(tree)))
     }
 
-    /// The objects.
+    /// Returns the objects.
     pub fn objects(&self) -> &'a Primitives {
         self.objects
     }
 
-    /// The nearest object in the ray's range; of several at the same distance the one of the lowest id.
+    /// Returns the nearest object in the ray's range; of several at the same distance, the object with
+    /// the lowest id.
     #[inline]
     pub fn nearest_hit(&self, ray: &Ray) -> Option<Hit> {
         match &self.structure {
@@ -104,7 +107,7 @@ impl<'a> Accelerator<'a> {
         }
     }
 
-    /// Whether anything is in the ray's range. The first hit ends the traversal.
+    /// Returns whether any object is in the ray's range. The first hit ends the traversal.
     #[inline]
     pub fn any_hit(&self, ray: &Ray) -> bool {
         match &self.structure {
@@ -113,7 +116,8 @@ impl<'a> Accelerator<'a> {
         }
     }
 
-    // What follows is not generic, so that it is compiled here, optimised, however its callers are compiled.
+    // The methods below are not generic, so that they are compiled and optimised in this crate even if
+    // the callers are not optimised.
 
     fn nearest_hit_uncounted(&self, ray: &Ray) -> Option<Hit> {
         self.find(ray, &mut ())
@@ -123,7 +127,8 @@ impl<'a> Accelerator<'a> {
         self.meets(ray, &mut ())
     }
 
-    /// [`nearest_hit`](Self::nearest_hit) with its tests counted, but for those of [`Structure::Wide`].
+    /// Answers as [`nearest_hit`](Self::nearest_hit) does and counts the tests, except in
+    /// [`Structure::Wide`].
     pub fn nearest_hit_counted(&self, ray: &Ray, counts: &mut TestCounts) -> Option<Hit> {
         match &self.structure {
             Structure::Wide(wide) => wide.nearest_hit(ray),
@@ -131,7 +136,7 @@ impl<'a> Accelerator<'a> {
         }
     }
 
-    /// [`any_hit`](Self::any_hit) with its tests counted likewise.
+    /// Answers as [`any_hit`](Self::any_hit) does and counts the tests, except in [`Structure::Wide`].
     pub fn any_hit_counted(&self, ray: &Ray, counts: &mut TestCounts) -> bool {
         match &self.structure {
             Structure::Wide(wide) => wide.any_hit(ray),
@@ -139,8 +144,9 @@ impl<'a> Accelerator<'a> {
         }
     }
 
-    /// Asks as `query` says and counts the tests, the same number on every machine: the wide layout's by portable code.
-    /// Returns whether the ray hits. [`Query::All`] through a wide layout tests every object.
+    /// Answers `query` and counts the tests. Returns whether the ray hits. The wide layouts use portable
+    /// code here, so that the counts are the same on every machine; for [`Query::All`] they test every
+    /// object.
     pub fn count(&self, query: Query, ray: &Ray, counts: &mut TestCounts) -> bool {
         match query {
             Query::All => self.visit(ray, false, counts),
@@ -149,7 +155,7 @@ impl<'a> Accelerator<'a> {
         }
     }
 
-    /// The nearest object; the wide layouts' by portable code.
+    /// Returns the nearest object. The wide layouts use portable code.
     #[inline(always)]
     fn find(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
         match (&self.structure, self.objects) {
@@ -168,7 +174,7 @@ impl<'a> Accelerator<'a> {
         }
     }
 
-    /// Whether there is any object; by portable code too.
+    /// Returns whether any object is hit. The wide layouts use portable code.
     #[inline(always)]
     fn meets(&self, ray: &Ray, counter: &mut impl Counter) -> bool {
         match &self.structure {
@@ -179,23 +185,29 @@ impl<'a> Accelerator<'a> {
         }
     }
 
-    /// Tests objects on the ray's way: up to the first hit, or all of them. Returns whether there was a hit.
+    /// Tests the objects on the ray, up to the first hit or all of them. Returns whether there was a
+    /// hit.
     #[inline(always)]
     fn visit(&self, ray: &Ray, ends_at_hit: bool, counter: &mut impl Counter) -> bool {
         let mut found = false;
-        let mut note = |hit: Option<f32>| {
-            found |= hit.is_some();
-            found && ends_at_hit
-        };
+        // To visit all objects, the tests report no hit, so that the traversal continues.
         match self.objects {
             Primitives::Triangles(triangles) => {
                 let shear = Shear::new(ray);
-                let test = |id: u32| note(triangles[id as usize].intersect(&shear, ray.t_max()));
+                let test = |id: u32| {
+                    let hit = triangles[id as usize].intersect(&shear, ray.t_max());
+                    found |= hit.is_some();
+                    found && ends_at_hit
+                };
                 self.structure
                     .any_hit(triangles.len(), ray, test, counter);
             }
             Primitives::Spheres(spheres) => {
-                let test = |id: u32| note(spheres[id as usize].intersect(ray, ray.t_max()));
+                let test = |id: u32| {
+                    let hit = spheres[id as usize].intersect(ray, ray.t_max());
+                    found |= hit.is_some();
+                    found && ends_at_hit
+                };
                 self.structure
                     .any_hit(spheres.len(), ray, test, counter);
             }

@@ -1,4 +1,4 @@
-//! Finds the objects on a ray by any structure: a hierarchy, the wide layout, a KD-tree, or none.
+//! Finds the objects on a ray with any structure: a hierarchy, the wide layout, a KD-tree, or none.
 
 mod accelerator;
 pub mod kd_tree;

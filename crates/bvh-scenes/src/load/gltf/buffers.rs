@@ -1,4 +1,4 @@
-//! The buffers of a glTF file, each read when a mesh first needs it, and each file once.
+//! The buffers of a glTF file. A buffer is read when a mesh first needs it, and a file once.
 
 use super::{MOST_BYTES, OutsideFiles};
 use crate::read;
@@ -15,7 +15,7 @@ use std::rc::Rc;
 enum Bytes<'a> {
     /// The binary chunk of a GLB file.
     Chunk(&'a [u8]),
-    /// Those of a file, which several buffers may name, or of a data URI.
+    /// The contents of a file, which several buffers may name, or of a data URI.
     Read(Rc<Vec<u8>>),
 }
 
@@ -25,20 +25,21 @@ pub struct Buffers<'a> {
     outside: OutsideFiles,
     /// The binary chunk of a GLB file.
     chunk: Option<&'a [u8]>,
-    /// Those that a mesh has needed, by their number.
+    /// The buffers that a mesh has needed, by their number.
     needed: BTreeMap<usize, Bytes<'a>>,
+    /// The files that buffers have named, by their canonical path.
     files: BTreeMap<PathBuf, Rc<Vec<u8>>>,
     /// Bytes read so far.
     total: u64,
 }
 
 impl<'a> Buffers<'a> {
-    /// The buffers of the file at `path`, none of which is read yet.
+    /// Prepares the buffers of the file at `path` without reading any.
     pub fn new(path: &'a Path, outside: OutsideFiles, chunk: Option<&'a [u8]>) -> Self {
         Self { path, outside, chunk, needed: BTreeMap::new(), files: BTreeMap::new(), total: 0 }
     }
 
-    /// Reads a buffer unless that is done. Returns what is wrong with it otherwise.
+    /// Reads a buffer if no mesh has needed it before. The error describes its fault.
     pub fn need(&mut self, root: &Root, number: usize) -> Result<(), String> {
         if self.needed.contains_key(&number) {
             return Ok(());
@@ -54,7 +55,7 @@ impl<'a> Buffers<'a> {
         Ok(())
     }
 
-    /// The bytes of a buffer that was [needed](Self::need).
+    /// Returns the bytes of a buffer that was [needed](Self::need).
     pub fn bytes(&self, number: usize) -> Option<&[u8]> {
         Some(match self.needed.get(&number)? {
             Bytes::Chunk(bytes) => bytes,
@@ -71,7 +72,7 @@ impl<'a> Buffers<'a> {
             }
             (None, Some(chunk)) if number == 0 => (Bytes::Chunk(chunk), chunk.len()),
             (None, Some(_)) => {
-                return Err("no URI; expected one, the binary chunk is that of buffers[0]".into());
+                return Err("no URI; expected one, since buffers[0] alone has the chunk".into());
             }
             (None, None) => {
                 return Err("no URI; expected one, or a GLB file with a binary chunk".into());
@@ -83,7 +84,7 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    /// The bytes of a `data:` URI, or of a file beside the one that names it.
+    /// Returns the bytes of a `data:` URI, or of a file in the folder of the glTF file.
     fn of_uri(&mut self, uri: &str) -> Result<Rc<Vec<u8>>, String> {
         if let Some(data) = uri.strip_prefix("data:") {
             let encoded = data
@@ -96,7 +97,7 @@ impl<'a> Buffers<'a> {
             return Ok(Rc::new(bytes));
         }
         if uri.contains("://") {
-            return Err(format!("`{uri}`; expected a file beside this one, or data in base64"));
+            return Err(format!("`{uri}`; expected a file in this folder, or data in base64"));
         }
         let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
         let path = self.allowed(Path::new(&*name))?;
@@ -109,27 +110,26 @@ impl<'a> Buffers<'a> {
         Ok(bytes)
     }
 
-    /// The path of a file by its name in a URI. Refuses one outside the folder of the file that names it, also where links lead there,
-    /// unless such files are allowed.
+    /// Returns the path of a file by its name in a URI. Rejects a file outside the folder of the
+    /// glTF file, also one behind a symbolic link, unless such files are allowed.
     fn allowed(&self, name: &Path) -> Result<PathBuf, String> {
-        let refused = || {
-            let name = name.display();
-            Err(format!(
-                "`{name}` is outside the scene's folder; accepted: a file in it, or any with --outside-files"
-            ))
-        };
         let path = self.path.with_file_name(name);
-        if self.outside == OutsideFiles::Refused && leaves(name) {
-            return refused();
+        if self.outside == OutsideFiles::Rejected && leaves(name) {
+            return Err(outside_message(name));
         }
-        // Of a file that is not there, the reader says so.
+        // A missing file has no canonical path; the reader then reports that the file is missing.
         let Ok(path) = fs::canonicalize(&path) else { return Ok(path) };
-        // Of a name alone the parent is empty, which is no path.
+        // A file name without a folder has the empty parent, which cannot be canonicalised.
         let folder = Path::new(".").join(self.path.parent().unwrap_or(Path::new("")));
+        // Canonical paths follow symbolic links, which the name alone does not reveal.
         let is_below = fs::canonicalize(folder).is_ok_and(|folder| path.starts_with(folder));
-        if self.outside == OutsideFiles::Refused && !is_below { refused() } else { Ok(path) }
+        if self.outside == OutsideFiles::Rejected && !is_below {
+            return Err(outside_message(name));
+        }
+        Ok(path)
     }
 
+    /// Adds to the bytes read so far, and rejects more than a scene can use.
     fn count(&mut self, bytes: usize) -> Result<(), String> {
         self.total += bytes as u64;
         match self.total > MOST_BYTES {
@@ -142,7 +142,14 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// Whether a relative path leads out of its folder, or the path is not relative.
+fn outside_message(name: &Path) -> String {
+    format!(
+        "`{}` is outside the scene's folder; accepted: a file in it, or any with --outside-files",
+        name.display()
+    )
+}
+
+/// Returns whether a path leads out of its folder or is absolute.
 fn leaves(name: &Path) -> bool {
     let mut depth = 0i64;
     name.components().any(|component| {
@@ -166,7 +173,7 @@ mod tests {
         fs::create_dir(folder.path().join("a")).unwrap();
         fs::write(folder.path().join("b.bin"), [7; 60]).unwrap();
         let path = folder.path().join("scene.gltf");
-        let mut buffers = Buffers::new(&path, OutsideFiles::Refused, None);
+        let mut buffers = Buffers::new(&path, OutsideFiles::Rejected, None);
         for name in ["b.bin", "./b.bin", "a/../b.bin", "%62.bin"] {
             assert_eq!(*buffers.of_uri(name).unwrap(), [7; 60], "{name}");
         }
@@ -174,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn paths_that_lead_out_of_their_folder_are_told_from_those_that_do_not() {
+    fn paths_that_lead_out_of_their_folder_are_recognised() {
         for name in ["a.bin", "./a.bin", "a/b/../../c.bin", "..a/b", "a..", ".a"] {
             assert!(!leaves(Path::new(name)), "{name}");
         }

@@ -1,10 +1,10 @@
-//! Whether the numbers of a `v` or `f` statement are what they should be.
+//! Checks the numbers of a `v` or `f` statement.
 
 use super::error::{ObjError, Place};
 use super::statements::{MOST_CORNERS, shown, vertex_index};
 use std::str::FromStr;
 
-/// The words of a vertex that count: its coordinates, and its weight if it has one, but no colour.
+/// Returns the words of a vertex without its colour: its coordinates, and its weight if it has one.
 pub fn vertex<'a, 'b>(
     words: &'b [&'a [u8]],
     place: impl Fn() -> Place,
@@ -19,7 +19,8 @@ pub fn vertex<'a, 'b>(
             .ok_or_else(|| ObjError::Coordinate { place: place(), found: shown(word) })?;
     }
     if let [_, _, _, word] = words {
-        // tobj divides by the weight: x / 0 is never finite, x / infinity always is.
+        // `tobj` divides by the weight. The quotients reject the weight 0; an infinite weight needs
+        // its own test, because x / ∞ is finite.
         number(word)
             .filter(|w: &f32| w.is_finite() && position.iter().all(|x| (x / w).is_finite()))
             .ok_or_else(|| ObjError::Weight { place: place(), found: shown(word) })?;
@@ -28,7 +29,8 @@ pub fn vertex<'a, 'b>(
     Ok(&words[..3])
 }
 
-/// The highest index of a face that counts from the start of the file, or 0; `vertices` of them lie above the face.
+/// Returns the highest index of a face that counts from the start of the file, or 0 if all indices
+/// count back from the face. `vertices` is the number of vertices above the face.
 pub fn face(
     corners: &[&[u8]],
     vertices: usize,

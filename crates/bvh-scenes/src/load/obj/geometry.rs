@@ -1,4 +1,5 @@
-//! The `v` and `f` statements of an OBJ file, one per line and without colours, texture and normal indices, for `tobj`.
+//! The `v` and `f` statements of an OBJ file for `tobj`: one per line, without colours, texture
+//! indices and normal indices.
 
 use super::check;
 use super::error::{ObjError, Place};
@@ -6,28 +7,28 @@ use super::statements::{Keyword, MOST_CORNERS, Statements, shown, vertex_index};
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
-/// Bytes that are prepared at a time.
+/// The number of bytes that are prepared at a time.
 const BLOCK: usize = 1 << 16;
 
-/// Reads like a file of checked numbers, up to the first fault.
+/// A reader of checked statements, which ends at the first fault.
 pub struct Geometry<'a> {
     path: &'a Path,
     statements: Statements<'a>,
     words: Vec<&'a [u8]>,
-    /// Statements that are ready, from `taken` on.
+    /// Prepared statements; `tobj` has taken the first `taken` bytes.
     block: Vec<u8>,
     taken: usize,
     fault: Option<ObjError>,
     /// The highest index of a vertex so far, and the first line that names it.
     highest: (usize, usize),
-    /// `v` statements so far.
+    /// The number of `v` statements so far.
     pub vertices: usize,
-    /// `f` statements of fewer than three vertices so far; they are left out.
+    /// The number of `f` statements with fewer than three vertices so far; they are skipped.
     pub short_faces: usize,
 }
 
 impl<'a> Geometry<'a> {
-    /// Of the bytes of a file; `path` only names it in errors.
+    /// Creates a reader of a file's bytes; `path` only names the file in errors.
     pub fn new(bytes: &'a [u8], path: &'a Path) -> Self {
         Self {
             path,
@@ -42,19 +43,20 @@ impl<'a> Geometry<'a> {
         }
     }
 
-    /// Lines so far that begin with no keyword, the number of the first and its first word.
+    /// Returns the number of lines so far that begin with no keyword, with the first such line's
+    /// number and first word.
     pub fn unknown(&self) -> Option<(usize, usize, String)> {
         self.statements
             .unknown
             .map(|(count, line, word)| (count, line, shown(word)))
     }
 
-    /// Reads on to the end of the file.
+    /// Checks the rest of the file.
     ///
     /// # Errors
     ///
-    /// The first fault in the order of the file. An index above the number of vertices can be told only at the end of the
-    /// file, since faces may name vertices below them, and comes last.
+    /// The first fault in the order of the file. An index above the number of vertices is found only
+    /// at the end of the file, because a face may come before its vertices, and is reported last.
     pub fn finish(&mut self) -> Result<(), ObjError> {
         while self.add_statement() {}
         let (index, line) = self.highest;
@@ -72,7 +74,7 @@ impl<'a> Geometry<'a> {
         Place { path: self.path.to_path_buf(), line }
     }
 
-    /// Adds the next statement to the block; `false` at the end of the file and at a fault.
+    /// Adds the next statement to the block. Returns false at the end of the file and at a fault.
     fn add_statement(&mut self) -> bool {
         if self.fault.is_some() {
             return false;
@@ -99,15 +101,14 @@ impl<'a> Geometry<'a> {
                 if index > self.highest.0 {
                     self.highest = (index, line);
                 }
-                match self.words.len() {
-                    0..3 => self.short_faces += 1,
-                    _ => add(
-                        b'f',
-                        self.words
-                            .iter()
-                            .map(|corner| vertex_index(corner)),
-                        &mut self.block,
-                    ),
+                if self.words.len() < 3 {
+                    self.short_faces += 1;
+                } else {
+                    let corners = self
+                        .words
+                        .iter()
+                        .map(|corner| vertex_index(corner));
+                    add(b'f', corners, &mut self.block);
                 }
             }
         }

@@ -1,20 +1,22 @@
-//! Traversal of a KD-tree, with the answers of testing every object.
+//! Traversal of a KD-tree, with the same answers as a test of every object.
 //!
-//! A ray's interval in a cell is computed by the operations of [`Slabs`] and only ever cut by split planes. An object's
-//! box on one side of a plane therefore has its interval within that side's. A box on both sides is referenced from
-//! both, and the two intervals overlap. So no cell that contains a hit is skipped. A hit outside the current cell counts
-//! as well, and cells that begin behind it are skipped.
+//! A ray's interval in a cell is computed by the operations of [`Slabs`] and is only ever cut by split
+//! planes. If an object's box is on one side of a plane, its interval is therefore within the interval
+//! of that side. A box on both sides is referenced from both, and the two intervals overlap. Hence the
+//! traversal skips no cell that contains a hit. A hit outside the current cell counts as well, and
+//! cells that begin behind the hit are skipped.
 
 use super::{Cell, KdTree};
 use bvh_core::{Counter, Hit, Ray, Slabs};
 use std::ops::ControlFlow;
 
 impl KdTree {
-    /// The nearest object that `ray` hits in its range; of several at the same distance, the one with the lowest id.
-    /// Takes the same `test` as [`bvh_core::nearest_hit_by`] and gives the same answer, bit by bit.
+    /// Returns the nearest object that `ray` hits in its range; of several at the same distance, the
+    /// object with the lowest id. Accepts the same `test` as [`bvh_core::nearest_hit_by`] and gives the
+    /// same answer, bit for bit.
     ///
-    /// `counter` counts the root's box and every visited split plane as one box each, and an object as often as it is
-    /// tested: in each of the cells that it overlaps, at most.
+    /// `counter` counts the root's box and every visited split plane as one box each. It counts every
+    /// test of an object, which may happen once in each cell that the object overlaps.
     #[inline]
     pub fn nearest_hit(
         &self,
@@ -30,6 +32,7 @@ impl KdTree {
                     && t <= *t_max
                 {
                     let hit = Hit { t, object };
+                    // Cells may return equal distances in any order; the lowest id decides.
                     if nearest.is_none_or(|nearest| hit.precedes(&nearest)) {
                         nearest = Some(hit);
                         *t_max = t;
@@ -41,7 +44,8 @@ impl KdTree {
         nearest
     }
 
-    /// Whether `ray` hits any object in its range; see [`bvh_core::any_hit_by`] and [`nearest_hit`](Self::nearest_hit).
+    /// Returns whether `ray` hits any object in its range; see [`bvh_core::any_hit_by`] and
+    /// [`nearest_hit`](Self::nearest_hit).
     #[inline]
     pub fn any_hit(
         &self,
@@ -63,8 +67,8 @@ impl KdTree {
         found
     }
 
-    /// Calls `leaf` with the objects of every leaf that the ray may hit, from near to far, until it breaks. `leaf` may
-    /// lower the distance beyond which cells are skipped.
+    /// Calls `leaf` with the objects of every leaf that the ray may hit, from near to far, until `leaf`
+    /// breaks. `leaf` may lower the distance beyond which cells are skipped.
     #[inline(always)]
     fn walk<C: Counter>(
         &self,
@@ -86,7 +90,7 @@ impl KdTree {
         if entry > exit || entry > t_max {
             return;
         }
-        // Every level leaves at most one cell pending, so the stack cannot overflow.
+        // Every level adds at most one pending cell, so the stack cannot overflow.
         let mut stack = [(0, 0.0, 0.0); Self::MAX_DEPTH];
         let mut pending = 0;
         let mut cell = 0;
@@ -143,29 +147,39 @@ mod tests {
     use glam::Vec3;
     use proptest::prelude::*;
 
-    /// Boxes between points of a small grid: many are flat, identical or nested, and many faces coincide.
+    /// Makes boxes between points of a small grid: many are flat, identical or nested, and many faces
+    /// coincide.
     fn boxes() -> impl Strategy<Value = Vec<Aabb>> {
-        let corner = || prop::array::uniform3(-3i8..4);
-        let between = |(a, b): ([i8; 3], [i8; 3])| {
-            Aabb::around([a, b].map(|corner| Vec3::from(corner.map(|c| f32::from(c) * 0.75))))
-        };
-        prop::collection::vec((corner(), corner()).prop_map(between), 0..120)
+        let corners = prop::array::uniform2(prop::array::uniform3(-3i8..4));
+        let b = corners.prop_map(|corners| {
+            Aabb::around(corners.map(|corner| Vec3::from(corner.map(|c| f32::from(c) * 0.75))))
+        });
+        prop::collection::vec(b, 0..120)
+    }
+
+    /// Makes corners of these boxes, and points halfway between them; zeros have both signs.
+    fn point(coordinates: [i8; 3]) -> Vec3 {
+        Vec3::from(coordinates.map(|c| f32::from(c) * -0.375))
     }
 
     proptest! {
         #[test]
         fn trees_are_bounded_and_give_the_answers_of_brute_force(
             boxes in boxes(),
-            rays in prop::collection::vec((prop::array::uniform3(-9i8..10), prop::array::uniform3(-4i8..5)), 100),
+            rays in prop::collection::vec(
+                (prop::array::uniform3(-9i8..10), prop::array::uniform3(-4i8..5)),
+                100,
+            ),
         ) {
             let tree = Config::default().build(&boxes).unwrap();
             prop_assert!(tree.references() >= boxes.len() && tree.references() <= 16 * boxes.len());
             prop_assert!(tree.depth() as f64 <= 8.0 + 1.3 * libm::log2(boxes.len().max(1) as f64));
             for (origin, towards) in rays {
-                // Through corners, along faces and edges, and past them; zeros of both signs.
-                let point = |p: [i8; 3]| Vec3::from(p.map(|c| f32::from(c) * -0.375));
+                // Rays go through corners, along faces and edges, and past them.
                 let Ok(ray) = Ray::half_line(point(origin), point(towards)) else { continue };
-                let solid = |id: u32, t_max| clip_to_box(&ray, &boxes[id as usize], ray.t_min(), t_max);
+                let solid = |id: u32, t_max| {
+                    clip_to_box(&ray, &boxes[id as usize], ray.t_min(), t_max)
+                };
                 let expected = nearest_hit_of_all(boxes.len() as u32, &ray, solid, &mut ());
                 prop_assert_eq!(tree.nearest_hit(&ray, solid, &mut ()), expected, "{:?}", ray);
                 let any = tree.any_hit(&ray, |id| solid(id, f32::MAX).is_some(), &mut ());
@@ -175,10 +189,11 @@ mod tests {
     }
 
     #[test]
-    fn apart_objects_are_told_apart_by_few_tests() {
-        let row =
-            |i: i32| Aabb { min: Vec3::X * i as f32 * 2.0, max: Vec3::X * (i as f32 * 2.0) + 1.0 };
-        let boxes: Vec<Aabb> = (0..64).map(row).collect();
+    fn separate_objects_need_few_tests() {
+        let boxes: Vec<Aabb> = (0..64)
+            .map(|i| Vec3::X * i as f32 * 2.0)
+            .map(|min| Aabb { min, max: min + 1.0 })
+            .collect();
         let tree = Config::default().build(&boxes).unwrap();
         assert_eq!(tree.references(), boxes.len());
         let mut counts = TestCounts::default();
