@@ -1,16 +1,16 @@
-//! What the program knows of its own commands: completions for shells, and the manual page.
+//! Completions for shells and the manual page, both generated from the program's arguments.
 
 use clap::Command;
 use clap_complete::Shell;
 
-/// The file by which a shell completes the program's arguments.
+/// Returns the file with which a shell completes the program's arguments.
 pub fn completions(shell: Shell, command: &mut Command) -> Vec<u8> {
     let mut file = Vec::new();
     clap_complete::generate(shell, command, "bvh", &mut file);
     file
 }
 
-/// The manual page of the program, its commands' pages behind it, for `man -l -`.
+/// Returns the manual page of the program, followed by the pages of its commands, for `man -l -`.
 pub fn manual(command: Command) -> std::io::Result<Vec<u8>> {
     let mut page = Vec::new();
     clap_mangen::Man::new(command.clone()).render(&mut page)?;

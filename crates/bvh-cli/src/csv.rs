@@ -1,16 +1,16 @@
-//! Tables of numbers as CSV, in the form in which the experiments write theirs.
+//! Tables of numbers as CSV, in the same form as the tables of the experiments.
 
 use std::fmt::{Display, Write as _};
 
 /// A table whose cells are numbers and words that need no quotes.
 pub struct Table {
     text: String,
-    /// Whether the current row has a cell.
+    /// True if the current row has a cell.
     begun: bool,
 }
 
 impl Table {
-    /// A table with these columns, separated by commas, and no row.
+    /// Creates a table without rows. Commas separate the names of the columns.
     pub fn new(columns: &str) -> Self {
         Self { text: format!("{columns}\n"), begun: false }
     }
@@ -38,7 +38,7 @@ impl Table {
         self.begun = false;
     }
 
-    /// The table as text.
+    /// Returns the table as text.
     pub fn text(&self) -> &str {
         &self.text
     }

@@ -8,23 +8,23 @@ use bvh_search::SearchError;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A failure, with the file or object it concerns.
+/// A failure, with its file or object.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each message says what its fields are")]
+#[allow(missing_docs, reason = "each message describes its fields")]
 pub enum Error {
-    /// A scene that is neither built in, nor fetched, nor a readable mesh file.
+    /// The scene is neither built in, nor fetched, nor a readable mesh file.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A command line that asks for something contradictory.
+    /// The command line has an invalid value or contradicts itself.
     #[error("{0}")]
     Usage(String),
-    /// A file of rays that is wrong: file, key, found, accepted.
+    /// The file of rays is invalid. The message names the key, what was found and what is accepted.
     #[error("{}: {message}", .file.display())]
     Rays { file: PathBuf, message: String },
-    /// An input that could not be read.
+    /// An input cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// A file or folder that could not be read or written.
+    /// A file or folder cannot be read or written.
     #[error("{}: cannot {action}: {source}", .path.display())]
     Io { path: PathBuf, action: &'static str, source: io::Error },
     /// A search failed.
@@ -33,35 +33,41 @@ pub enum Error {
     /// Rays cannot be traced through this scene.
     #[error("scene {scene}, tracing: {source}")]
     Tracing { scene: String, source: DensityError },
-    /// A tree file that is damaged, or for another scene.
+    /// A tree file is damaged or belongs to a different scene.
     #[error(transparent)]
     TreeFile(#[from] TreeFileError),
-    /// A structure that a picture cannot be traced with.
+    /// A picture cannot be traced with the structure.
     #[error(transparent)]
     Structure(#[from] StructureError),
-    /// Ctrl-C during a picture.
+    /// Ctrl-C ended a picture.
     #[error("interrupted; no picture was written")]
     Abandoned,
-    /// Ctrl-C before a bake has any tree.
+    /// Ctrl-C ended a bake that had no tree.
     #[error("interrupted; there was no tree yet, and no file was written")]
     NoTree,
-    /// Ctrl-C during a bake.
-    #[error("interrupted; the best tree so far, of cost {cost}, is in {0}; `--from {0}` goes on", .path.display())]
+    /// Ctrl-C ended a bake.
+    #[error(
+        "interrupted; the best tree so far, of cost {cost}, is in {0}; `--from {0}` continues",
+        .path.display()
+    )]
     Stopped { path: PathBuf, cost: f64 },
-    /// Ctrl-C during a bake of instances.
-    #[error("interrupted; the best trees so far, of all meshes and over the instances, are in {}", .path.display())]
+    /// Ctrl-C ended a bake of instances.
+    #[error(
+        "interrupted; the best trees so far, of all meshes and over the instances, are in {}",
+        .path.display()
+    )]
     StoppedInstances { path: PathBuf },
 }
 
 impl Error {
-    /// 2 for faults of the command line or its inputs, 130 after Ctrl-C, otherwise 1.
+    /// Returns 2 for faults of the command line or its inputs, 130 after Ctrl-C, otherwise 1.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Scene(_) | Self::Usage(_) | Self::Rays { .. } => 2,
-            Self::Read(error) | Self::TreeFile(TreeFileError::Read(error)) => of_reading(error),
+            Self::Read(error) | Self::TreeFile(TreeFileError::Read(error)) => read_code(error),
             Self::TreeFile(_) => 2,
             Self::Structure(error) => match error {
-                StructureError::File(TreeFileError::Read(error)) => of_reading(error),
+                StructureError::File(TreeFileError::Read(error)) => read_code(error),
                 StructureError::Unknown(_)
                 | StructureError::Spheres(_)
                 | StructureError::File(_) => 2,
@@ -88,7 +94,8 @@ impl Error {
     }
 }
 
-fn of_reading(error: &ReadError) -> u8 {
+fn read_code(error: &ReadError) -> u8 {
+    // A wrong path is a fault of the command line, a failing disk is not.
     if error.is_of_the_path() { 2 } else { 1 }
 }
 

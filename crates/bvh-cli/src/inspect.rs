@@ -1,4 +1,5 @@
-//! `bvh inspect` and `bvh verify`: what a tree file is, what its tree costs, and what it looks like.
+//! `bvh inspect` and `bvh verify`: report the origin of a tree file, and the costs and the shape of its
+//! tree.
 
 use crate::scene_files::SceneFiles;
 use crate::{Error, csv};
@@ -20,40 +21,40 @@ use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 use std::path::{Path, PathBuf};
 
-/// Say what a tree file holds: its origin, costs, depth, arity, validity.
+/// Report the origin of a tree file, and the costs, depth, arity and validity of its tree.
 #[derive(Args, Clone, Debug)]
 pub struct InspectArgs {
     /// The tree file.
     #[arg(value_name = "FILE.bvh")]
     pub file: PathBuf,
-    /// The scene it is for, by name or path of a mesh file: checks the tree against its objects, compares it with
-    /// Müller–Fellner's, and measures the end-point overlap.
+    /// The tree's scene, by name or path of a mesh file. Checks the tree against the scene's objects,
+    /// compares it with the Müller–Fellner tree, and measures the end-point overlap.
     pub scene: Option<String>,
     /// Write the nodes to a CSV file, one row each, in full precision.
     #[arg(long, value_name = "NODES.csv")]
     pub nodes: Option<PathBuf>,
-    /// Says what the scene's files may refer to.
+    /// Permits files outside the scene's folder.
     #[command(flatten)]
     pub files: SceneFiles,
-    /// Print the facts as JSON, under the same names.
+    /// Print the facts as JSON with the same names.
     #[arg(long)]
     pub json: bool,
 }
 
-/// The nodes of a tree.
+/// The kind of the table of nodes.
 const NODES: FileKind =
     FileKind { name: "a CSV file of nodes", beginning: b"node,parent,", extension: "csv" };
 /// The columns of the nodes, which docs/TREE_FILES.md describes.
 const COLUMNS: &str = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
 
-/// Facts by name, in the order in which they are printed: as a text, and as JSON.
+/// Named facts in the order of the output, each with its value as text and as JSON.
 #[derive(Default)]
 struct Facts(Vec<(String, String, serde_json::Value)>);
 
 impl Facts {
-    fn add(&mut self, what: &str, value: impl Display + Serialize) {
+    fn add(&mut self, name: &str, value: impl Display + Serialize) {
         self.0
-            .push((what.into(), value.to_string(), json!(value)));
+            .push((name.into(), value.to_string(), json!(value)));
     }
 }
 
@@ -61,7 +62,7 @@ impl Display for Facts {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         self.0
             .iter()
-            .try_for_each(|(what, text, _)| writeln!(f, "{what}: {text}"))
+            .try_for_each(|(name, text, _)| writeln!(f, "{name}: {text}"))
     }
 }
 
@@ -70,13 +71,13 @@ impl Serialize for Facts {
         serializer.collect_map(
             self.0
                 .iter()
-                .map(|(what, _, value)| (what, value)),
+                .map(|(name, _, value)| (name, value)),
         )
     }
 }
 
-/// Inspects a file, and prints a line per fact, `what: value`, or JSON. Refuses a file that is damaged, or for another scene than
-/// the one named.
+/// Inspects a file, and prints each fact as a line `name: value`, or all as JSON. Rejects a damaged
+/// file, and a file for a different scene.
 pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     if let Some(nodes) = &args.nodes {
         output_file("--nodes", nodes, &NODES)?;
@@ -94,23 +95,24 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     Ok(())
 }
 
-/// Prove that a tree file, whoever made it, holds a tree for a scene: validity and costs are computed again.
+/// Prove that a tree file from any source contains a tree for a scene. Computes validity and costs
+/// again.
 #[derive(Args, Clone, Debug)]
 pub struct VerifyArgs {
     /// The tree file.
     #[arg(value_name = "FILE.bvh")]
     pub file: PathBuf,
-    /// The scene it is for, by name or path of a mesh file.
+    /// The tree's scene, by name or path of a mesh file.
     pub scene: String,
-    /// Says what the scene's files may refer to.
+    /// Permits files outside the scene's folder.
     #[command(flatten)]
     pub files: SceneFiles,
-    /// Print the facts as JSON, under the same names.
+    /// Print the facts as JSON with the same names.
     #[arg(long)]
     pub json: bool,
 }
 
-/// As [`inspect`], of a file that must be for the scene.
+/// Does the same as [`inspect`], and requires a scene.
 pub fn verify(args: &VerifyArgs) -> Result<(), Error> {
     let scene = args.files.load(&args.scene)?;
     let (_, facts) = examine(&args.file, Some(&scene))?;
@@ -122,26 +124,25 @@ fn print(facts: &Facts, as_json: bool) {
     print_line(&if as_json { format!("{:#}", json!(facts)) } else { facts.to_string() });
 }
 
-/// The tree in a file and the facts about it.
+/// Reads the tree in a file, and lists the facts about it.
 fn examine(path: &Path, scene: Option<&Scene>) -> Result<(Bvh, Facts), Error> {
     let bytes = tree_file::read(path)?;
     let file = tree_file::open(path, &bytes)?;
-    scene
-        .iter()
-        .filter_map(|scene| scene.remark.as_ref())
-        .for_each(|remark| print_error(remark));
+    if let Some(remark) = scene.and_then(|scene| scene.remark.as_ref()) {
+        print_error(remark);
+    }
     let mut facts = Facts::default();
     describe(file.header(), &bytes, &mut facts);
     let tree = file.tree().map_err(TreeFileError::of(path))?;
     measure(&tree, &mut facts);
     match scene {
         Some(scene) => against(&tree, file, scene, &mut facts).map_err(TreeFileError::of(path))?,
-        None => facts.add("valid", "as a tree; with a scene its objects are checked too"),
+        None => facts.add("valid", "as a tree; name a scene to check its objects too"),
     }
     Ok((tree, facts))
 }
 
-/// The facts in the header.
+/// Adds the facts in the header.
 fn describe(header: &Header, bytes: &[u8], facts: &mut Facts) {
     let objective = match header.objective {
         Objective::InternalArea => "internal area".to_owned(),
@@ -153,7 +154,7 @@ fn describe(header: &Header, bytes: &[u8], facts: &mut Facts) {
             format!("surface area heuristic, traversal {traversal}, intersection {intersection}")
         }
     };
-    // The magic comes first, then the version.
+    // The version follows the magic number.
     let version = bytes[Header::MAGIC.len()..]
         .first_chunk()
         .map_or(0, |bytes| u32::from_le_bytes(*bytes));
@@ -170,7 +171,7 @@ fn describe(header: &Header, bytes: &[u8], facts: &mut Facts) {
     facts.add("nodes", header.nodes);
 }
 
-/// The facts that follow from the tree alone.
+/// Adds the facts that follow from the tree alone.
 fn measure(tree: &Bvh, facts: &mut Facts) {
     let area = cost::internal_area(tree);
     facts.add("inner nodes", tree.inner_count());
@@ -193,7 +194,7 @@ fn measure(tree: &Bvh, facts: &mut Facts) {
     facts.add("leaves by objects", histogram(&leaves));
 }
 
-/// `2 × 100, 3 × 7`: sizes and how many have them.
+/// Lists sizes with their frequencies, such as `2 × 100, 3 × 7`.
 fn histogram(counts: &BTreeMap<u32, usize>) -> String {
     let bins: Vec<String> = counts
         .iter()
@@ -202,13 +203,13 @@ fn histogram(counts: &BTreeMap<u32, usize>) -> String {
     if bins.is_empty() { "none".into() } else { bins.join(", ") }
 }
 
-/// The facts that only the scene can tell.
+/// Adds the facts that need the scene.
 fn against(tree: &Bvh, file: TreeFile, scene: &Scene, facts: &mut Facts) -> Result<(), FileError> {
     file.for_boxes(&scene.boxes)?;
     validate_references(tree, &scene.boxes, &scene.primitives)?;
     facts.add("scene", &scene.name);
     facts.add("valid", "yes, over this scene's objects");
-    // Boxes that the file's checksum has accepted are finite: a valid tree lies around them.
+    // The build cannot fail, because a valid tree over these boxes proves that they are finite.
     if let Ok(greedy) = muller_fellner::Config::default().build(&scene.boxes) {
         let base = cost::internal_area(&greedy);
         if base > 0.0 {
@@ -219,7 +220,7 @@ fn against(tree: &Bvh, file: TreeFile, scene: &Scene, facts: &mut Facts) -> Resu
         Ok(triangles) => {
             facts.add("end-point overlap", end_point_overlap(tree, triangles));
         }
-        Err(_) => facts.add("end-point overlap", "of triangles only"),
+        Err(_) => facts.add("end-point overlap", "defined for triangles only"),
     }
     Ok(())
 }
@@ -230,18 +231,17 @@ fn end_point_overlap(tree: &Bvh, triangles: &[Triangle]) -> f64 {
     let bar = ProgressBar::new(parts.count() as u64).with_message("end-point overlap");
     let style = ProgressStyle::with_template("{bar:10} {msg}, {eta} left");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let part = |number| {
-        let part = parts.part(number);
-        bar.inc(1);
-        part
-    };
     let found: Vec<Overlap> = (0..parts.count())
         .into_par_iter()
-        .map(part)
+        .map(|number| parts.part(number))
+        .inspect(|_| bar.inc(1))
         .collect();
     bar.finish_and_clear();
+    // Adding in a fixed order gives the same sum for any number of threads.
     let mut sum = Overlap::default();
-    found.iter().for_each(|part| sum.add(part));
+    for part in &found {
+        sum.add(part);
+    }
     sum.value()
 }
 

@@ -1,4 +1,4 @@
-//! The program `bvh`: parses the arguments, calls the command, and sets the exit code.
+//! The program `bvh`: parses the arguments, runs the command, and sets the exit code.
 
 mod bake;
 mod commands;
@@ -17,7 +17,8 @@ use error::Error;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Bounding volume hierarchies by stochastic search: bake the best tree that a budget buys, and look at it.
+/// Bounding volume hierarchies by stochastic search: bake the best tree within a budget, and inspect
+/// it.
 #[derive(Parser)]
 #[command(name = "bvh", version, arg_required_else_help = true)]
 struct Cli {
@@ -31,9 +32,9 @@ enum Command {
     Inspect(inspect::InspectArgs),
     Verify(inspect::VerifyArgs),
     Render(render::RenderArgs),
-    /// List the built-in scenes, their sizes, and what each stands in for.
+    /// List the built-in scenes, their sizes, and the originals that they replace.
     Scenes,
-    /// Print the file by which a shell completes arguments.
+    /// Print the file with which a shell completes arguments.
     Completions {
         shell: Shell,
     },

@@ -1,4 +1,4 @@
-//! `bvh render`: arguments in, a PNG file and a line of numbers out.
+//! `bvh render`: draws a scene into a PNG file, and prints times and counts.
 
 use crate::Error;
 use crate::scene_files::SceneFiles;
@@ -12,11 +12,12 @@ use bvh_terminal::files;
 use bvh_terminal::output::{print_error, print_line};
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
 
-/// Draw a scene with a small Whitted ray tracer; the picture is the same with any structure.
+/// Draw a scene with a small Whitted ray tracer. The picture is the same with any structure.
 #[derive(clap::Args, Clone, Debug)]
 pub struct RenderArgs {
     /// Name or path of the scene, as in `bvh scenes`.
@@ -25,40 +26,51 @@ pub struct RenderArgs {
     /// The picture, a PNG file.
     #[arg(long, value_name = "FILE.png")]
     pub out: PathBuf,
-    /// What finds the objects on a ray: brute, kdtree, bvh, wide, or a saved tree. Changes nothing but the time.
+    /// The acceleration structure: brute, kdtree, bvh, wide, or a saved tree. It changes only the
+    /// time.
     #[arg(long, value_name = "NAME|FILE.bvh", default_value = "bvh")]
     pub accel: String,
-    /// Show how many tests each pixel took, all its rays together, instead of the scene.
+    /// Show the number of tests of each pixel's rays instead of the scene.
     #[arg(long)]
     pub heatmap: bool,
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", default_value = "960x540", value_parser = size)]
     pub size: (u32, u32),
-    /// Smooth edges by N² rays per pixel.
-    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=16))]
+    /// Smooth edges with N² rays per pixel.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 2,
+        value_parser = clap::value_parser!(u32).range(1..=16)
+    )]
     pub samples: u32,
-    /// Mirror reflections to follow.
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(0..=64))]
+    /// The number of mirror reflections to follow.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 4,
+        value_parser = clap::value_parser!(u32).range(0..=64)
+    )]
     pub depth: u32,
-    /// The eye; without it, the whole scene is framed from outside.
+    /// The eye. The default shows the whole scene from outside.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub from: Option<DVec3>,
-    /// The middle of the picture; the centre of the scene if not given.
+    /// The middle of the picture. The default is the centre of the scene.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub at: Option<DVec3>,
-    /// Angle of view from bottom to top, degrees.
+    /// The angle of view from bottom to top, in degrees.
     #[arg(long, value_name = "DEGREES", value_parser = angle)]
     pub fov: Option<f64>,
-    /// A point light in place of the automatic ones; may be repeated.
+    /// A point light that replaces the automatic lights; may be repeated.
     #[arg(long = "light", value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub lights: Vec<DVec3>,
-    /// No lights: surfaces are lit from the eye and no shadow ray is sent.
+    /// Light surfaces from the eye, without lights and shadow rays.
     #[arg(long, conflicts_with = "lights")]
     pub no_lights: bool,
-    /// No ground under a scene that is seen from outside.
+    /// Draw no ground under a scene that is seen from outside.
     #[arg(long)]
     pub no_ground: bool,
-    /// Says what the scene's files may refer to.
+    /// Permits files outside the scene's folder.
     #[command(flatten)]
     pub files: SceneFiles,
     /// Limits the threads.
@@ -66,9 +78,9 @@ pub struct RenderArgs {
     pub jobs: Jobs,
 }
 
-/// Pictures.
+/// The kind of pictures.
 const PICTURE: FileKind = FileKind { name: "a PNG file", beginning: b"\x89PNG", extension: "png" };
-/// Most pixels of a picture: a gigabyte of them and their counts.
+/// The largest number of pixels of a picture. With their counts they need a gigabyte.
 const LARGEST: u64 = 100_000_000;
 
 fn size(text: &str) -> Result<(u32, u32), String> {
@@ -90,14 +102,9 @@ fn point(text: &str) -> Result<DVec3, String> {
         .split(',')
         .map(|number| number.trim().parse().ok())
         .collect();
+    // Rays have f32 coordinates, so that larger numbers would overflow.
     match numbers.as_deref() {
-        Some(&[x, y, z])
-            if [x, y, z]
-                .iter()
-                .all(|&number| (number as f32).is_finite()) =>
-        {
-            Ok(DVec3::new(x, y, z))
-        }
+        Some(&[x, y, z]) if DVec3::new(x, y, z).as_vec3().is_finite() => Ok(DVec3::new(x, y, z)),
         _ => Err("accepted: three numbers as in 1.5,-2,0".into()),
     }
 }
@@ -117,6 +124,7 @@ impl RenderArgs {
             .iter()
             .fold(Aabb::EMPTY, |all, b| all.union(b));
         let automatic = framing::automatic(scene, &bounds, f64::from(width) / f64::from(height));
+        // The automatic eye fits the automatic angle; any other pair gets the default angle.
         let view = match (self.from, self.at) {
             (None, None) => View { fov: self.fov.unwrap_or(automatic.fov), ..automatic },
             (from, at) => View {
@@ -133,7 +141,7 @@ impl RenderArgs {
     }
 }
 
-/// Draws the picture, writes it, and prints how long it took.
+/// Draws the picture, writes it, and prints its times.
 pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     if args.accel.ends_with(".bvh") {
         input_file("--accel", Path::new(&args.accel))?;
@@ -141,13 +149,14 @@ pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> 
     output_file("--out", &args.out, &PICTURE)?;
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;
-    scene
-        .remark
-        .iter()
-        .for_each(|remark| print_error(remark));
+    if let Some(remark) = &scene.remark {
+        print_error(remark);
+    }
     if args.heatmap && args.accel == "wide" {
         return Err(Error::Usage(
-            "--heatmap: the wide layout counts no tests; accepted with it: --accel brute, kdtree, bvh, FILE.bvh".into(),
+            "--heatmap: the wide layout counts no tests; \
+             accepted with it: --accel brute, kdtree, bvh, FILE.bvh"
+                .into(),
         ));
     }
     let options = args.options(&scene);
@@ -160,11 +169,10 @@ pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> 
         ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
     bar.set_message(scene.name.clone());
-    let tile_done = || {
+    let film = draw(&scene, &accelerator, &options, &|| {
         bar.inc(1);
         !interrupted.load(Relaxed)
-    };
-    let film = draw(&scene, &accelerator, &options, &tile_done);
+    });
     bar.finish_and_clear();
     let film = film.ok_or(Error::Abandoned)?;
     let rendered = start.elapsed().as_secs_f64() - built;
@@ -174,17 +182,20 @@ pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> 
     Ok(())
 }
 
-/// Writes the picture, or its heat map.
+/// Writes the picture or its heat map.
 fn write(args: &RenderArgs, film: &Film, rays_per_pixel: u32) -> Result<(), Error> {
-    let failed =
-        |error: String| Error::io(&args.out, "encode the picture")(std::io::Error::other(error));
+    let action = "encode the picture";
     let bytes = if args.heatmap {
-        let pixels = heat::map(film, rays_per_pixel).map_err(|error| failed(error.to_string()))?;
+        let pixels = heat::map(film, rays_per_pixel)
+            .map_err(io::Error::other)
+            .map_err(Error::io(&args.out, action))?;
         image::png(film.width, &pixels)
     } else {
         image::png(film.width, &film.pixels)
     };
-    let bytes = bytes.map_err(|error| failed(error.to_string()))?;
+    let bytes = bytes
+        .map_err(io::Error::other)
+        .map_err(Error::io(&args.out, action))?;
     Ok(files::write(&args.out, &bytes)?)
 }
 
@@ -203,13 +214,12 @@ fn summary(
         film.rays
     );
     if args.accel != "wide" {
-        let per_ray = |tests: u64| tests as f64 / film.rays as f64;
+        let boxes = film.counts.boxes as f64 / film.rays as f64;
+        let objects = film.counts.objects as f64 / film.rays as f64;
         let heat::Range { min, median, max, .. } = heat::range(film, rays_per_pixel);
         text += &format!(
-            "per ray: {:.2} boxes, {:.2} objects; per pixel: at least {min:.0} tests, median {median:.0}, at most \
-             {max:.0}\n",
-            per_ray(film.counts.boxes),
-            per_ray(film.counts.objects),
+            "per ray: {boxes:.2} boxes, {objects:.2} objects; \
+             per pixel: at least {min:.0} tests, median {median:.0}, at most {max:.0}\n"
         );
     }
     text + &format!("Picture: {}", args.out.display())

@@ -1,12 +1,13 @@
-//! What the files of scenes may refer to.
+//! The arguments about files that a scene's file refers to.
 
 use bvh_scenes::load::OutsideFiles;
 use bvh_scenes::{Scene, SceneError};
 
-/// What the files of scenes may refer to.
+/// The permission to read files outside a scene's folder.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
 pub struct SceneFiles {
-    /// Let a glTF file name buffers outside its own folder. Whoever made the file then says which files are read.
+    /// Let a glTF file name buffers outside its own folder. The author of the file then decides
+    /// which files are read.
     #[arg(long)]
     pub outside_files: bool,
 }
@@ -17,7 +18,7 @@ impl SceneFiles {
         Scene::load_with(name, self.outside())
     }
 
-    /// Whether such buffers are read.
+    /// Returns whether such buffers are read.
     pub fn outside(self) -> OutsideFiles {
         self.outside_files.into()
     }

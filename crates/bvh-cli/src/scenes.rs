@@ -1,13 +1,13 @@
-//! `bvh scenes`: the scenes that can be named without a path.
+//! `bvh scenes`: lists the scenes that need no path.
 
 use crate::Error;
 use bvh_scenes::builtin::stand_ins::STAND_INS;
 use bvh_scenes::{FETCHED, SPHERES, Scene, fetched_path};
 use bvh_terminal::output::print_line;
 
-/// Prints a table of the built-in scenes: their sizes, and what each stands in for.
+/// Prints a table of the built-in scenes: their sizes, and the originals that they replace.
 pub fn scenes() -> Result<(), Error> {
-    let mut table = line("name", "objects", "kind", "what it is");
+    let mut table = line("name", "objects", "kind", "description");
     for scene in STAND_INS {
         let kind = format!("stand-in for {}", scene.original);
         table += &line(scene.name, &scene.triangle_count.to_string(), &kind, scene.character);

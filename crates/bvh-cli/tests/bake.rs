@@ -1,4 +1,5 @@
-//! Baking and inspecting as their users meet them: what is written, kept, refused, and read by other languages.
+//! Baking and inspecting from the command line: files that are written, kept, rejected, and read by
+//! other languages.
 
 mod support;
 
@@ -23,28 +24,23 @@ fn a_bake_of_work_writes_the_same_bytes_on_any_number_of_threads() {
     assert!(bytes[0] == bytes[1]);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "no other file is left");
     let scene = Scene::load("escher").unwrap();
-    let tree = tree_file::load(&folder.path().join("1.bvh"), &scene)
-        .unwrap()
-        .0;
+    let (tree, _) = tree_file::load(&folder.path().join("1.bvh"), &scene).unwrap();
     let facts = facts(&said(folder.path(), &["inspect", "1.bvh", "escher"]));
-    assert_eq!(facts["internal area"], bvh_core::cost::internal_area(&tree).to_string());
-    assert_eq!(
-        (facts["method"].as_str(), facts["cost when saved"].as_str()),
-        ("best", facts["internal area"].as_str())
-    );
-    assert_eq!(facts["version"], "2", "what older programs read");
-    assert!(
-        facts["internal area over Müller–Fellner's"]
-            .parse::<f64>()
-            .unwrap()
-            < 0.9
-    );
-    assert!(facts["end-point overlap"].parse::<f64>().unwrap() > 0.0);
+    let area = &facts["internal area"];
+    assert_eq!(*area, bvh_core::cost::internal_area(&tree).to_string());
+    assert_eq!((facts["method"].as_str(), &facts["cost when saved"]), ("best", area));
+    assert_eq!(facts["version"], "2", "the oldest version that suffices");
+    assert!(number(&facts, "internal area over Müller–Fellner's") < 0.9);
+    assert!(number(&facts, "end-point overlap") > 0.0);
     assert!(facts["valid"].starts_with("yes"));
 }
 
+fn number(facts: &BTreeMap<String, String>, name: &str) -> f64 {
+    facts[name].parse().unwrap()
+}
+
 #[test]
-fn a_bake_for_rays_keeps_how_often_they_visit_each_node() {
+fn a_bake_for_rays_saves_the_number_of_visits_of_each_node() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("walk.toml"), WALK).unwrap();
@@ -114,7 +110,7 @@ cameras = [
 ";
 
 #[test]
-fn a_bake_goes_on_from_another_and_is_never_worse() {
+fn a_bake_from_an_earlier_tree_is_never_worse() {
     let folder = tempfile::tempdir().unwrap();
     let bake = |out: &str, more: &[&str]| {
         said(folder.path(), &[&["bake", "spheres750", "--out", out], more].concat());
@@ -134,7 +130,7 @@ fn a_bake_goes_on_from_another_and_is_never_worse() {
 }
 
 #[test]
-fn a_bake_takes_the_time_it_was_given() {
+fn a_bake_uses_its_whole_time() {
     let folder = tempfile::tempdir().unwrap();
     let start = Instant::now();
     said(folder.path(), &["bake", "spheres75", "--budget", "500ms", "--out", "a.bvh"]);
@@ -142,7 +138,7 @@ fn a_bake_takes_the_time_it_was_given() {
 }
 
 #[test]
-fn a_kill_leaves_the_old_file_or_a_whole_new_one() {
+fn a_kill_leaves_the_old_file_or_a_complete_new_one() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bvh");
     let scene = Scene::load("spheres750").unwrap();
@@ -165,20 +161,15 @@ fn a_kill_leaves_the_old_file_or_a_whole_new_one() {
 }
 
 #[test]
-fn what_cannot_be_baked_or_inspected_is_said_and_nothing_is_lost() {
+fn invalid_bakes_and_inspections_are_rejected_and_change_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     said(folder.path(), &["bake", "spheres75", "--budget", "0s", "--out", "good.bvh"]);
     let good = fs::read(path("good.bvh")).unwrap();
     fs::write(path("cut.bvh"), &good[..good.len() - 1]).unwrap();
-    fs::write(
-        path("flipped.bvh"),
-        good.iter()
-            .enumerate()
-            .map(|(at, b)| b ^ u8::from(at == 300))
-            .collect::<Vec<_>>(),
-    )
-    .unwrap();
+    let mut flipped = good.clone();
+    flipped[300] ^= 1;
+    fs::write(path("flipped.bvh"), flipped).unwrap();
     fs::write(path("file"), "").unwrap();
     fs::create_dir(path("folder")).unwrap();
     let bake = |more: &[&'static str]| [&["bake", "spheres75", "--budget", "0s"], more].concat();
@@ -244,9 +235,9 @@ fn the_facts_are_the_same_in_json() {
         "{json:?}"
     );
     assert!(json.keys().eq(plain.keys()));
-    for what in ["internal area", "surface area heuristic", "internal area over Müller–Fellner's"]
+    for name in ["internal area", "surface area heuristic", "internal area over Müller–Fellner's"]
     {
-        assert_eq!(json[what].as_f64(), plain[what].parse().ok(), "{what}");
+        assert_eq!(json[name].as_f64(), plain[name].parse().ok(), "{name}");
     }
 }
 
@@ -265,33 +256,24 @@ fn the_nodes_are_written_in_full_precision() {
     let folder = tempfile::tempdir().unwrap();
     said(folder.path(), &["bake", "spheres75", "--budget", "0s", "--out", "a.bvh"]);
     said(folder.path(), &["inspect", "a.bvh", "--nodes", "nodes.csv"]);
-    let tree = tree_file::load(&folder.path().join("a.bvh"), &Scene::load("spheres75").unwrap())
-        .unwrap()
-        .0;
+    let scene = Scene::load("spheres75").unwrap();
+    let (tree, _) = tree_file::load(&folder.path().join("a.bvh"), &scene).unwrap();
     let mut reader = csv::Reader::from_path(folder.path().join("nodes.csv")).unwrap();
     let columns = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
-    assert_eq!(
-        reader
-            .headers()
-            .unwrap()
-            .iter()
-            .collect::<Vec<_>>()
-            .join(","),
-        columns
-    );
+    let headers: Vec<&str> = reader.headers().unwrap().iter().collect();
+    assert_eq!(headers.join(","), columns);
     let mut rows = 0;
     for (index, row) in reader.records().enumerate() {
         let row = row.unwrap();
         let node = &tree.nodes[index];
         let corners = [node.aabb.min.to_array(), node.aabb.max.to_array()].concat();
-        assert_eq!(
-            (5..11)
-                .map(|at| row[at].parse::<f32>().unwrap())
-                .collect::<Vec<_>>(),
-            corners
-        );
+        let written: Vec<f32> = (5..11)
+            .map(|column| row[column].parse().unwrap())
+            .collect();
+        assert_eq!(written, corners);
         let kind = if node.is_leaf() { "leaf" } else { "inner" };
         assert_eq!((&row[0], &row[2]), (index.to_string().as_str(), kind));
+        // Only the root has an empty cell instead of a parent.
         match row[1].parse::<usize>() {
             Ok(parent) => assert!(tree.nodes[parent].children().contains(&index)),
             Err(_) => assert_eq!((&row[1], index), ("", 0)),
@@ -301,22 +283,24 @@ fn the_nodes_are_written_in_full_precision() {
     assert_eq!(rows, tree.nodes.len());
 }
 
-/// Compares the facts of another reader with those of `inspect`; sums of areas may differ in their last digits.
+/// Compares the facts of another reader with the facts of `inspect`.
 fn agree(reader: &str, output: &Output, inspected: &BTreeMap<String, String>) {
     assert!(output.status.success(), "{reader}: {}", text(&output.stderr));
     let read = facts(&text(&output.stdout));
-    for what in ["method", "seed", "work", "objects", "nodes", "inner nodes", "leaves", "depth"] {
-        assert_eq!(read[what], inspected[what], "{reader}: {what}");
+    for name in ["method", "seed", "work", "objects", "nodes", "inner nodes", "leaves", "depth"] {
+        assert_eq!(read[name], inspected[name], "{reader}: {name}");
     }
-    for what in ["cost when saved", "internal area"] {
-        let [own, theirs] =
-            [&inspected[what], &read[what]].map(|value| value.parse::<f64>().unwrap());
-        assert!((own - theirs).abs() <= 1e-12 * own, "{reader}: {what}: {theirs}, not {own}");
+    // Another order of additions changes the last digits of a sum of areas.
+    for name in ["cost when saved", "internal area"] {
+        let expected = number(inspected, name);
+        let found = number(&read, name);
+        let error = (found - expected).abs();
+        assert!(error <= 1e-12 * expected, "{reader}: {name}: {found}, not {expected}");
     }
 }
 
 #[test]
-fn readers_in_python_and_cpp_agree_with_inspect_and_refuse_damage() {
+fn readers_in_python_and_cpp_agree_with_inspect_and_reject_damage() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let scripts = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scripts");
@@ -325,17 +309,15 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_refuse_damage() {
         let out = format!("{index}.bvh");
         let bake = ["bake", scene, "--budget=1Mwork", "--seed=18446744073709551615"];
         said(at, &[&bake[..], &["--method", method, "--out", &out]].concat());
+        // One flipped bit must not go unnoticed.
         let mut bytes = fs::read(at.join(&out)).unwrap();
         let middle = bytes.len() / 2;
         bytes[middle] ^= 1;
         fs::write(at.join(format!("{index}.damaged")), bytes).unwrap();
     }
     let mut readers = Vec::new();
-    if Command::new("python3")
-        .arg("--version")
-        .output()
-        .is_ok_and(|output| output.status.success())
-    {
+    let python = Command::new("python3").arg("--version").output();
+    if python.is_ok_and(|output| output.status.success()) {
         readers.push(("python3", vec![scripts.join("read_tree.py")]));
     }
     let built = Command::new("c++")
@@ -359,9 +341,10 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_refuse_damage() {
         for index in 0..trees.len() {
             let inspected = facts(&said(at, &["inspect", &format!("{index}.bvh")]));
             agree(name, &read(format!("{index}.bvh")), &inspected);
-            assert!(!read(format!("{index}.damaged")).status.success(), "{name} took damage");
+            let damaged = read(format!("{index}.damaged"));
+            assert!(!damaged.status.success(), "{name} accepted a damaged file");
         }
     }
     let tried: Vec<&str> = readers.iter().map(|reader| reader.0).collect();
-    eprintln!("readers tried: {tried:?}; the others' programs are not here");
+    eprintln!("readers tried: {tried:?}; the other programs are not installed");
 }

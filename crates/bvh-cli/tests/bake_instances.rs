@@ -1,4 +1,5 @@
-//! Baked scenes of instances: their files, loaded as users load them, answer as the same scene written out.
+//! The files of a baked scene of instances, loaded as users load them, give the same answers as the flat
+//! scene.
 
 mod support;
 
@@ -9,14 +10,16 @@ use std::fs;
 use std::path::Path;
 use support::{glb, names, refused, said};
 
-/// A GLB file of two meshes and one of points, under nodes that turn them by right angles and mirror them, so that nothing is rounded.
+/// Returns the triangle of this number, with small whole coordinates.
+fn triangle(number: u32) -> Triangle {
+    let coordinates: [u32; 9] = std::array::from_fn(|i| 9 * number + i as u32);
+    Triangle::from(coordinates.map(|i| (i.wrapping_mul(2_654_435_761) >> 27) as f32))
+}
+
+/// Returns a GLB file of two meshes of triangles and one of points, and the triangles. Nodes turn the
+/// meshes by right angles and mirror them, so that nothing is rounded.
 fn forest() -> (Vec<u8>, [Vec<Triangle>; 2]) {
-    let number = |i: u32| (i.wrapping_mul(2_654_435_761) >> 27) as f32;
-    let point = |i: u32| [number(3 * i), number(3 * i + 1), number(3 * i + 2)];
-    let meshes = [0..150, 150..400].map(|range| {
-        let triangle = |i: u32| Triangle::from([point(3 * i), point(3 * i + 1), point(3 * i + 2)]);
-        range.map(triangle).collect::<Vec<_>>()
-    });
+    let meshes = [0..150, 150..400].map(|range| range.map(triangle).collect::<Vec<_>>());
     let corners: Vec<u8> = bytemuck::cast_slice(&meshes.concat()).to_vec();
     let json = format!(
         r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0, 4, 5, 6]}}], "nodes": [
@@ -38,26 +41,27 @@ fn forest() -> (Vec<u8>, [Vec<Triangle>; 2]) {
     (glb(json, &corners), meshes)
 }
 
-/// The files of a folder of instances as a user loads them, who has the meshes.
+/// Loads a folder of instances as a user who has the meshes does.
 fn load_instances(folder: &Path, meshes: &[Vec<Triangle>]) -> Instances {
-    let layout = |(mesh, triangles): (usize, &Vec<Triangle>)| {
+    let mut parts = Vec::new();
+    for (mesh, triangles) in meshes.iter().enumerate() {
         let bytes = fs::read(folder.join(format!("mesh_{mesh}.bvh"))).unwrap();
-        WideBvh::new(&file::load(&bytes, &boxes(triangles)).unwrap(), triangles).unwrap()
-    };
-    let parts: Vec<WideBvh> = meshes.iter().enumerate().map(layout).collect();
+        let tree = file::load(&bytes, &boxes(triangles)).unwrap();
+        parts.push(WideBvh::new(&tree, triangles).unwrap());
+    }
     let mut rows = csv::Reader::from_path(folder.join("instances.csv")).unwrap();
-    let instance = |row: Result<(u32, u32, [f32; 12]), csv::Error>| {
-        let (_, part, columns) = row.unwrap();
-        Instance { part, transform: Affine3A::from_cols_array(&columns) }
-    };
-    let instances: Vec<Instance> = rows.deserialize().map(instance).collect();
+    let mut instances = Vec::new();
+    for row in rows.deserialize() {
+        let (_node, part, columns): (u32, u32, [f32; 12]) = row.unwrap();
+        instances.push(Instance { part, transform: Affine3A::from_cols_array(&columns) });
+    }
     let boxes = Instance::boxes(&instances, &parts).unwrap();
     let top = file::load(&fs::read(folder.join("top.bvh")).unwrap(), &boxes).unwrap();
     Instances::new(parts, instances, top).unwrap()
 }
 
 #[test]
-fn a_scene_of_instances_is_baked_mesh_by_mesh_and_answers_as_the_flat_one() {
+fn a_scene_of_instances_is_baked_mesh_by_mesh_and_answers_like_the_flat_scene() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let (glb, meshes) = forest();
@@ -80,7 +84,7 @@ fn a_scene_of_instances_is_baked_mesh_by_mesh_and_answers_as_the_flat_one() {
 
     let flat = Scene::load(at.join("forest.glb").to_str().unwrap()).unwrap();
     let flat = flat.triangles().unwrap();
-    // Of the nodes in the order of the scene: meshes 1, 0, 0, 1 and 0.
+    // The first triangle of each instance in the flat scene, whose nodes place these meshes in order.
     let first: Vec<usize> = [1, 0, 0, 1, 0]
         .iter()
         .scan(0, |end, &mesh: &usize| Some(std::mem::replace(end, *end + meshes[mesh].len())))
@@ -88,13 +92,9 @@ fn a_scene_of_instances_is_baked_mesh_by_mesh_and_answers_as_the_flat_one() {
     let number = |i: u32| (i.wrapping_mul(2_246_822_519) >> 26) as f32 - 32.0;
     let mut hits = 0;
     for i in 0..2000 {
-        // From a point of a lattice towards about the middle of a triangle.
-        let middle = (flat[7 * i as usize % flat.len()]
-            .0
-            .iter()
-            .sum::<Vec3>()
-            / 3.0)
-            .round();
+        // The ray goes from a lattice point towards the rounded middle of a triangle.
+        let corners = flat[7 * i as usize % flat.len()].0;
+        let middle = (corners.iter().sum::<Vec3>() / 3.0).round();
         let away = Vec3::new(number(2 * i), number(2 * i + 1), 128.0);
         let ray = Ray::half_line((middle + away).to_array(), (-away / 128.0).to_array()).unwrap();
         let shear = Shear::new(&ray);
@@ -102,28 +102,30 @@ fn a_scene_of_instances_is_baked_mesh_by_mesh_and_answers_as_the_flat_one() {
             .iter()
             .enumerate()
             .filter_map(|(id, triangle)| Some((triangle.intersect(&shear, ray.t_max())?, id)));
-        let right = all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        // Of several triangles at the same distance, the one with the lowest id is the answer.
+        let expected = all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let found = scene.nearest_hit(&ray);
         let found = found.map(|hit| (hit.t, first[hit.instance as usize] + hit.triangle as usize));
-        assert_eq!(found, right, "ray {i}");
+        assert_eq!(found, expected, "ray {i}");
         hits += u32::from(found.is_some());
     }
     assert!((1000..2000).contains(&hits), "{hits} of 2000 rays hit");
 }
 
 #[test]
-fn a_bake_of_instances_replaces_nobodys_files_and_says_what_it_cannot_do() {
+fn a_bake_of_instances_replaces_no_other_files_and_rejects_invalid_input() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let (glb, _) = forest();
     fs::write(at.join("forest.glb"), &glb).unwrap();
     fs::write(at.join("one.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
-    let json_at = glb
+    // A scale of 0 has no inverse.
+    let scale = glb
         .windows(9)
         .position(|bytes| bytes == b"[-1, 1, 1")
         .unwrap();
     let mut flat = glb.clone();
-    flat[json_at..json_at + 9].copy_from_slice(b"[ 0, 1, 1");
+    flat[scale..scale + 9].copy_from_slice(b"[ 0, 1, 1");
     fs::write(at.join("flat.glb"), flat).unwrap();
     fs::create_dir(at.join("full")).unwrap();
     fs::write(at.join("full/mine"), "mine").unwrap();

@@ -1,4 +1,4 @@
-//! Ctrl-C while `bvh bake` searches: the best tree so far is kept, and it is worth having.
+//! Ctrl-C while `bvh bake` searches: the best tree so far is written, and it is a good one.
 #![cfg(unix)]
 
 mod support;
@@ -10,7 +10,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use support::{begin, cost, ended, said, send, text};
 
-/// Bakes konistil into `a.bvh`, and interrupts it a while after it has begun, however long it would take.
+/// Bakes konistil into `a.bvh`, and interrupts the search this long after it has begun. Returns the
+/// messages.
 fn interrupted(folder: &Path, more: &[&str], after: Duration) -> String {
     let args = [&["bake", "konistil", "--out", "a.bvh"], more].concat();
     let before = fs::read_dir(folder).unwrap().count();
@@ -30,7 +31,7 @@ fn interrupted(folder: &Path, more: &[&str], after: Duration) -> String {
 fn ctrl_c_keeps_the_best_tree_so_far() {
     let folder = tempfile::tempdir().unwrap();
     let said = interrupted(folder.path(), &["--budget", "1h"], Duration::ZERO);
-    assert!(said.contains("`--from a.bvh` goes on"), "{said}");
+    assert!(said.contains("`--from a.bvh` continues"), "{said}");
     tree_file::load(&folder.path().join("a.bvh"), &Scene::load("konistil").unwrap()).unwrap();
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
@@ -51,7 +52,8 @@ fn a_bake_that_is_interrupted_early_is_not_behind_plain_reinsertion() {
         "plain.bvh",
     ];
     said(folder.path(), &args);
-    // Long enough for reinsertion and the starts that precede it, on a busy machine too; the heat of a long search has not paid by then.
+    // The time suffices for reinsertion and the trees built before it, also on a busy machine. The heat
+    // of a long search has not paid by then.
     let plain = cost("plain.bvh");
     let after = Duration::from_secs(1) + 8 * begin.elapsed();
     for more in [
@@ -60,7 +62,8 @@ fn a_bake_that_is_interrupted_early_is_not_behind_plain_reinsertion() {
         &["--budget", "1h", "--references", "1.2"],
     ] {
         interrupted(folder.path(), more, after);
-        // Where leaves may be divided they are part of the measure, and moves that save as much come in another order.
+        // If leaves may be divided, they are part of the measure, and moves with equal gains come in a
+        // different order.
         let most = if more.contains(&"--references") { 1.0001 } else { 1.0 };
         let found = cost("a.bvh");
         assert!(found <= most * plain, "{more:?}: {found} is above {plain}");

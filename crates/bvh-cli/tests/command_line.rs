@@ -1,4 +1,4 @@
-//! The commands of `bvh` that no tree is made by, and how all of them reject what is wrong.
+//! The commands of `bvh` that build no tree, and the rejection of invalid input by all commands.
 
 mod support;
 
@@ -11,7 +11,7 @@ use support::{
 };
 
 #[test]
-fn scenes_are_listed_with_what_they_stand_in_for() {
+fn scenes_are_listed_with_the_originals_that_they_replace() {
     assert!(said(Path::new("."), &["scenes"]).contains("stand-in for Cloister"));
 }
 
@@ -39,14 +39,20 @@ fn no_command_replaces_a_file_of_another_kind() {
     let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     fs::write(at.join("mesh.obj"), mesh).unwrap();
     said(at, &["bake", "mesh.obj", "--budget=0s", "--out=tree.bvh"]);
-    let no = |args: &[&str], parts: &[&str]| refused(at, args, 2, parts);
-    no(&["bake", "mesh.obj", "--budget=0s", "--out=mesh.obj"], &["--out", "mesh.obj", "tree file"]);
-    no(&["render", "mesh.obj", "--size=8x8", "--out=mesh.obj"], &["--out", "mesh.obj", "PNG"]);
-    no(
-        &["render", "mesh.obj", "--accel=tree.bvh", "--out=tree.bvh"],
-        &["--out", "tree.bvh", "PNG"],
-    );
-    no(&["inspect", "tree.bvh", "--nodes=tree.bvh"], &["--nodes", "tree.bvh", "CSV"]);
+    for (args, parts) in [
+        (
+            &["bake", "mesh.obj", "--budget=0s", "--out=mesh.obj"][..],
+            ["--out", "mesh.obj", "tree file"],
+        ),
+        (&["render", "mesh.obj", "--size=8x8", "--out=mesh.obj"], ["--out", "mesh.obj", "PNG"]),
+        (
+            &["render", "mesh.obj", "--accel=tree.bvh", "--out=tree.bvh"],
+            ["--out", "tree.bvh", "PNG"],
+        ),
+        (&["inspect", "tree.bvh", "--nodes=tree.bvh"], ["--nodes", "tree.bvh", "CSV"]),
+    ] {
+        refused(at, args, 2, &parts);
+    }
     assert_eq!(fs::read_to_string(at.join("mesh.obj")).unwrap(), mesh);
     // Files of the same kind are replaced.
     said(at, &["bake", "mesh.obj", "--budget=0s", "--out=tree.bvh", "--from=tree.bvh"]);
@@ -57,7 +63,7 @@ fn no_command_replaces_a_file_of_another_kind() {
 }
 
 #[test]
-fn a_file_whose_name_says_another_kind_is_not_begun() {
+fn an_extension_of_another_kind_is_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     for (args, accepted) in [
@@ -73,7 +79,7 @@ fn a_file_whose_name_says_another_kind_is_not_begun() {
 
 #[cfg(unix)]
 #[test]
-fn pipes_devices_and_folders_are_refused_as_inputs() {
+fn pipes_devices_and_folders_are_rejected_as_inputs() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let made = std::process::Command::new("mkfifo")
@@ -82,18 +88,21 @@ fn pipes_devices_and_folders_are_refused_as_inputs() {
         .status();
     assert!(made.unwrap().success());
     fs::create_dir(at.join("folder.bvh")).unwrap();
-    let no = |args: &[&str], parts: &[&str]| refused(at, args, 2, parts);
-    no(&["inspect", "p.bvh"], &["p.bvh", "not a regular file"]);
-    no(&["bake", "spheres75", "--budget=0s", "--from=p.bvh", "--out=x.bvh"], &["p.bvh"]);
-    no(&["bake", "/dev/zero", "--budget=0s", "--out=x.bvh"], &["/dev/zero"]);
-    no(&["inspect", "folder.bvh"], &["folder.bvh", "a folder"]);
-    no(&["render", "spheres75", "--accel=folder.bvh", "--out=x.png"], &["--accel", "folder.bvh"]);
+    for (args, parts) in [
+        (&["inspect", "p.bvh"][..], &["p.bvh", "not a regular file"][..]),
+        (&["bake", "spheres75", "--budget=0s", "--from=p.bvh", "--out=x.bvh"], &["p.bvh"]),
+        (&["bake", "/dev/zero", "--budget=0s", "--out=x.bvh"], &["/dev/zero"]),
+        (&["inspect", "folder.bvh"], &["folder.bvh", "a folder"]),
+        (&["render", "spheres75", "--accel=folder.bvh", "--out=x.png"], &["--accel", "folder.bvh"]),
+    ] {
+        refused(at, args, 2, parts);
+    }
 }
 
-// Where files have holes, so that this one takes no space.
+// Linux stores holes of files, so that this file needs no space on the disk.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_file_of_64_gigabytes_is_refused_by_its_header() {
+fn a_file_of_64_gigabytes_is_rejected_by_its_header() {
     let folder = tempfile::tempdir().unwrap();
     fs::File::create(folder.path().join("huge.bvh"))
         .unwrap()
@@ -104,7 +113,7 @@ fn a_file_of_64_gigabytes_is_refused_by_its_header() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn what_cannot_be_said_is_an_error_and_a_reader_that_left_is_none() {
+fn a_full_output_is_an_error_and_a_closed_pipe_is_none() {
     let folder = tempfile::tempdir().unwrap();
     let full = fs::File::options()
         .write(true)
@@ -123,7 +132,7 @@ fn what_cannot_be_said_is_an_error_and_a_reader_that_left_is_none() {
         drop(child.stdout.take());
         assert!(child.wait().unwrap().success(), "{args:?}");
     }
-    // A file is put in the place of what has its name: never of a device.
+    // A new file replaces the file with its name, and must never replace a device.
     refused(
         folder.path(),
         &["render", "spheres75", "--out", "/dev/full"],
@@ -134,7 +143,7 @@ fn what_cannot_be_said_is_an_error_and_a_reader_that_left_is_none() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn help_and_version_that_cannot_be_said_are_errors() {
+fn help_and_version_on_a_full_output_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     for args in
         [&["--help"][..], &["--version"], &["-h"], &["bake", "--help"], &["help", "inspect"]]
@@ -170,19 +179,25 @@ fn a_folder_that_cannot_be_written_is_named() {
         eprintln!("not tried: this user can write into any folder here");
         return;
     };
-    let no = |args: &[&str], parts: &[&str]| refused(at, args, 1, parts);
-    no(&["bake", "spheres75", "--budget=1h", "--out=locked/x.bvh"], &["locked", "cannot create"]);
-    no(&["inspect", "good.bvh", "--nodes=locked/x.csv"], &["locked/x.csv", "cannot write"]);
-    no(&["render", "spheres75", "--size=8x8", "--out=locked/x.png"], &["locked/x.png", "cannot"]);
+    for (args, parts) in [
+        (
+            &["bake", "spheres75", "--budget=1h", "--out=locked/x.bvh"][..],
+            ["locked", "cannot create"],
+        ),
+        (&["inspect", "good.bvh", "--nodes=locked/x.csv"], ["locked/x.csv", "cannot write"]),
+        (&["render", "spheres75", "--size=8x8", "--out=locked/x.png"], ["locked/x.png", "cannot"]),
+    ] {
+        refused(at, args, 1, &parts);
+    }
     assert_eq!(fs::read_dir(&locked).unwrap().count(), 0);
 }
 
 #[test]
-fn a_wrong_value_of_any_flag_is_refused_by_name() {
+fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     said(at, &["bake", "spheres75", "--budget=0s", "--out=good.bvh"]);
-    // Every command with what it cannot do without.
+    // Every command needs its required arguments before a flag can be wrong.
     let flags = wrong_flags(
         at,
         &[
@@ -199,8 +214,7 @@ fn a_wrong_value_of_any_flag_is_refused_by_name() {
 }
 
 #[test]
-fn a_buffer_outside_the_folder_of_a_scene_is_read_by_every_command_that_is_told_so_and_by_no_other()
-{
+fn every_command_reads_buffers_outside_the_folder_of_a_scene_only_with_permission() {
     let folder = tempfile::tempdir().unwrap();
     let at = &folder.path().join("inner");
     fs::create_dir(at).unwrap();

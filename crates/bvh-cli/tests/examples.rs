@@ -1,4 +1,4 @@
-//! The examples in the documentation that call `bvh`, or describe rays for it.
+//! The examples in the documentation that call `bvh` or describe rays for it.
 
 #[path = "../../bvh-terminal/tests/program/pages.rs"]
 mod pages;
@@ -9,7 +9,7 @@ use std::fs;
 use support::{run, said, text};
 
 #[test]
-fn every_description_of_rays_is_baked_for_as_it_is_printed() {
+fn a_bake_accepts_every_printed_description_of_rays() {
     let mut descriptions = 0;
     for block in blocks_in("toml")
         .into_iter()
@@ -27,13 +27,13 @@ fn every_description_of_rays_is_baked_for_as_it_is_printed() {
 }
 
 #[test]
-fn every_command_is_one_that_the_program_reads() {
+fn the_program_accepts_every_printed_command() {
     let bvh = Called { name: "bvh", package: "bvh-cli" };
     assert!(bvh.reads_blocks() > 2 && bvh.knows_sentences() > 3);
 }
 
 #[test]
-fn what_is_not_read_is_found() {
+fn an_invalid_command_is_found() {
     let folder = tempfile::tempdir().unwrap();
     for wrong in [
         &["bake", "scene.obj", "--budgett", "10s"][..],

@@ -1,4 +1,4 @@
-//! `bvh render` as its users meet it.
+//! `bvh render` from the command line.
 
 mod support;
 
@@ -46,7 +46,7 @@ fn the_eye_may_be_anywhere_and_the_scene_a_single_point() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_refused_with_what_would_be_accepted() {
+fn invalid_pictures_are_rejected_with_the_accepted_values() {
     let folder = tempfile::tempdir().unwrap();
     for (args, code, parts) in [
         (&["sofa"][..], 2, &["no such scene", "spheres75"][..]),

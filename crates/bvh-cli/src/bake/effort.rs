@@ -1,20 +1,20 @@
-//! Budgets on the command line: of time, or of work.
+//! Budgets of time or work on the command line.
 
 use bvh_search::Deadline;
 use std::str::FromStr;
 use std::time::Duration;
 
-/// A budget: of time, or of work in nodes made or visited.
+/// A budget of time or work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
-    /// Elapsed, from the search's beginning.
+    /// Time since the search began.
     Time(Duration),
-    /// As [`Budget::max_work`](bvh_search::Budget::max_work).
+    /// Nodes built or visited: [`Budget::max_work`](bvh_search::Budget::max_work).
     Work(u64),
 }
 
 impl Effort {
-    /// A part of this budget.
+    /// Returns a fraction of this budget.
     pub fn share(self, part: f64) -> Self {
         match self {
             Self::Time(time) => Self::Time(time.mul_f64(part)),
@@ -22,7 +22,7 @@ impl Effort {
         }
     }
 
-    /// The time that there is, from now on.
+    /// Returns the deadline of a search that begins now. A budget of work has none.
     pub(super) fn deadline(self) -> Deadline {
         Deadline::after(if let Self::Time(limit) = self { limit } else { Duration::MAX })
     }
@@ -42,23 +42,22 @@ impl FromStr for Effort {
                     "G" => Some(1_000_000_000),
                     _ => None,
                 };
-                unit.and_then(|unit| {
-                    digits
-                        .trim_end()
-                        .parse::<u64>()
-                        .ok()?
-                        .checked_mul(unit)
-                })
-                .map(Self::Work)
+                let number: Option<u64> = digits.trim_end().parse().ok();
+                number
+                    .zip(unit)
+                    .and_then(|(number, unit)| number.checked_mul(unit))
+                    .map(Self::Work)
             }
-            // `5M` would be five months.
+            // `5M` would be five months, but its author probably forgot `work`.
             None if text.contains('M') => None,
             None => humantime::parse_duration(text)
                 .ok()
                 .map(Self::Time),
         };
         effort.ok_or_else(|| {
-            "expected a time such as 10s, 500ms or 1h30m, or work such as 50Mwork (units k, M, G)".into()
+            "expected a time such as 10s, 500ms or 1h30m, \
+             or work such as 50Mwork (units k, M, G)"
+                .into()
         })
     }
 }

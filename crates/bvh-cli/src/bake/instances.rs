@@ -1,4 +1,5 @@
-//! `bvh bake --instances`: a tree for every mesh of a glTF file and one over the places where its nodes put them, in a folder.
+//! `bvh bake --instances`: writes a tree for every mesh of a glTF file, and one tree over the
+//! instances that its nodes place, into a folder.
 
 use super::BakeArgs;
 use super::plan::Plan;
@@ -8,7 +9,6 @@ use crate::csv;
 use bvh_build::{Builder, median_cut};
 use bvh_core::cost::Objective;
 use bvh_core::{Instance, InvalidInstances, Primitives, Triangle, WideBvh};
-use bvh_scenes::load::mesh::Fault;
 use bvh_scenes::load::{Format, OutsideFiles, gltf};
 use bvh_scenes::tree_file::TreeFileError;
 use bvh_scenes::{Scene, SceneError, SceneKind, read};
@@ -20,15 +20,16 @@ use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// The tree over the instances, whose ids are rows of [`INSTANCES`]. It is written last: where it is, the folder is complete.
+/// The tree over the instances, whose ids are rows of [`INSTANCES`]. It is written last, so that a
+/// folder with this file is complete.
 const TOP: &str = "top.bvh";
-/// The instances, a row each.
+/// The table of instances, one row each.
 const INSTANCES: &str = "instances.csv";
-/// Its columns, which docs/TREE_FILES.md describes.
+/// The columns of [`INSTANCES`], which docs/TREE_FILES.md describes.
 const COLUMNS: &str = "node,mesh,xx,xy,xz,yx,yy,yz,zx,zy,zz,tx,ty,tz";
 
-/// Searches for one tree after the other until the budget is spent or `interrupted` becomes true, and keeps each as soon as it is
-/// found. If it is interrupted, the folder gets all its files all the same.
+/// Searches for one tree after the other until the budget is spent or `interrupted` becomes true, and
+/// writes each tree as soon as its search ends. An interrupted bake still writes all files.
 pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     new_folder(&args.out)?;
     args.jobs.apply()?;
@@ -40,13 +41,15 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         .unwrap_or_default()
         .to_string_lossy()
         .into_owned();
-    let part = |(mesh, triangles): (&usize, &Vec<Triangle>)| {
+    let mut scenes = Vec::new();
+    for (mesh, triangles) in &parts.meshes {
         let name = format!("{stem}, mesh {mesh}");
-        Scene::new(&name, SceneKind::File, Primitives::Triangles(triangles.clone()))
-    };
-    let scenes: Vec<Scene> = parts.meshes.iter().map(part).collect();
+        let primitives = Primitives::Triangles(triangles.clone());
+        scenes.push(Scene::new(&name, SceneKind::File, primitives));
+    }
     let instances = instances(&parts);
     let top = top(&stem, &scenes, &instances, &parts)?;
+    // Everything that can be invalid has been checked, so that a fault leaves no folder behind.
     fs::create_dir_all(&args.out).map_err(Error::io(&args.out, "create the folder"))?;
     files::write(&args.out.join(INSTANCES), table(&instances, &parts).as_bytes())?;
 
@@ -55,7 +58,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         .chain([&top])
         .map(|scene| scene.boxes.len())
         .sum();
-    // Every leaf of the top tree is a box and whole, and the tree is not laid out.
+    // The top tree's objects are boxes, which cannot be divided, and it has no wide layout of its own.
     let plan_of_top = Plan { references: 1.0, objective: Objective::InternalArea, ..plan.clone() };
     let names = parts
         .meshes
@@ -67,6 +70,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         .map(|scene| (scene, &plan))
         .chain([(&top, &plan_of_top)]);
     for (name, (scene, plan)) in names.zip(given) {
+        // Every tree gets a share of the budget in proportion to its number of objects.
         let part = scene.boxes.len() as f64 / objects as f64;
         let plan = Plan { effort: plan.effort.share(part), ..plan.clone() };
         bake_part(&plan, scene, &args.out.join(name), interrupted)?;
@@ -80,7 +84,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     Ok(())
 }
 
-/// Searches for the tree over one mesh or over the instances, and keeps it.
+/// Searches for the tree over one mesh or over the instances, and writes it.
 fn bake_part(
     plan: &Plan,
     scene: &Scene,
@@ -103,47 +107,56 @@ fn bake_part(
     Ok(())
 }
 
-/// Refuses a folder in which something is: nobody's files are replaced or mixed with these.
+/// Rejects a folder with files, which would be replaced by the new files or mixed with them.
 fn new_folder(path: &Path) -> Result<(), Error> {
     output_folder("--out", path)?;
     let is_empty = fs::read_dir(path).map_or(true, |mut entries| entries.next().is_none());
-    let refused = || {
-        Error::Usage(format!(
-            "--out: {}: a folder with files; accepted: a new or empty one",
-            path.display()
-        ))
-    };
-    if is_empty { Ok(()) } else { Err(refused()) }
+    if is_empty {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "--out: {}: a folder with files; accepted: a new or empty one",
+        path.display()
+    )))
 }
 
 fn parts(path: &Path, outside: OutsideFiles) -> Result<gltf::Parts, Error> {
     let bytes = read(path)?;
-    let name = || path.display().to_string();
-    match Format::of(&bytes, path) {
-        Format::Gltf => {
-            let refused = |fault: Fault| SceneError { name: name(), message: fault.to_string() };
-            Ok(gltf::parts(&bytes, path, outside).map_err(refused)?)
-        }
-        format => Err(SceneError {
-            name: name(),
-            message: format!(
-                "--instances with a file of the kind {format:?}; accepted: glTF or GLB, whose nodes place meshes"
-            ),
-        }
-        .into()),
-    }
-}
-
-/// The instances, of parts by their order among the meshes that are baked.
-fn instances(parts: &gltf::Parts) -> Vec<Instance> {
-    let instance = |place: &gltf::Placed| Instance {
-        part: parts.meshes.range(..place.mesh).count() as u32,
-        transform: Affine3A::from_mat4(place.transform.as_mat4()),
+    let parts = match Format::of(&bytes, path) {
+        Format::Gltf => gltf::parts(&bytes, path, outside).map_err(|fault| fault.to_string()),
+        format => Err(format!(
+            "--instances with a file of the kind {format:?}; \
+             accepted: glTF or GLB, whose nodes place meshes"
+        )),
     };
-    parts.places.iter().map(instance).collect()
+    let name = path.display().to_string();
+    Ok(parts.map_err(|message| SceneError { name, message })?)
 }
 
-/// The boxes of all instances, as a scene.
+/// Returns the instances. A part is the rank of its mesh among the meshes that are baked.
+fn instances(parts: &gltf::Parts) -> Vec<Instance> {
+    let mut instances = Vec::new();
+    for place in &parts.places {
+        instances.push(Instance {
+            part: parts.meshes.range(..place.mesh).count() as u32,
+            transform: Affine3A::from_mat4(place.transform.as_mat4()),
+        });
+    }
+    instances
+}
+
+/// Lays out a part, whose box is the same in any tree; the fastest builder will do.
+fn lay_out(scene: &Scene) -> Result<WideBvh, String> {
+    let triangles = scene
+        .triangles()
+        .map_err(|error| error.to_string())?;
+    let tree = median_cut::Config::default()
+        .build(&scene.boxes)
+        .map_err(|error| error.to_string())?;
+    WideBvh::new(&tree, triangles).map_err(|error| error.to_string())
+}
+
+/// Returns a scene of the boxes of all instances.
 fn top(
     stem: &str,
     scenes: &[Scene],
@@ -151,32 +164,23 @@ fn top(
     parts: &gltf::Parts,
 ) -> Result<Scene, Error> {
     let name = format!("{stem}, instances");
-    let failed = |message: String| Error::from(SceneError { name: name.clone(), message });
-    let layout = |scene: &Scene| {
-        let triangles = scene
-            .triangles()
-            .map_err(|error| failed(error.to_string()))?;
-        let tree = median_cut::Config::default().build(&scene.boxes);
-        let tree = tree.map_err(|error| failed(error.to_string()))?;
-        WideBvh::new(&tree, triangles).map_err(|error| failed(error.to_string()))
-    };
-    // The box of a part is the same in any tree.
     let layouts = scenes
         .iter()
-        .map(layout)
-        .collect::<Result<Vec<_>, Error>>()?;
-    let boxes = Instance::boxes(instances, &layouts).map_err(|invalid| match invalid {
-        InvalidInstances::Transform(at) => {
-            let node = parts.places[at].node;
-            let mesh = parts.places[at].mesh;
-            let found = "its transform has no inverse, or its box is not finite";
-            failed(format!(
-                "nodes[{node}] places meshes[{mesh}]: {found}; expected an invertible one"
-            ))
-        }
-        other => failed(other.to_string()),
-    })?;
-    // Triangles with these boxes: only boxes are looked at.
+        .map(lay_out)
+        .collect::<Result<Vec<_>, String>>();
+    let boxes = layouts.and_then(|layouts| {
+        Instance::boxes(instances, &layouts).map_err(|invalid| match invalid {
+            InvalidInstances::Transform(index) => {
+                let node = parts.places[index].node;
+                let mesh = parts.places[index].mesh;
+                let found = "its transform has no inverse, or its box is not finite";
+                format!("nodes[{node}] places meshes[{mesh}]: {found}; expected an invertible one")
+            }
+            other => other.to_string(),
+        })
+    });
+    let boxes = boxes.map_err(|message| SceneError { name: name.clone(), message })?;
+    // A scene needs objects, and the search reads only their boxes.
     let triangles = boxes
         .iter()
         .map(|aabb| Triangle([aabb.min, aabb.max, aabb.min]))
@@ -184,7 +188,7 @@ fn top(
     Ok(Scene::new(&name, SceneKind::File, Primitives::Triangles(triangles)))
 }
 
-/// Returns the text of [`INSTANCES`]: where each node of the scene places which mesh.
+/// Returns the text of [`INSTANCES`]: the node, the mesh and the transform of each instance.
 fn table(instances: &[Instance], parts: &gltf::Parts) -> String {
     let mut table = csv::Table::new(COLUMNS);
     for (place, instance) in parts.places.iter().zip(instances) {

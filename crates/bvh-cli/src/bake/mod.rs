@@ -1,4 +1,4 @@
-//! `bvh bake`: the best tree for a scene that a budget buys, kept in a file.
+//! `bvh bake`: searches for the best tree of a scene within a budget, and writes it to a file.
 
 mod effort;
 pub mod instances;
@@ -31,44 +31,47 @@ use watch::gain;
 pub struct BakeArgs {
     /// Name of a scene, or path of a mesh file.
     pub scene: String,
-    /// How long to search: a time (`10s`, `1m 30s`), or work (`50Mwork`: 50 million nodes visited), which gives the
-    /// same bytes everywhere.
+    /// How long to search: a time (`10s`, `1m 30s`), or work (`50Mwork`: 50 million nodes visited),
+    /// which gives the same bytes on every machine.
     #[arg(long, value_name = "TIME|WORK")]
     pub budget: Effort,
-    /// The file to write; an old one is replaced when the new one is complete. With --instances a new or empty folder.
+    /// The file to write. It replaces an existing file when it is complete. With --instances, a new
+    /// or empty folder.
     #[arg(long, value_name = "FILE.bvh|DIR")]
     pub out: PathBuf,
-    /// Bake a tree for every mesh of a glTF file, each once, and one over the places where its nodes put them.
+    /// Bake one tree for every mesh of a glTF file, and one tree over the instances that its nodes
+    /// place.
     #[arg(long, conflicts_with_all = ["rays", "from", "explain"])]
     pub instances: bool,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Search for the least cost of rays instead of area: `default`, rays that need no camera, or a file that describes those
-    /// of a renderer.
+    /// Minimise the cost of rays instead of area: `default` for rays that need no camera, or a file
+    /// that describes the rays of a renderer.
     #[arg(long, value_name = "default|FILE.toml")]
     pub rays: Option<String>,
-    /// What the search minimises: `area`, the internal area, which suits every tracer; or `layout`, the nodes and blocks of triangles
-    /// that are tested in this project's own wide layout. Default: `layout` with --rays, else `area`.
+    /// The cost to minimise: `area`, the internal area, which suits every tracer; or `layout`, the
+    /// tests of nodes and of blocks of triangles in this project's wide layout. The default is
+    /// `layout` with --rays, and `area` otherwise.
     #[arg(long, value_name = "area|layout", value_enum)]
     pub cost: Option<BakeCost>,
-    /// Let objects be divided among leaves where that pays, up to so many references per object, 1 to 16. Leaves count in the cost
-    /// then.
+    /// Divide objects among leaves where it pays, up to N references per object, 1 to 16. The cost
+    /// then includes the leaves.
     #[arg(long, value_name = "N", default_value_t = 1.0)]
     pub references: f64,
     /// The method, with its default parameters.
     #[arg(long, value_name = "NAME", default_value = BEST)]
     pub method: String,
-    /// Go on from the tree of an earlier bake of the same scene; the result is never worse.
+    /// Continue from the tree of an earlier bake of the same scene; the result is never worse.
     #[arg(long, value_name = "FILE.bvh")]
     pub from: Option<PathBuf>,
     /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
-    /// Says what the scene's files may refer to.
+    /// Permits files outside the scene's folder.
     #[command(flatten)]
     pub files: SceneFiles,
-    /// Say first what the scene does not need and is left out, and why.
+    /// First list the steps that the scene does not need and that are skipped, with reasons.
     #[arg(long)]
     pub explain: bool,
 }
@@ -82,19 +85,19 @@ pub enum BakeCost {
     Layout,
 }
 
-/// Baked trees.
+/// The kind of baked trees.
 const TREE: FileKind =
     FileKind { name: "a tree file", beginning: &Header::MAGIC, extension: "bvh" };
-/// The method that goes on from a given tree.
+/// The method that can continue from a given tree.
 const BEST: &str = "best";
 
 impl BakeArgs {
-    /// The search that the arguments ask for.
+    /// Returns the search that the arguments specify.
     fn plan(&self) -> Result<Plan, Error> {
         let rays = self.rays.as_deref().map(Rays::read).transpose()?;
         let method = self.method()?;
         self.check_references(&method)?;
-        // Rays save more tests by the cost of the layout: `results/ray_objective`.
+        // The cost of the layout saves more tests of rays than area does: `results/ray_objective`.
         let default_cost = if rays.is_some() { BakeCost::Layout } else { BakeCost::Area };
         let objective = match self.cost.unwrap_or(default_cost) {
             BakeCost::Area => Objective::InternalArea,
@@ -111,7 +114,7 @@ impl BakeArgs {
         })
     }
 
-    /// The method that was named. Rejects one that cannot start from a tree if a tree is given.
+    /// Returns the named method. If a tree is given, rejects methods that cannot continue from it.
     fn method(&self) -> Result<Method, Error> {
         let name = &self.method;
         let found = Method::all()
@@ -123,11 +126,11 @@ impl BakeArgs {
                 Err(Error::Usage(format!("--method {name}: no such method; accepted: {accepted}")))
             }
             Some(Method::Best(config)) => {
-                // The budget ends the search; the limit of the method itself does not count.
+                // The budget ends the search, so the method's own limit is lifted.
                 Ok(Method::Best(best::Config { horizon: Some(Horizon::Known), ..config }))
             }
             Some(_) if self.from.is_some() => Err(Error::Usage(format!(
-                "--method {name} cannot go on --from a tree; accepted: {BEST}"
+                "--method {name} cannot continue --from a tree; accepted: {BEST}"
             ))),
             Some(method) => Ok(method),
         }
@@ -148,13 +151,14 @@ impl BakeArgs {
         Ok(())
     }
 
-    /// The name that the file records: the method's, and that of the rays if there are any.
+    /// Returns the name that the file records: the method, and the rays if there are any.
     fn recorded(&self) -> String {
         const MOST_BYTES: usize = 64;
         let Some(rays) = &self.rays else { return self.method.clone() };
         let file = Path::new(rays).file_name();
         let file = file.map_or(rays.clone(), |name| name.to_string_lossy().into_owned());
         let mut name = format!("{} for rays of {file}", self.method).replace('\0', "");
+        // Removing characters and not bytes keeps the name valid UTF-8.
         while name.len() > MOST_BYTES {
             name.pop();
         }
@@ -162,8 +166,8 @@ impl BakeArgs {
     }
 }
 
-/// Searches until the budget is spent or `interrupted` becomes true, writes the best tree found, and prints its cost. If it is
-/// interrupted, it writes the file all the same and returns [`Error::Stopped`].
+/// Searches until the budget is spent or `interrupted` becomes true, writes the best tree, and prints
+/// its cost. An interrupted bake writes the file as well, and returns [`Error::Stopped`].
 pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     if let Some(from) = &args.from {
         input_file("--from", from)?;
@@ -172,10 +176,9 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let plan = args.plan()?;
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;
-    scene
-        .remark
-        .iter()
-        .for_each(|remark| print_error(remark));
+    if let Some(remark) = &scene.remark {
+        print_error(remark);
+    }
     if args.explain {
         let text = explain::scene(&scene).map_err(Error::search(&scene.name, "--explain"))?;
         print_line(&text);
@@ -187,11 +190,12 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         }
         None => None,
     };
+    // Reserving the file first reports a full disk before the search and not after it.
     let reserved = Reserved::new(&args.out, plan.most_bytes(&scene))?;
     let bake = plan.begin(&scene, start.as_ref(), interrupted)?;
     if args.explain && bake.is_whole() {
         print_line(
-            "  left out: divided objects: no spatial split of a top-down division saves anything",
+            "  skipped: divided objects: no spatial split of a top-down division saves anything",
         );
     }
     let baked = bake.search(interrupted)?;
@@ -207,7 +211,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     Ok(())
 }
 
-/// The result of a bake in words.
+/// Describes the result of a bake.
 fn summary(plan: &Plan, scene: &Scene, bake: &Bake, baked: &Baked) -> String {
     let Baked { outcome, base, before, seconds } = baked;
     let objects = scene.boxes.len();
@@ -222,23 +226,24 @@ fn summary(plan: &Plan, scene: &Scene, bake: &Bake, baked: &Baked) -> String {
         ),
     ];
     if let Some(before) = before {
-        lines.push(format!("{} the tree it went on from, {before}", gain(outcome.cost, *before)));
+        lines.push(format!("{} the tree it started from, {before}", gain(outcome.cost, *before)));
     }
     if plan.references > 1.0 {
         let references = outcome.tree.prim_ids.len();
         let allowed = plan.references;
         lines.push(if references > objects {
-            format!("{references} references to {objects} objects, where no more than {allowed} were allowed")
+            format!("{references} references to {objects} objects, at most {allowed} per object")
         } else {
             "no object is divided, because that does not pay here".into()
         });
     }
-    // A method that plans with the clock has carried out its plan when the time is over.
+    // A method that plans its time completes its plan just before the time is over, and then could have
+    // used more.
     let in_time =
         matches!(plan.effort, Effort::Time(limit) if *seconds >= 0.5 * limit.as_secs_f64());
     let why = match outcome.stop {
         StopReason::Completed if in_time => "",
-        StopReason::Completed => ", and nothing more that this method does",
+        StopReason::Completed => ", and the method has completed",
         StopReason::Optimal => ", and no tree is better",
         _ => "",
     };

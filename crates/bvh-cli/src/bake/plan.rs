@@ -1,4 +1,4 @@
-//! A bake without its command line: the search, what it found, and the tree file of that.
+//! A bake without its command line: the search, its result, and the tree file.
 
 use super::effort::Effort;
 use super::rays::Rays;
@@ -18,41 +18,42 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 pub struct Plan {
     /// The method, with its parameters.
     pub method: Method,
-    /// How long to search.
+    /// The budget of the search.
     pub effort: Effort,
-    /// Seed of the random numbers.
+    /// The seed of the random numbers.
     pub seed: u64,
-    /// The cost that is minimised.
+    /// The cost that the search minimises.
     pub objective: Objective,
-    /// Most references per object that leaves may have; 1 for whole objects.
+    /// The largest number of references per object; 1 for whole objects.
     pub references: f64,
-    /// Rays whose visits take the place of areas.
+    /// The rays whose visits replace areas.
     pub rays: Option<Rays>,
     /// The name of the method that the tree file records.
     pub name: String,
 }
 
-/// The tree of an earlier bake, from which a search goes on.
+/// The tree of an earlier bake, from which a search continues.
 pub struct Start {
-    /// Over the same scene.
+    /// The tree, over the same scene.
     pub tree: Bvh,
-    /// The work that it took, in nodes made or visited.
+    /// The work of the earlier bake, in nodes built or visited.
     pub work: u64,
 }
 
 impl Plan {
-    /// The most references to a scene's objects that leaves may have.
+    /// Returns the largest number of references to a scene's objects.
     fn most_references(&self, scene: &Scene) -> usize {
         (self.references * scene.boxes.len() as f64) as usize
     }
 
-    /// The size of the largest tree file that a bake of this scene can write, in bytes.
+    /// Returns the size in bytes of the largest tree file that a bake of this scene can write.
     pub fn most_bytes(&self, scene: &Scene) -> usize {
+        // A tree with n leaves has fewer than 2n nodes; each node may have a number of visits.
         let reference = 2 * (size_of::<Node>() + size_of::<f32>()) + size_of::<u32>();
         Header::BYTES + self.most_references(scene) * reference
     }
 
-    /// Begins a bake: from now on its time runs.
+    /// Begins a bake. Its time starts after the greedy tree is built.
     pub fn begin<'a>(
         &'a self,
         scene: &'a Scene,
@@ -61,13 +62,13 @@ impl Plan {
     ) -> Result<Bake<'a>, Error> {
         let greedy = greedy(self.method.name(), scene, interrupted)?;
         let deadline = self.effort.deadline();
+        // There is a tree now, which Ctrl-C must save instead of ending the program.
         interrupt::hold();
-        let is_over = || {
+        let from = start.map(|start| &start.tree);
+        let division = Division::decide(self.most_references(scene), scene, from, &|| {
             let is_timed = matches!(self.effort, Effort::Time(_));
             interrupted.load(Relaxed) || is_timed && deadline.has_passed()
-        };
-        let from = start.map(|start| &start.tree);
-        let division = Division::decide(self.most_references(scene), scene, from, &is_over)?;
+        })?;
         let density = match &self.rays {
             Some(rays) => Some(rays.density(scene, &greedy, self.seed)?),
             None => None,
@@ -88,7 +89,7 @@ pub struct Bake<'a> {
 }
 
 impl Bake<'_> {
-    /// Whether the search is for whole objects although it may divide them, because no split saves anything.
+    /// Returns whether the search keeps objects whole because no split saves anything.
     pub fn is_whole(&self) -> bool {
         matches!(self.division, Division::Useless)
     }
@@ -128,6 +129,7 @@ impl Bake<'_> {
             Effort::Time(_) => Budget::UNLIMITED,
             Effort::Work(work) => Budget { max_work: Some(work), ..Budget::UNLIMITED },
         };
+        // With little work `best` may end above a tree that it builds on its way; that tree is kept.
         let fallback = match (*effort, method) {
             (Effort::Work(work), Method::Best(_)) => {
                 best::fallback(problem, work, &Interrupted(interrupted))?
@@ -146,6 +148,7 @@ impl Bake<'_> {
     /// Returns the bytes of the tree file.
     pub fn file(&self, baked: &Baked) -> Result<Vec<u8>, FileError> {
         let tree = &baked.outcome.tree;
+        // The work of all bakes that led to this tree, one after the other.
         let spent = self.start.map_or(0, |start| start.work);
         let visits = self
             .density
@@ -161,7 +164,7 @@ impl Bake<'_> {
         file::save_references(tree, &self.scene.boxes, &self.scene.primitives, &origin)
     }
 
-    /// The cost that the search minimises, in words.
+    /// Names the cost that the search minimises.
     pub fn unit(&self) -> &'static str {
         match (self.plan.objective, &self.density) {
             (Objective::Layout, Some(_)) => "cost of the wide layout for rays, times root area,",
@@ -175,12 +178,12 @@ impl Bake<'_> {
 
 /// The result of a search.
 pub struct Baked {
-    /// The best tree, and how the search ended.
+    /// The best tree, and the reason why the search ended.
     pub outcome: Outcome,
     /// The cost of the greedy tree.
     pub base: f64,
-    /// The cost of the tree that the search went on from.
+    /// The cost of the tree that the search continued from.
     pub before: Option<f64>,
-    /// Elapsed since the bake began.
+    /// The time since the bake began.
     pub seconds: f64,
 }

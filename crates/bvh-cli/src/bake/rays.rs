@@ -1,4 +1,4 @@
-//! The rays of `bake --rays`: a renderer's, or any through the scene, and their density.
+//! The rays of `bake --rays`, from a renderer or any through the scene, and their density.
 
 use crate::Error;
 use bvh_config::fault;
@@ -8,17 +8,17 @@ use bvh_scenes::{Scene, read_text};
 use bvh_terminal::arguments::input_file;
 use std::path::Path;
 
-/// The rays that a tree is baked for.
+/// The rays that train a tree.
 #[derive(Clone)]
 pub enum Rays {
-    /// Any, without a camera.
+    /// Rays that need no camera.
     Default,
-    /// A renderer's.
+    /// The rays of a renderer.
     Rendered(RenderedRays),
 }
 
 impl Rays {
-    /// `default`, or the file of this name.
+    /// Returns the rays named `default`, or reads the file with this name.
     pub fn read(named: &str) -> Result<Self, Error> {
         if named == "default" {
             return Ok(Self::Default);
@@ -31,7 +31,7 @@ impl Rays {
             .map_err(|message| Error::Rays { file: path.to_owned(), message })
     }
 
-    /// Their density in a scene, of which `tree` is any tree.
+    /// Returns the rays' density in a scene; `tree` is any valid tree over the scene.
     pub fn density(&self, scene: &Scene, tree: &Bvh, seed: u64) -> Result<RayDensity, Error> {
         let rays = match self {
             Self::Default => of_anything(TRAINED, scene, tree, seed),

@@ -8,17 +8,19 @@ use bvh_search::Splits;
 use bvh_terminal::interrupt;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// Objects over which the greedy tree is built so soon, in a few tenths of a second, that even an interrupted bake finishes it.
+/// The number of objects up to which even an interrupted bake builds the greedy tree, because that
+/// takes a few tenths of a second.
 const BUILT_AT_ONCE: usize = 200_000;
 
-/// Builds the greedy tree, by which the others are measured. If that is interrupted, only a bake that already keeps trees goes on, with
-/// the tree of a faster builder.
+/// Builds the greedy tree, the reference for the costs of all other trees. If the build is interrupted,
+/// a bake that has already written trees continues with the tree of a faster builder.
 pub fn greedy(method: &str, scene: &Scene, interrupted: &AtomicBool) -> Result<Bvh, Error> {
     let is_interrupted = || scene.boxes.len() > BUILT_AT_ONCE && interrupted.load(Relaxed);
     let config = muller_fellner::Config::default();
     let greedy = match config.build_watched(&scene.boxes, None, &Watch::new(&is_interrupted)) {
         Err(BuildError::Cancelled) if !interrupt::holds() => return Err(Error::NoTree),
         Err(BuildError::Cancelled) => {
+            // The folder of instances must get all its files even after Ctrl-C.
             ploc::Config { radius: 1, ..Default::default() }.build(&scene.boxes)
         }
         greedy => greedy,
@@ -26,20 +28,21 @@ pub fn greedy(method: &str, scene: &Scene, interrupted: &AtomicBool) -> Result<B
     greedy.map_err(Error::search(&scene.name, method))
 }
 
-/// Whether a bake divides objects among leaves.
+/// The decision whether a bake divides objects among leaves.
 pub enum Division<'a> {
-    /// Nobody asked for it, or the bake was over before it was known to pay.
+    /// The arguments do not permit it, or the bake ended before the decision.
     No,
-    /// No spatial split saves anything: the search for whole objects finds the same tree.
+    /// No spatial split saves anything, so that the search for whole objects finds the same tree.
     Useless,
-    /// The tree that it goes on from does.
+    /// The starting tree divides objects.
     OfStart(Splits<'a>),
-    /// This division with spatial splits shows that it pays.
+    /// This tree, divided with spatial splits, shows that splits pay.
     Pays(Splits<'a>, Bvh),
 }
 
 impl<'a> Division<'a> {
-    /// Decides whether leaves may have as many as `most_references`, where the search goes on `from` a tree or from none.
+    /// Decides whether leaves may have up to `most_references` in total. The search continues `from` a
+    /// tree, if there is one.
     pub fn decide(
         most_references: usize,
         scene: &'a Scene,
@@ -49,7 +52,7 @@ impl<'a> Division<'a> {
         let Some(splits) = Splits::at_most(most_references, &scene.boxes, &scene.primitives) else {
             return Ok(Self::No);
         };
-        // A tree with divided objects stays one.
+        // A search from divided objects cannot return to whole ones.
         if from.is_some_and(|tree| tree.prim_ids.len() > scene.boxes.len()) {
             return Ok(Self::OfStart(splits));
         }
@@ -61,7 +64,7 @@ impl<'a> Division<'a> {
         Ok(if pays { Self::Pays(splits, divided) } else { Self::Useless })
     }
 
-    /// The leave to divide objects, for the search.
+    /// Returns the permission to divide objects for the search.
     pub fn splits(&self) -> Option<Splits<'_>> {
         match self {
             Self::No | Self::Useless => None,

@@ -1,4 +1,4 @@
-//! Observes a bake: ends it in time, and shows its progress.
+//! Observes a bake, ends it in time, and shows its progress.
 
 use super::effort::Effort;
 use bvh_search::{Deadline, Event, Observer};
@@ -6,7 +6,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
 
-/// Cancels a search once it is set.
+/// Cancels a search once the flag is set.
 pub struct Interrupted<'a>(pub &'a AtomicBool);
 
 impl Observer for Interrupted<'_> {
@@ -15,26 +15,28 @@ impl Observer for Interrupted<'_> {
     }
 }
 
-/// Watches a bake: ends it with its budget of time or when it is interrupted, and shows its progress.
+/// Ends a bake when its time is over or when it is interrupted, and shows its progress.
 pub struct Watch<'a> {
-    /// Hidden unless standard error is a terminal.
+    /// The progress bar, which is hidden unless standard error is a terminal.
     pub bar: ProgressBar,
     deadline: Deadline,
     effort: Effort,
     /// The cost that gains are relative to.
     base: f64,
     last: Mutex<Option<Event>>,
-    /// Moves and work so far, which events are far behind while it is hot.
+    /// The number of moves so far. Events are rare while the search is hot, so that their numbers would
+    /// be out of date.
     moves: AtomicU64,
+    /// The work so far.
     work: AtomicU64,
-    /// When the bar was last brought up to date, in milliseconds since the beginning.
+    /// The time of the bar's last update, in milliseconds since the beginning.
     shown: AtomicU64,
     interrupted: &'a AtomicBool,
 }
 
 impl<'a> Watch<'a> {
     pub fn new(effort: Effort, deadline: Deadline, base: f64, interrupted: &'a AtomicBool) -> Self {
-        // In thousandths of the budget.
+        // The bar counts thousandths of the budget.
         let bar = ProgressBar::new(1000);
         let style = ProgressStyle::with_template("{bar:10} {wide_msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -52,7 +54,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Shows incumbent, gain, rate and time left, ten times a second.
+    /// Shows the incumbent, its gain, the rate and the time left, ten times a second.
     fn show(&self) {
         const REFRESH_MILLISECONDS: u64 = 100;
         if self.bar.is_hidden() {
@@ -61,22 +63,21 @@ impl<'a> Watch<'a> {
         let elapsed = self.deadline.elapsed();
         let now = elapsed.as_millis() as u64;
         let before = self.shown.load(Relaxed);
-        let due = now >= before + REFRESH_MILLISECONDS;
-        if !due
-            || self
-                .shown
-                .compare_exchange(before, now, Relaxed, Relaxed)
-                .is_err()
-        {
+        if now < before + REFRESH_MILLISECONDS {
             return;
         }
-        let Some(event) = *self
+        // All threads of a search come here; the one that changes the time updates the bar.
+        let claim = self
+            .shown
+            .compare_exchange(before, now, Relaxed, Relaxed);
+        if claim.is_err() {
+            return;
+        }
+        let last = self
             .last
             .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-        else {
-            return;
-        };
+            .unwrap_or_else(PoisonError::into_inner);
+        let Some(event) = *last else { return };
         let seconds = elapsed.as_secs_f64().max(1e-9);
         let done = match self.effort {
             Effort::Time(_) => self.deadline.fraction(),
@@ -118,7 +119,7 @@ impl Observer for Watch<'_> {
     }
 }
 
-/// Returns in words how far `cost` is below or above `base`.
+/// Describes by how much `cost` is below or above `base`.
 pub fn gain(cost: f64, base: f64) -> String {
     let percent = if base > 0.0 { 100.0 * (1.0 - cost / base) } else { 0.0 };
     if percent >= 0.0 {

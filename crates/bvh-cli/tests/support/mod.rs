@@ -1,4 +1,4 @@
-//! The program `bvh` as a child process, and what it says of trees.
+//! The program `bvh` as a child process, and its reports on trees.
 #![allow(dead_code, unused_imports)] // each test file uses some of it
 
 #[path = "../../../bvh-scenes/tests/support/glb.rs"]
@@ -13,15 +13,15 @@ use std::path::Path;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_bvh");
 
-/// The facts that `inspect` and the readers print.
+/// Parses the facts that `inspect` and the readers print.
 pub fn facts(text: &str) -> BTreeMap<String, String> {
     text.lines()
         .filter_map(|line| line.split_once(": "))
-        .map(|(what, value)| (what.into(), value.into()))
+        .map(|(name, value)| (name.into(), value.into()))
         .collect()
 }
 
-/// The internal area of the tree in a file, as `inspect` has it.
+/// Returns the internal area of the tree in a file, which `inspect` reports.
 pub fn cost(folder: &Path, file: &str) -> f64 {
     facts(&said(folder, &["inspect", file]))["internal area"]
         .parse()
