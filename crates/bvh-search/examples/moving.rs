@@ -1,4 +1,5 @@
-//! Follows a mesh that moves: refits every frame, and improves the tree for a moment when its cost has drifted.
+//! Follows a moving mesh: refits every frame, and improves the tree briefly when its cost has
+//! drifted.
 //!
 //! `cargo run -p bvh-search --example moving`
 
@@ -7,7 +8,7 @@ use std::error::Error;
 
 const DRIFT: f64 = 1.15;
 
-/// A sheet of triangles that is wound up, a little more with `time`.
+/// The corners of a sheet that is wound up, more with `time`.
 fn sheet(time: f32) -> Vec<[f32; 3]> {
     let point = |i: u16| {
         let u = f32::from(i % 65) / 8.0 - 4.0;
@@ -19,10 +20,9 @@ fn sheet(time: f32) -> Vec<[f32; 3]> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let corners = |i: u32| [[i, i + 1, i + 65], [i + 66, i + 65, i + 1]];
     let indices: Vec<[u32; 3]> = (0..64 * 65)
         .filter(|i| i % 65 < 64)
-        .flat_map(corners)
+        .flat_map(|i| [[i, i + 1, i + 65], [i + 66, i + 65, i + 1]])
         .collect();
     let mut triangles = Triangle::from_mesh(&sheet(0.3), &indices)?;
     let mut tree = bake(&boxes(&triangles), Duration::from_millis(200))?.tree;
@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let drift = wide.expected_visits() / fresh;
         print!("frame {frame:2}: {drift:.2} times the cost");
         if drift > DRIFT {
-            // The tree is brought up to date and improved for a moment; a renderer would do so beside its frames.
+            // A renderer would refit and improve the tree in another thread, while it draws frames.
             let boxes = boxes(&triangles);
             tree.refit(&boxes);
             tree = improve(&tree, &boxes, Duration::from_millis(100))?.tree;

@@ -5,7 +5,7 @@
 use bvh_search::prelude::*;
 use std::error::Error;
 
-/// Boxes along a spiral, of all sizes.
+/// Boxes of many sizes along a spiral.
 fn spiral() -> Vec<Aabb> {
     (0..3000u16)
         .map(f32::from)
@@ -20,10 +20,11 @@ fn spiral() -> Vec<Aabb> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let boxes = spiral();
-    // Any binary tree: from another library by `Bvh::from_first_count`, from a file, or as here.
+    // Any binary tree will do: from another library by `Bvh::from_first_count`, from a file, or as
+    // here.
     let tree = median_cut::Config { leaf_fraction: 0.001, ..Default::default() }.build(&boxes)?;
     let before = cost::internal_area(&tree);
-    // `improve(&tree, &boxes, Duration::from_secs(1))` does the same in silence.
+    // `improve(&tree, &boxes, Duration::from_secs(1))` does the same without progress.
     let deadline = Deadline::after(Duration::from_secs(1));
     let watched = deadline.watched(|event| {
         let ms = deadline.elapsed().as_millis();

@@ -1,15 +1,16 @@
-//! The everyday calls: the best tree that a given time buys, with every parameter at its default.
+//! The everyday calls: the best tree for a given time, with every parameter at its default.
 
 use crate::{Budget, Deadline, Outcome, Problem, SearchError, best, optimize, solve};
 use bvh_core::{Aabb, Bvh};
 use std::time::Duration;
 
-/// The best tree over `boxes` that [`best`](crate::best) finds in about `time`, from the milliseconds of a build to the minutes
-/// of a bake. The search plans with the time, so that one call for a second finds a better tree than ten for a tenth. It ends
-/// earlier if the tree is proved optimal, and later if the time is not enough for the fastest build.
+/// Returns the best tree over `boxes` that [`best`](crate::best) finds in about `time`, from the
+/// milliseconds of a build to the minutes of a bake. The search plans with the time, so one call
+/// for a second finds a better tree than ten calls for a tenth. The search ends earlier if it
+/// proves its tree optimal, and later if the time is not enough for the fastest build.
 ///
-/// [`solve`] has everything that is left out here: progress, cancellation, seeds, other searches, and limits in work in place
-/// of time, under which a search has the same result on every machine.
+/// [`solve`] has everything else: progress, cancellation, seeds, other searches, and limits in work
+/// instead of time, which give the same result on every machine.
 ///
 /// ```
 /// use bvh_search::prelude::*;
@@ -23,10 +24,11 @@ pub fn bake(boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
     solve(&best::Config::default(), &Problem::new(boxes), 1, Budget::UNLIMITED, &deadline)
 }
 
-/// Improves a tree over `boxes` for about `time`: one from another library, or one that has been
-/// [refitted](Bvh::refit) to objects that moved. How far refitting has let it drift is the growth of its
-/// [internal area](bvh_core::cost::internal_area) over the root's, or of
-/// [`WideBvh::expected_visits`](bvh_core::WideBvh::expected_visits). What [`optimize()`] says of trees holds here too.
+/// Improves a tree over `boxes` for about `time`: a tree from another library, or one that has been
+/// [refitted](Bvh::refit) to objects that moved. The growth of the tree's
+/// [internal area](bvh_core::cost::internal_area) over the root's area, or of
+/// [`WideBvh::expected_visits`](bvh_core::WideBvh::expected_visits), measures how far refitting has
+/// degraded the tree. Accepts the same trees as [`optimize()`].
 pub fn improve(tree: &Bvh, boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
     let deadline = Deadline::after(time);
     optimize(tree, &Problem::new(boxes), &best::Config::default(), 1, Budget::UNLIMITED, &deadline)

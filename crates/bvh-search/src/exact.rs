@@ -1,10 +1,13 @@
-//! The exact optimum of small scenes, by dynamic programming over subsets: the measure of every other method.
+//! The exact optimum of small scenes, by dynamic programming over subsets: the reference for every
+//! other method.
 //!
-//! The class is *binary trees with one object per leaf*, over which all objectives of a [`Problem`] have the same
-//! optima: they grow with the internal area. Wider nodes would make it meaningless: merging an inner node into its
-//! parent removes a term that is never negative, so that a single node over all objects would always be the cheapest.
+//! The search space is *binary trees with one object per leaf*. All objectives of a [`Problem`]
+//! have the same optima there, because they grow with the internal area. Wider nodes would make the
+//! problem meaningless: merging an inner node into its parent removes a term that is never
+//! negative, so a single node over all objects would always be cheapest.
 //!
-//! The recurrence is that of Karras & Aila 2013 for treelets (`Subsets`), here for the whole tree.
+//! The recurrence comes from Karras & Aila 2013, who use it for treelets (`Subsets`); here it
+//! covers the whole tree.
 
 use crate::run::{Problem, Run, Search, SearchError, Shortcut};
 use crate::tree::{Area, Subsets};
@@ -12,7 +15,8 @@ use bvh_build::BuildError;
 use bvh_config::Accepts;
 use bvh_core::{Aabb, Bvh, Node, PackedAabb, check_boxes};
 
-/// The most objects a scene may have: 3¹⁶ / 2 divisions take a few hundredths of a second and 2¹⁶ sets 2.8 MB.
+/// The maximum number of objects. 3¹⁶ / 2 divisions take a few hundredths of a second, and 2¹⁶ sets
+/// take 2.8 MB.
 pub const MOST_OBJECTS: usize = 16;
 
 bvh_config::config! {
@@ -21,10 +25,11 @@ bvh_config::config! {
 }
 
 impl Search for Config {
-    /// One evaluation, whose work is the number of divisions compared. The tree is optimal up to the rounding of 15
-    /// additions. Of equal divisions the one is taken whose part with the first object is the least as a bit set.
+    /// Makes one evaluation, whose work is the number of divisions compared. The tree is optimal up
+    /// to the rounding of 15 additions. Among equal divisions, the search chooses the one whose
+    /// part with the first object is the least as a bit set.
     ///
-    /// Refuses scenes of more than [`MOST_OBJECTS`] objects. O(3ⁿ) time, O(2ⁿ) memory.
+    /// Rejects scenes with more than [`MOST_OBJECTS`] objects. O(3ⁿ) time, O(2ⁿ) memory.
     fn search(&self, problem: &Problem, _seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         let n = problem.boxes.len();
         (..=MOST_OBJECTS).check("objects", &n)?;
@@ -41,8 +46,8 @@ impl Search for Config {
     }
 }
 
-/// The optimum in place of a search, if the scene is [tiny](most_work_of_tiny) and the optimum takes no more work than
-/// `work` and the rest of the run's budget. Ends the run.
+/// Returns the optimum and ends the run, if the scene is [tiny](most_work_of_tiny) and the optimum
+/// takes no more work than `work` and the rest of the run's budget.
 pub(crate) fn instead(
     problem: &Problem,
     work: u64,
@@ -58,15 +63,16 @@ pub(crate) fn instead(
     Ok(Some(tree))
 }
 
-/// An upper bound of the work of the optimum where it may replace a search: the number of divisions, those with an empty
-/// part included. `None` for more than [`MOST_OBJECTS`], and for two objects or fewer, which have only one tree.
+/// Returns an upper bound of the optimum's work, where the optimum may replace a search: the number
+/// of divisions, including those with an empty part. `None` for more than [`MOST_OBJECTS`], and for
+/// two objects or fewer, which have only one tree.
 pub(crate) fn most_work_of_tiny(objects: usize) -> Option<u64> {
     (3..=MOST_OBJECTS)
         .contains(&objects)
         .then(|| 3u64.pow(objects as u32) / 2)
 }
 
-/// The tree of the best divisions of all sets, over one object or more.
+/// Builds the tree of the best divisions, over one object or more.
 fn tree(boxes: &[Aabb], subsets: &Subsets) -> Bvh {
     let mut tree = Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, 1)], prim_ids: vec![] };
     let mut stack = vec![(0, (1usize << boxes.len()) - 1)];
@@ -95,7 +101,8 @@ mod tests {
     use bvh_core::cost::Measure;
     use bvh_core::validate;
 
-    /// The least total size of inner nodes of all binary trees over these sets, by merging every two of them in turn.
+    /// The least total size of inner nodes of all binary trees over these sets, by merging every
+    /// pair.
     fn brute_force(sets: &[Aabb], size: &dyn Measure) -> f64 {
         let mut least = if sets.len() < 2 { 0.0 } else { f64::INFINITY };
         for i in 0..sets.len() {
@@ -135,18 +142,15 @@ mod tests {
     }
 
     #[test]
-    fn too_many_objects_and_bad_boxes_are_refused() {
-        let refused = |boxes: &[Aabb]| {
+    fn too_many_objects_and_bad_boxes_are_rejected() {
+        fn error(boxes: &[Aabb]) -> String {
             solve(&Config {}, &Problem::new(boxes), 1, Budget::UNLIMITED, &())
                 .unwrap_err()
                 .to_string()
-        };
-        assert_eq!(
-            refused(&scatter(17)),
-            format!("objects is 17; accepted: at most {MOST_OBJECTS}")
-        );
+        }
+        assert_eq!(error(&scatter(17)), format!("objects is 17; accepted: at most {MOST_OBJECTS}"));
         let mut boxes = scatter(5);
         boxes[3].max.x = f32::NAN;
-        assert!(refused(&boxes).contains("object 3"));
+        assert!(error(&boxes).contains("object 3"));
     }
 }

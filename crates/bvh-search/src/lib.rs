@@ -1,14 +1,16 @@
-// The root of the crate; its front page is its README.
+// The crate's front page is its README.
 #![doc = include_str!("../README.md")]
 
 pub mod annealing;
 #[cfg(feature = "std")]
 mod bake;
+mod baselines;
 pub mod best;
+mod candidates;
 pub mod exact;
+pub mod grasp;
 mod local;
 pub mod lower_bound;
-mod multistart;
 mod optimize;
 mod orders;
 mod owned;
@@ -26,11 +28,11 @@ mod tuning;
 pub use annealing::ruin_recreate;
 #[cfg(feature = "std")]
 pub use bake::{bake, improve};
+pub use baselines::{LocalSearch, iterated, rebuild, rotation, treelet};
 pub use bvh_build;
 pub use bvh_core;
 pub use local::initial::Start;
-pub use local::{LocalSearch, reinsertion, rotation, treelet};
-pub use multistart::{grasp, iterated, rebuild};
+pub use local::reinsertion;
 pub use optimize::optimize;
 pub use orders::{genetic, random_orders};
 pub use owned::{Improvement, Objects, OwnedTree};

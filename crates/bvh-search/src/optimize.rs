@@ -1,4 +1,4 @@
-//! Any binary tree in, a better one out: for callers with a builder of their own.
+//! Improvement of any binary tree, for callers with their own builder.
 
 use crate::best;
 use crate::run::{Budget, Found, Observer, Outcome, Problem, Run, SearchError, solve};
@@ -7,17 +7,19 @@ use bvh_config::{Check, OutOfRange};
 use bvh_core::cost::Objective;
 use bvh_core::{Aabb, Bvh, Node, NodeKind, check_boxes, validate, validate_references};
 
-/// Improves `tree`, over the objects of the problem, by [`best`](crate::best) without its builder, until the
-/// budget is spent or the observer cancels. The result has the same leaves with the same objects; leaves of several
-/// objects are moved as a whole. The cost is the [internal area](bvh_core::cost::internal_area), or the problem's measure in
-/// its place, with boxes made tight, and never above that of `tree`.
+/// Improves `tree`, over the objects of the problem, by [`best`](crate::best) without its builder,
+/// until the budget is spent or the observer cancels. The result has the same leaves with the same
+/// objects; a leaf of several objects moves as one. The cost is the
+/// [internal area](bvh_core::cost::internal_area), or the problem's measure instead, with tight
+/// boxes. The cost never exceeds the cost of `tree`.
 ///
-/// [`improve`](crate::improve) is the same for a given time, with every parameter at its default.
+/// [`improve`](crate::improve) does the same for a given time, with every parameter at its default.
 ///
-/// If objects may be divided among leaves, or if the cost is that of the [layout](Objective::Layout), which makes leaves of its own,
-/// every leaf of several objects is first divided into leaves of one; boxes are then those of the objects, or of their parts.
+/// Every leaf of several objects is first divided into leaves of one, if objects may be divided
+/// among leaves or if the objective is the [layout](Objective::Layout), which chooses its own
+/// leaves. The boxes are then the boxes of the objects or of their parts.
 ///
-/// Refuses trees that are not [valid](validate), and inner nodes with more than two children.
+/// Rejects trees that are not [valid](validate), and inner nodes with more than two children.
 pub fn optimize(
     tree: &Bvh,
     problem: &Problem,
@@ -36,7 +38,8 @@ pub fn optimize(
         let tree = one_reference_per_leaf(tree, problem);
         return solve(&From { tree, config }, problem, seed, budget, observer);
     }
-    // To the search, every leaf is one object with the box of the leaf.
+    // The search sees every leaf as one object with the leaf's box, so it never separates the
+    // objects of a leaf.
     let mut tight = tree.clone();
     let mut leaves = Vec::new();
     tight.refit(boxes);
@@ -76,28 +79,29 @@ pub fn optimize(
     Ok(outcome)
 }
 
-/// The same tree with tight boxes and one reference per leaf: leaves of several are halved in their order.
+/// Returns the same tree with tight boxes and one reference per leaf. Leaves of several references
+/// are halved in their order.
 fn one_reference_per_leaf(tree: &Bvh, problem: &Problem) -> Bvh {
     let mut single = tree.clone();
-    let mut at = 0;
-    while at < single.nodes.len() {
-        let node = single.nodes[at];
+    let mut index = 0;
+    while index < single.nodes.len() {
+        let node = single.nodes[index];
         let range = node.prims();
         if range.len() > 1 {
             let middle = range.start + range.len() / 2;
-            single.nodes[at] = Node::inner(node.aabb, single.nodes.len() as u32, 2);
+            single.nodes[index] = Node::inner(node.aabb, single.nodes.len() as u32, 2);
             let halves = [range.start..middle, middle..range.end];
             single.nodes.extend(
                 halves.map(|half| Node::leaf(node.aabb, half.start as u32, half.len() as u32)),
             );
         }
-        at += 1;
+        index += 1;
     }
     let split = problem
         .splits
         .filter(|_| tree.prim_ids.len() > problem.boxes.len());
-    for at in (0..single.nodes.len()).rev() {
-        let node = single.nodes[at];
+    for index in (0..single.nodes.len()).rev() {
+        let node = single.nodes[index];
         let below = single.nodes[node.children()].iter();
         let aabb = match (node.kind(), split) {
             (NodeKind::Inner { .. }, _) => {
@@ -110,11 +114,12 @@ fn one_reference_per_leaf(tree: &Bvh, problem: &Problem) -> Bvh {
                 let part = splits
                     .objects
                     .clip(single.prim_ids[first as usize], &node.aabb);
-                // A reference to nothing does no harm.
+                // A degenerate object may have no part in its leaf. The leaf's box is then as tight
+                // as known.
                 if part == Aabb::EMPTY { node.aabb } else { part }
             }
         };
-        single.nodes[at] = match node.kind() {
+        single.nodes[index] = match node.kind() {
             NodeKind::Inner { first, count } => Node::inner(aabb, first, count),
             NodeKind::Leaf { first, count } => Node::leaf(aabb, first, count),
         };
@@ -122,7 +127,7 @@ fn one_reference_per_leaf(tree: &Bvh, problem: &Problem) -> Bvh {
     single
 }
 
-/// `best`, from a given tree.
+/// The search `best`, started from a given tree.
 struct From<'a> {
     tree: Bvh,
     config: &'a best::Config,

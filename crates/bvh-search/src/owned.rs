@@ -1,14 +1,15 @@
-//! A tree that owns what it is over, for callers who can lend nothing: the bindings to other languages.
+//! A tree that owns its objects, for callers that cannot lend them: the bindings to other
+//! languages.
 
 use crate::{Budget, Observer, Outcome, Problem, SearchError, Splits, best, optimize, solve};
 use bvh_core::cost::Objective;
 use bvh_core::file::{self, FileError, Origin};
 use bvh_core::{Aabb, Bvh, Primitives, Triangle};
 
-/// What a tree is over.
+/// The objects of a tree.
 #[derive(Clone, Debug)]
 pub enum Objects {
-    /// Objects of which only the boxes are known.
+    /// Objects known by their boxes only.
     Boxes(Vec<Aabb>),
     /// Objects of a known shape, which can be divided among leaves.
     Shapes(Primitives),
@@ -24,15 +25,15 @@ pub struct OwnedTree {
     tree: Bvh,
     boxes: Vec<Aabb>,
     shapes: Option<Primitives>,
-    /// How many references to objects the tree may have.
+    /// Maximum number of references to objects.
     most: usize,
     /// The work of all searches so far.
     work: u64,
 }
 
 impl OwnedTree {
-    /// The tree that is found until `observer` cancels the search, as a [`Deadline`](crate::Deadline) does. Shapes may be divided
-    /// among leaves, into up to `references` parts each on average; boxes may not.
+    /// Searches until `observer` cancels, as a [`Deadline`](crate::Deadline) does. Shapes may be
+    /// divided among leaves, into up to `references` parts each on average; boxes may not.
     pub fn find(
         objects: Objects,
         references: f64,
@@ -45,7 +46,8 @@ impl OwnedTree {
         Ok(owned)
     }
 
-    /// The tree over these objects that `bytes` hold. As many references as it has stay allowed.
+    /// Reads a tree over these objects from `bytes`. Later searches may use as many references as
+    /// the tree has.
     pub fn load(objects: Objects, bytes: &[u8]) -> Result<Self, FileError> {
         let mut owned = Self::bare(objects, 1.0);
         let file = file::TreeFile::open(bytes)?.for_boxes(&owned.boxes)?;
@@ -62,20 +64,20 @@ impl OwnedTree {
         Ok(())
     }
 
-    /// Searches as [`improve`](Self::improve) does and leaves the tree as it is, so that others can read it meanwhile. The result is
-    /// for [`apply`](Self::apply).
+    /// Searches as [`improve`](Self::improve) does without changing the tree, so that other threads
+    /// can read it meanwhile. Pass the result to [`apply`](Self::apply).
     pub fn improvement(&self, observer: &dyn Observer) -> Result<Improvement, SearchError> {
         let config = best::Config::default();
         optimize(&self.tree, &self.problem(), &config, 1, Budget::UNLIMITED, observer)
             .map(Improvement)
     }
 
-    /// Puts an improvement of this very tree in its place.
+    /// Replaces the tree by an improvement of this very tree.
     pub fn apply(&mut self, improvement: Improvement) {
         self.take(improvement.0);
     }
 
-    /// The tree as a file, which [`load`](Self::load) and the harness read.
+    /// Returns the tree as a file, which [`load`](Self::load) and the program `bvh` read.
     pub fn save(&self) -> Result<Vec<u8>, FileError> {
         let origin = Origin { method: "best", seed: 1, work: self.work, ..Origin::default() };
         match &self.shapes {
@@ -107,7 +109,7 @@ impl OwnedTree {
         }
     }
 
-    /// The objects, without a tree.
+    /// Builds the value without a tree.
     fn bare(objects: Objects, references: f64) -> Self {
         let (boxes, shapes) = match objects {
             Objects::Boxes(boxes) => (boxes, None),
@@ -117,7 +119,7 @@ impl OwnedTree {
         Self { tree: Bvh::default(), boxes, shapes, most, work: 0 }
     }
 
-    /// What is searched for, now and later.
+    /// The problem that every search solves.
     fn problem(&self) -> Problem<'_> {
         let shapes = self.shapes.as_ref();
         let splits = shapes.and_then(|shapes| Splits::at_most(self.most, &self.boxes, shapes));

@@ -1,11 +1,14 @@
-//! Loops over independent tasks: on all threads of the current rayon pool, or on one without the feature `rayon`.
+//! Loops over independent tasks, on all threads of the current rayon pool, or on one thread without
+//! the feature `rayon`.
 //!
-//! Results come in the order of the tasks, whichever thread has done them.
+//! Results come in the order of the tasks, whichever thread ran them.
 
-/// The most nodes of all trees that a batch of trials keeps, 1 GB. It decides how often the budget is checked, and no result.
+/// Maximum number of nodes of all trees that a batch of trials keeps, 1 GB. It decides how often
+/// the budget is checked, and affects no result.
 pub(crate) const KEPT_NODES: u64 = 1 << 25;
 
-/// The results of the tasks `0..count`. Every thread has a state of its own, made by `init`: buffers that are reused.
+/// Returns the results of the tasks `0..count`. `init` builds a separate state for every thread:
+/// buffers that its tasks reuse.
 pub(crate) fn map_init<S, T: Send>(
     count: usize,
     init: impl Fn() -> S + Send + Sync,
@@ -28,7 +31,7 @@ pub(crate) fn map_init<S, T: Send>(
     }
 }
 
-/// The results of a few long tasks, of which any may be given to another thread.
+/// Returns the results of a few long tasks. Each may run on another thread.
 pub(crate) fn map<T: Send>(count: usize, task: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
     #[cfg(feature = "rayon")]
     {
@@ -43,7 +46,7 @@ pub(crate) fn map<T: Send>(count: usize, task: impl Fn(usize) -> T + Send + Sync
     (0..count).map(task).collect()
 }
 
-/// Number of threads that share the tasks.
+/// The number of threads that share the tasks.
 pub(crate) fn threads() -> usize {
     #[cfg(feature = "rayon")]
     return rayon::current_num_threads();

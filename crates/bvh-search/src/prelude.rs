@@ -1,4 +1,4 @@
-//! What a program needs that builds, bakes, traces and saves trees: `use bvh_search::prelude::*`.
+//! Everything for programs that build, bake, trace and save trees: `use bvh_search::prelude::*`.
 
 pub use crate::{Budget, Outcome, Problem, StopReason, best, optimize, solve};
 #[cfg(feature = "std")]

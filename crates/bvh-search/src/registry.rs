@@ -1,4 +1,4 @@
-//! The one registry of methods: the only place that knows all of them by name.
+//! The registry of methods: the only place that knows all of them by name.
 
 use crate::run::{Problem, Run, Search, SearchError};
 use bvh_config::{Check, OutOfRange};
@@ -8,8 +8,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 /// One line per method: its name in specs and tables, and the configuration that runs it.
 macro_rules! methods {
     ($($(#[$doc:meta])* $name:literal => $variant:ident($config:ty),)*) => {
-        /// A builder or a search with its parameters, as a spec names it: a table whose `method` is the name and
-        /// whose other keys are the configuration's fields. Unknown names and keys are refused.
+        /// A builder or a search with its parameters, as a spec names it: a table whose `method` is
+        /// the name and whose other keys are the configuration's fields. Unknown names and keys are
+        /// rejected.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
         #[serde(tag = "method")]
@@ -21,8 +22,9 @@ macro_rules! methods {
             /// The names of all methods.
             pub const NAMES: &[&str] = &[$($name),*];
 
-            /// Reads the parameters of the method called `name`; `None` if there is none of this name. Unlike
-            /// deserialising a whole method, hands `parameters` on unbuffered, so that its errors know their place.
+            /// Reads the parameters of the method called `name`; `None` if no method has this name.
+            /// Unlike the deserialisation of a whole method, this function passes `parameters` on
+            /// unbuffered, so errors keep their position.
             pub fn read<'de, D: Deserializer<'de>>(name: &str, parameters: D) -> Result<Option<Self>, D::Error> {
                 match name {
                     $($name => <$config>::deserialize(parameters).map(|config| Some(Self::$variant(config))),)*
@@ -30,7 +32,7 @@ macro_rules! methods {
                 }
             }
 
-            /// Every method with its default parameters.
+            /// Returns every method with its default parameters.
             pub fn all() -> Vec<Self> {
                 vec![$(Self::$variant(Default::default())),*]
             }

@@ -1,10 +1,10 @@
-//! A scene for the unit tests of searches, and trees over any.
+//! Scenes and trees for the unit tests of searches.
 
 use crate::tree::{Area, Working};
 use bvh_build::Builder;
 use bvh_core::{Aabb, RayDensity, Segment, cost};
 
-/// A reproducible scatter of `n` small boxes.
+/// Returns a reproducible scatter of `n` small boxes.
 pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
     let hash =
         |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 65_521) as f32;
@@ -16,13 +16,14 @@ pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
         .collect()
 }
 
-/// The working form of a binary tree over finite boxes.
+/// Builds the working form of a binary tree over finite boxes.
 pub(crate) fn built(builder: &dyn Builder, boxes: &[Aabb]) -> Working {
     let tree = builder.build(boxes).unwrap();
     Working::from_bvh(&tree, cost::internal_area(&tree), Area).unwrap()
 }
 
-/// The density of rays from a corner of the scene to the corners of all objects; none where nothing has a size.
+/// Returns the density of rays from a corner of the scene to the corners of all objects; `None` if
+/// the scene has no extent.
 pub(crate) fn density(boxes: &[Aabb]) -> Option<RayDensity> {
     let bounds = boxes
         .iter()

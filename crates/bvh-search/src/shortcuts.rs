@@ -1,30 +1,30 @@
-//! Which shortcuts a scene allows, and why: decided from its boxes, before the work.
+//! The shortcuts that a scene allows, with reasons, decided from its boxes before the search.
 
 use crate::{Shortcut, exact, lower_bound};
 use bvh_build::{BuildError, Presorted};
 use bvh_core::Aabb;
 
-/// The properties of a scene that decide about [shortcuts](Shortcut).
+/// The properties of a scene that decide its [shortcuts](Shortcut).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Facts {
     /// Number of objects.
     pub objects: usize,
-    /// Number of objects whose box equals that of the previous object.
+    /// Number of objects whose box equals the box of the previous object.
     pub repeated: usize,
-    /// The box around all.
+    /// The box around all objects.
     pub bounds: Aabb,
-    /// Whether `bounds` has no area.
+    /// True if `bounds` has no area.
     pub flat: bool,
-    /// Per axis, whether the objects come in order.
+    /// Per axis, true if the objects are already sorted.
     pub in_order: [bool; 3],
-    /// Per axis, the lowest axis that orders all objects identically, usually itself.
+    /// Per axis, the lowest axis that orders all objects identically, usually the same axis.
     pub same_orders: [u8; 3],
     /// A [lower bound](lower_bound::of_largest) of the internal area.
     pub lower_bound: f64,
 }
 
 impl Facts {
-    /// Examines a scene as builders and searches do. O(n): the sort is a radix sort.
+    /// Examines a scene as builders and searches do, with a radix sort. O(n).
     pub fn of(boxes: &[Aabb]) -> Result<Self, BuildError> {
         let sorted = Presorted::new(boxes)?;
         Ok(Self {
@@ -43,8 +43,8 @@ impl Facts {
         })
     }
 
-    /// The shortcuts that hold for the whole scene, and why. More may be taken later: orders that become the same
-    /// further down the tree, and a bound that a search meets.
+    /// Returns the shortcuts of the whole scene, with reasons. More may follow later: orders may
+    /// become equal further down the tree, and a search may meet the bound.
     pub fn shortcuts(&self) -> Vec<(Shortcut, String)> {
         const AXES: [&str; 3] = ["x", "y", "z"];
         let mut found = Vec::new();

@@ -1,4 +1,4 @@
-//! A search returns soon after its observer cancels, whatever numbers its configuration has.
+//! A search returns soon after its observer cancels, for any numbers in its configuration.
 
 use bvh_build::{Builder, median_cut, ploc};
 use bvh_core::{Aabb, validate};
@@ -8,7 +8,7 @@ use bvh_search::{
 };
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// Counts the polls, and cancels after so many.
+/// Counts the polls, and cancels after a number of them.
 struct Polls {
     polled: AtomicU64,
     until: u64,
@@ -21,10 +21,12 @@ impl Observer for Polls {
 }
 
 fn boxes(n: u32) -> Vec<Aabb> {
-    let at = |i: u32, k: u32| (i.wrapping_mul(2_654_435_761).rotate_left(k) >> 16) as f32;
-    let low = |i| [at(i, 3), at(i, 11), at(i, 19)];
     (0..n)
-        .map(|i| Aabb::from((low(i), low(i).map(|c| c + 50.0))))
+        .map(|i: u32| {
+            let hash = i.wrapping_mul(2_654_435_761);
+            let low = [3, 11, 19].map(|salt| (hash.rotate_left(salt) >> 16) as f32);
+            Aabb::from((low, low.map(|c| c + 50.0)))
+        })
         .collect()
 }
 
@@ -89,26 +91,26 @@ fn the_observer_is_polled_between_moves_however_long_they_are() {
 }
 
 #[test]
-fn numbers_that_no_poll_could_interrupt_are_refused() {
-    let refused = |method: Method, boxes: &[Aabb]| {
+fn numbers_that_no_poll_could_interrupt_are_rejected() {
+    fn error(method: Method, boxes: &[Aabb]) -> String {
         solve(&method, &Problem::new(boxes), 1, Budget::UNLIMITED, &())
             .unwrap_err()
             .to_string()
-    };
+    }
     let tournament = rebuild::Config { tournament: 1 << 31, ..Default::default() };
     assert_eq!(
-        refused(Method::Rebuild(tournament), &[]),
+        error(Method::Rebuild(tournament), &[]),
         "tournament is 2147483648; accepted: 1 to 1000"
     );
     let ruin = ruin_recreate::Ruin { removed: u32::MAX, ..Default::default() };
     let ruin = ruin_recreate::Config { ruin, ..Default::default() };
     assert_eq!(
-        refused(Method::RuinRecreate(ruin), &[]),
+        error(Method::RuinRecreate(ruin), &[]),
         "ruin.removed is 4294967295; accepted: 1 to 1000"
     );
     let population = genetic::Config { population: 1_000_000, ..Default::default() };
     let message = "population is 1000000; accepted: at most 262144";
-    assert_eq!(refused(Method::Genetic(population), &boxes(1024)), message);
+    assert_eq!(error(Method::Genetic(population), &boxes(1024)), message);
 }
 
 /// Methods whose first tree is a construction over all objects.

@@ -1,4 +1,4 @@
-//! Local search against the exact optimum, and the laws that every method of it must obey.
+//! The laws of every local search: start, budgets, cancellation, threads and rejected trees.
 
 use bvh_build::Builder;
 use bvh_core::{Aabb, Bvh, Node, cost, validate};
@@ -108,7 +108,7 @@ fn budgets_end_a_search_where_they_say() {
     for method in methods() {
         for max_work in [0, 1, 5_000, 100_000] {
             let outcome = run(&method, &boxes, max_work);
-            // One move more at most, or the start alone.
+            // At most one more move, or the start alone.
             assert!(
                 outcome.work <= max_work.max(1999) + 2000,
                 "{} {max_work} {}",
@@ -133,7 +133,7 @@ fn a_budget_barely_above_what_the_best_does_without_one_is_kept() {
     let boxes = scatter(1000, 4);
     for work_per_object in [100, 200, 300, 400] {
         let config = best::Config { work_per_object, first: 50.0, ..Default::default() };
-        // The start and the first descent are not in what the best counts as its own.
+        // `best` does not count the start and the first descent in its work per object.
         let max_work = work_per_object * 1000 + 60_000;
         let outcome = solve(&config, &Problem::new(&boxes), 5, work(max_work), &()).unwrap();
         assert!(outcome.work <= max_work + 2000, "{} of {max_work}", outcome.work);
@@ -163,7 +163,7 @@ fn a_cancelled_search_returns_what_it_has() {
 
 #[test]
 fn the_best_ends_when_the_time_does_and_its_pieces_are_a_valid_tree() {
-    /// Time passes by the question.
+    /// A clock that advances with every reading.
     struct Clock(AtomicU32);
     impl Observer for Clock {
         fn progress(&self) -> Option<f64> {
@@ -184,7 +184,7 @@ fn the_best_ends_when_the_time_does_and_its_pieces_are_a_valid_tree() {
     }
 }
 
-/// Every inner node has a leaf on its left: as deep as a tree can be.
+/// The deepest tree: every inner node has a leaf on its left.
 fn chain(boxes: &[Aabb]) -> Bvh {
     let n = boxes.len() as u32;
     let mut nodes = vec![Node::inner(Aabb::EMPTY, 1, 2)];
@@ -213,7 +213,7 @@ fn the_deepest_tree_can_be_optimised() {
 }
 
 #[test]
-fn leaves_of_several_objects_are_kept_and_other_trees_refused_by_name() {
+fn leaves_of_several_objects_are_kept_and_other_trees_are_rejected_by_name() {
     let boxes = scatter(400, 6);
     let pairs: Vec<Aabb> = boxes
         .chunks(2)
@@ -240,31 +240,31 @@ fn leaves_of_several_objects_are_kept_and_other_trees_refused_by_name() {
     assert_eq!(outcome.cost, cost::internal_area(&outcome.tree));
     assert!(outcome.cost < cost::internal_area(&tree));
 
-    let refused = |tree: &Bvh, boxes: &[Aabb]| {
+    let error = |tree: &Bvh, boxes: &[Aabb]| {
         optimize(tree, &Problem::new(boxes), &config, 1, work(0), &()).unwrap_err()
     };
     let mut flat = Bvh { nodes: vec![Node::inner(Aabb::EMPTY, 1, 3)], prim_ids: vec![0, 1, 2] };
     flat.nodes
         .extend((0..3).map(|i| Node::leaf(Aabb::EMPTY, i, 1)));
     flat.refit(&boxes[..3]);
-    assert_eq!(refused(&flat, &boxes[..3]), SearchError::NotBinary { node: 0, children: 3 });
-    assert!(matches!(refused(&flat, &boxes[..2]), SearchError::Invalid(_)));
+    assert_eq!(error(&flat, &boxes[..3]), SearchError::NotBinary { node: 0, children: 3 });
+    assert!(matches!(error(&flat, &boxes[..2]), SearchError::Invalid(_)));
 }
 
 #[test]
 fn parameters_outside_their_range_are_named() {
     let problem = Problem::new(&[]);
-    let refused = |method: Method| {
+    let error = |method: Method| {
         solve(&method, &problem, 1, Budget::UNLIMITED, &())
             .unwrap_err()
             .to_string()
     };
     let cold = ruin_recreate::Config { cold: 1.0, ..Default::default() };
-    assert_eq!(refused(Method::RuinRecreate(cold)), "cold is 1; accepted: above 0, not above hot");
+    assert_eq!(error(Method::RuinRecreate(cold)), "cold is 1; accepted: above 0, not above hot");
     let sweeps = reinsertion::Config { sweeps: 0, ..Default::default() };
-    assert_eq!(refused(Method::Reinsertion(sweeps)), "sweeps is 0; accepted: 1 or more");
+    assert_eq!(error(Method::Reinsertion(sweeps)), "sweeps is 0; accepted: 1 or more");
     let pieces = best::Config { pieces: 5000, ..Default::default() };
-    assert_eq!(refused(Method::Best(pieces)), "pieces is 5000; accepted: 0 to 4096");
+    assert_eq!(error(Method::Best(pieces)), "pieces is 5000; accepted: 0 to 4096");
 }
 
 proptest! {

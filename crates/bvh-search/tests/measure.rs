@@ -1,4 +1,5 @@
-//! A measure of boxes in place of the area: every builder and search goes by it, and the area as a measure is the area.
+//! Measures of boxes instead of the area: every builder and search uses them, and the area as a
+//! measure equals the area.
 
 use bvh_build::Builder;
 use bvh_core::cost::{self, Measure, Objective};
@@ -7,8 +8,8 @@ use bvh_search::{
     Budget, Method, Outcome, Problem, Shortcut, Start, best, exact, reinsertion, solve,
 };
 
-/// Rays that are nearly parallel to the x axis: the face across it counts most. Monotone, as every sum of products of
-/// extents is.
+/// The measure for rays nearly parallel to the x axis: the face across it counts most. It is
+/// monotone, like every sum of products of extents.
 #[derive(Debug)]
 struct AlongX;
 
@@ -20,11 +21,17 @@ impl Measure for AlongX {
     }
 }
 
+/// Scattered coordinates below 2¹⁶.
+fn coordinate(i: u32, salt: u32) -> f32 {
+    (i.wrapping_mul(2_654_435_761).rotate_left(salt) >> 16) as f32
+}
+
 fn boxes(n: u32) -> Vec<Aabb> {
-    let at = |i: u32, k: u32| (i.wrapping_mul(2_654_435_761).rotate_left(k) >> 16) as f32;
-    let low = |i| [at(i, 3), at(i, 11), at(i, 19)];
     (0..n)
-        .map(|i| Aabb::from((low(i), low(i).map(|c| c + at(i, 25) / 16.0))))
+        .map(|i| {
+            let low = [3, 11, 19].map(|salt| coordinate(i, salt));
+            Aabb::from((low, low.map(|c| c + coordinate(i, 25) / 16.0)))
+        })
         .collect()
 }
 
@@ -62,7 +69,7 @@ fn the_area_as_a_measure_gives_the_same_history_as_the_area() {
 }
 
 #[test]
-fn builders_and_searches_go_by_the_measure_and_report_every_objective_by_it() {
+fn builders_and_searches_use_the_measure_and_report_every_objective_by_it() {
     let boxes = boxes(700);
     let objectives =
         [Objective::GoldsmithSalmon, Objective::Sah(Default::default()), Objective::Layout];
@@ -72,7 +79,7 @@ fn builders_and_searches_go_by_the_measure_and_report_every_objective_by_it() {
         let found = run(&method, &boxes, Some(&AlongX));
         assert_eq!(found.cost, cost::internal_measure(&found.tree, &AlongX), "{name}");
         let before = cost::internal_measure(&by_area.tree, &AlongX);
-        // Boxes are not compared by median cut.
+        // Median cut does not compare boxes.
         let ratio = if name == "median_cut" { 1.0..=1.0 } else { 0.0..=0.99 };
         assert!(ratio.contains(&(found.cost / before)), "{name}: {} {before}", found.cost);
         for objective in objectives {
@@ -120,7 +127,7 @@ fn local_searches_begin_with_a_tree_by_the_measure() {
     }
 }
 
-/// Stops a search as soon as it asks.
+/// Cancels at the first poll.
 struct Stopped;
 
 impl bvh_search::Observer for Stopped {
@@ -153,14 +160,15 @@ fn trees_for_a_sample_of_rays_are_entered_less_often_than_trees_by_area() {
     let bounds = boxes
         .iter()
         .fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
-    let at = |i: u32, k: u32| {
-        (i.wrapping_mul(2_246_822_519).rotate_left(k) >> 8) as f32 / (1 << 24) as f32
-    };
     let size = bounds.max - bounds.min;
     // A camera in one corner: no ray has a uniform direction.
     let segments: Vec<Segment> = (0..20_000)
         .map(|i| {
-            let to = bounds.min + size * glam::Vec3::new(at(i, 1), at(i, 9), at(i, 17));
+            let part = [1, 9, 17].map(|salt| {
+                let hash = u32::wrapping_mul(i, 2_246_822_519).rotate_left(salt);
+                (hash >> 8) as f32 / (1 << 24) as f32
+            });
+            let to = bounds.min + size * glam::Vec3::from(part);
             Segment { from: bounds.min.to_array(), to: to.to_array() }
         })
         .collect();

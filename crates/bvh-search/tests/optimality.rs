@@ -3,20 +3,21 @@
 use bvh_core::{Aabb, validate};
 use bvh_search::{Budget, Method, Problem, exact, lower_bound, solve};
 
-/// Long and flat boxes on a wavy sheet, as a mesh has them.
+/// Long and flat boxes on a wavy sheet, similar to a mesh.
 fn sheet() -> Vec<Aabb> {
-    let at = |i: u16| (f32::from(i % 40), f32::from(i / 40));
-    let wave = |x: f32, y: f32| (x * 0.37).fract() * 2.0 + (y * 0.21).fract();
-    let low = |i| {
-        let (x, y) = at(i);
-        [x + (y * 0.61).fract(), y, wave(x, y)]
-    };
-    let size = |i: u16| {
-        [0.4 + f32::from(i % 7) * 0.3, 0.2 + f32::from(i % 5) * 0.5, f32::from(i % 3) * 0.4]
-    };
-    let high = |i| std::array::from_fn(|axis| low(i)[axis] + size(i)[axis]);
-    (0..1600)
-        .map(|i| Aabb::from((low(i), high(i))))
+    (0..1600u16)
+        .map(|i| {
+            let x = f32::from(i % 40);
+            let y = f32::from(i / 40);
+            let wave = (x * 0.37).fract() * 2.0 + (y * 0.21).fract();
+            let low = [x + (y * 0.61).fract(), y, wave];
+            let size = [
+                0.4 + f32::from(i % 7) * 0.3,
+                0.2 + f32::from(i % 5) * 0.5,
+                f32::from(i % 3) * 0.4,
+            ];
+            Aabb::from((low, std::array::from_fn(|axis| low[axis] + size[axis])))
+        })
         .collect()
 }
 
@@ -58,7 +59,7 @@ fn no_method_goes_below_the_optimum_the_bound_neither_above_and_the_best_reaches
             let outcome = solve(&method, &problem, 1, budget, &()).unwrap();
             let name = format!("instance {number}, {}", method.name());
             validate(&outcome.tree, boxes).expect(&name);
-            // Goldsmith–Salmon trees are not binary: their wider nodes leave terms out.
+            // Goldsmith–Salmon trees are not binary: their wider nodes have fewer terms.
             let binary = outcome.tree.nodes.len() == 2 * boxes.len() - 1;
             assert!(
                 !binary || outcome.cost >= optimum * (1.0 - 1e-12),

@@ -1,4 +1,4 @@
-//! What is left out changes no cost; and what would change one is not left out.
+//! Shortcuts change no cost, and the builders skip no work that would change one.
 
 use bvh_build::{Builder, muller_fellner::Config};
 use bvh_core::{Aabb, cost::internal_area};
@@ -21,7 +21,7 @@ fn scattered(n: usize) -> Vec<Aabb> {
         .collect()
 }
 
-/// All of one box; one inside the next; segments along each axis, in and out of order.
+/// Equal boxes; nested boxes; segments along each axis, in and out of order.
 fn stiff(n: usize) -> Vec<Vec<Aabb>> {
     let nested = |i: usize| cube([-(i as f32); 3], 2.0 * i as f32);
     let mut scenes = vec![vec![cube([0.1; 3], 0.7); n], (1..=n).map(nested).collect()];
@@ -72,7 +72,7 @@ fn a_search_that_meets_the_bound_stops_with_the_cost_of_one_that_goes_on() {
 }
 
 #[test]
-fn a_tiny_scene_gets_the_optimum_in_place_of_a_search() {
+fn a_tiny_scene_gets_the_optimum_instead_of_a_search() {
     for n in 3..=10 {
         let boxes = scattered(n);
         let optimum = best(&boxes, &[]);
@@ -104,20 +104,19 @@ fn no_tree_is_below_the_bound_and_stiff_scenes_meet_it() {
 }
 
 #[test]
-fn a_scene_says_what_it_does_not_need() {
-    let of = |boxes: &[Aabb]| -> Vec<Shortcut> {
-        Facts::of(boxes)
-            .unwrap()
-            .shortcuts()
+fn facts_report_the_shortcuts_of_a_scene() {
+    fn shortcuts(boxes: &[Aabb]) -> Vec<Shortcut> {
+        let found = Facts::of(boxes).unwrap().shortcuts();
+        found
             .into_iter()
             .map(|(shortcut, _)| shortcut)
             .collect()
-    };
-    assert_eq!(of(&scattered(1)), []);
-    assert_eq!(of(&scattered(500)), [Shortcut::BoundMet]);
-    assert_eq!(of(&scattered(12)), [Shortcut::Tiny, Shortcut::BoundMet]);
+    }
+    assert_eq!(shortcuts(&scattered(1)), []);
+    assert_eq!(shortcuts(&scattered(500)), [Shortcut::BoundMet]);
+    assert_eq!(shortcuts(&scattered(12)), [Shortcut::Tiny, Shortcut::BoundMet]);
     let line = &stiff(50)[3];
-    assert_eq!(of(line), [Shortcut::Flat, Shortcut::BoundMet]);
+    assert_eq!(shortcuts(line), [Shortcut::Flat, Shortcut::BoundMet]);
     let repeated: Vec<Aabb> = scattered(5)
         .into_iter()
         .flat_map(|b| [b; 10])
@@ -128,24 +127,28 @@ fn a_scene_says_what_it_does_not_need() {
 /// A flat axis orders the objects by index, and that may be the best order of all.
 #[test]
 fn a_flat_axis_that_orders_like_no_other_may_have_the_best_split() {
-    // Two crossing rows of flat tiles, one after the other, and the same tiles in turns.
-    let tile = |x: f32, y: f32| Aabb::from(([x, y, 0.0], [x + 1.0, y + 1.0, 0.0]));
-    let at = |i: usize| 2.0 * i as f32;
-    let (row, column): (Vec<_>, Vec<_>) = (0..9)
-        .map(|i| (tile(at(i), 8.0), tile(8.0, at(i))))
+    // Two crossing rows of flat tiles, one after the other, and the same tiles interleaved.
+    fn tile(x: f32, y: f32) -> Aabb {
+        Aabb::from(([x, y, 0.0], [x + 1.0, y + 1.0, 0.0]))
+    }
+    fn cost(boxes: &[Aabb]) -> f64 {
+        internal_area(&Config::default().build(boxes).unwrap())
+    }
+    let positions = (0..9u8).map(|i| 2.0 * f32::from(i));
+    let (row, column): (Vec<_>, Vec<_>) = positions
+        .map(|position| (tile(position, 8.0), tile(8.0, position)))
         .unzip();
-    let cost = |boxes: &[Aabb]| internal_area(&Config::default().build(boxes).unwrap());
     let one_by_one: Vec<Aabb> = row.iter().chain(&column).copied().collect();
-    let in_turns: Vec<Aabb> = row
+    let interleaved: Vec<Aabb> = row
         .iter()
         .zip(&column)
         .flat_map(|(a, b)| [*a, *b])
         .collect();
-    assert!(cost(&one_by_one) < cost(&in_turns));
+    assert!(cost(&one_by_one) < cost(&interleaved));
 }
 
-/// Between equal boxes the value of a split is linear in the number on the left, so that none is better than those at
-/// the ends of the run; but one may be as good, and more balanced.
+/// Between equal boxes, the value of a split is linear in the number on the left, so none is better
+/// than the splits at the ends of the run. One may be equally good and more balanced.
 #[test]
 fn a_tie_may_part_equal_boxes_so_that_merging_them_would_change_the_cost() {
     let large = cube([0.0; 3], 4.0);

@@ -1,29 +1,30 @@
 //! The cost of the wide layout of a tree that changes.
 //!
-//! Moves are proposed by the areas of boxes, as always, and judged by the [cost of the layout](bvh_core::cost::LayoutCost): of the
-//! nodes that a move has written and of their ancestors, the rows of costs are made again from the lowest up, about a hundred per
-//! move.
+//! Areas of boxes propose the moves, as always, and the
+//! [cost of the layout](bvh_core::cost::LayoutCost) accepts or rejects them. A move recomputes the
+//! rows of costs of the nodes that it has written and of their ancestors, from the lowest up: about
+//! a hundred per move.
 
 use crate::tree::{ANCHOR, Metric, NONE, Working};
 use bvh_core::cost::LayoutCost;
 
-/// A row of costs for every node of a tree, and what is needed to undo a change.
+/// A row of costs for every node of a tree, and the rows that undo a change.
 #[derive(Debug, Default)]
 pub(crate) struct Layout {
     rows: Vec<LayoutCost>,
-    /// The rows that the present change has replaced.
+    /// The rows that the current change has replaced.
     replaced: Vec<(u32, LayoutCost)>,
-    /// Per node, the number of the change during which it was found to need a new row.
+    /// Per node, the number of the last change that gave it a new row.
     marks: Vec<u32>,
     change: u32,
     stack: Vec<(u32, bool)>,
     cost: f64,
-    /// Rows made so far.
+    /// The number of rows computed so far.
     pub visits: u64,
 }
 
 impl Layout {
-    /// Makes all rows, unless those of the tree are there.
+    /// Computes all rows, unless they exist.
     #[inline(always)]
     pub fn prepare(&mut self, tree: &Working<impl Metric>) {
         if self.rows.len() != tree.nodes.len() {
@@ -31,7 +32,7 @@ impl Layout {
         }
     }
 
-    /// Makes all rows. O(nodes).
+    /// Computes all rows. O(nodes).
     #[inline(never)]
     pub fn fill(&mut self, tree: &Working<impl Metric>) {
         self.rows.clear();
@@ -40,15 +41,15 @@ impl Layout {
         self.marks.clear();
         self.marks.resize(tree.nodes.len(), 0);
         self.change = 0;
-        for &at in tree.preorder().iter().rev() {
-            self.rows[at as usize] = self.row(tree, at);
+        for &index in tree.preorder().iter().rev() {
+            self.rows[index as usize] = self.row(tree, index);
         }
         self.cost = self.root(tree);
     }
 
     #[inline(always)]
-    fn row(&self, tree: &Working<impl Metric>, at: u32) -> LayoutCost {
-        let node = &tree.nodes[at as usize];
+    fn row(&self, tree: &Working<impl Metric>, index: u32) -> LayoutCost {
+        let node = &tree.nodes[index as usize];
         if node.is_leaf() {
             return LayoutCost::leaf(node.area, 1);
         }
@@ -63,44 +64,44 @@ impl Layout {
             .map_or(0.0, |root| self.rows[root as usize].value())
     }
 
-    /// The cost of the tree as it is now.
+    /// The cost of the tree after the last accepted change.
     pub fn current(&self) -> f64 {
         self.cost
     }
 
-    /// The cost of the tree's layout. O(nodes).
+    /// Computes the cost of the tree's layout. O(nodes).
     pub fn cost(&mut self, tree: &Working<impl Metric>) -> f64 {
         self.fill(tree);
         self.cost
     }
 
-    /// Whether the tree's present change makes the layout dearer by less than `most`. If it does not, the rows are as before the
-    /// change, and the caller undoes it.
+    /// Returns whether the tree's current change makes the layout more expensive by less than
+    /// `most`. Otherwise restores the rows, and the caller must undo the change.
     #[inline(always)]
     pub fn accepts(&mut self, tree: &Working<impl Metric>, most: f64) -> bool {
         if self.rows.len() < tree.nodes.len() {
-            // Leaves that were added since.
+            // The tree has gained leaves since the last call.
             self.rows
                 .resize(tree.nodes.len(), LayoutCost::leaf(0.0, 0));
             self.marks.resize(tree.nodes.len(), 0);
         }
         self.replaced.clear();
         self.change += 1;
-        for at in tree.changed() {
-            let mut at = at;
-            // A node that the change has taken out for good has no parent, or one that has none.
-            while at != ANCHOR && at != NONE && self.marks[at as usize] != self.change {
-                self.marks[at as usize] = self.change;
-                at = tree.nodes[at as usize].parent;
+        for written in tree.changed() {
+            let mut index = written;
+            // A node that the change has removed has no parent, or a parent without one.
+            while index != ANCHOR && index != NONE && self.marks[index as usize] != self.change {
+                self.marks[index as usize] = self.change;
+                index = tree.nodes[index as usize].parent;
             }
         }
         self.stack.clear();
         self.stack
             .extend(tree.root().map(|root| (root, false)));
-        while let Some((at, children_done)) = self.stack.pop() {
-            let node = &tree.nodes[at as usize];
+        while let Some((index, children_done)) = self.stack.pop() {
+            let node = &tree.nodes[index as usize];
             if !children_done && !node.is_leaf() {
-                self.stack.push((at, true));
+                self.stack.push((index, true));
                 let marked = node
                     .children
                     .into_iter()
@@ -110,17 +111,18 @@ impl Layout {
                 continue;
             }
             self.visits += 1;
-            let row = self.row(tree, at);
-            self.replaced.push((at, self.rows[at as usize]));
-            self.rows[at as usize] = row;
+            let row = self.row(tree, index);
+            self.replaced
+                .push((index, self.rows[index as usize]));
+            self.rows[index as usize] = row;
         }
         let cost = self.root(tree);
         if cost - self.cost < most {
             self.cost = cost;
             return true;
         }
-        for &(at, row) in &self.replaced {
-            self.rows[at as usize] = row;
+        for &(index, row) in &self.replaced {
+            self.rows[index as usize] = row;
         }
         false
     }

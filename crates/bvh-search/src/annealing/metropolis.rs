@@ -8,7 +8,8 @@ use bvh_core::with_vector_instructions;
 
 /// Makes moves of one kind.
 pub(crate) trait Mover {
-    /// Changes the tree, and undoes the change unless Metropolis accepts it. Returns whether it was accepted.
+    /// Changes the tree, and undoes the change unless Metropolis accepts it. Returns whether it was
+    /// accepted.
     fn step(&mut self, tree: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream)
     -> bool;
     /// Nodes visited by all moves so far.
@@ -17,11 +18,13 @@ pub(crate) trait Mover {
     fn sampler(&mut self) -> &mut NodeSampler;
 }
 
-/// Work of a move after which the observer is polled at once: all moves between two polls take less than a millisecond.
+/// Work of a move after which the observer is polled at once, so that less than a millisecond
+/// passes between two polls.
 const LONG_MOVE: u64 = 1 << 11;
 
 with_vector_instructions! {
-    /// Moves until the quota is used up, while the temperature falls geometrically from `hot` to `cold`.
+    /// Makes moves until the quota is used up, while the temperature falls geometrically from `hot`
+    /// to `cold`.
     pub(crate) cool = cool_plain<M: Mover>(
         mover: &mut M, tree: &mut Working<impl Metric>, heat: [f64; 2], quota: Quota, rng: &mut Stream, observer: &dyn Observer)
         -> Tally
@@ -50,6 +53,8 @@ fn cool_plain<M: Mover>(
             if observer.cancelled() {
                 return tally;
             }
+            // `libm` returns the same bits on every platform; the standard library's `powf` does
+            // not.
             temperature = hot * libm::pow(cold / hot, tally.work as f64 / quota.work as f64);
         } else if long_move && observer.cancelled() {
             return tally;

@@ -1,8 +1,9 @@
 //! Simulated annealing of trees: one schedule for every kind of move.
 //!
-//! From the ground up: a `Mover` makes one Metropolis move (`metropolis`), which begins at a node drawn by `node_sampler`;
-//! `subtrees` cuts the tree, so that several threads can move at once; `schedule` lowers the temperature. There are two
-//! kinds of moves, each a method of its own: single reinsertions, here, and [`ruin_recreate`].
+//! A `Mover` makes one Metropolis move (`metropolis`), which begins at a node drawn by
+//! `node_sampler`. `subtrees` cuts the tree, so that several threads can move at once, and
+//! `schedule` lowers the temperature. There are two kinds of moves, each a separate method: single
+//! reinsertions, here, and [`ruin_recreate`].
 
 pub(crate) mod layout;
 mod metropolis;

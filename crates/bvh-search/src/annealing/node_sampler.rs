@@ -1,4 +1,4 @@
-//! Where moves begin: most often below large nodes, where there is most to gain.
+//! The nodes at which moves begin: most often below large nodes, where the most area can be saved.
 
 use crate::run::Stream;
 use crate::tree::{ANCHOR, Metric, Working};
@@ -6,25 +6,26 @@ use crate::tuning::{LEAST_WINDOWS, MOVES_PER_WINDOW, SHORT_RUN, WINDOW, WINDOW_O
 use rand::RngExt;
 use std::ops::Range;
 
-/// Draws nodes of a tree in preorder, each in proportion to the square root of its parent's area at the first draw.
-/// Weighting by the node's own area would never draw degenerate boxes; equal weights would waste moves on tiny nodes.
+/// Draws nodes of a tree in preorder, each in proportion to the square root of its parent's area at
+/// the first draw. Weights by the area of the node itself would never draw degenerate boxes; equal
+/// weights would waste moves on tiny nodes.
 ///
-/// In large trees, consecutive draws come from one *window* of the nodes, which are neighbours in the tree, so that moves
-/// find their nodes in a cache. The golden section of the whole leads from one window to the next: it comes everywhere
-/// about equally often, however few windows there are.
+/// In large trees, consecutive draws come from one *window*, nodes that are neighbours in the tree,
+/// so that moves find their nodes in a cache. The next window is the golden section of all nodes
+/// further, which visits every part of the tree about equally often, even with few windows.
 #[derive(Debug, Default)]
 pub(crate) struct NodeSampler {
     /// The only nodes that are drawn; all nodes if empty.
     only: Vec<u32>,
     /// Prefix sums of the weights, by position, the total last.
     sums: Vec<f64>,
-    /// The present window, by position.
+    /// The current window, by position.
     window: Range<usize>,
-    /// The fraction of the total weight at which the window's middle was drawn, 0 to 1.
+    /// The fraction of the total weight at the window's middle, 0 to 1.
     middle: f64,
-    /// Whether the run is so short that small windows would not cover the tree.
+    /// True if the run is so short that small windows would not cover the tree.
     short_run: bool,
-    /// Draws left in this window.
+    /// Remaining draws in this window.
     draws: u32,
 }
 
@@ -32,12 +33,12 @@ pub(crate) struct NodeSampler {
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 impl NodeSampler {
-    /// For a run of this much work per object.
+    /// Builds a sampler for a run of this much work per object.
     pub fn for_work(per_object: f64) -> Self {
         Self { short_run: per_object < SHORT_RUN, ..Self::default() }
     }
 
-    /// Draws only these nodes, unless there are none.
+    /// Builds a sampler that draws only these nodes, or all nodes if `only` is empty.
     pub fn among(only: Vec<u32>) -> Self {
         Self { only, ..Self::default() }
     }
@@ -52,7 +53,7 @@ impl NodeSampler {
         self.node(self.position(self.window.clone(), rng.random()))
     }
 
-    /// The node at this position.
+    /// Returns the node at this position.
     #[inline(always)]
     fn node(&self, position: usize) -> u32 {
         self.only
@@ -60,10 +61,10 @@ impl NodeSampler {
             .map_or(position as u32 + 1, |&node| node)
     }
 
-    /// The position in the window at which the fraction `drawn` of its weight is reached.
+    /// Returns the position in the window at which the fraction `drawn` of its weight is reached.
     #[inline(always)]
     fn position(&self, window: Range<usize>, drawn: f64) -> usize {
-        let [low, high] = [window.start, window.end].map(|at| self.sums[at]);
+        let [low, high] = [window.start, window.end].map(|index| self.sums[index]);
         let drawn = low + drawn * (high - low);
         let before = self.sums[window.start + 1..window.end].partition_point(|&sum| sum <= drawn);
         window.start + before
@@ -100,12 +101,12 @@ impl NodeSampler {
     }
 }
 
-/// The weight of a node: the square root of its parent's area, or of the root's own. The tiny summand makes all nodes equally
-/// likely where none has an area.
+/// Returns the weight of a node: the square root of its parent's area, or of its own area for the
+/// root. The tiny summand makes all nodes equally likely if none has an area.
 #[inline(always)]
-pub(crate) fn weight(tree: &Working<impl Metric>, at: u32) -> f64 {
-    let parent = tree.nodes[at as usize].parent;
-    tree.nodes[if parent == ANCHOR { at } else { parent } as usize]
+pub(crate) fn weight(tree: &Working<impl Metric>, index: u32) -> f64 {
+    let parent = tree.nodes[index as usize].parent;
+    tree.nodes[if parent == ANCHOR { index } else { parent } as usize]
         .area
         .sqrt()
         + f64::MIN_POSITIVE
@@ -132,9 +133,9 @@ mod tests {
         let tree = built(&muller_fellner::Config::default(), &scatter(50));
         for only in [vec![], vec![7, 3, 60, 12]] {
             let nodes: Vec<u32> = if only.is_empty() { (1..100).collect() } else { only.clone() };
-            let weight = |&at: &u32| {
-                let parent = tree.nodes[at as usize].parent;
-                tree.nodes[if parent == ANCHOR { at } else { parent } as usize]
+            let weight = |&index: &u32| {
+                let parent = tree.nodes[index as usize].parent;
+                tree.nodes[if parent == ANCHOR { index } else { parent } as usize]
                     .area
                     .sqrt()
             };
@@ -145,16 +146,16 @@ mod tests {
                 counts.iter().sum::<u32>(),
                 nodes
                     .iter()
-                    .map(|&at| counts[at as usize])
+                    .map(|&index| counts[index as usize])
                     .sum::<u32>()
             );
-            for at in nodes {
-                let expected = f64::from(times) * weight(&at) / total;
-                let off = (f64::from(counts[at as usize]) - expected).abs();
+            for index in nodes {
+                let expected = f64::from(times) * weight(&index) / total;
+                let off = (f64::from(counts[index as usize]) - expected).abs();
                 assert!(
                     off < 5.0 * expected.sqrt(),
-                    "node {at}: {} of {expected}",
-                    counts[at as usize]
+                    "node {index}: {} of {expected}",
+                    counts[index as usize]
                 );
             }
         }

@@ -1,4 +1,5 @@
-//! Moves that change which references there are: an object is divided between two leaves, or two leaves of it are reunited.
+//! Moves that change the references: they divide an object between two leaves, or reunite two
+//! leaves of an object.
 //!
 //! ```text
 //!     P ⊇ L ∪ T                        P' ⊇ L ∪ T₁      Q' ⊇ R ∪ T₂
@@ -6,11 +7,12 @@
 //!     └── T       out of L             └── T₁           └── T₂
 //! ```
 //!
-//! A leaf that makes its ancestors large is cut where one of them would end without it; each part then gets the best position.
-//! A move is kept if the tree's cost, leaves included, falls by more than the price of a reference. Reuniting is the same
-//! backwards. So a split that does not pay its price is undone, whoever made it.
+//! A leaf that enlarges its ancestors is cut where one of them would end without the leaf; each
+//! part then gets the best position. A move is kept if the tree's cost, leaves included, falls by
+//! more than the price of a reference. Reuniting reverses a division, so a split that does not pay
+//! its price is undone, whichever method made it.
 //!
-//! Spatial splits: Stich, Friedrich & Dietrich 2009. Search over them is ours.
+//! Spatial splits: Stich, Friedrich & Dietrich 2009. The search over them is new.
 
 use super::layout::Layout;
 use crate::run::{Observer, Quota, Splits, Stream, Tally, WORK_PER_POLL};
@@ -26,7 +28,8 @@ pub(crate) struct Divider<'a> {
     search: PositionSearch,
     /// The layout whose cost judges the moves, unless the tree's area does.
     layout: Option<Layout>,
-    /// Per leaf, another one of the same object: the leaves of an object form a ring.
+    /// Per leaf, the next leaf of the same object; the leaves of an object form a ring. `NONE` for
+    /// leaves out of the tree.
     ring: Vec<u32>,
     /// Leaves out of the tree, each with its spare parent.
     spares: Vec<u32>,
@@ -44,8 +47,8 @@ impl<'a> Divider<'a> {
         Self { splits, search, layout, ring, spares, count: 0, planes, visits: 0 }
     }
 
-    /// Tries to reunite the leaves of every object, and to divide leaves until `quota` is used up. The tree is in preorder before
-    /// and after.
+    /// Tries to reunite the leaves of every object, then to divide leaves until `quota` is used up.
+    /// The tree is in preorder before and after.
     pub fn pass<A: Metric>(
         &mut self,
         tree: &mut Working<A>,
@@ -72,7 +75,7 @@ impl<'a> Divider<'a> {
                 .map_or(0, |layout| layout.visits)
     }
 
-    /// Ties the leaves of every object to a ring. O(nodes).
+    /// Links the leaves of every object into a ring. O(nodes).
     fn tie(&mut self, tree: &Working<impl Metric>) {
         self.ring.clear();
         self.ring.resize(tree.nodes.len(), NONE);
@@ -89,14 +92,14 @@ impl<'a> Divider<'a> {
             .max()
             .unwrap_or(0);
         let mut last = vec![NONE; objects];
-        for (at, node) in leaves() {
+        for (index, node) in leaves() {
             let last = &mut last[node.children[1] as usize];
-            self.ring[at as usize] = at;
+            self.ring[index as usize] = index;
             if *last != NONE {
-                self.ring[at as usize] = self.ring[*last as usize];
-                self.ring[*last as usize] = at;
+                self.ring[index as usize] = self.ring[*last as usize];
+                self.ring[*last as usize] = index;
             }
-            *last = at;
+            *last = index;
         }
     }
 
@@ -141,7 +144,7 @@ impl<'a> Divider<'a> {
             tree.undo();
             return false;
         };
-        self.visits += tree.attach(leaf, position.beside).1;
+        self.visits += tree.attach(leaf, position.sibling).1;
         if !self.accepts(tree, price) {
             return false;
         }
@@ -155,7 +158,7 @@ impl<'a> Divider<'a> {
         true
     }
 
-    /// Divides `leaf` at a random plane of those that suggest themselves, if that costs less.
+    /// Divides `leaf` at a random candidate plane, if that costs less.
     #[inline(always)]
     fn divide(&mut self, tree: &mut Working<impl Metric>, leaf: u32, rng: &mut Stream) -> bool {
         let Node { aabb, area, children: [_, object], parent, .. } = tree.nodes[leaf as usize];
@@ -166,9 +169,9 @@ impl<'a> Divider<'a> {
         if self.planes.is_empty() {
             return false;
         }
-        let (axis, at) = self.planes[rng.random_range(0..self.planes.len())];
+        let (axis, plane) = self.planes[rng.random_range(0..self.planes.len())];
         let parts = Aabb::from(&aabb)
-            .halves(axis, at)
+            .halves(axis, plane)
             .map(|region| self.splits.objects.clip(object, &region));
         if parts.contains(&Aabb::EMPTY) {
             return false;
@@ -197,7 +200,8 @@ impl<'a> Divider<'a> {
             let part = parts[side];
             let area = areas[side];
             tree.resize_leaf(leaf, object, part, area);
-            // The other part costs its own area at least.
+            // The other part will cost at least its area, which tightens the limit of the first
+            // search.
             let rest = if side == 0 { areas[1] } else { 0.0 };
             let Some(position) =
                 self.search
@@ -206,7 +210,7 @@ impl<'a> Divider<'a> {
                 tree.undo();
                 return false;
             };
-            self.visits += tree.attach(leaf, position.beside).1;
+            self.visits += tree.attach(leaf, position.sibling).1;
             limit -= position.cost;
         }
         if !self.accepts(tree, -price) {
@@ -219,8 +223,9 @@ impl<'a> Divider<'a> {
         true
     }
 
-    /// What a division has to save, and what a reunion may cost: leave is limited, and the rays that are traced are not quite those
-    /// that the cost is for, so that a division which saves next to nothing is no gain.
+    /// Returns the saving that a division needs, and the cost that a reunion may have. The number
+    /// of references is limited, and the cost only approximates the rays that are traced, so a
+    /// division that saves almost nothing is no gain.
     #[inline(always)]
     fn price(&self, tree: &Working<impl Metric>) -> f64 {
         let cost = self
@@ -230,13 +235,15 @@ impl<'a> Divider<'a> {
         PRICE_OF_A_REFERENCE * cost / self.count as f64
     }
 
-    /// The most that the new positions may cost, if the old ones saved so much: without a layout, no more.
+    /// Returns the maximum cost of the new positions, if the removal saved `saved`. With a layout,
+    /// the area may rise, because the layout decides.
     #[inline(always)]
     fn limit(&self, saved: f64) -> f64 {
         if self.layout.is_some() { DIVISION_DEARER_BY_AREA * saved } else { saved }
     }
 
-    /// Whether the layout, if there is one, gets dearer by less than `most`; undoes the change if it does not.
+    /// Returns whether the layout, if there is one, becomes more expensive by less than `most`.
+    /// Otherwise undoes the change.
     #[inline(always)]
     fn accepts(&mut self, tree: &mut Working<impl Metric>, most: f64) -> bool {
         let accepted = self
@@ -249,20 +256,21 @@ impl<'a> Divider<'a> {
         accepted
     }
 
-    /// Finds the planes at which to cut a leaf: those where an ancestor would end without it, and the middle of its longest side.
+    /// Finds the planes at which to cut a leaf: the planes where an ancestor would end without the
+    /// leaf, and the middle of the leaf's longest side.
     #[inline(always)]
     fn find_planes(&mut self, tree: &Working<impl Metric>, leaf: u32) {
         let item = tree.nodes[leaf as usize].aabb;
         let [negated_low, high] = item.planes();
         self.planes.clear();
         let mut below = leaf;
-        let mut at = tree.nodes[leaf as usize].parent;
+        let mut index = tree.nodes[leaf as usize].parent;
         let mut rest = PackedAabb::EMPTY;
         for _ in 0..LEVELS_OF_PLANES {
-            if at == ANCHOR || rest.union(&item) == rest {
+            if index == ANCHOR || rest.union(&item) == rest {
                 break;
             }
-            rest.grow(&tree.nodes[tree.nodes[at as usize].other(below) as usize].aabb);
+            rest.grow(&tree.nodes[tree.nodes[index as usize].other(below) as usize].aabb);
             let [negated_rest_low, rest_high] = rest.planes();
             for axis in 0..3 {
                 for plane in [-negated_rest_low[axis], rest_high[axis]] {
@@ -272,7 +280,7 @@ impl<'a> Divider<'a> {
                 }
             }
             self.visits += 1;
-            (below, at) = (at, tree.nodes[at as usize].parent);
+            (below, index) = (index, tree.nodes[index as usize].parent);
         }
         let aabb = Aabb::from(&item);
         let axis = aabb.longest_axis();
@@ -283,7 +291,7 @@ impl<'a> Divider<'a> {
     }
 }
 
-/// What leaves of this size cost.
+/// Returns the cost of leaves of this size.
 fn leaf_cost<A: Metric>(_: &Working<A>, area: f64) -> f64 {
     A::LEAF * area
 }
@@ -317,10 +325,11 @@ fn change_plain<A: Metric>(
     let mut sums = Vec::with_capacity(tree.nodes.len());
     let mut sum = 0.0;
     let leaves: Vec<u32> = (1..tree.nodes.len() as u32)
-        .filter(|&at| tree.nodes[at as usize].is_leaf())
+        .filter(|&index| tree.nodes[index as usize].is_leaf())
         .collect();
     for &leaf in &leaves {
-        // Of two leaves, the one that comes later in the ring is the one that goes.
+        // The leaf with the higher index leaves the tree, so every pair is tried from one side
+        // only.
         loop {
             let other = divider.ring[leaf as usize];
             if other == NONE || other <= leaf || is_over(divider, &mut done) {
@@ -364,13 +373,15 @@ mod tests {
     use bvh_core::cost::{layout_area, total_area};
     use bvh_core::{Triangle, validate_references};
 
-    /// Long diagonal triangles, of which boxes say little.
+    /// Long diagonal triangles, which boxes describe badly.
     fn diagonals(n: u32) -> Vec<Triangle> {
-        let diagonal = |aabb: &Aabb| {
-            let far = aabb.min + (aabb.max - aabb.min) * 40.0;
-            Triangle([aabb.min, far, aabb.max])
-        };
-        scatter(n).iter().map(diagonal).collect()
+        scatter(n)
+            .iter()
+            .map(|aabb| {
+                let far = aabb.min + (aabb.max - aabb.min) * 40.0;
+                Triangle([aabb.min, far, aabb.max])
+            })
+            .collect()
     }
 
     #[test]
@@ -388,7 +399,8 @@ mod tests {
             let mut before = cost(&start);
             let mut tree = Working::from_bvh(&start, total_area(&start), WithLeaves(Area)).unwrap();
             let mut most_seen = 0;
-            // With less leave than there are references, nothing is divided, and leaves that pay little are still reunited.
+            // With fewer allowed references than the tree has, nothing is divided, and leaves that
+            // pay little are still reunited.
             for most in [180, 200, 160, 150] {
                 let mut divider = Divider::new(Splits { objects, most, division: None }, by_layout);
                 let mut references = tree.objects();
@@ -404,7 +416,8 @@ mod tests {
                     );
                     assert!((tree.area() - total_area(&flat)).abs() <= 1e-9 * tree.area());
                     let after = cost(&flat);
-                    // Every reference that was added has saved its price, and none that went cost more.
+                    // Every added reference has saved its price, and no removed reference cost
+                    // more.
                     let gone = references as f64 - flat.prim_ids.len() as f64;
                     let price = PRICE_OF_A_REFERENCE * before;
                     let least_leave = if gone > 0.0 { gone / 150.0 } else { gone / 200.0 };

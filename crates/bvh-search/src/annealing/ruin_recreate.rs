@@ -1,8 +1,9 @@
-//! Annealed ruin and recreate: take several related subtrees out, put each back where it costs least, and accept the
-//! result as simulated annealing does.
+//! Annealed ruin and recreate: a move removes several related subtrees and inserts each where it
+//! costs least. Simulated annealing accepts or rejects the result.
 //!
-//! Schrimpf et al. 2000 (ruin and recreate); Kirkpatrick, Gelatt & Vecchi 1983; Shaw 1998 (related removal).
-//! Temperatures are relative to an area of the move, so that one schedule suits nodes of all sizes.
+//! Schrimpf et al. 2000 (ruin and recreate); Kirkpatrick, Gelatt & Vecchi 1983; Shaw 1998 (related
+//! removal). Temperatures are relative to an area of the move, so one schedule suits nodes of all
+//! sizes.
 
 use super::layout::Layout;
 use super::metropolis::Mover;
@@ -18,12 +19,12 @@ use rand::RngExt;
 use rand::seq::SliceRandom;
 
 bvh_config::config! {
-    /// What to ruin, how to cool, and for how long.
+    /// The move, the temperatures and the amount of work.
     pub struct Config {
         /// The move.
         ruin: Ruin, in Itself;
-        /// First temperature, relative to the move's `scale`. The default suits 8000 nodes of work per object or more; less
-        /// work needs a lower one, in proportion.
+        /// First temperature, relative to the move's `scale`. The default suits 8000 nodes of work
+        /// per object or more. Less work needs a proportionally lower temperature.
         hot: f64 = 0.1, in above(0.0);
         /// Last temperature, not above `hot`.
         cold: f64 = 0.003, in above(0.0);
@@ -36,25 +37,26 @@ bvh_config::config! {
 }
 
 bvh_config::config! {
-    /// A move. Some levels up from a random node, more often one below a large node, is the *top* of the ruined part. Either
-    /// several random descents from there each end at a subtree that is taken out; or everything in a layer at one side of
-    /// the top's box is, without which that box cannot shrink. Then every subtree gets the best position.
+    /// A move. The *top* of the ruined part is some levels above a random node, more often a node
+    /// below a large one. The move removes either the ends of several random descents from the top,
+    /// or everything in a layer at one side of the top's box, without which that box cannot shrink.
+    /// Then every removed subtree gets the best position.
     pub struct Ruin {
         /// Maximum number of levels from the random node up to the top.
         climb: u32 = 8, in 1..=u32::MAX - 1;
-        /// Maximum number of subtrees taken out by random descents.
+        /// Maximum number of subtrees that random descents remove.
         removed: u32 = 14, in 1..=1000;
-        /// Fraction of the moves that take out a layer.
+        /// Fraction of the moves that remove a layer.
         slabs: f64 = 0.2, in 0.0..=1.0;
         /// Maximum thickness of the layer, as a fraction of the box.
         thickness: f64 = 0.6, in 0.0..=1.0;
-        /// Maximum number of subtrees in a layer: with more there is no move.
+        /// Maximum number of subtrees in a layer. A layer with more is not removed.
         most: u32 = 24, in 1..=1000;
-        /// Fraction of the moves that look for positions nearby only: in the smallest subtree above the top whose box
-        /// contains the top's former box. Better positions are seldom further up, and a quarter more moves fit into the same
-        /// work.
+        /// Fraction of the moves that search positions nearby only, in the smallest subtree above
+        /// the top whose box contains the top's former box. Better positions are seldom further up,
+        /// and a quarter more moves fit into the same work.
         near: f64 = 0.6, in 0.0..=1.0;
-        /// What temperatures are relative to.
+        /// The area that temperatures are relative to.
         scale: Scale = Scale::Saved;
     }
 }
@@ -107,7 +109,7 @@ pub(crate) struct RuinMover<'a> {
     work: u64,
 }
 
-/// The subtrees that a move has taken out.
+/// The subtrees that a move has removed.
 #[derive(Debug, Default)]
 struct Removed {
     /// Roots of the subtrees, each with its former sibling.
@@ -124,7 +126,7 @@ impl Removed {
         (self.saved, self.least) = (0.0, 0.0);
     }
 
-    /// Takes a subtree out. Returns the number of nodes visited.
+    /// Removes a subtree. Returns the number of nodes visited.
     #[inline(always)]
     fn take(&mut self, tree: &mut Working<impl Metric>, node: u32) -> u64 {
         let (saved, sibling, visits) = tree.detach(node);
@@ -136,7 +138,8 @@ impl Removed {
 }
 
 impl<'a> RuinMover<'a> {
-    /// For an annealing run of this much work per object, judged by the cost of the wide layout or by the tree's area.
+    /// Builds a mover for an annealing run of `length` work per object, judged by the cost of the
+    /// wide layout or by the tree's area.
     pub fn new(ruin: &'a Ruin, length: f64, by_layout: bool) -> Self {
         let (search, side, removed) = Default::default();
         let layout = by_layout.then(Layout::default);
@@ -151,8 +154,8 @@ impl<'a> RuinMover<'a> {
         }
     }
 
-    /// Takes scattered subtrees out of the scope, up to one level further down than the move has climbed. The scope keeps
-    /// a root.
+    /// Removes scattered subtrees from the scope, up to one level further down than the move has
+    /// climbed. The scope keeps a root.
     #[inline(always)]
     fn scattered(
         &mut self,
@@ -176,7 +179,7 @@ impl<'a> RuinMover<'a> {
         }
     }
 
-    /// Takes a layer at one side of the scope's box out, but leaves the scope a root.
+    /// Removes a layer at one side of the scope's box. The scope keeps a root.
     #[inline(always)]
     fn layer(&mut self, tree: &mut Working<impl Metric>, scope: Scope, rng: &mut Stream) {
         let Ruin { thickness, most, .. } = *self.ruin;
@@ -243,14 +246,16 @@ impl Mover for RuinMover<'_> {
         let positions = if near { scope.around(tree, &top_box) } else { Scope::ALL };
         let Removed { roots, saved, least } = &mut self.removed;
         roots.shuffle(rng);
-        // Metropolis draws its random number first: a move that leads above the resulting limit need not be finished.
+        // Metropolis draws its random number first, so that a move above the resulting limit need
+        // not be finished.
         let chance = 1.0 - rng.random::<f64>();
         let scale = match ruin.scale {
             Scale::Saved => *saved,
             Scale::Top => top_area,
         };
         let worse = -temperature * scale * libm::log(chance);
-        // What costs more area may make a better layout.
+        // A tree of larger area may have a cheaper layout, so the area only rejects moves that are
+        // far above the limit.
         let mut limit =
             *saved + if self.layout.is_some() { DEARER_BY_AREA * worse } else { worse } - *least;
         for &(node, first) in &*roots {
@@ -265,7 +270,7 @@ impl Mover for RuinMover<'_> {
                 tree.undo();
                 return false;
             };
-            self.work += tree.attach(node, position.beside).1;
+            self.work += tree.attach(node, position.sibling).1;
             limit -= position.cost;
         }
         let most = LAYOUT_HEAT * worse;

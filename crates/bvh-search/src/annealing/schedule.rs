@@ -1,7 +1,8 @@
-//! Simulated annealing of a tree by any kind of move: rounds, temperatures, and the final local search.
+//! Simulated annealing of a tree by any kind of move: rounds, temperatures, and the final local
+//! search.
 //!
-//! Kirkpatrick, Gelatt & Vecchi 1983. The temperature falls geometrically with the fraction of the work, or of the time,
-//! that is done:
+//! Kirkpatrick, Gelatt & Vecchi 1983. The temperature falls geometrically with the completed
+//! fraction of the work or of the time:
 //!
 //! ```text
 //!   hot ┐
@@ -21,7 +22,7 @@ use crate::tuning::{FINAL_PASSES_PART, FINAL_PASSES_WORK, LAST_ROUND, ROUNDS, WO
 use bvh_config::OutOfRange;
 use bvh_core::Bvh;
 
-/// The temperatures of one annealing run, and how long it lasts.
+/// The temperatures and the length of one annealing run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Schedule {
     /// First temperature.
@@ -30,12 +31,13 @@ pub(crate) struct Schedule {
     pub cold: f64,
     /// The work over which the temperature falls, and the maximum number of moves.
     pub quota: Quota,
-    /// The observer's progress at which the run has to be done, if the observer reports any; greater than the progress at
-    /// the beginning.
+    /// The observer's progress at which the run must end, if the observer reports its progress;
+    /// greater than the progress at the start.
     pub end: f64,
     /// Number of subtrees that are annealed at once, at least 1.
     pub subtrees: u32,
-    /// Whether passes of reinsertion follow: they lower the area, which is not always the goal.
+    /// True if passes of reinsertion follow. They lower the area, which is not always the
+    /// objective.
     pub to_local_optimum: bool,
 }
 
@@ -48,7 +50,8 @@ pub(crate) struct AnnealingRun<'a> {
 }
 
 impl AnnealingRun<'_> {
-    /// Anneals the initial tree by moves of one kind, until the work of the run or the budget is done.
+    /// Anneals the initial tree by moves of one kind, until the work of the run or the budget is
+    /// used up.
     pub fn search<M: Mover>(
         &self,
         mover: impl Fn() -> M + Sync,
@@ -73,17 +76,18 @@ impl AnnealingRun<'_> {
     }
 }
 
-/// Refuses a last temperature above the first.
+/// Rejects a last temperature above the first.
 pub(crate) fn check_fall(hot: f64, cold: f64) -> Option<OutOfRange> {
     let rises = hot > 0.0 && cold > hot;
     rises.then(|| OutOfRange::new("cold", cold, "above 0, not above hot"))
 }
 
-/// Anneals `tree`, then improves it to a local optimum of reinsertion. After every round, `round` is shown the tree and the
-/// work since the previous call. Every round has its own random stream of `seed`, and so has every subtree of a round,
-/// from stream `first` on.
+/// Anneals `tree`, then improves it to a local optimum of reinsertion. Calls `round` after every
+/// round, with the tree and the work since the previous call. Every round, and every subtree of a
+/// round, draws from a separate random stream of `seed`, from stream `first` on.
 ///
-/// If the observer reports its progress, the temperature follows the work or the time, whichever is nearer to its end.
+/// If the observer reports its progress, the temperature follows the work or the time, whichever is
+/// closer to its end.
 pub(crate) fn anneal<M: Mover, A: Metric>(
     mover: impl Fn() -> M + Sync,
     schedule: &Schedule,
@@ -111,7 +115,7 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     if began.is_some() {
         next = next.min(short);
     }
-    // The fraction of the work or time that is done, and the fraction per unit of work.
+    // The completed fraction of the work or time, and the fraction per unit of work.
     let mut fraction = 0.0;
     let mut rate = 1.0 / work as f64;
     tree.sort_in_preorder();
@@ -162,7 +166,7 @@ mod tests {
     use bvh_build::muller_fellner;
     use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-    /// Counts the moves of another mover, and checks the tree after every one.
+    /// Counts the moves of another mover, and checks the tree after every move.
     struct Checked<'a, M> {
         inner: M,
         moves: &'a AtomicU64,

@@ -1,5 +1,5 @@
-//! Removal of one side of a node's box: of everything in a layer there. Only when all of it is gone does the box shrink,
-//! which the removal of scattered subtrees seldom achieves.
+//! Removal of one side of a node's box: of everything in a layer there. The box shrinks only when
+//! the whole layer is gone, which the removal of scattered subtrees seldom achieves.
 
 use crate::run::Stream;
 use crate::tree::{Metric, Working};
@@ -13,9 +13,10 @@ pub(crate) struct Side {
 }
 
 impl Side {
-    /// Finds what lies in a layer at a random side of the box of `top`, of a random thickness up to the fraction
-    /// `thickness` of the box: the largest subtrees inside the layer, and the leaves that reach through it to the side.
-    /// Finds nothing if they are more than `most`. Returns the number of nodes visited.
+    /// Finds the content of a layer at a random side of the box of `top`, of a random thickness up
+    /// to the fraction `thickness` of the box: the largest subtrees inside the layer, and the
+    /// leaves that extend through it to the side. Finds nothing if they are more than `most`.
+    /// Returns the number of nodes visited.
     #[inline(always)]
     pub fn find(
         &mut self,
@@ -29,9 +30,10 @@ impl Side {
         self.stack.clear();
         let side = rng.random_range(0..2);
         let axis = rng.random_range(0..3);
-        // The interval of a node along the axis, towards the side. In f64, so that the scale of the scene has no effect.
-        let span = |at: u32| {
-            let planes = tree.nodes[at as usize].aabb.planes();
+        // The interval of a node along the axis, towards the side. The arithmetic in f64 cannot
+        // overflow or underflow, so the scale of the scene has no effect.
+        let span = |index: u32| {
+            let planes = tree.nodes[index as usize].aabb.planes();
             (-f64::from(planes[1 - side][axis]), f64::from(planes[side][axis]))
         };
         let (begin, end) = span(top);
@@ -39,9 +41,9 @@ impl Side {
         let mut visits = 0;
         self.stack
             .extend(tree.nodes[top as usize].children);
-        while let Some(at) = self.stack.pop() {
-            let node = &tree.nodes[at as usize];
-            let (near, far) = span(at);
+        while let Some(index) = self.stack.pop() {
+            let node = &tree.nodes[index as usize];
+            let (near, far) = span(index);
             visits += 1;
             if far <= limit {
                 continue;
@@ -51,7 +53,7 @@ impl Side {
                     self.roots.clear();
                     break;
                 }
-                self.roots.push(at);
+                self.roots.push(index);
             } else if !node.is_leaf() {
                 self.stack.extend(node.children);
             }

@@ -1,8 +1,9 @@
-//! Simulated annealing on single reinsertions: move one subtree to another position nearby, for better or for worse.
+//! Simulated annealing on single reinsertions: a move takes one subtree to another position nearby,
+//! better or worse.
 //!
-//! Kirkpatrick, Gelatt & Vecchi 1983; Kensler 2008 anneals rotations, which are reinsertions over one or two levels.
-//! Temperatures are relative to the area that the removal of the subtree saves, so that one schedule suits nodes of all
-//! sizes.
+//! Kirkpatrick, Gelatt & Vecchi 1983; Kensler 2008 anneals rotations, which are reinsertions over
+//! one or two levels. Temperatures are relative to the area that the removal of the subtree saves,
+//! so one schedule suits nodes of all sizes.
 
 use super::metropolis::Mover;
 use super::node_sampler::NodeSampler;
@@ -15,7 +16,7 @@ use bvh_core::PackedAabb;
 use rand::RngExt;
 
 bvh_config::config! {
-    /// What to move where, how to cool, and for how long.
+    /// The move, the temperatures and the amount of work.
     pub struct Config {
         /// The move; `move` in specs.
         #[cfg_attr(feature = "serde", serde(rename = "move"))]
@@ -33,19 +34,19 @@ bvh_config::config! {
 }
 
 bvh_config::config! {
-    /// A move: a random subtree, more often one below a large node, is taken out of the tree and placed again, not more than
-    /// some levels up from where it was.
+    /// A move: removes a random subtree, more often below a large node, and inserts it again at
+    /// most some levels above its old position.
     pub struct SingleMove {
         /// Maximum number of levels up.
         climb: u32 = 12, in 1..=u32::MAX - 1;
-        /// Which position below the top of the climb the subtree gets.
+        /// The position that the subtree gets, below the top of the climb.
         target: Target = Target::Best;
     }
 }
 
 impl Config {
     fn check_together(&self) -> impl Iterator<Item = OutOfRange> {
-        // Specs call the step a move.
+        // Specs call the step `move`, which is a keyword in Rust.
         Itself
             .faults("move", &self.step)
             .into_iter()
@@ -53,7 +54,7 @@ impl Config {
     }
 }
 
-/// Which position a subtree gets.
+/// The position that a subtree gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -62,7 +63,7 @@ impl Config {
 )]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Target {
-    /// The end of a random descent from the top, of at most one level more than the climb.
+    /// The end of a random descent from the top, at most one level longer than the climb.
     Random,
     /// The best of all positions except its previous one.
     Best,
@@ -89,8 +90,8 @@ impl Config {
 pub(crate) struct SingleMover<'a> {
     config: &'a SingleMove,
     sampler: NodeSampler,
-    /// Inner nodes whose children remain to be examined, each with the growth of the node and of all its ancestors up to the
-    /// top.
+    /// Inner nodes whose children remain to be examined, each with the growth of the node and of
+    /// all its ancestors up to the top.
     stack: Vec<(u32, f64)>,
     work: u64,
 }
@@ -100,11 +101,13 @@ impl<'a> SingleMover<'a> {
         Self { config, sampler: NodeSampler::default(), stack: Vec::new(), work: 0 }
     }
 
-    /// The cheapest position below `top`, or beside it, for a detached item, except beside `sibling`; `None` if none costs
-    /// less than `limit`. The growth above the top is not counted.
+    /// Returns the cheapest position for a detached item, next to `top` or below it, but not next
+    /// to `sibling`; `None` if none costs less than `limit`. The growth above the top is not
+    /// counted.
     ///
-    /// An exact branch and bound like [`PositionSearch`](crate::tree::PositionSearch), which cannot replace it: that one
-    /// begins at the sibling and visits nodes in another order, so that its work, and with it every result, differs.
+    /// This is an exact branch and bound like [`PositionSearch`](crate::tree::PositionSearch). That
+    /// search cannot replace it: it begins at the sibling and visits nodes in another order, so its
+    /// work, and with it every result, would differ.
     #[inline(always)]
     fn best(
         &mut self,
@@ -116,23 +119,23 @@ impl<'a> SingleMover<'a> {
         let mut best = None;
         let mut least = limit;
         let mut visits = 1;
-        let mut look = |at: u32, growth: f64, least: &mut f64, stack: &mut Vec<(u32, f64)>| {
-            let node = &tree.nodes[at as usize];
+        let mut look = |index: u32, growth: f64, least: &mut f64, stack: &mut Vec<(u32, f64)>| {
+            let node = &tree.nodes[index as usize];
             let cost = growth + tree.metric().of(&node.aabb.union(aabb));
-            if cost < *least && at != sibling {
+            if cost < *least && index != sibling {
                 *least = cost;
-                best = Some(at);
+                best = Some(index);
             }
             let growth = cost - node.area;
             if !node.is_leaf() && growth + area < *least {
-                stack.push((at, growth));
+                stack.push((index, growth));
             }
         };
         look(top, 0.0, &mut least, &mut self.stack);
-        while let Some((at, growth)) = self.stack.pop() {
+        while let Some((index, growth)) = self.stack.pop() {
             if growth + area < least {
                 visits += 2;
-                for child in tree.nodes[at as usize].children {
+                for child in tree.nodes[index as usize].children {
                     look(child, growth, &mut least, &mut self.stack);
                 }
             }
@@ -175,20 +178,21 @@ impl Mover for SingleMover<'_> {
             }
             top = above;
         }
-        // Metropolis draws its random number first: positions above the resulting limit need not be examined.
+        // Metropolis draws its random number first, so that positions above the resulting limit
+        // need not be examined.
         let chance = 1.0 - rng.random::<f64>();
         let limit = saved * (1.0 - temperature * libm::log(chance));
         let target = match self.config.target {
             Target::Random => {
-                let mut at = top;
+                let mut index = top;
                 for _ in 0..rng.random_range(0..=levels + 1) {
-                    if tree.nodes[at as usize].is_leaf() {
+                    if tree.nodes[index as usize].is_leaf() {
                         break;
                     }
-                    at = tree.nodes[at as usize].children[usize::from(rng.random::<bool>())];
+                    index = tree.nodes[index as usize].children[usize::from(rng.random::<bool>())];
                     self.work += 1;
                 }
-                Some(at).filter(|&at| at != sibling)
+                Some(index).filter(|&index| index != sibling)
             }
             Target::Best => {
                 let item = &tree.nodes[node as usize];

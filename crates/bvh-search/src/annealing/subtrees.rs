@@ -1,7 +1,9 @@
-//! Annealing and local search on disjoint subtrees at once, with the same result on any number of threads.
+//! Annealing and local search on disjoint subtrees in parallel, with the same result on any number
+//! of threads.
 //!
-//! Every subtree is a small tree of its own while a thread works on it. Other subtrees are cut in every round, of another
-//! size, and between rounds moves have the whole tree, so that every node can move everywhere.
+//! Every subtree is a separate small tree while a thread works on it. Every round cuts different
+//! subtrees, of a different size, and moves on the whole tree follow, so every node can move
+//! everywhere.
 
 use super::metropolis::{self, Mover};
 use super::node_sampler::{self, NodeSampler};
@@ -15,8 +17,9 @@ use rand::RngExt;
 /// Random streams per round: one for the whole tree, one for every subtree.
 pub(crate) const STREAMS: u64 = 1 << 24;
 
-/// One round of annealing of a `tree` in preorder, which is in preorder again at the end unless the observer cancels: first on about `count` subtrees, if
-/// more than one, then on the whole tree, where moves begin near the nodes that are in no subtree.
+/// Makes one round of annealing: first on about `count` subtrees, if more than one, then on the
+/// whole tree, where moves begin near the nodes outside all subtrees. The `tree` is in preorder
+/// before, and after unless the observer cancels.
 pub(crate) fn cool<M: Mover>(
     mover: &(impl Fn() -> M + Sync),
     tree: &mut Working<impl Metric>,
@@ -30,10 +33,10 @@ pub(crate) fn cool<M: Mover>(
     let mut whole = mover();
     let mut done = Tally::default();
     if count > 1 && tree.objects() as f64 >= f64::from(count) * f64::from(LEAST_SUBTREE) {
-        // Of another size in every round, so that the borders are elsewhere.
+        // A different size in every round moves the borders, across which nothing moves.
         let smaller = SMALLEST_SUBTREES + (1.0 - SMALLEST_SUBTREES) * rng.random::<f64>();
         let (subtrees, starts) =
-            cut(tree, smaller / f64::from(count), |at| node_sampler::weight(tree, at));
+            cut(tree, smaller / f64::from(count), |index| node_sampler::weight(tree, index));
         let all: f64 = subtrees
             .iter()
             .map(|subtree| subtree.weight)
@@ -54,14 +57,15 @@ pub(crate) fn cool<M: Mover>(
         *whole.sampler() = NodeSampler::among(starts);
     }
     done += metropolis::cool(&mut whole, tree, heat, quota.less(&done), &mut rng, observer);
-    // After a cancellation whatever comes next sorts first, and somebody may be waiting.
+    // A cancelled search must return soon, and every later round would sort first.
     if !observer.cancelled() {
         tree.sort_in_preorder();
     }
     done
 }
 
-/// Improves a `tree` in preorder to a local optimum of reinsertion, first on about `count` subtrees, if more than one.
+/// Improves a `tree` in preorder to a local optimum of reinsertion, first on about `count`
+/// subtrees, if more than one.
 pub(crate) fn to_local_optimum(
     tree: &mut Working<impl Metric>,
     count: u32,
@@ -71,8 +75,9 @@ pub(crate) fn to_local_optimum(
     let mut done = Tally::default();
     if count > 1 {
         let (subtrees, _) = cut(tree, 1.0 / f64::from(count), |_| 1.0);
-        let share = |all: u64| all / (2 * subtrees.len().max(1) as u64);
-        let share = Quota { work: share(quota.work), moves: share(quota.moves) };
+        // One half of the quota for all subtrees together, one for the whole tree.
+        let parts = 2 * subtrees.len().max(1) as u64;
+        let share = Quota { work: quota.work / parts, moves: quota.moves / parts };
         let found = parallel::map(subtrees.len(), |number| {
             let mut small = subtrees[number].take(tree);
             let tally = reinsertion::to_local_optimum(&mut small, share, observer);
@@ -85,7 +90,7 @@ pub(crate) fn to_local_optimum(
     done
 }
 
-/// A subtree of a tree in preorder, in which its nodes are contiguous.
+/// A subtree of a tree in preorder. Its nodes are contiguous.
 #[derive(Clone, Copy, Debug)]
 struct Subtree {
     root: u32,
@@ -94,51 +99,52 @@ struct Subtree {
     weight: f64,
 }
 
-/// The largest subtrees of a tree in preorder that each have at most the fraction `most` of its weight, except the smallest
-/// ones; and the nodes that are in no subtree or near the root of one. O(n).
+/// Returns the largest subtrees of a tree in preorder that each have at most the fraction `most` of
+/// its weight, except tiny ones; and the nodes that are outside all subtrees or near the root of
+/// one. O(n).
 fn cut(
     tree: &Working<impl Metric>,
     most: f64,
     weight: impl Fn(u32) -> f64,
 ) -> (Vec<Subtree>, Vec<u32>) {
     let mut totals = vec![(1u32, 0.0); tree.nodes.len()];
-    for (at, node) in tree.nodes.iter().enumerate().skip(1).rev() {
-        let mut total = (1, weight(at as u32));
+    for (index, node) in tree.nodes.iter().enumerate().skip(1).rev() {
+        let mut total = (1, weight(index as u32));
         if !node.is_leaf() {
             for (nodes, weight) in node.children.map(|child| totals[child as usize]) {
                 total = (total.0 + nodes, total.1 + weight);
             }
         }
-        totals[at] = total;
+        totals[index] = total;
     }
     let most = most
         * tree
             .root()
             .map_or(0.0, |root| totals[root as usize].1);
-    // The level in a subtree, 1 for its root; 0 outside of subtrees.
+    // The level in a subtree, 1 for its root; 0 outside all subtrees.
     let mut depths = vec![0u8; tree.nodes.len()];
     let mut subtrees = vec![];
     let mut starts = vec![];
-    for (at, node) in (0..).zip(&tree.nodes).skip(1) {
+    for (index, node) in (0..).zip(&tree.nodes).skip(1) {
         let above = depths[node.parent as usize];
-        let (nodes, weight) = totals[at as usize];
+        let (nodes, weight) = totals[index as usize];
         if above > 0 {
-            depths[at as usize] = above.saturating_add(1);
+            depths[index as usize] = above.saturating_add(1);
         } else if weight <= most {
-            depths[at as usize] = 1;
+            depths[index as usize] = 1;
             if nodes >= 2 * LEAST_SUBTREE {
-                subtrees.push(Subtree { root: at, nodes, weight });
+                subtrees.push(Subtree { root: index, nodes, weight });
             }
         }
-        if depths[at as usize] <= BELOW_SUBTREE_ROOTS {
-            starts.push(at);
+        if depths[index as usize] <= BELOW_SUBTREE_ROOTS {
+            starts.push(index);
         }
     }
     (subtrees, starts)
 }
 
 impl Subtree {
-    /// A copy of the subtree as a tree of its own.
+    /// Copies the subtree into a separate tree.
     fn take<A: Metric>(&self, tree: &Working<A>) -> Working<A> {
         let range = self.root as usize..(self.root + self.nodes) as usize;
         let mut nodes = Vec::with_capacity(range.len() + 1);
@@ -146,21 +152,21 @@ impl Subtree {
         nodes.extend(
             tree.nodes[range]
                 .iter()
-                .map(|node| moved(node, |at| at.wrapping_sub(self.root - 1))),
+                .map(|node| moved(node, |index| index.wrapping_sub(self.root - 1))),
         );
         nodes[1].parent = ANCHOR;
         Working::from_nodes(nodes, tree.metric())
     }
 }
 
-/// The node with all its links mapped.
+/// Returns the node with all its links mapped.
 fn moved(node: &Node, place: impl Fn(u32) -> u32) -> Node {
     let children = if node.is_leaf() { node.children } else { node.children.map(&place) };
     let parent = if node.parent == ANCHOR { ANCHOR } else { place(node.parent) };
     Node { children, parent, ..*node }
 }
 
-/// Puts trees in preorder back to where they were taken from. O(n).
+/// Puts annealed subtrees, in preorder, back to their place. O(n).
 fn put_back<A: Metric>(
     tree: &mut Working<A>,
     subtrees: &[Subtree],
@@ -173,7 +179,7 @@ fn put_back<A: Metric>(
         let to = subtree.root as usize;
         let parent = nodes[to].parent;
         for (old, new) in nodes[to..].iter_mut().zip(&small.nodes[1..]) {
-            *old = moved(new, |at| at + subtree.root - 1);
+            *old = moved(new, |index| index + subtree.root - 1);
         }
         nodes[to].parent = parent;
     }

@@ -1,4 +1,5 @@
-//! From an initial tree to the end of the budget: annealing runs, each recombined with the incumbent.
+//! From an initial tree to the end of the budget: annealing runs, each recombined with the
+//! incumbent.
 
 use super::config::{Config, Horizon};
 use super::plan::{Planned, plan};
@@ -19,8 +20,9 @@ use crate::tuning::{
 };
 use bvh_core::cost::Objective;
 
-/// Improves the incumbent, whose working form is `tree`, until the work is done or the time is over; its
-/// references too, if the problem has splits. If there is an `other` start, a trial decides which of the two is improved.
+/// Improves the incumbent, whose working form is `tree`, until the work is done or the time is
+/// over. Also improves its references, if the problem has splits. With an `other` start, a trial
+/// chooses the better of the two.
 pub(crate) fn improve<A: Metric>(
     config: &Config,
     (tree, other): (&mut Working<A>, Option<Working<A>>),
@@ -58,35 +60,36 @@ pub(crate) fn improve<A: Metric>(
     }
 }
 
-/// The numbers of the runs that decide between two starts, after those of all others.
+/// The number of the first trial run. Trial runs decide between two starts, and their numbers
+/// follow the numbers of all other runs, so that no random stream is used twice.
 const TRIALS: u64 = 1 << 20;
 
-/// A search under way.
+/// A search in progress.
 struct Improvement<'a, 'p, 'r, 's> {
     config: &'a Config,
     seed: u64,
     /// Number of objects.
     n: u64,
-    /// The work that is left.
+    /// The remaining work.
     left: u64,
-    /// Whether the cost of the wide layout is the goal, not the area.
+    /// True if the objective is the cost of the wide layout, not the area.
     by_layout: bool,
-    /// What changes the references, if they may change.
+    /// Divides and reunites references, if they may change.
     divider: Option<Divider<'s>>,
     best: &'a mut Incumbent<'p>,
     run: &'a mut Run<'r>,
-    /// Whether a local optimum of reinsertion is kept.
+    /// True if the incumbent is at least as good as a local optimum of reinsertion.
     is_secured: bool,
 }
 
 impl Improvement<'_, '_, '_, '_> {
-    /// The plan of annealing runs, each due at a fraction of the work or of the time.
+    /// Follows a plan of annealing runs. Each ends at a fraction of the work or of the time.
     fn until_known_end(&mut self, tree: &mut Working<impl Metric>) {
         let n = self.n;
         let observer = self.run.observer();
         let timed = observer.progress().is_some();
         let mut length = self.left as f64 / n as f64;
-        // The progress at which to be done, so that there is time for the conversion.
+        // The last moves must end early enough for the conversion of the tree.
         let mut end_of_all = 1.0;
         if timed {
             let quota = self.run.left().at_most(self.left.min(PROBE * n));
@@ -100,7 +103,8 @@ impl Improvement<'_, '_, '_, '_> {
         }
         let all = self.left;
         let began = observer.progress().unwrap_or(0.0);
-        // Short runs are worth their work where they can be recombined, which layouts cannot.
+        // Short runs pay only because they are recombined, and trees judged by their layout cannot
+        // be.
         let config = if self.by_layout {
             &Config { reheats: 0, ..self.config.clone() }
         } else {
@@ -121,7 +125,7 @@ impl Improvement<'_, '_, '_, '_> {
         }
     }
 
-    /// A local optimum, then generations of growing length.
+    /// Searches a local optimum, then anneals in generations of growing length.
     fn until_stopped(&mut self, tree: &mut Working<impl Metric>) {
         self.reinsert(tree);
         let mut length = self.config.first;
@@ -133,7 +137,7 @@ impl Improvement<'_, '_, '_, '_> {
         }
     }
 
-    /// Reinsertion to a local optimum, which is offered to the incumbent.
+    /// Reinserts to a local optimum and offers it to the incumbent.
     fn reinsert(&mut self, tree: &mut Working<impl Metric>) {
         self.best
             .improve(tree, u32::MAX, self.run, |tree, _, quota, observer| {
@@ -141,8 +145,9 @@ impl Improvement<'_, '_, '_, '_> {
             });
     }
 
-    /// Long before the heat has paid, whoever stops a search by the clock is to get no less than plain reinsertion gives. The plan goes
-    /// on from the tree as it was.
+    /// Keeps a local optimum of reinsertion. A caller who stops a time-limited search before
+    /// annealing pays then gets at least the result of plain reinsertion. The plan continues from
+    /// the unchanged tree.
     fn secure(&mut self, metric: impl Metric, length: f64) {
         if length >= SECURED_FROM
             && !self.is_secured
@@ -153,7 +158,7 @@ impl Improvement<'_, '_, '_, '_> {
         }
     }
 
-    /// Anneals both trees for a short time, and goes on with the one that ends better.
+    /// Anneals both trees for a short time and keeps the one that ends better.
     fn choose<A: Metric>(
         &mut self,
         tree: &mut Working<A>,
@@ -188,7 +193,8 @@ impl Improvement<'_, '_, '_, '_> {
         }
     }
 
-    /// The schedule of an annealing run; `length` is the work per object of the whole search, or of the generation.
+    /// Returns the schedule of an annealing run. `length` is the work per object of the whole
+    /// search, or of the generation.
     fn schedule(&self, hot: f64, work: u64, end: f64, length: f64) -> Schedule {
         let timed = self.run.observer().progress().is_some();
         let by_threads =
@@ -210,9 +216,9 @@ impl Improvement<'_, '_, '_, '_> {
         }
     }
 
-    /// One annealing run from `tree`, which is recombined with the result. The `first` run of a plan, though, replaces
-    /// the tree if it ends better; and if it does not and there is a clock, there was no time for anything, nor is there
-    /// any for recombination.
+    /// Makes one annealing run from `tree` and recombines the tree with the result. The `first` run
+    /// of a plan replaces the tree instead, if it ends better. If it does not and time is limited,
+    /// the time was too short for annealing, and recombination is skipped, too.
     fn anneal(
         &mut self,
         tree: &mut Working<impl Metric>,
@@ -226,15 +232,17 @@ impl Improvement<'_, '_, '_, '_> {
         let observer: &dyn Observer = &Until { observer: self.run.observer(), end: schedule.end };
         let mut done = Tally::default();
         let mut rounds = 0;
-        // Every run has room for 2⁴⁰ random streams: those of 2¹⁶ rounds. Stream 0 is the probe's, the last are the divider's.
+        // Every run has room for 2⁴⁰ random streams, enough for 2¹⁶ rounds. Stream 0 belongs to the
+        // probe, the last streams to the divider.
         let streams = [self.seed, 1 + (number << 40)];
         let mut division = stream(self.seed, (1 << 63) + number);
         let ruin = self.config.ruin(length);
         let best = &mut *self.best;
         let run = &mut *self.run;
         let by_layout = self.by_layout;
-        // Trees with different references cannot be recombined. So only the first run, which is not recombined, changes them as it
-        // goes; the others do so before they begin.
+        // Trees with different references cannot be recombined. Only the first run, which is not
+        // recombined, may change references between its rounds; the other runs change them before
+        // they begin.
         if let Some(divider) = self.divider.as_mut().filter(|_| !first) {
             tree.sort_in_preorder();
             let work = (schedule.quota.work as f64 * WORK_ON_REFERENCES) as u64;
@@ -288,7 +296,8 @@ impl Improvement<'_, '_, '_, '_> {
         self.left = self.left.saturating_sub(done.work);
     }
 
-    /// Moves at the lowest temperature. Also returns the work that fits into the rest of the time at this rate.
+    /// Makes moves at the lowest temperature. Also returns the work that fits into the rest of the
+    /// time at this rate.
     fn probe(
         &self,
         tree: &mut Working<impl Metric>,
@@ -310,12 +319,12 @@ impl Improvement<'_, '_, '_, '_> {
     }
 }
 
-/// What a tree costs. O(n).
+/// Returns the cost of a tree. O(n).
 fn cost(tree: &Working<impl Metric>, by_layout: bool) -> f64 {
     if by_layout { Layout::default().cost(tree) } else { tree.area() }
 }
 
-/// An observer that also cancels at `end`, if that is before all the time has passed.
+/// An observer that also cancels when the progress reaches `end`.
 struct Until<'a> {
     observer: &'a dyn Observer,
     end: f64,
@@ -338,7 +347,7 @@ mod tests {
     use crate::{best, reinsertion};
     use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-    /// A clock of a long search that is stopped when it has been asked so often.
+    /// A slow clock that cancels after 5000 polls.
     struct StoppedEarly(AtomicU32);
 
     impl Observer for StoppedEarly {

@@ -1,6 +1,7 @@
 //! `best`: the methods that pay, in the order that pays, for any budget.
 //!
-//! Which method ends lowest depends on the time there is, from the few milliseconds of a build to the minutes of a bake:
+//! The available time decides which method ends lowest, from the milliseconds of a build to the
+//! minutes of a bake:
 //!
 //! ```text
 //!   budget          milliseconds              seconds                    minutes
@@ -19,29 +20,33 @@
 //!                                             └──────────────────────────────────────────────┘
 //! ```
 //!
-//! *A few objects.* Where the [exact solver](crate::exact) takes less work than the budget has, its optimum is the answer.
+//! *A few objects.* If the budget has enough work for the [exact solver](crate::exact), the result
+//! is the optimum.
 //!
-//! *Milliseconds* (`small_budget`). A clustering along the Morton curve is the fastest build that is worth starting from.
-//! Reinsertion then begins with the largest nodes, in which most of the area that can be saved lies, and stops when the
-//! time does. If a local optimum comes first, the search goes on as below.
+//! *Milliseconds* (`small_budget`). A clustering along the Morton curve is the fastest build that
+//! is a good start. Reinsertion begins with the largest nodes, which hold most of the area that can
+//! be saved, and stops when the time is over. If it reaches a local optimum earlier, the search
+//! continues as below.
 //!
-//! *The end is known*, from the budget's work or the observer's [progress](crate::Observer::progress). A greedy top-down
-//! division is followed at once by one long run of [annealed ruin and recreate](crate::ruin_recreate): a local search
-//! before it would be forgotten at its first temperature, and at equal work one long run ends lower than several short
-//! ones, one after another or side by side. If there is much to be done, several short runs from a lower temperature
-//! follow. Each loosens everything except the top of the tree and finds other optima, better in some places and worse in
-//! others. A search of a minute or more by a clock, which somebody may stop early, first keeps the local optimum of
-//! reinsertion aside.
+//! *The end is known*, from the budget's work or the observer's
+//! [progress](crate::Observer::progress). One long run of
+//! [annealed ruin and recreate](crate::ruin_recreate) follows a greedy top-down division at once. A
+//! local search in between would be lost at the first temperature, and at equal work one long run
+//! ends lower than several short runs, sequential or parallel. With much work, several short runs
+//! from a lower temperature follow. Each loosens everything except the top of the tree and finds
+//! another optimum, better in some places and worse in others. A time-limited search of a minute or
+//! more, which the user may stop early, first keeps a local optimum of reinsertion.
 //!
-//! *The end is open.* Reinsertion to a local optimum, then generations, each annealed from the incumbent and longer than
-//! the one before, so that whenever the search is stopped, a constant fraction of the work has gone into the last
-//! generation.
+//! *The end is open.* Reinsertion leads to a local optimum. Generations follow, each annealed from
+//! the incumbent and longer than the previous one. Whenever the search is stopped, a constant
+//! fraction of the work has gone into the last generation.
 //!
-//! *Recombination.* The result of an annealing run is recombined with the incumbent, which keeps every subtree that became
-//! better and drops every subtree that became worse. Only the first run of a known end is not, if it ends better; if it
-//! ends worse under a clock, there was no time to do anything, nor is there any for recombination.
+//! *Recombination.* The result of an annealing run is recombined with the incumbent, which keeps
+//! every subtree that became better and drops every subtree that became worse. The first run of a
+//! plan is an exception: it replaces the incumbent if it ends better. If it ends worse under a time
+//! limit, the time was too short for annealing, and for recombination, too.
 //!
-//! The numbers that decide between all these are in one table, `tuning.rs`, and in [`Config`].
+//! The thresholds between these phases are in one table, `tuning.rs`, and in [`Config`].
 
 mod config;
 mod improve;
@@ -65,9 +70,10 @@ use small_budget::SmallBudget;
 
 search_by_metric!(Config);
 
-/// What whoever stops a search of this much work early can have in place of a worse tree: the outcome of plain reinsertion, before the
-/// search. It takes a twentieth of the work at most; none if there is too little. By the clock, a search keeps such a tree
-/// itself; by work it does not, because its bytes are to follow from its plan alone.
+/// Returns the outcome of plain reinsertion, for callers who may stop a search of this much work
+/// early and want no worse tree. Reinsertion takes at most a twentieth of the work; `None` if the
+/// work is too little. A time-limited search keeps such a tree itself. A search limited by work
+/// does not, because its bytes must follow from its plan alone.
 pub fn fallback(
     problem: &Problem,
     work: u64,
@@ -79,7 +85,8 @@ pub fn fallback(
     solve(&reinsertion::Config::default(), problem, 0, Budget::UNLIMITED, observer).map(Some)
 }
 
-/// What a search found, with the [`fallback`]'s tree where that costs less, as it may after a search that was stopped early.
+/// Returns the outcome of a search, with the [`fallback`]'s tree if it costs less, which happens
+/// after an early stop.
 pub fn unless_behind(found: Outcome, fallback: Option<Outcome>) -> Outcome {
     let better = fallback.filter(|other| other.cost < found.cost);
     match better {
@@ -88,8 +95,8 @@ pub fn unless_behind(found: Outcome, fallback: Option<Outcome>) -> Outcome {
     }
 }
 
-/// The division with spatial splits, if the problem allows them: the one that the caller has, or a new one, unless the observer
-/// cancels before it is made.
+/// Returns the division with spatial splits, if the problem allows them: the caller's division or a
+/// new one. `None` if the observer cancels first.
 fn division(problem: &Problem, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
     let Some(splits) = problem
         .splits
@@ -107,7 +114,7 @@ fn division(problem: &Problem, observer: &dyn Observer) -> Result<Option<Bvh>, S
 }
 
 impl Config {
-    /// Subtrees, if there are several, are annealed in parallel, each with a random stream of its own.
+    /// Anneals several subtrees in parallel, each with a separate random stream.
     fn search_by<A: Metric>(
         &self,
         metric: A,
@@ -124,7 +131,7 @@ impl Config {
         if let Some(optimum) = exact::instead(problem, work, run)? {
             return Ok(optimum);
         }
-        // Small budgets go by area.
+        // The search for small budgets supports the area only.
         let small = match problem.measure {
             None if self.start.is_none() => small_budget::search(problem, metric, run)?,
             _ => SmallBudget::Large(None),
@@ -142,9 +149,10 @@ impl Config {
         Ok(best.tree)
     }
 
-    /// Builds the initial tree. Unless that is chosen by the configuration, a clustering is built as well, which takes a fraction of the
-    /// time: it is the initial tree where it is much cheaper, and otherwise kept aside, so that no budget ends above what the smallest
-    /// ones begin with. Like that of the [`fallback`], its work counts only where it is used.
+    /// Builds the initial tree. Unless the configuration names a builder, also builds a clustering,
+    /// which takes a fraction of the time. A much cheaper clustering becomes the initial tree;
+    /// otherwise it is kept aside, so no budget ends above the start of the smallest budgets. Its
+    /// work counts only if it is used, like the work of the [`fallback`].
     fn initial(
         &self,
         morton: Option<MortonOrder>,
@@ -173,8 +181,8 @@ impl Config {
         Ok(started)
     }
 
-    /// Improves a tree with one reference per leaf, and its references if they may change; or another one, where a trial shows that
-    /// to be better.
+    /// Improves a tree with one reference per leaf, and its references if they may change. If a
+    /// trial shows that the other tree is better, improves the other tree instead.
     pub(crate) fn improved<A: Metric>(
         &self,
         (tree, other): (Bvh, Option<Bvh>),

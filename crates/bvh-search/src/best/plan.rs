@@ -5,14 +5,14 @@ use crate::tuning::{MOST_GENERATIONS, WORK_PER_PAIR};
 
 /// One annealing run of the plan.
 pub(super) struct Planned {
-    /// Its first temperature.
+    /// First temperature.
     pub hot: f64,
-    /// The fraction of all work, or time, that is over when it ends.
+    /// The fraction of all work or time at which the run ends.
     pub until: f64,
 }
 
-/// The annealing runs for `length` work per object, and the work per object of each long run with the short ones that
-/// follow it.
+/// Returns the annealing runs for `length` work per object, and the work per object of each long
+/// run including its short runs.
 pub(super) fn plan(config: &Config, length: f64, n: u64) -> (Vec<Planned>, f64) {
     let longest = config.longest.min(WORK_PER_PAIR * n as f64);
     let equal = (length / longest)

@@ -1,19 +1,23 @@
 //! Recombination: the best tree in which every split comes from one of several trees.
 //!
-//! Good trees over the same objects share many *clades*, sets of objects below one node. A clade may be divided as in
-//! any of the trees that have it, independently of the tree above. Dynamic programming over the clades therefore finds the
-//! best of all combinations, which is never worse than the best of the trees. Compare the crossover by common partitions
-//! of Whitley, Hains & Howe 2009 and the clade-based search for species trees of Bryant 1996.
+//! Good trees over the same objects share many *clades*, sets of objects below one node. A clade
+//! may be divided as in any of the trees that have it, independently of the tree above. Dynamic
+//! programming over the clades therefore finds the best of all combinations, which is never worse
+//! than the best of the trees. Compare the crossover by common partitions (Whitley, Hains & Howe
+//! 2009) and the clade-based search for species trees (Bryant 1996).
 
 use crate::tree::{ANCHOR, Metric, NONE, Node, Working};
 use std::collections::HashMap;
 
-/// The best tree over the clades of `trees`, which are one tree or more over the same objects. O(total size).
+/// Returns the best tree over the clades of `trees`, one tree or more over the same objects.
+/// O(total size).
 ///
-/// Clades are identified by 128-bit sums of scattered keys: among a billion clades, the probability that any two different
-/// ones are confused is below 10⁻²⁰.
+/// Clades are identified by 128-bit sums of scattered keys. Among a billion clades, the probability
+/// that any two different clades collide is below 10⁻²⁰.
 pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
-    // Every node of every tree: number of objects, tree, index. Per tree and node: its clade.
+    // Every node of every tree, as number of objects, tree and index. The sort below then visits
+    // smaller clades first, and ties in the order of the trees, which makes the result
+    // deterministic.
     let mut by_size: Vec<(u32, u32, u32)> = Vec::new();
     let mut clade_of: Vec<Vec<u32>> = Vec::new();
     let mut number = HashMap::new(); // only looked up by key, so that its order has no effect
@@ -21,26 +25,27 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
         let order = tree.preorder();
         let mut keys = vec![(0u128, 0u32); tree.nodes.len()];
         let mut clades = vec![NONE; tree.nodes.len()];
-        for &at in order.iter().rev() {
-            let node = &tree.nodes[at as usize];
+        for &index in order.iter().rev() {
+            let node = &tree.nodes[index as usize];
             let [left, right] = node.children.map(|child| child as usize);
-            keys[at as usize] = if node.is_leaf() {
+            keys[index as usize] = if node.is_leaf() {
                 (key_of_leaf::<A>(node), 1)
             } else {
                 (keys[left].0.wrapping_add(keys[right].0), keys[left].1 + keys[right].1)
             };
-            let (key, size) = keys[at as usize];
+            let (key, size) = keys[index as usize];
             let next = number.len() as u32;
-            clades[at as usize] = *number.entry(key).or_insert(next);
-            by_size.push((size, which, at));
+            clades[index as usize] = *number.entry(key).or_insert(next);
+            by_size.push((size, which, index));
         }
         clade_of.push(clades);
     }
     by_size.sort_unstable();
-    // Smaller clades first: cost of the best division, the area of the clade's own box included, and where it is found.
+    // Per clade: cost of the best division, including the area of the clade's box, and the node
+    // that has the division. Parts are smaller than the clade, so their costs are final.
     let mut best = vec![(f64::INFINITY, 0, NONE); number.len()];
-    for (_, which, at) in by_size {
-        let node = &trees[which as usize].nodes[at as usize];
+    for (_, which, index) in by_size {
+        let node = &trees[which as usize].nodes[index as usize];
         let clades = &clade_of[which as usize];
         let cost = if node.is_leaf() {
             A::LEAF * node.area
@@ -50,9 +55,9 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
                 .map(|child| best[clades[child as usize] as usize].0);
             node.area + left + right
         };
-        let best = &mut best[clades[at as usize] as usize];
+        let best = &mut best[clades[index as usize] as usize];
         if cost < best.0 {
-            *best = (cost, which, at);
+            *best = (cost, which, index);
         }
     }
     let mut nodes = vec![trees[0].nodes[ANCHOR as usize]];
@@ -61,8 +66,8 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
         .map(|root| (clade_of[0][root as usize], ANCHOR, 0));
     let mut stack: Vec<(u32, u32, usize)> = root.into_iter().collect();
     while let Some((clade, parent, side)) = stack.pop() {
-        let (_, which, at) = best[clade as usize];
-        let node = trees[which as usize].nodes[at as usize];
+        let (_, which, index) = best[clade as usize];
+        let node = trees[which as usize].nodes[index as usize];
         let to = nodes.len() as u32;
         nodes[parent as usize].children[side] = to;
         nodes.push(Node { parent, ..node });
@@ -74,7 +79,8 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
     Working::from_nodes(nodes, trees[0].metric())
 }
 
-/// A key for what a leaf holds: its object, and where there are several leaves of one object, the part of it.
+/// Returns a key for a leaf: its object, and the part of the object if the object may have several
+/// leaves.
 fn key_of_leaf<A: Metric>(node: &Node) -> u128 {
     let object = key(node.children[1]);
     if A::LEAF == 0.0 {
@@ -90,18 +96,21 @@ fn key_of_leaf<A: Metric>(node: &Node) -> u128 {
         })
 }
 
-/// A key for an object, scattered over 128 bits: SplitMix64 (Steele, Lea & Flood 2014) twice.
+/// Returns a key for an object, scattered over 128 bits by two rounds of SplitMix64 (Steele, Lea &
+/// Flood 2014).
 fn key(object: u32) -> u128 {
-    let scatter = |state: u64| {
-        let state = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let state = (state ^ (state >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        state ^ (state >> 31)
-    };
     const GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
-    let at = 2 * u64::from(object) + 1;
-    let low = scatter(at.wrapping_mul(GAMMA));
-    let high = scatter((at + 1).wrapping_mul(GAMMA));
+    let number = 2 * u64::from(object) + 1;
+    let low = split_mix(number.wrapping_mul(GAMMA));
+    let high = split_mix((number + 1).wrapping_mul(GAMMA));
     u128::from(high) << 64 | u128::from(low)
+}
+
+/// The output function of SplitMix64.
+fn split_mix(state: u64) -> u64 {
+    let state = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let state = (state ^ (state >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    state ^ (state >> 31)
 }
 
 #[cfg(test)]
@@ -117,13 +126,13 @@ mod tests {
     fn the_recombined_tree_has_the_best_part_of_every_parent() {
         let boxes: Vec<Aabb> = (0..200u16)
             .map(|i| {
-                let at = [f32::from(i) * 1.7 % 9.0, f32::from(i) * 2.3 % 7.0, f32::from(i / 3)];
-                Aabb::from((at, at.map(|c| c + 1.0)))
+                let low = [f32::from(i) * 1.7 % 9.0, f32::from(i) * 2.3 % 7.0, f32::from(i / 3)];
+                Aabb::from((low, low.map(|c| c + 1.0)))
             })
             .collect();
         let good = built(&muller_fellner::Config::default(), &boxes);
         let [left, right] = good.nodes[good.root().unwrap() as usize].children;
-        // Two parents, each spoilt on one side of the root.
+        // Two parents, each degraded on one side of the root.
         let spoilt = |side: u32| {
             let mut tree = good.clone();
             let mut rng = stream(u64::from(side), 0);

@@ -1,9 +1,11 @@
-//! Budgets of milliseconds: clustering along the Morton curve, then reinsertion of the largest nodes while there is time.
+//! Budgets of milliseconds: clustering along the Morton curve, then reinsertion of the largest
+//! nodes until the time is over.
 //!
-//! Bittner, Hapala & Havran 2013 first reinsert the nodes that cost most: few nodes near the root have most of the area
-//! that can be saved. With larger budgets, annealing from a top-down division ends lower.
+//! Bittner, Hapala & Havran 2013 first reinsert the most expensive nodes, because a few nodes near
+//! the root hold most of the area that can be saved. With larger budgets, annealing from a top-down
+//! division ends lower.
 //!
-//! Time limits are measured in multiples of the time of the Morton sort, which always runs first.
+//! Time limits are multiples of the duration of the Morton sort, which always runs first.
 
 use crate::local::incumbent::Incumbent;
 use crate::local::initial::construction;
@@ -23,15 +25,17 @@ use bvh_core::{Aabb, Bvh, cost};
 /// The result of a small budget.
 #[allow(clippy::large_enum_variant, reason = "one is made per search, and taken apart at once")]
 pub(super) enum SmallBudget<'p, A> {
-    /// The budget is not small. The objects in Morton order, if there was a clock for whose sake they were sorted.
+    /// The budget is not small. Holds the objects in Morton order, if a time limit required the
+    /// sort.
     Large(Option<MortonOrder>),
     /// The budget is used up.
     Tree(Bvh),
-    /// A local optimum of reinsertion came before the end of the budget: the search can go on.
+    /// Reinsertion reached a local optimum before the end of the budget, so the search can
+    /// continue.
     LocalOptimum(Incumbent<'p>, Working<A>),
 }
 
-/// The search for a small budget.
+/// Searches within a small budget.
 pub(super) fn search<'p, A: Metric>(
     problem: &Problem<'p>,
     metric: A,
@@ -77,7 +81,8 @@ pub(super) fn search<'p, A: Metric>(
             (start, front) = (divided, usize::MAX);
         }
     }
-    // Under a clock the initial tree is not evaluated: the result is better in any case.
+    // A time-limited search does not evaluate the initial tree: reinsertion never makes it worse,
+    // and the evaluation would take the time of many moves.
     let mut before = None;
     if began.is_none() {
         before = Some(Incumbent::begin(start.clone(), problem, run));
@@ -104,7 +109,7 @@ pub(super) fn search<'p, A: Metric>(
     Ok(SmallBudget::LocalOptimum(best, tree))
 }
 
-/// The top-down division, unless the observer cancels before it is made.
+/// Returns the top-down division; `None` if the observer cancels first.
 fn divided(boxes: &[Aabb], run: &Run) -> Result<Option<Bvh>, SearchError> {
     match watched(run.observer(), |watch| construction().build_watched(boxes, None, watch)) {
         Err(BuildError::Cancelled) => Ok(None),
@@ -112,7 +117,8 @@ fn divided(boxes: &[Aabb], run: &Run) -> Result<Option<Bvh>, SearchError> {
     }
 }
 
-/// Estimates the time of the sort in warm memory, which the steps after it have, as a fraction of all time.
+/// Estimates the duration of the sort in warm memory, in which the later steps run, as a fraction
+/// of all time.
 fn warm_sort(problem: &Problem, observer: &dyn Observer) -> Result<f64, SearchError> {
     let boxes = &problem.boxes[..problem.boxes.len().div_ceil(WARM_SAMPLE)];
     let began = observer.progress().unwrap_or(0.0);
@@ -121,8 +127,8 @@ fn warm_sort(problem: &Problem, observer: &dyn Observer) -> Result<f64, SearchEr
     Ok((took * problem.boxes.len() as f64 / boxes.len() as f64).max(1e-9))
 }
 
-/// Whether a top-down build is worth its time: it must be better than clustering on samples of the scene. Takes about a
-/// tenth of its time.
+/// Returns whether a top-down build is worth its time: it must be better than clustering on samples
+/// of the scene. The samples take about a tenth of the full build's time.
 fn top_down_may_be_better(
     morton: &MortonOrder,
     problem: &Problem,
@@ -148,8 +154,8 @@ fn top_down_may_be_better(
     Ok(divided < TOP_DOWN_BELOW * clustered)
 }
 
-/// Reinserts more and more of the largest nodes, until the observer's progress is at `end` or the run stops. Returns whether
-/// a local optimum came first.
+/// Reinserts more and more of the largest nodes, until the observer's progress reaches `end` or the
+/// run stops. Returns whether it reached a local optimum first.
 fn reinsert_largest(tree: &mut Siblings, front: usize, end: f64, run: &mut Run) -> bool {
     let observer: &dyn Observer = run.observer();
     let mut part = FIRST_PASS;
@@ -172,22 +178,24 @@ fn reinsert_largest(tree: &mut Siblings, front: usize, end: f64, run: &mut Run) 
     }
 }
 
-/// The k largest nodes, the largest first and equal ones by index, where k is about the fraction `part` of all nodes. Only the
-/// first `front` · k nodes are examined.
+/// Selects the k largest nodes, the largest first and equal nodes by index, where k is about the
+/// fraction `part` of all nodes. Examines only the first `front` · k nodes.
 fn largest(tree: &Siblings, part: f64, front: usize, order: &mut Vec<u32>) {
     let nodes = tree.len() - 1;
     let count = ((part * nodes as f64) as usize).clamp(1, nodes);
     let examined = 1..=count.saturating_mul(front).min(nodes) as u32;
-    // No area is negative, so that areas are ordered as their bits are.
-    let key = |at: u32| (!tree.area(at).to_bits(), at);
-    let mut keyed: Vec<(u64, u32)> = examined.map(key).collect();
+    // Areas are never negative, so their bits have the same order. Inverted bits put the largest
+    // first, and the index breaks ties.
+    let mut keyed: Vec<(u64, u32)> = examined
+        .map(|index| (!tree.area(index).to_bits(), index))
+        .collect();
     if count < keyed.len() {
         keyed.select_nth_unstable(count);
         keyed.truncate(count);
     }
     keyed.sort_unstable();
     order.clear();
-    order.extend(keyed.into_iter().map(|(_, at)| at));
+    order.extend(keyed.into_iter().map(|(_, index)| index));
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The best tree of a local search: the working form is converted only when it is really better.
+//! The best tree of a local search. The working form is converted only when it is better.
 
 use super::pass::TOLERANCE;
 use crate::lower_bound;
@@ -8,13 +8,14 @@ use bvh_build::{Builder, Watch};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective};
 
-/// The best tree so far. Local search lowers the internal area; for binary trees with one object per leaf every
-/// objective of a [`Problem`] grows with it, so that lowering it lowers them all.
+/// The best tree so far. Local search lowers the internal area. For binary trees with one object
+/// per leaf, every objective of a [`Problem`] grows with the internal area, so all of them fall
+/// together.
 pub(crate) struct Incumbent<'p> {
     problem: Problem<'p>,
     pub tree: Bvh,
     area: f64,
-    /// An internal area below which there is no tree.
+    /// A lower bound of the internal area of all trees.
     lower_bound: f64,
 }
 
@@ -32,21 +33,21 @@ impl<'p> Incumbent<'p> {
         Ok((incumbent, working))
     }
 
-    /// The working form of the best tree. Its boxes are tight, as builders and moves leave them.
+    /// Converts the best tree to its working form. Builders and moves leave boxes tight.
     pub fn working<A: Metric>(&self, metric: A) -> Result<Working<A>, SearchError> {
         Working::from_bvh(&self.tree, self.area, metric)
     }
 
-    /// Begins with a valid tree whose boxes are tight.
+    /// Starts with a valid tree whose boxes are tight.
     pub fn begin(tree: Bvh, problem: &Problem<'p>, run: &mut Run) -> Self {
         let mut incumbent = Self::begin_unbounded(tree, problem, run);
         incumbent.bound(run);
         incumbent
     }
 
-    /// Ends the run now or later, as soon as the tree meets a lower bound.
+    /// Computes the lower bound and ends the run if the tree meets it, now or later.
     pub fn bound(&mut self, run: &mut Run) {
-        // The bound is one of areas of whole objects.
+        // The bound holds for areas and undivided objects only.
         let Problem { measure, splits, objective, .. } = self.problem;
         let of_areas = measure.is_none() && splits.is_none() && objective != Objective::Layout;
         if of_areas && self.problem.allows(Shortcut::BoundMet) {
@@ -55,7 +56,8 @@ impl<'p> Incumbent<'p> {
         self.stop_if_optimal(run);
     }
 
-    /// As [`begin`](Self::begin), without a lower bound, where there is no time to compute one.
+    /// Like [`begin`](Self::begin), without a lower bound, for searches without the time to compute
+    /// it.
     pub fn begin_unbounded(tree: Bvh, problem: &Problem<'p>, run: &mut Run) -> Self {
         let (cost, area) = costs(problem, &tree);
         run.record(cost, tree.nodes.len() as u64);
@@ -80,7 +82,7 @@ impl<'p> Incumbent<'p> {
         may_be_better && self.offer_tree(tree.to_bvh(), run)
     }
 
-    /// As [`offer`](Self::offer), for a valid tree that needs no conversion.
+    /// Like [`offer`](Self::offer), for a valid tree that needs no conversion.
     pub fn offer_tree(&mut self, candidate: Bvh, run: &mut Run) -> bool {
         let (cost, area) = costs(&self.problem, &candidate);
         let improved = run.improve(cost);
@@ -92,8 +94,8 @@ impl<'p> Incumbent<'p> {
         improved
     }
 
-    /// Repeats a pass over `tree` until it keeps no move, at most `passes` times, and keeps the best tree. `pass` is
-    /// given the number of passes before it.
+    /// Repeats a pass over `tree` until it keeps no move, at most `passes` times, and keeps the
+    /// best tree. `pass` receives the number of earlier passes.
     pub fn improve<A: Metric>(
         &mut self,
         tree: &mut Working<A>,
@@ -115,7 +117,7 @@ impl<'p> Incumbent<'p> {
     }
 }
 
-/// The tree's cost, and what its working form calls its area.
+/// Returns the tree's cost, and the total that its working form calls the area.
 fn costs(problem: &Problem, tree: &Bvh) -> (f64, f64) {
     let cost = problem.cost(tree);
     let area = match *problem {

@@ -5,7 +5,8 @@ use bvh_config::{Accepts, Check, Itself, OutOfRange};
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 
-/// A builder of a tree with one object per leaf. Different initial trees lead to different local optima.
+/// A builder of a tree with one object per leaf. Different initial trees lead to different local
+/// optima.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -16,12 +17,14 @@ use bvh_core::{Aabb, Bvh};
 pub enum Start {
     /// Greedy top-down division.
     MullerFellner(muller_fellner::Config),
-    /// Bottom-up clustering: better on some scenes of architecture and machines, much worse on smooth surfaces.
+    /// Bottom-up clustering: better on some scenes of architecture and machines, much worse on
+    /// smooth surfaces.
     Agglomerative(ploc::Config),
 }
 
 impl Default for Start {
-    /// Müller–Fellner with |L|^0.9, from which local search reaches lower costs than from the original.
+    /// Returns Müller–Fellner with |L|^0.9. Local search from its trees reaches lower costs than
+    /// from trees of the original heuristic.
     fn default() -> Self {
         Self::MullerFellner(construction())
     }

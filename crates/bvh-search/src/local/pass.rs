@@ -1,14 +1,16 @@
-//! What all passes over a tree share: their repetition, an order of nodes, and what counts as an improvement.
+//! The common parts of all passes over a tree: repetition, an order of nodes, and the least
+//! improvement.
 
 use crate::run::{Observer, Quota, Tally};
 use crate::tree::{Metric, Working};
 
-/// A move must save more than this fraction of its cost: more than rounding errors, so that no two moves undo each other
-/// for ever.
+/// The fraction of its cost that a move must save. It exceeds rounding errors, so no two moves undo
+/// each other forever.
 pub(crate) const TOLERANCE: f64 = 1e-12;
 
-/// Sorts nodes by area, the largest first, and nodes of equal area in the order given.
-pub(super) fn sort_by_area(tree: &Working<impl Metric>, order: &mut [u32]) {
+/// Sorts nodes by area, the largest first. The sort is stable: nodes of equal area keep their
+/// order.
+pub(crate) fn sort_by_area(tree: &Working<impl Metric>, order: &mut [u32]) {
     order.sort_by(|&a, &b| {
         tree.nodes[b as usize]
             .area
@@ -17,7 +19,7 @@ pub(super) fn sort_by_area(tree: &Working<impl Metric>, order: &mut [u32]) {
 }
 
 /// Repeats a pass until it keeps no move, the quota is used up, or the observer cancels.
-pub(super) fn repeat(
+pub(crate) fn repeat(
     quota: Quota,
     observer: &dyn Observer,
     mut pass: impl FnMut(Quota) -> Tally,

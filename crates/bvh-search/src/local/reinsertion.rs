@@ -1,9 +1,10 @@
-//! Reinsertion: take a subtree out and put it where it costs least, over and over, to a local optimum.
+//! Reinsertion: removes one subtree at a time and inserts it where it costs least, until a local
+//! optimum.
 //!
 //! Bittner, Hapala & Havran 2013; the position search of Meister & Bittner 2018.
 //!
-//! Differs from them: the search is exact and sequential, every node is tried, and the method ends only when a whole
-//! pass over the tree finds nothing.
+//! Differs from them: the search is exact and sequential, every node is tried, and the method ends
+//! only when a full pass over the tree finds no improvement.
 
 use super::incumbent::Incumbent;
 use super::initial::Start;
@@ -15,7 +16,7 @@ use bvh_core::with_vector_instructions;
 use rand::seq::SliceRandom;
 
 bvh_config::config! {
-    /// In which order to try the nodes, how often, and from where.
+    /// The order in which nodes are tried, the number of passes, and the initial tree.
     pub struct Config {
         /// The order of a pass over all nodes.
         order: Order = Order::ByArea;
@@ -35,9 +36,9 @@ bvh_config::config! {
 )]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Order {
-    /// The largest node first, equal ones by index.
+    /// The largest node first, equal nodes by index.
     ByArea,
-    /// Another random order every time.
+    /// A new random order in every pass.
     Random,
 }
 
@@ -85,8 +86,8 @@ pub(crate) fn to_local_optimum(
 }
 
 with_vector_instructions! {
-    /// Tries to improve the position of every node of `order` once. Stops early when the quota is used up or the observer
-    /// cancels.
+    /// Tries to improve the position of every node of `order` once. Stops early when the quota is
+    /// used up or the observer cancels.
     pub(crate) pass = pass_plain<T: Linked>(
         tree: &mut T, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally
 }
@@ -117,7 +118,7 @@ fn pass_plain<T: Linked>(
         }
         done.moves += 1;
         if let (Some(position), _) = search.attached(tree, node, TOLERANCE) {
-            done.work += tree.reinsert(node, position.beside);
+            done.work += tree.reinsert(node, position.sibling);
             done.kept += 1;
         }
     }

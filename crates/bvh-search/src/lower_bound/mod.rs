@@ -1,40 +1,45 @@
-//! A proven lower bound of the internal area of every binary tree over a scene, for any number of objects.
+//! A proven lower bound of the internal area of every binary tree over a scene, for any number of
+//! objects.
 //!
 //! # The bound
 //!
-//! Every object i has a weight wᵢ > 0; w(S) is the weight of a set. Let A(S) be the half area of the box around S and
-//! gᵢ(x) the least A(S) of all sets of two objects or more that contain i and weigh x or more. Let α be any function
-//! with α(p) + α(1 − p) = 1 for 0 < p < 1, and ψᵢ(wᵢ) = 0,
+//! Every object i has a weight wᵢ > 0; w(S) is the weight of a set. Let A(S) be the half area of
+//! the box around S and gᵢ(x) the least A(S) of all sets of two objects or more that contain i and
+//! weigh x or more. Let α be any function with α(p) + α(1 − p) = 1 for 0 < p < 1, and ψᵢ(wᵢ) = 0,
 //!
 //! > ψᵢ(x) = min over y < x of ψᵢ(y) + α(y / x) · gᵢ(x) / y,
 //!
-//! where y is wᵢ or a greater weight that a set with i may have. Then **every binary tree over S with one object per
-//! leaf has an internal area of at least Σ wᵢ · ψᵢ(w(S)) over the objects i of S.**
+//! where y is wᵢ or a greater weight that a set with i may have. Then **every binary tree over S
+//! with one object per leaf has an internal area of at least Σ wᵢ · ψᵢ(w(S)) over the objects i of
+//! S.**
 //!
-//! *Proof*, by induction over the size of S. A single object has no inner node, and ψᵢ(wᵢ) = 0. Otherwise the root
-//! divides S into L and R; let x = w(S) and y = w(L). The area of the root is A(S), and A(S) ≥ gᵢ(x) for every i in S.
-//! By the definition of ψ, wᵢ · ψᵢ(x) ≤ wᵢ · ψᵢ(y) + α(y / x) · A(S) · wᵢ / y for the objects of L. Summed over L,
-//! whose weights add up to y, this is Σ wᵢ · ψᵢ(x) ≤ Σ wᵢ · ψᵢ(y) + α(y / x) · A(S), and likewise for R with α(1 − y /
-//! x). As both α add up to 1, the sum over S is at most A(S) plus the sums for L and R, which by induction are at most
-//! the internal areas of the subtrees. ∎
+//! *Proof*, by induction over the size of S. A single object has no inner node, and ψᵢ(wᵢ) = 0.
+//! Otherwise the root divides S into L and R; let x = w(S) and y = w(L). The area of the root is
+//! A(S), and A(S) ≥ gᵢ(x) for every i in S. By the definition of ψ, wᵢ · ψᵢ(x) ≤ wᵢ · ψᵢ(y) + α(y /
+//! x) · A(S) · wᵢ / y for the objects of L. Summed over L, whose weights add up to y, this is Σ wᵢ
+//! · ψᵢ(x) ≤ Σ wᵢ · ψᵢ(y) + α(y / x) · A(S), and likewise for R with α(1 − y / x). Because both α
+//! add up to 1, the sum over S is at most A(S) plus the sums for L and R, which by induction are at
+//! most the internal areas of the subtrees. ∎
 //!
-//! With equal weights and α(p) = 1 − p this is ∫ (c(t) − 1) dt, where c(t) = Σ 1 / (the most objects in a box of
-//! area t with i) is a fractional count of the boxes of area t that are needed to cover all objects. That alone is
-//! never below the minimum spanning tree under the areas of unions of pairs, whose cost is the same integral over the
-//! number of connected components. The α used here, α(p) = h(p) / (h(p) + h(1 − p)) with
-//! h(p) = (1 − p^¼) / (1 − p), charges more to unequal divisions: a chain of log₂ n equal divisions then costs as much
-//! as it does in a tree, and not only ln n. Being a secant of a concave function, h decreases, so α decreases too.
+//! With equal weights and α(p) = 1 − p this is ∫ (c(t) − 1) dt, where c(t) = Σ 1 / (the most
+//! objects in a box of area t with i) is a fractional count of the boxes of area t that are needed
+//! to cover all objects. This bound alone is never below the minimum spanning tree under the areas
+//! of unions of pairs, whose cost is the same integral over the number of connected components. The
+//! α used here, α(p) = h(p) / (h(p) + h(1 − p)) with h(p) = (1 − p^¼) / (1 − p), charges more to
+//! unequal divisions: a chain of log₂ n equal divisions then costs as much as in a tree, and not
+//! only ln n. h is a secant of a concave function, so h decreases, and α decreases, too.
 //!
 //! # Rounding down
 //!
-//! Everything that is not computed exactly is rounded down. Weights are integers, and sizes fall into classes; a step between
-//! classes has the cost of the cheapest pair of their sizes: y as large and x as small as can be, since α decreases and
-//! divisions leave the least weight of any object on either side. gᵢ is searched for by branch and bound
-//! (`smallest_box`), which returns the least open bound when its effort ends; at the lower ends of bands of sizes;
-//! and for large sizes once for a whole group of neighbours.
+//! Every inexact value is rounded down. Weights are integers, and sizes fall into classes. A step
+//! between classes has the cost of the cheapest pair of their sizes: the largest possible y and the
+//! smallest possible x, because α decreases and divisions leave at least the weight of one object
+//! on either side. A branch and bound (`smallest_box`) searches gᵢ at the lower ends of bands of
+//! sizes, and for large sizes once for a whole group of neighbours. It returns the least open bound
+//! when its effort ends.
 //!
-//! Weights: large objects among small ones belong into clusters of their own, so that wᵢ grows with the square root of
-//! the area that i needs to be united with its nearest neighbour.
+//! Large objects among small ones belong into separate clusters. The weight wᵢ therefore grows with
+//! the square root of the area of the union of i and its nearest neighbour.
 
 mod smallest_box;
 
@@ -47,15 +52,18 @@ use smallest_box::{Clusters, Grouped};
 /// The effort beyond which the bound improves too little for the time it takes.
 pub const DEFAULT_EFFORT: u32 = 16;
 
-/// A lower bound of [`bvh_core::cost::internal_area`] of every binary tree over `boxes` with one object per leaf, in
-/// world units squared; 0 for fewer than two objects. See the [module](self) for the proof.
+/// A lower bound of [`bvh_core::cost::internal_area`] of every binary tree over `boxes` with one
+/// object per leaf, in world units squared; 0 for fewer than two objects. See the [module](self)
+/// for the proof.
 ///
-/// `effort` limits the search for the smallest boxes: the number of times that their neighbourhood is examined after the
-/// first. Time grows with the effort and, for objects that are spread over space, with n log n; O(n²) where boxes overlap
-/// so much that all objects are neighbours. Memory O(n).
+/// `effort` limits the search for the smallest boxes: the number of times that it examines their
+/// neighbourhood after the first. Time grows with the effort and, for objects that are spread over
+/// space, with n log n; O(n²) if boxes overlap so much that all objects are neighbours. Memory
+/// O(n).
 ///
-/// The result is reduced by the fraction 10⁻¹², more than all rounding errors together. Areas are rounded as in the cost of
-/// a tree and are monotone in the box; only the sums of a few hundred terms and over all objects add errors.
+/// The result is reduced by the fraction 10⁻¹², more than all rounding errors together. Areas are
+/// rounded as in the cost of a tree and are monotone in the box; only the sums of a few hundred
+/// terms and over all objects add errors.
 pub fn internal_area(
     boxes: &[Aabb],
     effort: u32,
@@ -66,8 +74,11 @@ pub fn internal_area(
     if n < 2 {
         return Ok(0.0);
     }
-    let nearest =
-        map_init(n, || (), |(), at| clusters.smallest_box(clusters.leaf(at), 2, effort, observer));
+    let nearest = map_init(
+        n,
+        || (),
+        |(), object| clusters.smallest_box(clusters.leaf(object), 2, effort, observer),
+    );
     let weights = weights(&nearest);
     clusters.set_weights(&weights);
     let classes = Classes::new(clusters.weight());
@@ -85,22 +96,22 @@ pub fn internal_area(
     let shares = map_init(
         n,
         || (),
-        |(), at| {
+        |(), object| {
             if observer.cancelled() {
                 return 0.0;
             }
-            let mut areas = vec![nearest[at]; classes.first.len()];
+            let mut areas = vec![nearest[object]; classes.first.len()];
             for band in &bands {
                 let class = classes
                     .first
                     .partition_point(|&first| first < band.from);
-                let area = band.area(at);
+                let area = band.area(object);
                 areas[class..]
                     .iter_mut()
                     .for_each(|least| *least = least.max(area));
             }
             *areas.last_mut().unwrap_or(&mut 0.0) = clusters.area();
-            weights[at] as f64 * classes.least_path(weights[at], &areas)
+            weights[object] as f64 * classes.least_path(weights[object], &areas)
         },
     );
     if observer.cancelled() {
@@ -109,14 +120,14 @@ pub fn internal_area(
     Ok(shares.into_iter().collect::<Sum>().value() * (1.0 - 1e-12))
 }
 
-/// A lower bound in O(n): the area of the root plus the areas of all objects except the smallest and the largest, in
-/// world units squared; 0 for fewer than two objects. It is met where all boxes are equal, where every box is inside the
-/// next, and where nothing has an area.
+/// A lower bound in O(n): the area of the root plus the areas of all objects except the smallest
+/// and the largest, in world units squared; 0 for fewer than two objects. The optimum meets it if
+/// all boxes are equal, if every box is inside the next, or if no box has an area.
 ///
-/// *Proof.* Every inner node has at least the area of the largest object below it. The inner nodes above `k` of the
-/// objects, but for the root, are k − 2 or more if these are all objects, and k − 1 or more otherwise: k paths to the
-/// root join in k − 1 nodes, and if something else is below the root, it joins them in one more. Take for the `k`
-/// objects those of area t or more, and integrate over t. ∎
+/// *Proof.* Every inner node has at least the area of the largest object below it. There are k − 2
+/// or more inner nodes above `k` of the objects, not counting the root, if these are all objects,
+/// and k − 1 or more otherwise: k paths to the root join in k − 1 nodes, and any other object joins
+/// them in one more. Choose the `k` objects of area t or more, and integrate over t. ∎
 pub fn of_largest(boxes: &[Aabb]) -> f64 {
     if boxes.len() < 2 {
         return 0.0;
@@ -138,74 +149,72 @@ pub fn of_largest(boxes: &[Aabb]) -> f64 {
     sum.value().max(root)
 }
 
-/// The objects of a group together weigh at most 1/8 of the size in question, so that searching for one box for the whole
-/// group weakens the bound little.
+/// The objects of a group together weigh at most 1/8 of the size in question, so one search for the
+/// whole group weakens the bound little.
 const SEEDS_PER_SIZE: u64 = 8;
 
 /// The range of weights: 1 to 16 in units of the least.
 const LEAST_WEIGHT: u64 = 4;
 const MOST_WEIGHT: u64 = 64;
 
-/// Integer weights from the area that every object needs with its nearest neighbour.
+/// Returns integer weights from the area of the union of every object and its nearest neighbour.
 fn weights(nearest: &[f64]) -> Vec<u64> {
     let mut sorted = nearest.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let unit = sorted[sorted.len() / 4];
-    let weight =
-        |area: f64| if unit > 0.0 { (area / unit).sqrt() * LEAST_WEIGHT as f64 } else { 0.0 };
+    if unit <= 0.0 {
+        return vec![LEAST_WEIGHT; nearest.len()];
+    }
     nearest
         .iter()
-        .map(|&area| (weight(area).round() as u64).clamp(LEAST_WEIGHT, MOST_WEIGHT))
+        .map(|area| ((area / unit).sqrt() * LEAST_WEIGHT as f64).round() as u64)
+        .map(|weight| weight.clamp(LEAST_WEIGHT, MOST_WEIGHT))
         .collect()
 }
 
-/// The sizes for which smallest boxes are searched: every size while single objects matter, then ever larger steps.
+/// The sizes for which smallest boxes are searched: every size while single objects matter, then
+/// increasing steps.
 fn bands(total: u64) -> impl Iterator<Item = u64> {
-    let next = |&from: &u64| Some(from + if from < MOST_WEIGHT { 1 } else { from.div_ceil(6) });
-    std::iter::successors(Some(2 * LEAST_WEIGHT + 1), next).take_while(move |&from| from < total)
+    std::iter::successors(Some(2 * LEAST_WEIGHT + 1), |&from| {
+        let step = if from < MOST_WEIGHT { 1 } else { from.div_ceil(6) };
+        Some(from + step)
+    })
+    .take_while(move |&from| from < total)
 }
 
-/// Sizes in classes: of one size each up to the greatest weight, then ever wider; the last holds the weight of all objects
-/// only.
+/// Classes of sizes: one size each up to the greatest weight, then increasing widths. The last
+/// class holds the weight of all objects only.
 struct Classes {
     /// The least size of every class.
     first: Vec<u64>,
-    /// The least α(y / x) / y of the steps to a class, one row per class, one entry per class that leads to it.
+    /// The least α(y / x) / y of the steps to a class: one row per class, one entry per class that
+    /// leads to it.
     rates: Vec<Vec<f64>>,
 }
 
 impl Classes {
     fn new(total: u64) -> Self {
-        let next = |&size: &u64| {
+        let first: Vec<u64> = std::iter::successors(Some(LEAST_WEIGHT), |&size| {
             let step = if size <= MOST_WEIGHT { 1 } else { size.div_ceil(32) };
             (size < total).then_some(total.min(size + step))
-        };
-        let first: Vec<u64> = std::iter::successors(Some(LEAST_WEIGHT), next).collect();
-        let last = |class: usize| {
-            first
-                .get(class + 1)
-                .map_or(total, |next| next - 1)
-        };
-        let leads = |to: usize| {
-            first
-                .partition_point(|&from| from + LEAST_WEIGHT <= last(to))
-                .min(to)
-        };
-        let rate = |from: usize, to: usize| {
-            let y = last(from).min(last(to) - LEAST_WEIGHT);
-            let x = first[to].max(y + LEAST_WEIGHT);
-            share(y as f64 / x as f64) / y as f64
-        };
-        let row = |to: usize| {
-            (0..leads(to))
-                .map(|from| rate(from, to))
-                .collect()
-        };
-        let rates = (0..first.len()).map(row).collect();
+        })
+        .collect();
+        let mut last: Vec<u64> = first[1..].iter().map(|next| next - 1).collect();
+        last.push(total);
+        let rates = (0..first.len())
+            .map(|to| {
+                // A step must leave room for the least weight on the other side.
+                let sources = first.partition_point(|&from| from + LEAST_WEIGHT <= last[to]);
+                (0..sources.min(to))
+                    .map(|from| rate(last[from], first[to], last[to]))
+                    .collect()
+            })
+            .collect();
         Self { first, rates }
     }
 
-    /// ψ at the weight of all objects, for an object of this weight and the areas of its smallest boxes by class.
+    /// Returns ψ at the weight of all objects, for an object of this weight and the areas of its
+    /// smallest boxes by class.
     fn least_path(&self, weight: u64, areas: &[f64]) -> f64 {
         let start = (weight - LEAST_WEIGHT) as usize;
         let mut least = vec![f64::INFINITY; self.first.len()];
@@ -220,13 +229,24 @@ impl Classes {
     }
 }
 
-/// α: the fraction of a node's area that is charged to a child with this fraction of the node's weight.
+/// Returns the least α(y / x) / y of a step from sizes up to `from` to sizes `first..=last`.
+fn rate(from: u64, first: u64, last: u64) -> f64 {
+    let y = from.min(last - LEAST_WEIGHT);
+    let x = first.max(y + LEAST_WEIGHT);
+    share(y as f64 / x as f64) / y as f64
+}
+
+/// α: the fraction of a node's area that is charged to a child with this fraction of the node's
+/// weight.
 fn share(part: f64) -> f64 {
-    // 1 / h, without cancellation: 1 − p = (1 − p^¼)(1 + p^¼)(1 + p^½).
-    let over_secant = |p: f64| (1.0 + p.sqrt().sqrt()) * (1.0 + p.sqrt());
-    let own = over_secant(part);
-    let other = over_secant(1.0 - part);
-    other / (own + other)
+    let of_child = over_secant(part);
+    let of_sibling = over_secant(1.0 - part);
+    of_sibling / (of_child + of_sibling)
+}
+
+/// Returns 1 / h without cancellation, by 1 − p = (1 − p^¼)(1 + p^¼)(1 + p^½).
+fn over_secant(p: f64) -> f64 {
+    (1.0 + p.sqrt().sqrt()) * (1.0 + p.sqrt())
 }
 
 #[cfg(test)]
@@ -236,15 +256,15 @@ mod tests {
     use crate::run::{Budget, Problem, solve};
     use proptest::prelude::*;
 
-    /// Boxes of very different sizes, `flat` axes without extent; every fourth scene is on a coarse grid, which makes
-    /// ties, flat boxes and coincident ones.
+    /// Boxes of very different sizes, `flat` axes without extent; every fourth scene is on a coarse
+    /// grid, which makes ties, flat boxes and coincident ones.
     fn scene(n: usize, flat: usize) -> impl Strategy<Value = Vec<Aabb>> {
-        let coordinate = (0u8..=255).prop_map(|at| f32::from(at) / 16.0);
+        let coordinate = (0u8..=255).prop_map(|step| f32::from(step) / 16.0);
         let aabb = (prop::array::uniform3(coordinate), prop::array::uniform3(0u8..=7), 1u8..=40);
         (prop::collection::vec(aabb, n), 0u8..4).prop_map(move |(boxes, coarse)| {
-            let on_grid = |at: f32| if coarse == 0 { (at / 4.0).floor() } else { at };
+            let on_grid = |value: f32| if coarse == 0 { (value / 4.0).floor() } else { value };
             let of = |(low, size, scale): ([f32; 3], [u8; 3], u8)| {
-                let keep = |axis: usize, at: f32| if axis < flat { 0.0 } else { on_grid(at) };
+                let keep = |axis: usize, value: f32| if axis < flat { 0.0 } else { on_grid(value) };
                 let low: [f32; 3] = std::array::from_fn(|axis| keep(axis, low[axis]));
                 let size = |axis| keep(axis, f32::from(size[axis]) * f32::from(scale) / 40.0);
                 Aabb::from((low, std::array::from_fn(|axis| low[axis] + size(axis))))
@@ -275,12 +295,12 @@ mod tests {
     #[test]
     fn it_is_most_of_the_optimum_of_scattered_boxes() {
         for salt in 1..=4u16 {
-            let at = |i: u16, k: u16| {
+            let number = |i: u16, k: u16| {
                 f32::from((i * 97 + salt * 41 + 7).wrapping_mul(k * 211 + 89) % 997) / 100.0
             };
-            let corner = |i| [at(i, 1), at(i, 2), at(i, 3)];
+            let corner = |i| [number(i, 1), number(i, 2), number(i, 3)];
             let boxes: Vec<Aabb> = (0..12)
-                .map(|i| Aabb::from((corner(i), corner(i).map(|c| c + at(i, 4) / 10.0))))
+                .map(|i| Aabb::from((corner(i), corner(i).map(|c| c + number(i, 4) / 10.0))))
                 .collect();
             let tightness = internal_area(&boxes, DEFAULT_EFFORT, &()).unwrap() / optimum(&boxes);
             assert!(tightness > 0.8, "{tightness}");
@@ -319,14 +339,14 @@ mod tests {
         let boxes = crate::scatter::scatter(3000);
         let whole = internal_area(&boxes, 1, &()).unwrap();
         for polls in [0, 1, 10_000] {
-            // This effort would take hours.
+            // Without a cancellation, this effort would take hours.
             let bound = internal_area(&boxes, u32::MAX, &After(AtomicU64::new(polls))).unwrap();
             assert!(bound > 0.0 && bound < whole, "{bound} {whole}");
         }
     }
 
     #[test]
-    fn bad_boxes_are_refused_and_extreme_ones_are_not() {
+    fn bad_boxes_are_rejected_and_extreme_ones_are_not() {
         let mut boxes = crate::scatter::scatter(50);
         for factor in [2f32.powi(-140), 2f32.powi(100)] {
             let scaled: Vec<Aabb> = boxes

@@ -1,14 +1,17 @@
-//! The smallest box around an object and enough others: branch and bound over its six faces, which may end at any time.
+//! The smallest box around an object and enough others: an anytime branch and bound over its six
+//! faces.
 
 use crate::run::Observer;
 use bvh_build::median_cut::{Config, CutAxis};
 use bvh_build::{BuildError, Builder};
 use bvh_core::{Aabb, Bvh, NodeKind, with_vector_instructions};
+use std::cmp::Ordering;
 use std::ops::Range;
 
-/// How far a box reaches in six directions, as −min and max, each padded to four lanes. A box contains an object if it
-/// reaches as far in every direction. The maximum is the union of boxes; the minimum is a lower bound of the reach of every
-/// box that contains any one of several objects.
+/// The extent of a box in six directions, as −min and max, each padded to four lanes. A box
+/// contains an object if it reaches as far in every direction. The maximum of several reaches is
+/// the union of the boxes; the minimum is a lower bound of the reach of every box that contains at
+/// least one of the objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(32))]
 struct Reach([f32; 8]);
@@ -28,7 +31,8 @@ impl Reach {
         }))
     }
 
-    /// The least half area of a box with this reach, rounded like [`Aabb::half_area`] and therefore as monotone.
+    /// Returns the least half area of a box with this reach, rounded like [`Aabb::half_area`] and
+    /// therefore also monotone.
     #[inline(always)]
     fn half_area(&self) -> f64 {
         let extent =
@@ -45,7 +49,7 @@ impl From<&Aabb> for Reach {
     }
 }
 
-/// A node of the tree in which neighbours are looked up: a group of objects that are near each other.
+/// A node of the tree that finds neighbours: a group of objects close to each other.
 #[derive(Clone, Debug)]
 struct Cluster {
     /// The objects below the node, in tree order.
@@ -68,7 +72,8 @@ pub(super) struct Clusters {
     weight_before: Vec<u64>,
 }
 
-/// A cluster that weighs at most 1/128 of the size in question counts as inside a box as soon as one of its objects is.
+/// A cluster that weighs at most 1/128 of the size in question counts as inside a box as soon as
+/// one of its objects is.
 const CLUSTERS_PER_SIZE: u64 = 128;
 
 /// Areas of smallest boxes with at least a certain weight, for groups of objects.
@@ -79,16 +84,20 @@ pub(super) struct Grouped {
 }
 
 impl Grouped {
-    /// The area for one object.
-    pub fn area(&self, at: usize) -> f64 {
+    /// Returns the area for one object.
+    pub fn area(&self, object: usize) -> f64 {
+        let group = self
+            .groups
+            .partition_point(|group| group.0 <= object);
         self.groups
-            .get(self.groups.partition_point(|group| group.0 <= at))
+            .get(group)
             .map_or(0.0, |group| group.1)
     }
 }
 
 impl Clusters {
-    /// A tree of objects with weight 1 each. Refuses boxes that builders refuse. O(n log n).
+    /// Builds a tree of objects with weight 1 each. Rejects the boxes that builders reject. O(n log
+    /// n).
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
         let tree = Config { axis: CutAxis::Longest, ..Config::default() }.build(boxes)?;
         let reaches: Vec<Reach> = tree
@@ -125,23 +134,23 @@ impl Clusters {
         self.weight_before.last().copied().unwrap_or(0)
     }
 
-    /// Half area of the box around all.
+    /// The half area of the box around all objects.
     pub fn area(&self) -> f64 {
         self.nodes
             .first()
             .map_or(0.0, |root| root.half_area)
     }
 
-    /// The cluster of a single object.
-    pub fn leaf(&self, at: usize) -> usize {
-        self.leaves[at]
+    /// Returns the cluster of a single object.
+    pub fn leaf(&self, object: usize) -> usize {
+        self.leaves[object]
     }
 
     fn weight_of(&self, objects: &Range<usize>) -> u64 {
         self.weight_before[objects.end] - self.weight_before[objects.start]
     }
 
-    /// The largest clusters that weigh at most `most` or are single objects, in tree order.
+    /// Returns the largest clusters that weigh at most `most` or are single objects, in tree order.
     pub fn groups(&self, most: u64) -> Vec<usize> {
         let mut groups = vec![];
         let mut stack = vec![0];
@@ -156,22 +165,17 @@ impl Clusters {
         groups
     }
 
-    /// The areas of groups, to be looked up by object.
+    /// Returns the areas of groups, indexed by object.
     pub fn grouped(&self, from: u64, groups: &[usize], areas: &[f64]) -> Grouped {
-        let end = |&group: &usize| self.nodes[group].objects.end;
-        Grouped {
-            from,
-            groups: groups
-                .iter()
-                .map(end)
-                .zip(areas.iter().copied())
-                .collect(),
-        }
+        let ends = groups
+            .iter()
+            .map(|&group| self.nodes[group].objects.end);
+        Grouped { from, groups: ends.zip(areas.iter().copied()).collect() }
     }
 
-    /// A lower bound of the half area of every box that contains an object of the cluster `seed` and weighs at least `weight`,
-    /// which must not be more than all objects do; the exact minimum for a single object and enough effort.
-    /// 0 once the observer cancels.
+    /// Returns a lower bound of the half area of every box that contains an object of the cluster
+    /// `seed` and weighs at least `weight`, which must not exceed the total weight. The bound is
+    /// the exact minimum for a single object and enough effort, and 0 once the observer cancels.
     pub fn smallest_box(
         &self,
         seed: usize,
@@ -183,7 +187,7 @@ impl Clusters {
     }
 }
 
-/// The nodes of the tree with the summary of their objects. Parents come before children.
+/// Returns the nodes of the tree with the summary of their objects. Parents come before children.
 fn nodes(tree: &Bvh, reaches: &[Reach]) -> Vec<Cluster> {
     let mut nodes: Vec<Cluster> = Vec::with_capacity(tree.nodes.len());
     for node in &tree.nodes {
@@ -224,18 +228,40 @@ struct Member {
     weight: u32,
 }
 
-/// All boxes that contain `must` and only `members`, weigh enough, and are smaller than the best box known.
+impl Member {
+    /// Orders members by area. The cluster breaks ties, so that the order is total and the result
+    /// deterministic.
+    #[inline(always)]
+    fn compare(&self, other: &Self) -> Ordering {
+        self.area
+            .total_cmp(&other.area)
+            .then(self.cluster.cmp(&other.cluster))
+    }
+}
+
+#[inline(always)]
+fn total_weight(members: &[Member]) -> u64 {
+    members
+        .iter()
+        .map(|member| u64::from(member.weight))
+        .sum()
+}
+
+/// All boxes that contain `must` and only `members`, weigh enough, and are smaller than the best
+/// known box.
 struct Region {
     must: Reach,
     members: Vec<Member>,
-    /// Number of members that weigh enough together, taking those first that need the least area.
+    /// The number of members that weigh enough together, in increasing order of the area that they
+    /// need.
     enough: usize,
-    /// The area that the last of them needs: no box of the region is smaller.
+    /// The area that the last of these members needs. No box of the region is smaller.
     bound: f64,
 }
 
 impl Region {
-    /// `None` if the region has no box smaller than `known`, which is updated to the area of the best box found.
+    /// Builds the region; `None` if it has no box smaller than `known`. Lowers `known` to the area
+    /// of the best box found.
     #[inline(always)]
     fn new(
         clusters: &Clusters,
@@ -244,38 +270,25 @@ impl Region {
         weight: u64,
         known: &mut f64,
     ) -> Option<Self> {
-        let with = |member: Member| {
-            let area = must
-                .union(&clusters.nodes[member.cluster as usize].reach)
-                .half_area();
-            Member { area, ..member }
-        };
         let mut members: Vec<Member> = members
-            .map(with)
+            .map(|member| {
+                let reach = &clusters.nodes[member.cluster as usize].reach;
+                Member { area: must.union(reach).half_area(), ..member }
+            })
             .filter(|member| member.area < *known)
             .collect();
-        let weigh = |members: &[Member]| {
-            members
-                .iter()
-                .map(|member| u64::from(member.weight))
-                .sum::<u64>()
-        };
-        if weigh(&members) < weight {
+        if total_weight(&members) < weight {
             return None;
         }
-        // The smallest prefix that weighs enough ends within `low..high`.
+        // Invariant: the smallest prefix that weighs enough ends within `low..high`. Quickselect
+        // finds it in O(n) without a full sort.
         let mut low = 0;
         let mut high = members.len();
         let mut missing = weight;
         while high - low > 1 {
             let half = (high - low) / 2;
-            let by_area = |a: &Member, b: &Member| {
-                a.area
-                    .total_cmp(&b.area)
-                    .then(a.cluster.cmp(&b.cluster))
-            };
-            members[low..high].select_nth_unstable_by(half, by_area);
-            let lower = weigh(&members[low..low + half]);
+            members[low..high].select_nth_unstable_by(half, Member::compare);
+            let lower = total_weight(&members[low..low + half]);
             if lower >= missing {
                 high = low + half;
             } else {
@@ -289,7 +302,7 @@ impl Region {
         Some(region)
     }
 
-    /// The reaches of the first `enough` members.
+    /// Returns the reaches of the first `enough` members.
     #[inline(always)]
     fn nearest<'a>(&'a self, clusters: &'a Clusters) -> impl Iterator<Item = &'a Reach> {
         self.members[..self.enough]
@@ -297,15 +310,15 @@ impl Region {
             .map(|member| &clusters.nodes[member.cluster as usize].reach)
     }
 
-    /// The box around them: a good box of the region.
+    /// Returns the box around these members, a good box of the region.
     #[inline(always)]
     fn around(&self, clusters: &Clusters) -> Reach {
         self.nearest(clusters)
             .fold(self.must, |union, reach| union.union(reach))
     }
 
-    /// Where to divide the region: the face whose move from `must` to that box costs most area, at the median of the
-    /// reaches that it passes.
+    /// Chooses the division of the region: the face whose move from `must` to that box costs most
+    /// area, at the median of the reaches that it passes.
     fn division(&self, clusters: &Clusters) -> Option<(usize, f32)> {
         let around = self.around(clusters);
         let mut best = None;
@@ -350,7 +363,7 @@ fn search_plain(
     let mut known = clusters.nodes[around].half_area;
     let must = clusters.nodes[seed].reach;
     let members = neighbours(clusters, &must, weight / CLUSTERS_PER_SIZE, known);
-    // Regions without smaller boxes have been dropped; the others together contain all smaller boxes.
+    // Invariant: the regions together contain all boxes smaller than `known`.
     let mut regions: Vec<Region> =
         Region::new(clusters, must, members.into_iter(), weight, &mut known)
             .into_iter()
@@ -369,18 +382,19 @@ fn search_plain(
         }
         let region = regions.swap_remove(least);
         left = left.saturating_sub(2 * region.members.len() as u64);
-        let Some((face, at)) = region.division(clusters) else { return region.bound };
+        let Some((face, plane)) = region.division(clusters) else { return region.bound };
         let members = || region.members.iter().copied();
-        let short =
-            members().filter(|member| clusters.nodes[member.cluster as usize].reach.0[face] < at);
+        let short = members()
+            .filter(|member| clusters.nodes[member.cluster as usize].reach.0[face] < plane);
         let mut far = region.must;
-        far.0[face] = at;
+        far.0[face] = plane;
         regions.extend(Region::new(clusters, region.must, short, weight, &mut known));
         regions.extend(Region::new(clusters, far, members(), weight, &mut known));
     }
 }
 
-/// The clusters that need less area than `known` together with `must`: single objects, or clusters that weigh at most `most`.
+/// Returns the clusters that need less area than `known` together with `must`: single objects, or
+/// clusters that weigh at most `most`.
 #[inline(always)]
 fn neighbours(clusters: &Clusters, must: &Reach, most: u64, known: f64) -> Vec<Member> {
     let mut found = vec![];

@@ -1,17 +1,19 @@
 //! The genetic algorithm over insertion orders of Goldsmith–Salmon trees.
 //!
-//! Ng & Trifonov 2003, section 4; operators after Cassen, Michalewicz & Subramanian 1995. An individual is a
-//! permutation of the objects, its fitness the cost of the tree from inserting them in that order. A generation consists
-//! of as many tournaments of two as the population has individuals, one-point order crossover whose children replace the
-//! parents, mutation by swaps.
+//! Ng & Trifonov 2003, section 4; operators after Cassen, Michalewicz & Subramanian 1995. An
+//! individual is a permutation of the objects. Its fitness is the cost of the tree that inserting
+//! the objects in this order builds. A generation consists of one tournament of two per individual,
+//! one-point order crossover whose children replace the parents, and mutation by swaps.
 //!
-//! Differs from the paper: nothing known. Where the paper is silent: 'the most fit is always kept' means that the best
-//! individual so far takes the place of the least fit of a generation whose individuals are all less fit, so that the
-//! size of the population is constant; the number of swaps is uniform between 0 and twice its mean;
-//! an individual that a generation leaves unchanged is not evaluated again, though it counts as evaluated.
+//! Differs from the paper: nothing known. Where the paper is silent: 'the most fit is always kept'
+//! means that the best individual so far replaces the least fit of a generation whose individuals
+//! are all less fit, so the size of the population is constant. The number of swaps is uniform
+//! between 0 and twice its mean. An individual that a generation leaves unchanged is not evaluated
+//! again, though it counts as evaluated.
 //!
-//! *Not done*: resuming an insertion where a child's order first differs from its parent's. Of 2n/500 swapped positions
-//! the first comes so early that only about one insertion in twenty could be saved, less than keeping the trees costs.
+//! *Not done*: resuming an insertion where a child's order first differs from its parent's. The
+//! first of 2n/500 swapped positions comes so early that only about one insertion in twenty could
+//! be saved, less than the cost of keeping the trees.
 
 use super::{Evaluated, Insertion, random_order};
 use crate::run::{Problem, Run, Search, SearchError, Stream, stream};
@@ -22,7 +24,7 @@ use rand::RngExt;
 use rand::seq::SliceRandom;
 
 bvh_config::config! {
-    /// Size and operators.
+    /// The population and the operators.
     pub struct Config {
         /// Number of individuals.
         population: usize = 50, in 1..=1_000_000;
@@ -30,10 +32,10 @@ bvh_config::config! {
         generations: u64 = 100;
         /// The probability that a pair of parents is replaced by its two children.
         crossover: f64 = 0.7, in 0.0..=1.0;
-        /// Mean number of swaps per individual and generation, as a fraction of the number of objects. The paper has about
-        /// n/500 swaps.
+        /// Mean number of swaps per individual and generation, as a fraction of the number of
+        /// objects. The paper has about n/500 swaps.
         mutation: f64 = 0.002, in 0.0..=1.0;
-        /// How the objects are inserted.
+        /// The parameters of the insertion.
         insertion: goldsmith_salmon::Config, in Itself;
     }
 }
@@ -43,7 +45,7 @@ bvh_config::config! {
 struct Individual {
     order: Vec<u32>,
     cost: f64,
-    /// Whether `cost` is the cost of `order`.
+    /// True if `cost` is the cost of `order`.
     evaluated: bool,
 }
 
@@ -81,7 +83,7 @@ impl Search for Config {
                 keep(&best, &mut population);
             }
         }
-        // Another order of the same cost may have taken the place of the one whose tree was kept.
+        // Another order of the same cost may have replaced the order whose tree was kept.
         if built.0 != best.order
             && let Some(tree) = insertion.tree(&best.order, run.observer())
         {
@@ -91,11 +93,12 @@ impl Search for Config {
     }
 }
 
-/// The most entries of all permutations together: 1 GB.
+/// Maximum number of entries of all permutations together, 1 GB.
 const MOST_ENTRIES: usize = 1 << 28;
 
-/// Evaluates the individuals that have changed and records the generation. Returns the fittest, the first of equals, and its tree if
-/// it was evaluated now. Individuals that a cancellation leaves without evaluation are no candidates.
+/// Evaluates the individuals that have changed and records the generation. Returns the fittest, the
+/// first of equals, and its tree if it was evaluated now. Individuals that a cancellation leaves
+/// without evaluation have an infinite cost.
 fn evaluate(
     insertion: &Insertion,
     population: &mut [Individual],
@@ -129,20 +132,20 @@ fn evaluate(
     Ok((fittest.clone(), tree))
 }
 
-/// The winners of as many tournaments of two as there are individuals. A tournament may draw the same individual twice.
+/// Returns the winners of one tournament of two per individual. A tournament may draw the same
+/// individual twice.
 fn select(population: &[Individual], rng: &mut Stream) -> Vec<Individual> {
     let count = population.len() as u32;
-    let mut tournament = |_| {
-        let a = rng.random_range(0..count) as usize;
-        let b = rng.random_range(0..count) as usize;
-        let a = &population[a];
-        let b = &population[b];
-        if b.cost < a.cost { b } else { a }.clone()
-    };
-    (0..count).map(&mut tournament).collect()
+    (0..count)
+        .map(|_| {
+            let a = &population[rng.random_range(0..count) as usize];
+            let b = &population[rng.random_range(0..count) as usize];
+            if b.cost < a.cost { b } else { a }.clone()
+        })
+        .collect()
 }
 
-/// Puts the best individual so far in the place of the least fit, the last of equals.
+/// Replaces the least fit individual, the last of equals, by the best individual so far.
 fn keep(best: &Individual, population: &mut [Individual]) {
     if let Some(least_fit) = population
         .iter_mut()
@@ -152,8 +155,8 @@ fn keep(best: &Individual, population: &mut [Individual]) {
     }
 }
 
-/// Pairs the parents at random and replaces each pair by its two children with the given probability. Of an odd number,
-/// one parent is left over.
+/// Pairs the parents at random and replaces each pair by its two children with the given
+/// probability. In an odd population, one parent stays unpaired.
 fn cross(parents: &mut [Individual], probability: f64, marks: &mut [bool], rng: &mut Stream) {
     parents.shuffle(rng);
     for pair in parents.chunks_exact_mut(2) {
@@ -172,8 +175,9 @@ fn cross(parents: &mut [Individual], probability: f64, marks: &mut [bool], rng: 
     }
 }
 
-/// One-point order crossover: the first `cut` objects of `a`, then the others in the order of `b`. `marks` has one entry
-/// per object; all are false before and after.
+/// Returns the child of a one-point order crossover: the first `cut` objects of `a`, then the
+/// remaining objects in the order of `b`. `marks` has one entry per object; all are false before
+/// and after.
 fn child(a: &[u32], b: &[u32], cut: usize, marks: &mut [bool]) -> Vec<u32> {
     let (kept, _) = a.split_at(cut);
     kept.iter()
@@ -189,7 +193,7 @@ fn child(a: &[u32], b: &[u32], cut: usize, marks: &mut [bool]) -> Vec<u32> {
     order
 }
 
-/// Swaps random pairs; their number is uniform between 0 and 2 · `mean` · n, rounded.
+/// Swaps random pairs. The number of swaps is uniform between 0 and 2 · `mean` · n, rounded.
 fn mutate(individual: &mut Individual, mean: f64, rng: &mut Stream) {
     let n = individual.order.len() as u32;
     if n < 2 {
@@ -211,6 +215,10 @@ mod tests {
     use crate::scatter::scatter;
     use bvh_core::cost::Objective;
     use proptest::prelude::*;
+
+    fn individual(cost: f64) -> Individual {
+        Individual { order: vec![], cost, evaluated: true }
+    }
 
     fn is_permutation(order: &[u32], n: usize) -> bool {
         let mut sorted = order.to_vec();
@@ -289,7 +297,7 @@ mod tests {
 
     #[test]
     fn as_many_tournaments_are_held_as_there_are_individuals() {
-        // One individual has one tournament, which it wins, and then its mutant is evaluated.
+        // A single individual wins the only tournament, and then its mutant is evaluated.
         let boxes = scatter(80);
         let problem = Problem { objective: Objective::GoldsmithSalmon, ..Problem::new(&boxes) };
         let config = Config { population: 1, generations: 50, mutation: 0.05, ..Config::default() };
@@ -298,16 +306,16 @@ mod tests {
             .history;
         assert!(history.last().unwrap().incumbent < history[0].cost);
         for count in [1, 2, 7] {
-            let individual =
-                |at: usize| Individual { order: vec![], cost: at as f64, evaluated: true };
-            let population: Vec<Individual> = (0..count).map(individual).collect();
-            assert_eq!(select(&population, &mut stream(1, 0)).len(), count);
+            let population: Vec<Individual> = (0..count)
+                .map(f64::from)
+                .map(individual)
+                .collect();
+            assert_eq!(select(&population, &mut stream(1, 0)).len(), count as usize);
         }
     }
 
     #[test]
     fn the_best_takes_the_place_of_the_least_fit() {
-        let individual = |cost| Individual { order: vec![], cost, evaluated: true };
         let mut population = [3.0, 5.0, 4.0].map(individual);
         keep(&individual(2.0), &mut population);
         assert_eq!(population.map(|individual| individual.cost), [3.0, 2.0, 4.0]);

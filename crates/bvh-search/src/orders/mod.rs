@@ -1,12 +1,13 @@
-//! Searches over insertion orders. They share the fitness of an order: the cost of its Goldsmith–Salmon tree.
+//! Searches over insertion orders. The fitness of an order is the cost of its Goldsmith–Salmon
+//! tree.
 
 pub mod genetic;
 pub mod random_orders;
 
 use crate::parallel::{KEPT_NODES, map_init};
 use crate::run::{Observer, Problem, Run, SearchError, Stream, watched};
+use bvh_build::BuildError;
 use bvh_build::goldsmith_salmon::{self, InvalidOrder, Scene, Workspace};
-use bvh_build::{BuildError, Watch};
 use bvh_core::{Bvh, cost::Objective};
 use rand::seq::SliceRandom;
 
@@ -39,21 +40,31 @@ impl<'p> Insertion<'p> {
         2 * self.scene.len() as u64
     }
 
-    /// The cost of the tree of one order, which must be a permutation of the objects; `None` if the observer cancels before.
+    /// Inserts the objects in this order and returns the Goldsmith–Salmon cost.
+    fn insert(
+        &self,
+        order: &[u32],
+        workspace: &mut Workspace,
+        observer: &dyn Observer,
+    ) -> Result<f64, InvalidOrder> {
+        watched(observer, |watch| {
+            self.config
+                .insert_watched(&self.scene, order, workspace, watch)
+        })
+    }
+
+    /// Returns the cost of the tree of one order, which must be a permutation of the objects;
+    /// `None` if the observer cancels first.
     fn cost(
         &self,
         order: &[u32],
         (workspace, tree): &mut Buffers,
         observer: &dyn Observer,
     ) -> Option<f64> {
-        let insert = |watch: &Watch| {
-            self.config
-                .insert_watched(&self.scene, order, workspace, watch)
-        };
-        let goldsmith_salmon = match watched(observer, insert) {
+        let goldsmith_salmon = match self.insert(order, workspace, observer) {
             Ok(cost) => cost,
             Err(InvalidOrder::Cancelled) => return None,
-            // It would be a defect of the search, and never becomes the incumbent.
+            // Only a defect of the search leads here. An infinite cost never becomes the incumbent.
             Err(_) => {
                 debug_assert!(false, "orders are permutations");
                 return Some(f64::INFINITY);
@@ -67,32 +78,29 @@ impl<'p> Insertion<'p> {
         Some(self.problem.cost(tree))
     }
 
-    /// The tree of one order, unless the observer cancels before it is built.
+    /// Builds the tree of one order; `None` if the observer cancels first.
     fn tree(&self, order: &[u32], observer: &dyn Observer) -> Option<Bvh> {
         let (mut workspace, mut tree) = Buffers::default();
-        let insert = |watch: &Watch| {
-            self.config
-                .insert_watched(&self.scene, order, &mut workspace, watch)
-        };
-        watched(observer, insert).ok()?;
+        self.insert(order, &mut workspace, observer)
+            .ok()?;
         workspace.write(&mut tree);
         Some(tree)
     }
 
-    /// Evaluates several orders on all threads of the current rayon pool: all, unless the observer cancels before. Without an order
-    /// that was evaluated before, fails if it cancels before the first one.
+    /// Evaluates orders on all threads of the current rayon pool, until the observer cancels. Fails
+    /// if neither this call nor an earlier one has evaluated any order.
     fn evaluate(&self, orders: &[&[u32]], run: &Run) -> Result<Evaluated, SearchError> {
         let observer = run.observer();
         let mut found = Evaluated { costs: Vec::with_capacity(orders.len()), cheapest: None };
         let mut limit = run.incumbent();
-        // Only so many trees are kept at a time.
+        // The number of trees kept at a time limits the memory.
         let most = (KEPT_NODES / self.work().max(1)).max(1) as usize;
         for (number, orders) in orders.chunks(most).enumerate() {
-            let evaluated = map_init(orders.len(), Buffers::default, |buffers, at| {
-                if number + at > 0 && observer.cancelled() {
+            let evaluated = map_init(orders.len(), Buffers::default, |buffers, index| {
+                if number + index > 0 && observer.cancelled() {
                     return None;
                 }
-                let cost = self.cost(orders[at], buffers, observer)?;
+                let cost = self.cost(orders[index], buffers, observer)?;
                 let (workspace, _) = buffers;
                 let tree = (cost <= limit).then(|| {
                     let mut tree = Bvh::default();
@@ -101,14 +109,14 @@ impl<'p> Insertion<'p> {
                 });
                 Some((cost, tree))
             });
-            for (at, evaluated) in evaluated.into_iter().enumerate() {
+            for (index, evaluated) in evaluated.into_iter().enumerate() {
                 let (cost, tree) = evaluated.unzip();
                 found.costs.push(cost);
                 let is_cheapest = cost
                     .is_some_and(|cost| found.cheapest.is_none() && cost <= limit || cost < limit);
                 if let (Some(cost), Some(tree), true) = (cost, tree.flatten(), is_cheapest) {
                     limit = cost;
-                    found.cheapest = Some((number * most + at, tree));
+                    found.cheapest = Some((number * most + index, tree));
                 }
             }
         }
@@ -121,13 +129,15 @@ impl<'p> Insertion<'p> {
 
 /// The outcome of evaluating several orders.
 struct Evaluated {
-    /// In the order of the orders; `None` where a cancellation came before.
+    /// In the sequence of the orders; `None` for orders that a cancellation left without
+    /// evaluation.
     costs: Vec<Option<f64>>,
-    /// The number of the first of the cheapest orders, and its tree, unless it is dearer than the incumbent.
+    /// The number of the first of the cheapest orders, and its tree; `None` if it costs more than
+    /// the incumbent.
     cheapest: Option<(usize, Bvh)>,
 }
 
-/// A permutation of `0..n`, each equally likely.
+/// Draws a permutation of `0..n`, each equally likely.
 fn random_order(n: usize, rng: &mut Stream) -> Vec<u32> {
     let mut order: Vec<u32> = (0..n as u32).collect();
     order.shuffle(rng);

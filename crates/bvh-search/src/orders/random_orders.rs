@@ -11,11 +11,11 @@ use bvh_config::Itself;
 use bvh_core::Bvh;
 
 bvh_config::config! {
-    /// How many orders to try.
+    /// The number of orders to try, and the insertion.
     pub struct Config {
         /// Number of independent random orders.
         trials: u64 = 100, in 1..;
-        /// How the objects are inserted.
+        /// The parameters of the insertion.
         insertion: goldsmith_salmon::Config, in Itself;
     }
 }
@@ -26,14 +26,15 @@ const BATCH: u64 = 64;
 impl Search for Config {
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         let insertion = Insertion::new(problem, &self.insertion)?;
-        let order = |trial| random_order(insertion.len(), &mut stream(seed, trial));
         let mut next = 0;
         let mut best = Bvh::default();
         while next < self.trials && run.stopped().is_none() {
             let end = self
                 .trials
                 .min(next.saturating_add(run.evaluations_left(insertion.work()).min(BATCH)));
-            let orders: Vec<Vec<u32>> = (next..end).map(order).collect();
+            let orders: Vec<Vec<u32>> = (next..end)
+                .map(|trial| random_order(insertion.len(), &mut stream(seed, trial)))
+                .collect();
             let orders: Vec<&[u32]> = orders.iter().map(Vec::as_slice).collect();
             let Evaluated { costs, cheapest } = insertion.evaluate(&orders, run)?;
             let mut improved = false;

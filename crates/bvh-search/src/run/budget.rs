@@ -1,9 +1,10 @@
-//! How much a search may do, how much it has done, and why it ended.
+//! Limits of a search, the work done, and the reason to stop.
 
 use std::ops::AddAssign;
 
-/// Limits in machine-independent units; `None` is no limit. A limit in seconds is a [`Deadline`](crate::Deadline), or any other
-/// [`Observer`](crate::Observer) that cancels. There is no default: without any limit, [`best`](crate::best) takes hours.
+/// Limits in machine-independent units; `None` is no limit. A limit in seconds is a
+/// [`Deadline`](crate::Deadline), or any other [`Observer`](crate::Observer) that cancels. There is
+/// no default: without any limit, [`best`](crate::best) takes hours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -34,19 +35,19 @@ impl Budget {
 )]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum StopReason {
-    /// It did all that its configuration asks for.
+    /// The search completed everything that its configuration requests.
     Completed,
-    /// No tree costs less than its incumbent.
+    /// No tree costs less than the incumbent.
     Optimal,
     /// [`Budget::max_evaluations`] was reached.
     Evaluations,
     /// [`Budget::max_work`] was reached.
     Work,
-    /// The observer asked for it.
+    /// The observer cancelled the search.
     Cancelled,
 }
 
-/// What was done to a tree, for [`Run::count`](crate::Run::count).
+/// Counts of moves and work, for [`Run::count`](crate::Run::count).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Moves evaluated.
@@ -65,7 +66,7 @@ impl AddAssign for Tally {
     }
 }
 
-/// How much may still be done.
+/// The moves and the work that remain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quota {
     /// Moves to evaluate.
@@ -78,19 +79,19 @@ impl Quota {
     /// No limit.
     pub const ENDLESS: Self = Self { moves: u64::MAX, work: u64::MAX };
 
-    /// Whether `done` has used up either limit.
+    /// Returns whether `done` has used up either limit.
     #[inline(always)]
     pub fn is_reached(&self, done: &Tally) -> bool {
         done.moves >= self.moves || done.work >= self.work
     }
 
-    /// The same quota with no more than this work.
+    /// Returns the same quota, limited to this work.
     #[must_use]
     pub fn at_most(self, work: u64) -> Self {
         Self { work: self.work.min(work), ..self }
     }
 
-    /// What is left of the quota after `done`.
+    /// Returns the remaining quota after `done`.
     #[must_use]
     pub fn less(&self, done: &Tally) -> Self {
         Self {

@@ -1,12 +1,12 @@
-//! Time limits for searches: the only place where a wall clock and a search meet.
+//! Time limits for searches: the only code of this crate that reads a wall clock.
 
 use super::observer::{Event, Observer};
 use std::time::{Duration, Instant};
 
-/// A limit on the time a search may take, counted from when this was made.
+/// A time limit for a search, which starts with the construction of this value.
 ///
-/// The search reads the clock itself, through [`Observer`]: it plans with the fraction of the limit that has passed and
-/// ends soon after all of it has. No second thread is needed to keep the time.
+/// The search reads the clock through [`Observer`]: it plans with the elapsed fraction of the limit
+/// and ends soon after the limit. No second thread is needed.
 #[derive(Clone, Copy, Debug)]
 pub struct Deadline {
     start: Instant,
@@ -14,12 +14,13 @@ pub struct Deadline {
 }
 
 impl Deadline {
-    /// A limit that begins now.
+    /// Returns a limit that begins now.
     pub fn after(limit: Duration) -> Self {
         Self { start: Instant::now(), limit }
     }
 
-    /// The same limit, with a function that is shown every event of the search's history, in order.
+    /// Returns an observer with the same limit that calls `watch` for every event of the search, in
+    /// order.
     pub fn watched<F: Fn(&Event) + Sync>(self, watch: F) -> Watched<F> {
         Watched { deadline: self, watch }
     }
@@ -29,14 +30,14 @@ impl Deadline {
         self.start.elapsed()
     }
 
-    /// Whether the time is up. A limit of zero has passed from the beginning.
+    /// Returns whether the time is over. A limit of zero has passed from the start.
     pub fn has_passed(&self) -> bool {
         self.elapsed() >= self.limit
     }
 
-    /// The fraction of the limit that has passed, 0 to 1.
+    /// The elapsed fraction of the limit, 0 to 1.
     pub fn fraction(&self) -> f64 {
-        // An elapsed time of zero over a limit of zero is NaN, and the smaller of NaN and 1 is 1.
+        // Zero elapsed over a limit of zero is NaN, and `f64::min` of NaN and 1 is 1.
         self.elapsed()
             .div_duration_f64(self.limit)
             .min(1.0)
@@ -53,7 +54,7 @@ impl Observer for Deadline {
     }
 }
 
-/// A [`Deadline`] with a function that follows the search; made by [`Deadline::watched`].
+/// A [`Deadline`] with a function that follows the search; see [`Deadline::watched`].
 #[derive(Clone, Copy, Debug)]
 pub struct Watched<F> {
     deadline: Deadline,

@@ -1,22 +1,22 @@
-//! What a search can refuse.
+//! The errors of a search.
 
 use bvh_build::BuildError;
 use bvh_config::OutOfRange;
 use bvh_core::{Bvh, InvalidBvh};
 
-/// What a search returns.
+/// The result of a search.
 pub(crate) type Found = Result<Bvh, SearchError>;
 
-/// Why a search did not start. Once started, a search always returns a tree.
+/// The reason why a search did not start. A started search always returns a tree.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SearchError {
-    /// The scene cannot be built.
+    /// The builder rejects the scene.
     #[error(transparent)]
     Build(#[from] BuildError),
-    /// The tree to be optimised is not a valid tree over these boxes.
+    /// The tree to optimise is not a valid tree over these boxes.
     #[error(transparent)]
     Invalid(#[from] InvalidBvh),
-    /// Local search works on binary trees.
+    /// Local search requires binary trees.
     #[error("inner node {node} has {children} children; local search takes binary trees only")]
     NotBinary {
         /// Index of the node.

@@ -1,5 +1,5 @@
-//! One search at work: the only place that counts evaluations and work, keeps the incumbent's cost and the history,
-//! and decides when to stop.
+//! A search in progress: the only place that counts evaluations and work, keeps the incumbent's
+//! cost and the history, and decides when to stop.
 
 mod budget;
 #[cfg(feature = "std")]
@@ -24,11 +24,11 @@ pub use problem::{Judge, Problem, Shortcut, Splits};
 pub use stream::Stream;
 pub(crate) use stream::stream;
 
-/// A search, or a builder seen as a search of one evaluation.
+/// A search. Every builder is a search of one evaluation.
 pub trait Search: Check {
-    /// Looks for a good tree, reports every evaluation to `run`, and returns the incumbent. Stops as soon as
-    /// [`Run::stopped`] says so, but never before one tree has been evaluated. The parameters have been
-    /// [checked](Check).
+    /// Searches a good tree, reports every evaluation to `run`, and returns the incumbent. Stops as
+    /// soon as [`Run::stopped`] reports a reason, but never before one tree has been evaluated. The
+    /// caller has [checked](Check) the parameters.
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError>;
 }
 
@@ -42,7 +42,7 @@ impl<B: Builder> Search for B {
     }
 }
 
-/// The state that all searches have in common.
+/// The state common to all searches.
 pub struct Run<'a> {
     budget: Budget,
     observer: &'a dyn Observer,
@@ -51,20 +51,20 @@ pub struct Run<'a> {
     incumbent: f64,
     /// The proof that no tree costs less than the incumbent, if there is one.
     optimal: Option<Shortcut>,
-    /// The cheapest of the trees that were built and not followed, with its cost.
+    /// The cheapest of the trees that the search built and did not improve, with its cost.
     aside: Option<(f64, Bvh)>,
     history: Vec<Event>,
 }
 
 impl<'a> Run<'a> {
-    /// Counts one evaluation that took `work` nodes and found `cost`. Returns whether it is the new incumbent:
-    /// strictly cheaper than all before, so that of equal trees the first is kept.
+    /// Counts one evaluation that took `work` nodes and found `cost`. Returns whether it is the new
+    /// incumbent, strictly cheaper than all before, so the first of equal trees is kept.
     pub fn record(&mut self, cost: f64, work: u64) -> bool {
         self.record_generation(1, cost, work)
     }
 
-    /// Counts several evaluations that took `work` nodes together and whose best found `cost`, as one event.
-    /// Returns whether it is the new incumbent.
+    /// Counts several evaluations as one event. They took `work` nodes together, and the best found
+    /// `cost`. Returns whether it is the new incumbent.
     pub fn record_generation(&mut self, evaluations: u64, cost: f64, work: u64) -> bool {
         self.count(Tally { moves: evaluations, work, kept: 0 });
         let improved = cost < self.incumbent;
@@ -75,7 +75,7 @@ impl<'a> Run<'a> {
         improved
     }
 
-    /// Counts moves without an event for each. Searches that make millions of moves report their improvements by
+    /// Counts moves without events. Searches that make millions of moves report improvements by
     /// [`improve`](Self::improve).
     pub fn count(&mut self, tally: Tally) {
         self.evaluations = self.evaluations.saturating_add(tally.moves);
@@ -83,8 +83,8 @@ impl<'a> Run<'a> {
         self.observer.counted(self.evaluations, self.work);
     }
 
-    /// Records an event if moves that were already counted led to a new incumbent of this cost. Returns whether they
-    /// did.
+    /// Records an event if already counted moves led to a new incumbent of this cost. Returns
+    /// whether they did.
     pub fn improve(&mut self, cost: f64) -> bool {
         let improved = cost < self.incumbent;
         if improved {
@@ -101,7 +101,8 @@ impl<'a> Run<'a> {
         self.observer.event(&event);
     }
 
-    /// Keeps a tree that the search has built and does not follow: if it ends up as the cheapest of all, it is the outcome. O(nodes).
+    /// Keeps a tree that the search has built and does not improve. It becomes the outcome if it
+    /// ends as the cheapest. O(nodes).
     pub fn keep_aside(&mut self, problem: &Problem, tree: Bvh) {
         let cost = problem.cost(&tree);
         if self
@@ -113,8 +114,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The cheapest of what a search has `found`, what it has kept aside, and what the caller knows. Where a cancellation came before
-    /// there was anything, the tree of the fastest builder.
+    /// Returns the cheapest of the tree that the search `found`, the tree kept aside, and the
+    /// caller's `known` tree. Builds a tree with the fastest builder if a cancellation left none.
     fn cheapest(&mut self, found: Found, problem: &Problem, known: Option<(f64, &Bvh)>) -> Found {
         let mut tree = match found {
             Err(SearchError::Build(BuildError::Cancelled)) => None,
@@ -134,7 +135,7 @@ impl<'a> Run<'a> {
         Ok(tree)
     }
 
-    /// Replaces the tree by another one of this cost if that is cheaper, or if there is no tree.
+    /// Replaces the tree by another of this cost, if the other is cheaper or if there is no tree.
     fn prefer(&mut self, tree: &mut Option<Bvh>, cost: f64, other: impl FnOnce() -> Bvh) {
         if tree.is_none() || cost < self.incumbent {
             self.improve(cost);
@@ -147,48 +148,47 @@ impl<'a> Run<'a> {
         self.incumbent
     }
 
-    /// Ends the search, because this shortcut proved that no tree costs less than the incumbent.
+    /// Ends the search, because this shortcut proved the incumbent optimal.
     pub fn proved_optimal(&mut self, by: Shortcut) {
         self.optimal = Some(by);
     }
 
-    /// What is left of the budget: endless where it has no limit, nothing if the incumbent is optimal.
+    /// Returns the remaining budget: endless without a limit, nothing if the incumbent is optimal.
     pub fn left(&self) -> Quota {
         if self.optimal.is_some() {
             return Quota { work: 0, moves: 0 };
         }
-        let left =
-            |limit: Option<u64>, count| limit.map_or(u64::MAX, |limit| limit.saturating_sub(count));
         Quota {
-            work: left(self.budget.max_work, self.work),
-            moves: left(self.budget.max_evaluations, self.evaluations),
+            work: remaining(self.budget.max_work, self.work),
+            moves: remaining(self.budget.max_evaluations, self.evaluations),
         }
     }
 
-    /// The observer, which may be asked from other threads.
+    /// The observer, which any thread may poll.
     pub fn observer(&self) -> &'a dyn Observer {
         self.observer
     }
 
-    /// Why the search must return now, if it must.
+    /// Returns the reason why the search must return now; `None` if it may continue.
     pub fn stopped(&self) -> Option<StopReason> {
-        let reached = |limit: Option<u64>, count| limit.is_some_and(|limit| count >= limit);
+        let Budget { max_evaluations, max_work } = self.budget;
         if self.evaluations == 0 {
             None
         } else if self.observer.cancelled() {
             Some(StopReason::Cancelled)
         } else if self.optimal.is_some() {
             Some(StopReason::Optimal)
-        } else if reached(self.budget.max_evaluations, self.evaluations) {
+        } else if remaining(max_evaluations, self.evaluations) == 0 {
             Some(StopReason::Evaluations)
-        } else if reached(self.budget.max_work, self.work) {
+        } else if remaining(max_work, self.work) == 0 {
             Some(StopReason::Work)
         } else {
             None
         }
     }
 
-    /// How many evaluations of `work` nodes each are left in the budget, at least one before the first.
+    /// Returns the number of evaluations of `work` nodes each that remain in the budget, at least
+    /// one before the first.
     pub fn evaluations_left(&self, work: u64) -> u64 {
         let left = self.left();
         left.moves
@@ -197,15 +197,20 @@ impl<'a> Run<'a> {
     }
 }
 
+/// Returns the rest of a limit after `count`; endless without a limit.
+fn remaining(limit: Option<u64>, count: u64) -> u64 {
+    limit.map_or(u64::MAX, |limit| limit.saturating_sub(count))
+}
+
 /// The builder for searches that were cancelled during their first construction.
 const FASTEST: Clustering = Clustering { radius: 1, near_rounds: 0 };
 
-/// What a search found.
+/// The outcome of a search.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The incumbent.
     pub tree: Bvh,
-    /// Its cost by the problem's objective.
+    /// The incumbent's cost by the problem's objective.
     pub cost: f64,
     /// Trees or moves evaluated.
     pub evaluations: u64,
@@ -213,17 +218,18 @@ pub struct Outcome {
     pub work: u64,
     /// Why the search returned.
     pub stop: StopReason,
-    /// The shortcut that proved the tree optimal, if one did: with [`Shortcut::Tiny`], the tree is the exact solver's, which
-    /// took the place of the search.
+    /// The shortcut that proved the tree optimal, if any. [`Shortcut::Tiny`] means that the exact
+    /// solver replaced the search.
     pub proof: Option<Shortcut>,
     /// Every event, in order.
     pub history: Vec<Event>,
 }
 
-/// Runs one search within `budget`, after a [check](Check) of its parameters; randomness comes from `seed` alone. The outcome never
-/// costs more than any tree built on the way, nor than the problem's [known](Problem::known) one.
+/// Runs one search within `budget`, after a [check](Check) of its parameters. All randomness comes
+/// from `seed`. The outcome never costs more than any tree built during the search, nor than the
+/// problem's [known](Problem::known) tree.
 ///
-/// A cancelled search returns soon: constructions are cut off, too.
+/// A cancelled search returns soon, even during a construction.
 pub fn solve(
     search: &dyn Search,
     problem: &Problem,
@@ -243,7 +249,7 @@ pub fn solve(
         history: Vec::new(),
     };
     search.check()?;
-    // A cancelled search has no time for that at its end.
+    // Evaluate the known tree first: a cancelled search has no time for it at its end.
     let known = problem
         .known
         .map(|tree| (problem.cost(tree), tree));

@@ -1,4 +1,4 @@
-//! How a caller follows a search, and stops it.
+//! [`Observer`]: the caller's way to follow a search and to stop it.
 
 use bvh_build::Watch;
 
@@ -15,23 +15,25 @@ pub struct Event {
     pub incumbent: f64,
 }
 
-/// Nodes visited between two polls of an observer: less than a millisecond, whatever a single move takes.
+/// Nodes visited between two polls of an observer, less than a millisecond.
 pub(crate) const WORK_PER_POLL: u64 = 1 << 14;
 
-/// Follows a search from outside, from any thread. `()` watches nothing.
+/// Follows a search. The search may call it from any thread. `()` ignores everything.
 pub trait Observer: Sync {
     /// Called after every event of the history, in order.
     fn event(&self, _event: &Event) {}
-    /// Called whenever moves or trees have been counted, with all evaluations and all work so far: a search may go on for long
-    /// without an event.
+    /// Called whenever moves or trees have been counted, with all evaluations and all work so far.
+    /// A search may run long without an event.
     fn counted(&self, _evaluations: u64, _work: u64) {}
-    /// Polled often, by constructions too; the search returns its incumbent soon after this becomes true. If there is none yet, it
-    /// returns the caller's [known](crate::Problem::known) tree, or that of the fastest builder.
+    /// Polled often, by constructions too. The search returns its incumbent soon after this becomes
+    /// true. Without an incumbent, it returns the caller's [known](crate::Problem::known) tree, or
+    /// a tree of the fastest builder.
     fn cancelled(&self) -> bool {
         false
     }
-    /// The elapsed fraction of the available time, 0 to 1, if the time of the cancellation is known in advance. The
-    /// search then plans to be done when this reaches 1. Such runs cannot be repeated exactly.
+    /// The elapsed fraction of the available time, 0 to 1, if the time of the cancellation is known
+    /// in advance. The search then plans to end when this reaches 1. Such runs cannot be repeated
+    /// exactly.
     fn progress(&self) -> Option<f64> {
         None
     }
@@ -39,8 +41,7 @@ pub trait Observer: Sync {
 
 impl Observer for () {}
 
-/// Constructs something, unless the observer cancels.
+/// Calls `construct` with a watch that the observer can cancel.
 pub(crate) fn watched<T>(observer: &dyn Observer, construct: impl FnOnce(&Watch) -> T) -> T {
-    let is_cancelled = || observer.cancelled();
-    construct(&Watch::new(&is_cancelled))
+    construct(&Watch::new(&|| observer.cancelled()))
 }

@@ -6,8 +6,8 @@ use rand::rngs::ChaCha8Rng;
 /// ChaCha with 8 rounds: the same numbers on every machine and in every version.
 pub type Stream = ChaCha8Rng;
 
-/// The stream `index` of the generator seeded by `seed`. Streams of one seed do not overlap, so that independent
-/// trials can draw in any order, or in parallel.
+/// Returns the stream `index` of the generator seeded by `seed`. Streams of one seed do not
+/// overlap, so independent trials can draw in any order, or in parallel.
 pub(crate) fn stream(seed: u64, index: u64) -> Stream {
     let mut rng = Stream::seed_from_u64(seed);
     rng.set_stream(index);

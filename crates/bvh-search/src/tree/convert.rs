@@ -5,14 +5,16 @@ use crate::run::SearchError;
 use bvh_core::{Aabb, Bvh, Node as BvhNode, NodeKind, PackedAabb};
 
 impl<M: Metric> Working<M> {
-    /// The working form of a valid tree with one object per leaf, whose boxes are tight, as those of builders are, and whose
-    /// internal area, by the metric, is `area`. O(n). Refuses inner nodes with more than two children.
+    /// Builds the working form of a valid tree with one object per leaf and tight boxes, whose
+    /// internal area by the metric is `area`. Rejects inner nodes with more than two children.
+    /// O(n).
     pub fn from_bvh(tree: &Bvh, area: f64, metric: M) -> Result<Self, SearchError> {
         let mut nodes = Vec::with_capacity(tree.nodes.len() + 1);
         nodes.push(Node::ANCHOR);
-        // Two dummy slots for leaves, so that the store is branch-free: which nodes are leaves is unpredictable.
+        // Leaves write to two dummy slots, so the store needs no branch, which the processor could
+        // not predict.
         let mut parents = vec![ANCHOR; tree.nodes.len() + 2];
-        for (index, (node, at)) in tree.nodes.iter().zip(1..).enumerate() {
+        for (index, (node, place)) in tree.nodes.iter().zip(1..).enumerate() {
             let (first, count, leaf) = match node.kind() {
                 NodeKind::Inner { first, count } => (first, count, false),
                 NodeKind::Leaf { first, .. } => (first, 2, true),
@@ -21,7 +23,7 @@ impl<M: Metric> Working<M> {
                 return Err(SearchError::NotBinary { node: index, children: count });
             }
             let below = if leaf { tree.nodes.len() } else { first as usize };
-            (parents[below], parents[below + 1]) = (at, at);
+            (parents[below], parents[below + 1]) = (place, place);
             let object = tree.prim_ids[if leaf { first as usize } else { 0 }];
             let children = if leaf { [NONE, object] } else { [first + 1, first + 2] };
             let aabb = PackedAabb::from(&node.aabb);
@@ -37,7 +39,7 @@ impl<M: Metric> Working<M> {
         Ok(working)
     }
 
-    /// The tree, children adjacent and left before right, objects in leaf order.
+    /// Returns the flat tree, with adjacent children, left before right, and objects in leaf order.
     pub fn to_bvh(&self) -> Bvh {
         let mut tree = Bvh::default();
         let Some(root) = self.root() else { return tree };
@@ -48,8 +50,8 @@ impl<M: Metric> Working<M> {
         let mut free = 1;
         let mut stack = Vec::with_capacity(64);
         let mut next = Some((root, 0));
-        while let Some((at, to)) = next {
-            let node = &self.nodes[at as usize];
+        while let Some((place, to)) = next {
+            let node = &self.nodes[place as usize];
             let aabb = Aabb::from(&node.aabb);
             let [left, right] = node.children;
             if left == NONE {

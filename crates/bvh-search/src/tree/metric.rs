@@ -1,6 +1,6 @@
-//! The size of a box that a search minimises the sum of: its half area, or a measure from outside.
+//! The size of a box, whose sum a search minimises: the half area, or the caller's measure.
 //!
-//! Searches are generic over it, so that the area costs no indirection.
+//! Searches are generic over the metric, so the area costs no indirection.
 
 pub(crate) use bvh_core::cost::Area;
 use bvh_core::cost::{self, Measure, Sum};
@@ -8,11 +8,12 @@ use bvh_core::{Bvh, PackedAabb};
 
 /// The size of a box: finite, not negative, and no smaller for a box that contains another.
 pub(crate) trait Metric: Copy + Send + Sync {
-    /// What a unit of a leaf's size costs beside one of an inner node's: 0 where every tree has the same leaves.
+    /// The cost of a leaf per unit of its size, relative to an inner node; 0 where every tree has
+    /// the same leaves.
     const LEAF: f64 = 0.0;
     /// The size of a box that is not empty.
     fn of(self, aabb: &PackedAabb) -> f64;
-    /// The total size of the boxes of all inner nodes, and of the leaves as far as they count.
+    /// The total size of the boxes of all inner nodes, and of the leaves weighted by `LEAF`.
     fn internal(self, tree: &Bvh) -> f64;
 }
 
@@ -38,8 +39,8 @@ impl Metric for &dyn Measure {
     }
 }
 
-/// As another metric, for trees whose leaves change because objects are divided among them: both kinds of nodes count, as in the
-/// surface area heuristic with equal constants.
+/// Another metric for trees that divide objects among leaves. Leaves and inner nodes count equally,
+/// as in the surface area heuristic with equal constants.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WithLeaves<A>(pub A);
 
@@ -60,7 +61,8 @@ impl<A: Metric> Metric for WithLeaves<A> {
     }
 }
 
-/// Implements [`Search`](crate::Search) by the method `search_by`, which is generic over the metric.
+/// Implements [`Search`](crate::Search) by the type's method `search_by`, which is generic over the
+/// metric. A blanket implementation would overlap with the implementation for all builders.
 macro_rules! search_by_metric {
     ($config:ty) => {
         impl crate::run::Search for $config {

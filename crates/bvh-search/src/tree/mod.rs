@@ -1,12 +1,13 @@
-//! Trees that can be changed, and the search for the best position in them.
+//! Mutable trees, and the search for the best position in them.
 //!
-//! [`Working`] is the working form of all searches: parents, packed boxes, cached areas, and a journal that undoes a
-//! change. Making it takes longer than a search of a few milliseconds has; that one changes the flat tree itself
-//! ([`Siblings`]). Both are [`Linked`], which is all that reinsertion needs.
+//! [`Working`] is the working form of all searches: parents, packed boxes, cached areas, and a
+//! journal that undoes a change. Its construction takes longer than a search of a few milliseconds
+//! has. That search changes the flat tree itself ([`Siblings`]). Both implement [`Linked`], the
+//! operations that reinsertion needs.
 //!
-//! In the working form, node 0 is not a node but the *anchor*, whose first child is the root, so that the root needs no
-//! special case. A detached subtree keeps its parent node, and attaching uses that node again, so that nothing is ever
-//! allocated.
+//! In the working form, node 0 is the *anchor*, whose first child is the root, so the root needs no
+//! special case. A detached subtree keeps its parent node, and attaching reuses that node, so no
+//! move allocates memory.
 
 mod convert;
 mod linked;
@@ -43,7 +44,7 @@ pub(crate) struct Node {
     pub parent: u32,
     /// Both children, or `[NONE, object]`.
     pub children: [u32; 2],
-    /// In the journal only: the node's index.
+    /// In the journal only: the node's index in the tree.
     pub index: u32,
 }
 
@@ -69,7 +70,7 @@ impl Node {
     }
 }
 
-/// A binary tree under change. Leaves hold one object each.
+/// A mutable binary tree. Leaves hold one object each.
 #[derive(Clone, Debug)]
 pub(crate) struct Working<M = Area> {
     metric: M,
@@ -89,12 +90,12 @@ impl<M: Metric> Working<M> {
         Self { metric, nodes, area, added: 0.0, journal, change: 0, spare }
     }
 
-    /// The size of boxes by which the tree is judged.
+    /// The metric that measures the boxes.
     pub fn metric(&self) -> M {
         self.metric
     }
 
-    /// A tree of linked nodes, the anchor first.
+    /// Builds a tree from linked nodes, the anchor first.
     pub fn from_nodes(mut nodes: Vec<Node>, metric: M) -> Self {
         nodes.iter_mut().for_each(|node| node.stamp = 0);
         let mut tree = Self::new(nodes, metric);
@@ -112,8 +113,8 @@ impl<M: Metric> Working<M> {
         self.nodes.len() / 2
     }
 
-    /// The total area of all inner nodes, and of the leaves as far as they count, kept incrementally by a compensated sum: every change adds one rounding error,
-    /// and nothing else.
+    /// The total area of all inner nodes, and of the leaves weighted by `LEAF`, updated
+    /// incrementally by a compensated sum: every change adds a single rounding error.
     pub fn area(&self) -> f64 {
         self.area.value() + self.added
     }
@@ -127,7 +128,7 @@ impl<M: Metric> Working<M> {
             .value()
     }
 
-    /// What a node adds to the area of the tree, if its kind adds anything.
+    /// Returns the node's part of the tree's area; `None` if its kind has none.
     #[inline(always)]
     fn part(node: &Node) -> Option<f64> {
         match node.is_leaf() {
@@ -137,7 +138,7 @@ impl<M: Metric> Working<M> {
         }
     }
 
-    /// Begins a change, which can be undone as a whole until the next one begins.
+    /// Begins a change, which can be undone until the next change begins.
     #[inline(always)]
     pub fn begin(&mut self) {
         self.change += 1;
@@ -161,12 +162,12 @@ impl<M: Metric> Working<M> {
         }
     }
 
-    /// The node, entered in the journal before it is written.
+    /// Returns the node for writing, after recording it in the journal.
     #[inline(always)]
-    fn write(&mut self, at: u32) -> &mut Node {
-        let node = &mut self.nodes[at as usize];
+    fn write(&mut self, index: u32) -> &mut Node {
+        let node = &mut self.nodes[index as usize];
         if node.stamp != self.change {
-            self.journal.push(Node { index: at, ..*node });
+            self.journal.push(Node { index, ..*node });
             node.stamp = self.change;
         }
         node
@@ -180,8 +181,9 @@ impl<M: Metric> Working<M> {
         self.write(new).parent = parent;
     }
 
-    /// Takes the subtree of `node`, which is not the root, out of the tree together with its parent node. Boxes are made
-    /// tight. Returns the area saved, the sibling that replaced the parent, and the number of nodes visited.
+    /// Removes the subtree of `node`, which is not the root, together with its parent node. Makes
+    /// boxes tight. Returns the area saved, the sibling that replaced the parent, and the number of
+    /// nodes visited.
     #[inline(always)]
     pub fn detach(&mut self, node: u32) -> (f64, u32, u64) {
         let parent = self.nodes[node as usize].parent;
@@ -190,26 +192,26 @@ impl<M: Metric> Working<M> {
         self.write(parent).parent = NONE;
         self.replace_child(above, parent, sibling);
         let mut saved = area;
-        let mut at = above;
+        let mut index = above;
         let mut visits = 2;
-        while at != ANCHOR {
-            let aabb = self.union_of(self.nodes[at as usize].children);
+        while index != ANCHOR {
+            let aabb = self.union_of(self.nodes[index as usize].children);
             visits += 1;
-            if aabb == self.nodes[at as usize].aabb {
+            if aabb == self.nodes[index as usize].aabb {
                 break;
             }
             let area = self.metric.of(&aabb);
-            let node = self.write(at);
+            let node = self.write(index);
             saved += node.area - area;
             (node.aabb, node.area) = (aabb, area);
-            at = node.parent;
+            index = node.parent;
         }
         self.added -= saved;
         (saved, sibling, visits)
     }
 
-    /// Puts a detached `node` beside `position`, with its parent node above both. Returns the area added and the number of
-    /// nodes visited.
+    /// Inserts a detached `node` next to `position`, with its parent node above both. Returns the
+    /// area added and the number of nodes visited.
     #[inline(always)]
     pub fn attach(&mut self, node: u32, position: u32) -> (f64, u64) {
         let Node { aabb: added_box, parent, .. } = self.nodes[node as usize];
@@ -221,25 +223,25 @@ impl<M: Metric> Working<M> {
         let joint = self.write(parent);
         (joint.children, joint.aabb, joint.area) = ([position, node], aabb, area);
         let mut added = area;
-        let mut at = above;
+        let mut index = above;
         let mut visits = 2;
-        while at != ANCHOR {
-            let grown = self.nodes[at as usize].aabb.union(&added_box);
+        while index != ANCHOR {
+            let grown = self.nodes[index as usize].aabb.union(&added_box);
             visits += 1;
-            if grown == self.nodes[at as usize].aabb {
+            if grown == self.nodes[index as usize].aabb {
                 break;
             }
             let area = self.metric.of(&grown);
-            let node = self.write(at);
+            let node = self.write(index);
             added += area - node.area;
             (node.aabb, node.area) = (grown, area);
-            at = node.parent;
+            index = node.parent;
         }
         self.added += added;
         (added, visits)
     }
 
-    /// Adds a leaf that is not in the tree, with a parent of its own, so that it can be attached. The boxes are empty.
+    /// Adds a detached leaf with its parent node, so that it can be attached. The boxes are empty.
     pub fn push_spare(&mut self, object: u32) -> u32 {
         let leaf = self.nodes.len() as u32;
         self.nodes
@@ -249,7 +251,7 @@ impl<M: Metric> Working<M> {
         leaf
     }
 
-    /// Gives a detached leaf another box, of this area. What leaves cost changes with it.
+    /// Gives a detached leaf another box, of this area. The cost of leaves changes accordingly.
     #[inline(always)]
     pub fn resize_leaf(&mut self, leaf: u32, object: u32, aabb: PackedAabb, area: f64) {
         let node = self.write(leaf);
@@ -266,33 +268,34 @@ impl<M: Metric> Working<M> {
             .union(&self.nodes[right as usize].aabb)
     }
 
-    /// Gives the inner node `at` these children and makes its box tight. Its ancestors are not updated: where several
-    /// nodes get new children, the lowest must come first, and the highest must keep its set of objects.
+    /// Gives the inner node `index` these children and makes its box tight. Does not update its
+    /// ancestors: if several nodes get new children, the lowest must come first, and the highest
+    /// must keep its set of objects.
     #[inline(always)]
-    pub fn join(&mut self, at: u32, children: [u32; 2]) {
+    pub fn join(&mut self, index: u32, children: [u32; 2]) {
         let aabb = self.union_of(children);
         let area = self.metric.of(&aabb);
         children
             .into_iter()
-            .for_each(|child| self.write(child).parent = at);
-        let node = self.write(at);
+            .for_each(|child| self.write(child).parent = index);
+        let node = self.write(index);
         let before = node.area;
         (node.children, node.aabb, node.area) = (children, aabb, area);
         self.added += area - before;
     }
 
-    /// Number of changes begun so far, to be compared with a node's `stamp`.
+    /// The number of changes begun so far, comparable with a node's `stamp`.
     pub fn changes(&self) -> u64 {
         self.change
     }
 
-    /// All nodes but the anchor, parents before children, left before right. O(n).
+    /// Returns all nodes except the anchor, parents before children, left before right. O(n).
     pub fn preorder(&self) -> Vec<u32> {
         let mut order = Vec::with_capacity(self.nodes.len());
         let mut stack: Vec<u32> = self.root().into_iter().collect();
-        while let Some(at) = stack.pop() {
-            order.push(at);
-            let node = &self.nodes[at as usize];
+        while let Some(index) = stack.pop() {
+            order.push(index);
+            let node = &self.nodes[index as usize];
             if !node.is_leaf() {
                 stack.extend([node.children[1], node.children[0]]);
             }
@@ -313,15 +316,15 @@ impl<M: Metric> Working<M> {
             .collect();
         let mut area = Sum::default();
         while let Some((old, parent, side)) = stack.pop() {
-            let at = nodes.len() as u32;
+            let index = nodes.len() as u32;
             let node = self.nodes[old as usize];
             nodes.push(Node { parent, stamp: 0, ..node });
-            nodes[parent as usize].children[side] = at;
+            nodes[parent as usize].children[side] = index;
             if let Some(part) = Self::part(&node) {
                 area.add(part);
             }
             if !node.is_leaf() {
-                stack.extend([(node.children[1], at, 1), (node.children[0], at, 0)]);
+                stack.extend([(node.children[1], index, 1), (node.children[0], index, 0)]);
             }
         }
         self.spare = std::mem::replace(&mut self.nodes, nodes);

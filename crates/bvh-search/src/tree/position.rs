@@ -1,7 +1,8 @@
 //! The best position for a subtree: an exact branch and bound over all nodes of the tree.
 //!
-//! Placing an item with the box B *beside* a node X puts a new node J in place of X, around X and B, and every ancestor
-//! of X has to reach B as well. A(·) is the half area of a box, or any other monotone measure:
+//! Inserting an item with the box B *next to* a node X replaces X by a new node J around X and B,
+//! and every ancestor of X grows to contain B. A(·) is the half area of a box, or any other
+//! monotone measure:
 //!
 //! ```text
 //!            R
@@ -13,25 +14,28 @@
 //!         X     B
 //! ```
 //!
-//! For a node Y below X, the ancestors are those of X and X itself, and the new node there is no smaller than B:
+//! The ancestors of a node Y below X include X and its ancestors, and the new node there is no
+//! smaller than B:
 //!
 //! ```text
 //!   cost beside Y ≥ A(B) + growth(X) + growth(P) + growth(R),   growth(N) = A(N ∪ B) − A(N)
 //! ```
 //!
-//! A subtree whose bound reaches the best cost so far is not entered. The search begins at a node that is likely to be
-//! good and looks near it first (Meister & Bittner 2018), so that the bound is tight from the start.
+//! The search does not enter a subtree whose bound reaches the best cost so far. It begins at a
+//! promising node and examines the neighbourhood first (Meister & Bittner 2018), so the bound is
+//! tight from the start.
 
 use super::linked::Linked;
 use super::{ANCHOR, Metric, NONE, Working};
 use bvh_core::PackedAabb;
 
-/// Finds positions. Holds the buffers of a search, and counts the nodes it visits.
+/// Finds positions. Holds the buffers of a search and counts the nodes that it visits.
 #[derive(Debug, Default)]
 pub(crate) struct PositionSearch {
     /// From the first node up to the root.
     path: Vec<Step>,
-    /// Inner nodes whose children remain to be examined, each with the growth of the node and all its ancestors.
+    /// Inner nodes whose children remain to be examined, each with the growth of the node and all
+    /// its ancestors.
     stack: Vec<(u32, f64)>,
     /// Nodes visited by all searches so far.
     pub visits: u64,
@@ -49,7 +53,8 @@ struct Step {
     growth: f64,
 }
 
-/// The subtree in which positions are looked for, named by its parent, since its root changes when subtrees move.
+/// The subtree that is searched for positions, identified by its parent, because its root changes
+/// when subtrees move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Scope {
     pub above: u32,
@@ -72,7 +77,8 @@ impl Scope {
         tree.nodes[self.above as usize].children[self.side]
     }
 
-    /// The smallest larger subtree that contains this one and whose box contains `aabb`, or else the whole tree.
+    /// Returns the smallest larger subtree that contains this one and whose box contains `aabb`, or
+    /// the whole tree.
     #[inline(always)]
     pub fn around(self, tree: &Working<impl Metric>, aabb: &PackedAabb) -> Self {
         let mut scope = self;
@@ -88,20 +94,21 @@ impl Scope {
     }
 }
 
-/// A position for a subtree, and the area that placing the subtree there adds.
+/// A position for a subtree, named by its future sibling, and the area that inserting the subtree
+/// there adds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Position {
-    pub beside: u32,
+    pub sibling: u32,
     pub cost: f64,
 }
 
-/// The box of the subtree to be placed, and its half area.
+/// The box of the subtree to be inserted, and its half area.
 type Item<'a> = (&'a PackedAabb, f64);
 
 impl PositionSearch {
-    /// The cheapest position in a scope for a *detached* item, if one costs less than `limit`. The scope is the whole
-    /// tree, or its box contains that of the item. The search begins at `first` inside the scope, or at the scope's root
-    /// if `first` is itself detached.
+    /// Returns the cheapest position in a scope for a *detached* item, if one costs less than
+    /// `limit`. The scope is the whole tree, or its box contains the item's box. The search begins
+    /// at `first` inside the scope, or at the scope's root if `first` is itself detached.
     #[inline(always)]
     pub fn detached(
         &mut self,
@@ -112,30 +119,31 @@ impl PositionSearch {
         limit: f64,
     ) -> Option<Position> {
         self.path.clear();
-        let mut at = first;
+        let mut index = first;
         let mut below = NONE;
-        while at != scope.above {
-            if at == NONE {
+        while index != scope.above {
+            if index == NONE {
                 self.path.clear();
-                (at, below) = (scope.root(tree), NONE);
+                (index, below) = (scope.root(tree), NONE);
             }
-            let node = &tree.nodes[at as usize];
+            let node = &tree.nodes[index as usize];
             let joint = tree.metric().of(&node.aabb.union(item.0));
             self.path
-                .push(Step { node: at, below, joint, growth: joint - node.area });
-            (below, at) = (at, node.parent);
+                .push(Step { node: index, below, joint, growth: joint - node.area });
+            (below, index) = (index, node.parent);
         }
-        let mut best = Position { beside: NONE, cost: limit };
+        let mut best = Position { sibling: NONE, cost: limit };
         self.climb(&mut best);
         self.search(tree, item, &mut best);
-        (best.beside != NONE).then_some(best)
+        (best.sibling != NONE).then_some(best)
     }
 
-    /// The cheapest position for `node`, which stays in the tree while the search pretends that it is gone; and the cost
-    /// of its present position. `None` if no position is cheaper than the present one by more than the fraction
-    /// `tolerance`.
+    /// Returns the cheapest position for `node`, which stays in the tree while the search treats it
+    /// as removed, and the cost of its current position. `None` if no position is cheaper than the
+    /// current one by more than the fraction `tolerance`.
     ///
-    /// Ancestors have their boxes *without* the node here, so that their present boxes are the unions with B.
+    /// The boxes of ancestors count *without* the node here, so their current boxes are the unions
+    /// with B.
     #[inline(always)]
     pub fn attached<T: Linked>(
         &mut self,
@@ -151,35 +159,39 @@ impl PositionSearch {
         let mut rest = tree.aabb(sibling);
         let rest_area = tree.area(sibling);
         let joint = tree.area(parent);
-        let mut at = tree.parent(parent);
+        let mut index = tree.parent(parent);
         self.path
             .push(Step { node: sibling, below: NONE, joint, growth: joint - rest_area });
         let mut below = parent;
-        while at != T::ABOVE {
-            let area = tree.area(at);
-            rest.grow(&tree.aabb(tree.other(at, below)));
-            self.path
-                .push(Step { node: at, below, joint: area, growth: area - tree.size(&rest) });
-            (below, at) = (at, tree.parent(at));
+        while index != T::ABOVE {
+            let area = tree.area(index);
+            rest.grow(&tree.aabb(tree.other(index, below)));
+            self.path.push(Step {
+                node: index,
+                below,
+                joint: area,
+                growth: area - tree.size(&rest),
+            });
+            (below, index) = (index, tree.parent(index));
         }
-        let mut best = Position { beside: NONE, cost: f64::INFINITY };
+        let mut best = Position { sibling: NONE, cost: f64::INFINITY };
         self.climb(&mut best);
-        let own = self.path[0].growth + rest_area;
-        if best.cost >= own * (1.0 - tolerance) || best.beside == sibling {
-            best = Position { beside: NONE, cost: own * (1.0 - tolerance) };
+        let current = self.path[0].growth + rest_area;
+        if best.cost >= current * (1.0 - tolerance) || best.sibling == sibling {
+            best = Position { sibling: NONE, cost: current * (1.0 - tolerance) };
         }
         self.search(tree, (&aabb, area), &mut best);
-        ((best.beside != NONE).then_some(best), own)
+        ((best.sibling != NONE).then_some(best), current)
     }
 
-    /// Tries the positions beside the path's nodes, and sums up their growth.
+    /// Tries the positions next to the path's nodes, and sums up their growth.
     #[inline(always)]
     fn climb(&mut self, best: &mut Position) {
         let mut growth = 0.0;
         for step in self.path.iter_mut().rev() {
             let cost = growth + step.joint;
             if cost < best.cost {
-                *best = Position { beside: step.node, cost };
+                *best = Position { sibling: step.node, cost };
             }
             growth += step.growth;
             step.growth = growth;
@@ -187,23 +199,23 @@ impl PositionSearch {
         self.visits += self.path.len() as u64;
     }
 
-    /// Examines everything beside and below the path, from its first node up.
+    /// Examines everything next to and below the path, from its first node up.
     #[inline(always)]
     fn search(&mut self, tree: &impl Linked, item: Item, best: &mut Position) {
-        for &Step { node: at, below, growth, .. } in &self.path {
+        for &Step { node: index, below, growth, .. } in &self.path {
             if growth + item.1 >= best.cost {
                 continue;
             }
-            let mut next = (at, growth);
+            let mut next = (index, growth);
             if below != NONE {
-                let other = tree.other(at, below);
+                let other = tree.other(index, below);
                 self.visits += 1;
                 next = (other, try_position(tree, other, item.0, growth, best));
                 if next.1 + item.1 >= best.cost {
                     continue;
                 }
             }
-            // Everything below, the more promising child first.
+            // Descend, the more promising child first: a lower best cost rejects more of the rest.
             loop {
                 let (node, growth) = next;
                 if let Some([left, right]) = tree.children(node) {
@@ -228,7 +240,7 @@ impl PositionSearch {
     }
 }
 
-/// The next node on the stack below which a position may cost less than `limit`.
+/// Pops the next node below which a position may cost less than `limit`.
 #[inline(always)]
 fn pop(stack: &mut Vec<(u32, f64)>, area: f64, limit: f64) -> Option<(u32, f64)> {
     while let Some(next) = stack.pop() {
@@ -239,18 +251,19 @@ fn pop(stack: &mut Vec<(u32, f64)>, area: f64, limit: f64) -> Option<(u32, f64)>
     None
 }
 
-/// Tries the position beside a node. Returns the growth of the node and all its ancestors, infinite for a leaf.
+/// Tries the position next to a node. Returns the growth of the node and all its ancestors,
+/// infinite for a leaf.
 #[inline(always)]
 fn try_position(
     tree: &impl Linked,
-    at: u32,
+    index: u32,
     aabb: &PackedAabb,
     growth: f64,
     best: &mut Position,
 ) -> f64 {
-    let cost = growth + tree.size(&tree.aabb(at).union(aabb));
+    let cost = growth + tree.size(&tree.aabb(index).union(aabb));
     if cost < best.cost {
-        *best = Position { beside: at, cost };
+        *best = Position { sibling: index, cost };
     }
-    if tree.children(at).is_none() { f64::INFINITY } else { cost - tree.area(at) }
+    if tree.children(index).is_none() { f64::INFINITY } else { cost - tree.area(index) }
 }

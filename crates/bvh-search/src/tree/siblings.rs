@@ -1,15 +1,16 @@
-//! Reinsertion in the flat tree itself, with a list of parents beside it: for searches of a few milliseconds, in which
-//! conversion to and from the working form would take much of the time.
+//! Reinsertion in the flat tree itself, with a separate list of parents, for searches of a few
+//! milliseconds: conversion to and from the working form would take much of that time.
 //!
-//! Siblings stay adjacent: a node that moves takes its pair with it, as in Meister & Bittner 2018. A parent may then come
-//! after its children, which [`Siblings::into_tree`] repairs.
+//! Siblings stay adjacent: a moving node takes its pair along, as in Meister & Bittner 2018. A
+//! parent may then come after its children, which [`Siblings::into_tree`] repairs.
 
 use super::NONE;
 use super::linked::Linked;
 use bvh_core::{Bvh, Node, NodeKind, PackedAabb};
 use std::hint::select_unpredictable;
 
-/// A binary tree under change. The root is node 0; siblings are pairs: nodes 1 and 2, 3 and 4, and so on.
+/// A mutable binary tree. The root is node 0; siblings form pairs: nodes 1 and 2, 3 and 4, and so
+/// on.
 #[cfg_attr(test, derive(Clone))]
 pub(crate) struct Siblings {
     tree: Bvh,
@@ -17,20 +18,20 @@ pub(crate) struct Siblings {
     parents: Vec<u32>,
 }
 
-/// The pair that a node other than the root belongs to.
+/// Returns the pair of a node other than the root.
 #[inline(always)]
-fn pair(at: u32) -> usize {
-    (at as usize - 1) / 2
+fn pair(index: u32) -> usize {
+    (index as usize - 1) / 2
 }
 
-/// The first node of a pair.
+/// Returns the first node of a pair.
 #[inline(always)]
 fn first(pair: u32) -> usize {
     2 * pair as usize + 1
 }
 
 impl Siblings {
-    /// Takes over a tight binary tree of two objects or more, whose siblings are adjacent. O(n).
+    /// Wraps a tight binary tree of two objects or more, whose siblings are adjacent. O(n).
     pub fn new(tree: Bvh) -> Self {
         debug_assert!(
             tree.nodes
@@ -38,11 +39,12 @@ impl Siblings {
                 .all(|node| node.is_leaf() || node.children().len() == 2)
         );
         let pairs = tree.nodes.len() / 2;
-        // One dummy slot for leaves, so that the store is branch-free: which nodes are leaves is unpredictable.
+        // Leaves write to a dummy slot, so the store needs no branch, which the processor could not
+        // predict.
         let mut parents = vec![0; pairs + 1];
-        for (node, at) in tree.nodes.iter().zip(0..) {
+        for (node, index) in tree.nodes.iter().zip(0..) {
             let pair = if node.is_leaf() { pairs } else { pair(node.children().start as u32) };
-            parents[pair] = at;
+            parents[pair] = index;
         }
         parents.truncate(pairs);
         Self { tree, parents }
@@ -54,41 +56,42 @@ impl Siblings {
     }
 
     #[inline(always)]
-    fn node(&self, at: u32) -> &Node {
-        &self.tree.nodes[at as usize]
+    fn node(&self, index: u32) -> &Node {
+        &self.tree.nodes[index as usize]
     }
 
-    /// Writes a node that was elsewhere to `at`.
+    /// Writes a node to `index` and links its children to it.
     #[inline(always)]
-    fn put(&mut self, at: u32, node: Node) {
+    fn put(&mut self, index: u32, node: Node) {
         if !node.is_leaf() {
-            self.parents[pair(node.children().start as u32)] = at;
+            self.parents[pair(node.children().start as u32)] = index;
         }
-        self.tree.nodes[at as usize] = node;
+        self.tree.nodes[index as usize] = node;
     }
 
-    /// Makes the boxes from `at` upwards tight until one does not change. Returns the number of nodes visited.
+    /// Makes the boxes from `index` upwards tight until one does not change. Returns the number of
+    /// nodes visited.
     #[inline(always)]
-    fn tighten(&mut self, mut at: u32) -> u64 {
+    fn tighten(&mut self, mut index: u32) -> u64 {
         let mut visits = 0;
-        while at != NONE {
+        while index != NONE {
             let [left, right] = self
-                .children(at)
+                .children(index)
                 .expect("an inner node")
                 .map(|child| self.node(child).aabb);
             visits += 1;
             let aabb = left.union(&right);
-            let node = &mut self.tree.nodes[at as usize];
+            let node = &mut self.tree.nodes[index as usize];
             if aabb == node.aabb {
                 break;
             }
             node.aabb = aabb;
-            at = self.parent(at);
+            index = self.parent(index);
         }
         visits
     }
 
-    /// The tree with parents before their children again. O(n).
+    /// Returns the tree with parents before their children again. O(n).
     pub fn into_tree(self) -> Bvh {
         let Self { mut tree, parents } = self;
         let PairOrder { sequence, late } = PairOrder::of(&parents);
@@ -105,7 +108,8 @@ impl Siblings {
             node.set_first(select_unpredictable(node.is_leaf(), before, after));
             node
         };
-        // Late pairs are kept aside until it is their turn; the others move towards the front, if at all.
+        // Reorder in place: late pairs wait in a copy, and all other pairs move towards the front
+        // or stay, so no unread pair is overwritten.
         let nodes = tree.nodes.as_mut_slice();
         let aside: Vec<Node> = late
             .iter()
@@ -129,8 +133,8 @@ impl Siblings {
     }
 }
 
-/// An order of the pairs in which each comes after that of its parent: by number, but a pair with a lower number than its
-/// parent's pair follows that pair at once.
+/// An order of the pairs in which each comes after its parent's pair: by number, except that a pair
+/// with a lower number than its parent's pair follows that pair at once.
 struct PairOrder {
     sequence: Vec<u32>,
     /// The pairs that follow a pair with a higher number.
@@ -140,7 +144,8 @@ struct PairOrder {
 impl PairOrder {
     fn of(parents: &[u32]) -> Self {
         const DONE: u32 = NONE - 1;
-        // Per pair, the last entry of `waiting` that waits for it. An entry is a pair and the previous entry.
+        // Linked lists: per pair, the last entry of `waiting` that waits for it. An entry is a pair
+        // and the previous entry.
         let mut last = vec![NONE; parents.len()];
         let mut waiting = Vec::new();
         let mut sequence = Vec::with_capacity(parents.len());
@@ -153,12 +158,12 @@ impl PairOrder {
                 continue;
             }
             ready.push(number);
-            while let Some(at) = ready.pop() {
-                sequence.push(at);
-                if at != number {
-                    late.push(at);
+            while let Some(index) = ready.pop() {
+                sequence.push(index);
+                if index != number {
+                    late.push(index);
                 }
-                let mut entry = std::mem::replace(&mut last[at as usize], DONE);
+                let mut entry = std::mem::replace(&mut last[index as usize], DONE);
                 while entry != NONE {
                     let (waits, before) = waiting[entry as usize];
                     ready.push(waits);
@@ -174,13 +179,13 @@ impl Linked for Siblings {
     const ABOVE: u32 = NONE;
 
     #[inline(always)]
-    fn parent(&self, at: u32) -> u32 {
-        if at == 0 { NONE } else { self.parents[pair(at)] }
+    fn parent(&self, index: u32) -> u32 {
+        if index == 0 { NONE } else { self.parents[pair(index)] }
     }
 
     #[inline(always)]
-    fn children(&self, at: u32) -> Option<[u32; 2]> {
-        let node = self.node(at);
+    fn children(&self, index: u32) -> Option<[u32; 2]> {
+        let node = self.node(index);
         let first = node.children().start as u32;
         (!node.is_leaf()).then_some([first, first + 1])
     }
@@ -191,13 +196,13 @@ impl Linked for Siblings {
     }
 
     #[inline(always)]
-    fn aabb(&self, at: u32) -> PackedAabb {
-        PackedAabb::from(&self.node(at).aabb)
+    fn aabb(&self, index: u32) -> PackedAabb {
+        PackedAabb::from(&self.node(index).aabb)
     }
 
     #[inline(always)]
-    fn area(&self, at: u32) -> f64 {
-        self.aabb(at).half_area()
+    fn area(&self, index: u32) -> f64 {
+        self.aabb(index).half_area()
     }
 
     #[inline(always)]
@@ -238,15 +243,15 @@ mod tests {
         ]
     }
 
-    /// The positions that a node other than the root may be moved to.
+    /// The positions to which a node other than the root may move.
     fn positions(tree: &Siblings, node: u32) -> Vec<u32> {
         let allowed = |&place: &u32| {
-            let mut above = std::iter::successors(Some(place), |&at| {
-                Some(tree.parent(at)).filter(|&at| at != NONE)
+            let mut above = std::iter::successors(Some(place), |&index| {
+                Some(tree.parent(index)).filter(|&index| index != NONE)
             });
             place != tree.parent(node)
                 && place != tree.other(NONE, node)
-                && above.all(|at| at != node)
+                && above.all(|index| index != node)
         };
         (0..tree.len() as u32).filter(allowed).collect()
     }
@@ -291,7 +296,7 @@ mod tests {
                 let after = before - own + found.map_or(own, |place| place.cost);
                 assert!((after - least).abs() <= 1e-12 * before, "{after} {least}");
                 if let Some(place) = found {
-                    tree.reinsert(node, place.beside);
+                    tree.reinsert(node, place.sibling);
                     assert!((cost::internal_area(&tree.tree) - after).abs() <= 1e-12 * before);
                 }
             }

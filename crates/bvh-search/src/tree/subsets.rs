@@ -1,13 +1,14 @@
 //! The best binary tree over every subset of a few leaves, by dynamic programming.
 //!
-//! The best subtree below a node does not depend on the rest of the tree, so that the least internal area over a set S is
-//! best(S) = A(S) + min over the divisions of S in two of best(L) + best(S ∖ L), with best = 0 for single leaves
-//! (Karras & Aila 2013).
+//! The best subtree below a node does not depend on the rest of the tree. The least internal area
+//! over a set S is therefore best(S) = A(S) + min over the divisions of S in two of best(L) +
+//! best(S ∖ L), with best = 0 for single leaves (Karras & Aila 2013).
 
 use super::Metric;
 use bvh_core::PackedAabb;
 
-/// Per subset of the leaves, as a bit set: its box, its least internal area, and one side of its best division.
+/// Per subset of the leaves, as a bit set: its box, its least internal area, and one side of its
+/// best division.
 #[derive(Debug)]
 pub(crate) struct Subsets {
     boxes: Vec<PackedAabb>,
@@ -16,7 +17,7 @@ pub(crate) struct Subsets {
 }
 
 impl Subsets {
-    /// Room for so many leaves, at most 16.
+    /// Allocates room for `leaves` leaves, at most 16.
     pub fn new(leaves: u32) -> Self {
         let subsets = 1 << leaves;
         Self {
@@ -26,9 +27,11 @@ impl Subsets {
         }
     }
 
-    /// Finds the best divisions and returns the least internal area over all leaves. O(3ⁿ) for n leaves.
+    /// Finds the best divisions and returns the least internal area over all leaves. O(3ⁿ) for n
+    /// leaves.
     ///
-    /// Of equal divisions, the one is taken whose side with the lowest leaf is the least as a bit set.
+    /// Among equal divisions, chooses the one whose side with the lowest leaf is the least as a bit
+    /// set.
     #[inline(always)]
     pub fn solve(
         &mut self,
@@ -47,7 +50,7 @@ impl Subsets {
             }
             let lowest = set ^ rest;
             self.boxes[set] = self.boxes[rest].union(&self.boxes[lowest]);
-            // `side` never has the lowest leaf, so that every division is tried once.
+            // `side` never contains the lowest leaf, so every division is tried once.
             let mut side = rest;
             let mut least = f64::INFINITY;
             let mut best = 0;
@@ -56,6 +59,7 @@ impl Subsets {
                 if cost < least {
                     (least, best) = (cost, side);
                 }
+                // The next smaller subset of `rest`.
                 side = (side - 1) & rest;
             }
             self.cost[set] = least + metric.of(&self.boxes[set]);
@@ -64,7 +68,8 @@ impl Subsets {
         self.cost[all]
     }
 
-    /// Both sides of the best division of a set of two leaves or more, the side with the lowest leaf first.
+    /// Returns both sides of the best division of a set of two leaves or more, the side with the
+    /// lowest leaf first.
     #[inline(always)]
     pub fn division(&self, set: usize) -> [usize; 2] {
         let side = usize::from(self.side[set]);

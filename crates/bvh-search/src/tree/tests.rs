@@ -1,4 +1,4 @@
-//! The working form against brute force, move by move.
+//! Compares the working form with brute force, move by move.
 
 use super::*;
 use crate::run::stream;
@@ -22,21 +22,21 @@ fn scene(n: usize) -> (Vec<Aabb>, Working) {
     (boxes, working)
 }
 
-/// Every box is the union below it, every parent the right one.
+/// Asserts that every box is the union below it and that every parent link is right.
 fn assert_tight(tree: &Working, boxes: &[Aabb]) {
     let bvh = tree.to_bvh();
     validate(&bvh, boxes).unwrap();
     let mut tight = bvh.clone();
     tight.refit(boxes);
     assert_eq!(bvh, tight);
-    for at in tree.preorder() {
-        let node = &tree.nodes[at as usize];
+    for index in tree.preorder() {
+        let node = &tree.nodes[index as usize];
         assert!(
             node.is_leaf()
                 || node
                     .children
                     .iter()
-                    .all(|&child| tree.nodes[child as usize].parent == at)
+                    .all(|&child| tree.nodes[child as usize].parent == index)
         );
         assert_eq!(node.area, node.aabb.half_area());
     }
@@ -134,7 +134,7 @@ fn assert_best_places(mut tree: Working<impl Metric>) {
                 .is_none()
         );
         assert!((found.map_or(own, |place| place.cost) - least).abs() <= 1e-12 * least);
-        let place = found.map_or(sibling, |place| place.beside);
+        let place = found.map_or(sibling, |place| place.sibling);
         let (added, _) = tree.attach(node, place);
         assert!((added - least).abs() <= 1e-12 * least && tree.area() <= start * (1.0 + 1e-12));
     }
@@ -148,7 +148,7 @@ fn the_best_place_in_a_region_is_the_best_there_and_costs_what_it_adds() {
     let mut elsewhere = 0;
     for _ in 0..200 {
         let mut tree = tree.clone();
-        // At random, so that the best place often is far away.
+        // Random moves, after which the best place is often far away.
         for _ in 0..20 {
             let node = any(&tree, &mut rng);
             tree.detach(node);
@@ -163,11 +163,11 @@ fn the_best_place_in_a_region_is_the_best_there_and_costs_what_it_adds() {
         let region = Scope::of(&tree, above, sibling).around(&tree, &aabb);
         let root = region.root(&tree);
         let inside = |&place: &u32| {
-            let mut at = place;
-            while at != root && at != ANCHOR {
-                at = tree.nodes[at as usize].parent;
+            let mut index = place;
+            while index != root && index != ANCHOR {
+                index = tree.nodes[index as usize].parent;
             }
-            at == root
+            index == root
         };
         assert!(
             region == Scope::ALL
@@ -191,7 +191,7 @@ fn the_best_place_in_a_region_is_the_best_there_and_costs_what_it_adds() {
             let place = search
                 .detached(&tree, region, (&aabb, area), first, f64::INFINITY)
                 .unwrap();
-            assert!(inside(&place.beside));
+            assert!(inside(&place.sibling));
             assert!((place.cost - least).abs() <= 1e-12 * least, "{} {least}", place.cost);
         }
         elsewhere += u32::from(everywhere < least * (1.0 - 1e-9));

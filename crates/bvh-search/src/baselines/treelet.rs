@@ -1,24 +1,26 @@
-//! Treelet restructuring: give a small part of the tree its optimal shape, over and over, to a local optimum.
+//! Treelet restructuring: gives one small part of the tree after the other its optimal shape, until
+//! a local optimum.
 //!
-//! Karras & Aila 2013, 'Fast parallel construction of high-quality bounding volume hierarchies', section 3: a treelet
-//! is grown from its root by opening the leaf of largest area; dynamic programming over the subsets of its leaves finds
-//! the best of all shapes. Domingues & Pedrini 2015 use other sizes.
+//! Karras & Aila 2013, 'Fast parallel construction of high-quality bounding volume hierarchies',
+//! section 3: a treelet is grown from its root by opening the leaf of largest area; dynamic
+//! programming over the subsets of its leaves finds the best of all shapes. Domingues & Pedrini
+//! 2015 use other sizes.
 //!
-//! Differs from them: any size from 3 to 12 at every node, bottom-up, until a whole pass changes nothing; a treelet
-//! none of whose nodes has changed since it was last optimal is not solved again.
+//! Differs from them: any size from 3 to 12 at every node, bottom-up, until a full pass changes
+//! nothing. A treelet whose nodes have not changed since it was last optimal is not solved again.
 
-use super::incumbent::Incumbent;
-use super::initial::Start;
-use super::pass::{TOLERANCE, repeat};
+use crate::local::incumbent::Incumbent;
+use crate::local::initial::Start;
+use crate::local::pass::{TOLERANCE, repeat};
 use crate::run::{Found, Observer, Problem, Quota, Run, Tally};
 use crate::tree::{Metric, NONE, Subsets, Working, search_by_metric};
 use bvh_config::Itself;
 use bvh_core::with_vector_instructions;
 
 bvh_config::config! {
-    /// How large treelets are, how often all are tried, and from where.
+    /// The size of treelets, the number of passes, and the initial tree.
     pub struct Config {
-        /// Leaves of a treelet. Solving one takes O(3^size) time. The paper takes 7.
+        /// Leaves of a treelet. Solving one takes O(3^size) time. The paper uses 7.
         size: u32 = 7, in 3..=12;
         /// Maximum number of passes over all nodes; the method ends earlier at a local optimum.
         sweeps: u32 = 1000, in 1..;
@@ -57,8 +59,8 @@ pub(crate) fn to_local_optimum(
 }
 
 with_vector_instructions! {
-    /// Restructures the treelet of every node, children before parents, where that pays. Stops early when the quota is
-    /// used up or the observer cancels.
+    /// Restructures the treelet of every node if that pays, children before parents. Stops early
+    /// when the quota is used up or the observer cancels.
     pass = pass_plain(tree: &mut Working<impl Metric>, solver: &mut Solver, quota: Quota, observer: &dyn Observer) -> Tally
 }
 
@@ -83,7 +85,8 @@ fn pass_plain(
             continue;
         }
         done.moves += 1;
-        // One unit per subset for its box, and one per 16 divisions of a subset, which take about as long.
+        // One unit per subset for its box, and one per 16 divisions of a subset, which take about
+        // as long.
         let size = solver.leaves.len() as u32;
         done.work += 2u64.pow(size) + 3u64.pow(size) / 16;
         if solver.solve(tree) {
@@ -100,8 +103,8 @@ fn pass_plain(
 #[derive(Debug)]
 struct Solver {
     size: usize,
-    /// Per node of the tree, the number of changes begun when the treelet below it was last made optimal, at first
-    /// `NEVER`.
+    /// Per node of the tree, the number of changes begun when the treelet below it was last made
+    /// optimal; initially `NEVER`.
     solved: Vec<u64>,
     leaves: Vec<u32>,
     /// The inner nodes, the root first.
@@ -123,8 +126,8 @@ impl Solver {
         }
     }
 
-    /// Opens the leaf of largest area until there are enough leaves. Returns whether anything in the treelet has changed
-    /// since it was solved.
+    /// Opens the leaf of largest area until the treelet has enough leaves. Returns whether any node
+    /// of the treelet has changed since it was solved.
     #[inline(always)]
     fn grow(&mut self, tree: &Working<impl Metric>, root: u32) -> bool {
         self.inner.clear();
@@ -154,7 +157,7 @@ impl Solver {
         solved == NEVER || last > solved
     }
 
-    /// Finds the best shape. Returns whether it is better than the present one.
+    /// Finds the best shape. Returns whether it is better than the present shape.
     #[inline(always)]
     fn solve(&mut self, tree: &Working<impl Metric>) -> bool {
         let least = self.subsets.solve(
@@ -179,16 +182,19 @@ impl Solver {
         let mut joints: [(usize, [u32; 2]); 12] = [(0, [NONE; 2]); 12];
         joints[0].0 = all;
         let mut used = 1;
-        for at in 0..self.inner.len() {
-            joints[at].1 = self.subsets.division(joints[at].0).map(|part| {
-                if part.is_power_of_two() {
-                    self.leaves[part.trailing_zeros() as usize]
-                } else {
-                    joints[used].0 = part;
-                    used += 1;
-                    self.inner[used - 1]
-                }
-            });
+        for index in 0..self.inner.len() {
+            joints[index].1 = self
+                .subsets
+                .division(joints[index].0)
+                .map(|part| {
+                    if part.is_power_of_two() {
+                        self.leaves[part.trailing_zeros() as usize]
+                    } else {
+                        joints[used].0 = part;
+                        used += 1;
+                        self.inner[used - 1]
+                    }
+                });
         }
         for (&node, &(_, children)) in self.inner.iter().zip(&joints).rev() {
             tree.join(node, children);
@@ -221,7 +227,7 @@ mod tests {
             let found = tree.to_bvh();
             validate(&found, &boxes).unwrap();
             assert!(found.is_tight(&boxes));
-            // Nothing was skipped that would have paid.
+            // The pass skipped no treelet that would have paid.
             let again = pass(&mut tree.clone(), &mut Solver::new(size, &tree), Quota::ENDLESS, &());
             assert_eq!(again.kept, 0);
         }

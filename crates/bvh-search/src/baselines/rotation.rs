@@ -1,21 +1,22 @@
-//! Tree rotations: swap subtrees one and two levels below a node, over and over, to a local optimum.
+//! Tree rotations: swaps of subtrees one and two levels below a node, until a local optimum.
 //!
-//! Kensler 2008, 'Tree rotations for improving bounding volume hierarchies': a child is swapped with a grandchild of the
-//! other side (four ways), or two grandchildren of different sides are swapped (two ways).
+//! Kensler 2008, 'Tree rotations for improving bounding volume hierarchies': a child is swapped
+//! with a grandchild of the other side (four ways), or two grandchildren of different sides are
+//! swapped (two ways).
 //!
-//! Differs from the paper: hill climbing only; its annealing is [annealing](crate::annealing) on reinsertion moves, of
-//! which every rotation is one or two.
+//! Differs from the paper: hill climbing only. Simulated annealing is in
+//! [annealing](crate::annealing), on reinsertion moves; every rotation is one or two reinsertions.
 
-use super::incumbent::Incumbent;
-use super::initial::Start;
-use super::pass::{TOLERANCE, repeat, sort_by_area};
+use crate::local::incumbent::Incumbent;
+use crate::local::initial::Start;
+use crate::local::pass::{TOLERANCE, repeat, sort_by_area};
 use crate::run::{Found, Observer, Problem, Quota, Run, Tally};
 use crate::tree::{Metric, Working, search_by_metric};
 use bvh_config::Itself;
 use bvh_core::with_vector_instructions;
 
 bvh_config::config! {
-    /// In which order to try the nodes, how often, and from where.
+    /// The order in which nodes are tried, the number of passes, and the initial tree.
     pub struct Config {
         /// The order of a pass over all nodes.
         order: Order = Order::BottomUp;
@@ -37,7 +38,7 @@ bvh_config::config! {
 pub enum Order {
     /// Children before their parents.
     BottomUp,
-    /// The largest node first, equal ones parents first.
+    /// The largest node first; among equal nodes, parents first.
     ByArea,
 }
 
@@ -60,7 +61,7 @@ impl Config {
 }
 
 impl Order {
-    /// The nodes of a pass, in this order.
+    /// Returns the nodes of a pass, in this order.
     fn of(self, tree: &Working<impl Metric>) -> Vec<u32> {
         let mut order = tree.preorder();
         match self {
@@ -84,8 +85,8 @@ pub(crate) fn to_local_optimum(
 }
 
 with_vector_instructions! {
-    /// Makes the best rotation at every node of `order` where one pays. Stops early when the quota is used up or the
-    /// observer cancels.
+    /// Makes the best rotation at every node of `order`, if one pays. Stops early when the quota is
+    /// used up or the observer cancels.
     pass = pass_plain(tree: &mut Working<impl Metric>, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally
 }
 
@@ -128,11 +129,12 @@ impl Rotation {
     }
 }
 
-/// The rotation at an inner node that saves most, if any saves area. None of them changes the node's own box.
+/// Returns the rotation at an inner node that saves most, if any saves area. No rotation changes
+/// the box of the node itself, so its ancestors stay tight.
 #[inline(always)]
 fn best(tree: &Working<impl Metric>, top: u32) -> Option<Rotation> {
     let area = |children| tree.metric().of(&tree.union_of(children));
-    let node = |at: u32| &tree.nodes[at as usize];
+    let node = |index: u32| &tree.nodes[index as usize];
     let sides = node(top).children;
     let mut most = TOLERANCE * node(top).area;
     let mut best = None;
@@ -171,12 +173,12 @@ mod tests {
     use bvh_build::median_cut;
     use bvh_core::validate;
 
-    /// The total areas of every tree that one rotation makes of this one, boxes recomputed from nothing.
+    /// The total areas of all trees that are one rotation away, with recomputed boxes.
     fn neighbours(tree: &Working, tops: &[u32]) -> Vec<f64> {
         let mut found = vec![];
         for &top in tops {
-            let below = |at: u32| {
-                let node = &tree.nodes[at as usize];
+            let below = |index: u32| {
+                let node = &tree.nodes[index as usize];
                 if node.is_leaf() { vec![] } else { node.children.to_vec() }
             };
             let [Some(left), Some(right)] = [0, 1].map(|side| below(top).get(side).copied()) else {
@@ -204,11 +206,11 @@ mod tests {
                     children[usize::from(tree.nodes[parent as usize].children[0] != old)] = new;
                     other.nodes[new as usize].parent = parent;
                 }
-                for at in other.preorder().into_iter().rev() {
-                    if !other.nodes[at as usize].is_leaf() {
-                        let aabb = other.union_of(other.nodes[at as usize].children);
-                        other.nodes[at as usize].area = aabb.half_area();
-                        other.nodes[at as usize].aabb = aabb;
+                for index in other.preorder().into_iter().rev() {
+                    if !other.nodes[index as usize].is_leaf() {
+                        let aabb = other.union_of(other.nodes[index as usize].children);
+                        other.nodes[index as usize].area = aabb.half_area();
+                        other.nodes[index as usize].aabb = aabb;
                     }
                 }
                 found.push(other.internal_area());

@@ -1,11 +1,12 @@
-//! Iterated local search: perturb the incumbent by a few random moves, search locally again, keep the better tree.
+//! Iterated local search: perturbs the incumbent by a few random moves, repeats the local search,
+//! and keeps the better tree.
 //!
-//! Lourenço, Martin & Stützle 2003, acceptance 'better'. The simplest way beyond the first local optimum, and the baseline
-//! for [`rebuild`](crate::rebuild) and [`ruin_recreate`](crate::ruin_recreate), which perturb one small part of the tree
-//! at a time.
+//! Lourenço, Martin & Stützle 2003, acceptance 'better'. It is the simplest way beyond the first
+//! local optimum, and the baseline for [`rebuild`](crate::rebuild) and
+//! [`ruin_recreate`](crate::ruin_recreate), which perturb one small part of the tree at a time.
 
+use super::LocalSearch;
 use crate::annealing::{Mover as _, SingleMove, SingleMover, Target};
-use crate::local::LocalSearch;
 use crate::local::incumbent::Incumbent;
 use crate::local::initial::Start;
 use crate::run::{Found, Problem, Run, Tally, stream};
@@ -14,9 +15,9 @@ use bvh_config::Itself;
 use std::ops::Bound::{Excluded, Included};
 
 bvh_config::config! {
-    /// How strongly to perturb, how to search locally, and for how long.
+    /// The strength of perturbations, the local search, and the amount of work.
     pub struct Config {
-        /// Random moves of a perturbation per object; there is at least one.
+        /// Random moves of a perturbation per object; at least one is made.
         strength: f64 = 0.01, in (Excluded(0.0), Included(1.0));
         /// Maximum number of levels up and down of a random move.
         climb: u32 = 4, in 1..=u32::MAX - 1;
@@ -57,10 +58,10 @@ impl Config {
             let mut rng = stream(seed, number);
             let mut mover = SingleMover::new(&kick);
             number += 1;
-            // At this temperature every move is accepted.
             let mut tally = Tally::default();
             let observer = run.observer();
             while tally.moves < kicks && (tally.moves % 1024 > 0 || !observer.cancelled()) {
+                // The highest temperature accepts every move, so the move becomes a perturbation.
                 tally.kept += u64::from(mover.step(&mut other, f64::MAX, &mut rng));
                 tally.moves += 1;
             }

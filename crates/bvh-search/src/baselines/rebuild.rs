@@ -1,18 +1,22 @@
-//! Rebuilding: find nodes that look badly split, rebuild the subtrees below them with other splits, keep what is better.
+//! Rebuilding: finds nodes that look badly split, rebuilds their subtrees with other splits, and
+//! keeps the better ones.
 //!
-//! Ng & Trifonov 2003, section 5: 'If at some node it appears that a wrong decision has been made so that the two
-//! children are highly imbalance and one is contributing significantly to the overall cost of the hierarchy, a
-//! different selection point can be made and this part of the hierarchy resembling a subtree can be rebuilt.'
+//! Ng & Trifonov 2003, section 5: 'If at some node it appears that a wrong decision has been made
+//! so that the two children are highly imbalance and one is contributing significantly to the
+//! overall cost of the hierarchy, a different selection point can be made and this part of the
+//! hierarchy resembling a subtree can be rebuilt.'
 //!
-//! Differs from the paper: nothing is stored at the nodes; the other splits come from GRASP's randomised construction; a
-//! rebuilt subtree is improved to a local optimum before it is compared, and its nodes are reinserted once among all
-//! others afterwards, which makes the whole an iterated local search (Lourenço, Martin & Stützle 2003).
+//! Differs from the paper: nothing is stored at the nodes. GRASP's randomised construction chooses
+//! the other splits. A rebuilt subtree is improved to a local optimum before the comparison, and
+//! its nodes are then reinserted once anywhere in the tree, which makes the method an iterated
+//! local search (Lourenço, Martin & Stützle 2003).
 
-use super::grasp::{Candidates, Randomised};
+use super::LocalSearch;
+use crate::candidates::{Candidates, Randomised};
 use crate::local::incumbent::Incumbent;
 use crate::local::initial::{Start, construction};
 use crate::local::pass::TOLERANCE;
-use crate::local::{LocalSearch, reinsertion};
+use crate::local::reinsertion;
 use crate::parallel;
 use crate::run::{
     Found, Observer, Problem, Quota, Run, SearchError, Stream, Tally, stream, watched,
@@ -26,23 +30,24 @@ use bvh_core::{Aabb, Bvh};
 use rand::RngExt;
 
 bvh_config::config! {
-    /// Which subtrees to rebuild, how, and for how long.
+    /// The subtrees to rebuild, the construction, and the amount of work.
     pub struct Config {
         /// Maximum number of objects of a rebuilt subtree.
         objects: u32 = 200, in 3..=1_000_000;
-        /// Number of random nodes of which the one is taken whose children have the largest area. In measurements, more
-        /// of them, or the children's area relative to the node's, found no better nodes, and 1 hardly worse ones.
+        /// Number of random nodes in a tournament. The node whose children have the largest area
+        /// wins. In measurements, larger tournaments, or the children's area relative to the
+        /// node's, found no better nodes, and a tournament of 1 found hardly worse nodes.
         tournament: u32 = 2, in 1..=1000;
-        /// Maximum number of levels from that node up to the root of the rebuilt subtree, since a bad split shows below
-        /// the split that caused it.
+        /// Maximum number of levels from that node up to the root of the rebuilt subtree, because a
+        /// bad split shows below the split that caused it.
         climb: u32 = 6, in 0..=1000;
         /// The splits that may be chosen, as in [`grasp`](crate::grasp).
         candidates: Candidates = Candidates::AxisBest, in Itself;
         /// The probability of taking one of the candidates other than the best.
         noise: f64 = 0.3, in 0.0..=1.0;
-        /// The heuristic that ranks splits; by default that of the initial tree.
+        /// The heuristic that ranks splits; by default the heuristic of the default initial tree.
         construction: muller_fellner::Config = construction(), in Itself;
-        /// How a rebuilt subtree is improved before it is compared.
+        /// The local search that improves a rebuilt subtree before the comparison.
         local_search: LocalSearch = LocalSearch::Reinsertion;
         /// Work per object, unless the budget has less.
         work_per_object: u64 = 10_000;
@@ -54,7 +59,7 @@ bvh_config::config! {
 search_by_metric!(Config);
 
 impl Config {
-    /// Rebuilds disjoint subtrees in parallel, each with a random stream of its own.
+    /// Rebuilds disjoint subtrees in parallel, each with a separate random stream.
     fn search_by<A: Metric>(
         &self,
         metric: A,
@@ -71,27 +76,27 @@ impl Config {
         best.offer(&tree, run);
         let mut rng = stream(seed, 0);
         let mut number = 0;
-        let mut own = self.work_per_object.saturating_mul(n);
-        // The work that a batch may take: it is not begun with less.
+        let mut work_left = self.work_per_object.saturating_mul(n);
+        // A batch is not begun with less work than it may need.
         let enough = BATCH * WORK_PER_OBJECT * n.min(self.objects.into());
-        while run.stopped().is_none() && own.min(run.left().work) >= enough {
+        while run.stopped().is_none() && work_left.min(run.left().work) >= enough {
             tree.sort_in_preorder();
             let mut round = Tally::default();
             while round.work < n * WORK_PER_OBJECT && !run.observer().cancelled() {
                 let left = run.left().less(&round);
-                let quota = left.at_most(own.saturating_sub(round.work));
+                let quota = left.at_most(work_left.saturating_sub(round.work));
                 if quota.work < enough || quota.moves == 0 {
                     break;
                 }
                 let subtrees = self.select(&tree, &mut rng, quota.moves.min(BATCH), &mut round);
-                // The selection draws from stream 0.
+                // The selection draws from stream 0, so constructions begin with stream 1.
                 let first = number + 1;
                 let share = Quota { work: quota.work / (2 * BATCH), ..Quota::ENDLESS };
-                let construct = |at: usize| {
-                    let rng = stream(seed, first + at as u64);
+                let construct = |index: usize| {
+                    let rng = stream(seed, first + index as u64);
                     self.construct(
                         (&tree, problem.measure),
-                        &subtrees[at],
+                        &subtrees[index],
                         share,
                         rng,
                         run.observer(),
@@ -104,7 +109,7 @@ impl Config {
                 let limit = Quota { work: quota.work / 2, ..Quota::ENDLESS };
                 round += replace(&mut tree, &subtrees, &found, limit, run.observer());
             }
-            own = own.saturating_sub(round.work);
+            work_left = work_left.saturating_sub(round.work);
             run.count(round);
             best.offer(&tree, run);
         }
@@ -115,7 +120,8 @@ impl Config {
 /// Number of subtrees that are rebuilt together.
 const BATCH: u64 = 4;
 
-/// Work per object of the scene between two sorts of the nodes; also about the work per object of one rebuilt subtree.
+/// Work per object of the scene between two sorts of the nodes. A rebuilt subtree takes about as
+/// much work per object.
 const WORK_PER_OBJECT: u64 = 64;
 
 /// A subtree: its inner nodes, root first, its leaves, and the total area of its inner nodes.
@@ -127,17 +133,17 @@ struct Subtree {
 }
 
 impl Subtree {
-    /// The subtree below `root`, unless it has more than `most` leaves.
+    /// Collects the subtree below `root`; `None` if it has more than `most` leaves.
     fn below(tree: &Working<impl Metric>, root: u32, most: u32) -> Option<Self> {
         let mut subtree = Self::default();
         let mut stack = vec![root];
-        while let Some(at) = stack.pop() {
-            let node = &tree.nodes[at as usize];
+        while let Some(index) = stack.pop() {
+            let node = &tree.nodes[index as usize];
             if node.is_leaf() {
-                subtree.leaves.push(at);
+                subtree.leaves.push(index);
             } else {
                 subtree.area += node.area;
-                subtree.inner.push(at);
+                subtree.inner.push(index);
                 stack.extend([node.children[1], node.children[0]]);
             }
             // A subtree has one leaf more than inner nodes.
@@ -146,6 +152,12 @@ impl Subtree {
             }
         }
         Some(subtree)
+    }
+
+    /// Returns whether two subtrees of one tree share a leaf.
+    fn overlaps(&self, other: &Self) -> bool {
+        // If two subtrees share a leaf, one of them contains the root of the other.
+        self.inner.contains(&other.inner[0]) || other.inner.contains(&self.inner[0])
     }
 }
 
@@ -164,29 +176,27 @@ impl Config {
             tally.work += u64::from(self.tournament);
             let mut root = (-1.0, ANCHOR);
             for _ in 0..self.tournament {
-                let at = rng.random_range(1..tree.nodes.len() as u32);
-                let contribution = contribution(tree, at);
+                let index = rng.random_range(1..tree.nodes.len() as u32);
+                let contribution = contribution(tree, index);
                 if contribution > root.0 {
-                    root = (contribution, at);
+                    root = (contribution, index);
                 }
             }
             let mut found = None;
-            let mut at = root.1;
+            let mut index = root.1;
             for _ in 0..=rng.random_range(0..=self.climb) {
-                let Some(subtree) = Subtree::below(tree, at, self.objects) else { break };
+                let Some(subtree) = Subtree::below(tree, index, self.objects) else { break };
                 tally.work += subtree.inner.len() as u64;
                 found = Some(subtree);
-                at = tree.nodes[at as usize].parent;
-                if at == ANCHOR {
+                index = tree.nodes[index as usize].parent;
+                if index == ANCHOR {
                     break;
                 }
             }
             let Some(subtree) = found.filter(|subtree| subtree.leaves.len() >= 3) else { continue };
-            // Of two subtrees with a common leaf, one contains the root of the other.
-            let holds = |one: &Subtree, other: &Subtree| one.inner.contains(&other.inner[0]);
             if !subtrees
                 .iter()
-                .any(|other| holds(other, &subtree) || holds(&subtree, other))
+                .any(|other| other.overlaps(&subtree))
             {
                 subtrees.push(subtree);
             }
@@ -194,7 +204,8 @@ impl Config {
         subtrees
     }
 
-    /// Another tree over the leaves of a subtree, if it is better, and the work that it took.
+    /// Constructs another tree over the leaves of a subtree. Returns it if it is better, and the
+    /// work.
     fn construct<A: Metric>(
         &self,
         (tree, measure): (&Working<A>, Option<&dyn Measure>),
@@ -230,9 +241,9 @@ impl Config {
     }
 }
 
-/// The area of a node's children, 0 for a leaf.
-fn contribution(tree: &Working<impl Metric>, at: u32) -> f64 {
-    let node = &tree.nodes[at as usize];
+/// Returns the total area of a node's children, 0 for a leaf.
+fn contribution(tree: &Working<impl Metric>, index: u32) -> f64 {
+    let node = &tree.nodes[index as usize];
     if node.is_leaf() {
         0.0
     } else {
@@ -243,7 +254,7 @@ fn contribution(tree: &Working<impl Metric>, at: u32) -> f64 {
     }
 }
 
-/// Replaces subtrees by the better ones, then tries all their nodes in all positions of the tree once.
+/// Replaces subtrees by better ones, then reinserts all their nodes once, anywhere in the tree.
 fn replace<A: Metric>(
     tree: &mut Working<A>,
     subtrees: &[Subtree],
@@ -272,18 +283,18 @@ fn graft(tree: &mut Working<impl Metric>, subtree: &Subtree, shape: &Working<imp
     let order = shape.preorder();
     let mut new = vec![ANCHOR; shape.nodes.len()];
     let mut inner = subtree.inner.iter();
-    for &at in &order {
-        let node = &shape.nodes[at as usize];
-        new[at as usize] = if node.is_leaf() {
+    for &index in &order {
+        let node = &shape.nodes[index as usize];
+        new[index as usize] = if node.is_leaf() {
             subtree.leaves[node.children[1] as usize]
         } else {
             inner.next().copied().unwrap_or(ANCHOR) // both trees have the same number
         };
     }
-    for &at in order.iter().rev() {
-        let node = &shape.nodes[at as usize];
+    for &index in order.iter().rev() {
+        let node = &shape.nodes[index as usize];
         if !node.is_leaf() {
-            tree.join(new[at as usize], node.children.map(|child| new[child as usize]));
+            tree.join(new[index as usize], node.children.map(|child| new[child as usize]));
         }
     }
 }
@@ -294,6 +305,7 @@ mod tests {
     use crate::scatter::{built, scatter};
     use bvh_build::median_cut;
     use bvh_core::validate;
+    use std::collections::BTreeSet;
 
     #[test]
     fn grafting_changes_the_subtree_alone_and_areas_stay_exact() {
@@ -315,12 +327,8 @@ mod tests {
                 graft(&mut tree, subtree, &other);
                 let after = Subtree::below(&tree, subtree.inner[0], 50).unwrap();
                 assert!((after.area - other.area()).abs() <= 1e-12 * other.area());
-                let sorted = |leaves: &[u32]| {
-                    let mut leaves = leaves.to_vec();
-                    leaves.sort_unstable();
-                    leaves
-                };
-                assert_eq!(sorted(&after.leaves), sorted(&subtree.leaves));
+                let leaves: BTreeSet<u32> = after.leaves.into_iter().collect();
+                assert_eq!(leaves, subtree.leaves.iter().copied().collect());
                 kept += 1;
             }
             let area = tree.internal_area();

@@ -1,4 +1,4 @@
-//! GRASP's randomised construction: Müller–Fellner that sometimes does not take the best split.
+//! GRASP's randomised construction: Müller–Fellner that does not always choose the best split.
 //!
 //! Ng & Trifonov 2003, section 3.4; Feo & Resende 1995. The four candidate rules of the paper are
 //!
@@ -9,74 +9,47 @@
 //! | Figure 1 | `k_best`, restricted by cardinality | 0.1 |
 //! | section 3.4 | `within`, restricted by value | any |
 //!
-//! GRASP's second phase, which the paper leaves to future work (sections 3.4 and 5), is `local_search`: every
-//! constructed tree is improved to a local optimum of its own.
+//! GRASP's second phase, which the paper leaves to future work (sections 3.4 and 5), is
+//! `local_search`: every constructed tree is improved to its local optimum.
 //!
-//! Differs from the paper: nothing in the first two rules; for the others it does not say how noise acts, and here
-//! it is the probability of taking one of the candidates other than the best, each equally likely.
+//! Differs from the paper: not in the first two rules. For the others, the paper does not define
+//! how noise acts; here it is the probability of choosing a candidate other than the best, each
+//! equally likely.
 
-use crate::local::LocalSearch;
+use crate::baselines::LocalSearch;
+pub use crate::candidates::Candidates;
+use crate::candidates::Randomised;
 use crate::parallel::{KEPT_NODES, map_init};
-use crate::run::{
-    Observer, Problem, Quota, Run, Search, SearchError, Stream, Tally, stream, watched,
-};
+use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Tally, stream, watched};
 use crate::tree::{Area, Metric, Working};
-use bvh_build::top_down::{Split, SplitCost, SplitRule, Sweep, Workspace};
+use bvh_build::top_down::Workspace;
 use bvh_build::{BuildError, Presorted, Watch, muller_fellner};
-use bvh_config::{Accepts, Check, Itself, OutOfRange};
+use bvh_config::Itself;
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Measure};
-use rand::RngExt;
 
 bvh_config::config! {
-    /// How to construct trees, and how many.
+    /// The construction, and the number of trees.
     pub struct Config {
         /// Number of independent constructions.
         trials: u64 = 100, in 1..;
         /// The splits of a node that may be chosen.
         candidates: Candidates = Candidates::AxisBest, in Itself;
-        /// The probability of taking one of the candidates other than the best. Without it, all candidates are equally
-        /// likely.
+        /// The probability of choosing a candidate other than the best. Without it, all candidates
+        /// are equally likely.
         #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
         noise: Option<f64>, in 0.0..=1.0;
-        /// How every constructed tree is improved; by default not at all, as in the paper, which ends far above every method
-        /// with local search.
+        /// The local search that improves every constructed tree. The default is none, as in the
+        /// paper, which ends far above every method with local search.
         #[cfg_attr(feature = "serde", serde(skip_serializing_if = "LocalSearch::is_none"))]
         local_search: LocalSearch = LocalSearch::None;
-        /// The heuristic that ranks splits, and the rest of the greedy builder's configuration.
+        /// The heuristic that ranks splits, and the other parameters of the greedy builder.
         construction: muller_fellner::Config, in Itself;
     }
 }
 
-/// The restricted candidate list of a node.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Candidates {
-    /// The best split of each of the three axes.
-    AxisBest,
-    /// The k best splits of all axes, k ≥ 1.
-    KBest(u32),
-    /// The best split and all that cost less than (1 + α) times as much, α ≥ 0.
-    Within(f64),
-}
-
-impl Check for Candidates {
-    fn faults(&self) -> Vec<OutOfRange> {
-        match self {
-            Self::AxisBest => vec![],
-            Self::KBest(k) => (1..).faults("k_best", k),
-            Self::Within(alpha) => (0.0..).faults("within", alpha),
-        }
-    }
-}
-
 impl Config {
-    /// Construction number `trial`, into `tree`.
+    /// Makes the construction number `trial` and writes it into the buffers' tree.
     fn construct(
         &self,
         scene: &Presorted,
@@ -91,7 +64,8 @@ impl Config {
             .construct(scene, measure, &mut rule, buffers, watch)
     }
 
-    /// Improves a tree to a local optimum; leaves it as it was if the observer cancels before. Returns the nodes visited.
+    /// Improves a tree to a local optimum; leaves it unchanged if the observer cancels first.
+    /// Returns the number of nodes visited.
     fn improve(
         &self,
         tree: &mut Bvh,
@@ -126,8 +100,9 @@ impl Config {
         Ok(work)
     }
 
-    /// Makes trial number `trial`: constructs and improves a tree in `tree`. `None` if the observer cancels before the tree is
-    /// constructed; the first trial then fails, so that it is never without a tree.
+    /// Makes the trial number `trial`: constructs and improves `tree`. Returns `None` if the
+    /// observer cancels before the construction ends, except for the first trial, which fails
+    /// instead, so a trial is either complete or an error.
     fn attempt(
         &self,
         scene: &Presorted,
@@ -162,12 +137,13 @@ struct Trial {
 }
 
 impl Search for Config {
-    /// Trials are independent: each draws from a stream of its own, so they run in parallel.
+    /// Runs trials in parallel. They are independent, because each draws from a separate stream.
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         let scene = watched(run.observer(), |watch| Presorted::watched(problem.boxes, watch))?;
         let construction = (2 * scene.len() as u64).saturating_sub(1);
         let observer = run.observer();
-        // Trials whose work is not known in advance run in smaller batches, to waste less at the end of a budget.
+        // The work of trials with local search is not known in advance. Smaller batches waste less
+        // at the end of a budget.
         let most = if self.local_search.is_none() { BATCH } else { SMALL_BATCH };
         let most = most.min(KEPT_NODES / construction.max(1)).max(1);
         let mut next = 0;
@@ -177,9 +153,9 @@ impl Search for Config {
                 .trials
                 .min(next.saturating_add(run.evaluations_left(construction).min(most)));
             let limit = run.incumbent();
-            let results = map_init((end - next) as usize, Default::default, |buffers, at| {
+            let results = map_init((end - next) as usize, Default::default, |buffers, index| {
                 let (workspace, tree): &mut (Workspace, Bvh) = buffers;
-                let number = (seed, next + at as u64);
+                let number = (seed, next + index as u64);
                 let mut trial =
                     self.attempt(&scene, problem, number, (workspace, tree), observer)?;
                 if let Some(trial) = trial.as_mut().filter(|trial| trial.cost < limit) {
@@ -209,41 +185,6 @@ const BATCH: u64 = 32;
 
 /// Number of trials between two checks of the budget, with local search.
 const SMALL_BATCH: u64 = 4;
-
-/// Draws a split from a node's restricted candidate list.
-pub(crate) struct Randomised {
-    candidates: Candidates,
-    noise: Option<f64>,
-    rng: Stream,
-    list: Vec<Split>,
-}
-
-impl Randomised {
-    pub fn new(candidates: Candidates, noise: Option<f64>, rng: Stream) -> Self {
-        Self { candidates, noise, rng, list: Vec::new() }
-    }
-}
-
-impl SplitRule for Randomised {
-    /// The random draw comes before the scan of the node, so that only the candidates that it can choose are looked for.
-    #[inline(always)]
-    fn choose<C: SplitCost>(&mut self, node: &mut Sweep<'_, C>) -> Split {
-        let Self { candidates, noise, rng, list } = self;
-        if noise.is_some_and(|noise| !rng.random_bool(noise)) {
-            return node.best();
-        }
-        match *candidates {
-            Candidates::AxisBest if noise.is_none() => {
-                return node.axis_best(rng.random_range(0..3u8));
-            }
-            Candidates::AxisBest => node.axis_bests(list),
-            Candidates::KBest(k) => node.k_best(k as usize, list),
-            Candidates::Within(alpha) => node.within(alpha, list),
-        }
-        let first = u32::from(noise.is_some() && list.len() > 1);
-        list[rng.random_range(first..list.len() as u32) as usize]
-    }
-}
 
 #[cfg(test)]
 mod tests {

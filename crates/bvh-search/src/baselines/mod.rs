@@ -1,0 +1,58 @@
+//! Published methods that [`best`](crate::best) is compared with and never calls.
+//!
+//! Two local searches, [`rotation`] and [`treelet`], and two ways to continue from a local optimum,
+//! [`iterated`] and [`rebuild`]. GRASP and the ways to continue share [`LocalSearch`], which names
+//! a local search.
+
+pub mod iterated;
+pub mod rebuild;
+pub mod rotation;
+pub mod treelet;
+
+use crate::local::reinsertion;
+use crate::run::{Observer, Quota, Tally};
+use crate::tree::{Metric, Working};
+
+/// A local search by name, with its default order of nodes: how other searches improve a tree they
+/// have made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub enum LocalSearch {
+    /// Leaves the tree as it is.
+    #[default]
+    None,
+    /// By [rotations](crate::rotation).
+    Rotation,
+    /// By [treelets](crate::treelet) of 7 leaves.
+    Treelet,
+    /// By [reinsertion](crate::reinsertion).
+    Reinsertion,
+}
+
+impl LocalSearch {
+    /// Returns whether the tree is left as it is.
+    pub fn is_none(&self) -> bool {
+        *self == Self::None
+    }
+
+    /// Improves the tree until it is a local optimum, the quota is used up, or the observer
+    /// cancels.
+    pub(crate) fn improve(
+        self,
+        tree: &mut Working<impl Metric>,
+        quota: Quota,
+        observer: &dyn Observer,
+    ) -> Tally {
+        match self {
+            Self::None => Tally::default(),
+            Self::Rotation => rotation::to_local_optimum(tree, quota, observer),
+            Self::Treelet => treelet::to_local_optimum(tree, quota, observer),
+            Self::Reinsertion => reinsertion::to_local_optimum(tree, quota, observer),
+        }
+    }
+}
