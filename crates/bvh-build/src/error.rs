@@ -3,8 +3,8 @@
 use crate::OutOfRange;
 use bvh_core::{Aabb, InvalidBox, MAX_OBJECTS, check_boxes};
 
-/// The reason why no tree was built. Any other input of finite boxes and numbers gives a tree unless the
-/// caller cancels.
+/// The reason why no tree was built. Any other input of finite boxes and numbers gives a tree
+/// unless the caller cancels.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BuildError {
     /// An object's box is not finite or is inverted.

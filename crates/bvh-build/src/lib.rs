@@ -1,4 +1,4 @@
-// The root of the crate; its front page is its README.
+// The crate's front page is its README.
 #![doc = include_str!("../README.md")]
 
 mod error;
@@ -18,9 +18,9 @@ pub use watch::{OBJECTS_PER_POLL, Watch};
 
 /// A builder: a configuration that turns boxes into a tree, after it has been [checked](Check).
 pub trait Builder: Check {
-    /// Builds a tree over `boxes`; `boxes[i]` bounds object `i`. No boxes give the tree without nodes. Where boxes are compared by
-    /// size, their size is the `measure`, or the half area if there is none.
-    /// Returns [`BuildError::Cancelled`] soon after the `watch` ends the construction.
+    /// Builds a tree over `boxes`; `boxes[i]` bounds object `i`. No boxes give the tree without
+    /// nodes. The size of a box is the `measure`, or the half area if there is none. Returns
+    /// [`BuildError::Cancelled`] soon after the `watch` cancels the construction.
     fn build_watched(
         &self,
         boxes: &[Aabb],
@@ -28,12 +28,12 @@ pub trait Builder: Check {
         watch: &Watch,
     ) -> Result<Bvh, BuildError>;
 
-    /// [`build_watched`](Self::build_watched) by nobody.
+    /// Builds a tree like [`build_watched`](Self::build_watched), without a watch.
     fn build_by(&self, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Result<Bvh, BuildError> {
         self.build_watched(boxes, measure, &Watch::default())
     }
 
-    /// [`build_by`](Self::build_by) half area.
+    /// Builds a tree by half area, without a watch.
     fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
         self.build_by(boxes, None)
     }

@@ -1,13 +1,14 @@
-//! How a caller ends a construction before it is finished.
+//! [`Watch`]: the caller's way to cancel a construction.
 
 use crate::BuildError;
 use std::fmt::{self, Debug, Formatter};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// Asks the caller whether a construction is still wanted. Builders ask about once per millisecond of each of their threads, and never
-/// while they have done less than [`OBJECTS_PER_POLL`]: small scenes are always built.
+/// Asks the caller whether to cancel a construction. Each thread of a builder polls about once per
+/// millisecond, and never before it has visited [`OBJECTS_PER_POLL`] objects, so small scenes are
+/// always built.
 ///
-/// The [default](Default) never ends a construction.
+/// The [default](Default) never cancels.
 ///
 /// ```
 /// use bvh_build::{BuildError, Builder, Watch, muller_fellner};
@@ -20,20 +21,21 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 #[derive(Default)]
 pub struct Watch<'a> {
     is_cancelled: Option<&'a (dyn Fn() -> bool + Sync)>,
-    /// Set by the first answer that ends the construction, so that all threads agree.
+    /// Set by the first poll that cancels, so that all threads agree.
     ended: AtomicBool,
 }
 
-/// Objects that a builder visits between two questions.
+/// The number of objects that a builder visits between two polls.
 pub const OBJECTS_PER_POLL: usize = 1 << 15;
 
 impl<'a> Watch<'a> {
-    /// Ends a construction soon after `is_cancelled` returns true, on whichever thread.
+    /// Returns a watch that cancels a construction soon after `is_cancelled` returns true on any
+    /// thread.
     pub fn new(is_cancelled: &'a (dyn Fn() -> bool + Sync)) -> Self {
         Self { is_cancelled: Some(is_cancelled), ended: AtomicBool::new(false) }
     }
 
-    /// Asks. Once the construction has ended it stays so.
+    /// Polls the caller. A cancellation is final.
     pub fn is_cancelled(&self) -> bool {
         if self.ended.load(Relaxed) {
             return true;
@@ -47,7 +49,7 @@ impl<'a> Watch<'a> {
         cancelled
     }
 
-    /// Returns [`BuildError::Cancelled`] if the construction has ended, without asking again.
+    /// Returns [`BuildError::Cancelled`] if a poll has cancelled the construction. Does not poll.
     pub fn ensure_wanted(&self) -> Result<(), BuildError> {
         if self.ended.load(Relaxed) { Err(BuildError::Cancelled) } else { Ok(()) }
     }
@@ -61,10 +63,10 @@ impl Debug for Watch<'_> {
     }
 }
 
-/// The questions of one thread, spaced by its work.
+/// The polls of one thread, spaced by its work.
 pub(crate) struct Pace<'a> {
     watch: &'a Watch<'a>,
-    /// Objects still to be visited before the next question.
+    /// Objects to visit before the next poll.
     left: usize,
 }
 
@@ -73,7 +75,7 @@ impl<'a> Pace<'a> {
         Self { watch, left: OBJECTS_PER_POLL }
     }
 
-    /// Counts visits of objects. Returns whether the construction ends.
+    /// Counts visits of objects. Returns whether the construction is cancelled.
     #[inline(always)]
     pub fn ends_after(&mut self, objects: usize) -> bool {
         if objects < self.left {
@@ -91,7 +93,7 @@ mod tests {
     use std::sync::atomic::AtomicUsize;
 
     #[test]
-    fn questions_are_spaced_by_work_and_an_end_is_final() {
+    fn polls_are_spaced_by_work_and_a_cancellation_is_final() {
         let asked = AtomicUsize::new(0);
         let third = || asked.fetch_add(1, Relaxed) == 2;
         let watch = Watch::new(&third);

@@ -155,7 +155,7 @@ fn the_tree_is_the_brute_force_one_with_wide_nodes_too() {
     }
 }
 
-/// A pseudo-random integer below `end`.
+/// Returns a pseudo-random integer below `end`.
 fn hash(i: u32, salt: u32, end: u32) -> f32 {
     let bits = i.wrapping_mul(2_654_435_761).rotate_left(salt);
     (bits % end) as f32
@@ -223,8 +223,8 @@ fn an_object_as_large_as_the_scene_stays_with_the_root() {
 
 #[test]
 fn pairing_with_inner_nodes_happens_when_allowed_and_cheaper() {
-    // A cluster of six, then a far object: enlarging the six's node costs more than a node above
-    // it.
+    // A cluster of six, then a far object: enlarging the node of the six costs more than a node
+    // above it.
     let mut boxes: Vec<Aabb> = (0..6)
         .map(|i| cube([0.1 * i as f32, 0.0, 0.0], 10.0))
         .collect();

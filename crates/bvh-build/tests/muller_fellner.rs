@@ -26,9 +26,9 @@ fn topology(tree: &Bvh) -> Vec<Vec<u32>> {
     sets
 }
 
-/// The paper's Table 1 word by word: examines every candidate of every axis, without blocks and
-/// without pruning. Returns the same topology as [`topology`], for a `weight` per object and a cost
-/// of a split from areas and loads.
+/// Follows the paper's Table 1 literally: examines every candidate of every axis, without blocks
+/// and without pruning. Returns the same topology as [`topology`], for a `weight` per object and a
+/// cost of a split from areas and loads.
 fn brute_force(
     boxes: &[Aabb],
     weights: &[f32],
@@ -63,7 +63,7 @@ fn brute_force(
                 let areas = [around(low, boxes).half_area(), around(high, boxes).half_area()];
                 candidates.push(Candidate {
                     cost: cost(areas, [load(low), load(high)]),
-                    // Of equal costs the most even split wins, then the lowest axis.
+                    // Among equal costs the most even split wins, then the lowest axis.
                     rank: (n.abs_diff(2 * left), axis, left),
                     parts: [high.to_vec(), low.to_vec()],
                 });
@@ -78,7 +78,7 @@ fn brute_force(
     sets
 }
 
-/// A way to split some objects.
+/// A split of some objects.
 struct Candidate {
     cost: f64,
     rank: (usize, usize, usize),

@@ -1,4 +1,4 @@
-//! Every construction is watched, and none takes more than a multiple of n log n.
+//! Every construction polls its watch, and none takes more than a multiple of n log n.
 
 use bvh_build::top_down::{TakeBest, Workspace};
 use bvh_build::{
@@ -9,7 +9,7 @@ use bvh_core::{Aabb, Bvh, Triangle, cost, validate};
 use muller_fellner::Heuristic;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// Triangles with corners anywhere in the unit cube: most are as large as the scene.
+/// Triangles with random corners in the unit cube: most are as large as the scene.
 fn soup(n: u32) -> Vec<Triangle> {
     let mut state = 88_172_645_463_325_252u64;
     let mut random = || {
@@ -42,7 +42,7 @@ fn builders() -> Vec<(&'static str, Box<dyn Builder + Sync>)> {
     ]
 }
 
-/// Calls a construction with a watch that ends it at question number `end`, and returns how often it was asked.
+/// Runs a construction with a watch that cancels at poll number `end`. Returns the number of polls.
 fn asked<T>(
     end: usize,
     construct: impl FnOnce(&Watch) -> Result<T, BuildError>,
@@ -125,11 +125,11 @@ fn objects_as_large_as_the_scene_are_divided_in_little_time_into_a_tree_about_as
             let tree = tree.unwrap();
             // Objects visited per object: the levels of the tree.
             let levels = (questions * OBJECTS_PER_POLL) as f64 / f64::from(n);
-            // Nodes of a few hundred objects may still be divided one by one.
+            // Nodes of a few hundred objects may still separate one object after the other.
             let most = 6.0 * f64::from(n).log2() + 128.0;
             assert!(levels < most, "{n}, {power}: {levels} levels of {most}");
             let area = cost::internal_area(&tree);
-            // Without any weight on the number of objects, trees are bad wherever they are.
+            // Without any weight on the number of objects, trees are bad everywhere.
             assert!(power < 0.9 || area < 1.05 * greedy, "{n}, {power}: {area} above {greedy}");
         }
     }

@@ -1,4 +1,5 @@
-//! Reads configurations from TOML, and names everything that is wrong: the key, the line, and what would be accepted.
+//! Reads configurations from TOML and reports every fault: the key, the line, and the accepted
+//! values.
 
 use crate::{Check, OutOfRange};
 use serde::de::DeserializeOwned;
@@ -9,17 +10,17 @@ use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
-/// A refused value.
+/// A rejected value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// Where it stands, as `methods[1].noise`; empty for the spec as a whole.
+    /// The path of the value, such as `methods[1].noise`; empty for the full text.
     pub key: String,
-    /// What follows the key in the message.
+    /// The message after the key.
     rest: String,
 }
 
 impl Fault {
-    /// The refusal of the value `found` of `key`.
+    /// Returns the rejection of the value `found` of `key`.
     pub fn new(
         key: impl fmt::Display,
         found: impl fmt::Display,
@@ -28,7 +29,8 @@ impl Fault {
         OutOfRange::new(key, found, accepted).into()
     }
 
-    /// The same fault, seen from the table or list that has the refused one under `key`.
+    /// Returns the same fault, with a key relative to the table or list that contains this value
+    /// under `key`.
     pub fn below(self, key: &str) -> Self {
         let dot = if self.key.is_empty() || self.key.starts_with('[') { "" } else { "." };
         Self { key: format!("{key}{dot}{}", self.key), ..self }
@@ -49,29 +51,29 @@ impl From<OutOfRange> for Fault {
     }
 }
 
-/// A table on its way to a value, with the path to where it is.
+/// A deserializer that tracks the path of the current value.
 type Tracked<'a, 'b> = Deserializer<'a, 'b, Value>;
 
-/// Whether `key` is `outer`, or stands somewhere below it.
+/// Returns whether `key` is `outer` or is nested in it.
 pub fn is_within(key: &str, outer: &str) -> bool {
     let below = key.strip_prefix(outer);
     below.is_some_and(|rest| outer.is_empty() || rest.is_empty() || rest.starts_with(['.', '[']))
 }
 
-/// What a table says, if that can be told, and everything that is wrong with it.
+/// The value of a table, if it could be read, and all faults.
 pub type Read<T> = (Option<T>, Vec<Fault>);
 
-/// Most faults that one table is searched for.
+/// Maximum number of faults reported for one table.
 const MOST_FAULTS: usize = 100;
 
-/// Deserialises a table by `read`, and checks the ranges. Serde stops at the first error: what it refuses is left out, and the
-/// rest is read again, with a default in its place.
+/// Deserialises a table by `read`, and checks the ranges. Serde stops at the first error, so the
+/// rejected key is removed and the rest is read again, with a default instead.
 fn tracked<T: Check>(
     table: Table,
     read: impl Fn(Tracked) -> Result<T, toml::de::Error>,
 ) -> Read<T> {
     let mut faults = Vec::<Fault>::new();
-    let mut left_out = Vec::new();
+    let mut removed = Vec::new();
     let mut table = Value::Table(table);
     while faults.len() < MOST_FAULTS {
         let mut track = Track::new();
@@ -79,7 +81,7 @@ fn tracked<T: Check>(
             Err(error) => error,
             Ok(value) => {
                 let ranges = value.faults().into_iter().map(Fault::from);
-                // A list is empty if an element was refused.
+                // A removed list counts as empty, which is no separate fault.
                 let apart = |late: &Fault| {
                     !faults
                         .iter()
@@ -91,36 +93,36 @@ fn tracked<T: Check>(
         };
         let path = track.path();
         let key = if path.iter().len() == 0 { String::new() } else { path.to_string() };
-        // A field may be missing because it has been left out.
-        let is_new = |(at, name): &(String, String)| {
-            error.message() != format!("missing field `{name}`") || !is_within(at, &key)
+        // A field may be missing because it was removed after a fault.
+        let is_new = |(position, name): &(String, String)| {
+            error.message() != format!("missing field `{name}`") || !is_within(position, &key)
         };
-        if left_out.iter().all(is_new) {
+        if removed.iter().all(is_new) {
             faults.push(Fault { key: key.clone(), rest: format!(": {}", error.message()) });
         }
         let steps: Vec<&Segment> = path.iter().collect();
-        // Elements of lists stay, lest others change their numbers.
+        // Elements of lists stay, because a removal would change the indices of later elements.
         let innermost = steps
             .iter()
             .rposition(|step| matches!(step, Segment::Map { .. }));
-        match innermost.and_then(|last| leave_out(&mut table, &steps[..=last])) {
-            Some(name) => left_out.push((key, name)),
+        match innermost.and_then(|last| remove(&mut table, &steps[..=last])) {
+            Some(name) => removed.push((key, name)),
             None => break,
         }
     }
     (None, faults)
 }
 
-/// Takes the key to which the steps lead out of a table, and returns it.
-fn leave_out(value: &mut Value, steps: &[&Segment]) -> Option<String> {
+/// Removes the key at the end of the path from its table, and returns it.
+fn remove(value: &mut Value, steps: &[&Segment]) -> Option<String> {
     match (steps, value) {
         ([Segment::Map { key }], Value::Table(table)) => table.remove(key).map(|_| key.clone()),
         (
             [Segment::Map { key } | Segment::Enum { variant: key }, below @ ..],
             Value::Table(table),
-        ) => leave_out(table.get_mut(key)?, below),
+        ) => remove(table.get_mut(key)?, below),
         ([Segment::Seq { index }, below @ ..], Value::Array(list)) => {
-            leave_out(list.get_mut(*index)?, below)
+            remove(list.get_mut(*index)?, below)
         }
         _ => None,
     }
@@ -130,7 +132,7 @@ fn leave_out(value: &mut Value, steps: &[&Segment]) -> Option<String> {
 ///
 /// # Errors
 ///
-/// Everything that is wrong with it, a line each.
+/// Returns all faults, one per line.
 pub fn parse<T: DeserializeOwned + Check>(text: &str, file: &str) -> Result<T, String> {
     let table: Table = text
         .parse()
@@ -146,8 +148,8 @@ pub fn deserialize<T: DeserializeOwned + Check>(table: Table) -> Read<T> {
     tracked(table, |deserializer| T::deserialize(deserializer))
 }
 
-/// Deserialises a table that says under `tag` what it is, by `read`, which returns `None` for a name that is none of
-/// the `accepted` ones. Serde's own enums with a tag would buffer the table and forget where an error is.
+/// Deserialises a table whose `tag` names its type, by `read`, which returns `None` for a name that
+/// is not `accepted`. Serde's tagged enums would buffer the table and lose the position of errors.
 pub fn tagged<T: Check>(
     mut table: Table,
     tag: &str,
@@ -168,8 +170,8 @@ pub fn tagged<T: Check>(
     }
 }
 
-/// All that is wrong with a text, a line each, in its order; each line but the first begins with `file`. What stands in the table
-/// `above` goes before what stands on top.
+/// Formats the faults of a text in its order, one per line. Each line except the first begins with
+/// `file`. Keys of the table `above` take precedence over the same keys at the top level.
 pub fn say(faults: &[Fault], text: &str, file: &str, above: Option<&str>) -> String {
     let table = DeTable::parse(text).ok();
     let start = |key: &str| Some(in_table(table.as_ref()?.get_ref(), key)?.start);
@@ -183,11 +185,11 @@ pub fn say(faults: &[Fault], text: &str, file: &str, above: Option<&str>) -> Str
         .iter()
         .map(|fault| (place(fault), fault))
         .collect();
-    placed.sort_by_key(|(at, _)| *at);
+    placed.sort_by_key(|(position, _)| *position);
     let mut known = HashSet::new();
     placed.retain(|(_, fault)| known.insert(&fault.key));
-    let line = |(at, fault): (Option<usize>, &Fault)| match at {
-        Some(at) => format!("line {}: {fault}", text[..at].matches('\n').count() + 1),
+    let line = |(position, fault): (Option<usize>, &Fault)| match position {
+        Some(position) => format!("line {}: {fault}", text[..position].matches('\n').count() + 1),
         None => fault.to_string(),
     };
     placed
@@ -231,18 +233,18 @@ mod tests {
         for (key, line) in
             [("a", 1), ("b[1].c", 4), ("d.e f", 7), ("d.none", 6), ("g[1].h", 11), ("b[7]", 2)]
         {
-            let said = say(&[Fault::new(key, 1, 2)], text, "", None);
-            assert_eq!(said, format!("line {line}: {key} is 1; accepted: 2"));
+            let message = say(&[Fault::new(key, 1, 2)], text, "", None);
+            assert_eq!(message, format!("line {line}: {key} is 1; accepted: 2"));
         }
         assert_eq!(say(&[Fault::new("none", 1, 2)], text, "", None), "none is 1; accepted: 2");
     }
 
     #[test]
-    fn faults_are_said_in_the_order_of_the_text_and_once_each() {
+    fn faults_are_reported_in_the_order_of_the_text_and_once_each() {
         let faults = ["b", "q.a", "a", "b"].map(|key| Fault::new(key, 1, 2));
-        let said = say(&faults, "a = 1\nb = 1\n[q]\na = 1\n", "f", None);
+        let message = say(&faults, "a = 1\nb = 1\n[q]\na = 1\n", "f", None);
         let line = |line, key| format!("line {line}: {key} is 1; accepted: 2");
-        assert_eq!(said, [line(1, "a"), line(2, "b"), line(4, "q.a")].join("\nf: "));
+        assert_eq!(message, [line(1, "a"), line(2, "b"), line(4, "q.a")].join("\nf: "));
         let replaced = say(&faults, "a = 1\nb = 1\n[q]\na = 1\n", "f", Some("q"));
         assert_eq!(replaced, [line(2, "b"), line(4, "q.a"), line(4, "a")].join("\nf: "));
     }

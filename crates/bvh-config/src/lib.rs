@@ -1,19 +1,20 @@
-//! Configurations: a field declares its name, type, default and accepted values once, by [`config!`](crate::config!).
+//! Configurations: [`config!`](crate::config!) declares the name, type, default and accepted values
+//! of each field once.
 //!
 //! ```
 //! bvh_config::config! {
-//!     /// How to measure.
+//!     /// The parameters of a measurement.
 //!     pub struct Config {
 //!         /// Number of measurements.
 //!         count: u32 = 3, in 1..=1000;
-//!         /// Fraction of them that is thrown away, if any.
+//!         /// Fraction of the measurements to discard, if any.
 //!         outliers: Option<f64>, in 0.0..=1.0;
 //!     }
 //! }
 //! use bvh_config::Check;
 //! assert_eq!(Config::default().check(), Ok(()));
-//! let refused = Config { outliers: Some(2.0), ..Config::default() }.check().unwrap_err();
-//! assert_eq!(refused.to_string(), "outliers is 2; accepted: 0 to 1");
+//! let rejected = Config { outliers: Some(2.0), ..Config::default() }.check().unwrap_err();
+//! assert_eq!(rejected.to_string(), "outliers is 2; accepted: 0 to 1");
 //! ```
 
 #[cfg(feature = "toml")]
@@ -26,25 +27,26 @@ use std::fmt::Display;
 use std::ops::Bound::{self, Excluded, Included, Unbounded};
 use std::ops::{RangeBounds, RangeFrom, RangeInclusive, RangeToInclusive};
 
-/// A parameter whose value is not accepted.
+/// A parameter with a rejected value.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{key} is {found}; accepted: {accepted}")]
 pub struct OutOfRange {
-    /// The parameter's name; dots lead to those of inner configurations, as in TOML.
+    /// The parameter's name; dots separate the names of nested configurations, as in TOML.
     pub key: String,
     /// The value found.
     pub found: String,
-    /// The values that would be accepted, in words.
+    /// The accepted values, in words.
     pub accepted: String,
 }
 
 impl OutOfRange {
-    /// The refusal of the value `found` of `key`.
+    /// Returns the rejection of the value `found` of `key`.
     pub fn new(key: impl Display, found: impl Display, accepted: impl Display) -> Self {
         Self { key: key.to_string(), found: found.to_string(), accepted: accepted.to_string() }
     }
 
-    /// The same refusal, seen from the configuration that holds the refused one under `key`.
+    /// Returns the same rejection, with a key relative to the configuration that contains this one
+    /// under `key`.
     #[must_use]
     pub fn below(self, key: impl Display) -> Self {
         let dot = if self.key.starts_with('[') { "" } else { "." };
@@ -52,14 +54,14 @@ impl OutOfRange {
     }
 }
 
-/// A value that knows whether all its parameters are in range.
+/// A value that can check its parameters.
 pub trait Check {
-    /// All parameters that are out of their ranges, in order.
+    /// Returns all parameters that are out of range, in order.
     fn faults(&self) -> Vec<OutOfRange> {
         Vec::new()
     }
 
-    /// Refuses the first parameter that is out of its range.
+    /// Rejects the first parameter that is out of range.
     fn check(&self) -> Result<(), OutOfRange> {
         self.faults()
             .into_iter()
@@ -76,19 +78,22 @@ impl<C: Check> Check for Option<C> {
 
 impl<C: Check> Check for Vec<C> {
     fn faults(&self) -> Vec<OutOfRange> {
-        let below = |(at, inner): (usize, &C)| Itself.faults(&format!("[{at}]"), inner);
-        self.iter().enumerate().flat_map(below).collect()
+        self.iter()
+            .enumerate()
+            .flat_map(|(index, inner)| Itself.faults(&format!("[{index}]"), inner))
+            .collect()
     }
 }
 
-/// The right side of a field's `in`: which values of type `V` are accepted.
+/// The right side of a field's `in`: the accepted values of type `V`.
 ///
-/// Implemented by the ranges of the standard library for numbers and for collections of them, and by [`Itself`].
+/// Implemented by the ranges of the standard library for numbers and for collections of them, and
+/// by [`Itself`].
 pub trait Accepts<V: ?Sized> {
-    /// What is not accepted in the value `found` of the parameter `key`.
+    /// Returns all faults of the value `found` of the parameter `key`.
     fn faults(&self, key: &str, found: &V) -> Vec<OutOfRange>;
 
-    /// Refuses the value unless it is accepted.
+    /// Rejects a value that is not accepted.
     fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange> {
         self.faults(key, found)
             .into_iter()
@@ -96,7 +101,7 @@ pub trait Accepts<V: ?Sized> {
             .map_or(Ok(()), Err)
     }
 
-    /// The accepted values in words, if there is more to say than their type does.
+    /// Returns the accepted values in words; `None` if the type accepts no others.
     fn accepted(&self) -> Option<String> {
         None
     }
@@ -104,14 +109,15 @@ pub trait Accepts<V: ?Sized> {
 
 /// The fields of a configuration, as [`config!`](crate::config!) declares them.
 pub trait Keys {
-    /// Their names, in order.
+    /// The names of the fields, in order.
     const KEYS: &[&str];
 
-    /// What each accepts, in words, if there is more to say than its type does.
+    /// Returns the accepted values of each field in words; `None` if the type accepts no others.
     fn accepted() -> Vec<Option<String>>;
 }
 
-/// Adds what each field accepts to its description in the JSON schema of the configuration.
+/// Adds the accepted values of each field to its description in the JSON schema of the
+/// configuration.
 #[cfg(feature = "schema")]
 pub fn describe_accepted<C: Keys>(schema: &mut schemars::Schema) {
     let Some(fields) = schema
@@ -130,7 +136,7 @@ pub fn describe_accepted<C: Keys>(schema: &mut schemars::Schema) {
     }
 }
 
-/// Accepts the values that pass their own [`Check`]: inner configurations.
+/// Accepts the values that pass their [`Check`]: nested configurations.
 #[derive(Clone, Copy, Debug)]
 pub struct Itself;
 
@@ -165,13 +171,14 @@ macro_rules! ranges {
     )* };
 }
 
-// Not for all `R: RangeBounds`, which would leave no room for `Itself`.
+// One implementation per type of range: an implementation for all `R: RangeBounds` would overlap
+// with `Itself`.
 ranges! {
     RangeInclusive<V::Number>, RangeFrom<V::Number>, RangeToInclusive<V::Number>,
     (Bound<V::Number>, Bound<V::Number>),
 }
 
-/// All numbers above `low`, without `low` itself.
+/// Returns the range of all numbers above `low`, without `low`.
 pub const fn above<N>(low: N) -> (Bound<N>, Bound<N>) {
     (Excluded(low), Unbounded)
 }
@@ -190,7 +197,7 @@ fn in_words<N: Display>(range: &impl RangeBounds<N>) -> String {
     }
 }
 
-/// Adds what is wrong with several fields together, but for those fields that are out of their own range.
+/// Adds the faults of combinations of fields, except for fields that are out of range themselves.
 #[doc(hidden)]
 pub fn add_together(faults: &mut Vec<OutOfRange>, together: impl IntoIterator<Item = OutOfRange>) {
     let known: Vec<String> = faults
@@ -204,17 +211,19 @@ pub fn add_together(faults: &mut Vec<OutOfRange>, together: impl IntoIterator<It
     );
 }
 
-/// Declares a configuration: a struct with public fields, each `name: type = default, in accepted;`.
+/// Declares a configuration: a struct with public fields, each
+/// `name: type = default, in accepted;`.
 ///
-/// From the declaration follow the struct with `Clone`, `Debug`, `PartialEq` and [`Default`]; a sentence in the
-/// documentation of every field that states its default and the accepted values; [`Check`](crate::Check); and serde's
-/// traits, under the feature `serde` of the crate that calls the macro, with unknown keys refused and missing ones
-/// replaced by their defaults; and a JSON schema by `schemars`, under its feature `schema`. A crate that always depends on both
-/// writes `serde;` first.
+/// The macro generates the struct with `Clone`, `Debug`, `PartialEq` and [`Default`], and
+/// [`Check`](crate::Check). The documentation of every field ends with its default and its accepted
+/// values. Under the feature `serde` of the calling crate, the macro derives serde's traits, which
+/// reject unknown keys and replace missing ones by defaults; under the feature `schema`, it derives
+/// a JSON schema by `schemars`. A crate that always depends on both writes `serde;` first.
 ///
-/// Without `= default` a field has the default of its type, unsaid; without `in` every value is accepted. The right side
-/// of `in` is anything that [`Accepts`](crate::Accepts) the field's type. What several fields have to be
-/// together is checked by the function after the struct, which returns all that is wrong, as in `check Self::temperatures_fall;`.
+/// Without `= default`, a field has the default of its type, and the documentation does not mention
+/// it. Without `in`, every value is accepted. The right side of `in` is any value that
+/// [`Accepts`](crate::Accepts) the field's type. A function after the struct may check combinations
+/// of fields and returns their faults, as in `check Self::temperatures_fall;`.
 #[macro_export]
 macro_rules! config {
     (@default) => { ::core::default::Default::default() };
@@ -261,7 +270,7 @@ macro_rules! config {
 
         impl $crate::Check for $name {
             fn faults(&self) -> ::std::vec::Vec<$crate::OutOfRange> {
-                #[allow(unused_mut, reason = "of some configurations every value is accepted")]
+                #[allow(unused_mut, reason = "some configurations accept every value")]
                 let mut faults = ::std::vec::Vec::new();
                 $($(faults.extend($crate::Accepts::faults(&($range), stringify!($field), &self.$field));)?)*
                 $($crate::add_together(&mut faults, $together(self));)?
@@ -304,7 +313,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     crate::config! {
-        /// A configuration with another inside.
+        /// A configuration that contains another.
         struct Outer {
             /// Limited on both sides, without the lower end.
             part: f64 = 0.5, in (Excluded(0.0), Included(1.0));
@@ -324,7 +333,7 @@ mod tests {
     }
 
     crate::config! {
-        /// Held by another configuration.
+        /// Contained in another configuration.
         struct Inner {
             /// May be infinite.
             limit: f64 = f64::INFINITY, in 1.0..=f64::INFINITY;
@@ -332,8 +341,8 @@ mod tests {
     }
 
     #[test]
-    fn every_field_says_in_words_what_it_accepts_beyond_its_type() {
-        let said = Outer::KEYS
+    fn every_field_reports_the_values_it_accepts() {
+        let reported = Outer::KEYS
             .iter()
             .zip(Outer::accepted())
             .map(|(key, words)| (*key, words.unwrap_or_default()));
@@ -344,19 +353,21 @@ mod tests {
             ("by_name", "at most 9"),
             ("inner", ""),
         ];
-        assert!(said.eq(expected.map(|(key, words)| (key, words.to_owned()))));
+        assert!(reported.eq(expected.map(|(key, words)| (key, words.to_owned()))));
     }
 
     #[test]
-    fn a_refusal_names_the_key_the_value_and_what_would_be_accepted() {
-        let refused = |change: fn(&mut Outer)| {
+    fn a_rejection_names_the_key_the_value_and_the_accepted_values() {
+        fn check(change: fn(&mut Outer)) -> Result<(), String> {
             let mut outer = Outer::default();
             change(&mut outer);
             outer.check().map_err(|error| error.to_string())
-        };
-        assert_eq!(refused(|_| ()), Ok(()));
-        assert_eq!(refused(|outer| outer.part = 1.0), Ok(()));
-        let expect = |change, message: &str| assert_eq!(refused(change), Err(message.into()));
+        }
+        fn expect(change: fn(&mut Outer), message: &str) {
+            assert_eq!(check(change), Err(message.into()));
+        }
+        assert_eq!(check(|_| ()), Ok(()));
+        assert_eq!(check(|outer| outer.part = 1.0), Ok(()));
         expect(|outer| outer.part = 0.0, "part is 0; accepted: above 0, up to 1");
         expect(|outer| outer.part = f64::NAN, "part is NaN; accepted: above 0, up to 1");
         expect(|outer| outer.factor = f64::INFINITY, "factor is inf; accepted: above 0");
@@ -365,10 +376,14 @@ mod tests {
             |outer| outer.sizes = vec![2, 1],
             "sizes is not sorted; accepted: ascending numbers",
         );
-        let name = |outer: &mut Outer| outer.by_name = BTreeMap::from([("a".into(), [0.0, 10.0])]);
-        expect(name, "by_name.a[1] is 10; accepted: at most 9");
-        let inner = |outer: &mut Outer| outer.inner = vec![Inner::default(), Inner { limit: 0.0 }];
-        expect(inner, "inner[1].limit is 0; accepted: 1 to inf");
+        expect(
+            |outer| outer.by_name = BTreeMap::from([("a".into(), [0.0, 10.0])]),
+            "by_name.a[1] is 10; accepted: at most 9",
+        );
+        expect(
+            |outer| outer.inner = vec![Inner::default(), Inner { limit: 0.0 }],
+            "inner[1].limit is 0; accepted: 1 to inf",
+        );
         let outer = Outer {
             part: 0.0,
             sizes: vec![0, 7, 0],

@@ -1,17 +1,18 @@
-//! What counts as a number, or as a collection of numbers, when a parameter's range is checked.
+//! The numbers, and collections of numbers, that a range can check.
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
 /// A number that can be a parameter.
 pub trait Number: PartialOrd + Display {
-    /// Whether it is neither infinite nor NaN. Infinity is accepted only where a range names it as its end.
+    /// Returns whether the number is neither infinite nor NaN. Infinity is accepted only if a range
+    /// names it as its end.
     fn is_finite(&self) -> bool {
         true
     }
 }
 
-/// A number, or any collection of numbers of which each has to be in range.
+/// A number, or a collection of numbers that must all be in range.
 pub trait Numbers {
     /// The type of the numbers.
     type Number: Number;
@@ -48,7 +49,7 @@ impl<V: Numbers> Numbers for [V] {
     fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &V::Number)) {
         self.iter()
             .enumerate()
-            .for_each(|(at, inner)| inner.each(&format!("{key}[{at}]"), visit));
+            .for_each(|(index, inner)| inner.each(&format!("{key}[{index}]"), visit));
     }
 }
 

@@ -27,7 +27,7 @@ pub struct Node {
 pub enum NodeKind {
     /// Two or more children at `nodes[first..first + count]`.
     Inner {
-        /// Index of the first child; greater than the node's own.
+        /// Index of the first child, greater than the index of the node.
         first: u32,
         /// Number of children, at least 2.
         count: u32,

@@ -103,7 +103,7 @@ pub(crate) fn binary_visited<'t>(tree: &'t Bvh, visits: &mut Vec<f32>) -> Cow<'t
     let root = tree.nodes[0];
     let mut split = Bvh { nodes: vec![root], prim_ids: tree.prim_ids.clone() };
     let visits_before = core::mem::replace(visits, vec![visits[0]]);
-    // New nodes with the ranges of siblings in `tree` that they stand for. A range of one is a node
+    // New nodes with the ranges of siblings in `tree` that they replace. A range of one is a node
     // of `tree`; a longer range is a part of a wide node.
     let mut open = vec![(0, 0..1)];
     while let Some((to, siblings)) = open.pop() {

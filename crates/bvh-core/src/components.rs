@@ -1,9 +1,9 @@
-//! Rays by component: what numpy, C and wavefront renderers have.
+//! Rays by component, the format of numpy, C and wavefront renderers.
 
 use crate::{InvalidRay, Ray};
 use glam::Vec3;
 
-/// Rays in slices by component, all of the same length.
+/// Rays as one slice per component, all of the same length.
 #[derive(Clone, Copy, Debug)]
 pub struct RayComponents<'a> {
     origin: [&'a [f32]; 3],
@@ -15,14 +15,14 @@ pub struct RayComponents<'a> {
 /// One end of the ranges of many rays.
 #[derive(Clone, Copy, Debug)]
 pub enum Distances<'a> {
-    /// The same for all rays.
+    /// One distance for all rays.
     All(f32),
-    /// One for each ray.
+    /// One distance per ray.
     Each(&'a [f32]),
 }
 
 impl Distances<'_> {
-    /// The distance of one ray.
+    /// Returns the distance of one ray.
     #[inline(always)]
     pub(crate) fn of(&self, number: usize) -> f32 {
         match self {
@@ -39,21 +39,21 @@ impl Distances<'_> {
     }
 }
 
-/// Why components are not rays.
+/// The reason why components are rejected.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("ray {number}: {reason}")]
 pub struct InvalidRays {
-    /// The number of the first such ray.
+    /// The number of the first rejected ray.
     pub number: usize,
-    /// Why it is none.
+    /// The fault of that ray.
     pub reason: InvalidRay,
 }
 
 impl<'a> RayComponents<'a> {
-    /// The rays with these components, by the rules of [`Ray::new`]. O(n) time.
+    /// Makes rays from components that satisfy the rules of [`Ray::new`]. O(n).
     ///
     /// # Panics
-    /// If the slices are not equally long.
+    /// Panics if the slices are not equally long.
     pub fn new(
         origin: [&'a [f32]; 3],
         direction: [&'a [f32]; 3],
@@ -69,11 +69,11 @@ impl<'a> RayComponents<'a> {
         Ok(rays)
     }
 
-    /// As [`new`](Self::new) without its checks, for a caller who knows that they would pass. Of another ray every answer may be wrong, but
-    /// nothing worse happens.
+    /// Makes rays like [`new`](Self::new), without the checks, for callers who know that they would
+    /// pass. Otherwise answers may be wrong, but nothing is undefined.
     ///
     /// # Panics
-    /// If the slices are not equally long.
+    /// Panics if the slices are not equally long.
     pub fn assume_valid(
         origin: [&'a [f32]; 3],
         direction: [&'a [f32]; 3],
@@ -92,21 +92,21 @@ impl<'a> RayComponents<'a> {
         Self { origin, direction, t_min, t_max }
     }
 
-    /// How many rays these are.
+    /// Returns the number of rays.
     #[inline(always)]
     pub fn len(&self) -> usize {
         self.origin[0].len()
     }
 
-    /// Whether these are none.
+    /// Returns whether there are no rays.
     pub fn is_empty(&self) -> bool {
         self.origin[0].is_empty()
     }
 
-    /// One of the rays.
+    /// Returns one of the rays.
     ///
     /// # Panics
-    /// If there are not so many.
+    /// Panics if there is no such ray.
     #[inline(always)]
     pub fn ray(&self, number: usize) -> Ray {
         let [origin, direction] = self.vectors(number);
@@ -115,17 +115,16 @@ impl<'a> RayComponents<'a> {
 
     #[inline(always)]
     fn vectors(&self, number: usize) -> [Vec3; 2] {
-        let vector = |[x, y, z]: [&[f32]; 3]| Vec3::new(x[number], y[number], z[number]);
-        [vector(self.origin), vector(self.direction)]
+        [self.origin, self.direction].map(|[x, y, z]| Vec3::new(x[number], y[number], z[number]))
     }
 
-    /// The slices of the origins and of the directions.
+    /// Returns the slices of the origins and of the directions.
     #[inline(always)]
     pub(crate) fn slices(&self) -> [[&'a [f32]; 3]; 2] {
         [self.origin, self.direction]
     }
 
-    /// The ends of the ranges.
+    /// Returns the ends of the ranges.
     #[inline(always)]
     pub(crate) fn ranges(&self) -> [Distances<'a>; 2] {
         [self.t_min, self.t_max]

@@ -1,9 +1,11 @@
-//! Compiles a function a second time for processors with wider vectors, and chooses at run time.
+//! A macro that compiles a function a second time for processors with wider vectors, and chooses at
+//! run time.
 
-/// Defines `$fast`, which does what the `#[inline(always)]` function `$plain` does, with AVX2 where the processor has
-/// it: a [`PackedAabb`](crate::PackedAabb) is then one register, which takes about a third off the time of a build.
-/// Same operations in the same order, none fused, hence the same bits. For the crates of this workspace; needs `std`
-/// where it is used.
+/// Defines the function `$fast`. It runs the `#[inline(always)]` function `$plain`, compiled with
+/// AVX2 if the processor has it: a [`PackedAabb`](crate::PackedAabb) is then one register, which
+/// makes builds about a third faster. The operations and their order are the same, and none is
+/// fused, hence the same bits. The macro is for the crates of this workspace and needs `std` in the
+/// calling crate.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! with_vector_instructions {
@@ -18,7 +20,7 @@ macro_rules! with_vector_instructions {
                     $plain($($name),*)
                 }
                 if is_x86_feature_detected!("avx2") {
-                    // SAFETY: the processor has AVX2, checked on the line above.
+                    // SAFETY: `vectorised` needs AVX2, and the processor has it by the test above.
                     return unsafe { vectorised($($name),*) };
                 }
             }

@@ -3,9 +3,9 @@
 //! # Meaning of an answer
 //!
 //! A ray has an origin `o`, a direction `d` and a range `t_min..=t_max`, a triangle has corners
-//! `a`, `b`, `c`; all are f32 and are taken as the real numbers that they are. The ray *meets* the
-//! triangle if its line crosses the closed triangle (edges and corners belong to it) and is not
-//! parallel to the triangle's plane. With `A = a − o` and so on,
+//! `a`, `b`, `c`; all are f32 and count as exact real numbers. The ray *meets* the triangle if its
+//! line crosses the closed triangle (edges and corners belong to it) and is not parallel to the
+//! triangle's plane. With `A = a − o` and so on,
 //!
 //! ```text
 //!   u = d · (C × B)     v = d · (A × C)     w = d · (B × A)      n = (b − a) × (c − a)
@@ -14,7 +14,7 @@
 //! ```
 //!
 //! The real distance is *rounded once*, to the nearest f32, ties to even. The ray *hits* the
-//! triangle if `t ≥ 0` and `t_min ≤ rounded t ≤ t_max`. From this follow the cases at the border:
+//! triangle if `t ≥ 0` and `t_min ≤ rounded t ≤ t_max`. The cases at the border follow:
 //!
 //! - Triangles without area, and rays in a triangle's plane, have `d · n = 0`: never hit.
 //! - A triangle behind the origin is not hit, however little; a distance below 2⁻¹⁵⁰ rounds to +0,
@@ -22,10 +22,10 @@
 //! - A distance that rounds to infinity is beyond every `t_max`.
 //! - A triangle with a corner that is not finite is never hit.
 //!
-//! Of several triangles the *nearest* hit is the one of the least rounded distance, and of the
-//! lowest id among equals. Neither a tree nor an instruction set appears in these definitions.
-//! Closed meshes are watertight: a line that passes from one side of a surface to the other crosses
-//! some closed triangle of the surface, if it is not parallel to it.
+//! The *nearest* hit among several triangles has the least rounded distance, and the lowest id
+//! among equals. Neither a tree nor an instruction set appears in these definitions. Closed meshes
+//! are watertight: a line that passes from one side of a surface to the other crosses some closed
+//! triangle of the surface, unless the line is parallel to that triangle.
 //!
 //! # Layers
 //!
@@ -65,38 +65,38 @@
 //!
 //! The weights `v / D` and `w / D` are off by 4E / D each. With Z the larger |B_z − A_z|, |C_z −
 //! A_z| this moves `t d_z` by 8 EZ / D; all roundings together are below 40 εR. The bound `(16 EZ /
-//! |D| + 2⁻⁴⁷R) / |d_z|` covers both. If both ends of this interval round to one f32, that is the
-//! rounded distance, since rounding is monotone.
+//! |D| + 2⁻⁴⁷R) / |d_z|` covers both. If both ends of this interval round to one f32, that f32 is
+//! the rounded distance, because rounding is monotone.
 //!
 //! Nothing overflows or underflows: coordinates are multiples of 2⁻¹⁴⁹ below 2¹²⁹, all values above
 //! are between 2⁻⁷⁵⁰ and 2⁷⁵⁰ or zero.
 //!
-//! *Expansions* are exact. The quotient is rounded by the sign of `A · n − m d · n`, where m is the
-//! middle between two f32.
+//! *Expansions* are exact. The sign of `A · n − m d · n`, where m is the middle between two f32,
+//! rounds the quotient.
 //!
 //! Sources: Möller & Trumbore 1997, 'Fast, minimum storage ray/triangle intersection' (the
 //! quotients); Woop, Benthin & Wald 2013, 'Watertight ray/triangle intersection' (the shear);
 //! Shewchuk 1997, 'Adaptive precision floating-point arithmetic and fast robust geometric
-//! predicates' (filters and expansions). Different from the second: the shear decides no answer,
-//! because every answer within the errors of the shear is left to the next layer.
+//! predicates' (filters and expansions). Differs from Woop et al.: the shear decides no answer,
+//! because the next layer decides every answer within the errors of the shear.
 
 use crate::Ray;
 use crate::expansion::Expansion;
 use glam::Vec3;
 
-/// The answer of a layer with errors about a line and a triangle.
+/// The answer of a layer with rounding errors about a line and a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Verdict {
-    /// The line does not cross the triangle, or behind the origin or beyond every f32.
+    /// The line does not cross the triangle, or crosses it behind the origin or beyond every f32.
     Miss,
-    /// It crosses the triangle at this distance, rounded from the real one.
+    /// The line crosses the triangle at this distance, rounded from the real distance.
     Hit(f32),
     /// The error bound allows several answers.
     Unsure,
 }
 
-/// A ray in f64: its origin and direction in the order of axes whose last is the axis of the
-/// largest component.
+/// A ray in f64. The axis of the direction's largest component is the last of `axes`, the order of
+/// the coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Line {
     origin: [f64; 3],
@@ -104,7 +104,7 @@ pub(crate) struct Line {
     axes: [usize; 3],
 }
 
-/// 64ε in f64: the factor of error bounds.
+/// The factor of error bounds, 64ε in f64.
 const ERROR: f64 = 1.0 / (1_u64 << 47) as f64;
 
 impl Line {
@@ -122,7 +122,7 @@ impl Line {
         }
     }
 
-    /// The triangle's corners relative to the origin, in the order of axes.
+    /// Returns the triangle's corners relative to the origin, in the order of `axes`.
     #[inline(always)]
     fn relative(&self, triangle: &[Vec3; 3]) -> [[f64; 3]; 3] {
         let [kx, ky, kz] = self.axes;
@@ -135,7 +135,7 @@ impl Line {
         [relative(a), relative(b), relative(c)]
     }
 
-    /// The edge values `u`, `v`, `w`, multiplied by `d_z`, and the bound of their errors.
+    /// Returns the edge values `u`, `v`, `w`, multiplied by `d_z`, and the bound of their errors.
     #[inline(always)]
     fn edges(&self, corners: &[[f64; 3]; 3]) -> ([f64; 3], f64) {
         let [dx, dy, dz] = self.direction;
@@ -149,7 +149,7 @@ impl Line {
         ([cross(c, b), cross(a, c), cross(b, a)], error * (spread + error))
     }
 
-    /// Decides in f64 where the error bound permits.
+    /// Decides in f64 if the error bound permits.
     #[inline(always)]
     pub(crate) fn filter(&self, triangle: &[Vec3; 3]) -> Verdict {
         let corners = self.relative(triangle);
@@ -190,8 +190,8 @@ impl Line {
     }
 }
 
-/// The rounded distance at which the ray's line crosses the triangle at or in front of the origin,
-/// by exact arithmetic. Does not allocate.
+/// Returns the rounded distance at which the ray's line crosses the triangle at or in front of the
+/// origin, by exact arithmetic. Does not allocate.
 #[cold]
 #[inline(never)]
 pub(crate) fn distance(ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
@@ -205,12 +205,12 @@ pub(crate) fn distance(ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
 
 type Vector<const N: usize> = [Expansion<N>; 3];
 
-/// The exact difference of two points.
+/// Returns the exact difference of two points.
 fn difference(p: Vec3, q: Vec3) -> Vector<2> {
     [0, 1, 2].map(|axis| Expansion::difference(p[axis], q[axis]))
 }
 
-/// The exact cross product.
+/// Returns the exact cross product.
 fn cross(p: &Vector<2>, q: &Vector<2>) -> Vector<16> {
     [(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
         let mut component = Expansion::ZERO;
@@ -220,7 +220,7 @@ fn cross(p: &Vector<2>, q: &Vector<2>) -> Vector<16> {
     })
 }
 
-/// The exact values that decide about a ray and a triangle.
+/// The exact values that decide whether a ray hits a triangle.
 struct Volumes {
     direction: Vec3,
     /// The corners relative to the origin.
@@ -244,18 +244,18 @@ impl Volumes {
         })
     }
 
-    /// `u`, `v` and `w`.
+    /// Returns `u`, `v` and `w`.
     fn edges(&self) -> [Expansion<96>; 3] {
         let [a, b, c] = &self.corners;
         [(c, b), (a, c), (b, a)].map(|(p, q)| self.along_direction(&cross(p, q)))
     }
 
-    /// `d · n`, which is −(u + v + w).
+    /// Returns `d · n`, which is −(u + v + w).
     fn determinant(&self) -> Expansion<96> {
         self.along_direction(&self.normal)
     }
 
-    /// The product of the direction and a vector.
+    /// Returns the product of the direction and a vector.
     fn along_direction(&self, vector: &Vector<16>) -> Expansion<96> {
         let mut sum = Expansion::ZERO;
         for (component, along) in vector.iter().zip(self.direction.to_array()) {
@@ -264,7 +264,7 @@ impl Volumes {
         sum
     }
 
-    /// `A · n`.
+    /// Returns `A · n`.
     fn along_normal(&self) -> Expansion<192> {
         let mut sum = Expansion::ZERO;
         for (component, along) in self.normal.iter().zip(&self.corners[0]) {
@@ -274,16 +274,17 @@ impl Volumes {
     }
 }
 
-/// The quotient, rounded to the nearest f32, ties to even; `None` if it is negative, its
-/// denominator zero, or it rounds to infinity.
+/// Returns the quotient, rounded to the nearest f32, ties to even; `None` if it is negative, if the
+/// denominator is zero, or if the quotient rounds to infinity.
 fn round_quotient(numerator: &Expansion<192>, denominator: &Expansion<96>) -> Option<f32> {
     let sign = denominator.sign();
     if sign == 0 || numerator.sign() * sign < 0 {
         return None;
     }
-    // The quotient of the approximations is off by less than 2⁻³⁸ of itself: it rounds to the right f32 or to a neighbour.
+    // The relative error of this quotient is below 2⁻³⁸, so it rounds to the right f32 or to a
+    // neighbour.
     let near = ((numerator.approximate() / denominator.approximate()) as f32).min(f32::MAX);
-    // The side of the middle between two neighbours on which the exact quotient is.
+    // The side of `middle` on which the exact quotient is: −1, 0 or 1.
     let side = |middle: f64| {
         let mut difference: Expansion<384> = numerator.widened();
         difference.add_scaled(denominator, -middle);
@@ -301,12 +302,12 @@ fn round_quotient(numerator: &Expansion<192>, denominator: &Expansion<96>) -> Op
             return Some(near.next_down());
         }
     }
-    // A zero is +0.
+    // Turn −0 into +0.
     Some(near + 0.0)
 }
 
-/// The middle between a number that is not negative and the next f32, where the largest is followed
-/// by 2¹²⁸.
+/// Returns the middle between a number that is not negative and the next f32. The number after the
+/// largest f32 is 2¹²⁸.
 fn middle_above(number: f32) -> f64 {
     const BEYOND: f64 = 2.0 * (1_u128 << 127) as f64;
     let next = number.next_up();
@@ -314,7 +315,7 @@ fn middle_above(number: f32) -> f64 {
     0.5 * (f64::from(number) + next)
 }
 
-/// The largest size of a number.
+/// Returns the largest absolute value.
 #[inline(always)]
 fn largest(numbers: &[f64]) -> f64 {
     numbers
@@ -322,7 +323,7 @@ fn largest(numbers: &[f64]) -> f64 {
         .fold(0.0, |most, number| larger(most, number.abs()))
 }
 
-/// The larger of two numbers, the second if one is NaN.
+/// Returns the larger of two numbers, the second if one is NaN.
 #[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }

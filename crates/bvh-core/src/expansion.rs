@@ -29,15 +29,15 @@ impl<const N: usize> Expansion<N> {
         wide
     }
 
-    /// The terms, the smallest first.
+    /// Returns the terms, the smallest first.
     fn terms(&self) -> &[f64] {
         &self.terms[..self.len]
     }
 
-    /// Adds a number, which makes the expansion longer by one term at most.
+    /// Adds a number. The expansion grows by at most one term.
     ///
     /// # Panics
-    /// If there is no room for another term.
+    /// Panics if there is no room for another term.
     pub(crate) fn add(&mut self, number: f64) {
         let mut carry = number;
         let mut kept = 0;
@@ -56,7 +56,7 @@ impl<const N: usize> Expansion<N> {
         self.len = kept;
     }
 
-    /// Adds the product of an expansion and a number: two terms at most for each term of the
+    /// Adds the product of an expansion and a number: at most two terms for each term of the
     /// expansion.
     pub(crate) fn add_scaled<const M: usize>(&mut self, factor: &Expansion<M>, number: f64) {
         for &term in factor.terms() {
@@ -66,7 +66,7 @@ impl<const N: usize> Expansion<N> {
         }
     }
 
-    /// Adds the product of two expansions: two terms at most for each pair of their terms.
+    /// Adds the product of two expansions: at most two terms for each pair of their terms.
     pub(crate) fn add_product<const A: usize, const B: usize>(
         &mut self,
         a: &Expansion<A>,
@@ -77,7 +77,7 @@ impl<const N: usize> Expansion<N> {
         }
     }
 
-    /// Subtracts the product of two expansions, likewise.
+    /// Subtracts the product of two expansions: at most two terms for each pair of their terms.
     pub(crate) fn subtract_product<const A: usize, const B: usize>(
         &mut self,
         a: &Expansion<A>,
@@ -88,7 +88,7 @@ impl<const N: usize> Expansion<N> {
         }
     }
 
-    /// The sign of the exact value: −1, 0 or 1.
+    /// Returns the sign of the exact value: −1, 0 or 1.
     pub(crate) fn sign(&self) -> i32 {
         match self.terms().last() {
             None => 0,
@@ -97,14 +97,15 @@ impl<const N: usize> Expansion<N> {
         }
     }
 
-    /// The value in f64, off by less than 2⁻⁴⁰ of itself, and with the sign of the exact value.
+    /// Returns the value in f64, with a relative error below 2⁻⁴⁰ and with the sign of the exact
+    /// value.
     pub(crate) fn approximate(&self) -> f64 {
         self.terms().iter().sum()
     }
 }
 
 impl Expansion<2> {
-    /// The exact difference of two numbers.
+    /// Returns the exact difference of two numbers.
     pub(crate) fn difference(a: f32, b: f32) -> Self {
         let (sum, rest) = two_sum(f64::from(a), -f64::from(b));
         let mut difference = Self::ZERO;
@@ -114,7 +115,7 @@ impl Expansion<2> {
     }
 }
 
-/// The rounded sum of two numbers, and what rounding took from it.
+/// Returns the rounded sum of two numbers and the rounding error (Knuth).
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_part = sum - a;
@@ -122,8 +123,8 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
     (sum, (a - a_part) + (b - b_part))
 }
 
-/// The rounded product of two numbers, and what rounding took from it. Without a fused operation,
-/// which the processor may lack and `core` does not have.
+/// Returns the rounded product of two numbers and the rounding error (Dekker). It avoids the fused
+/// operation, which `core` and some processors lack.
 fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     let (a_high, a_low) = split(a);
@@ -134,7 +135,7 @@ fn two_product(a: f64, b: f64) -> (f64, f64) {
     (product, rest + a_low * b_low)
 }
 
-/// Two halves of at most 26 bits each.
+/// Splits a number into two halves of at most 26 bits each.
 fn split(a: f64) -> (f64, f64) {
     const SPLITTER: f64 = ((1_u64 << 27) + 1) as f64;
     let scaled = SPLITTER * a;

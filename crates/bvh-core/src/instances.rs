@@ -204,9 +204,8 @@ impl Instances {
         self.placed[instance as usize].local(ray, ray.t_max())
     }
 
-    /// Returns the nearest triangle of any instance that `ray` hits in its range. Of several
-    /// triangles at the same distance it returns one of the lowest instance, and of these the one
-    /// with the lowest id.
+    /// Returns the nearest triangle of any instance that `ray` hits in its range. Among triangles
+    /// at the same distance, the lowest instance comes first, then the lowest id.
     pub fn nearest_hit(&self, ray: &Ray) -> Option<InstanceHit> {
         let slabs = Slabs::new(ray, &self.top.root_aabb()?);
         let mut nearest: Option<(Hit, u32)> = None;

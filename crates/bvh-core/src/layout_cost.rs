@@ -1,8 +1,11 @@
-//! The cost of the wide layout that a tree becomes, before it is made: what a ray pays that is traced through it.
+//! The cost of a tree's wide layout, computed without building the layout: the expected cost of
+//! tracing a ray through it.
 //!
-//! A wide node stands for up to seven binary nodes, and a block for up to four triangles, so that the cost of the layout is not
-//! proportional to that of the tree: a search that takes a quarter off the internal area of a greedy tree takes a twelfth off its
-//! layout's cost, and searching by the layout's own takes off a fifth. The best layout is found from the leaves up:
+//! A wide node replaces up to seven binary nodes, and a block holds up to four triangles, so the
+//! cost of the layout is not proportional to the cost of the tree. A search that lowers the
+//! internal area of a greedy tree by a quarter lowers its layout's cost by a twelfth; a search that
+//! minimises the layout's cost lowers it by a fifth. Dynamic programming finds the best layout from
+//! the leaves up:
 //!
 //! ```text
 //!   as k children:      cost(P, k) = min over i + j = k of cost(L, i) + cost(R, j)         P
@@ -10,8 +13,9 @@
 //!   as a leaf:          A(P) · block · ⌈objects / 4⌉                                    L     R
 //! ```
 //!
-//! Source: Ylitie, Karras & Laine 2017, section 4.1. What a subtree contributes is a row of seven costs, and a changed node
-//! changes only the rows above it: that is what makes a search by this cost possible.
+//! Source: Ylitie, Karras & Laine 2017, section 4.1. A subtree contributes a row of seven costs,
+//! and a changed node changes only the rows above it, which makes searches that minimise this cost
+//! possible.
 
 use crate::collapse::binary;
 use crate::cost::Measure;
@@ -23,25 +27,26 @@ use alloc::vec::Vec;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub struct LayoutCost {
-    /// Least cost as at most 1 to 7 children of a wide node.
+    /// The least costs as at most 1 to 7 children of a wide node.
     as_children: [f64; 7],
     objects: u32,
 }
 
 impl LayoutCost {
-    /// A leaf of a box of this size.
+    /// Returns the costs of a leaf whose box has this size.
     #[inline(always)]
     pub fn leaf(size: f64, objects: u32) -> Self {
         Self { as_children: [leaf_cost(size, objects); 7], objects }
     }
 
-    /// A node of two children, whose box has this size.
+    /// Returns the costs of a node with two children, whose box has this size.
     #[inline(always)]
     pub fn join(size: f64, left: &Self, right: &Self) -> Self {
         const NEVER: f64 = f64::INFINITY;
         let [a, b, c, d, e, f, g] = right.as_children;
         let right_children = [a, b, c, d, e, f, g, NEVER];
-        // `[k - 2]` as k children; the last are more than a node has.
+        // `split[k - 2]` is the cost as k children. The last entries exceed the children of a node
+        // and are ignored; a fixed length lets the compiler unroll the loops.
         let mut split = [NEVER; 14];
         for (first, cost) in left.as_children.iter().enumerate() {
             for (second, other) in right_children.iter().enumerate() {
@@ -57,13 +62,13 @@ impl LayoutCost {
         let mut as_children = [one; 7];
         for k in 1..7 {
             let fewer = as_children[k - 1];
-            let own = split[k - 1];
-            as_children[k] = if own < fewer { own } else { fewer };
+            let exactly = split[k - 1];
+            as_children[k] = if exactly < fewer { exactly } else { fewer };
         }
         Self { as_children, objects }
     }
 
-    /// The cost of the subtree as one child, or as the root: a wide node, or a leaf.
+    /// Returns the cost of the subtree as one child or as the root: a wide node or a leaf.
     #[inline(always)]
     pub fn value(&self) -> f64 {
         self.as_children[0]
@@ -75,13 +80,14 @@ fn leaf_cost(size: f64, objects: u32) -> f64 {
     size * (f64::from(BLOCK_COST) * f64::from(objects.div_ceil(TriangleBlock::LANES as u32)))
 }
 
-/// The cost of the least costly wide layout of `tree` for endless uniform lines, times the root's half area: nodes and blocks
-/// of triangles, each by the half area of its box, in world units squared. Nodes of several children are halved. O(nodes).
+/// Returns the cost of the cheapest wide layout of `tree` for endless uniform lines, times the
+/// root's half area: nodes and blocks of triangles, each weighted by the half area of its box, in
+/// world units squared. Nodes with more than two children are halved first. O(nodes).
 pub fn layout_area(tree: &Bvh) -> f64 {
     layout(tree, |node| node.aabb.half_area())
 }
 
-/// As [`layout_area`], with the measure in place of the half area.
+/// Returns the same as [`layout_area`], with the measure instead of the half area. O(nodes).
 pub fn layout_measure(tree: &Bvh, measure: &dyn Measure) -> f64 {
     layout(tree, |node| measure.of(&PackedAabb::from(&node.aabb)))
 }

@@ -221,8 +221,8 @@ impl Ord for Near {
     }
 }
 
-/// Returns the object nearest to `point` if its squared distance is at most `limit`. Of several
-/// objects at the same distance it returns the one with the lowest id.
+/// Returns the object nearest to `point` if its squared distance is at most `limit`. Among objects
+/// at the same distance, the lowest id wins.
 ///
 /// `distance_squared` returns the squared distance of an object, or `None` to skip the object. The
 /// distance must not be less than the distance of the object's box. The distance of a divided

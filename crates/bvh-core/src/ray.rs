@@ -1,54 +1,55 @@
-//! A ray that is always one: finite, with a direction, over a range of distances.
+//! A valid ray: finite, with a direction, over a range of distances.
 
 use glam::{Vec3, Vec4};
 
 /// The points `origin + t · direction` with `t_min <= t <= t_max`.
 ///
-/// Every value of this type is finite and has a direction; what is not is refused by [`Ray::new`], so that no test
-/// further down meets a NaN. A range with `t_min > t_max` is empty and hits nothing; with `t_min == t_max` it is
-/// one point. Zero components of the direction may have either sign.
+/// Every value of this type is finite and has a direction. [`Ray::new`] rejects anything else, so
+/// no later test meets a NaN. A range with `t_min > t_max` is empty and hits nothing; a range with
+/// `t_min == t_max` is one point. Zero components of the direction may have either sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(16))]
 pub struct Ray {
-    // Whole vectors: a load of four lanes cannot be served from the stores of single ones that have not reached the
-    // cache.
+    // Four-lane fields: a load of four lanes would stall on recent stores of single lanes that have
+    // not reached the cache.
     /// The origin, and the smallest distance.
     origin: Vec4,
     /// The direction, and the largest distance.
     direction: Vec4,
-    /// 1 / direction, finite: ±`f32::MAX` where the direction is ±0 or nearly; and the least size of the three, which is
-    /// 1 / the direction's largest component.
+    /// 1 / direction, kept finite: ±`f32::MAX` where the direction is ±0 or nearly 0. The fourth
+    /// lane is the least absolute value of the three, 1 / the direction's largest component.
     inverse: Vec4,
 }
 
-/// Why there is no such ray.
+/// The reason why a ray is rejected.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum InvalidRay {
-    /// A NaN or infinite component of the origin.
+    /// The origin has a NaN or infinite component.
     #[error("the ray's origin {0} is not finite")]
     Origin(Vec3),
-    /// A NaN or infinite component of the direction, or a zero, vanishing or enormous direction.
+    /// The direction has a NaN or infinite component, or is zero, tiny or huge.
     #[error(
         "the ray's direction {0} must be finite, its largest component between 2^-100 and 2^100"
     )]
     Direction(Vec3),
-    /// A range that is NaN or reaches behind the origin.
+    /// The range is NaN or extends behind the origin.
     #[error("the ray's range {t_min}..={t_max} must not be NaN and must start at 0 or later")]
     Range {
-        /// The smallest distance asked for.
+        /// The smallest distance found.
         t_min: f32,
-        /// The largest distance asked for.
+        /// The largest distance found.
         t_max: f32,
     },
 }
 
 impl Ray {
-    /// The largest component of a direction: a smaller or larger one could lose precision in its reciprocal.
+    /// The range of a direction's largest component. The reciprocal of a component outside could
+    /// lose precision.
     const DIRECTION_RANGE: core::ops::RangeInclusive<f32> = pow2(-100)..=pow2(100);
 
-    /// The ray from `origin` in `direction` over `t_min..=t_max`. Distances `t` are in multiples of the direction's
-    /// length, which need not be 1. An infinite `t_max` stands for the largest finite distance. Arrays `[f32; 3]` will
-    /// do.
+    /// Makes the ray from `origin` in `direction` over `t_min..=t_max`. Distances `t` are in
+    /// multiples of the direction's length, which need not be 1. An infinite `t_max` becomes the
+    /// largest finite distance. Arrays `[f32; 3]` are accepted.
     #[inline]
     pub fn new(
         origin: impl Into<Vec3>,
@@ -58,7 +59,7 @@ impl Ray {
     ) -> Result<Self, InvalidRay> {
         let origin = origin.into();
         let direction = direction.into();
-        // One comparison for all lanes; a NaN fails each.
+        // One comparison covers all lanes, and NaN fails every comparison.
         let sizes = direction.extend(1.0).abs();
         let longest = sizes.truncate().max_element();
         let is_finite = (origin.extend(0.0).abs().cmple(Vec4::MAX) & sizes.cmple(Vec4::MAX)).all();
@@ -69,9 +70,9 @@ impl Ray {
         Ok(Self::assume_valid(origin, direction, t_min, t_max))
     }
 
-    /// [`new`](Self::new) without its checks, for a caller who knows that they would pass: the finite origin, a direction
-    /// whose largest component is between 2⁻¹⁰⁰ and 2¹⁰⁰, and `0 <= t_min`, none of them NaN. Of another ray every
-    /// answer may be wrong, but nothing worse happens.
+    /// Makes a ray like [`new`](Self::new), without the checks, for callers who know that they
+    /// would pass: a finite origin, a direction whose largest component is between 2⁻¹⁰⁰ and 2¹⁰⁰,
+    /// `0 <= t_min`, and no NaN. Otherwise answers may be wrong, but nothing is undefined.
     #[inline]
     pub fn assume_valid(
         origin: impl Into<Vec3>,
@@ -86,7 +87,7 @@ impl Ray {
             .min(Vec4::MAX);
         let sizes = inverse.abs();
         let least = sizes.x.min(sizes.y).min(sizes.z);
-        // A zero is +0, so that no kernel hands out another one.
+        // Adding 0 turns −0 into +0, so no kernel returns a distance of −0.
         Self {
             origin: origin.extend(t_min + 0.0),
             direction: direction.extend(t_max.min(f32::MAX) + 0.0),
@@ -94,7 +95,7 @@ impl Ray {
         }
     }
 
-    /// The first check of [`new`](Self::new) that fails.
+    /// Returns the error of the first check of [`new`](Self::new) that fails.
     #[cold]
     fn why_not(origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> InvalidRay {
         let longest = direction.abs().max_element();
@@ -107,7 +108,7 @@ impl Ray {
         }
     }
 
-    /// The whole half line: `t` from 0 to the largest finite distance.
+    /// Makes a half line: `t` from 0 to the largest finite distance.
     #[inline]
     pub fn half_line(
         origin: impl Into<Vec3>,
@@ -116,25 +117,25 @@ impl Ray {
         Self::new(origin, direction, 0.0, f32::MAX)
     }
 
-    /// Where `t` is 0; finite.
+    /// The point where `t` is 0; finite.
     #[inline]
     pub fn origin(&self) -> Vec3 {
         self.origin.truncate()
     }
 
-    /// The step by which `t` counts; finite, not zero, any length.
+    /// The unit of `t`: finite, not zero, of any length.
     #[inline]
     pub fn direction(&self) -> Vec3 {
         self.direction.truncate()
     }
 
-    /// The reciprocals of the direction's components; finite: ±`f32::MAX` where they would not be.
+    /// The reciprocals of the direction's components, kept finite: at most `f32::MAX` in size.
     #[inline]
     pub fn inverse_direction(&self) -> Vec3 {
         self.inverse.truncate()
     }
 
-    /// The least size of the reciprocals of the direction's components.
+    /// The least absolute value of the reciprocals of the direction's components.
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
     #[inline]
     pub(crate) fn least_inverse(&self) -> f32 {
@@ -153,14 +154,14 @@ impl Ray {
         self.direction.w
     }
 
-    /// The point at distance `t`, in f32.
+    /// Returns the point at distance `t`, in f32.
     #[inline]
     pub fn at(&self, t: f32) -> Vec3 {
         self.origin() + t * self.direction()
     }
 }
 
-/// An object met by a ray.
+/// A hit of a ray with an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// The distance, in multiples of the direction's length.
@@ -170,24 +171,25 @@ pub struct Hit {
 }
 
 impl Hit {
-    /// What a batch writes for a ray that meets nothing: no object has this id, and no distance is so large.
+    /// The value that a batch writes for a ray without a hit. No object has this id, and no hit has
+    /// this distance.
     pub const MISS: Self = Self { t: f32::INFINITY, object: u32::MAX };
 
-    /// Whether this is [`MISS`](Self::MISS).
+    /// Returns whether this is [`MISS`](Self::MISS).
     #[inline]
     pub fn is_miss(&self) -> bool {
         self.object == u32::MAX
     }
 
-    /// Whether this hit is to be preferred: the nearer one, and of two at the same distance the one of the lower id,
-    /// so that the answer does not depend on the order in which objects are tested.
+    /// Returns whether this hit is preferred: the nearer hit, or the lower id at the same distance.
+    /// The answer of a traversal therefore does not depend on the order of the tests.
     #[inline]
     pub fn precedes(&self, other: &Self) -> bool {
         self.t < other.t || (self.t == other.t && self.object < other.object)
     }
 }
 
-/// 2^k for k from -126 to 127, in a constant.
+/// Returns 2^k for k from -126 to 127, in constants too.
 pub(crate) const fn pow2(k: i32) -> f32 {
     f32::from_bits(((k + 127) as u32) << 23)
 }
@@ -197,7 +199,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rays_that_go_nowhere_are_refused_and_named() {
+    fn invalid_rays_are_rejected_with_their_fault() {
         let inf = f32::INFINITY;
         for bad in
             [Vec3::ZERO, -Vec3::ZERO, Vec3::NAN, Vec3::X * inf, Vec3::X * 1e-45, Vec3::X * 3e38]
@@ -211,8 +213,8 @@ mod tests {
             assert!(matches!(Ray::half_line(bad, Vec3::X), Err(InvalidRay::Origin(_))), "{bad}");
         }
         for (t_min, t_max) in [(f32::NAN, 1.0), (0.0, f32::NAN), (-1.0, 1.0), (-inf, inf)] {
-            let refused = Ray::new(Vec3::ZERO, Vec3::X, t_min, t_max);
-            assert!(matches!(refused, Err(InvalidRay::Range { .. })), "{t_min} {t_max}");
+            let rejected = Ray::new(Vec3::ZERO, Vec3::X, t_min, t_max);
+            assert!(matches!(rejected, Err(InvalidRay::Range { .. })), "{t_min} {t_max}");
         }
     }
 

@@ -1,21 +1,22 @@
-//! The conservative ray–box test: it never misses a box that holds a hit.
+//! The conservative ray–box test: it never misses a box that contains a hit.
 
 use crate::{Aabb, Ray};
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
 /// A ray prepared for tests against the boxes of one scene.
 ///
-/// Three promises make the answer of a traversal independent of its tree:
+/// Three properties make the answer of a traversal independent of its tree:
 ///
-/// 1. *Conservative.* The interval of a box contains the exact one: the exit is enlarged by [`Slabs::FAR`], which
-///    covers the rounding of entry and exit (the bound 1 + 2γ(3) of Pharr, Jakob & Humphreys, Physically Based
-///    Rendering, 3.9.2, and the multiplication itself), and the box by [`Slabs::MARGIN`] of the scene's distance
-///    from the origin, which covers what the rounding of [`Triangle::intersect`](crate::Triangle::intersect) moves
-///    a vertex (Woop, Benthin & Wald 2013, section 4, who enlarge each box by its own distance).
-/// 2. *Monotone.* A box inside another one, bit by bit, has its interval inside the other's: each operation rounds
-///    monotonically.
-/// 3. *Defined.* Reciprocals are finite and the margin is never zero, hence no 0 · ∞, and a ray in a face plane is
-///    strictly inside the enlarged box.
+/// 1. *Conservative.* The interval of a box contains the exact interval. The exit grows by
+///    [`Slabs::FAR`], which covers the rounding of entry and exit (the bound 1 + 2γ(3) of Pharr,
+///    Jakob & Humphreys, Physically Based Rendering, 3.9.2, and the multiplication itself). The box
+///    grows by [`Slabs::MARGIN`] of the scene's distance from the origin, which covers the rounding
+///    of a vertex by [`Triangle::intersect`](crate::Triangle::intersect) (Woop, Benthin & Wald
+///    2013, section 4, who enlarge each box by the distance of that box).
+/// 2. *Monotone.* The interval of a box inside another box is inside the other's interval, bit by
+///    bit: each operation rounds monotonically.
+/// 3. *Defined.* Reciprocals are finite and the margin is never zero, so no 0 · ∞ occurs, and a ray
+///    in a face plane is strictly inside the enlarged box.
 #[derive(Clone, Copy, Debug)]
 pub struct Slabs {
     /// origin + margin, subtracted from lower corners.
@@ -27,15 +28,16 @@ pub struct Slabs {
 }
 
 impl Slabs {
-    /// What an exit is multiplied by: with u = 2^-24 an entry is too far by (1 + u)^3 and an exit too near by
-    /// (1 − u)^4 at most.
+    /// The factor of an exit. With u = 2^-24, an entry is too far by at most (1 + u)^3, and an exit
+    /// too near by at most (1 − u)^4.
     pub const FAR: f32 = 1.0 + 8.0 * (f32::EPSILON / 2.0);
 
-    /// By how much boxes grow, in multiples of the largest coordinate of the scene relative to the ray's origin.
-    /// The rounding of a sheared vertex is below 6u of it.
+    /// The growth of boxes, in multiples of the largest coordinate of the scene relative to the
+    /// ray's origin. The rounding of a sheared vertex is below 6u of that coordinate.
     pub const MARGIN: f32 = 8.0 * (f32::EPSILON / 2.0);
 
-    /// Prepares `ray` for boxes inside `bounds`, which may be a scene's root box or one object's.
+    /// Prepares `ray` for boxes inside `bounds`, which may be a scene's root box or an object's
+    /// box.
     #[inline]
     pub fn new(ray: &Ray, bounds: &Aabb) -> Self {
         let origin = ray.origin();
@@ -48,12 +50,12 @@ impl Slabs {
         }
     }
 
-    /// The distances between which the ray may be inside the box, `t_min` at least; none when the first exceeds the
-    /// second.
+    /// Returns the distances between which the ray may be inside the box, from `t_min` on. The
+    /// interval is empty if the first exceeds the second.
     #[inline(always)]
     pub fn interval(&self, aabb: &Aabb) -> (f32, f32) {
         let Aabb { min, max } = *aabb;
-        // Two overlapping loads and a rotation; the fourth lane is not used.
+        // Two overlapping loads of four lanes and a rotation. The fourth lane is not used.
         let min = Vec4::new(min.x, min.y, min.z, max.x);
         let max = Vec4::new(aabb.min.z, max.x, max.y, max.z).yzwx();
         let low = (min - self.lower) * self.inverse;
@@ -64,9 +66,11 @@ impl Slabs {
         (entry, smaller(smaller(far.x, far.y), far.z) * Self::FAR)
     }
 
-    /// The distances between which the ray may cross the plane across `axis` at `position`, a plane that meets the
-    /// bounds: up to the second it may be in front of the plane, from the first on behind it. The interval of any box
-    /// in front of the plane ends, and that of any box behind it begins, on that side, bit by bit.
+    /// Returns the distances between which the ray may cross the plane across `axis` at `position`,
+    /// a plane that meets the bounds. The ray may be in front of the plane up to the second
+    /// distance, and behind it from the first on. The interval of a box in front of the plane ends
+    /// by the second distance, and the interval of a box behind it begins at the first or later,
+    /// bit by bit.
     #[inline(always)]
     pub fn crossing(&self, axis: usize, position: f32) -> (f32, f32) {
         let a = (position - self.lower[axis]) * self.inverse[axis];
@@ -74,7 +78,8 @@ impl Slabs {
         (smaller(a, b), larger(a, b) * Self::FAR)
     }
 
-    /// Where the ray enters the box; infinite when it misses it, which is behind every `t_max`.
+    /// Returns the distance at which the ray enters the box; infinity for a miss, which is beyond
+    /// every `t_max`.
     #[inline(always)]
     pub fn entry(&self, aabb: &Aabb) -> f32 {
         let (entry, exit) = self.interval(aabb);
@@ -82,45 +87,46 @@ impl Slabs {
     }
 }
 
-/// By how much boxes grow along each axis for a ray that meets boxes inside `bounds`; never too little to change the
-/// origin it is added to.
+/// Returns the growth of boxes along each axis for a ray that meets boxes inside `bounds`. It is
+/// always large enough to change the origin when added to it.
 #[inline(always)]
 pub(crate) fn margin(ray: &Ray, bounds: &Aabb) -> Vec3 {
     let origin = ray.origin();
     let reach = (bounds.min - origin)
         .abs()
         .max((bounds.max - origin).abs());
-    // The second term covers the rounding of the sum with the origin, the third is for an origin and a reach of zero.
+    // The second term covers the rounding of the sum with the origin. The third keeps the margin
+    // above zero if the origin and the reach are zero.
     reach.max_element() * Slabs::MARGIN + origin.abs() * f32::EPSILON + f32::MIN_POSITIVE
 }
 
-/// The larger of two numbers; unlike `f32::max` one instruction, since neither is NaN.
+/// Returns the larger of two numbers that are not NaN. Unlike `f32::max`, it is one instruction.
 #[inline(always)]
 fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The smaller of two numbers, as [`larger`].
+/// Returns the smaller of two numbers that are not NaN.
 #[inline(always)]
 fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Moves the distance of a hit into its object's own box: from wherever rounding put it to where a traversal looks.
-/// `None` when `t` is before `ray.t_min()` or NaN, the ray misses the box in its range, or the moved distance is behind
-/// `t_max`.
+/// Moves the distance of a hit into the interval of its object's box, which rounding may have left,
+/// so that every traversal finds the hit. Returns `None` if `t` is below `ray.t_min()` or NaN, if
+/// the ray misses the box in its range, or if the moved distance exceeds `t_max`.
 ///
-/// A traversal skips a box whose entry is behind the nearest hit so far. Whether an object with nearly the same
-/// distance is in that box or in another one would otherwise decide which of them is found.
+/// A traversal skips a box whose entry is behind the nearest hit so far. Without the move, the tree
+/// would decide which of two objects at nearly the same distance is found.
 ///
-/// `bounds` must be the object's box, or one inside it.
+/// `bounds` must be the object's box, or a box inside it.
 #[inline]
 pub fn clip_to_box(ray: &Ray, bounds: &Aabb, t: f32, t_max: f32) -> Option<f32> {
     if t.is_nan() || t < ray.t_min() {
         return None;
     }
     let (entry, exit) = Slabs::new(ray, bounds).interval(bounds);
-    // A zero is +0, however it came about.
+    // Adding 0 turns −0 into +0.
     let moved = larger(smaller(t, exit), entry) + 0.0;
     (entry <= exit && moved <= t_max).then_some(moved)
 }
@@ -171,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_on_one_side_of_a_plane_is_met_on_that_side() {
+    fn boxes_on_one_side_of_a_plane_are_met_on_that_side() {
         let b = Aabb::from(([0.1, -0.2, 0.3], [0.4, -0.2, 0.9]));
         for direction in
             [Vec3::new(0.3, -0.1, 0.7), Vec3::new(-1e-40, 0.0, 1.0), Vec3::new(-0.0, 1.0, 0.0)]
@@ -211,10 +217,10 @@ mod tests {
                 [Vec3::ZERO, Vec3::splat(0.2), Vec3::new(0.25, 0.2, -9.0), Vec3::splat(-3e38)]
             {
                 let ray = Ray::half_line(origin, direction).unwrap();
-                let own = Slabs::new(&ray, &inner).interval(&inner);
+                let alone = Slabs::new(&ray, &inner).interval(&inner);
                 let scene = Slabs::new(&ray, &outer).interval(&inner);
                 let around = Slabs::new(&ray, &outer).interval(&outer);
-                assert!(own.0 >= scene.0 && own.1 <= scene.1, "{ray:?}");
+                assert!(alone.0 >= scene.0 && alone.1 <= scene.1, "{ray:?}");
                 assert!(scene.0 >= around.0 && scene.1 <= around.1, "{ray:?}");
             }
         }

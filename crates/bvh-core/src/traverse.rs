@@ -72,8 +72,8 @@ impl Counter for TestCounts {
     }
 }
 
-/// Returns the nearest of `objects` that `ray` hits in its range. Of several objects at the same
-/// distance it returns the one with the lowest id.
+/// Returns the nearest of `objects` that `ray` hits in its range. Among objects at the same
+/// distance, the lowest id wins.
 ///
 /// `tree` is a [`&Bvh`](crate::Bvh) over the [boxes](crate::boxes) of `objects`, or a view of one.
 ///
@@ -293,7 +293,7 @@ fn walk<C: Counter>(
         }
         kind = loop {
             let Some(pending) = stack.pop() else { return };
-            // A hit that was found after the push may lie in front of this box.
+            // A hit found after the push may be in front of this box.
             if pending.entry <= t_max {
                 break pending.kind;
             }
@@ -342,7 +342,7 @@ fn objects(tree: BvhView<'_>, leaf: NodeKind) -> &[u32] {
 }
 
 /// Pushes the children that the ray enters, in such an order that the nearest one is popped first.
-/// Of two children at the same distance the one with the lower index is popped first.
+/// Among children at the same distance, the lower index is popped first.
 fn push_sorted<const N: usize>(
     children: &[Node],
     slabs: &Slabs,

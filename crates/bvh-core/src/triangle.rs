@@ -1,26 +1,27 @@
-//! Triangles, and a ray test that lets no ray through the edge between two of them.
+//! Triangles, and a watertight ray test: no ray passes through the edge between two triangles.
 
 use crate::exact::{self, Line, Verdict};
 use crate::{Aabb, Ray, clip_to_box};
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
-/// A triangle in world units; either side can be hit.
+/// A triangle in world units. Rays can hit both sides.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Triangle(pub [Vec3; 3]);
 
 impl From<[[f32; 3]; 3]> for Triangle {
-    /// From three corners.
+    /// Makes a triangle from three corners.
     fn from(corners: [[f32; 3]; 3]) -> Self {
         Self(corners.map(Vec3::from))
     }
 }
 
-/// The axes of the shear, by the axis of the direction's largest component.
+/// The axes of the shear, indexed by the axis of the direction's largest component.
 pub(crate) static AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
 
-/// A ray prepared for tests against triangles: the shear that turns its direction into the axis `z`.
+/// A ray prepared for tests against triangles: the shear that turns its direction into the axis
+/// `z`.
 #[derive(Clone, Copy, Debug)]
 pub struct Shear {
     pub(crate) ray: Ray,
@@ -28,7 +29,7 @@ pub struct Shear {
     pub(crate) axes: [usize; 3],
     /// The ray's origin along these axes.
     pub(crate) origin: [f32; 3],
-    /// How far a step along z moves in x and in y; both at most 1.
+    /// The movement in x and in y per step along z, both at most 1 in size.
     pub(crate) slope: [f32; 2],
     /// The direction along z.
     pub(crate) depth: f64,
@@ -41,7 +42,7 @@ impl Shear {
         let origin = ray.origin().to_array();
         let direction = ray.direction().to_array();
         let size = direction.map(f32::abs);
-        // The lowest axis on ties; without a branch, which could not be predicted.
+        // The lowest axis on ties, without a branch that the processor could not predict.
         let z = usize::from(size[1] > size[0]);
         let z = if size[2] > size[0].max(size[1]) { 2 } else { z };
         let axes @ [kx, ky, kz] = AXES[z];
@@ -54,8 +55,8 @@ impl Shear {
         }
     }
 
-    /// A point relative to the ray: 0, 0 and any z when it is on it. The same operations in the same order as the
-    /// vector form of the wide layout.
+    /// Transforms a point to the ray's coordinates, where points on the ray have x = y = 0. The
+    /// wide layout uses the same operations in the same order, so both give the same bits.
     #[inline(always)]
     fn apply(&self, p: &Vec3) -> [f32; 3] {
         let p: &[f32; 3] = p.as_ref();
@@ -69,19 +70,20 @@ impl Shear {
 }
 
 impl Triangle {
-    /// The smallest box around the three corners.
+    /// Returns the smallest box around the three corners.
     #[inline]
     pub fn aabb(&self) -> Aabb {
         Aabb::around(self.0)
     }
 
-    /// The triangle's area in world units squared.
+    /// Returns the triangle's area in world units squared.
     pub(crate) fn area(&self) -> f64 {
         let [a, b, c] = self.0.map(|corner| corner.as_dvec3());
         0.5 * (b - a).cross(c - a).length()
     }
 
-    /// The point of the triangle that is nearest to `point`, in f64; of a degenerate one, of the segment or point that it is.
+    /// Returns the point of the triangle nearest to `point`, in f64. A degenerate triangle counts
+    /// as a segment or a point.
     ///
     /// Source: Ericson 2005, *Real-Time Collision Detection*, section 5.1.5.
     pub fn closest_point(&self, point: impl Into<Vec3>) -> DVec3 {
@@ -105,9 +107,9 @@ impl Triangle {
         nearer(nearer(edges[0], edges[1]), edges[2])
     }
 
-    /// The weights of the three corners at the point where the ray's line meets the triangle's plane; their sum is 1. They
-    /// interpolate what the corners have, such as normals, at a hit, and cost nothing to who does not ask. `None` for a ray in
-    /// the plane.
+    /// Returns the weights of the three corners at the point where the ray's line meets the
+    /// triangle's plane. Their sum is 1. They interpolate values of the corners, such as normals,
+    /// at a hit. Returns `None` for a ray in the plane.
     pub fn barycentrics(&self, ray: &Ray) -> Option<[f64; 3]> {
         let shear = Shear::new(ray);
         let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = self
@@ -118,11 +120,12 @@ impl Triangle {
         (sum != 0.0).then(|| weights.map(|weight| weight / sum))
     }
 
-    /// The unit vector that is perpendicular to the triangle, on the side from which its corners run counterclockwise, computed
-    /// in f64; `None` of a degenerate triangle.
+    /// Returns the unit vector perpendicular to the triangle, on the side from which its corners
+    /// run counterclockwise, computed in f64; `None` for a degenerate triangle.
     pub fn normal(&self) -> Option<Vec3> {
         let [a, b, c] = self.0.map(Vec3::as_dvec3);
-        // Edges of length about one: their product neither overflows nor vanishes.
+        // Scaled edges have lengths of about one, so their product neither overflows nor
+        // underflows.
         let scale = (b - a).abs().max((c - a).abs()).max_element();
         ((b - a) / scale)
             .cross((c - a) / scale)
@@ -130,23 +133,24 @@ impl Triangle {
             .map(|normal| normal.as_vec3())
     }
 
-    /// Whether the corners coincide or are collinear: such a triangle is never hit. Exact as long as the differences
-    /// of its coordinates are exact in f64.
+    /// Returns whether the corners coincide or are collinear. Such a triangle is never hit. The
+    /// answer is exact if the differences of the coordinates are exact in f64.
     pub fn is_degenerate(&self) -> bool {
         let [a, b, c] = self.0.map(Vec3::as_dvec3);
         (b - a).cross(c - a) == DVec3::ZERO
     }
 
-    /// Returns the distance at which the ray hits the triangle, in real arithmetic, if that distance
-    /// is in the ray's range and at most `t_max`. The distance is the real one, rounded once to the
-    /// nearest `f32`, ties to even, and therefore within half a unit in the last place.
+    /// Returns the distance at which the ray hits the triangle, in real arithmetic, if that
+    /// distance is in the ray's range and at most `t_max`. The distance is the real one, rounded
+    /// once to the nearest `f32`, ties to even, and therefore within half a unit in the last place.
     ///
-    /// The ray's line must cross the closed triangle, and the ray must not be parallel to its plane.
-    /// A triangle behind the origin is not hit, however near. No distance is −0.
+    /// The ray's line must cross the closed triangle, and the ray must not be parallel to its
+    /// plane. A triangle behind the origin is not hit, however near. No distance is −0.
     ///
-    /// A reference for tests. Traversals call [`intersect`](Self::intersect), which rounds the corners
-    /// relative to the ray. Its distances may differ in the last digits, and its answers at the
-    /// triangle's border. Next to an edge this function computes with expansions, which takes longer.
+    /// A reference for tests. Traversals call [`intersect`](Self::intersect), which rounds the
+    /// corners relative to the ray. Its distances may differ in the last digits, and its answers at
+    /// the triangle's border. Next to an edge this function computes with expansions, which takes
+    /// longer.
     ///
     /// Source: Shewchuk 1997, 'Adaptive precision floating-point arithmetic and fast robust
     /// geometric predicates'.
@@ -166,23 +170,26 @@ impl Triangle {
         (ray.t_min() <= t && t <= t_max).then_some(t)
     }
 
-    /// The distance at which the ray meets the triangle, if that is in the ray's range and at most `t_max`.
+    /// Returns the distance at which the ray hits the triangle if that distance is in the ray's
+    /// range and at most `t_max`.
     ///
-    /// Watertight: of two triangles that share an edge, a ray through the edge hits at least one, since both see the
-    /// same sheared vertices and the side of an edge is decided exactly. A ray in the triangle's plane does not hit
-    /// it, nor does any hit a degenerate one or one whose coordinates relative to the origin overflow. The distance
-    /// lies in the interval of the triangle's own box (see [`clip_to_box`]).
+    /// The test is watertight: a ray through a common edge of two triangles hits at least one of
+    /// them, because both use the same sheared vertices and the side of an edge is exact. A ray in
+    /// a triangle's plane does not hit the triangle. No ray hits a degenerate triangle, or a
+    /// triangle whose coordinates relative to the origin overflow. The distance is inside the
+    /// interval of the triangle's box (see [`clip_to_box`]).
     ///
-    /// Source: Woop, Benthin & Wald 2013, 'Watertight ray/triangle intersection'. Differs from the paper: every
-    /// candidate, not only one with an edge value of zero, is decided in f64, which costs nothing measurable (most
-    /// triangles are rejected in f32, exactly) and makes the distance as precise as the sheared vertices are.
+    /// Source: Woop, Benthin & Wald 2013, 'Watertight ray/triangle intersection'. Differs from the
+    /// paper: f64 decides every candidate, not only candidates with an edge value of zero. This
+    /// costs nothing measurable, because f32 rejects most triangles exactly, and it makes the
+    /// distance as precise as the sheared vertices.
     #[inline]
     pub fn intersect(&self, shear: &Shear, t_max: f32) -> Option<f32> {
         let [a, b, c] = &self.0;
         let [ax, ay, _] = shear.apply(a);
         let [bx, by, _] = shear.apply(b);
         let [cx, cy, _] = shear.apply(c);
-        // Rounding is monotone: the sign of a difference of rounded products is right, or the difference is 0.
+        // Rounding is monotone, so the difference of rounded products has the right sign or is 0.
         let u = cx * by - cy * bx;
         let v = ax * cy - ay * cx;
         let w = bx * ay - by * ax;
@@ -192,7 +199,7 @@ impl Triangle {
         self.decide(shear, t_max)
     }
 
-    /// The rest of the test, for the few triangles that the sides of their edges in f32 do not exclude.
+    /// Completes the test for the few triangles that the edge values in f32 do not reject.
     #[inline(never)]
     pub(crate) fn decide(&self, shear: &Shear, t_max: f32) -> Option<f32> {
         let [a, b, c] = &self.0;
@@ -215,7 +222,7 @@ impl Triangle {
         if t < f64::from(shear.ray.t_min()) {
             return None;
         }
-        // Collinear corners can get an area from the rounding of the shear.
+        // The rounding of the shear can give collinear corners an area.
         clip_to_box(&shear.ray, &self.aabb(), t as f32, t_max).filter(|_| !self.is_degenerate())
     }
 }
@@ -298,7 +305,8 @@ mod tests {
 
     #[test]
     fn triangles_without_area_are_never_hit() {
-        // Steps of eighths: the multiples below are exact, the corners truly collinear.
+        // Multiples of one eighth keep the products below exact, so the corners are truly
+        // collinear.
         let a = Vec3::new(0.125, 0.75, 0.375);
         let b = Vec3::new(0.875, -0.5, 2.0);
         for corners in

@@ -1,5 +1,4 @@
-//! A triangle is hit where real arithmetic says so, at the real distance rounded once: compared
-//! with exact rationals.
+//! Hits and distances agree with real arithmetic, rounded once: a comparison with exact rationals.
 
 mod support;
 
@@ -26,7 +25,7 @@ fn power(k: i32) -> BigRational {
     if k < 0 { size.recip() } else { size }
 }
 
-/// The exact value of a finite number.
+/// Returns the exact value of a finite number.
 fn exact(x: f32) -> BigRational {
     let bits = x.to_bits();
     let fraction = i64::from(bits & 0x7f_ffff);
@@ -54,8 +53,8 @@ fn dot(p: &Vector, q: &Vector) -> BigRational {
     &p[0] * &q[0] + &p[1] * &q[1] + &p[2] * &q[2]
 }
 
-/// The distance and the weights of the second and third corner by Cramer's rule (Möller & Trumbore
-/// 1997): other products than the library's.
+/// Returns the distance and the weights of the second and third corner by Cramer's rule (Möller &
+/// Trumbore 1997), with other products than the library.
 fn cramer(ray: &Ray, triangle: &Triangle) -> Option<[BigRational; 3]> {
     let [a, b, c] = triangle.0.map(point);
     let origin = point(ray.origin());
@@ -76,7 +75,8 @@ fn cramer(ray: &Ray, triangle: &Triangle) -> Option<[BigRational; 3]> {
 /// Rounds a number that is not negative to the nearest f32, ties to even, by integer division;
 /// infinity beyond the largest.
 fn rounded(x: &BigRational) -> f32 {
-    // In units of the last place: the exponent for which the quotient has 24 bits, or that of subnormal numbers.
+    // Units of the last place: the exponent for which the quotient has 24 bits, or the exponent of
+    // subnormal numbers.
     let mut exponent = (x.numer().bits() as i32 - x.denom().bits() as i32 - 24).max(-149);
     if x / power(exponent) >= power(24) {
         exponent += 1;
@@ -88,11 +88,12 @@ fn rounded(x: &BigRational) -> f32 {
         whole += 1;
     }
     let whole = whole.iter_u32_digits().next().unwrap_or(0);
-    // Exact: at most 2^24, and a power of two; larger powers than f32 has are infinite.
+    // The product of a number up to 2^24 and a power of two is exact. Powers beyond the range of
+    // f32 are infinite.
     (f64::from(whole) * 2f64.powi(exponent)) as f32
 }
 
-/// The distance of the hit by the definition.
+/// Returns the distance of the hit by the definition.
 fn expected(ray: &Ray, triangle: &Triangle) -> Option<f32> {
     let [t, v, w] = cramer(ray, triangle)?;
     let is_inside = v >= zero() && w >= zero() && &v + &w <= integer(1);
@@ -103,7 +104,7 @@ fn expected(ray: &Ray, triangle: &Triangle) -> Option<f32> {
     (ray.t_min() <= t && t <= ray.t_max()).then_some(t)
 }
 
-/// Compares one ray and one triangle; whether it is a hit.
+/// Compares one ray and one triangle. Returns whether the ray hits.
 fn check(ray: &Ray, triangle: &Triangle) -> bool {
     let found = triangle.hit_exactly(ray, ray.t_max());
     let expected = expected(ray, triangle);
@@ -141,7 +142,8 @@ fn the_reference_rounds_as_the_processor_does() {
     assert_eq!(rounded(&(exact(f32::MAX) + power(102))), f32::MAX);
 }
 
-/// Any number: of all sizes, subnormal ones and zeros among them, or of a few, so that values meet.
+/// Returns a number of any size, subnormal numbers and zeros included, or one of a few values, so
+/// that values coincide.
 fn number(random: &mut Random) -> f32 {
     match random.below(8) {
         0 => 0.0,
@@ -163,7 +165,8 @@ fn wild_point(random: &mut Random) -> Vec3 {
     Vec3::new(number(random), number(random), number(random))
 }
 
-/// A point at or next to an edge, a corner, the inside or the plane of the triangle, in f32.
+/// Returns a point at or next to an edge, a corner, the inside or the plane of the triangle, in
+/// f32.
 fn target(triangle: &Triangle, random: &mut Random) -> Vec3 {
     let [a, b, c] = triangle.0.map(Vec3::as_dvec3);
     let s = random.of(&[0.0, 0.5, 1.0, 0.25, 1.0 / 3.0, 0.1, 1.5]);
@@ -184,7 +187,7 @@ fn target(triangle: &Triangle, random: &mut Random) -> Vec3 {
     point
 }
 
-/// Rays aimed at where decisions are hard.
+/// Returns rays towards points where the decision is hard.
 fn hard_ray(triangle: &Triangle, random: &mut Random) -> Option<Ray> {
     let [a, b, c] = triangle.0;
     let size = triangle
@@ -196,7 +199,7 @@ fn hard_ray(triangle: &Triangle, random: &mut Random) -> Option<Ray> {
     axis_parallel[random.below(3)] = random.of(&[1.0, -1.0, 0.125, 3.0]);
     let power = libm::exp2f(random.below(41) as f32 - 20.0);
     let (origin, direction) = match random.below(9) {
-        // From anywhere, not through the target exactly, because the direction is rounded.
+        // From anywhere. The ray misses the target slightly, because the direction is rounded.
         0 => {
             let origin = random.point() * size * random.of(&[0.0, 1.0, 100.0, 1e6]);
             (origin, target - origin)
@@ -227,7 +230,7 @@ fn hard_ray(triangle: &Triangle, random: &mut Random) -> Option<Ray> {
     Ray::new(origin, direction, t_min, t_max).ok()
 }
 
-/// Triangles of many kinds, at many scales.
+/// Returns triangles of many kinds, at many scales.
 fn hard_triangle(random: &mut Random) -> Triangle {
     let scale = match random.below(4) {
         0 => 1.0,

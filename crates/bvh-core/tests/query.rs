@@ -104,7 +104,7 @@ proptest! {
                 prop_assert!(frustum(&planes).may_meet(&aabb));
             }
         }
-        // The whole box is on the outer side of this plane.
+        // The full box is on the outer side of this plane.
         let beyond = Frustum { planes: vec![[1.0, 0.0, 0.0, -aabb.max.x - 1.0]] };
         prop_assert!(!beyond.may_meet(&aabb));
         let touching = Sphere::new(aabb.max + Vec3::X * (radius + 1.0), radius);

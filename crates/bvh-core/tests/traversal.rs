@@ -212,7 +212,7 @@ fn counts_include_the_root_and_stop_at_the_first_hit() {
     assert_eq!(tests_of_nearest(&tree, &boxes, &forwards), TestCounts { boxes: 3, objects: 1 });
     let backwards = Ray::half_line(middle + Vec3::X * 9.0, -Vec3::X).unwrap();
     assert_eq!(tests_of_any(&tree, &backwards), TestCounts { boxes: 7, objects: 1 });
-    // A ray that misses the root tests its box and nothing else.
+    // A ray that misses the root tests only the root's box.
     let past = Ray::half_line(middle + Vec3::X * 9.0, Vec3::X).unwrap();
     assert_eq!(tests_of_nearest(&tree, &boxes, &past), TestCounts { boxes: 1, objects: 0 });
     assert_eq!(nearest_hit_by(&Bvh::default(), &past, |_, _| Some(0.0), &mut ()), None);

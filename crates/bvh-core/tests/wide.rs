@@ -1,4 +1,5 @@
-//! Every kernel of the wide layout, ray by ray and in batches, gives the answer of testing every triangle, bit by bit.
+//! Every kernel of the wide layout, ray by ray and in batches, gives the answer of testing every
+//! triangle, bit by bit.
 
 mod support;
 
@@ -11,7 +12,8 @@ use support::{
     Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree,
 };
 
-/// The layouts of several trees over the triangles, for every kernel that this processor has.
+/// Returns the layouts of several trees over the triangles, for every kernel that this processor
+/// has.
 fn layouts(triangles: &[Triangle], random: &mut Random) -> Vec<(Kernel, WideBvh)> {
     let boxes = boxes(triangles);
     let mut trees: Vec<_> = SHAPES
@@ -34,7 +36,7 @@ fn layouts(triangles: &[Triangle], random: &mut Random) -> Vec<(Kernel, WideBvh)
     layouts.flat_map(of_kernel).collect()
 }
 
-/// Checks all rays by all layouts: one by one, and in a batch. The number of rays that hit.
+/// Checks all rays by all layouts, one by one and in a batch. Returns the number of rays that hit.
 fn check(name: &str, triangles: &[Triangle], layouts: &[(Kernel, WideBvh)], rays: &[Ray]) -> usize {
     let expected: Vec<Option<Hit>> = rays
         .iter()
@@ -65,8 +67,9 @@ fn check(name: &str, triangles: &[Triangle], layouts: &[(Kernel, WideBvh)], rays
     expected.iter().flatten().count()
 }
 
-/// Sixteen rays at a time that begin close to each other and run nearly the same way, towards and beyond an edge or a
-/// corner of some triangle: what packets are made for, where they are most easily wrong.
+/// Returns groups of sixteen rays that begin close to each other and run nearly in the same
+/// direction, towards and beyond an edge or a corner of some triangle: the rays that packets are
+/// made for, in the hardest places.
 fn bundles(triangles: &[Triangle], count: usize, random: &mut Random) -> Vec<Ray> {
     let mut rays = Vec::new();
     for _ in 0..count {
@@ -149,8 +152,8 @@ fn batches_of_any_length_answer_as_their_rays_do() {
     }
 }
 
-/// Distances of which no f32 is close to the exact one: once answers were lost because corners beyond `t_max` times the
-/// direction's length, rounded, were taken for corners beyond every hit.
+/// Distances that f32 represents badly. Answers were once lost because corners beyond the rounded
+/// product of `t_max` and the direction's length counted as beyond every hit.
 #[test]
 fn distances_that_underflow_are_answered_alike() {
     let mut random = Random(2);

@@ -1,17 +1,17 @@
-//! The working form of the tree: children in blocks of four, so that one access to memory and one vector comparison
-//! serve four boxes.
+//! The working form of the tree: children in blocks of four, so that one memory access and one
+//! vector comparison serve four boxes.
 
 use super::Object;
 use bvh_core::cost::{Area, Measure};
 use bvh_core::{Aabb, PackedAabb};
 
-/// The size of a box that is −min.xyz, max.xyz: its half area, or a measure.
+/// The size of a box given as −min.xyz, max.xyz: its half area, or a measure.
 pub(super) trait Size: Copy {
     fn of(self, bounds: [f32; 6]) -> f64;
 }
 
 impl Size for Area {
-    /// By the operations of [`PackedAabb::half_area`].
+    /// Uses the operations of [`PackedAabb::half_area`], hence the same bits.
     #[inline(always)]
     fn of(self, bounds: [f32; 6]) -> f64 {
         let bound = |i: usize| f64::from(bounds[i]);
@@ -33,9 +33,9 @@ pub(super) const LEAF: u32 = 1 << 31;
 /// The missing parent of the root.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Four children of one node, side by side. A node with more children has several consecutive blocks, whose number is a
-/// power of two: when they are full they move to twice the space. A node has no record of its own but a lane in its
-/// parent's block, and is named by `block · LANES + lane`.
+/// Four children of one node. A node with more children has several consecutive blocks. Their
+/// number is a power of two: full blocks move to twice the space. A node has no separate record but
+/// a lane in its parent's block; its id is `block · LANES + lane`.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Block {
@@ -43,15 +43,17 @@ pub(super) struct Block {
     pub(super) bounds: [[f32; LANES]; 6],
     /// An inner child's first block; a leaf's object, marked [`LEAF`].
     pub(super) link: [u32; LANES],
-    /// An inner child's number of children; 2 for a leaf, the children of the pair that it may become.
+    /// An inner child's number of children; 2 for a leaf, the children of the pair that it may
+    /// become.
     pub(super) count: [u32; LANES],
-    /// An inner child's size. For a leaf, the size from which its growth is counted: 0, or its own if children are
-    /// chosen by area.
+    /// An inner child's size. For a leaf, the size from which its growth counts: 0, or the leaf's
+    /// size if children are chosen by area.
     pub(super) area: [f64; LANES],
 }
 
 impl Block {
-    /// Unused lanes hold leaves that contain nothing and would grow without bound.
+    /// A block of unused lanes. They act as leaves that contain nothing and whose growth is
+    /// infinite, so no scan needs a test for them.
     pub(super) const EMPTY: Self = Self {
         bounds: [[f32::INFINITY; LANES]; 6],
         link: [LEAF; LANES],
@@ -59,19 +61,20 @@ impl Block {
         area: [0.0; LANES],
     };
 
-    /// The first inner child that contains `b`.
+    /// Returns the first inner child that contains `b`.
     #[inline(always)]
     pub(super) fn first_containing(&self, b: &[f32; 6]) -> Option<usize> {
         let lanes = self.containing(b);
         (lanes != 0).then(|| lanes.trailing_zeros() as usize % LANES)
     }
 
-    /// One bit per inner child that contains `b`. Compilers do not vectorise the plain version below.
+    /// Returns one bit per inner child that contains `b`. Compilers do not vectorise the plain
+    /// version below.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     fn containing(&self, b: &[f32; 6]) -> u32 {
         use std::arch::x86_64::*;
-        // SAFETY: every x86-64 processor has SSE2, and nothing here goes through a pointer.
+        // SAFETY: these intrinsics need SSE2, which every x86-64 processor has, and use no pointer.
         unsafe {
             let lanes = |x: [f32; LANES]| _mm_setr_ps(x[0], x[1], x[2], x[3]);
             let side = |i: usize| _mm_cmple_ps(_mm_set1_ps(b[i]), lanes(self.bounds[i]));
@@ -100,13 +103,13 @@ impl Block {
             .sum()
     }
 
-    /// The size of the union of a child and `b`.
+    /// Returns the size of the union of a child and `b`.
     #[inline(always)]
     pub(super) fn union_size(&self, lane: usize, b: &[f32; 6], size: impl Size) -> f64 {
         size.of(std::array::from_fn(|i| larger(self.bounds[i][lane], b[i])))
     }
 
-    /// The first block of an inner child's children, and their number.
+    /// Returns the first block of an inner child's children, and their number.
     #[inline(always)]
     pub(super) fn family(&self, lane: usize) -> (usize, usize) {
         (self.link[lane] as usize, self.count[lane] as usize)
@@ -146,19 +149,19 @@ impl Block {
     }
 }
 
-/// A single instruction, unlike `f32::max`, which handles NaN.
+/// Returns the larger of two numbers that are not NaN. Unlike `f32::max`, it is one instruction.
 #[inline(always)]
 fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The block and the lane of a node.
+/// Returns the block and the lane of a node.
 #[inline(always)]
 pub(super) fn place(node: u32) -> (usize, usize) {
     (node as usize / LANES, node as usize % LANES)
 }
 
-/// The first block of an inner node's children, and their number.
+/// Returns the first block of an inner node's children, and their number.
 #[inline(always)]
 pub(super) fn family(blocks: &[Block], node: u32) -> (usize, usize) {
     let (block, lane) = place(node);
@@ -177,7 +180,7 @@ mod tests {
             leaf in prop::array::uniform4(any::<bool>()),
             b in prop::array::uniform6(-2i8..2),
         ) {
-            // Zeros of both signs meet.
+            // Zeros of both signs occur.
             let mut block = Block { bounds: bounds.map(|side| side.map(|c| f32::from(c) * -0.5)), ..Block::EMPTY };
             block.link = leaf.map(|leaf| if leaf { LEAF } else { 7 });
             let b = b.map(|c| f32::from(c) * 0.5);

@@ -6,19 +6,19 @@ use crate::watch::Pace;
 use bvh_core::cost::Sum;
 use std::ops::Range;
 
-/// A [`Config`](super::Config) known at compile time.
+/// A [`Config`](super::Config) known at compile time, so that the inner loop has no branch on it.
 pub(super) trait Rule {
     const BY_AREA: bool;
     const PAIR_INNER: bool;
 
-    /// The area from which the growth of a leaf is counted.
+    /// Returns the area from which the growth of a leaf counts.
     #[inline(always)]
     fn leaf_area(object: &Object) -> f64 {
         if Self::BY_AREA { object.area } else { 0.0 }
     }
 }
 
-/// `Rules<BY_AREA, PAIR_INNER>`
+/// The rule with these constants.
 pub(super) struct Rules<const BY_AREA: bool, const PAIR_INNER: bool>;
 
 impl<const BY_AREA: bool, const PAIR_INNER: bool> Rule for Rules<BY_AREA, PAIR_INNER> {
@@ -26,16 +26,16 @@ impl<const BY_AREA: bool, const PAIR_INNER: bool> Rule for Rules<BY_AREA, PAIR_I
     const PAIR_INNER: bool = PAIR_INNER;
 }
 
-/// Number of objects that descend together, because a single descent waits for memory at every node.
+/// Number of objects that descend together. A single descent would wait for memory at every node.
 const BATCH: usize = 4;
 
-/// The upper parts of a batch's paths: the nodes that contain the object, below which no node does.
+/// The upper parts of a batch's paths: the nodes that contain the object.
 #[derive(Debug, Default)]
 pub(super) struct Walk {
-    /// One row per block that was searched: for each object the node found there, if any. All objects find the same
-    /// node in the same row.
+    /// One row per step of the search: for each object the node found there, if any. Objects that
+    /// find the same node find it in the same row.
     trail: Vec<[u32; BATCH]>,
-    /// For each object the row in which its last node was found. Later rows have no meaning for it.
+    /// For each object the row of its last node. Later rows have no meaning for the object.
     last: [usize; BATCH],
 }
 
@@ -49,7 +49,7 @@ impl Walk {
         walkers: Range<usize>,
         from: usize,
     ) {
-        // The blocks still to be searched.
+        // Per object, the range of blocks to search next.
         let mut ahead = [(0, 0); BATCH];
         for walker in walkers {
             let (first, count) = family(blocks, self.trail[from][walker]);
@@ -57,19 +57,19 @@ impl Walk {
             self.last[walker] = from;
         }
         let mut row = from;
-        while ahead.iter().any(|(at, end)| at < end) {
+        while ahead.iter().any(|(index, end)| index < end) {
             row += 1;
             if row == self.trail.len() {
                 self.trail.push([NONE; BATCH]);
             }
             for walker in 0..BATCH {
-                let (at, end) = ahead[walker];
-                if at < end {
-                    let block = &blocks[at];
+                let (index, end) = ahead[walker];
+                if index < end {
+                    let block = &blocks[index];
                     let mut found = NONE;
-                    ahead[walker] = (at + 1, if block.is_leaf(LANES - 1) { at } else { end });
+                    ahead[walker] = (index + 1, if block.is_leaf(LANES - 1) { index } else { end });
                     if let Some(lane) = block.first_containing(&objects[walker].bounds) {
-                        found = (at * LANES + lane) as u32;
+                        found = (index * LANES + lane) as u32;
                         self.last[walker] = row;
                         let (first, count) = block.family(lane);
                         ahead[walker] = (first, first + count.div_ceil(LANES));
@@ -95,14 +95,16 @@ struct Stop {
     node: u32,
     /// The first block of the node and its siblings, if the object is paired with the node.
     pair_among: Option<usize>,
-    /// Number of the nodes in `grown` that are enlarged.
+    /// Number of nodes in `grown` that the insertion enlarges.
     grown: usize,
-    /// Number of blocks that the search for it examined.
+    /// Number of blocks that the search examined.
     examined: usize,
 }
 
-/// Inserts the objects of a valid order and returns the tree's cost; `None` if the construction ends before. The upper part of the path is found for a batch of
-/// objects at once, and again from the node below which an insertion of the same batch has changed the tree.
+/// Inserts the objects of a valid order and returns the tree's cost; `None` if the construction is
+/// cancelled. The upper parts of the paths are found for a batch of objects at once. If an earlier
+/// insertion of the batch has changed the tree below a node of a path, the path is found again from
+/// that node.
 #[inline(always)]
 pub(super) fn insert_each<R: Rule>(
     scene: &Scene,
@@ -154,8 +156,8 @@ pub(super) fn insert_each<R: Rule>(
     Some(if rest.is_empty() || root_area <= 0.0 { 0.0 } else { cost.value() / root_area })
 }
 
-/// The stop of least increase on the path whose last node to contain the object is `last`. Fills `grown` with the rest
-/// of the path.
+/// Returns the stop of least increase on the path. `last` is the last node of the path that
+/// contains the object. Fills `grown` with the rest of the path.
 #[inline(always)]
 fn find_stop<R: Rule>(
     blocks: &[Block],
@@ -165,25 +167,26 @@ fn find_stop<R: Rule>(
     grown: &mut Vec<Grown>,
 ) -> Stop {
     grown.clear();
-    // Stopping at a node that contains the object adds the node's area and nothing else. No node above adds less.
+    // A stop at a node that contains the object adds only the node's area, and the nodes above are
+    // no smaller. The last such node is therefore the best of them.
     let (block, lane) = place(last);
     let increase = if last == NONE { f64::INFINITY } else { blocks[block].area[lane] };
     let mut stop = Stop { increase, node: last, pair_among: None, grown: 0, examined: 0 };
     let (mut first, mut count) = family(blocks, last);
     let mut inherited = 0.0;
     let mut examined = 0;
-    // Every stop further down adds at least the growth of the nodes above it and the object's own area.
+    // Every stop further down adds at least the growth of the nodes above it and the object's area.
     while inherited + object.area < stop.increase {
         let mut least = f64::INFINITY;
         let mut next = Grown { node: NONE, area: 0.0 };
         examined += count.div_ceil(LANES);
-        for (at, block) in blocks
+        for (index, block) in blocks
             .iter()
             .enumerate()
             .skip(first)
             .take(count.div_ceil(LANES))
         {
-            // Only leaves follow, each of which adds at least twice the object's area.
+            // Only leaves follow. Each adds at least twice the object's area.
             if block.is_leaf(0) {
                 let beaten = !R::BY_AREA && least <= 2.0 * object.area;
                 let useless = inherited + 2.0 * object.area >= stop.increase
@@ -192,13 +195,13 @@ fn find_stop<R: Rule>(
                     break;
                 }
             }
-            for lane in 0..LANES.min(count - (at - first) * LANES) {
+            for lane in 0..LANES.min(count - (index - first) * LANES) {
                 let area = block.union_size(lane, &object.bounds, size);
                 let growth = area - block.area[lane];
                 let growth =
                     if R::BY_AREA { growth } else { growth * f64::from(block.count[lane]) };
                 if growth < least {
-                    (least, next) = (growth, Grown { node: (at * LANES + lane) as u32, area });
+                    (least, next) = (growth, Grown { node: (index * LANES + lane) as u32, area });
                 }
             }
         }
@@ -236,13 +239,14 @@ fn find_stop<R: Rule>(
     Stop { examined, ..stop }
 }
 
-/// Makes the object a child of the stop, or of a new inner node that replaces it. Returns the grown node.
+/// Makes the object a child of the stop, or of a new inner node that replaces the stop. Returns the
+/// grown node.
 #[inline(always)]
 fn attach<R: Rule>(blocks: &mut Vec<Block>, stop: &Stop, object: &Object, id: u32) -> u32 {
     let (mut block, mut lane) = place(stop.node);
     if let Some(among) = stop.pair_among {
         if blocks[block].is_leaf(lane) {
-            // The leaf is swapped with the first leaf, so that inner nodes stay in front.
+            // Swap the leaf with the first leaf, so that inner nodes stay in front.
             let mut front = among;
             while !blocks[front].is_leaf(LANES - 1) {
                 front += 1;

@@ -1,26 +1,31 @@
-//! Goldsmith–Salmon: inserts the objects one by one, each where it raises the expected cost of the tree least.
+//! Goldsmith–Salmon: inserts the objects one by one, each where it raises the expected cost of the
+//! tree least.
 //!
-//! Goldsmith & Salmon 1987, 'Automatic creation of object hierarchies for ray tracing', as described by Ng & Trifonov
-//! 2003, sections 1 and 4, and by Ericson 2005, 'Real-time collision detection', section 6.2.3.1. The first object is
-//! the root. Every further object descends a single path to a leaf, without backtracking. It may stop at any node N of
-//! the path, and stops where the cost Σ S(node) · children grows least, with S the half area:
+//! Goldsmith & Salmon 1987, 'Automatic creation of object hierarchies for ray tracing', as
+//! described by Ng & Trifonov 2003, sections 1 and 4, and by Ericson 2005, 'Real-time collision
+//! detection', section 6.2.3.1. The first object is the root. Every further object descends a
+//! single path to a leaf, without backtracking. It may stop at any node N of the path, and stops
+//! where the cost Σ S(node) · children grows least, with S the half area:
 //!
-//! - an inner N takes the object as a further child, which adds S(N ∪ object), and children · growth of S for N and
-//!   every node above it;
-//! - a leaf N is paired with the object under a new inner node, which adds 2 · S(N ∪ object), and children · growth of
-//!   S for every node above it.
+//! - an inner N gets the object as a further child, which adds S(N ∪ object), and children · growth
+//!   of S for N and every node above it;
+//! - a leaf N is paired with the object under a new inner node, which adds 2 · S(N ∪ object), and
+//!   children · growth of S for every node above it.
 //!
-//! The expected cost is this sum divided by S(root). All choices share the divisor, so the root's growth counts, too.
+//! The expected cost is this sum divided by S(root). All choices share the divisor, so the root's
+//! growth counts, too.
 //!
-//! The sources leave some choices open. Here an inner child that contains the object is next on the path before any
-//! other child; among the others, [`Descent`] decides. Of equal children the first is taken: inner nodes before leaves,
-//! and inner nodes in the order in which they became inner nodes. (Goldsmith & Salmon take the nearest centre, or any.)
-//! Of equal stops the first is taken, from the last node that contains the object downwards, and a further child before
-//! a pair, so that a scene without area becomes one wide node instead of a chain.
+//! The sources leave some choices open. Here an inner child that contains the object is next on the
+//! path before any other child; among the others, [`Descent`] decides. Among equal children the
+//! first is chosen: inner nodes before leaves, and inner nodes in the order in which they became
+//! inner nodes. (Goldsmith & Salmon choose the nearest centre, or any.) Among equal stops the first
+//! is chosen, from the last node that contains the object downwards, and a further child before a
+//! pair, so a scene without area becomes one wide node instead of a chain.
 //!
-//! *Complexity.* O(path · children) per object, hence O(n log n) expected for a random order. In the worst case objects
-//! sorted along a line become a chain of about n/4 levels, all of which grow with every object: O(n²). Identical,
-//! nested or flat objects make very wide nodes, in which leaves that cannot be chosen are skipped: O(1) per object.
+//! *Complexity.* O(path · children) per object, hence O(n log n) expected for a random order. In
+//! the worst case, objects sorted along a line become a chain of about n/4 levels, and every object
+//! enlarges all of them: O(n²). Identical, nested or flat objects make very wide nodes. Leaves
+//! there that cannot be chosen are skipped: O(1) per object.
 
 mod block;
 mod insertion;
@@ -34,13 +39,13 @@ use bvh_core::{Aabb, Bvh, Node, PackedAabb};
 use insertion::{Rules, Walk, insert_each};
 
 bvh_config::config! {
-    /// How to insert. As a [`Builder`], inserts in the order of the indices.
+    /// The rules of the insertion. As a [`Builder`], inserts in the order of the indices.
     pub struct Config {
-        /// Which child is the next node of the path.
+        /// The choice of the next node of the path.
         descent: Descent = Descent::Cost;
-        /// Whether an object may also be paired with an inner node, at 2 · S(N ∪ object) plus the growth of the nodes
-        /// above. Goldsmith & Salmon pair with leaves only. Over random orders of three meshes both give the same mean
-        /// cost within 2 %.
+        /// True if an object may also be paired with an inner node, at 2 · S(N ∪ object) plus the
+        /// growth of the nodes above. Goldsmith & Salmon pair with leaves only. Over random orders
+        /// of three meshes both give the same mean cost within 2 %.
         pair_inner: bool = false;
     }
 }
@@ -54,12 +59,13 @@ bvh_config::config! {
 )]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Descent {
-    /// The child whose cost grows least: by children · growth of S for an inner node, and by 2 · S(pair) for a leaf,
-    /// which cost nothing before. Ng & Trifonov's 'minimal increase in cost'.
+    /// The child whose cost grows least: by children · growth of S for an inner node, and by 2 ·
+    /// S(pair) for a leaf, which cost nothing before. Ng & Trifonov's 'minimal increase in cost'.
     #[default]
     Cost,
-    /// The child whose area grows least, whether inner node or leaf: Ericson's reading of Goldsmith & Salmon. Its mean
-    /// cost is within 3 % of the other's. A build takes O(n²) where many leaves nest in one another.
+    /// The child whose area grows least, inner node or leaf: Ericson's reading of Goldsmith &
+    /// Salmon. Its mean cost is within 3 % of the other rule. A build takes O(n²) if many leaves
+    /// are nested.
     Area,
 }
 
@@ -70,7 +76,7 @@ pub struct Scene<'a> {
     measure: Option<&'a dyn Measure>,
 }
 
-/// A box as in [`bvh_core::PackedAabb`], without padding, and its size.
+/// A box in the form of [`bvh_core::PackedAabb`], without padding, and its size.
 #[derive(Clone, Copy, Debug)]
 struct Object {
     /// −min.xyz, max.xyz.
@@ -79,12 +85,12 @@ struct Object {
 }
 
 impl<'a> Scene<'a> {
-    /// Checks and packs the boxes, in O(n).
+    /// Checks and packs the boxes. O(n).
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
         Self::by(boxes, None)
     }
 
-    /// The same, with a measure in place of the half area.
+    /// Checks and packs the boxes, with a measure instead of the half area. O(n).
     pub fn by(boxes: &[Aabb], measure: Option<&'a dyn Measure>) -> Result<Self, BuildError> {
         check_scene(boxes)?;
         let pack = |b: &Aabb| {
@@ -97,21 +103,22 @@ impl<'a> Scene<'a> {
         Ok(Self { objects: boxes.iter().map(pack).collect(), measure })
     }
 
-    /// Number of objects.
+    /// Returns the number of objects.
     pub fn len(&self) -> usize {
         self.objects.len()
     }
 
-    /// Whether there are no objects.
+    /// Returns whether there are no objects.
     pub fn is_empty(&self) -> bool {
         self.objects.is_empty()
     }
 }
 
-/// Why the objects were not inserted. An order must name every object of the scene exactly once.
+/// The reason why the objects were not inserted. An order must name every object of the scene
+/// exactly once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidOrder {
-    /// Too few or too many entries.
+    /// The order has too few or too many entries.
     #[error("the order names {named} objects but the scene has {objects}")]
     Length {
         /// Number of entries.
@@ -119,7 +126,7 @@ pub enum InvalidOrder {
         /// Number of objects in the scene.
         objects: usize,
     },
-    /// An entry is no object of the scene.
+    /// An entry is not an object of the scene.
     #[error("position {position} of the order names object {object}, of {objects}")]
     NoObject {
         /// Index of the entry.
@@ -142,11 +149,11 @@ pub enum InvalidOrder {
     Cancelled,
 }
 
-/// The growing tree and the buffers of a build, reused by further builds without allocating. Takes at most 192 bytes per
-/// object, typically 100.
+/// The growing tree and the buffers of a build. Further builds reuse them without allocating. Takes
+/// at most 192 bytes per object, typically 100.
 #[derive(Debug, Default)]
 pub struct Workspace {
-    /// Block 0 holds the root alone.
+    /// Block 0 holds only the root.
     blocks: Vec<Block>,
     walk: Walk,
     /// The nodes of the path that the object enlarges.
@@ -156,9 +163,10 @@ pub struct Workspace {
 }
 
 impl Config {
-    /// Inserts the scene's objects in the given order and returns the tree's cost by
-    /// [`goldsmith_salmon`](bvh_core::cost::goldsmith_salmon), by the scene's measure, which is maintained incrementally. Equal
-    /// orders give equal bits. [`Workspace::write`] then writes the tree. A refused order leaves the workspace's tree as it was.
+    /// Inserts the scene's objects in the given order. Returns the tree's cost by
+    /// [`goldsmith_salmon`](bvh_core::cost::goldsmith_salmon) and the scene's measure, which is
+    /// updated incrementally. Equal orders give equal bits. [`Workspace::write`] then writes the
+    /// tree. A rejected order leaves the workspace's tree unchanged.
     pub fn insert_all(
         &self,
         scene: &Scene,
@@ -168,7 +176,8 @@ impl Config {
         self.insert_watched(scene, order, workspace, &Watch::default())
     }
 
-    /// As [`insert_all`](Self::insert_all), unless the `watch` ends it: the workspace then holds no complete tree.
+    /// Inserts the objects like [`insert_all`](Self::insert_all), unless the `watch` cancels. The
+    /// workspace then holds no complete tree.
     pub fn insert_watched(
         &self,
         scene: &Scene,
@@ -181,7 +190,7 @@ impl Config {
             .ok_or(InvalidOrder::Cancelled)
     }
 
-    /// `None` if the `watch` ends the insertion.
+    /// Inserts a valid order; `None` if the `watch` cancels.
     fn insert_valid(
         &self,
         scene: &Scene,
@@ -240,8 +249,8 @@ impl Builder for Config {
 }
 
 impl Workspace {
-    /// Writes the tree built last into `tree` and reuses its memory. Children are adjacent and in their order; after
-    /// them come their descendants, one child's after the other's. O(n).
+    /// Writes the last tree into `tree` and reuses its memory. Children are adjacent and in their
+    /// order. The descendants of the first child follow, then the descendants of the next. O(n).
     pub fn write(&mut self, tree: &mut Bvh) {
         let Self { blocks, stack, .. } = self;
         let Bvh { nodes, prim_ids } = tree;
@@ -255,7 +264,8 @@ impl Workspace {
         stack.push((0, 0));
         while let Some((index, node)) = stack.pop() {
             let (block, lane) = place(node);
-            // As in `Aabb::from(&PackedAabb)`, adding 0 keeps the signs of zeros from depending on the order.
+            // Like `Aabb::from(&PackedAabb)`, this makes all zeros +0, so the order of insertion
+            // does not change their signs.
             let [x, y, z, far_x, far_y, far_z] = blocks[block].bounds.map(|bounds| bounds[lane]);
             let aabb =
                 Aabb::from(([0.0 - x, 0.0 - y, 0.0 - z], [far_x + 0.0, far_y + 0.0, far_z + 0.0]));

@@ -1,14 +1,17 @@
-//! Agglomerative clustering: repeatedly joins clusters that are each other's nearest neighbour along the Morton curve.
+//! Agglomerative clustering: repeatedly joins clusters that are each other's nearest neighbour
+//! along the Morton curve.
 //!
-//! Meister & Bittner 2018, 'Parallel locally-ordered clustering for bounding volume hierarchy construction' (PLOC).
-//! Clusters lie in Morton order. In every round each cluster finds its nearest neighbour among the `radius` clusters on
-//! either side, by the area of the joint box, and every two clusters that find each other are joined.
+//! Meister & Bittner 2018, 'Parallel locally-ordered clustering for bounding volume hierarchy
+//! construction' (PLOC). Clusters are in Morton order. In every round, each cluster finds its
+//! nearest neighbour among the `radius` clusters on either side, by the area of the joint box, and
+//! any two clusters that find each other are joined.
 //!
-//! Differs from the paper: Morton cells are cubes, so that flat scenes are not distorted. The first rounds may look at
-//! adjacent clusters only. Of equally near neighbours the one is taken whose position has the least exclusive or with
-//! the cluster's own, so that regular grids are divided by powers of two and identical clusters pair off. A round that
-//! follows one with few joins also joins adjacent clusters that found no partner, which bounds the rounds by O(log n)
-//! for any scene.
+//! Differs from the paper: Morton cells are cubes, so flat scenes are not distorted. The first
+//! rounds may examine only adjacent clusters. Among equally near neighbours, the position with the
+//! least exclusive or with the cluster's position wins, so regular grids are divided by powers of
+//! two and identical clusters pair off. After a round with few joins, the next round also joins
+//! adjacent clusters without a partner, which bounds the number of rounds by O(log n) for any
+//! scene.
 
 mod clusters;
 mod morton;
@@ -21,18 +24,19 @@ use bvh_core::{Aabb, Bvh, PackedAabb};
 use clusters::Clusters;
 
 bvh_config::config! {
-    /// How far to look for a neighbour.
+    /// The range of the search for neighbours.
     pub struct Config {
-        /// Clusters looked at on either side.
+        /// Number of clusters examined on either side.
         radius: u32 = 24, in 1..=1000;
-        /// Number of first rounds that look only at the next cluster on either side: faster, and often no worse.
+        /// Number of first rounds that examine only the next cluster on either side: faster, and
+        /// often no worse.
         near_rounds: u32 = 0;
     }
 }
 
 impl Builder for Config {
-    /// O(radius · n), and a radix sort. The search for neighbours uses all threads of the current rayon pool; their
-    /// number does not change the tree.
+    /// Builds a tree in O(radius · n), plus a radix sort. The search for neighbours uses all
+    /// threads of the current rayon pool; their number does not change the tree.
     fn build_watched(
         &self,
         boxes: &[Aabb],
@@ -48,7 +52,7 @@ impl Builder for Config {
     }
 }
 
-/// The objects of a scene in Morton order, which builds with any radius start from.
+/// The objects of a scene in Morton order: the start of builds with any radius.
 #[derive(Clone, Debug)]
 pub struct MortonOrder {
     /// One box per object, by index.
@@ -60,7 +64,8 @@ pub struct MortonOrder {
 }
 
 impl MortonOrder {
-    /// Checks and sorts: a radix sort in O(n), O(n log n) if most objects are within a thousandth of the scene's size.
+    /// Checks and sorts the objects. The radix sort takes O(n), or O(n log n) if most objects are
+    /// within a thousandth of the scene's size.
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
         check_scene(boxes)?;
         let boxes: Vec<PackedAabb> = boxes.iter().map(PackedAabb::from).collect();
@@ -71,7 +76,7 @@ impl MortonOrder {
         Ok(Self { boxes, bounds, order })
     }
 
-    /// The objects in order.
+    /// Returns the objects in order.
     pub fn order(&self) -> &[u32] {
         &self.order
     }
@@ -81,7 +86,8 @@ impl MortonOrder {
         self.build_watched(config, None, &Watch::default())
     }
 
-    /// The same, with a measure in place of the half area if there is one, unless the `watch` ends it.
+    /// Clusters the sorted objects by the measure, or by half area without one, unless the `watch`
+    /// cancels.
     pub fn build_watched(
         self,
         config: &Config,
@@ -116,8 +122,8 @@ mod tests {
     use bvh_core::validate;
     use proptest::prelude::*;
 
-    fn cube(at: [f32; 3], size: f32) -> Aabb {
-        Aabb::from((at, at.map(|c| c + size)))
+    fn cube(low: [f32; 3], size: f32) -> Aabb {
+        Aabb::from((low, low.map(|c| c + size)))
     }
 
     fn scatter(n: u32) -> Vec<Aabb> {
@@ -160,7 +166,7 @@ mod tests {
 
     #[test]
     fn no_scene_takes_more_rounds_than_a_multiple_of_the_logarithm() {
-        // One inside the other: every cluster's nearest is the smallest.
+        // Nested boxes: the smallest cluster is the nearest of every cluster.
         let boxes: Vec<Aabb> = (1..20_000u16)
             .map(|i| cube([-f32::from(i); 3], 2.0 * f32::from(i)))
             .collect();
@@ -183,7 +189,8 @@ mod tests {
         }
     }
 
-    /// The objects below every inner node, sorted, as the definition has them: without arrays of planes, f32, or early exits.
+    /// Returns the objects below every inner node, sorted, straight from the definition: without
+    /// arrays of planes, f32, or early exits.
     fn oracle(boxes: &[Aabb], config: &Config) -> Vec<Vec<u32>> {
         let packed: Vec<PackedAabb> = boxes.iter().map(PackedAabb::from).collect();
         let mut current: Vec<(Aabb, Vec<u32>)> = morton::order(&packed)
@@ -198,34 +205,37 @@ mod tests {
                 break;
             }
             let radius = if round < config.near_rounds { 1 } else { config.radius as usize };
-            let key = |at: usize, other: usize| {
-                let area = current[at].0.union(&current[other].0).half_area();
-                (area, at ^ other)
+            let key = |index: usize, other: usize| {
+                let area = current[index]
+                    .0
+                    .union(&current[other].0)
+                    .half_area();
+                (area, index ^ other)
             };
-            let nearest = |at: usize| {
-                let others = (at.saturating_sub(radius)..n.min(at + radius + 1))
-                    .filter(|&other| other != at);
+            let nearest = |index: usize| {
+                let others = (index.saturating_sub(radius)..n.min(index + radius + 1))
+                    .filter(|&other| other != index);
                 others
-                    .min_by(|&a, &b| key(at, a).partial_cmp(&key(at, b)).unwrap())
+                    .min_by(|&a, &b| key(index, a).partial_cmp(&key(index, b)).unwrap())
                     .unwrap()
             };
             let mut nearest: Vec<usize> = (0..n).map(nearest).collect();
-            let mutual = |nearest: &[usize], at: usize| nearest[nearest[at]] == at;
-            for at in 0..n - 1 {
-                if few && !mutual(&nearest, at) && !mutual(&nearest, at + 1) {
-                    (nearest[at], nearest[at + 1]) = (at + 1, at);
+            let mutual = |nearest: &[usize], index: usize| nearest[nearest[index]] == index;
+            for index in 0..n - 1 {
+                if few && !mutual(&nearest, index) && !mutual(&nearest, index + 1) {
+                    (nearest[index], nearest[index + 1]) = (index + 1, index);
                 }
             }
             let mut next = Vec::new();
-            for at in 0..n {
-                let other = nearest[at];
-                if !mutual(&nearest, at) {
-                    next.push(current[at].clone());
-                } else if other > at {
-                    let mut ids = [current[at].1.clone(), current[other].1.clone()].concat();
+            for index in 0..n {
+                let other = nearest[index];
+                if !mutual(&nearest, index) {
+                    next.push(current[index].clone());
+                } else if other > index {
+                    let mut ids = [current[index].1.clone(), current[other].1.clone()].concat();
                     ids.sort_unstable();
                     joined.push(ids.clone());
-                    next.push((current[at].0.union(&current[other].0), ids));
+                    next.push((current[index].0.union(&current[other].0), ids));
                 }
             }
             few = n - next.len() < n.div_ceil(clusters::FEW);
@@ -237,13 +247,13 @@ mod tests {
 
     fn below_inner_nodes(tree: &Bvh) -> Vec<Vec<u32>> {
         let mut below: Vec<Vec<u32>> = vec![Vec::new(); tree.nodes.len()];
-        for at in (0..tree.nodes.len()).rev() {
-            let node = &tree.nodes[at];
+        for index in (0..tree.nodes.len()).rev() {
+            let node = &tree.nodes[index];
             let mut ids = tree.prim_ids[node.prims()].to_vec();
             node.children()
                 .for_each(|child| ids.extend_from_slice(&below[child]));
             ids.sort_unstable();
-            below[at] = ids;
+            below[index] = ids;
         }
         let mut inner: Vec<_> = below
             .into_iter()
@@ -256,7 +266,7 @@ mod tests {
     proptest! {
         #[test]
         fn trees_are_those_of_the_definition(
-            // Small integers: areas are exact in f32, and many are equal.
+            // Small integers make areas exact in f32, and many areas equal.
             corners in prop::collection::vec(([0u8..40, 0u8..40, 0u8..6], [0u8..5, 0u8..5, 0u8..5]), 1..90),
             radius in 1u32..30, near_rounds in 0u32..3, exponent in prop::sample::select(vec![-60, 0, 100]),
         ) {

@@ -3,8 +3,9 @@
 use bvh_core::glam::DVec4;
 use bvh_core::{PackedAabb, with_vector_instructions};
 
-/// The objects in the order of the Morton codes of their box centres, equal codes by index. Centres are rounded to a
-/// grid of 2^21 points along the longest side of the box around all centres, with the same spacing along the others.
+/// Returns the objects in the order of the Morton codes of their box centres, equal codes by index.
+/// Centres are rounded to a grid of 2^21 points along the longest side of the box around all
+/// centres, with the same spacing along the other sides.
 pub(super) fn order(boxes: &[PackedAabb]) -> Vec<u32> {
     let codes = codes(boxes);
     let mut order: Vec<(u32, u32)> = codes
@@ -12,7 +13,8 @@ pub(super) fn order(boxes: &[PackedAabb]) -> Vec<u32> {
         .zip(0..)
         .map(|(&code, index)| (high(code), index))
         .collect();
-    // The lower halves are compared only where the upper halves are equal, which is rare.
+    // Equal upper halves are rare, so sorting 32-bit keys first and comparing lower halves later is
+    // faster than sorting 64-bit keys.
     radsort::sort_by_key(&mut order, |&(high, _)| high);
     for equal in order
         .chunk_by_mut(|a, b| a.0 == b.0)
@@ -26,13 +28,13 @@ pub(super) fn order(boxes: &[PackedAabb]) -> Vec<u32> {
         .collect()
 }
 
-/// The upper 32 bits of a code of 63 bits.
+/// Returns the upper 32 bits of a code of 63 bits.
 fn high(code: u64) -> u32 {
     (code >> 31) as u32
 }
 
 with_vector_instructions! {
-    /// The Morton code of every box's centre.
+    /// Returns the Morton code of every box's centre.
     codes = codes_plain(boxes: &[PackedAabb]) -> Vec<u64>
 }
 
@@ -45,7 +47,8 @@ fn codes_plain(boxes: &[PackedAabb]) -> Vec<u64> {
     }
     let side = (high - low).max_element();
     let cells = if side > 0.0 { f64::from((1 << 21) - 1) / side } else { 0.0 };
-    // Adding 2^52 to a small number rounds it to an integer and leaves that in the lowest bits.
+    // Adding 2^52 to a small number rounds it to an integer and leaves the integer in the lowest
+    // bits.
     let integers = DVec4::splat((1u64 << 52) as f64);
     boxes
         .iter()
@@ -57,7 +60,7 @@ fn codes_plain(boxes: &[PackedAabb]) -> Vec<u64> {
         .collect()
 }
 
-/// Moves bit i of 21 to bit 3·i, in each of four numbers.
+/// Moves bit i, below 21, to bit 3·i, in each of four numbers.
 #[inline(always)]
 fn spread(mut bits: [u64; 4]) -> [u64; 4] {
     bits = bits.map(|bits| bits & 0x1f_ffff);
@@ -93,7 +96,7 @@ mod tests {
             points in prop::collection::vec((0u8..5, 0u32..1 << 22, prop::sample::select(vec![1e-7f32, 1.0])), 0..60),
             copies in prop::sample::select(vec![1usize, 100]),
         ) {
-            // Coarse or fine coordinates: many codes agree in their upper half, some altogether.
+            // Coarse or fine coordinates: many codes have equal upper halves, and some are equal.
             let point = |&(x, y, scale): &(u8, u32, f32)| [f32::from(x), y as f32 * 1e-6 * scale, scale];
             let boxes: Vec<PackedAabb> =
                 points.iter().map(|p| PackedAabb::from(&Aabb::from((point(p), point(p))))).collect();

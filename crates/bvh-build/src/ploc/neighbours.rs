@@ -1,4 +1,5 @@
-//! Every cluster's nearest neighbour in Morton order: vectorised over clusters, one distance after the other.
+//! Every cluster's nearest neighbour in Morton order: vectorised over clusters, one distance after
+//! the other.
 
 use bvh_core::cost::Measure;
 use bvh_core::{PackedAabb, with_vector_instructions};
@@ -6,29 +7,34 @@ use bvh_core::{PackedAabb, with_vector_instructions};
 /// Clusters whose neighbours are found in one call.
 pub(super) const CHUNK: usize = 512;
 
-/// Buffers of one call of [`find`]: the boxes of a chunk and its surroundings as one array per plane, and results.
+/// Buffers of one call of [`find`]: the boxes of a chunk and its surroundings as one array per
+/// plane, and results.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
     planes: [Vec<f32>; 6],
-    /// Per pair of clusters, the side lengths of the joint box; its area later replaces the first.
+    /// Per pair of clusters, the side lengths of the joint box. Its area later replaces the first
+    /// side.
     sides: [Vec<f32>; 3],
     /// Per cluster, the bits of the smallest area so far.
     least: Vec<i32>,
-    /// Copy of the results so far: reading and writing the same array would keep the loop from being vectorised.
+    /// A copy of the results so far. Reading and writing the same array would prevent
+    /// vectorisation.
     before: Vec<i32>,
 }
 
-/// Scaled coordinates are clamped to this magnitude. Only an axis along which all boxes lie in one plane, far from the
-/// origin for the scene's size, has larger ones: extents are below 2, and an f32 has 24 bits.
+/// The maximum magnitude of scaled coordinates; larger ones are clamped. Extents are below 2 and an
+/// f32 has 24 bits, so coordinates are larger only along an axis where all boxes are in one plane
+/// far from the origin.
 const FARTHEST: f64 = (1u64 << 40) as f64;
 
 with_vector_instructions! {
-    /// Finds the nearest neighbours of the `found.len()` clusters from `start` on, at most [`CHUNK`], among those up to
-    /// `radius` positions before and after, and writes their distances, negative for neighbours before. The nearest
-    /// has the smallest joint box; of equals, the least exclusive or of its position and the cluster's.
+    /// Finds the nearest neighbours of the `found.len()` clusters from `start` on, at most
+    /// [`CHUNK`], among the clusters up to `radius` positions before and after. Writes the
+    /// distances, negative for neighbours before. The nearest neighbour has the smallest joint box;
+    /// among equal ones, the least exclusive or of both positions.
     ///
-    /// Areas are f32. Coordinates are first multiplied by `scale`, a power of two, so that no area overflows, and only
-    /// clusters some 2^60 times smaller than the scene have area 0.
+    /// Areas are f32. Coordinates are first multiplied by `scale`, a power of two, so no area
+    /// overflows, and only clusters about 2^60 times smaller than the scene have area 0.
     pub(super) find = find_plain(
         boxes: &[PackedAabb], scale: f64, measure: Option<&dyn Measure>, radius: usize, start: usize, found: &mut [i32], scratch: &mut Scratch)
 }
@@ -45,7 +51,8 @@ fn find_plain(
 ) {
     let len = found.len();
     let Scratch { planes, sides, least, before } = scratch;
-    // Position p of the chunk is stored at radius + p. Beyond the ends lie boxes at infinity, whose areas never win.
+    // Position p of the chunk is stored at radius + p. Boxes at infinity, whose areas never win,
+    // fill the places beyond the ends.
     let first = start.saturating_sub(radius);
     let last = (start + len + radius).min(boxes.len());
     let offset = first + radius - start;
@@ -57,12 +64,12 @@ fn find_plain(
     let [a, b, c, d, e, f] = planes
         .each_mut()
         .map(|plane| &mut plane[offset..offset + last - first]);
-    for (at, aabb) in boxes[first..last].iter().enumerate() {
+    for (index, aabb) in boxes[first..last].iter().enumerate() {
         let [low, high] = aabb
             .planes()
             .map(|plane| plane.map(|x| (f64::from(x) * scale).clamp(-FARTHEST, FARTHEST) as f32));
-        [a[at], b[at], c[at]] = [low[0], low[1], low[2]];
-        [d[at], e[at], f[at]] = [high[0], high[1], high[2]];
+        [a[index], b[index], c[index]] = [low[0], low[1], low[2]];
+        [d[index], e[index], f[index]] = [high[0], high[1], high[2]];
     }
     sides
         .iter_mut()
@@ -71,7 +78,7 @@ fn find_plain(
     least.resize(len, i32::MAX);
     before.resize(len, 0);
     for distance in 1..=radius {
-        // All pairs at this distance of which at least one cluster is in the chunk.
+        // All pairs at this distance with at least one cluster in the chunk.
         let pairs = len + distance;
         before.copy_from_slice(found);
         if let Some(measure) = measure {
@@ -93,8 +100,8 @@ fn find_plain(
     }
 }
 
-/// The measures of the joint boxes of the clusters at p − distance and p, from p = `start` on, scaled as areas are, rounded to f32;
-/// infinite only where there is no such cluster.
+/// Writes the measures of the joint boxes of the clusters at p − distance and p, from p = `start`
+/// on, scaled like areas and rounded to f32; infinity only where a cluster does not exist.
 fn joint_sizes(
     measure: &dyn Measure,
     scale: f64,
@@ -113,20 +120,21 @@ fn joint_sizes(
     }
 }
 
-/// The side lengths of the joint boxes of the clusters at p and p + distance, for every p that `sides` has room for.
+/// Writes the side lengths of the joint boxes of the clusters at p and p + distance, for every p in
+/// `sides`.
 #[inline(always)]
 fn joint_sides(low: &[f32], high: &[f32], distance: usize, sides: &mut [f32]) {
     let larger = |a: f32, b: f32| if a > b { a } else { b };
     let pairs = sides.len();
     let (low, low_on) = (&low[..pairs], &low[distance..][..pairs]);
     let (high, high_on) = (&high[..pairs], &high[distance..][..pairs]);
-    for at in 0..pairs {
-        sides[at] = larger(low[at], low_on[at]) + larger(high[at], high_on[at]);
+    for index in 0..pairs {
+        sides[index] = larger(low[index], low_on[index]) + larger(high[index], high_on[index]);
     }
 }
 
-/// Takes the neighbours `distance` before and after a cluster where they are nearer than all neighbours so far. Areas
-/// compare as their bits do, so that no branch is needed.
+/// Replaces the results of clusters whose neighbours at `distance` are nearer than all neighbours
+/// so far. Areas are not negative, so they compare like their bits, and no branch is needed.
 #[inline(always)]
 fn take_nearer(
     areas: &[f32],
@@ -142,21 +150,21 @@ fn take_nearer(
     let least = &mut least[..len];
     let known = &known[..len];
     let far = distance as i32;
-    for at in 0..len {
-        let before = before[at].to_bits() as i32;
-        let after = after[at].to_bits() as i32;
-        let position = (start + at) as i32;
+    for index in 0..len {
+        let before = before[index].to_bits() as i32;
+        let after = after[index].to_bits() as i32;
+        let position = (start + index) as i32;
         let bits = |on: i32| position ^ (position + on);
         let backwards = is_less([before, bits(-far)], [after, bits(far)]);
         let area = after.min(before);
         let on = (far ^ backwards) - backwards;
-        let nearer = is_less([area, bits(on)], [least[at], bits(known[at])]);
-        least[at] = area.min(least[at]);
-        found[at] = known[at] ^ (known[at] ^ on) & nearer;
+        let nearer = is_less([area, bits(on)], [least[index], bits(known[index])]);
+        least[index] = area.min(least[index]);
+        found[index] = known[index] ^ (known[index] ^ on) & nearer;
     }
 }
 
-/// −1, all bits set, if `a` precedes `b` lexicographically; else 0.
+/// Returns −1, all bits set, if `a` precedes `b` lexicographically; otherwise 0.
 #[inline(always)]
 fn is_less(a: [i32; 2], b: [i32; 2]) -> i32 {
     -(i32::from(a[0] < b[0]) | i32::from(a[0] == b[0]) & i32::from(a[1] < b[1]))

@@ -1,9 +1,11 @@
-//! The division of a scene, from the root down to single objects, by the splits that a [`SplitRule`] chooses.
+//! The division of a scene, from the root down to single objects, by the splits that a
+//! [`SplitRule`] chooses.
 //!
-//! The objects' orders along the three axes are partitioned stably, so that nothing is sorted twice (Ng & Trifonov 2003,
-//! Table 1). A node's place follows from the numbers of objects alone: a node over m objects has its 2m − 2 descendants
-//! in one block, which holds the two children, then the left child's block, then the right child's. So subtrees can be
-//! built in any order, or in parallel, into the same bytes.
+//! The objects' orders along the three axes are partitioned stably, so nothing is sorted twice (Ng
+//! & Trifonov 2003, Table 1). A node's place follows from the numbers of objects: the 2m − 2
+//! descendants of a node over m objects are one block, which holds the two children, then the left
+//! child's block, then the right child's block. Subtrees can therefore be built in any order, or in
+//! parallel, into the same bytes.
 
 #[cfg(feature = "rayon")]
 use super::presort::PARALLEL_OBJECTS;
@@ -17,7 +19,8 @@ use bvh_core::{Aabb, Bvh, Node, PackedAabb, with_vector_instructions};
 #[cfg(feature = "rayon")]
 use std::sync::Mutex;
 
-/// Buffers of a build. Further builds over the same number of objects reuse them without allocating.
+/// Buffers of a build. Further builds over the same number of objects reuse them without
+/// allocating.
 #[derive(Debug, Default)]
 pub struct Workspace {
     orders: [Vec<u32>; 2],
@@ -27,15 +30,16 @@ pub struct Workspace {
 /// Buffers of one thread.
 #[derive(Debug, Default)]
 struct Scratch {
-    /// Per object of the scene, 1 if it goes to the left. Each thread has its own array, although the threads' objects
-    /// are disjoint, because objects of different subtrees would share cache lines.
+    /// Per object of the scene, 1 if it goes to the left. Each thread has a separate array,
+    /// although the threads' objects are disjoint, because objects of different subtrees would
+    /// share cache lines.
     goes_left: Vec<u8>,
     goes_right: Vec<u32>,
     blocks: [Vec<Block>; 3],
     stack: Vec<Frame>,
 }
 
-/// A node still to be divided: its objects, its place in the tree, and its descendants' block.
+/// A node to divide: its objects, its place in the tree, and its descendants' block.
 #[derive(Clone, Copy, Debug)]
 struct Frame {
     /// First object, relative to the task.
@@ -51,13 +55,14 @@ struct Frame {
 #[derive(Clone, Copy, Debug)]
 struct Known {
     aabb: PackedAabb,
-    /// Per axis, the lowest axis known to order the objects identically, usually itself.
+    /// Per axis, the lowest axis known to order the objects identically, usually the same axis.
     same_as: [u8; 3],
     /// Number of [stalls](stalls) from the root down to the node.
     stalls: u8,
 }
 
-/// A subtree below a node that is already written, with exclusive parts of all arrays: it can be built independently.
+/// A subtree below a node that is already written, with exclusive parts of all arrays, so it can be
+/// built independently.
 struct Task<'a> {
     /// The descendants' block, 2·objects − 2 nodes, and its position in the whole tree.
     below: &'a mut [Node],
@@ -74,13 +79,13 @@ pub struct Division<'a, C> {
     pub scene: &'a Presorted,
     /// The cost of splits.
     pub split_cost: &'a C,
-    /// Whether to look for axes that order a node's objects identically.
+    /// Whether to find axes that order a node's objects identically.
     pub skip_same_order: bool,
-    /// The caller's way to end the division.
+    /// The caller's way to cancel the division.
     pub watch: &'a Watch<'a>,
 }
 
-/// Whether a split of the node into sides with these boxes [stalls](is_stall).
+/// Returns whether a split of the node into sides with these boxes [stalls](is_stall).
 #[inline(always)]
 fn stalls<C: SplitCost>(node: &Sweep<C>, split: &Split, side_boxes: &[PackedAabb; 2]) -> bool {
     let counts = [split.left as usize, node.len() - split.left as usize];
@@ -89,9 +94,9 @@ fn stalls<C: SplitCost>(node: &Sweep<C>, split: &Split, side_boxes: &[PackedAabb
 }
 
 impl<C: SplitCost> Division<'_, C> {
-    /// Divides by `rule` into `tree` on one thread, reusing the memory of tree and workspace. O(n log n), but for costs of
-    /// splits that do not [limit](SplitCost::most_stalls) stalls: O(n²) if every split separates a single object. Clears the tree if
-    /// the watch ends the division.
+    /// Divides by `rule` into `tree` on one thread and reuses the memory of tree and workspace. O(n
+    /// log n); for split costs without a [limit](SplitCost::most_stalls) on stalls O(n²), if every
+    /// split separates a single object. Clears the tree if the watch cancels.
     pub fn on_one_thread<R: SplitRule>(
         &self,
         rule: &mut R,
@@ -104,8 +109,8 @@ impl<C: SplitCost> Division<'_, C> {
         self.finish(tree)
     }
 
-    /// As [`on_one_thread`](Self::on_one_thread), on the threads of the current rayon pool and with the same bytes. `rule` is copied
-    /// into every task.
+    /// Divides like [`on_one_thread`](Self::on_one_thread), on the threads of the current rayon
+    /// pool, with the same bytes. Every task gets a copy of `rule`.
     #[cfg(feature = "rayon")]
     pub fn on_all_threads<R: SplitRule + Copy + Send + Sync>(
         &self,
@@ -120,7 +125,7 @@ impl<C: SplitCost> Division<'_, C> {
         self.finish(tree)
     }
 
-    /// Clears a tree whose division has ended too early.
+    /// Clears the tree of a cancelled division.
     fn finish(&self, tree: &mut Bvh) -> Result<(), BuildError> {
         let finished = self.watch.ensure_wanted();
         if finished.is_err() {
@@ -131,7 +136,7 @@ impl<C: SplitCost> Division<'_, C> {
     }
 }
 
-/// Builds a task's subtree, parts of it in tasks of their own.
+/// Builds a task's subtree, parts of it in separate tasks.
 #[cfg(feature = "rayon")]
 fn spawn<'s, C: SplitCost, R: SplitRule + Copy + Send + Sync + 's>(
     scope: &rayon::Scope<'s>,
@@ -140,7 +145,8 @@ fn spawn<'s, C: SplitCost, R: SplitRule + Copy + Send + Sync + 's>(
     mut task: Task<'s>,
     mut rule: R,
 ) {
-    // At most one set of buffers per thread is made. Buffers have no invariant, so a poisoned lock does no harm.
+    // The pool allocates at most one set of buffers per thread. Buffers have no invariant, so a
+    // poisoned lock does no harm.
     let pooled = || {
         scratches
             .lock()
@@ -149,7 +155,8 @@ fn spawn<'s, C: SplitCost, R: SplitRule + Copy + Send + Sync + 's>(
     let mut scratch = pooled().pop().unwrap_or_default();
     scratch.goes_left.resize(division.scene.len(), 0);
     let mut pace = Pace::new(division.watch);
-    // A loop rather than a recursion: one side goes to the pool and the other stays, however unbalanced the splits.
+    // A loop instead of a recursion: one side goes to the pool and the other stays, so unbalanced
+    // splits need no deep stack.
     while task.objects() >= PARALLEL_OBJECTS {
         if pace.ends_after(task.objects()) {
             return;
@@ -168,7 +175,8 @@ fn spawn<'s, C: SplitCost, R: SplitRule + Copy + Send + Sync + 's>(
     pooled().push(scratch);
 }
 
-/// Sizes all arrays, writes the root, and returns the root's task; `None` for a scene without objects.
+/// Resizes all arrays, writes the root, and returns the root's task; `None` for a scene without
+/// objects.
 fn prepare<'a>(
     scene: &Presorted,
     workspace: &'a mut Workspace,
@@ -240,13 +248,13 @@ fn split_task<'a, C: SplitCost, R: SplitRule>(
 }
 
 with_vector_instructions! {
-    /// [`build_plain`], with the vector instructions that the processor has.
+    /// Runs [`build_plain`] with the processor's vector instructions.
     build = build_plain<C: SplitCost, R: SplitRule>(
         division: &Division<'_, C>, task: Task<'_>, rule: &mut R, scratch: &mut Scratch)
 }
 
 with_vector_instructions! {
-    /// [`split_node`], with the vector instructions that the processor has.
+    /// Runs [`split_node`] with the processor's vector instructions.
     #[cfg(feature = "rayon")]
     split_node_fast = split_node<C: SplitCost, R: SplitRule>(
         division: &Division<'_, C>, orders: [&mut [u32]; 3], known: Known, rule: &mut R, scratch: &mut Scratch)
@@ -274,9 +282,10 @@ fn build_plain<C: SplitCost, R: SplitRule>(
         }
         let range = start as usize..(start + len) as usize;
         if len == 2 {
-            for (at, &object) in x[range].iter().enumerate() {
+            for (index, &object) in x[range].iter().enumerate() {
                 let aabb = (&division.scene.boxes[object as usize]).into();
-                nodes[below as usize + at] = Node::leaf(aabb, objects_at + start + at as u32, 1);
+                nodes[below as usize + index] =
+                    Node::leaf(aabb, objects_at + start + index as u32, 1);
             }
             continue;
         }
@@ -292,9 +301,9 @@ fn build_plain<C: SplitCost, R: SplitRule>(
                 known: known[1],
             },
         ];
-        for (at, side) in sides.into_iter().enumerate().rev() {
+        for (index, side) in sides.into_iter().enumerate().rev() {
             let aabb = (&side.known.aabb).into();
-            nodes[below as usize + at] = if side.len == 1 {
+            nodes[below as usize + index] = if side.len == 1 {
                 Node::leaf(aabb, objects_at + side.start, 1)
             } else {
                 stack.push(side);
@@ -305,8 +314,8 @@ fn build_plain<C: SplitCost, R: SplitRule>(
     scratch.stack = stack;
 }
 
-/// Lets the rule split a node of two or more objects and partitions its orders. Returns the number of objects on the
-/// left and the facts about both sides.
+/// Lets the rule split a node of two or more objects and partitions its orders. Returns the number
+/// of objects on the left and the facts about both sides.
 #[inline(always)]
 fn split_node<C: SplitCost, R: SplitRule>(
     division: &Division<'_, C>,
@@ -361,7 +370,8 @@ fn split_node<C: SplitCost, R: SplitRule>(
     (left, known)
 }
 
-/// Moves the objects that go left to the front and keeps the order on both sides, without branches.
+/// Moves the objects that go left to the front and keeps the order on both sides. It has no
+/// branches, because the side of an object is unpredictable.
 #[inline(always)]
 fn partition(order: &mut [u32], goes_right: &mut Vec<u32>, goes_left: &[u8]) {
     if goes_right.len() < order.len() {
@@ -370,8 +380,8 @@ fn partition(order: &mut [u32], goes_right: &mut Vec<u32>, goes_left: &[u8]) {
     let goes_right = &mut goes_right[..order.len()];
     let mut left = 0;
     let mut right = 0;
-    for at in 0..order.len() {
-        let object = order[at];
+    for index in 0..order.len() {
+        let object = order[index];
         let side = usize::from(goes_left[object as usize]);
         order[left] = object;
         goes_right[right] = object;

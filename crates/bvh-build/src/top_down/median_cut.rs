@@ -1,9 +1,10 @@
 //! Median cut: halves the objects of a node at the median of their box centres.
 //!
-//! Kay & Kajiya 1986, 'Ray tracing complex scenes', alternate the axes; Chang's CSS 552 report splits the longest
-//! axis of the node's box and stops at 10 % of all objects.
+//! Kay & Kajiya 1986, 'Ray tracing complex scenes', alternate the axes; Chang's CSS 552 report
+//! splits the longest axis of the node's box and stops at 10 % of all objects.
 //!
-//! Differs from the sources: an odd object goes to the left half; equal centres are ordered by index.
+//! Differs from the sources: an odd object goes to the left half; equal centres are ordered by
+//! index.
 
 use crate::error::check_scene;
 use crate::watch::Pace;
@@ -12,17 +13,17 @@ use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh, Node};
 
 bvh_config::config! {
-    /// How to cut.
+    /// The axis of cuts, and the size of leaves.
     pub struct Config {
-        /// Which axis a node is cut along.
+        /// The axis along which a node is cut.
         axis: CutAxis = CutAxis::Alternating;
-        /// A node with at most this fraction of all objects is a leaf. A leaf may always hold one object: with 0, each
-        /// holds exactly one.
+        /// A node with at most this fraction of all objects is a leaf. With 0, every leaf holds
+        /// exactly one object.
         leaf_fraction: f64 = 0.0, in 0.0..=1.0;
     }
 }
 
-/// Which axis a node is cut along.
+/// The axis along which a node is cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -45,7 +46,7 @@ struct Frame {
 }
 
 impl Builder for Config {
-    /// O(n log n); depth at most ⌈log₂ n⌉.
+    /// Builds a tree of depth at most ⌈log₂ n⌉ in O(n log n).
     fn build_watched(
         &self,
         boxes: &[Aabb],
@@ -109,9 +110,9 @@ mod tests {
 
     /// Unit cubes at x = 0, 2, 4, … and y = 0, 100, 0, 100, …
     fn zigzag(n: usize) -> Vec<Aabb> {
-        let at = |i: usize| [2.0 * i as f32, 100.0 * (i % 2) as f32, 0.0];
+        let low = |i: usize| [2.0 * i as f32, 100.0 * (i % 2) as f32, 0.0];
         (0..n)
-            .map(|i| Aabb::from((at(i), at(i).map(|c| c + 1.0))))
+            .map(|i| Aabb::from((low(i), low(i).map(|c| c + 1.0))))
             .collect()
     }
 

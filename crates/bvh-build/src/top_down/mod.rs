@@ -1,4 +1,5 @@
-//! Top-down division: scenes sorted along every axis, the candidate splits of a node, and builders that choose among them.
+//! Top-down division: scenes sorted along every axis, the candidate splits of a node, and builders
+//! that choose among them.
 
 mod divide;
 pub mod median_cut;

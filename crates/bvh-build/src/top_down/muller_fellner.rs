@@ -1,11 +1,11 @@
 //! Müller–Fellner: top-down object division by the best of all splits along all three axes.
 //!
-//! Müller & Fellner 1999, 'Hybrid scene structuring with application to ray tracing', as described by Ng &
-//! Trifonov 2003, sections 3.1 and 3.2.
+//! Müller & Fellner 1999, 'Hybrid scene structuring with application to ray tracing', as described
+//! by Ng & Trifonov 2003, sections 3.1 and 3.2.
 //!
-//! Differs from the paper: nodes are divided down to single objects, as by Ng & Trifonov, not to a cost threshold.
-//! Scans are pruned without changing their result. Ties go to the more balanced split, then to the lower axis and
-//! position.
+//! Differs from the paper: nodes are divided down to single objects, as in Ng & Trifonov, not to a
+//! cost threshold. Scans are pruned without changing their result. Ties go to the more balanced
+//! split, then to the lower axis and position.
 
 use super::divide::{Division, Workspace};
 #[cfg(feature = "rayon")]
@@ -21,16 +21,18 @@ use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 
 bvh_config::config! {
-    /// How to divide.
+    /// The heuristic, and the shortcuts of a build.
     pub struct Config {
-        /// The cost of a split. The default is the original's.
+        /// The cost of a split. The default is the original heuristic.
         heuristic: Heuristic = Heuristic::AreaTimesCount, in Itself;
-        /// Whether axes that order a node's objects identically are scanned once. Greedy trees stay the
-        /// same; candidate lists of GRASP lose their duplicates, which may change its trees.
+        /// True if axes that order a node's objects identically are scanned once. Greedy trees stay
+        /// the same; candidate lists of GRASP lose their duplicates, which may change its trees.
         skip_same_order: bool = true;
-        /// Whether an axis along which the objects came in order is not sorted again. Changes no tree.
+        /// True if objects that are already in order along an axis are not sorted along it. Changes
+        /// no tree.
         skip_sorted: bool = true;
-        /// Whether a scene without area, all on one line along an axis, is divided along x alone. Changes no tree.
+        /// True if a scene without area, all on one line along an axis, is divided only along x.
+        /// Changes no tree.
         skip_flat: bool = true;
     }
 }
@@ -49,14 +51,15 @@ pub enum Heuristic {
     AreaTimesCount,
     /// S(L)·|L|^p + S(R)·|R|^p, 0 ≤ p ≤ 1.
     AreaTimesPower(f64),
-    /// Areas alone: the heuristic of Table 2, in one of its readings.
+    /// Only areas: the heuristic of Table 2, in one of its readings.
     AreaOnly(AreaOnly),
-    /// S(L)·ΣC_obj(L) + S(R)·ΣC_obj(R) with made-up costs, to see what costs of objects change. Costs that are known are
-    /// given to [`Config::build_weighted`].
+    /// S(L)·ΣC_obj(L) + S(R)·ΣC_obj(R) with made-up costs, to measure the effect of object costs.
+    /// Pass known costs to [`Config::build_weighted`].
     AreaTimesCost(MadeUpCosts),
 }
 
-/// Costs C_obj for scenes whose objects have none of their own: one object in so many is dearer than the others.
+/// Costs C_obj for scenes whose objects have no known costs: one object in `every` is more
+/// expensive than the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -65,9 +68,9 @@ pub enum Heuristic {
 )]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MadeUpCosts {
-    /// The objects 0, `every`, 2 · `every` and so on are dear, `every` ≥ 1.
+    /// The objects 0, `every`, 2 · `every` and so on are expensive, `every` ≥ 1.
     pub every: u32,
-    /// What they cost, 0 to 10⁶; the others cost 1.
+    /// The cost of the expensive objects, 0 to 10⁶; the others cost 1.
     pub cost: f64,
 }
 
@@ -103,7 +106,7 @@ impl Builder for Config {
         measure: Option<&dyn Measure>,
         watch: &Watch,
     ) -> Result<Bvh, BuildError> {
-        // Every tree over a scene without area has the same area, but not the same measure.
+        // All trees over a scene without area have the same area, but measures may differ.
         let scene =
             Presorted::sort(boxes, self.skip_sorted, self.skip_flat && measure.is_none(), watch)?;
         self.check()?;
@@ -114,7 +117,7 @@ impl Builder for Config {
     }
 }
 
-/// A division that waits for its split cost.
+/// A division that is ready except for its split cost.
 trait Divide {
     fn by<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError>;
 }
@@ -135,7 +138,7 @@ impl Divide for Greedy<'_> {
     }
 }
 
-/// As [`Config::construct`] is called.
+/// The arguments of [`Config::construct`].
 struct ByRule<'a, R> {
     scene: &'a Presorted,
     rule: &'a mut R,
@@ -152,7 +155,7 @@ impl<R: SplitRule> Divide for ByRule<'_, R> {
     }
 }
 
-/// Divides by this split cost, of a measure if there is one.
+/// Divides by this split cost, with the measure if there is one.
 fn by_cost(
     cost: &impl SplitCost,
     measure: Option<&dyn Measure>,
@@ -165,8 +168,8 @@ fn by_cost(
 }
 
 impl Config {
-    /// Builds with `weights[i]` as the expected cost C_obj of intersecting object `i`, in any unit, finite and not
-    /// negative. The configured heuristic is not used.
+    /// Builds with `weights[i]` as the expected cost C_obj of intersecting object `i`, in any unit,
+    /// finite and not negative. The configured heuristic is not used.
     pub fn build_weighted(&self, boxes: &[Aabb], weights: &[f32]) -> Result<Bvh, BuildError> {
         let watch = &Watch::default();
         let scene = &Presorted::sort(boxes, self.skip_sorted, self.skip_flat, watch)?;
@@ -186,8 +189,9 @@ impl Config {
         Ok(tree)
     }
 
-    /// Divides by any rule, such as a randomised one, on one thread, by half area or by a measure, unless the `watch` ends it. Reuses
-    /// the memory of `workspace` and `tree`. The heuristic's parameter must be [in range](Check).
+    /// Divides by any rule, for example a randomised one, on one thread, by half area or by a
+    /// measure, unless the `watch` cancels. Reuses the memory of `workspace` and `tree`. The
+    /// heuristic's parameter must be [in range](Check).
     pub fn construct(
         &self,
         scene: &Presorted,
@@ -220,7 +224,7 @@ impl Config {
     }
 }
 
-/// Divides by the best splits, on as many threads as pay.
+/// Divides by the best splits, on all threads if the scene is large enough.
 fn greedy<C: SplitCost>(division: &Division<C>, tree: &mut Bvh) -> Result<(), BuildError> {
     let workspace = &mut Workspace::default();
     #[cfg(feature = "rayon")]

@@ -4,8 +4,8 @@ use crate::error::check_scene;
 use crate::{BuildError, OBJECTS_PER_POLL, Watch};
 use bvh_core::{Aabb, PackedAabb};
 
-/// Number of objects from which on sorting and division run in parallel: large enough that the start of a task takes a
-/// negligible part of its time.
+/// Least number of objects that are sorted and divided in parallel. It is large enough that the
+/// start of a task takes a negligible part of its time.
 pub const PARALLEL_OBJECTS: usize = 4096;
 
 /// A scene's objects, sorted along every axis: the input of any number of top-down builds.
@@ -15,26 +15,29 @@ pub struct Presorted {
     pub(super) boxes: Vec<PackedAabb>,
     /// Per axis, the objects by increasing box centre, equal centres by index.
     pub(super) orders: [Vec<u32>; 3],
-    /// Per axis, whether the objects already came in order.
+    /// Per axis, true if the objects were already in order.
     in_order: [bool; 3],
 }
 
 impl Presorted {
-    /// Checks and sorts. O(n): a radix sort of f64 centres, which are exact where an f32 centre would round.
+    /// Checks and sorts the objects, by a radix sort of f64 centres, which are exact where f32
+    /// centres would be rounded. O(n).
     ///
-    /// Source: Ng & Trifonov 2003, Table 1, step 1: 'sort boxes along all three axes', by *box* centre.
+    /// Source: Ng & Trifonov 2003, Table 1, step 1: 'sort boxes along all three axes', by *box*
+    /// centre.
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
         Self::watched(boxes, &Watch::default())
     }
 
-    /// As [`new`](Self::new), unless the `watch` ends it: it is asked before every axis.
+    /// Sorts like [`new`](Self::new), unless the `watch` cancels. Polls before every axis.
     pub fn watched(boxes: &[Aabb], watch: &Watch) -> Result<Self, BuildError> {
         Self::sort(boxes, true, false, watch)
     }
 
-    /// As [`new`](Self::new). Without `skip_sorted`, objects that already came in order are sorted, too. With
-    /// `x_without_area`, a scene without area is sorted along x alone and has that order along all axes: every candidate
-    /// split of its nodes costs nothing, and of those a greedy build takes the halves along the lowest axis.
+    /// Sorts like [`new`](Self::new). Without `skip_sorted`, objects that are already in order are
+    /// sorted, too. With `x_without_area`, a scene without area is sorted only along x and has that
+    /// order along all axes: every candidate split of its nodes costs nothing, so a greedy build
+    /// halves them along the lowest axis.
     pub(crate) fn sort(
         boxes: &[Aabb],
         skip_sorted: bool,
@@ -51,7 +54,7 @@ impl Presorted {
                 .zip(0..)
                 .map(|(b, index)| (b.doubled_centroid()[axis], index))
                 .collect();
-            // Most unsorted scenes are found to be so within a few objects.
+            // The check ends at the first pair out of order, usually within a few objects.
             let in_order = keyed.is_sorted_by_key(|&(key, _)| key);
             if !(in_order && skip_sorted) {
                 radsort::sort_by_key(&mut keyed, |&(key, _)| key);
@@ -78,7 +81,8 @@ impl Presorted {
         Ok(Self { boxes: boxes.iter().map(PackedAabb::from).collect(), orders, in_order })
     }
 
-    /// Whether the box around all objects has no area, so that every tree costs nothing; true without boxes. O(n).
+    /// Returns whether the box around all objects has no area, so that every tree costs nothing;
+    /// true without boxes. O(n).
     pub fn without_area(boxes: &[Aabb]) -> bool {
         boxes
             .iter()
@@ -87,13 +91,14 @@ impl Presorted {
             == 0.0
     }
 
-    /// Per axis, whether the objects came in order and needed no sorting, as along an axis on which all box centres
-    /// coincide.
+    /// Returns, per axis, whether the objects were already in order, for example because all box
+    /// centres coincide along the axis.
     pub fn in_order(&self) -> [bool; 3] {
         self.in_order
     }
 
-    /// Per axis, the lowest axis that orders all objects identically, usually itself. O(n).
+    /// Returns, per axis, the lowest axis that orders all objects identically, usually the same
+    /// axis. O(n).
     pub fn same_orders(&self) -> [u8; 3] {
         let orders = self.orders.each_ref().map(Vec::as_slice);
         let mut same_as = [0, 1, 2];
@@ -101,18 +106,19 @@ impl Presorted {
         same_as
     }
 
-    /// Number of objects.
+    /// Returns the number of objects.
     pub fn len(&self) -> usize {
         self.boxes.len()
     }
 
-    /// Whether there are no objects.
+    /// Returns whether there are no objects.
     pub fn is_empty(&self) -> bool {
         self.boxes.is_empty()
     }
 }
 
-/// The results for all three axes, on several threads if there are so many `objects` that they pay.
+/// Returns the results for all three axes, computed on several threads if the number of `objects`
+/// makes that pay.
 pub(super) fn in_parallel<T: Send>(
     objects: usize,
     x: impl FnOnce() -> T + Send,
@@ -129,7 +135,8 @@ pub(super) fn in_parallel<T: Send>(
     [x(), y(), z()]
 }
 
-/// Finds axes that order a node's objects identically, given those of its parent. They do so in the whole subtree.
+/// Finds axes that order a node's objects identically, given those of its parent. They order the
+/// objects of all descendants identically, too.
 ///
 /// Source: Ng & Trifonov 2003, section 3.2.
 #[inline(always)]
@@ -156,8 +163,10 @@ mod tests {
 
     #[test]
     fn equal_centres_are_ordered_by_index_and_signed_zeros_are_equal() {
-        let at = |x: f32| Aabb::from(([x, 0.0, 0.0], [x, 0.0, 0.0]));
-        let sorted = Presorted::new(&[at(1.0), at(0.0), at(-0.0), at(-1.0), at(0.0)]).unwrap();
+        let point = |x: f32| Aabb::from(([x, 0.0, 0.0], [x, 0.0, 0.0]));
+        let sorted =
+            Presorted::new(&[point(1.0), point(0.0), point(-0.0), point(-1.0), point(0.0)])
+                .unwrap();
         assert_eq!(sorted.orders[0], [3, 1, 2, 4, 0]);
         assert_eq!(sorted.orders[1], [0, 1, 2, 3, 4]);
     }

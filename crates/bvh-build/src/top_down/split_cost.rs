@@ -1,47 +1,52 @@
-//! The cost of a split: the Müller–Fellner estimate, its weighted forms, and the alternatives of Table 2.
+//! The cost of a split: the Müller–Fellner estimate, its weighted forms, and the alternatives of
+//! Table 2.
 //!
-//! A split's cost depends on its two sides alone. The division by the parent's area and the factor 2 of a surface
-//! drop out (Ng & Trifonov 2003, section 3.2).
+//! A split's cost depends on its two sides alone. The division by the parent's area and the factor
+//! 2 of a surface drop out (Ng & Trifonov 2003, section 3.2).
 
 use bvh_core::PackedAabb;
 use bvh_core::cost::Measure;
 
-/// The cost of a node's splits, from the size and the *load* of either side. The load is a sum over a side's objects: of
-/// ones, or of weights.
+/// The cost of a node's splits, from the size and the *load* of either side. The load of a side is
+/// the number of its objects, or the sum of their weights.
 ///
-/// A side's value must not shrink as objects are added to it, nor may [`join`](Self::join) or [`bound`](Self::bound)
-/// as values grow. Scans rely on this to prune without changing a result.
+/// A side's value must not shrink when it gains objects, and [`join`](Self::join) and
+/// [`bound`](Self::bound) must not shrink when values grow. Scans rely on this to prune without
+/// changing a result.
 pub trait SplitCost: Sync {
-    /// The load of one object. Default 1.
+    /// Returns the load of one object. Default: 1.
     #[inline(always)]
     fn load(&self, _object: u32) -> f64 {
         1.0
     }
-    /// The load of several objects. Default: their number.
+    /// Returns the load of several objects. Default: their number.
     #[inline(always)]
     fn total_load(&self, objects: &[u32]) -> f64 {
         objects.len() as f64
     }
-    /// The size of a box that is not empty, no smaller than that of any box inside it. Default its half area.
+    /// Returns the size of a box that is not empty, no smaller than the size of any box inside it.
+    /// Default: the half area.
     #[inline(always)]
     fn size(&self, aabb: &PackedAabb) -> f64 {
         aabb.half_area()
     }
-    /// The value of a side with this size and load: finite and not negative.
+    /// Returns the value of a side with this size and load: finite and not negative.
     fn side(&self, area: f64, load: f64) -> f64;
-    /// The cost of a split, from the values of its sides; symmetric.
+    /// Returns the cost of a split, a symmetric function of the values of its sides.
     #[inline(always)]
     fn join(&self, left: f64, right: f64) -> f64 {
         left + right
     }
-    /// The number of splits between the root and a node that may stall, which is to separate a few objects from almost all others in a
-    /// box almost as large. After so many, every split that would stall is replaced by a balanced one of least size times load. Default
-    /// 64, more than scenes with a few objects as large as the scene need; `None` is no limit.
+    /// Returns the maximum number of splits between the root and a node that may stall: separate a
+    /// few objects from almost all others, in a box almost as large. Beyond the limit, a balanced
+    /// split of least size times load replaces every split that would stall. Default: 64, more than
+    /// scenes with a few objects as large as the scene need. `None` is no limit.
     #[inline(always)]
     fn most_stalls(&self) -> Option<u8> {
         Some(64)
     }
-    /// A lower bound on the cost of all splits whose sides have at least these values. Default: [`join`](Self::join).
+    /// Returns a lower bound of the cost of all splits whose sides have at least these values.
+    /// Default: [`join`](Self::join).
     #[inline(always)]
     fn bound(&self, left: f64, right: f64) -> f64 {
         self.join(left, right)
@@ -85,16 +90,16 @@ impl SplitCost for AreaTimesWeight<'_> {
     }
 }
 
-/// S(L)·|L|^p + S(R)·|R|^p. A p slightly below 1 often gives a better tree, because the number of objects overstates
-/// the cost of a side that will itself be divided.
+/// S(L)·|L|^p + S(R)·|R|^p. A p slightly below 1 often gives a better tree, because the number of
+/// objects overstates the cost of a side that will be divided further.
 ///
-/// Differs from the paper: p = 1 there.
+/// Differs from the paper: the paper has p = 1.
 #[derive(Clone, Debug)]
 pub struct AreaTimesPower(Vec<f64>);
 
 impl AreaTimesPower {
-    /// A table of powers for up to `objects` objects, with `exponent` within 0..=1. They are computed in software, so
-    /// that they are the same on every machine.
+    /// Makes a table of powers for up to `objects` objects, with `exponent` within 0..=1. Software
+    /// computes the powers, so they are the same on every machine.
     pub fn new(objects: usize, exponent: f64) -> Self {
         Self(
             (0..=objects)
@@ -109,16 +114,16 @@ impl SplitCost for AreaTimesPower {
     fn side(&self, area: f64, load: f64) -> f64 {
         area * self.0[load as usize]
     }
-    /// 8: powers below 1 favour splits that separate single objects.
+    /// Returns 8: powers below 1 favour splits that separate single objects.
     #[inline(always)]
     fn most_stalls(&self) -> Option<u8> {
         Some(8)
     }
 }
 
-/// A heuristic that 'only considers the surface area of the subscene bounding volumes, ignoring the number of
-/// objects contained inside them' (Ng & Trifonov 2003, section 3.3 and Table 2). The paper gives no formula;
-/// these are the readings we know of.
+/// A heuristic that 'only considers the surface area of the subscene bounding volumes, ignoring the
+/// number of objects contained inside them' (Ng & Trifonov 2003, section 3.3 and Table 2). The
+/// paper gives no formula; these are the known readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -129,7 +134,8 @@ impl SplitCost for AreaTimesPower {
 pub enum AreaOnly {
     /// S(L) + S(R), the literal reading.
     Sum,
-    /// S(L) + S(R), where a side of one object counts 0: the objective, which leaves out leaves, applied directly.
+    /// S(L) + S(R), where a side of one object counts 0: the direct use of the objective, which
+    /// skips leaves.
     InnerSum,
     /// max(S(L), S(R)).
     Max,
@@ -159,19 +165,19 @@ impl SplitCost for AreaOnly {
             Self::Product => left * right,
         }
     }
-    /// No limit: to leave out the numbers of objects is what these are about.
+    /// Returns no limit: these heuristics ignore the numbers of objects by definition.
     #[inline(always)]
     fn most_stalls(&self) -> Option<u8> {
         None
     }
     #[inline(always)]
     fn bound(&self, left: f64, right: f64) -> f64 {
-        // Only the difference may shrink as a side grows.
+        // Only the difference may shrink when a side grows.
         if *self == Self::Difference { 0.0 } else { self.join(left, right) }
     }
 }
 
-/// Size times load, whatever the power, with the sizes and loads of another cost.
+/// Size times load, with the sizes and loads of another cost.
 pub(super) struct Linear<'a, C>(pub &'a C);
 
 impl<C: SplitCost> SplitCost for Linear<'_, C> {
@@ -193,7 +199,8 @@ impl<C: SplitCost> SplitCost for Linear<'_, C> {
     }
 }
 
-/// Any of these with a measure in place of the half area. Not generic: the measure takes longer than the calls.
+/// Any split cost with a measure instead of the half area. It is not generic, because the measure
+/// takes longer than the virtual calls.
 #[derive(Clone, Copy)]
 pub(super) struct ByMeasure<'a> {
     pub cost: &'a dyn SplitCost,

@@ -1,4 +1,5 @@
-//! The candidate splits of one node: every position along every axis, valued by two scans per axis.
+//! The candidate splits of one node: every position along every axis, evaluated by two scans per
+//! axis.
 
 use super::split_cost::{Linear, SplitCost};
 use bvh_core::PackedAabb;
@@ -7,7 +8,7 @@ use std::cmp::Ordering;
 /// A candidate: the first `left` objects in the order of `axis` against the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Split {
-    /// By the build's [`SplitCost`]; lower is better.
+    /// The cost by the build's [`SplitCost`]; lower is better.
     pub cost: f64,
     /// 0, 1 or 2.
     pub axis: u8,
@@ -20,8 +21,9 @@ pub struct Split {
 impl Split {
     const NONE: Self = Self { cost: f64::INFINITY, axis: u8::MAX, left: 0, imbalance: u32::MAX };
 
-    /// Cheaper first; of equal cost the more balanced, then the lower axis, then the lower position. The order is total,
-    /// so that ties do not depend on the order in which candidates are met, and input without area is halved.
+    /// Orders candidates by cost, then by balance, then by axis, then by position. The order is
+    /// total, so the result does not depend on the order of the scan, and input without area is
+    /// halved.
     #[inline]
     fn rank(&self, other: &Self) -> Ordering {
         self.cost.total_cmp(&other.cost).then_with(|| {
@@ -30,14 +32,14 @@ impl Split {
     }
 }
 
-/// The choice among a node's candidates. It is asked for once per node of three or more objects, for parents before
-/// their children and for a left subtree before the right one.
+/// The choice among a node's candidates. The division calls it once per node of three or more
+/// objects, for parents before their children and for a left subtree before the right one.
 pub trait SplitRule {
-    /// Picks a split of the node, one that a method of `node` returned.
+    /// Chooses a split of the node, one that a method of `node` returned.
     fn choose<C: SplitCost>(&mut self, node: &mut Sweep<'_, C>) -> Split;
 }
 
-/// The deterministic rule of Müller & Fellner: takes the best candidate.
+/// The deterministic rule of Müller & Fellner: the best candidate.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TakeBest;
 
@@ -48,10 +50,11 @@ impl SplitRule for TakeBest {
     }
 }
 
-/// Objects per block of a scan; nodes of up to twice as many form one block. Blocks of 8 and of 32 were slower.
+/// Objects per block of a scan; nodes with up to twice this number form one block. Blocks of 8 and
+/// of 32 were slower.
 const BLOCK: usize = 16;
 
-/// In a balanced split, either side has at least one in this many objects.
+/// In a balanced split, either side has at least one in `BALANCED` objects.
 const BALANCED: u32 = 8;
 
 /// The surroundings of one block of consecutive objects in a node's order.
@@ -61,7 +64,7 @@ pub(super) struct Block {
     left: PackedAabb,
     left_load: f64,
     left_value: f64,
-    /// Likewise of all objects after the block, as a right side.
+    /// The box of all objects after the block, their load, and their value as a right side.
     right: PackedAabb,
     right_load: f64,
     right_value: f64,
@@ -84,7 +87,8 @@ pub struct Sweep<'a, C> {
     pub(super) boxes: &'a [PackedAabb],
     pub(super) split_cost: &'a C,
     pub(super) orders: [&'a [u32]; 3],
-    /// Per axis, the lowest axis known to order the node's objects identically, usually itself.
+    /// Per axis, the lowest axis known to order the node's objects identically, usually the same
+    /// axis.
     pub(super) same_as: [u8; 3],
     /// The node's box.
     pub(super) aabb: PackedAabb,
@@ -93,7 +97,7 @@ pub struct Sweep<'a, C> {
 }
 
 impl<C: SplitCost> Sweep<'_, C> {
-    /// The best candidate of all axes. O(n).
+    /// Returns the best candidate of all axes. O(n).
     #[inline(always)]
     pub fn best(&mut self) -> Split {
         let mut best = Split::NONE;
@@ -103,7 +107,8 @@ impl<C: SplitCost> Sweep<'_, C> {
         best
     }
 
-    /// The split with at least one in [`BALANCED`] objects on either side whose size times load is least. O(n).
+    /// Returns the balanced split, with at least one in [`BALANCED`] objects on either side, of
+    /// least size times load. O(n).
     #[inline(never)]
     pub(super) fn best_balanced(&mut self) -> Split {
         let split_cost = &Linear(self.split_cost);
@@ -123,7 +128,7 @@ impl<C: SplitCost> Sweep<'_, C> {
         best
     }
 
-    /// The best candidate of one axis. O(n).
+    /// Returns the best candidate of one axis. O(n).
     #[inline(always)]
     pub fn axis_best(&mut self, axis: u8) -> Split {
         self.improve(self.same_as[axis as usize], Split::NONE)
@@ -135,14 +140,14 @@ impl<C: SplitCost> Sweep<'_, C> {
         list.clear();
         for axis in 0..3 {
             let same = self.same_as[axis as usize];
-            // An axis with the order of a lower one has the same best.
+            // An axis with the order of a lower axis has the same best candidate.
             let best = if same == axis { self.axis_best(axis) } else { list[same as usize] };
             list.push(best);
         }
         list.sort_unstable_by(Split::rank);
     }
 
-    /// Replaces `best` by the best candidate of `axis` if that ranks before it.
+    /// Returns the better of `best` and the best candidate of `axis`.
     #[inline(always)]
     fn improve(&mut self, axis: u8, mut best: Split) -> Split {
         self.scan::<true>(axis, best.cost, |candidate| {
@@ -154,8 +159,8 @@ impl<C: SplitCost> Sweep<'_, C> {
         best
     }
 
-    /// Fills `list` with the `k` best candidates of all axes, best first, or with all if there are fewer. Expected O(n)
-    /// for small `k`, O(n·k) at worst.
+    /// Fills `list` with the `k` best candidates of all axes, best first, or with all if there are
+    /// fewer. Expected O(n) for small `k`, O(n·k) at worst.
     #[inline(always)]
     pub fn k_best(&mut self, k: usize, list: &mut Vec<Split>) {
         list.clear();
@@ -163,11 +168,11 @@ impl<C: SplitCost> Sweep<'_, C> {
         for axis in self.distinct_axes() {
             self.scan::<false>(axis, bound(list), |candidate| {
                 if candidate.cost <= bound(list) {
-                    let mut at = list.len();
-                    while at > 0 && candidate.rank(&list[at - 1]).is_lt() {
-                        at -= 1;
+                    let mut index = list.len();
+                    while index > 0 && candidate.rank(&list[index - 1]).is_lt() {
+                        index -= 1;
                     }
-                    list.insert(at, candidate);
+                    list.insert(index, candidate);
                     list.truncate(k);
                 }
                 bound(list)
@@ -175,8 +180,8 @@ impl<C: SplitCost> Sweep<'_, C> {
         }
     }
 
-    /// Fills `list` with the best candidate and all others that cost less than (1 + `alpha`) times as much, best first.
-    /// O(n log n) at worst.
+    /// Fills `list` with the best candidate and all others that cost less than (1 + `alpha`) times
+    /// as much, best first. O(n log n) at worst.
     #[inline(always)]
     pub fn within(&mut self, alpha: f64, list: &mut Vec<Split>) {
         list.clear();
@@ -196,29 +201,32 @@ impl<C: SplitCost> Sweep<'_, C> {
         list.sort_unstable_by(Split::rank);
     }
 
-    /// Number of objects in the node.
+    /// Returns the number of objects in the node.
     #[inline(always)]
     #[allow(clippy::len_without_is_empty)] // never empty
     pub fn len(&self) -> usize {
         self.orders[0].len()
     }
 
-    /// The axes to scan. Identical orders have identical candidates, of which ties prefer the lower axis's.
+    /// Returns the axes to scan. Identical orders have identical candidates, and ties prefer the
+    /// lower axis.
     #[inline(always)]
     fn distinct_axes(&self) -> impl Iterator<Item = u8> + use<C> {
         let same_as = self.same_as;
         (0..3).filter(move |&axis| same_as[axis as usize] == axis)
     }
 
-    /// Calls `visit` once for every candidate of `axis` that costs at most `bound`, and for some others, in any order.
-    /// `visit` returns the bound that holds from then on. With `BEST`, a candidate may be skipped if a cheaper one is
-    /// shown later.
+    /// Calls `visit` once for every candidate of `axis` that costs at most `bound`, and for some
+    /// others, in any order. `visit` returns the new bound. With `BEST`, the scan may skip a
+    /// candidate if it visits a cheaper one later.
     ///
-    /// Objects are taken in blocks. One pass gathers each block's box, and scans over the blocks from both ends value
-    /// the candidates between blocks. A side's value only grows as it gains objects, so the left side at a block's
-    /// start and the right side at its end bound the cost of every candidate inside; most blocks need no closer look.
+    /// The scan processes objects in blocks. One pass gathers each block's box, and scans over the
+    /// blocks from both ends evaluate the candidates between blocks. A side's value only grows as
+    /// it gains objects, so the left side at a block's start and the right side at its end bound
+    /// the cost of every candidate inside. Most blocks need no further examination.
     ///
-    /// Source: Ng & Trifonov 2003, section 3.2. Differs from the paper: the blocks, which change no result.
+    /// Source: Ng & Trifonov 2003, section 3.2. Differs from the paper: the blocks, which change no
+    /// result.
     #[inline(always)]
     fn scan<const BEST: bool>(
         &mut self,
@@ -237,18 +245,18 @@ impl<C: SplitCost> Sweep<'_, C> {
         };
 
         if boxes[order[0] as usize] == self.aabb && boxes[order[n - 1] as usize] == self.aabb {
-            // The first and the last object fill the node's box, so every side of every candidate has that box, and all
-            // candidates cost the same but for rounding. The node is halved.
+            // The first and the last object fill the node's box, so every side of every candidate
+            // has that box, and all candidates cost the same except for rounding. Halve the node.
             let area = split_cost.size(&self.aabb);
             let (left, right) = order.split_at(n / 2);
             let [left, right] =
                 [left, right].map(|side| split_cost.side(area, split_cost.total_load(side)));
-            // Blocks of another node must not be taken for this one's in `side_boxes`.
+            // `side_boxes` must not use the blocks of another node.
             self.blocks[axis as usize].clear();
             visit(candidate(split_cost.join(left, right), n / 2));
             return;
         }
-        // A small node is one block that nothing surrounds.
+        // A small node is a single block without surroundings.
         let (size, blocks) = if n <= 2 * BLOCK {
             (n, &[Block::NONE][..])
         } else {
@@ -282,7 +290,8 @@ impl<C: SplitCost> Sweep<'_, C> {
         }
     }
 
-    /// The boxes of both sides of a candidate that one of this sweep's methods returned. O(1) but for small nodes.
+    /// Returns the boxes of both sides of a candidate that a method of this sweep returned. O(1)
+    /// except for small nodes.
     #[inline(always)]
     pub(super) fn side_boxes(&self, split: &Split) -> [PackedAabb; 2] {
         let axis = split.axis as usize;
@@ -306,7 +315,7 @@ impl<C: SplitCost> Sweep<'_, C> {
     }
 }
 
-/// The surroundings of every block of `order`.
+/// Computes the surroundings of every block of `order`.
 #[inline(always)]
 fn gather_blocks<C: SplitCost>(
     boxes: &[PackedAabb],
@@ -315,7 +324,7 @@ fn gather_blocks<C: SplitCost>(
     blocks: &mut Vec<Block>,
 ) {
     blocks.clear();
-    // Each block's own box is kept where the box of all objects before it goes later.
+    // `left` first stores the block's box, and later the box of all objects before the block.
     blocks.extend(
         order
             .chunks(BLOCK)
@@ -344,8 +353,9 @@ fn gather_blocks<C: SplitCost>(
     }
 }
 
-/// Computes the costs of the candidates inside one block, `costs[i]` for i of the block's objects on the left,
-/// 1 ≤ i < objects, and returns the lowest. Has no branches, because a build spends most of its time in small nodes.
+/// Computes the costs of the candidates inside one block and returns the lowest: `costs[i]` for i
+/// of the block's objects on the left, 1 ≤ i < objects. It has no branches, because a build spends
+/// most of its time in small nodes, where they are unpredictable.
 #[inline(always)]
 fn value_block<C: SplitCost>(
     boxes: &[PackedAabb],
@@ -376,7 +386,7 @@ fn value_block<C: SplitCost>(
     lowest
 }
 
-/// The box of several objects.
+/// Returns the box around several objects.
 #[inline(always)]
 pub(super) fn union_of(boxes: &[PackedAabb], objects: &[u32]) -> PackedAabb {
     let mut aabb = PackedAabb::EMPTY;

@@ -111,8 +111,8 @@ impl Plain {
         }
     }
 
-    /// Tries every stop of the path and keeps the cheapest tree. Of equal ones it keeps the first,
-    /// from the last inner node that contains the object downwards.
+    /// Tries every stop of the path and keeps the cheapest tree, the first among equal trees, from
+    /// the last inner node that contains the object downwards.
     fn insert(&self, config: &Config, boxes: &[Aabb], id: u32) -> Self {
         let mut node = self;
         let mut path = vec![];

@@ -98,7 +98,7 @@ impl CompressedNode {
     }
 }
 
-/// Returns the exponent of the smallest step of which 255 cover `extent`.
+/// Returns the exponent of the smallest step such that 255 steps cover `extent`.
 fn exponent(extent: f64) -> u8 {
     let rounded_down = libm::ilogb(extent / 255.0).saturating_add(127);
     let exponent = rounded_down.clamp(1, 253) as u8;
@@ -107,9 +107,9 @@ fn exponent(extent: f64) -> u8 {
 }
 
 impl CompressedBvh {
-    /// Compresses `tree`, which must be valid over `boxes`. Of all wide trees that result from
-    /// removing nodes of `tree`, this is the one with the least expected time for a random line.
-    /// Leaves of more than three objects are divided first. O(objects).
+    /// Compresses `tree`, which must be valid over `boxes`. The result has the least expected time
+    /// for a random line among all wide trees that can be made by removing nodes of `tree`. Leaves
+    /// of more than three objects are divided first. O(objects).
     pub fn new(tree: &Bvh, boxes: &[Aabb]) -> Result<Self, InvalidBvh> {
         validate(tree, boxes)?;
         let mut compressed = Self::default();
@@ -122,7 +122,7 @@ impl CompressedBvh {
         compressed
             .nodes
             .push(CompressedNode::around(&tree.nodes[0].aabb));
-        // The nodes of `tree` that the compressed nodes stand for, in the same order.
+        // The node of `tree` for each compressed node, in the same order.
         let mut subtrees = alloc::vec![0];
         let mut index = 0;
         while let Some(&subtree) = subtrees.get(index) {
@@ -242,6 +242,5 @@ fn slots(aabb: &Aabb, children: &[usize], tree: &Bvh) -> [Option<usize>; 8] {
 
 /// Returns the direction from a node's centre to the corner of a slot.
 fn direction(slot: usize) -> DVec3 {
-    let side = |bit: usize| if slot >> bit & 1 == 1 { 1.0 } else { -1.0 };
-    DVec3::new(side(2), side(1), side(0))
+    DVec3::from([2, 1, 0].map(|bit| if slot >> bit & 1 == 1 { 1.0 } else { -1.0 }))
 }

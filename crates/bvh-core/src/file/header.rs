@@ -32,7 +32,7 @@ pub struct Header {
     pub bounds: Aabb,
     /// The name of the method that built the tree.
     pub method: String,
-    /// Whether the file records how often rays visit each node; see
+    /// True if the file records how often rays visit each node; see
     /// [`TreeFile::visits`](super::TreeFile::visits).
     pub has_visits: bool,
 }
@@ -51,7 +51,7 @@ impl Header {
     const PLAIN: u32 = 2;
     /// The flag of a file of version 4 that has visits.
     const VISITS: u32 = 1;
-    /// A number that is stored in the byte order of the file and thereby identifies it.
+    /// A number whose stored bytes identify the byte order of the file.
     const ENDIANNESS: u32 = 0x0102_0304;
     /// The bytes of the root's box. They equal the box in the first node.
     pub(super) const BOUNDS: core::ops::Range<usize> = 80..104;
@@ -60,9 +60,10 @@ impl Header {
     /// The last field, the checksum of every other byte of the file.
     pub(super) const CHECKSUM: core::ops::Range<usize> = 188..192;
 
-    /// Returns the header of a file of `length` bytes, of which `beginning` holds at least the first [`BYTES`](Self::BYTES).
-    /// Rejects a file of another length than its header demands, so that nobody has to read it. Does not check the checksum,
-    /// which [`TreeFile::open`](super::TreeFile::open) does.
+    /// Returns the header of a file of `length` bytes. `beginning` holds at least the first
+    /// [`BYTES`](Self::BYTES) of them. Rejects a file whose length differs from the length that its
+    /// header requires, before the caller reads the rest. Does not verify the checksum;
+    /// [`TreeFile::open`](super::TreeFile::open) does.
     pub fn of_file(beginning: &[u8], length: u64) -> Result<Self, FileError> {
         let header = Self::decode(beginning)?;
         let expected = Self::BYTES as u64 + header.sections().iter().sum::<u64>();
@@ -73,7 +74,8 @@ impl Header {
         }
     }
 
-    /// Returns the bytes of the nodes, of the object ids, and of the visits. Counts are below 2^32, so nothing overflows.
+    /// Returns the lengths of the nodes, of the object ids and of the visits, in bytes. Counts are
+    /// below 2^32, so nothing overflows.
     pub(super) fn sections(&self) -> [u64; 3] {
         let nodes = self.nodes as u64;
         let references = self.references as u64;
@@ -139,8 +141,8 @@ impl Header {
 
     /// Reads all fields except the checksum.
     ///
-    /// Of several faults it reports the most informative one: first a wrong magic number, then the
-    /// byte order, then the version, then any other field.
+    /// If there are several faults, reports the most informative one: first a wrong magic number,
+    /// then the byte order, then the version, then any other field.
     pub(super) fn decode(bytes: &[u8]) -> Result<Self, FileError> {
         let mut fields = Fields(bytes);
         let magic: [u8; 8] = fields.take().ok_or(FileError::Magic)?;

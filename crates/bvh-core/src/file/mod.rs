@@ -224,7 +224,7 @@ pub struct TreeFile<'a> {
     nodes: &'a [u8],
     prim_ids: &'a [u8],
     visits: &'a [u8],
-    /// Whether the tree has passed the check of its structure, in place, while the checksum was
+    /// True if the tree has passed the check of its structure, in place, while the checksum was
     /// computed.
     is_sound: bool,
 }

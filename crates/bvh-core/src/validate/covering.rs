@@ -34,8 +34,8 @@ pub(super) fn is_covered(objects: &dyn Clip, object: u32, full: &Aabb, leaves: &
     true
 }
 
-/// Returns a face, as axis and coordinate, that cuts `part`. Of all boxes with such a face it takes
-/// the one that shares most with `part`, so that few cuts are needed.
+/// Returns a face, as axis and coordinate, that cuts `part`. Chooses the box that shares most with
+/// `part`, so that few cuts are needed.
 fn face_through(part: &Aabb, leaves: &[Aabb]) -> Option<(usize, f32)> {
     let mut best = None;
     let mut largest = -1.0;
@@ -76,7 +76,7 @@ mod tests {
     use crate::Triangle;
     use glam::Vec3;
 
-    /// The parts of the only object of `objects` in the two halves of `part`.
+    /// Returns the parts of the only object of `objects` in the two halves of `part`.
     fn halves_of_part(objects: &dyn Clip, part: &Aabb, axis: usize) -> [Aabb; 2] {
         let middle = 0.5 * (part.min[axis] + part.max[axis]);
         part.halves(axis, middle)

@@ -17,8 +17,8 @@ const NODES: usize = 32;
 /// A tree of the right size that is checked piece by piece.
 ///
 /// Every node and every object id refers to one slot. A slot is a pair of siblings, a position in
-/// `prim_ids`, or an object. There are as many slots as references. If every slot is marked at the
-/// end, each slot is referred to exactly once.
+/// `prim_ids`, or an object. The number of slots equals the number of references. If every slot is
+/// marked at the end, each slot is referred to exactly once.
 pub(crate) struct FastPath<'a> {
     tree: BvhView<'a>,
     /// One mark per slot: the pairs of siblings, then the positions in `prim_ids`, then the
@@ -197,7 +197,7 @@ struct Boxes {
     min: Vec4,
     /// The upper corner of the box around all boxes.
     max: Vec4,
-    /// Whether no box is inverted or has a NaN.
+    /// True if no box is inverted or has a NaN.
     ordered: BVec4A,
 }
 

@@ -1,5 +1,5 @@
 //! Scenes, trees and rays for the tests of traversals.
-#![allow(dead_code)] // each test file uses some of it
+#![allow(dead_code)] // each test file uses a part of this module
 
 use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Shear, Triangle, nearest_hit_of_all};
 use glam::Vec3;
@@ -20,12 +20,12 @@ impl Random {
         (self.bits() % n as u64) as usize
     }
 
-    /// Uniform in 0..1.
+    /// Returns a uniform number in 0..1.
     pub fn unit(&mut self) -> f32 {
         (self.bits() >> 40) as f32 / (1u64 << 24) as f32
     }
 
-    /// Uniform in the cube from -1 to 1.
+    /// Returns a uniform point in the cube from -1 to 1.
     pub fn point(&mut self) -> Vec3 {
         Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
     }
@@ -35,8 +35,8 @@ impl Random {
     }
 }
 
-/// How a test tree is made: inner nodes of 2 to `arity` children, leaves of up to `leaf` objects; `sorted` splits by
-/// position and otherwise at random.
+/// The shape of a test tree: inner nodes have 2 to `arity` children, and leaves have up to `leaf`
+/// objects. `sorted` trees split by position, other trees at random.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
     pub arity: usize,
@@ -52,7 +52,7 @@ pub const SHAPES: [Shape; 5] = [
     Shape { arity: 40, leaf: 2, sorted: false },
 ];
 
-/// A tree over the boxes.
+/// Builds a tree over the boxes.
 pub fn tree(boxes: &[Aabb], shape: Shape, random: &mut Random) -> Bvh {
     let mut ids: Vec<u32> = (0..boxes.len() as u32).collect();
     let mut tree = Bvh::default();
@@ -96,7 +96,7 @@ pub fn tree(boxes: &[Aabb], shape: Shape, random: &mut Random) -> Bvh {
     tree
 }
 
-/// The deepest tree there is: every inner node has one leaf and the rest.
+/// Builds the deepest tree: every inner node has one leaf and the rest.
 pub fn chain(boxes: &[Aabb]) -> Bvh {
     let n = boxes.len() as u32;
     let mut nodes =
@@ -117,7 +117,7 @@ pub fn boxes(triangles: &[Triangle]) -> Vec<Aabb> {
     triangles.iter().map(Triangle::aabb).collect()
 }
 
-/// Small and large triangles, some of them degenerate, some twice.
+/// Returns small and large triangles, some of them degenerate, some twice.
 pub fn soup(n: usize, random: &mut Random) -> Vec<Triangle> {
     let mut triangles: Vec<Triangle> = Vec::new();
     for i in 0..n {
@@ -135,7 +135,8 @@ pub fn soup(n: usize, random: &mut Random) -> Vec<Triangle> {
     triangles
 }
 
-/// A cube of side 2 whose faces are grids of axis-parallel triangles: everything is in a face plane.
+/// Returns a cube of side 2 whose faces are grids of axis-parallel triangles: everything is in a
+/// face plane.
 pub fn grid_box(cells: usize) -> Vec<Triangle> {
     let at = |i: usize| i as f32 * 2.0 / cells as f32 - 1.0;
     let mut triangles = Vec::new();
@@ -157,7 +158,8 @@ pub fn grid_box(cells: usize) -> Vec<Triangle> {
     triangles
 }
 
-/// A sphere of radius 1, closed: an octahedron, each face divided into four `levels` times.
+/// Returns a closed sphere of radius 1: an octahedron whose faces are divided into four `levels`
+/// times.
 pub fn ball(levels: usize) -> Vec<Triangle> {
     let mut triangles = Vec::new();
     for x in [Vec3::X, -Vec3::X] {
@@ -170,7 +172,8 @@ pub fn ball(levels: usize) -> Vec<Triangle> {
     for _ in 0..levels {
         triangles = (triangles.iter())
             .flat_map(|&Triangle([a, b, c])| {
-                // The same sum whichever way an edge runs.
+                // The sum does not depend on the direction of the edge, so neighbours share the
+                // corner exactly.
                 let ab = (a + b).normalize();
                 let bc = (b + c).normalize();
                 let ca = (c + a).normalize();
@@ -188,8 +191,8 @@ pub fn scaled(triangles: &[Triangle], factor: f32) -> Vec<Triangle> {
         .collect()
 }
 
-/// Rays that look for trouble: axis-parallel with both zeros, in face planes, along edges, through vertices, edges and
-/// centres, from inside, from a corner, of short and of zero-length range.
+/// Returns difficult rays: axis-parallel with both zeros, in face planes, along edges, through
+/// vertices, edges and centres, from inside, from a corner, with short and with zero-length ranges.
 pub fn rays(triangles: &[Triangle], n: usize, random: &mut Random) -> Vec<Ray> {
     let bounds = boxes(triangles)
         .iter()
@@ -237,14 +240,14 @@ pub fn rays(triangles: &[Triangle], n: usize, random: &mut Random) -> Vec<Ray> {
     rays
 }
 
-/// The answer of testing every triangle.
+/// Returns the answer of testing every triangle.
 pub fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
     let shear = Shear::new(ray);
     let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
     nearest_hit_of_all(triangles.len() as u32, ray, test, &mut ())
 }
 
-/// An answer, to be compared bit by bit.
+/// Returns an answer as bits, for exact comparison.
 pub fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
     hit.map(|hit| (hit.t.to_bits(), hit.object))
 }

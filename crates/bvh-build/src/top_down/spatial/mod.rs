@@ -1,11 +1,14 @@
-//! Top-down division with spatial splits: an object that a plane cuts may go to both sides, each with its part of it.
+//! Top-down division with spatial splits: an object that a plane cuts may go to both sides, each
+//! with a part of it.
 //!
-//! Stich, Friedrich & Dietrich 2009, 'Spatial splits in bounding volume hierarchies', with its reference unsplitting.
+//! Stich, Friedrich & Dietrich 2009, 'Spatial splits in bounding volume hierarchies', with its
+//! reference unsplitting.
 //!
-//! Differs from the source: the node with the largest box is divided next, so that a limit on the number of references is
-//! spent where it saves most; nodes are divided down to single references; the cost of a side grows with |side|^0.9, which
-//! searches start from (see [`muller_fellner::Heuristic`](crate::muller_fellner::Heuristic)); every position between two
-//! objects is a candidate, not those of bins. Spatial splits have bins.
+//! Differs from the source: the node with the largest box is divided next, so the limited number of
+//! references is spent where it saves most. Nodes are divided down to single references. The cost
+//! of a side grows with |side|^0.9, like the start of searches (see
+//! [`muller_fellner::Heuristic`](crate::muller_fellner::Heuristic)). Every position between two
+//! objects is a candidate for object splits; only spatial splits use bins.
 
 mod object_split;
 mod plane;
@@ -19,28 +22,28 @@ use object_split::{Axis, Candidates};
 use std::collections::BinaryHeap;
 
 bvh_config::config! {
-    /// How many references, and where to look for spatial splits.
+    /// The number of references, and the search for spatial splits.
     pub struct Config {
-        /// Maximum number of references per object, 1 or more. With 1 nothing is split.
+        /// Maximum number of references per object, 1 or more. With 1, no object is divided.
         references: f64 = 1.2, in 1.0..=16.0;
-        /// Least area that the sides of the best object split have in common for a spatial split to be looked for, relative to the
-        /// root's box.
+        /// Least common area of the sides of the best object split, relative to the root's box, for
+        /// which spatial splits are tried.
         overlap: f64 = 1e-5, in 0.0..=1.0;
-        /// Bins along every axis, whose borders are the candidates of spatial splits.
+        /// Bins along every axis. Their borders are the candidates of spatial splits.
         bins: u32 = 32, in 2..=1024;
         /// The power of the number of references in the cost of a side.
         power: f64 = 0.9, in 0.0..=1.0;
     }
 }
 
-/// The part of an object in a leaf.
+/// A part of an object, for one leaf.
 #[derive(Clone, Copy, Debug)]
 struct Reference {
     aabb: Aabb,
     object: u32,
 }
 
-/// A node that is to be divided: the largest first, equal ones in the order in which they were made.
+/// A node to divide: the largest first, equal nodes in the order of their indices.
 #[derive(Debug)]
 struct Open {
     area: f64,
@@ -72,7 +75,7 @@ impl PartialEq for Open {
 
 impl Eq for Open {}
 
-/// Two sides of a node, and what they cost.
+/// The two sides of a node, and their cost.
 #[derive(Debug)]
 struct Sides {
     cost: f64,
@@ -81,7 +84,7 @@ struct Sides {
 }
 
 impl Sides {
-    /// Whether the split of a node of this size [stalls](is_stall).
+    /// Returns whether the split of a node of this size [stalls](is_stall).
     fn stall(&self, node_size: f64) -> bool {
         let counts = self.references.each_ref().map(Vec::len);
         let larger = usize::from(counts[1] > counts[0]);
@@ -90,16 +93,18 @@ impl Sides {
 }
 
 impl Config {
-    /// Builds a tree over `boxes`, one per object, whose objects may lie in several leaves. One reference per leaf;
-    /// [`validate_references`](bvh_core::validate_references) holds, and boxes are those of the parts. O(r log² r) time for
-    /// r references and balanced splits, beside the clipping.
+    /// Builds a tree over `boxes`, one per object. Objects may be in several leaves, and each leaf
+    /// has one reference. [`validate_references`](bvh_core::validate_references) accepts the tree,
+    /// and boxes are the boxes of the parts. O(r log² r) time for r references and balanced splits,
+    /// not counting the clipping.
     pub fn build(&self, boxes: &[Aabb], objects: &dyn Clip) -> Result<Bvh, BuildError> {
         self.check()?;
         let most = (self.references * boxes.len() as f64) as usize;
         self.build_at_most(most, boxes, objects)
     }
 
-    /// As [`build`](Self::build), with at most so many references, at least one per object.
+    /// Builds a tree like [`build`](Self::build), with at most `most` references, but at least one
+    /// per object.
     pub fn build_at_most(
         &self,
         most: usize,
@@ -109,7 +114,7 @@ impl Config {
         self.build_watched(most, boxes, objects, &Watch::default())
     }
 
-    /// As [`build_at_most`](Self::build_at_most), unless the `watch` ends it.
+    /// Builds a tree like [`build_at_most`](Self::build_at_most), unless the `watch` cancels.
     pub fn build_watched(
         &self,
         most: usize,
@@ -132,21 +137,21 @@ impl Config {
     }
 }
 
-/// A build at work.
+/// A build in progress.
 struct Build<'a> {
     config: &'a Config,
     objects: &'a dyn Clip,
-    /// References that may still be added.
+    /// Number of references that may be added.
     extra: usize,
     watch: &'a Watch<'a>,
-    /// Least common area for which a spatial split is looked for.
+    /// Least common area for which spatial splits are tried.
     least_overlap: f64,
-    /// |side|^power by |side|.
+    /// The powers |side|^power, indexed by |side|.
     powers: Vec<f64>,
     axes: [Axis; 3],
 }
 
-/// Stalls on the way to a node after which a split that would stall is replaced by a balanced one.
+/// Number of stalls above a node after which a balanced split replaces a split that would stall.
 const MOST_STALLS: u8 = 8;
 
 impl Build<'_> {
@@ -193,13 +198,13 @@ impl Build<'_> {
         Ok(tree)
     }
 
-    /// The cost of a side.
+    /// Returns the cost of a side.
     fn cost(&self, aabb: &Aabb, count: usize) -> f64 {
         aabb.half_area() * self.powers[count]
     }
 
-    /// Divides two references or more by the better of the best object split and the best spatial split, or in balance where the node
-    /// is below so many splits that have stalled. Fails if the watch ends the division.
+    /// Divides two references or more by the better of the best object split and the best spatial
+    /// split, or by a balanced split after [`MOST_STALLS`] stalls. Fails if the watch cancels.
     fn split(
         &mut self,
         aabb: &Aabb,
@@ -245,7 +250,7 @@ impl Build<'_> {
     }
 }
 
-/// The box around the references.
+/// Returns the box around the references.
 fn union(references: &[Reference]) -> Aabb {
     references
         .iter()
@@ -259,7 +264,7 @@ mod tests {
     use bvh_core::{Triangle, cost, validate_references};
     use glam::Vec3;
 
-    /// Long triangles in many directions, which cross each other.
+    /// Returns long triangles in many directions, which cross each other.
     fn needles(n: u32) -> Vec<Triangle> {
         let coordinate = |i: u32, salt: u32| {
             (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 4093) as f32 / 41.0
@@ -300,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn scenes_of_points_of_one_object_and_of_none_are_built_and_bad_boxes_refused() {
+    fn scenes_of_points_of_one_object_and_of_none_are_built_and_bad_boxes_are_rejected() {
         for triangles in
             [vec![], needles(1), vec![Triangle([Vec3::ONE; 3]); 30], vec![needles(1)[0]; 3000]]
         {

@@ -1,4 +1,5 @@
-//! Object splits of a node: every position between two references in the orders of their centres along the axes.
+//! Object splits of a node: every position between two references in the orders of their centres
+//! along the axes.
 
 use super::{Build, Reference, Sides, union};
 use crate::top_down::presort::in_parallel;
@@ -8,30 +9,31 @@ use bvh_core::Aabb;
 /// The candidates of object splits along one axis.
 #[derive(Debug, Default)]
 pub(super) struct Axis {
-    /// The references' centres along the axis and their positions, in order.
+    /// The references' centres along the axis and their positions, sorted.
     keys: Vec<(f64, u32)>,
-    /// The half areas of the last references, by their number less 1.
+    /// The half areas of the boxes around the last references: `areas[i]` covers i + 1 references.
     areas: Vec<f64>,
 }
 
-/// Which object splits are candidates, and what a side costs.
+/// The candidates among object splits, and the cost of a side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Candidates {
-    /// All, by area times a power of the number of references.
+    /// All splits, by area times a power of the number of references.
     All,
-    /// Those with at least one in eight references on either side, by area times number.
+    /// Splits with at least one in eight references on either side, by area times number.
     Balanced,
 }
 
 impl Axis {
-    /// Sorts the references by their centres along the axis of this number, equal centres in their order.
+    /// Sorts the references by their centres along the axis `number`; equal centres keep their
+    /// order.
     fn sort(&mut self, references: &[Reference], number: usize) {
         self.keys.clear();
         self.keys.extend(
             references
                 .iter()
                 .zip(0..)
-                .map(|(r, at)| (r.aabb.doubled_centroid()[number], at)),
+                .map(|(r, index)| (r.aabb.doubled_centroid()[number], index)),
         );
         if references.len() >= RADIX_SORTED {
             radsort::sort_by_key(&mut self.keys, |&(centre, _)| centre);
@@ -41,7 +43,8 @@ impl Axis {
         }
     }
 
-    /// The least cost of the candidates and the number of references on the left side; of equal ones the first.
+    /// Returns the least cost of the candidates and the number of references on the left side; the
+    /// first among equal candidates.
     fn best(
         &mut self,
         references: &[Reference],
@@ -56,14 +59,14 @@ impl Axis {
         let least_side = if candidates == Candidates::All { 1 } else { (count / 8).max(1) };
         let mut aabb = Aabb::EMPTY;
         self.areas.clear();
-        for &(_, at) in self.keys.iter().rev() {
-            aabb = aabb.union(&references[at as usize].aabb);
+        for &(_, index) in self.keys.iter().rev() {
+            aabb = aabb.union(&references[index as usize].aabb);
             self.areas.push(aabb.half_area());
         }
         aabb = Aabb::EMPTY;
         let mut best = (f64::INFINITY, 1);
-        for (before, &(_, at)) in (1..count).zip(&self.keys) {
-            aabb = aabb.union(&references[at as usize].aabb);
+        for (before, &(_, index)) in (1..count).zip(&self.keys) {
+            aabb = aabb.union(&references[index as usize].aabb);
             let after = count - before;
             let cost =
                 side_cost(aabb.half_area(), before) + side_cost(self.areas[after - 1], after);
@@ -75,12 +78,12 @@ impl Axis {
     }
 }
 
-/// References from which on a radix sort is faster.
+/// Least number of references for which a radix sort is faster.
 const RADIX_SORTED: usize = 2048;
 
 impl Build<'_> {
-    /// The best of the object splits in the orders of the centres along the axes; ties go to the lower axis and position.
-    /// Fails if the watch ends the division.
+    /// Returns the best object split in the orders of the centres along the axes; ties go to the
+    /// lower axis and position. Fails if the watch cancels.
     pub(super) fn object_split(
         &mut self,
         references: &[Reference],
@@ -108,10 +111,11 @@ impl Build<'_> {
         let keys = &self.axes[axis].keys;
         let mut ordered: Vec<Reference> = keys
             .iter()
-            .map(|&(_, at)| references[at as usize])
+            .map(|&(_, index)| references[index as usize])
             .collect();
         if union(&ordered[..left]) == union(&ordered[left..]) {
-            // Nothing is gained, and the power would take off one reference after the other.
+            // Such a split gains nothing, and the power would separate one reference after the
+            // other.
             left = count / 2;
         }
         let sides = [ordered[..left].to_vec(), ordered.split_off(left)];

@@ -1,4 +1,4 @@
-//! Spatial splits of a node: the borders of bins, and the references that go to either side or to both.
+//! Spatial splits of a node: the borders of bins, and the references on either side or on both.
 
 use super::{Build, Reference, Sides, union};
 use crate::top_down::presort::in_parallel;
@@ -10,11 +10,12 @@ use bvh_core::Aabb;
 pub(super) struct Plane {
     pub cost: f64,
     axis: usize,
-    at: f32,
+    position: f32,
 }
 
 impl Build<'_> {
-    /// The border of bins where a spatial split costs least, by its cost before unsplitting; of equal ones the first.
+    /// Returns the border of bins where a spatial split costs least before unsplitting; the first
+    /// among equal borders.
     pub(super) fn best_plane(&self, aabb: &Aabb, references: &[Reference]) -> Option<Plane> {
         let along = |axis| self.best_plane_along(axis, aabb, references);
         let found = in_parallel(references.len(), || along(0), || along(1), || along(2));
@@ -50,7 +51,8 @@ impl Build<'_> {
             parts[first].1 += 1;
             parts[last].2 += 1;
         }
-        // Where every plane cuts all that is on one side of it, there are no parts to look at.
+        // If no plane has a reference entirely on either side, no plane divides anything, and the
+        // parts need not be clipped.
         let mut entered = 0;
         let mut gone = 0;
         let divides = parts[..bins - 1].iter().any(|part| {
@@ -110,28 +112,29 @@ impl Build<'_> {
             }
             let cost = self.cost(&before, entered) + self.cost(behind, *left);
             if best.is_none_or(|best| cost < best.cost) {
-                best = Some(Plane { cost, axis, at: border(bin) });
+                best = Some(Plane { cost, axis, position: border(bin) });
             }
         }
         best
     }
 
-    /// Divides the references at a plane. One that the plane cuts goes whole to one side where that costs less. `None` if a side
-    /// would have all of them, or more references than there may be.
+    /// Divides the references at a plane. A reference that the plane cuts goes undivided to one
+    /// side if that costs less. Returns `None` if a side would have all references, or if the tree
+    /// would have too many.
     pub(super) fn spatial_split(
         &self,
         references: &[Reference],
-        Plane { axis, at, .. }: Plane,
+        Plane { axis, position, .. }: Plane,
     ) -> Option<Sides> {
         let mut sides = [Vec::new(), Vec::new()];
         let mut cut = Vec::new();
         for reference in references {
-            if reference.aabb.max[axis] <= at {
+            if reference.aabb.max[axis] <= position {
                 sides[0].push(*reference);
-            } else if reference.aabb.min[axis] >= at {
+            } else if reference.aabb.min[axis] >= position {
                 sides[1].push(*reference);
             } else {
-                let halves = reference.aabb.halves(axis, at);
+                let halves = reference.aabb.halves(axis, position);
                 let parts = halves.map(|region| self.objects.clip(reference.object, &region));
                 match parts.map(|part| part != Aabb::EMPTY) {
                     [true, true] => cut.push((*reference, parts)),
@@ -169,7 +172,7 @@ impl Build<'_> {
         {
             return None;
         }
-        // Unsplitting may have left a side smaller than it was when the others were decided on.
+        // Unsplitting may have left a side with a smaller box than the decisions assumed.
         let boxes = sides.each_ref().map(|side| union(side));
         Some(Sides {
             cost: self.cost(&boxes[0], left) + self.cost(&boxes[1], right),

@@ -1,4 +1,4 @@
-//! The fast path passes sound trees of its kind and nothing else.
+//! The fast path passes sound trees of its kind and rejects all others.
 
 use super::super::{Leaves, find_fault as fault};
 use super::*;
