@@ -80,7 +80,7 @@ impl<C: Check> Check for Vec<C> {
     fn faults(&self) -> Vec<OutOfRange> {
         self.iter()
             .enumerate()
-            .flat_map(|(index, inner)| Itself.faults(&format!("[{index}]"), inner))
+            .flat_map(|(index, inner)| Nested.faults(&format!("[{index}]"), inner))
             .collect()
     }
 }
@@ -88,7 +88,7 @@ impl<C: Check> Check for Vec<C> {
 /// The right side of a field's `in`: the accepted values of type `V`.
 ///
 /// Implemented by the ranges of the standard library for numbers and for collections of them, and
-/// by [`Itself`].
+/// by [`Nested`].
 pub trait Accepts<V: ?Sized> {
     /// Returns all faults of the value `found` of the parameter `key`.
     fn faults(&self, key: &str, found: &V) -> Vec<OutOfRange>;
@@ -138,9 +138,9 @@ pub fn describe_accepted<C: Keys>(schema: &mut schemars::Schema) {
 
 /// Accepts the values that pass their [`Check`]: nested configurations.
 #[derive(Clone, Copy, Debug)]
-pub struct Itself;
+pub struct Nested;
 
-impl<C: Check> Accepts<C> for Itself {
+impl<C: Check> Accepts<C> for Nested {
     fn faults(&self, key: &str, found: &C) -> Vec<OutOfRange> {
         found
             .faults()
@@ -172,7 +172,7 @@ macro_rules! ranges {
 }
 
 // One implementation per type of range: an implementation for all `R: RangeBounds` would overlap
-// with `Itself`.
+// with `Nested`.
 ranges! {
     RangeInclusive<V::Number>, RangeFrom<V::Number>, RangeToInclusive<V::Number>,
     (Bound<V::Number>, Bound<V::Number>),
@@ -324,7 +324,7 @@ mod tests {
             /// Numbers by name.
             by_name: BTreeMap<String, [f64; 2]>, in ..=9.0;
             /// Other configurations.
-            inner: Vec<Inner>, in Itself;
+            inner: Vec<Inner>, in Nested;
         }
         check |outer: &Outer| match outer.sizes.is_sorted() {
             true => None,

@@ -24,7 +24,7 @@ use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Tally, stre
 use crate::tree::{Area, Metric, Working};
 use bvh_build::top_down::Workspace;
 use bvh_build::{BuildError, Presorted, Watch, muller_fellner};
-use bvh_config::Itself;
+use bvh_config::Nested;
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Measure};
 
@@ -34,7 +34,7 @@ bvh_config::config! {
         /// Number of independent constructions.
         trials: u64 = 100, in 1..;
         /// The splits of a node that may be chosen.
-        candidates: Candidates = Candidates::AxisBest, in Itself;
+        candidates: Candidates = Candidates::AxisBest, in Nested;
         /// The probability of choosing a candidate other than the best. Without it, all candidates
         /// are equally likely.
         #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
@@ -44,7 +44,7 @@ bvh_config::config! {
         #[cfg_attr(feature = "serde", serde(skip_serializing_if = "LocalSearch::is_none"))]
         local_search: LocalSearch = LocalSearch::None;
         /// The heuristic that ranks splits, and the other parameters of the greedy builder.
-        construction: muller_fellner::Config, in Itself;
+        construction: muller_fellner::Config, in Nested;
     }
 }
 

@@ -4,7 +4,7 @@ use crate::measure::empirical_cost;
 use crate::measure::ray_cost::TrainedOn;
 use crate::peers::{Peer, command};
 use bvh_config::fault::{self, Fault, Read};
-use bvh_config::{Check, Itself, Keys, OutOfRange};
+use bvh_config::{Check, Keys, Nested, OutOfRange};
 use bvh_core::cost::Objective;
 use bvh_search::{Budget, Method, Shortcut};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -83,7 +83,7 @@ bvh_config::config! { serde;
         seed_as: Option<String>;
         /// Random rays whose mean number of box tests judges the trees of its runs in place of the objective; the costs in
         /// `history.csv` are then such numbers. Default none.
-        judge: Option<empirical_cost::Config>, in Itself;
+        judge: Option<empirical_cost::Config>, in Nested;
         /// Rays of the experiment's `ray_cost` whose visits take the place of areas in its runs and in their objective; the costs in
         /// `history.csv` are then such numbers. Not for `median_cut`, which compares no sizes of boxes. Default none.
         for_rays: Option<TrainedOn>;

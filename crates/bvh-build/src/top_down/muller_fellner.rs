@@ -16,7 +16,7 @@ use super::split_cost::{
 };
 use super::sweep::{SplitRule, TakeBest};
 use crate::{BuildError, Builder, Check, OutOfRange, Watch};
-use bvh_config::{Accepts, Itself};
+use bvh_config::{Accepts, Nested};
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 
@@ -24,7 +24,7 @@ bvh_config::config! {
     /// The heuristic, and the shortcuts of a build.
     pub struct Config {
         /// The cost of a split. The default is the original heuristic.
-        heuristic: Heuristic = Heuristic::AreaTimesCount, in Itself;
+        heuristic: Heuristic = Heuristic::AreaTimesCount, in Nested;
         /// True if axes that order a node's objects identically are scanned once. Greedy trees stay
         /// the same; candidate lists of GRASP lose their duplicates, which may change its trees.
         skip_same_order: bool = true;

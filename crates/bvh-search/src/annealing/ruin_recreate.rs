@@ -14,7 +14,7 @@ use crate::local::initial::Start;
 use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Node, PositionSearch, Scope, Working, search_by_metric};
 use crate::tuning::{DEARER_BY_AREA, LAYOUT_HEAT};
-use bvh_config::{Itself, above};
+use bvh_config::{Nested, above};
 use rand::RngExt;
 use rand::seq::SliceRandom;
 
@@ -22,7 +22,7 @@ bvh_config::config! {
     /// The move, the temperatures and the amount of work.
     pub struct Config {
         /// The move.
-        ruin: Ruin, in Itself;
+        ruin: Ruin, in Nested;
         /// First temperature, relative to the move's `scale`. The default suits 8000 nodes of work
         /// per object or more. Less work needs a proportionally lower temperature.
         hot: f64 = 0.1, in above(0.0);
@@ -31,7 +31,7 @@ bvh_config::config! {
         /// Work per object, unless the budget has less.
         work_per_object: u64 = 10_000;
         /// The builder of the initial tree.
-        start: Start, in Itself;
+        start: Start, in Nested;
     }
     check |config: &Config| check_fall(config.hot, config.cold);
 }

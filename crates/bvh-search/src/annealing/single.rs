@@ -11,7 +11,7 @@ use super::schedule::{AnnealingRun, check_fall};
 use crate::local::initial::Start;
 use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
-use bvh_config::{Accepts, Itself, OutOfRange, above};
+use bvh_config::{Accepts, Nested, OutOfRange, above};
 use bvh_core::PackedAabb;
 use rand::RngExt;
 
@@ -28,7 +28,7 @@ bvh_config::config! {
         /// Work per object, unless the budget has less.
         work_per_object: u64 = 10_000;
         /// The builder of the initial tree.
-        start: Start, in Itself;
+        start: Start, in Nested;
     }
     check Self::check_together;
 }
@@ -47,7 +47,7 @@ bvh_config::config! {
 impl Config {
     fn check_together(&self) -> impl Iterator<Item = OutOfRange> {
         // Specs call the step `move`, which is a keyword in Rust.
-        Itself
+        Nested
             .faults("move", &self.step)
             .into_iter()
             .chain(check_fall(self.hot, self.cold))

@@ -11,7 +11,7 @@ use crate::local::incumbent::Incumbent;
 use crate::local::initial::Start;
 use crate::run::{Found, Problem, Run, Tally, stream};
 use crate::tree::{Metric, search_by_metric};
-use bvh_config::Itself;
+use bvh_config::Nested;
 use std::ops::Bound::{Excluded, Included};
 
 bvh_config::config! {
@@ -26,7 +26,7 @@ bvh_config::config! {
         /// Work per object, unless the budget has less.
         work_per_object: u64 = 10_000;
         /// The builder of the initial tree, which is first improved to a local optimum.
-        start: Start, in Itself;
+        start: Start, in Nested;
     }
 }
 

@@ -24,7 +24,7 @@ use crate::run::{
 use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
 use bvh_build::top_down::Workspace;
 use bvh_build::{BuildError, Presorted, muller_fellner};
-use bvh_config::Itself;
+use bvh_config::Nested;
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 use rand::RngExt;
@@ -42,17 +42,17 @@ bvh_config::config! {
         /// bad split shows below the split that caused it.
         climb: u32 = 6, in 0..=1000;
         /// The splits that may be chosen, as in [`grasp`](crate::grasp).
-        candidates: Candidates = Candidates::AxisBest, in Itself;
+        candidates: Candidates = Candidates::AxisBest, in Nested;
         /// The probability of taking one of the candidates other than the best.
         noise: f64 = 0.3, in 0.0..=1.0;
         /// The heuristic that ranks splits; by default the heuristic of the default initial tree.
-        construction: muller_fellner::Config = construction(), in Itself;
+        construction: muller_fellner::Config = construction(), in Nested;
         /// The local search that improves a rebuilt subtree before the comparison.
         local_search: LocalSearch = LocalSearch::Reinsertion;
         /// Work per object, unless the budget has less.
         work_per_object: u64 = 10_000;
         /// The builder of the initial tree, which is first improved to a local optimum.
-        start: Start, in Itself;
+        start: Start, in Nested;
     }
 }
 

@@ -14,7 +14,7 @@ use crate::local::initial::Start;
 use crate::local::pass::{TOLERANCE, repeat};
 use crate::run::{Found, Observer, Problem, Quota, Run, Tally};
 use crate::tree::{Metric, NONE, Subsets, Working, search_by_metric};
-use bvh_config::Itself;
+use bvh_config::Nested;
 use bvh_core::with_vector_instructions;
 
 bvh_config::config! {
@@ -25,7 +25,7 @@ bvh_config::config! {
         /// Maximum number of passes over all nodes; the method ends earlier at a local optimum.
         sweeps: u32 = 1000, in 1..;
         /// The builder of the initial tree.
-        start: Start, in Itself;
+        start: Start, in Nested;
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::annealing::ruin_recreate::{Ruin, Scale};
 use crate::local::initial::Start;
 use crate::run::Run;
-use bvh_config::{Itself, above};
+use bvh_config::{Nested, above};
 use std::ops::Bound::{Excluded, Included};
 
 bvh_config::config! {
@@ -47,11 +47,11 @@ bvh_config::config! {
         #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
         horizon: Option<Horizon>;
         /// The move.
-        ruin: Ruin, in Itself;
+        ruin: Ruin, in Nested;
         /// The builder of the initial tree. The default depends on the budget: clustering for
         /// milliseconds, otherwise top-down division with |L|^0.9.
         #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-        start: Option<Start>, in Itself;
+        start: Option<Start>, in Nested;
     }
 }
 

@@ -1,7 +1,7 @@
 //! The builders of the initial tree of a local search.
 
 use bvh_build::{BuildError, Builder, Watch, muller_fellner, ploc};
-use bvh_config::{Accepts, Check, Itself, OutOfRange};
+use bvh_config::{Accepts, Check, Nested, OutOfRange};
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 
@@ -39,8 +39,8 @@ pub(crate) fn construction() -> muller_fellner::Config {
 impl Check for Start {
     fn faults(&self) -> Vec<OutOfRange> {
         match self {
-            Self::MullerFellner(config) => Itself.faults("muller_fellner", config),
-            Self::Agglomerative(config) => Itself.faults("agglomerative", config),
+            Self::MullerFellner(config) => Nested.faults("muller_fellner", config),
+            Self::Agglomerative(config) => Nested.faults("agglomerative", config),
         }
     }
 }

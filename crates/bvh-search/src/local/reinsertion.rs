@@ -11,7 +11,7 @@ use super::initial::Start;
 use super::pass::{TOLERANCE, repeat, sort_by_area};
 use crate::run::{Found, Observer, Problem, Quota, Run, Tally, WORK_PER_POLL, stream};
 use crate::tree::{Linked, Metric, PositionSearch, Working, search_by_metric};
-use bvh_config::Itself;
+use bvh_config::Nested;
 use bvh_core::with_vector_instructions;
 use rand::seq::SliceRandom;
 
@@ -23,7 +23,7 @@ bvh_config::config! {
         /// Maximum number of passes; the method ends earlier at a local optimum.
         sweeps: u32 = 1000, in 1..;
         /// The builder of the initial tree.
-        start: Start, in Itself;
+        start: Start, in Nested;
     }
 }
 

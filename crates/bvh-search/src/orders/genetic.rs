@@ -18,7 +18,7 @@
 use super::{Evaluated, Insertion, random_order};
 use crate::run::{Problem, Run, Search, SearchError, Stream, stream};
 use bvh_build::goldsmith_salmon;
-use bvh_config::{Accepts, Itself};
+use bvh_config::{Accepts, Nested};
 use bvh_core::Bvh;
 use rand::RngExt;
 use rand::seq::SliceRandom;
@@ -36,7 +36,7 @@ bvh_config::config! {
         /// objects. The paper has about n/500 swaps.
         mutation: f64 = 0.002, in 0.0..=1.0;
         /// The parameters of the insertion.
-        insertion: goldsmith_salmon::Config, in Itself;
+        insertion: goldsmith_salmon::Config, in Nested;
     }
 }
 

@@ -7,7 +7,7 @@
 use super::{Evaluated, Insertion, random_order};
 use crate::run::{Problem, Run, Search, SearchError, stream};
 use bvh_build::goldsmith_salmon;
-use bvh_config::Itself;
+use bvh_config::Nested;
 use bvh_core::Bvh;
 
 bvh_config::config! {
@@ -16,7 +16,7 @@ bvh_config::config! {
         /// Number of independent random orders.
         trials: u64 = 100, in 1..;
         /// The parameters of the insertion.
-        insertion: goldsmith_salmon::Config, in Itself;
+        insertion: goldsmith_salmon::Config, in Nested;
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the configurations of reports share: keys that several kinds have, and what their lists have to be.
 
 use super::target::Target;
-use bvh_config::{Accepts, Itself, OutOfRange};
+use bvh_config::{Accepts, Nested, OutOfRange};
 use std::collections::BTreeMap;
 
 bvh_config::config! { serde;
@@ -26,7 +26,7 @@ bvh_config::config! { serde;
         /// Labels of the methods.
         methods: Vec<String>, in OneOrMore;
         /// Costs to be reached: base, base −1 %, best known +1 % and +0.1 % unless others are named.
-        targets: Vec<Target> = Target::usual(), in Itself;
+        targets: Vec<Target> = Target::usual(), in Nested;
     }
     check |config: &Self| OneOrMore.faults("targets", &config.targets);
 }

@@ -4,7 +4,7 @@ use super::config::Labels;
 use super::metric::Metric;
 use super::prelude::*;
 use crate::statistics::{geometric_mean, minimum};
-use bvh_config::Itself;
+use bvh_config::Nested;
 
 bvh_config::config! { serde;
     /// Tests of rays of the cameras' path that trees were trained on, and of another path, against the time in which a tree is built.
@@ -16,7 +16,7 @@ bvh_config::config! { serde;
         /// Label of the method that the others are compared with.
         base: String;
         /// Methods that differ in their budgets.
-        series: Vec<Series>, in Itself;
+        series: Vec<Series>, in Nested;
     }
 }
 

@@ -7,7 +7,7 @@ use super::prelude::*;
 use super::sides::Sides;
 use crate::statistics::best_of::predicted_best;
 use crate::statistics::{expected_best_of, median, minimum, range};
-use bvh_config::{Accepts, Itself, above};
+use bvh_config::{Accepts, Nested, above};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ bvh_config::config! { serde;
         /// Ratios within this relative distance of the paper's agree with it.
         tolerance: f64 = 0.02, in 0.0..=1.0;
         /// The columns; the paper's ratios are to its values in the first.
-        columns: Vec<Column>, in Itself;
+        columns: Vec<Column>, in Nested;
     }
     check |config: &Self| OneOrMore.faults("columns", &config.columns);
 }

@@ -14,7 +14,7 @@ use crate::measure::{empirical_cost, ray_cost, speed};
 use crate::processor::PROCESSOR;
 use crate::report::Report;
 use crate::stress;
-use bvh_config::{Itself, config};
+use bvh_config::{Nested, config};
 use bvh_core::cost::Objective;
 use bvh_scenes::fnv1a;
 use bvh_search::{Budget, exact};
@@ -38,7 +38,7 @@ config! {
         /// The question that the experiment answers, for its readers.
         question: String;
         /// A measurement over the suite of stiff cases, in place of runs on scenes.
-        suite: Option<stress::Measure>, in Itself;
+        suite: Option<stress::Measure>, in Nested;
         /// Names or paths of the scenes; `A..B` after a colon stands for all numbers from A to B. With `suite`, names
         /// of cases, none for all.
         scenes: Vec<String>;
@@ -72,15 +72,15 @@ config! {
         /// What is run, at least one; with `suite`, none for every method of the registry.
         methods: Vec<Labelled>;
         /// Measurements of every run's tree with random rays.
-        rays: Vec<empirical_cost::Config>, in Itself;
+        rays: Vec<empirical_cost::Config>, in Nested;
         /// A picture drawn with every run's tree, and with brute force and a KD-tree.
-        render: Option<picture::Config>, in Itself;
+        render: Option<picture::Config>, in Nested;
         /// Rays traced through the tree of every method's first run, in all layouts, in turns.
-        tracing: Option<speed::Config>, in Itself;
+        tracing: Option<speed::Config>, in Nested;
         /// Rays that methods with `for_rays` are trained on, and others that judge all trees by the tests that they take.
-        ray_cost: Option<ray_cost::Config>, in Itself;
+        ray_cost: Option<ray_cost::Config>, in Nested;
         /// Tables and figures made from the rows.
-        reports: Vec<Report>, in Itself;
+        reports: Vec<Report>, in Nested;
     }
 }
 

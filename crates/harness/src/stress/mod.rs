@@ -21,7 +21,7 @@ pub mod transform;
 use crate::Error;
 use crate::report::output::Output;
 use crate::rows::columns::Columns;
-use bvh_config::{Accepts, Itself, OutOfRange};
+use bvh_config::{Accepts, Nested, OutOfRange};
 pub use case::{Case, Check, EXACT_OBJECTS, Effort, LargerScenes, Part, Size, is_builder, methods};
 pub use cell::Cell;
 pub use promise::{Broken, Promise, Verdict};
@@ -56,8 +56,8 @@ impl Measure {
 impl bvh_config::Check for Measure {
     fn faults(&self) -> Vec<OutOfRange> {
         match self {
-            Self::Stability(config) => Itself.faults("stability", config),
-            Self::Precision(config) => Itself.faults("precision", config),
+            Self::Stability(config) => Nested.faults("stability", config),
+            Self::Precision(config) => Nested.faults("precision", config),
         }
     }
 }
