@@ -37,6 +37,7 @@ impl<'a> Watch<'a> {
 
     /// Polls the caller. A cancellation is final.
     pub fn is_cancelled(&self) -> bool {
+        // Relaxed suffices: the flag orders no other memory.
         if self.ended.load(Relaxed) {
             return true;
         }

@@ -76,31 +76,34 @@ fn tracked<T: Check>(
     let mut removed = Vec::new();
     let mut table = Value::Table(table);
     while faults.len() < MOST_FAULTS {
+        // The path of an error is known only while serde reads the untouched table, hence the copy.
         let mut track = Track::new();
         let error = match read(Deserializer::new(table.clone(), &mut track)) {
             Err(error) => error,
             Ok(value) => {
-                let ranges = value.faults().into_iter().map(Fault::from);
+                let mut out_of_range = value.faults();
                 // A removed list counts as empty, which is no separate fault.
-                let apart = |late: &Fault| {
+                out_of_range.retain(|late| {
                     !faults
                         .iter()
                         .any(|fault| is_within(&fault.key, &late.key))
-                };
-                let ranges: Vec<Fault> = ranges.filter(apart).collect();
-                return (Some(value), [faults, ranges].concat());
+                });
+                faults.extend(out_of_range.into_iter().map(Fault::from));
+                return (Some(value), faults);
             }
         };
         let path = track.path();
-        let key = if path.iter().len() == 0 { String::new() } else { path.to_string() };
+        let steps: Vec<&Segment> = path.iter().collect();
+        // An empty path is written as a dot, which is no key.
+        let key = if steps.is_empty() { String::new() } else { path.to_string() };
         // A field may be missing because it was removed after a fault.
         let is_new = |(position, name): &(String, String)| {
             error.message() != format!("missing field `{name}`") || !is_within(position, &key)
         };
         if removed.iter().all(is_new) {
-            faults.push(Fault { key: key.clone(), rest: format!(": {}", error.message()) });
+            let rest = format!(": {}", error.message());
+            faults.push(Fault { key: key.clone(), rest });
         }
-        let steps: Vec<&Segment> = path.iter().collect();
         // Elements of lists stay, because a removal would change the indices of later elements.
         let innermost = steps
             .iter()
@@ -185,6 +188,7 @@ pub fn say(faults: &[Fault], text: &str, file: &str, above: Option<&str>) -> Str
         .iter()
         .map(|fault| (place(fault), fault))
         .collect();
+    // Stable: faults without a position stay first, in their order.
     placed.sort_by_key(|(position, _)| *position);
     let mut known = HashSet::new();
     placed.retain(|(_, fault)| known.insert(&fault.key));
@@ -204,6 +208,7 @@ fn in_table(table: &DeTable, key: &str) -> Option<Range<usize>> {
         .iter()
         .find_map(|(name, value)| match key.strip_prefix(name.get_ref().as_ref())? {
             "" => Some(name.span()),
+            // A name may be the beginning of another; only a dot or an index continues the path.
             rest if rest.starts_with(['.', '[']) => {
                 Some(in_value(value, rest).unwrap_or(name.span()))
             }
@@ -216,7 +221,9 @@ fn in_value(value: &Spanned<DeValue>, key: &str) -> Option<Range<usize>> {
         DeValue::Table(table) => in_table(table, key.strip_prefix('.')?),
         DeValue::Array(array) => {
             let (index, rest) = key.strip_prefix('[')?.split_once(']')?;
-            let element = array.get(index.parse::<usize>().ok()?)?;
+            let index: usize = index.parse().ok()?;
+            let element = array.get(index)?;
+            // A key below that is missing is reported at the line of its list's element.
             Some(in_value(element, rest).unwrap_or(element.span()))
         }
         _ => None,

@@ -49,6 +49,7 @@ impl OutOfRange {
     /// under `key`.
     #[must_use]
     pub fn below(self, key: impl Display) -> Self {
+        // An index follows its list without a dot: `methods[1].noise`.
         let dot = if self.key.starts_with('[') { "" } else { "." };
         Self { key: format!("{key}{dot}{}", self.key), ..self }
     }
@@ -154,6 +155,7 @@ macro_rules! ranges {
     ($($range:ty,)*) => { $(
         impl<V: Numbers + ?Sized> Accepts<V> for $range {
             fn faults(&self, key: &str, found: &V) -> Vec<OutOfRange> {
+                // `1.0..` contains infinity, which is accepted only if the range names it.
                 let unlimited = matches!(self.end_bound(), Unbounded);
                 let mut faults = Vec::new();
                 found.each(key, &mut |key, number| {

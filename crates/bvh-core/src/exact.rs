@@ -17,8 +17,8 @@
 //! triangle if `t ≥ 0` and `t_min ≤ rounded t ≤ t_max`. The cases at the border follow:
 //!
 //! - Triangles without area, and rays in a triangle's plane, have `d · n = 0`: never hit.
-//! - A triangle behind the origin is not hit, however little; a distance below 2⁻¹⁵⁰ rounds to +0,
-//!   and no distance is −0.
+//! - A triangle behind the origin is not hit, even very close to the origin; a distance below 2⁻¹⁵⁰
+//!   rounds to +0, and no distance is −0.
 //! - A distance that rounds to infinity is beyond every `t_max`.
 //! - A triangle with a corner that is not finite is never hit.
 //!

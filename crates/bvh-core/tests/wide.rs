@@ -325,7 +325,7 @@ fn a_layout_whose_triangles_cannot_be_followed_says_so_and_stays_as_it_was() {
         assert_eq!(layout.refit(&with(4, infinite)), Err(RefitError::NotFinite(4)));
         assert!(matches!(layout.refit(&triangles[..20]), Err(RefitError::Lost(20..))));
     }
-    check("refused", &triangles, &layouts, &rays(&triangles, 500, &mut random));
+    check("rejected", &triangles, &layouts, &rays(&triangles, 500, &mut random));
 }
 
 #[test]

@@ -65,6 +65,8 @@ impl SplitRule for Randomised {
             Candidates::KBest(k) => node.k_best(k as usize, list),
             Candidates::Within(alpha) => node.within(alpha, list),
         }
+        // With noise, this draw is for candidates other than the best, unless the list has no
+        // other.
         let first = u32::from(noise.is_some() && list.len() > 1);
         list[rng.random_range(first..list.len() as u32) as usize]
     }

@@ -33,6 +33,7 @@ impl Search for Config {
     fn search(&self, problem: &Problem, _seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
         let n = problem.boxes.len();
         (..=MOST_OBJECTS).check("objects", &n)?;
+        // NaN would make every comparison of divisions false.
         check_boxes(problem.boxes).map_err(BuildError::from)?;
         let mut subsets = Subsets::new(n as u32);
         let leaves = problem.boxes.iter().map(PackedAabb::from);
@@ -64,8 +65,8 @@ pub(crate) fn instead(
 }
 
 /// Returns an upper bound of the optimum's work, where the optimum may replace a search: the number
-/// of divisions, including those with an empty part. `None` for more than [`MOST_OBJECTS`], and for
-/// two objects or fewer, which have only one tree.
+/// of divisions, including divisions with an empty part. `None` for more than [`MOST_OBJECTS`], and
+/// for two objects or fewer, which have only one tree.
 pub(crate) fn most_work_of_tiny(objects: usize) -> Option<u64> {
     (3..=MOST_OBJECTS)
         .contains(&objects)
@@ -86,6 +87,7 @@ fn tree(boxes: &[Aabb], subsets: &Subsets) -> Bvh {
             tree.nodes
                 .extend([Node::leaf(Aabb::EMPTY, 0, 1); 2]);
             let [left, right] = subsets.division(set);
+            // The left side is popped first, so objects are in leaf order from left to right.
             stack.extend([(first + 1, right), (first, left)]);
         }
     }

@@ -152,6 +152,8 @@ impl Search for Config {
             let end = self
                 .trials
                 .min(next.saturating_add(run.evaluations_left(construction).min(most)));
+            // Only trees below the incumbent at the start of the batch can win, so only these are
+            // kept.
             let limit = run.incumbent();
             let results = map_init((end - next) as usize, Default::default, |buffers, index| {
                 let (workspace, tree): &mut (Workspace, Bvh) = buffers;
@@ -170,6 +172,8 @@ impl Search for Config {
                 {
                     best = tree;
                 }
+                // Later results of the batch are dropped, so that the outcome does not depend on
+                // its size.
                 if run.stopped().is_some() {
                     break;
                 }

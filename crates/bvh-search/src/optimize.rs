@@ -42,6 +42,7 @@ pub fn optimize(
     // objects of a leaf.
     let mut tight = tree.clone();
     let mut leaves = Vec::new();
+    // Padded boxes would make the search's areas, and so its cost, differ from the tree's.
     tight.refit(boxes);
     for node in &mut tight.nodes {
         if let NodeKind::Leaf { .. } = node.kind() {
@@ -69,6 +70,7 @@ pub fn optimize(
         }
     }
     outcome.tree.prim_ids = prim_ids;
+    // The search ran on leaves as objects, for which the caller's known tree would not be valid.
     if let Some(known) = problem.known {
         let cost = Problem { objective: Objective::InternalArea, ..*problem }.cost(known);
         if cost < outcome.cost {
@@ -89,6 +91,8 @@ fn one_reference_per_leaf(tree: &Bvh, problem: &Problem) -> Bvh {
         let range = node.prims();
         if range.len() > 1 {
             let middle = range.start + range.len() / 2;
+            // The halves are appended and so visited later in this loop, until every leaf has one
+            // reference.
             single.nodes[index] = Node::inner(node.aabb, single.nodes.len() as u32, 2);
             let halves = [range.start..middle, middle..range.end];
             single.nodes.extend(
@@ -100,6 +104,7 @@ fn one_reference_per_leaf(tree: &Bvh, problem: &Problem) -> Bvh {
     let split = problem
         .splits
         .filter(|_| tree.prim_ids.len() > problem.boxes.len());
+    // Children come after their parents, so a pass from the back makes boxes tight.
     for index in (0..single.nodes.len()).rev() {
         let node = single.nodes[index];
         let below = single.nodes[node.children()].iter();

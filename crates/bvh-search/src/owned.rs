@@ -81,6 +81,7 @@ impl OwnedTree {
     pub fn save(&self) -> Result<Vec<u8>, FileError> {
         let origin = Origin { method: "best", seed: 1, work: self.work, ..Origin::default() };
         match &self.shapes {
+            // The validation of divided objects needs their shapes.
             Some(shapes) => file::save_references(&self.tree, &self.boxes, shapes, &origin),
             None => file::save(&self.tree, &self.boxes, &origin),
         }

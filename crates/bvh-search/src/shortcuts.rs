@@ -53,6 +53,7 @@ impl Facts {
         }
         for (axis, name) in AXES.into_iter().enumerate() {
             let same = self.same_orders[axis] as usize;
+            // A flat scene is not sorted along y and z at all.
             if self.in_order[axis] && !(self.flat && axis > 0) {
                 found.push((
                     Shortcut::Sorted,
@@ -75,11 +76,11 @@ impl Facts {
         }
         if let Some(work) = exact::most_work_of_tiny(self.objects) {
             let why =
-                format!("the search `best`, given {work} nodes of work: the optimum takes no more");
+                format!("the search `best` with {work} nodes of work: the optimum takes no more");
             found.push((Shortcut::Tiny, why));
         }
         let why = format!(
-            "what is left of a local search at an internal area of {}: no tree has less",
+            "the rest of a local search at an internal area of {}: no tree has less",
             self.lower_bound
         );
         found.push((Shortcut::BoundMet, why));

@@ -14,8 +14,8 @@ impl Size for Area {
     /// Uses the operations of [`PackedAabb::half_area`], hence the same bits.
     #[inline(always)]
     fn of(self, bounds: [f32; 6]) -> f64 {
-        let bound = |i: usize| f64::from(bounds[i]);
-        let [x, y, z] = [bound(0) + bound(3), bound(1) + bound(4), bound(2) + bound(5)];
+        let [low_x, low_y, low_z, x, y, z] = bounds.map(f64::from);
+        let [x, y, z] = [low_x + x, low_y + y, low_z + z];
         x * y + y * z + z * x
     }
 }

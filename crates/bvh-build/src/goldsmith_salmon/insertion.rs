@@ -57,6 +57,7 @@ impl Walk {
             self.last[walker] = from;
         }
         let mut row = from;
+        // One step of all objects per turn, so that their memory accesses overlap.
         while ahead.iter().any(|(index, end)| index < end) {
             row += 1;
             if row == self.trail.len() {
@@ -67,6 +68,8 @@ impl Walk {
                 if index < end {
                     let block = &blocks[index];
                     let mut found = NONE;
+                    // Inner nodes are in front of leaves: a block that ends with a leaf is the last
+                    // that can contain the object.
                     ahead[walker] = (index + 1, if block.is_leaf(LANES - 1) { index } else { end });
                     if let Some(lane) = block.first_containing(&objects[walker].bounds) {
                         found = (index * LANES + lane) as u32;
@@ -123,6 +126,7 @@ pub(super) fn insert_each<R: Rule>(
     for batch in rest.chunks(BATCH) {
         let objects =
             std::array::from_fn(|i| scene.objects[batch[i.min(batch.len() - 1)] as usize]);
+        // Paths of the previous batch are stale, because its insertions have changed the tree.
         walk.trail.clear();
         walk.trail.push([NONE; BATCH]);
         walk.descend(blocks, &objects, 0..batch.len(), 0);
@@ -138,6 +142,7 @@ pub(super) fn insert_each<R: Rule>(
             let stop = find_stop::<R>(blocks, size, object, walk.trail[row][i], grown);
             examined += stop.examined;
             let attached_to = attach::<R>(blocks, &stop, object, id);
+            // Only the nodes down to the stop grow; the search went further.
             grown.truncate(stop.grown);
             if let Some(last) = grown.last_mut() {
                 last.node = attached_to;
@@ -206,6 +211,7 @@ fn find_stop<R: Rule>(
             }
         }
         let Grown { node, area } = next;
+        // The scan ended before any child, because no stop further down can be cheaper.
         if node == NONE {
             break;
         }
@@ -270,6 +276,7 @@ fn attach<R: Rule>(blocks: &mut Vec<Block>, stop: &Stop, object: &Object, id: u3
     } else {
         let (mut first, count) = family(blocks, stop.node);
         let full = count / LANES;
+        // Doubling the space keeps the copies O(1) per object on average.
         if count % LANES == 0 && full.is_power_of_two() {
             let moved = blocks.len();
             blocks.extend_from_within(first..first + full);

@@ -93,14 +93,14 @@ impl<'a> Scene<'a> {
     /// Checks and packs the boxes, with a measure instead of the half area. O(n).
     pub fn by(boxes: &[Aabb], measure: Option<&'a dyn Measure>) -> Result<Self, BuildError> {
         check_scene(boxes)?;
-        let pack = |b: &Aabb| {
+        let objects = boxes.iter().map(|b| {
             let min = -b.min;
             let max = b.max;
             let area =
                 measure.map_or_else(|| b.half_area(), |measure| measure.of(&PackedAabb::from(b)));
             Object { bounds: [min.x, min.y, min.z, max.x, max.y, max.z], area }
-        };
-        Ok(Self { objects: boxes.iter().map(pack).collect(), measure })
+        });
+        Ok(Self { objects: objects.collect(), measure })
     }
 
     /// Returns the number of objects.
@@ -198,6 +198,8 @@ impl Config {
         workspace: &mut Workspace,
         watch: &Watch,
     ) -> Option<f64> {
+        // The measure and the rules are types, so that the descent is compiled without branches on
+        // them.
         let pace = Pace::new(watch);
         match scene.measure {
             Some(measure) => self.insert_by(measure, scene, order, workspace, pace),

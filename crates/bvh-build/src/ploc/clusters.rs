@@ -155,6 +155,7 @@ impl Clusters {
             let far = nearest[index];
             let other = index.wrapping_add_signed(far as isize);
             let mutual = nearest[other] == -far;
+            // Always written, and kept only if the counter advances.
             (joined[pairs], kept[left]) = (index as u32, index as u32);
             pairs += usize::from(mutual & (far > 0));
             left += usize::from(!mutual | (far > 0));
@@ -166,6 +167,8 @@ impl Clusters {
             .map(|&index| index as usize)
         {
             let other = index.wrapping_add_signed(nearest[index] as isize);
+            // Later joins are nearer to the root, so filling from the end puts parents before
+            // children.
             self.free -= 2;
             let pair = &mut self.nodes[self.free..][..2];
             pair[0].write(node((boxes[index], below[index])));
@@ -197,6 +200,7 @@ impl Clusters {
 #[inline(always)]
 fn node((aabb, below): (PackedAabb, u32)) -> Node {
     let aabb = Aabb::from(&aabb);
+    // Both are built and one is selected, because the kind of a cluster is unpredictable.
     let leaf = Node::leaf(aabb, below & !LEAF, 1);
     let inner = Node::inner(aabb, below, 2);
     if below & LEAF != 0 { leaf } else { inner }

@@ -106,8 +106,10 @@ impl MortonOrder {
         let mut clusters = Clusters::new(boxes, &bounds);
         let mut round = 0;
         while clusters.count() > 1 {
+            // The first rounds have most clusters, so a small radius saves most time there.
             let radius = if round < config.near_rounds { 1 } else { config.radius as usize };
             clusters.find_nearest(radius, measure, watch);
+            // A cancelled search leaves clusters without a neighbour, which must not be joined.
             watch.ensure_wanted()?;
             clusters.join();
             round += 1;
@@ -127,10 +129,13 @@ mod tests {
     }
 
     fn scatter(n: u32) -> Vec<Aabb> {
-        let hash =
-            |i: u32, salt: u32| (i.wrapping_mul(2_654_435_761).rotate_left(salt) % 65_521) as f32;
         (0..n)
-            .map(|i| cube([hash(i, 3), hash(i, 11), hash(i, 19)], hash(i, 27) / 32.0))
+            .map(|i| {
+                let hash = i.wrapping_mul(2_654_435_761);
+                let [x, y, z, size] =
+                    [3, 11, 19, 27].map(|salt| (hash.rotate_left(salt) % 65_521) as f32);
+                cube([x, y, z], size / 32.0)
+            })
             .collect()
     }
 

@@ -75,11 +75,13 @@ fn find_plain(
         .iter_mut()
         .for_each(|side| side.resize(len + radius, 0.0));
     least.clear();
+    // Larger than the bits of any finite area and of infinity.
     least.resize(len, i32::MAX);
     before.resize(len, 0);
     for distance in 1..=radius {
         // All pairs at this distance with at least one cluster in the chunk.
         let pairs = len + distance;
+        // The loop writes `found` and reads `before`: separate arrays let it be vectorised.
         before.copy_from_slice(found);
         if let Some(measure) = measure {
             let sizes = &mut sides[0][..pairs];
@@ -124,13 +126,18 @@ fn joint_sizes(
 /// `sides`.
 #[inline(always)]
 fn joint_sides(low: &[f32], high: &[f32], distance: usize, sides: &mut [f32]) {
-    let larger = |a: f32, b: f32| if a > b { a } else { b };
     let pairs = sides.len();
     let (low, low_on) = (&low[..pairs], &low[distance..][..pairs]);
     let (high, high_on) = (&high[..pairs], &high[distance..][..pairs]);
     for index in 0..pairs {
         sides[index] = larger(low[index], low_on[index]) + larger(high[index], high_on[index]);
     }
+}
+
+/// Returns the larger of two numbers that are not NaN. Unlike `f32::max`, it is one instruction.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 /// Replaces the results of clusters whose neighbours at `distance` are nearer than all neighbours
@@ -152,12 +159,15 @@ fn take_nearer(
     let far = distance as i32;
     for index in 0..len {
         let before = before[index].to_bits() as i32;
+        // Not negative, so the order of the bits is the order of the areas.
         let after = after[index].to_bits() as i32;
         let position = (start + index) as i32;
         let bits = |on: i32| position ^ (position + on);
         let backwards = is_less([before, bits(-far)], [after, bits(far)]);
         let area = after.min(before);
         let on = (far ^ backwards) - backwards;
+        // Distances come in increasing order, but the tie-break is by exclusive or, so equal areas
+        // compare.
         let nearer = is_less([area, bits(on)], [least[index], bits(known[index])]);
         least[index] = area.min(least[index]);
         found[index] = known[index] ^ (known[index] ^ on) & nearer;

@@ -153,6 +153,7 @@ fn spawn<'s, C: SplitCost, R: SplitRule + Copy + Send + Sync + 's>(
             .unwrap_or_else(std::sync::PoisonError::into_inner)
     };
     let mut scratch = pooled().pop().unwrap_or_default();
+    // Marks need no reset: every object of a node is marked before the node is partitioned.
     scratch.goes_left.resize(division.scene.len(), 0);
     let mut pace = Pace::new(division.watch);
     // A loop instead of a recursion: one side goes to the pool and the other stays, so unbalanced
@@ -277,10 +278,12 @@ fn build_plain<C: SplitCost, R: SplitRule>(
     let mut pace = Pace::new(division.watch);
     while let Some(Frame { start, len, below, known }) = stack.pop() {
         if pace.ends_after(len as usize) {
+            // The tree is incomplete, and `finish` clears it.
             stack.clear();
             break;
         }
         let range = start as usize..(start + len) as usize;
+        // Two objects have one split, and the order along x decides which is left.
         if len == 2 {
             for (index, &object) in x[range].iter().enumerate() {
                 let aabb = (&division.scene.boxes[object as usize]).into();
@@ -353,6 +356,7 @@ fn split_node<C: SplitCost, R: SplitRule>(
     let axis = split.axis as usize;
     let left = split.left as usize;
     let orders = [x, y, z];
+    // If all other axes have the same order, no partition is needed, and no marks.
     if (0..3).any(|other| other != axis && same_as[other] as usize == other) {
         let (to_left, to_right) = orders[axis].split_at(left);
         to_left
@@ -383,6 +387,7 @@ fn partition(order: &mut [u32], goes_right: &mut Vec<u32>, goes_left: &[u8]) {
     for index in 0..order.len() {
         let object = order[index];
         let side = usize::from(goes_left[object as usize]);
+        // Written always; the counter decides whether the entry is kept.
         order[left] = object;
         goes_right[right] = object;
         left += side;

@@ -75,6 +75,8 @@ impl Builder for Config {
                 .iter()
                 .fold(Aabb::EMPTY, |b, &id| b.union(&boxes[id as usize]));
             if len <= max_leaf {
+                // The selection leaves no defined order within a side, and a leaf's order must be
+                // reproducible.
                 ids.sort_unstable();
                 nodes[node] = Node::leaf(aabb, start as u32, len as u32);
                 continue;

@@ -76,10 +76,13 @@ pub struct MadeUpCosts {
 
 impl MadeUpCosts {
     fn of(self, objects: usize) -> Vec<f32> {
-        let cost = |object: usize| {
-            if object.is_multiple_of(self.every as usize) { self.cost as f32 } else { 1.0 }
-        };
-        (0..objects).map(cost).collect()
+        let mut costs = vec![1.0; objects];
+        for (object, cost) in costs.iter_mut().enumerate() {
+            if object.is_multiple_of(self.every as usize) {
+                *cost = self.cost as f32;
+            }
+        }
+        costs
     }
 }
 

@@ -45,36 +45,13 @@ impl Presorted {
         watch: &Watch,
     ) -> Result<Self, BuildError> {
         check_scene(boxes)?;
-        let sorted = |axis: usize| {
-            if boxes.len() >= OBJECTS_PER_POLL && watch.is_cancelled() {
-                return (Vec::new(), false);
-            }
-            let mut keyed: Vec<(f64, u32)> = boxes
-                .iter()
-                .zip(0..)
-                .map(|(b, index)| (b.doubled_centroid()[axis], index))
-                .collect();
-            // The check ends at the first pair out of order, usually within a few objects.
-            let in_order = keyed.is_sorted_by_key(|&(key, _)| key);
-            if !(in_order && skip_sorted) {
-                radsort::sort_by_key(&mut keyed, |&(key, _)| key);
-            }
-            (
-                keyed
-                    .into_iter()
-                    .map(|(_, index)| index)
-                    .collect::<Vec<u32>>(),
-                in_order,
-            )
+        let along = |axis| sorted_along(boxes, axis, skip_sorted, watch);
+        let [x, y, z] = if x_without_area && Self::without_area(boxes) {
+            let x = along(0);
+            [x.clone(), x.clone(), x]
+        } else {
+            in_parallel(boxes.len(), || along(0), || along(1), || along(2))
         };
-        let sorted = || {
-            if x_without_area && Self::without_area(boxes) {
-                let x = sorted(0);
-                return [x.clone(), x.clone(), x];
-            }
-            in_parallel(boxes.len(), || sorted(0), || sorted(1), || sorted(2))
-        };
-        let [x, y, z] = sorted();
         watch.ensure_wanted()?;
         let orders = [x.0, y.0, z.0];
         let in_order = [x.1, y.1, z.1];
@@ -117,6 +94,26 @@ impl Presorted {
     }
 }
 
+/// Returns the objects sorted along an axis, and whether they were already in order.
+fn sorted_along(boxes: &[Aabb], axis: usize, skip_sorted: bool, watch: &Watch) -> (Vec<u32>, bool) {
+    if boxes.len() >= OBJECTS_PER_POLL && watch.is_cancelled() {
+        return (Vec::new(), false);
+    }
+    let mut keyed: Vec<(f64, u32)> = boxes
+        .iter()
+        .zip(0..)
+        .map(|(b, index)| (b.doubled_centroid()[axis], index))
+        .collect();
+    // The check ends at the first pair out of order, usually within a few objects.
+    let in_order = keyed.is_sorted_by_key(|&(key, _)| key);
+    if !(in_order && skip_sorted) {
+        // The radix sort is stable, so equal centres stay in the order of their indices.
+        radsort::sort_by_key(&mut keyed, |&(key, _)| key);
+    }
+    let order = keyed.into_iter().map(|(_, index)| index);
+    (order.collect(), in_order)
+}
+
 /// Returns the results for all three axes, computed on several threads if the number of `objects`
 /// makes that pay.
 pub(super) fn in_parallel<T: Send>(
@@ -135,8 +132,8 @@ pub(super) fn in_parallel<T: Send>(
     [x(), y(), z()]
 }
 
-/// Finds axes that order a node's objects identically, given those of its parent. They order the
-/// objects of all descendants identically, too.
+/// Finds axes that order a node's objects identically, given the identical axes of its parent. They
+/// order the objects of all descendants identically, too.
 ///
 /// Source: Ng & Trifonov 2003, section 3.2.
 #[inline(always)]

@@ -172,6 +172,7 @@ impl<C: SplitCost> Sweep<'_, C> {
                     while index > 0 && candidate.rank(&list[index - 1]).is_lt() {
                         index -= 1;
                     }
+                    // Insertion keeps the list sorted; k is small.
                     list.insert(index, candidate);
                     list.truncate(k);
                 }
@@ -195,6 +196,7 @@ impl<C: SplitCost> Sweep<'_, C> {
                 limit
             });
         }
+        // A best cost of 0, or a rounded limit, excludes the best candidate itself.
         if !list.contains(&best) {
             list.push(best);
         }
@@ -270,6 +272,7 @@ impl<C: SplitCost> Sweep<'_, C> {
         };
         let mut costs = [0.0; 2 * BLOCK];
         for (index, (block, objects)) in blocks.iter().zip(order.chunks(size)).enumerate() {
+            // Equal costs must be visited, because ties are decided by rank.
             if split_cost.bound(block.left_value, block.right_value) > bound {
                 continue;
             }
@@ -333,6 +336,7 @@ fn gather_blocks<C: SplitCost>(
     let mut aabb = PackedAabb::EMPTY;
     let mut load = 0.0;
     for (block, objects) in blocks.iter_mut().zip(order.chunks(BLOCK)).rev() {
+        // An empty side has no value; its candidates do not exist.
         if aabb != PackedAabb::EMPTY {
             block.right_value = split_cost.side(split_cost.size(&aabb), load);
         }
@@ -346,9 +350,9 @@ fn gather_blocks<C: SplitCost>(
         if aabb != PackedAabb::EMPTY {
             block.left_value = split_cost.side(split_cost.size(&aabb), load);
         }
-        let own = std::mem::replace(&mut block.left, aabb);
+        let of_block = std::mem::replace(&mut block.left, aabb);
         block.left_load = load;
-        aabb.grow(&own);
+        aabb.grow(&of_block);
         load += split_cost.total_load(objects);
     }
 }

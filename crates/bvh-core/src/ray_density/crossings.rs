@@ -69,7 +69,7 @@ impl Crossings {
             }
         }
         // Walks from cell to cell through the face that comes first. Each axis takes exactly the
-        // steps between the two cells, so the walk reaches the last cell whatever the rounding.
+        // steps between the two cells, so the walk reaches the last cell despite rounding.
         while cell != end {
             let times = [0, 1, 2].map(|axis| time_of_next_face(axis, cell, end, from, ray));
             let earliest = (0..3).min_by(|&a, &b| times[a].total_cmp(&times[b]));

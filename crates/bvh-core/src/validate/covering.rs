@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 
 /// The number of cells per leaf after which a covering is rejected. Divisions by planes, as
 /// builders and searches make them, need a few cells. A forged file must not keep the check busy
-/// for ever.
+/// forever.
 const CELLS_PER_LEAF: usize = 256;
 
 /// Returns whether every part of `object`, whose box is `full`, is in one of `leaves`, compared
@@ -18,8 +18,8 @@ pub(super) fn is_covered(objects: &dyn Clip, object: u32, full: &Aabb, leaves: &
     let mut cells_left = CELLS_PER_LEAF * leaves.len();
     let mut open: Vec<Aabb> = alloc::vec![*full];
     while let Some(region) = open.pop() {
-        // Tightly: a part that is a little too large might stick out of the leaf that was made for
-        // it.
+        // Clip tightly, because a slightly enlarged part might extend beyond the leaf that was made
+        // for it.
         let part = objects.clip_tightly(object, &region);
         if part == Aabb::EMPTY || leaves.iter().any(|leaf| leaf.contains(&part)) {
             continue;

@@ -27,6 +27,7 @@ impl Layout {
     /// Computes all rows, unless they exist.
     #[inline(always)]
     pub fn prepare(&mut self, tree: &Working<impl Metric>) {
+        // A mover works on one tree between two sorts, so only a new mover has no rows.
         if self.rows.len() != tree.nodes.len() {
             self.fill(tree);
         }
@@ -41,6 +42,7 @@ impl Layout {
         self.marks.clear();
         self.marks.resize(tree.nodes.len(), 0);
         self.change = 0;
+        // Children before parents, because a row depends on the rows of both children.
         for &index in tree.preorder().iter().rev() {
             self.rows[index as usize] = self.row(tree, index);
         }
@@ -85,6 +87,8 @@ impl Layout {
                 .resize(tree.nodes.len(), LayoutCost::leaf(0.0, 0));
             self.marks.resize(tree.nodes.len(), 0);
         }
+        // A mark equals the current change only during this call, so marks never need to be
+        // cleared.
         self.replaced.clear();
         self.change += 1;
         for written in tree.changed() {
@@ -95,6 +99,8 @@ impl Layout {
                 index = tree.nodes[index as usize].parent;
             }
         }
+        // Mark the ancestors first, then visit the marked nodes from the root: every row is
+        // computed once, after its children, although the paths of the changed nodes overlap.
         self.stack.clear();
         self.stack
             .extend(tree.root().map(|root| (root, false)));
@@ -121,6 +127,7 @@ impl Layout {
             self.cost = cost;
             return true;
         }
+        // The move is rejected: restore the rows, as the caller restores the tree.
         for &(index, row) in &self.replaced {
             self.rows[index as usize] = row;
         }
@@ -138,41 +145,41 @@ mod tests {
     use rand::RngExt;
 
     #[test]
-    fn rows_that_follow_moves_are_those_that_are_made_anew() {
+    fn rows_that_follow_moves_equal_recomputed_rows() {
         let mut tree = built(&muller_fellner::Config::default(), &scatter(120));
         let mut rng = stream(3, 0);
         let mut layout = Layout::default();
         layout.prepare(&tree);
         let mut accepted = 0;
-        let mut refused = 0;
+        let mut rejected = 0;
         for _ in 0..4000 {
             let draw = |rng: &mut crate::run::Stream| rng.random_range(1..tree.nodes.len() as u32);
             let node = draw(&mut rng);
-            let beside = draw(&mut rng);
-            let mut above = beside;
+            let sibling = draw(&mut rng);
+            let mut above = sibling;
             while above != ANCHOR && above != node {
                 above = tree.nodes[above as usize].parent;
             }
             let parent = tree.nodes[node as usize].parent;
-            if above == node || parent == ANCHOR || beside == parent {
+            if above == node || parent == ANCHOR || sibling == parent {
                 continue;
             }
             let before = (layout.cost, tree.to_bvh());
             tree.begin();
             tree.detach(node);
-            tree.attach(node, beside);
+            tree.attach(node, sibling);
             if layout.accepts(&tree, 0.05 * before.0 * rng.random::<f64>().powi(4)) {
                 accepted += 1;
             } else {
                 tree.undo();
-                refused += 1;
+                rejected += 1;
                 assert_eq!((layout.cost, tree.to_bvh()), before);
             }
             let followed = layout.cost;
-            let anew = Layout::default().cost(&tree);
-            assert_eq!(followed, anew);
-            assert!((anew - layout_area(&tree.to_bvh())).abs() <= 1e-12 * anew);
+            let recomputed = Layout::default().cost(&tree);
+            assert_eq!(followed, recomputed);
+            assert!((recomputed - layout_area(&tree.to_bvh())).abs() <= 1e-12 * recomputed);
         }
-        assert!(accepted > 100 && refused > 1000, "{accepted} {refused}");
+        assert!(accepted > 100 && rejected > 1000, "{accepted} {rejected}");
     }
 }

@@ -46,9 +46,12 @@ fn cool_plain<M: Mover>(
         let work = mover.work() - before;
         let long_move = work - tally.work > LONG_MOVE;
         tally.work = work;
+        // Checked before every move, so that a budget is exceeded by one move at most.
         if quota.is_reached(&tally) {
             return tally;
         }
+        // The temperature changes little within a few moves, so the power and the poll are needed
+        // only now and then.
         if tally.moves % MOVES_PER_TEMPERATURE == 0 {
             if observer.cancelled() {
                 return tally;

@@ -66,6 +66,8 @@ impl NodeSampler {
     fn position(&self, window: Range<usize>, drawn: f64) -> usize {
         let [low, high] = [window.start, window.end].map(|index| self.sums[index]);
         let drawn = low + drawn * (high - low);
+        // The last sum of the window is excluded: rounding may draw it, and the result must stay
+        // inside.
         let before = self.sums[window.start + 1..window.end].partition_point(|&sum| sum <= drawn);
         window.start + before
     }
@@ -73,6 +75,8 @@ impl NodeSampler {
     /// Chooses the next window.
     #[inline(never)]
     fn next_window(&mut self, tree: &Working<impl Metric>, rng: &mut Stream) {
+        // The weights keep their values until the next round: updating the sums after every move
+        // would take O(n).
         if self.sums.is_empty() {
             self.weigh(tree);
             self.middle = rng.random();
@@ -80,6 +84,7 @@ impl NodeSampler {
         let all = self.sums.len() - 1;
         (self.window, self.draws) = (0..all, u32::MAX);
         let reach = if self.short_run { WINDOW_OF_SHORT_RUNS * WINDOW } else { WINDOW };
+        // Smaller trees fit into a near cache and need no windows.
         if all >= LEAST_WINDOWS * reach {
             self.middle = (self.middle + GOLDEN).fract();
             let middle = self.position(0..all, self.middle);

@@ -107,6 +107,7 @@ impl<'a> Divider<'a> {
     #[inline(always)]
     fn reunite(&mut self, tree: &mut Working<impl Metric>, leaf: u32, other: u32) -> bool {
         let [a, b] = [leaf, other].map(|leaf| tree.nodes[leaf as usize]);
+        // A root cannot be detached.
         if b.parent == ANCHOR {
             return false;
         }
@@ -115,6 +116,7 @@ impl<'a> Divider<'a> {
             .splits
             .objects
             .clip(object, &Aabb::from(&a.aabb.union(&b.aabb)));
+        // A degenerate object may vanish under clipping; it stays divided.
         if whole == Aabb::EMPTY {
             return false;
         }
@@ -132,6 +134,7 @@ impl<'a> Divider<'a> {
         self.visits += visits;
         let limit =
             self.limit(saved + saved_other + leaf_cost(tree, a.area + b.area - area)) + price;
+        // The detached leaf gets an empty box of no area, so that sums over all leaves stay right.
         tree.resize_leaf(other, object, PackedAabb::EMPTY, 0.0);
         tree.resize_leaf(leaf, object, whole, area);
         let position = (area < limit)
@@ -148,6 +151,7 @@ impl<'a> Divider<'a> {
         if !self.accepts(tree, price) {
             return false;
         }
+        // Rings are singly linked: find the predecessor to unlink the leaf.
         let mut before = leaf;
         while self.ring[before as usize] != other {
             before = self.ring[before as usize];
@@ -173,6 +177,7 @@ impl<'a> Divider<'a> {
         let parts = Aabb::from(&aabb)
             .halves(axis, plane)
             .map(|region| self.splits.objects.clip(object, &region));
+        // One side is empty, so the plane divides the box but not the object.
         if parts.contains(&Aabb::EMPTY) {
             return false;
         }
@@ -186,10 +191,13 @@ impl<'a> Divider<'a> {
         if self.layout.is_none() {
             limit -= price;
         }
+        // Even positions without any growth would cost too much.
         if limit <= areas[0] + areas[1] {
             tree.undo();
             return false;
         }
+        // Leaves that a reunion has removed are used again, so nodes grow only to the largest
+        // number of references.
         let spare = self.spares.last().copied().unwrap_or_else(|| {
             let spare = tree.push_spare(object);
             self.ring.resize(tree.nodes.len(), NONE);
@@ -216,6 +224,7 @@ impl<'a> Divider<'a> {
         if !self.accepts(tree, -price) {
             return false;
         }
+        // Only an accepted move uses the spare; a rejected move leaves it for the next one.
         self.spares.pop();
         self.ring[spare as usize] = self.ring[leaf as usize];
         self.ring[leaf as usize] = spare;
@@ -267,6 +276,7 @@ impl<'a> Divider<'a> {
         let mut index = tree.nodes[leaf as usize].parent;
         let mut rest = PackedAabb::EMPTY;
         for _ in 0..LEVELS_OF_PLANES {
+            // Once the rest covers the leaf, no ancestor further up is larger because of it.
             if index == ANCHOR || rest.union(&item) == rest {
                 break;
             }
@@ -322,6 +332,8 @@ fn change_plain<A: Metric>(
         }
         quota.is_reached(done) || polled && observer.cancelled()
     };
+    // Leaves are drawn by the square root of their area, like the nodes of other moves: large
+    // leaves gain most. The tiny summand keeps points drawable.
     let mut sums = Vec::with_capacity(tree.nodes.len());
     let mut sum = 0.0;
     let leaves: Vec<u32> = (1..tree.nodes.len() as u32)

@@ -166,6 +166,7 @@ impl<'a> RuinMover<'a> {
     ) {
         for _ in 0..rng.random_range(1..=self.ruin.removed) {
             let mut node = scope.root(tree);
+            // The scope has shrunk to one leaf, which stays as its root.
             if tree.nodes[node as usize].is_leaf() {
                 break;
             }
@@ -243,8 +244,12 @@ impl Mover for RuinMover<'_> {
             self.scattered(tree, scope, levels, rng);
         }
         let near = rng.random::<f64>() < ruin.near;
+        // Every removed subtree is inside the top's former box, and a scope must contain the boxes
+        // of its items.
         let positions = if near { scope.around(tree, &top_box) } else { Scope::ALL };
         let Removed { roots, saved, least } = &mut self.removed;
+        // The order decides which subtree chooses first; a fixed order would always favour the same
+        // ones.
         roots.shuffle(rng);
         // Metropolis draws its random number first, so that a move above the resulting limit need
         // not be finished.
@@ -262,6 +267,8 @@ impl Mover for RuinMover<'_> {
             let item = &tree.nodes[node as usize];
             let aabb = item.aabb;
             let area = item.area;
+            // `least` covered this subtree with its own area; its exact position replaces that
+            // bound now.
             limit += area;
             let Some(position) = self
                 .search

@@ -98,6 +98,7 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
 ) {
     let n = tree.objects() as u64;
     let Quota { work, moves } = schedule.quota;
+    // Two objects have only one tree.
     if n < 3 {
         return;
     }
@@ -112,12 +113,14 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     let began = observer.progress();
     let [short, long] = WORK_PER_ROUND.map(|work| work * n);
     let mut next = (work / ROUNDS).clamp(short, long).min(work);
+    // The rate of work is still unknown, so the first round under a time limit is short.
     if began.is_some() {
         next = next.min(short);
     }
     // The completed fraction of the work or time, and the fraction per unit of work.
     let mut fraction = 0.0;
     let mut rate = 1.0 / work as f64;
+    // Moves find their nodes near each other in memory only after a sort.
     tree.sort_in_preorder();
     while fraction < 1.0 {
         let step = rate * next as f64;
@@ -130,6 +133,7 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
         streams += subtrees::STREAMS;
         done += tally;
         round(tree, tally);
+        // A cancelled search has no time for the final passes.
         if observer.cancelled() || schedule.quota.is_reached(&done) {
             return;
         }
@@ -137,8 +141,11 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
         if let (Some(began), Some(now)) = (began, observer.progress()) {
             let passed = (now - began) / (schedule.end - began);
             let per_node = passed / done.work as f64;
+            // Reserve the time of the final passes at the measured rate, as the work is reserved
+            // above.
             let kept = (per_node * final_passes as f64).min(1.0 / FINAL_PASSES_PART as f64);
             let timed = passed / (1.0 - kept);
+            // Whichever of work and time is nearer to its end drives the temperature.
             if timed > fraction {
                 (fraction, rate) = (timed, timed / done.work as f64);
                 next = ((1.0 / ROUNDS as f64 / rate) as u64).clamp(short, long);

@@ -45,10 +45,14 @@ impl Side {
             let node = &tree.nodes[index as usize];
             let (near, far) = span(index);
             visits += 1;
+            // The subtree ends before the layer.
             if far <= limit {
                 continue;
             }
+            // A leaf that crosses the limit but does not reach the side need not go for the box to
+            // shrink.
             if near >= limit || (node.is_leaf() && far >= end) {
+                // Too many subtrees: the move would cost more work than it is likely to gain.
                 if self.roots.len() == most {
                     self.roots.clear();
                     break;

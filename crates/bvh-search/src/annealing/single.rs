@@ -163,13 +163,17 @@ impl Mover for SingleMover<'_> {
     ) -> bool {
         self.work += 1;
         let node = self.sampler.draw(tree, rng);
+        // The root has no other position.
         if tree.nodes[node as usize].parent == ANCHOR {
             return false;
         }
         tree.begin();
+        // The journal makes a rejected move cheap to undo, so the tree is changed before the
+        // decision.
         let (saved, sibling, visits) = tree.detach(node);
         self.work += visits;
         let levels = rng.random_range(1..=self.config.climb);
+        // The sibling has replaced the parent, so the climb starts there.
         let mut top = sibling;
         for _ in 0..levels {
             let above = tree.nodes[top as usize].parent;
@@ -192,6 +196,7 @@ impl Mover for SingleMover<'_> {
                     index = tree.nodes[index as usize].children[usize::from(rng.random::<bool>())];
                     self.work += 1;
                 }
+                // A position next to the sibling would restore the tree.
                 Some(index).filter(|&index| index != sibling)
             }
             Target::Best => {

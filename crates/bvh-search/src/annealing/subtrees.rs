@@ -47,9 +47,12 @@ pub(crate) fn cool<M: Mover>(
         };
         let found = parallel::map(subtrees.len(), |number| {
             let mut small = subtrees[number].take(tree);
+            // A stream per subtree, not per thread: the result must not depend on the schedule of
+            // threads.
             let rng = &mut stream(seed, first + 1 + number as u64);
             let quota = share(&subtrees[number]);
             let tally = metropolis::cool(&mut mover(), &mut small, heat, quota, rng, observer);
+            // Sorted here, in parallel; `put_back` then leaves the full tree in preorder.
             small.sort_in_preorder();
             (small, tally)
         });
@@ -132,6 +135,7 @@ fn cut(
             depths[index as usize] = above.saturating_add(1);
         } else if weight <= most {
             depths[index as usize] = 1;
+            // A smaller subtree is left to the moves on the whole tree.
             if nodes >= 2 * LEAST_SUBTREE {
                 subtrees.push(Subtree { root: index, nodes, weight });
             }
@@ -177,6 +181,7 @@ fn put_back<A: Metric>(
     for (subtree, (small, tally)) in subtrees.iter().zip(found) {
         done += tally;
         let to = subtree.root as usize;
+        // The root's link leads out of the subtree and must survive the copy.
         let parent = nodes[to].parent;
         for (old, new) in nodes[to..].iter_mut().zip(&small.nodes[1..]) {
             *old = moved(new, |index| index + subtree.root - 1);

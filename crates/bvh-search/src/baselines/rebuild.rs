@@ -77,9 +77,11 @@ impl Config {
         let mut rng = stream(seed, 0);
         let mut number = 0;
         let mut work_left = self.work_per_object.saturating_mul(n);
-        // A batch is not begun with less work than it may need.
+        // A batch does not begin unless the remaining work covers it.
         let enough = BATCH * WORK_PER_OBJECT * n.min(self.objects.into());
         while run.stopped().is_none() && work_left.min(run.left().work) >= enough {
+            // Grafts scatter a subtree's nodes; the sort makes neighbours in the tree neighbours in
+            // memory again.
             tree.sort_in_preorder();
             let mut round = Tally::default();
             while round.work < n * WORK_PER_OBJECT && !run.observer().cancelled() {
@@ -91,6 +93,8 @@ impl Config {
                 let subtrees = self.select(&tree, &mut rng, quota.moves.min(BATCH), &mut round);
                 // The selection draws from stream 0, so constructions begin with stream 1.
                 let first = number + 1;
+                // One half of the quota for the constructions, one for the reinsertions afterwards.
+                // Moves are not limited: every construction counts as one.
                 let share = Quota { work: quota.work / (2 * BATCH), ..Quota::ENDLESS };
                 let construct = |index: usize| {
                     let rng = stream(seed, first + index as u64);
@@ -291,6 +295,7 @@ fn graft(tree: &mut Working<impl Metric>, subtree: &Subtree, shape: &Working<imp
             inner.next().copied().unwrap_or(ANCHOR) // both trees have the same number
         };
     }
+    // Children first: `join` computes a box from the boxes of the children.
     for &index in order.iter().rev() {
         let node = &shape.nodes[index as usize];
         if !node.is_leaf() {

@@ -102,6 +102,7 @@ fn pass_plain(
         if tree.nodes[node as usize].is_leaf() {
             continue;
         }
+        // A poll may read a clock, hence only at every 1024th node.
         if quota.is_reached(&done) || done.moves % 1024 == 1023 && observer.cancelled() {
             break;
         }

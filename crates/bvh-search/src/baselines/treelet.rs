@@ -79,6 +79,8 @@ fn pass_plain(
         if quota.is_reached(&done) || done.moves % 64 == 63 && observer.cancelled() {
             break;
         }
+        // Growing is cheap compared with solving, so unchanged treelets are grown but not solved
+        // again.
         let fresh = solver.grow(tree, root);
         done.work += 2 * solver.inner.len() as u64;
         if !fresh || solver.leaves.len() < 3 {
@@ -94,6 +96,7 @@ fn pass_plain(
             solver.restructure(tree);
             done.kept += 1;
         }
+        // Recorded after the change, so that the treelet's own nodes do not count as changed.
         solver.solved[root as usize] = tree.changes();
     }
     done

@@ -55,7 +55,7 @@ bvh_config::config! {
     }
 }
 
-/// True if the search knows its end.
+/// The search's knowledge of its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",

@@ -32,6 +32,7 @@ pub(crate) fn improve<A: Metric>(
     run: &mut Run,
 ) {
     let n = tree.objects() as u64;
+    // Two objects have only one tree.
     if n < 3 {
         return;
     }
@@ -116,6 +117,7 @@ impl Improvement<'_, '_, '_, '_> {
             let work =
                 if timed { self.left } else { self.left.min(due.saturating_sub(all - self.left)) };
             let end = began + (end_of_all - began) * until;
+            // A slow earlier run may have used the time of this one.
             if observer.progress().is_some_and(|now| now >= end) {
                 continue;
             }
@@ -251,6 +253,7 @@ impl Improvement<'_, '_, '_, '_> {
             done += tally;
             best.offer(tree, run);
         }
+        // Anneal a copy: recombination needs both trees.
         let mut annealed = tree.clone();
         let mut divider = self.divider.as_mut().filter(|_| first);
         anneal(
@@ -277,6 +280,7 @@ impl Improvement<'_, '_, '_, '_> {
                 }
             },
         );
+        // The cost of a layout is no sum over clades, so such trees cannot be recombined.
         if by_layout {
             if cost(&annealed, by_layout) < cost(tree, by_layout) {
                 *tree = annealed;

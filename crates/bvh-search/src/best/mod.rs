@@ -23,10 +23,10 @@
 //! *A few objects.* If the budget has enough work for the [exact solver](crate::exact), the result
 //! is the optimum.
 //!
-//! *Milliseconds* (`small_budget`). A clustering along the Morton curve is the fastest build that
-//! is a good start. Reinsertion begins with the largest nodes, which hold most of the area that can
-//! be saved, and stops when the time is over. If it reaches a local optimum earlier, the search
-//! continues as below.
+//! *Milliseconds* (`small_budget`). A clustering along the Morton curve is the fastest build with a
+//! good tree to start from. Reinsertion begins with the largest nodes, which hold most of the area
+//! that can be saved, and stops when the time is over. If it reaches a local optimum earlier, the
+//! search continues as below.
 //!
 //! *The end is known*, from the budget's work or the observer's
 //! [progress](crate::Observer::progress). One long run of
@@ -172,6 +172,8 @@ impl Config {
             Err(BuildError::Cancelled) => return Ok(clustered),
             started => started?,
         };
+        // Both are evaluated by the problem's objective, also where the clustering was built by
+        // area.
         let [other, first] = [&clustered, &started].map(|tree| problem.cost(tree));
         if other < CLUSTERING_MUCH_CHEAPER * first {
             run.keep_aside(problem, started);

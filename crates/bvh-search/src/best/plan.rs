@@ -15,6 +15,7 @@ pub(super) struct Planned {
 /// run including its short runs.
 pub(super) fn plan(config: &Config, length: f64, n: u64) -> (Vec<Planned>, f64) {
     let longest = config.longest.min(WORK_PER_PAIR * n as f64);
+    // Runs of equal length: a short last run would begin at a low temperature.
     let equal = (length / longest)
         .ceil()
         .clamp(1.0, MOST_GENERATIONS as f64);
@@ -25,6 +26,7 @@ pub(super) fn plan(config: &Config, length: f64, n: u64) -> (Vec<Planned>, f64) 
     let mut plan = Vec::new();
     for number in 0..equal as u64 {
         for reheat in 0..=reheats {
+            // A short run never starts hotter than its long run.
             let hot = if reheat == 0 { hot } else { hot.min(config.reheat) };
             let part = 1.0 - kept + kept * f64::from(reheat) / f64::from(reheats.max(1));
             plan.push(Planned { hot, until: (number as f64 + part) / equal });

@@ -34,6 +34,7 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
                 (keys[left].0.wrapping_add(keys[right].0), keys[left].1 + keys[right].1)
             };
             let (key, size) = keys[index as usize];
+            // Clades are numbered in the order of their first occurrence.
             let next = number.len() as u32;
             clades[index as usize] = *number.entry(key).or_insert(next);
             by_size.push((size, which, index));
@@ -61,6 +62,7 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
         }
     }
     let mut nodes = vec![trees[0].nodes[ANCHOR as usize]];
+    // All trees are over the same objects, so their roots are the same clade.
     let root = trees[0]
         .root()
         .map(|root| (clade_of[0][root as usize], ANCHOR, 0));
@@ -90,6 +92,8 @@ fn key_of_leaf<A: Metric>(node: &Node) -> u128 {
     [low[0], low[1], low[2], high[0], high[1], high[2]]
         .into_iter()
         .fold(object, |sum, plane| {
+            // Multiplying between the planes makes the key depend on their order, and an odd factor
+            // loses no bits.
             sum.rotate_left(21)
                 .wrapping_mul(0x2d99_787926d46932a4c1f32680f70c55)
                 ^ key(plane.to_bits())

@@ -45,6 +45,7 @@ pub(super) fn search<'p, A: Metric>(
     let n = problem.boxes.len();
     let began = observer.progress();
     let work = run.left().work / n.max(1) as u64;
+    // Without a clock the decision depends on the work alone, which keeps the result reproducible.
     if n < 3 || began.is_none() && work >= ANNEAL_FROM_WORK {
         return Ok(SmallBudget::Large(None));
     }
@@ -52,6 +53,7 @@ pub(super) fn search<'p, A: Metric>(
     let mut two_starts = false;
     let mut end = f64::INFINITY;
     if let (Some(began), Some(sorted)) = (began, observer.progress()) {
+        // A coarse clock may not have advanced; the bound avoids a division by zero.
         let sort = (sorted - began).max(1e-9);
         let times = (1.0 - began) / sort;
         let by_threads = if threads() > 1 { SEVERAL_THREADS } else { 1.0 };
@@ -70,6 +72,7 @@ pub(super) fn search<'p, A: Metric>(
             let tree = Incumbent::begin_unbounded(morton.build(&config)?, problem, run).tree;
             return Ok(SmallBudget::Tree(tree));
         }
+        // Stop early enough to order and evaluate the tree.
         (two_starts, end) = (times >= two_starts_from, 1.0 - FINISH_TIME * sort);
     }
     let two_starts = two_starts && top_down_may_be_better(&morton, problem, run)?;
@@ -171,6 +174,7 @@ fn reinsert_largest(tree: &mut Siblings, front: usize, end: f64, run: &mut Run) 
             run.count(tally);
             kept += tally.kept;
         }
+        // Only a pass over all nodes that keeps no move proves a local optimum.
         if part >= 1.0 && kept == 0 {
             return true;
         }
@@ -190,6 +194,7 @@ fn largest(tree: &Siblings, part: f64, front: usize, order: &mut Vec<u32>) {
         .map(|index| (!tree.area(index).to_bits(), index))
         .collect();
     if count < keyed.len() {
+        // Selection first makes the sort O(k log k) instead of O(n log n).
         keyed.select_nth_unstable(count);
         keyed.truncate(count);
     }

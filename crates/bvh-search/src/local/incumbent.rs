@@ -78,6 +78,8 @@ impl<'p> Incumbent<'p> {
 
     /// Keeps `tree` if it is the best so far. O(n).
     pub fn offer(&mut self, tree: &Working<impl Metric>, run: &mut Run) -> bool {
+        // The incremental area rejects most trees without the conversion. The layout's cost does
+        // not follow the area, so every tree is converted for it.
         let may_be_better = tree.area() < self.area || self.problem.objective == Objective::Layout;
         may_be_better && self.offer_tree(tree.to_bvh(), run)
     }
@@ -89,6 +91,7 @@ impl<'p> Incumbent<'p> {
         if improved {
             self.area = area;
             self.tree = candidate;
+            // Only a new incumbent can meet the bound.
             self.stop_if_optimal(run);
         }
         improved

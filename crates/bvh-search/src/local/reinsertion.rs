@@ -103,6 +103,7 @@ fn pass_plain<T: Linked>(
     let mut search = PositionSearch::default();
     let mut poll = WORK_PER_POLL;
     for &node in order {
+        // The search counts its own visits; both together are the work of the pass.
         let so_far = Tally { work: done.work + search.visits, ..done };
         if quota.is_reached(&so_far) {
             break;
@@ -113,6 +114,7 @@ fn pass_plain<T: Linked>(
             }
             poll = so_far.work + WORK_PER_POLL;
         }
+        // The root cannot move.
         if tree.parent(node) == T::ABOVE {
             continue;
         }

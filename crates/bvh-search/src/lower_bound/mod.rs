@@ -100,6 +100,7 @@ pub fn internal_area(
             if observer.cancelled() {
                 return 0.0;
             }
+            // Any set of two objects or more needs at least the box with the nearest neighbour.
             let mut areas = vec![nearest[object]; classes.first.len()];
             for band in &bands {
                 let class = classes
@@ -110,6 +111,7 @@ pub fn internal_area(
                     .iter_mut()
                     .for_each(|least| *least = least.max(area));
             }
+            // The last class holds the weight of all objects, whose only box is the scene's.
             *areas.last_mut().unwrap_or(&mut 0.0) = clusters.area();
             weights[object] as f64 * classes.least_path(weights[object], &areas)
         },
@@ -161,6 +163,7 @@ const MOST_WEIGHT: u64 = 64;
 fn weights(nearest: &[f64]) -> Vec<u64> {
     let mut sorted = nearest.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
+    // The lower quartile is robust against a few tiny objects.
     let unit = sorted[sorted.len() / 4];
     if unit <= 0.0 {
         return vec![LEAST_WEIGHT; nearest.len()];

@@ -357,6 +357,7 @@ fn search_plain(
     observer: &dyn Observer,
 ) -> f64 {
     let mut around = seed;
+    // The box of the smallest ancestor with enough weight is a first upper bound.
     while around != 0 && clusters.weight_of(&clusters.nodes[around].objects) < weight {
         around = clusters.nodes[around].parent;
     }
@@ -380,10 +381,14 @@ fn search_plain(
         if left == 0 || observer.cancelled() {
             return regions[least].bound;
         }
+        // The region with the least bound first: the search's bound is that least bound, so only
+        // its division can raise it.
         let region = regions.swap_remove(least);
         left = left.saturating_sub(2 * region.members.len() as u64);
         let Some((face, plane)) = region.division(clusters) else { return region.bound };
         let members = || region.members.iter().copied();
+        // Every box either ends below the plane on this face, which excludes the members beyond, or
+        // reaches the plane. The two regions cover both cases.
         let short = members()
             .filter(|member| clusters.nodes[member.cluster as usize].reach.0[face] < plane);
         let mut far = region.must;

@@ -63,6 +63,7 @@ impl Search for Config {
         }
         let (mut best, tree) = evaluate(&insertion, &mut population, run)?;
         let mut built = (best.order.clone(), tree.unwrap_or_default());
+        // One buffer for all crossovers, so that a child needs no second allocation.
         let mut marks = vec![false; insertion.len()];
         for _ in 0..self.generations {
             if run.stopped().is_some() {
@@ -168,6 +169,7 @@ fn cross(parents: &mut [Individual], probability: f64, marks: &mut [bool], rng: 
         let children =
             [child(&a.order, &b.order, cut, marks), child(&b.order, &a.order, cut, marks)];
         for (parent, order) in [a, b].into_iter().zip(children) {
+            // A child may equal its parent, which needs no new evaluation.
             if parent.order != order {
                 (parent.order, parent.evaluated) = (order, false);
             }
@@ -205,6 +207,7 @@ fn mutate(individual: &mut Individual, mean: f64, rng: &mut Stream) {
             .order
             .swap(rng.random_range(0..n) as usize, rng.random_range(0..n) as usize);
     }
+    // Two swaps may cancel out; evaluating the order again then is only a little work.
     individual.evaluated &= swaps == 0;
 }
 

@@ -112,6 +112,8 @@ impl<'p> Insertion<'p> {
             for (index, evaluated) in evaluated.into_iter().enumerate() {
                 let (cost, tree) = evaluated.unzip();
                 found.costs.push(cost);
+                // The first tree may equal the incumbent's cost; later trees must be strictly
+                // cheaper, so that the first of equals is kept.
                 let is_cheapest = cost
                     .is_some_and(|cost| found.cheapest.is_none() && cost <= limit || cost < limit);
                 if let (Some(cost), Some(tree), true) = (cost, tree.flatten(), is_cheapest) {

@@ -17,7 +17,7 @@ pub enum SearchError {
     #[error(transparent)]
     Invalid(#[from] InvalidBvh),
     /// Local search requires binary trees.
-    #[error("inner node {node} has {children} children; local search takes binary trees only")]
+    #[error("inner node {node} has {children} children; local search accepts binary trees only")]
     NotBinary {
         /// Index of the node.
         node: usize,

@@ -118,6 +118,7 @@ impl<'a> Run<'a> {
     /// caller's `known` tree. Builds a tree with the fastest builder if a cancellation left none.
     fn cheapest(&mut self, found: Found, problem: &Problem, known: Option<(f64, &Bvh)>) -> Found {
         let mut tree = match found {
+            // A cancelled first construction leaves no tree; any other error is the caller's.
             Err(SearchError::Build(BuildError::Cancelled)) => None,
             found => Some(found?),
         };
@@ -137,6 +138,7 @@ impl<'a> Run<'a> {
 
     /// Replaces the tree by another of this cost, if the other is cheaper or if there is no tree.
     fn prefer(&mut self, tree: &mut Option<Bvh>, cost: f64, other: impl FnOnce() -> Bvh) {
+        // Strictly cheaper, so that equal trees do not depend on the order of the offers.
         if tree.is_none() || cost < self.incumbent {
             self.improve(cost);
             *tree = Some(other());
@@ -172,6 +174,7 @@ impl<'a> Run<'a> {
     /// Returns the reason why the search must return now; `None` if it may continue.
     pub fn stopped(&self) -> Option<StopReason> {
         let Budget { max_evaluations, max_work } = self.budget;
+        // No reason counts before the first tree: a search always returns one.
         if self.evaluations == 0 {
             None
         } else if self.observer.cancelled() {

@@ -54,6 +54,8 @@ impl<M: Metric> Working<M> {
             let node = &self.nodes[place as usize];
             let aabb = Aabb::from(&node.aabb);
             let [left, right] = node.children;
+            // Preorder in the flat tree, with a stack of right children only: left ones follow at
+            // once.
             if left == NONE {
                 tree.nodes[to as usize] = BvhNode::leaf(aabb, tree.prim_ids.len() as u32, 1);
                 tree.prim_ids.push(right);

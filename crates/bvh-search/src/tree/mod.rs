@@ -143,6 +143,8 @@ impl<M: Metric> Working<M> {
     pub fn begin(&mut self) {
         self.change += 1;
         self.journal.clear();
+        // Folding the change into the compensated sum here keeps `undo` exact: it only drops
+        // `added`.
         self.area.add(self.added);
         self.added = 0.0;
     }
@@ -157,6 +159,8 @@ impl<M: Metric> Working<M> {
     #[inline(always)]
     pub fn undo(&mut self) {
         self.added = 0.0;
+        // Every node is in the journal once, in its state before the change, so the order is
+        // irrelevant.
         for node in self.journal.drain(..) {
             self.nodes[node.index as usize] = node;
         }
@@ -197,6 +201,7 @@ impl<M: Metric> Working<M> {
         while index != ANCHOR {
             let aabb = self.union_of(self.nodes[index as usize].children);
             visits += 1;
+            // An unchanged box leaves all boxes above unchanged, too.
             if aabb == self.nodes[index as usize].aabb {
                 break;
             }
@@ -228,6 +233,7 @@ impl<M: Metric> Working<M> {
         while index != ANCHOR {
             let grown = self.nodes[index as usize].aabb.union(&added_box);
             visits += 1;
+            // An ancestor that already contains the box ends the growth.
             if grown == self.nodes[index as usize].aabb {
                 break;
             }

@@ -18,7 +18,7 @@
 //! smaller than B:
 //!
 //! ```text
-//!   cost beside Y ≥ A(B) + growth(X) + growth(P) + growth(R),   growth(N) = A(N ∪ B) − A(N)
+//!   cost next to Y ≥ A(B) + growth(X) + growth(P) + growth(R),   growth(N) = A(N ∪ B) − A(N)
 //! ```
 //!
 //! The search does not enter a subtree whose bound reaches the best cost so far. It begins at a
@@ -122,6 +122,8 @@ impl PositionSearch {
         let mut index = first;
         let mut below = NONE;
         while index != scope.above {
+            // The first node is detached, so its path does not lead to the scope; start at the
+            // scope's root instead.
             if index == NONE {
                 self.path.clear();
                 (index, below) = (scope.root(tree), NONE);
@@ -193,6 +195,8 @@ impl PositionSearch {
             if cost < best.cost {
                 *best = Position { sibling: step.node, cost };
             }
+            // Stored sums are the growth of a node and all its ancestors, the bound for everything
+            // below.
             growth += step.growth;
             step.growth = growth;
         }

@@ -163,6 +163,7 @@ impl PairOrder {
                 if index != number {
                     late.push(index);
                 }
+                // Everything that waited for this pair may follow now, the last entry first.
                 let mut entry = std::mem::replace(&mut last[index as usize], DONE);
                 while entry != NONE {
                     let (waits, before) = waiting[entry as usize];
@@ -217,6 +218,8 @@ impl Linked for Siblings {
         let rest = *self.node(sibling);
         let displaced = *self.node(position);
         let joint = self.node(node).aabb.union(&displaced.aabb);
+        // The pair of the moving node stays together: its sibling's place takes the displaced node,
+        // and the sibling moves up to the parent's place.
         self.put(sibling, displaced);
         self.put(parent, rest);
         self.put(position, Node::inner(joint, node.min(sibling), 2));
@@ -286,14 +289,14 @@ mod tests {
             for _ in 0..200 {
                 let node = rng.random_range(1..tree.len() as u32);
                 let before = cost::internal_area(&tree.tree);
-                let (found, own) = search.attached(&tree, node, 0.0);
+                let (found, current) = search.attached(&tree, node, 0.0);
                 let least = positions(&tree, node).into_iter().map(|place| {
                     let mut moved = tree.clone();
                     moved.reinsert(node, place);
                     cost::internal_area(&moved.tree)
                 });
                 let least = least.fold(before, f64::min);
-                let after = before - own + found.map_or(own, |place| place.cost);
+                let after = before - current + found.map_or(current, |place| place.cost);
                 assert!((after - least).abs() <= 1e-12 * before, "{after} {least}");
                 if let Some(place) = found {
                     tree.reinsert(node, place.sibling);

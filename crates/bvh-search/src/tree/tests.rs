@@ -109,10 +109,10 @@ fn assert_best_places(mut tree: Working<impl Metric>) {
     for _ in 0..300 {
         let node = any(&tree, &mut rng);
         let start = tree.area();
-        let (found, own) = search.attached(&tree, node, 0.0);
+        let (found, current) = search.attached(&tree, node, 0.0);
         tree.begin();
         let (saved, sibling, _) = tree.detach(node);
-        assert!((saved - own).abs() <= 1e-12 * saved);
+        assert!((saved - current).abs() <= 1e-12 * saved);
         let without = tree.clone();
         let costs = without.preorder().into_iter().map(|place| {
             let mut tree = without.clone();
@@ -133,7 +133,7 @@ fn assert_best_places(mut tree: Working<impl Metric>) {
                 .detached(&tree, Scope::ALL, (&aabb, area), sibling, below)
                 .is_none()
         );
-        assert!((found.map_or(own, |place| place.cost) - least).abs() <= 1e-12 * least);
+        assert!((found.map_or(current, |place| place.cost) - least).abs() <= 1e-12 * least);
         let place = found.map_or(sibling, |place| place.sibling);
         let (added, _) = tree.attach(node, place);
         assert!((added - least).abs() <= 1e-12 * least && tree.area() <= start * (1.0 + 1e-12));

@@ -187,6 +187,7 @@ impl Build<'_> {
             let Sides { boxes, references: sides, .. } =
                 self.split(&aabb, &references, &mut stalls)?;
             self.watch.ensure_wanted()?;
+            // The sides hold copies, so the parent's references are freed at once.
             drop(references);
             let first = tree.nodes.len() as u32;
             tree.nodes[node as usize] = Node::inner(aabb, first, 2);
@@ -217,6 +218,7 @@ impl Build<'_> {
         let is_last = *stalled == MOST_STALLS;
         if (is_last || references.len() >= LEAST_STALLED) && sides.stall(node_area) {
             if is_last {
+                // The rejected spatial split must give back its references.
                 self.extra = extra;
                 return self.object_split(references, Candidates::Balanced);
             }

@@ -63,6 +63,7 @@ impl Axis {
             aabb = aabb.union(&references[index as usize].aabb);
             self.areas.push(aabb.half_area());
         }
+        // The second pass grows the left side, with the areas of all right sides known.
         aabb = Aabb::EMPTY;
         let mut best = (f64::INFINITY, 1);
         for (before, &(_, index)) in (1..count).zip(&self.keys) {

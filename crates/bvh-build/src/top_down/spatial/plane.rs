@@ -48,6 +48,8 @@ impl Build<'_> {
             [reference.aabb.min[axis], reference.aabb.max[axis]].map(bin_of)
         };
         for [first, last] in references.iter().map(bins_of) {
+            // A reference enters the left side of every plane after its first bin, and leaves the
+            // right side of every plane after its last.
             parts[first].1 += 1;
             parts[last].2 += 1;
         }
@@ -65,6 +67,7 @@ impl Build<'_> {
         let mut pace = Pace::new(self.watch);
         for reference in references {
             let [first, last] = bins_of(reference);
+            // Clipping is the slow part, and a large reference is clipped once per bin.
             if pace.ends_after(1 + last - first) {
                 return None;
             }
