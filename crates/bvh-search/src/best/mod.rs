@@ -1,50 +1,15 @@
 //! `best`: the methods that pay, in the order that pays, for any budget.
 //!
-//! The available time decides which method ends lowest, from the milliseconds of a build to the
-//! minutes of a bake:
+//! The section "The portfolio `best`" of `docs/METHODS.md` shows the plan, with a picture. In
+//! short: the [exact solver](crate::exact) for a few objects; clustering and reinsertion of the
+//! largest nodes in milliseconds (`small_budget`); one long run of
+//! [annealed ruin and recreate](crate::ruin_recreate) and short runs after it if the end is known,
+//! from the budget's work or the observer's [progress](crate::Observer::progress) (`plan`);
+//! generations of growing length if the end is open (`improve`).
 //!
-//! ```text
-//!   budget          milliseconds              seconds                    minutes
-//!   ───────────────────────────────────────────────────────────────────────────────────────────►
-//!   initial tree    clustering (PLOC)         top-down division with |L|^0.9
-//!   then            reinsertion of the        ┌─ end known ──────────────────────────────────┐
-//!                   largest nodes, as         │ hot                                          │
-//!                   many as there is          │   \            long annealing run            │
-//!                   time for                  │     \                                        │
-//!                                             │        \      |\   |\   |\    short runs,    │
-//!                                             │             \ | \  | \  | \   each recombined│
-//!                                             │ cold         \|  \ |  \ |  \  with the best  │
-//!                                             ├─ end open ───────────────────────────────────┤
-//!                                             │ local optimum, then generations of doubling  │
-//!                                             │ length:  |\  |_\  |____\  |_________\  ...   │
-//!                                             └──────────────────────────────────────────────┘
-//! ```
-//!
-//! *A few objects.* If the budget has enough work for the [exact solver](crate::exact), the result
-//! is the optimum.
-//!
-//! *Milliseconds* (`small_budget`). A clustering along the Morton curve is the fastest build with a
-//! good tree to start from. Reinsertion begins with the largest nodes, which hold most of the area
-//! that can be saved, and stops when the time is over. If it reaches a local optimum earlier, the
-//! search continues as below.
-//!
-//! *The end is known*, from the budget's work or the observer's
-//! [progress](crate::Observer::progress). One long run of
-//! [annealed ruin and recreate](crate::ruin_recreate) follows a greedy top-down division at once. A
-//! local search in between would be lost at the first temperature, and at equal work one long run
-//! ends lower than several short runs, sequential or parallel. With much work, several short runs
-//! from a lower temperature follow. Each loosens everything except the top of the tree and finds
-//! another optimum, better in some places and worse in others. A time-limited search of a minute or
-//! more, which the user may stop early, first keeps a local optimum of reinsertion.
-//!
-//! *The end is open.* Reinsertion leads to a local optimum. Generations follow, each annealed from
-//! the incumbent and longer than the previous one. Whenever the search is stopped, a constant
-//! fraction of the work has gone into the last generation.
-//!
-//! *Recombination.* The result of an annealing run is recombined with the incumbent, which keeps
-//! every subtree that became better and drops every subtree that became worse. The first run of a
-//! plan is an exception: it replaces the incumbent if it ends better. If it ends worse under a time
-//! limit, the time was too short for annealing, and for recombination, too.
+//! The result of an annealing run is recombined with the incumbent (`recombine`). The first run of
+//! a plan is an exception: it replaces the incumbent if it ends better. If it ends worse under a
+//! time limit, the time was too short for annealing, and for recombination, too.
 //!
 //! The thresholds between these phases are in one table, `tuning.rs`, and in [`Config`].
 
