@@ -1,26 +1,26 @@
-//! Counts the answers to rays that differ from the right ones.
+//! Counts wrong answers to rays.
 
 use bvh_core::{Bvh, Hit, Ray};
 
-/// The answer of an any-hit query that hits.
+/// The answer to an any-hit query that hits.
 pub const SOME_HIT: Hit = Hit { t: 0.0, object: 0 };
 
-/// Numbers of answers that differ from the right ones.
+/// The numbers of wrong answers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Disagreements {
     /// Rays that should hit and do not.
     pub missed: u64,
     /// Rays that should not hit and do.
     pub false_hits: u64,
-    /// Rays that hit, but elsewhere.
+    /// Rays that hit, but at another place.
     pub other: u64,
 }
 
-/// Hits whose distances differ by more, in multiples of the root box's diagonal, are different hits.
+/// The largest difference of distances of one hit, in multiples of the root box's diagonal.
 const TOLERANCE: f64 = 1e-4;
 
-/// Wrong answers of another library. Distances are compared with a tolerance, and objects are not: where two triangles
-/// share an edge, either is right.
+/// Counts wrong answers of another library. Distances are compared with a tolerance. Objects are
+/// not compared: where two triangles share an edge, either is right.
 pub fn disagreements(
     right: &[Option<Hit>],
     found: &[Option<Hit>],
@@ -40,7 +40,7 @@ pub fn disagreements(
     })
 }
 
-/// Wrong answers of ours, which must be right bit by bit.
+/// Counts wrong answers of ours, which must be right bit by bit.
 pub(super) fn exact_disagreements(right: &[Option<Hit>], found: &[Option<Hit>]) -> Disagreements {
     compare(right, found, |_, right, found| right == found)
 }

@@ -1,4 +1,4 @@
-//! The layouts in which our trees are traced, and the instruction sets that they are held to.
+//! The layouts of our trees for tracing, and the instruction sets that they are limited to.
 
 use super::contender::{Contender, Tracer};
 use bvh_core::cost::{self, SahConstants};
@@ -13,22 +13,22 @@ use std::time::Instant;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Layout {
-    /// The tree as it is.
+    /// The unmodified tree.
     Binary,
-    /// The tree with its leaves merged where the surface area heuristic, both constants 1, says so.
+    /// The tree with merged leaves where the surface area heuristic, both constants 1, favours
+    /// them.
     BinaryLeaves,
     /// [`WideBvh`] with the best instructions of this machine.
     Wide,
-    /// [`WideBvh`] with the best instructions of this machine, laid out once more: only noise tells its times from those
-    /// of `Wide`.
+    /// A second copy of `Wide`; its times differ from the first copy's only by noise.
     WideAgain,
-    /// [`WideBvh`] that is handed batches of rays, coherent or incoherent ones as their kind says.
+    /// [`WideBvh`] that traces batches of rays, coherent or incoherent according to their kind.
     WideBatches,
-    /// As `WideBatches`, laid out once more: the noise of batches.
+    /// A second copy of `WideBatches`; its times differ from the first copy's only by noise.
     WideBatchesAgain,
-    /// As `WideBatches`, laid out as if a block of triangles took half the time of a node.
+    /// `WideBatches`, laid out as if a block of triangles took half the time of a node.
     WideCheapBlocks,
-    /// As `WideBatches`, laid out as if a block of triangles took twice the time of a node.
+    /// `WideBatches`, laid out as if a block of triangles took twice the time of a node.
     WideDearBlocks,
     /// [`WideBvh`] with portable code.
     WidePortable,
@@ -54,19 +54,19 @@ impl Instructions {
     }
 }
 
-/// Whether a layout of this name is one that is measured a second time, for the noise.
+/// Returns true if a layout with this name is a second copy, measured for its noise.
 pub fn is_repeat(layout: &str) -> bool {
     layout.ends_with(", again")
 }
 
-/// Whether a layout of this name is called ray by ray.
+/// Returns true if a layout with this name traces rays one by one.
 pub fn is_single(layout: &str) -> bool {
     !["batches", "packets", "blocks"]
         .iter()
         .any(|word| layout.contains(word))
 }
 
-/// The name of a kernel's instruction set in tables.
+/// Returns the name of a kernel's instruction set in tables.
 fn instructions_of(kernel: Kernel) -> &'static str {
     match kernel {
         Kernel::Avx512 => "AVX-512",
@@ -75,22 +75,38 @@ fn instructions_of(kernel: Kernel) -> &'static str {
     }
 }
 
-/// The instruction set of code without intrinsics, in tables: the one that the compiler chose.
+/// The name in tables for code without intrinsics, whose instruction set the compiler chose.
 pub const COMPILED: &str = "as compiled";
 
 impl Layout {
-    /// Whether it is traced by the vector kernels.
+    /// The layout's name in tables.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Binary => "binary",
+            Self::BinaryLeaves => "binary, merged leaves",
+            Self::Wide => "wide",
+            Self::WideAgain => "wide, again",
+            Self::WideBatches => "wide, batches",
+            Self::WideBatchesAgain => "wide, batches, again",
+            Self::WideCheapBlocks => "wide, cheap blocks",
+            Self::WideDearBlocks => "wide, dear blocks",
+            Self::WidePortable => "wide, portable",
+        }
+    }
+
+    /// Returns true if the vector kernels trace the layout.
     fn has_kernels(self) -> bool {
         !matches!(self, Self::Binary | Self::BinaryLeaves | Self::WidePortable)
     }
 
-    /// Whether it is made for random lines alone, whatever rays the tree is for.
+    /// Returns true if the layout is always made for random lines, whatever rays the tree is for.
     pub fn is_for_lines(self) -> bool {
         matches!(self, Self::WideCheapBlocks | Self::WideDearBlocks)
     }
 }
 
-/// The wide layout of a valid tree for rays that enter its nodes as often as `visits` says, else for random lines.
+/// Returns the wide layout of a valid tree for rays that enter its nodes as often as `visits`
+/// states, otherwise for random lines.
 pub fn widened(
     tree: &Bvh,
     triangles: &[Triangle],
@@ -102,9 +118,11 @@ pub fn widened(
     }
 }
 
-/// One of our trees, valid over the scene, in each of these layouts and, where that has vector kernels, with each of these
-/// instruction sets, by default the best that there is; wide ones for rays that enter the tree's nodes as often as `visits` says, if it does. An error says
-/// why there is no such layout.
+/// Lays out a tree of ours, valid over the scene, in each of the layouts.
+///
+/// Layouts with vector kernels are limited to each of the instruction sets in turn, by default to
+/// the best available one. Wide layouts are made for rays that enter the tree's nodes as often as
+/// `visits` states, otherwise for random lines.
 pub fn own_contenders<'a>(
     layouts: &[Layout],
     instructions: &[Instructions],
@@ -121,7 +139,7 @@ pub fn own_contenders<'a>(
     Ok(contenders)
 }
 
-/// The kernels with which a layout is traced.
+/// Returns the kernels that trace a layout.
 fn kernels(layout: Layout, instructions: &[Instructions]) -> Vec<Kernel> {
     if !layout.has_kernels() {
         return vec![Kernel::Portable];
@@ -129,10 +147,9 @@ fn kernels(layout: Layout, instructions: &[Instructions]) -> Vec<Kernel> {
     if instructions.is_empty() {
         return vec![Kernel::best()];
     }
-    let asked = instructions
+    instructions
         .iter()
-        .map(|instructions| instructions.kernel());
-    asked
+        .map(|instructions| instructions.kernel())
         .filter(|kernel| kernel.is_available())
         .collect()
 }
@@ -147,31 +164,40 @@ fn own_contender<'a>(
     let triangles = scene
         .triangles()
         .map_err(|error| error.to_string())?;
-    let accelerator = |structure| Tracer::Own(Accelerator::new(&scene.primitives, structure));
     let start = Instant::now();
-    let held = |wide: Result<WideBvh, InvalidBvh>| {
-        let wide = wide.map_err(|error| error.to_string())?;
-        wide.with_kernel(kernel)
-            .ok_or_else(|| format!("{kernel:?} is not available"))
+    let wide = match layout {
+        Layout::Binary | Layout::BinaryLeaves => None,
+        Layout::WideCheapBlocks => Some(WideBvh::with_block_cost(tree, triangles, 0.5)),
+        Layout::WideDearBlocks => Some(WideBvh::with_block_cost(tree, triangles, 2.0)),
+        _ => Some(widened(tree, triangles, visits)),
     };
-    let wide = || held(widened(tree, triangles, visits));
-    let blocks = |cost| held(WideBvh::with_block_cost(tree, triangles, cost));
-    let (name, tracer) = match layout {
-        Layout::Binary => ("binary", accelerator(Structure::Tree(Cow::Borrowed(tree)))),
-        Layout::BinaryLeaves => {
-            let merged = collapse_leaves(tree, &SahConstants::default());
-            ("binary, merged leaves", accelerator(Structure::Tree(Cow::Owned(merged))))
+    let tracer = match wide {
+        None => {
+            let tree = match layout {
+                Layout::Binary => Cow::Borrowed(tree),
+                _ => Cow::Owned(collapse_leaves(tree, &SahConstants::default())),
+            };
+            Tracer::Own(Accelerator::new(&scene.primitives, Structure::Tree(tree)))
         }
-        Layout::Wide => ("wide", accelerator(Structure::Wide(wide()?))),
-        Layout::WideAgain => ("wide, again", accelerator(Structure::Wide(wide()?))),
-        Layout::WideBatches => ("wide, batches", Tracer::Batches(wide()?)),
-        Layout::WideBatchesAgain => ("wide, batches, again", Tracer::Batches(wide()?)),
-        Layout::WideCheapBlocks => ("wide, cheap blocks", Tracer::Batches(blocks(0.5)?)),
-        Layout::WideDearBlocks => ("wide, dear blocks", Tracer::Batches(blocks(2.0)?)),
-        Layout::WidePortable => ("wide, portable", accelerator(Structure::WidePortable(wide()?))),
+        Some(wide) => {
+            let wide = wide
+                .map_err(|error| error.to_string())?
+                .with_kernel(kernel)
+                .ok_or_else(|| format!("{kernel:?} is not available"))?;
+            match layout {
+                Layout::Wide | Layout::WideAgain => {
+                    Tracer::Own(Accelerator::new(&scene.primitives, Structure::Wide(wide)))
+                }
+                Layout::WidePortable => {
+                    let structure = Structure::WidePortable(wide);
+                    Tracer::Own(Accelerator::new(&scene.primitives, structure))
+                }
+                _ => Tracer::Batches(wide),
+            }
+        }
     };
     Ok(Contender {
-        layout: name.into(),
+        layout: layout.name().into(),
         instructions: instructions_of(kernel).into(),
         version: env!("CARGO_PKG_VERSION").into(),
         preparation_seconds: start.elapsed().as_secs_f64(),
@@ -179,7 +205,8 @@ fn own_contender<'a>(
     })
 }
 
-/// Returns the surface area heuristic of a tree with both constants 1, after the best collapse of leaves.
+/// Returns the surface area heuristic of a tree with both constants 1, after the best collapse of
+/// leaves.
 pub fn collapsed_sah(tree: &Bvh) -> f64 {
     let constants = SahConstants::default();
     cost::sah(&collapse_leaves(tree, &constants), &constants)

@@ -1,4 +1,5 @@
-//! Rays through trees: how many tests they take, how fast they are, and whether the answers are right.
+//! Measurements of rays through trees: the number of tests, the speed, and the correctness of
+//! answers.
 
 mod answers;
 pub mod contender;

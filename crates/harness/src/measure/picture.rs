@@ -1,4 +1,4 @@
-//! Pictures as measurements: the tests and the seconds that they take with a run's tree, with brute force and with a
+//! Pictures as measurements: their tests and seconds with a run's tree, with brute force and with a
 //! KD-tree.
 
 use crate::Error;
@@ -13,28 +13,29 @@ use std::time::Instant;
 
 config! {
     serde;
-    /// The picture that is drawn with every run's tree; it frames the whole scene.
+    /// The picture that every run's tree draws; it frames the whole scene.
     pub struct Config {
-        /// In pixels.
+        /// Width in pixels.
         width: u32 = 320, in 1..=10_000;
-        /// In pixels.
+        /// Height in pixels.
         height: u32 = 180, in 1..=10_000;
         /// `samples`² rays go through each pixel.
         samples: u32 = 1, in 1..=16;
     }
 }
 
-/// The structures that are not trees of ours: their names in tables, and the names that `--accel` accepts.
+/// The structures other than our trees: their names in tables, and the names that `--accel`
+/// accepts.
 pub const BASELINES: [(&str, &str); 2] = [("brute force", "brute"), ("KD-tree", "kdtree")];
 
 /// A picture is drawn again until this many seconds have passed.
 const REPEAT_WITHIN: f64 = 2.0;
-/// A picture is drawn at most so often.
+/// The maximum number of times that a picture is drawn.
 const MOST_REPEATS: usize = 25;
 
 impl Config {
-    /// Draws the scene on one thread with the tree of `run`, which took `build_seconds` to build. If `first`, draws it
-    /// with each of the [`BASELINES`] before that.
+    /// Draws the scene on one thread with the tree of `run`, which was built in `build_seconds`. If
+    /// `first`, draws it with each of the [`BASELINES`] before.
     pub fn measure(
         &self,
         scene: &Scene,
@@ -64,17 +65,15 @@ impl Config {
         for (method, structure, repetition, build_seconds) in structures {
             let accelerator = Accelerator::new(&scene.primitives, structure);
             let (film, seconds) = pool.install(|| self.draw(scene, &accelerator));
-            let per_ray = |tests: u64| tests as f64 / film.rays as f64;
-            let boxes = film.counts.boxes;
-            let objects = film.counts.objects;
+            let rays = film.rays as f64;
             rows.push(RenderRow {
                 scene: scene.name.clone(),
                 method: method.into(),
                 repetition,
                 objects: scene.boxes.len(),
                 rays: film.rays,
-                boxes_per_ray: per_ray(boxes),
-                objects_per_ray: per_ray(objects),
+                boxes_per_ray: film.counts.boxes as f64 / rays,
+                objects_per_ray: film.counts.objects as f64 / rays,
                 picture: format!("{:016x}", fnv1a(film.pixels.as_flattened().iter().copied())),
             });
             times.push(RenderTimeRow {
@@ -83,13 +82,14 @@ impl Config {
                 repetition,
                 repeats: seconds.len(),
                 build_seconds,
+                // Other programs can only slow a drawing down, so the shortest time is the best.
                 render_seconds: seconds.into_iter().fold(f64::INFINITY, f64::min),
             });
         }
         Ok((rows, times))
     }
 
-    /// The picture, and the seconds that each repetition took.
+    /// Returns the picture and the seconds of each repetition.
     fn draw(&self, scene: &Scene, accelerator: &Accelerator) -> (Film, Vec<f64>) {
         let Self { width, height, samples } = *self;
         let options = Options { width, height, samples, ..Options::default() };

@@ -1,5 +1,5 @@
-//! Trees for the rays that are traced: the density of the rays that a tree is searched for, and the tests that other rays of the
-//! same kind, or of another camera, take in it.
+//! Trees for the rays that will be traced: the density of the rays that a tree is trained on, and
+//! the tests of other rays, of the same kind or of another camera, in it.
 
 use super::contender::timed;
 use crate::statistics::minimum;
@@ -16,7 +16,7 @@ use rand::SeedableRng;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The rays that a tree is searched for.
+/// The rays that a tree is trained on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TrainedOn {
@@ -24,12 +24,12 @@ pub enum TrainedOn {
     Default,
     /// Rays from the scene's first path of cameras.
     Camera,
-    /// The paper's random rays: from anywhere inside.
+    /// The paper's random rays, which start anywhere inside.
     Inside,
 }
 
 impl TrainedOn {
-    /// The name in results; trees that are searched by area are trained on `none`.
+    /// Returns the name in results; trees for areas are trained on `none`.
     pub fn name(trained: Option<Self>) -> &'static str {
         match trained {
             None => "none",
@@ -42,17 +42,19 @@ impl TrainedOn {
 
 config! {
     serde;
-    /// How trees are trained on rays, and judged by others.
+    /// The rays that trees are trained on, and the different rays that judge them.
     pub struct Config {
-        /// Primary rays of each path that judge trees; without a camera, rays of each family. 0 to train trees and judge none.
+        /// Primary rays of each path that judge trees; without a camera, rays of each family. With
+        /// 0, trees are trained but not judged.
         count: u32 = 50_000, in 0..=10_000_000;
         /// Primary rays that trees are trained on; without a camera, rays of each family.
         trained: u32 = TRAINED, in 1..;
-        /// Turns in which rays are timed; 0 for counting only.
+        /// Rounds of timed rays; with 0, tests are only counted.
         rounds: u32 = 3;
         /// Cameras by scene; scenes without an entry are seen from outside.
         cameras: BTreeMap<String, Cameras>;
-        /// Rays by whose visits every tree is costed, and tested one by one, for reports of `correlation`. Default none.
+        /// Rays whose visits cost every tree, which is then also tested singly, for reports of
+        /// `correlation`. Default none.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         costs: Vec<TrainedOn>;
     }
@@ -65,7 +67,7 @@ config! {
 pub struct Cameras {
     /// The path that trees are trained on; other rays from it judge them.
     pub same: Vec<Viewpoint>,
-    /// A path that trees are only judged by; needless where none are.
+    /// A path that only judges trees; unnecessary if none are judged.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub other: Vec<Viewpoint>,
     /// Positions of lights.
@@ -75,47 +77,42 @@ pub struct Cameras {
 impl Default for Cameras {
     /// Two arcs around the scene, and a light above it.
     fn default() -> Self {
-        let around = |eyes: [[f64; 3]; 3]| {
-            eyes.map(|eye| Viewpoint { eye, target: [0.5; 3] })
-                .to_vec()
-        };
         Self {
-            same: around([[1.9, 1.3, 2.2], [2.4, 1.0, 0.9], [2.0, 1.5, -0.5]]),
-            other: around([[-0.9, 1.2, -1.0], [-1.4, 0.8, 0.3], [-0.8, 0.6, 1.7]]),
+            same: towards_centre([[1.9, 1.3, 2.2], [2.4, 1.0, 0.9], [2.0, 1.5, -0.5]]),
+            other: towards_centre([[-0.9, 1.2, -1.0], [-1.4, 0.8, 0.3], [-0.8, 0.6, 1.7]]),
             lights: vec![[0.8, 2.0, 1.3]],
         }
     }
 }
 
+fn towards_centre(eyes: [[f64; 3]; 3]) -> Vec<Viewpoint> {
+    eyes.map(|eye| Viewpoint { eye, target: [0.5; 3] })
+        .to_vec()
+}
+
 impl Config {
-    fn check_rays(&self) -> impl Iterator<Item = OutOfRange> {
+    fn check_rays(&self) -> Vec<OutOfRange> {
         // A primary ray, one that it reflects, and one to every light.
-        let rendered = self
+        let rays_per_pixel = self
             .cameras
             .values()
             .map(|cameras| 2 + cameras.lights.len());
-        let too_many = check_count("trained", self.trained, rendered.fold(OF_ANYTHING, usize::max));
-        let paths = |(scene, cameras): (&String, &Cameras)| {
-            [("same", &cameras.same, true), ("other", &cameras.other, self.count > 0)]
-                .map(|(name, path, is_used)| (scene.clone(), name, is_used && path.is_empty()))
-        };
-        let empty = self
-            .cameras
-            .iter()
-            .flat_map(paths)
-            .filter(|(.., is_empty)| *is_empty);
-        too_many
-            .into_iter()
-            .chain(empty.map(|(scene, name, _)| {
-                OutOfRange::new(
-                    format!("cameras.{scene}.{name}"),
-                    "empty",
-                    "at least one viewpoint",
-                )
-            }))
+        let most_rays = rays_per_pixel.fold(OF_ANYTHING, usize::max);
+        let mut faults = Vec::new();
+        faults.extend(check_count("trained", self.trained, most_rays));
+        for (scene, cameras) in &self.cameras {
+            let paths = [("same", &cameras.same, true), ("other", &cameras.other, self.count > 0)];
+            for (name, path, is_used) in paths {
+                if is_used && path.is_empty() {
+                    let key = format!("cameras.{scene}.{name}");
+                    faults.push(OutOfRange::new(key, "empty", "at least one viewpoint"));
+                }
+            }
+        }
+        faults
     }
 
-    /// A renderer's rays from one of the paths through a scene.
+    /// Returns a renderer's rays from one of the paths through a scene.
     fn rendered(
         &self,
         scene: &Scene,
@@ -130,17 +127,17 @@ impl Config {
             .cloned()
             .unwrap_or_default();
         let Some(root) = tree.root_aabb() else { return Vec::new() };
-        let place = |at: [f64; 3]| in_box(&root, at).to_array();
         let path = if other { &cameras.other } else { &cameras.same };
-        let pose = |view: &Viewpoint| Pose { eye: place(view.eye), target: place(view.target) };
-        let lights = cameras
-            .lights
-            .iter()
-            .map(|&light| place(light))
-            .collect();
+        let poses = path.iter().map(|view| Pose {
+            eye: in_box(&root, view.eye).to_array(),
+            target: in_box(&root, view.target).to_array(),
+        });
+        let lights = cameras.lights.iter();
         let rays = RenderedRays {
-            cameras: path.iter().map(pose).collect(),
-            lights,
+            cameras: poses.collect(),
+            lights: lights
+                .map(|&light| in_box(&root, light).to_array())
+                .collect(),
             count,
             seed,
             ..Default::default()
@@ -148,7 +145,7 @@ impl Config {
         of_renderer(&rays, scene, tree)
     }
 
-    /// The density of the rays that a tree is trained on; `seed` draws them.
+    /// Returns the density of the rays that a tree is trained on; `seed` draws the rays.
     pub fn density(
         &self,
         trained: TrainedOn,
@@ -169,31 +166,33 @@ impl Config {
 
 /// Rays that judge trees.
 pub struct TestRays {
-    /// Their kind.
+    /// The kind of the rays.
     pub kind: Kind,
-    /// Which path of cameras they come from: `same` as the training's, `other`, or `none`.
+    /// The path of cameras that they come from: `same` as in the training, `other`, or `none`.
     pub camera: &'static str,
     rays: Vec<Ray>,
 }
 
-/// All rays that judge the trees of a scene, of which `tree` is one.
+/// Returns all rays that judge the trees of a scene. `tree` is any of these trees.
 pub fn test_rays(config: &Config, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TestRays> {
     let mut test_rays = Vec::new();
     for (camera, other) in [("same", false), ("other", true)] {
         let traced = config.rendered(scene, tree, other, config.count, seed);
         for kind in [Kind::Primary, Kind::Bounce, Kind::Shadow] {
-            let own = traced.iter().filter(|traced| traced.kind == kind);
-            test_rays.push(TestRays { kind, camera, rays: own.map(|traced| traced.ray).collect() });
+            let rays_of_kind = traced
+                .iter()
+                .filter(|traced| traced.kind == kind)
+                .map(|traced| traced.ray);
+            test_rays.push(TestRays { kind, camera, rays: rays_of_kind.collect() });
         }
     }
     let mut rng = Stream::seed_from_u64(seed);
     let root = tree.root_aabb();
-    let random = |_| random_ray(Family::Inside, root.as_ref()?, &mut rng);
-    test_rays.push(TestRays {
-        kind: Kind::Incoherent,
-        camera: "none",
-        rays: (0..config.count).filter_map(random).collect(),
-    });
+    let rays = (0..config.count)
+        .filter_map(|_| random_ray(Family::Inside, root.as_ref()?, &mut rng))
+        .collect();
+    test_rays.push(TestRays { kind: Kind::Incoherent, camera: "none", rays });
+    // A scene without reflections has no bounced rays.
     test_rays.retain(|test_rays| !test_rays.rays.is_empty());
     test_rays
 }
@@ -204,7 +203,8 @@ impl TestRays {
         self.rays.len() as u64
     }
 
-    /// Tests of nodes and of blocks of triangles per ray in a layout, the same on every machine.
+    /// Returns the tests of nodes and of blocks of triangles per ray in a layout. They do not
+    /// depend on the machine.
     pub fn tests(&self, wide: &WideBvh) -> [f64; 2] {
         let mut counts = TestCounts::default();
         for ray in &self.rays {
@@ -214,15 +214,15 @@ impl TestRays {
                 wide.nearest_hit_counted(ray, &mut counts);
             }
         }
-        let per_ray =
-            |tests: u64, of_each: u64| tests as f64 / (of_each as f64 * self.rays.len() as f64);
+        let rays = self.rays.len() as f64;
         [
-            per_ray(counts.boxes, WideBvh::BOXES_OF_NODE),
-            per_ray(counts.objects, WideBvh::OBJECTS_OF_BLOCK),
+            counts.boxes as f64 / (WideBvh::BOXES_OF_NODE as f64 * rays),
+            counts.objects as f64 / (WideBvh::OBJECTS_OF_BLOCK as f64 * rays),
         ]
     }
 
-    /// Million rays per second through each of the layouts, which take turns, each part of the rays by its fastest turn.
+    /// Returns the million rays per second through each of the layouts, in interleaved rounds. Each
+    /// part of the rays counts with its fastest round.
     pub fn speeds(&self, layouts: &[&WideBvh], rounds: u32) -> Vec<f64> {
         let mut hits: Vec<Option<Hit>> = vec![None; self.rays.len()];
         let mut turns: Vec<Vec<Vec<f64>>> = vec![Vec::new(); layouts.len()];
@@ -238,15 +238,19 @@ impl TestRays {
                 });
             }
         }
-        let fastest = |turns: &Vec<Vec<f64>>| {
-            let parts = turns.first().map_or(0, Vec::len);
-            let seconds: f64 = (0..parts)
-                .filter_map(|part| minimum(turns.iter().map(|turn| turn[part])))
-                .sum();
-            self.rays.len() as f64 / seconds / 1e6
-        };
-        turns.iter().map(fastest).collect()
+        let seconds = turns.iter().map(|turns| fastest_seconds(turns));
+        seconds
+            .map(|seconds| self.rays.len() as f64 / seconds / 1e6)
+            .collect()
     }
+}
+
+/// Sums the shortest time of each part. `turns` holds the seconds of each part for each round.
+fn fastest_seconds(turns: &[Vec<f64>]) -> f64 {
+    let parts = turns.first().map_or(0, Vec::len);
+    (0..parts)
+        .filter_map(|part| minimum(turns.iter().map(|turn| turn[part])))
+        .sum()
 }
 
 #[cfg(test)]
@@ -254,8 +258,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rays_that_judge_are_others_than_those_of_the_training_and_a_layout_for_them_needs_fewer_tests()
-     {
+    fn a_layout_for_rays_needs_fewer_tests_of_other_rays_of_the_same_camera() {
         let scene = Scene::load("escher:3000").unwrap();
         let tree = muller_fellner::Config::default()
             .build(&scene.boxes)
@@ -273,18 +276,14 @@ mod tests {
             .map(|test_rays| (test_rays.kind, test_rays.camera))
             .collect();
         assert_eq!((kinds.len(), kinds[6]), (7, (Kind::Incoherent, "none")));
-        let sum = |wide: &WideBvh| {
-            test_rays[..3]
-                .iter()
-                .map(|test_rays| test_rays.tests(wide).iter().sum::<f64>())
+        let [plain_tests, trained_tests] = [&plain, &trained].map(|wide| {
+            let same_camera = test_rays[..3].iter();
+            same_camera
+                .flat_map(|test_rays| test_rays.tests(wide))
                 .sum::<f64>()
-        };
-        assert!(sum(&trained) < sum(&plain), "{} {}", sum(&trained), sum(&plain));
-        assert!(
-            test_rays[0]
-                .speeds(&[&plain, &trained], 2)
-                .into_iter()
-                .all(|speed| speed > 0.0)
-        );
+        });
+        assert!(trained_tests < plain_tests, "{trained_tests} {plain_tests}");
+        let speeds = test_rays[0].speeds(&[&plain, &trained], 2);
+        assert!(speeds.iter().all(|speed| *speed > 0.0), "{speeds:?}");
     }
 }

@@ -1,4 +1,5 @@
-//! Rays per second, and tests per ray: every contender in turns, on one thread, with all answers compared.
+//! Rays per second and tests per ray: all contenders in interleaved rounds, on one thread, with all
+//! answers compared.
 
 use super::answers;
 use super::contender::{Batch, Contender, PART, Tracer};
@@ -15,48 +16,59 @@ use std::path::PathBuf;
 
 config! {
     serde;
-    /// Which rays are traced how often through which layouts, on scenes of triangles.
+    /// The rays, layouts and rounds of a measurement, on scenes of triangles.
     pub struct Config {
         /// Rays of each kind.
         count: u32 = 1_000_000, in 1..=MOST_RAYS;
-        /// Turns in which every contender traces all rays of a kind, after one that is not timed.
+        /// Rounds in which every contender traces all rays of a kind, after one that is not timed.
         rounds: u32 = 5, in 1..=1_000_000;
         /// Kinds of rays.
         rays: Vec<Kind> = vec![Kind::Incoherent, Kind::Primary, Kind::Bounce, Kind::Shadow];
         /// Layouts of our trees.
-        layouts: Vec<Layout> = vec![Layout::Binary, Layout::BinaryLeaves, Layout::Wide, Layout::WidePortable];
-        /// Cameras of primary rays by scene; for other scenes one outside the root's box.
+        layouts: Vec<Layout> = default_layouts();
+        /// Cameras of primary rays by scene; for other scenes a camera outside the root's box.
         cameras: BTreeMap<String, Viewpoint>;
-        /// Instruction sets to which the wide layouts are held, each in turn; those that the processor lacks are skipped. None
-        /// stands for the best that the processor has.
+        /// Instruction sets that the wide layouts are limited to, each in turn; sets that the
+        /// processor lacks are skipped. None means the best set of the processor.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         instructions: Vec<Instructions>;
-        /// The programs of `scripts/ray-peers`, by which Embree and tinybvh trace too. All speeds go to `timing_rays.csv`.
+        /// The programs of `scripts/ray-peers`, which trace with Embree and tinybvh. All speeds go
+        /// to `timing_rays.csv`.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         ray_peers: Vec<PathBuf>;
     }
 }
 
-/// Most rays of a kind, all in memory at once.
+/// The maximum number of rays of a kind, which are all in memory at once.
 const MOST_RAYS: u32 = 100_000_000;
 
-/// The row of one contender for rays of one kind on one scene, and all that other libraries are compared by.
+fn default_layouts() -> Vec<Layout> {
+    vec![Layout::Binary, Layout::BinaryLeaves, Layout::Wide, Layout::WidePortable]
+}
+
+/// The row of one contender for rays of one kind on one scene, and the numbers that other libraries
+/// are compared by.
 pub struct Traced {
     /// Answers and tests.
     pub answers: TraceRow,
     /// Seconds.
     pub times: TraceTimeRow,
-    /// The instruction set that the contender was held to.
+    /// The instruction set that the contender was limited to.
     pub instructions: String,
-    /// The version of its library.
+    /// The version of the contender's library.
     pub version: String,
     /// The seconds of each turn.
     pub turns: Vec<f64>,
 }
 
-/// Traces rays, the same for all, through the contenders of a scene, each with its method's label. `tree` is any valid
-/// tree over the scene: the right answers, which are the same for every tree, come from it. `seed` draws the rays.
-/// `None` as soon as `cancelled` says so. An error says which contender gave no answers.
+/// Traces the same rays through all contenders of a scene, each with its method's label.
+///
+/// The right answers come from `tree`; any valid tree over the scene gives the same. `seed` draws
+/// the rays. Returns `None` once `cancelled` returns true.
+///
+/// # Errors
+///
+/// If a contender gives no answers; the message names it.
 pub fn measure(
     config: &Config,
     scene: &Scene,
@@ -85,7 +97,7 @@ pub fn measure(
         let of_kind = OfKind { scene, tree, kind, rays: &rays, right: &right };
         let mut hits = vec![None; rays.len()];
         let mut answers = Vec::new();
-        // By contender and turn, the seconds of each part of the rays.
+        // The seconds of each part of the rays, by contender and round.
         let mut turns = vec![Vec::new(); contenders.len()];
         for round in 0..=config.rounds {
             for ((method, contender), turns) in contenders.iter().zip(&mut turns) {
@@ -94,6 +106,7 @@ pub fn measure(
                 }
                 hits.fill(None);
                 let seconds = contender.tracer.trace(&batch, &mut hits)?;
+                // The first round warms the caches up; its time does not count.
                 if round == 0 {
                     answers.push(of_kind.row(method, contender, &hits));
                 } else {
@@ -152,7 +165,7 @@ struct OfKind<'a> {
 }
 
 impl OfKind<'_> {
-    /// What a contender found, beside the right answers, and the tests that it took.
+    /// Compares a contender's answers with the right ones and counts its tests.
     fn row(&self, method: &str, contender: &Contender, hits: &[Option<Hit>]) -> TraceRow {
         let query = self.kind.query();
         let found = match (&contender.tracer, query) {
@@ -162,16 +175,16 @@ impl OfKind<'_> {
             _ => answers::disagreements(self.right, hits, self.tree, self.rays),
         };
         let counts = match &contender.tracer {
-            Tracer::Own(own) => {
+            Tracer::Own(accelerator) => {
                 let mut counts = TestCounts::default();
-                self.rays
-                    .iter()
-                    .for_each(|ray| _ = own.count(query, ray, &mut counts));
+                for ray in self.rays {
+                    accelerator.count(query, ray, &mut counts);
+                }
                 Some(counts)
             }
             Tracer::Batches(_) | Tracer::Other(_) => None,
         };
-        let per_ray = |tests: u64| tests as f64 / self.rays.len().max(1) as f64;
+        let rays = self.rays.len().max(1) as f64;
         TraceRow {
             scene: self.scene.name.clone(),
             method: method.into(),
@@ -182,8 +195,8 @@ impl OfKind<'_> {
             missed_hits: found.missed,
             false_hits: found.false_hits,
             other_hits: found.other,
-            boxes_per_ray: counts.map(|counts| per_ray(counts.boxes)),
-            objects_per_ray: counts.map(|counts| per_ray(counts.objects)),
+            boxes_per_ray: counts.map(|counts| counts.boxes as f64 / rays),
+            objects_per_ray: counts.map(|counts| counts.objects as f64 / rays),
         }
     }
 }
