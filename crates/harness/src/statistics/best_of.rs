@@ -1,23 +1,26 @@
-//! The interval of the best of several fresh trials, predicted from a pool of trials already run.
+//! The interval of the best of several fresh trials, predicted from a pool of finished trials.
 
 use super::sorted;
 
-/// Probability that the best of the fresh trials lies below the interval, and likewise above it.
+/// The probability that the best of the fresh trials is below the interval; the same holds above
+/// it.
 const TAIL: f64 = 0.05;
 
 /// The largest fraction of the pool to which a tail is fitted.
 const FITTED: f64 = 0.1;
 
-/// Fewest values to which a tail is fitted, where the pool has as many.
+/// The minimum number of values to which a tail is fitted, unless the pool is smaller.
 const FEWEST: usize = 5;
 
-/// Returns the ends of an interval that holds the lowest of `m` fresh values with a probability of at least 90 %. The fresh values
-/// are independent and of the same distribution as the pool.
+/// Returns the ends of an interval that holds the lowest of `m` fresh values with a probability of
+/// at least 90 %. The fresh values are independent and have the same distribution as the pool.
 ///
-/// The upper end is an order statistic of the pool, and so is the lower end where the pool has at least 19 `m` values. Their
-/// coverage is exact for every continuous distribution (Hahn & Meeker 1991). A smaller pool has no order statistic that is low
-/// enough: the lower end is extrapolated by exponential tails of several lengths, the lowest of which counts. That is too wide for
-/// a normal distribution and close for a few rare low values. It is too narrow where hardly any value of the pool shows the tail.
+/// The upper end is an order statistic of the pool; the lower end is one if the pool has at least
+/// 19 `m` values. Their coverage is exact for every continuous distribution (Hahn & Meeker 1991). A
+/// smaller pool has no order statistic that is low enough. Its lower end is the lowest
+/// extrapolation by exponential tails of several lengths, which is too wide for a normal
+/// distribution and close for a few rare low values. It is too narrow if hardly any value of the
+/// pool shows the tail.
 ///
 /// `None` if the pool has fewer than `m` values, or only one. O(N log N).
 pub fn predicted_best(pool: &[f64], m: usize) -> Option<(f64, f64)> {
@@ -26,13 +29,14 @@ pub fn predicted_best(pool: &[f64], m: usize) -> Option<(f64, f64)> {
         return None;
     }
     let sorted = sorted(pool);
-    // All fresh values lie above the pool's lowest with the probability n / (n + m).
+    // All fresh values are above the pool's lowest with the probability n / (n + m).
     let below_all = m as f64 / (n + m) as f64;
     let low = if below_all <= TAIL { exact_low(&sorted, m) } else { extrapolated_low(&sorted, m) };
     Some((low, exact_high(&sorted, m)))
 }
 
-/// The probabilities that all of `m` fresh values lie above the j-th of the pool's values, for j from 1.
+/// Returns the probabilities that all of `m` fresh values are above the pool's j-th value, j from
+/// 1.
 fn all_above(n: usize, m: usize) -> impl Iterator<Item = f64> {
     (0..n).scan(1.0, move |probability, passed| {
         *probability *= (n - passed) as f64 / (n + m - passed) as f64;
@@ -40,7 +44,8 @@ fn all_above(n: usize, m: usize) -> impl Iterator<Item = f64> {
     })
 }
 
-/// The highest value of the pool that the lowest fresh value undercuts with at most the probability [`TAIL`].
+/// Returns the pool's highest value that the lowest fresh value undercuts with a probability of at
+/// most [`TAIL`].
 fn exact_low(sorted: &[f64], m: usize) -> f64 {
     let undercut = all_above(sorted.len(), m).map(|above| 1.0 - above);
     let allowed = undercut
@@ -49,13 +54,15 @@ fn exact_low(sorted: &[f64], m: usize) -> f64 {
     sorted[allowed.max(1) - 1]
 }
 
-/// The lowest value of the pool that the lowest fresh value exceeds with at most the probability [`TAIL`].
+/// Returns the pool's lowest value that the lowest fresh value exceeds with a probability of at
+/// most [`TAIL`].
 fn exact_high(sorted: &[f64], m: usize) -> f64 {
     let at = all_above(sorted.len(), m).position(|above| above <= TAIL);
     sorted[at.unwrap_or(sorted.len() - 1)]
 }
 
-/// The lowest end by tails that are fitted to a tenth of the values, to half as many, and so on.
+/// Returns the lowest end of tails that are fitted to a tenth of the values, to half as many, and
+/// so on.
 fn extrapolated_low(sorted: &[f64], m: usize) -> f64 {
     let mut low = sorted[0];
     let mut fitted = ((FITTED * sorted.len() as f64) as usize)
@@ -68,8 +75,9 @@ fn extrapolated_low(sorted: &[f64], m: usize) -> f64 {
     low
 }
 
-/// The value below which [`TAIL`] of `m` fresh values are expected, if the lowest `fitted` values thin out exponentially. The scale of
-/// the tail is estimated too, so that its gaps follow a Pareto distribution instead of an exponential one.
+/// Returns the value below which [`TAIL`] of `m` fresh values are expected if the lowest `fitted`
+/// values thin out exponentially. The scale of the tail is also estimated, hence its gaps follow a
+/// Pareto distribution instead of an exponential one.
 fn end_of_tail(sorted: &[f64], m: usize, fitted: usize) -> f64 {
     let n = sorted.len();
     let threshold = sorted[fitted];
@@ -90,10 +98,10 @@ mod tests {
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
 
-    /// Draws of one kind.
+    /// A distribution to draw from.
     type Draw = fn(&mut ChaCha8Rng) -> f64;
 
-    /// A standard normal value, by Box and Muller.
+    /// Draws a standard normal value by the method of Box and Muller.
     fn normal(rng: &mut ChaCha8Rng) -> f64 {
         let (radius, angle): (f64, f64) = (1.0 - rng.random::<f64>(), rng.random());
         (-2.0 * radius.ln()).sqrt() * (std::f64::consts::TAU * angle).cos()
@@ -107,12 +115,12 @@ mod tests {
         (1.0 - rng.random::<f64>()).ln()
     }
 
-    /// Skewed to the right, like the costs of trials.
+    /// Draws a value that is skewed to the right, like the costs of trials.
     fn log_normal(rng: &mut ChaCha8Rng) -> f64 {
         (0.5 * normal(rng)).exp()
     }
 
-    /// Mostly one value and seldom a lower one, as with very little noise.
+    /// Draws mostly one value and seldom a lower one, as trials with very little noise do.
     fn seldom_lower(rng: &mut ChaCha8Rng) -> f64 {
         if rng.random::<f64>() < 0.05 {
             0.02 * exponential_to_the_left(rng)
@@ -123,7 +131,8 @@ mod tests {
 
     const POOLS: usize = 1500;
 
-    /// The fractions of fresh best-of-`m` values below and above the intervals that pools of `n` predict.
+    /// Returns the fractions of fresh best-of-`m` values below and above the intervals that pools
+    /// of `n` predict.
     fn missed(draw: Draw, n: usize, m: usize) -> (f64, f64) {
         let mut rng = ChaCha8Rng::seed_from_u64(33);
         let mut below = 0;
@@ -140,7 +149,7 @@ mod tests {
 
     #[test]
     fn nine_of_ten_fresh_bests_lie_in_the_interval_that_a_pool_predicts() {
-        // Four standard deviations of a fraction of 5 % among so many pools.
+        // Four standard deviations of a fraction of 5 % among this number of pools.
         let most = TAIL + 4.0 * (TAIL * (1.0 - TAIL) / POOLS as f64).sqrt();
         let light: [Draw; 4] = [normal, uniform, exponential_to_the_left, log_normal];
         for (n, m) in [(400, 10), (400, 100), (500, 100), (100, 100), (40, 10)] {
@@ -171,7 +180,8 @@ mod tests {
     fn a_pool_that_is_large_enough_gives_ends_that_are_order_statistics() {
         let pool: Vec<f64> = (0..400).map(f64::from).collect();
         let (low, high) = predicted_best(&pool, 10).unwrap();
-        // One fresh value of ten undercuts the lowest of 400 with 10 / 410, the second lowest with nearly twice as much.
+        // One of ten fresh values undercuts the lowest of 400 with the probability 10 / 410, and
+        // the second lowest with nearly twice that probability.
         assert_eq!(low, 1.0);
         assert!(high.fract() == 0.0 && (90.0..120.0).contains(&high), "{high}");
         assert!(predicted_best(&pool, 100).unwrap().0 < 0.0);

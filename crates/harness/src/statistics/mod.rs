@@ -1,47 +1,52 @@
-//! Statistics: quantiles, the expected best of several trials, the primal integral, correlations, rank tests, time-to-target fits.
+//! Statistics: quantiles, the expected best of several trials, the primal integral, correlations,
+//! rank tests, time-to-target fits.
 
 pub mod best_of;
 pub mod rank;
 pub mod time_to_target;
 
-/// The values in ascending order.
+/// Returns the values in ascending order.
 pub fn sorted(values: &[f64]) -> Vec<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     sorted
 }
 
-/// The `q`-quantile of finite values, 0 ≤ q ≤ 1, interpolated linearly between order statistics; `None` of none.
+/// Returns the `q`-quantile of finite values, 0 ≤ q ≤ 1, interpolated linearly between order
+/// statistics; `None` if there are no values.
 pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
     let sorted = sorted(values);
     let position = q * (sorted.len().checked_sub(1)? as f64);
     let below = sorted[position.floor() as usize];
     let above = sorted[position.ceil() as usize];
-    // Between two infinite values there is no number to interpolate by.
+    // The difference of two infinite values is NaN.
     Some(if below == above { below } else { below + (above - below) * position.fract() })
 }
 
-/// The least of the values that at least the fraction `q` of all of them do not exceed, 0 < q ≤ 1; `None` of none.
-/// Values may be infinite, as the times of runs that never end are.
+/// Returns the least value that at least the fraction `q` of all values do not exceed, 0 < q ≤ 1;
+/// `None` if there are no values. Values may be infinite, like the times of runs that never end.
 pub fn order_quantile(values: &[f64], q: f64) -> Option<f64> {
     let sorted = sorted(values);
     let rank = (q * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.saturating_sub(1)).copied()
 }
 
-/// The median of finite values.
+/// Returns the median of finite values; `None` if there are no values.
 pub fn median(values: &[f64]) -> Option<f64> {
     quantile(values, 0.5)
 }
 
-/// Returns two of the values between which the median of their distribution lies with a probability of at least 95 %: the narrowest pair of
-/// order statistics that leaves as many values out on both sides (the interval of the sign test). The lowest and the highest of fewer than
-/// six values, which hold it with a lower probability. `None` of none. O(N log N).
+/// Returns two of the values that enclose the median of their distribution with a probability of at
+/// least 95 %: the narrowest pair of order statistics with equally many values outside on both
+/// sides (the interval of the sign test).
+///
+/// Returns the lowest and the highest of fewer than six values, which enclose the median with a
+/// lower probability, and `None` if there are no values. O(N log N).
 pub fn median_interval(values: &[f64]) -> Option<(f64, f64)> {
     let sorted = sorted(values);
     let n = sorted.len();
     let last = n.checked_sub(1)?;
-    // Probability that exactly `left_out` of the values lie below the median.
+    // Probability that exactly `left_out` of the values are below the median.
     let mut exactly = 0.5f64.powi(n as i32);
     let mut at_most = 0.0;
     let mut left_out = 0;
@@ -57,12 +62,13 @@ pub fn median_interval(values: &[f64]) -> Option<(f64, f64)> {
     Some((sorted[left_out], sorted[last - left_out]))
 }
 
-/// The lower quartile, the median and the upper quartile of finite values; NaN of none.
+/// Returns the lower quartile, the median and the upper quartile of finite values; NaN if there are
+/// no values.
 pub fn quartiles(values: &[f64]) -> [f64; 3] {
     [0.25, 0.5, 0.75].map(|q| quantile(values, q).unwrap_or(f64::NAN))
 }
 
-/// The lowest and the highest value.
+/// Returns the lowest and the highest value.
 pub fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values.into_iter().fold(None, |range, value| {
         let (low, high) = range.unwrap_or((value, value));
@@ -70,20 +76,21 @@ pub fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
-/// The lowest value.
+/// Returns the lowest value.
 pub fn minimum(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     values.into_iter().min_by(f64::total_cmp)
 }
 
-/// The expected lowest of `m` values drawn without replacement from a pool of N, exactly:
-/// E\[min of m\] = Σᵢ c₍ᵢ₎ · C(N − i, m − 1) / C(N, m), values ascending. `None` unless 1 ≤ m ≤ N. O(N log N).
+/// Returns the exact expectation of the lowest of `m` values drawn without replacement from a pool:
+/// E\[min of m\] = Σᵢ c₍ᵢ₎ · C(N − i, m − 1) / C(N, m), values ascending. `None` unless 1 ≤ m ≤ N.
+/// O(N log N).
 pub fn expected_best_of(pool: &[f64], m: usize) -> Option<f64> {
     let n = pool.len();
     if m == 0 || m > n {
         return None;
     }
     let sorted = sorted(pool);
-    // The weight of the i-th value, from that of the one before, so that no binomial is ever formed.
+    // Each weight follows from the previous one, which avoids binomials that overflow.
     let mut weight = m as f64 / n as f64;
     let mut expected = 0.0;
     for (i, value) in (1..=n - m + 1).zip(sorted) {
@@ -95,16 +102,17 @@ pub fn expected_best_of(pool: &[f64], m: usize) -> Option<f64> {
     Some(expected)
 }
 
-/// Half the width of the normal distribution's central 95 %, in standard deviations.
+/// Half the width of the normal distribution's central 95 % interval, in standard deviations.
 pub const NORMAL_95: f64 = 1.959_963_984_540_054;
 
-/// The geometric mean of positive values; NaN of none.
+/// Returns the geometric mean of positive values; NaN if there are no values.
 pub fn geometric_mean(values: &[f64]) -> f64 {
     (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp()
 }
 
-/// The mean of values and the 95 % interval of the mean that they were drawn around, by Student's t; no interval of fewer
-/// than two. `None` of none.
+/// Returns the mean of values and the 95 % interval of their distribution's mean, by Student's t.
+///
+/// Fewer than two values have no interval, and no values have no mean.
 pub fn mean_interval(values: &[f64]) -> Option<(f64, Option<(f64, f64)>)> {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -119,7 +127,8 @@ pub fn mean_interval(values: &[f64]) -> Option<(f64, Option<(f64, f64)>)> {
     Some((mean, Some((mean - half, mean + half))))
 }
 
-/// Half the width of the 95 % interval of a mean of so many values, in standard errors; `None` of fewer than two.
+/// Returns half the width of the 95 % interval of a mean, in standard errors; `None` for fewer than
+/// two values.
 pub fn student(values: usize) -> Option<f64> {
     let freedom = values
         .checked_sub(1)
@@ -130,52 +139,57 @@ pub fn student(values: usize) -> Option<f64> {
         .copied()
 }
 
-/// The 97.5 % quantiles of Student's t for 1 to 20 degrees of freedom. With more, intervals by the last are somewhat
-/// wider than they need be.
+/// The 97.5 % quantiles of Student's t for 1 to 20 degrees of freedom. The last one also serves
+/// more degrees of freedom, for which it is slightly too wide.
 const STUDENT: [f64; 20] = [
     12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160,
     2.145, 2.131, 2.120, 2.110, 2.101, 2.093, 2.086,
 ];
 
-/// The primal integral (Berthold 2013) up to `horizon`, divided by it: the mean over that time of the primal gap
-/// |cost − reference| / max(cost, reference), which is 1 before the first incumbent. `incumbents` are times and costs,
-/// both ascending in time. 0 is the reference at once, 1 is nothing at all. `None` unless the horizon is above 0.
+/// Returns the primal integral (Berthold 2013) up to `horizon`, divided by `horizon`: the mean
+/// primal gap |cost − reference| / max(cost, reference) over that time, with a gap of 1 before the
+/// first incumbent.
+///
+/// `incumbents` are times and costs, ascending in time. A search that starts with the reference has
+/// 0, a search that finds nothing has 1. `None` unless the horizon is above 0.
 pub fn primal_integral(incumbents: &[(f64, f64)], reference: f64, horizon: f64) -> Option<f64> {
-    let gap = |cost: f64| {
-        let greater = cost.max(reference);
-        if greater > 0.0 { (cost - reference).abs() / greater } else { 0.0 }
-    };
     let mut since = 0.0;
-    let mut current = 1.0;
+    let mut gap = 1.0;
     let mut integral = 0.0;
     for &(time, cost) in incumbents
         .iter()
         .take_while(|(time, _)| *time < horizon)
     {
-        integral += current * (time - since);
-        (since, current) = (time, gap(cost));
+        integral += gap * (time - since);
+        since = time;
+        gap = primal_gap(cost, reference);
     }
-    (horizon > 0.0).then(|| (integral + current * (horizon - since)) / horizon)
+    (horizon > 0.0).then(|| (integral + gap * (horizon - since)) / horizon)
 }
 
-/// Pearson's correlation of pairs; `None` of fewer than two, or if either side is constant.
+fn primal_gap(cost: f64, reference: f64) -> f64 {
+    let greater = cost.max(reference);
+    // Two costs of 0 are equal, although their ratio is undefined.
+    if greater > 0.0 { (cost - reference).abs() / greater } else { 0.0 }
+}
+
+/// Returns Pearson's correlation of pairs; `None` for fewer than two, or if either side is
+/// constant.
 pub fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
     let n = pairs.len() as f64;
-    let mean_x = pairs.iter().map(|p| p.0).sum::<f64>() / n;
-    let mean_y = pairs.iter().map(|p| p.1).sum::<f64>() / n;
-    let product = |f: fn(f64, f64) -> f64| {
-        pairs
-            .iter()
-            .map(|&(x, y)| f(x - mean_x, y - mean_y))
-            .sum::<f64>()
-    };
-    let xx = product(|x, _| x * x);
-    let yy = product(|_, y| y * y);
-    (pairs.len() > 1 && xx > 0.0 && yy > 0.0)
-        .then(|| product(|x, y| x * y) / (xx.sqrt() * yy.sqrt()))
+    let mean_x = pairs.iter().map(|pair| pair.0).sum::<f64>() / n;
+    let mean_y = pairs.iter().map(|pair| pair.1).sum::<f64>() / n;
+    let centred = pairs
+        .iter()
+        .map(|&(x, y)| (x - mean_x, y - mean_y));
+    let xx: f64 = centred.clone().map(|(x, _)| x * x).sum();
+    let yy: f64 = centred.clone().map(|(_, y)| y * y).sum();
+    let xy: f64 = centred.map(|(x, y)| x * y).sum();
+    (pairs.len() > 1 && xx > 0.0 && yy > 0.0).then(|| xy / (xx.sqrt() * yy.sqrt()))
 }
 
-/// Returns the 95 % interval of Pearson's correlation of so many pairs, by Fisher's transformation; `None` for fewer than four.
+/// Returns the 95 % interval of Pearson's correlation by Fisher's transformation; `None` for fewer
+/// than four pairs.
 pub fn pearson_interval(correlation: f64, pairs: usize) -> Option<(f64, f64)> {
     let freedom = pairs
         .checked_sub(3)
@@ -185,26 +199,26 @@ pub fn pearson_interval(correlation: f64, pairs: usize) -> Option<(f64, f64)> {
     Some(((transformed - half).tanh(), (transformed + half).tanh()))
 }
 
-/// Spearman's rank correlation of pairs: Pearson's of the ranks, equal values sharing their mean rank.
+/// Returns Spearman's rank correlation of pairs: Pearson's correlation of their ranks. Equal values
+/// share their mean rank.
 pub fn spearman(pairs: &[(f64, f64)]) -> Option<f64> {
-    let of = |side: fn(&(f64, f64)) -> f64| ranks(&pairs.iter().map(side).collect::<Vec<_>>());
-    pearson(
-        &of(|p| p.0)
-            .into_iter()
-            .zip(of(|p| p.1))
-            .collect::<Vec<_>>(),
-    )
+    let (first, second): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
+    let rank_pairs: Vec<(f64, f64)> = ranks(&first)
+        .into_iter()
+        .zip(ranks(&second))
+        .collect();
+    pearson(&rank_pairs)
 }
 
-/// The rank of every value, from 1, equal values sharing their mean rank.
+/// Returns the rank of every value, from 1. Equal values share their mean rank.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let mut ranks = vec![0.0; values.len()];
     let mut before = 0;
     for ties in order.chunk_by(|&a, &b| values[a] == values[b]) {
-        for &at in ties {
-            ranks[at] = before as f64 + (ties.len() as f64 + 1.0) / 2.0;
+        for &index in ties {
+            ranks[index] = before as f64 + (ties.len() as f64 + 1.0) / 2.0;
         }
         before += ties.len();
     }
@@ -245,7 +259,8 @@ mod tests {
 
     #[test]
     fn the_interval_of_a_median_is_that_of_the_sign_test() {
-        // Of 25 values the 8th and the 18th: 7 or fewer of 25 coins show heads with 0.0216, 8 or fewer with 0.054.
+        // The 8th and the 18th value: 7 or fewer of 25 coins show heads with the probability
+        // 0.0216, 8 or fewer with 0.054.
         let values: Vec<f64> = (1..=25).rev().map(f64::from).collect();
         assert_eq!(median_interval(&values), Some((8.0, 18.0)));
         assert_eq!(median_interval(&values[..6]), Some((20.0, 25.0)));

@@ -1,27 +1,28 @@
-//! Tests of whether one method is really better than another: by ranks, so that no distribution is assumed.
+//! Significance tests of the difference between two methods. They use ranks and assume no
+//! distribution.
 //!
-//! P values are two-sided: twice the smaller tail, at most 1. For samples of up to [`MOST_EXACT`] values they are
-//! exact, given the ranks, ties included: every assignment of the ranks is counted, by dynamic programming over their
-//! sums. Larger samples use the normal approximation with the variance corrected for ties and the statistic for
-//! continuity.
+//! P values are two-sided: twice the smaller tail, at most 1. For samples of up to [`MOST_EXACT`]
+//! values they are exact, even with ties: dynamic programming over sums of ranks counts all
+//! assignments of the ranks. Larger samples use the normal approximation, with the variance
+//! corrected for ties and the statistic for continuity.
 
 use super::{ranks, sorted};
 
-/// The most values for which all assignments are counted.
+/// The maximum number of values for which all assignments are counted.
 pub const MOST_EXACT: usize = 60;
 
 /// The outcome of a test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Test {
-    /// W⁺, the sum of the ranks of positive differences; or U, the number of pairs in which the first sample's value is
-    /// the greater one, ties counting a half.
+    /// W⁺, the sum of the ranks of positive differences; or U, the number of pairs in which the
+    /// first sample's value is greater. Ties count a half.
     pub statistic: f64,
-    /// How likely a statistic as far out or farther is if there is no difference.
+    /// The probability of a statistic at least this extreme if there is no difference.
     pub p_value: f64,
 }
 
-/// Wilcoxon's signed-rank test (Wilcoxon 1945) of paired differences; those of 0 are left out. `None` if no others are
-/// left.
+/// Performs Wilcoxon's signed-rank test (Wilcoxon 1945) of paired differences, ignoring zeros.
+/// `None` if all differences are zero.
 pub fn wilcoxon_signed_rank(differences: &[f64]) -> Option<Test> {
     let differences: Vec<f64> = differences
         .iter()
@@ -53,7 +54,8 @@ fn signed_ranks(differences: &[f64], exact: bool) -> Test {
     Test { statistic, p_value }
 }
 
-/// The Mann–Whitney U test (Mann & Whitney 1947) of two independent samples. `None` if either is empty.
+/// Performs the Mann–Whitney U test (Mann & Whitney 1947) of two independent samples. `None` if
+/// either is empty.
 pub fn mann_whitney(first: &[f64], second: &[f64]) -> Option<Test> {
     let some = !first.is_empty() && !second.is_empty();
     some.then(|| rank_sum(first, second, first.len() + second.len() <= MOST_EXACT))
@@ -75,19 +77,22 @@ fn rank_sum(first: &[f64], second: &[f64], exact: bool) -> Test {
     Test { statistic, p_value }
 }
 
-/// The effect size A₁₂ (Vargha & Delaney 2000): how likely a value of the first sample is greater than one of the
-/// second, ties counting a half. 0.5 is no difference. `None` if either is empty.
+/// Returns the effect size A₁₂ (Vargha & Delaney 2000): the probability that a value of the first
+/// sample is greater than a value of the second, where ties count a half. 0.5 is no difference.
+/// `None` if either sample is empty.
 pub fn a12(first: &[f64], second: &[f64]) -> Option<f64> {
     let pairs = (first.len() * second.len()) as f64;
     mann_whitney(first, second).map(|test| test.statistic / pairs)
 }
 
-/// The least p-value that the signed-rank test can give with so many differences, none of them 0.
+/// Returns the least p-value that the signed-rank test can give for this number of nonzero
+/// differences.
 pub fn least_signed_rank(samples: usize) -> f64 {
     (2.0 * 0.5f64.powi(samples as i32)).min(1.0)
 }
 
-/// The least p-value that the Mann–Whitney test can give with samples of these sizes: 2 / C(m + n, m).
+/// Returns the least p-value that the Mann–Whitney test can give for samples of these sizes:
+/// 2 / C(m + n, m).
 pub fn least_rank_sum(first: usize, second: usize) -> f64 {
     let sets = (1..=first)
         .map(|i| (second + i) as f64 / i as f64)
@@ -95,8 +100,8 @@ pub fn least_rank_sum(first: usize, second: usize) -> f64 {
     (2.0 / sets).min(1.0)
 }
 
-/// P values of tests made together, corrected so that all of those below α are right with probability 1 − α (Holm
-/// 1979).
+/// Corrects the p-values of a family of tests (Holm 1979): with probability 1 − α, every difference
+/// whose corrected value is below α exists.
 pub fn holm(p_values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p_values.len()).collect();
     order.sort_by(|&a, &b| p_values[a].total_cmp(&p_values[b]));
@@ -111,8 +116,8 @@ pub fn holm(p_values: &[f64]) -> Vec<f64> {
     corrected
 }
 
-/// How many subsets of the ranks, of `size` if that is given, have the sum s / 2, for every s. Ranks are multiples of a
-/// half. O(n · size · s).
+/// Counts, for every s, the subsets of the ranks that have the sum s / 2 and, if given, this
+/// `size`. Ranks are multiples of a half. O(n · size · s).
 fn subsets_by_sum(ranks: &[f64], size: Option<usize>) -> Vec<f64> {
     let doubled: Vec<usize> = ranks
         .iter()
@@ -134,14 +139,14 @@ fn subsets_by_sum(ranks: &[f64], size: Option<usize>) -> Vec<f64> {
     counts.pop().unwrap_or_default()
 }
 
-/// Twice the smaller tail at `sum`, of a distribution over halves.
+/// Returns twice the smaller tail at `sum` of a distribution over multiples of a half.
 fn two_sided(counts: &[f64], sum: f64) -> f64 {
     let at = (2.0 * sum) as usize;
     let (below, above): (f64, f64) = (counts[..=at].iter().sum(), counts[at..].iter().sum());
     (2.0 * below.min(above) / counts.iter().sum::<f64>()).min(1.0)
 }
 
-/// Σ t³ − t over groups of t equal ranks.
+/// Returns Σ t³ − t over groups of t equal ranks.
 fn ties(ranks: &[f64]) -> f64 {
     sorted(ranks)
         .chunk_by(|a, b| a == b)
@@ -150,7 +155,7 @@ fn ties(ranks: &[f64]) -> f64 {
         .sum()
 }
 
-/// Twice the tail beyond `deviation` less a half, of a normal distribution of this variance.
+/// Returns twice the tail beyond `deviation` − ½ of a normal distribution with this variance.
 fn normal_two_sided(deviation: f64, variance: f64) -> f64 {
     if variance <= 0.0 {
         return 1.0;
@@ -166,8 +171,9 @@ mod tests {
     #[test]
     #[allow(clippy::approx_constant, reason = "3.14 is a measurement here")]
     fn the_worked_examples_of_hollander_and_wolfe_come_out() {
-        // Hollander & Wolfe 1973, depression scale before and after (p. 29) and permeability of membranes (p. 69), as
-        // in the manual of R's wilcox.test: one-sided p-values 0.01953 and 0.1272.
+        // Hollander & Wolfe 1973, depression scale before and after (p. 29) and permeability of
+        // membranes (p. 69), as in the manual of R's wilcox.test: one-sided p-values 0.01953 and
+        // 0.1272.
         let before = [1.83, 0.50, 1.62, 2.48, 1.68, 1.88, 1.55, 3.06, 1.30];
         let after = [0.878, 0.647, 0.598, 2.05, 1.06, 1.29, 1.06, 3.14, 1.29];
         let differences: Vec<f64> = before
@@ -186,25 +192,17 @@ mod tests {
         assert_eq!(a12(&term, &early), Some(0.7));
     }
 
-    /// The smaller tail at `found`, doubled, of what `statistic` is over all of `sets`.
+    /// Returns twice the smaller tail at `found` of the `statistic` over all `sets`.
     fn by_enumeration(
         sets: impl Iterator<Item = u32>,
         found: f64,
         statistic: impl Fn(u32) -> f64,
     ) -> f64 {
         let all: Vec<f64> = sets.map(statistic).collect();
-        let tail = |count: usize| count as f64 / all.len() as f64;
-        let below = tail(
-            all.iter()
-                .filter(|&&value| value <= found)
-                .count(),
-        );
-        (2.0 * below.min(tail(
-            all.iter()
-                .filter(|&&value| value >= found)
-                .count(),
-        )))
-        .min(1.0)
+        let below = all.iter().filter(|&&value| value <= found);
+        let above = all.iter().filter(|&&value| value >= found);
+        let tail = below.count().min(above.count()) as f64 / all.len() as f64;
+        (2.0 * tail).min(1.0)
     }
 
     #[test]
@@ -212,62 +210,59 @@ mod tests {
         let values = [3.0, -1.0, 2.0, 2.0, -3.0, 5.0, 1.0, 4.0, 3.0, 8.0];
         for n in 1..=values.len() {
             let values = &values[..n];
-            let ranks = ranks(
-                &values
-                    .iter()
-                    .map(|value: &f64| value.abs())
-                    .collect::<Vec<_>>(),
-            );
-            let sum = |set: u32| {
-                (0..n)
-                    .filter(|i| set >> i & 1 == 1)
-                    .map(|i| ranks[i])
-                    .sum::<f64>()
-            };
+            let sizes: Vec<f64> = values.iter().copied().map(f64::abs).collect();
+            let ranks = ranks(&sizes);
             let test = wilcoxon_signed_rank(values).unwrap();
-            let expected = by_enumeration(0..1 << n, test.statistic, sum);
+            let expected = by_enumeration(0..1 << n, test.statistic, |set| {
+                let chosen = (0..n).filter(|i| set >> i & 1 == 1);
+                chosen.map(|i| ranks[i]).sum()
+            });
             assert!((test.p_value - expected).abs() < 1e-12, "{n}: {test:?}, {expected}");
         }
         for split in 1..values.len() {
             let (first, second) = values.split_at(split);
-            let u = |set: u32| -> f64 {
-                let of = |side: u32| (0..values.len()).filter(move |i| set >> i & 1 == side);
-                let half = |a: f64, b: f64| if a == b { 0.5 } else { f64::from(u8::from(a > b)) };
-                of(1)
-                    .flat_map(|i| of(0).map(move |j| (i, j)))
-                    .map(|(i, j)| half(values[i], values[j]))
-                    .sum()
-            };
             let test = mann_whitney(first, second).unwrap();
             let sets =
                 (0..1 << values.len()).filter(|set: &u32| set.count_ones() as usize == split);
-            let expected = by_enumeration(sets, test.statistic, u);
+            let expected = by_enumeration(sets, test.statistic, |set| pairs_won(&values, set));
             assert!((test.p_value - expected).abs() < 1e-12, "{split}: {test:?}, {expected}");
         }
     }
 
+    /// Counts the pairs in which the value of the set is greater than the other; ties count a half.
+    fn pairs_won(values: &[f64], set: u32) -> f64 {
+        let mut won = 0.0;
+        for (i, a) in values.iter().enumerate() {
+            for (j, b) in values.iter().enumerate() {
+                if set >> i & 1 == 1 && set >> j & 1 == 0 {
+                    won += if a == b { 0.5 } else { f64::from(u8::from(a > b)) };
+                }
+            }
+        }
+        won
+    }
+
     #[test]
     fn the_normal_approximation_is_near_the_exact_values_where_it_takes_over() {
-        let values = |count: usize, shift: f64| -> Vec<f64> {
-            (0..count)
-                .map(|i| ((i * 37) % 23) as f64 - 11.0 + shift)
-                .collect()
-        };
-        let near = |[exact, approximate]: [Test; 2]| {
-            let difference = (exact.p_value - approximate.p_value).abs();
-            assert!(
-                difference < 0.003 && exact.statistic == approximate.statistic,
-                "{exact:?}, {approximate:?}"
-            );
-        };
         for shift in [0.3, 1.0, 2.6, 4.7] {
-            near([true, false].map(|exact| signed_ranks(&values(MOST_EXACT, shift), exact)));
-            let half = MOST_EXACT / 2;
-            near(
-                [true, false]
-                    .map(|exact| rank_sum(&values(half, shift), &values(half, 0.0), exact)),
-            );
+            let paired = shifted_values(MOST_EXACT, shift);
+            let first = shifted_values(MOST_EXACT / 2, shift);
+            let second = shifted_values(MOST_EXACT / 2, 0.0);
+            for [exact, approximate] in [
+                [true, false].map(|is_exact| signed_ranks(&paired, is_exact)),
+                [true, false].map(|is_exact| rank_sum(&first, &second, is_exact)),
+            ] {
+                let difference = (exact.p_value - approximate.p_value).abs();
+                assert!(difference < 0.003, "{exact:?}, {approximate:?}");
+                assert_eq!(exact.statistic, approximate.statistic);
+            }
         }
+    }
+
+    fn shifted_values(count: usize, shift: f64) -> Vec<f64> {
+        (0..count)
+            .map(|i| ((i * 37) % 23) as f64 - 11.0 + shift)
+            .collect()
     }
 
     #[test]

@@ -1,23 +1,26 @@
-//! The shifted exponential distribution of the time that a randomised search takes to reach a target.
+//! The shifted exponential distribution of the time that a randomised search takes to reach a
+//! target.
 //!
-//! Aiex, Resende & Ribeiro 2007, 'TTT plots: a perl program to create time-to-target plots'; Hoos & Stützle 1998 for
-//! runs that never reach it.
+//! Aiex, Resende & Ribeiro 2007, 'TTT plots: a perl program to create time-to-target plots'; Hoos &
+//! Stützle 1998 for runs that never reach the target.
 
 use super::sorted;
 
-/// P(solved within t) = 1 − exp(−(t − shift) / mean) from `shift` on, both in the unit of the times.
+/// P(solved within t) = 1 − exp(−(t − shift) / mean) for t ≥ shift, both in the unit of the times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShiftedExponential {
-    /// The time before which no run is done. May come out below 0.
+    /// The time before which no run reaches the target; a fit may give a negative one.
     pub shift: f64,
-    /// The mean time after that.
+    /// The mean time after `shift`.
     pub mean: f64,
 }
 
 impl ShiftedExponential {
-    /// Fitted, as in the source, to the quartiles of the times of `runs` runs of which some were `solved`, in any
-    /// order: robust against outliers, and possible as long as three quarters were solved. `None` otherwise, or if the
-    /// quartiles are equal.
+    /// Fits the distribution to the quartiles of times, as the source does, which is robust against
+    /// outliers. `solved` are the times, in any order, of the runs among `runs` that reached the
+    /// target.
+    ///
+    /// `None` if fewer than three quarters of the runs did, or if the quartiles are equal.
     pub fn fit(solved: &[f64], runs: usize) -> Option<Self> {
         let sorted = sorted(solved);
         let lower = at(&sorted, runs, 0.25)?;
@@ -26,12 +29,13 @@ impl ShiftedExponential {
         (mean > 0.0).then(|| Self { shift: lower - mean * standard_quantile(0.25), mean })
     }
 
-    /// P(solved within `time`).
+    /// Returns P(solved within `time`).
     pub fn probability(&self, time: f64) -> f64 {
         -libm::expm1(-((time - self.shift) / self.mean).max(0.0))
     }
 
-    /// The greatest difference between the fit and the distribution of these times (Kolmogorov–Smirnov).
+    /// Returns the greatest difference between the fit and the distribution of these times
+    /// (Kolmogorov–Smirnov).
     pub fn distance(&self, solved: &[f64], runs: usize) -> f64 {
         let steps = sorted(solved)
             .into_iter()
@@ -44,12 +48,13 @@ impl ShiftedExponential {
     }
 }
 
-/// The quantile of the exponential distribution of mean 1.
+/// Returns the quantile of the exponential distribution with mean 1.
 fn standard_quantile(probability: f64) -> f64 {
     -libm::log1p(-probability)
 }
 
-/// The time of this probability, the i-th of n runs standing at (i − ½) / n, linear in between.
+/// Returns the time of this probability. The i-th of n runs has the probability (i − ½) / n; times
+/// in between are interpolated linearly.
 fn at(sorted: &[f64], runs: usize, probability: f64) -> Option<f64> {
     let position = (runs as f64 * probability - 0.5).max(0.0);
     let below = sorted.get(position.floor() as usize)?;
@@ -61,7 +66,7 @@ fn at(sorted: &[f64], runs: usize, probability: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Times that stand exactly where the distribution has its i-th of n.
+    /// Returns the distribution's quantiles as the times of all runs.
     fn times(law: ShiftedExponential, runs: u32) -> Vec<f64> {
         let quantile = |probability| law.shift + law.mean * standard_quantile(probability);
         (0..runs)
