@@ -1,4 +1,4 @@
-//! What a case is: a stiff scene, checks of methods, or checks of other parts of the program.
+//! Cases of the suite: stiff scenes, checks of methods, and checks of other parts of the program.
 
 use super::promise::Verdict;
 use bvh_core::{Aabb, Triangle};
@@ -10,7 +10,7 @@ use bvh_search::{Method, Outcome};
 pub struct Case {
     /// `S01` to `S45`; also names its scene in [`stiff`].
     pub id: &'static str,
-    /// What it is.
+    /// A short description.
     pub name: &'static str,
     /// How the promises are checked; at least one way.
     pub checks: &'static [Check],
@@ -21,20 +21,20 @@ pub struct Case {
 pub enum Check {
     /// Every method builds the scene of the case, every traversal traces it.
     Scene(SceneCase),
-    /// Every method refuses these boxes and names the object.
+    /// Every method rejects these boxes and names the object.
     Refused {
         /// Makes this many boxes.
         boxes: fn(usize) -> Vec<Aabb>,
-        /// Index of the object that is named.
+        /// Index of the object that the error names.
         object: usize,
     },
-    /// Asked of the method of this name, or of all.
+    /// A check of the method with this name, or of all methods.
     Method(Option<&'static str>, fn(&Method) -> Verdict),
-    /// Asked of another part of the program.
+    /// A check of another part of the program.
     Part(Part, fn() -> Verdict),
 }
 
-/// A part of the program that is neither method nor traversal.
+/// A part of the program that is neither a method nor a traversal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Rays and their ranges.
@@ -43,15 +43,15 @@ pub enum Part {
     ObjFiles,
     /// The reader of tree files.
     TreeFiles,
-    /// Costs that are kept while a tree changes.
+    /// Costs that are updated while a tree changes.
     Costs,
 }
 
 impl Part {
-    /// All of them, in the order of the tables.
+    /// All parts, in the order of the tables.
     pub const ALL: [Self; 4] = [Self::Rays, Self::ObjFiles, Self::TreeFiles, Self::Costs];
 
-    /// Its name in tables.
+    /// The part's name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Rays => "rays",
@@ -62,19 +62,19 @@ impl Part {
     }
 }
 
-/// How the scene of a case is built and traced.
+/// The scene of a case.
 #[derive(Debug)]
 pub struct SceneCase {
     /// Numbers of objects by [`Size`].
     pub sizes: [usize; 3],
-    /// What else is promised of this scene.
+    /// A further promise about this scene.
     pub also: Option<Also>,
 }
 
 /// A promise about one method's outcome on one scene.
 pub type Also = fn(&Method, &[Aabb], &Outcome) -> Verdict;
 
-/// How large a scene is.
+/// The size of a scene.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
 )]
@@ -84,12 +84,12 @@ pub enum Size {
     Few,
     /// For builders, in the tests.
     Many,
-    /// For builders, as the case is meant.
+    /// For builders, at the full size of the case.
     All,
 }
 
 impl Case {
-    /// How its scene is checked, if it has one.
+    /// The case's scene, if it has one.
     pub fn scene(&self) -> Option<&SceneCase> {
         self.checks.iter().find_map(|check| match check {
             Check::Scene(scene) => Some(scene),
@@ -97,29 +97,29 @@ impl Case {
         })
     }
 
-    /// Its scene of so many triangles; none if the case has no scene.
+    /// Returns the case's scene with this number of triangles; none if the case has no scene.
     pub fn triangles(&self, objects: usize) -> Vec<Triangle> {
         stiff::by_id(self.id).map_or_else(Vec::new, |triangles| triangles(objects))
     }
 }
 
-/// Whether the method is a builder: one evaluation, no search.
+/// Returns true if the method is a builder: one evaluation, no search.
 pub fn is_builder(method: &Method) -> bool {
     use Method::{Agglomerative, GoldsmithSalmon, MedianCut, MullerFellner};
     matches!(method, MullerFellner(_) | MedianCut(_) | GoldsmithSalmon(_) | Agglomerative(_))
 }
 
-/// Objects of the scenes for the exact optimum.
+/// The number of objects for which the exact optimum is computed.
 pub const EXACT_OBJECTS: usize = 12;
 
-/// How much is asked of the methods on every scene.
+/// The amount of work for the methods on every scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
     /// Size of the scenes that builders get.
     pub builders: Size,
     /// Nodes per object that a search may make or visit on a scene of few objects.
     pub work_per_object: u64,
-    /// What searches get besides, if anything.
+    /// Larger scenes for searches, if any.
     pub larger: Option<LargerScenes>,
 }
 
@@ -136,8 +136,8 @@ pub struct LargerScenes {
 }
 
 impl SceneCase {
-    /// The numbers of objects that a method gets, each with its work per object, in ascending order. The exact optimum
-    /// gets [`EXACT_OBJECTS`] at most.
+    /// Returns the numbers of objects for a method, each with its work per object, in ascending
+    /// order. The exact optimum gets at most [`EXACT_OBJECTS`].
     pub fn extents(&self, method: &Method, effort: &Effort) -> Vec<(usize, u64)> {
         let few = (self.sizes[Size::Few as usize], effort.work_per_object);
         let further = match method {
@@ -159,7 +159,7 @@ impl SceneCase {
     }
 }
 
-/// Every method of the registry and every builder in its other forms, with labels.
+/// Returns every method of the registry and every variant of the builders, with labels.
 pub fn methods() -> Vec<(String, Method)> {
     use bvh_build::{goldsmith_salmon, median_cut, muller_fellner, ploc, top_down::AreaOnly};
     use goldsmith_salmon::Descent;

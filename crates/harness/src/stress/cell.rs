@@ -1,4 +1,4 @@
-//! Carries out the checks of one case for one method, traversal or part: a cell of the suite's table.
+//! Performs the checks of one case for one method, traversal or part: a cell of the suite's table.
 
 use super::case::{Case, Check, EXACT_OBJECTS, Effort, Part, Size};
 use super::examine::{self, Examined};
@@ -12,9 +12,9 @@ use bvh_search::Method;
 pub enum Cell {
     /// All promises are kept.
     Kept(Examined),
-    /// Refused with a typed error that names the object, as promised.
+    /// The input is rejected with a typed error that names the object, as promised.
     Refused(String),
-    /// The promise that was broken.
+    /// A promise is broken.
     Broken(Broken),
 }
 
@@ -28,8 +28,8 @@ impl From<Verdict> for Cell {
 }
 
 impl Cell {
-    /// This and a further check of the same case and subject: what is broken, else the numbers of the first and the
-    /// notes of both.
+    /// Combines two checks of the same case and subject: the broken promise, if any, otherwise the
+    /// numbers of the first check and the notes of both.
     fn and(self, other: Self) -> Self {
         match (self, other) {
             (Self::Broken(broken), _) => Self::Broken(broken),
@@ -46,7 +46,8 @@ impl Cell {
 }
 
 impl Case {
-    /// All that is asked of a method; `None` if nothing is. Of a scene at several sizes the largest is reported.
+    /// Performs all checks of a method; `None` if there are none. The result reports the largest
+    /// size of the scene.
     pub fn of_method(&self, method: &Method, effort: &Effort) -> Option<Cell> {
         let cells = self
             .checks
@@ -75,7 +76,7 @@ impl Case {
         cells.reduce(Cell::and)
     }
 
-    /// Whether a traversal answers the scene's rays; `None` if there is no scene.
+    /// Checks a traversal's answers to the scene's rays; `None` if there is no scene.
     pub fn of_traversal(&self, traversal: tracing::Traversal, rays: usize) -> Option<Cell> {
         let triangles = self.triangles(self.scene()?.sizes[Size::Few as usize]);
         let traced = std::panic::catch_unwind(|| {
@@ -89,7 +90,7 @@ impl Case {
         )
     }
 
-    /// What is asked of another part; `None` if nothing is.
+    /// Performs all checks of another part; `None` if there are none.
     pub fn of_part(&self, part: Part) -> Option<Cell> {
         self.checks.iter().find_map(|check| match check {
             Check::Part(of, check) if *of == part => Some(check().into()),

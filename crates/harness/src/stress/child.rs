@@ -1,5 +1,5 @@
-//! What runs in a process of its own: other libraries, whose crash or hang must not end the run, and builds whose peak
-//! memory is to be known.
+//! Work in a separate process: other libraries, whose crash or hang must not end the run, and
+//! builds whose peak memory is measured.
 
 use super::peers::{self, Found};
 use bvh_scenes::builtin::stiff;
@@ -7,10 +7,10 @@ use bvh_search::{Budget, Method, Problem, solve};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// The hidden command of the harness that [`main`] carries out.
+/// The hidden command of the harness that [`main`] performs.
 pub const COMMAND: &str = "suite-child";
 
-/// Runs this very program again and returns what it prints; an error if it fails or takes longer than `limit`.
+/// Runs this program again and returns its output, or an error if it fails or exceeds `limit`.
 fn ask(arguments: [&str; 3], limit: Duration) -> Result<String, String> {
     let program = std::env::current_exe().map_err(|error| error.to_string())?;
     let start = Instant::now();
@@ -22,7 +22,7 @@ fn ask(arguments: [&str; 3], limit: Duration) -> Result<String, String> {
         .stderr(Stdio::null())
         .spawn()
         .map_err(|error| error.to_string())?;
-    // What is printed fits into the pipe.
+    // The output fits into the pipe, so nobody needs to read it before the end.
     loop {
         match child
             .try_wait()
@@ -48,20 +48,23 @@ fn ask(arguments: [&str; 3], limit: Duration) -> Result<String, String> {
     }
 }
 
-/// Another library on the scene of a case, in a child; or how that ended.
+/// Examines another library on the scene of a case in a child process. An error describes how the
+/// child failed.
 pub fn examine(peer: &str, case: &str, objects: usize, limit: Duration) -> Result<Found, String> {
     let answer = ask([peer, case, &objects.to_string()], limit)?;
     toml::from_str(&answer).map_err(|error| error.to_string())
 }
 
-/// Peak memory of a build beyond its boxes, in bytes, in a child; `None` where the system does not report it.
+/// Measures the peak memory of a build beyond its boxes, in bytes, in a child process; `None` if
+/// the system does not report it.
 pub fn peak_bytes(method: &Method, case: &str, objects: usize) -> Option<u64> {
     let method = toml::to_string(method).ok()?;
     let answer = ask([&method, case, &objects.to_string()], Duration::from_secs(3600)).ok()?;
     answer.trim().parse().ok()
 }
 
-/// What the child does: `subject` is a library's name or a method as a spec writes it. Returns what to print.
+/// Performs the child's work and returns its output. `subject` is a library's name or a method in
+/// the notation of specs.
 pub fn main(subject: &str, id: &str, objects: usize) -> Result<String, String> {
     let generator = stiff::by_id(id).ok_or_else(|| format!("{id} is no case with a scene"))?;
     let triangles = generator(objects);
@@ -82,7 +85,7 @@ pub fn main(subject: &str, id: &str, objects: usize) -> Result<String, String> {
     }
 }
 
-/// A size in bytes from the process status of Linux.
+/// Returns a size in bytes from the process status of Linux.
 fn status(key: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status

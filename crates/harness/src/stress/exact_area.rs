@@ -1,15 +1,16 @@
-//! The internal area of a tree in exact arithmetic, against which reported costs are measured.
+//! The internal area of a tree in exact arithmetic, the reference for reported costs.
 
 use bvh_core::Bvh;
 use num_bigint::{BigInt, BigUint};
 use num_traits::{ToPrimitive, Zero};
 
-/// An f32 is a whole multiple of 2^-149; a product of two differences of them one of 2^-298.
+/// Every f32 is an integer multiple of 2^-149, hence a product of two differences is an integer
+/// multiple of 2^-298.
 const UNIT: u32 = 298;
-/// An f64 is a whole multiple of 2^-1074.
+/// Every f64 is an integer multiple of 2^-1074.
 const UNIT_F64: u32 = 1074;
 
-/// A finite number in units of 2^-149.
+/// Returns a finite number in units of 2^-149.
 fn whole(x: f32) -> BigInt {
     let bits = x.to_bits();
     let exponent = bits >> 23 & 0xff;
@@ -19,7 +20,8 @@ fn whole(x: f32) -> BigInt {
     if x.is_sign_negative() { -size } else { size }
 }
 
-/// [`bvh_core::cost::internal_area`] of a valid tree, exact, in units of 2^-298. O(nodes).
+/// Returns the exact [`bvh_core::cost::internal_area`] of a valid tree in units of 2^-298.
+/// O(nodes).
 pub fn internal_area(tree: &Bvh) -> BigUint {
     let mut total = BigInt::zero();
     for node in tree.nodes.iter().filter(|node| !node.is_leaf()) {
@@ -28,17 +30,15 @@ pub fn internal_area(tree: &Bvh) -> BigUint {
     total.magnitude().clone()
 }
 
-/// The half area of a box that is not empty, exact, in units of 2^-298.
+/// Returns the exact half area of a nonempty box in units of 2^-298.
 pub fn half_area(aabb: &bvh_core::Aabb) -> BigInt {
-    let side = |axis: usize| whole(aabb.max[axis]) - whole(aabb.min[axis]);
-    let x = side(0);
-    let y = side(1);
-    let z = side(2);
+    let [x, y, z] = [0, 1, 2].map(|axis| whole(aabb.max[axis]) - whole(aabb.min[axis]));
     &x * &y + &y * &z + &z * &x
 }
 
-/// |cost − exact| / exact, with `exact` in units of 2^-298; 0 if both are 0, infinite if only one is or the cost is not
-/// a finite number from 0 up.
+/// Returns |cost − exact| / exact, with `exact` in units of 2^-298.
+///
+/// 0 if both are 0; infinite if only one is 0, or if the cost is negative or not finite.
 pub fn relative_error(cost: f64, exact: &BigUint) -> f64 {
     if !(cost.is_finite() && cost >= 0.0) {
         return f64::INFINITY;
@@ -59,9 +59,9 @@ pub fn relative_error(cost: f64, exact: &BigUint) -> f64 {
     ratio(&difference, &exact)
 }
 
-/// a / b for b above 0.
+/// Returns a / b for b above 0.
 pub fn ratio(a: &BigUint, b: &BigUint) -> f64 {
-    // In units of 2^-200: far below any rounding of a ratio that is not tiny.
+    // Units of 2^-200 are far below the rounding of any ratio that is not tiny.
     ((a << 200u32) / b)
         .to_f64()
         .unwrap_or(f64::INFINITY)

@@ -1,4 +1,4 @@
-//! One method on one scene: whether the promises P1, P2 and P4 to P7 are kept, and the numbers to report.
+//! Checks the promises P1, P2 and P4 to P7 for one method on one scene, and collects its numbers.
 
 use super::case::{Case, SceneCase, is_builder};
 use super::exact_area::{internal_area, relative_error};
@@ -12,13 +12,14 @@ use bvh_search::{Budget, Method, Outcome, Problem, SearchError, solve};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
-/// Largest relative error of a cost.
+/// The largest accepted relative error of a cost.
 pub const ROUNDING: f64 = 1e-12;
 
-/// Most objects of a scene that is built again for other numbers of threads and at other scales.
+/// The maximum number of objects of a scene that is built again for other numbers of threads and at
+/// other scales.
 const REPEATED: usize = 20_000;
 
-/// What was found of one method on one scene.
+/// The findings about one method on one scene.
 #[derive(Clone, Debug, Default)]
 pub struct Examined {
     /// Number of objects.
@@ -27,21 +28,21 @@ pub struct Examined {
     pub depth: usize,
     /// The internal area.
     pub cost: f64,
-    /// Of the cost against exact arithmetic.
+    /// The cost's relative error against exact arithmetic.
     pub relative_error: f64,
-    /// Seconds that the method took.
+    /// The method's wall time.
     pub seconds: f64,
     /// Further findings.
     pub note: String,
 }
 
-/// The budget of a method on a scene of `objects` objects; builders have none.
+/// Returns the budget of a method on a scene with this number of objects; builders have none.
 pub fn budget(method: &Method, objects: usize, work_per_object: u64) -> Budget {
     let work = work_per_object.saturating_mul(objects as u64 + 1);
     Budget { max_evaluations: None, max_work: (!is_builder(method)).then_some(work) }
 }
 
-/// Runs a method with seed 1; a panic is a broken promise.
+/// Runs a method with seed 1. A panic breaks a promise.
 pub fn run(method: &Method, boxes: &[Aabb], work_per_object: u64) -> Result<Outcome, Broken> {
     let budget = budget(method, boxes.len(), work_per_object);
     solved(method, boxes, budget)?.map_err(|error| P1.broken(format!("refused: {error}")))
@@ -65,7 +66,7 @@ fn solved(
     })
 }
 
-/// Checks a method on the scene of a case with so many objects.
+/// Checks a method on the scene of a case with this number of objects.
 pub fn examine(
     case: &Case,
     scene: &SceneCase,
@@ -95,8 +96,8 @@ pub fn examine(
     Ok(Examined { objects: boxes.len(), depth, cost, relative_error, seconds, note })
 }
 
-/// P2 and P7: the tree is valid and tight, its cost finite, exact but for rounding, the best of the history and no
-/// higher than the start's. Returns the relative error of the cost.
+/// Checks P2 and P7: the tree is valid and tight; its cost is finite, exact except for rounding,
+/// the best of the history, and not above the start's. Returns the relative error of the cost.
 pub fn check_outcome(boxes: &[Aabb], outcome: &Outcome) -> Result<f64, Broken> {
     let Outcome { tree, cost, history, .. } = outcome;
     validate(tree, boxes).map_err(|error| P2.broken(error))?;
@@ -125,7 +126,7 @@ pub fn on_threads<T: Send>(
         .install(work)
 }
 
-/// P4: the same tree and history on one thread and on three.
+/// Checks P4: the same tree and history on one thread and on three.
 fn check_threads(
     method: &Method,
     boxes: &[Aabb],
@@ -140,7 +141,7 @@ fn check_threads(
     Ok(())
 }
 
-/// P5: the scene scaled by 2^k gives the same tree, and 4^k times the cost, bit by bit.
+/// Checks P5: the scene scaled by 2^k gives the same tree and 4^k times the cost, bit by bit.
 pub fn check_scale(
     method: &Method,
     boxes: &[Aabb],
@@ -156,7 +157,7 @@ pub fn check_scale(
     Ok(())
 }
 
-/// The method refuses the boxes and names the object.
+/// Checks that the method rejects the boxes and names the object.
 pub fn refuses(method: &Method, boxes: &[Aabb], object: usize) -> Verdict {
     match solved(method, boxes, Budget::UNLIMITED)? {
         Err(error @ SearchError::Build(_))

@@ -1,5 +1,5 @@
-//! Every kernel of the wide layout, ray by ray and in batches of both hints, against testing every triangle; and rays where rounding
-//! decides.
+//! Compares every kernel of the wide layout, ray by ray and in batches with both hints, with
+//! testing every triangle; and makes rays where rounding decides.
 
 use super::promise::{Broken, ensure};
 use super::tracing::{self, bits, wide_layouts};
@@ -10,10 +10,12 @@ use glam::Vec3;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 
-/// Lengths of batches, in turn: one ray, less and more than kernels take at once, and far more.
+/// The lengths of consecutive batches: one ray, fewer and more rays than a kernel processes at
+/// once, and far more.
 const LENGTHS: [usize; 12] = [1, 3, 16, 15, 17, 33, 7, 23, 25, 65, 257, 1023];
 
-/// P3, bit by bit, for the layouts of two trees and every kernel that this processor has. Returns how many rays hit.
+/// Checks P3, bit by bit, for the layouts of two trees and every kernel of this processor. Returns
+/// the number of rays that hit.
 pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
     let objects = Primitives::Triangles(triangles.to_vec());
     let brute_force = Accelerator::new(&objects, Structure::Brute);
@@ -60,7 +62,7 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
     Ok(expected.iter().flatten().count())
 }
 
-/// The answers to one batch of rays, handed over by component.
+/// Returns the answers to one batch of rays that is passed component by component.
 fn by_component(
     wide: &WideBvh,
     rays: &[Ray],
@@ -95,14 +97,17 @@ fn by_component(
     (nearest.collect(), any)
 }
 
-/// Rays of [`tracing::rays`]: half of them one by one, half in bundles.
+/// Returns rays of [`tracing::rays`], half of them single, half in bundles.
 pub fn random(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
     half_in_bundles(count, seed, |count| tracing::rays(triangles, count, seed))
 }
 
-/// Rays where rounding decides, half of them one by one, half in bundles: in planes of triangles and along edges, from and through
-/// their corners, edges and centres, along axes or all but along them, of directions of any length, so that distances underflow;
-/// over half lines, single points and ranges that end at a hit or just beside it.
+/// Returns rays where rounding decides, half of them single, half in bundles.
+///
+/// The rays run in planes of triangles and along edges, from and through their corners, edges and
+/// centres, and along axes, exactly or nearly. Their directions have any length, which makes
+/// distances underflow. They cover half lines, single points, and ranges that end at a hit or next
+/// to it.
 pub fn adversarial(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
     let objects = Primitives::Triangles(triangles.to_vec());
     let brute_force = Accelerator::new(&objects, Structure::Brute);
@@ -135,7 +140,7 @@ fn one_adversarial(
         2 => along,
         _ => Vec3::from([(); 3].map(|()| rng.random_range(-1.0..1.0))),
     };
-    // Of any length that is accepted.
+    // The largest component becomes 1, so that every length below is accepted.
     let direction = direction / direction.abs().max_element();
     let back = pick(&[0.0, 0.0, 1.0, -1.0, 0.3, 100.0, 1e-7], rng);
     let origin = target - direction * (size * back).min(f32::MAX / 4.0);
@@ -156,7 +161,7 @@ fn one_adversarial(
     Ray::new(origin, direction, t_min, t_max).ok()
 }
 
-/// A corner, a point of an edge, the centre, or any point in the plane, not far from the triangle.
+/// Returns a corner, a point of an edge, the centre, or any point in the plane near the triangle.
 fn in_plane(Triangle([a, b, c]): &Triangle, rng: &mut Stream) -> Vec3 {
     let (u, v) = match rng.random_range(0..5) {
         0 => (0.0, 0.0),
@@ -172,10 +177,11 @@ fn pick<T: Copy>(of: &[T], rng: &mut Stream) -> T {
     *of.choose(rng).expect("some")
 }
 
-/// Rays in a bundle: those of a packet.
+/// The number of rays in a bundle, the same as in a packet.
 const BUNDLE: usize = 64;
 
-/// The rays that `make` makes, a half of `count`, and bundles around further ones: equal, all but equal, or close to each other.
+/// Returns `count` rays: half of them directly from `make`, half in bundles around further rays of
+/// `make`. The rays of a bundle are equal, nearly equal, or close to each other.
 fn half_in_bundles(count: usize, seed: u64, mut make: impl FnMut(usize) -> Vec<Ray>) -> Vec<Ray> {
     let mut rng = Stream::seed_from_u64(!seed);
     let mut rays = make(count / 2);
@@ -185,7 +191,7 @@ fn half_in_bundles(count: usize, seed: u64, mut make: impl FnMut(usize) -> Vec<R
         let mut near =
             || Vec3::from([(); 3].map(|()| 1.0 + spread * rng.random_range(-1.0..1.0f32)));
         for _ in 0..BUNDLE {
-            // Factors, so that zeros stay what they are at every scale.
+            // Factors instead of offsets keep zeros, and work at every scale.
             let origin = ray.origin() * near();
             let direction = ray.direction() * near();
             rays.push(Ray::new(origin, direction, ray.t_min(), ray.t_max()).unwrap_or(ray));
@@ -195,9 +201,10 @@ fn half_in_bundles(count: usize, seed: u64, mut make: impl FnMut(usize) -> Vec<R
     rays
 }
 
-/// The triangles times 2^`exponent`, a part of them denormal if that is far below zero; `None` if they would not be finite.
+/// Scales triangles by 2^`exponent`, which makes some of them denormal if the exponent is very low;
+/// `None` if they would not be finite.
 pub fn scaled(triangles: &[Triangle], exponent: i32) -> Option<Vec<Triangle>> {
-    // In two steps, as 2^-140 itself has few bits.
+    // Two steps, because 2^-140 itself is denormal and would lose bits.
     let step = 2f32.powi(exponent / 2);
     let scaled: Vec<_> = triangles
         .iter()

@@ -1,7 +1,8 @@
-//! The suite: cases S01 to S45, stiff and extreme, and what is promised of every method, traversal and reader on them.
+//! The suite: the stiff and extreme cases S01 to S45, and the promises that every method, traversal
+//! and reader keeps on them.
 //!
-//! [`CASES`] is the one table for the tests and the experiment; [`Promise`] lists the general promises. Nothing else in
-//! the harness knows the suite but the commands and specs that run it.
+//! Tests and the experiment share the table [`CASES`]. [`Promise`] lists the general promises. Only
+//! the commands and specs that run the suite know it.
 
 pub mod case;
 mod cell;
@@ -28,23 +29,23 @@ pub use promise::{Broken, Promise, Verdict};
 use std::path::Path;
 pub use table::{CASES, by_id};
 
-/// A measurement over the suite, as a spec asks for it.
+/// A measurement over the suite, selected by a spec.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
     /// Every case with every method.
     Stability(stability::Config),
-    /// Areas in f32 and f64 against exact ones.
+    /// Areas in f32 and f64 compared with exact areas.
     Precision(precision::Config),
 }
 
 impl Measure {
-    /// The columns of the CSV files that measurements leave.
+    /// The columns of the CSV files that measurements write.
     pub fn columns() -> Vec<Columns> {
         [stability::columns(), precision::columns()].concat()
     }
 
-    /// What it says about the CSV files in the folder.
+    /// Makes tables and figures from the CSV files in the folder.
     pub fn output(&self, folder: &Path) -> Result<Output, Error> {
         match self {
             Self::Stability(_) => stability::output(folder),

@@ -1,27 +1,27 @@
-//! Other libraries on the same scenes, by the same promises. Their crash or hang would end the program: they are only
-//! ever called in a child process.
+//! Checks other libraries on the same scenes for the same promises. It runs only in a child
+//! process, because a library's crash or hang would end the program.
 
 use serde::{Deserialize, Serialize};
 
-/// What is found of another library's tree.
+/// The findings about another library's tree.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Found {
     /// Edges from the root to the deepest leaf.
     pub depth: usize,
     /// The internal area.
     pub cost: f64,
-    /// The promises that it broke, as [`Broken`](super::promise::Broken) shows them.
+    /// The broken promises, in the notation of [`Broken`](super::promise::Broken).
     pub broken: Vec<String>,
 }
 
 #[cfg(feature = "peers")]
 pub use compiled_in::{NAMES, examine};
 
-/// The other libraries by name; none without the feature `peers`.
+/// The names of the other libraries; none without the feature `peers`.
 #[cfg(not(feature = "peers"))]
 pub const NAMES: &[&str] = &[];
 
-/// The library's tree over the triangles; `None`, as no library is compiled in.
+/// Examines a library's tree over the triangles; `None`, because no library is compiled in.
 #[cfg(not(feature = "peers"))]
 pub fn examine(_: &str, _: &[bvh_core::Triangle]) -> Option<Found> {
     None
@@ -40,7 +40,7 @@ mod compiled_in {
     use bvh_scenes::builtin::stiff;
     use bvh_scenes::trace::{Accelerator, Structure};
 
-    /// The libraries by name. A further one is one line, here and in [`peer`].
+    /// The names of the libraries. Adding a library takes one line here and one in [`peer`].
     pub const NAMES: &[&str] = &["bvh 0.13", "obvhs 0.4 fast", "obvhs 0.4 slow"];
 
     fn peer(name: &str) -> Option<Peer> {
@@ -55,10 +55,10 @@ mod compiled_in {
 
     /// Rays per scene.
     const RAYS: usize = 500;
-    /// Most objects of a scene that is traced by brute force and scaled.
+    /// The maximum number of objects of a scene that is traced by brute force and scaled.
     const FEW: usize = 1000;
 
-    /// The library's tree over the triangles; `None` if there is no such library.
+    /// Examines a library's tree over the triangles; `None` if there is no such library.
     pub fn examine(name: &str, triangles: &[Triangle]) -> Option<Found> {
         let peer = peer(name)?;
         let boxes = stiff::boxes(triangles);

@@ -1,6 +1,8 @@
-//! The experiment `precision`: what areas in f32 save in time and lose in decisions against areas in f64 and exact ones.
+//! The experiment `precision`: the time that areas in f32 save, and the decisions that they get
+//! wrong, compared with areas in f64 and exact areas.
 //!
-//! The builder has areas in f64 only, so a plain sweep, the same code for every kind of number, stands in for it.
+//! The builder supports only areas in f64, so a plain sweep, generic over the kind of number,
+//! replaces it here.
 
 use super::exact_area::{half_area, internal_area, ratio};
 use super::table::by_id;
@@ -23,11 +25,11 @@ use std::time::Instant;
 
 config! {
     serde;
-    /// What is measured.
+    /// Parameters of the measurement.
     pub struct Config {
         /// Objects per scene.
         objects: usize = 1500, in 3..=10_000_000;
-        /// Builds per time; the shortest counts.
+        /// Builds per time; the shortest one counts.
         repetitions: u32 = 7, in 1..;
     }
 }
@@ -39,15 +41,15 @@ struct Row {
     /// `f32` or `f64`.
     method: String,
     objects: usize,
-    /// Inner nodes of the exact tree over three objects or more, where there is a choice.
+    /// Inner nodes of the exact tree over at least three objects, where there is a choice.
     decisions: usize,
     /// Decisions for a split that costs more than the best one, in exact arithmetic.
     wrong: usize,
-    /// Their fraction of all decisions.
+    /// Wrong decisions as a fraction of all decisions.
     wrong_fraction: f64,
     /// Decisions in which no candidate has a finite cost.
     undecided: usize,
-    /// The internal area of the whole tree over that of the exact one; 1 if both are 0.
+    /// The internal area of the full tree over the exact tree's; 1 if both are 0.
     cost_over_exact: f64,
 }
 
@@ -61,12 +63,13 @@ struct Timing {
     nanoseconds_per_object: f64,
 }
 
-/// The columns of the files that a measurement leaves.
+/// The columns of the files that a measurement writes.
 pub fn columns() -> Vec<Columns> {
     vec![Columns::of::<Row>(), Columns::of::<Timing>()]
 }
 
-/// A kind of number for costs: the cost of a split is the sum over both sides of half area times number of objects.
+/// A kind of number for costs. The cost of a split is the sum over both sides of half area times
+/// number of objects.
 trait Number: Clone + PartialOrd + for<'a> Add<&'a Self, Output = Self> {
     fn side(aabb: &Aabb, count: usize) -> Self;
     fn is_finite(&self) -> bool;
@@ -100,11 +103,11 @@ impl Number for BigInt {
     }
 }
 
-/// The first `left` objects in the order of `axis` against the rest.
+/// A split into the first `left` objects in the order of `axis` and the rest.
 type Split = (usize, usize);
 
-/// The best of all splits by the rules of the builder: of equal cost the more balanced, then the lower axis and
-/// position. `None` if no cost is finite.
+/// Returns the best of all splits by the builder's rules: among equal costs the more balanced one,
+/// then the lower axis and position. `None` if no cost is finite.
 fn best<N: Number>(boxes: &[Aabb], orders: &[Vec<u32>; 3]) -> Option<(N, Split)> {
     let n = orders[0].len();
     let mut best: Option<(N, usize, Split)> = None;
@@ -131,7 +134,7 @@ fn best<N: Number>(boxes: &[Aabb], orders: &[Vec<u32>; 3]) -> Option<(N, Split)>
     best.map(|(cost, _, split)| (cost, split))
 }
 
-/// What a split costs, exactly.
+/// Returns the exact cost of a split.
 fn exact_cost(boxes: &[Aabb], orders: &[Vec<u32>; 3], (axis, left): Split) -> BigInt {
     let (l, r) = orders[axis].split_at(left);
     let [l, r] = [l, r].map(|side| {
@@ -143,7 +146,7 @@ fn exact_cost(boxes: &[Aabb], orders: &[Vec<u32>; 3], (axis, left): Split) -> Bi
     l + r
 }
 
-/// The objects of both sides in the orders of all axes.
+/// Returns the objects of both sides in the orders of all axes.
 fn divide(
     orders: &[Vec<u32>; 3],
     (axis, left): Split,
@@ -163,20 +166,13 @@ fn divide(
     })
 }
 
-/// Divides greedily down to single objects. `choose` is asked for the split of every node of three or more.
+/// Divides greedily down to single objects. `choose` selects the split of every node with at least
+/// three objects.
 fn build(boxes: &[Aabb], mut choose: impl FnMut(&[Vec<u32>; 3]) -> Split) -> Bvh {
-    let sorted = |axis: usize| {
-        let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-        order.sort_by(|&a, &b| {
-            let key = |object: u32| boxes[object as usize].doubled_centroid()[axis];
-            key(a).total_cmp(&key(b))
-        });
-        order
-    };
     let placeholder = Node::leaf(Aabb::EMPTY, 0, 1);
     let mut tree = Bvh { nodes: vec![placeholder], prim_ids: Vec::with_capacity(boxes.len()) };
     let mut goes_left = vec![false; boxes.len()];
-    let mut open = vec![(0, [0, 1, 2].map(sorted))];
+    let mut open = vec![(0, [0, 1, 2].map(|axis| sorted_by_centre(boxes, axis)))];
     while let Some((node, orders)) = open.pop() {
         if let [object] = orders[0][..] {
             tree.nodes[node] = Node::leaf(Aabb::EMPTY, tree.prim_ids.len() as u32, 1);
@@ -194,12 +190,22 @@ fn build(boxes: &[Aabb], mut choose: impl FnMut(&[Vec<u32>; 3]) -> Split) -> Bvh
     tree
 }
 
-/// The best split, or the middle of the first order where no cost is finite.
+fn sorted_by_centre(boxes: &[Aabb], axis: usize) -> Vec<u32> {
+    let centres: Vec<f64> = boxes
+        .iter()
+        .map(|aabb| aabb.doubled_centroid()[axis])
+        .collect();
+    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+    order.sort_by(|&a, &b| centres[a as usize].total_cmp(&centres[b as usize]));
+    order
+}
+
+/// Returns the best split, or the middle of the first order if no cost is finite.
 fn chosen<N: Number>(boxes: &[Aabb], orders: &[Vec<u32>; 3]) -> Split {
     best::<N>(boxes, orders).map_or((0, orders[0].len() / 2), |(_, split)| split)
 }
 
-/// What f32 and f64 would have decided at the nodes of the exact tree.
+/// The decisions of f32 and f64 at the nodes of the exact tree.
 #[derive(Default)]
 struct Decisions {
     area: BigUint,
@@ -230,7 +236,7 @@ fn decisions(boxes: &[Aabb]) -> Decisions {
     found
 }
 
-/// The stiff scenes on which precision could matter, by case.
+/// Returns the stiff scenes on which precision may matter, by case.
 fn scenes(n: usize) -> Vec<(String, Vec<Aabb>)> {
     let mut found: Vec<(String, Vec<Aabb>)> = Vec::new();
     let uniform = stiff::boxes(&stiff::uniform(n));
@@ -288,51 +294,46 @@ impl Config {
         Ok(output.text())
     }
 
-    /// The tree by one kind of number, and the seconds of the fastest build.
+    /// Returns the tree of one kind of number, and the seconds of the fastest build.
     fn timed<N: Number>(&self, boxes: &[Aabb]) -> (Bvh, f64) {
-        let once = |_| {
+        let builds = (0..self.repetitions.max(1)).map(|_| {
             let start = Instant::now();
             let tree = build(boxes, |orders| chosen::<N>(boxes, orders));
             (tree, start.elapsed().as_secs_f64())
-        };
-        let builds = (0..self.repetitions.max(1)).map(once);
+        });
         builds
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .unwrap_or_default()
     }
 }
 
-fn figure(rows: &[Row], timing: &[Timing]) -> Figure {
-    let of = |kind: &'static str| rows.iter().filter(move |row| row.method == kind);
-    let scenes: Vec<String> = of("f32").map(|row| row.scene.clone()).collect();
-    let panel = |title: &str, label: &str, value: &dyn Fn(&'static str) -> Vec<f64>| Panel {
+/// Draws one number of each row as bars by scene, one colour per kind of number.
+fn panel<T>(title: &str, label: &str, rows: &[T], bar: impl Fn(&T) -> (&str, &str, f64)) -> Panel {
+    let mut scenes = Vec::new();
+    let mut values = [Vec::new(), Vec::new()];
+    for row in rows {
+        let (scene, method, value) = bar(row);
+        if method == KINDS[0] {
+            scenes.push(scene.to_owned());
+        }
+        values[usize::from(method != KINDS[0])].push(value);
+    }
+    let [f32_values, f64_values] = values;
+    Panel {
         title: title.into(),
-        x: Axis::categories("", scenes.clone()),
+        x: Axis::categories("", scenes),
         y: Axis::linear(label),
-        layers: ["f32", "f64"]
-            .map(|kind| Layer::bars(kind, value(kind), 0.0))
-            .into(),
-    };
-    let wrong = |kind| {
-        of(kind)
-            .map(|row| 100.0 * row.wrong_fraction)
-            .collect()
-    };
-    let cost = |kind| {
-        of(kind)
-            .map(|row| 100.0 * (row.cost_over_exact - 1.0))
-            .collect()
-    };
-    let own_time = |kind: &'static str| {
-        timing
-            .iter()
-            .filter(move |row| row.method == kind)
-    };
-    let time = |kind| {
-        own_time(kind)
-            .map(|row| row.nanoseconds_per_object / 1000.0)
-            .collect()
-    };
+        layers: vec![
+            Layer::bars(KINDS[0], f32_values, 0.0),
+            Layer::bars(KINDS[1], f64_values, 0.0),
+        ],
+    }
+}
+
+/// The kinds of numbers in the column `method`.
+const KINDS: [&str; 2] = ["f32", "f64"];
+
+fn figure(rows: &[Row], timing: &[Timing]) -> Figure {
     Figure {
         title: "What f32 areas cost: Müller–Fellner's choices against exact arithmetic".into(),
         caption: "Stiff scenes of the suite. Above, how often the chosen split is not the best one, at the nodes of \
@@ -341,15 +342,21 @@ fn figure(rows: &[Row], timing: &[Timing]) -> Figure {
             .into(),
         columns: 1,
         panels: vec![
-            panel("wrong decisions", "% of nodes", &wrong),
-            panel("cost above the exact tree's", "%", &cost),
-            panel("time", "µs per object", &time),
+            panel("wrong decisions", "% of nodes", rows, |row| {
+                (&row.scene, &row.method, 100.0 * row.wrong_fraction)
+            }),
+            panel("cost above the exact tree's", "%", rows, |row| {
+                (&row.scene, &row.method, 100.0 * (row.cost_over_exact - 1.0))
+            }),
+            panel("time", "µs per object", timing, |row| {
+                (&row.scene, &row.method, row.nanoseconds_per_object / 1000.0)
+            }),
         ],
         looks: vec![],
     }
 }
 
-/// What is made from the CSV files in the folder.
+/// Makes the table and the figure from the CSV files in the folder.
 pub fn output(folder: &Path) -> Result<Output, Error> {
     let rows: Vec<Row> = read(&folder.join("precision.csv"))?;
     let timing: Vec<Timing> = read(&folder.join("timing_precision.csv"))?;
@@ -358,34 +365,29 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
         .iter()
         .filter(|row| row.method == "f32")
         .count();
-    let of = |kind: &str| {
-        let wrong: Vec<&Row> = rows
+    let [by_f32, by_f64] = KINDS.map(|kind| {
+        let wrong = rows
             .iter()
             .filter(|row| row.method == kind && row.wrong > 0)
-            .collect();
-        let worst = wrong
-            .iter()
-            .map(|row| 100.0 * row.wrong_fraction)
-            .fold(0.0, f64::max);
-        match wrong.len() {
+            .map(|row| 100.0 * row.wrong_fraction);
+        let worst = wrong.clone().fold(0.0, f64::max);
+        match wrong.count() {
             0 => format!("areas in {kind} on none"),
             some => format!(
                 "areas in {kind} on {some} of {scenes} scenes, at up to {worst:.1} % of nodes"
             ),
         }
-    };
-    let seconds = |kind: &str| -> f64 {
-        timing
-            .iter()
-            .filter(|row| row.method == kind)
+    });
+    let [f32_time, f64_time] = KINDS.map(|kind| {
+        let times = timing.iter().filter(|row| row.method == kind);
+        times
             .map(|row| row.nanoseconds_per_object)
-            .sum()
-    };
-    let saved = 100.0 * (1.0 - seconds("f32") / seconds("f64"));
+            .sum::<f64>()
+    });
+    let saved = 100.0 * (1.0 - f32_time / f64_time);
     output.reading = format!(
-        "Splits worse than by exact arithmetic: by {}; by {}. f32 takes {saved:.0} % less time.",
-        of("f32"),
-        of("f64")
+        "Splits worse than by exact arithmetic: by {by_f32}; by {by_f64}. \
+         f32 takes {saved:.0} % less time."
     );
     let columns = "scene method decisions wrong undecided cost_over_exact";
     output.show("Decisions at the nodes of the exact tree:", &rows, columns)?;

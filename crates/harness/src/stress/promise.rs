@@ -1,9 +1,9 @@
-//! The promises that the suite checks, and how a broken one is reported.
+//! The promises that the suite checks, and the reports of broken ones.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// What is promised of every method, traversal and reader, whatever its input.
+/// A promise of every method, traversal and reader for every input.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
 )]
@@ -12,7 +12,7 @@ pub enum Promise {
     P1,
     /// Containment is exact, bit by bit.
     P2,
-    /// No false miss: every traversal answers as brute force does.
+    /// No false miss: every traversal gives the answers of brute force.
     P3,
     /// The same bytes for any number of threads.
     P4,
@@ -20,12 +20,12 @@ pub enum Promise {
     P5,
     /// Depth is reported, no stack overflows.
     P6,
-    /// Every cost is finite and that of the tree.
+    /// Every cost is finite and equals the tree's cost.
     P7,
 }
 
 impl Promise {
-    /// This promise is broken by `what` was found.
+    /// Reports that `what` breaks this promise.
     pub fn broken(self, what: impl fmt::Display) -> Broken {
         Broken { promise: Some(self), what: what.to_string() }
     }
@@ -49,22 +49,22 @@ impl FromStr for Promise {
     }
 }
 
-/// A promise that does not hold. Shown, and read again, as `P2: what was found`.
+/// A broken promise. Its text form, which can be parsed again, is `P2: observation`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Broken {
-    /// One of the general promises, or none if the case alone promised it.
+    /// The general promise; none if only the case makes it.
     pub promise: Option<Promise>,
-    /// What was found instead.
+    /// The observation.
     pub what: String,
 }
 
 impl Broken {
-    /// For `map_err`: something failed that the case alone promised to succeed.
+    /// For `map_err`: reports a failure that breaks a promise of the case itself.
     pub fn case(what: impl fmt::Display) -> Self {
         Self { promise: None, what: what.to_string() }
     }
 
-    /// The same, found at `place`.
+    /// Adds the `place` of the observation.
     pub fn within(self, place: impl fmt::Display) -> Self {
         Self { what: format!("{place}: {}", self.what), ..self }
     }
@@ -91,11 +91,11 @@ impl From<&str> for Broken {
     }
 }
 
-/// What was found, for the note, or the promise that was broken.
+/// The text of a note, or the broken promise.
 pub type Verdict = Result<String, Broken>;
 
-/// Returns an error unless the condition holds: `ensure!(condition, P7: "cost {cost}")`, or without `P7:` for what
-/// the case alone promises.
+/// Returns an error unless the condition holds: `ensure!(condition, P7: "cost {cost}")`, or without
+/// `P7:` for promises of the case itself.
 macro_rules! ensure {
     ($holds:expr, $promise:ident: $($what:tt)+) => {
         let holds: bool = $holds;

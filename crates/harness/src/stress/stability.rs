@@ -1,4 +1,5 @@
-//! The experiment `stability`: every case with every method, traversal and part, as rows and a heat map.
+//! The experiment `stability`: every case with every method, traversal and part, as rows and a heat
+//! map.
 
 use super::case::{Case, Effort, LargerScenes, Part, SceneCase, Size, is_builder};
 use super::cell::Cell;
@@ -22,22 +23,22 @@ use std::time::Duration;
 
 config! {
     serde;
-    /// What is run.
+    /// Parameters of the measurement.
     pub struct Config {
-        /// Size of the scenes that builders get.
+        /// Size of the scenes for builders.
         builders: Size = Size::Many;
         /// Budget of a search: nodes per object that it may make or visit.
         work_per_object: u64 = 1000, in 1..;
-        /// Scenes for searches beyond those of few objects, each built once more. Default none.
+        /// Larger scenes for searches, in addition to the scenes of few objects. Default none.
         larger_searches: Option<LargerScenes>;
         /// Rays per scene and traversal.
         rays: usize = 5000, in 1..=100_000_000;
-        /// Seconds after which the build of another library, if any is compiled in, counts as hanging.
+        /// Seconds after which the build of another library counts as hanging.
         seconds_per_peer: u64 = 20, in 1..;
     }
 }
 
-/// How a cell ended.
+/// The outcome of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 enum Class {
     #[serde(rename = "as promised")]
@@ -60,16 +61,16 @@ struct Row {
     scene: String,
     /// The method, traversal, part or library.
     method: String,
-    /// What came of it:
+    /// The outcome:
     outcome: Class,
-    /// 0 where nothing is built.
+    /// Number of objects; 0 if nothing is built.
     objects: usize,
     depth: Option<usize>,
     /// Internal area, world units squared.
     cost: Option<f64>,
-    /// Of the cost against exact arithmetic.
+    /// The cost's relative error against exact arithmetic.
     relative_error: Option<f64>,
-    /// The error, or the promises that are broken.
+    /// The error, or the broken promises.
     note: String,
 }
 
@@ -83,11 +84,11 @@ struct Timing {
     seconds: f64,
     /// The same per object.
     nanoseconds_per_object: f64,
-    /// Of builders on S36, beyond the boxes, where the system tells.
+    /// Peak memory of builders on S36, beyond the boxes, if the system reports it.
     peak_bytes_per_object: Option<f64>,
 }
 
-/// The columns of the files that a measurement leaves.
+/// The columns of the files that a measurement writes.
 pub fn columns() -> Vec<Columns> {
     vec![Columns::of::<Row>(), Columns::of::<Timing>()]
 }
@@ -96,7 +97,7 @@ pub fn columns() -> Vec<Columns> {
 const MEMORY: &str = "S36";
 
 impl Row {
-    /// A row without numbers.
+    /// Makes a row without numbers.
     fn bare(case: &Case, method: &str, outcome: Class, note: String) -> Self {
         Self {
             scene: format!("{} {}", case.id, case.name),
@@ -111,23 +112,34 @@ impl Row {
     }
 
     fn new(case: &Case, method: &str, cell: Cell) -> (Self, Option<Examined>) {
-        let row = |outcome, note| Self::bare(case, method, outcome, note);
-        match cell {
-            Cell::Refused(error) => (row(Class::Refused, error), None),
-            Cell::Broken(broken) => (row(Class::Broken, broken.to_string()), None),
-            Cell::Kept(examined) if case.scene().is_some() && examined.seconds > 0.0 => {
-                let Examined { objects, depth, cost, relative_error, .. } = examined;
-                let depth = Some(depth);
-                let cost = Some(cost);
-                let relative_error = Some(relative_error);
-                let kept = row(Class::Kept, examined.note.clone());
-                (Self { objects, depth, cost, relative_error, ..kept }, Some(examined))
+        let examined = match cell {
+            Cell::Refused(error) => return (Self::bare(case, method, Class::Refused, error), None),
+            Cell::Broken(broken) => {
+                return (Self::bare(case, method, Class::Broken, broken.to_string()), None);
             }
-            Cell::Kept(examined) => (row(Class::Kept, examined.note), None),
+            Cell::Kept(examined) => examined,
+        };
+        let row = Self::bare(case, method, Class::Kept, examined.note.clone());
+        // Checks that build nothing have no numbers.
+        if case.scene().is_none() || examined.seconds <= 0.0 {
+            return (row, None);
         }
+        let row = Self {
+            objects: examined.objects,
+            depth: Some(examined.depth),
+            cost: Some(examined.cost),
+            relative_error: Some(examined.relative_error),
+            ..row
+        };
+        (row, Some(examined))
     }
 
-    /// A row of another library, whose note lists broken promises.
+    /// Returns true for a cell that breaks a promise, crashes or hangs.
+    fn is_bad(&self) -> bool {
+        matches!(self.outcome, Class::Broken | Class::Dead)
+    }
+
+    /// Makes a row of another library, whose note lists broken promises.
     fn of_peer(
         case: &Case,
         peer: &str,
@@ -142,7 +154,7 @@ impl Row {
         Self { objects, depth, cost, ..Self::bare(case, peer, outcome, broken.join(BETWEEN)) }
     }
 
-    /// What the heat map shows: the broken promises, or the depth.
+    /// The text in the heat map: the broken promises, or the depth.
     fn text(&self) -> String {
         match self.outcome {
             Class::Kept | Class::Refused => self
@@ -160,7 +172,7 @@ impl Row {
     }
 }
 
-/// Separates broken promises in a note.
+/// The separator of broken promises in a note.
 const BETWEEN: &str = "; ";
 
 impl Config {
@@ -172,8 +184,10 @@ impl Config {
         store: &Store,
         interrupted: &dyn Fn() -> bool,
     ) -> Result<String, Error> {
-        let chosen = |case: &&Case| cases.is_empty() || cases.iter().any(|id| id == case.id);
-        let cases: Vec<&Case> = CASES.iter().filter(chosen).collect();
+        let cases: Vec<&Case> = CASES
+            .iter()
+            .filter(|case| cases.is_empty() || cases.iter().any(|id| id == case.id))
+            .collect();
         let effort = Effort {
             builders: self.builders,
             work_per_object: self.work_per_object,
@@ -239,7 +253,7 @@ impl Config {
         Ok(output(store.folder())?.text())
     }
 
-    /// Another library on a case: few objects with all checks, then many.
+    /// Examines another library on a case: few objects with all checks, then many.
     fn peer(&self, case: &Case, scene: &SceneCase, peer: &str) -> Row {
         let limit = Duration::from_secs(self.seconds_per_peer.max(1));
         let mut last = None;
@@ -266,42 +280,30 @@ impl Config {
     }
 }
 
-/// The rows of the CSV files in the folder, our own and the other libraries'. The latter may be those of an earlier run:
-/// without the feature `peers` none are written.
+/// Reads the rows of the CSV files in the folder: ours and other libraries'.
+///
+/// Without the feature `peers`, the latter come from an earlier run, if there was one.
 fn rows(folder: &Path) -> Result<[Vec<Row>; 2], Error> {
     let peers = folder.join("timing_third_party_cells.csv");
     Ok([read(&folder.join("cells.csv"))?, if peers.is_file() { read(&peers)? } else { vec![] }])
 }
 
-/// Every case by everything that was asked of it.
+/// Draws the outcomes of all cases (rows) by method, traversal, part or library (columns).
 fn heat_map(rows: &[Row]) -> HeatMap {
-    let names = |name: fn(&Row) -> &String| {
-        let mut names: Vec<String> = Vec::new();
-        for row in rows {
-            if !names.contains(name(row)) {
-                names.push(name(row).clone());
-            }
-        }
-        names
-    };
-    let scenes = names(|row| &row.scene);
-    let columns = names(|row| &row.method);
-    let cell = |scene: &String, column: &String| {
-        let row = rows
-            .iter()
-            .find(|row| (&row.scene, &row.method) == (scene, column));
-        let shown =
-            |row: &Row| figures::Cell { class: Some(row.outcome as usize), text: row.text() };
-        row.map(shown).unwrap_or_default()
-    };
-    let cells = scenes
-        .iter()
-        .flat_map(|scene| {
-            columns
+    let scenes = distinct(rows.iter().map(|row| &row.scene));
+    let columns = distinct(rows.iter().map(|row| &row.method));
+    let mut cells = Vec::new();
+    for scene in &scenes {
+        for column in &columns {
+            let row = rows
                 .iter()
-                .map(move |column| cell(scene, column))
-        })
-        .collect();
+                .find(|row| row.scene == *scene && row.method == *column);
+            cells.push(row.map_or_else(figures::Cell::default, |row| figures::Cell {
+                class: Some(row.outcome as usize),
+                text: row.text(),
+            }));
+        }
+    }
     HeatMap {
         title: HEADING.into(),
         caption:
@@ -318,33 +320,42 @@ fn heat_map(rows: &[Row]) -> HeatMap {
     }
 }
 
+/// Returns the different names in the order of their first occurrence.
+fn distinct<'a>(all: impl Iterator<Item = &'a String>) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for name in all {
+        if !names.contains(name) {
+            names.push(name.clone());
+        }
+    }
+    names
+}
+
 const HEADING: &str = "Stiff and extreme cases";
 
-/// The summary and the broken promises, from the CSV files in the folder.
+/// Makes the summary and the table of broken promises from the CSV files in the folder.
 pub fn output(folder: &Path) -> Result<Output, Error> {
     let [own, peers] = rows(folder)?;
-    let is_bad = |row: &&Row| matches!(row.outcome, Class::Broken | Class::Dead);
-    let count = |class| {
-        own.iter()
-            .filter(|row| row.outcome == class)
-            .count()
-    };
+    let [kept, refused] = [Class::Kept, Class::Refused].map(|class| {
+        let rows = own.iter().filter(|row| row.outcome == class);
+        rows.count()
+    });
+    let broken = own.iter().filter(|row| row.is_bad()).count();
+    let bad_peers = peers.iter().filter(|row| row.is_bad()).count();
     let worst = own
         .iter()
         .filter_map(|row| row.relative_error)
         .fold(0.0, f64::max);
     let mut output = Output::new("", HEADING);
     output.reading = format!(
-        "{} cells: {} as promised, {} with the error promised, {} broken. Largest error of a cost: {worst:.1e}. Other \
-         libraries: {} of {} cells break a promise, crash or hang.",
+        "{} cells: {kept} as promised, {refused} with the error promised, {broken} broken. \
+         Largest error of a cost: {worst:.1e}. Other libraries: {bad_peers} of {} cells break a \
+         promise, crash or hang.",
         own.len(),
-        count(Class::Kept),
-        count(Class::Refused),
-        own.iter().filter(is_bad).count(),
-        peers.iter().filter(is_bad).count(),
         peers.len(),
     );
-    let bad: Vec<&Row> = own.iter().chain(&peers).filter(is_bad).collect();
+    let rows = own.iter().chain(&peers);
+    let bad: Vec<&Row> = rows.filter(|row| row.is_bad()).collect();
     if !bad.is_empty() {
         output.show("Broken promises:", &bad, "scene method outcome note")?;
     }

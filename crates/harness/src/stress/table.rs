@@ -8,7 +8,7 @@ use bvh_core::Aabb;
 use bvh_scenes::builtin::stiff;
 use glam::Vec3;
 
-/// The case of this identifier.
+/// Returns the case with this identifier.
 pub fn by_id(id: &str) -> Option<&'static Case> {
     CASES.iter().find(|case| case.id == id)
 }
@@ -17,17 +17,17 @@ const fn case(id: &'static str, name: &'static str, checks: &'static [Check]) ->
     Case { id, name, checks }
 }
 
-/// A scene with a promise of its own.
+/// A scene with a further promise.
 const fn scene(sizes: [usize; 3], also: Also) -> Check {
     Scene(SceneCase { sizes, also: Some(also) })
 }
 
-/// A scene of which only the general promises are asked.
+/// A scene with only the general promises.
 const fn plain(sizes: [usize; 3]) -> Check {
     Scene(SceneCase { sizes, also: None })
 }
 
-/// The uniform scene with one damaged box.
+/// Returns the uniform scene with one damaged box.
 fn with_bad_object(n: usize, damage: fn(&mut Aabb)) -> Vec<Aabb> {
     let mut boxes = stiff::boxes(&stiff::uniform(n));
     boxes
@@ -45,7 +45,8 @@ const fn refused(boxes: fn(usize) -> Vec<Aabb>) -> Check {
     Refused { boxes, object: BAD }
 }
 
-/// All cases in order. Sizes: for searches and rays; for builders in the tests; for builders as the case is meant.
+/// All cases in order. Sizes: for searches and rays; for builders in the tests; for builders at the
+/// full size of the case.
 pub static CASES: [Case; 45] = [
     case("S01", "empty", &[scene([0, 0, 0], scenes::empty_tree)]),
     case("S02", "one object", &[scene([1, 1, 1], scenes::one_leaf)]),
@@ -138,5 +139,5 @@ pub static CASES: [Case; 45] = [
     ),
     case("S43", "exact optimum known", &[Method(None, methods::above_the_optimum)]),
     case("S44", "ray estimator", &[Part(Rays, rays::estimates_converge)]),
-    case("S45", "two unit cubes", &[scene([2, 2, 2], scenes::seven)]),
+    case("S45", "two unit cubes", &[scene([2, 2, 2], scenes::root_area_is_seven)]),
 ];

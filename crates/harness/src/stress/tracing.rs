@@ -1,4 +1,4 @@
-//! Every traversal against testing every triangle, and the rays that make it hard.
+//! Compares every traversal with testing every triangle, and makes difficult rays.
 
 use super::promise::{Broken, Verdict, ensure};
 use bvh_build::{Builder, goldsmith_salmon, median_cut, muller_fellner};
@@ -12,10 +12,10 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use std::borrow::Cow;
 
-/// Prepares triangles for rays, in one way or several; or says why it cannot.
+/// Prepares objects for rays in one or several ways, or returns the reason why it cannot.
 pub type Traversal = fn(&Primitives) -> Result<Vec<Accelerator<'_>>, String>;
 
-/// Every traversal by name: a further one is one line.
+/// Every traversal by name. Adding a traversal takes one line.
 pub const TRAVERSALS: &[(&str, Traversal)] = &[
     ("binary tree", over_binary_trees),
     ("n-ary tree", |objects| {
@@ -38,8 +38,8 @@ fn build(objects: &Primitives, builder: &dyn Builder) -> Result<Bvh, String> {
         .map_err(|error| error.to_string())
 }
 
-/// With one object per leaf, with the leaves that the surface area heuristic merges, and with a tenth of all objects in
-/// every leaf.
+/// Prepares trees with one object per leaf, with leaves merged by the surface area heuristic, and
+/// with a tenth of all objects in every leaf.
 fn over_binary_trees(objects: &Primitives) -> Result<Vec<Accelerator<'_>>, String> {
     let greedy = build(objects, &muller_fellner::Config::default())?;
     let merged = collapse_leaves(&greedy, &SahConstants::default());
@@ -63,7 +63,8 @@ fn over_wide_layouts(
         .collect())
 }
 
-/// Of a binary tree and of one with many children per node, for every kernel that this processor has.
+/// Lays out a binary tree and a tree with many children per node for every kernel of this
+/// processor.
 pub fn wide_layouts(triangles: &[Triangle]) -> Result<Vec<(Kernel, WideBvh)>, String> {
     let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
     let builders: [&dyn Builder; 2] =
@@ -74,18 +75,23 @@ pub fn wide_layouts(triangles: &[Triangle]) -> Result<Vec<(Kernel, WideBvh)>, St
             .build(&boxes)
             .map_err(|error| error.to_string())?;
         let wide = WideBvh::new(&tree, triangles).map_err(|error| error.to_string())?;
-        let of_kernel = |kernel| Some((kernel, wide.clone().with_kernel(kernel)?));
-        layouts.extend(Kernel::ALL.into_iter().filter_map(of_kernel));
+        for kernel in Kernel::ALL {
+            // The processor may lack the kernel's instructions.
+            if let Some(wide) = wide.clone().with_kernel(kernel) {
+                layouts.push((kernel, wide));
+            }
+        }
     }
     Ok(layouts)
 }
 
-/// An answer, to be compared bit by bit.
+/// Returns the bits of an answer, for exact comparison.
 pub fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
     hit.map(|hit| (hit.t.to_bits(), hit.object))
 }
 
-/// P3: the traversal gives the answer of testing every object for all rays, bit by bit. Says how many hit.
+/// Checks P3: for all rays the traversal gives the answers of testing every object, bit by bit. The
+/// note reports the number of hits.
 pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Verdict {
     let accelerators = traversal(objects).map_err(Broken::case)?;
     let brute_force = Accelerator::new(objects, Structure::Brute);
@@ -103,8 +109,9 @@ pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Verdic
     Ok(format!("{hits} of {} rays hit", rays.len()))
 }
 
-/// Rays at a scene of any scale: at random, towards corners, edges and centres, along axes with zeros of both signs, in
-/// the planes of faces of boxes, from inside, from corners, and over short, empty and single-point ranges.
+/// Returns rays for a scene of any scale: random ones; towards corners, edges and centres; along
+/// axes with zeros of both signs; in the planes of faces of boxes; from inside and from corners;
+/// over short, empty and single-point ranges.
 pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
     let mut rng = Stream::seed_from_u64(seed);
     let bounds = triangles
@@ -117,7 +124,7 @@ pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
             break;
         }
         let mut unit = || Vec3::from([(); 3].map(|()| rng.random::<f32>()));
-        // Weighted, so that nothing overflows.
+        // A weighted sum of the corners cannot overflow; their difference could.
         let inside = |at: Vec3| bounds.min * (1.0 - at) + bounds.max * at;
         let somewhere = inside(unit());
         let elsewhere = inside(unit());
@@ -148,7 +155,7 @@ pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
             3 => (1.0, 0.5),
             _ => (0.0, f32::MAX),
         };
-        // Any length will do, but not every one is accepted.
+        // Very long and very short directions are rejected, so a third of them are normalised.
         let length = direction.abs().max_element();
         let scaled = if length > 0.0 { direction / length } else { direction };
         rays.extend(Ray::new(

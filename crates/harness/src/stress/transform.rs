@@ -1,4 +1,4 @@
-//! Exact changes of a scene that a method should not notice, or should: scale, reflection, order.
+//! Exact transformations of a scene with a known effect on trees: scale, reflection, order.
 
 use bvh_core::{Aabb, Bvh};
 use bvh_search::Stream;
@@ -7,21 +7,25 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use std::ops::RangeInclusive;
 
-/// All coordinates times 2^k; exact for the k of [`scale_range`].
+/// Multiplies all coordinates by 2^k; exact for every k of [`scale_range`].
 pub fn scaled(boxes: &[Aabb], k: i32) -> Vec<Aabb> {
-    let scale = |p: Vec3| (p.as_dvec3() * libm::exp2(k.into())).as_vec3();
+    let factor = libm::exp2(k.into());
     boxes
         .iter()
-        .map(|b| Aabb { min: scale(b.min), max: scale(b.max) })
+        .map(|aabb| Aabb {
+            min: (aabb.min.as_dvec3() * factor).as_vec3(),
+            max: (aabb.max.as_dvec3() * factor).as_vec3(),
+        })
         .collect()
 }
 
-/// A cost in units of area after the scene was scaled by 2^k.
+/// Returns a cost in units of area after the scene is scaled by 2^k.
 pub fn scaled_area(area: f64, k: i32) -> f64 {
     area * libm::exp2((2 * k).into())
 }
 
-/// The k by which all coordinates can be scaled so that none overflows or becomes denormal; 0 is always among them.
+/// Returns the range of k for which no coordinate times 2^k overflows or becomes denormal; it
+/// always includes 0.
 pub fn scale_range(boxes: &[Aabb]) -> RangeInclusive<i32> {
     let coordinates = boxes.iter().flat_map(|b| {
         b.min
@@ -36,33 +40,31 @@ pub fn scale_range(boxes: &[Aabb]) -> RangeInclusive<i32> {
     (-126 - low).min(0)..=(127 - high).max(0)
 }
 
-/// All coordinates along an axis negated.
+/// Negates all coordinates along an axis.
 pub fn mirrored(boxes: &[Aabb], axis: usize) -> Vec<Aabb> {
     let mut sign = Vec3::ONE;
     sign[axis] = -1.0;
-    let mirror = |b: &Aabb| Aabb {
-        min: (b.min * sign).min(b.max * sign),
-        max: (b.min * sign).max(b.max * sign),
-    };
-    boxes.iter().map(mirror).collect()
+    boxes
+        .iter()
+        .map(|aabb| Aabb {
+            min: (aabb.min * sign).min(aabb.max * sign),
+            max: (aabb.min * sign).max(aabb.max * sign),
+        })
+        .collect()
 }
 
-/// The boxes in another order, and for every place in it the object's index before.
+/// Returns the boxes in another order, and the original index of each.
 pub fn shuffled(boxes: &[Aabb], seed: u64) -> (Vec<Aabb>, Vec<u32>) {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     order.shuffle(&mut Stream::seed_from_u64(seed));
     (order.iter().map(|&i| boxes[i as usize]).collect(), order)
 }
 
-/// The same tree, but for the boxes: the same nodes over the same objects.
+/// Returns true if two trees have the same nodes over the same objects; their boxes may differ.
 pub fn same_topology(a: &Bvh, b: &Bvh) -> bool {
-    let kinds = |tree: &Bvh| {
-        tree.nodes
-            .iter()
-            .map(|node| node.kind())
-            .collect::<Vec<_>>()
-    };
-    a.prim_ids == b.prim_ids && kinds(a) == kinds(b)
+    let a_kinds = a.nodes.iter().map(|node| node.kind());
+    let b_kinds = b.nodes.iter().map(|node| node.kind());
+    a.prim_ids == b.prim_ids && a_kinds.eq(b_kinds)
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What the cases ask of the readers of OBJ files and tree files.
+//! Checks of the readers of OBJ files and tree files.
 
 use crate::stress::promise::{Broken, Verdict, ensure};
 use crate::stress::tracing;
@@ -8,7 +8,7 @@ use bvh_scenes::load::mesh::Mesh;
 use bvh_scenes::{builtin::stiff, load::obj};
 use std::path::Path;
 
-/// S17: degenerate triangles are never hit, and counted by the reader.
+/// S17: degenerate triangles are never hit, and the reader counts them.
 pub fn degenerate_are_counted() -> Verdict {
     let triangles = stiff::degenerate(60);
     let degenerate = triangles
@@ -30,16 +30,21 @@ pub fn degenerate_are_counted() -> Verdict {
 }
 
 fn to_obj(triangles: &[Triangle]) -> String {
-    let corner = |p: &glam::Vec3| format!("v {} {} {}\n", p.x, p.y, p.z);
-    let triangle = |t: &Triangle| t.0.iter().map(corner).collect::<String>() + "f -3 -2 -1\n";
-    triangles.iter().map(triangle).collect()
+    let mut text = String::new();
+    for triangle in triangles {
+        for corner in &triangle.0 {
+            text += &format!("v {} {} {}\n", corner.x, corner.y, corner.z);
+        }
+        text += "f -3 -2 -1\n";
+    }
+    text
 }
 
 fn read(text: &str) -> Result<Mesh, obj::ObjError> {
     obj::parse(text.as_bytes(), Path::new("scene.obj"))
 }
 
-/// The message with which the text is refused, which must name this line.
+/// Returns the message that rejects the text, which must name this line.
 fn refused_in_line(text: &str, line: usize) -> Verdict {
     let Err(error) = read(text) else { return Err(Broken::case("the file is accepted")) };
     let message = error.to_string();
@@ -50,18 +55,19 @@ fn refused_in_line(text: &str, line: usize) -> Verdict {
     Ok(message)
 }
 
-/// S18: the word `nan` is refused by its line.
+/// S18: the word `nan` is rejected, and the error names its line.
 pub fn nan_in_a_file() -> Verdict {
     refused_in_line("v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", 2)
 }
 
-/// S19: infinities likewise, however they are written.
+/// S19: infinities are rejected in every notation, and the error names their line.
 pub fn infinity_in_a_file() -> Verdict {
     refused_in_line("v 0 0 0\nv 1 0 0\nv 0 -inf 0\nf 1 2 3\n", 3)?;
     refused_in_line("v 1e39 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 1)
 }
 
-/// S35: unused vertices do not count, relative indices and polygons are resolved, files without faces are refused.
+/// S35: unused vertices do not count, relative indices and polygons are resolved, files without
+/// faces are rejected.
 pub fn files_as_people_write_them() -> Verdict {
     let mesh = read("v 9e9 0 0\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 -2 -1\n")
         .map_err(Broken::case)?;
@@ -77,8 +83,8 @@ pub fn files_as_people_write_them() -> Verdict {
     refused_in_line("v 0 0 0\nv nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 3 4\n", 2)
 }
 
-/// S38: a tree file with any bit flipped, cut at any length, of another version or endianness, or of another scene is
-/// refused.
+/// S38: a tree file is rejected if a bit is flipped, if it is truncated, or if it has another
+/// version, endianness or scene.
 pub fn damaged_tree_files() -> Verdict {
     let boxes = stiff::boxes(&stiff::uniform(12));
     let tree = muller_fellner::Config::default()

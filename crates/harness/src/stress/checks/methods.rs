@@ -1,4 +1,4 @@
-//! What the cases ask of methods apart from their stiff scenes: scales, threads, budgets, edges of parameters.
+//! Checks of methods without stiff scenes: scales, threads, budgets, extreme parameters.
 
 use crate::stress::case::is_builder;
 use crate::stress::examine::{ROUNDING, check_outcome, check_scale, on_threads, run};
@@ -26,28 +26,32 @@ fn solved(
     solve(search, &Problem::new(boxes), seed, budget, &()).map_err(Broken::case)
 }
 
-/// Five scenes for P5: uniform, flat, a line, many ties, and very different sizes; coordinates between 2^-5 and 2^5.
+/// Returns five scenes for P5: uniform, flat, a line, many ties, and very different sizes.
+/// Coordinates are between 2^-5 and 2^5.
 pub fn scaled_scenes(n: usize) -> [Vec<Aabb>; 5] {
-    let flat = |b: &Aabb| Aabb {
-        min: b.min * Vec3::new(1.0, 1.0, 0.0),
-        max: b.max * Vec3::new(1.0, 1.0, 0.0),
-    };
-    let line = |b: &Aabb| Aabb { min: b.min * Vec3::Y, max: b.max * Vec3::Y };
-    let sized = |(i, b): (usize, &Aabb)| Aabb {
-        min: b.min,
-        max: b.min + b.extent().as_vec3() / (1 + i % 9) as f32,
-    };
     let uniform = boxes(n);
+    let mut sized = uniform.clone();
+    for (index, aabb) in sized.iter_mut().enumerate() {
+        aabb.max = aabb.min + aabb.extent().as_vec3() / (1 + index % 9) as f32;
+    }
     [
-        uniform.iter().map(flat).collect(),
-        uniform.iter().map(line).collect(),
+        projected(&uniform, Vec3::new(1.0, 1.0, 0.0)),
+        projected(&uniform, Vec3::Y),
         stiff::boxes(&stiff::planar_grid(n)),
-        uniform.iter().enumerate().map(sized).collect(),
+        sized,
         uniform,
     ]
 }
 
-/// S21: every k from -120 to 120 on five scenes.
+/// Flattens boxes along the axes that are 0 in `axes`.
+fn projected(boxes: &[Aabb], axes: Vec3) -> Vec<Aabb> {
+    boxes
+        .iter()
+        .map(|aabb| Aabb { min: aabb.min * axes, max: aabb.max * axes })
+        .collect()
+}
+
+/// S21: P5 holds for every k from -120 to 120 on five scenes.
 pub fn scales(method: &Method) -> Verdict {
     let n = if let Method::Exact(_) = method { 7 } else { 24 };
     const WORK: u64 = 60;
@@ -61,14 +65,12 @@ pub fn scales(method: &Method) -> Verdict {
     Ok("241 scales of 5 scenes".into())
 }
 
-/// S37: threads 1, 2, 3 and 8, three seeds.
+/// S37: P4 holds for 1, 2, 3 and 8 threads and three seeds.
 pub fn threads_and_seeds(method: &Method) -> Verdict {
     let boxes = boxes(if let Method::Exact(_) = method { 10 } else { 120 });
     for seed in [1, 2, 1 << 40] {
-        let on = |threads| {
-            let budget = Budget { max_evaluations: None, max_work: Some(20_000) };
-            on_threads(threads, || solved(method, &boxes, seed, budget))
-        };
+        let budget = Budget { max_evaluations: None, max_work: Some(20_000) };
+        let on = |threads| on_threads(threads, || solved(method, &boxes, seed, budget));
         let one = on(1)?;
         for threads in [1, 2, 3, 8] {
             let other = on(threads)?;
@@ -79,7 +81,7 @@ pub fn threads_and_seeds(method: &Method) -> Verdict {
     Ok("4 numbers of threads, 3 seeds".into())
 }
 
-/// Cancels at once, or at a time.
+/// An observer that cancels immediately, or at a time.
 struct Deadline(Option<Instant>);
 
 impl Observer for Deadline {
@@ -90,7 +92,8 @@ impl Observer for Deadline {
     }
 }
 
-/// S39: with a budget of 0, and cancelled at once or after a millisecond, a method returns its best tree so far.
+/// S39: a method returns its best tree so far with a budget of 0, and if it is cancelled
+/// immediately or after a millisecond.
 pub fn budgets_end(method: &Method) -> Verdict {
     let boxes = boxes(if let Method::Exact(_) = method { 10 } else { 200 });
     let nothing = Budget { max_evaluations: Some(0), max_work: Some(0) };
@@ -107,8 +110,8 @@ pub fn budgets_end(method: &Method) -> Verdict {
     Ok(String::new())
 }
 
-/// S40: populations of one and two, mutation and crossover never and always: permutations stay permutations, and the
-/// best is never lost.
+/// S40: with populations of one and two, mutation and crossover never or always, permutations stay
+/// permutations, and the best is never lost.
 pub fn genetic_edges(_: &Method) -> Verdict {
     let boxes = boxes(30);
     for (population, mutation, crossover) in
@@ -122,7 +125,7 @@ pub fn genetic_edges(_: &Method) -> Verdict {
             ..Default::default()
         };
         let outcome = solved(&config, &boxes, 3, Budget::UNLIMITED)?;
-        // The tree is valid only if its order was a permutation.
+        // An order that is no permutation would give an invalid tree.
         check_outcome(&boxes, &outcome)?;
         let incumbents: Vec<f64> = outcome
             .history
@@ -132,7 +135,7 @@ pub fn genetic_edges(_: &Method) -> Verdict {
         ensure!(incumbents.is_sorted_by(|a, b| a >= b), "the best was lost");
         ensure!(incumbents.last() == Some(&outcome.cost), "the best was not returned");
     }
-    // Cuts fall on both ends when there are two places only.
+    // With only two places, cuts fall on both ends.
     let config = genetic::Config {
         population: 2,
         generations: 40,
@@ -146,7 +149,8 @@ pub fn genetic_edges(_: &Method) -> Verdict {
     Ok("8 settings, scenes of 0, 1, 2 and 30".into())
 }
 
-/// S41: without noise, and with one candidate, GRASP is greedy, bit by bit; more candidates than there are do no harm.
+/// S41: without noise, or with one candidate, GRASP is greedy, bit by bit. A candidate list longer
+/// than the number of candidates does no harm.
 pub fn grasp_edges(_: &Method) -> Verdict {
     let boxes = boxes(150);
     let greedy = muller_fellner::Config::default()
@@ -169,7 +173,8 @@ pub fn grasp_edges(_: &Method) -> Verdict {
     Ok(String::new())
 }
 
-/// S42: after a million random moves, each judged by the cost kept so far, that cost is the tree's.
+/// S42: after a million random moves, each judged by the updated cost, the updated cost is the
+/// tree's.
 pub fn a_million_moves(_: &Method) -> Verdict {
     const MOVES: u64 = 1_000_000;
     let boxes = boxes(60);
@@ -180,7 +185,7 @@ pub fn a_million_moves(_: &Method) -> Verdict {
     Ok(format!("{} moves, off by {error:.0e}", outcome.evaluations))
 }
 
-/// S42: the cost that insertion keeps is the recomputed one.
+/// S42: the cost that insertion updates equals the recomputed cost.
 pub fn insertion_keeps_its_cost() -> Verdict {
     let mut largest: f64 = 0.0;
     for make in

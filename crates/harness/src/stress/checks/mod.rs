@@ -1,4 +1,4 @@
-//! What the cases ask besides the general promises.
+//! The checks of single cases beyond the general promises.
 
 pub mod files;
 pub mod methods;

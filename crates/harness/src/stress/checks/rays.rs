@@ -1,4 +1,4 @@
-//! What the cases ask of rays, their ranges, and the estimator that traces random ones.
+//! Checks of rays, their ranges, and the estimator that traces random rays.
 
 use crate::measure::empirical_cost;
 use crate::rows::RayRow;
@@ -11,7 +11,7 @@ use bvh_scenes::trace::{Accelerator, Query, Structure};
 use bvh_scenes::{Scene, SceneKind, builtin::stiff};
 use glam::Vec3;
 
-/// S15: zero, NaN and infinite directions and origins are refused before any traversal.
+/// S15: zero, NaN and infinite directions and origins are rejected before any traversal.
 pub fn no_such_rays() -> Verdict {
     let nan = f32::NAN;
     let inf = f32::INFINITY;
@@ -33,7 +33,8 @@ pub fn no_such_rays() -> Verdict {
     Ok(format!("{} refused", directions.len() + origins.len()))
 }
 
-/// S16: an empty range hits nothing, an infinite one is the longest finite one, a single point hits what is there.
+/// S16: an empty range hits nothing, an infinite range equals the longest finite one, a single
+/// point hits an object at that point.
 pub fn ranges_are_defined() -> Verdict {
     let triangle = Primitives::Triangles(vec![Triangle([Vec3::ZERO, Vec3::X, Vec3::Y])]);
     let origin = Vec3::new(0.25, 0.25, -2.0);
@@ -65,9 +66,10 @@ pub fn ranges_are_defined() -> Verdict {
     Ok(String::new())
 }
 
-/// S22: distances so small that they are denormal, or round to 0, are the same in every traversal.
+/// S22: distances that are denormal or round to 0 are the same in every traversal.
 ///
-/// Coordinates from 2^-100 on and directions up to 1e30 make distances from far below the smallest number up to 1.
+/// Coordinates from 2^-100 and directions up to 1e30 make distances from far below the smallest
+/// number up to 1.
 pub fn denormal_distances() -> Verdict {
     let mut hits = 0;
     let mut check = |objects: &Primitives, rays: &[Ray]| {
@@ -108,7 +110,8 @@ pub fn denormal_distances() -> Verdict {
     Ok(format!("{hits} rays hit"))
 }
 
-/// S44: four times the rays halve the standard error, and the 95 % intervals cover what many more rays find.
+/// S44: four times the rays halve the standard error, and the 95 % intervals cover the mean of many
+/// more rays.
 pub fn estimates_converge() -> Verdict {
     let primitives = Primitives::Triangles(stiff::uniform(500));
     let scene = Scene::new("uniform", SceneKind::Procedural, primitives);

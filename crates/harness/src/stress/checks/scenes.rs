@@ -1,4 +1,4 @@
-//! What single cases promise besides P1 to P7 of one method's outcome on their scene.
+//! Checks of one method's outcome on the scene of a single case, beyond P1 to P7.
 
 use crate::stress::examine::{ROUNDING, run};
 use crate::stress::promise::{Broken, Verdict, ensure};
@@ -12,12 +12,13 @@ fn is_top_down(method: &Method) -> bool {
     matches!(method, Method::MullerFellner(_) | Method::MedianCut(_))
 }
 
-/// Whether the method is Müller–Fellner's own: the readings of Table 2 give worse trees on purpose.
+/// Returns true if the method is the published Müller–Fellner method. The variants of Table 2 build
+/// worse trees on purpose.
 fn is_greedy(method: &Method) -> bool {
     matches!(method, Method::MullerFellner(config) if config.heuristic == Default::default())
 }
 
-/// ⌈log₂ n⌉.
+/// Returns ⌈log₂ n⌉.
 fn levels(objects: usize) -> usize {
     objects
         .max(1)
@@ -25,27 +26,27 @@ fn levels(objects: usize) -> usize {
         .trailing_zeros() as usize
 }
 
-/// S01: no node, no cost.
+/// S01: an empty tree has no node and no cost.
 pub fn empty_tree(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
     ensure!(outcome.tree == Bvh::default() && outcome.cost == 0.0, "{:?}", outcome.tree);
     Ok(String::new())
 }
 
-/// S02: one leaf, no cost.
+/// S02: the tree is one leaf without cost.
 pub fn one_leaf(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
     let nodes = &outcome.tree.nodes;
     ensure!(nodes.len() == 1 && nodes[0].is_leaf() && outcome.cost == 0.0, "{nodes:?}");
     Ok(String::new())
 }
 
-/// S03: one inner node over two leaves.
+/// S03: the tree is one inner node over two leaves.
 pub fn one_inner_node(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
     let nodes = &outcome.tree.nodes;
     ensure!(nodes.len() == 3 && outcome.tree.inner_count() == 1, "{nodes:?}");
     Ok(String::new())
 }
 
-/// S04, S07: the top-down builders halve, and order by index.
+/// S04, S07: the top-down builders halve the objects and order them by index.
 pub fn balanced(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     let depth = outcome.tree.depth();
     if !is_top_down(method) {
@@ -64,13 +65,13 @@ pub fn balanced(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     Ok(format!("⌈log2 n⌉ = {}", levels(boxes.len())))
 }
 
-/// S05: as S04, and the cost is 0.
+/// S05: the tree is balanced as in S04, and its cost is 0.
 pub fn balanced_at_no_cost(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     ensure!(outcome.cost == 0.0, P7: "points cost {}", outcome.cost);
     balanced(method, boxes, outcome)
 }
 
-/// S10: the cost is 0, and the top-down builders' trees are as shallow as can be.
+/// S10: the cost is 0, and the top-down builders' trees have the least possible depth.
 pub fn shallow_at_no_cost(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     ensure!(outcome.cost == 0.0, P7: "segments on a line cost {}", outcome.cost);
     let depth = outcome.tree.depth();
@@ -79,7 +80,7 @@ pub fn shallow_at_no_cost(method: &Method, boxes: &[Aabb], outcome: &Outcome) ->
     Ok(String::new())
 }
 
-/// S08: axes that order the objects alike are recognised, and the tree is the same.
+/// S08: axes with the same order of objects are recognised, and the tree is the same.
 pub fn same_orders_change_nothing(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     let Method::MullerFellner(config) = method else { return Ok(String::new()) };
     let config =
@@ -109,7 +110,7 @@ pub fn teapot_is_isolated(method: &Method, boxes: &[Aabb], outcome: &Outcome) ->
     let teapot = boxes.len().saturating_sub(STADIUM);
     let mut level = 0;
     let mut at = (!tree.nodes.is_empty()).then_some(0);
-    // Down to where most of the teapot is.
+    // The teapot's node is on the path to the child that holds most of it.
     while let Some(node) = at {
         let below = objects_below(tree, node);
         let inside = below
@@ -143,7 +144,7 @@ fn objects_below(tree: &Bvh, node: usize) -> Vec<u32> {
     ids
 }
 
-/// S28: reports the costs by which binary trees and wider ones are compared.
+/// S28: reports the costs that compare binary trees with wider ones.
 pub fn both_costs(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
     let tree = &outcome.tree;
     let widest = tree
@@ -159,10 +160,11 @@ pub fn both_costs(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
 
 /// S32: the reflected scene costs the same.
 ///
-/// Insertion and the exact optimum look at areas and indices only, which no reflection changes. Müller–Fellner breaks
-/// ties between equally good cuts towards the lower end, which a reflection exchanges; in this scene both ends are
-/// alike. It is not asked of median cut, which gives an odd object to the lower half, of Morton curves, which begin at a
-/// corner, or of searches that draw positions.
+/// Insertion and the exact optimum use only areas and indices, which no reflection changes.
+/// Müller–Fellner breaks ties between equally good cuts towards the lower end, which a reflection
+/// exchanges; in this scene both ends are alike. The check skips median cut, which gives an odd
+/// object to the lower half, Morton curves, which begin at a corner, and searches that draw
+/// positions.
 pub fn reflection_costs_the_same(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     if !matches!(method, Method::MullerFellner(_) | Method::GoldsmithSalmon(_) | Method::Exact(_)) {
         return Ok(String::new());
@@ -175,8 +177,8 @@ pub fn reflection_costs_the_same(method: &Method, boxes: &[Aabb], outcome: &Outc
     Ok("three reflections".into())
 }
 
-/// S33: the order of the objects changes nothing where no two centres coincide. Insertion depends on it: the range of
-/// its costs is reported.
+/// S33: the order of the objects changes nothing if no two centres coincide. Insertion depends on
+/// the order; the check reports the range of its costs.
 pub fn order_does_not_matter(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     const ORDERS: u64 = 20;
     if let Method::GoldsmithSalmon(_) = method {
@@ -203,8 +205,8 @@ pub fn order_does_not_matter(method: &Method, boxes: &[Aabb], outcome: &Outcome)
     Ok(String::new())
 }
 
-/// S45: the root has 3 · 1 + 1 · 1 + 1 · 3.
-pub fn seven(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
+/// S45: the root's half area is 3 · 1 + 1 · 1 + 1 · 3.
+pub fn root_area_is_seven(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
     let tree = &outcome.tree;
     let costs = [outcome.cost, cost::goldsmith_salmon(tree), cost::sah(tree, &Default::default())];
     ensure!(costs == [7.0, 2.0, 13.0 / 7.0], "costs {costs:?}");
