@@ -1,4 +1,4 @@
-//! Tells the harness which sources and which compiler built it and how, for the provenance of results.
+//! Passes the revision, the compiler and its options to the harness, for the provenance of results.
 
 use std::process::Command;
 
@@ -32,7 +32,7 @@ fn main() {
     }
 }
 
-/// What the program is made of, from this folder.
+/// The sources of the program, relative to this folder.
 const SOURCES: [&str; 9] = [
     "build.rs",
     "src",
@@ -45,7 +45,7 @@ const SOURCES: [&str; 9] = [
     "../figures/src",
 ];
 
-/// The version of a package in the lock file of the workspace; the lowest if there are several.
+/// Returns the version of a package in the lock file of the workspace; the lowest of several.
 fn locked_version(package: &str) -> Option<String> {
     const LOCK: &str = "../../Cargo.lock";
     println!("cargo:rerun-if-changed={LOCK}");
@@ -54,8 +54,10 @@ fn locked_version(package: &str) -> Option<String> {
     Some(after.split('"').next()?.to_owned())
 }
 
-/// The commit of the sources, with a `+` where they differ from it. Found here and not when the program runs: then the current folder
-/// may belong to another repository, and the sources may have moved on.
+/// Returns the commit of the sources, with a `+` if they differ from it.
+///
+/// It is determined here because at run time the current folder may belong to another repository,
+/// and the sources may have changed.
 fn revision() -> Option<String> {
     let git = |args: &[&str]| {
         let output = Command::new("git")
@@ -69,7 +71,7 @@ fn revision() -> Option<String> {
                 .to_owned(),
         )
     };
-    // Sources in a folder of somebody else's repository are not of its commit.
+    // Sources that an enclosing repository does not track do not belong to its commit.
     git(&["ls-files", "--error-unmatch", "build.rs"])?;
     // The log of HEAD changes with every commit and checkout.
     println!("cargo:rerun-if-changed={}", git(&["rev-parse", "--git-path", "logs/HEAD"])?);

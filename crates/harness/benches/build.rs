@@ -1,4 +1,4 @@
-//! Times of builders: against each other, against more threads, and against other libraries.
+//! Times of builders, compared with each other, with more threads, and with other libraries.
 //!
 //! `cargo bench -p harness --bench build --features peers`
 
@@ -69,7 +69,7 @@ fn one_thread(scene: &Scene) {
     contenders.extend(peers(boxes));
     compare(&format!("{}, {} objects, one thread", scene.name, boxes.len()), 25, contenders);
 
-    // Trials start from sorted objects: many are measured together, so that the sort counts once.
+    // Trials share the sorted objects, so many are measured together to count the sort once.
     const TRIALS: u64 = 20;
     let greedy = || {
         let scene = Presorted::new(boxes).expect("finite boxes");
@@ -109,13 +109,13 @@ fn shuffled(n: u32) -> Vec<u32> {
     order
 }
 
-/// No other libraries without the feature.
+/// Returns no contenders: other libraries need the feature.
 #[cfg(not(feature = "peers"))]
 fn peers(_boxes: &[Aabb]) -> Vec<Contender<'_>> {
     Vec::new()
 }
 
-/// Builds by other libraries, with their own leaves.
+/// Returns the builds of other libraries, with their leaves.
 #[cfg(feature = "peers")]
 fn peers(boxes: &[Aabb]) -> Vec<Contender<'_>> {
     use obvhs::{BvhBuildParams, aabb, bvh2::builder::build_bvh2};

@@ -1,4 +1,5 @@
-//! Times of the sizes of boxes that searches go by: half areas, and densities of rays, for which five times as long is aimed at.
+//! Times of the box sizes that searches use: half areas, and densities of rays, which may take at
+//! most five times as long.
 //!
 //! `cargo bench -p harness --bench density`
 
@@ -12,7 +13,7 @@ use harness::measure::ray_cost::{Config, TrainedOn};
 use paired::{Contender, compare};
 use std::hint::black_box;
 
-/// How often every box is evaluated in a turn.
+/// The number of evaluations of every box in a round.
 const REPEATS: usize = 10;
 
 fn main() {
@@ -24,7 +25,8 @@ fn main() {
     }
 }
 
-/// Evaluates the boxes of a greedy tree in the tree's order, and pairs of neighbours in it, as a search for places joins them.
+/// Evaluates the boxes of a greedy tree in the tree's order, and unions of neighbours, like a
+/// search for positions.
 fn evaluate(scene: &Scene) {
     let tree = muller_fellner::Config::default()
         .build(&scene.boxes)

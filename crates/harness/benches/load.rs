@@ -1,8 +1,9 @@
-//! The time to load a tree, with all checks, against the time to build one; and the parts of the time to load.
+//! The time to load a tree, with all checks, compared with the time to build one; and the parts of
+//! the loading time.
 //!
-//! After a build, caches hold the builder's data, so that the file, the boxes and the kernel's records of the file's
-//! pages come from memory; the second load in a row finds them in caches. The time to map a file depends on how the
-//! kernel happens to hold it in memory: in pieces of one page to hundreds of pages.
+//! After a build, caches hold the builder's data, and the file, the boxes and the kernel's records
+//! of the file's pages come from memory. A second load finds them in caches. The time to map a file
+//! depends on the pieces in which the kernel holds it, from one page to hundreds of pages.
 //!
 //! `cargo bench -p harness --bench load`
 
@@ -88,7 +89,7 @@ fn loads(scene: &Scene, path: &Path) {
     let title = format!("{}, {} objects, {} bytes", scene.name, boxes.len(), held.len());
     compare(&title, 25, contenders);
 
-    // Every part is measured with the caches as a build leaves them.
+    // A build before every part leaves the caches in the same state.
     let mut contenders: Vec<Contender> =
         vec![(MULLER_FELLNER, Box::new(build)), ("map, check, view", Box::new(load))];
     contenders.extend(parts());
@@ -97,11 +98,12 @@ fn loads(scene: &Scene, path: &Path) {
 
 fn map(path: &Path) -> Mmap {
     let file = File::open(path).expect("the file");
-    // SAFETY: nobody else writes to this file while it is mapped.
+    // SAFETY: the file is in a temporary folder of this process, which does not write to it while
+    // it is mapped.
     unsafe { Mmap::map(&file) }.expect("a mapping")
 }
 
-/// The least that reading the bytes can cost.
+/// Sums the bytes, the cheapest way to read all of them.
 fn sum(bytes: &[u8]) -> u64 {
     let words = bytes.as_chunks::<8>().0;
     words

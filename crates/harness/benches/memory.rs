@@ -1,9 +1,11 @@
-//! The most memory that each method of `experiments/anytime.toml` has allocated at once, beyond the scene, on one thread.
+//! The peak memory of each method of `experiments/anytime.toml`, beyond the scene, on one thread.
 //!
-//! `cargo bench -p harness --bench memory` writes `results/memory/memory.csv`; scenes that have not been fetched are left out.
+//! `cargo bench -p harness --bench memory` writes `results/memory/memory.csv`; scenes that have not
+//! been fetched are skipped.
 //!
-//! Bytes are those that the program asks its allocator for, so that they are the same on every 64-bit machine: no pages,
-//! no padding, and not the program itself; a buffer that grows counts twice while it is copied.
+//! The program counts the bytes that it requests from its allocator, without pages, padding and the
+//! program itself, hence the numbers are the same on every 64-bit machine. A buffer that grows
+//! counts twice while it is copied.
 
 use bvh_scenes::Scene;
 use bvh_search::{Problem, solve};
@@ -42,7 +44,7 @@ fn main() {
     fs::write(path, to_bytes(&rows, path).expect("rows")).expect("a file");
 }
 
-/// The first run of every method, as the experiment does it.
+/// Measures the first run of every method of the experiment.
 fn measure(experiment: &Experiment, scene: &Scene, rows: &mut Vec<MemoryRow>) {
     for labelled in &experiment.methods {
         let Contestant::Ours(method) = &labelled.method else { continue };

@@ -1,10 +1,11 @@
-//! What a ray costs that misses the whole scene: its making, its preparation and the test of the root.
+//! The cost of a ray that misses the scene: its construction, its preparation and the root's test.
 //!
 //! `cargo bench -p harness --bench misses -- SCENE [PROGRAM]`
 //!
-//! In turns, on one thread; medians over the rounds, in nanoseconds per ray more than the loop alone. PROGRAM is the one of
-//! `scripts/ray-peers/build`: Embree and tinybvh on the same rays in the same turns. Theirs are made before their clocks
-//! start, and the same loop is subtracted.
+//! Interleaved rounds on one thread. The numbers are medians over the rounds, in nanoseconds per
+//! ray beyond an empty loop. PROGRAM, made by `scripts/ray-peers/build`, runs Embree and tinybvh on
+//! the same rays in the same rounds. Their rays are constructed before their clocks start, and the
+//! same loop is subtracted.
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Coherence, Hit, Ray, WideBvh};
@@ -20,14 +21,14 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 
-/// Turns in which every contender answers all rays, after the first few, which are not timed.
+/// The number of timed rounds, in each of which every contender answers all rays.
 const ROUNDS: usize = 300;
 const WARM_UP: usize = 20;
 
-/// Rays that are handed over at once.
+/// The number of rays per call.
 const BATCH: usize = 1024;
 
-/// A name, and what returns the seconds that all rays took.
+/// A name, and a function that returns the seconds of all rays.
 type Contender<'a> = (String, Box<dyn FnMut() -> f64 + 'a>);
 
 fn main() {
@@ -117,7 +118,7 @@ fn main() {
     }
 }
 
-/// The seconds that `answer` takes for all items.
+/// Measures the seconds of `answer` for all items.
 fn timed<'a, T>(items: &'a [T], mut answer: impl FnMut(&T) + 'a) -> Box<dyn FnMut() -> f64 + 'a> {
     Box::new(move || {
         let start = Instant::now();
@@ -128,7 +129,7 @@ fn timed<'a, T>(items: &'a [T], mut answer: impl FnMut(&T) + 'a) -> Box<dyn FnMu
     })
 }
 
-/// Rays from outside of the box, of unit direction, that pass it or go away from it, exactly.
+/// Returns rays with unit directions that start outside the box and miss it, exactly.
 fn rays_that_miss(root: &Aabb) -> Vec<Ray> {
     let mut rng = Stream::seed_from_u64(1);
     let mut point = || DVec3::from([(); 3].map(|()| rng.random_range(-1.0..1.0)));

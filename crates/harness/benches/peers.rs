@@ -1,11 +1,12 @@
-//! Who is ahead at each budget: the time and cost of every other library, and the cost of `best` in the same time.
+//! The time and cost of every other library, and the cost of `best` in the same time.
 //!
 //! `cargo bench -p harness --bench peers --features peers -- [--rounds N] SCENE...`
 //!
-//! With `RUSTFLAGS="-C target-cpu=native"`, which `obvhs` gains from. One thread, one object per leaf, cost over that
-//! of greedy Müller–Fellner. Rounds are in turns. A library's time is its least over the rounds, without the conversion
-//! of its tree; the time of `best` is that of the whole call. The table shows the round of `best` with the least cost
-//! among the rounds that took no longer than the library, or the quickest if all took longer.
+//! Use `RUSTFLAGS="-C target-cpu=native"`, which `obvhs` gains from. All run on one thread, with
+//! one object per leaf, in interleaved rounds. Costs are ratios to greedy Müller–Fellner. A
+//! library's time is its least over the rounds, without the conversion of its tree; the time of
+//! `best` includes the full call. The table shows the round of `best` with the least cost among the
+//! rounds that took no longer than the library, or the quickest round if all took longer.
 
 mod clock;
 
@@ -15,10 +16,10 @@ use bvh_scenes::Scene;
 use clap::Parser;
 use harness::peers::{NoSettings, Obvhs, Peer, Preset};
 
-/// The fraction of a library's time that `best` may plan with: other programs disturb both.
+/// The fraction of a library's time that `best` may plan with, because other programs disturb both.
 const PLANNED: f64 = 0.99;
 
-/// Times whose ratio is at most this count as the same.
+/// The largest ratio of times that count as equal.
 const SAME: f64 = 1.02;
 
 #[derive(Parser)]
@@ -80,7 +81,7 @@ fn measure(scene: &Scene, rounds: usize) {
             peer.build(scene)
                 .expect("a library of this program")
         };
-        // The first times are for memory, caches and the limit.
+        // The first builds warm memory and caches up, and their time sets the limit.
         let mut least = (0..3)
             .map(|_| theirs().seconds)
             .fold(f64::INFINITY, f64::min);

@@ -1,9 +1,11 @@
-//! `best` against the clock: percent below greedy Müller–Fellner, one triangle per leaf, after so many seconds.
+//! `best` against the clock: percent below greedy Müller–Fellner, one triangle per leaf, after each
+//! limit in seconds.
 //!
 //! `cargo bench -p harness --bench search -- [--seconds 0.1,1,10,60] [--threads 1,2] [--seed N] SCENE...`
 //!
-//! The time is that of the whole call, with the build and the final conversion. The numbers of threads take turns. Runs
-//! on more than one thread have 0.6 of the limit, after which they should be no worse than one thread after all of it.
+//! The time includes the build and the final conversion. The numbers of threads alternate. Runs on
+//! more than one thread have 0.6 of the limit, and should reach the cost of one thread after the
+//! full limit.
 
 mod clock;
 
@@ -12,10 +14,11 @@ use bvh_core::cost;
 use bvh_scenes::Scene;
 use clap::Parser;
 
-/// The fraction of the limit that runs on more than one thread have.
+/// The fraction of the limit for runs on more than one thread.
 const LESS_TIME: f64 = 0.6;
 
-/// The fraction of the limit that the search may plan with: the conversion of its result takes the rest.
+/// The fraction of the limit that the search may plan with; the conversion of its result needs the
+/// rest.
 const PLANNED: f64 = 0.97;
 
 #[derive(Parser)]

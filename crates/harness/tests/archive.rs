@@ -1,4 +1,5 @@
-//! The archive of the best known trees: what is committed is true, and only what is better comes in.
+//! The archive of the best known trees: the committed rows are true, and only better trees are
+//! added.
 
 mod support;
 
@@ -13,7 +14,7 @@ use std::path::Path;
 use support::{folder_with, refused, said, save, text};
 
 #[test]
-fn every_tree_of_the_archive_is_valid_costs_what_is_written_and_is_the_best_known() {
+fn every_tree_of_the_archive_is_valid_has_the_recorded_cost_and_is_the_best_known() {
     let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../results");
     let rows = archive::rows(&results).unwrap();
     assert_eq!(
@@ -44,7 +45,7 @@ fn every_tree_of_the_archive_is_valid_costs_what_is_written_and_is_the_best_know
     }
 }
 
-/// A tree of the scene, and a better one.
+/// Returns a tree of the scene and a better one.
 fn trees(scene: &Scene) -> [Bvh; 2] {
     let poor = median_cut::Config::default()
         .build(&scene.boxes)
@@ -59,50 +60,50 @@ fn trees(scene: &Scene) -> [Bvh; 2] {
 fn a_tree_from_elsewhere_is_compared_with_the_best_known() {
     let spec = "question = 'q'\nscenes = ['spheres75:60']\nmethods = [{ method = 'median_cut' }]\n";
     let folder = folder_with("spec.toml", spec);
-    let at = folder.path();
-    said(at, &["spec.toml"]);
+    let dir = folder.path();
+    said(dir, &["spec.toml"]);
     let scene = Scene::load("spheres75:60").unwrap();
     let [poor, good] = trees(&scene);
-    save(&good, &scene, &at.join("good.bvh"));
-    let shown = said(at, &["compare", "good.bvh", "spheres75:60"]);
+    save(&good, &scene, &dir.join("good.bvh"));
+    let shown = said(dir, &["compare", "good.bvh", "spheres75:60"]);
     assert!(shown.contains("found by: median_cut"), "{shown}");
     let ratio = cost::internal_area(&good) / cost::internal_area(&poor);
     assert!(
         ratio < 1.0 && shown.contains(&format!("over the best known: {ratio}")),
         "{ratio}: {shown}"
     );
-    // Nothing is known of another scene, and the tree is not for it.
+    // Another scene has no best known cost, and the tree does not fit it.
     let other = Scene::load("spheres75:50").unwrap();
     let [tree, _] = trees(&other);
-    save(&tree, &other, &at.join("other.bvh"));
+    save(&tree, &other, &dir.join("other.bvh"));
     assert!(
-        said(at, &["compare", "other.bvh", "spheres75:50"]).contains("none of this very scene")
+        said(dir, &["compare", "other.bvh", "spheres75:50"]).contains("none of this very scene")
     );
-    refused(at, &["compare", "other.bvh", "spheres75:60"], 2, &["other.bvh"]);
+    refused(dir, &["compare", "other.bvh", "spheres75:60"], 2, &["other.bvh"]);
 }
 
 #[test]
-fn only_a_better_tree_comes_into_the_archive_and_becomes_the_best_known() {
+fn only_a_better_tree_is_archived_and_becomes_the_best_known() {
     let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    fs::create_dir(at.join("results")).unwrap();
+    let dir = folder.path();
+    fs::create_dir(dir.join("results")).unwrap();
     let scene = Scene::load("spheres75:60").unwrap();
     let [poor, good] = trees(&scene);
-    save(&poor, &scene, &at.join("poor.bvh"));
-    save(&good, &scene, &at.join("good.bvh"));
+    save(&poor, &scene, &dir.join("poor.bvh"));
+    save(&good, &scene, &dir.join("good.bvh"));
     let files = || {
         ["best_known.csv", "trees/trees.csv"]
-            .map(|file| fs::read(at.join("results").join(file)).unwrap())
+            .map(|file| fs::read(dir.join("results").join(file)).unwrap())
     };
     for file in ["poor.bvh", "good.bvh"] {
-        let kept = said(at, &["compare", file, "spheres75:60", "--keep", &format!("made {file}")]);
+        let kept = said(dir, &["compare", file, "spheres75:60", "--keep", &format!("made {file}")]);
         assert!(kept.contains("kept in: results/trees/spheres75-60.bvh"), "{kept}");
         assert!(
-            fs::read(at.join("results/trees/spheres75-60.bvh")).unwrap()
-                == fs::read(at.join(file)).unwrap()
+            fs::read(dir.join("results/trees/spheres75-60.bvh")).unwrap()
+                == fs::read(dir.join(file)).unwrap()
         );
         let [known, trees] = files().map(|bytes| text(&bytes));
-        let (tree, _) = tree_file::load(&at.join(file), &scene).unwrap();
+        let (tree, _) = tree_file::load(&dir.join(file), &scene).unwrap();
         let cost = cost::internal_area(&tree).to_string();
         assert!(trees.contains(&format!("made {file}")) && trees.lines().count() == 2, "{trees}");
         assert!(
@@ -114,7 +115,7 @@ fn only_a_better_tree_comes_into_the_archive_and_becomes_the_best_known() {
     }
     let before = files();
     for worse in ["poor.bvh", "good.bvh"] {
-        refused(at, &["compare", worse, "spheres75:60", "--keep", "worse"], 2, &["its cost is"]);
+        refused(dir, &["compare", worse, "spheres75:60", "--keep", "worse"], 2, &["its cost is"]);
         assert!(files() == before);
     }
 }

@@ -1,8 +1,10 @@
-//! Imports lead downwards only: between the rooms of a crate as ARCHITECTURE.md lists them, and between files in no circle.
+//! Imports lead only downwards between the rooms of a crate, in the order of ARCHITECTURE.md, and
+//! files import each other in no circle.
 //!
-//! A room is a file or folder at the top of a crate's sources. Paths that begin with `crate`, `super`, or the name of a child module are followed, through re-exports, to the file
-//! that defines the item. Re-exports themselves and unit tests do not count, nor does what a module defines for the files
-//! of its own folder.
+//! A room is a file or folder at the top of a crate's sources. The test follows paths that begin
+//! with `crate`, `super`, or the name of a child module, through re-exports, to the file that
+//! defines the item. It ignores re-exports themselves, unit tests, and items that a module defines
+//! for the files of its folder.
 
 mod support;
 
@@ -13,7 +15,7 @@ use support::top;
 
 type Module = Vec<String>;
 
-/// The code of every module of a crate, without comments and unit tests.
+/// Collects the code of every module of a crate, without comments and unit tests.
 fn modules(folder: &Path, at: &Module, found: &mut BTreeMap<Module, String>) {
     let mut entries: Vec<PathBuf> = fs::read_dir(folder)
         .unwrap()
@@ -46,7 +48,8 @@ fn modules(folder: &Path, at: &Module, found: &mut BTreeMap<Module, String>) {
     }
 }
 
-/// Whether a file is code of its crate: no unit tests, and no program beside a library.
+/// Returns true if a file is code of its crate, not unit tests, and not a program next to a
+/// library.
 fn is_source(path: &Path) -> bool {
     let is_beside_a_library = path.ends_with("main.rs") && path.with_file_name("lib.rs").exists();
     let is_rust = path
@@ -55,7 +58,7 @@ fn is_source(path: &Path) -> bool {
     is_rust && !path.ends_with("tests.rs") && !is_beside_a_library
 }
 
-/// All paths of a use tree such as `a::{b, c::{d as e, self}}`.
+/// Returns all paths of a use tree such as `a::{b, c::{d as e, self}}`.
 fn paths(tree: &str) -> Vec<Module> {
     let tree = tree.trim();
     let (head, rest) = tree.split_once('{').unwrap_or((tree, ""));
@@ -96,16 +99,16 @@ fn paths(tree: &str) -> Vec<Module> {
     }
 }
 
-/// The paths that a module re-exports, and all other paths in its code that lead to modules of its crate.
+/// Returns the paths that a module re-exports, and all other paths in its code that lead to modules
+/// of its crate.
 fn used(module: &Module, code: &str, known: &BTreeMap<Module, String>) -> [Vec<Module>; 2] {
     let mut found = [Vec::new(), Vec::new()];
     for statement in code.split(';') {
         let (code, tree) = statement
             .rsplit_once("use ")
             .unwrap_or((statement, ""));
-        let is_path = |c: char| c.is_alphanumeric() || "_:".contains(c);
         let inline = code
-            .split(|c| !is_path(c))
+            .split(|c: char| !c.is_alphanumeric() && !"_:".contains(c))
             .filter(|word| word.starts_with("crate::") || word.starts_with("super::"));
         let exported = code.trim_end().ends_with("pub") || code.trim_end().ends_with("pub(crate)");
         let inline = inline.flat_map(paths).map(|path| (false, path));
@@ -134,7 +137,7 @@ fn used(module: &Module, code: &str, known: &BTreeMap<Module, String>) -> [Vec<M
     found
 }
 
-/// The module that defines what a path names.
+/// Returns the module that defines the item of a path.
 fn resolve(path: &Module, exports: &BTreeMap<Module, Vec<Module>>, depth: usize) -> Module {
     let length = (0..=path.len())
         .rev()
@@ -151,7 +154,8 @@ fn resolve(path: &Module, exports: &BTreeMap<Module, Vec<Module>>, depth: usize)
     }
 }
 
-/// For every file of a crate's sources, the files that define what it uses, without those of its own folder.
+/// Returns, for every file of a crate's sources, the files that define the items it uses, without
+/// the modules above it.
 fn edges(folder: &Path) -> BTreeSet<(Module, Module)> {
     let mut known = BTreeMap::new();
     modules(folder, &Module::new(), &mut known);
@@ -168,14 +172,14 @@ fn edges(folder: &Path) -> BTreeSet<(Module, Module)> {
         let targets = paths
             .iter()
             .map(|path| resolve(path, &exports, 0));
-        // What a module defines is open to the files of its own folder.
+        // The items of a module are open to the files of its folder.
         let others = targets.filter(|target| !module.starts_with(target));
         edges.extend(others.map(|target| ((*module).clone(), target)));
     }
     edges
 }
 
-/// The crates whose rooms ARCHITECTURE.md lists, each with its floors from the top down.
+/// Returns the crates whose rooms ARCHITECTURE.md lists, each with its floors from the top down.
 fn floors(page: &str) -> Vec<(String, Vec<Vec<String>>)> {
     let block = page
         .split("```floors\n")
@@ -184,7 +188,7 @@ fn floors(page: &str) -> Vec<(String, Vec<Vec<String>>)> {
         .split("```")
         .next()
         .unwrap();
-    // A line that is indented goes on with the crate above.
+    // An indented line continues the crate above.
     let lines = block.replace("\n ", " ");
     let floor = |names: &str| {
         names
@@ -200,7 +204,7 @@ fn floors(page: &str) -> Vec<(String, Vec<Vec<String>>)> {
         .collect()
 }
 
-/// The rooms of a crate: the files and folders at the top of its sources.
+/// Returns the rooms of a crate: the files and folders at the top of its sources.
 fn rooms(folder: &Path) -> BTreeSet<String> {
     let mut found = BTreeMap::new();
     modules(folder, &Module::new(), &mut found);
@@ -210,20 +214,22 @@ fn rooms(folder: &Path) -> BTreeSet<String> {
         .collect()
 }
 
-/// All imports that lead from a room to one that is not on a lower floor.
+/// Returns all imports from a room to one that is not on a lower floor.
 fn rising(edges: &BTreeSet<(Module, Module)>, floors: &[Vec<String>]) -> Vec<String> {
-    let floor = |module: &Module| {
+    let floor = |room: &String| {
         floors
             .iter()
-            .position(|rooms| rooms.contains(&module[0]))
+            .position(|rooms| rooms.contains(room))
     };
-    let rises = |(from, to): &&(Module, Module)| {
+    let mut rising = Vec::new();
+    for (from, to) in edges {
         // The root of a crate is no room.
-        let are_rooms = !to.is_empty() && !from.is_empty();
-        are_rooms && from[0] != to[0] && floor(to) <= floor(from)
-    };
-    let shown = |(from, to): &(Module, Module)| format!("{} uses {}", from.join("/"), to.join("/"));
-    edges.iter().filter(rises).map(shown).collect()
+        let ([from_room, ..], [to_room, ..]) = (&from[..], &to[..]) else { continue };
+        if from_room != to_room && floor(to_room) <= floor(from_room) {
+            rising.push(format!("{} uses {}", from.join("/"), to.join("/")));
+        }
+    }
+    rising
 }
 
 #[test]
@@ -285,7 +291,7 @@ fn no_file_uses_a_file_that_uses_it() {
             .to_string_lossy()
             .into_owned();
         let mut edges = edges(&folder.join("src"));
-        // What nothing uses, or what uses nothing, is in no circle.
+        // A file that nothing uses, or that uses nothing, is in no circle.
         loop {
             let (uses, used): (BTreeSet<_>, BTreeSet<_>) = edges.iter().cloned().unzip();
             let before = edges.len();

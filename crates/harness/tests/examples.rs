@@ -1,5 +1,6 @@
-//! Every example in the documentation is run by a test: specs by the harness, as they are printed; Rust by the doctests of a crate; C and
-//! Python by the tests of those languages; commands by their program as far as it reads arguments. Those of `bvh` are in its own tests.
+//! A test runs every example in the documentation: the harness runs specs as printed; the doctests
+//! of a crate run Rust; the tests of the bindings run C and Python; and the programs parse the
+//! arguments of commands. The commands of `bvh` are in the tests of that crate.
 
 #[path = "../../bvh-terminal/tests/program/pages.rs"]
 mod pages;
@@ -22,7 +23,7 @@ fn every_block_has_a_language_whose_examples_are_run() {
             block.place(),
             block.language
         );
-        // `scripts/languages` compiles and runs that of C, pytest that of Python.
+        // `scripts/languages` compiles and runs the C example, pytest runs the Python example.
         for (language, page) in [("c", "bvh-c/README.md"), ("python", "bvh-python/README.md")] {
             assert!(block.language != language || block.page.ends_with(page), "{}", block.place());
         }
@@ -52,7 +53,7 @@ fn every_block_of_rust_is_a_doctest() {
     }
 }
 
-/// Fewer triangles than the scenes of examples have.
+/// A scene with fewer triangles than the scenes of examples.
 const SMALL: &str = "escher:60";
 
 #[test]
@@ -64,17 +65,17 @@ fn every_spec_runs_as_it_is_printed() {
             .parse()
             .unwrap_or_else(|error| panic!("{}: {error}", block.place()));
         let folder = tempfile::tempdir().unwrap();
-        let at = folder.path();
+        let dir = folder.path();
         if table.contains_key("cameras") {
             continue; // `bvh` runs it.
         }
-        // Without a question it is a part of a spec.
+        // A table without a question is a part of a spec.
         let around = if table.contains_key("question") {
             ""
         } else {
             "question = 'q'\nscenes = ['escher']\n"
         };
-        fs::write(at.join("spec.toml"), format!("{around}{}", block.text)).unwrap();
+        fs::write(dir.join("spec.toml"), format!("{around}{}", block.text)).unwrap();
         for name in table
             .get("scenes")
             .and_then(toml::Value::as_array)
@@ -85,13 +86,13 @@ fn every_spec_runs_as_it_is_printed() {
             assert!(loaded.is_ok(), "{}: {}", block.place(), loaded.unwrap_err());
         }
         if block.text.contains("peer.py") {
-            fs::copy(top().join("scripts/external_method.py"), at.join("peer.py")).unwrap();
+            fs::copy(top().join("scripts/external_method.py"), dir.join("peer.py")).unwrap();
             if !run_python() {
-                eprintln!("{} is left out: python3 is not here", block.place());
+                eprintln!("{} is skipped: there is no python3", block.place());
                 continue;
             }
         }
-        ended(&run(at, &["spec.toml", "--scene", SMALL]), 0, &["runs"]);
+        ended(&run(dir, &["spec.toml", "--scene", SMALL]), 0, &["runs"]);
         specs += 1;
     }
     assert!(specs > 0);
@@ -115,7 +116,7 @@ fn every_command_of_a_block_names_what_is_there_and_is_read_by_the_program() {
     assert!(harness.reads_blocks() > 3 && harness.knows_sentences() > 3);
 }
 
-/// What a command of the project names is there.
+/// Asserts that the files in a command of the project exist.
 fn check_files(command: &[String], place: &str) {
     let known = ["bvh", "c++", "cargo", "harness"];
     let program = &command[0];

@@ -1,6 +1,6 @@
-//! What the world does to a running harness: full disks, folders that cannot be written, kills, a second harness.
+//! External faults during a run: full disks, read-only folders, kills, a second harness.
 //!
-//! `KILLS=100 cargo test -p harness --test faults` kills that often.
+//! `KILLS=100 cargo test -p harness --test faults` kills the harness 100 times.
 
 mod support;
 
@@ -24,12 +24,12 @@ methods = [
 ]
 ";
 
-/// A folder with the spec in it.
+/// Creates a folder with the spec.
 fn folder() -> tempfile::TempDir {
     folder_with("spec.toml", SPEC)
 }
 
-/// What is killed or goes on in the background: nobody reads what it says.
+/// Prepares a harness that is killed or runs in the background, without output.
 fn command(folder: &Path, args: &[&str]) -> Command {
     let mut command = program(folder, args);
     command
@@ -38,14 +38,14 @@ fn command(folder: &Path, args: &[&str]) -> Command {
     command
 }
 
-/// What a run leaves that every run must leave.
+/// Returns the files that every run must reproduce.
 fn results(out: &Path) -> Vec<(String, Vec<u8>)> {
     let files = reproducible(&out.join("spec"));
     assert!(files.len() >= 3, "{files:?}");
     files
 }
 
-/// What one uninterrupted run writes.
+/// Returns the files of one uninterrupted run.
 fn whole(folder: &Path) -> Vec<(String, Vec<u8>)> {
     said(folder, &["spec.toml", "--out", "whole"]);
     results(&folder.join("whole"))
@@ -86,24 +86,17 @@ fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
     }
     said(folder.path(), &["spec.toml", "--resume", "--out", &out]);
     let found = results(&folder.path().join(&out));
-    let names = |files: &[(String, Vec<u8>)]| {
-        files
-            .iter()
-            .map(|(name, _)| name.clone())
-            .collect::<Vec<_>>()
-    };
-    let differ: Vec<&String> = found
+    let differing: Vec<&String> = found
         .iter()
-        .zip(&whole)
-        .filter(|(a, b)| a != b)
-        .map(|(a, _)| &a.0)
+        .filter(|file| !whole.contains(file))
+        .map(|(name, _)| name)
         .collect();
-    assert!(found == whole, "{differ:?}, {:?} and {:?}", names(&found), names(&whole));
+    assert!(found == whole, "{differing:?}");
     eprintln!("{killed} kills, {} experiments finished", finished + 1);
 }
 
 #[test]
-fn a_second_harness_on_the_same_folder_is_refused_and_disturbs_nothing() {
+fn a_second_harness_on_the_same_folder_is_rejected_and_disturbs_nothing() {
     struct Killed(Child);
     impl Drop for Killed {
         fn drop(&mut self) {
@@ -124,7 +117,7 @@ fn a_second_harness_on_the_same_folder_is_refused_and_disturbs_nothing() {
         let args = [&["long.toml"], more].concat();
         refused(folder.path(), &args, 1, &["results/long is in use by another harness", "--out"]);
     }
-    // Other folders are free, and the kept run is still there.
+    // Other folders are free, and the kept run still exists.
     said(folder.path(), &["spec.toml"]);
     assert!(
         folder
@@ -144,7 +137,7 @@ fn a_second_harness_on_the_same_folder_is_refused_and_disturbs_nothing() {
 
 #[cfg(unix)]
 #[test]
-fn a_full_disk_is_reported_and_what_was_finished_is_kept() {
+fn a_full_disk_is_reported_and_finished_runs_are_kept() {
     let folder = folder();
     let whole = whole(folder.path());
     for blocks in [0, 1, 2, 8] {
@@ -166,7 +159,7 @@ fn a_full_disk_is_reported_and_what_was_finished_is_kept() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn help_and_version_that_cannot_be_said_are_errors() {
+fn help_and_version_that_cannot_be_printed_are_errors() {
     let folder = folder();
     for args in [&["--help"][..], &["--version"], &["-h"], &["merge", "--help"], &["help", "new"]] {
         unsaid(folder.path(), args);
@@ -193,26 +186,24 @@ fn a_folder_that_cannot_be_written_is_named() {
 }
 
 #[test]
-fn a_folder_where_a_file_should_be_is_named_and_so_is_the_reverse() {
+fn a_folder_instead_of_a_file_is_named_and_so_is_the_reverse() {
     let folder = folder();
-    let at = folder.path();
-    fs::create_dir(at.join("folder.obj")).unwrap();
-    fs::create_dir(at.join("folder.toml")).unwrap();
-    refused(at, &["folder.toml"], 2, &["folder.toml"]);
-    refused(at, &["spec.toml", "--scene=folder.obj"], 2, &["folder.obj", "a folder"]);
-    let made = |path: &str| fs::create_dir_all(at.join(path)).unwrap();
-    made("a/spec/runs.csv");
-    refused(at, &["spec.toml", "--out=a"], 1, &["a/spec/runs.csv", "cannot replace the file"]);
-    assert!(!at.join("a/spec/runs.csv.unfinished").exists());
-    fs::remove_dir(at.join("a/spec/runs.csv")).unwrap();
+    let dir = folder.path();
+    fs::create_dir(dir.join("folder.obj")).unwrap();
+    fs::create_dir(dir.join("folder.toml")).unwrap();
+    refused(dir, &["folder.toml"], 2, &["folder.toml"]);
+    refused(dir, &["spec.toml", "--scene=folder.obj"], 2, &["folder.obj", "a folder"]);
+    for folder in ["a/spec/runs.csv", "b/spec/.lock", "c/spec", "d"] {
+        fs::create_dir_all(dir.join(folder)).unwrap();
+    }
+    refused(dir, &["spec.toml", "--out=a"], 1, &["a/spec/runs.csv", "cannot replace the file"]);
+    assert!(!dir.join("a/spec/runs.csv.unfinished").exists());
+    fs::remove_dir(dir.join("a/spec/runs.csv")).unwrap();
     // The runs were not lost.
-    said(at, &["spec.toml", "--out=a", "--resume"]);
-    made("b/spec/.lock");
-    refused(at, &["spec.toml", "--out=b"], 1, &["b/spec/.lock", "cannot create the file"]);
-    made("c/spec");
-    fs::write(at.join("c/spec/.partial"), "").unwrap();
-    refused(at, &["spec.toml", "--out=c"], 1, &["c/spec/.partial", "cannot"]);
-    made("d");
-    fs::write(at.join("d/spec"), "").unwrap();
-    refused(at, &["spec.toml", "--out=d"], 1, &["d/spec", "cannot create the folder"]);
+    said(dir, &["spec.toml", "--out=a", "--resume"]);
+    refused(dir, &["spec.toml", "--out=b"], 1, &["b/spec/.lock", "cannot create the file"]);
+    fs::write(dir.join("c/spec/.partial"), "").unwrap();
+    refused(dir, &["spec.toml", "--out=c"], 1, &["c/spec/.partial", "cannot"]);
+    fs::write(dir.join("d/spec"), "").unwrap();
+    refused(dir, &["spec.toml", "--out=d"], 1, &["d/spec", "cannot create the folder"]);
 }

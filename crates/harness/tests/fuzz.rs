@@ -1,7 +1,8 @@
-//! The fuzz targets on a stable compiler: the kept inputs, and as many mutations of them as time allows.
+//! The fuzz targets on a stable compiler: the kept inputs and mutations of them.
 //!
-//! `FUZZ_SECONDS=600 cargo test -p harness --test fuzz NAME` goes on for longer, each time with other mutations. An
-//! input that breaks a promise is printed; kept under `fuzz/corpus/NAME` it becomes a test for ever.
+//! `FUZZ_SECONDS=600 cargo test -p harness --test fuzz NAME` runs for longer, each time with
+//! different mutations. An input that breaks a promise is printed; a file in `fuzz/corpus/NAME`
+//! keeps it as a test.
 
 #[path = "../fuzz/src/lib.rs"]
 mod targets;
@@ -14,7 +15,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
 use std::time::{Duration, Instant, SystemTime};
 
-/// The files of a folder, in the order of their names.
+/// Returns the contents of a folder's files, in the order of their names.
 fn files(folder: &Path) -> Vec<Vec<u8>> {
     let mut paths: Vec<_> = fs::read_dir(folder)
         .unwrap()
@@ -28,8 +29,8 @@ fn files(folder: &Path) -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// One to eight changes: bits, bytes, words that matter, numbers, and pieces cut, repeated, or taken from another
-/// input.
+/// Makes one to eight changes: bits, bytes, special words, numbers, and pieces that are cut,
+/// repeated, or copied from another input.
 fn mutated(inputs: &[Vec<u8>], rng: &mut Stream) -> Vec<u8> {
     const WORDS: [u32; 10] = [
         0,
@@ -45,79 +46,60 @@ fn mutated(inputs: &[Vec<u8>], rng: &mut Stream) -> Vec<u8> {
     ];
     let mut bytes = inputs.choose(rng).cloned().unwrap_or_default();
     for _ in 0..rng.random_range(1..=8) {
-        let at = rng.random_range(0..=bytes.len());
-        let end = rng.random_range(at..=bytes.len().min(at + 40));
+        let start = rng.random_range(0..=bytes.len());
+        let end = rng.random_range(start..=bytes.len().min(start + 40));
         match rng.random_range(0..8) {
-            0 => bytes.insert(at, rng.random()),
-            1 => drop(bytes.drain(at..end)),
+            0 => bytes.insert(start, rng.random()),
+            1 => drop(bytes.drain(start..end)),
             2 => {
-                let piece = bytes[at..end].to_vec();
+                let piece = bytes[start..end].to_vec();
                 let to = rng.random_range(0..=bytes.len());
                 bytes.splice(to..to, piece);
             }
             3 => {
                 let other = inputs.choose(rng).cloned().unwrap_or_default();
                 let from = rng.random_range(0..=other.len());
-                bytes.splice(
-                    at..end,
-                    other[from..other.len().min(from + 40)]
-                        .iter()
-                        .copied(),
-                );
+                let piece = &other[from..other.len().min(from + 40)];
+                bytes.splice(start..end, piece.iter().copied());
             }
             4 => {
-                let word = WORDS
-                    .choose(rng)
-                    .copied()
-                    .unwrap_or_default()
-                    .to_le_bytes();
-                bytes
-                    .iter_mut()
-                    .skip(at)
-                    .zip(word)
-                    .for_each(|(old, new)| *old = new);
+                let word = WORDS.choose(rng).unwrap().to_le_bytes();
+                for (old, new) in bytes[start..].iter_mut().zip(word) {
+                    *old = new;
+                }
             }
             5 => {
-                let digit = bytes
-                    .iter()
-                    .skip(at)
-                    .position(u8::is_ascii_digit)
-                    .map(|from| at + from);
-                let number = *["-1", "0", "nan", "1e39", "18446744073709551616"]
-                    .choose(rng)
-                    .unwrap();
-                digit
-                    .into_iter()
-                    .for_each(|at| drop(bytes.splice(at..at + 1, number.bytes())));
+                let numbers = ["-1", "0", "nan", "1e39", "18446744073709551616"];
+                let number = numbers.choose(rng).unwrap();
+                if let Some(digit) = bytes[start..].iter().position(u8::is_ascii_digit) {
+                    bytes.splice(start + digit..=start + digit, number.bytes());
+                }
             }
-            6 => bytes
-                .iter_mut()
-                .skip(at)
-                .take(1)
-                .for_each(|byte| *byte ^= 1 << rng.random_range(0..8)),
-            _ => bytes
-                .iter_mut()
-                .skip(at)
-                .take(4)
-                .for_each(|byte| *byte = rng.random()),
+            6 => {
+                if let Some(byte) = bytes.get_mut(start) {
+                    *byte ^= 1 << rng.random_range(0..8);
+                }
+            }
+            _ => {
+                for byte in bytes[start..].iter_mut().take(4) {
+                    *byte = rng.random();
+                }
+            }
         }
     }
     bytes
 }
 
-/// Runs a target over what is kept and `count` mutations, or for as long as `FUZZ_SECONDS` says.
+/// Runs a target on the kept inputs and on `count` mutations, or for `FUZZ_SECONDS`.
 fn run(name: &str, count: usize, further: Vec<Vec<u8>>) {
     let (_, target) = targets::TARGETS
         .into_iter()
         .find(|(known, _)| *known == name)
         .unwrap();
-    let holds = |bytes: &[u8]| {
+    let check = |bytes: &[u8]| {
         if let Err(panic) = catch_unwind(AssertUnwindSafe(|| target(bytes))) {
-            eprintln!(
-                "{name} broke a promise for the {} bytes \"{}\"",
-                bytes.len(),
-                bytes.escape_ascii()
-            );
+            let input = bytes.escape_ascii();
+            eprintln!("{name} broke a promise for the {} bytes \"{input}\"", bytes.len());
             resume_unwind(panic);
         }
     };
@@ -125,27 +107,30 @@ fn run(name: &str, count: usize, further: Vec<Vec<u8>>) {
         .join("fuzz/corpus")
         .join(name);
     let inputs = [files(&corpus), further, vec![Vec::new()]].concat();
-    inputs.iter().for_each(|input| holds(input));
-    let seconds = std::env::var("FUZZ_SECONDS")
+    inputs.iter().for_each(|input| check(input));
+    let seconds: Option<u64> = std::env::var("FUZZ_SECONDS")
         .ok()
         .and_then(|seconds| seconds.parse().ok());
     let start = Instant::now();
-    let seed = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-    let mut rng = Stream::seed_from_u64(
-        seconds
-            .and(seed.ok())
-            .map_or(1, |since| since.as_nanos() as u64),
-    );
+    // Commits are tested with the same mutations each time, long runs with new ones.
+    let seed = match seconds {
+        Some(_) => SystemTime::UNIX_EPOCH
+            .elapsed()
+            .unwrap()
+            .as_nanos() as u64,
+        None => 1,
+    };
+    let mut rng = Stream::seed_from_u64(seed);
     let mut executions = 0;
-    while seconds.map_or(executions < count, |s: u64| start.elapsed() < Duration::from_secs(s)) {
-        holds(&mutated(&inputs, &mut rng));
+    while match seconds {
+        Some(seconds) => start.elapsed() < Duration::from_secs(seconds),
+        None => executions < count,
+    } {
+        check(&mutated(&inputs, &mut rng));
         executions += 1;
     }
-    eprintln!(
-        "{name}: {} inputs and {executions} mutations in {:.1?}",
-        inputs.len(),
-        start.elapsed()
-    );
+    let inputs = inputs.len();
+    eprintln!("{name}: {inputs} inputs and {executions} mutations in {:.1?}", start.elapsed());
 }
 
 #[test]
@@ -154,17 +139,17 @@ fn every_method_survives_boxes_of_any_bits() {
 }
 
 #[test]
-fn any_bytes_are_an_obj_file_or_refused() {
+fn any_bytes_are_an_obj_file_or_rejected() {
     run("obj", 20_000, vec![]);
 }
 
 #[test]
-fn any_bytes_are_a_spec_or_refused() {
+fn any_bytes_are_a_spec_or_rejected() {
     run("spec", 1000, files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments")));
 }
 
 #[test]
-fn any_bytes_are_a_tree_file_or_refused() {
+fn any_bytes_are_a_tree_file_or_rejected() {
     run("tree_file", 20_000, vec![]);
 }
 

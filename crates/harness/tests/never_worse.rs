@@ -1,5 +1,8 @@
-//! No search ends above a tree that was built on its way, nor above one that its caller has; and `best` never above what its smallest
-//! budgets begin with. Over all built-in and stiff scenes, small, all methods, and budgets from nothing to some hundred nodes per object.
+//! No search returns a tree that costs more than one it built on its way or got from its caller,
+//! and `best` never costs more than its start with the smallest budgets.
+//!
+//! The tests cover small versions of all built-in and stiff scenes, all methods, and budgets from
+//! nothing to several hundred nodes per object.
 
 use bvh_build::{Builder, muller_fellner, ploc};
 use bvh_core::{Aabb, Triangle, cost, validate};
@@ -11,7 +14,7 @@ use harness::stress::examine::ROUNDING;
 use rand::{RngExt, SeedableRng};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// Triangles with corners anywhere in the unit cube: most are as large as the scene.
+/// Returns triangles with corners anywhere in the unit cube; most are as large as the scene.
 fn soup(n: usize) -> Vec<Aabb> {
     let mut random = bvh_search::Stream::seed_from_u64(1);
     let mut corner = || [random.random::<f32>(), random.random(), random.random()];
@@ -20,7 +23,7 @@ fn soup(n: usize) -> Vec<Aabb> {
         .collect()
 }
 
-/// All scenes with some hundred objects, and a few that are stiff only where they are larger.
+/// Returns all scenes with several hundred objects, and a few that are stiff only at larger sizes.
 fn scenes() -> Vec<(String, Vec<Aabb>)> {
     let built_in =
         ["bijou", "cloister", "escher", "konistil", "pinecon2", "spheres7500"].map(|name| {
@@ -44,7 +47,7 @@ fn scenes() -> Vec<(String, Vec<Aabb>)> {
         .collect()
 }
 
-/// Work per object: around the border between small and large budgets, and beyond.
+/// Work per object: near the border between small and large budgets, and beyond.
 const WORK: [u64; 7] = [0, 3, 19, 20, 25, 60, 300];
 
 fn solved(method: &Method, problem: &Problem, work: u64, observer: &dyn Observer) -> Outcome {
@@ -55,7 +58,8 @@ fn solved(method: &Method, problem: &Problem, work: u64, observer: &dyn Observer
     outcome
 }
 
-/// Whether a cost is no higher than another one, but for the rounding of a sum kept by increments.
+/// Returns true if a cost is at most `limit`, except for the rounding of a sum updated by
+/// increments.
 fn at_most(cost: f64, limit: f64) -> bool {
     cost <= limit * (1.0 + ROUNDING)
 }
@@ -126,7 +130,7 @@ fn local_searches_begin_no_more_than_a_little_above_the_greedy_tree() {
     }
 }
 
-/// A clock that is over after a number of questions of any kind.
+/// A clock that expires after a number of queries of any kind.
 struct Questions {
     asked: AtomicU64,
     most: u64,

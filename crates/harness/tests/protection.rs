@@ -1,5 +1,5 @@
-//! What the program does not do to its user's files, whatever it is called with: lead results elsewhere, lose finished
-//! runs, write through links, wait for ever on what is no file, or replace what it did not write.
+//! No arguments make the program damage its user's files: it never writes results elsewhere, loses
+//! finished runs, writes through links, waits forever for a pipe, or replaces files of others.
 
 mod support;
 
@@ -30,18 +30,18 @@ larger_searches = { objects = 0, work_per_object = 1 }
 rays = 1
 ";
 
-/// A folder with a spec of this name in it.
+/// Creates a folder with a spec of this name.
 fn folder(spec: &str) -> tempfile::TempDir {
     folder_with(spec, SPEC)
 }
 
-/// What must be refused as a wrong call is, with parts of the message.
+/// Asserts that the arguments are rejected as a usage error with these parts of the message.
 fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
     support::refused(folder, args, 2, parts);
 }
 
 #[test]
-fn a_spec_whose_name_would_lead_elsewhere_is_refused() {
+fn a_spec_whose_name_would_lead_elsewhere_is_rejected() {
     for spec in ["...toml", "..toml", ".lock.toml", ".partial.toml", "quick.toml", "x.new.toml"] {
         let folder = folder(spec);
         refused(folder.path(), &[spec, "--out", "out/below"], &[spec, "do not begin with a dot"]);
@@ -50,7 +50,7 @@ fn a_spec_whose_name_would_lead_elsewhere_is_refused() {
 }
 
 #[test]
-fn two_specs_of_one_name_in_one_command_are_refused_before_the_work() {
+fn two_specs_with_one_name_in_one_command_are_rejected_before_the_work() {
     let folder = folder("spec.toml");
     fs::create_dir(folder.path().join("other")).unwrap();
     fs::write(folder.path().join("other/spec.toml"), SPEC).unwrap();
@@ -61,63 +61,60 @@ fn two_specs_of_one_name_in_one_command_are_refused_before_the_work() {
 #[test]
 fn finished_results_are_replaced_by_force_only() {
     let folder = folder("spec.toml");
-    let at = folder.path();
-    said(at, &["spec.toml"]);
-    let files = || {
-        (
-            reproducible(&at.join("results/spec")),
-            fs::read(at.join("results/spec/timing.csv")).unwrap(),
-        )
-    };
-    let first = files();
-    // A repetition goes beside them.
-    let repeated = said(at, &["spec.toml"]);
+    let dir = folder.path();
+    said(dir, &["spec.toml"]);
+    let results = dir.join("results/spec");
+    let first = reproducible(&results);
+    let first_timing = fs::read(results.join("timing.csv")).unwrap();
+    // A repetition writes to a folder next to them.
+    let repeated = said(dir, &["spec.toml"]);
     assert!(repeated.contains("results/spec is kept and has the same rows"), "{repeated}");
-    assert!(files() == first && reproducible(&at.join("results/spec.new")) == first.0);
-    // Other runs are refused.
+    assert!(reproducible(&dir.join("results/spec.new")) == first);
+    // Other runs are rejected.
     for other in [&["--scene=spheres750"][..], &["--seed=2"], &["--shard=1/2"]] {
-        refused(at, &[&["spec.toml"], other].concat(), &["results/spec", "--force", "--out"]);
+        refused(dir, &[&["spec.toml"], other].concat(), &["results/spec", "--force", "--out"]);
     }
-    assert!(files() == first);
-    said(at, &["spec.toml", "--seed=2", "--force"]);
-    assert!(files().0 != first.0);
+    assert!(reproducible(&results) == first);
+    assert!(fs::read(results.join("timing.csv")).unwrap() == first_timing);
+    said(dir, &["spec.toml", "--seed=2", "--force"]);
+    assert!(reproducible(&results) != first);
 }
 
 #[test]
 fn resuming_what_is_finished_does_nothing() {
     let folder = folder("spec.toml");
-    let at = folder.path();
-    said(at, &["spec.toml", "--resume"]);
+    let dir = folder.path();
+    said(dir, &["spec.toml", "--resume"]);
     let written = || {
-        let files = names(&at.join("results/spec"))
+        let files = names(&dir.join("results/spec"))
             .into_iter()
-            .map(|name| at.join("results/spec").join(name));
+            .map(|name| dir.join("results/spec").join(name));
         files
             .map(|file| (fs::metadata(&file).unwrap().modified().unwrap(), file))
             .collect::<Vec<_>>()
     };
     let first = written();
-    let resumed = run(at, &["spec.toml", "--resume"]);
+    let resumed = run(dir, &["spec.toml", "--resume"]);
     ended(&resumed, 0, &[]);
     assert!(text(&resumed.stdout).contains("nothing was done"), "{}", text(&resumed.stdout));
     assert_eq!(
-        (names(&at.join("results")), written()),
+        (names(&dir.join("results")), written()),
         (vec![".lock".into(), "best_known.csv".into(), "spec".into()], first)
     );
-    // An interrupted repetition beside it is completed.
-    said(at, &["spec.toml"]);
-    fs::create_dir(at.join("results/spec.new/.partial")).unwrap();
+    // An interrupted repetition in the neighbouring folder is completed.
+    said(dir, &["spec.toml"]);
+    fs::create_dir(dir.join("results/spec.new/.partial")).unwrap();
     fs::copy(
-        at.join("results/spec.new/resolved.toml"),
-        at.join("results/spec.new/.partial/resolved.toml"),
+        dir.join("results/spec.new/resolved.toml"),
+        dir.join("results/spec.new/.partial/resolved.toml"),
     )
     .unwrap();
-    said(at, &["spec.toml", "--resume"]);
-    assert!(!at.join("results/spec.new/.partial").exists());
+    said(dir, &["spec.toml", "--resume"]);
+    assert!(!dir.join("results/spec.new/.partial").exists());
     // The suite of cases is no exception.
-    fs::write(at.join("suite.toml"), SUITE).unwrap();
-    said(at, &["suite.toml"]);
-    assert!(said(at, &["suite.toml", "--resume"]).contains("nothing was done"));
+    fs::write(dir.join("suite.toml"), SUITE).unwrap();
+    said(dir, &["suite.toml"]);
+    assert!(said(dir, &["suite.toml", "--resume"]).contains("nothing was done"));
 }
 
 #[test]
@@ -135,21 +132,21 @@ fn a_missing_folder_is_named_before_the_work() {
 #[test]
 fn the_finished_runs_of_an_interrupted_experiment_are_discarded_by_force_only() {
     let folder = folder("spec.toml");
-    let at = folder.path();
-    said(at, &["spec.toml", "--shard=1/2"]);
-    refused(at, &["spec.toml"], &["finished runs", "--resume", "--force"]);
-    assert!(at.join("results/spec/.partial/000000").is_dir());
-    said(at, &["spec.toml", "--resume"]);
-    said(at, &["spec.toml", "--out=whole"]);
-    assert!(reproducible(&at.join("results/spec")) == reproducible(&at.join("whole/spec")));
+    let dir = folder.path();
+    said(dir, &["spec.toml", "--shard=1/2"]);
+    refused(dir, &["spec.toml"], &["finished runs", "--resume", "--force"]);
+    assert!(dir.join("results/spec/.partial/000000").is_dir());
+    said(dir, &["spec.toml", "--resume"]);
+    said(dir, &["spec.toml", "--out=whole"]);
+    assert!(reproducible(&dir.join("results/spec")) == reproducible(&dir.join("whole/spec")));
 }
 
 #[test]
-fn a_damaged_finished_run_is_named_and_done_again_or_refused() {
+fn a_damaged_finished_run_is_named_and_repeated_or_rejected() {
     let folder = folder("spec.toml");
-    let at = folder.path();
-    said(at, &["spec.toml", "--out=whole"]);
-    let whole = reproducible(&at.join("whole/spec"));
+    let dir = folder.path();
+    said(dir, &["spec.toml", "--out=whole"]);
+    let whole = reproducible(&dir.join("whole/spec"));
     let damages: [fn(&Path); 3] = [
         |part| fs::remove_file(part.join("runs.csv")).unwrap(),
         |part| fs::write(part.join("timing.csv"), "").unwrap(),
@@ -162,53 +159,44 @@ fn a_damaged_finished_run_is_named_and_done_again_or_refused() {
     for (number, damage) in damages.into_iter().enumerate() {
         let one = format!("one{number}");
         let two = format!("two{number}");
-        said(at, &["spec.toml", "--shard=1/2", "--out", &one]);
-        said(at, &["spec.toml", "--shard=2/2", "--out", &two]);
-        damage(&at.join(&one).join("spec/.partial/000002"));
-        let merge = run(at, &["merge", &one, &two, "--out=merged"]);
+        said(dir, &["spec.toml", "--shard=1/2", "--out", &one]);
+        said(dir, &["spec.toml", "--shard=2/2", "--out", &two]);
+        damage(&dir.join(&one).join("spec/.partial/000002"));
+        let merge = run(dir, &["merge", &one, &two, "--out=merged"]);
         let error = text(&merge.stderr);
         assert!(
             !merge.status.success() && error.contains("000002") && error.contains("damaged"),
             "{error}"
         );
-        assert!(!at.join("merged").exists());
-        let resumed = run(at, &["spec.toml", "--resume", "--out", &one]);
+        assert!(!dir.join("merged").exists());
+        let resumed = run(dir, &["spec.toml", "--resume", "--out", &one]);
         ended(&resumed, 0, &["done again", "000002"]);
-        assert!(reproducible(&at.join(&one).join("spec")) == whole);
+        assert!(reproducible(&dir.join(&one).join("spec")) == whole);
     }
 }
 
 #[test]
 fn the_page_replaces_no_file_of_another_kind() {
     let folder = folder("spec.toml");
-    let at = folder.path();
-    said(at, &["spec.toml"]);
-    refused(at, &["report", "--out=spec.toml"], &["--out", "spec.toml", "HTML"]);
-    refused(at, &["report", "--out=results/spec/runs.csv"], &["--out", "runs.csv", "HTML"]);
-    refused(at, &["report", "--out=x.csv"], &["a name that ends with", ".html", "accepted"]);
-    assert_eq!(fs::read_to_string(at.join("spec.toml")).unwrap(), SPEC);
+    let dir = folder.path();
+    said(dir, &["spec.toml"]);
+    refused(dir, &["report", "--out=spec.toml"], &["--out", "spec.toml", "HTML"]);
+    refused(dir, &["report", "--out=results/spec/runs.csv"], &["--out", "runs.csv", "HTML"]);
+    refused(dir, &["report", "--out=x.csv"], &["a name that ends with", ".html", "accepted"]);
+    assert_eq!(fs::read_to_string(dir.join("spec.toml")).unwrap(), SPEC);
     for _ in 0..2 {
-        said(at, &["report", "--out=page.html"]);
+        said(dir, &["report", "--out=page.html"]);
     }
 }
 
 #[test]
 fn results_come_from_the_programs_repository_and_not_from_the_current_folders() {
     let folder = folder("spec.toml");
-    let git = |args: &[&str]| {
-        let by = ["-c", "user.name=x", "-c", "user.email=x", "-c", "init.defaultBranch=x"];
-        std::process::Command::new("git")
-            .args(by)
-            .args(args)
-            .current_dir(folder.path())
-            .output()
-            .ok()
-    };
-    git(&["init"]);
-    git(&["commit", "--allow-empty", "--no-gpg-sign", "--message=x"]);
-    let Some(elsewhere) = git(&["rev-parse", "HEAD"]).filter(|output| output.status.success())
-    else {
-        return eprintln!("left out: there is no git");
+    git(folder.path(), &["init"]);
+    git(folder.path(), &["commit", "--allow-empty", "--no-gpg-sign", "--message=x"]);
+    let head = git(folder.path(), &["rev-parse", "HEAD"]);
+    let Some(elsewhere) = head.filter(|output| output.status.success()) else {
+        return eprintln!("skipped: there is no git");
     };
     said(folder.path(), &["spec.toml"]);
     let provenance =
@@ -218,33 +206,44 @@ fn results_come_from_the_programs_repository_and_not_from_the_current_folders() 
     assert!(!env!("HARNESS_REVISION").starts_with(text(&elsewhere.stdout).trim()));
 }
 
+/// Runs git with an author and a branch, which a machine's configuration may lack.
+fn git(folder: &Path, args: &[&str]) -> Option<std::process::Output> {
+    let settings = ["-c", "user.name=x", "-c", "user.email=x", "-c", "init.defaultBranch=x"];
+    std::process::Command::new("git")
+        .args(settings)
+        .args(args)
+        .current_dir(folder)
+        .output()
+        .ok()
+}
+
 #[cfg(unix)]
 #[test]
-fn pipes_and_devices_are_refused_as_inputs_and_links_are_not_written_through() {
+fn pipes_and_devices_are_rejected_as_inputs_and_links_are_not_written_through() {
     use std::os::unix::fs::symlink;
     let folder = folder("spec.toml");
-    let at = folder.path();
+    let dir = folder.path();
     let made = std::process::Command::new("mkfifo")
         .args(["p.toml", "p.obj"])
-        .current_dir(at)
+        .current_dir(dir)
         .status();
     assert!(made.unwrap().success());
-    refused(at, &["p.toml"], &["p.toml", "not a regular file"]);
-    refused(at, &["spec.toml", "--scene=p.obj"], &["p.obj"]);
-    fs::write(at.join("precious"), "precious").unwrap();
-    fs::create_dir_all(at.join("results/spec")).unwrap();
+    refused(dir, &["p.toml"], &["p.toml", "not a regular file"]);
+    refused(dir, &["spec.toml", "--scene=p.obj"], &["p.obj"]);
+    fs::write(dir.join("precious"), "precious").unwrap();
+    fs::create_dir_all(dir.join("results/spec")).unwrap();
     for lock in ["results/.lock", "results/spec/.lock"] {
-        let _ = fs::remove_file(at.join(lock));
-        symlink(at.join("precious"), at.join(lock)).unwrap();
-        let output = run(at, &["spec.toml", "--force"]);
+        let _ = fs::remove_file(dir.join(lock));
+        symlink(dir.join("precious"), dir.join(lock)).unwrap();
+        let output = run(dir, &["spec.toml", "--force"]);
         assert!(
             !output.status.success() && text(&output.stderr).contains(lock),
             "{}",
             text(&output.stderr)
         );
-        fs::remove_file(at.join(lock)).unwrap();
+        fs::remove_file(dir.join(lock)).unwrap();
     }
-    assert_eq!(fs::read_to_string(at.join("precious")).unwrap(), "precious");
+    assert_eq!(fs::read_to_string(dir.join("precious")).unwrap(), "precious");
 }
 
 #[cfg(unix)]
@@ -273,27 +272,27 @@ fn arguments_need_not_be_utf_8() {
 #[test]
 fn the_first_signal_ends_even_a_program_that_waits_for_another() {
     let folder = folder("spec.toml");
-    let at = folder.path();
-    fs::create_dir(at.join("results")).unwrap();
-    let lock = fs::File::create(at.join("results/.lock")).unwrap();
+    let dir = folder.path();
+    fs::create_dir(dir.join("results")).unwrap();
+    let lock = fs::File::create(dir.join("results/.lock")).unwrap();
     lock.lock().unwrap();
-    let mut child = program(at, &["spec.toml"])
+    let mut child = program(dir, &["spec.toml"])
         .stderr(std::process::Stdio::null())
         .spawn()
         .unwrap();
-    // All runs are finished, and the best known costs are in use by us.
-    wait_for(&at.join("results/spec/runs.csv"));
+    // All runs are finished, and the program waits for the best known costs, which this test locks.
+    wait_for(&dir.join("results/spec/runs.csv"));
     let start = Instant::now();
     send("-TERM", &child);
     while child.try_wait().unwrap().is_none() && start.elapsed() < Duration::from_secs(5) {
         std::thread::sleep(Duration::from_millis(10));
     }
-    // Without effect on a program that has ended.
+    // This has no effect on a program that has ended.
     child.kill().unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(130), "{:?}", start.elapsed());
     // Nothing is lost.
     drop(lock);
-    said(at, &["spec.toml", "--resume"]);
+    said(dir, &["spec.toml", "--resume"]);
 }
 
 #[test]
@@ -310,16 +309,16 @@ fn control_characters_of_a_spec_do_not_reach_the_terminal() {
 }
 
 #[test]
-fn a_buffer_outside_the_folder_of_a_scene_is_read_by_a_spec_that_is_told_so_and_by_no_other() {
+fn only_a_spec_that_allows_it_reads_a_buffer_outside_the_folder_of_a_scene() {
     let folder = tempfile::tempdir().unwrap();
-    let at = &folder.path().join("inner");
-    fs::create_dir(at).unwrap();
-    fs::write(at.join("scene.gltf"), outside_scene("../outside.bin")).unwrap();
+    let dir = &folder.path().join("inner");
+    fs::create_dir(dir).unwrap();
+    fs::write(dir.join("scene.gltf"), outside_scene("../outside.bin")).unwrap();
     fs::write(folder.path().join("outside.bin"), outside_buffer()).unwrap();
     let spec = "question = 'q'\nscenes = ['scene.gltf']\nmethods = [{ method = 'median_cut' }]\n";
-    fs::write(at.join("spec.toml"), spec).unwrap();
-    refused(at, &["spec.toml"], &["buffers[0]", "outside the scene's folder", "--outside-files"]);
-    said(at, &["spec.toml", "--outside-files"]);
-    fs::write(at.join("told.toml"), format!("outside_files = true\n{spec}")).unwrap();
-    said(at, &["told.toml"]);
+    fs::write(dir.join("spec.toml"), spec).unwrap();
+    refused(dir, &["spec.toml"], &["buffers[0]", "outside the scene's folder", "--outside-files"]);
+    said(dir, &["spec.toml", "--outside-files"]);
+    fs::write(dir.join("told.toml"), format!("outside_files = true\n{spec}")).unwrap();
+    said(dir, &["told.toml"]);
 }

@@ -1,4 +1,5 @@
-//! Ordinary rays make no kernel meet subnormal numbers: Intel's processors take about 150 cycles for each of these.
+//! Ordinary rays lead no kernel to subnormal numbers, each of which costs Intel processors about
+//! 150 cycles.
 #![cfg(target_arch = "x86_64")]
 
 use bvh_build::{Builder, muller_fellner};
@@ -11,14 +12,14 @@ use std::arch::asm;
 const KINDS: [Kind; 4] = [Kind::Primary, Kind::Bounce, Kind::Shadow, Kind::Incoherent];
 const INSIDE: Viewpoint = Viewpoint { eye: [0.3, 0.4, 0.6], target: [0.8, 0.5, 0.3] };
 
-/// The flags of the control and status register that say: an operand, or a result, was subnormal.
+/// The flags of the control and status register for subnormal operands and results.
 const SUBNORMAL_OPERAND: u32 = 1 << 1;
 const UNDERFLOW: u32 = 1 << 4;
 const ALL_FLAGS: u32 = 0b11_1111;
 
 fn control_and_status() -> u32 {
     let mut register = 0u32;
-    // SAFETY: the instruction writes four bytes to the address of `register`.
+    // SAFETY: the instruction writes exactly the four bytes of `register`.
     unsafe { asm!("stmxcsr [{}]", in(reg) &raw mut register, options(nostack)) };
     register
 }
@@ -37,7 +38,7 @@ fn raised_by(work: impl FnOnce()) -> Option<&'static str> {
     }
 }
 
-/// Every way in which a layout answers rays, each with the flags that it raised.
+/// Answers rays in every way that a layout has. Returns each way with the flag that it raised.
 fn flags(wide: &WideBvh, rays: &[Ray]) -> Vec<(&'static str, Option<&'static str>)> {
     let mut hits = vec![Hit::MISS; rays.len()];
     let mut shadows = vec![false; rays.len()];

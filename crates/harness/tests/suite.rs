@@ -5,7 +5,6 @@ use bvh_core::cost::{Objective, total_area};
 use bvh_core::{
     Aabb, Primitives, RayDensity, Segment, Triangle, WideBvh, file, validate, validate_references,
 };
-use bvh_scenes::Scene;
 use bvh_scenes::builtin::stiff::{self, STIFF};
 use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_search::{Budget, Method, Problem, Splits, StopReason, optimize, solve};
@@ -22,7 +21,7 @@ use std::collections::BTreeSet;
 /// Nodes per object that a search may make or visit here.
 const WORK: u64 = 150;
 
-/// What is asked of every method in the quick tier.
+/// The effort for every method in the quick tier.
 const QUICK: Effort = Effort { builders: Size::Few, work_per_object: WORK, larger: None };
 
 /// Panics with all broken promises at once.
@@ -40,20 +39,12 @@ fn broken(case: &Case, subject: &str, cell: Option<Cell>) -> Option<String> {
 }
 
 #[test]
-fn every_case_from_s01_to_s45_is_there_and_checked() {
-    let ids: Vec<String> = CASES
-        .iter()
-        .map(|case| case.id.to_owned())
-        .collect();
-    assert_eq!(
-        ids,
-        (1..=45)
-            .map(|i| format!("S{i:02}"))
-            .collect::<Vec<_>>()
-    );
+fn every_case_from_s01_to_s45_exists_and_is_checked() {
+    let expected = (1..=45).map(|number| format!("S{number:02}"));
+    assert!(CASES.iter().map(|case| case.id).eq(expected));
     for case in &CASES {
         assert!(!case.checks.is_empty(), "{} has no check", case.id);
-        // A check of a method or a part that does not exist would never be made.
+        // A check of a method that does not exist would never be performed.
         for check in case.checks {
             match check {
                 Check::Method(Some(name), _) => {
@@ -69,24 +60,20 @@ fn every_case_from_s01_to_s45_is_there_and_checked() {
 }
 
 #[test]
-fn every_scene_has_the_size_it_is_asked_for() {
+fn every_scene_has_the_requested_size() {
+    let mut scenes = 0;
     for case in &CASES {
         if let Some(scene) = case.scene() {
             let few = scene.sizes[0];
             assert_eq!(case.triangles(few).len(), few, "{}", case.id);
             assert!(scene.sizes.is_sorted(), "{}", case.id);
+            scenes += 1;
         }
     }
-    assert_eq!(
-        STIFF.len(),
-        CASES
-            .iter()
-            .filter(|case| case.scene().is_some())
-            .count()
-    );
+    assert_eq!(scenes, STIFF.len());
 }
 
-/// Every case with every one of these methods.
+/// Checks every case with each of these methods.
 fn check_methods(methods: &[(String, Method)], effort: Effort) {
     let found = methods
         .par_iter()
@@ -133,50 +120,23 @@ fn every_traversal_answers_as_brute_force_on_every_scene() {
     assert_kept(found);
 }
 
-/// Four meshes and a closed box, by rays drawn from several seeds.
-#[test]
-#[ignore = "slow: a million rays, each against every triangle"]
-fn every_traversal_answers_a_million_rays_as_brute_force() {
-    let clusters =
-        ["escher", "bijou", "konistil", "pinecon2"].map(|name| format!("{name}:cluster:200:1"));
-    let meshes = clusters.map(|name| Scene::load(&name).unwrap().primitives);
-    let meshes = meshes
-        .into_iter()
-        .chain([Primitives::Triangles(stiff::closed_box(192))]);
-    let mut jobs = Vec::new();
-    for objects in meshes {
-        jobs.extend((0..20).map(|seed| (objects.clone(), seed)));
-    }
-    let broken: Vec<String> = jobs
-        .par_iter()
-        .flat_map_iter(|(objects, seed)| {
-            let Primitives::Triangles(triangles) = objects else { unreachable!("all are meshes") };
-            let rays = tracing::rays(triangles, 10_000, *seed);
-            TRAVERSALS
-                .iter()
-                .filter_map(move |(name, traversal)| {
-                    let broken = tracing::check(*traversal, objects, &rays).err()?;
-                    Some(format!("{name}, seed {seed}: {broken}"))
-                })
-        })
-        .collect();
-    assert_kept(broken);
-}
-
-/// Powers of two by which scenes are scaled, each for an equal part of the rays: most of them where vector kernels take no detours,
-/// the others to nearly the largest, nearly the smallest and to denormal coordinates.
+/// The powers of two that scale scenes, each for an equal part of the rays. Most of them keep
+/// vector kernels on their fast path, the others lead to nearly the largest, nearly the smallest
+/// and to denormal coordinates.
 const SCALES: [i32; 8] = [0, 0, 1, 20, -20, 120, -120, -140];
 
-/// Rays that are answered at once, so that their answers take little memory.
+/// The number of rays that are answered together, which limits the memory for their answers.
 const PIECE: usize = 25_000;
 
-/// Most triangles of a scene of which all are tested by a million rays: enough for a few nodes.
+/// The maximum number of triangles of a scene that a million rays test one by one; enough for a few
+/// nodes.
 const TESTED: usize = 40;
 
-/// The scene of a case, times two to this power.
+/// The scene of a case, scaled by two to this power.
 type Scaled = (&'static Case, i32, Vec<Triangle>);
 
-/// The scene of every case that has one, in its smallest size but with at most so many triangles.
+/// Returns the scene of every case that has one, in its smallest size and with at most `most`
+/// triangles.
 fn scenes(most: usize) -> impl Iterator<Item = (&'static Case, Vec<Triangle>)> {
     CASES.iter().filter_map(move |case| {
         let few = case.scene()?.sizes[Size::Few as usize];
@@ -184,7 +144,8 @@ fn scenes(most: usize) -> impl Iterator<Item = (&'static Case, Vec<Triangle>)> {
     })
 }
 
-/// So many rays of both sorts, or a few more, through the scene of every case, at every scale at which it is finite.
+/// Checks at least these numbers of rays in the scene of every case, at every scale at which the
+/// scene is finite.
 fn check_kernels(random: usize, adversarial: usize) {
     let mut jobs = Vec::new();
     for (case, triangles) in scenes(TESTED) {
@@ -195,27 +156,23 @@ fn check_kernels(random: usize, adversarial: usize) {
         let pieces = random.div_ceil(PIECE * scaled.len()) * scaled.len();
         jobs.extend((0..pieces).map(|piece| (pieces, scaled[piece % scaled.len()].clone())));
     }
-    let check = |(seed, (pieces, (case, scale, triangles))): (usize, (usize, Scaled))| {
-        let random = random.div_ceil(pieces);
-        let adversarial = adversarial.div_ceil(pieces);
-        let mut rays = kernels::random(&triangles, random, seed as u64);
-        rays.extend(kernels::adversarial(&triangles, adversarial, seed as u64));
-        let name = format!("{} ({}) * 2^{scale}, seed {seed}", case.id, case.name);
-        assert_eq!(rays.len(), random + adversarial, "{name}");
-        kernels::check(&triangles, &rays).map_err(|broken| format!("{name}, {broken}"))
-    };
     let checked: Vec<Result<usize, String>> = jobs
         .into_par_iter()
         .enumerate()
-        .map(check)
+        .map(|(seed, (pieces, (case, scale, triangles)))| {
+            let random = random.div_ceil(pieces);
+            let adversarial = adversarial.div_ceil(pieces);
+            let mut rays = kernels::random(&triangles, random, seed as u64);
+            rays.extend(kernels::adversarial(&triangles, adversarial, seed as u64));
+            let name = format!("{} ({}) * 2^{scale}, seed {seed}", case.id, case.name);
+            assert_eq!(rays.len(), random + adversarial, "{name}");
+            kernels::check(&triangles, &rays).map_err(|broken| format!("{name}, {broken}"))
+        })
         .collect();
     let hits: usize = checked.iter().flatten().sum();
-    assert_kept(
-        checked
-            .into_iter()
-            .filter_map(Result::err)
-            .collect(),
-    );
+    let broken = checked.into_iter().filter_map(Result::err);
+    assert_kept(broken.collect());
+    // Rays that miss everything would prove little.
     let rays = STIFF.len() * (random + adversarial);
     assert!(hits > rays / 10, "{hits} of {rays} rays hit");
 }
@@ -267,7 +224,7 @@ fn best() -> Method {
     Method::Best(bvh_search::best::Config::default())
 }
 
-/// The cost that is reported for a tree is the one that it has.
+/// Asserts that the reported cost of a tree is its cost.
 fn assert_reported(who: &str, reported: f64, cost: f64) {
     assert!(
         (reported - cost).abs() <= examine::ROUNDING * cost,
@@ -275,7 +232,7 @@ fn assert_reported(who: &str, reported: f64, cost: f64) {
     );
 }
 
-/// The layout answers rays through the triangles as another one does.
+/// Asserts that two layouts give the same answers to rays through the triangles.
 fn assert_same_answers(case: &Case, wide: &WideBvh, plain: &WideBvh, triangles: &[Triangle]) {
     for ray in tracing::rays(triangles, 300, 2) {
         assert_eq!(wide.nearest_hit(&ray), plain.nearest_hit(&ray), "{}: {ray:?}", case.id);
@@ -303,10 +260,10 @@ fn every_objective_is_what_its_method_reports() {
 }
 
 #[test]
-fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
+fn every_case_holds_with_the_visits_of_rays_instead_of_area() {
     let method = best();
     let mut searched = 0;
-    let mut refused = 0;
+    let mut without_density = 0;
     for (case, triangles) in scenes(2000) {
         let boxes = stiff::boxes(&triangles);
         let bounds = boxes
@@ -327,7 +284,7 @@ fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
             })
             .collect();
         let Ok(density) = RayDensity::of_rays(&bounds, &segments, 0.1) else {
-            refused += 1;
+            without_density += 1;
             continue;
         };
         searched += 1;
@@ -340,7 +297,8 @@ fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
         validate(&outcome.tree, &boxes).unwrap();
         assert!(outcome.cost <= problem.cost(&start), "{}: a worse tree", case.id);
         assert_reported(case.id, outcome.cost, problem.cost(&outcome.tree));
-        // What is saved can be loaded, and every ray has its right answer in the layout for these rays.
+        // What is saved can be loaded, and every ray has its right answer in the layout for these
+        // rays.
         let visits = density.visits(&outcome.tree);
         let bytes = file::save(
             &outcome.tree,
@@ -360,7 +318,7 @@ fn every_case_holds_with_the_visits_of_rays_in_place_of_area() {
         let plain = WideBvh::new(&start, &triangles).unwrap();
         assert_same_answers(case, &wide, &plain, &triangles);
     }
-    assert!(searched > 25 && refused < 10, "{searched} searched, {refused} without a density");
+    assert!(searched > 25 && without_density < 10, "{searched}, {without_density}");
 }
 
 #[test]
@@ -419,12 +377,15 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
     let method = best();
     let mut divided = 0;
     for (case, few) in scenes(300) {
-        // Long ones, which are worth dividing, from one corner of the scene to another.
+        // Only long triangles, from one part of the scene to another, are worth dividing.
         let others = few.iter().cycle().skip(few.len() / 2);
-        let long = |(near, far): (&Triangle, &Triangle)| Triangle([near.0[0], near.0[1], far.0[2]]);
-        let triangles: Vec<Triangle> = few.iter().zip(others).map(long).collect();
-        // The parts of triangles have coordinates of their own, up to 2^-100 times as large as the triangle's: they too are to be
-        // normal numbers.
+        let triangles: Vec<Triangle> = few
+            .iter()
+            .zip(others)
+            .map(|(near, far)| Triangle([near.0[0], near.0[1], far.0[2]]))
+            .collect();
+        // The parts of triangles have new coordinates, as small as 2^-100 times the triangle's.
+        // They must be normal numbers too.
         let range = scale_range(&stiff::boxes(&triangles));
         let range = range.start() + 100..=*range.end();
         if triangles.is_empty() || !range.contains(&0) {
@@ -483,7 +444,7 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
 }
 
 #[test]
-fn a_cancelled_method_says_so() {
+fn a_cancelled_method_reports_it() {
     struct Impatient;
     impl bvh_search::Observer for Impatient {
         fn cancelled(&self) -> bool {

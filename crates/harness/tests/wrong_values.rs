@@ -1,6 +1,7 @@
-//! A wrong value under any key of a spec or any flag of the program is refused with exit code 2 and its name.
+//! A wrong value under any key of a spec, or of any flag of the program, is rejected with exit code
+//! 2 and its name.
 //!
-//! No key and no flag is listed here: keys are asked of the parser, flags of `--help`, so that new ones are tried too.
+//! The parser lists the keys, and `--help` the flags, so that new ones are tested too.
 
 mod support;
 
@@ -29,27 +30,25 @@ fn follow<'a>(value: &'a mut Value, step: &Step) -> &'a mut Value {
     }
 }
 
-/// The paths of all tables in a value.
+/// Collects the paths of all tables in a value.
 fn tables(value: &Value, path: &[Step], found: &mut Vec<Vec<Step>>) {
-    let on = |step: Step| [path, &[step]].concat();
     match value {
         Value::Table(table) => {
             found.push(path.to_vec());
-            table
-                .iter()
-                .for_each(|(key, value)| tables(value, &on(Step::Key(key.clone())), found));
+            for (key, value) in table {
+                tables(value, &[path, &[Step::Key(key.clone())]].concat(), found);
+            }
         }
         Value::Array(array) => {
-            array
-                .iter()
-                .enumerate()
-                .for_each(|(index, value)| tables(value, &on(Step::Index(index)), found));
+            for (index, value) in array.iter().enumerate() {
+                tables(value, &[path, &[Step::Index(index)]].concat(), found);
+            }
         }
         _ => {}
     }
 }
 
-/// A spec with the value at a key of the table at `path`.
+/// Returns a spec with the value under a key of the table at `path`.
 fn with(spec: &Value, path: &[Step], key: &str, value: Value) -> Value {
     let mut spec = spec.clone();
     path.iter()
@@ -60,14 +59,14 @@ fn with(spec: &Value, path: &[Step], key: &str, value: Value) -> Value {
     spec
 }
 
-/// The error's exit code and message.
+/// Parses a spec. An error is an exit code and a message.
 fn read(spec: &Value) -> Result<Experiment, (u8, String)> {
     let text = toml::to_string(spec).unwrap();
     Experiment::parse(Path::new("folder/some.toml"), &text, &Overrides::default())
         .map_err(|error| (error.exit_code(), error.to_string()))
 }
 
-/// The names that a message gives as accepted.
+/// Returns the names that a message lists as accepted.
 fn accepted(message: &str) -> Vec<String> {
     let Some((_, names)) = message.split_once("expected ") else { return Vec::new() };
     names
@@ -78,15 +77,16 @@ fn accepted(message: &str) -> Vec<String> {
         .collect()
 }
 
-/// Where a table is, whatever its number: arrays' elements are told by their method or kind.
+/// Returns the place of a table. It names elements of arrays by their method or kind instead of
+/// their index, so that each method and kind is tested once.
 fn place(spec: &Value, path: &[Step]) -> String {
-    let mut at = spec.clone();
+    let mut value = spec.clone();
     let mut place = String::new();
     for step in path {
-        at = follow(&mut at, step).clone();
+        value = follow(&mut value, step).clone();
         let tag = ["kind", "method"]
             .iter()
-            .find_map(|tag| at.get(tag)?.as_str())
+            .find_map(|tag| value.get(tag)?.as_str())
             .unwrap_or_default();
         match step {
             Step::Key(key) => place += &format!(".{key}"),
@@ -96,13 +96,13 @@ fn place(spec: &Value, path: &[Step]) -> String {
     place
 }
 
-/// The committed experiments with every default spelled out, and one with every method.
+/// Returns the committed experiments with every default spelled out, and one with every method.
 fn specs() -> Vec<Value> {
     let mut specs = Vec::new();
     for (_, text) in experiments() {
         let mut spec: Table = text.parse().unwrap();
         spec.remove("quick");
-        // Other libraries may not be compiled in; any method may stand for them.
+        // Other libraries may not be compiled in, so a method of ours replaces them.
         for method in spec
             .get_mut("methods")
             .and_then(Value::as_array_mut)
@@ -127,7 +127,7 @@ fn specs() -> Vec<Value> {
         .iter()
         .map(|method| Table::try_from(method).unwrap())
         .collect();
-    let question = Value::from("Which keys has every method?");
+    let question = Value::from("Which keys does every method have?");
     let all =
         [("question", question), ("scenes", vec!["escher"].into()), ("methods", methods.into())];
     let mut all: Table = all
@@ -148,7 +148,7 @@ tracing = { cameras = { escher = { eye = [1.0, 2.0, 3.0], target = [0.5, 0.5, 0.
 }
 
 #[test]
-fn a_wrong_value_under_any_key_of_a_spec_is_refused_by_name() {
+fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
     let wrong = Value::Datetime("1979-05-27".parse().unwrap());
     let [nan, infinite] = [f64::NAN, f64::NEG_INFINITY].map(Value::from);
     let doubtful = [
@@ -167,7 +167,7 @@ fn a_wrong_value_under_any_key_of_a_spec_is_refused_by_name() {
     ];
     let mut seen = BTreeMap::new();
     let found = RefCell::new(BTreeSet::new());
-    let complain = |what: String| found.borrow_mut().insert(what);
+    let complain = |message: String| found.borrow_mut().insert(message);
     for spec in specs() {
         assert!(read(&spec).is_ok(), "{:?}", read(&spec));
         let mut paths = Vec::new();
@@ -181,7 +181,7 @@ fn a_wrong_value_under_any_key_of_a_spec_is_refused_by_name() {
                 .as_table()
                 .unwrap()
                 .clone();
-            // A key that no table has makes the parser list those that it would accept.
+            // An unknown key makes the parser list the keys that it accepts.
             let unknown = read(&with(&spec, &path, "unheard_of", 1.into()));
             let listed = unknown.map_or_else(|(_, message)| accepted(&message), |_| Vec::new());
             for key in table.keys().cloned().chain(listed) {
@@ -196,9 +196,8 @@ fn a_wrong_value_under_any_key_of_a_spec_is_refused_by_name() {
                 {
                     Ok(_) => true,
                     Err((code, message)) => {
-                        // What is refused is the key, or one within it.
-                        // Nothing is wrong with a label but that a report names another. What a table may hold
-                        // can be for the key above to say.
+                        // The message names the key or one within it. A label is only wrong because
+                        // a report names another one. For a table, the key above may be named.
                         let other = key == "label" && message.contains("names method");
                         let above = path
                             .iter()
@@ -223,7 +222,7 @@ fn a_wrong_value_under_any_key_of_a_spec_is_refused_by_name() {
                     }
                 }
                 let taken: Vec<bool> = doubtful.iter().map(try_value).collect();
-                // Numbers count or measure something, but for what is so much above or below.
+                // All numbers are counts or measures, except percentages above or below a value.
                 if (taken[0] || taken[3] || taken[8]) && key != "percent" {
                     complain(format!("{place}.{key}: -1, -0.5 or [-1] is accepted"));
                 }
@@ -244,11 +243,11 @@ fn a_wrong_value_under_any_key_of_a_spec_is_refused_by_name() {
 }
 
 #[test]
-fn a_wrong_value_of_any_flag_is_refused_by_name() {
+fn a_wrong_value_of_any_flag_is_rejected_by_name() {
     let spec = "question = 'q'\nscenes = ['spheres75']\nmethods = [{ method = 'median_cut' }]\n";
     let folder = folder_with("spec.toml", spec);
     fs::copy(top().join("results/trees/spheres75.bvh"), folder.path().join("good.bvh")).unwrap();
-    // Every command with what it cannot do without.
+    // Every command with its required arguments.
     let flags = wrong_flags(
         folder.path(),
         &[

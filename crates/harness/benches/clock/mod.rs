@@ -1,11 +1,12 @@
-//! `best` against the clock, as the benchmarks of whole searches need it.
+//! Runs `best` against the clock, for the benchmarks of full searches.
 
 use bvh_core::{cost, validate};
 use bvh_scenes::Scene;
 use bvh_search::{Budget, Deadline, Problem, solve};
 use std::time::Duration;
 
-/// The seconds that `best` takes when it may plan with `seconds`, and the internal area of its tree, which is valid.
+/// Runs `best` with a plan of `seconds`. Returns its wall time and the internal area of its valid
+/// tree.
 pub fn best(scene: &Scene, seconds: f64, seed: u64) -> (f64, f64) {
     let deadline = Deadline::after(Duration::from_secs_f64(seconds));
     let config = bvh_search::best::Config::default();

@@ -1,4 +1,4 @@
-//! Ratios of times measured in turns, so that a machine whose speed drifts does not favour either side.
+//! Ratios of times from interleaved rounds, which cancel a drift of the machine's speed.
 
 use harness::statistics::quantile;
 use std::time::Instant;
@@ -6,13 +6,13 @@ use std::time::Instant;
 /// A named piece of work.
 pub type Contender<'a> = (&'a str, Box<dyn FnMut() + 'a>);
 
-/// Runs all contenders in turns, `rounds` times after one warm-up, and prints each one's median and least time and the
-/// quartiles of its ratios to the first, round by round.
+/// Runs all contenders in `rounds` interleaved rounds after a warm-up. Prints the median and the
+/// least time of each, and the quartiles of its ratio to the first contender in the same round.
 pub fn compare(title: &str, rounds: usize, contenders: Vec<Contender<'_>>) {
     compare_each_after(|| (), title, rounds, contenders);
 }
 
-/// The same, with something done before each that is not timed.
+/// Does the same as [`compare`], with untimed work before each contender.
 pub fn compare_each_after(
     mut before: impl FnMut(),
     title: &str,

@@ -1,4 +1,4 @@
-//! Boxes of any bits through every builder, search, bound and conversion.
+//! Boxes of arbitrary bits for every builder, search, bound and conversion.
 
 use super::bytes::Bytes;
 use bvh_build::{Builder, muller_fellner};
@@ -9,10 +9,10 @@ use bvh_search::{Budget, Method, Problem, SearchError, best, lower_bound, optimi
 use harness::stress::EXACT_OBJECTS;
 use harness::stress::examine::{ROUNDING, check_outcome};
 
-/// Most boxes of one input.
+/// The maximum number of boxes of one input.
 const MOST: usize = 20;
 
-/// The bytes: how to read the rest, a seed, the budget, then boxes.
+/// Reads a mode, a seed, a budget, then boxes, and checks that they are rejected or built.
 pub fn boxes(bytes: &[u8]) {
     let mut bytes = Bytes(bytes);
     let [mode, seed, budget] = bytes.take();
@@ -33,57 +33,46 @@ pub fn boxes(bytes: &[u8]) {
     } else {
         Budget { max_evaluations: None, max_work: limit.map(|limit| limit * 40) }
     };
-    let bad = boxes.iter().position(|b| {
-        let min = b.min.to_array();
-        let max = b.max.to_array();
-        !(0..3).all(|axis| min[axis].is_finite() && max[axis].is_finite() && min[axis] <= max[axis])
-    });
-    match bad {
-        Some(bad) => refused(&boxes, bad, seed.into(), budget),
-        None => built(&boxes, seed.into(), budget),
+    match boxes.iter().position(is_invalid) {
+        Some(object) => check_rejected(&boxes, object, seed.into(), budget),
+        None => check_built(&boxes, seed.into(), budget),
     }
 }
 
-/// Everything names the object.
-fn refused(boxes: &[Aabb], bad: usize, seed: u64, budget: Budget) {
-    let named = |who: &str, message: String| {
-        assert!(message.contains(&format!("object {bad} ")), "{who}: {message}");
-    };
+fn is_invalid(aabb: &Aabb) -> bool {
+    let is_finite = aabb.min.is_finite() && aabb.max.is_finite();
+    !is_finite || aabb.min.cmpgt(aabb.max).any()
+}
+
+/// Checks that all errors name the invalid object.
+fn check_rejected(boxes: &[Aabb], object: usize, seed: u64, budget: Budget) {
+    let problem = Problem::new(boxes);
+    let mut messages = Vec::new();
     for method in Method::all() {
+        // Too many objects are an earlier error of the exact method.
         if matches!(method, Method::Exact(_)) && boxes.len() > EXACT_OBJECTS {
             continue;
         }
-        let error =
-            solve(&method, &Problem::new(boxes), seed, budget, &()).expect_err(method.name());
+        let error = solve(&method, &problem, seed, budget, &()).expect_err(method.name());
         assert!(matches!(error, SearchError::Build(_)), "{}: {error:?}", method.name());
-        named(method.name(), error.to_string());
+        messages.push(error.to_string());
     }
-    named("check", check_boxes(boxes).unwrap_err().to_string());
-    named(
-        "KD-tree",
-        kd_tree::Config::default()
-            .build(boxes)
-            .unwrap_err()
-            .to_string(),
-    );
-    named(
-        "bound",
-        lower_bound::internal_area(boxes, 1, &())
-            .unwrap_err()
-            .to_string(),
-    );
+    let kd_tree = kd_tree::Config::default().build(boxes);
+    let bound = lower_bound::internal_area(boxes, 1, &());
     let config = best::Config::default();
-    let tree = Bvh::default();
-    named(
-        "optimize",
-        optimize(&tree, &Problem::new(boxes), &config, seed, budget, &())
-            .unwrap_err()
-            .to_string(),
-    );
+    let optimized = optimize(&Bvh::default(), &problem, &config, seed, budget, &());
+    messages.push(check_boxes(boxes).unwrap_err().to_string());
+    messages.push(kd_tree.unwrap_err().to_string());
+    messages.push(bound.unwrap_err().to_string());
+    messages.push(optimized.unwrap_err().to_string());
+    for message in messages {
+        assert!(message.contains(&format!("object {object} ")), "{message}");
+    }
 }
 
-/// Every method gives a tight tree of exact cost, the same one again, and what is made of trees holds too.
-fn built(boxes: &[Aabb], seed: u64, budget: Budget) {
+/// Checks that every method builds a tight tree of exact cost, twice the same, and that everything
+/// derived from the tree is valid too.
+fn check_built(boxes: &[Aabb], seed: u64, budget: Budget) {
     let bound = lower_bound::internal_area(boxes, lower_bound::DEFAULT_EFFORT, &()).unwrap();
     assert!(bound.is_finite() && bound >= 0.0);
     for method in Method::all() {
@@ -91,29 +80,19 @@ fn built(boxes: &[Aabb], seed: u64, budget: Budget) {
             Method::Exact(_) => &boxes[..boxes.len().min(EXACT_OBJECTS - 3)],
             _ => boxes,
         };
-        let solve = || solve(&method, &Problem::new(boxes), seed, budget, &());
-        let outcome = solve().unwrap_or_else(|error| panic!("{}: {error}", method.name()));
-        check_outcome(boxes, &outcome)
-            .unwrap_or_else(|broken| panic!("{}: {broken}", method.name()));
-        let again = solve().unwrap();
-        assert!(
-            again.tree == outcome.tree && again.history == outcome.history,
-            "{}",
-            method.name()
-        );
-        let binary = outcome
-            .tree
-            .nodes
-            .iter()
-            .all(|node| node.is_leaf() || node.children().len() == 2);
-        if binary && !matches!(method, Method::Exact(_)) {
-            assert!(
-                outcome.cost >= bound * (1.0 - ROUNDING),
-                "{} is below the bound",
-                method.name()
-            );
+        let name = method.name();
+        let problem = Problem::new(boxes);
+        let [outcome, again] = [(); 2].map(|()| {
+            solve(&method, &problem, seed, budget, &())
+                .unwrap_or_else(|error| panic!("{name}: {error}"))
+        });
+        check_outcome(boxes, &outcome).unwrap_or_else(|broken| panic!("{name}: {broken}"));
+        assert!(again.tree == outcome.tree && again.history == outcome.history, "{name}");
+        // The exact method got fewer boxes than the bound.
+        if is_binary(&outcome.tree) && !matches!(method, Method::Exact(_)) {
+            assert!(outcome.cost >= bound * (1.0 - ROUNDING), "{name} is below the bound");
         }
-        converted(&outcome.tree, boxes);
+        check_conversions(&outcome.tree, boxes);
     }
     let kd_tree = kd_tree::Config::default().build(boxes).unwrap();
     assert!(kd_tree.references() >= kd_tree.cells().min(1));
@@ -131,19 +110,21 @@ fn built(boxes: &[Aabb], seed: u64, budget: Budget) {
     }
 }
 
-/// Merged leaves, another library's nodes and a file give a valid tree, the latter two this very one.
-fn converted(tree: &Bvh, boxes: &[Aabb]) {
+fn is_binary(tree: &Bvh) -> bool {
+    let mut nodes = tree.nodes.iter();
+    nodes.all(|node| node.is_leaf() || node.children().len() == 2)
+}
+
+/// Checks that merged leaves, another library's nodes and a file give a valid tree, and the file
+/// the same one.
+fn check_conversions(tree: &Bvh, boxes: &[Aabb]) {
     let constants = SahConstants::default();
     let merged = collapse_leaves(tree, &constants);
     validate(&merged, boxes).unwrap();
     assert!(cost::sah(&merged, &constants) <= cost::sah(tree, &constants) * (1.0 + ROUNDING));
     let bytes = file::save(tree, boxes, &file::Origin::default()).unwrap();
     assert_eq!(file::load(&bytes, boxes).as_ref(), Ok(tree));
-    if tree
-        .nodes
-        .iter()
-        .all(|node| node.is_leaf() || node.children().len() == 2)
-    {
+    if is_binary(tree) {
         let other = Bvh::from_first_count(&tree.to_first_count(), &tree.prim_ids).unwrap();
         validate(&other, boxes).unwrap();
     }

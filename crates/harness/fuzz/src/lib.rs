@@ -1,7 +1,7 @@
-//! What any bytes must survive, as functions of the bytes: run by libFuzzer, and by `cargo test` on stable.
+//! The fuzz targets, functions of arbitrary bytes: libFuzzer runs them, and `cargo test` on stable.
 //!
-//! Each returns if the promises hold and panics if one is broken. Where most bytes would be refused at once, the first
-//! ones choose how the rest is read.
+//! A target returns if the promises hold and panics if one is broken. Where most bytes would be
+//! rejected immediately, the first bytes select how the rest is read.
 
 pub mod boxes;
 pub mod bytes;
@@ -16,7 +16,7 @@ pub use rays::rays;
 pub use spec::spec;
 pub use tree_file::tree_file;
 
-/// What takes any bytes.
+/// A function of arbitrary bytes.
 pub type Target = fn(&[u8]);
 
 /// Every target by name.

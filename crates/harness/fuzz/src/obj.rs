@@ -1,10 +1,11 @@
-//! OBJ files of any bytes.
+//! OBJ files of arbitrary bytes.
 
 use bvh_scenes::load::obj::parse;
 use std::fmt::Write;
 use std::path::Path;
 
-/// The bytes: a file. What is read is finite, counted, and the same when it is written and read again.
+/// Parses the bytes as a file. Checks that the mesh is finite and counted, and stays the same if it
+/// is written and read again.
 pub fn obj(bytes: &[u8]) {
     let path = Path::new("scene.obj");
     let mesh = match parse(bytes, path) {

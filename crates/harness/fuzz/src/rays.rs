@@ -1,16 +1,16 @@
-//! Rays and triangles of any bits: every traversal against testing every object.
+//! Rays and triangles of arbitrary bits: compares every traversal with testing every object.
 
 use super::bytes::Bytes;
 use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
 use bvh_core::{
-    Aabb, Hit, Primitives, Ray, Sphere, Triangle, any_hit_by, clip_to_box, nearest_hit_by,
+    Aabb, Primitives, Ray, Sphere, Triangle, any_hit_by, clip_to_box, nearest_hit_by,
     nearest_hit_of_all,
 };
 use bvh_scenes::trace::kd_tree;
 use glam::Vec3;
-use harness::stress::tracing::{TRAVERSALS, check};
+use harness::stress::tracing::{TRAVERSALS, bits, check};
 
-/// The bytes: how to read the rest, the number of triangles, an exponent, then triangles, then rays.
+/// Reads a mode, the number of triangles, an exponent, then triangles, then rays.
 pub fn rays(bytes: &[u8]) {
     let mut bytes = Bytes(bytes);
     let [mode, count, exponent] = bytes.take();
@@ -18,11 +18,8 @@ pub fn rays(bytes: &[u8]) {
     let few_in_rays = mode & 2 == 0;
     let scale = f32::from_bits(u32::from(exponent.clamp(1, 254)) << 23);
     let scale = if mode & 4 == 0 { 1.0 } else { scale };
-    // A scene is finite.
-    let finite = |at: Vec3| (at * scale).map(|c| if c.is_finite() { c } else { 0.0 });
-    let mut corner = || finite(bytes.point(few));
     let triangles: Vec<Triangle> = (0..count % 12)
-        .map(|_| Triangle([corner(), corner(), corner()]))
+        .map(|_| Triangle([(); 3].map(|()| finite(bytes.point(few) * scale))))
         .collect();
     let mut rays = Vec::new();
     while !bytes.0.is_empty() && rays.len() < 8 {
@@ -33,7 +30,7 @@ pub fn rays(bytes: &[u8]) {
         let range = if mode & 8 == 0 { (0.0, f32::INFINITY) } else { (t_min, t_max) };
         match Ray::new(origin, direction, range.0, range.1) {
             Ok(ray) => rays.push(ray),
-            // Every refusal has one of three reasons.
+            // A ray is rejected only for its direction's length, a NaN, or a negative start.
             Err(error) => assert!(
                 !(origin + direction).is_finite()
                     || direction.abs().max_element() < 1e-30
@@ -56,14 +53,20 @@ pub fn rays(bytes: &[u8]) {
         .collect();
     let around: Vec<Aabb> = spheres.iter().map(Sphere::aabb).collect();
     for ray in &rays {
-        over(&boxes, ray, |id, t_max| clip_to_box(ray, &boxes[id as usize], ray.t_min(), t_max));
-        over(&around, ray, |id, t_max| spheres[id as usize].intersect(ray, t_max));
+        check_trees(&boxes, ray, |id, t_max| {
+            clip_to_box(ray, &boxes[id as usize], ray.t_min(), t_max)
+        });
+        check_trees(&around, ray, |id, t_max| spheres[id as usize].intersect(ray, t_max));
     }
 }
 
-/// Trees and a KD-tree over the boxes answer as testing every object does.
-fn over(boxes: &[Aabb], ray: &Ray, test: impl Fn(u32, f32) -> Option<f32>) {
-    let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
+/// Replaces coordinates that are not finite, which every scene rejects.
+fn finite(point: Vec3) -> Vec3 {
+    point.map(|coordinate| if coordinate.is_finite() { coordinate } else { 0.0 })
+}
+
+/// Checks that trees and a KD-tree over the boxes give the answers of testing every object.
+fn check_trees(boxes: &[Aabb], ray: &Ray, test: impl Fn(u32, f32) -> Option<f32>) {
     let expected = nearest_hit_of_all(boxes.len() as u32, ray, &test, &mut ());
     let any = |id: u32| test(id, ray.t_max()).is_some();
     for builder in

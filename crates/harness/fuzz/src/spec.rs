@@ -1,9 +1,10 @@
-//! Specs of any bytes.
+//! Specs of arbitrary bytes.
 
 use harness::spec::{Experiment, Name, Overrides};
 use std::path::Path;
 
-/// The bytes: a spec. It is refused with its file named, or read, and then its resolved form is read as itself.
+/// Parses the bytes as a spec. Checks that the error names the file, or that the resolved spec
+/// reads back as itself.
 pub fn spec(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     let path = Path::new("spec.toml");

@@ -1,4 +1,4 @@
-//! Tree files of any bytes, as they are and with a right checksum.
+//! Tree files of arbitrary bytes, unmodified and with a right checksum.
 
 use bvh_core::cost::{self, SahConstants};
 use bvh_core::file::{Header, TreeFile, load};
@@ -7,10 +7,11 @@ use bvh_core::{
 };
 use glam::Vec3;
 
-/// The first byte says what is mended; the rest is a file.
+/// Opens the bytes after the first one as a file. The first byte selects the fields that are
+/// corrected.
 pub fn tree_file(bytes: &[u8]) {
     let Some((&mode, bytes)) = bytes.split_first() else { return };
-    // As a mapped file lies, so that views are tried.
+    // Views need the alignment of a mapped file.
     let mut held = vec![Line([0; 64]); bytes.len().div_ceil(64)];
     for (line, part) in held.iter_mut().zip(bytes.chunks(64)) {
         line.0[..part.len()].copy_from_slice(part);
@@ -21,7 +22,7 @@ pub fn tree_file(bytes: &[u8]) {
         .take(bytes.len())
         .collect();
     if mode & 1 == 1 && flat.len() >= Header::BYTES {
-        mend_start(&mut flat, mode & 2 == 2, mode & 4 == 4);
+        correct_header(&mut flat, mode & 2 == 2, mode & 4 == 4);
         seal(&mut flat);
         for (line, part) in held.iter_mut().zip(flat.chunks(64)) {
             line.0[..part.len()].copy_from_slice(part);
@@ -29,8 +30,8 @@ pub fn tree_file(bytes: &[u8]) {
     }
     let lines = held.len();
     let len = flat.len();
-    // SAFETY: `Line` is an array of bytes, so `lines` of them are 64 times as many initialised bytes, and `len` is no
-    // more.
+    // SAFETY: `Line` is an array of 64 bytes without padding, so `lines` of them are `64 * lines`
+    // initialised bytes.
     let aligned = unsafe { std::slice::from_raw_parts(held.as_ptr().cast::<u8>(), lines * 64) };
     opened(&aligned[..len]);
     let _ = TreeFile::open(&flat).map(|file| (file.view().is_ok(), file.tree().is_ok()));
@@ -40,8 +41,9 @@ pub fn tree_file(bytes: &[u8]) {
 #[repr(align(64))]
 struct Line([u8; 64]);
 
-/// Gives a file the right first bytes and, if asked for, as many objects as its length has room for, and visits.
-fn mend_start(bytes: &mut [u8], counts: bool, visits: bool) {
+/// Gives a file the right magic bytes and, on request, visits, and as many objects as fit its
+/// length.
+fn correct_header(bytes: &mut [u8], counts: bool, visits: bool) {
     bytes[..8].copy_from_slice(&Header::MAGIC);
     bytes[8..12].copy_from_slice(&(Header::VERSION - u32::from(!visits)).to_le_bytes());
     bytes[12..16].copy_from_slice(&[4, 3, 2, 1]);
@@ -55,7 +57,8 @@ fn mend_start(bytes: &mut [u8], counts: bool, visits: bool) {
     }
 }
 
-/// Writes the checksum, bit by bit as the definition of CRC-32 has it, in the order that `bvh_core::file` documents.
+/// Writes the CRC-32, computed bit by bit from its definition, over the bytes that `bvh_core::file`
+/// documents.
 fn seal(file: &mut [u8]) {
     let covered = file[Header::BYTES..].iter().chain(&file[..188]);
     let sum = !covered.fold(u32::MAX, |sum, byte| {
@@ -106,7 +109,7 @@ fn rays() -> impl Iterator<Item = Ray> {
         .flatten()
 }
 
-/// Every traversal ends, tests only objects that there are, and none twice.
+/// Checks that every traversal ends, tests only existing objects, and none twice.
 fn traced(tree: &Bvh, objects: usize) {
     for ray in rays() {
         let mut counts = TestCounts::default();
@@ -120,7 +123,7 @@ fn traced(tree: &Bvh, objects: usize) {
     }
 }
 
-/// Whatever the boxes are, costs, refitting and conversions do not fail.
+/// Checks that costs, refitting and conversions succeed for any boxes.
 fn measured(mut tree: Bvh, objects: usize) {
     let constants = SahConstants::default();
     let costs =
