@@ -1,4 +1,4 @@
-//! One entry of a spec's `methods`: what is run, with its label, limits and seeds.
+//! One entry of a spec's `methods`: a method with its label, limits and seeds.
 
 use crate::measure::empirical_cost;
 use crate::measure::ray_cost::TrainedOn;
@@ -10,22 +10,22 @@ use bvh_search::{Budget, Method, Shortcut};
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Table;
 
-/// A method with the label that tables and figures show, and what its entry says besides.
+/// A method with the label that tables and figures show, and the further keys of its entry.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(into = "Table")]
 pub struct Labelled {
     /// Unique within the experiment.
     pub label: String,
-    /// What is run.
+    /// The method that runs.
     pub method: Contestant,
-    /// The keys of the entry that are no parameters of the method; without the label.
-    pub own: Own,
+    /// The keys of the entry that are not parameters of the method; without the label.
+    pub options: EntryOptions,
 }
 
 /// A method of ours, another library, or a program.
 #[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(untagged)]
-#[allow(missing_docs, reason = "said above")]
+#[allow(missing_docs, reason = "the line above names the variants in order")]
 pub enum Contestant {
     Ours(Method),
     Peer(Peer),
@@ -33,7 +33,7 @@ pub enum Contestant {
 }
 
 impl Contestant {
-    /// Its name in specs.
+    /// The method's name in specs.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Ours(method) => method.name(),
@@ -68,90 +68,102 @@ impl Check for Contestant {
 }
 
 bvh_config::config! { serde;
-    /// The keys of an entry besides those of its method.
-    pub struct Own {
-        /// What tables and figures call the method: unique within the experiment. Default the method's name.
+    /// The keys of an entry that are not parameters of its method.
+    pub struct EntryOptions {
+        /// The method's name in tables and figures: unique within the experiment. Default the
+        /// method's name.
         label: Option<String>;
-        /// Limits of its runs besides the experiment's: the lower of both counts. Default none.
+        /// Limits of the method's runs; the lower of this and the experiment's limit applies.
+        /// Default none.
         budget: Option<Budget>;
-        /// Seconds that each of its runs may take, besides the experiment's `max_seconds`: the lower of both counts. Default none.
+        /// Seconds that each run of the method may take; the lower of this and the experiment's
+        /// `max_seconds` applies. Default none.
         max_seconds: Option<f64>, in 0.001..=1e6;
-        /// What its runs do although the scene does not need it, to measure what leaving it out saves. Default nothing.
+        /// Steps that the method's runs perform although the scene does not need them, to measure
+        /// the savings of skipping them. Default none.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         keep: Vec<Shortcut>;
-        /// Label whose seeds its runs have, for methods that are to differ in nothing else. Default its own.
+        /// Label whose seeds the method's runs use, for methods that must differ in nothing else.
+        /// Default the method's label.
         seed_as: Option<String>;
-        /// Random rays whose mean number of box tests judges the trees of its runs in place of the objective; the costs in
-        /// `history.csv` are then such numbers. Default none.
+        /// Random rays whose mean number of box tests judges trees instead of the objective; the
+        /// costs in `history.csv` are then such means. Default none.
         judge: Option<empirical_cost::Config>, in Nested;
-        /// Rays of the experiment's `ray_cost` whose visits take the place of areas in its runs and in their objective; the costs in
-        /// `history.csv` are then such numbers. Not for `median_cut`, which compares no sizes of boxes. Default none.
+        /// Rays of the experiment's `ray_cost` whose visits replace areas in the method's runs and
+        /// in their objective; the costs in `history.csv` are then such visits. Not for
+        /// `median_cut`, which compares no box sizes. Default none.
         for_rays: Option<TrainedOn>;
-        /// The cost that its runs minimise in place of the experiment's. Default none.
+        /// The cost that the method's runs minimise instead of the experiment's. Default none.
         objective: Option<Objective>;
-        /// Maximum number of references per object where objects may be divided among leaves: for `best`. Default none: they may not.
+        /// Maximum number of references per object if the method may divide objects among leaves:
+        /// for `best`. Default none: it may not.
         references: Option<f64>, in 1.0..=16.0;
     }
 }
 
 impl Labelled {
-    /// Methods that make every tree anew, so that it can be judged as a whole.
+    /// Methods that build every tree from scratch, so that each can be judged as a whole.
     pub(crate) const JUDGED: [&str; 3] = ["genetic", "random_orders", "grasp"];
 
     /// A method under its own name, without limits.
     pub fn new(method: Method) -> Self {
-        Self { label: method.name().into(), method: Contestant::Ours(method), own: Own::default() }
+        Self {
+            label: method.name().into(),
+            method: Contestant::Ours(method),
+            options: EntryOptions::default(),
+        }
     }
 
-    /// Reads an entry, and finds everything that is wrong with it by itself.
-    pub(crate) fn read(mut table: Table) -> Read<Self> {
-        let own = Own::KEYS
+    /// Reads an entry and finds all its faults that do not depend on the rest of the spec.
+    pub(crate) fn read(mut entry: Table) -> Read<Self> {
+        // A method rejects unknown keys, so the keys that are not its parameters are removed first.
+        let option_table = EntryOptions::KEYS
             .iter()
-            .filter_map(|key| table.remove_entry(*key))
+            .filter_map(|key| entry.remove_entry(*key))
             .collect();
-        let (own, mut faults) = fault::deserialize::<Own>(own);
-        let ours = Method::NAMES.join(", ");
-        let libraries = Peer::NAMES.join(", ");
-        let accepted =
-            || format!("{ours}, the libraries {libraries}, or {}", command::Config::NAME);
-        let (method, of_method) = fault::tagged(
-            table,
+        let (options, mut faults) = fault::deserialize::<EntryOptions>(option_table);
+        let (method, method_faults) = fault::tagged(
+            entry,
             "method",
             |name, parameters| Contestant::read(name, parameters),
-            accepted,
+            accepted_methods,
         );
-        faults.extend(of_method);
-        let labelled = own.zip(method).map(|(mut own, method)| {
-            let label = own
+        faults.extend(method_faults);
+        let labelled = options.zip(method).map(|(mut options, method)| {
+            let label = options
                 .label
                 .take()
                 .unwrap_or_else(|| method.name().into());
-            Self { label, method, own }
+            Self { label, method, options }
         });
         (labelled, faults)
     }
 }
 
+fn accepted_methods() -> String {
+    let ours = Method::NAMES.join(", ");
+    let libraries = Peer::NAMES.join(", ");
+    format!("{ours}, the libraries {libraries}, or {}", command::Config::NAME)
+}
+
 impl<'de> Deserialize<'de> for Labelled {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let (read, faults) = Self::read(Table::deserialize(deserializer)?);
-        let wrong = || {
-            serde::de::Error::custom(
-                faults
-                    .iter()
-                    .map(Fault::to_string)
-                    .collect::<String>(),
-            )
-        };
-        read.filter(|_| faults.is_empty())
-            .ok_or_else(wrong)
+        let (labelled, faults) = Self::read(Table::deserialize(deserializer)?);
+        match labelled {
+            Some(labelled) if faults.is_empty() => Ok(labelled),
+            _ => {
+                let messages: String = faults.iter().map(Fault::to_string).collect();
+                Err(serde::de::Error::custom(messages))
+            }
+        }
     }
 }
 
 impl From<Labelled> for Table {
-    fn from(Labelled { label, method, own }: Labelled) -> Self {
+    fn from(Labelled { label, method, options }: Labelled) -> Self {
+        let options = EntryOptions { label: Some(label), ..options };
         let mut table = Self::try_from(&method).unwrap_or_default();
-        table.extend(Self::try_from(&Own { label: Some(label), ..own }).unwrap_or_default());
+        table.extend(Self::try_from(&options).unwrap_or_default());
         table
     }
 }

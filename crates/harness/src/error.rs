@@ -1,4 +1,4 @@
-//! What can go wrong in the harness, and the exit code of each failure.
+//! The failures of the harness and their exit codes.
 
 use bvh_core::file::FileError;
 use bvh_scenes::render::StructureError;
@@ -11,7 +11,7 @@ use std::process::ExitStatus;
 
 /// A failure, with the file or object it concerns.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each message says what its fields are")]
+#[allow(missing_docs, reason = "each message names its fields")]
 pub enum Error {
     /// A spec that cannot be run: file, key, what was found, what would be accepted.
     #[error("{}: {message}", .file.display())]
@@ -28,10 +28,10 @@ pub enum Error {
     /// A file or folder that could not be read or written.
     #[error("{}: cannot {action}: {source}", .path.display())]
     Io { path: PathBuf, action: &'static str, source: io::Error },
-    /// A CSV file whose content is not what the harness writes.
+    /// A CSV file that the harness cannot have written.
     #[error("{}: {source}", .path.display())]
     Csv { path: PathBuf, source: csv::Error },
-    /// A TOML file among the results whose content is not what the harness writes.
+    /// A TOML file in the results that the harness cannot have written.
     #[error("{}: {source}", .path.display())]
     Toml { path: PathBuf, source: toml::de::Error },
     /// Another harness is writing to the same folder.
@@ -40,16 +40,16 @@ pub enum Error {
     /// A run failed.
     #[error("scene {scene}, method {method}: {source}")]
     Search { scene: String, method: String, source: Box<SearchError> },
-    /// Another library refused a scene.
+    /// Another library rejected a scene.
     #[error("scene {scene}, library {library}: {message}")]
     Library { scene: String, library: &'static str, message: String },
-    /// An external program did not do its part.
+    /// An external method failed.
     #[error("scene {scene}, method {method}, command `{command}`: {source}")]
     External { scene: String, method: String, command: String, source: CommandFault },
     /// Rays cannot be traced through this scene.
     #[error("scene {scene}, tracing: {message}")]
     Tracing { scene: String, message: String },
-    /// What was left out as not needed has changed a cost: a defect of the method.
+    /// A step that was skipped as unnecessary has changed a cost: a defect of the method.
     #[error("scene {scene}: {message}; please report this")]
     Ablation { scene: String, message: String },
     /// A method returned something that is not a tree over the scene: a defect of the method.
@@ -66,12 +66,13 @@ pub enum Error {
     /// A figure could not be drawn.
     #[error(transparent)]
     Figure(#[from] figures::FigureError),
-    /// `--check` found other numbers than the committed ones.
+    /// `--check` found numbers that differ from the committed ones.
     #[error(
-        "{differences} difference(s) from the committed results; if they are meant, run again without --check"
+        "{differences} difference(s) from the committed results; \
+         if they are intended, run again without --check"
     )]
     Differs { differences: usize },
-    /// A finished run whose files are not what was written.
+    /// A finished run whose files no longer match their checksums.
     #[error("{}: {file} is damaged or missing", .part.display())]
     Damaged { part: PathBuf, file: String },
     /// Parts of an experiment that cannot be joined.
@@ -82,41 +83,42 @@ pub enum Error {
     Interrupted { finished: usize, runs: usize },
 }
 
-/// The failure of a program that is a method.
+/// The failure of an external method.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandFault {
-    /// There is no such program, or it may not be run.
+    /// The program does not exist or is not executable.
     #[error("it cannot be started: {0}")]
     NotStarted(io::Error),
-    /// It reports a failure, with the last line on standard error.
+    /// The program reported a failure.
     #[error("{status}: {last_line}")]
     Failed {
-        /// How it ended.
+        /// The exit status.
         status: ExitStatus,
-        /// Its last words.
+        /// The last line on standard error.
         last_line: String,
     },
-    /// It ended without a tree.
-    #[error("it left no file at the path that is its last argument")]
+    /// The program ended without writing a tree.
+    #[error("it wrote no file at the path that is its last argument")]
     NoTree,
-    /// Its tree is damaged, or none over these boxes.
-    #[error("its tree is refused: {0}")]
-    Refused(#[from] FileError),
-    /// It took too long.
+    /// The tree is damaged or was built over other boxes.
+    #[error("its tree is invalid: {0}")]
+    InvalidTree(#[from] FileError),
+    /// The program exceeded its time limit.
     #[error("it did not end within {0} s")]
     TimedOut(f64),
-    /// The run was interrupted, and so it was ended.
+    /// The run was interrupted, which kills the program.
     #[error("it was interrupted")]
     Interrupted,
-    /// Files could not be exchanged with it.
-    #[error("the files that it is given cannot be written or read: {0}")]
+    /// The files for the program could not be written or read.
+    #[error("its input or output files cannot be written or read: {0}")]
     Exchange(#[from] io::Error),
 }
 
 impl Error {
-    /// 2 for what the user can mend in a spec or a command line, 130 after Ctrl-C, otherwise 1.
+    /// Returns 2 for mistakes in a spec or a command line, 130 after Ctrl-C, otherwise 1.
     pub fn exit_code(&self) -> u8 {
         match self {
+            // A wrong path is the user's mistake; a failing disk is not.
             Self::Read(error) | Self::TreeFile(TreeFileError::Read(error))
                 if !error.is_of_the_path() =>
             {
@@ -129,7 +131,7 @@ impl Error {
         }
     }
 
-    /// For `map_err` on file operations: names the path and what was tried.
+    /// For `map_err` on file operations: names the path and the attempted action.
     pub fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::Io { path: path.to_owned(), action, source }
     }

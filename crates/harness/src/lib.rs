@@ -1,7 +1,8 @@
 //! Experiments on bounding volume hierarchies: TOML specs in, CSV files and figures out.
 //!
-//! Data flows one way: [`spec`] → [scenes](bvh_scenes) → [`run`] → [`rows`] → [`report`], which reads the CSV files only.
-//! The commands are in [`cli`]. Clocks, threads and folders of results are here.
+//! Data flows one way: [`spec`] → [scenes](bvh_scenes) → [`run`] → [`rows`] → [`report`], which
+//! reads only the CSV files. The commands are in [`cli`]. The libraries below read no clocks and
+//! know no folders of results; this crate does.
 
 pub mod cli;
 pub mod contestant;

@@ -28,9 +28,9 @@ enum Command {
     Merge(merge::MergeArgs),
     Compare(compare::CompareArgs),
     New(new::NewArgs),
-    /// Print the JSON schema of specs, by which editors complete and check them.
+    /// Print the JSON schema of specs, which lets editors complete and check them.
     Schema,
-    /// One case of the suite, in a process of its own.
+    /// One case of the suite, in a separate process.
     #[command(name = child::COMMAND, hide = true)]
     SuiteChild {
         subject: String,

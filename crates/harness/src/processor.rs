@@ -1,8 +1,8 @@
-//! The processor that this program runs on, by the name that its results are kept under.
+//! The processor that this program runs on, and the names that its results are filed under.
 
 use std::sync::LazyLock;
 
-/// A processor's name, and the numbers that tell models of one name apart.
+/// A processor's name, and the numbers that distinguish models with the same name.
 pub struct Processor {
     name: String,
     model: Option<[String; 2]>,
@@ -14,20 +14,13 @@ pub static PROCESSOR: LazyLock<Processor> = LazyLock::new(|| {
 });
 
 impl Processor {
-    /// Reads the text in which Linux describes processors. Of other texts the architecture remains.
+    /// Parses the contents of Linux's `/proc/cpuinfo`. Without a name there, the architecture is
+    /// the name.
     fn parse(info: &str) -> Self {
-        let value = |key: &str| {
-            let lines = info
-                .lines()
-                .filter_map(|line| line.split_once(':'));
-            let mut found = lines.filter(|(name, _)| name.trim() == key);
-            found
-                .next()
-                .map(|(_, value)| value.trim().to_owned())
-        };
-        let name = value("model name").unwrap_or_else(|| std::env::consts::ARCH.into());
-        let model = value("cpu family")
-            .zip(value("model"))
+        let name = value(info, "model name").unwrap_or_else(|| std::env::consts::ARCH.into());
+        let family = value(info, "cpu family");
+        let model = family
+            .zip(value(info, "model"))
             .map(|(family, model)| [family, model]);
         Self { name, model }
     }
@@ -40,19 +33,30 @@ impl Processor {
         }
     }
 
-    /// The name for folders, for example `amd-epyc-25-17`: lower-case letters and digits with single hyphens between.
+    /// The name for folders, for example `amd-epyc-25-17`: lower-case letters and digits, with
+    /// single hyphens between words.
     pub fn folder(&self) -> String {
-        let model = self.model.iter().flatten().map(String::as_str);
-        let words: Vec<&str> = std::iter::once(self.name.as_str())
-            .chain(model)
+        let numbers = self.model.iter().flatten();
+        let words: Vec<String> = std::iter::once(&self.name)
+            .chain(numbers)
+            .map(|word| word.to_lowercase())
             .collect();
-        let lower = words.join(" ").to_lowercase();
-        let parts = lower.split(|letter: char| !letter.is_ascii_alphanumeric());
-        parts
+        let name = words.join(" ");
+        let parts: Vec<&str> = name
+            .split(|letter: char| !letter.is_ascii_alphanumeric())
             .filter(|part| !part.is_empty())
-            .collect::<Vec<_>>()
-            .join("-")
+            .collect();
+        parts.join("-")
     }
+}
+
+/// Returns the first value of a key; every core repeats the same keys.
+fn value(info: &str, key: &str) -> Option<String> {
+    let (_, value) = info
+        .lines()
+        .filter_map(|line| line.split_once(':'))
+        .find(|(name, _)| name.trim() == key)?;
+    Some(value.trim().to_owned())
 }
 
 #[cfg(test)]
@@ -60,21 +64,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn models_of_one_name_have_folders_of_their_own() {
-        let text = |model| {
+    fn models_with_one_name_have_separate_folders() {
+        let cpuinfo = |model| {
             format!(
-                "processor\t: 0\ncpu family\t: 6\nmodel\t\t: {model}\nmodel name\t: Intel(R) Xeon(R) CPU @ 2.70GHz\n"
+                "processor\t: 0\ncpu family\t: 6\nmodel\t\t: {model}\n\
+                 model name\t: Intel(R) Xeon(R) CPU @ 2.70GHz\n"
             )
         };
-        let older = Processor::parse(&text(106));
-        let newer = Processor::parse(&text(143));
+        let older = Processor::parse(&cpuinfo(106));
+        let newer = Processor::parse(&cpuinfo(143));
         assert_eq!(newer.name(), "Intel(R) Xeon(R) CPU @ 2.70GHz (family 6, model 143)");
         assert_eq!(newer.folder(), "intel-r-xeon-r-cpu-2-70ghz-6-143");
         assert_ne!(older.folder(), newer.folder());
     }
 
     #[test]
-    fn a_machine_that_does_not_say_has_its_architecture() {
+    fn a_processor_without_a_name_is_named_by_its_architecture() {
         assert_eq!(
             Processor::parse("Features : fp asimd").folder(),
             std::env::consts::ARCH.replace('_', "-")

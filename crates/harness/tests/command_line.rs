@@ -1,4 +1,5 @@
-//! The program as its users meet it: what it writes, what it refuses, and what survives a kill.
+//! The program from its users' view: the files it writes, the arguments it rejects, and the runs
+//! that survive a kill.
 
 mod support;
 
@@ -37,7 +38,7 @@ scenes = ['escher']
 repetitions = 1
 ";
 
-/// A folder with the spec in it.
+/// Creates a folder with the spec.
 fn folder() -> tempfile::TempDir {
     folder_with("spec.toml", SPEC)
 }
@@ -123,10 +124,10 @@ fn a_signal_ends_a_lower_bound_of_any_effort() {
     let folder = folder_with("spec.toml", spec);
     let child = begin(folder.path(), &["spec.toml"]);
     wait_for(&folder.path().join("results/spec/.partial"));
-    // The tree takes milliseconds; then it is the bound that the signal meets.
+    // The tree takes milliseconds, so the signal interrupts the bound.
     std::thread::sleep(std::time::Duration::from_millis(500));
     send("-INT", &child);
-    // A bound that was cut short is no result.
+    // An interrupted bound is not a result.
     ended(&child.wait_with_output().unwrap(), 130, &["0 of 1 runs are kept"]);
 }
 
@@ -175,16 +176,19 @@ fn quick_seed_and_scene_change_what_is_run() {
 }
 
 #[test]
-fn what_is_wrong_is_named_and_costs_nothing_but_a_message() {
+fn mistakes_are_named_before_any_work() {
     let folder = folder();
-    let spec = |name: &str, text: String| fs::write(folder.path().join(name), text).unwrap();
-    spec("key.toml", SPEC.replace("repetitions = 3", "repetition = 3"));
-    spec("parameter.toml", SPEC.replace("noise = 0.1", "noise = 2.0"));
-    spec("scene.toml", SPEC.replace("'pinecon2'", "'sofa'"));
-    spec("label.toml", SPEC.replace("method = 'noise'", "method = 'nose'"));
-    fs::write(folder.path().join("nan.obj"), "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n").unwrap();
-    fs::write(folder.path().join("empty.obj"), "").unwrap();
-    fs::write(folder.path().join("file"), "").unwrap();
+    for (name, text) in [
+        ("key.toml", &*SPEC.replace("repetitions = 3", "repetition = 3")),
+        ("parameter.toml", &SPEC.replace("noise = 0.1", "noise = 2.0")),
+        ("scene.toml", &SPEC.replace("'pinecon2'", "'sofa'")),
+        ("label.toml", &SPEC.replace("method = 'noise'", "method = 'nose'")),
+        ("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n"),
+        ("empty.obj", ""),
+        ("file", ""),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
     for (args, parts) in [
         (&["missing.toml"][..], &["missing.toml"][..]),
         (&["key.toml"], &["key.toml", "repetition", "repetitions"]),
@@ -228,15 +232,16 @@ fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_di
         &["--shard", "4/3", "from 1 to N"],
     );
 
-    // The same runs twice are welcome, as long as they agree.
+    // Two parts may hold the same run, as long as its results agree.
     part("2/3", "two");
     part("2/3", "again");
     let folders = ["merge", "one", "two", "three", "again", "--out"];
     said(folder.path(), &[&folders[..], &["merged"]].concat());
     let whole = reproducible(&folder.path().join("whole/spec"));
     assert!(whole == reproducible(&folder.path().join("merged/spec")));
-    let figure = |out: &str| fs::read(folder.path().join(out).join("spec/table.svg")).unwrap();
-    assert!(figure("whole") == figure("merged"));
+    let [figure, merged_figure] = ["whole", "merged"]
+        .map(|out| fs::read(folder.path().join(out).join("spec/table.svg")).unwrap());
+    assert!(figure == merged_figure);
     let provenance = fs::read_to_string(folder.path().join("merged/spec/provenance.toml")).unwrap();
     assert_eq!(provenance.matches("[[parts]]").count(), 4);
     fs::remove_dir_all(folder.path().join("merged")).unwrap();
@@ -284,7 +289,7 @@ title = 'gaps'
 methods = ['greedy', 'search']
 ";
 
-/// The column of the first row of the scene and method.
+/// Returns the column of the first row of the scene and method.
 fn cell(path: &Path, scene: &str, method: &str, column: &str) -> f64 {
     let rows = rows(path);
     let row = rows
@@ -297,31 +302,35 @@ fn cell(path: &Path, scene: &str, method: &str, column: &str) -> f64 {
 #[test]
 fn gaps_are_to_the_best_known_cost_and_stay_until_they_are_redrawn() {
     let folder = tempfile::tempdir().unwrap();
-    let write = |name: &str, work: &str| {
-        fs::write(folder.path().join(name), GAPS.replace("max_work = 2000", work)).unwrap();
-    };
-    let succeeds = |args: &[&str]| drop(said(folder.path(), args));
-    write("short.toml", "max_work = 2000");
-    write("long.toml", "max_work = 10000000");
-    succeeds(&["short.toml"]);
-    let numbers = folder.path().join("results/short/numbers.csv");
-    let gap = || cell(&numbers, "escher:300", "search", "gap_median");
-    assert_eq!(gap(), 0.0, "its own best is the best known");
-    // Small scenes have an exact optimum, whoever finds it.
+    let path = folder.path();
+    fs::write(path.join("short.toml"), GAPS).unwrap();
+    let long = GAPS.replace("max_work = 2000", "max_work = 10000000");
+    fs::write(path.join("long.toml"), long).unwrap();
+    said(path, &["short.toml"]);
+    assert_eq!(gap(path), 0.0, "its own best is the best known");
+    // Small scenes are compared with their exact optimum, which no run needs to find.
+    let numbers = path.join("results/short/numbers.csv");
     assert!(cell(&numbers, "spheres75:12", "greedy", "lower_bound_over_reference") >= 1.0 - 1e-12);
-    let best_known = || fs::read(folder.path().join("results/best_known.csv")).unwrap();
-    let before = best_known();
-    succeeds(&["long.toml"]);
-    let after = best_known();
-    assert!(before != after && gap() == 0.0);
-    succeeds(&["short.toml", "--check"]);
-    assert!(best_known() == after, "a check writes nothing");
-    succeeds(&["short.toml", "--redraw"]);
-    assert!(gap() > 0.0);
-    succeeds(&["short.toml", "--check"]);
+    let best_known = path.join("results/best_known.csv");
+    let before = fs::read(&best_known).unwrap();
+    said(path, &["long.toml"]);
+    let after = fs::read(&best_known).unwrap();
+    assert!(before != after);
+    assert_eq!(gap(path), 0.0, "later finds do not change recorded gaps");
+    said(path, &["short.toml", "--check"]);
+    assert!(fs::read(&best_known).unwrap() == after, "a check writes nothing");
+    said(path, &["short.toml", "--redraw"]);
+    assert!(gap(path) > 0.0);
+    said(path, &["short.toml", "--check"]);
     // Rows of another spec cannot be redrawn.
-    write("short.toml", "max_work = 3000");
-    refused(folder.path(), &["short.toml", "--redraw"], 2, &["another spec"]);
+    let other = GAPS.replace("max_work = 2000", "max_work = 3000");
+    fs::write(path.join("short.toml"), other).unwrap();
+    refused(path, &["short.toml", "--redraw"], 2, &["another spec"]);
+}
+
+fn gap(folder: &Path) -> f64 {
+    let numbers = folder.join("results/short/numbers.csv");
+    cell(&numbers, "escher:300", "search", "gap_median")
 }
 
 #[test]
@@ -362,7 +371,7 @@ fn a_mistyped_command_is_answered_with_the_one_that_is_meant() {
     ] {
         refused(folder.path(), args, 2, &[args[0], meant]);
     }
-    // A spec is none, though it be called alike.
+    // A spec with the name of a command is not that command.
     refused(folder.path(), &["merge.toml"], 2, &["merge.toml: no such file"]);
     fs::rename(folder.path().join("spec.toml"), folder.path().join("mergee")).unwrap();
     said(folder.path(), &["mergee"]);
@@ -385,10 +394,10 @@ fn runs_that_the_clock_ends_leave_rows_among_the_timings_alone_and_checks_do_not
     assert_eq!(names, [&["provenance.toml", "resolved.toml"][..], &timings].concat());
     let runs = results.join("timing_runs.csv");
     let seconds: f64 = rows(&runs)[0]["seconds"].parse().unwrap();
-    // However busy the machine is: without the limit, `best` takes hours.
+    // The bounds are wide for busy machines; without the limit, `best` takes hours.
     assert!((0.05..20.0).contains(&seconds), "{seconds}");
 
-    // Other costs are no difference, another spec is.
+    // Different costs are no difference between time-limited runs, but a different spec is.
     fs::write(
         &runs,
         fs::read_to_string(&runs)

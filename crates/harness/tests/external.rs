@@ -1,4 +1,4 @@
-//! Methods that are programs of others: what they are given, what is made of their trees, and what is said when they fail.
+//! External methods: their input, the use of their trees, and the errors when they fail.
 #![cfg(unix)]
 
 mod support;
@@ -11,7 +11,8 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use support::{folder_with, program, refused, rows, run, said, save, send, wait_for};
 
-/// A folder with a spec whose second method is the shell script, and with the file of a good tree.
+/// Creates a folder with a spec whose second method is the shell script, and with a valid tree
+/// file.
 fn folder(script: &str, more: &str) -> tempfile::TempDir {
     let spec = format!(
         "question = 'Is theirs better?'\nscenes = ['spheres75']\nrepetitions = 2\nmethods = [\n\
@@ -28,9 +29,9 @@ fn folder(script: &str, more: &str) -> tempfile::TempDir {
     folder
 }
 
-/// These columns of a finished run's rows.
-fn columns(at: &Path, columns: [&str; 4]) -> Vec<[String; 4]> {
-    let rows = rows(&at.join("results/spec/runs.csv"));
+/// Returns these columns of a finished run's rows.
+fn columns(dir: &Path, columns: [&str; 4]) -> Vec<[String; 4]> {
+    let rows = rows(&dir.join("results/spec/runs.csv"));
     rows.iter()
         .map(|row| columns.map(|column| row[column].clone()))
         .collect()
@@ -41,9 +42,9 @@ fn the_tree_of_a_program_is_costed_by_us_and_every_run_has_its_seed_and_the_boxe
     // 75 boxes of six numbers of four bytes.
     let script = "echo $BVH_SEED >> seeds; test $(wc -c < \"$1\") -eq 1800 && cp good.bvh \"$2\"";
     let folder = folder(script, "timeout_seconds = 60");
-    let at = folder.path();
-    said(at, &["spec.toml", "--jobs=1"]);
-    let rows = columns(at, ["method", "cost", "work", "seed"]);
+    let dir = folder.path();
+    said(dir, &["spec.toml", "--jobs=1"]);
+    let rows = columns(dir, ["method", "cost", "work", "seed"]);
     let (ours, theirs) = rows.split_at(2);
     assert!(
         theirs
@@ -52,22 +53,22 @@ fn the_tree_of_a_program_is_costed_by_us_and_every_run_has_its_seed_and_the_boxe
         "{rows:?}"
     );
     assert!(theirs[0][3] != theirs[1][3]);
-    let seeds = fs::read_to_string(at.join("seeds")).unwrap();
+    let seeds = fs::read_to_string(dir.join("seeds")).unwrap();
     assert!(seeds.lines().eq(theirs.iter().map(|row| &row[3])), "{seeds} for {theirs:?}");
     // A repetition has the same rows.
-    said(at, &["spec.toml", "--check"]);
+    said(dir, &["spec.toml", "--check"]);
 }
 
 #[test]
-fn what_a_program_does_not_do_is_said_with_the_method_and_the_command() {
+fn errors_of_programs_name_the_method_and_the_command() {
     for (script, more, parts) in [
         ("echo first >&2; echo 'no license' >&2; exit 3", "", &["exit status: 3: no license"][..]),
-        ("exit 4", "", &["exit status: 4: it says nothing"]),
+        ("exit 4", "", &["exit status: 4: it printed nothing"]),
         ("kill -9 $$", "", &["signal: 9"]),
-        ("true", "", &["left no file"]),
-        ("mkfifo \"$2\"", "", &["left no file"]),
-        ("echo tree > \"$2\"", "", &["its tree is refused", "not a tree file"]),
-        ("head -c 1000 good.bvh > \"$2\"", "", &["its tree is refused", "cut or extended"]),
+        ("true", "", &["wrote no file"]),
+        ("mkfifo \"$2\"", "", &["wrote no file"]),
+        ("echo tree > \"$2\"", "", &["its tree is invalid", "not a tree file"]),
+        ("head -c 1000 good.bvh > \"$2\"", "", &["its tree is invalid", "cut or extended"]),
         ("sleep 60", "timeout_seconds = 0.1", &["did not end within 0.1 s"]),
     ] {
         let folder = folder(script, more);
@@ -77,7 +78,7 @@ fn what_a_program_does_not_do_is_said_with_the_method_and_the_command() {
 }
 
 #[test]
-fn commands_that_cannot_be_started_or_are_none_are_refused() {
+fn missing_and_empty_commands_are_rejected() {
     let folder = folder("", "");
     let spec = fs::read_to_string(folder.path().join("spec.toml")).unwrap();
     for (command, code, part) in [
@@ -102,24 +103,24 @@ fn commands_that_cannot_be_started_or_are_none_are_refused() {
 #[test]
 fn a_signal_ends_a_program_and_what_it_has_started_within_a_second() {
     let folder = folder("sleep 60 & echo $! > pid.new; mv pid.new pid; wait", "");
-    let at = folder.path();
-    let mut child = program(at, &["spec.toml", "--jobs=1"])
+    let dir = folder.path();
+    let mut child = program(dir, &["spec.toml", "--jobs=1"])
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    wait_for(&at.join("pid"));
+    wait_for(&dir.join("pid"));
     let start = Instant::now();
     send("-TERM", &child);
     assert_eq!(child.wait().unwrap().code(), Some(130));
     assert!(start.elapsed() < Duration::from_secs(1), "{:?}", start.elapsed());
-    assert_ended(at, "SIGTERM");
+    assert_ended(dir, "SIGTERM");
 }
 
-/// The process whose number is in the file `pid` of the folder has ended.
-fn assert_ended(at: &Path, how: &str) {
-    let pid = fs::read_to_string(at.join("pid")).unwrap();
+/// Asserts that the process whose number is in the folder's file `pid` has ended.
+fn assert_ended(dir: &Path, how: &str) {
+    let pid = fs::read_to_string(dir.join("pid")).unwrap();
     let start = Instant::now();
-    // Whoever inherits it reaps it in a moment.
+    // The process that inherits it may take a moment to reap it.
     let lives = || {
         Command::new("kill")
             .args(["-0", pid.trim()])
@@ -140,7 +141,7 @@ fn what_a_program_has_started_ends_with_it_however_the_program_ends() {
     let leave = begin.replace("sh -c", "setsid sh -c");
     let daemon = format!("({leave});");
     let ways = [begin, &leave, &daemon];
-    // On other systems nothing is known of what leaves the group.
+    // On other systems a process that leaves the group escapes.
     let ways = if cfg!(target_os = "linux") { &ways[..] } else { &ways[..1] };
     for begin in ways {
         for (end, more, code) in [
@@ -160,13 +161,13 @@ fn what_a_program_has_started_ends_with_it_however_the_program_ends() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_tree_of_64_gigabytes_is_refused_by_its_header() {
+fn a_tree_of_64_gigabytes_is_rejected_by_its_header() {
     let folder = folder("truncate -s 64G \"$2\"", "");
     refused(
         folder.path(),
         &["spec.toml"],
         1,
-        &["method theirs", "its tree is refused", "not a tree file"],
+        &["method theirs", "its tree is invalid", "not a tree file"],
     );
 }
 

@@ -1,4 +1,4 @@
-//! The page of the columns of all CSV files, docs/COLUMNS.md: what is written wherever a file's rows are declared, in one place.
+//! docs/COLUMNS.md: the columns of all CSV files, collected from the declarations of their rows.
 
 use crate::report::Report;
 use crate::rows;
@@ -14,8 +14,10 @@ pub fn all() -> Vec<Columns> {
 pub fn page() -> String {
     let sections: String = all().iter().map(Columns::to_string).collect();
     format!(
-        "# Columns of CSV files\n\nEvery column of every CSV file that the harness writes; made by `UPDATE_DOCS=1 cargo test -p \
-         harness --test docs` from the declarations of the rows.\nFiles whose names begin with `timing` hold what differs from run to \
-         run; an empty cell is a number that there is not. FILE stands for a name that is chosen.\n{sections}"
+        "# Columns of CSV files\n\n\
+         Every column of every CSV file that the harness writes; generated from the declarations of\n\
+         the rows by `UPDATE_DOCS=1 cargo test -p harness --test docs`. Files whose names begin with\n\
+         `timing` hold numbers that differ from run to run. An empty cell means that the number does\n\
+         not exist. FILE is a placeholder for a name that the spec chooses.\n{sections}"
     )
 }

@@ -1,4 +1,5 @@
-//! `harness compare`: a tree against the best known one of its scene, and into the archive if it is better.
+//! `harness compare`: compares a tree with the best known one of its scene and, on request,
+//! archives a better one.
 
 use crate::Error;
 use crate::run::{archive, reference};
@@ -10,7 +11,9 @@ use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use std::path::{Path, PathBuf};
 
-/// Compare the tree in a file, whoever made it, with the best known one of a scene; cost and validity are computed again.
+/// Compare the tree in a file with the best known one of a scene.
+///
+/// Any program may have written the file; its cost and validity are computed again.
 #[derive(Args, Clone, Debug)]
 pub struct CompareArgs {
     /// The tree file.
@@ -18,24 +21,27 @@ pub struct CompareArgs {
     pub file: PathBuf,
     /// The scene it is for, by name or path of a mesh file.
     pub scene: String,
-    /// Let a glTF file name buffers outside its own folder. Whoever made the file then says which files are read.
+    /// Let a glTF file name buffers outside its own folder. Its author then chooses which files are
+    /// read.
     #[arg(long)]
     pub outside_files: bool,
-    /// Folder with the best known costs, by default `results`, if it is there.
+    /// Folder with the best known costs, by default `results` if it exists.
     #[arg(long, value_name = "DIR")]
     pub results: Option<PathBuf>,
-    /// If the tree is the best known, keep it in the archive among the results, with the command that made it.
+    /// If the tree is the best known, keep it in the archive in the results folder, with the
+    /// command that made it.
     #[arg(long, value_name = "COMMAND", value_parser = NonEmptyStringValueParser::new())]
     pub keep: Option<String>,
 }
 
-/// Prints the costs of the tree and of the best known one, which is a binary tree with one object per leaf.
+/// Prints the costs of the tree and of the best known one, a binary tree with one object per leaf.
 pub fn compare(args: &CompareArgs) -> Result<(), Error> {
     let file = &args.file;
     let results = args
         .results
         .as_deref()
         .unwrap_or(Path::new("results"));
+    // The default folder may be missing: a tree can be costed outside a checkout.
     if args.results.is_some() {
         input_folder("--results", results)?;
     }
@@ -54,7 +60,7 @@ pub fn compare(args: &CompareArgs) -> Result<(), Error> {
     Ok(())
 }
 
-/// The best known cost of the scene, its method, and the ratio of `area` to it.
+/// Returns the best known cost of the scene, its method, and the ratio of `area` to it.
 fn best_known(results: &Path, scene: &Scene, area: f64) -> Result<String, Error> {
     let Some(best) = reference::best_known(results, scene)? else {
         return Ok("best known internal area: none of this very scene".into());

@@ -1,18 +1,20 @@
-//! `--explain`: lists before the work what an experiment's scenes do not need and what was not asked for, both of which are left out.
+//! `--explain`: lists, before an experiment runs, which steps it skips and which it performs.
+//!
+//! A step is skipped if the scene does not need it or the spec does not ask for it.
 
 use crate::Error;
 use crate::run::resolved::load_scenes;
 use crate::spec::Experiment;
 use bvh_scenes::explain::scene;
 
-/// What is left out of an experiment, scene by scene, and what is going to run.
+/// Returns the text that lists the skipped steps scene by scene, and the runs to come.
 pub fn experiment(experiment: &Experiment) -> Result<String, Error> {
     let (scenes, _) = load_scenes(experiment)?;
     let mut text = format!("{}: {}\n", experiment.name, experiment.question);
-    for of_one in &scenes {
-        text += &scene(of_one).map_err(Error::search(&of_one.name, "--explain"))?;
+    for loaded in &scenes {
+        text += &scene(loaded).map_err(Error::search(&loaded.name, "--explain"))?;
     }
-    let asked = [
+    let steps = [
         (!experiment.rays.is_empty(), "random rays"),
         (experiment.render.is_some(), "pictures and their shadow rays"),
         (experiment.tracing.is_some(), "wide layouts and timed rays"),
@@ -26,24 +28,24 @@ pub fn experiment(experiment: &Experiment) -> Result<String, Error> {
         ),
         (!experiment.reports.is_empty(), "tables and figures"),
     ];
-    let not_asked: Vec<_> = asked
+    let skipped: Vec<_> = steps
         .iter()
-        .filter(|(asked, _)| !asked)
-        .map(|&(_, what)| what)
+        .filter(|(is_wanted, _)| !is_wanted)
+        .map(|&(_, name)| name)
         .collect();
-    if !not_asked.is_empty() {
-        text += &format!("left out, not asked for: {}\n", not_asked.join(", "));
+    if !skipped.is_empty() {
+        text += &format!("skipped, not in the spec: {}\n", skipped.join(", "));
     }
     let labels: Vec<_> = experiment
         .methods
         .iter()
         .map(|labelled| labelled.label.as_str())
         .collect();
-    let times = experiment.repetitions;
     let labels = labels.join("; ");
+    let repetitions = experiment.repetitions;
     text += &match experiment.suite {
         Some(_) => format!("to run: the suite of cases with {labels}\n"),
-        None => format!("to run: {} scenes, {times} times each of {labels}\n", scenes.len()),
+        None => format!("to run: {} scenes, {repetitions} times each of {labels}\n", scenes.len()),
     };
     Ok(text)
 }

@@ -1,4 +1,4 @@
-//! `harness merge`: joins the parts of experiments that were run with `--shard`.
+//! `harness merge`: joins the parts of experiments that ran with `--shard`.
 
 use crate::Error;
 use crate::rows::store::Existing;
@@ -7,7 +7,7 @@ use bvh_terminal::arguments::output_folder;
 use bvh_terminal::output::print_line;
 use std::path::PathBuf;
 
-/// Join the parts of experiments made with --shard into what one run would have written.
+/// Join the parts of experiments that ran with --shard into the files that one run writes.
 #[derive(clap::Args, Clone, Debug)]
 pub struct MergeArgs {
     /// Folders that were given as --out to runs with --shard.
@@ -16,12 +16,12 @@ pub struct MergeArgs {
     /// Folder for the results.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Replace results that are there already.
+    /// Replace existing results.
     #[arg(long)]
     pub force: bool,
 }
 
-/// Merges, and prints the tables of every experiment.
+/// Merges the parts and prints the tables of every experiment.
 pub fn merge(args: &MergeArgs) -> Result<(), Error> {
     output_folder("--out", &args.out)?;
     let existing = if args.force { Existing::Replace } else { Existing::Keep };

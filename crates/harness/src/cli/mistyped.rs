@@ -1,15 +1,17 @@
-//! Which command a mistyped word means.
+//! The suggestion for a mistyped command.
 
 use clap::Command;
 use std::ffi::OsStr;
 use std::path::Path;
 
-/// How alike two words must be for one to be a mistyped other, between 0 and 1; as clap has it.
+/// The least Jaro similarity, between 0 and 1, at which a word counts as a mistyped command; clap
+/// uses the same threshold.
 const ALIKE: f64 = 0.7;
 
-/// What to say about a first argument that is neither a command nor a flag, nor looks like a file, but is close to a command.
+/// Returns the message about a first argument that resembles a command, unless it is one, or a
+/// flag, or looks like a file.
 pub fn mistyped(first: Option<&OsStr>, command: &Command) -> Option<String> {
-    let is_file = |word: &str| word.contains(['.', '/', '\\']) || Path::new(word).exists();
+    // Specs are positional, so clap itself accepts any word here and suggests nothing.
     let word = first
         .and_then(OsStr::to_str)
         .filter(|word| !word.starts_with('-') && !is_file(word))?;
@@ -23,5 +25,9 @@ pub fn mistyped(first: Option<&OsStr>, command: &Command) -> Option<String> {
     let (likeness, name) = closest;
     (ALIKE..1.0)
         .contains(&likeness)
-        .then(|| format!("{word:?}: no such file or command; is `{name}` meant?"))
+        .then(|| format!("{word:?}: no such file or command; did you mean `{name}`?"))
+}
+
+fn is_file(word: &str) -> bool {
+    word.contains(['.', '/', '\\']) || Path::new(word).exists()
 }

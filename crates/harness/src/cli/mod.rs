@@ -1,4 +1,4 @@
-//! The commands of the program, one file each: arguments in, files and lines for the terminal out.
+//! The commands of the program, one file each: arguments in, files and terminal output out.
 
 pub mod columns;
 pub mod compare;

@@ -1,4 +1,5 @@
-//! `harness new` and `harness schema`: a spec to begin with, and what lets editors complete it.
+//! `harness new` and `harness schema`: a spec to begin with, and the schema that editors complete
+//! it by.
 
 use crate::{Error, spec};
 use bvh_terminal::output::{print_bytes, print_line};
@@ -10,7 +11,7 @@ use std::path::PathBuf;
 /// Write a commented spec to begin with.
 #[derive(Args, Clone, Debug)]
 pub struct NewArgs {
-    /// The file to write; one that is there stays.
+    /// The file to write; an existing file is never replaced.
     #[arg(value_name = "NAME.toml")]
     pub file: PathBuf,
 }
@@ -18,7 +19,7 @@ pub struct NewArgs {
 /// The spec to begin with.
 const TEMPLATE: &str = include_str!("new.toml");
 
-/// Writes the spec, if there is no file yet.
+/// Writes the spec unless the file exists.
 pub fn new(args: &NewArgs) -> Result<(), Error> {
     let file = &args.file;
     if file
@@ -31,7 +32,7 @@ pub fn new(args: &NewArgs) -> Result<(), Error> {
         )));
     }
     let mut new = File::create_new(file).map_err(|error| match error.kind() {
-        ErrorKind::AlreadyExists => Error::Usage(format!("{} is there already", file.display())),
+        ErrorKind::AlreadyExists => Error::Usage(format!("{} exists already", file.display())),
         _ => Error::io(file, "write the file")(error),
     })?;
     new.write_all(TEMPLATE.as_bytes())

@@ -6,7 +6,7 @@ use bvh_terminal::arguments::{FileKind, input_folder, output_file};
 use bvh_terminal::output::print_line;
 use std::path::PathBuf;
 
-/// The page of all results.
+/// The kind of file that holds the page.
 const PAGE: FileKind =
     FileKind { name: "an HTML page", beginning: b"<!DOCTYPE html>", extension: "html" };
 
@@ -16,12 +16,12 @@ pub struct ReportArgs {
     /// Folder with the results of experiments.
     #[arg(long, value_name = "DIR", default_value = "results")]
     pub results: PathBuf,
-    /// The page.
+    /// The page to write.
     #[arg(long, value_name = "FILE.html", default_value = "results/report.html")]
     pub out: PathBuf,
 }
 
-/// Writes the page, and prints how many experiments are on it.
+/// Writes the page and prints the number of experiments on it.
 pub fn report(args: &ReportArgs) -> Result<(), Error> {
     input_folder("--results", &args.results)?;
     output_file("--out", &args.out, &PAGE)?;

@@ -1,9 +1,11 @@
-//! `harness SPEC.toml...`: runs experiments, compares them with committed results, or makes their reports again.
+//! `harness SPEC.toml...`: runs experiments, compares them with committed results, or makes their
+//! reports again.
 
 use crate::Error;
 use crate::cli::explain;
 use crate::rows::store::Existing;
-use crate::run::execute::{Extent, Said, execute};
+use crate::run::execute::{Extent, Verbosity, execute};
+use crate::run::finish::Summary;
 use crate::run::shard::Shard;
 use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
@@ -16,56 +18,59 @@ use std::sync::atomic::AtomicBool;
 /// Run experiments.
 #[derive(clap::Args, Clone, Debug)]
 pub struct RunArgs {
-    /// Experiment specs, run one after the other.
+    /// Experiment specs, run one after another.
     #[arg(value_name = "SPEC.toml", required = true)]
     pub specs: Vec<PathBuf>,
-    /// Folder for the results; each experiment has a folder of its own in it.
+    /// Folder for the results; each experiment writes to a separate folder in it.
     #[arg(long, value_name = "DIR", default_value = "results")]
     pub out: PathBuf,
-    /// Scene to run on in place of the spec's, by name or path of a mesh file; may be repeated.
+    /// Scene to run on instead of the spec's scenes, by name or path of a mesh file; may be
+    /// repeated.
     #[arg(long = "scene", value_name = "NAME|PATH")]
     pub scenes: Vec<String>,
-    /// Let a glTF file name buffers outside its own folder. Whoever made the file then says which files are read.
+    /// Let a glTF file name buffers outside its own folder. Its author then chooses which files are
+    /// read.
     #[arg(long)]
     pub outside_files: bool,
     /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
-    /// Seed in place of the spec's.
+    /// Seed instead of the spec's.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Run the spec's smaller variant, into the folder `quick` among the results.
+    /// Run the spec's smaller variant, into the folder `quick` of the results.
     #[arg(long)]
     pub quick: bool,
     /// Compare with the committed results instead of writing any; exit code 1 on a difference.
     #[arg(long, conflicts_with = "resume")]
     pub check: bool,
-    /// Make the tables and figures again from the rows there are, with the best known costs of now; run nothing.
+    /// Make the tables and figures again from existing rows, with the current best known costs; run
+    /// nothing.
     #[arg(long, conflicts_with_all = ["check", "resume", "shard"])]
     pub redraw: bool,
-    /// Keep the finished runs of an interrupted experiment and do the rest, which is nothing if all are finished.
+    /// Keep the finished runs of an interrupted experiment and perform the missing ones.
     #[arg(long)]
     pub resume: bool,
-    /// Replace the results that are there already. Without it, finished results stay, and those of a repetition go
-    /// beside them, into a folder whose name ends with `.new`.
+    /// Replace existing results. Without this flag, finished results stay, and a repetition writes
+    /// to a folder next to them whose name ends with `.new`.
     #[arg(long, conflicts_with_all = ["check", "redraw", "resume"])]
     pub force: bool,
-    /// Do only the I-th of N parts of the runs, from 1, and leave them for `harness merge`. Every part needs an --out
-    /// of its own.
+    /// Perform only the I-th of N parts of the runs, from 1, and keep them for `harness merge`.
+    /// Every part needs a different --out.
     #[arg(long, value_name = "I/N", conflicts_with = "check")]
     pub shard: Option<Shard>,
-    /// Say nothing but errors, and differences under --check.
+    /// Print only errors and, under --check, differences.
     #[arg(long)]
     pub quiet: bool,
-    /// Say of every run, on standard error, what was done: method, scene, repetition, seed, seconds.
+    /// Print a line about every run on standard error: method, scene, repetition, seed, seconds.
     #[arg(long, conflicts_with = "quiet")]
     pub verbose: bool,
-    /// Print first what each scene does not need and is left out, and why.
+    /// Print first the steps that each scene makes unnecessary, and why they are skipped.
     #[arg(long)]
     pub explain: bool,
 }
 
-/// Runs all experiments, and prints their tables.
+/// Runs all experiments and prints their tables.
 pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     output_folder("--out", &args.out)?;
     args.jobs.apply()?;
@@ -75,7 +80,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         seed: args.seed,
         quick: args.quick,
     };
-    // All specs are checked before the first one is run.
+    // A mistake in the last spec must not surface after hours of runs of the first.
     let experiments = args
         .specs
         .iter()
@@ -95,7 +100,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         (_, true) => Existing::Replace,
         _ => Existing::Keep,
     };
-    let extent = Extent { existing, shard: args.shard, said: said(args) };
+    let extent = Extent { existing, shard: args.shard, verbosity: verbosity(args) };
     let mut differences = 0;
     for experiment in &experiments {
         if args.explain {
@@ -114,40 +119,44 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
             .remarks
             .iter()
             .for_each(|remark| print_error(remark));
-        if args.quiet {
-            continue;
-        }
-        print_line(&experiment.question);
-        for name in &summary.left_out {
-            print_line(&format!("(without {name}: scripts/fetch-scenes brings it)"));
-        }
-        print_line(&format!("\n{}Results: {}", summary.text, summary.folder.display()));
-        if let Some(kept) = &summary.beside {
-            let same = check::compare(&summary.folder, kept, &summary.left_out, !experiment.quick)?
-                .is_empty();
-            let has = match same {
-                true if experiment.is_by_the_clock() => "is of the same spec",
-                true => "has the same rows",
-                false => "has other rows",
-            };
-            let kept = kept.display();
-            print_line(&format!("({kept} is kept and {has}; --force would replace it)"));
+        if !args.quiet {
+            print_summary(experiment, &summary)?;
         }
     }
     if differences > 0 { Err(Error::Differs { differences }) } else { Ok(()) }
 }
 
-/// What is said while the runs are carried out.
-fn said(args: &RunArgs) -> Said {
+fn print_summary(experiment: &Experiment, summary: &Summary) -> Result<(), Error> {
+    let Summary { text, skipped_scenes, folder, previous, .. } = summary;
+    print_line(&experiment.question);
+    for name in skipped_scenes {
+        print_line(&format!("(without {name}: scripts/fetch-scenes brings it)"));
+    }
+    print_line(&format!("\n{text}Results: {}", folder.display()));
+    if let Some(previous) = previous {
+        let differences = check::compare(folder, previous, skipped_scenes, !experiment.quick)?;
+        let relation = match differences.is_empty() {
+            true if experiment.is_by_the_clock() => "comes from the same spec",
+            true => "has the same rows",
+            false => "has different rows",
+        };
+        let previous = previous.display();
+        print_line(&format!("({previous} is kept and {relation}; --force would replace it)"));
+    }
+    Ok(())
+}
+
+fn verbosity(args: &RunArgs) -> Verbosity {
     match (args.quiet, args.verbose) {
-        (true, _) => Said::Bar,
-        (_, true) => Said::EveryRun,
-        _ => Said::Progress,
+        (true, _) => Verbosity::Bar,
+        (_, true) => Verbosity::EveryRun,
+        _ => Verbosity::Progress,
     }
 }
 
-/// Runs into a temporary folder and prints how the rows differ from the committed ones. Returns the number of
-/// differences.
+/// Runs into a temporary folder and prints how the rows differ from the committed ones.
+///
+/// Returns the number of differences.
 fn compare(
     args: &RunArgs,
     experiment: &Experiment,
@@ -157,20 +166,21 @@ fn compare(
         tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
     let fresh = temporary.path().join(experiment.folder());
     let committed = args.out.join(experiment.folder());
+    // Gaps are measured from the references of the committed run, not from later finds.
     reference::adopt(&committed, temporary.path())?;
-    let extent = Extent { said: said(args), ..Extent::default() };
+    let extent = Extent { verbosity: verbosity(args), ..Extent::default() };
     let summary = execute(experiment, temporary.path(), extent, interrupted)?;
-    let found = check::compare(&fresh, &committed, &summary.left_out, !experiment.quick)?;
+    let found = check::compare(&fresh, &committed, &summary.skipped_scenes, !experiment.quick)?;
     let name = &experiment.name;
-    for scene in &summary.left_out {
+    for scene in &summary.skipped_scenes {
         print_line(&format!("{name}: scene {scene} is not fetched; its rows are not compared"));
     }
     for difference in &found {
         print_line(&format!("{name}: {difference}"));
     }
     if experiment.is_by_the_clock() {
-        let what = "the clock ends runs, so their rows cannot be compared; their trees are valid";
-        print_line(&format!("{name}: {what}"));
+        let remark = "the clock ends runs, so their rows cannot be compared; their trees are valid";
+        print_line(&format!("{name}: {remark}"));
     }
     if found.is_empty() {
         print_line(&format!("{name}: as committed"));

@@ -52,7 +52,7 @@ fn shapes<'a>(boxes: impl Iterator<Item = (Aabb, [Vec3; 3])> + 'a) -> Vec<Shape>
     (0..).zip(boxes).map(shape).collect()
 }
 
-/// The ray as the library's type, which makes its direction a unit vector.
+/// Converts a ray to the library's type, which normalises its direction.
 fn ray(ray: &Ray) -> TheirRay<f32, 3> {
     let direction = ray.direction();
     TheirRay::new(point(ray.origin()), Vector3::new(direction.x, direction.y, direction.z))
@@ -62,8 +62,10 @@ fn shapes_of_boxes(boxes: &[Aabb]) -> Vec<Shape> {
     shapes(boxes.iter().map(|&aabb| (aabb, [aabb.min; 3])))
 }
 
-/// The tree as our type. Theirs keeps the boxes of children in their parent, none for the root and none in leaves: here
-/// an inner node has the union of its children's boxes, and a leaf its object's box.
+/// Converts a tree to our type.
+///
+/// The library keeps the boxes of children in their parent, and none for the root or in leaves.
+/// Here an inner node gets the union of its children's boxes, and a leaf its object's box.
 fn to_ours(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
     let corner = |p: Point3<f32>| Vec3::new(p.x, p.y, p.z);
     let aabb = |b: TheirAabb<f32, 3>| Aabb { min: corner(b.min), max: corner(b.max) };
@@ -97,7 +99,8 @@ pub(super) fn build(boxes: &[Aabb]) -> Built {
     Built::tight(to_ours(&theirs, boxes), seconds, boxes)
 }
 
-/// Its tree and its recursive traversal, which collects all objects whose boxes the ray meets.
+/// Returns the library's tree and its recursive traversal, which collects all objects whose boxes
+/// the ray meets.
 pub(super) fn raw(boxes: &[Aabb]) -> Raw {
     let mut shapes = shapes_of_boxes(boxes);
     let theirs = TheirBvh::build(&mut shapes);
@@ -112,9 +115,9 @@ pub(super) fn raw(boxes: &[Aabb]) -> Raw {
     Raw { tree, nearest: Box::new(nearest) }
 }
 
-/// The iterator by distance, ended at the first box that begins behind the nearest hit: the library's only traversal
-/// that is ordered and works at any depth. Its triangle test sees front sides only, so each triangle is tested both
-/// ways round.
+/// The iterator by distance, ended at the first box that begins behind the nearest hit: the
+/// library's only traversal that is ordered and works at any depth. Its triangle test sees front
+/// sides only, so each triangle is tested both ways round.
 pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
     let mut shapes = shapes(
         triangles

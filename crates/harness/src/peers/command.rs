@@ -1,4 +1,5 @@
-//! Programs of others as methods, in whatever language: the boxes of a scene in a file, and a tree file back.
+//! External programs as methods, in any language: they read the boxes of a scene from a file and
+//! write a tree file.
 
 use super::program::Program;
 use crate::error::CommandFault;
@@ -14,17 +15,19 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 bvh_config::config! { serde;
-    /// A program that builds trees, called as `COMMAND… BOXES TREE` in the folder in which the harness was called.
+    /// A program that builds trees, called as `COMMAND… BOXES TREE` in the harness's working
+    /// folder.
     ///
-    /// `BOXES` is a file with min x, y, z, max x, y, z of every object as little-endian `f32`, and nothing else: object `i` has
-    /// the bytes from `24 i`, and the CRC-32 of the file is the checksum of the scene in a tree file. `TREE` is where the
-    /// program leaves the [tree file](bvh_core::file). The environment variable `BVH_SEED` has the seed of the run. Of what
-    /// is printed, only the last line on standard error is read, if the program fails.
+    /// The file `BOXES` holds min x, y, z, max x, y, z of every object as little-endian `f32`, and
+    /// nothing else: object `i` begins at byte `24 i`, and the CRC-32 of the file is the checksum
+    /// of the scene in a tree file. The program writes the [tree file](bvh_core::file) to the path
+    /// `TREE`. The environment variable `BVH_SEED` holds the seed of the run. The harness ignores
+    /// the program's output, except the last line on standard error if the program fails.
     #[serde(tag = "method", rename = "external")]
     pub struct Config {
-        /// The program and its first arguments. Whoever runs the spec runs this program.
+        /// The program and its first arguments. Everybody who runs the spec runs this program.
         command: Vec<String>;
-        /// Seconds after which the program is ended and the run fails. Default none.
+        /// Seconds after which the program is killed and the run fails. Default none.
         #[serde(skip_serializing_if = "Option::is_none")]
         timeout_seconds: Option<f64>, in above(0.0);
     }
@@ -41,8 +44,11 @@ impl Config {
             .then(|| OutOfRange::new("command", "empty", "a list of a program and its arguments"))
     }
 
-    /// The program's tree over `boxes`, those of the `objects`, and the seconds that it took, its start and files included. Ends the
-    /// program as soon as the run is `cancelled`, and with the program, however it ends, all that it has started.
+    /// Runs the program over `boxes`, the boxes of `objects`. Returns its tree and the seconds that
+    /// it needed, including its start and its files.
+    ///
+    /// Kills the program once the run is `cancelled`. Whenever the program ends, all processes that
+    /// it has started are killed as well.
     pub fn build(
         &self,
         boxes: &[Aabb],
@@ -51,27 +57,26 @@ impl Config {
         cancelled: &dyn Fn() -> bool,
     ) -> Result<(Bvh, f64), CommandFault> {
         let folder = tempfile::tempdir()?;
-        let [given, tree, said] =
-            ["boxes", "tree.bvh", "stderr"].map(|name| folder.path().join(name));
-        let corners = boxes
+        let boxes_path = folder.path().join("boxes");
+        let tree_path = folder.path().join("tree.bvh");
+        let stderr_path = folder.path().join("stderr");
+        let box_bytes: Vec<u8> = boxes
             .iter()
             .flat_map(|aabb| [aabb.min.to_array(), aabb.max.to_array()])
-            .flatten();
-        fs::write(
-            &given,
-            corners
-                .flat_map(f32::to_le_bytes)
-                .collect::<Vec<u8>>(),
-        )?;
+            .flatten()
+            .flat_map(f32::to_le_bytes)
+            .collect();
+        fs::write(&boxes_path, box_bytes)?;
         let mut command = Command::new(&self.command[0]);
         command
             .args(&self.command[1..])
-            .args([&given, &tree])
+            .args([&boxes_path, &tree_path])
             .env("BVH_SEED", seed.to_string());
+        // Standard error goes to a file: a full pipe that nobody reads would stop the program.
         command
             .stdin(Stdio::null())
             .stdout(Stdio::null())
-            .stderr(File::create(&said)?);
+            .stderr(File::create(&stderr_path)?);
         let start = Instant::now();
         let mut program =
             Program::start(&mut command, folder.path()).map_err(CommandFault::NotStarted)?;
@@ -80,23 +85,25 @@ impl Config {
                 break status;
             }
             let elapsed = start.elapsed();
-            let late = self
-                .timeout_seconds
-                .filter(|limit| elapsed.as_secs_f64() > *limit);
-            if late.is_some() || cancelled() {
-                return Err(late.map_or(CommandFault::Interrupted, CommandFault::TimedOut));
+            if let Some(limit) = self.timeout_seconds
+                && elapsed.as_secs_f64() > limit
+            {
+                return Err(CommandFault::TimedOut(limit));
             }
-            // The wait is at most a fiftieth of what is measured.
-            std::thread::sleep(
-                (elapsed / 50).clamp(Duration::from_micros(200), Duration::from_millis(20)),
-            );
+            if cancelled() {
+                return Err(CommandFault::Interrupted);
+            }
+            // A fiftieth of the elapsed time bounds the error of the measured seconds.
+            let pause = elapsed / 50;
+            std::thread::sleep(pause.clamp(Duration::from_micros(200), Duration::from_millis(20)));
         };
         let seconds = start.elapsed().as_secs_f64();
+        // No child of the program may write to the tree file while it is read.
         drop(program);
         if !status.success() {
-            return Err(CommandFault::Failed { status, last_line: last_line(&said)? });
+            return Err(CommandFault::Failed { status, last_line: last_line(&stderr_path)? });
         }
-        let tree = file::load(&tree_file::read(&tree)?, boxes)?;
+        let tree = file::load(&tree_file::read(&tree_path)?, boxes)?;
         validate_references(&tree, boxes, objects).map_err(FileError::Tree)?;
         Ok((tree, seconds))
     }
@@ -107,21 +114,23 @@ impl From<TreeFileError> for CommandFault {
         match error {
             TreeFileError::Read(ReadError::Failed { source, .. }) => Self::Exchange(source),
             TreeFileError::Read(_) => Self::NoTree,
-            TreeFileError::Invalid { source, .. } => Self::Refused(source),
+            TreeFileError::Invalid { source, .. } => Self::InvalidTree(source),
         }
     }
 }
 
-/// The last line of a text file that says something; the file may be long.
+/// Returns the last line of a text file that is not blank.
 fn last_line(path: &Path) -> io::Result<String> {
+    // The file may be long, so only its end is read.
     const MOST_BYTES: u64 = 2048;
     let mut file = File::open(path)?;
     let length = file.seek(SeekFrom::End(0))?;
     file.seek(SeekFrom::Start(length.saturating_sub(MOST_BYTES)))?;
-    let mut end = Vec::new();
-    file.read_to_end(&mut end)?;
-    let end = String::from_utf8_lossy(&end);
-    let last = end.lines().rfind(|line| !line.trim().is_empty());
-    Ok(last
-        .map_or_else(|| "it says nothing on standard error".into(), |line| line.trim().to_owned()))
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)?;
+    let text = String::from_utf8_lossy(&bytes);
+    match text.lines().rfind(|line| !line.trim().is_empty()) {
+        Some(line) => Ok(line.trim().to_owned()),
+        None => Ok("it printed nothing on standard error".into()),
+    }
 }

@@ -1,4 +1,5 @@
-//! Rays per second of all libraries side by side: every mode on every scene, and geometric means over the scenes.
+//! Rays per second of all libraries for comparison: every mode on every scene, and geometric means
+//! over the scenes.
 
 use crate::measure::layout::{COMPILED, is_repeat, is_single};
 use crate::measure::speed::Traced;
@@ -10,11 +11,11 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The library of our own contenders.
 pub const OURS: &str = "ours";
 
-/// The name in the column `scene` of rows that are means over all scenes.
+/// The value of the column `scene` in rows that are means over all scenes.
 pub const MEAN: &str = "geometric mean";
 
-/// The largest accepted share of wrong answers: one in this number of rays. A contender above it has failed, and so has its
-/// time: tinybvh's packets overflow their stack in deep trees.
+/// The largest accepted share of wrong answers is one in this number of rays. The time of a
+/// contender above it is meaningless: tinybvh's packets overflow their stack in deep trees.
 const WRONG_AT_MOST_ONE_IN: u64 = 100;
 
 /// The speed of one contender on one scene.
@@ -26,14 +27,16 @@ pub struct Speed {
     pub turns: Vec<f64>,
 }
 
-/// The speeds of contenders that did not fail. `library_of` names the library of a method's label, and
-/// `search_seconds` the time in which the tree of a label was built on a scene, where the contender does not include it.
+/// Returns the speeds of contenders that did not fail.
+///
+/// `library_of` names the library of a method's label. `search_seconds` returns the seconds in
+/// which the tree of a label was built on a scene, for contenders that get it ready-made.
 pub fn speeds(
     traced: &[Traced],
     library_of: impl Fn(&str) -> String,
     search_seconds: impl Fn(&str, &str) -> f64,
 ) -> Vec<Speed> {
-    let speed = |traced: &Traced| {
+    let speed_of = |traced: &Traced| {
         let Traced { answers, times, .. } = traced;
         let library = library_of(&answers.method);
         let mode = if library == answers.method {
@@ -66,12 +69,10 @@ pub fn speeds(
                 .collect(),
         }
     };
-    let answers_well =
-        |traced: &&Traced| wrong_answers(traced) * WRONG_AT_MOST_ONE_IN <= traced.answers.count;
     traced
         .iter()
-        .filter(answers_well)
-        .map(speed)
+        .filter(|traced| wrong_answers(traced) * WRONG_AT_MOST_ONE_IN <= traced.answers.count)
+        .map(speed_of)
         .collect()
 }
 
@@ -80,8 +81,8 @@ fn wrong_answers(traced: &Traced) -> u64 {
     answers.missed_hits + answers.false_hits + answers.other_hits
 }
 
-/// The rows of `timing_rays.csv`: all speeds, and for every contender and kind of rays that all scenes have, the geometric
-/// mean of the speeds and all disagreements.
+/// Returns the rows of `timing_rays.csv`: all speeds, and for every contender and kind of rays that
+/// all scenes have, the geometric mean of the speeds and the sum of disagreements.
 pub fn rows(speeds: &[Speed]) -> Vec<PeerRayRow> {
     let rows: Vec<PeerRayRow> = speeds
         .iter()
@@ -142,8 +143,8 @@ fn is_split_by_embree(row: &PeerRayRow) -> bool {
     row.library == "embree" && row.mode.starts_with("high") && !row.mode.contains("robust")
 }
 
-/// For each of our modes and kinds of rays, its speed over that of the fastest mode of other libraries that are held to the
-/// same instruction set: scene by scene, and their geometric mean.
+/// Returns, for each of our modes and kinds of rays, the speed divided by the speed of the fastest
+/// third-party mode limited to the same instruction set: scene by scene, and the geometric mean.
 pub fn ratios(speeds: &[Speed]) -> Vec<RayRatioRow> {
     let mut groups: BTreeMap<[&str; 3], Vec<&Speed>> = BTreeMap::new();
     let mut order = Vec::new();
@@ -185,7 +186,7 @@ fn to_six_decimals(ratio: f64) -> f64 {
     (ratio * 1e6).round() / 1e6
 }
 
-/// Our speed on one scene over the fastest rival's, in all turns and in each.
+/// The ratio of our speed on one scene to the fastest rival's, over all turns and for each turn.
 struct OverFastest {
     row: RayRatioRow,
     turns: Vec<f64>,
@@ -197,22 +198,18 @@ fn over_fastest(
     against: &str,
     is_rival: IsRival,
 ) -> Option<OverFastest> {
-    let is_comparable = |rival: &&Speed| {
-        rival.row.library != OURS
-            && rival.row.scene == own.row.scene
-            && rival.row.rays == own.row.rays
-            && [COMPILED, own.row.instructions.as_str()].contains(&rival.row.instructions.as_str())
-            && is_rival(&rival.row)
-    };
-    let by_speed = |a: &&Speed, b: &&Speed| {
-        a.row
-            .million_per_s
-            .total_cmp(&b.row.million_per_s)
-    };
+    // A library without separate code for instruction sets is a rival under each of them.
+    let accepted_instructions = [COMPILED, own.row.instructions.as_str()];
     let fastest = speeds
         .iter()
-        .filter(is_comparable)
-        .max_by(by_speed)?;
+        .filter(|rival| rival.row.library != OURS && is_rival(&rival.row))
+        .filter(|rival| rival.row.scene == own.row.scene && rival.row.rays == own.row.rays)
+        .filter(|rival| accepted_instructions.contains(&rival.row.instructions.as_str()))
+        .max_by(|a, b| {
+            a.row
+                .million_per_s
+                .total_cmp(&b.row.million_per_s)
+        })?;
     let turns: Vec<f64> = own
         .turns
         .iter()
@@ -238,32 +235,31 @@ fn over_fastest(
     Some(OverFastest { row, turns })
 }
 
-/// The geometric mean over scenes, and the one without the scene that lifts it most.
+/// Returns the geometric mean over scenes, with and without the scene that raises it most.
 fn mean_ratio(scenes: &[OverFastest]) -> Option<RayRatioRow> {
-    let by_ratio = |a: &&OverFastest, b: &&OverFastest| a.row.ratio.total_cmp(&b.row.ratio);
-    let carrier = scenes.iter().max_by(by_ratio)?;
-    let mean_of = |ratios: Vec<f64>| geometric_mean(&ratios);
+    let carrier = scenes
+        .iter()
+        .max_by(|a, b| a.row.ratio.total_cmp(&b.row.ratio))?;
+    let ratios: Vec<f64> = scenes.iter().map(|over| over.row.ratio).collect();
+    let ratio = geometric_mean(&ratios);
     let without: Vec<f64> = scenes
         .iter()
         .filter(|over| over.row.scene != carrier.row.scene)
         .map(|over| over.row.ratio)
         .collect();
-    let ratio = mean_of(scenes.iter().map(|over| over.row.ratio).collect());
     let turn_count = scenes
         .iter()
         .map(|over| over.turns.len())
         .min()
         .unwrap_or(0);
-    let mean_of_turn = |turn: usize| {
-        mean_of(
-            scenes
-                .iter()
-                .map(|over| over.turns[turn])
-                .collect(),
-        )
-    };
-    let (least_turn, greatest_turn) =
-        range((0..turn_count).map(mean_of_turn)).unwrap_or((ratio, ratio));
+    let turn_means = (0..turn_count).map(|turn| {
+        let ratios: Vec<f64> = scenes
+            .iter()
+            .map(|over| over.turns[turn])
+            .collect();
+        geometric_mean(&ratios)
+    });
+    let (least_turn, greatest_turn) = range(turn_means).unwrap_or((ratio, ratio));
     Some(RayRatioRow {
         scene: MEAN.into(),
         fastest: String::new(),
@@ -272,36 +268,35 @@ fn mean_ratio(scenes: &[OverFastest]) -> Option<RayRatioRow> {
         greatest_turn,
         build_seconds: mean_build_seconds(scenes.iter().map(|over| over.row.build_seconds)),
         carried_by: carrier.row.scene.clone(),
-        ratio_without: (!without.is_empty()).then(|| mean_of(without)),
+        ratio_without: (!without.is_empty()).then(|| geometric_mean(&without)),
         ..carrier.row.clone()
     })
 }
 
-/// Lines for the terminal: for every instruction set and kind of rays our fastest mode, over the fastest of other libraries.
+/// Returns lines for the terminal: for every instruction set and kind of rays, the ratio of our
+/// fastest mode to the fastest third-party mode.
 pub fn text(ratios: &[RayRatioRow]) -> String {
-    let mut text = String::from("Speeds over those of the fastest mode of any other library:\n");
+    let mut text = String::from("Our speed over the fastest mode of any other library:\n");
     let groups: BTreeSet<[&str; 2]> = ratios
         .iter()
         .map(|row| [row.processor.as_str(), row.rays.as_str()])
         .collect();
     for [processor, kind] in groups {
-        let of_group = || {
-            let is_of_group = |row: &&RayRatioRow| row.processor == processor && row.rays == kind;
-            let of_group = ratios.iter().filter(is_of_group);
-            of_group.filter(|row| row.against == AGAINST[0].0 && !is_repeat(&row.mode))
-        };
-        let by_ratio = |a: &&RayRatioRow, b: &&RayRatioRow| a.ratio.total_cmp(&b.ratio);
-        let best_mean = of_group()
+        let group: Vec<&RayRatioRow> = ratios
+            .iter()
+            .filter(|row| row.processor == processor && row.rays == kind)
+            .filter(|row| row.against == AGAINST[0].0 && !is_repeat(&row.mode))
+            .collect();
+        let best_mean = group
+            .iter()
             .filter(|row| row.scene == MEAN)
-            .max_by(by_ratio);
-        let least_of_mode = |mode: &str| {
-            of_group()
-                .filter(|row| row.mode == mode)
-                .min_by(by_ratio)
-        };
-        if let Some(mean) = best_mean
-            && let Some(least) = least_of_mode(&mean.mode)
-        {
+            .max_by(|a, b| a.ratio.total_cmp(&b.ratio));
+        let Some(mean) = best_mean else { continue };
+        let least = group
+            .iter()
+            .filter(|row| row.mode == mean.mode)
+            .min_by(|a, b| a.ratio.total_cmp(&b.ratio));
+        if let Some(least) = least {
             text += &format!(
                 "  {processor}, {kind}: {:.2} ({}), least {:.2} on {}\n",
                 mean.ratio, mean.mode, least.ratio, least.scene

@@ -1,18 +1,21 @@
-//! Embree and tinybvh, whose libraries need a C++ compiler: a program of their own traces with them, behind pipes.
+//! Embree and tinybvh, which need a C++ compiler: a separate program traces with them, behind
+//! pipes.
 //!
-//! `scripts/ray-peers/build` makes the program; its source describes the bytes that go through the pipes. One process
-//! per mode holds the scene for as long as the contender lives, so that all contenders take turns in one run.
+//! `scripts/ray-peers/build` makes the program; its source describes the bytes in the pipes. One
+//! process per mode holds the scene as long as the contender lives, which lets all contenders
+//! alternate in one run.
 
 use crate::measure::contender::{Batch, Contender, PART, Tracer};
 use bvh_core::{Bvh, FirstCountNode, Hit, Triangle};
 use bvh_scenes::Scene;
 use bvh_scenes::trace::Query;
 use std::cell::RefCell;
+use std::error::Error;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-/// A mode of the program, as the program lists it.
+/// A mode that the program lists.
 #[derive(Debug, PartialEq, Eq)]
 struct Mode {
     instructions: String,
@@ -22,45 +25,41 @@ struct Mode {
 }
 
 impl Mode {
-    /// Reads a line of four parts between tabs.
+    /// Parses a line of four parts separated by tabs.
     fn parse(line: &str) -> Option<Self> {
-        let mut parts = line.split('\t').map(str::to_owned);
-        let [instructions, library, version, name] =
-            [parts.next()?, parts.next()?, parts.next()?, parts.next()?];
-        parts
-            .next()
-            .is_none()
-            .then_some(Self { instructions, library, version, name })
+        let parts: Vec<String> = line.split('\t').map(str::to_owned).collect();
+        let [instructions, library, version, name] = parts.try_into().ok()?;
+        Some(Self { instructions, library, version, name })
     }
 }
 
-/// The modes that the program lists.
+/// Returns the modes that the program lists.
 fn modes(program: &Path) -> Result<Vec<Mode>, String> {
     let shown = program.display();
     let listed = Command::new(program)
         .output()
         .map_err(|error| format!("{shown}: {error}"))?;
     let text = String::from_utf8_lossy(&listed.stdout);
-    let parse = |line| {
-        Mode::parse(line).ok_or_else(|| {
+    let mut modes = Vec::new();
+    for line in text.lines() {
+        modes.push(Mode::parse(line).ok_or_else(|| {
             format!(
-                "{shown}: it lists {line:?}; expected instruction set, library, version and mode between tabs \
-                 (scripts/ray-peers/build makes it again)"
+                "{shown}: it lists {line:?}; expected instruction set, library, version and mode \
+                 between tabs (scripts/ray-peers/build makes it again)"
             )
-        })
-    };
-    let modes: Vec<Mode> = text
-        .lines()
-        .map(parse)
-        .collect::<Result<_, _>>()?;
+        })?);
+    }
     if modes.is_empty() {
         return Err(format!("{shown}: it lists no mode; expected one per line"));
     }
     Ok(modes)
 }
 
-/// A contender for every mode of the program, each with the name of its library. An error says what the program did not
-/// do.
+/// Starts a contender for every mode of the program. Returns each with the name of its library.
+///
+/// # Errors
+///
+/// If the program cannot be started or its output is malformed.
 pub fn contenders(
     program: &Path,
     scene: &Scene,
@@ -94,50 +93,53 @@ pub fn contenders(
     Ok(contenders)
 }
 
-/// tinybvh's tree with spatial splits over the scene's triangles, with its own leaves and boxes, and the seconds that its build took.
-/// An error says what the program did not do.
+/// Returns tinybvh's tree with spatial splits over the scene's triangles, with its leaves and
+/// boxes, and the seconds of its build.
+///
+/// # Errors
+///
+/// If the program cannot be started or its output is malformed.
 pub fn split_tree(program: &Path, scene: &Scene) -> Result<(Bvh, f64), String> {
     let triangles = scene
         .triangles()
         .map_err(|error| error.to_string())?;
-    let failed = |error: &dyn std::fmt::Display| {
-        format!(
-            "{} \"{SPLIT_TREE}\": {error}; scripts/ray-peers/build makes it anew",
-            program.display()
-        )
-    };
-    let (mut process, seconds) =
-        Process::start(program, SPLIT_TREE, triangles).map_err(|error| failed(&error))?;
-    let (nodes, ids) = nodes(&mut process.answers).map_err(|error| failed(&error))?;
-    let tree = Bvh::from_first_count(&nodes, &ids).map_err(|error| failed(&error))?;
-    Ok((tree, seconds))
+    read_split_tree(program, triangles).map_err(|error| {
+        let program = program.display();
+        format!("{program} \"{SPLIT_TREE}\": {error}; scripts/ray-peers/build makes it again")
+    })
 }
 
-/// What hands out a tree, and is no mode because it traces nothing.
+/// The argument for a tree. It is not a mode, because it traces nothing.
 const SPLIT_TREE: &str = "tinybvh tree splits";
 
-/// Reads a tree's nodes and the triangles of its leaves, behind the number of each.
-fn nodes(from: &mut impl Read) -> io::Result<(Vec<FirstCountNode>, Vec<u32>)> {
+fn read_split_tree(program: &Path, triangles: &[Triangle]) -> Result<(Bvh, f64), Box<dyn Error>> {
+    let (mut process, seconds) = Process::start(program, SPLIT_TREE, triangles)?;
+    let (nodes, ids) = read_nodes(&mut process.answers)?;
+    Ok((Bvh::from_first_count(&nodes, &ids)?, seconds))
+}
+
+/// Reads the number of nodes, the number of references, the nodes and the references of a tree.
+fn read_nodes(reader: &mut impl Read) -> io::Result<(Vec<FirstCountNode>, Vec<u32>)> {
     let mut counts = [0u32; 2];
-    from.read_exact(bytemuck::cast_slice_mut(&mut counts))?;
-    let [nodes, ids] = counts.map(|count| count as usize);
-    let mut nodes = vec![FirstCountNode::default(); nodes];
-    let mut ids = vec![0u32; ids];
-    from.read_exact(bytemuck::cast_slice_mut(&mut nodes))?;
-    from.read_exact(bytemuck::cast_slice_mut(&mut ids))?;
+    reader.read_exact(bytemuck::cast_slice_mut(&mut counts))?;
+    let [node_count, id_count] = counts.map(|count| count as usize);
+    let mut nodes = vec![FirstCountNode::default(); node_count];
+    let mut ids = vec![0u32; id_count];
+    reader.read_exact(bytemuck::cast_slice_mut(&mut nodes))?;
+    reader.read_exact(bytemuck::cast_slice_mut(&mut ids))?;
     Ok((nodes, ids))
 }
 
 /// The program in one mode, with one scene.
 struct Process {
     child: Child,
-    /// `None` once the process has been told to end.
+    /// `None` once the process is ending.
     rays: Option<BufWriter<ChildStdin>>,
     answers: BufReader<ChildStdout>,
 }
 
 impl Process {
-    /// Starts the program and hands it the triangles. Returns the seconds that its build took, too.
+    /// Starts the program and sends it the triangles. Also returns the seconds of its build.
     fn start(program: &Path, mode: &str, triangles: &[Triangle]) -> io::Result<(Self, f64)> {
         let mut child = Command::new(program)
             .arg(mode)
@@ -166,13 +168,13 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // The end of its input ends the program.
+        // The program ends when its input ends.
         self.rays = None;
         _ = self.child.wait();
     }
 }
 
-/// Writes rays and what they ask.
+/// Writes a query and its rays.
 fn ask(program: &mut impl Write, batch: &Batch) -> io::Result<()> {
     let any = u32::from(batch.query == Query::Any);
     let picture = u32::from(batch.in_squares);
@@ -189,7 +191,7 @@ fn ask(program: &mut impl Write, batch: &Batch) -> io::Result<()> {
     program.flush()
 }
 
-/// Reads the seconds of each part and the hits of all rays. Objects are not named: their distances tell hits apart.
+/// Reads the seconds of each part and the hits of all rays. A hit has a distance but no object.
 fn answer(program: &mut impl Read, hits: &mut [Option<Hit>]) -> io::Result<Vec<f64>> {
     let mut seconds = vec![0f64; hits.len().div_ceil(PART)];
     let mut distances = vec![0f32; hits.len()];
@@ -256,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tree_is_read_from_its_nodes_and_one_that_is_cut_short_is_refused() {
+    fn a_tree_is_read_from_its_nodes_and_a_truncated_one_is_rejected() {
         let aabb = bvh_core::Aabb::from([[0.0; 3], [1.0; 3]]);
         let nodes = vec![
             bvh_core::Node::inner(aabb, 1, 2),
@@ -271,13 +273,13 @@ mod tests {
             .concat();
         sent.extend_from_slice(bytemuck::cast_slice(&nodes));
         sent.extend_from_slice(bytemuck::cast_slice(ids));
-        let (nodes, ids) = super::nodes(&mut &sent[..]).unwrap();
+        let (nodes, ids) = read_nodes(&mut &sent[..]).unwrap();
         assert_eq!(Bvh::from_first_count(&nodes, &ids), Ok(tree));
-        assert!(super::nodes(&mut &sent[..sent.len() - 1]).is_err());
+        assert!(read_nodes(&mut &sent[..sent.len() - 1]).is_err());
     }
 
     #[test]
-    fn a_program_that_is_not_there_is_named() {
+    fn a_missing_program_is_named() {
         let scene = Scene::load("escher:20").unwrap();
         let Err(message) = contenders(Path::new("no/ray_peers"), &scene) else { panic!("it ran") };
         assert!(message.contains("no/ray_peers"), "{message}");

@@ -1,7 +1,8 @@
-//! Other libraries and programs as methods of experiments: their trees by our cost, their traversals beside ours.
+//! Third-party libraries and programs as methods of experiments: our costs of their trees, and
+//! their traversals compared with ours.
 //!
-//! A library is one file and one line in [`Peer`]. Specs that name one are understood without the cargo feature
-//! `peers`, so that the message can say what is missing.
+//! A library is one file and one line in [`Peer`]. Specs that name one are parsed even without the
+//! cargo feature `peers`, which lets the error name the missing feature.
 
 #[cfg(feature = "peers")]
 mod bvh;
@@ -22,8 +23,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 /// A library with its settings, as a spec names it.
 ///
-/// For costs and build times it builds a tree with one object per leaf, as ours have. For rays it builds its own
-/// structures by the same settings: with its own leaves, and with split triangles where it splits them.
+/// For costs and build times it builds a tree with one object per leaf, as our methods do. For rays
+/// it builds its native structures with the same settings: with its leaves, and with split
+/// triangles if it splits them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(tag = "method", rename_all = "snake_case")]
 pub enum Peer {
@@ -44,13 +46,13 @@ pub struct NoSettings {}
 pub struct Obvhs {
     /// The library's preset. Default medium.
     pub preset: Preset,
-    /// In place of the preset's `reinsertion_batch_ratio`: the fraction of nodes that are reinserted; above 1 several
-    /// times. Default the preset's.
+    /// The fraction of nodes that are reinserted, `reinsertion_batch_ratio`; above 1, nodes are
+    /// reinserted repeatedly. Default the preset's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reinsertion: Option<f32>,
 }
 
-/// The presets of `obvhs`, by the names of its functions without `_build`.
+/// The presets of `obvhs`, named like its functions without `_build`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[allow(missing_docs, reason = "the library's names")]
@@ -69,7 +71,7 @@ pub enum Preset {
 pub struct Built {
     /// The tree as our type, with tight boxes.
     pub tree: Bvh,
-    /// The time that the library took to build it, without conversions.
+    /// The time that the library needed to build the tree, without conversions.
     pub seconds: f64,
 }
 
@@ -81,12 +83,13 @@ impl Built {
     }
 }
 
-/// A library's tree over boxes and its traversal, as they are, for the stress suite.
+/// A library's unmodified tree over boxes and its traversal, for the stress suite.
 #[cfg(feature = "peers")]
 pub(crate) struct Raw {
     /// The tree as our type, with the library's boxes.
     pub(crate) tree: Bvh,
-    /// The nearest distance at which a ray meets an object, by the library's own traversal and the caller's test.
+    /// Returns the nearest distance at which a ray meets an object, found by the library's
+    /// traversal with the caller's test of objects.
     pub(crate) nearest: Nearest,
 }
 
@@ -106,7 +109,7 @@ impl Peer {
     /// The names of all libraries.
     pub const NAMES: &[&str] = &["bvh", "obvhs"];
 
-    /// Reads the settings of the library called `name`; `None` if there is none of this name.
+    /// Reads the settings of the library called `name`; `None` if no library has this name.
     pub fn read<'de, D: Deserializer<'de>>(
         name: &str,
         settings: D,
@@ -126,12 +129,16 @@ impl Peer {
         }
     }
 
-    /// The cargo feature that the program lacks to use this library, if it does.
+    /// The cargo feature that this build of the program lacks for the library, if any.
     pub fn missing_feature(&self) -> Option<&'static str> {
         (!cfg!(feature = "peers")).then_some("peers")
     }
 
-    /// Builds the tree over the scene's objects. An error says what the library cannot do.
+    /// Builds the tree over the scene's objects.
+    ///
+    /// # Errors
+    ///
+    /// If the library is not compiled in.
     #[cfg_attr(
         not(feature = "peers"),
         allow(unused_variables, reason = "there is nothing to build")
@@ -147,7 +154,7 @@ impl Peer {
         }
     }
 
-    /// The tree over boxes by the settings as they are.
+    /// Builds the tree over boxes with unmodified settings.
     #[cfg(feature = "peers")]
     pub(crate) fn raw(&self, boxes: &[Aabb]) -> Raw {
         match self {
@@ -156,7 +163,7 @@ impl Peer {
         }
     }
 
-    /// The library's ways to trace rays through the scene's triangles.
+    /// Returns the library's ways to trace rays through the scene's triangles.
     #[cfg_attr(
         not(feature = "peers"),
         allow(unused_variables, reason = "there is nothing to trace")
@@ -197,11 +204,12 @@ mod tests {
     }
 
     #[test]
-    fn a_fraction_out_of_range_is_refused_by_its_name() {
-        let obvhs = |ratio| Peer::Obvhs(Obvhs { reinsertion: Some(ratio), ..Default::default() });
-        let refused = obvhs(-0.5).check().unwrap_err().to_string();
-        assert_eq!(refused, "reinsertion is -0.5; accepted: 0 to 100");
-        assert_eq!(obvhs(2.0).check(), Ok(()));
+    fn a_fraction_out_of_range_is_rejected_by_its_name() {
+        let settings = Obvhs { reinsertion: Some(-0.5), ..Default::default() };
+        let error = Peer::Obvhs(settings).check().unwrap_err();
+        assert_eq!(error.to_string(), "reinsertion is -0.5; accepted: 0 to 100");
+        let settings = Obvhs { reinsertion: Some(2.0), ..Default::default() };
+        assert_eq!(Peer::Obvhs(settings).check(), Ok(()));
     }
 
     #[test]

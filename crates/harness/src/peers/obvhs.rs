@@ -1,7 +1,7 @@
 //! The crate `obvhs`.
 
 use super::{Built, Obvhs, Preset, Raw};
-use crate::measure::contender::{Batch, Contender, Tracer, timed};
+use crate::measure::contender::{Batch, Contender, Trace, Tracer, timed};
 use crate::measure::layout::COMPILED;
 use ::obvhs::bvh2::{Bvh2, builder as binary};
 use ::obvhs::cwbvh::builder as wide;
@@ -11,7 +11,7 @@ use ::obvhs::triangle::Triangle as TheirTriangle;
 use ::obvhs::{BvhBuildParams, aabb};
 use bvh_core::{Aabb, Bvh, FirstCountNode, Hit, Ray, Triangle};
 use bvh_scenes::trace::Query;
-use glam::{Vec3, Vec3A};
+use glam::Vec3A;
 use std::time::Duration;
 
 fn parameters(config: &Obvhs) -> BvhBuildParams {
@@ -42,13 +42,16 @@ fn to_ours(theirs: &Bvh2, boxes: &[Aabb]) -> Bvh {
     if boxes.is_empty() {
         return Bvh::default();
     }
-    let ours = |node: &::obvhs::bvh2::node::Bvh2Node| FirstCountNode {
-        min: node.aabb().min.into(),
-        first: node.first_index,
-        max: node.aabb().max.into(),
-        count: node.prim_count,
-    };
-    let nodes: Vec<FirstCountNode> = theirs.nodes.iter().map(ours).collect();
+    let nodes: Vec<FirstCountNode> = theirs
+        .nodes
+        .iter()
+        .map(|node| FirstCountNode {
+            min: node.aabb().min.into(),
+            first: node.first_index,
+            max: node.aabb().max.into(),
+            count: node.prim_count,
+        })
+        .collect();
     Bvh::from_first_count(&nodes, &theirs.primitive_indices)
         .unwrap_or_else(|error| panic!("obvhs built no tree: {error}"))
 }
@@ -57,8 +60,8 @@ fn ray(ray: &Ray, t_max: f32) -> TheirRay {
     TheirRay::new(ray.origin().into(), ray.direction().into(), ray.t_min(), t_max)
 }
 
-/// Builds over boxes, with one object per leaf and no split triangles. The library's own stopwatch leaves out
-/// conversions and checks.
+/// Builds over boxes, with one object per leaf and no split triangles. The library's stopwatch
+/// excludes conversions and checks.
 pub(super) fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
     let parameters =
         BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..parameters(config) };
@@ -66,24 +69,24 @@ pub(super) fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
     Built::tight(to_ours(&theirs, boxes), time.as_secs_f64(), boxes)
 }
 
-/// The preset as it is, with several objects per leaf.
+/// Builds with the unmodified preset, with several objects per leaf.
 pub(super) fn raw(config: &Obvhs, boxes: &[Aabb]) -> Raw {
     let (theirs, _) = build_over(boxes, parameters(config));
     let tree = to_ours(&theirs, boxes);
     let nearest = move |ray: &Ray, test: &dyn Fn(u32) -> Option<f32>| {
         let mut hit = RayHit::none();
-        // The library takes only hits before the end of the range.
+        // The library accepts only hits strictly before the end of the range.
         theirs.ray_traverse(self::ray(ray, ray.t_max().next_up()), &mut hit, |_, at| {
             test(theirs.primitive_indices[at]).unwrap_or(f32::INFINITY)
         });
-        // The distance is overwritten at the end, whether there was a hit or not.
+        // The library overwrites the distance even if there was no hit.
         (hit.primitive_id != u32::MAX).then_some(hit.t)
     };
     Raw { tree, nearest: Box::new(nearest) }
 }
 
-/// A [`Trace`](crate::measure::contender::Trace) by a tree over `triangles` in the order of its leaves. The library's trees
-/// have the same functions but no common trait.
+/// Makes a [`Trace`](crate::measure::contender::Trace) from a tree over `triangles` in the order of
+/// its leaves. It is a macro because the library's trees share functions but no trait.
 macro_rules! traced_by {
     ($tree:ident, $triangles:expr) => {{
         let triangles: Vec<RtTriangle> = $triangles;
@@ -101,36 +104,43 @@ macro_rules! traced_by {
     }};
 }
 
-/// The preset's binary tree and its compressed eight-wide tree, with triangles in the order of leaves, as the library
-/// recommends. It expects unit directions; ours are, up to rounding.
+/// Returns the preset's binary tree and its compressed eight-wide tree, with triangles in the order
+/// of leaves, as the library recommends. It expects unit directions; ours have unit length up to
+/// rounding.
 pub(super) fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contender<'static>> {
-    let corner = |p: Vec3| Vec3A::from(p);
     let theirs: Vec<TheirTriangle> = triangles
         .iter()
-        .map(|&Triangle([a, b, c])| TheirTriangle { v0: corner(a), v1: corner(b), v2: corner(c) })
+        .map(|&Triangle(corners)| {
+            let [v0, v1, v2] = corners.map(Vec3A::from);
+            TheirTriangle { v0, v1, v2 }
+        })
         .collect();
-    let in_order = |ids: &[u32]| -> Vec<RtTriangle> {
-        ids.iter()
-            .map(|&id| (&theirs[id as usize]).into())
-            .collect()
-    };
     let mut binary_time = Duration::ZERO;
     let mut wide_time = Duration::ZERO;
     let tree = binary::build_bvh2_from_tris(&theirs, parameters(config), &mut binary_time);
-    let trace_binary = traced_by!(tree, in_order(&tree.primitive_indices));
+    let trace_binary = traced_by!(tree, in_order(&theirs, &tree.primitive_indices));
     let compressed = wide::build_cwbvh_from_tris(&theirs, parameters(config), &mut wide_time);
-    let trace_wide = traced_by!(compressed, in_order(&compressed.primitive_indices));
-    let contender = |layout: &str, time: Duration, trace| Contender {
+    let trace_wide = traced_by!(compressed, in_order(&theirs, &compressed.primitive_indices));
+    vec![
+        contender("binary, their own", binary_time, Box::new(trace_binary)),
+        contender("wide, their own", wide_time, Box::new(trace_wide)),
+    ]
+}
+
+fn in_order(triangles: &[TheirTriangle], ids: &[u32]) -> Vec<RtTriangle> {
+    ids.iter()
+        .map(|&id| (&triangles[id as usize]).into())
+        .collect()
+}
+
+fn contender(layout: &str, time: Duration, trace: Trace<'static>) -> Contender<'static> {
+    Contender {
         layout: layout.into(),
         instructions: COMPILED.into(),
         version: env!("HARNESS_OBVHS").into(),
         preparation_seconds: time.as_secs_f64(),
         tracer: Tracer::Other(trace),
-    };
-    vec![
-        contender("binary, their own", binary_time, Box::new(trace_binary) as _),
-        contender("wide, their own", wide_time, Box::new(trace_wide) as _),
-    ]
+    }
 }
 
 #[inline(always)]

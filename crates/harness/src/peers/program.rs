@@ -1,13 +1,15 @@
-//! A program of others at work, and the end of all that it has started.
+//! A running external program, which ends together with all processes that it has started.
 
 use std::io;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus};
 
-/// A program, ended with all that it has started as soon as this is dropped, also if it has ended by itself.
+/// A running program. Dropping it kills the program and all processes that it has started, even if
+/// the program itself has ended.
 ///
-/// What it starts is in its process group. On Linux what has left that group is found by the variable [`MARK`] of its environment; nothing
-/// is known of a process that leaves the group and clears its environment.
+/// The processes are members of its process group. On Linux, processes that left the group are
+/// found by the variable [`MARK`] in their environment. A process that leaves the group and clears
+/// its environment escapes.
 #[derive(Debug)]
 pub struct Program {
     child: Child,
@@ -15,14 +17,15 @@ pub struct Program {
     mark: Vec<u8>,
 }
 
-/// The environment variable with the folder that program and harness share, by which its processes are told from all others.
+/// The environment variable that identifies the program's processes; its value is the folder that
+/// program and harness share.
 const MARK: &str = "BVH_FOLDER";
 
 impl Program {
-    /// Starts a program; `folder` is one that no other program is given.
+    /// Starts a program. No other program may get the same `folder`.
     pub fn start(command: &mut Command, folder: &Path) -> io::Result<Self> {
         command.env(MARK, folder);
-        // In a group of its own, so that what it starts can be ended with it.
+        // A separate group can be killed as a whole, and Ctrl-C in the terminal does not reach it.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(command, 0);
         let child = command.spawn()?;
@@ -33,7 +36,7 @@ impl Program {
         })
     }
 
-    /// How it has ended, if it has.
+    /// Returns the exit status if the program has ended.
     pub fn status(&mut self) -> io::Result<Option<ExitStatus>> {
         self.child.try_wait()
     }
@@ -41,7 +44,7 @@ impl Program {
 
 impl Drop for Program {
     fn drop(&mut self) {
-        // The system gives the number of a group to nobody else while anything is in it.
+        // The system reuses the number of a group only after its last member has ended.
         #[cfg(unix)]
         {
             use nix::{sys::signal, unistd::Pid};
@@ -55,7 +58,7 @@ impl Drop for Program {
     }
 }
 
-/// Processes by a variable of their environment, which all that they start inherits.
+/// Finds processes by a variable of their environment, which child processes inherit.
 #[cfg(target_os = "linux")]
 mod marked {
     use nix::sys::signal::{Signal, kill};
@@ -64,10 +67,11 @@ mod marked {
     use std::thread::sleep;
     use std::time::Duration;
 
-    /// How often processes are looked for, because they take a moment to end, and may start others in it.
+    /// The maximum number of searches. A process needs a moment to end, in which it may start
+    /// others.
     const ROUNDS: usize = 200;
 
-    /// Kills all processes of which `variable` is in the environment.
+    /// Kills all processes that have `variable` in their environment.
     pub fn end(variable: &[u8]) {
         for _ in 0..ROUNDS {
             let found = processes(variable);
@@ -82,19 +86,20 @@ mod marked {
     }
 
     fn processes(variable: &[u8]) -> Vec<Pid> {
-        let entries = fs::read_dir("/proc")
-            .into_iter()
+        let Ok(entries) = fs::read_dir("/proc") else { return vec![] };
+        entries
             .flatten()
-            .flatten();
-        let process = |entry: fs::DirEntry| {
-            let number = entry.file_name().to_str()?.parse().ok()?;
-            // Those of other users cannot be read.
-            let environment = fs::read(entry.path().join("environ")).ok()?;
-            let is_marked = environment
-                .split(|&byte| byte == 0)
-                .any(|found| found == variable);
-            is_marked.then(|| Pid::from_raw(number))
-        };
-        entries.filter_map(process).collect()
+            .filter_map(|entry| marked_process(&entry, variable))
+            .collect()
+    }
+
+    fn marked_process(entry: &fs::DirEntry, variable: &[u8]) -> Option<Pid> {
+        let number = entry.file_name().to_str()?.parse().ok()?;
+        // The environments of other users' processes cannot be read.
+        let environment = fs::read(entry.path().join("environ")).ok()?;
+        let mut variables = environment.split(|&byte| byte == 0);
+        variables
+            .any(|found| found == variable)
+            .then(|| Pid::from_raw(number))
     }
 }

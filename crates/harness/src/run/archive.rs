@@ -1,4 +1,4 @@
-//! The archive of the best known trees: a folder with a tree file per scene and a row per file, which anyone can beat.
+//! The archive of the best known trees: a folder with one tree file per scene and a table of them.
 
 use crate::Error;
 use crate::rows::lock::wait_for_folder;
@@ -12,59 +12,63 @@ use bvh_terminal::files;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The folder among the results.
+/// The archive's folder in the results.
 const FOLDER: &str = "trees";
 
-/// The rows of the archive in a folder of results; none if there is no archive.
+/// Returns the rows of the archive in a folder of results; none if there is no archive.
 pub fn rows(results: &Path) -> Result<Vec<TreeRow>, Error> {
     let path = results.join(FOLDER).join(TreeRow::FILE);
     if path.is_file() { read(&path) } else { Ok(vec![]) }
 }
 
-/// Where the archive keeps the tree of a scene.
+/// Returns the path of a scene's tree in the archive.
 pub fn path(results: &Path, scene: &str) -> PathBuf {
     results
         .join(FOLDER)
         .join(format!("{}.bvh", scene.replace(':', "-")))
 }
 
-/// Keeps the tree `file` of a scene, which the `command` has made, and records its cost there and among the best known ones. Refuses
-/// one that another of the archive, or the best known cost, is better than or equal to. Returns where it is kept.
+/// Keeps the tree in `file`, which `command` produced, and records its cost in the archive and
+/// among the best known costs. Returns the tree's new path.
+///
+/// # Errors
+///
+/// If the scene's tree in the archive costs no more, or if a lower cost is known.
 pub fn keep(results: &Path, scene: &Scene, file: &Path, command: &str) -> Result<PathBuf, Error> {
-    let refused =
-        |message: String| Err(Error::Usage(format!("--keep: {}: {message}", file.display())));
     let bytes = tree_file::read(file)?;
     let (tree, header) = tree_file::load(file, scene)?;
     let objects = scene.boxes.len();
+    // Wider nodes and leaves would make every cost beatable.
     if tree.nodes.len() + 1 != 2 * objects {
-        return refused("not a binary tree with one object per leaf".into());
+        return Err(rejected(file, "not a binary tree with one object per leaf"));
     }
     let internal_area = cost::internal_area(&tree);
+    // Held until both tables are written, so that no other harness archives a better tree
+    // meanwhile.
     let _lock = wait_for_folder(results)?;
-    let known = best_known(results, scene)?;
-    if let Some(known) = known
-        .as_ref()
-        .filter(|known| internal_area > known.cost * (1.0 + ROUNDING))
+    let best = best_known(results, scene)?;
+    if let Some(best) = &best
+        && internal_area > best.cost * (1.0 + ROUNDING)
     {
-        return refused(format!(
-            "its cost is {internal_area}, and the best known is {}",
-            known.cost
-        ));
+        let message = format!("its cost is {internal_area}, the best known cost is {}", best.cost);
+        return Err(rejected(file, &message));
     }
     let mut rows = rows(results)?;
     let row_checksum = checksum(scene);
-    let old = rows
+    if let Some(index) = rows
         .iter()
-        .position(|row| row.scene == scene.name);
-    if let Some(old) = old
-        .map(|at| rows.remove(at))
-        .filter(|old| old.checksum == row_checksum)
-        && internal_area >= old.internal_area * (1.0 - ROUNDING)
+        .position(|row| row.scene == scene.name)
     {
-        return refused(format!(
-            "its cost is {internal_area}, and that in the archive is {}",
-            old.internal_area
-        ));
+        let archived = rows.remove(index);
+        // A tree over other boxes is no competitor: the scene has changed since.
+        if archived.checksum == row_checksum
+            && internal_area >= archived.internal_area * (1.0 - ROUNDING)
+        {
+            let archived_area = archived.internal_area;
+            let message =
+                format!("its cost is {internal_area}, the archived tree's is {archived_area}");
+            return Err(rejected(file, &message));
+        }
     }
     let path = path(results, &scene.name);
     rows.push(TreeRow {
@@ -72,7 +76,7 @@ pub fn keep(results: &Path, scene: &Scene, file: &Path, command: &str) -> Result
         objects,
         checksum: row_checksum,
         internal_area,
-        lower_bound: known.and_then(|known| known.lower_bound),
+        lower_bound: best.and_then(|best| best.lower_bound),
         command: command.into(),
     });
     rows.sort_by(|a, b| a.scene.cmp(&b.scene));
@@ -83,4 +87,8 @@ pub fn keep(results: &Path, scene: &Scene, file: &Path, command: &str) -> Result
     files::write(&table, &to_bytes(&rows, &table)?)?;
     improve(results, scene, &tree, &header)?;
     Ok(path)
+}
+
+fn rejected(file: &Path, message: &str) -> Error {
+    Error::Usage(format!("--keep: {}: {message}", file.display()))
 }

@@ -1,5 +1,5 @@
-//! Compares fresh results with committed ones: the resolved spec key by key, every CSV file but the timing ones row by row,
-//! and every figure but the timing ones byte by byte.
+//! Compares fresh results with committed ones: the resolved spec key by key, CSV files row by row,
+//! and figures byte by byte. Files with times are not compared.
 
 use crate::Error;
 use bvh_scenes::read_text;
@@ -10,91 +10,110 @@ use std::fs;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Differences beyond this many per file are only counted.
+/// The number of differences per file that are listed; further ones are only counted.
 const SHOWN: usize = 5;
 
-/// Lists how the resolved spec, the CSV files and, if they are kept, the figures in `fresh` differ from those in `committed`,
-/// one line each. Rows of the scenes in `left_out` are not compared. If any scene is left out, neither are figures and the
-/// rows of files without a column `scene`, which summarise all scenes.
+/// A parsed CSV file.
+struct Rows {
+    header: StringRecord,
+    records: Vec<StringRecord>,
+}
+
+/// Lists the differences between the folders `fresh` and `committed`, one line each.
+///
+/// The rows of `skipped_scenes` are not compared. If any scene was skipped, neither are figures, nor
+/// the rows of files without a column `scene`, which summarise all scenes.
 pub fn compare(
     fresh: &Path,
     committed: &Path,
-    left_out: &[String],
+    skipped_scenes: &[String],
     has_figures: bool,
 ) -> Result<Vec<String>, Error> {
-    let mut names = results(fresh, ".csv")?;
+    let mut names = untimed_files(fresh, ".csv")?;
     if !committed.is_dir() {
         return Ok(vec![format!("{}: no committed results to compare with", committed.display())]);
     }
-    names.extend(results(committed, ".csv")?);
-    let mut differences = compare_specs(fresh, committed, left_out)?;
+    names.extend(untimed_files(committed, ".csv")?);
+    let mut differences = compare_specs(fresh, committed, skipped_scenes)?;
     for name in names {
-        let paths = [fresh.join(&name), committed.join(&name)];
-        match [paths[0].is_file(), paths[1].is_file()] {
-            [true, true] => {
-                differences.extend(compare_files(&name, &paths[0], &paths[1], left_out)?)
-            }
-            [true, false] => differences.push(format!("{name} is not among the committed results")),
-            _ => differences.push(format!("{name} is committed but is no longer written")),
+        let fresh_file = fresh.join(&name);
+        let committed_file = committed.join(&name);
+        if !committed_file.is_file() {
+            differences.push(format!("{name} is not among the committed results"));
+        } else if !fresh_file.is_file() {
+            differences.push(format!("{name} is committed but is no longer written"));
+        } else {
+            let fresh_rows = read_rows(&fresh_file, skipped_scenes)?;
+            let committed_rows = read_rows(&committed_file, skipped_scenes)?;
+            let all_scenes = skipped_scenes.is_empty();
+            differences.extend(compare_rows(&name, &fresh_rows, &committed_rows, all_scenes));
         }
     }
-    if has_figures && left_out.is_empty() {
+    if has_figures && skipped_scenes.is_empty() {
         differences.extend(compare_figures(fresh, committed)?);
     }
     Ok(differences)
 }
 
-/// How the figures differ: those of the committed results that hold no seconds are to have the same bytes.
+/// Compares the bytes of all figures that show no seconds.
 fn compare_figures(fresh: &Path, committed: &Path) -> Result<Vec<String>, Error> {
-    let mut all = results(fresh, ".svg")?;
-    all.extend(results(committed, ".svg")?);
-    let difference = |name: String| {
-        let read = |folder: &Path| fs::read(folder.join(&name)).ok();
-        match (read(fresh), read(committed)) {
-            (Some(now), Some(then)) if now == then => None,
-            (Some(_), Some(_)) => {
-                Some(format!("{name} is drawn otherwise than the committed figure"))
-            }
-            (Some(_), None) => Some(format!("{name} is not among the committed results")),
-            (None, _) => Some(format!("{name} is committed but is no longer drawn")),
+    let mut names = untimed_files(fresh, ".svg")?;
+    names.extend(untimed_files(committed, ".svg")?);
+    let mut differences = Vec::new();
+    for name in names {
+        let fresh_bytes = fs::read(fresh.join(&name)).ok();
+        let committed_bytes = fs::read(committed.join(&name)).ok();
+        if fresh_bytes == committed_bytes {
+            continue;
         }
-    };
-    Ok(all.into_iter().filter_map(difference).collect())
+        differences.push(if fresh_bytes.is_none() {
+            format!("{name} is committed but is no longer drawn")
+        } else if committed_bytes.is_none() {
+            format!("{name} is not among the committed results")
+        } else {
+            format!("{name} differs from the committed figure")
+        });
+    }
+    Ok(differences)
 }
 
-/// How the resolved specs differ.
+/// Compares the resolved specs key by key.
 fn compare_specs(
     fresh: &Path,
     committed: &Path,
-    left_out: &[String],
+    skipped_scenes: &[String],
 ) -> Result<Vec<String>, Error> {
-    let read = |folder: &Path| -> Result<Value, Error> {
-        let path = folder.join("resolved.toml");
-        let mut table: Table = toml::from_str(&read_text(&path)?).map_err(Error::toml(&path))?;
-        if let Some(Value::Array(scenes)) = table.get_mut("scenes") {
-            let name = |scene: &Value| {
-                scene
-                    .get("name")
-                    .and_then(Value::as_str)
-                    .unwrap_or_default()
-                    .to_owned()
-            };
-            scenes.retain(|scene| !left_out.contains(&name(scene)));
-        }
-        Ok(Value::Table(table))
-    };
+    let fresh_spec = Value::Table(read_spec(fresh, skipped_scenes)?);
+    let committed_spec = Value::Table(read_spec(committed, skipped_scenes)?);
     let mut differences = Vec::new();
-    compare_values("", &read(fresh)?, &read(committed)?, &mut differences);
+    compare_values("", &fresh_spec, &committed_spec, &mut differences);
     Ok(shortened("resolved.toml", differences))
+}
+
+fn read_spec(folder: &Path, skipped_scenes: &[String]) -> Result<Table, Error> {
+    let path = folder.join("resolved.toml");
+    let mut spec: Table = toml::from_str(&read_text(&path)?).map_err(Error::toml(&path))?;
+    if let Some(Value::Array(scenes)) = spec.get_mut("scenes") {
+        scenes.retain(|scene| {
+            let name = scene.get("name").and_then(Value::as_str);
+            !skipped_scenes
+                .iter()
+                .any(|skipped| Some(skipped.as_str()) == name)
+        });
+    }
+    Ok(spec)
 }
 
 fn compare_values(key: &str, fresh: &Value, committed: &Value, differences: &mut Vec<String>) {
     match (fresh, committed) {
-        (Value::Table(fresh), Value::Table(committed)) => {
-            let names: BTreeSet<&String> = fresh.keys().chain(committed.keys()).collect();
+        (Value::Table(fresh_table), Value::Table(committed_table)) => {
+            let names: BTreeSet<&String> = fresh_table
+                .keys()
+                .chain(committed_table.keys())
+                .collect();
             for name in names {
                 let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
-                match (fresh.get(name), committed.get(name)) {
+                match (fresh_table.get(name), committed_table.get(name)) {
                     (Some(fresh), Some(committed)) => {
                         compare_values(&key, fresh, committed, differences)
                     }
@@ -102,14 +121,17 @@ fn compare_values(key: &str, fresh: &Value, committed: &Value, differences: &mut
                         differences.push(format!("{key} is {fresh}, not committed"))
                     }
                     (None, _) => {
-                        differences.push(format!("{key} is committed, but is no key any more"))
+                        differences.push(format!("{key} is committed but is no longer a key"))
                     }
                 }
             }
         }
-        (Value::Array(fresh), Value::Array(committed)) if fresh.len() == committed.len() => {
-            for (at, (fresh, committed)) in fresh.iter().zip(committed).enumerate() {
-                compare_values(&format!("{key}[{at}]"), fresh, committed, differences);
+        (Value::Array(fresh_values), Value::Array(committed_values))
+            if fresh_values.len() == committed_values.len() =>
+        {
+            for (index, fresh) in fresh_values.iter().enumerate() {
+                let key = format!("{key}[{index}]");
+                compare_values(&key, fresh, &committed_values[index], differences);
             }
         }
         _ if fresh == committed => {}
@@ -117,7 +139,7 @@ fn compare_values(key: &str, fresh: &Value, committed: &Value, differences: &mut
     }
 }
 
-/// The first differences in a file, and how many more there are.
+/// Returns the first differences in a file and the number of further ones.
 fn shortened(file: &str, mut differences: Vec<String>) -> Vec<String> {
     let more = differences.len().saturating_sub(SHOWN);
     differences.truncate(SHOWN);
@@ -130,50 +152,44 @@ fn shortened(file: &str, mut differences: Vec<String>) -> Vec<String> {
         .collect()
 }
 
-/// The files of a folder whose names end so, without those that hold seconds, as their names say.
-fn results(folder: &Path, end: &str) -> Result<BTreeSet<String>, Error> {
+/// Returns the names in a folder that end with `suffix`, without the files that hold seconds.
+fn untimed_files(folder: &Path, suffix: &str) -> Result<BTreeSet<String>, Error> {
     let mut names = files::names(folder)?;
-    names.retain(|name| name.ends_with(end) && !name.starts_with("timing"));
+    names.retain(|name| name.ends_with(suffix) && !name.starts_with("timing"));
     Ok(names)
 }
 
-fn compare_files(
-    name: &str,
-    fresh: &Path,
-    committed: &Path,
-    left_out: &[String],
-) -> Result<Vec<String>, Error> {
-    let (header, fresh) = read(fresh, left_out)?;
-    let (committed_header, committed) = read(committed, left_out)?;
-    // Rows that name no scene are about all scenes, of which some are missing here.
-    if !left_out.is_empty() && !header.iter().any(|column| column == "scene") {
-        return Ok(Vec::new());
+fn compare_rows(name: &str, fresh: &Rows, committed: &Rows, all_scenes: bool) -> Vec<String> {
+    let header = &fresh.header;
+    // Rows that name no scene are about all scenes, and some are missing here.
+    if !all_scenes && !header.iter().any(|column| column == "scene") {
+        return vec![];
     }
-    if header != committed_header {
-        return Ok(vec![format!("{name}: columns are {header:?}, committed {committed_header:?}")]);
+    if *header != committed.header {
+        let committed_header = &committed.header;
+        return vec![format!("{name}: columns are {header:?}, committed {committed_header:?}")];
     }
-    if !left_out.is_empty() && !header.iter().any(|column| column == "scene") {
-        return Ok(Vec::new());
+    let mut differences = Vec::new();
+    for (fresh_row, committed_row) in fresh.records.iter().zip(&committed.records) {
+        for (column, (now, then)) in header
+            .iter()
+            .zip(fresh_row.iter().zip(committed_row))
+        {
+            if now != then {
+                let row = identity(header, committed_row);
+                differences.push(format!("{row}: {column} is {now}, committed {then}"));
+            }
+        }
     }
-    let mut differences: Vec<String> = fresh
-        .iter()
-        .zip(&committed)
-        .flat_map(|(fresh, committed)| {
-            let columns = header.iter().zip(fresh.iter().zip(committed));
-            columns
-                .filter(|(_, (now, then))| now != then)
-                .map(|(column, (now, then))| {
-                    format!("{}: {column} is {now}, committed {then}", identity(&header, committed))
-                })
-        })
-        .collect();
-    if fresh.len() != committed.len() {
-        differences.push(format!("{} rows, committed {}", fresh.len(), committed.len()));
+    let fresh_count = fresh.records.len();
+    let committed_count = committed.records.len();
+    if fresh_count != committed_count {
+        differences.push(format!("{fresh_count} rows, committed {committed_count}"));
     }
-    Ok(shortened(name, differences))
+    shortened(name, differences)
 }
 
-/// What a row is about: its scene, method and so on.
+/// Returns the columns that identify a row: its scene, method and so on.
 fn identity(header: &StringRecord, row: &StringRecord) -> String {
     let keys = ["scene", "method", "column", "quantity", "repetition", "trials", "evaluations"];
     let values = header
@@ -186,7 +202,8 @@ fn identity(header: &StringRecord, row: &StringRecord) -> String {
         .join(", ")
 }
 
-fn read(path: &Path, left_out: &[String]) -> Result<(StringRecord, Vec<StringRecord>), Error> {
+fn read_rows(path: &Path, skipped_scenes: &[String]) -> Result<Rows, Error> {
+    // A row of another length is a difference to report, not an error.
     let mut reader = csv::ReaderBuilder::new()
         .flexible(true)
         .from_path(path)
@@ -195,29 +212,26 @@ fn read(path: &Path, left_out: &[String]) -> Result<(StringRecord, Vec<StringRec
         .headers()
         .map_err(Error::csv(path))?
         .clone();
-    let scene = header.iter().position(|column| column == "scene");
-    let rows: Vec<StringRecord> = reader
+    let mut records: Vec<StringRecord> = reader
         .records()
         .collect::<Result<_, _>>()
         .map_err(Error::csv(path))?;
-    let is_left_out = |row: &StringRecord| {
-        scene
-            .and_then(|at| row.get(at))
-            .is_some_and(|name| left_out.iter().any(|out| out == name))
-    };
-    Ok((
-        header,
-        rows.into_iter()
-            .filter(|row| !is_left_out(row))
-            .collect(),
-    ))
+    if let Some(scene_column) = header.iter().position(|column| column == "scene") {
+        records.retain(|record| {
+            let scene = record.get(scene_column);
+            !skipped_scenes
+                .iter()
+                .any(|skipped| Some(skipped.as_str()) == scene)
+        });
+    }
+    Ok(Rows { header, records })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn differences(fresh: &str, committed: &str, left_out: &[String]) -> Vec<String> {
+    fn differences(fresh: &str, committed: &str, skipped_scenes: &[String]) -> Vec<String> {
         let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
         fs::write(folders[0].path().join("runs.csv"), fresh).unwrap();
         fs::write(folders[1].path().join("runs.csv"), committed).unwrap();
@@ -225,13 +239,13 @@ mod tests {
         for folder in &folders {
             fs::write(folder.path().join("resolved.toml"), "").unwrap();
         }
-        compare(folders[0].path(), folders[1].path(), left_out, true).unwrap()
+        compare(folders[0].path(), folders[1].path(), skipped_scenes, true).unwrap()
     }
 
     const COMMITTED: &str = "scene,method,cost\na,m,1.5\nb,m,2.5\n";
 
     #[test]
-    fn a_summary_of_all_scenes_is_compared_only_if_all_scenes_are_there() {
+    fn a_summary_of_all_scenes_is_compared_only_without_skipped_scenes() {
         let fresh = "answer\nlower on 1 of 1 scenes\n";
         let committed = "answer\nlower on 2 of 2 scenes\n";
         assert_eq!(differences(fresh, committed, &["b".to_owned()]), Vec::<String>::new());
@@ -264,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_that_is_drawn_otherwise_is_named_unless_it_shows_seconds_or_lacks_a_scene() {
+    fn an_altered_figure_is_named_unless_it_shows_seconds_or_lacks_a_scene() {
         let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
         for (folder, text) in folders.iter().zip(["<svg/>", "<svg></svg>"]) {
             fs::write(folder.path().join("resolved.toml"), "").unwrap();
@@ -272,10 +286,10 @@ mod tests {
                 fs::write(folder.path().join(name), text).unwrap();
             }
         }
-        let found = |left_out: &[String], has_figures| {
-            compare(folders[0].path(), folders[1].path(), left_out, has_figures).unwrap()
+        let found = |skipped_scenes: &[String], has_figures| {
+            compare(folders[0].path(), folders[1].path(), skipped_scenes, has_figures).unwrap()
         };
-        assert_eq!(found(&[], true), ["trials.svg is drawn otherwise than the committed figure"]);
+        assert_eq!(found(&[], true), ["trials.svg differs from the committed figure"]);
         assert!(found(&["sponza".into()], true).is_empty() && found(&[], false).is_empty());
         fs::write(folders[1].path().join("trials.svg"), "<svg/>").unwrap();
         assert!(found(&[], true).is_empty());
@@ -286,20 +300,20 @@ mod tests {
     #[test]
     fn a_stale_resolved_spec_is_named_by_its_keys() {
         let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
-        let write = |at: usize, text: &str| {
-            fs::write(folders[at].path().join("resolved.toml"), text).unwrap()
-        };
-        write(0, "[experiment]\nseed = 1\nm = [{ a = 1 }]\n[[scenes]]\nname = 'x'\n");
-        write(
-            1,
-            "[experiment]\nold = 1\nm = [{ a = 2 }]\n[[scenes]]\nname = 'x'\n[[scenes]]\nname = 'y'\n",
-        );
+        let specs = [
+            "[experiment]\nseed = 1\nm = [{ a = 1 }]\n[[scenes]]\nname = 'x'\n",
+            "[experiment]\nold = 1\nm = [{ a = 2 }]\n\
+             [[scenes]]\nname = 'x'\n[[scenes]]\nname = 'y'\n",
+        ];
+        for (folder, spec) in folders.iter().zip(specs) {
+            fs::write(folder.path().join("resolved.toml"), spec).unwrap();
+        }
         let found = compare(folders[0].path(), folders[1].path(), &["y".into()], true).unwrap();
         assert_eq!(
             found,
             [
                 "resolved.toml: experiment.m[0].a is 1, committed 2",
-                "resolved.toml: experiment.old is committed, but is no key any more",
+                "resolved.toml: experiment.old is committed but is no longer a key",
                 "resolved.toml: experiment.seed is 1, not committed",
             ]
         );

@@ -1,4 +1,4 @@
-//! Executes an experiment: opens its folder, carries out its measurements, and concludes.
+//! Executes an experiment: opens its folder, performs its measurements and makes its reports.
 
 use super::clocked::ClockedPeers;
 use super::finish::{Summary, conclude};
@@ -21,21 +21,21 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-pub use super::measurement::Said;
+pub use super::measurement::Verbosity;
 
-/// How much of an experiment is to be done.
+/// How much of an experiment to execute.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Extent {
-    /// What happens to the results that are there already.
+    /// How to treat existing results.
     pub existing: Existing,
-    /// Do these runs only, and leave them to be [merged](crate::run::merge::merge).
+    /// Perform only these runs and keep them to be [merged](crate::run::merge::merge).
     pub shard: Option<Shard>,
-    /// What is said of the runs on standard error.
-    pub said: Said,
+    /// Which lines about the runs go to standard error.
+    pub verbosity: Verbosity,
 }
 
-/// Runs `experiment` into `out/NAME/`. As soon as `interrupted` becomes true, the unfinished runs are given up and the
-/// finished ones are kept.
+/// Runs `experiment` into `out/NAME/`. Once `interrupted` is true, unfinished runs are abandoned
+/// and finished ones are kept.
 pub fn execute(
     experiment: &Experiment,
     out: &Path,
@@ -43,22 +43,25 @@ pub fn execute(
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
     let measurements = measurements(experiment);
-    let whole_only = measurements
+    let indivisible = measurements
         .iter()
-        .find_map(|measurement| measurement.whole_only());
-    if let Some(why) = whole_only.filter(|_| extent.shard.is_some()) {
-        return Err(Error::Usage(format!("{}: {why}", experiment.name)));
+        .find_map(|measurement| measurement.indivisible());
+    if let Some(reason) = indivisible
+        && extent.shard.is_some()
+    {
+        return Err(Error::Usage(format!("{}: {reason}", experiment.name)));
     }
-    let run = || run(experiment, &measurements, out, extent, interrupted);
-    let Some(threads) = experiment.threads else { return run() };
+    let Some(threads) = experiment.threads else {
+        return run(experiment, &measurements, out, extent, interrupted);
+    };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.into())
-        .build();
-    let pool = pool.map_err(|error| Error::Usage(format!("threads = {threads}: {error}")))?;
-    pool.install(run)
+        .build()
+        .map_err(|error| Error::Usage(format!("threads = {threads}: {error}")))?;
+    pool.install(|| run(experiment, &measurements, out, extent, interrupted))
 }
 
-/// The measurements that an experiment asks for, in their order: later ones use the runs of the first.
+/// Returns the measurements of an experiment in their order: later ones use the trees of the runs.
 fn measurements(experiment: &Experiment) -> Vec<Box<dyn Measurement + Sync + '_>> {
     if let Some(measure) = &experiment.suite {
         return vec![Box::new(Suite(measure))];
@@ -83,32 +86,34 @@ fn run(
     extent: Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
-    let Extent { existing, shard, said } = extent;
-    let (scenes, left_out) = load_scenes(experiment)?;
+    let Extent { existing, shard, verbosity } = extent;
+    let (scenes, skipped_scenes) = load_scenes(experiment)?;
     let resolved = Resolved::new(experiment, &scenes);
-    let Target { folder, beside, is_finished } =
-        Target::choose(out, &resolved, existing, shard.is_some())?;
+    let target = Target::choose(out, &resolved, existing, shard.is_some())?;
+    let Target { folder, previous, is_finished } = target;
     if is_finished {
-        return Ok(Summary { left_out, ..Summary::finished(folder) });
+        return Ok(Summary { skipped_scenes, ..Summary::finished(folder) });
     }
     let store = Store::open(&folder, &to_toml(&resolved)?, existing)?;
     let jobs = Job::all(experiment, &scenes)?;
-    let is_own = |index: &usize| shard.is_none_or(|shard| shard.has(*index));
-    let own: Vec<usize> = (0..jobs.len()).filter(is_own).collect();
-    let runs = own.len();
+    let assigned: Vec<usize> = (0..jobs.len())
+        .filter(|&index| shard.is_none_or(|shard| shard.has(index)))
+        .collect();
+    let runs = assigned.len();
     let mut remarks: Vec<String> = scenes
         .iter()
         .filter_map(|scene| scene.remark.clone())
         .collect();
+    // The subsets of one mesh share its remark.
     remarks.dedup();
     let mut work = Work {
         experiment,
         scenes: &scenes,
         jobs: &jobs,
-        own,
+        assigned,
         store: &store,
         watch: Watch { bar: progress(runs as u64), interrupted },
-        said,
+        verbosity,
         trees: Trees::new(),
         remarks,
     };
@@ -121,14 +126,18 @@ fn run(
     if let Some(shard) = shard {
         store.keep_shard(&to_toml(&provenance)?)?;
         let text = format!("{runs} runs, part {shard}; `harness merge` joins the parts.\n");
-        return Ok(Summary { text, left_out, remarks, folder, beside });
+        return Ok(Summary { text, skipped_scenes, remarks, folder, previous });
     }
-    let best_known = if beside.is_some() { BestKnown::Read(out) } else { BestKnown::Improve(out) };
+    // A repetition is compared with the previous results, which requires the same references.
+    let best_known = match previous {
+        Some(_) => BestKnown::Read(out),
+        None => BestKnown::Improve(out),
+    };
     let text = conclude(&resolved, best_known, &provenance, store)? + &text;
-    Ok(Summary { text, left_out, remarks, folder, beside })
+    Ok(Summary { text, skipped_scenes, remarks, folder, previous })
 }
 
-/// A bar with the time left; hidden unless standard error is a terminal.
+/// Creates a bar that shows the time left; it is hidden unless standard error is a terminal.
 fn progress(runs: u64) -> ProgressBar {
     let bar = ProgressBar::new(runs);
     let template = "{msg} {wide_bar} {pos}/{len} runs, {eta} left";

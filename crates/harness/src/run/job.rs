@@ -16,62 +16,59 @@ pub(crate) struct Job<'a> {
     pub base: f64,
     pub labelled: &'a Labelled,
     pub repetition: u32,
-    /// Whether this run also measures what depends on the scene alone.
+    /// Whether this run also makes the measurements that depend only on the scene.
     pub first_of_scene: bool,
 }
 
 impl<'a> Job<'a> {
-    /// All runs of an experiment, scene by scene, in the order of the spec.
+    /// Returns all runs of an experiment, scene by scene, in the order of the spec.
     pub fn all(experiment: &'a Experiment, scenes: &'a [Scene]) -> Result<Vec<Self>, Error> {
         let bases = scenes
             .par_iter()
-            .map(|scene| base_cost(scene, &experiment.objective));
-        let bases = bases.collect::<Result<Vec<_>, _>>()?;
-        let of_scene = |(scene, base): (&'a Scene, f64)| {
-            experiment
-                .runs()
-                .map(move |(labelled, repetition, first_of_scene)| Self {
-                    scene,
-                    base,
-                    labelled,
-                    repetition,
-                    first_of_scene,
-                })
-        };
-        Ok(scenes
-            .iter()
-            .zip(bases)
-            .flat_map(of_scene)
-            .collect())
+            .map(|scene| base_cost(scene, &experiment.objective))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut jobs = Vec::new();
+        for (scene, base) in scenes.iter().zip(bases) {
+            for (labelled, repetition, first_of_scene) in experiment.runs() {
+                jobs.push(Self { scene, base, labelled, repetition, first_of_scene });
+            }
+        }
+        Ok(jobs)
     }
 
     /// The seed of the run.
     pub fn seed(&self, experiment: &Experiment) -> u64 {
-        let seeds = self
+        let label = self
             .labelled
-            .own
+            .options
             .seed_as
             .as_ref()
             .unwrap_or(&self.labelled.label);
-        experiment.seed_of(&self.scene.name, seeds, self.repetition)
+        experiment.seed_of(&self.scene.name, label, self.repetition)
     }
 
-    /// The density of the rays whose visits the run's method minimises, if it does; every repetition has its own rays.
+    /// Returns the density of the rays whose visits the run minimises, if it does. Every repetition
+    /// uses different rays.
     pub fn density(&self, experiment: &Experiment) -> Result<Option<RayDensity>, Error> {
-        let (Some(config), Some(trained)) = (&experiment.ray_cost, self.labelled.own.for_rays)
+        let (Some(config), Some(trained)) = (&experiment.ray_cost, self.labelled.options.for_rays)
         else {
             return Ok(None);
         };
         let seed =
             experiment.seed_of(&self.scene.name, "rays that trees are trained on", self.repetition);
-        let failed = |message| Error::Tracing { scene: self.scene.name.clone(), message };
-        config
+        let density = config
             .density(trained, self.scene, seed)
-            .map(Some)
-            .map_err(failed)
+            .map_err(self.tracing_error())?;
+        Ok(Some(density))
     }
 
-    /// How often those rays enter the nodes of the run's tree, which decides how it is laid out.
+    /// For `map_err` where rays cannot be traced: names the scene.
+    pub fn tracing_error(&self) -> impl Fn(String) -> Error + use<> {
+        tracing_error(self.scene)
+    }
+
+    /// Returns how often the run's training rays enter each node of `tree`, which decides its
+    /// layout.
     pub fn visits(&self, experiment: &Experiment, tree: &Bvh) -> Result<Option<Vec<f32>>, Error> {
         Ok(self
             .density(experiment)?
@@ -79,7 +76,13 @@ impl<'a> Job<'a> {
     }
 }
 
-/// The cost of the scene's greedy Müller–Fellner tree, the base of all ratios.
+/// For `map_err` where rays cannot be traced through a scene.
+pub(crate) fn tracing_error(scene: &Scene) -> impl Fn(String) -> Error + use<> {
+    let scene = scene.name.clone();
+    move |message| Error::Tracing { scene: scene.clone(), message }
+}
+
+/// Returns the cost of the scene's greedy Müller–Fellner tree, the base of all ratios.
 fn base_cost(scene: &Scene, objective: &Objective) -> Result<f64, Error> {
     let tree = muller_fellner::Config::default().build(&scene.boxes);
     Ok(objective.cost(&tree.map_err(Error::search(&scene.name, "muller_fellner, the base"))?))

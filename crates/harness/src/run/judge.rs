@@ -1,4 +1,4 @@
-//! Random rays as the judge of trees, in place of a cost.
+//! Random rays that judge trees instead of a cost.
 
 use crate::measure::empirical_cost;
 use crate::rows::RayRow;
@@ -6,18 +6,20 @@ use bvh_core::Bvh;
 use bvh_scenes::Scene;
 use bvh_search::Judge;
 
-/// The mean number of box tests of the same random rays through every tree.
+/// Judges a tree by the mean number of box tests of random rays, the same rays for every tree.
 ///
-/// Ng & Trifonov 2003, section 4: 'The intention was to use actual simulation instead of the cost function for evaluating
-/// fitness, but using a small number of rays gave unstable evaluations and poor performance.'
+/// Ng & Trifonov 2003, section 4: 'The intention was to use actual simulation instead of the cost
+/// function for evaluating fitness, but using a small number of rays gave unstable evaluations and
+/// poor performance.'
 ///
-/// Differs from the paper: the rays are the same for all trees of a run. The paper does not say, but new ones for every
-/// evaluation would be what makes it unstable.
+/// Differs from the paper: the rays are the same for all trees of a run. The paper leaves this
+/// open, but new rays for every evaluation would explain the instability.
 #[derive(Debug)]
 pub(crate) struct RayJudge<'a> {
     pub rays: &'a empirical_cost::Config,
     pub scene: &'a Scene,
-    /// Of the rays: those of every repetition are others, and none of them those of the final measurement.
+    /// Seed of the rays. Every repetition uses different rays, and none of them reappear in the
+    /// final measurement.
     pub seed: u64,
 }
 

@@ -10,13 +10,13 @@ use bvh_scenes::Scene;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-/// The trees of runs, by the number of their run.
+/// The trees of runs by the index of the run.
 pub(crate) type Trees = BTreeMap<usize, Bvh>;
 
-/// A part of an experiment that makes rows of its own.
+/// A part of an experiment that makes rows.
 pub(crate) trait Measurement {
-    /// The reason why it cannot be done in parts, if it cannot.
-    fn whole_only(&self) -> Option<&'static str> {
+    /// Returns the reason why shards cannot share this measurement, if they cannot.
+    fn indivisible(&self) -> Option<&'static str> {
         None
     }
 
@@ -24,33 +24,32 @@ pub(crate) trait Measurement {
     fn measure(&self, work: &mut Work) -> Result<String, Error>;
 }
 
-/// An experiment under way, with everything that its measurements share.
+/// A running experiment, with everything that its measurements share.
 pub(crate) struct Work<'a> {
     pub experiment: &'a Experiment,
     pub scenes: &'a [Scene],
     /// All runs of the experiment.
     pub jobs: &'a [Job<'a>],
-    /// The numbers of the runs that are to be performed here: all, or a part of them.
-    pub own: Vec<usize>,
+    /// The indices of the runs of this shard: all runs, unless the experiment is split.
+    pub assigned: Vec<usize>,
     pub store: &'a Store,
     pub watch: Watch<'a>,
-    pub said: Said,
+    pub verbosity: Verbosity,
     /// The trees of performed runs that later measurements need.
     pub trees: Trees,
-    /// One line each on what the user should know of scene files and damaged runs.
+    /// Peculiarities of scene files and damaged runs, one line each.
     pub remarks: Vec<String>,
 }
 
 impl Work<'_> {
-    /// Rebuilds those of the wanted trees that are missing, because their runs were kept from an interrupted experiment.
-    pub fn complete_trees(&mut self, wanted: impl Fn(&Job) -> bool) -> Result<(), Error> {
-        for (index, job) in self
-            .jobs
-            .iter()
-            .enumerate()
-            .filter(|(_, job)| wanted(job))
-        {
+    /// Rebuilds the wanted trees whose runs were kept from an interrupted experiment.
+    pub fn complete_trees(&mut self, is_wanted: impl Fn(&Job) -> bool) -> Result<(), Error> {
+        for (index, job) in self.jobs.iter().enumerate() {
+            if !is_wanted(job) {
+                continue;
+            }
             if let Entry::Vacant(missing) = self.trees.entry(index) {
+                // The same seed gives the same tree, so a kept run needs no tree file.
                 let performed = perform(self.experiment, job, &self.watch)?;
                 let (_, tree) = performed.ok_or(all_finished(self.jobs))?;
                 missing.insert(tree);
@@ -59,7 +58,7 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// The failure of a measurement that is interrupted after all runs are finished.
+    /// Returns the error of a measurement that is interrupted after all runs are finished.
     pub fn interrupted(&self) -> Error {
         all_finished(self.jobs)
     }
@@ -69,12 +68,12 @@ fn all_finished(jobs: &[Job]) -> Error {
     Error::Interrupted { finished: jobs.len(), runs: jobs.len() }
 }
 
-/// The reports of progress on standard error.
+/// How the progress of runs is reported on standard error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Said {
-    /// Nothing but a bar where there is a terminal.
+pub enum Verbosity {
+    /// A bar on a terminal, otherwise nothing.
     Bar,
-    /// A bar where there is a terminal, elsewhere a line a second at most, and the last.
+    /// A bar on a terminal, otherwise at most one line per second and one for the last run.
     #[default]
     Progress,
     /// A line for every run.

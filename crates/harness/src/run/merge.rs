@@ -1,4 +1,5 @@
-//! Joins the parts of an experiment that was run on several machines into what one machine would have written.
+//! Joins the parts of an experiment that ran on several machines into the files that one machine
+//! writes.
 
 use crate::Error;
 use crate::rows::lock::lock_folder;
@@ -13,22 +14,26 @@ use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-/// One part of an experiment, as `--shard` left it, locked.
+/// One part of an experiment, made with `--shard`. Its folder stays locked as long as this lives.
 struct Part {
     partial: PathBuf,
     resolved: String,
     _lock: File,
 }
 
-/// At most this many missing runs are named one by one.
+/// The maximum number of missing runs that an error names.
 const NAMED: usize = 5;
 
-/// Joins every experiment of which there is a part in one of `folders`, each the `--out` of a harness with `--shard`,
-/// into its folder in `out`: except for seconds and provenance, the bytes that one machine would have written. The
-/// parts stay. Returns the tables of every experiment and where its results are.
+/// Joins every experiment that has a part in one of `folders`, each the `--out` of a harness with
+/// `--shard`, into its folder in `out`.
 ///
-/// Refuses parts of different specs, scenes or seeds, runs that two parts have with different results, parts that
-/// are being written, and missing runs, which it names.
+/// Except for seconds and provenance, the bytes are the same as from one machine. The parts stay.
+/// Returns the tables of every experiment and the folder of its results.
+///
+/// # Errors
+///
+/// If parts come from different specs, scenes or seeds, if two parts have different results of a
+/// run, if a part is being written, or if runs are missing.
 pub fn merge(
     folders: &[PathBuf],
     out: &Path,
@@ -53,28 +58,31 @@ pub fn merge(
         .collect()
 }
 
-/// The parts in one `--out`, of whole experiments and of quick ones, by the names of their folders in it.
+/// Returns the parts in one `--out`, full and quick, by the names of their folders in it.
 fn parts(out: &Path) -> Result<Vec<(PathBuf, Part)>, Error> {
-    let quick = out.join("quick");
-    let mut parts = Vec::new();
-    for folder in [Some(out), quick.is_dir().then_some(quick.as_path())]
+    let mut names: Vec<PathBuf> = files::names(out)?
         .into_iter()
-        .flatten()
-    {
-        for path in files::names(folder)?
-            .into_iter()
-            .map(|name| folder.join(name))
-        {
-            let partial = path.join(".partial");
-            let spec = partial.join("resolved.toml");
-            if spec.is_file() {
-                // Locked until the end, so that no part changes meanwhile.
-                let lock = lock_folder(&path)?;
-                let resolved =
-                    fs::read_to_string(&spec).map_err(Error::io(&spec, "read the file"))?;
-                let name = path.strip_prefix(out).unwrap_or(&path).to_owned();
-                parts.push((name, Part { partial, resolved, _lock: lock }));
-            }
+        .map(PathBuf::from)
+        .collect();
+    let quick = out.join("quick");
+    if quick.is_dir() {
+        let quick_names = files::names(&quick)?;
+        names.extend(
+            quick_names
+                .iter()
+                .map(|name| Path::new("quick").join(name)),
+        );
+    }
+    let mut parts = Vec::new();
+    for name in names {
+        let folder = out.join(&name);
+        let partial = folder.join(".partial");
+        let spec = partial.join("resolved.toml");
+        if spec.is_file() {
+            // Locked until the end, so that no part changes meanwhile.
+            let lock = lock_folder(&folder)?;
+            let resolved = fs::read_to_string(&spec).map_err(Error::io(&spec, "read the file"))?;
+            parts.push((name, Part { partial, resolved, _lock: lock }));
         }
     }
     Ok(parts)
@@ -87,24 +95,21 @@ fn join(
     out: &Path,
     existing: Existing,
 ) -> Result<(String, PathBuf), Error> {
-    let fail = |message| Error::Merge { experiment: name.display().to_string(), message };
-    let own = out
-        .join(name)
-        .join(".partial")
-        .canonicalize()
-        .ok();
-    if parts
-        .iter()
-        .any(|part| own.is_some() && part.partial.canonicalize().ok() == own)
+    let merge_error = |message| Error::Merge { experiment: name.display().to_string(), message };
+    // Symbolic links and `..` may hide that two paths are the same folder.
+    if let Ok(target) = out.join(name).join(".partial").canonicalize()
+        && parts.iter().any(|part| {
+            part.partial
+                .canonicalize()
+                .is_ok_and(|path| path == target)
+        })
     {
-        return Err(Error::Usage(format!(
-            "--out {} is also one of the parts; choose another",
-            out.display()
-        )));
+        let out = out.display();
+        return Err(Error::Usage(format!("--out {out} is also one of the parts; choose another")));
     }
-    let resolved = common_spec(name, parts).map_err(fail)?;
-    let owners = owners(&resolved, parts, fail)?;
-    let Target { folder, beside, .. } = Target::choose(out, &resolved, existing, false)?;
+    let resolved = common_spec(name, parts).map_err(merge_error)?;
+    let owners = owners(&resolved, parts, merge_error)?;
+    let Target { folder, previous, .. } = Target::choose(out, &resolved, existing, false)?;
     let store = Store::open(&folder, &parts[0].resolved, existing)?;
     for (index, owner) in owners.iter().enumerate() {
         store.keep(index, &FinishedRun::read(owner)?)?;
@@ -118,11 +123,15 @@ fn join(
                 .push(toml::from_str(&text).map_err(Error::toml(&path))?);
         }
     }
-    let best_known = if beside.is_some() { BestKnown::Read(out) } else { BestKnown::Improve(out) };
+    let best_known = match previous {
+        Some(_) => BestKnown::Read(out),
+        None => BestKnown::Improve(out),
+    };
     Ok((conclude(&resolved, best_known, &provenance, store)?, folder))
 }
 
-/// What all parts were made of. Somebody may have edited it, so it is checked as far as the merging relies on it.
+/// Returns the resolved spec that all parts share. Somebody may have edited it, so everything that
+/// merging relies on is checked.
 fn common_spec(name: &Path, parts: &[Part]) -> Result<Resolved, String> {
     let (first, others) = parts.split_first().ok_or("no parts")?;
     if let Some(other) = others
@@ -133,66 +142,68 @@ fn common_spec(name: &Path, parts: &[Part]) -> Result<Resolved, String> {
         let other = other.partial.display();
         return Err(format!("{first} and {other} are parts of different specs, scenes or seeds"));
     }
-    let bad = |message: String| format!("{}/resolved.toml: {message}", first.partial.display());
-    let resolved: Resolved =
-        toml::from_str(&first.resolved).map_err(|error| bad(error.to_string()))?;
+    checked_spec(name, &first.resolved)
+        .map_err(|message| format!("{}/resolved.toml: {message}", first.partial.display()))
+}
+
+fn checked_spec(name: &Path, text: &str) -> Result<Resolved, String> {
+    let resolved: Resolved = toml::from_str(text).map_err(|error| error.to_string())?;
     if resolved.experiment.folder() != name {
-        return Err(bad(format!("name is {:?}; accepted: the folder's", resolved.experiment.name)));
+        return Err(format!("name is {:?}; accepted: the folder's", resolved.experiment.name));
     }
     resolved
         .experiment
         .check_run_count()
-        .map_err(|error| bad(error.to_string()))?;
+        .map_err(|error| error.to_string())?;
     Ok(resolved)
 }
 
-/// For every run a kept folder of it. Refuses runs of which there is none, of which one is damaged, or two differ.
+/// Returns a finished folder for every run.
+///
+/// # Errors
+///
+/// If a run is missing or damaged, or if two folders of a run differ.
 fn owners(
     resolved: &Resolved,
     parts: &[Part],
-    fail: impl Fn(String) -> Error,
+    merge_error: impl Fn(String) -> Error,
 ) -> Result<Vec<PathBuf>, Error> {
-    let of_scene: Vec<_> = resolved.experiment.runs().collect();
-    let named = |index: usize| {
-        let (labelled, repetition, _) = of_scene[index % of_scene.len()];
-        let scene = &resolved.scenes[index / of_scene.len()].name;
-        format!("scene {scene}, method {}, repetition {repetition}", labelled.label)
-    };
     let mut owners = Vec::new();
     let mut missing = Vec::new();
     for index in 0..resolved.run_count() {
-        let kept = parts
+        let mut copies = parts
             .iter()
-            .map(|part| part.partial.join(store::part_name(index)));
-        let kept: Vec<PathBuf> = kept.filter(|kept| kept.is_dir()).collect();
-        let Some((owner, others)) = kept.split_first() else {
+            .map(|part| part.partial.join(store::part_name(index)))
+            .filter(|copy| copy.is_dir());
+        let Some(owner) = copies.next() else {
             missing.push(index);
             continue;
         };
-        let run = FinishedRun::read(owner)?;
-        for other in others {
-            if let Some(file) = run.difference(&FinishedRun::read(other)?) {
+        let run = FinishedRun::read(&owner)?;
+        // Two machines may both have performed a run; the copies must agree.
+        for copy in copies {
+            if let Some(file) = run.difference(&FinishedRun::read(&copy)?) {
                 let owner = owner.display();
-                let other = other.display();
-                return Err(fail(format!(
-                    "{owner} and {other} have different {file} of {}",
-                    named(index)
+                let copy = copy.display();
+                let run = resolved.run_name(index);
+                return Err(merge_error(format!(
+                    "{owner} and {copy} have different {file} of {run}"
                 )));
             }
         }
-        owners.push(owner.clone());
+        owners.push(owner);
     }
     if missing.is_empty() {
         return Ok(owners);
     }
-    let first: Vec<String> = missing
+    let names: Vec<String> = missing
         .iter()
         .take(NAMED)
-        .copied()
-        .map(named)
+        .map(|&index| resolved.run_name(index))
         .collect();
+    let names = names.join("; ");
     let more = if missing.len() > NAMED { "; and more" } else { "" };
     let count = missing.len();
     let all = resolved.run_count();
-    Err(fail(format!("{count} of {all} runs are missing: {}{more}", first.join("; "))))
+    Err(merge_error(format!("{count} of {all} runs are missing: {names}{more}")))
 }

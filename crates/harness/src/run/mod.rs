@@ -1,4 +1,4 @@
-//! Runs an experiment: jobs in, rows out, none of them lost.
+//! Runs an experiment: jobs in, rows out, none lost.
 
 pub mod archive;
 pub mod check;

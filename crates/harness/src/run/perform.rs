@@ -1,4 +1,4 @@
-//! Performs one run of an experiment: solves a scene by a method under observation.
+//! Performs one run of an experiment: applies a method to a scene and observes it.
 
 use super::job::Job;
 use super::judge::RayJudge;
@@ -13,16 +13,16 @@ use bvh_core::cost::{Measure, Objective};
 use bvh_core::{Bvh, validate_references};
 use bvh_scenes::Scene;
 use bvh_search::{
-    Budget, Deadline, Event, Judge, Observer, Outcome, Problem, SearchError, Splits, StopReason,
-    exact, lower_bound, solve,
+    Budget, Deadline, Event, Judge, Method, Observer, Outcome, Problem, SearchError, Splits,
+    StopReason, exact, lower_bound, solve,
 };
 use indicatif::ProgressBar;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-/// A proven lower bound of the scene's internal area: the exact optimum where gaps are measured from it, else the bound
-/// that the experiment asks for, if it asks for one.
+/// Computes a lower bound of the scene's internal area: the exact optimum if gaps are measured from
+/// it, otherwise the bound that the experiment requests, if any.
 fn bound(experiment: &Experiment, scene: &Scene, watch: &Watch) -> Result<Option<BoundRow>, Error> {
     let lower_bound = if experiment.needs_optimum(scene.boxes.len()) {
         let problem = Problem::new(&scene.boxes);
@@ -36,7 +36,7 @@ fn bound(experiment: &Experiment, scene: &Scene, watch: &Watch) -> Result<Option
     Ok(Some(BoundRow { scene: scene.name.clone(), objects: scene.boxes.len(), lower_bound }))
 }
 
-/// One run and its tree; `None` if it was interrupted.
+/// Performs one run. Returns its rows and its tree, or `None` if it was interrupted.
 pub(crate) fn perform(
     experiment: &Experiment,
     job: &Job,
@@ -56,12 +56,12 @@ pub(crate) fn perform(
         deadline: limit.map(Deadline::after),
         events: Mutex::default(),
     };
-    let solved = solve_or_build(experiment, job, seed, &stopwatch);
+    let result = solve_or_build(experiment, job, seed, &stopwatch);
     // Cancelling kills the external program, which is not an error.
     if watch.cancelled() {
         return Ok(None);
     }
-    let (outcome, seconds) = solved?;
+    let (outcome, seconds) = result?;
     let valid = validate_references(&outcome.tree, &scene.boxes, &scene.primitives);
     valid.map_err(|source| Error::InvalidTree {
         scene: scene.name.clone(),
@@ -71,6 +71,7 @@ pub(crate) fn perform(
     let solved = Solved { experiment, job, seed, outcome: &outcome, seconds };
     let run = solved.run_row();
     let mut finished = FinishedRun::default();
+    // The rows of a time-limited run differ from run to run, so they go to a timing file.
     if experiment.is_by_the_clock() {
         finished.add(&[solved.clocked_row(run)])?;
         return Ok(Some((finished, outcome.tree)));
@@ -80,7 +81,7 @@ pub(crate) fn perform(
         Some(config) => config.measure(scene, &outcome.tree, &run, seconds, job.first_of_scene)?,
         None => Default::default(),
     };
-    // A bound that was cut short is no result.
+    // An interrupted bound is not a result.
     if watch.cancelled() {
         return Ok(None);
     }
@@ -96,7 +97,7 @@ pub(crate) fn perform(
     Ok(Some((finished, outcome.tree)))
 }
 
-/// The tree of a job's method, and the seconds that it took.
+/// Returns the tree of a job's method and the seconds that the method needed.
 fn solve_or_build(
     experiment: &Experiment,
     job: &Job,
@@ -104,77 +105,84 @@ fn solve_or_build(
     stopwatch: &Stopwatch,
 ) -> Result<(Outcome, f64), Error> {
     let Job { scene, labelled, .. } = *job;
-    match &labelled.method {
-        Contestant::Ours(method) => {
-            let ray_seed = experiment.seed_of(&scene.name, "rays of the judge", job.repetition);
-            let judge =
-                labelled
-                    .own
-                    .judge
-                    .as_ref()
-                    .map(|rays| RayJudge { rays, scene, seed: ray_seed });
-            let density = job.density(experiment)?;
-            let problem = Problem {
-                objective: labelled
-                    .own
-                    .objective
-                    .unwrap_or(experiment.objective),
-                splits: splits(labelled, scene),
-                measure: density
-                    .as_ref()
-                    .map(|density| density as &dyn Measure),
-                judge: judge.as_ref().map(|judge| judge as &dyn Judge),
-                disabled: &labelled.own.keep,
-                ..Problem::new(&scene.boxes)
-            };
-            let outcome = solve(method, &problem, seed, experiment.budget_of(labelled), stopwatch);
-            let seconds = stopwatch.start.elapsed().as_secs_f64();
-            let mut outcome = outcome.map_err(Error::search(&scene.name, &labelled.label))?;
-            let own = judge.is_some() || density.is_some() || problem.splits.is_some();
-            if own || labelled.own.objective.is_some() {
-                outcome.cost = experiment.objective.cost(&outcome.tree);
-            }
-            Ok((outcome, seconds))
-        }
+    let (tree, seconds) = match &labelled.method {
+        Contestant::Ours(method) => return search(experiment, job, method, seed, stopwatch),
         Contestant::Peer(peer) => {
-            let scene_name = scene.name.clone();
-            let library = peer.name();
-            let refused = |message| Error::Library { scene: scene_name, library, message };
-            let Built { tree, seconds } = peer.build(scene).map_err(refused)?;
-            Ok(built(tree, seconds, &experiment.objective, stopwatch))
-        }
-        Contestant::External(program) => {
-            let cancelled = || stopwatch.watch.cancelled();
-            let (tree, seconds) = program
-                .build(&scene.boxes, &scene.primitives, seed, &cancelled)
-                .map_err(|source| Error::External {
+            let Built { tree, seconds } = peer
+                .build(scene)
+                .map_err(|message| Error::Library {
                     scene: scene.name.clone(),
-                    method: labelled.label.clone(),
-                    command: program.command.join(" "),
-                    source,
+                    library: peer.name(),
+                    message,
                 })?;
-            Ok(built(tree, seconds, &experiment.objective, stopwatch))
+            (tree, seconds)
         }
-    }
+        Contestant::External(program) => program
+            .build(&scene.boxes, &scene.primitives, seed, &|| stopwatch.watch.cancelled())
+            .map_err(|source| Error::External {
+                scene: scene.name.clone(),
+                method: labelled.label.clone(),
+                command: program.command.join(" "),
+                source,
+            })?,
+    };
+    stopwatch.note(seconds);
+    Ok((single_evaluation(tree, &experiment.objective), seconds))
 }
 
-/// Whether and how the method may divide the scene's objects.
+/// Applies one of our methods with all options of its entry.
+fn search(
+    experiment: &Experiment,
+    job: &Job,
+    method: &Method,
+    seed: u64,
+    stopwatch: &Stopwatch,
+) -> Result<(Outcome, f64), Error> {
+    let Job { scene, labelled, .. } = *job;
+    let options = &labelled.options;
+    let ray_seed = experiment.seed_of(&scene.name, "rays of the judge", job.repetition);
+    let judge = options
+        .judge
+        .as_ref()
+        .map(|rays| RayJudge { rays, scene, seed: ray_seed });
+    let density = job.density(experiment)?;
+    let problem = Problem {
+        objective: options.objective.unwrap_or(experiment.objective),
+        splits: splits(labelled, scene),
+        measure: density
+            .as_ref()
+            .map(|density| density as &dyn Measure),
+        judge: judge.as_ref().map(|judge| judge as &dyn Judge),
+        disabled: &options.keep,
+        ..Problem::new(&scene.boxes)
+    };
+    let result = solve(method, &problem, seed, experiment.budget_of(labelled), stopwatch);
+    let seconds = stopwatch.start.elapsed().as_secs_f64();
+    let mut outcome = result.map_err(Error::search(&scene.name, &labelled.label))?;
+    // Rows compare all methods by the experiment's objective, whatever the search minimised.
+    let has_other_measure = judge.is_some() || density.is_some() || problem.splits.is_some();
+    if has_other_measure || options.objective.is_some() {
+        outcome.cost = experiment.objective.cost(&outcome.tree);
+    }
+    Ok((outcome, seconds))
+}
+
+/// Returns how the method may divide the scene's objects, if it may.
 fn splits<'a>(labelled: &Labelled, scene: &'a Scene) -> Option<Splits<'a>> {
-    let references = labelled.own.references? * scene.boxes.len() as f64;
+    let references = labelled.options.references? * scene.boxes.len() as f64;
     Splits::at_most(references as usize, &scene.boxes, &scene.primitives)
 }
 
-/// A tree by others, as a search of one evaluation, and the seconds of the building alone.
-fn built(tree: Bvh, seconds: f64, objective: &Objective, stopwatch: &Stopwatch) -> (Outcome, f64) {
+/// Describes a third-party tree as the outcome of a search of one evaluation.
+fn single_evaluation(tree: Bvh, objective: &Objective) -> Outcome {
     let cost = objective.cost(&tree);
     let work = tree.nodes.len() as u64;
-    let event = Event { evaluations: 1, work, cost, incumbent: cost };
-    stopwatch.note(seconds);
+    let history = vec![Event { evaluations: 1, work, cost, incumbent: cost }];
     let stop = StopReason::Completed;
-    (Outcome { tree, cost, evaluations: 1, work, stop, proof: None, history: vec![event] }, seconds)
+    Outcome { tree, cost, evaluations: 1, work, stop, proof: None, history }
 }
 
-/// Follows all runs: moves the bar, passes an interruption on.
+/// Observes all runs: moves the bar and forwards an interruption.
 pub(crate) struct Watch<'a> {
     pub bar: ProgressBar,
     pub interrupted: &'a AtomicBool,
@@ -190,7 +198,7 @@ impl Observer for Watch<'_> {
     }
 }
 
-/// Notes when the events of one run happen, and ends it after its seconds, if it has a limit.
+/// Records the times of a run's events, and ends the run at its deadline, if it has one.
 struct Stopwatch<'a> {
     watch: &'a Watch<'a>,
     start: Instant,
@@ -206,7 +214,7 @@ impl Stopwatch<'_> {
             .push(seconds);
     }
 
-    /// When each event so far happened, in seconds since the start.
+    /// Returns the time of each event so far, in seconds since the start.
     fn seconds(&self) -> Vec<f64> {
         self.events
             .lock()

@@ -1,4 +1,5 @@
-//! Where results come from: revision, compiler, processor, threads, date. In a file apart from the reproducible ones.
+//! The origin of results: revision, compiler, processor, threads, date. It has a separate file, as
+//! it is not reproducible.
 
 use crate::processor::PROCESSOR;
 use serde::{Deserialize, Serialize};
@@ -7,23 +8,25 @@ use std::time::SystemTime;
 /// Contents of `provenance.toml`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Provenance {
-    /// The command line, the program's own path left out.
+    /// The command line without the program's path.
     pub command: String,
-    /// Git revision of the sources that the program was built from, `+` when they had uncommitted changes, or `unknown`.
+    /// Git revision of the program's sources, with `+` if they had uncommitted changes, or
+    /// `unknown`.
     pub revision: String,
     /// Version of this program.
     pub version: String,
     /// The compiler that built it.
     pub rustc: String,
-    /// The harness's own profile (in the dev profile the libraries have a higher opt-level), the target features that the compiler
-    /// could take for granted, debug assertions, and whether other libraries are compiled in.
+    /// The harness's profile (in the dev profile the libraries have a higher opt-level), the target
+    /// features that the compiler could assume, debug assertions, and whether third-party libraries
+    /// are compiled in.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub build: String,
     /// Processor model and architecture.
     pub cpu: String,
     /// Threads used.
     pub threads: usize,
-    /// When the results were completed, UTC.
+    /// The time at which the results were completed, UTC.
     pub date: String,
     /// The provenance of every part, if the results are merged.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -31,18 +34,15 @@ pub struct Provenance {
 }
 
 impl Provenance {
-    /// Gathers everything now.
+    /// Collects the provenance of results that are completed now.
     pub fn gather() -> Self {
-        Self {
+        let mut command = "harness".to_owned();
+        for argument in std::env::args_os().skip(1) {
             // Arguments need not be UTF-8.
-            command: std::iter::once("harness".into())
-                .chain(
-                    std::env::args_os()
-                        .skip(1)
-                        .map(|argument| argument.to_string_lossy().into_owned()),
-                )
-                .collect::<Vec<_>>()
-                .join(" "),
+            command += &format!(" {}", argument.to_string_lossy());
+        }
+        Self {
+            command,
             revision: env!("HARNESS_REVISION").into(),
             version: env!("CARGO_PKG_VERSION").into(),
             rustc: env!("HARNESS_RUSTC").into(),

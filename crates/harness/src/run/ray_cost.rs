@@ -1,10 +1,11 @@
 //! Judges the trees of all runs by rays that they were not trained on.
 
-use super::job::Job;
+use super::job::{Job, tracing_error};
 use super::measurement::{Measurement, Work};
 use crate::Error;
 use crate::measure::layout::{collapsed_sah, widened};
-use crate::measure::ray_cost::{Config, TrainedOn, test_rays};
+use crate::measure::ray_cost::{Config, TestRays, TrainedOn, test_rays};
+use crate::rows::store::Store;
 use crate::rows::{LayoutRow, RunTestRow, TestRow, TestTimeRow, VisitRow};
 use crate::spec::Experiment;
 use bvh_core::cost::{self, Objective};
@@ -12,180 +13,225 @@ use bvh_core::{Bvh, WideBvh};
 use bvh_search::Observer;
 use rayon::prelude::*;
 
-/// The name in results of the trees that are trained on rays, whatever the label of their method.
+/// The name that results give to all trees trained on rays, whatever the label of their method.
 const RAYS: &str = "rays";
 
 /// Rays that judge the trees of all runs.
 pub(crate) struct Judging<'a>(pub &'a Config);
 
 impl Measurement for Judging<'_> {
-    fn whole_only(&self) -> Option<&'static str> {
-        Some("trees are judged by rays beside each other, not in parts")
+    fn indivisible(&self) -> Option<&'static str> {
+        Some("rays judge all trees of a scene together; run it without --shard")
     }
 
     fn measure(&self, work: &mut Work) -> Result<String, Error> {
         work.complete_trees(|_| true)?;
-        judge(self.0, work)?;
+        let runs: Vec<Run> = work
+            .trees
+            .iter()
+            .map(|(&index, tree)| (&work.jobs[index], tree))
+            .collect();
+        let mut rows = Rows::default();
+        for scene_runs in runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
+            rows.judge_scene(self.0, work, scene_runs)?;
+        }
+        rows.write(work.store)?;
         Ok(String::new())
     }
 }
 
-/// Counts the tests of the same rays in the trees of all runs on a scene, each in the layout for the rays that it was trained on, and
-/// takes the time of those in the trees of first runs.
-fn judge(config: &Config, work: &Work) -> Result<(), Error> {
-    let Work { experiment, jobs, trees, store, watch, .. } = work;
-    let mut rows = Vec::new();
-    let mut times = Vec::new();
-    let mut sizes = Vec::new();
-    let mut visits = Vec::new();
-    let mut of_runs = Vec::new();
-    let runs: Vec<(&Job, &Bvh)> = trees
-        .iter()
-        .map(|(&index, tree)| (&jobs[index], tree))
-        .collect();
-    for of_scene in runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
-        let scene = of_scene[0].0.scene;
-        let layouts = of_scene
+/// A run and its tree.
+type Run<'a> = (&'a Job<'a>, &'a Bvh);
+
+/// The rows of a judgement; the vectors of files that are not requested stay empty.
+#[derive(Default)]
+struct Rows {
+    tests: Vec<TestRow>,
+    times: Vec<TestTimeRow>,
+    layouts: Vec<LayoutRow>,
+    visits: Vec<VisitRow>,
+    run_tests: Vec<RunTestRow>,
+}
+
+impl Rows {
+    fn write(&self, store: &Store) -> Result<(), Error> {
+        store.write_rows(&self.tests)?;
+        store.write_rows(&self.layouts)?;
+        if !self.visits.is_empty() {
+            store.write_rows(&self.visits)?;
+            store.write_rows(&self.run_tests)?;
+        }
+        if !self.times.is_empty() {
+            store.write_rows(&self.times)?;
+        }
+        Ok(())
+    }
+
+    /// Counts the tests of the same rays in the trees of all runs on a scene, and times the rays in
+    /// the trees of first runs. Each tree is laid out for the rays that it was trained on.
+    fn judge_scene(&mut self, config: &Config, work: &Work, runs: &[Run]) -> Result<(), Error> {
+        let experiment = work.experiment;
+        let repetitions = experiment.repetitions as usize;
+        let (first_job, first_tree) = runs[0];
+        let scene = first_job.scene;
+        let layouts = runs
             .par_iter()
-            .map(|(job, tree)| layout(experiment, job, tree));
-        let layouts = layouts.collect::<Result<Vec<WideBvh>, Error>>()?;
-        // By method, with all repetitions.
-        let methods: Vec<usize> = (0..of_scene.len())
-            .step_by(experiment.repetitions as usize)
+            .map(|(job, tree)| layout(experiment, job, tree))
+            .collect::<Result<Vec<WideBvh>, Error>>()?;
+        // Runs are ordered by method, then by repetition.
+        let layouts_of_methods = layouts.chunks(repetitions);
+        self.layouts.extend(
+            runs.chunks(repetitions)
+                .zip(layouts_of_methods.clone())
+                .map(|(runs, layouts)| layout_row(runs, layouts)),
+        );
+        for &trained_on in &config.costs {
+            self.visits
+                .extend(visit_rows(experiment, config, trained_on, runs)?);
+        }
+        let first_layouts: Vec<&WideBvh> = layouts_of_methods
+            .map(|layouts| &layouts[0])
             .collect();
-        let first: Vec<&WideBvh> = methods.iter().map(|&at| &layouts[at]).collect();
-        for &at in &methods {
-            let range = at..at + experiment.repetitions as usize;
-            sizes.push(size(&of_scene[range.clone()], &layouts[range]));
-        }
-        for &trained in &config.costs {
-            visits.extend(costs(experiment, config, trained, of_scene)?);
-        }
         let seed = experiment.seed_of(&scene.name, "rays that judge trees", 0);
-        for rays in test_rays(config, scene, of_scene[0].1, seed) {
-            if watch.cancelled() {
+        for rays in test_rays(config, scene, first_tree, seed) {
+            if work.watch.cancelled() {
                 return Err(work.interrupted());
             }
             let tests: Vec<[f64; 2]> = layouts
                 .par_iter()
                 .map(|wide| rays.tests(wide))
                 .collect();
-            let of_run = |((job, _), tests): (&(&Job, &Bvh), &[f64; 2])| RunTestRow {
-                scene: scene.name.clone(),
-                method: job.labelled.label.clone(),
-                repetition: job.repetition,
-                judged_on: rays.kind.name().into(),
-                camera: rays.camera.into(),
-                tests: tests[0] + tests[1],
-            };
             if !config.costs.is_empty() {
-                of_runs.extend(of_scene.iter().zip(&tests).map(of_run));
+                self.run_tests.extend(
+                    runs.iter()
+                        .zip(&tests)
+                        .map(|((job, _), tests)| run_test_row(job, &rays, *tests)),
+                );
             }
-            let speeds = rays.speeds(&first, config.rounds);
-            for (number, &at) in methods.iter().enumerate() {
-                let own = &tests[at..at + experiment.repetitions as usize];
-                let labelled = of_scene[at].0.labelled;
-                let plain = labelled.own.objective.is_none() && labelled.own.references.is_none();
-                let tree =
-                    if labelled.own.for_rays.is_some() && plain { RAYS } else { &labelled.label };
-                let [node_tests, block_tests, tests] =
-                    [mean(own, |t| t[0]), mean(own, |t| t[1]), mean(own, |t| t[0] + t[1])];
-                rows.push(TestRow {
-                    scene: scene.name.clone(),
-                    method: labelled.label.clone(),
-                    tree: tree.into(),
-                    trained_on: TrainedOn::name(labelled.own.for_rays).into(),
-                    judged_on: rays.kind.name().into(),
-                    camera: rays.camera.into(),
-                    node_tests: node_tests.0,
-                    block_tests: block_tests.0,
-                    repetitions: own.len(),
-                    tests_standard_error: tests.1,
-                    rays: rays.count(),
-                });
-                if let Some(&million_per_s) = speeds.get(number).filter(|_| config.rounds > 0) {
-                    times.push(TestTimeRow {
-                        scene: scene.name.clone(),
-                        method: labelled.label.clone(),
-                        judged_on: rays.kind.name().into(),
-                        camera: rays.camera.into(),
-                        million_per_s,
-                    });
-                }
+            self.tests.extend(
+                runs.chunks(repetitions)
+                    .zip(tests.chunks(repetitions))
+                    .map(|(runs, tests)| test_row(runs[0].0, &rays, tests)),
+            );
+            if config.rounds > 0 {
+                let speeds = rays.speeds(&first_layouts, config.rounds);
+                self.times
+                    .extend(
+                        runs.chunks(repetitions)
+                            .zip(speeds)
+                            .map(|(runs, million_per_s)| TestTimeRow {
+                                scene: scene.name.clone(),
+                                method: runs[0].0.labelled.label.clone(),
+                                judged_on: rays.kind.name().into(),
+                                camera: rays.camera.into(),
+                                million_per_s,
+                            }),
+                    );
             }
         }
+        Ok(())
     }
-    store.write_rows(&rows)?;
-    store.write_rows(&sizes)?;
-    if !config.costs.is_empty() {
-        store.write_rows(&visits)?;
-        store.write_rows(&of_runs)?;
-    }
-    if !times.is_empty() {
-        store.write_rows(&times)?;
-    }
-    Ok(())
 }
 
-/// The costs of a scene's trees by the density of rays that none of them is tested by.
-fn costs(
+fn run_test_row(job: &Job, rays: &TestRays, [node_tests, block_tests]: [f64; 2]) -> RunTestRow {
+    RunTestRow {
+        scene: job.scene.name.clone(),
+        method: job.labelled.label.clone(),
+        repetition: job.repetition,
+        judged_on: rays.kind.name().into(),
+        camera: rays.camera.into(),
+        tests: node_tests + block_tests,
+    }
+}
+
+/// Averages the tests of a method over its repetitions.
+fn test_row(job: &Job, rays: &TestRays, tests: &[[f64; 2]]) -> TestRow {
+    let labelled = job.labelled;
+    let options = &labelled.options;
+    // Reports compare all plain trees for rays with all trees for areas, so they share one name.
+    let is_plain = options.objective.is_none() && options.references.is_none();
+    let tree = if options.for_rays.is_some() && is_plain { RAYS } else { &labelled.label };
+    TestRow {
+        scene: job.scene.name.clone(),
+        method: labelled.label.clone(),
+        tree: tree.into(),
+        trained_on: TrainedOn::name(options.for_rays).into(),
+        judged_on: rays.kind.name().into(),
+        camera: rays.camera.into(),
+        node_tests: mean(tests.iter().map(|tests| tests[0])),
+        block_tests: mean(tests.iter().map(|tests| tests[1])),
+        repetitions: tests.len(),
+        tests_standard_error: standard_error(tests),
+        rays: rays.count(),
+    }
+}
+
+/// Costs a scene's trees by the density of rays that serve no other purpose.
+fn visit_rows(
     experiment: &Experiment,
     config: &Config,
-    trained: TrainedOn,
-    of_scene: &[(&Job, &Bvh)],
+    trained_on: TrainedOn,
+    runs: &[Run],
 ) -> Result<Vec<VisitRow>, Error> {
-    let scene = of_scene[0].0.scene;
+    let scene = runs[0].0.scene;
     let seed = experiment.seed_of(&scene.name, "rays that costs are of", 0);
-    let density = config.density(trained, scene, seed);
-    let density =
-        density.map_err(|message| Error::Tracing { scene: scene.name.clone(), message })?;
-    let row = |(job, tree): &(&Job, &Bvh)| VisitRow {
+    let density = config
+        .density(trained_on, scene, seed)
+        .map_err(tracing_error(scene))?;
+    let rows = runs.iter().map(|(job, tree)| VisitRow {
         scene: scene.name.clone(),
         method: job.labelled.label.clone(),
         repetition: job.repetition,
-        rays: TrainedOn::name(Some(trained)).into(),
+        rays: TrainedOn::name(Some(trained_on)).into(),
         goldsmith_salmon: Objective::GoldsmithSalmon.cost_by(tree, &density),
-    };
-    Ok(of_scene.iter().map(row).collect())
+    });
+    Ok(rows.collect())
 }
 
-/// The layout of a run's tree: for the rays that it was trained on, else for random lines.
+/// Lays out a run's tree for the rays that it was trained on, otherwise for random lines.
 fn layout(experiment: &Experiment, job: &Job, tree: &Bvh) -> Result<WideBvh, Error> {
-    let failed = |message| Error::Tracing { scene: job.scene.name.clone(), message };
     let triangles = job
         .scene
         .triangles()
-        .map_err(|error| failed(error.to_string()))?;
+        .map_err(|error| job.tracing_error()(error.to_string()))?;
     let visits = job.visits(experiment, tree)?;
-    widened(tree, triangles, visits.as_deref()).map_err(|error| failed(error.to_string()))
+    widened(tree, triangles, visits.as_deref())
+        .map_err(|error| job.tracing_error()(error.to_string()))
 }
 
-/// The sizes and costs of a method's trees and their layouts, means over repetitions.
-fn size(runs: &[(&Job, &Bvh)], layouts: &[WideBvh]) -> LayoutRow {
+/// Averages the sizes and costs of a method's trees and layouts over repetitions.
+fn layout_row(runs: &[Run], layouts: &[WideBvh]) -> LayoutRow {
     let job = runs[0].0;
     let objects = job.scene.boxes.len() as f64;
-    let mean = |of: &dyn Fn(&Bvh) -> f64| {
-        runs.iter().map(|(_, tree)| of(tree)).sum::<f64>() / runs.len() as f64
-    };
+    let trees = runs.iter().map(|(_, tree)| *tree);
     let bytes: usize = layouts.iter().map(WideBvh::bytes).sum();
+    let references_per_object = trees
+        .clone()
+        .map(|tree| tree.prim_ids.len() as f64 / objects);
+    let layout_over_root = trees
+        .clone()
+        .map(|tree| cost::over_root_area(tree, cost::layout_area(tree)));
     LayoutRow {
         scene: job.scene.name.clone(),
         method: job.labelled.label.clone(),
         repetitions: runs.len(),
-        references_per_object: mean(&|tree| tree.prim_ids.len() as f64 / objects),
+        references_per_object: mean(references_per_object),
         bytes_per_object: bytes as f64 / (objects * layouts.len() as f64),
-        collapsed_sah: mean(&collapsed_sah),
-        layout_over_root: mean(&|tree| cost::over_root_area(tree, cost::layout_area(tree))),
+        collapsed_sah: mean(trees.map(collapsed_sah)),
+        layout_over_root: mean(layout_over_root),
     }
 }
 
-/// The mean of a number over repetitions, and its standard error if there are several.
-fn mean(tests: &[[f64; 2]], of: impl Fn(&[f64; 2]) -> f64) -> (f64, Option<f64>) {
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let n = values.len() as f64;
+    values.sum::<f64>() / n
+}
+
+/// The standard error of the mean number of all tests, if there are several repetitions.
+fn standard_error(tests: &[[f64; 2]]) -> Option<f64> {
+    let totals = tests.iter().map(|tests| tests[0] + tests[1]);
     let n = tests.len() as f64;
-    let mean = tests.iter().map(&of).sum::<f64>() / n;
-    let squares: f64 = tests
-        .iter()
-        .map(|tests| (of(tests) - mean).powi(2))
-        .sum();
-    (mean, (tests.len() > 1).then(|| (squares / (n - 1.0) / n).sqrt()))
+    let mean = mean(totals.clone());
+    let squares: f64 = totals.map(|total| (total - mean).powi(2)).sum();
+    (tests.len() > 1).then(|| (squares / (n - 1.0) / n).sqrt())
 }

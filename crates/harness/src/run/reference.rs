@@ -1,11 +1,14 @@
-//! What gaps are measured from: the exact optimum of small scenes, else the best known cost, kept over all experiments.
+//! The references of gaps: the exact optimum of small scenes, otherwise the best known cost of all
+//! experiments.
 //!
-//! `best_known.csv` in the results folder has one row per scene and objective, improved at the end of every experiment
-//! that beats it. Reports that measure gaps read `references.csv` in the experiment's own folder: the rows as they were
-//! then. So later finds change no gap that was written; `--check` begins with the recorded references in place of the
-//! best known ones, and `--redraw` brings them, and the gaps, up to date.
+//! `best_known.csv` in the results folder has one row per scene and objective. Every experiment
+//! that finds a lower cost improves it when it ends. Reports that measure gaps read
+//! `references.csv` in the experiment's folder, a copy of the rows at that time, which keeps
+//! recorded gaps independent of later finds. `--check` starts from the recorded references instead
+//! of the best known costs; `--redraw` updates the references and the gaps.
 //!
-//! Only binary trees with one object per leaf count: wider nodes and leaves would make every cost beatable.
+//! Only binary trees with one object per leaf count: wider nodes and leaves would make every cost
+//! beatable.
 
 use crate::Error;
 use crate::report::Report;
@@ -31,14 +34,16 @@ pub const REFERENCES: &str = ReferenceRow::FILE;
 /// The folder with the best known costs.
 #[derive(Clone, Copy, Debug)]
 pub enum BestKnown<'a> {
-    /// They are read, and improved where a run was better.
+    /// Read the costs, and improve those that a run has beaten.
     Improve(&'a Path),
-    /// They are only read.
+    /// Only read the costs.
     Read(&'a Path),
 }
 
-/// Improves the best known costs by the rows in the store's folder, and records the references there if a report needs
-/// them. One harness at a time does so; at any moment the file is the old one or the whole new one.
+/// Improves the best known costs by the rows in the store's folder, and records the references
+/// there if a report needs them.
+///
+/// Only one harness at a time does this, and the file is replaced atomically.
 pub(crate) fn update(
     resolved: &Resolved,
     best_known: BestKnown,
@@ -55,27 +60,24 @@ pub(crate) fn update(
     let objective = name(&experiment.objective);
     let mut references = Vec::new();
     for scene in &resolved.scenes {
-        let small = experiment.needs_optimum(scene.objects);
-        // The optima of the hundreds of small scenes of experiments on optimality would be no news.
-        if scene.objects > exact::MOST_OBJECTS || small {
+        let has_optimum = experiment.needs_optimum(scene.objects);
+        // Other small scenes are solved exactly by the hundreds; nobody looks their costs up.
+        if scene.objects > exact::MOST_OBJECTS || has_optimum {
             let bound = bounds
                 .iter()
                 .find(|row| row.scene == scene.name)
                 .map(|row| row.lower_bound);
-            let own = runs
+            let eligible = runs
                 .iter()
                 .filter(|run| run.scene == scene.name && run.nodes + 1 == 2 * run.objects);
-            for found in own.flat_map(|run| finds(scene, &objective, run, bound)) {
-                offer(&mut known, ReferenceRow { revision: revision.to_owned(), ..found }, small);
+            for found in eligible.flat_map(|run| finds(scene, &objective, run, bound)) {
+                let found = ReferenceRow { revision: revision.to_owned(), ..found };
+                offer(&mut known, found, has_optimum);
             }
         }
         let key = (scene.name.as_str(), scene.objects, scene.checksum.as_str(), objective.as_str());
-        references.extend(
-            known
-                .iter()
-                .find(|row| key_of(row) == key)
-                .cloned(),
-        );
+        let reference = known.iter().find(|row| key_of(row) == key);
+        references.extend(reference.cloned());
     }
     if matches!(best_known, BestKnown::Improve(_)) {
         write_all_known(out, known, &before)?;
@@ -95,7 +97,7 @@ fn all_known(results: &Path) -> Result<Vec<ReferenceRow>, Error> {
     if path.is_file() { read(&path) } else { Ok(vec![]) }
 }
 
-/// Writes the best known costs if they are others than `before`.
+/// Writes the best known costs if they differ from `before`.
 fn write_all_known(
     results: &Path,
     mut known: Vec<ReferenceRow>,
@@ -109,7 +111,9 @@ fn write_all_known(
     Ok(())
 }
 
-/// Improves the best known costs of a scene by those of a binary tree with one object per leaf. The caller has locked the folder.
+/// Improves the best known costs of a scene by the costs of a binary tree with one object per leaf.
+///
+/// The caller has locked the folder.
 pub(crate) fn improve(
     results: &Path,
     scene: &Scene,
@@ -136,7 +140,7 @@ pub(crate) fn improve(
     write_all_known(results, known, &before)
 }
 
-/// Makes the references recorded in `folder`, if any, the best known ones in `out`.
+/// Copies the references recorded in `folder`, if any, to the best known costs in `out`.
 pub fn adopt(folder: &Path, out: &Path) -> Result<(), Error> {
     let recorded = folder.join(REFERENCES);
     if recorded.is_file() {
@@ -146,7 +150,7 @@ pub fn adopt(folder: &Path, out: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// The tree of least internal area that is known of this very scene.
+/// Returns the least known internal area of a scene with exactly these boxes.
 pub fn best_known(results: &Path, scene: &Scene) -> Result<Option<ReferenceRow>, Error> {
     let checksum = checksum(scene);
     let objective = name(&Objective::InternalArea);
@@ -156,7 +160,7 @@ pub fn best_known(results: &Path, scene: &Scene) -> Result<Option<ReferenceRow>,
         .find(|row| key_of(row) == key))
 }
 
-/// What a reference is of: scene, number of its objects, checksum of its boxes, and objective.
+/// The key of a reference: scene, number of objects, checksum of the boxes, and objective.
 fn key_of(row: &ReferenceRow) -> (&str, usize, &str, &str) {
     (&row.scene, row.objects, &row.checksum, &row.objective)
 }
@@ -171,8 +175,8 @@ fn name(objective: &Objective) -> String {
     }
 }
 
-/// What one run found, under the experiment's objective and under those that are columns of every run. `bound` is a
-/// lower bound of the internal area.
+/// Returns the costs of one run: under the experiment's objective, and under the objectives that
+/// are columns of every run. `bound` is a lower bound of the internal area.
 fn finds(
     scene: &LoadedScene,
     objective: &str,
@@ -180,13 +184,11 @@ fn finds(
     bound: Option<f64>,
 ) -> impl Iterator<Item = ReferenceRow> {
     let root_area = run.internal_area / run.cost_over_root_area;
+    // Goldsmith and Salmon's cost is twice the internal area over the root's, and so is its bound.
+    let goldsmith_salmon_bound = bound.map(|bound| 2.0 * bound / root_area);
     let costs = [
         (name(&Objective::InternalArea), run.internal_area, bound),
-        (
-            name(&Objective::GoldsmithSalmon),
-            run.goldsmith_salmon,
-            bound.map(|bound| 2.0 * bound / root_area),
-        ),
+        (name(&Objective::GoldsmithSalmon), run.goldsmith_salmon, goldsmith_salmon_bound),
         (objective.to_owned(), run.cost, None),
     ];
     costs
@@ -204,12 +206,13 @@ fn finds(
         })
 }
 
-/// Adds a row to the known ones, or keeps the better of it and the known row of the same key. The bound of an `optimum`
-/// is the cost, whether or not a run has found it.
-fn offer(known: &mut Vec<ReferenceRow>, mut found: ReferenceRow, optimum: bool) {
-    if let Some(least) = found
-        .lower_bound
-        .filter(|&bound| optimum && bound < found.cost * (1.0 - ROUNDING))
+/// Adds a row, or keeps the better of it and the known row with the same key.
+///
+/// If the bound is an optimum, it replaces the cost, whether or not a run has found it.
+fn offer(known: &mut Vec<ReferenceRow>, mut found: ReferenceRow, bound_is_optimum: bool) {
+    if let Some(least) = found.lower_bound
+        && bound_is_optimum
+        && least < found.cost * (1.0 - ROUNDING)
     {
         (found.cost, found.method, found.seed) = (least, "exact".into(), 0);
     }
@@ -260,17 +263,12 @@ mod tests {
     }
 
     #[test]
-    fn scenes_are_told_apart_by_their_boxes() {
+    fn scenes_are_identified_by_their_boxes() {
         let mut known = vec![row("a", 1.0, None)];
         offer(&mut known, ReferenceRow { checksum: "1".into(), ..row("a", 9.0, None) }, false);
         offer(&mut known, ReferenceRow { objects: 99, ..row("a", 8.0, None) }, false);
-        assert_eq!(
-            known
-                .iter()
-                .map(|row| row.cost)
-                .collect::<Vec<_>>(),
-            [1.0, 9.0, 8.0]
-        );
+        let costs: Vec<f64> = known.iter().map(|row| row.cost).collect();
+        assert_eq!(costs, [1.0, 9.0, 8.0]);
     }
 
     #[test]

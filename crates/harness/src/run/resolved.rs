@@ -1,4 +1,4 @@
-//! What an experiment comes to: its spec with every default spelled out, and the scenes it runs on.
+//! The resolved spec of an experiment: every default spelled out, and the scenes it runs on.
 
 use crate::Error;
 use crate::spec::Experiment;
@@ -14,7 +14,7 @@ pub(crate) struct Resolved {
     pub scenes: Vec<LoadedScene>,
 }
 
-/// A scene by what identifies it.
+/// The identity of a scene.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LoadedScene {
     pub name: String,
@@ -24,51 +24,55 @@ pub(crate) struct LoadedScene {
     pub checksum: String,
 }
 
-/// As in [`LoadedScene::checksum`].
+/// Returns a scene's checksum in the form of [`LoadedScene::checksum`].
 pub(crate) fn checksum(scene: &Scene) -> String {
     format!("{:016x}", scene.checksum())
 }
 
 impl Resolved {
-    /// An experiment with the scenes that were loaded for it.
+    /// Combines an experiment with the scenes that were loaded for it.
     pub fn new(experiment: &Experiment, scenes: &[Scene]) -> Self {
-        let loaded = |scene: &Scene| LoadedScene {
+        let loaded = scenes.iter().map(|scene| LoadedScene {
             name: scene.name.clone(),
             kind: scene.kind.to_string(),
             objects: scene.boxes.len(),
             checksum: checksum(scene),
-        };
-        Self { experiment: experiment.clone(), scenes: scenes.iter().map(loaded).collect() }
+        });
+        Self { experiment: experiment.clone(), scenes: loaded.collect() }
     }
 
-    /// Whether the experiment asks for these runs; its reports may be others.
+    /// Returns true if the experiment requests these runs; its reports may differ.
     pub fn has_runs_of(&self, experiment: &Experiment) -> bool {
         Experiment { reports: experiment.reports.clone(), ..self.experiment.clone() } == *experiment
     }
 
-    /// Whether `found` has the same runs, and perhaps further ones on optional scenes.
+    /// Returns true if `found` has the same runs, and perhaps further ones on optional scenes.
     pub fn repeats(&self, found: &Self) -> bool {
-        let optional = |name: &String| self.experiment.optional_scenes.contains(name);
+        let optional = &self.experiment.optional_scenes;
+        let mut required = self.scenes.iter();
+        let mut recorded = found.scenes.iter();
         found.has_runs_of(&self.experiment)
-            && self
-                .scenes
-                .iter()
-                .all(|scene| found.scenes.contains(scene))
-            && found
-                .scenes
-                .iter()
-                .all(|scene| self.scenes.contains(scene) || optional(&scene.name))
+            && required.all(|scene| found.scenes.contains(scene))
+            && recorded.all(|scene| self.scenes.contains(scene) || optional.contains(&scene.name))
     }
 
-    /// Number of runs over all scenes.
+    /// The number of runs over all scenes.
     pub fn run_count(&self) -> usize {
         self.experiment.runs().count() * self.scenes.len()
     }
+
+    /// Names run `index` in an error message.
+    pub fn run_name(&self, index: usize) -> String {
+        let runs: Vec<_> = self.experiment.runs().collect();
+        let (labelled, repetition, _) = runs[index % runs.len()];
+        let scene = &self.scenes[index / runs.len()].name;
+        format!("scene {scene}, method {}, repetition {repetition}", labelled.label)
+    }
 }
 
-/// Loads an experiment's scenes. Returns them and the names of the optional ones that are not there.
+/// Loads an experiment's scenes. Returns them and the names of optional scenes that are missing.
 pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>), Error> {
-    // The scenes of the suite are names of cases.
+    // The scenes of the suite are names of cases, which the suite itself makes.
     if experiment.suite.is_some() {
         return Ok(Default::default());
     }
@@ -80,11 +84,11 @@ pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>),
     let mut scenes = names
         .map(|name| Scene::load_with(&name, outside))
         .collect::<Result<Vec<_>, _>>()?;
-    let mut left_out = Vec::new();
+    let mut skipped_scenes = Vec::new();
     for name in &experiment.optional_scenes {
         match Scene::load_with(name, outside) {
             Ok(scene) => scenes.push(scene),
-            Err(_) => left_out.push(name.clone()),
+            Err(_) => skipped_scenes.push(name.clone()),
         }
     }
     let mut names = HashSet::new();
@@ -95,11 +99,11 @@ pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>),
         Some(twice) => {
             Err(Error::Usage(format!("two scenes are called {}; name each once", twice.name)))
         }
-        None => Ok((scenes, left_out)),
+        None => Ok((scenes, skipped_scenes)),
     }
 }
 
-/// `value` as TOML.
+/// Serialises `value` as TOML.
 pub(crate) fn to_toml(value: &impl Serialize) -> Result<String, Error> {
     toml::to_string(value)
         .map_err(|error| Error::Usage(format!("cannot be written as TOML: {error}")))

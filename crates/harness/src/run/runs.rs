@@ -1,7 +1,7 @@
-//! The runs of an experiment as a measurement: in parallel or one by one, with progress, until done or interrupted.
+//! The runs of an experiment as a measurement: in parallel or one by one, with progress reports.
 
 use super::job::Job;
-use super::measurement::{Measurement, Said, Trees, Work};
+use super::measurement::{Measurement, Trees, Verbosity, Work};
 use super::perform::perform;
 use crate::Error;
 use crate::spec::Experiment;
@@ -16,19 +16,22 @@ use std::time::{Duration, Instant};
 pub(crate) struct Runs;
 
 impl Measurement for Runs {
-    /// Performs the runs that the store does not have yet or has damaged, and keeps each as soon as it is finished.
+    /// Performs the runs that are missing or damaged in the store, and keeps each once it finishes.
     fn measure(&self, work: &mut Work) -> Result<String, Error> {
-        let todo = todo(work)?;
-        let progress = Progress::new(work, work.own.len() - todo.len());
-        let perform = |index: &usize| progress.perform(work, *index);
+        let missing = missing_runs(work)?;
+        let progress = Progress::new(work, work.assigned.len() - missing.len());
         let result = if work.experiment.sequential {
-            todo.iter().try_for_each(perform)
+            missing
+                .iter()
+                .try_for_each(|&index| progress.perform(work, index))
         } else {
-            todo.par_iter().try_for_each(perform)
+            missing
+                .par_iter()
+                .try_for_each(|&index| progress.perform(work, index))
         };
         work.watch.bar.finish_and_clear();
         result?;
-        let runs = work.own.len();
+        let runs = work.assigned.len();
         match progress.finished.into_inner() {
             finished if finished < runs => Err(Error::Interrupted { finished, runs }),
             _ => {
@@ -42,10 +45,10 @@ impl Measurement for Runs {
     }
 }
 
-/// The numbers of the runs that are to be performed, in their order. Damaged ones are remarked.
-fn todo(work: &mut Work) -> Result<Vec<usize>, Error> {
-    let mut todo = Vec::new();
-    for &index in &work.own {
+/// Returns the indices of the runs to perform, in their order, and adds a remark on damaged ones.
+fn missing_runs(work: &mut Work) -> Result<Vec<usize>, Error> {
+    let mut missing = Vec::new();
+    for &index in &work.assigned {
         match work.store.has(index) {
             Ok(true) => continue,
             Ok(false) => {}
@@ -53,24 +56,25 @@ fn todo(work: &mut Work) -> Result<Vec<usize>, Error> {
                 .remarks
                 .push(format!("done again: {damaged}")),
         }
-        todo.push(index);
+        missing.push(index);
     }
     let experiment = work.experiment;
     if experiment.sequential {
-        // Methods take turns, so that a disturbance of the machine does not hit all repetitions of one method.
+        // Methods alternate, so that a disturbance of the machine does not affect all repetitions
+        // of one method.
         let runs_of_scene = experiment.methods.len() * experiment.repetitions as usize;
-        todo.sort_by_key(|&index| (index / runs_of_scene, work.jobs[index].repetition));
+        missing.sort_by_key(|&index| (index / runs_of_scene, work.jobs[index].repetition));
     }
-    Ok(todo)
+    Ok(missing)
 }
 
-/// The runs that are finished, and the lines about them.
+/// The finished runs and the reports about them.
 struct Progress {
     trees: Mutex<Trees>,
     finished: AtomicUsize,
-    all: usize,
+    total: usize,
     start: Instant,
-    last: Mutex<Instant>,
+    last_report: Mutex<Instant>,
 }
 
 impl Progress {
@@ -83,13 +87,13 @@ impl Progress {
         Self {
             trees: Mutex::default(),
             finished: finished.into(),
-            all: work.own.len(),
+            total: work.assigned.len(),
             start: Instant::now(),
-            last: Mutex::new(Instant::now()),
+            last_report: Mutex::new(Instant::now()),
         }
     }
 
-    /// Performs a run and keeps it; does nothing if it is interrupted.
+    /// Performs a run and keeps it unless it is interrupted.
     fn perform(&self, work: &Work, index: usize) -> Result<(), Error> {
         let start = Instant::now();
         let job = &work.jobs[index];
@@ -104,51 +108,53 @@ impl Progress {
         }
         let finished = self.finished.fetch_add(1, Relaxed) + 1;
         work.watch.bar.inc(1);
-        self.say(work, job, finished, start.elapsed());
+        self.report(work, job, finished, start.elapsed());
         Ok(())
     }
 
     /// Prints the line about a finished run, if one is due.
-    fn say(&self, work: &Work, job: &Job, finished: usize, took: Duration) {
-        let mut last = self
-            .last
+    fn report(&self, work: &Work, job: &Job, finished: usize, duration: Duration) {
+        let mut last_report = self
+            .last_report
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        let Work { experiment, said, .. } = *work;
+        let Work { experiment, verbosity, .. } = *work;
         let bar: &ProgressBar = &work.watch.bar;
-        let due = match said {
-            Said::Bar => false,
-            Said::Progress => {
-                bar.is_hidden()
-                    && (finished == self.all || last.elapsed() >= Duration::from_secs(1))
+        let is_last = finished == self.total;
+        let is_due = match verbosity {
+            Verbosity::Bar => false,
+            Verbosity::Progress => {
+                bar.is_hidden() && (is_last || last_report.elapsed() >= Duration::from_secs(1))
             }
-            Said::EveryRun => true,
+            Verbosity::EveryRun => true,
         };
-        if !due {
+        if !is_due {
             return;
         }
-        *last = Instant::now();
+        *last_report = Instant::now();
         let line = self.line(experiment, job, finished);
-        let more = match said {
-            Said::EveryRun => details(experiment, job, took),
+        let details = match verbosity {
+            Verbosity::EveryRun => details(experiment, job, duration),
             _ => String::new(),
         };
-        // Whoever reads this may have left.
-        let _ = bar.suspend(|| writeln!(std::io::stderr(), "{line}{more}"));
+        // A closed standard error must not end the experiment.
+        let _ = bar.suspend(|| writeln!(std::io::stderr(), "{line}{details}"));
     }
 
     fn line(&self, experiment: &Experiment, job: &Job, finished: usize) -> String {
         let name = &experiment.name;
-        let all = self.all;
+        let total = self.total;
         let seconds = self.start.elapsed().as_secs();
+        // Names of files may hold characters that a terminal would obey.
         let label = job.labelled.label.escape_debug();
         let scene = job.scene.name.escape_debug();
-        format!("{name}: {finished} of {all} runs, {seconds} s: {label} on {scene}")
+        format!("{name}: {finished} of {total} runs, {seconds} s: {label} on {scene}")
     }
 }
 
-fn details(experiment: &Experiment, job: &Job, took: Duration) -> String {
+fn details(experiment: &Experiment, job: &Job, duration: Duration) -> String {
     let repetition = job.repetition;
     let seed = job.seed(experiment);
-    format!(", repetition {repetition}, seed {seed}, took {:.3} s", took.as_secs_f64())
+    let seconds = duration.as_secs_f64();
+    format!(", repetition {repetition}, seed {seed}, took {seconds:.3} s")
 }

@@ -1,4 +1,4 @@
-//! The rows of a run whose tree is found.
+//! The rows of a finished run.
 
 use super::job::Job;
 use crate::measure::empirical_cost;
@@ -10,7 +10,7 @@ use bvh_scenes::rays::Family;
 use bvh_scenes::trace::Query;
 use bvh_search::{Event, Outcome};
 
-/// A run whose tree is found.
+/// A finished run with its tree.
 pub(crate) struct Solved<'a> {
     pub experiment: &'a Experiment,
     pub job: &'a Job<'a>,
@@ -108,7 +108,8 @@ impl Solved<'_> {
         }
     }
 
-    /// Returns the time of every row of the history, if a report needs it; `event_seconds` are the times of all events.
+    /// Returns the time of every row of the history, if a report needs it; `event_seconds` are the
+    /// times of all events.
     pub fn clock_rows(&self, event_seconds: &[f64]) -> Vec<ClockRow> {
         let mut rows = Vec::new();
         if !self.experiment.keeps_clock() {
@@ -122,36 +123,42 @@ impl Solved<'_> {
     }
 
     pub fn ray_rows(&self) -> Vec<RayRow> {
-        let Self { experiment, job: &Job { scene, .. }, seed, .. } = *self;
-        let row = |config: &empirical_cost::Config| {
-            let (family, of_family) = match config.family {
-                Family::Inside => ("inside", "rays Inside"),
-                Family::Lines => ("lines", "rays Lines"),
-            };
-            let query = match config.query {
-                Query::Any => "any",
-                Query::Nearest => "nearest",
-                Query::All => "all",
-            };
-            let (scene_name, method, repetition) = self.identity();
-            // Every method gets the same rays, so that differences between methods come from their trees.
-            let ray_seed = experiment.seed_of(&scene_name, of_family, 0);
-            let named = RayRow {
-                scene: scene_name,
-                method,
-                seed,
-                repetition,
-                family: family.into(),
-                query: query.into(),
-                ..Default::default()
-            };
-            empirical_cost::measure(config, scene, &self.outcome.tree, ray_seed, named)
+        self.experiment
+            .rays
+            .iter()
+            .map(|config| self.ray_row(config))
+            .collect()
+    }
+
+    fn ray_row(&self, config: &empirical_cost::Config) -> RayRow {
+        let (family, stream) = match config.family {
+            Family::Inside => ("inside", "rays Inside"),
+            Family::Lines => ("lines", "rays Lines"),
         };
-        experiment.rays.iter().map(row).collect()
+        let query = match config.query {
+            Query::Any => "any",
+            Query::Nearest => "nearest",
+            Query::All => "all",
+        };
+        let (scene, method, repetition) = self.identity();
+        // Every method gets the same rays, so that methods differ only in their trees.
+        let ray_seed = self.experiment.seed_of(&scene, stream, 0);
+        let identity = RayRow {
+            scene,
+            method,
+            seed: self.seed,
+            repetition,
+            family: family.into(),
+            query: query.into(),
+            ..Default::default()
+        };
+        let tree = &self.outcome.tree;
+        empirical_cost::measure(config, self.job.scene, tree, ray_seed, identity)
     }
 }
 
-/// The events that `history.csv` keeps, each with its index: the first, every improvement, and the last.
+/// Returns the events that `history.csv` keeps, each with its index: the first, every improvement, and
+/// the last.
 fn milestones(history: &[Event]) -> impl Iterator<Item = (usize, &Event)> {
     history
         .iter()

@@ -5,12 +5,12 @@ use crate::Error;
 use crate::stress::Measure;
 use bvh_search::Observer;
 
-/// A measurement over the suite, always from the start.
+/// A measurement over the suite. It cannot be resumed.
 pub(crate) struct Suite<'a>(pub &'a Measure);
 
 impl Measurement for Suite<'_> {
-    fn whole_only(&self) -> Option<&'static str> {
-        Some("the suite of cases is not done in parts")
+    fn indivisible(&self) -> Option<&'static str> {
+        Some("the suite of cases cannot be split; run it without --shard")
     }
 
     fn measure(&self, work: &mut Work) -> Result<String, Error> {

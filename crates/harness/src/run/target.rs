@@ -1,4 +1,4 @@
-//! Which folder a run writes to, so that no finished results are replaced unless the user says so.
+//! The folder that a run writes to. Finished results are replaced only on request.
 
 use crate::Error;
 use crate::rows::store::{Existing, is_unfinished};
@@ -10,37 +10,44 @@ use std::path::{Path, PathBuf};
 pub struct Target {
     /// The folder.
     pub folder: PathBuf,
-    /// The finished results of the same runs beside which it lies.
-    pub beside: Option<PathBuf>,
-    /// Whether the finished results of these runs are in it, and are all that was asked for.
+    /// The folder with finished results of the same runs, if this run repeats them.
+    pub previous: Option<PathBuf>,
+    /// Whether the folder already holds all requested results.
     pub is_finished: bool,
 }
 
 impl Target {
-    /// `out/NAME`, or `out/NAME.new` where the former has finished results of the same runs; those may cover optional
-    /// scenes that are not there now, and are what an experiment to be resumed comes to. Refuses a folder with the finished results of other runs, and, for a `part`
-    /// that is to be merged, with any.
+    /// Returns `out/NAME`, or `out/NAME.new` if the former holds finished results of the same runs.
+    ///
+    /// Finished results may also cover optional scenes that are missing now. Resuming them leaves
+    /// nothing to do.
+    ///
+    /// # Errors
+    ///
+    /// If the folder holds finished results of other runs. For a shard, if it holds any.
     pub(crate) fn choose(
         out: &Path,
         resolved: &Resolved,
         existing: Existing,
-        part: bool,
+        is_shard: bool,
     ) -> Result<Self, Error> {
         let folder = out.join(resolved.experiment.folder());
         let recorded = folder.join("resolved.toml");
         if existing == Existing::Replace || is_unfinished(&folder) || !recorded.is_file() {
-            return Ok(Self { folder, beside: None, is_finished: false });
+            return Ok(Self { folder, previous: None, is_finished: false });
         }
         let text =
             std::fs::read_to_string(&recorded).map_err(Error::io(&recorded, "read the file"))?;
-        if part || !toml::from_str(&text).is_ok_and(|found| resolved.repeats(&found)) {
-            let found = if part {
-                "has finished results"
-            } else {
-                "has the results of another spec, scene or seed"
-            };
+        let found = if is_shard {
+            Some("has finished results")
+        } else if !toml::from_str(&text).is_ok_and(|found| resolved.repeats(&found)) {
+            Some("has the results of another spec, scene or seed")
+        } else {
+            None
+        };
+        if let Some(found) = found {
             return Err(Error::Usage(format!(
-                "{} {found}; --force replaces them, and with another --out they stay",
+                "{} {found}; --force replaces them, another --out keeps them",
                 folder.display()
             )));
         }
@@ -48,8 +55,8 @@ impl Target {
         repetition.push(".new");
         let repetition = PathBuf::from(repetition);
         if existing == Existing::Resume && !is_unfinished(&repetition) {
-            return Ok(Self { folder, beside: None, is_finished: true });
+            return Ok(Self { folder, previous: None, is_finished: true });
         }
-        Ok(Self { folder: repetition, beside: Some(folder), is_finished: false })
+        Ok(Self { folder: repetition, previous: Some(folder), is_finished: false })
     }
 }

@@ -1,7 +1,8 @@
-//! Experiment specs: TOML in, a checked [`Experiment`] out, or an error with file, key, found and accepted.
+//! Experiment specs: TOML in, a checked [`Experiment`] out, or an error with file, key, found and
+//! accepted.
 //!
-//! `read` leads from text to values, and `check` rejects what types alone do not. An entry of `methods` is a
-//! [`Labelled`].
+//! `read` turns text into values, and `check` rejects faults that types alone cannot. An entry of
+//! `methods` is a [`Labelled`].
 
 mod check;
 mod name;
@@ -25,10 +26,11 @@ use std::path::{Path, PathBuf};
 
 config! {
     serde;
-    /// A checked experiment: every method on every scene, a number of times, and how to report it.
+    /// A checked experiment: every method on every scene, with repetitions, and its reports.
     ///
-    /// These are also the keys of a spec, but for `name`, and for `quick`, a table of keys that replace others under
-    /// `--quick`. Serialised, with every default spelled out, it is `resolved.toml`.
+    /// The fields are also the keys of a spec, except `name`, and `quick`, which in a spec is a
+    /// table of keys that replace others under `--quick`. Serialised, with every default spelled
+    /// out, it is `resolved.toml`.
     pub struct Experiment {
         /// Name of the results folder, from the spec's file.
         name: Name;
@@ -37,47 +39,54 @@ config! {
         quick: bool;
         /// The question that the experiment answers, for its readers.
         question: String;
-        /// A measurement over the suite of stiff cases, in place of runs on scenes.
+        /// A measurement over the suite of stiff cases instead of runs on scenes.
         suite: Option<stress::Measure>, in Nested;
-        /// Names or paths of the scenes; `A..B` after a colon stands for all numbers from A to B. With `suite`, names
-        /// of cases, none for all.
+        /// Names or paths of the scenes; `A..B` after a colon means all numbers from A to B. With
+        /// `suite`, names of cases, none for all.
         scenes: Vec<String>;
-        /// Scenes that are left out, with a note, where they have not been fetched.
+        /// Scenes that are skipped, with a note, if they have not been fetched.
         optional_scenes: Vec<String>;
-        /// Whether glTF files may name buffers outside their own folders. Whoever made such a file then says which files are read.
+        /// Whether glTF files may name buffers outside their own folders. The author of such a file
+        /// then chooses which files are read.
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         outside_files: bool;
-        /// Every run's seed is derived from this one, the experiment, the scene, the method and the repetition.
+        /// The seed from which, with the experiment, the scene, the method and the repetition,
+        /// every run's seed is derived.
         seed: u64 = 1, in 0..=i64::MAX as u64;
         /// Runs of every method on every scene.
         repetitions: u32 = 1, in 1..;
-        /// Whether runs are done one at a time, methods in turns, because their times are the result.
+        /// Whether runs are performed one at a time, with alternating methods, because their times
+        /// are the result.
         sequential: bool;
-        /// Whether results are kept apart by processor, in a folder of its name: they are speeds that another one has not.
+        /// Whether results are kept separately for each processor, in a folder with its name,
+        /// because they are speeds of this processor.
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         per_processor: bool;
-        /// Threads of every run; by default those of the program.
+        /// Threads of every run; by default the program's threads.
         threads: Option<u16>, in 1..=1024;
-        /// What `cost` means; by default the paper's objective.
+        /// The cost in the column `cost`; by default the paper's objective.
         objective: Objective;
         /// Limits of every run; by default none.
         budget: Budget = Budget::UNLIMITED;
-        /// Seconds that every run of a method of ours may take, besides its `budget`. Such rows differ from run to run: they are in
-        /// `timing_runs.csv` in place of `runs.csv`, with the trees' costs after the best collapse of leaves. Default none.
+        /// Seconds that every run of a method of ours may take, in addition to its `budget`. Such
+        /// rows differ from run to run: they are in `timing_runs.csv` instead of `runs.csv`, with
+        /// the trees' costs after the best collapse of leaves. Default none.
         max_seconds: Option<f64>, in 0.001..=1e6;
-        /// The program of `scripts/ray-peers`, by which tinybvh's trees with spatial splits are costed beside such rows, if it is there.
+        /// The program of `scripts/ray-peers` that builds tinybvh's trees with spatial splits, to
+        /// cost them for comparison with time-limited runs; ignored if it does not exist.
         tinybvh: Option<PathBuf>;
-        /// Effort of a lower bound of every scene's internal area; by default no bound is sought.
+        /// Effort of a lower bound of every scene's internal area; by default no bound is computed.
         lower_bound: Option<u32>;
-        /// What is run, at least one; with `suite`, none for every method of the registry.
+        /// The methods, at least one; with `suite`, none for every method of the registry.
         methods: Vec<Labelled>;
         /// Measurements of every run's tree with random rays.
         rays: Vec<empirical_cost::Config>, in Nested;
-        /// A picture drawn with every run's tree, and with brute force and a KD-tree.
+        /// A picture drawn with every run's tree, with brute force and with a KD-tree.
         render: Option<picture::Config>, in Nested;
-        /// Rays traced through the tree of every method's first run, in all layouts, in turns.
+        /// Rays traced through the tree of every method's first run, in all layouts, interleaved.
         tracing: Option<speed::Config>, in Nested;
-        /// Rays that methods with `for_rays` are trained on, and others that judge all trees by the tests that they take.
+        /// Rays that methods with `for_rays` are trained on, and different rays that judge all
+        /// trees by the number of their tests.
         ray_cost: Option<ray_cost::Config>, in Nested;
         /// Tables and figures made from the rows.
         reports: Vec<Report>, in Nested;
@@ -85,9 +94,10 @@ config! {
 }
 
 impl Experiment {
-    /// The folder of its results within that of all results. Quick results have no speeds, and no processor.
+    /// The path of the experiment's folder in the results folder.
     pub fn folder(&self) -> PathBuf {
         let name = self.name.as_str();
+        // Quick results hold no speeds, so they do not depend on the processor.
         if self.quick {
             Path::new("quick").join(name)
         } else if self.per_processor {
@@ -97,24 +107,26 @@ impl Experiment {
         }
     }
 
-    /// The runs on one scene in order: method, repetition, and whether it is the first.
+    /// Returns the runs on one scene in order: method, repetition, and whether it is the first run.
     pub fn runs(&self) -> impl Iterator<Item = (&Labelled, u32, bool)> {
-        let of = |labelled| (0..self.repetitions).map(move |repetition| (labelled, repetition));
         self.methods
             .iter()
-            .flat_map(of)
             .enumerate()
-            .map(|(index, (labelled, repetition))| (labelled, repetition, index == 0))
+            .flat_map(|(index, labelled)| {
+                (0..self.repetitions)
+                    .map(move |repetition| (labelled, repetition, index == 0 && repetition == 0))
+            })
     }
 
-    /// The rays that judge its trees, if any do.
+    /// The rays that judge the experiment's trees, if any do.
     pub fn judges(&self) -> Option<&ray_cost::Config> {
         self.ray_cost
             .as_ref()
             .filter(|config| config.count > 0)
     }
 
-    /// Whether gaps are measured on scenes of so many objects from their exact optimum.
+    /// Returns true if gaps on scenes with this number of objects are measured from the exact
+    /// optimum.
     pub fn needs_optimum(&self, objects: usize) -> bool {
         objects <= exact::MOST_OBJECTS && self.reports.iter().any(Report::needs_references)
     }
@@ -152,33 +164,37 @@ impl Experiment {
 
     /// The limits of a method's runs.
     pub fn budget_of(&self, labelled: &Labelled) -> Budget {
-        let own = labelled.own.budget.unwrap_or(Budget::UNLIMITED);
-        let lower = |a: Option<u64>, b: Option<u64>| a.into_iter().chain(b).min();
+        let entry = labelled
+            .options
+            .budget
+            .unwrap_or(Budget::UNLIMITED);
+        let max_evaluations = [self.budget.max_evaluations, entry.max_evaluations];
+        let max_work = [self.budget.max_work, entry.max_work];
         Budget {
-            max_evaluations: lower(self.budget.max_evaluations, own.max_evaluations),
-            max_work: lower(self.budget.max_work, own.max_work),
+            max_evaluations: max_evaluations.into_iter().flatten().min(),
+            max_work: max_work.into_iter().flatten().min(),
         }
     }
 
     /// The seconds that a method's runs may take.
     pub fn max_seconds_of(&self, labelled: &Labelled) -> Option<f64> {
+        // Nothing can end a library's build, and an external program has its own timeout.
         let is_ours = matches!(labelled.method, Contestant::Ours(_));
-        let limits = self
-            .max_seconds
+        let common = self.max_seconds.filter(|_| is_ours);
+        [common, labelled.options.max_seconds]
             .into_iter()
-            .filter(|_| is_ours)
-            .chain(labelled.own.max_seconds);
-        limits.reduce(f64::min)
+            .flatten()
+            .reduce(f64::min)
     }
 
-    /// Whether the clock ends some of the runs, so that nothing but `timing*.csv` may have rows of them.
+    /// Returns true if the clock ends some runs. Only `timing*.csv` may then hold their rows.
     pub fn is_by_the_clock(&self) -> bool {
         self.methods
             .iter()
             .any(|labelled| self.max_seconds_of(labelled).is_some())
     }
 
-    /// The seed of one run, within 32 bits so that every spreadsheet keeps it exactly.
+    /// The seed of one run, of 32 bits, which every spreadsheet represents exactly.
     pub fn seed_of(&self, scene: &str, label: &str, repetition: u32) -> u64 {
         let variant = if self.quick { "-quick" } else { "" };
         let identity =

@@ -1,10 +1,10 @@
-//! The name of an experiment, which is also the name of a folder.
+//! The name of an experiment, which is also the name of its folder.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// A name that is safe as that of a folder among the results: it cannot lead elsewhere, and it is none of the names that
-/// the harness gives to files of its own there. Empty by default, in a spec that has not been given its file's name.
+/// A name that is safe for a folder in the results: it cannot lead outside, and the harness gives
+/// it to none of its own files. Empty until a spec gets the name of its file.
 #[derive(
     Clone,
     Debug,
@@ -20,12 +20,12 @@ use std::fmt;
 #[serde(try_from = "String")]
 pub struct Name(String);
 
-/// What names may be.
-pub const ACCEPTED: &str = "names that do not begin with a dot, are not `quick`, do not end with `.new`, and have no /, \\, : or control \
-     characters";
+/// The accepted names, for error messages.
+pub const ACCEPTED: &str = "names that do not begin with a dot, are not `quick`, do not end with \
+     `.new`, and have no /, \\, : or control characters";
 
 impl Name {
-    /// The name as a text.
+    /// Returns the name as text.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -35,13 +35,17 @@ impl TryFrom<String> for Name {
     type Error = String;
 
     fn try_from(name: String) -> Result<Self, String> {
-        let forbidden = |c: char| c.is_control() || ['/', '\\', ':'].contains(&c);
-        let reserved = name.starts_with('.') || name.ends_with(".new") || name == "quick";
-        if reserved || name.contains(forbidden) {
+        let is_reserved = name.starts_with('.') || name.ends_with(".new") || name == "quick";
+        if is_reserved || name.contains(is_forbidden) {
             return Err(format!("{name:?} is not the name of an experiment; accepted: {ACCEPTED}"));
         }
         Ok(Self(name))
     }
+}
+
+/// Returns true for separators of paths, on any system, and characters that terminals obey.
+fn is_forbidden(character: char) -> bool {
+    character.is_control() || ['/', '\\', ':'].contains(&character)
 }
 
 impl fmt::Display for Name {
@@ -55,24 +59,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_that_lead_elsewhere_or_are_the_harnesss_own_are_refused() {
+    fn names_that_lead_elsewhere_or_are_reserved_are_rejected() {
         for good in ["table4", "two words", "größe", "v1.2", "a..b"] {
             assert_eq!(Name::try_from(good.to_owned()).unwrap().as_str(), good);
         }
-        for wrong in [
-            ".",
-            "..",
-            ".lock",
-            ".partial",
-            "a/b",
-            "..\\x",
-            "c:x",
-            "x.new",
-            "quick",
-            "a\u{1b}[2J",
-            "a\0",
-        ] {
-            assert!(Name::try_from(wrong.to_owned()).is_err(), "{wrong:?}");
+        let leading_elsewhere = [".", "..", "a/b", "..\\x", "c:x"];
+        let reserved = [".lock", ".partial", "x.new", "quick"];
+        let control = ["a\u{1b}[2J", "a\0"];
+        for wrong in leading_elsewhere
+            .iter()
+            .chain(&reserved)
+            .chain(&control)
+        {
+            assert!(Name::try_from((*wrong).to_owned()).is_err(), "{wrong:?}");
         }
     }
 }

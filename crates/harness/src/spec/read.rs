@@ -1,4 +1,4 @@
-//! From a spec's text to a checked [`Experiment`], with what the command line changes.
+//! From a spec's text to a checked [`Experiment`], with the overrides of the command line.
 
 use super::{Experiment, Labelled, Name, check};
 use crate::Error;
@@ -10,7 +10,7 @@ use std::ffi::OsStr;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// What the command line changes in every spec.
+/// The keys that the command line changes in every spec.
 #[derive(Clone, Debug, Default)]
 pub struct Overrides {
     /// Replaces the scenes, if any are given.
@@ -29,86 +29,64 @@ impl Experiment {
         Self::parse(path, &read_text(path)?, overrides)
     }
 
-    /// Reads and checks a spec's text; `path` gives it its name.
+    /// Reads and checks a spec's text; `path` determines the experiment's name.
     pub fn parse(path: &Path, text: &str, overrides: &Overrides) -> Result<Self, Error> {
-        let refuse = |message: String| Error::Spec { file: path.to_owned(), message };
+        let rejected = |message: String| Error::Spec { file: path.to_owned(), message };
         let table: Table = text
             .parse()
-            .map_err(|error: toml::de::Error| refuse(error.to_string()))?;
-        let name = path
-            .file_stem()
-            .and_then(OsStr::to_str)
-            .ok_or("no UTF-8".to_owned());
-        let name = name.and_then(|name| Name::try_from(name.to_owned()));
-        let name = name.map_err(|message| {
-            refuse(format!("the file's name without its extension: {message}"))
+            .map_err(|error: toml::de::Error| rejected(error.to_string()))?;
+        let name = name_of(path).map_err(|message| {
+            rejected(format!("the file's name without its extension: {message}"))
         })?;
-        // A key that `quick` replaces stands there, not where it is read.
+        // A key that `quick` replaces is written there, not where it is read.
         let above = overrides.quick.then_some("quick");
-        let mut experiment = Self::from_table(table, name, overrides)
-            .map_err(|faults| refuse(fault::say(&faults, text, &path.to_string_lossy(), above)))?;
-        if let Some(folder) = path
-            .parent()
-            .and_then(Path::to_str)
-            .filter(|_| overrides.scenes.is_empty())
+        let mut experiment = Self::from_table(table, name, overrides).map_err(|faults| {
+            rejected(fault::say(&faults, text, &path.to_string_lossy(), above))
+        })?;
+        // Paths in a spec are relative to its folder, those on the command line to the shell's.
+        if overrides.scenes.is_empty()
+            && let Some(folder) = path.parent()
         {
             let scenes = experiment
                 .scenes
                 .iter_mut()
                 .chain(&mut experiment.optional_scenes);
-            // Words are names.
-            let is_path = |scene: &str| {
-                scene
-                    .split(':')
-                    .next()
-                    .is_some_and(|file| file.contains(['.', '/', '\\']))
-            };
             for scene in scenes.filter(|scene| is_path(scene)) {
-                *scene = Path::new(folder)
-                    .join(&*scene)
-                    .to_string_lossy()
-                    .into_owned();
+                let path = folder.join(&*scene);
+                *scene = path.to_string_lossy().into_owned();
             }
         }
         Ok(experiment)
     }
 
-    /// The experiment, or everything that is wrong with it.
+    /// Returns the experiment, or all faults of the spec.
     fn from_table(mut table: Table, name: Name, overrides: &Overrides) -> Result<Self, Vec<Fault>> {
         let mut faults = Vec::new();
-        leave_out_never_right(&mut table, "", &mut faults);
+        remove_unacceptable(&mut table, "", &mut faults);
         match table.remove("quick") {
             Some(Value::Table(quick)) if overrides.quick => replace(&mut table, quick),
             None if overrides.quick => {
-                faults.push(Fault::new(
-                    "quick",
-                    "missing",
-                    "with --quick, a table of keys to replace",
-                ));
+                let accepted = "with --quick, a table of keys to replace";
+                faults.push(Fault::new("quick", "missing", accepted));
             }
             None | Some(Value::Table(_)) => {}
             Some(found) => faults.push(Fault::new("quick", found, "a table of keys to replace")),
         }
         let mut labels = labels(table.get("methods"));
-        // Serde forgets the path to an error within a table that says itself of which type it is.
-        let (methods, methods_at) = list(&mut table, "methods", Labelled::read, &mut faults);
-        let read = |table| {
-            fault::tagged(
-                table,
-                "kind",
-                |kind, config| Report::read(kind, config),
-                || Report::NAMES.join(", "),
-            )
-        };
-        let (reports, reports_at) = list(&mut table, "reports", read, &mut faults);
-        let (experiment, of_others) = fault::deserialize::<Self>(table);
-        faults.extend(of_others);
+        // Serde loses the path to an error within an internally tagged enum, so entries are read
+        // singly.
+        let (methods, method_indices) = list(&mut table, "methods", Labelled::read, &mut faults);
+        let (reports, report_indices) = list(&mut table, "reports", read_report, &mut faults);
+        let (experiment, key_faults) = fault::deserialize::<Self>(table);
+        faults.extend(key_faults);
         let Some(mut experiment) = experiment else { return Err(faults) };
         if experiment.name != Name::default() {
             faults.push(Fault::new("name", experiment.name, "none, the file's name is used"));
         }
-        (experiment.name, experiment.quick) = (name, overrides.quick);
-        (experiment.methods, experiment.reports) = (methods, reports);
+        experiment.name = name;
+        experiment.quick = overrides.quick;
+        experiment.methods = methods;
+        experiment.reports = reports;
         if let Some(seed) = overrides.seed {
             experiment.seed = seed;
         }
@@ -128,50 +106,57 @@ impl Experiment {
                 .map(|method| Some(method.label.clone()))
                 .collect();
         }
-        // What is refused already is missing, and a list empty, for no other reason.
-        let apart = |late: &Fault| {
+        // A value that was rejected now looks missing, which is not a second fault.
+        let mut together = experiment.check_together();
+        together.retain(|late| {
             !faults
                 .iter()
                 .any(|fault| fault::is_within(&fault.key, &late.key))
-        };
-        let together = [
-            experiment
-                .check_together()
-                .into_iter()
-                .filter(apart)
-                .collect(),
-            check::unique(&labels),
-            experiment.check_methods(&methods_at),
-            experiment.check_ends(&methods_at, &faults),
-            experiment.check_reports(&labels, &reports_at),
-            experiment.check_clock(),
-        ];
-        let faults = [faults, together.concat()].concat();
+        });
+        together.extend(check::unique(&labels));
+        together.extend(experiment.check_methods(&method_indices));
+        together.extend(experiment.check_ends(&method_indices, &faults));
+        together.extend(experiment.check_reports(&labels, &report_indices));
+        together.extend(experiment.check_clock());
+        faults.extend(together);
         if faults.is_empty() { Ok(experiment) } else { Err(faults) }
     }
 }
 
-/// The labels of the entries of `methods`, as far as they can be told.
+fn name_of(path: &Path) -> Result<Name, String> {
+    let stem = path
+        .file_stem()
+        .and_then(OsStr::to_str)
+        .ok_or("no UTF-8")?;
+    Name::try_from(stem.to_owned())
+}
+
+/// Returns true if a scene is a mesh file; plain words are names.
+fn is_path(scene: &str) -> bool {
+    let file = scene.split(':').next().unwrap_or_default();
+    file.contains(['.', '/', '\\'])
+}
+
+fn read_report(table: Table) -> Read<Report> {
+    let accepted = || Report::NAMES.join(", ");
+    fault::tagged(table, "kind", |kind, config| Report::read(kind, config), accepted)
+}
+
+/// Returns the labels of the entries of `methods`, `None` for those without a readable one.
 fn labels(methods: Option<&Value>) -> Vec<Option<String>> {
-    let label = |entry: &Value| {
-        Some(
-            entry
-                .get("label")
-                .or(entry.get("method"))?
-                .as_str()?
-                .to_owned(),
-        )
-    };
-    methods
-        .and_then(Value::as_array)
-        .into_iter()
-        .flatten()
-        .map(label)
+    let entries = methods.and_then(Value::as_array);
+    let entries = entries.into_iter().flatten();
+    entries
+        .map(|entry| {
+            let label = entry.get("label").or(entry.get("method"))?;
+            Some(label.as_str()?.to_owned())
+        })
         .collect()
 }
 
-/// Takes the list of tables under `key` out of a spec, and reads each table by `read`. Returns what could be read with its place in
-/// the list; faults are added to `faults`.
+/// Removes the list of tables under `key` from a spec and reads each table by `read`.
+///
+/// Returns the values that could be read, with their indices in the list; adds faults to `faults`.
 fn list<T>(
     table: &mut Table,
     key: &str,
@@ -186,36 +171,35 @@ fn list<T>(
             vec![]
         }
     };
-    let mut read = |(at, entry): (usize, Value)| {
-        let (value, of_entry) = match entry {
+    let mut values = Vec::new();
+    let mut indices = Vec::new();
+    for (index, entry) in entries.into_iter().enumerate() {
+        let (value, entry_faults) = match entry {
             Value::Table(entry) => read(entry),
             found => (None, vec![Fault::new("", found, "a table")]),
         };
-        faults.extend(
-            of_entry
-                .into_iter()
-                .map(|fault| fault.below(&format!("{key}[{at}]"))),
-        );
-        Some((value?, at))
-    };
-    entries
-        .into_iter()
-        .enumerate()
-        .filter_map(&mut read)
-        .unzip()
+        let entry_faults = entry_faults.into_iter();
+        faults.extend(entry_faults.map(|fault| fault.below(&format!("{key}[{index}]"))));
+        if let Some(value) = value {
+            values.push(value);
+            indices.push(index);
+        }
+    }
+    (values, indices)
 }
 
-/// Takes out what no key takes: numbers that are infinite or NaN, and dates.
-fn leave_out_never_right(table: &mut Table, above: &str, faults: &mut Vec<Fault>) {
-    fn is_right(key: &str, value: &mut Value, faults: &mut Vec<Fault>) -> bool {
+/// Removes values that no key accepts: infinite numbers, NaN, and dates.
+fn remove_unacceptable(table: &mut Table, above: &str, faults: &mut Vec<Fault>) {
+    fn is_acceptable(key: &str, value: &mut Value, faults: &mut Vec<Fault>) -> bool {
         match value {
-            Value::Table(table) => leave_out_never_right(table, &format!("{key}."), faults),
+            Value::Table(table) => remove_unacceptable(table, &format!("{key}."), faults),
             Value::Array(list) => {
-                let mut right = true;
+                // Every element is visited, so that each one is named.
+                let mut is_list_acceptable = true;
                 for (index, value) in list.iter_mut().enumerate() {
-                    right &= is_right(&format!("{key}[{index}]"), value, faults);
+                    is_list_acceptable &= is_acceptable(&format!("{key}[{index}]"), value, faults);
                 }
-                return right;
+                return is_list_acceptable;
             }
             Value::Float(number) if number.is_finite() => {}
             Value::Float(_) | Value::Datetime(_) => {
@@ -226,12 +210,12 @@ fn leave_out_never_right(table: &mut Table, above: &str, faults: &mut Vec<Fault>
         }
         true
     }
-    table.retain(|key, value| is_right(&format!("{above}{key}"), value, faults));
+    table.retain(|key, value| is_acceptable(&format!("{above}{key}"), value, faults));
 }
 
-/// Replaces keys of `table` by those of `by`, tables key by key.
-fn replace(table: &mut Table, by: Table) {
-    for (key, value) in by {
+/// Replaces keys of `table` by the keys of `replacements`, nested tables key by key.
+fn replace(table: &mut Table, replacements: Table) {
+    for (key, value) in replacements {
         match (table.get_mut(&key), value) {
             (Some(Value::Table(old)), Value::Table(new)) => replace(old, new),
             (_, value) => {

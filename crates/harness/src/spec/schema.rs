@@ -1,8 +1,9 @@
-//! The JSON schema of specs, by which editors complete and check them, and the page of all keys. Both are made from the
-//! declarations that read and check the keys.
+//! The JSON schema of specs, which editors complete and check them by, and the page of all keys.
+//!
+//! Both come from the declarations that also read and check the keys.
 
 use super::{Contestant, Experiment, Labelled};
-use crate::contestant::Own;
+use crate::contestant::EntryOptions;
 use bvh_config::Keys;
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
@@ -14,15 +15,15 @@ impl JsonSchema for Labelled {
         "Labelled".into()
     }
 
-    /// One table per method, with its parameters and the keys that every entry has.
+    /// Describes one table per method, with its parameters and the keys that every entry has.
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let mut tables = Vec::new();
-        let own = properties(Own::json_schema(generator).as_value());
+        let options = properties(EntryOptions::json_schema(generator).as_value());
         flatten(Contestant::json_schema(generator).as_value(), &mut tables);
         for table in &mut tables {
-            let mut all = properties(table);
-            all.extend(own.clone());
-            table["properties"] = all.into();
+            let mut keys = properties(table);
+            keys.extend(options.clone());
+            table["properties"] = keys.into();
         }
         json!({ "oneOf": tables })
             .try_into()
@@ -30,7 +31,7 @@ impl JsonSchema for Labelled {
     }
 }
 
-/// What a schema lets one choose from, if it does.
+/// Returns the alternatives that a schema accepts, if it has any.
 fn choices(schema: &Value) -> Option<&Vec<Value>> {
     schema
         .get("oneOf")
@@ -38,7 +39,7 @@ fn choices(schema: &Value) -> Option<&Vec<Value>> {
         .as_array()
 }
 
-/// The tables among which a schema lets one choose, however nested the choice is.
+/// Collects the tables that a schema accepts, however nested the alternatives are.
 fn flatten(schema: &Value, tables: &mut Vec<Value>) {
     match choices(schema) {
         Some(choices) => choices
@@ -56,7 +57,7 @@ fn properties(schema: &Value) -> Map<String, Value> {
         .unwrap_or_default()
 }
 
-/// The JSON schema of specs.
+/// Returns the JSON schema of specs.
 pub fn schema() -> Value {
     let settings = SchemaSettings::draft07().with(|settings| settings.inline_subschemas = true);
     let mut schema = settings
@@ -65,19 +66,26 @@ pub fn schema() -> Value {
         .to_value();
     tidy(&mut schema);
     let mut keys = properties(&schema);
-    // The file has the name, and what says that it is the quick variant is the command line.
+    // The name comes from the file, and the command line selects the quick variant.
     keys.remove("name");
     keys.remove("quick");
-    let same = |key: &String| (key.clone(), json!({ "$ref": format!("#/properties/{key}") }));
-    let same: Map<String, Value> = keys.keys().map(same).collect();
-    let description = "Keys that replace others under `--quick`.";
-    let quick = json!({ "type": "object", "description": description, "properties": same, "additionalProperties": false });
+    let replaceable: Map<String, Value> = keys
+        .keys()
+        .map(|key| (key.clone(), json!({ "$ref": format!("#/properties/{key}") })))
+        .collect();
+    let quick = json!({
+        "type": "object",
+        "description": "Keys that replace others under `--quick`.",
+        "properties": replaceable,
+        "additionalProperties": false,
+    });
     keys.insert("quick".into(), quick);
     schema["properties"] = keys.into();
     schema
 }
 
-/// Makes a schema of Rust's types one of TOML: without `null`, and without what descriptions say to Rust alone.
+/// Turns a schema of Rust types into one of TOML: without `null`, and without the parts of
+/// descriptions that are about Rust.
 fn tidy(schema: &mut Value) {
     match schema {
         Value::Array(all) => all.iter_mut().for_each(tidy),
@@ -101,7 +109,7 @@ fn tidy(schema: &mut Value) {
                 if let [Value::Object(one)] = &mut any[..] {
                     let one = std::mem::take(one);
                     map.remove("anyOf");
-                    // What is said of the key goes before what is said of its type.
+                    // The description of the key takes precedence over the description of its type.
                     one.into_iter().for_each(|(key, value)| {
                         map.entry(key).or_insert(value);
                     });
@@ -116,16 +124,17 @@ fn tidy(schema: &mut Value) {
     }
 }
 
-/// A description without links, and without the line in which rustdoc says default and range as they stand in the code.
+/// Returns a description without links, and without the lines that repeat default and range as Rust
+/// expressions.
 fn described(text: &str) -> String {
-    let of_code = |line: &str| line.starts_with("Default `") || line.starts_with("Accepted: `");
     let lines: Vec<&str> = text
         .lines()
-        .filter(|line| !line.is_empty() && !of_code(line))
+        .filter(|line| !line.is_empty())
+        .filter(|line| !line.starts_with("Default `") && !line.starts_with("Accepted: `"))
         .collect();
-    let text = lines.join(" ");
+    let joined = lines.join(" ");
     let mut plain = String::new();
-    let mut rest = text.trim();
+    let mut rest = joined.trim();
     while let Some((before, after)) = rest.split_once('[') {
         let Some((name, after)) = after
             .split_once(']')
@@ -144,84 +153,77 @@ fn described(text: &str) -> String {
     plain + rest
 }
 
-/// The page of all keys, in Markdown.
+/// Returns the page of all keys, in Markdown.
 pub fn page() -> String {
     let schema = schema();
-    let mut text =
-        "# Keys of specs\n\nEvery key that a spec may have, as `harness schema` tells editors; made by \
-                    `UPDATE_DOCS=1 cargo test -p harness --test schema` from what reads the keys.\n\
-                    [How specs are written and run](EXPERIMENTS.md).\n"
-            .to_owned();
-    let mut section = |heading: &str, table: &Value, hidden: &[&str]| {
-        let description = table
-            .get("description")
-            .and_then(Value::as_str)
-            .unwrap_or_default();
-        text += &format!("\n{heading}\n\n{description}\n\n");
-        let mut rows = Vec::new();
-        keys_of(table, "", hidden, &mut rows);
-        if !rows.is_empty() {
-            text += &format!(
-                "| key | value | default | meaning |\n|---|---|---|---|\n{}",
-                rows.concat()
-            );
-        }
-    };
-    section("## An experiment", &schema, &["methods", "reports", "quick"]);
-    let entries = |key: &str| {
-        schema["properties"][key]["items"]["oneOf"]
-            .as_array()
-            .cloned()
-            .unwrap_or_default()
-    };
-    let methods = entries("methods");
-    let reports = entries("reports");
-    let own = properties(&methods[0])
+    let mut page = "# Keys of specs\n\n\
+        Every key that a spec may have, as `harness schema` describes it to editors; generated from\n\
+        the declarations that read the keys by `UPDATE_DOCS=1 cargo test -p harness --test schema`.\n\
+        [How specs are written and run](EXPERIMENTS.md).\n"
+        .to_owned();
+    page += &section("## An experiment", &schema, &["methods", "reports", "quick"]);
+    let methods = entries(&schema, "methods");
+    let options: Map<String, Value> = properties(&methods[0])
         .into_iter()
-        .filter(|(key, _)| Own::KEYS.contains(&key.as_str()));
-    let own = json!({ "properties": own.collect::<Map<_, _>>(), "description": "Beside `method`, its name." });
-    section("## Every entry of `methods`", &own, &[]);
-    for (tag, tables) in [("method", methods), ("kind", reports)] {
+        .filter(|(key, _)| EntryOptions::KEYS.contains(&key.as_str()))
+        .collect();
+    let description = "Further keys of an entry, next to `method`, its name.";
+    let options = json!({ "properties": options, "description": description });
+    page += &section("## Every entry of `methods`", &options, &[]);
+    for (tag, tables) in [("method", methods), ("kind", entries(&schema, "reports"))] {
         for table in &tables {
             let name = table["properties"][tag]["const"]
                 .as_str()
                 .unwrap_or_default();
-            section(&format!("## `{tag} = \"{name}\"`"), table, &[Own::KEYS, &[tag]].concat());
+            let hidden = [EntryOptions::KEYS, &[tag]].concat();
+            page += &section(&format!("## `{tag} = \"{name}\"`"), table, &hidden);
         }
     }
-    text
+    page
 }
 
-/// A row for every key of a table, those of tables within it included.
+/// Returns the tables that the list under `key` of an experiment may hold.
+fn entries(schema: &Value, key: &str) -> Vec<Value> {
+    let tables = schema["properties"][key]["items"]["oneOf"].as_array();
+    tables.cloned().unwrap_or_default()
+}
+
+fn section(heading: &str, table: &Value, hidden: &[&str]) -> String {
+    let description = text(table, "description");
+    let mut section = format!("\n{heading}\n\n{description}\n\n");
+    let mut rows = Vec::new();
+    keys_of(table, "", hidden, &mut rows);
+    if !rows.is_empty() {
+        section += "| key | value | default | meaning |\n|---|---|---|---|\n";
+        section += &rows.concat();
+    }
+    section
+}
+
+fn text<'a>(schema: &'a Value, key: &str) -> &'a str {
+    let text = schema.get(key).and_then(Value::as_str);
+    text.unwrap_or_default()
+}
+
+/// Adds a row for every key of a table, including the keys of nested tables.
 fn keys_of(table: &Value, above: &str, hidden: &[&str], rows: &mut Vec<String>) {
     for (key, schema) in properties(table)
         .iter()
         .filter(|(key, _)| !hidden.contains(&key.as_str()))
     {
-        let text = |key: &str| {
-            schema
-                .get(key)
-                .and_then(Value::as_str)
-                .unwrap_or_default()
-                .to_owned()
-        };
+        // A long default would widen the table, and repeats the rows of its keys.
         let default = schema
             .get("default")
             .map(Value::to_string)
             .filter(|text| text.len() <= 40);
-        let default = default.map_or_else(String::new, |text| format!("`{text}`"));
         let cells = [
             format!("`{above}{key}`"),
             format!("`{}`", value(schema)),
-            default,
-            text("description"),
+            default.map_or_else(String::new, |text| format!("`{text}`")),
+            text(schema, "description").to_owned(),
         ];
-        rows.push(format!(
-            "| {} |\n",
-            cells
-                .map(|cell| cell.replace('|', "\\|"))
-                .join(" | ")
-        ));
+        let cells = cells.map(|cell| cell.replace('|', "\\|"));
+        rows.push(format!("| {} |\n", cells.join(" | ")));
         keys_of(schema, &format!("{above}{key}."), &[], rows);
         keys_of(
             schema.get("items").unwrap_or(&Value::Null),
@@ -239,34 +241,32 @@ fn keys_of(table: &Value, above: &str, hidden: &[&str], rows: &mut Vec<String>) 
     }
 }
 
-/// What values a schema accepts, as in TOML.
+/// Describes the values that a schema accepts, in the notation of TOML.
 fn value(schema: &Value) -> String {
-    let choice = |all: &Vec<Value>, word: &dyn Fn(&Value) -> String| {
-        all.iter()
-            .map(word)
-            .collect::<Vec<_>>()
-            .join(" or ")
-    };
-    if let Some(one) = schema.get("const") {
-        return one.to_string();
+    if let Some(constant) = schema.get("const") {
+        return constant.to_string();
     }
-    if let Some(all) = schema.get("enum").and_then(Value::as_array) {
-        return choice(all, &Value::to_string);
+    if let Some(constants) = schema.get("enum").and_then(Value::as_array) {
+        let words: Vec<String> = constants.iter().map(Value::to_string).collect();
+        return words.join(" or ");
     }
-    if let Some(all) = choices(schema) {
-        return choice(all, &value);
+    if let Some(choices) = choices(schema) {
+        let words: Vec<String> = choices.iter().map(value).collect();
+        return words.join(" or ");
     }
-    let named = schema
+    let values_of_names = schema
         .get("additionalProperties")
-        .filter(|of| of.is_object());
+        .filter(|values| values.is_object());
     match schema.get("type").and_then(Value::as_str) {
         Some("array") => format!("[{}, …]", value(schema.get("items").unwrap_or(&Value::Null))),
-        Some("object") => match (named, schema.get("required")) {
-            (Some(of), _) => format!("{{ NAME = {}, … }}", value(of)),
+        Some("object") => match (values_of_names, schema.get("required")) {
+            (Some(values), _) => format!("{{ NAME = {}, … }}", value(values)),
             (None, None) => "{ … }".into(),
             (None, Some(_)) => {
-                let field = |(key, of): (&String, &Value)| format!("{key} = {}", value(of));
-                let fields: Vec<String> = properties(schema).iter().map(field).collect();
+                let fields: Vec<String> = properties(schema)
+                    .iter()
+                    .map(|(key, field)| format!("{key} = {}", value(field)))
+                    .collect();
                 format!("{{ {} }}", fields.join(", "))
             }
         },

@@ -1,4 +1,4 @@
-//! Of whole specs: what is refused and how, and what is read.
+//! Whole specs: the errors of wrong ones, and the values of good ones.
 
 use super::*;
 use crate::peers::Peer;
@@ -11,7 +11,7 @@ fn read(text: &str) -> Result<Experiment, String> {
     parse(text, &Overrides::default())
 }
 
-/// The quick variant.
+/// Reads the quick variant.
 fn read_quick(text: &str) -> Result<Experiment, String> {
     parse(text, &Overrides { quick: true, ..Default::default() })
 }
@@ -20,56 +20,156 @@ fn parse(text: &str, overrides: &Overrides) -> Result<Experiment, String> {
     Experiment::parse("spec.toml".as_ref(), text, overrides).map_err(|error| error.to_string())
 }
 
-/// The spec is refused by a message with all these parts.
-fn refused(text: &str, parts: &[&str]) {
+/// Asserts that a spec is rejected by a message with all these parts.
+fn assert_rejected(text: &str, parts: &[&str]) {
     let message = read(text).unwrap_err();
-    parts
-        .iter()
-        .for_each(|part| assert!(message.contains(part), "{part} in {message} for {text}"));
+    for part in parts {
+        assert!(message.contains(part), "{part} in {message} for {text}");
+    }
 }
 
+/// Lines to add to [`GOOD`], and the parts of the error.
+///
+/// The test `wrong_values` tries wrong values under every key. These cases are the ranges and
+/// relations whose message must also name the accepted values.
+const WRONG_KEYS: &[(&str, &[&str])] = &[
+    ("alpa = 1", &["spec.toml", "alpa", "expected one of", "repetitions"]),
+    ("repetitions = 0", &["repetitions is 0", "1 or more"]),
+    ("repetitions = 'x'", &["repetitions", "x", "line"]),
+    ("name = 'x'", &["name", "the file's name is used"]),
+    ("objective = 'volume'", &["volume", "internal_area"]),
+    ("budget = { seconds = 1 }", &["seconds", "max_evaluations"]),
+    ("tracing = { rounds = 0 }", &["tracing.rounds is 0", "1 to 1000000"]),
+    ("render = { width = 0 }", &["render.width is 0; accepted: 1 to 10000"]),
+    ("threads = 65535", &["threads is 65535", "1 to 1024"]),
+    ("repetitions = 4294967295", &["repetitions", "4294967295 runs"]),
+    ("objective = { sah = { traversal = -1.0 } }", &["objective.sah.traversal: -1 is not"]),
+    ("rays = [{ count = nan }]", &["rays[0].count is nan", "finite"]),
+    ("rays = [{ family = 'curves', query = 'any', count = 1 }]", &["curves", "inside"]),
+    ("tinybvh = 'x'", &["tinybvh is set without `max_seconds`"]),
+    ("[ray_cost]\ntrained = 200_000", &["ray_cost.trained is 200000", "up to 174762", "6 rays"]),
+    ("[[reports]]\nkind = 'pie'", &["pie", "table"]),
+];
+
+/// Kinds of reports, a line of one, and the parts of the error.
+const WRONG_REPORTS: &[(&str, &str, &[&str])] = &[
+    ("significance", "level = 1", &["reports[0].level is 1", "above 0 and below 1"]),
+    ("ray_tests", "tolerance = -0.1", &["reports[0].tolerance is -0.1", "0 to 1"]),
+    ("ray_tests", "paper = { e = [1, 2] }", &["reports[0].paper.e is a list of 2", "up to 1"]),
+    ("times", "paper = { e = [0.0] }", &["reports[0].paper.e[0] is 0", "above 0"]),
+    ("ecdf", "targets = []", &["reports[0].targets is empty", "one or more"]),
+    (
+        "ecdf",
+        "targets = [{ of = 'base', percent = -100 }]",
+        &["targets[0].percent is -100", "above -100"],
+    ),
+    (
+        "anytime",
+        "at_seconds = [1, 10, 2]",
+        &["reports[0].at_seconds is [1.0, 10.0, 2.0]", "ascending"],
+    ),
+    ("anytime", "at_seconds = [0]", &["reports[0].at_seconds[0] is 0", "above 0"]),
+    ("anytime", "file = '../../x'", &["reports[0].file is \"../../x\"", "letters, digits"]),
+    (
+        "generations",
+        "paper_final = { e = [3, 2] }",
+        &["paper_final.e is [3.0, 2.0]", "the lower number first"],
+    ),
+    ("pictures", "document = { 'brute force' = -1 }", &["document.brute force is -1", "above 0"]),
+    ("pareto", "methods = []", &["reports[0].methods is empty", "one or more"]),
+];
+
+/// The methods of a spec, and the parts of the error.
+const WRONG_METHODS: &[(&str, &[&str])] = &[
+    ("[]", &["methods is empty"]),
+    ("[{ noise = 0.1 }]", &["method is missing", "grasp"]),
+    ("[{ method = 'grep' }]", &["\"grep\"", "muller_fellner"]),
+    ("[{ method = 'obvhs', preset = 'best' }]", &["methods[0].preset", "best", "very_slow"]),
+    ("[{ method = 'grasp', alpa = 1 }]", &["methods[0]", "alpa", "noise"]),
+    ("[{ method = 'grasp', noise = 1.5 }]", &["methods[0].noise is 1.5", "0 to 1"]),
+    ("[{ method = 'grasp', budget = { max_seconds = 3 } }]", &["max_seconds", "max_work"]),
+    (
+        "[{ method = 'grasp', judge = { count = 0 } }]",
+        &["methods[0].judge.count is 0", "1 or more"],
+    ),
+    (
+        "[{ method = 'best', judge = { count = 9 } }]",
+        &["methods[0].judge is set for best", "genetic"],
+    ),
+    (
+        "[{ method = 'best', for_rays = 'camera' }]",
+        &["methods[0].for_rays is set without `ray_cost`"],
+    ),
+    (
+        "[{ method = 'median_cut', for_rays = 'inside' }]",
+        &["methods[0].for_rays", "median_cut, which compares"],
+    ),
+    (
+        "[{ method = 'best', for_rays = 'camera' }]\n\
+         [ray_cost]\n[tracing]\nlayouts = ['wide_dear_blocks']",
+        &["methods[0].for_rays is set together with `tracing.layouts`", "other layouts"],
+    ),
+    (
+        "[{ method = 'obvhs', for_rays = 'inside' }]",
+        &["methods[0].for_rays is set for obvhs", "of ours"],
+    ),
+    ("[{ method = 'grasp' }, { method = 'grasp' }]", &["methods[1].label", "second time"]),
+];
+
+/// Whole specs without their question, and the parts of the error.
+const WRONG_SPECS: &[(&str, &[&str])] = &[
+    (
+        "scenes = ['a:0..9999:0..99999:0..4294967295']\nmethods = [{ method = 'grasp' }]",
+        &["scenes", "4294967296000000000 runs"],
+    ),
+    ("scenes = ['a:5..4']\nmethods = [{ method = 'grasp' }]", &["scenes", "a:5..4", "A up to B"]),
+    (
+        "[suite]\nstability = { builders = 'few', work_per_object = 1, rays = 9223372036854775807 }",
+        &["suite.stability.rays", "1 to 100000000"],
+    ),
+    (
+        "[suite]\nprecision = { objects = 2, repetitions = 1 }",
+        &["suite.precision.objects is 2", "3 to"],
+    ),
+];
+
 #[test]
-fn wrong_keys_and_values_are_named_with_what_would_be_accepted() {
-    for (wrong, parts) in [
-        ("alpa = 1\n", &["spec.toml", "alpa", "expected one of", "repetitions"][..]),
-        ("repetitions = 0\n", &["repetitions is 0", "1 or more"]),
-        ("repetitions = 'x'\n", &["repetitions", "x", "line"]),
-        ("seed = -1\n", &["seed", "-1"]),
-        ("name = 'x'\n", &["name", "the file's name is used"]),
-        ("objective = 'volume'\n", &["volume", "internal_area"]),
-        ("budget = { seconds = 1 }\n", &["seconds", "max_evaluations"]),
-        ("[[reports]]\nkind = 'pie'\n", &["pie", "table"]),
-        ("rays = [{ family = 'lines', query = 'any', count = 0 }]\n", &["rays[0].count is 0"]),
-        ("tracing = { rounds = 0 }\n", &["tracing.rounds is 0", "1 to 1000000"]),
-        ("render = { width = 0 }\n", &["render.width is 0; accepted: 1 to 10000"]),
-        ("max_seconds = 0\n", &["max_seconds is 0", "0.001 to 1000000"]),
-        ("threads = 0\n", &["threads is 0", "1 to 1024"]),
-        ("threads = 65535\n", &["threads is 65535", "1 to 1024"]),
-        ("repetitions = 4294967295\n", &["repetitions", "4294967295 runs"]),
-        ("optional_scenes = []\nscenes = ['a:0..4294967295']\n", &["scenes", "4294967296 runs"]),
-        (
-            "scenes = ['a:0..9999:0..99999:0..4294967295']\n",
-            &["scenes", "4294967296000000000 runs"],
-        ),
-        ("scenes = ['a:5..4']\n", &["scenes", "a:5..4", "A up to B"]),
-        ("tracing = { count = 4294967295 }\n", &["tracing.count", "1 to 100000000"]),
-        ("objective = { sah = { traversal = -1.0 } }\n", &["objective.sah.traversal: -1 is not"]),
-        ("rays = [{ count = nan }]\n", &["rays[0].count is nan", "finite"]),
-        ("rays = [{ family = 'curves', query = 'any', count = 1 }]\n", &["curves", "inside"]),
-    ] {
-        let good = if wrong.contains("scenes = ['a") {
-            GOOD.replace("scenes = ['escher']\n", "")
-        } else {
-            GOOD.into()
+fn errors_name_wrong_keys_and_the_accepted_values() {
+    for (line, parts) in WRONG_KEYS {
+        assert_rejected(&format!("{GOOD}{line}\n"), parts);
+    }
+    for (methods, parts) in WRONG_METHODS {
+        let text = format!("question = 'q'\nscenes = ['escher']\nmethods = {methods}\n");
+        assert_rejected(&text, parts);
+    }
+    for (spec, parts) in WRONG_SPECS {
+        assert_rejected(&format!("question = 'q'\n{spec}\n"), parts);
+    }
+    for (kind, line, parts) in WRONG_REPORTS {
+        let common = "source = 's'\ntitle = 't'\n";
+        let keys = match *kind {
+            "significance" => "title = 't'\nmethod = 'grasp'\nagainst = ['grasp']\n".to_owned(),
+            "generations" => format!("{common}method = 'grasp'\nbaseline = 'grasp'\n"),
+            "pictures" => format!("{common}methods = ['grasp']\nscene = 'escher'\n"),
+            _ if line.starts_with("methods") => common.to_owned(),
+            _ => format!("{common}methods = ['grasp']\n"),
         };
-        refused(&format!("{good}{wrong}"), parts);
+        assert_rejected(&format!("{GOOD}[[reports]]\nkind = '{kind}'\n{keys}{line}\n"), parts);
     }
 }
 
 #[test]
-fn nothing_that_repeats_stands_beside_a_budget_in_seconds() {
+fn more_lights_leave_fewer_rays_to_train_on() {
+    let view = "[{ eye = [0, 0, 0], target = [1, 1, 1] }]";
+    let lights = "[1, 1, 1], ".repeat(9);
+    let cameras = format!("cameras.e = {{ same = {view}, other = {view}, lights = [{lights}] }}");
+    let text = format!("{GOOD}[ray_cost]\ntrained = 100_000\n{cameras}");
+    assert_rejected(&text, &["ray_cost.trained is 100000", "up to 95325", "11 rays"]);
+}
+
+#[test]
+fn reproducible_outputs_are_rejected_together_with_a_budget_in_seconds() {
     let clocked = format!("{GOOD}sequential = true\nmax_seconds = 0.5\n");
-    let of_one = GOOD.replace("noise = 0.1", "max_seconds = 2.0");
     assert!(read(&clocked).unwrap().is_by_the_clock());
     assert!(!read(GOOD).unwrap().is_by_the_clock());
     let report = "[[reports]]\nkind = 'numbers'\ntitle = 't'\nmethods = ['grasp']\n";
@@ -80,160 +180,31 @@ fn nothing_that_repeats_stands_beside_a_budget_in_seconds() {
         (format!("{clocked}[ray_cost]\ncount = 10\n"), "ray_cost is set"),
         (format!("{clocked}[tracing]\ncount = 10\n"), "tracing is set"),
         (format!("{clocked}[render]\nwidth = 10\n"), "render is set"),
-        (of_one, "sequential is false"),
+        (GOOD.replace("noise = 0.1", "max_seconds = 2.0"), "sequential is false"),
     ] {
-        let message = read(&spec).unwrap_err();
-        let parts = ["spec.toml", key, "beside `max_seconds`; accepted: "];
-        assert!(parts.iter().all(|part| message.contains(part)), "{spec}: {message}");
-        assert_eq!(message.lines().count(), 1, "{message}");
+        assert_rejected(&spec, &["spec.toml", key, "together with `max_seconds`; accepted: "]);
+        assert_eq!(read(&spec).unwrap_err().lines().count(), 1, "{spec}");
     }
-    refused(&format!("{GOOD}tinybvh = 'x'\n"), &["tinybvh is set without `max_seconds`"]);
 }
 
 #[test]
-fn the_lower_of_both_budgets_in_seconds_holds_and_only_for_methods_of_ours() {
-    let methods = "[{ method = 'grasp', max_seconds = 0.2 }, { method = 'best', max_seconds = 9.0 }, \
-                   { method = 'external', command = ['x'] }]";
-    let spec = format!(
-        "question = 'q'\nscenes = ['escher']\nsequential = true\nmax_seconds = 1.0\nmethods = {methods}\n"
-    );
-    let spec = read(&spec).unwrap();
-    let limits: Vec<_> = spec
+fn the_lower_of_two_budgets_in_seconds_applies_and_only_to_methods_of_ours() {
+    let text = "
+question = 'q'
+scenes = ['escher']
+sequential = true
+max_seconds = 1.0
+methods = [
+    { method = 'grasp', max_seconds = 0.2 },
+    { method = 'best', max_seconds = 9.0 },
+    { method = 'external', command = ['x'] },
+]";
+    let experiment = read(text).unwrap();
+    let limits = experiment
         .methods
         .iter()
-        .map(|method| spec.max_seconds_of(method))
-        .collect();
-    assert_eq!(limits, [Some(0.2), Some(1.0), None]);
-}
-
-#[test]
-fn finite_nonsense_in_reports_is_named_with_what_would_be_accepted() {
-    let common = "source = 's'\ntitle = 't'\n";
-    for (kind, wrong, parts) in [
-        ("significance", "level = -0.5", &["reports[0].level is -0.5", "above 0 and below 1"][..]),
-        ("significance", "level = 1", &["reports[0].level is 1", "above 0 and below 1"]),
-        ("trials", "best_of = 0", &["reports[0].best_of is 0", "1 or more"]),
-        ("ray_tests", "tolerance = -0.1", &["reports[0].tolerance is -0.1", "0 to 1"]),
-        (
-            "ray_tests",
-            "paper = { escher = [1, 2] }",
-            &["reports[0].paper.escher is a list of 2", "up to 1"],
-        ),
-        ("times", "paper = { escher = [0.0] }", &["reports[0].paper.escher[0] is 0", "above 0"]),
-        ("ecdf", "targets = []", &["reports[0].targets is empty", "one or more"]),
-        (
-            "ecdf",
-            "targets = [{ of = 'base', percent = -100 }]",
-            &["targets[0].percent is -100", "above -100"],
-        ),
-        (
-            "anytime",
-            "at_seconds = [1, 10, 2]",
-            &["reports[0].at_seconds is [1.0, 10.0, 2.0]", "ascending"],
-        ),
-        ("anytime", "at_seconds = [0]", &["reports[0].at_seconds[0] is 0", "above 0"]),
-        ("anytime", "file = '../../x'", &["reports[0].file is \"../../x\"", "letters, digits"]),
-        ("generations", "paper_gain = 0", &["reports[0].paper_gain is 0", "above 0"]),
-        (
-            "generations",
-            "paper_final = { e = [3, 2] }",
-            &["paper_final.e is [3.0, 2.0]", "the lower number first"],
-        ),
-        (
-            "pictures",
-            "document = { 'brute force' = -1 }",
-            &["document.brute force is -1", "above 0"],
-        ),
-        ("pareto", "methods = []", &["reports[0].methods is empty", "one or more"]),
-    ] {
-        let keys = match kind {
-            "significance" => "title = 't'\nmethod = 'grasp'\nagainst = ['grasp']\n".to_owned(),
-            "generations" => format!("{common}method = 'grasp'\nbaseline = 'grasp'\n"),
-            "pictures" => format!("{common}methods = ['grasp']\nscene = 'escher'\n"),
-            _ if wrong.starts_with("methods") => common.to_owned(),
-            _ => format!("{common}methods = ['grasp']\n"),
-        };
-        refused(&format!("{GOOD}[[reports]]\nkind = '{kind}'\n{keys}{wrong}\n"), parts);
-    }
-}
-
-#[test]
-fn nonsense_beside_reports_is_named_with_what_would_be_accepted() {
-    let view = "[{ eye = [0, 0, 0], target = [1, 1, 1] }]";
-    let lights = |count| {
-        format!(
-            "cameras.escher = {{ same = {view}, other = {view}, lights = {:?} }}",
-            vec![[1; 3]; count]
-        )
-    };
-    let suite = |measure: &str| format!("question = 'q'\n[suite]\n{measure}\n");
-    for (text, parts) in [
-        (
-            suite(
-                "stability = { builders = 'few', work_per_object = 1, rays = 9223372036854775807 }",
-            ),
-            &["suite.stability.rays", "1 to 100000000"][..],
-        ),
-        (
-            suite("precision = { objects = 2, repetitions = 1 }"),
-            &["suite.precision.objects is 2", "3 to"],
-        ),
-        (
-            format!("{GOOD}[ray_cost]\ntrained = 200_000"),
-            &["ray_cost.trained is 200000", "up to 174762", "6 rays"],
-        ),
-        (
-            format!("{GOOD}[ray_cost]\ntrained = 100_000\n{}", lights(9)),
-            &["ray_cost.trained is 100000", "up to 95325", "11 rays"],
-        ),
-    ] {
-        refused(&text, parts);
-    }
-}
-
-#[test]
-fn wrong_methods_are_named_with_what_would_be_accepted() {
-    for (methods, parts) in [
-        ("[]", &["methods is empty"][..]),
-        ("[{ noise = 0.1 }]", &["method is missing", "grasp"]),
-        ("[{ method = 'grep' }]", &["\"grep\"", "muller_fellner"]),
-        ("[{ method = 'obvhs', preset = 'best' }]", &["methods[0].preset", "best", "very_slow"]),
-        ("[{ method = 'grasp', alpa = 1 }]", &["methods[0]", "alpa", "noise"]),
-        ("[{ method = 'grasp', noise = 1.5 }]", &["methods[0].noise is 1.5", "0 to 1"]),
-        ("[{ method = 'grasp', label = 3 }]", &["methods[0].label", "3", "string"]),
-        ("[{ method = 'grasp', budget = { max_seconds = 3 } }]", &["max_seconds", "max_work"]),
-        (
-            "[{ method = 'grasp', judge = { count = 0 } }]",
-            &["methods[0].judge.count is 0", "1 or more"],
-        ),
-        (
-            "[{ method = 'best', judge = { count = 9 } }]",
-            &["methods[0].judge is set for best", "genetic"],
-        ),
-        (
-            "[{ method = 'best', for_rays = 'camera' }]",
-            &["methods[0].for_rays is set without `ray_cost`"],
-        ),
-        (
-            "[{ method = 'median_cut', for_rays = 'inside' }]",
-            &["methods[0].for_rays", "median_cut, which compares"],
-        ),
-        (
-            "[{ method = 'best', for_rays = 'camera' }]\n[ray_cost]\n[tracing]\nlayouts = ['wide_dear_blocks']",
-            &[
-                "methods[0].for_rays is set beside `tracing.layouts` with another cost of blocks",
-                "other layouts",
-            ],
-        ),
-        (
-            "[{ method = 'obvhs', for_rays = 'inside' }]",
-            &["methods[0].for_rays is set for obvhs", "of ours"],
-        ),
-        ("[{ method = 'best', for_rays = 'all' }]", &["methods[0].for_rays", "all", "default"]),
-        ("[{ method = 'grasp' }, { method = 'grasp' }]", &["methods[1].label", "second time"]),
-    ] {
-        refused(&format!("question = 'q'\nscenes = ['escher']\nmethods = {methods}\n"), parts);
-    }
+        .map(|method| experiment.max_seconds_of(method));
+    assert!(limits.eq([Some(0.2), Some(1.0), None]));
 }
 
 #[test]
@@ -249,28 +220,25 @@ fn another_library_is_accepted_exactly_with_its_feature() {
         else {
             panic!("{name} is no library");
         };
-        let read = read(&text);
         match peer.missing_feature() {
-            Some(feature) => {
-                refused(
-                    &text,
-                    &["methods[0].method", name, "--features", feature, "muller_fellner"],
-                );
-            }
-            None => assert!(read.is_ok(), "{read:?}"),
+            Some(feature) => assert_rejected(
+                &text,
+                &["methods[0].method", name, "--features", feature, "muller_fellner"],
+            ),
+            None => assert_eq!(read(&text).err(), None),
         }
     }
 }
 
 #[test]
-fn quick_takes_no_infinity_either() {
+fn quick_rejects_infinity_too() {
     let text = format!("{GOOD}[quick]\nobjective = {{ sah = {{ traversal = inf }} }}\n");
     let error = read_quick(&text).unwrap_err().to_string();
     assert!(error.contains("quick.objective.sah.traversal is inf"), "{error}");
 }
 
 #[test]
-fn quick_replaces_keys_and_names_its_results_apart() {
+fn quick_replaces_keys_and_has_a_separate_folder() {
     let text = format!("{GOOD}repetitions = 5\n[quick]\nrepetitions = 2\n");
     let quick = read_quick(&text).unwrap();
     assert_eq!((quick.repetitions, quick.folder()), (2, "quick/spec".into()));
@@ -287,20 +255,19 @@ fn a_resolved_spec_spells_out_every_default_and_reads_back_as_itself() {
 }
 
 #[test]
-fn of_two_limits_the_lower_one_counts() {
+fn the_lower_of_two_budgets_applies() {
     let good = GOOD.replace("0.1 }", "0.1, budget = { max_work = 9 } }");
-    let budget = |of_all: &str| {
-        let experiment = read(&format!("{good}budget = {of_all}\n")).unwrap();
-        experiment.budget_of(&experiment.methods[0])
-    };
-    let max_evaluations = Some(3);
-    let max_work = Some(5);
-    assert_eq!(budget("{ max_work = 5 }"), Budget { max_work, max_evaluations: None });
-    assert_eq!(budget("{ max_evaluations = 3 }"), Budget { max_evaluations, max_work: Some(9) });
+    for (common, max_evaluations, max_work) in
+        [("max_work = 5", None, Some(5)), ("max_evaluations = 3", Some(3), Some(9))]
+    {
+        let experiment = read(&format!("{good}budget = {{ {common} }}\n")).unwrap();
+        let budget = experiment.budget_of(&experiment.methods[0]);
+        assert_eq!(budget, Budget { max_evaluations, max_work });
+    }
 }
 
 #[test]
-fn seeds_differ_between_runs_and_follow_the_spec_alone() {
+fn seeds_differ_between_runs_and_depend_only_on_the_spec() {
     let experiment = read(GOOD).unwrap();
     let mut seeds: Vec<u64> = (0..100)
         .map(|repetition| experiment.seed_of("escher", "grasp", repetition))
@@ -312,7 +279,7 @@ fn seeds_differ_between_runs_and_follow_the_spec_alone() {
 }
 
 #[test]
-fn naming_a_wrong_key_among_thousands_of_methods_takes_no_time() {
+fn naming_a_wrong_key_among_thousands_of_methods_is_fast() {
     let methods = "[[methods]]\nmethod = 'grasp'\nlabel = 'NUMBER'\n";
     let many: String = (0..3000)
         .map(|number| methods.replace("NUMBER", &number.to_string()))
@@ -328,7 +295,7 @@ fn naming_a_wrong_key_among_thousands_of_methods_takes_no_time() {
 }
 
 #[test]
-fn all_errors_of_a_file_are_said_at_once_in_its_order_and_once_each() {
+fn all_errors_of_a_file_are_reported_at_once_in_its_order_and_once_each() {
     let text = "\
 question = ' '
 scenes = ['escher', 3]
@@ -341,7 +308,8 @@ methods = [
     { method = 'grasp', noise = 2.0, trials = 0, trails = 1, label = 3 },
     { method = 'grep', noise = 2.0, label = 'a' },
     7,
-    { method = 'annealing', label = 'a', hot = -1, cold = 0.2, move = { climb = 0 }, judge = { count = 0 }, for_rays = 'camera' },
+    { method = 'annealing', label = 'a', hot = -1, cold = 0.2, move = { climb = 0 }, \
+judge = { count = 0 }, for_rays = 'camera' },
     { method = 'best', work_per_object = 'x', label = 'c' },
     { method = 'best', label = 'd', references = 99.0, keep = ['nothing'] },
 ]
@@ -359,16 +327,9 @@ at_seconds = [1, -1]
 file = '../x'
 ";
     let message = read(text).unwrap_err();
-    let key = |line: &str| {
-        let (place, rest) = line
-            .split_once("spec.toml: ")?
-            .1
-            .split_once(": ")?;
-        Some(format!("{} {}", place.strip_prefix("line ")?, rest.split([' ', ':']).next()?))
-    };
-    let said: Vec<String> = message
+    let reported: Vec<String> = message
         .lines()
-        .map(|line| key(line).unwrap_or_else(|| line.into()))
+        .map(|line| line_and_key(line).unwrap_or_else(|| line.into()))
         .collect();
     let expected = [
         "1 question",
@@ -406,70 +367,79 @@ file = '../x'
         "26 reports[2].at_seconds[1]",
         "27 reports[2].file",
     ];
-    assert_eq!(said, expected, "{message}");
-    // Labels that can be told are.
-    let labels = "question = 'q'\nscenes = ['escher']\n[[methods]]\nmethod = 'grep'\n[[methods]]\nmethod = 'grasp'\n\
-                  [[methods]]\nmethod = 'grasp'\n[[reports]]\nkind = 'numbers'\nmethods = ['grep', 'grasp', 'a', 'b']\n";
-    let message = read(labels).unwrap_err();
-    let said: Vec<String> = message.lines().filter_map(key).collect();
-    assert_eq!(
-        said,
-        [
-            "4 methods[0].method",
-            "7 methods[2].label",
-            "11 reports[0].methods[2]",
-            "11 reports[0].methods[3]"
-        ]
-    );
+    assert_eq!(reported, expected, "{message}");
 }
 
 #[test]
-fn a_search_that_would_go_on_for_hours_is_refused_unless_the_spec_says_when_it_ends() {
-    let spec = |rest: &str, of_best: &str| {
-        let methods = format!("methods = [{{ method = 'grasp' }}, {{ method = 'best'{of_best} }}]");
-        read(&format!("question = 'q'\nscenes = ['escher']\n{rest}\n{methods}\n"))
-    };
-    let message = spec("", "").unwrap_err();
+fn labels_are_checked_even_if_a_method_is_unknown() {
+    let text = "question = 'q'\nscenes = ['escher']\n\
+                [[methods]]\nmethod = 'grep'\n\
+                [[methods]]\nmethod = 'grasp'\n\
+                [[methods]]\nmethod = 'grasp'\n\
+                [[reports]]\nkind = 'numbers'\nmethods = ['grep', 'grasp', 'a', 'b']\n";
+    let message = read(text).unwrap_err();
+    let reported: Vec<String> = message.lines().filter_map(line_and_key).collect();
+    let expected = [
+        "4 methods[0].method",
+        "7 methods[2].label",
+        "11 reports[0].methods[2]",
+        "11 reports[0].methods[3]",
+    ];
+    assert_eq!(reported, expected);
+}
+
+/// Returns the line number and the key of one error in a message.
+fn line_and_key(error: &str) -> Option<String> {
+    let (_, error) = error.split_once("spec.toml: line ")?;
+    let (line, rest) = error.split_once(": ")?;
+    let key = rest.split([' ', ':']).next()?;
+    Some(format!("{line} {key}"))
+}
+
+#[test]
+fn a_search_without_a_limit_is_rejected() {
+    let endless = "question = 'q'\nscenes = ['escher']\nREST\n\
+                   methods = [{ method = 'grasp' }, { method = 'best'KEYS }]\n";
     let parts = [
         "line 4: methods[1].budget is missing",
         "budget = { max_work = ",
         "max_seconds = ",
         "work_per_object",
     ];
-    assert!(
-        parts.iter().all(|part| message.contains(part)) && message.lines().count() == 1,
-        "{message}"
-    );
-    for (rest, of_best) in [
+    let text = endless.replace("REST", "").replace("KEYS", "");
+    assert_rejected(&text, &parts);
+    assert_eq!(read(&text).unwrap_err().lines().count(), 1);
+    for (rest, keys) in [
         ("budget = { max_work = 9 }", ""),
         ("sequential = true\nmax_seconds = 9.0", ""),
         ("", ", budget = { max_evaluations = 9 }"),
         ("sequential = true", ", max_seconds = 9.0"),
         ("", ", work_per_object = 10_000"),
     ] {
-        assert_eq!(spec(rest, of_best).err(), None, "{rest}{of_best}");
+        let text = endless
+            .replace("REST", rest)
+            .replace("KEYS", keys);
+        assert_eq!(read(&text).err(), None, "{text}");
     }
 }
 
 #[test]
-fn quick_is_refused_where_nothing_says_what_it_is() {
+fn quick_is_rejected_without_its_table() {
     let text = "question = 'q'\nscenes = ['escher']\n[[methods]]\nmethod = 'median_cut'\n";
     let message = read_quick(text).unwrap_err();
     assert!(message.contains("quick is missing") && message.contains("--quick"), "{message}");
 }
 
 #[test]
-fn scenes_of_a_spec_are_found_from_its_folder_and_those_of_the_command_line_are_not() {
-    let text = "question = 'q'\nscenes = ['escher:random:9:1..2', 'a/b:random:9:1', '/c.obj', 'd.ply']\n[[methods]]\nmethod = 'median_cut'\n";
-    let scenes = |overrides: &Overrides| {
-        Experiment::parse("x/y/spec.toml".as_ref(), text, overrides)
-            .unwrap()
-            .scenes
-    };
-    assert_eq!(
-        scenes(&Overrides::default()),
-        ["escher:random:9:1..2", "x/y/a/b:random:9:1", "/c.obj", "x/y/d.ply"]
-    );
+fn scenes_of_a_spec_are_relative_to_its_folder_and_scenes_of_the_command_line_are_not() {
+    let text = "
+question = 'q'
+scenes = ['escher:random:9:1..2', 'a/b:random:9:1', '/c.obj', 'd.ply']
+methods = [{ method = 'median_cut' }]";
+    let of_spec = ["escher:random:9:1..2", "x/y/a/b:random:9:1", "/c.obj", "x/y/d.ply"];
     let given = Overrides { scenes: vec!["a/b.obj".into()], ..Default::default() };
-    assert_eq!(scenes(&given), ["a/b.obj"]);
+    for (overrides, scenes) in [(Overrides::default(), &of_spec[..]), (given, &["a/b.obj"])] {
+        let experiment = Experiment::parse("x/y/spec.toml".as_ref(), text, &overrides).unwrap();
+        assert_eq!(experiment.scenes, scenes);
+    }
 }
