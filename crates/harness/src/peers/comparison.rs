@@ -127,7 +127,7 @@ fn mean_build_seconds(seconds: impl ExactSizeIterator<Item = f64>) -> f64 {
     seconds.sum::<f64>() / count
 }
 
-/// Whether a row is of a mode that one of ours is compared with.
+/// Returns true for the modes that ours are compared with.
 type IsRival = fn(&PeerRayRow) -> bool;
 
 /// The modes of other libraries that ours are compared with.

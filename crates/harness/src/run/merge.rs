@@ -44,7 +44,8 @@ pub fn merge(
         let found = parts(folder)?;
         if found.is_empty() {
             return Err(Error::Usage(format!(
-                "{} holds no part of an experiment; accepted: folders given as --out to runs with --shard",
+                "{} holds no part of an experiment; accepted: folders given as --out to runs with \
+                 --shard",
                 folder.display()
             )));
         }

@@ -131,35 +131,34 @@ impl Experiment {
         objects <= exact::MOST_OBJECTS && self.reports.iter().any(Report::needs_references)
     }
 
-    /// Whether a run of the method with this label keeps the cost of every trial: if a report reads them.
+    /// Returns true if a report reads the costs of all trials of the method with this label.
     pub fn keeps_trials_of(&self, label: &str) -> bool {
         self.reports
             .iter()
             .any(|report| report.trial_methods().contains(&label))
     }
 
-    /// Whether runs keep their improvements: if a report reads them, or if there is none that says what is read.
+    /// Returns true if runs keep their improvements: if a report reads them, or if there are no
+    /// reports.
     pub fn keeps_history(&self) -> bool {
         self.reports.is_empty() || self.keeps_clock()
     }
 
-    /// Whether runs keep the times of their improvements: if a report reads them.
+    /// Returns true if a report reads the times of improvements.
     pub fn keeps_clock(&self) -> bool {
         self.reports.iter().any(Report::needs_clock)
     }
 
-    /// Whether the rows of this experiment suffice for other reports.
+    /// Returns true if the rows of this experiment suffice for these reports.
     pub fn keeps_rows_for(&self, reports: &[Report]) -> bool {
-        let lacks_trials = |report: &Report| {
-            report
-                .trial_methods()
+        reports.iter().all(|report| {
+            let labels = report.trial_methods();
+            let has_trials = labels
                 .iter()
-                .any(|label| !self.keeps_trials_of(label))
-        };
-        let lacks_clock = |report: &Report| report.needs_clock() && !self.keeps_clock();
-        !reports
-            .iter()
-            .any(|report| lacks_trials(report) || lacks_clock(report))
+                .all(|label| self.keeps_trials_of(label));
+            let has_clock = !report.needs_clock() || self.keeps_clock();
+            has_trials && has_clock
+        })
     }
 
     /// The limits of a method's runs.

@@ -23,20 +23,14 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
         .iter()
         .map(|ray| brute_force.nearest_hit(ray))
         .collect();
-    let answers = |how: &str, nearest: &[Option<Hit>], any: &[bool]| {
-        for (i, expected) in expected.iter().enumerate() {
-            let same = bits(nearest[i]) == bits(*expected) && any[i] == expected.is_some();
-            ensure!(same, P3: "{how}: {:?} gives {:?} and {}, testing every triangle {expected:?}", rays[i], nearest[i], any[i]);
-        }
-        Ok(())
-    };
     for (kernel, wide) in wide_layouts(triangles).map_err(Broken::case)? {
         let nearest: Vec<_> = rays
             .iter()
             .map(|ray| wide.nearest_hit(ray))
             .collect();
         let any: Vec<_> = rays.iter().map(|ray| wide.any_hit(ray)).collect();
-        answers(&format!("{kernel:?}"), &nearest, &any)?;
+        compare(rays, &expected, &nearest, &any)
+            .map_err(|broken| broken.within(format!("{kernel:?}")))?;
         for coherence in [Coherence::Coherent, Coherence::Incoherent] {
             let mut nearest = vec![Hit::MISS; rays.len()];
             let mut any = vec![false; rays.len()];
@@ -54,12 +48,35 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
                 .iter()
                 .map(|hit| (!hit.is_miss()).then_some(*hit))
                 .collect();
-            answers(&format!("{kernel:?}, {coherence:?}"), &nearest, &any)?;
+            compare(rays, &expected, &nearest, &any)
+                .map_err(|broken| broken.within(format!("{kernel:?}, {coherence:?}")))?;
             let (nearest, any) = by_component(&wide, rays, coherence);
-            answers(&format!("{kernel:?}, {coherence:?}, by component"), &nearest, &any)?;
+            compare(rays, &expected, &nearest, &any).map_err(|broken| {
+                broken.within(format!("{kernel:?}, {coherence:?}, by component"))
+            })?;
         }
     }
     Ok(expected.iter().flatten().count())
+}
+
+/// Checks both kinds of answers to each ray against testing every triangle.
+fn compare(
+    rays: &[Ray],
+    expected: &[Option<Hit>],
+    nearest: &[Option<Hit>],
+    any: &[bool],
+) -> Result<(), Broken> {
+    for (index, ray) in rays.iter().enumerate() {
+        let expected = expected[index];
+        let nearest = nearest[index];
+        let any = any[index];
+        let is_right = bits(nearest) == bits(expected) && any == expected.is_some();
+        ensure!(
+            is_right,
+            P3: "{ray:?} gives {nearest:?} and {any}, testing every triangle {expected:?}"
+        );
+    }
+    Ok(())
 }
 
 /// Returns the answers to one batch of rays that is passed component by component.
@@ -68,13 +85,8 @@ fn by_component(
     rays: &[Ray],
     coherence: Coherence,
 ) -> (Vec<Option<Hit>>, Vec<bool>) {
-    let component = |of: fn(&Ray) -> Vec3, axis: usize| {
-        rays.iter()
-            .map(|ray| of(ray)[axis])
-            .collect::<Vec<_>>()
-    };
-    let origins = [0, 1, 2].map(|axis| component(Ray::origin, axis));
-    let directions = [0, 1, 2].map(|axis| component(Ray::direction, axis));
+    let origins = components(rays, Ray::origin);
+    let directions = components(rays, Ray::direction);
     let t_min: Vec<_> = rays.iter().map(Ray::t_min).collect();
     let t_max: Vec<_> = rays.iter().map(Ray::t_max).collect();
     let components = RayComponents::new(
@@ -95,6 +107,10 @@ fn by_component(
         .map(|(t, object)| Hit { t, object });
     let nearest = hits.map(|hit| if hit.is_miss() { None } else { Some(hit) });
     (nearest.collect(), any)
+}
+
+fn components(rays: &[Ray], vector: fn(&Ray) -> Vec3) -> [Vec<f32>; 3] {
+    [0, 1, 2].map(|axis| rays.iter().map(|ray| vector(ray)[axis]).collect())
 }
 
 /// Returns rays of [`tracing::rays`], half of them single, half in bundles.

@@ -307,10 +307,11 @@ fn heat_map(rows: &[Row]) -> HeatMap {
     HeatMap {
         title: HEADING.into(),
         caption:
-            "Every case with all that can be asked: methods, traversals, readers, and other libraries. Numbers \
-             are depths of trees; where a promise was broken, which: P1 no crash or hang, P2 boxes contain, P3 no hit is missed, P4 the \
-             same bytes for any number of threads, P5 scaling by 2^k changes no tree (other libraries promise none of this, least of \
-             all P5), P6 depth is reported, P7 costs are finite. Grey: not asked."
+            "Every case with all methods, traversals, readers, and other libraries. Numbers are \
+             depths of trees; letters are broken promises: P1 no crash or hang, P2 boxes contain, P3 \
+             no hit is missed, P4 the same bytes for any number of threads, P5 scaling by 2^k changes \
+             no tree (other libraries make none of these promises, least of all P5), P6 depth is \
+             reported, P7 costs are finite. Grey: no check."
                 .into(),
         row_label: "case".into(),
         rows: scenes,

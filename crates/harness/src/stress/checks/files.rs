@@ -91,7 +91,7 @@ pub fn damaged_tree_files() -> Verdict {
         .build(&boxes)
         .map_err(Broken::case)?;
     let whole = file::save(&tree, &boxes, &file::Origin::default()).map_err(Broken::case)?;
-    let refused = |bytes: &[u8]| file::load(bytes, &boxes).is_err();
+    let is_rejected = |bytes: &[u8]| file::load(bytes, &boxes).is_err();
     ensure!(
         file::load(&whole, &boxes).ok() == Some(tree),
         "an undamaged file is not the tree saved"
@@ -99,17 +99,17 @@ pub fn damaged_tree_files() -> Verdict {
     for bit in 0..8 * whole.len() {
         let mut damaged = whole.clone();
         damaged[bit / 8] ^= 1 << (bit % 8);
-        ensure!(refused(&damaged), "bit {bit} can be flipped");
+        ensure!(is_rejected(&damaged), "bit {bit} can be flipped");
     }
     for length in 0..whole.len() {
-        ensure!(refused(&whole[..length]), "{length} bytes are enough");
+        ensure!(is_rejected(&whole[..length]), "{length} bytes are enough");
     }
     let reversed: Vec<u8> = whole
         .chunks(4)
         .flat_map(|word| word.iter().rev())
         .copied()
         .collect();
-    ensure!(refused(&reversed), "another endianness is accepted");
+    ensure!(is_rejected(&reversed), "another endianness is accepted");
     let mut others = boxes.clone();
     others[3].max.x = others[3].max.x.next_up();
     ensure!(file::load(&whole, &others).is_err(), "the tree of another scene is accepted");
