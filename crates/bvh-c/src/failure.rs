@@ -1,4 +1,5 @@
-//! How functions fail: by a status or by null, with a message for the thread that called; panics end here too.
+//! Failures: a function returns a status or null, and keeps a message for the calling thread. Panics become
+//! failures as well.
 
 use bvh_files::WriteError;
 use bvh_files::tree_file::TreeFileError;
@@ -7,21 +8,21 @@ use std::ffi::{CString, c_char};
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What became of a call.
+/// The outcome of a call.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BvhStatus {
-    /// It did what it says.
+    /// The call succeeded.
     Ok = 0,
-    /// An argument, or what a file holds, is not accepted. Nothing was changed.
+    /// An argument or the contents of a file are invalid. The call changed nothing.
     Invalid = 1,
     /// A file could not be read or written.
     File = 2,
-    /// A fault of the library, which you may report.
+    /// The library has a fault. Please report it.
     Fault = 3,
 }
 
-/// Why a call did not do what it says.
+/// The reason why a call failed.
 #[derive(Debug)]
 pub(crate) struct Failure {
     pub status: BvhStatus,
@@ -29,7 +30,7 @@ pub(crate) struct Failure {
 }
 
 impl Failure {
-    /// An argument that is not accepted.
+    /// Creates the failure of an invalid argument.
     pub fn invalid(message: impl Display) -> Self {
         Self { status: BvhStatus::Invalid, message: message.to_string() }
     }
@@ -55,15 +56,16 @@ thread_local! {
     static LAST: RefCell<CString> = RefCell::default();
 }
 
-/// Why the last call of this thread that failed did so; empty if none has. Valid until another call of this thread fails.
+/// Returns the message of the last failed call of this thread, or an empty string if none has failed. The
+/// string is valid until another call of this thread fails.
 #[unsafe(no_mangle)]
 pub extern "C" fn bvh_last_error() -> *const c_char {
     LAST.with_borrow(|message| message.as_ptr())
 }
 
-/// Does it, and keeps the message if that fails.
+/// Runs the action, and keeps the message of a failure.
 fn attempt<T>(action: impl FnOnce() -> Result<T, Failure>) -> Result<T, BvhStatus> {
-    // After a panic nothing is used that it left half done: trees are replaced whole.
+    // The action is unwind safe: trees are replaced as a whole, so that a panic leaves the old tree.
     let result = catch_unwind(AssertUnwindSafe(action)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<&str>().copied();
         let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
@@ -77,57 +79,57 @@ fn attempt<T>(action: impl FnOnce() -> Result<T, Failure>) -> Result<T, BvhStatu
     })
 }
 
-/// For functions that return a status.
+/// Runs the action of a function that returns a status.
 pub(crate) fn status(action: impl FnOnce() -> Result<(), Failure>) -> BvhStatus {
     attempt(action).err().unwrap_or(BvhStatus::Ok)
 }
 
-/// For functions that return what they made, or null.
+/// Runs the action of a function that returns a new object or null.
 pub(crate) fn made<T>(action: impl FnOnce() -> Result<T, Failure>) -> *mut T {
     attempt(action).map_or(std::ptr::null_mut(), |value| Box::into_raw(Box::new(value)))
 }
 
-/// For functions that return an array within what they are given, or null.
+/// Runs the action of a function that returns an array inside one of its arguments, or null.
 pub(crate) fn array<T>(action: impl FnOnce() -> Result<*const T, Failure>) -> *const T {
     attempt(action).unwrap_or(std::ptr::null())
 }
 
-/// The thing that a pointer points to.
+/// Converts a pointer into a reference, and rejects null.
 ///
 /// # Safety
 /// `pointer` is null, or points to a `T` that nobody changes while the result is in use.
 pub(crate) unsafe fn given<'a, T>(name: &str, pointer: *const T) -> Result<&'a T, Failure> {
-    // SAFETY: promised by the caller.
+    // SAFETY: a pointer that is not null points to a `T` that nobody changes meanwhile.
     unsafe { pointer.as_ref() }.ok_or_else(|| Failure::invalid(format!("{name} is null")))
 }
 
-/// The thing that a pointer points to, to be changed.
+/// Converts a pointer into a mutable reference, and rejects null.
 ///
 /// # Safety
 /// `pointer` is null, or points to a `T` that nobody else uses while the result is in use.
 pub(crate) unsafe fn given_mut<'a, T>(name: &str, pointer: *mut T) -> Result<&'a mut T, Failure> {
-    // SAFETY: promised by the caller.
+    // SAFETY: a pointer that is not null points to a `T` that nobody else uses meanwhile.
     unsafe { pointer.as_mut() }.ok_or_else(|| Failure::invalid(format!("{name} is null")))
 }
 
-/// Refuses arrays that cannot be: null or not aligned, unless they are empty, and larger than memory.
+/// Rejects arrays that cannot exist: null, not aligned, or larger than the address space.
 fn check<T>(name: &str, first: *const T, count: usize) -> Result<(), Failure> {
     if first.is_null() {
         return Err(Failure::invalid(format!("{name} is null; accepted: {count} elements")));
     }
     if !first.is_aligned() {
         return Err(Failure::invalid(format!(
-            "{name} does not lie at a multiple of {}",
+            "{name} is not aligned to a multiple of {}",
             align_of::<T>()
         )));
     }
     if count > isize::MAX as usize / size_of::<T>() {
-        return Err(Failure::invalid(format!("{name} has {count} elements, more than memory can")));
+        return Err(Failure::invalid(format!("{name} has {count} elements, more than memory has")));
     }
     Ok(())
 }
 
-/// An array that is given by its first element and its length. An empty one may be null.
+/// Returns the array with this first element and length. An empty array may be null.
 ///
 /// # Safety
 /// `first` points to `count` elements that nobody changes while the result is in use.
@@ -140,11 +142,12 @@ pub(crate) unsafe fn slice<'a, T>(
         return Ok(&[]);
     }
     check(name, first, count)?;
-    // SAFETY: checked as far as possible, and promised by the caller.
+    // SAFETY: `first` is aligned and points to `count` elements that nobody changes meanwhile, and their
+    // size fits into `isize`.
     Ok(unsafe { std::slice::from_raw_parts(first, count) })
 }
 
-/// An array for results. An empty one may be null.
+/// Returns the array for results with this first element and length. An empty array may be null.
 ///
 /// # Safety
 /// `first` points to `count` elements that nobody else uses while the result is in use.
@@ -157,6 +160,7 @@ pub(crate) unsafe fn slice_mut<'a, T>(
         return Ok(&mut []);
     }
     check(name, first, count)?;
-    // SAFETY: checked as far as possible, and promised by the caller. The elements are plain numbers.
+    // SAFETY: `first` is aligned and points to `count` elements that nobody else uses meanwhile, and their
+    // size fits into `isize`. The elements are plain numbers, so that any bytes are valid.
     Ok(unsafe { std::slice::from_raw_parts_mut(first, count) })
 }

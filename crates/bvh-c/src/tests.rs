@@ -1,4 +1,4 @@
-//! What C callers can do wrong is refused by name, and what they do right agrees with the Rust crates.
+//! Wrong arguments from C are rejected by name, and the results of right ones agree with the Rust crates.
 
 use crate::failure::{BvhStatus, bvh_last_error, status};
 use crate::{tracer::*, tree::*};
@@ -7,47 +7,46 @@ use std::ffi::{CStr, CString, c_void};
 use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// A staircase of right triangles.
+/// Returns the corners of a staircase of right triangles.
 fn corners(count: usize) -> Vec<f32> {
-    let corner = |i: usize| {
-        let x = i as f32;
-        [x, 0.0, x, x + 1.5, 0.0, x, x, 1.5, x]
-    };
-    (0..count).flat_map(corner).collect()
+    (0..count)
+        .map(|i| i as f32)
+        .flat_map(|x| [x, 0.0, x, x + 1.5, 0.0, x, x, 1.5, x])
+        .collect()
 }
 
 fn last_error() -> String {
-    // SAFETY: a string that is valid until the next failure.
-    unsafe { CStr::from_ptr(bvh_last_error()) }
-        .to_str()
-        .unwrap()
-        .to_owned()
+    // SAFETY: the message ends with a zero, and no call of this thread fails before the copy is made.
+    let message = unsafe { CStr::from_ptr(bvh_last_error()) };
+    message.to_str().unwrap().to_owned()
 }
 
-/// The tree over such triangles.
+/// Builds a tree over triangles.
 fn tree(corners: &[f32]) -> *mut BvhTree {
-    // SAFETY: nine floats per triangle.
+    // SAFETY: `corners` has nine floats for each of the triangles.
     unsafe { bvh_tree_from_triangles(corners.as_ptr(), corners.len() / 9, 0.02, 1.0) }
 }
 
 #[test]
-fn trees_and_hits_are_those_of_the_rust_crates() {
+fn trees_and_hits_equal_the_results_of_the_rust_crates() {
     let corners = corners(40);
     let triangles: Vec<Triangle> = bytes_as_triangles(&corners);
     let tree = tree(&corners);
-    let ray = |x: f32| BvhRay {
-        origin: [x, 0.2, -1.0],
-        t_min: 0.0,
-        direction: [0.0, 0.0, 1.0],
-        t_max: f32::INFINITY,
-    };
-    let rays: Vec<BvhRay> = (0..1500).map(|i| ray(i as f32 * 0.03)).collect();
+    let rays: Vec<BvhRay> = (0..1500)
+        .map(|i| BvhRay {
+            origin: [i as f32 * 0.03, 0.2, -1.0],
+            t_min: 0.0,
+            direction: [0.0, 0.0, 1.0],
+            t_max: f32::INFINITY,
+        })
+        .collect();
     let mut count = 0;
     let mut ids = 0;
     let mut cost = 0.0;
     let mut hits = vec![BvhHit { t: 0.0, object: 0 }; rays.len()];
     let mut any = vec![9u8; rays.len()];
-    // SAFETY: the arrays have the lengths that are given, and the nodes are used before the tree is improved.
+    // SAFETY: every pointer comes with its array's length, and the nodes are copied before the tree is
+    // improved.
     unsafe {
         let nodes = std::slice::from_raw_parts(bvh_tree_nodes(tree, &mut count), count).to_vec();
         let ids = std::slice::from_raw_parts(bvh_tree_object_ids(tree, &mut ids), ids);
@@ -60,7 +59,8 @@ fn trees_and_hits_are_those_of_the_rust_crates() {
         assert!(cost <= before);
         let tracer = bvh_tracer_new(tree);
         for coherent in [0, 1] {
-            let (rays, count) = (rays.as_ptr(), rays.len());
+            let count = rays.len();
+            let rays = rays.as_ptr();
             assert_eq!(
                 bvh_tracer_nearest_hits(tracer, rays, count, coherent, hits.as_mut_ptr()),
                 BvhStatus::Ok
@@ -84,32 +84,33 @@ fn trees_and_hits_are_those_of_the_rust_crates() {
 
 fn bytes_as_triangles(corners: &[f32]) -> Vec<Triangle> {
     let (points, _) = corners.as_chunks::<3>();
-    points
-        .as_chunks::<3>()
-        .0
+    let (triangles, _) = points.as_chunks::<3>();
+    triangles
         .iter()
         .map(|&corners| Triangle::from(corners))
         .collect()
 }
 
-/// Whether it has been asked a thousand times.
+/// Cancels at the thousandth call.
 unsafe extern "C" fn asked_enough(context: *mut c_void) -> u8 {
-    // SAFETY: the test's counter.
+    // SAFETY: the context is the test's counter, which outlives the search and is changed atomically.
     let asked = unsafe { &*context.cast::<AtomicU64>() };
     u8::from(asked.fetch_add(1, Relaxed) >= 1000)
 }
 
 #[test]
-fn a_search_of_hours_ends_when_the_caller_says_so_and_keeps_what_it_found() {
-    let number = |i: u32| (i.wrapping_mul(2_654_435_761) >> 16) as f32;
-    let corners: Vec<f32> = (0..9 * 3000).map(number).collect();
-    // SAFETY: nine floats per triangle.
+fn a_search_of_hours_ends_when_the_caller_cancels_it_and_keeps_its_tree() {
+    let corners: Vec<f32> = (0..9 * 3000u32)
+        .map(|i| (i.wrapping_mul(2_654_435_761) >> 16) as f32)
+        .collect();
+    // SAFETY: `corners` has nine floats for each of the 3000 triangles.
     let tree = unsafe { bvh_tree_from_triangles(corners.as_ptr(), 3000, 0.0, 1.0) };
     let mut asked = AtomicU64::new(0);
     let mut before = 0.0;
     let mut after = 0.0;
     let start = std::time::Instant::now();
-    // SAFETY: a tree, numbers, and a function that counts atomically.
+    // SAFETY: the tree is not freed before the last call, no other thread uses it, and any thread may call
+    // the function, which only counts atomically.
     unsafe {
         bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut before);
         let context = (&raw mut asked).cast();
@@ -125,12 +126,12 @@ fn a_search_of_hours_ends_when_the_caller_says_so_and_keeps_what_it_found() {
 }
 
 #[test]
-fn files_come_back_and_what_is_wrong_with_one_is_named() {
+fn a_saved_tree_is_loaded_again_and_a_wrong_file_is_named() {
     let corners = corners(9);
     let tree = tree(&corners);
     let path = std::env::temp_dir().join(format!("bvh-c.{}.bvh", std::process::id()));
     let named = CString::new(path.to_str().unwrap()).unwrap();
-    // SAFETY: nine floats per triangle, and strings that end with a zero.
+    // SAFETY: `corners` has nine floats for each triangle, and the strings end with a zero.
     unsafe {
         assert_eq!(bvh_tree_save(tree, named.as_ptr()), BvhStatus::Ok, "{}", last_error());
         let loaded = bvh_tree_load_triangles(named.as_ptr(), corners.as_ptr(), 9);
@@ -149,63 +150,66 @@ fn files_come_back_and_what_is_wrong_with_one_is_named() {
 
 #[cfg(unix)]
 #[test]
-fn a_save_puts_a_new_file_in_the_place_of_the_old_one_and_never_writes_into_it() {
+fn a_save_replaces_the_old_file_and_never_writes_into_it() {
     let corners = corners(9);
     let tree = tree(&corners);
     let folder = tempfile::tempdir().unwrap();
     let [path, link] = ["tree.bvh", "link"].map(|name| folder.path().join(name));
     std::fs::write(&path, "precious").unwrap();
-    // What is written into the old file would be seen under its other name.
+    // A write into the old file would change its contents under the second name as well.
     std::fs::hard_link(&path, &link).unwrap();
     let named = CString::new(path.to_str().unwrap()).unwrap();
-    // SAFETY: a tree, and a string that ends with a zero.
+    // SAFETY: the tree is freed last, and the string ends with a zero.
     unsafe {
         assert_eq!(bvh_tree_save(tree, named.as_ptr()), BvhStatus::Ok, "{}", last_error());
         bvh_tree_free(tree);
     }
     assert_eq!(std::fs::read(&link).unwrap(), b"precious");
-    assert!(
-        std::fs::read(&path)
-            .unwrap()
-            .starts_with(b"\x89BVH")
-    );
+    let saved = std::fs::read(&path).unwrap();
+    assert!(saved.starts_with(b"\x89BVH"));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
 }
 
+/// Asserts that the last error contains this text.
+#[track_caller]
+fn rejected(part: &str) {
+    assert!(last_error().contains(part), "{}", last_error());
+}
+
 #[test]
-fn what_no_call_can_take_is_refused_by_name() {
+fn invalid_arguments_are_rejected_by_name() {
     let mut wrong = corners(5);
     let tree = tree(&wrong);
     wrong[9 * 3] = f32::NAN;
     let boxes = [0.0f32, 0.0, 0.0, 1.0, 1.0, 1.0];
     let ray = BvhRay { origin: [0.0; 3], t_min: 0.0, direction: [0.0; 3], t_max: 1.0 };
-    let refused = |parts: &str| assert!(last_error().contains(parts), "{}", last_error());
-    // SAFETY: what is not null has the lengths that are given.
+    // SAFETY: every pointer that a call dereferences comes with its array's length; null, unaligned and
+    // oversized arrays are rejected before.
     unsafe {
         assert!(bvh_tree_from_triangles(wrong.as_ptr(), 5, 0.0, 1.0).is_null());
-        refused("3");
+        rejected("3");
         assert!(bvh_tree_from_triangles(null(), 5, 0.0, 1.0).is_null());
-        refused("corners is null");
+        rejected("corners is null");
         assert!(bvh_tree_from_triangles(wrong.as_ptr().byte_add(1), 5, 0.0, 1.0).is_null());
-        refused("corners does not lie at a multiple of 4");
+        rejected("corners is not aligned to a multiple of 4");
         assert!(bvh_tree_from_triangles(wrong.as_ptr(), usize::MAX, 0.0, 1.0).is_null());
-        refused("more than memory can");
+        rejected("more than memory has");
         assert!(bvh_tree_from_triangles(wrong.as_ptr(), 5, 0.0, f64::NAN).is_null());
-        refused("references is NaN; accepted: 1 to 16");
+        rejected("references is NaN; accepted: 1 to 16");
         assert!(bvh_tree_from_boxes(boxes.as_ptr(), 1, -1.0).is_null());
-        refused("seconds is -1; accepted");
+        rejected("seconds is -1; accepted");
         assert!(bvh_tree_from_boxes(boxes.as_ptr().add(1), 0, f64::INFINITY).is_null());
-        refused("seconds is inf");
+        rejected("seconds is inf");
         let boxed = bvh_tree_from_boxes(boxes.as_ptr(), 1, 0.0);
         assert!(bvh_tracer_new(boxed).is_null());
-        refused("tree is over boxes");
+        rejected("tree is over boxes");
         assert!(bvh_tree_load_boxes(null(), boxes.as_ptr(), 1).is_null());
-        refused("path is null");
+        rejected("path is null");
         let mut cost = 7.0;
         assert_eq!(bvh_tree_cost(tree, 4, &mut cost), BvhStatus::Invalid);
-        refused("kind is 4; accepted: 0 to 3");
+        rejected("kind is 4; accepted: 0 to 3");
         assert_eq!((bvh_tree_cost(null(), 0, &mut cost), cost), (BvhStatus::Invalid, 7.0));
-        refused("tree is null");
+        rejected("tree is null");
         assert_eq!(bvh_tree_cost(tree, 0, null_mut()), BvhStatus::Invalid);
         assert!(
             bvh_tree_nodes(tree, null_mut()).is_null() && bvh_tree_nodes(null(), &mut 0).is_null()
@@ -214,7 +218,7 @@ fn what_no_call_can_take_is_refused_by_name() {
         let tracer = bvh_tracer_new(tree);
         let mut hit = BvhHit { t: 5.0, object: 5 };
         assert_eq!(bvh_tracer_nearest_hits(tracer, &ray, 1, 0, &mut hit), BvhStatus::Invalid);
-        refused("rays[0]: the ray's direction");
+        rejected("rays[0]: the ray's direction");
         assert_eq!(bvh_tracer_nearest_hits(tracer, null(), 0, 0, null_mut()), BvhStatus::Ok);
         assert_eq!(bvh_tracer_any_hits(tracer, null(), 1, 0, null_mut()), BvhStatus::Invalid);
         assert_eq!(hit.object, 5);
@@ -227,11 +231,11 @@ fn what_no_call_can_take_is_refused_by_name() {
 }
 
 #[test]
-fn a_panic_becomes_a_status_and_a_message_of_its_own_thread() {
+fn a_panic_becomes_a_status_and_a_message_for_its_thread() {
     assert_eq!(status(|| panic!("node {} is missing", 3)), BvhStatus::Fault);
     assert_eq!(last_error(), "a fault of the library: node 3 is missing");
     assert_eq!(std::thread::spawn(last_error).join().unwrap(), "");
-    // What succeeds leaves the message.
+    // A success does not clear the message.
     assert_eq!(status(|| Ok(())), BvhStatus::Ok);
     assert_eq!(last_error(), "a fault of the library: node 3 is missing");
 }

@@ -1,4 +1,4 @@
-//! Trees: made from boxes or triangles, improved, measured, saved, loaded, and lent as nodes.
+//! Trees: found over boxes or triangles, improved, measured, saved, loaded, and lent as nodes.
 
 use crate::failure::{BvhStatus, Failure, array, given, given_mut, made, slice, status};
 use bvh_search::bvh_core::{FirstCountNode, Primitives, cost::Objective, cost::SahConstants};
@@ -6,42 +6,44 @@ use bvh_search::prelude::*;
 use bvh_search::{Objects, Observer, OwnedTree};
 use std::ffi::{CStr, c_char, c_void};
 
-/// A tree with its objects. Any number of threads may read one at the same time; whoever improves or frees it must be alone.
+/// A tree with its objects. Any number of threads may read a tree at the same time. A thread that improves
+/// or frees it must be the only user.
 pub struct BvhTree {
     pub(crate) owned: OwnedTree,
     nodes: Vec<BvhNode>,
 }
 
-/// A binary node of 32 bytes, as tinybvh's `BVH::BVHNode`. Node 0 is the root. Where there are more, node 1 is not used, so that both
-/// children of a node share a cache line.
+/// A binary node of 32 bytes with the layout of tinybvh's `BVH::BVHNode`. Node 0 is the root. If there are
+/// more nodes, node 1 is unused, so that both children of a node share a cache line.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BvhNode {
-    /// Lower corner of the box.
+    /// The lower corner of the box.
     pub min: [f32; 3],
-    /// Index of the first of two adjacent children, or position of the leaf's first object id.
+    /// The index of the first of two adjacent children, or the position of the leaf's first object id.
     pub first: u32,
-    /// Upper corner of the box.
+    /// The upper corner of the box.
     pub max: [f32; 3],
-    /// Number of object ids of a leaf; 0 for an inner node.
+    /// The number of object ids of a leaf; 0 for an inner node.
     pub count: u32,
 }
 
-/// What a cost is; the numbers are those of tree files.
+/// A kind of cost. Tree files use the same numbers.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BvhCost {
-    /// Total half area of the inner nodes' boxes.
+    /// The total half area of the inner nodes' boxes.
     InternalArea = 0,
-    /// Goldsmith and Salmon's.
+    /// The cost of Goldsmith and Salmon.
     GoldsmithSalmon = 1,
     /// The surface area heuristic with both constants 1.
     Sah = 2,
-    /// The layout that `bvh_tracer_new` makes.
+    /// The cost of the layout that `bvh_tracer_new` makes.
     Layout = 3,
 }
 
-/// The best tree over `count` boxes that is found in about `seconds`, 0 or more. Each box is 6 floats: lower corner, upper corner.
+/// Searches for the best tree over `count` boxes for about `seconds`, 0 or more. Each box is 6 floats: the
+/// lower corner, then the upper corner.
 ///
 /// `boxes` points to 6 * `count` floats.
 #[unsafe(no_mangle)]
@@ -51,14 +53,15 @@ pub unsafe extern "C" fn bvh_tree_from_boxes(
     seconds: f64,
 ) -> *mut BvhTree {
     made(|| {
-        // SAFETY: promised by the caller.
+        // SAFETY: `boxes` points to 6 floats for each of `count` boxes.
         let boxes = unsafe { boxes_of(boxes, count) }?;
         found(boxes, 1.0, seconds)
     })
 }
 
-/// The best tree over `count` triangles that is found in about `seconds`, 0 or more. Each triangle is 9 floats: three corners.
-/// With `references` above 1, up to 16, triangles may be divided among leaves, into so many parts each on average.
+/// Searches for the best tree over `count` triangles for about `seconds`, 0 or more. Each triangle is 9
+/// floats: three corners. With `references` above 1, up to 16, triangles may be divided among leaves, on
+/// average into that many parts each.
 ///
 /// `corners` points to 9 * `count` floats.
 #[unsafe(no_mangle)]
@@ -72,26 +75,28 @@ pub unsafe extern "C" fn bvh_tree_from_triangles(
         if !(1.0..=16.0).contains(&references) {
             return Err(Failure::invalid(format!("references is {references}; accepted: 1 to 16")));
         }
-        // SAFETY: promised by the caller.
+        // SAFETY: `corners` points to 9 floats for each of `count` triangles.
         let triangles = unsafe { triangles_of(corners, count) }?;
         found(triangles, references, seconds)
     })
 }
 
-/// Improves a tree for about `seconds`, 0 or more. Arrays that `bvh_tree_nodes` and `bvh_tree_object_ids` lent end here.
+/// Improves a tree for about `seconds`, 0 or more. Arrays from `bvh_tree_nodes` and `bvh_tree_object_ids`
+/// become invalid.
 ///
 /// `tree` is a tree that no other thread uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvh_tree_improve(tree: *mut BvhTree, seconds: f64) -> BvhStatus {
-    // SAFETY: promised by the caller.
+    // SAFETY: the caller promises that no other thread uses the tree, and there is no function to call.
     unsafe { bvh_tree_improve_until(tree, seconds, None, std::ptr::null_mut()) }
 }
 
-/// As `bvh_tree_improve`, and ends soon after `cancelled(context)` is not 0, with the best tree until then, which is no failure. To
-/// cancel a search from its beginning, make the tree in 0 seconds first.
+/// Improves a tree like `bvh_tree_improve`, and ends soon after `cancelled(context)` returns a number other
+/// than 0. The tree is then the best one so far, and the call succeeds. To cancel a search from its
+/// beginning, create the tree in 0 seconds first.
 ///
-/// `tree` is a tree that no other thread uses; `cancelled` is null, or a function that throws nothing, and that any threads may call, several
-/// at once, until this returns.
+/// `tree` is a tree that no other thread uses; `cancelled` is null, or a function that throws no exception
+/// and that any number of threads may call at the same time until this call returns.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvh_tree_improve_until(
     tree: *mut BvhTree,
@@ -100,7 +105,7 @@ pub unsafe extern "C" fn bvh_tree_improve_until(
     context: *mut c_void,
 ) -> BvhStatus {
     status(|| {
-        // SAFETY: promised by the caller.
+        // SAFETY: no other thread uses the tree during the call.
         let tree = unsafe { given_mut("tree", tree) }?;
         let until = Until { deadline: deadline(seconds)?, cancelled, context };
         tree.owned
@@ -111,23 +116,25 @@ pub unsafe extern "C" fn bvh_tree_improve_until(
     })
 }
 
-/// Ends a search at its deadline, or when the caller says so.
+/// Ends a search at its deadline or when the caller cancels it.
 struct Until {
     deadline: Deadline,
     cancelled: Option<unsafe extern "C" fn(*mut c_void) -> u8>,
     context: *mut c_void,
 }
 
-// SAFETY: the context goes to nothing but the caller's function, which any threads may call.
+// SAFETY: the context is passed only to the caller's function, which any number of threads may call at the
+// same time.
 unsafe impl Sync for Until {}
 
 impl Observer for Until {
     fn cancelled(&self) -> bool {
-        // SAFETY: promised by the caller.
-        self.deadline.has_passed()
-            || self
-                .cancelled
-                .is_some_and(|cancelled| unsafe { cancelled(self.context) } != 0)
+        if self.deadline.has_passed() {
+            return true;
+        }
+        let Some(cancelled) = self.cancelled else { return false };
+        // SAFETY: any thread may call the function with this context until the search has ended.
+        unsafe { cancelled(self.context) != 0 }
     }
 
     fn progress(&self) -> Option<f64> {
@@ -135,7 +142,7 @@ impl Observer for Until {
     }
 }
 
-/// Writes a cost of the tree, one of `BvhCost`, to `cost`.
+/// Writes the cost of the kind `kind`, one of `BvhCost`, to `cost`.
 ///
 /// `tree` is a tree; `cost` points to a double.
 #[unsafe(no_mangle)]
@@ -145,6 +152,7 @@ pub unsafe extern "C" fn bvh_tree_cost(
     cost: *mut f64,
 ) -> BvhStatus {
     status(|| {
+        // A parameter of an enum's type would be undefined behaviour for any other number from C.
         let kinds = [
             (BvhCost::InternalArea, Objective::InternalArea),
             (BvhCost::GoldsmithSalmon, Objective::GoldsmithSalmon),
@@ -154,29 +162,36 @@ pub unsafe extern "C" fn bvh_tree_cost(
         let found = kinds
             .iter()
             .find(|(number, _)| *number as u32 == kind);
-        let refused = || Failure::invalid(format!("kind is {kind}; accepted: 0 to 3"));
-        let (_, objective) = found.ok_or_else(refused)?;
-        // SAFETY: promised by the caller.
-        let (tree, cost) = unsafe { (given("tree", tree)?, given_mut("cost", cost)?) };
+        let Some((_, objective)) = found else {
+            return Err(Failure::invalid(format!("kind is {kind}; accepted: 0 to 3")));
+        };
+        // SAFETY: nobody changes the tree during the call.
+        let tree = unsafe { given("tree", tree) }?;
+        // SAFETY: `cost` points to a double that nobody else uses during the call.
+        let cost = unsafe { given_mut("cost", cost) }?;
         *cost = tree.owned.cost(*objective);
         Ok(())
     })
 }
 
-/// The nodes of the tree, and their number in `count`. They belong to the tree, until it is improved or freed.
+/// Returns the nodes of the tree, and writes their number to `count`. The nodes belong to the tree and are
+/// valid until it is improved or freed.
 ///
 /// `tree` is a tree; `count` points to a size.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvh_tree_nodes(tree: *const BvhTree, count: *mut usize) -> *const BvhNode {
     array(|| {
-        // SAFETY: promised by the caller.
-        let (tree, count) = unsafe { (given("tree", tree)?, given_mut("count", count)?) };
+        // SAFETY: nobody changes the tree during the call.
+        let tree = unsafe { given("tree", tree) }?;
+        // SAFETY: `count` points to a size that nobody else uses during the call.
+        let count = unsafe { given_mut("count", count) }?;
         *count = tree.nodes.len();
         Ok(tree.nodes.as_ptr())
     })
 }
 
-/// The object ids that leaves name by position, and their number in `count`. They belong to the tree, until it is improved or freed.
+/// Returns the object ids, to which leaves refer by position, and writes their number to `count`. The ids
+/// belong to the tree and are valid until it is improved or freed.
 ///
 /// `tree` is a tree; `count` points to a size.
 #[unsafe(no_mangle)]
@@ -185,15 +200,17 @@ pub unsafe extern "C" fn bvh_tree_object_ids(
     count: *mut usize,
 ) -> *const u32 {
     array(|| {
-        // SAFETY: promised by the caller.
-        let (tree, count) = unsafe { (given("tree", tree)?, given_mut("count", count)?) };
+        // SAFETY: nobody changes the tree during the call.
+        let tree = unsafe { given("tree", tree) }?;
+        // SAFETY: `count` points to a size that nobody else uses during the call.
+        let count = unsafe { given_mut("count", count) }?;
         let ids = &tree.owned.tree().prim_ids;
         *count = ids.len();
         Ok(ids.as_ptr())
     })
 }
 
-/// The tree over these boxes, as for `bvh_tree_from_boxes`, in the file `path`, UTF-8.
+/// Loads the tree over these boxes, given as for `bvh_tree_from_boxes`, from the file `path`, in UTF-8.
 ///
 /// `path` is a string; `boxes` points to 6 * `count` floats.
 #[unsafe(no_mangle)]
@@ -202,11 +219,17 @@ pub unsafe extern "C" fn bvh_tree_load_boxes(
     boxes: *const f32,
     count: usize,
 ) -> *mut BvhTree {
-    // SAFETY: promised by the caller.
-    made(|| unsafe { loaded(text(path)?, boxes_of(boxes, count)?) })
+    made(|| {
+        // SAFETY: `path` is null or ends with a zero.
+        let path = unsafe { text(path) }?;
+        // SAFETY: `boxes` points to 6 floats for each of `count` boxes.
+        let boxes = unsafe { boxes_of(boxes, count) }?;
+        loaded(path, boxes)
+    })
 }
 
-/// The tree over these triangles, as for `bvh_tree_from_triangles`, in the file `path`, UTF-8.
+/// Loads the tree over these triangles, given as for `bvh_tree_from_triangles`, from the file `path`, in
+/// UTF-8.
 ///
 /// `path` is a string; `corners` points to 9 * `count` floats.
 #[unsafe(no_mangle)]
@@ -215,30 +238,38 @@ pub unsafe extern "C" fn bvh_tree_load_triangles(
     corners: *const f32,
     count: usize,
 ) -> *mut BvhTree {
-    // SAFETY: promised by the caller.
-    made(|| unsafe { loaded(text(path)?, triangles_of(corners, count)?) })
+    made(|| {
+        // SAFETY: `path` is null or ends with a zero.
+        let path = unsafe { text(path) }?;
+        // SAFETY: `corners` points to 9 floats for each of `count` triangles.
+        let triangles = unsafe { triangles_of(corners, count) }?;
+        loaded(path, triangles)
+    })
 }
 
-/// Writes the tree to the file `path`, UTF-8. One that is there is replaced when the new one is complete: after a failure it is the old one.
+/// Writes the tree to the file `path`, in UTF-8. An existing file is replaced when the new one is complete;
+/// a failure leaves the old one.
 ///
 /// `tree` is a tree; `path` is a string.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvh_tree_save(tree: *const BvhTree, path: *const c_char) -> BvhStatus {
     status(|| {
-        // SAFETY: promised by the caller.
-        let (tree, path) = unsafe { (given("tree", tree)?, text(path)?) };
+        // SAFETY: nobody changes the tree during the call.
+        let tree = unsafe { given("tree", tree) }?;
+        // SAFETY: `path` is null or ends with a zero.
+        let path = unsafe { text(path) }?;
         let bytes = tree.owned.save().map_err(Failure::invalid)?;
         Ok(bvh_files::write(path.as_ref(), &bytes)?)
     })
 }
 
-/// Frees a tree. Null is left alone. Tracers of the tree stay.
+/// Frees a tree. Ignores null. Tracers of the tree remain valid.
 ///
 /// `tree` is null, or a tree that nobody uses any more.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvh_tree_free(tree: *mut BvhTree) {
     if !tree.is_null() {
-        // SAFETY: it comes from `made`, and the caller gives it up.
+        // SAFETY: `made` has created the pointer from a box, and the caller frees it once.
         drop(unsafe { Box::from_raw(tree) });
     }
 }
@@ -248,12 +279,10 @@ fn whole(owned: OwnedTree) -> BvhTree {
 }
 
 fn nodes(owned: &OwnedTree) -> Vec<BvhNode> {
-    let node = |FirstCountNode { min, first, max, count }| BvhNode { min, first, max, count };
-    owned
-        .tree()
-        .to_first_count_aligned()
+    let nodes = owned.tree().to_first_count_aligned();
+    nodes
         .into_iter()
-        .map(node)
+        .map(|FirstCountNode { min, first, max, count }| BvhNode { min, first, max, count })
         .collect()
 }
 
@@ -272,28 +301,37 @@ fn loaded(path: &str, objects: Objects) -> Result<BvhTree, Failure> {
 }
 
 fn deadline(seconds: f64) -> Result<Deadline, Failure> {
-    let time = Duration::try_from_secs_f64(seconds);
-    let refused =
-        |_| Failure::invalid(format!("seconds is {seconds}; accepted: 0 or more, finite"));
-    time.map(Deadline::after).map_err(refused)
+    Duration::try_from_secs_f64(seconds)
+        .map(Deadline::after)
+        .map_err(|_| Failure::invalid(format!("seconds is {seconds}; accepted: 0 or more, finite")))
 }
 
+/// Copies boxes.
+///
+/// # Safety
 /// `first` points to 6 · `count` floats.
 unsafe fn boxes_of(first: *const f32, count: usize) -> Result<Objects, Failure> {
-    // SAFETY: promised by the caller; a box is its 6 floats.
-    Ok(Objects::Boxes(unsafe { slice("boxes", first.cast::<Aabb>(), count) }?.to_vec()))
+    // SAFETY: an `Aabb` is `repr(C)` with 6 floats, and `first` points to that many for each box.
+    let boxes = unsafe { slice("boxes", first.cast::<Aabb>(), count) }?.to_vec();
+    Ok(Objects::Boxes(boxes))
 }
 
+/// Copies triangles.
+///
+/// # Safety
 /// `first` points to 9 · `count` floats.
 unsafe fn triangles_of(first: *const f32, count: usize) -> Result<Objects, Failure> {
-    // SAFETY: promised by the caller; a triangle is its 9 floats.
+    // SAFETY: a `Triangle` is `repr(C)` with 9 floats, and `first` points to that many for each triangle.
     let triangles = unsafe { slice("corners", first.cast::<Triangle>(), count) }?.to_vec();
     Ok(Objects::Shapes(Primitives::Triangles(triangles)))
 }
 
-/// `path` is null or a string that ends with a zero.
+/// Returns a path as text.
+///
+/// # Safety
+/// `path` is null, or a string that ends with a zero and that nobody changes while the result is in use.
 unsafe fn text<'a>(path: *const c_char) -> Result<&'a str, Failure> {
-    // SAFETY: promised by the caller.
+    // SAFETY: a pointer that is not null points to a string that ends with a zero.
     let path = unsafe { CStr::from_ptr(given("path", path)?) };
     path.to_str()
         .map_err(|_| Failure::invalid("path is not UTF-8"))

@@ -1,4 +1,5 @@
-//! Prints the header of bvh-c: `cargo run --manifest-path crates/bvh-c/header/Cargo.toml > crates/bvh-c/include/bvh.h`.
+//! Prints the header of bvh-c:
+//! `cargo run --manifest-path crates/bvh-c/header/Cargo.toml > crates/bvh-c/include/bvh.h`.
 
 use std::error::Error;
 use std::path::Path;
