@@ -1,4 +1,5 @@
-"""Better bounding volume hierarchies by stochastic search: trees from numpy arrays, searched for seconds, saved, loaded and traced."""
+"""Better bounding volume hierarchies by stochastic search: find, save, load and trace trees over
+numpy arrays."""
 
 from os import PathLike
 from typing import Literal, final
@@ -10,7 +11,8 @@ __all__ = ["Tracer", "Tree"]
 
 @final
 class Tree:
-    """A tree with its objects. `from_triangles`, `from_boxes` and `load` make one; `len` is the number of objects."""
+    """A tree with its objects. `from_triangles`, `from_boxes` and `load` create trees; `len` is the
+    number of objects."""
 
     @staticmethod
     def from_triangles(triangles: ArrayLike, seconds: float = 1.0, *, references: float = 1.0) -> Tree: ...
@@ -22,7 +24,8 @@ class Tree:
     ) -> Tree: ...
     def save(self, path: str | PathLike[str]) -> None: ...
     def improve(self, seconds: float = 1.0) -> None:
-        """Until it returns other threads use the tree as it was; a second `improve` of theirs is a `RuntimeError`."""
+        """Until the call returns, other threads see the old tree, and a second `improve` raises a
+        `RuntimeError`."""
     def cost(
         self, kind: Literal["internal_area", "goldsmith_salmon", "sah", "layout"] = "internal_area"
     ) -> float: ...
@@ -32,7 +35,8 @@ class Tree:
 
 @final
 class Tracer:
-    """The triangles of a tree, laid out for speed. It needs the tree no longer, and does not follow its changes."""
+    """The triangles of a tree in a layout for fast traversal. Later improvements of the tree do not
+    change the tracer."""
 
     def __new__(cls, tree: Tree) -> Tracer: ...
     def nearest(

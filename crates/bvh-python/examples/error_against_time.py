@@ -1,6 +1,7 @@
-"""Draws what more seconds gain: the error of trees, against the best one found, over the time that their searches took.
+"""Draws the error of trees, relative to the best tree found, over the times of their searches.
 
-`python error_against_time.py [error.svg]`, or cell by cell in an editor that knows `# %%`. Needs matplotlib.
+Run `python error_against_time.py [error.svg]`, or cell by cell in an editor that knows `# %%`. Needs
+matplotlib.
 """
 
 # %% A scene: a tube along a knot, with posts of all heights around it.
@@ -39,7 +40,8 @@ posts = foot + random.uniform(0, 0.1, (4000, 3, 3)) + random.uniform(0, 3, (4000
 triangles = np.concatenate([knots, posts]).astype(np.float32)
 print(f"{len(triangles)} triangles")
 
-# %% A tree for every budget. One call for a second finds a better tree than ten for a tenth, so each begins anew.
+# %% A tree for every budget. One search of a second finds a better tree than ten searches of a tenth,
+# so each budget begins again.
 budgets = [0, 0.03, 0.1, 0.3, 1, 3]
 trees, seconds = [], []
 for budget in budgets:
@@ -53,7 +55,7 @@ best.improve(budgets[-1])
 least = min(tree.cost() for tree in [*trees, best])
 errors = [tree.cost() / least - 1 for tree in trees]
 
-# %% What that means for rays from outside to points of the scene.
+# %% The speeds of rays from outside to points of the scene.
 directions = random.normal(size=(200_000, 3))
 origins = random.uniform(-3, 3, directions.shape) - 20 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
 answers = []

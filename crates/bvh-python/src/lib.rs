@@ -5,7 +5,8 @@ mod search;
 mod tracer;
 mod tree;
 
-/// Better bounding volume hierarchies by stochastic search: trees from numpy arrays, searched for seconds, saved, loaded and traced.
+/// Better bounding volume hierarchies by stochastic search: find, save, load and trace trees over numpy
+/// arrays.
 #[pyo3::pymodule(name = "bvh_search")]
 mod module {
     #[pymodule_export]

@@ -1,16 +1,16 @@
-//! Searches that let other Python threads run, end with their time, and sooner when Ctrl-C is pressed.
+//! Searches that let other Python threads run, and that end with their time or after Ctrl-C.
 
-use crate::arrays::refused;
+use crate::arrays::invalid;
 use bvh_search::{Observer, prelude::*};
 use pyo3::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 
-/// How long a press of Ctrl-C may go unnoticed.
+/// The longest time between a press of Ctrl-C and the reaction.
 const NOTICE: Duration = Duration::from_millis(50);
 
-/// A time limit, and whether Ctrl-C was pressed before it.
+/// Ends a search at its deadline or after Ctrl-C.
 struct Watch {
     deadline: Deadline,
     pressed: AtomicBool,
@@ -26,17 +26,18 @@ impl Observer for Watch {
     }
 }
 
-/// What `search` finds in so many seconds, and what a handler of signals raised meanwhile.
+/// Runs `search` for `seconds`. Returns its result, and the exception that a signal handler has raised
+/// meanwhile.
 pub fn searched<T: Send>(
     py: Python,
     seconds: f64,
     search: impl FnOnce(&dyn Observer) -> T + Send,
 ) -> PyResult<(T, PyResult<()>)> {
-    let limit = Duration::try_from_secs_f64(seconds);
-    let limit =
-        limit.map_err(|_| refused(format!("seconds is {seconds}; accepted: 0 or more, finite")))?;
+    let limit = Duration::try_from_secs_f64(seconds)
+        .map_err(|_| invalid(format!("seconds is {seconds}; accepted: 0 or more, finite")))?;
     let watch = &Watch { deadline: Deadline::after(limit), pressed: AtomicBool::new(false) };
-    // Python hands signals to its main thread only, which is the one that called, if any. So another one searches.
+    // Python runs signal handlers on its main thread only. The calling thread may be the main thread, so a
+    // second thread searches while this one waits for signals.
     Ok(py.detach(|| {
         thread::scope(|scope| {
             let (sender, receiver) = channel();
@@ -52,6 +53,7 @@ pub fn searched<T: Send>(
                         raised = Python::attach(|py| py.check_signals());
                         watch.pressed.store(raised.is_err(), Relaxed);
                     }
+                    // The search has been cancelled and is about to end.
                     Err(RecvTimeoutError::Timeout) => {}
                 }
             }

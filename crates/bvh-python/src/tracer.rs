@@ -1,35 +1,39 @@
-//! The class `Tracer`: triangles in the wide layout, asked for hits by batches of rays on all threads.
+//! The class `Tracer`: triangles in the wide layout, which answer batches of rays on all threads.
 
-use crate::arrays::{rays, refused};
+use crate::arrays::{invalid, rays};
 use crate::tree::Tree;
 use bvh_search::prelude::*;
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-/// The triangles of a tree, laid out for speed. It needs the tree no longer, and does not follow its changes.
+/// The triangles of a tree in a layout for fast traversal. Later improvements of the tree do not change the
+/// tracer.
 #[pyclass(frozen, module = "bvh_search")]
 pub struct Tracer {
     wide: WideBvh,
 }
 
-/// Rays that a thread takes at once.
+/// The number of rays that a thread traces at once.
 const BATCH: usize = 4096;
 
 #[pymethods]
 impl Tracer {
     #[new]
     fn new(tree: &Tree) -> PyResult<Self> {
-        let refusal = || refused("tree is over boxes; accepted: a tree over triangles");
         let owned = tree.owned();
-        let triangles = owned.triangles().ok_or_else(refusal)?;
-        Ok(Self { wide: WideBvh::new(owned.tree(), triangles).map_err(refused)? })
+        let Some(triangles) = owned.triangles() else {
+            return Err(invalid("tree is over boxes; accepted: a tree over triangles"));
+        };
+        Ok(Self { wide: WideBvh::new(owned.tree(), triangles).map_err(invalid)? })
     }
 
-    /// The distances of the nearest hits, in multiples of the directions' lengths, and the triangles' indices; infinity and −1 for a
-    /// ray that meets nothing. Origins and directions are `(m, 3)`; `t_min` and `t_max`, by default 0 and infinity, are one number or
-    /// `(m,)`. `coherent` says that consecutive
-    /// rays begin close to each other and run the same way, which makes them faster and changes no answer.
+    /// Returns the distances of the nearest hits, in multiples of the directions' lengths, and the
+    /// triangles' indices. A ray without a hit has infinity and −1.
+    ///
+    /// Origins and directions have the shape `(m, 3)`. `t_min` and `t_max`, by default 0 and infinity, are
+    /// one number or have the shape `(m,)`. Set `coherent` if consecutive rays begin close to each other
+    /// and have similar directions: it changes the speed and no answer.
     #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = false))]
     fn nearest<'py>(
         &self,
@@ -50,15 +54,15 @@ impl Tracer {
                 self.wide
                     .nearest_hits(rays, hits, coherence(coherent))
             });
-            // The number of no object becomes −1.
-            hits.iter()
-                .map(|hit| (hit.t, hit.object as i32))
-                .unzip::<_, _, Vec<_>, Vec<_>>()
+            // The cast turns the id of a miss, `u32::MAX`, into −1.
+            let t: Vec<f32> = hits.iter().map(|hit| hit.t).collect();
+            let object: Vec<i32> = hits.iter().map(|hit| hit.object as i32).collect();
+            (t, object)
         });
         Ok((t.into_pyarray(py), object.into_pyarray(py)))
     }
 
-    /// Whether each ray meets any triangle. The arguments are those of `nearest`.
+    /// Returns whether each ray hits any triangle. Accepts the same arguments as `nearest`.
     #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = false))]
     fn any<'py>(
         &self,
@@ -85,7 +89,7 @@ impl Tracer {
     }
 }
 
-/// Distances, and indices of triangles.
+/// The distances and the indices of triangles.
 type Nearest<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i32>>);
 
 fn coherence(coherent: bool) -> Coherence {

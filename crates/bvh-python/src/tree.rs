@@ -1,6 +1,6 @@
-//! The class `Tree`: found over arrays, improved, measured, saved, loaded, and handed out as nodes.
+//! The class `Tree`: trees over arrays, found, improved, measured, saved, loaded, and copied as nodes.
 
-use crate::arrays::{boxes, refused, triangles};
+use crate::arrays::{boxes, invalid, triangles};
 use crate::search::searched;
 use bvh_files::WriteError;
 use bvh_files::tree_file::{self, TreeFileError};
@@ -14,12 +14,14 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, TryLockError};
 
-/// A tree with its objects. `from_triangles`, `from_boxes` and `load` make one; `len` is the number of objects.
+/// A tree with its objects. `from_triangles`, `from_boxes` and `load` create trees; `len` is the number of
+/// objects.
 #[pyclass(frozen, module = "bvh_search")]
 pub struct Tree {
-    /// Nobody calls Python while it is locked: Python may let another thread run, which would wait for the lock and not let this one on.
+    /// The tree. A thread must not call Python while it holds this lock: Python may switch to a second thread,
+    /// which would wait for the lock and never switch back.
     owned: RwLock<OwnedTree>,
-    /// Locked by the thread that improves the tree.
+    /// The lock of the thread that improves the tree.
     improving: Mutex<()>,
 }
 
@@ -28,8 +30,9 @@ impl Tree {
         Self { owned: RwLock::new(owned), improving: Mutex::new(()) }
     }
 
-    /// The tree as it is now. After a panic it is as before: it is replaced whole.
+    /// Returns the current tree.
     pub fn owned(&self) -> RwLockReadGuard<'_, OwnedTree> {
+        // A poisoned lock still has a valid tree, because trees are replaced as a whole.
         self.owned
             .read()
             .unwrap_or_else(PoisonError::into_inner)
@@ -38,25 +41,26 @@ impl Tree {
 
 #[pymethods]
 impl Tree {
-    /// The best tree over triangles, `(n, 3, 3)`, that is found in about so many seconds. With `references` above 1, up to 16,
-    /// triangles may be divided among leaves, into so many parts each on average.
+    /// Searches for the best tree over triangles, `(n, 3, 3)`, for about `seconds`. With `references` above 1,
+    /// up to 16, triangles may be divided among leaves, on average into that many parts each.
     #[staticmethod]
     #[pyo3(signature = (triangles, seconds = 1.0, *, references = 1.0))]
     fn from_triangles(triangles: &Bound<PyAny>, seconds: f64, references: f64) -> PyResult<Self> {
         if !(1.0..=16.0).contains(&references) {
-            return Err(refused(format!("references is {references}; accepted: 1 to 16")));
+            return Err(invalid(format!("references is {references}; accepted: 1 to 16")));
         }
         found(triangles.py(), "triangles", self::triangles(triangles)?, references, seconds)
     }
 
-    /// The best tree over boxes, `(n, 2, 3)` or `(n, 6)`, lower corners first, that is found in about so many seconds.
+    /// Searches for the best tree over boxes, `(n, 2, 3)` or `(n, 6)`, lower corners first, for about
+    /// `seconds`.
     #[staticmethod]
     #[pyo3(signature = (boxes, seconds = 1.0))]
     fn from_boxes(boxes: &Bound<PyAny>, seconds: f64) -> PyResult<Self> {
         found(boxes.py(), "boxes", self::boxes(boxes)?, 1.0, seconds)
     }
 
-    /// The tree in a file, over the same triangles or boxes as it was saved for.
+    /// Loads the tree in a file. The triangles or boxes must be the ones that it was saved for.
     #[staticmethod]
     #[pyo3(signature = (path, *, triangles = None, boxes = None))]
     fn load(
@@ -68,25 +72,27 @@ impl Tree {
             (Some(triangles), None) => self::triangles(triangles)?,
             (None, Some(boxes)) => self::boxes(boxes)?,
             _ => {
-                return Err(refused("a tree is over triangles or boxes; accepted: one of the two"));
+                return Err(invalid("a tree is over triangles or boxes; accepted: one of the two"));
             }
         };
-        let bytes = tree_file::read(&path).map_err(unread)?;
+        let bytes = tree_file::read(&path).map_err(read_error)?;
         OwnedTree::load(objects, &bytes)
             .map(Self::new)
-            .map_err(|error| at("path", error))
+            .map_err(|error| invalid_argument("path", error))
     }
 
-    /// Writes the tree to a file. One that is there is replaced when the new one is complete: after a failure it is the old one.
+    /// Writes the tree to a file. An existing file is replaced when the new one is complete; a failure leaves
+    /// the old one.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        let bytes = self.owned().save().map_err(refused)?;
-        bvh_files::write(&path, &bytes).map_err(unwritten)
+        let bytes = self.owned().save().map_err(invalid)?;
+        bvh_files::write(&path, &bytes).map_err(write_error)
     }
 
-    /// Improves the tree for about so many seconds. Ctrl-C ends it sooner, and the tree keeps what was gained. Until it returns other
-    /// threads use the tree as it was, and a second `improve` of theirs is a `RuntimeError`.
+    /// Improves the tree for about `seconds`. Ctrl-C ends the search early, and the tree keeps its gains. Until
+    /// the call returns, other threads see the old tree, and a second `improve` raises a `RuntimeError`.
     #[pyo3(signature = (seconds = 1.0))]
     fn improve(&self, py: Python, seconds: f64) -> PyResult<()> {
+        // Waiting for the lock here would block the interpreter and with it the other thread.
         let _improving = match self.improving.try_lock() {
             Ok(guard) => guard,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
@@ -94,7 +100,8 @@ impl Tree {
         };
         let (improvement, raised) =
             searched(py, seconds, |observer| self.owned().improvement(observer))?;
-        let improvement = improvement.map_err(refused)?;
+        let improvement = improvement.map_err(invalid)?;
+        // The gains are applied before a KeyboardInterrupt is raised.
         self.owned
             .write()
             .unwrap_or_else(PoisonError::into_inner)
@@ -102,8 +109,8 @@ impl Tree {
         raised
     }
 
-    /// The cost of the tree: `internal_area`, which is minimised, `goldsmith_salmon`, `sah` with both constants 1, or `layout`, that of
-    /// a `Tracer`.
+    /// Returns a cost of the tree: `internal_area`, which searches minimise, `goldsmith_salmon`, `sah` with both
+    /// constants 1, or `layout`, the cost of a `Tracer`.
     #[pyo3(signature = (kind = "internal_area"))]
     fn cost(&self, kind: &str) -> PyResult<f64> {
         let objective = match kind {
@@ -113,15 +120,17 @@ impl Tree {
             "layout" => Objective::Layout,
             _ => {
                 let accepted = "internal_area, goldsmith_salmon, sah, layout";
-                return Err(refused(format!("kind is {kind:?}; accepted: {accepted}")));
+                return Err(invalid(format!("kind is {kind:?}; accepted: {accepted}")));
             }
         };
         Ok(self.owned().cost(objective))
     }
 
-    /// The nodes, the root first, as an array with the fields `min`, `first`, `max` and `count`: `count` is 0 for an inner node, whose two
-    /// children begin at `first`; else the node is a leaf, whose objects are `object_ids()[first:first + count]`.
+    /// Returns the nodes, the root first, as an array with the fields `min`, `first`, `max` and `count`. An
+    /// inner node has the `count` 0, and its two children begin at `first`. The objects of a leaf are
+    /// `object_ids()[first:first + count]`.
     fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        // numpy views the words as records, so that no field is converted.
         let words: Vec<u32> = bytemuck::cast_slice(&self.owned().tree().to_first_count()).to_vec();
         let point = "3f4";
         let number = "u4";
@@ -134,7 +143,7 @@ impl Tree {
             .call_method1("view", (kind,))
     }
 
-    /// The object ids that leaves name by position.
+    /// Returns the object ids, to which leaves refer by position.
     fn object_ids<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
         let ids = self.owned().tree().prim_ids.clone();
         ids.into_pyarray(py)
@@ -150,7 +159,7 @@ impl Tree {
     }
 }
 
-/// The message of a second improvement.
+/// The message about a second improvement at the same time.
 const IMPROVING: &str =
     "another thread is improving this tree; accepted: `improve` when its call has returned";
 
@@ -166,23 +175,23 @@ fn found(
     raised?;
     found
         .map(Tree::new)
-        .map_err(|error| at(name, error))
+        .map_err(|error| invalid_argument(name, error))
 }
 
-/// What is wrong with an argument.
-fn at(name: &str, error: impl Display) -> PyErr {
-    refused(format!("{name}: {error}"))
+/// Creates the error of an argument with this name.
+fn invalid_argument(name: &str, error: impl Display) -> PyErr {
+    invalid(format!("{name}: {error}"))
 }
 
-/// What happened to a file that was to be read, as the `OSError` of its kind, or as the `ValueError` of what it holds.
-fn unread(error: TreeFileError) -> PyErr {
+/// Converts a failure to read into an `OSError` of its kind, or into a `ValueError` about the contents.
+fn read_error(error: TreeFileError) -> PyErr {
     match error {
-        TreeFileError::Invalid { source, .. } => at("path", source),
+        TreeFileError::Invalid { source, .. } => invalid_argument("path", source),
         TreeFileError::Read(error) => io::Error::new(error.kind(), error.to_string()).into(),
     }
 }
 
-/// What happened to a file that was to be written, as the `OSError` of its kind.
-fn unwritten(error: WriteError) -> PyErr {
+/// Converts a failure to write into an `OSError` of its kind.
+fn write_error(error: WriteError) -> PyErr {
     io::Error::new(error.source.kind(), error.to_string()).into()
 }

@@ -1,4 +1,4 @@
-"""Trees and hits are those of brute force and of the Rust crates; what is not accepted is refused by name."""
+"""Compares trees and hits with brute force and with the Rust crates, and tests the errors."""
 
 import os
 import signal
@@ -36,7 +36,7 @@ def brute_force(triangles, origins, directions, t_min=0.0, t_max=np.inf):
 
 @pytest.mark.parametrize("references", [1.0, 1.5])
 @pytest.mark.parametrize("coherent", [False, True])
-def test_hits_are_those_of_brute_force(references, coherent):
+def test_hits_equal_brute_force(references, coherent):
     tracer = Tracer(Tree.from_triangles(TRIANGLES, 0.05, references=references))
     random = np.random.default_rng(8)
     origins = random.uniform(0, 10, (3000, 3)).astype(np.float32)
@@ -56,7 +56,7 @@ def test_hits_are_those_of_brute_force(references, coherent):
         np.testing.assert_array_equal(tracer.any(origins, directions, **limits, coherent=coherent), hit)
 
 
-def test_costs_are_those_of_the_nodes_and_of_the_file(tmp_path):
+def test_costs_agree_with_the_nodes_and_with_the_file(tmp_path):
     tree = Tree.from_boxes(boxes_of(TRIANGLES).reshape(-1, 6), seconds=0.05)
     nodes = tree.nodes()
     assert nodes.dtype.names == ("min", "first", "max", "count") and len(nodes) == 2 * len(tree) - 1
@@ -66,7 +66,7 @@ def test_costs_are_those_of_the_nodes_and_of_the_file(tmp_path):
     assert tree.cost("sah") == pytest.approx(area.sum() / area[0], rel=1e-12)
     tree.save(tmp_path / "tree.bvh")
     assert struct.unpack_from("<d", (tmp_path / "tree.bvh").read_bytes(), 56) == (tree.cost(),)
-    # Leaves hold every object once, and each inner node is the union of its children.
+    # Leaves contain every object once, and each inner node is the union of its children.
     assert sorted(tree.object_ids()) == list(range(len(tree)))
     first = nodes["first"][inner]
     np.testing.assert_array_equal(nodes["min"][inner], np.minimum(nodes["min"][first], nodes["min"][first + 1]))
@@ -109,7 +109,7 @@ def test_a_save_that_fails_leaves_the_old_file_whole(tmp_path):
     assert os.listdir(tmp_path) == ["tree.bvh"]
 
 
-def test_whatever_numpy_makes_an_array_of_is_taken():
+def test_anything_that_numpy_converts_to_an_array_is_accepted():
     tree = Tree.from_triangles(TRIANGLES[::2].astype(np.float64).tolist(), 0)
     reference = Tree.from_triangles(TRIANGLES[::2], 0)
     np.testing.assert_array_equal(tree.nodes(), reference.nodes())
@@ -139,7 +139,7 @@ def test_whatever_numpy_makes_an_array_of_is_taken():
         (lambda: Tracer(Tree.from_boxes(boxes_of(TRIANGLES), 0)), "tree is over boxes; accepted"),
     ],
 )
-def test_what_is_not_accepted_is_named(call, message):
+def test_errors_name_the_argument(call, message):
     with pytest.raises(ValueError, match=message):
         call()
 
@@ -153,7 +153,7 @@ def test_what_is_not_accepted_is_named(call, message):
         (([[0, 0, 0]] * 2, [[0, 0, 1], [0, 0, 0]]), "ray 1: the ray's direction"),
     ],
 )
-def test_rays_that_are_not_accepted_are_named(rays, message):
+def test_errors_name_the_ray(rays, message):
     tracer = Tracer(Tree.from_triangles(TRIANGLES, 0))
     for ask in (tracer.nearest, tracer.any):
         with pytest.raises(ValueError, match=message):
@@ -168,7 +168,7 @@ def test_the_lines_of_the_readme_run(tmp_path, monkeypatch, capsys):
     assert (tmp_path / "scene.bvh").is_file()
 
 
-def test_an_interrupt_ends_a_search_which_keeps_what_it_gained():
+def test_an_interrupt_ends_a_search_which_keeps_its_gains():
     # Shells start jobs in the background with interrupts ignored, and then Python raises none.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     tree = Tree.from_triangles(TRIANGLES, 0)
@@ -182,7 +182,7 @@ def test_an_interrupt_ends_a_search_which_keeps_what_it_gained():
     assert tree.cost() < before
 
 
-def test_until_an_improvement_ends_other_threads_use_the_tree_as_it_was_and_cannot_improve_it():
+def test_until_an_improvement_ends_other_threads_see_the_old_tree_and_cannot_improve_it():
     tree = Tree.from_triangles(TRIANGLES, 0)
     before, nodes = tree.cost(), tree.nodes()
     improvement = threading.Thread(target=tree.improve, args=(2,))
