@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""An external method for specs, called as `external_method.py BOXES TREE`: division at the median of the longest axis."""
+"""An external method for specs, which divides objects at the median of the longest axis.
+
+Called as `external_method.py BOXES TREE`."""
 import os
 import struct
 import sys

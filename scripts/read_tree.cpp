@@ -1,4 +1,5 @@
-// Reads a tree file (format: the documentation of bvh_core::file) on a little-endian machine: prints what it is.
+// Prints the facts about a tree file on a little-endian machine. The documentation of bvh_core::file
+// describes the format.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -25,7 +26,7 @@ struct Node {
 #pragma pack(pop)
 static_assert(sizeof(Header) == 192 && sizeof(Node) == 32);
 
-// CRC-32 of zlib; `sum` is that of the bytes before.
+// Returns the CRC-32 of zlib; `sum` is the checksum of the preceding bytes.
 static uint32_t crc32(const char* bytes, size_t count, uint32_t sum = 0) {
     static const std::vector<uint32_t> table = [] {
         std::vector<uint32_t> table(256);

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Reads a tree file (format: the documentation of bvh_core::file): prints its facts, or its nodes with --nodes."""
+"""Prints the facts about a tree file, or its nodes with --nodes. The documentation of bvh_core::file
+describes the format."""
 import struct
 import sys
 import zlib

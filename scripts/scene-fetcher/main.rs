@@ -1,4 +1,5 @@
-//! Copies the real scenes out of the packages that ship them: `cargo metadata … | scene-fetcher FOLDER`.
+//! Copies the real scenes from the packages that contain them:
+//! `cargo metadata … | scene-fetcher FOLDER`.
 
 use std::error::Error;
 use std::fs;
@@ -10,13 +11,13 @@ use ruzstd::decoding::StreamingDecoder;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// A scene and where it comes from; the package's version is the manifest's.
+/// A scene and its package, whose version is in the manifest.
 struct Scene {
     file: &'static str,
     package: &'static str,
-    /// Inside the package; a name in `.zst` is decompressed.
+    /// The path inside the package. A file with the extension `.zst` is decompressed.
     source: &'static str,
-    /// Of the scene as written, hexadecimal.
+    /// The hexadecimal hash of the written scene.
     sha256: &'static str,
 }
 
@@ -69,7 +70,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Makes sure that the scene is in the folder, whole, and says where it came from.
+/// Writes the scene into the folder unless it is there, and reports its origin.
 fn put(scene: &Scene, folder: &Path, metadata: &Value) -> Result<String, Box<dyn Error>> {
     let package = find(metadata, scene.package)?;
     let target = folder.join(scene.file);
@@ -77,7 +78,7 @@ fn put(scene: &Scene, folder: &Path, metadata: &Value) -> Result<String, Box<dyn
         Ok(text) if sha256(&text) == scene.sha256 => (text, "already there"),
         Ok(_) => {
             return Err(format!(
-                "{} holds something else; move it away to get the scene {}",
+                "{} has different contents; move it away to get the scene {}",
                 target.display(),
                 scene.sha256
             )
@@ -89,7 +90,7 @@ fn put(scene: &Scene, folder: &Path, metadata: &Value) -> Result<String, Box<dyn
             if found != scene.sha256 {
                 let package = &package.name;
                 return Err(
-                    format!("{package} holds SHA-256 {found}, expected {}", scene.sha256).into()
+                    format!("{package} has SHA-256 {found}, expected {}", scene.sha256).into()
                 );
             }
             write(&target, &text)?;
@@ -98,7 +99,8 @@ fn put(scene: &Scene, folder: &Path, metadata: &Value) -> Result<String, Box<dyn
         Err(error) => return Err(format!("{}: {error}", target.display()).into()),
     };
     Ok(format!(
-        "{}: {done}, {} bytes, {} triangles, SHA-256 as expected\n    from {} of the package {}, licence of the package: {}",
+        "{}: {done}, {} bytes, {} triangles, SHA-256 as expected\n    \
+         from {} of the package {}, licence of the package: {}",
         target.display(),
         text.len(),
         triangles(&text),

@@ -1,4 +1,5 @@
-//! What a stranger does with `bvh-search`: load a mesh, bake it for a second, trace a million rays, ask, save and map.
+//! A program of a stranger who uses `bvh-search`: loads a mesh, bakes it for a second, traces a
+//! million rays, finds the closest triangle of a point, saves the tree, and maps the file.
 //!
 //! `cargo run --release --manifest-path examples/stranger/Cargo.toml [scene.obj]`
 
@@ -9,8 +10,9 @@ use std::time::Instant;
 fn main() -> Result<(), Box<dyn Error>> {
     let knot = concat!(env!("CARGO_MANIFEST_DIR"), "/knot.obj").to_string();
     let mut triangles = Vec::new();
-    for model in tobj::load_obj(std::env::args().nth(1).unwrap_or(knot), &tobj::GPU_LOAD_OPTIONS)?.0
-    {
+    let path = std::env::args().nth(1).unwrap_or(knot);
+    let (models, _materials) = tobj::load_obj(path, &tobj::GPU_LOAD_OPTIONS)?;
+    for model in models {
         let positions = model.mesh.positions.as_chunks::<3>().0;
         let indices = model.mesh.indices.as_chunks().0;
         triangles.extend(Triangle::from_mesh(positions, indices)?);
@@ -24,22 +26,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         found.evaluations
     );
 
-    // A million rays from points of a sphere around the scene to points of its box.
     let wide = WideBvh::new(&found.tree, &triangles)?;
     let bounds = found.tree.root_aabb().ok_or("an empty scene")?;
-    let size = bounds.max - bounds.min;
-    let rays = (0..1_000_000u32).map(|i| {
-        let part = |k: u32| (i.wrapping_mul(k) >> 8) as f32 / (1 << 24) as f32;
-        let z = 2.0 * part(2_654_435_769) - 1.0;
-        let angle = 6.283 * part(3_242_174_889);
-        let around =
-            Vec3::new(angle.cos() * (1.0 - z * z).sqrt(), angle.sin() * (1.0 - z * z).sqrt(), z);
-        let from = bounds.min + 0.5 * size + size.length() * around;
-        let to = bounds.min
-            + size * Vec3::new(part(2_447_445_413), part(1_640_531_527), part(374_761_393));
-        Ray::half_line(from, to - from)
-    });
-    let rays: Vec<Ray> = rays.collect::<Result<_, _>>()?;
+    let mut rays = Vec::new();
+    for i in 0..1_000_000 {
+        rays.push(ray(i, &bounds)?);
+    }
     let mut hits = vec![Hit::MISS; rays.len()];
     let start = Instant::now();
     wide.nearest_hits(&rays, &mut hits, Coherence::Incoherent);
@@ -58,13 +50,38 @@ fn main() -> Result<(), Box<dyn Error>> {
         &path,
         file::save(&found.tree, &boxes, &file::Origin { method: "best", ..Default::default() })?,
     )?;
-    // SAFETY: nobody else writes to the file of this process.
+    // SAFETY: the name of the file contains this process's number, and this process has finished
+    // writing, so that nobody changes the file while it is mapped.
     let map = unsafe { memmap2::Mmap::map(&std::fs::File::open(&path)?)? };
     std::fs::remove_file(&path)?;
     let mapped = file::TreeFile::open(&map)?.for_boxes(&boxes)?;
     let view = mapped.view()?;
-    let same =
-        |(ray, hit): (&Ray, &Hit)| nearest_hit(view, &triangles, ray).unwrap_or(Hit::MISS) == *hit;
-    assert!(rays.iter().zip(&hits).all(same), "the mapped tree answers as the wide layout");
+    for (ray, hit) in rays.iter().zip(&hits) {
+        let mapped_hit = nearest_hit(view, &triangles, ray).unwrap_or(Hit::MISS);
+        assert_eq!(mapped_hit, *hit, "the mapped tree and the wide layout disagree");
+    }
     Ok(())
+}
+
+/// Returns a fraction from 0 to 1 that multiplication by a large odd number scatters.
+fn scattered(i: u32, factor: u32) -> f32 {
+    (i.wrapping_mul(factor) >> 8) as f32 / (1 << 24) as f32
+}
+
+/// Returns a ray from a point on a sphere around the scene to a point in the scene's box.
+fn ray(i: u32, bounds: &Aabb) -> Result<Ray, Box<dyn Error>> {
+    let size = bounds.max - bounds.min;
+    // Points with uniform z are uniform on the sphere (Archimedes).
+    let z = 2.0 * scattered(i, 2_654_435_769) - 1.0;
+    let angle = 6.283 * scattered(i, 3_242_174_889);
+    let radius = (1.0 - z * z).sqrt();
+    let direction = Vec3::new(angle.cos() * radius, angle.sin() * radius, z);
+    let from = bounds.min + 0.5 * size + size.length() * direction;
+    let part = Vec3::new(
+        scattered(i, 2_447_445_413),
+        scattered(i, 1_640_531_527),
+        scattered(i, 374_761_393),
+    );
+    let to = bounds.min + size * part;
+    Ok(Ray::half_line(from, to - from)?)
 }
