@@ -100,7 +100,7 @@ impl Scene {
     /// to files outside its folder.
     pub fn load_with(name: &str, outside: OutsideFiles) -> Result<Self, SceneError> {
         match Subset::parse(name) {
-            // A stiff scene has no size of its own, so its count is generated and not a subset.
+            // A stiff scene is generated with any number of objects, so its count is not a subset.
             Some((id, Subset::Spaced(objects))) if stiff::by_id(id).is_some() => {
                 Self::stiff(id, name, objects)
             }

@@ -1,11 +1,12 @@
-//! The base cost of the stand-ins against one computed from the objects alone.
+//! Compares the base cost of the stand-ins with a cost that is computed from the objects alone.
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Bvh, cost};
 use bvh_scenes::Scene;
 use bvh_scenes::builtin::stand_ins::STAND_INS;
 
-/// Σ of inner half areas, every node's box recomputed from the objects below it and no node's box read.
+/// Returns the sum of inner half areas. Computes every node's box from the objects below it, and reads no
+/// box of the tree.
 fn from_objects(tree: &Bvh, boxes: &[Aabb]) -> f64 {
     let mut total = 0.0;
     let mut below = vec![Aabb::EMPTY; tree.nodes.len()];
@@ -25,7 +26,7 @@ fn from_objects(tree: &Bvh, boxes: &[Aabb]) -> f64 {
 }
 
 #[test]
-fn the_base_cost_of_every_stand_in_is_that_of_its_objects_and_of_the_papers_magnitude() {
+fn the_base_cost_of_every_stand_in_follows_from_its_objects_and_has_the_papers_magnitude() {
     let paper = [1.710e7, 1.845e9, 4.820e5, 1.027e14, 1.361e6];
     for (stand_in, paper) in STAND_INS.iter().zip(paper) {
         let boxes = Scene::load(stand_in.name).unwrap().boxes;

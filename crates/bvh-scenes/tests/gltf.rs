@@ -1,4 +1,4 @@
-//! What a glTF file may require, leave out and name, and what it may not.
+//! Extensions, missing parts and references of glTF files that are accepted or rejected.
 
 #[path = "support/glb.rs"]
 mod binary;
@@ -24,7 +24,7 @@ fn triangle() -> Mesh {
     Mesh::new(Triangle::from_mesh(&CORNERS, &[[0, 1, 2]]).unwrap())
 }
 
-/// A scene of one triangle in `buffers[0]`, with more keys at its top.
+/// Returns a scene of one triangle in `buffers[0]`, with additional top-level keys.
 fn json(buffers: &str, more: &str) -> String {
     format!(
         r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0}}],
@@ -37,7 +37,7 @@ fn json(buffers: &str, more: &str) -> String {
 /// The buffer in the binary chunk of a GLB file.
 const CHUNK: &str = r#"{"byteLength": 36}"#;
 
-/// A folder with `scene.gltf`, whose buffer is the file of this name.
+/// Creates a folder with `scene.gltf`, whose buffer is the file of this name.
 fn folder(name: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let text = json(&format!(r#"{{"uri": "{name}", "byteLength": 36}}"#), "");
@@ -46,7 +46,7 @@ fn folder(name: &str) -> tempfile::TempDir {
 }
 
 #[test]
-fn an_extension_that_a_file_requires_is_known_to_change_no_triangle_or_the_file_is_refused() {
+fn a_file_may_require_only_extensions_that_change_no_triangle() {
     let required = |names: &str| {
         glb(json(CHUNK, &format!(r#", "extensionsRequired": [{names}]"#)), &corner_bytes())
     };
@@ -70,7 +70,7 @@ fn an_extension_that_a_file_requires_is_known_to_change_no_triangle_or_the_file_
             "{message}"
         );
     }
-    // What is used and not required changes nothing for whoever does not know it.
+    // The format lets a reader ignore extensions that are used but not required.
     let used = glb(json(CHUNK, r#", "extensionsUsed": ["EVIL_no_such"]"#), &corner_bytes());
     assert_eq!(parse(&used, path).unwrap(), triangle());
 }
@@ -94,9 +94,9 @@ fn a_buffer_without_uri_is_the_binary_chunk_only_if_it_is_the_first() {
 }
 
 #[test]
-fn extras_of_any_kind_are_passed_over_wherever_they_are() {
+fn extras_of_any_kind_are_ignored_in_any_place() {
     let text = json(CHUNK, "");
-    // Attributes are names of accessors, nothing else.
+    // Attributes contain names of accessors and nothing else.
     let places = text.match_indices('{').map(|(place, _)| place);
     let places: Vec<usize> = places
         .filter(|&place| !text[place..].starts_with(r#"{"POSITION"#))
@@ -115,7 +115,7 @@ fn extras_of_any_kind_are_passed_over_wherever_they_are() {
 }
 
 #[test]
-fn a_buffer_that_no_mesh_needs_refuses_nothing() {
+fn a_buffer_that_no_mesh_needs_may_be_invalid() {
     for unused in [
         r#"{"uri": "no_such_file.bin", "byteLength": 36}"#,
         r#"{"uri": "../../outside.bin", "byteLength": 36}"#,
@@ -128,7 +128,7 @@ fn a_buffer_that_no_mesh_needs_refuses_nothing() {
 }
 
 #[test]
-fn a_buffer_outside_the_folder_of_the_scene_is_refused_unless_it_is_allowed() {
+fn a_buffer_outside_the_folder_of_the_scene_is_rejected_unless_it_is_allowed() {
     let outside = tempfile::tempdir().unwrap();
     let file = outside.path().join("outside.bin");
     fs::write(&file, corner_bytes()).unwrap();
@@ -150,14 +150,11 @@ fn a_buffer_outside_the_folder_of_the_scene_is_refused_unless_it_is_allowed() {
         fs::create_dir(folder.path().join("a")).unwrap();
         assert_outside(folder.path());
     }
-    // A file that is not there is not told from one that is.
-    let message = load(
-        &folder("../no_such_file")
-            .path()
-            .join("scene.gltf"),
-    )
-    .unwrap_err()
-    .to_string();
+    // The message must not reveal whether the file exists.
+    let scene_folder = folder("../no_such_file");
+    let message = load(&scene_folder.path().join("scene.gltf"))
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("`../no_such_file` is outside"), "{message}");
     #[cfg(unix)]
     {
@@ -167,9 +164,9 @@ fn a_buffer_outside_the_folder_of_the_scene_is_refused_unless_it_is_allowed() {
     }
 }
 
-/// The folder's scene is refused, and read where that is allowed.
-fn assert_outside(at: &Path) {
-    let path = at.join("scene.gltf");
+/// Asserts that the folder's scene is rejected, and that it is read with permission.
+fn assert_outside(folder: &Path) {
+    let path = folder.join("scene.gltf");
     let message = load(&path).unwrap_err().to_string();
     for part in ["buffers[0]", "outside the scene's folder", "--outside-files"] {
         assert!(message.contains(part), "{part}: {message}");

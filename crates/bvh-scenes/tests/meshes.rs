@@ -1,4 +1,5 @@
-//! Mesh files of every format give the same triangles, and any bytes give a mesh or an error that names its place.
+//! Mesh files of every format give the same triangles, and any bytes give a mesh or an error that
+//! names its place.
 
 #[path = "support/glb.rs"]
 mod binary;
@@ -27,20 +28,22 @@ fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
 }
 
 fn ply_text() -> Vec<u8> {
-    let mut text = "ply\nformat ascii 1.0\ncomment a square\nelement vertex 4\nproperty float x\nproperty double y\n\
-                    property float z\nproperty uchar red\nelement face 1\nproperty list uchar int vertex_indices\n\
-                    end_header\n"
+    let mut text = "ply\nformat ascii 1.0\ncomment a square\n\
+                    element vertex 4\nproperty float x\nproperty double y\nproperty float z\n\
+                    property uchar red\n\
+                    element face 1\nproperty list uchar int vertex_indices\nend_header\n"
         .to_string();
-    CORNERS
-        .iter()
-        .for_each(|[x, y, z]| text += &format!("{x} {y} {z} 255\n"));
+    for [x, y, z] in CORNERS {
+        text += &format!("{x} {y} {z} 255\n");
+    }
     (text + "4 0 1 2 3\n").into_bytes()
 }
 
 fn ply_binary(big: bool) -> Vec<u8> {
     let order = if big { "big" } else { "little" };
     let mut bytes = format!(
-        "ply\nformat binary_{order}_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        "ply\nformat binary_{order}_endian 1.0\n\
+         element vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
          element face 2\nproperty list uchar uint vertex_index\nend_header\n"
     )
     .into_bytes();
@@ -60,13 +63,12 @@ fn ply_binary(big: bool) -> Vec<u8> {
 
 fn stl_text() -> Vec<u8> {
     let mut text = String::new();
-    // Two solids, of which the second has no name.
+    // A file may have several solids, and a solid may have no name.
     for (solid, triangle) in ["solid a square", "solid"].iter().zip(square()) {
         text += &format!("{solid}\r\n facet normal 0 0 1\r\n  outer loop\r\n");
-        triangle
-            .0
-            .iter()
-            .for_each(|p| text += &format!("   vertex {} {:e} {}\r\n", p.x, p.y, p.z));
+        for corner in triangle.0 {
+            text += &format!("   vertex {} {:e} {}\r\n", corner.x, corner.y, corner.z);
+        }
         text += "  endloop\r\n endfacet\r\nendsolid\r\n";
     }
     text.into_bytes()
@@ -84,16 +86,21 @@ fn stl_binary() -> Vec<u8> {
     bytes
 }
 
-/// The JSON of a scene over a buffer of four positions and the indices of two triangles, `u16`.
+/// Returns the JSON of a scene over a buffer of four positions and of the indices of two triangles,
+/// `u16`.
 fn gltf_json(uri: &str, nodes: &str, primitive: &str) -> String {
     let uri = if uri.is_empty() { String::new() } else { format!(r#""uri": "{uri}", "#) };
     format!(
-        r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}], "nodes": [{nodes}],
+        r#"{{"asset": {{"version": "2.0"}},
+        "scene": 0, "scenes": [{{"nodes": [0]}}], "nodes": [{nodes}],
         "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}{primitive}}}]}}],
         "accessors": [
-            {{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]}},
+            {{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+              "min": [0, 0, 0], "max": [1, 1, 1]}},
             {{"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}}],
-        "bufferViews": [{{"buffer": 0, "byteLength": 48}}, {{"buffer": 0, "byteOffset": 48, "byteLength": 12}}],
+        "bufferViews": [
+            {{"buffer": 0, "byteLength": 48}},
+            {{"buffer": 0, "byteOffset": 48, "byteLength": 12}}],
         "buffers": [{{{uri}"byteLength": 60}}]}}"#
     )
 }
@@ -126,7 +133,7 @@ fn glb() -> Vec<u8> {
     binary::glb(gltf_json("", r#"{"mesh": 0}"#, INDEXED), &buffer())
 }
 
-/// A square in every format.
+/// Returns files of a square in every format.
 fn samples() -> [(&'static str, Format, Vec<u8>); 8] {
     let obj = b"v 0 0 0\nv 1 0 0\nv 1 1 0.5\nv 0 1 0.5\nf 1 2 3 4\n".to_vec();
     [
@@ -141,27 +148,27 @@ fn samples() -> [(&'static str, Format, Vec<u8>); 8] {
     ]
 }
 
-fn refusal(bytes: impl AsRef<[u8]>, name: &str) -> String {
+fn error(bytes: impl AsRef<[u8]>, name: &str) -> String {
     parse(bytes.as_ref(), Path::new(name))
         .unwrap_err()
         .to_string()
 }
 
-/// The bytes with one text in place of another.
+/// Replaces the first occurrence of a text.
 fn with(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
-    let at = bytes
+    let start = bytes
         .windows(from.len())
         .position(|window| window == from.as_bytes())
         .expect(from);
-    [&bytes[..at], to.as_bytes(), &bytes[at + from.len()..]].concat()
+    [&bytes[..start], to.as_bytes(), &bytes[start + from.len()..]].concat()
 }
 
 #[test]
-fn every_format_gives_the_same_triangles_whatever_the_file_is_called() {
+fn every_format_gives_the_same_triangles_under_any_file_name() {
     for (name, format, bytes) in samples() {
         for name in [name, "scene.obj", "scene.stl", "scene"] {
             if format == Format::Obj && name == "scene.stl" {
-                continue; // OBJ has no mark of its own.
+                continue; // OBJ has no signature.
             }
             assert_eq!(Format::of(&bytes, Path::new(name)), format);
             assert_eq!(parse(&bytes, Path::new(name)).unwrap(), Mesh::new(square()), "{name}");
@@ -179,11 +186,11 @@ fn text_formats_may_begin_with_a_byte_order_mark() {
     }
     let wrong =
         [b"\xef\xbb\xbf", &with(&stl_text(), "vertex 1 0e0 0\r", "vertex 1 0\r")[..]].concat();
-    assert!(refusal(wrong, "a.stl").starts_with("a.stl:5: "));
+    assert!(error(wrong, "a.stl").starts_with("a.stl:5: "));
 }
 
 #[test]
-fn a_mesh_file_is_a_scene_by_its_path_and_a_missing_one_is_said_to_be_missing() {
+fn the_path_of_a_mesh_file_names_a_scene_and_a_missing_file_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     for (name, _, bytes) in samples() {
         let path = folder.path().join(name);
@@ -195,12 +202,8 @@ fn a_mesh_file_is_a_scene_by_its_path_and_a_missing_one_is_said_to_be_missing() 
         );
     }
     for missing in ["none.ply", "none.obj", "folder/none"] {
-        assert!(
-            Scene::load(missing)
-                .unwrap_err()
-                .to_string()
-                .contains(&format!("{missing}: no such file"))
-        );
+        let message = Scene::load(missing).unwrap_err().to_string();
+        assert!(message.contains(&format!("{missing}: no such file")), "{message}");
     }
     assert!(matches!(load(folder.path()), Err(MeshError::Read(ReadError::Folder { .. }))));
     #[cfg(unix)]
@@ -212,38 +215,36 @@ fn a_mesh_file_is_a_scene_by_its_path_and_a_missing_one_is_said_to_be_missing() 
 }
 
 #[test]
-fn nodes_move_their_meshes_and_what_hangs_on_them() {
+fn nodes_move_their_meshes_and_their_children() {
     let nodes = r#"{"children": [1, 2], "translation": [10, 0, 0]},
         {"mesh": 0, "scale": [2, 2, 2]},
         {"mesh": 0, "matrix": [0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1]}"#;
     let mesh = parse(&gltf(nodes, INDEXED), Path::new("a.gltf")).unwrap();
-    let moved = |by: &dyn Fn(Vec3) -> Vec3| {
-        square()
-            .into_iter()
-            .map(|t| Triangle(t.0.map(by)))
-            .collect::<Vec<_>>()
-    };
-    let scaled = moved(&|p| p * 2.0 + Vec3::X * 10.0);
-    let turned = moved(&|p| Vec3::new(10.0 - p.y, p.x, p.z + 5.0));
-    assert_eq!(mesh.triangles, [scaled, turned].concat());
+    let mut expected = Vec::new();
+    for triangle in square() {
+        expected.push(Triangle(triangle.0.map(|p| p * 2.0 + Vec3::X * 10.0)));
+    }
+    for triangle in square() {
+        expected.push(Triangle(
+            triangle
+                .0
+                .map(|p| Vec3::new(10.0 - p.y, p.x, p.z + 5.0)),
+        ));
+    }
+    assert_eq!(mesh.triangles, expected);
 }
 
 #[test]
 fn strips_fans_and_lists_without_indices_are_triangles_and_lines_are_not() {
-    let corner = |at: usize| Vec3::from(CORNERS[at]);
-    let of = |corners: [[usize; 3]; 2]| corners.map(|c| Triangle(c.map(corner))).to_vec();
-    let triangles = |primitive: &str| {
-        parse(&gltf(r#"{"mesh": 0}"#, primitive), Path::new("a.gltf")).map(|mesh| mesh.triangles)
-    };
-    assert_eq!(triangles(r#", "mode": 5"#).unwrap(), of([[0, 1, 2], [1, 3, 2]]));
-    assert_eq!(triangles(r#", "mode": 6"#).unwrap(), of([[0, 1, 2], [0, 2, 3]]));
-    assert_eq!(triangles(r#", "mode": 4"#).unwrap(), of([[0, 1, 2]; 2])[..1]);
-    assert!(
-        triangles(r#", "mode": 1"#)
-            .unwrap_err()
-            .to_string()
-            .contains("no triangle")
-    );
+    for (mode, triangles) in
+        [(5, &[[0, 1, 2], [1, 3, 2]][..]), (6, &[[0, 1, 2], [0, 2, 3]]), (4, &[[0, 1, 2]])]
+    {
+        let file = gltf(r#"{"mesh": 0}"#, &format!(r#", "mode": {mode}"#));
+        let mesh = parse(&file, Path::new("a.gltf")).unwrap();
+        assert_eq!(mesh.triangles, Triangle::from_mesh(&CORNERS, triangles).unwrap(), "{mode}");
+    }
+    let lines = gltf(r#"{"mesh": 0}"#, r#", "mode": 1"#);
+    assert!(error(lines, "a.gltf").contains("no triangle"));
 }
 
 #[test]
@@ -259,14 +260,9 @@ fn buffers_are_files_in_the_folder_of_the_file_that_names_them() {
     std::fs::write(folder.path().join("my buffer.bin"), buffer()).unwrap();
     assert_eq!(load(&path).unwrap().triangles, square());
     std::fs::write(folder.path().join("my buffer.bin"), &buffer()[..50]).unwrap();
-    assert!(
-        load(&path)
-            .unwrap_err()
-            .to_string()
-            .contains("buffers[0]: 50 bytes; expected 60")
-    );
-    let remote =
-        refusal(gltf_json("http://example.org/a.bin", r#"{"mesh": 0}"#, INDEXED), "a.gltf");
+    let short = load(&path).unwrap_err().to_string();
+    assert!(short.contains("buffers[0]: 50 bytes; expected 60"), "{short}");
+    let remote = error(gltf_json("http://example.org/a.bin", r#"{"mesh": 0}"#, INDEXED), "a.gltf");
     assert!(remote.contains("a file in this folder"), "{remote}");
 }
 
@@ -324,23 +320,23 @@ fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
         (json.as_bytes()[..200].to_vec(), "a.gltf", &["a.gltf: ", "EOF"]),
     ];
     for (bytes, name, parts) in cases {
-        let message = refusal(bytes, name);
-        parts
-            .iter()
-            .for_each(|part| assert!(message.contains(part), "{part}: {message}"));
+        let message = error(bytes, name);
+        for part in parts {
+            assert!(message.contains(part), "{part}: {message}");
+        }
         assert!(message.len() < 400 && !message.contains('\n'), "{message}");
     }
 }
 
 #[test]
-fn files_made_to_harm_are_refused() {
+fn malicious_files_are_rejected() {
     let node = r#"{"mesh": 0}"#;
     for cycle in [
         r#"{"children": [1]}, {"children": [0], "mesh": 0}"#,
         r#"{"children": [0], "mesh": 0}"#,
         r#"{"children": [1, 1]}, {"mesh": 0}"#,
     ] {
-        assert!(refusal(gltf(cycle, INDEXED), "a.gltf").contains("reached twice"), "{cycle}");
+        assert!(error(gltf(cycle, INDEXED), "a.gltf").contains("reached twice"), "{cycle}");
     }
     let json = gltf(node, INDEXED);
     let beyond = "18446744073709551615";
@@ -353,22 +349,24 @@ fn files_made_to_harm_are_refused() {
         ),
         (r#""byteLength": 60"#, format!(r#""byteLength": {beyond}"#)),
     ] {
-        refusal(with(&json, from, &to), "a.gltf");
+        error(with(&json, from, &to), "a.gltf");
     }
     for length in [0, 1, u32::MAX - 3, u32::MAX] {
         let mut bytes = glb();
         bytes[12..16].copy_from_slice(&length.to_le_bytes());
-        refusal(bytes, "a.glb");
+        error(bytes, "a.glb");
     }
     let deep = format!("{}1{}", "[".repeat(100_000), "]".repeat(100_000));
-    refusal(format!(r#"{{"asset": {deep}}}"#), "a.gltf");
+    error(format!(r#"{{"asset": {deep}}}"#), "a.gltf");
     let header = "ply\nformat binary_little_endian 1.0\nelement vertex 90000000000\nend_header\n";
-    assert!(refusal(header, "a.ply").contains("room for"));
-    let list = "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uint int vertex_indices\nend_header\n";
-    refusal([list.as_bytes(), &[255; 8]].concat(), "a.ply");
+    assert!(error(header, "a.ply").contains("room for"));
+    // The length of the list is 2³² − 1.
+    let list = "ply\nformat binary_little_endian 1.0\nelement face 1\n\
+                property list uint int vertex_indices\nend_header\n";
+    error([list.as_bytes(), &[255; 8]].concat(), "a.ply");
     let mut stl = stl_binary();
     stl[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
-    assert!(refusal(stl, "a.stl").contains("4294967295"));
+    assert!(error(stl, "a.stl").contains("4294967295"));
 }
 
 #[test]
@@ -380,7 +378,7 @@ fn cut_files_give_a_mesh_or_an_error() {
     }
 }
 
-/// Whatever the bytes are, a mesh has triangles and all of them are finite.
+/// Asserts that the bytes give an error, or a mesh with triangles that are all finite.
 fn check(bytes: &[u8], name: &str) {
     if let Ok(mesh) = parse(bytes, Path::new(name)) {
         assert!(!mesh.triangles.is_empty());
@@ -403,13 +401,16 @@ proptest! {
     ) {
         let (name, _, original) = samples()[which].clone();
         let mut bytes = original.clone();
-        changes.iter().for_each(|(at, byte)| bytes[at.index(original.len())] = *byte);
+        for (place, byte) in changes {
+            bytes[place.index(original.len())] = byte;
+        }
         check(&bytes, name);
-        // Numbers that are wrong in files that are otherwise well formed.
+        // Wrong digits leave a file well formed, so that deeper checks see its numbers.
         let mut bytes = original;
-        let numbers: Vec<usize> = (0..bytes.len()).filter(|&at| bytes[at].is_ascii_digit()).collect();
-        for (at, digit) in digits.iter().filter(|_| !numbers.is_empty()) {
-            bytes[numbers[at.index(numbers.len())]] = *digit;
+        let numbers: Vec<usize> =
+            (0..bytes.len()).filter(|&index| bytes[index].is_ascii_digit()).collect();
+        for (place, digit) in digits.iter().filter(|_| !numbers.is_empty()) {
+            bytes[numbers[place.index(numbers.len())]] = *digit;
         }
         check(&bytes, name);
     }

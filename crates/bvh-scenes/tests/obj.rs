@@ -1,4 +1,4 @@
-//! OBJ files as people write them, and as nobody should: what is read, and what is refused in which line.
+//! Valid and invalid OBJ files: the triangles of the valid ones, and the lines that errors name.
 
 use bvh_core::Triangle;
 use bvh_scenes::load::mesh::Mesh;
@@ -14,13 +14,13 @@ fn read(text: impl AsRef<[u8]>) -> Result<Mesh, ObjError> {
     parse(text.as_ref(), Path::new("scene.obj"))
 }
 
-/// The mesh of the points followed by `faces`.
+/// Reads the points followed by `faces`.
 fn mesh(faces: &str) -> Mesh {
     read(format!("{POINTS}{faces}")).unwrap()
 }
 
-/// The message for the points, on lines 1 to 5, followed by `statements`.
-fn refusal(statements: &str) -> String {
+/// Returns the error about the points, on lines 1 to 5, followed by `statements`.
+fn error(statements: &str) -> String {
     read(format!("{POINTS}{statements}"))
         .unwrap_err()
         .to_string()
@@ -60,7 +60,7 @@ fn spellings_of_the_same_triangle_agree() {
     let text = format!("{POINTS}f 1 2 3\n");
     assert_eq!(read(text.replace('\n', "\r\n")).unwrap(), expected);
     assert_eq!(read(text.replace('\n', "\r")).unwrap(), expected);
-    // Two programs may each have added a mark.
+    // Two programs may each have added a byte order mark.
     for marks in ["\u{feff}", "\u{feff}\u{feff}"] {
         assert_eq!(read(format!("{marks}{text}")).unwrap(), expected);
     }
@@ -90,13 +90,13 @@ fn a_weight_divides_the_coordinates() {
 }
 
 #[test]
-fn faces_of_fewer_than_three_vertices_are_counted_and_left_out() {
+fn faces_of_fewer_than_three_vertices_are_counted_and_skipped() {
     let read = mesh("f\nf 1\nf 1 2\nf 1 2 3\n");
     assert_eq!((read.short_faces, read.triangles.len()), (3, 1));
 }
 
 #[test]
-fn lines_with_unknown_keywords_are_counted_and_all_oddities_are_remarked_in_one_sentence() {
+fn lines_with_unknown_keywords_are_counted_and_one_sentence_lists_all_oddities() {
     let read = mesh("V 7 7 7\nf 1 2 3\ncurv 0 1 \\\n1 2\nF 1 2 4\nf 1 2 2\nf 1 2\n");
     assert_eq!(read.unknown, Some((2, 6, "V".into())));
     let remark = read.remark().unwrap();
@@ -112,15 +112,11 @@ fn lines_with_unknown_keywords_are_counted_and_all_oddities_are_remarked_in_one_
 }
 
 #[test]
-fn a_face_of_too_many_vertices_is_refused() {
-    let face = |corners: usize| format!("{POINTS}f{}\n", " 1".repeat(corners));
-    assert_eq!(read(face(1 << 16)).unwrap().triangles.len(), (1 << 16) - 2);
-    assert!(
-        read(face((1 << 16) + 1))
-            .unwrap_err()
-            .to_string()
-            .starts_with("scene.obj:6: face of more than 65536")
-    );
+fn a_face_of_too_many_vertices_is_rejected() {
+    let corners = " 1".repeat(1 << 16);
+    assert_eq!(mesh(&format!("f{corners}\n")).triangles.len(), (1 << 16) - 2);
+    let message = error(&format!("f{corners} 1\n"));
+    assert!(message.starts_with("scene.obj:6: face of more than 65536"), "{message}");
 }
 
 #[test]
@@ -134,7 +130,7 @@ fn triangles_without_area_are_counted_and_kept_at_every_scale() {
 }
 
 #[test]
-fn a_refused_statement_is_named_with_its_line_and_what_would_be_accepted() {
+fn an_invalid_statement_is_named_with_its_line_and_the_accepted_values() {
     for (statements, names) in [
         ("v nan 0 0\nf 1 2 3\n", ["scene.obj:6: ", "`nan`", "finite"]),
         ("f 1 2 3\n\nv 0 -inf 0", [":8: ", "`-inf`", "finite"]),
@@ -155,7 +151,7 @@ fn a_refused_statement_is_named_with_its_line_and_what_would_be_accepted() {
         ("f 1 2 9223372036854775807", [":6: ", "5807", "most 5"]),
         ("f 1 2 -9223372036854775808", [":6: ", "5808", "least -5"]),
     ] {
-        let message = refusal(statements);
+        let message = error(statements);
         for name in names {
             assert!(message.contains(name), "{statements:?}: {message}");
         }
@@ -164,18 +160,18 @@ fn a_refused_statement_is_named_with_its_line_and_what_would_be_accepted() {
 
 #[test]
 fn an_endless_word_gives_a_short_message() {
-    assert!(refusal(&format!("v 0 0 {}", "x".repeat(1_000_000))).len() < 200);
+    assert!(error(&format!("v 0 0 {}", "x".repeat(1_000_000))).len() < 200);
 }
 
 #[test]
-fn what_holds_no_triangle_is_refused_in_one_sentence() {
+fn a_file_without_triangles_is_rejected_in_one_sentence() {
     assert!(matches!(read("[package]\nname = 1\n"), Err(ObjError::NoFaces { vertices: 0, .. })));
-    assert!(refusal("l 1 2 3\nf 1 2\n").contains("5 vertices and no face"));
+    assert!(error("l 1 2 3\nf 1 2\n").contains("5 vertices and no face"));
 }
 
 proptest! {
     #[test]
-    fn triangles_come_back_as_they_were_written(
+    fn written_triangles_are_read_unchanged(
         corners in prop::collection::vec(
             prop::array::uniform3(prop::array::uniform3(
                 any::<f32>().prop_filter("finite", |x| x.is_finite()))),

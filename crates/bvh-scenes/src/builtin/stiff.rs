@@ -1,7 +1,8 @@
-//! The stiff and extreme scenes: each a function of the number of objects, found by the identifier of its case.
+//! The stiff and extreme scenes. Each is a function of the number of objects, with the identifier of
+//! its case.
 //!
-//! All consist of triangles, so that everything can be traced; a scene of boxes has in each box the triangle over its
-//! diagonal. The same number gives the same scene on every machine.
+//! All scenes consist of triangles, so that rays can be traced; a scene of boxes has in each box the
+//! triangle over its diagonal. The same number gives the same scene on every machine.
 
 use bvh_core::{Aabb, Triangle};
 use bvh_search::Stream;
@@ -9,11 +10,11 @@ use glam::Vec3;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 
-/// Makes a scene of so many triangles, or of about as many where no such scene exists.
+/// Generates a scene with this number of triangles, or with about this number if that is impossible.
 pub type Generator = fn(usize) -> Vec<Triangle>;
 
-/// Every stiff scene by the identifier of the case that builds and traces it. Cases that ask different things may have the
-/// same scene, and those that are not listed ask about rays, refusals, files or threads.
+/// Every stiff scene by the identifier of the case that builds and traces it. Several cases may have the
+/// same scene. Cases that are not listed test rays, errors, files or threads.
 pub const STIFF: [(&str, Generator); 31] = [
     ("S01", uniform),
     ("S02", uniform),
@@ -48,7 +49,7 @@ pub const STIFF: [(&str, Generator); 31] = [
     ("S45", two_cubes),
 ];
 
-/// The generator of the case `id`, such as `S34`.
+/// Returns the generator of the case `id`, such as `S34`.
 pub fn by_id(id: &str) -> Option<Generator> {
     STIFF
         .iter()
@@ -56,12 +57,12 @@ pub fn by_id(id: &str) -> Option<Generator> {
         .map(|(_, generator)| *generator)
 }
 
-/// The boxes of the triangles.
+/// Returns the boxes of the triangles.
 pub fn boxes(triangles: &[Triangle]) -> Vec<Aabb> {
     triangles.iter().map(Triangle::aabb).collect()
 }
 
-/// A triangle with this box.
+/// Returns a triangle with this box.
 fn diagonal(Aabb { min, max }: Aabb) -> Triangle {
     Triangle([min, max, Vec3::new(max.x, min.y, max.z)])
 }
@@ -74,12 +75,12 @@ fn random(salt: u64) -> Stream {
     Stream::seed_from_u64(salt)
 }
 
-/// A point uniform in the cube from 0 to `size`.
+/// Draws a uniform point in the cube from 0 to `size`.
 fn point(rng: &mut Stream, size: f32) -> Vec3 {
     Vec3::from([(); 3].map(|()| rng.random::<f32>())) * size
 }
 
-/// A triangle with this corner and edges of at most `size` along every axis.
+/// Draws a triangle with this corner and edges of at most `size` along every axis.
 fn around(rng: &mut Stream, corner: Vec3, size: f32) -> Triangle {
     Triangle([corner, corner + point(rng, size), corner + point(rng, size)])
 }
@@ -93,7 +94,7 @@ fn many(
     (0..n).map(|i| make(&mut rng, i)).collect()
 }
 
-/// Small triangles at uniform positions; all coordinates lie within 1 to 18.
+/// Small triangles at uniform positions. All coordinates are within 1 to 18.
 pub fn uniform(n: usize) -> Vec<Triangle> {
     many(n, 1, |rng, _| {
         let corner = point(rng, 16.0) + 1.0;
@@ -118,35 +119,35 @@ pub fn concentric(n: usize) -> Vec<Triangle> {
         .collect()
 }
 
-/// S08: boxes of sizes 1 to 9 whose centres lie on the x axis, in mixed order.
+/// S08: boxes of sizes 1 to 9 with centres on the x axis, in random order.
 pub fn collinear_centres(n: usize) -> Vec<Triangle> {
     let mut order: Vec<usize> = (0..n).collect();
     order.shuffle(&mut random(8));
-    let place = |i: usize| {
+    let mut triangles = Vec::new();
+    for i in order {
         let half = Vec3::new(1.0, (1 + i % 5) as f32, (1 + i % 9) as f32) / 2.0;
         let center = Vec3::X * (3 * i) as f32;
-        diagonal(Aabb { min: center - half, max: center + half })
-    };
-    order.into_iter().map(place).collect()
+        triangles.push(diagonal(Aabb { min: center - half, max: center + half }));
+    }
+    triangles
 }
 
 /// S09: one triangle in every cell of a square grid in a plane, row by row.
 pub fn planar_grid(n: usize) -> Vec<Triangle> {
     let side = n.isqrt().max(1);
-    let at = |i: usize| Vec3::new((i % side) as f32, (i / side) as f32, 0.0);
     (0..n)
-        .map(|i| Triangle([at(i), at(i) + Vec3::X, at(i) + Vec3::Y]))
+        .map(|i| Vec3::new((i % side) as f32, (i / side) as f32, 0.0))
+        .map(|corner| Triangle([corner, corner + Vec3::X, corner + Vec3::Y]))
         .collect()
 }
 
-/// S10: segments on the x axis, in mixed order.
+/// S10: segments on the x axis, in random order.
 pub fn on_a_line(n: usize) -> Vec<Triangle> {
     let mut order: Vec<usize> = (0..n).collect();
     order.shuffle(&mut random(10));
-    let segment = |i: usize| [0.0, 1.0, 0.5].map(|x| Vec3::X * (2.0 * i as f32 + x));
     order
         .into_iter()
-        .map(|i| Triangle(segment(i)))
+        .map(|i| Triangle([0.0, 1.0, 0.5].map(|x| Vec3::X * (2.0 * i as f32 + x))))
         .collect()
 }
 
@@ -159,15 +160,15 @@ pub fn facets(n: usize) -> Vec<Triangle> {
     })
 }
 
-/// S12 to S16: the surface of the cube from -1 to 1, six faces of equal squares, two triangles each. At least 12.
+/// S12 to S16: the surface of the cube from -1 to 1: six faces of equal squares with two triangles each,
+/// and at least 12 triangles.
 pub fn closed_box(n: usize) -> Vec<Triangle> {
     let cells = (n / 12).isqrt().max(1);
-    let at = |i: usize| 2.0 * i as f32 / cells as f32 - 1.0;
     let mut triangles = Vec::new();
     for face in 0..6 {
-        let corner = |u: usize, v: usize| {
-            let u = at(u);
-            let v = at(v);
+        let corner = |column: usize, row: usize| {
+            let u = 2.0 * column as f32 / cells as f32 - 1.0;
+            let v = 2.0 * row as f32 / cells as f32 - 1.0;
             let w = if face < 3 { -1.0 } else { 1.0 };
             [Vec3::new(w, u, v), Vec3::new(v, w, u), Vec3::new(u, v, w)][face % 3]
         };
@@ -185,11 +186,8 @@ pub fn closed_box(n: usize) -> Vec<Triangle> {
 /// S17: every second triangle has three equal, two equal or collinear corners.
 pub fn degenerate(n: usize) -> Vec<Triangle> {
     many(n, 17, |rng, i| {
-        // Eighths: multiples are exact, the corners truly collinear.
-        let mut corner = || (point(rng, 64.0)).round() / 8.0;
-        let a = corner();
-        let b = corner();
-        let c = corner();
+        // Multiples of eighths are exact, so that the corners are truly collinear.
+        let [a, b, c] = [(); 3].map(|()| point(rng, 64.0).round() / 8.0);
         match i % 6 {
             1 => Triangle([a; 3]),
             3 => Triangle([a, b, a]),
@@ -220,7 +218,7 @@ pub fn enormous(n: usize) -> Vec<Triangle> {
     triangles
 }
 
-/// S24: unit detail at offset 1e6, where it is coarse, and at 1e8, where it vanishes.
+/// S24: details of size 1 at the offset 1e6, where they are coarse, and at 1e8, where they vanish.
 pub fn far_away(n: usize) -> Vec<Triangle> {
     let mut triangles = uniform(n);
     for (i, triangle) in triangles.iter_mut().enumerate() {
@@ -230,7 +228,7 @@ pub fn far_away(n: usize) -> Vec<Triangle> {
     triangles
 }
 
-/// S25: cubes at 2^k whose sides are a quarter of that, from small to large; at most 250 objects are distinct.
+/// S25: cubes at 2^k with sides of 2^k / 4, from small to large. At most 250 objects are distinct.
 pub fn powers_of_two(n: usize) -> Vec<Triangle> {
     let low = -(n as i32) / 2;
     (0..n as i32)
@@ -249,7 +247,8 @@ pub fn sorted(n: usize) -> Vec<Triangle> {
 /// Triangles of the stadium.
 pub const STADIUM: usize = 48;
 
-/// S27: a ball of small triangles on the floor of a box a million times larger, whose triangles come first.
+/// S27: a ball of small triangles on the floor of a box that is a million times larger. The triangles of
+/// the box come first.
 pub fn teapot_in_a_stadium(n: usize) -> Vec<Triangle> {
     let mut triangles = closed_box(STADIUM);
     // The ball is at the origin, where it keeps its detail, and not at the middle of the floor.
@@ -259,14 +258,14 @@ pub fn teapot_in_a_stadium(n: usize) -> Vec<Triangle> {
         .flat_map(|t| &mut t.0)
         .for_each(|p| *p = (*p + move_to) * 5e5);
     triangles.extend(many(n.saturating_sub(STADIUM), 27, |rng, _| {
-        let at = (point(rng, 2.0) - 1.0).normalize_or(Vec3::X) * 0.5 + Vec3::Z * 0.5;
-        around(rng, at, 0.05)
+        let corner = (point(rng, 2.0) - 1.0).normalize_or(Vec3::X) * 0.5 + Vec3::Z * 0.5;
+        around(rng, corner, 0.05)
     }));
     triangles.truncate(n);
     triangles
 }
 
-/// S28: one triangle over all the others.
+/// S28: one triangle over all other triangles.
 pub fn giant_over_small(n: usize) -> Vec<Triangle> {
     let mut triangles = uniform(n);
     if let Some(first) = triangles.first_mut() {
@@ -275,7 +274,7 @@ pub fn giant_over_small(n: usize) -> Vec<Triangle> {
     triangles
 }
 
-/// S29: triangles a million times as long as wide, in all directions.
+/// S29: triangles in all directions whose length is a million times their width.
 pub fn slivers(n: usize) -> Vec<Triangle> {
     many(n, 29, |rng, _| {
         let a = point(rng, 100.0);
@@ -290,7 +289,7 @@ pub fn slivers(n: usize) -> Vec<Triangle> {
     })
 }
 
-/// S30: triangles whose corners lie anywhere in the scene, so that most overlap.
+/// S30: triangles with corners anywhere in the scene, so that most triangles overlap.
 pub fn overlapping(n: usize) -> Vec<Triangle> {
     many(n, 30, |rng, _| Triangle([(); 3].map(|()| point(rng, 16.0))))
 }
@@ -304,8 +303,8 @@ pub fn two_densities(n: usize) -> Vec<Triangle> {
     })
 }
 
-/// S32: every second box is the reflection of the one before it in the origin. No two have the same centre along any
-/// axis.
+/// S32: every second box is the reflection of the previous box in the origin. No two boxes have the same
+/// centre along any axis.
 pub fn symmetric(n: usize) -> Vec<Triangle> {
     let half = uniform(n.div_ceil(2));
     let all = half

@@ -20,7 +20,7 @@ pub struct Film {
 }
 
 impl Film {
-    /// Assembles tiles, of which each row has `columns`.
+    /// Assembles tiles in rows of `columns`.
     pub fn of_tiles(width: u32, tiles: &[Self], columns: usize) -> Self {
         let mut film = Self { width, ..Self::default() };
         for row in tiles.chunks(columns) {

@@ -56,7 +56,7 @@ pub fn range(film: &Film, rays_per_pixel: u32) -> Range {
 /// Returns the pixels of a film's heat map and of the key below it.
 pub fn map(film: &Film, rays_per_pixel: u32) -> Result<Vec<[u8; 3]>, BadFont> {
     let range = range(film, rays_per_pixel);
-    // A picture without tests has the top 0, by which nothing can be divided.
+    // A picture without tests has the top 0, and its colours would be 0 / 0.
     let top = range.top.max(f64::MIN_POSITIVE) * f64::from(rays_per_pixel);
     let mut pixels: Vec<[u8; 3]> = film
         .tests

@@ -1,9 +1,9 @@
 //! Stand-in for bijou: a ring with a brilliant-cut stone, shoulders of small stones, and a chain.
 //!
-//! Every stone is a whole standard brilliant (table, stars, bezels, girdle, pavilion), whatever its
-//! size, beside a smooth shank, prongs and beads, on a cushion of a few large polygons; the ring
-//! leans against the axes. World units are chosen so that the greedy MF tree costs about 1.7e7, as
-//! the original's did.
+//! Every stone of any size is a complete standard brilliant (table, stars, bezels, girdle, pavilion).
+//! The shank, prongs and beads are smooth, and the cushion has a few large polygons. The ring leans
+//! against the axes. World units are chosen so that the greedy MF tree costs about 1.7e7, like the
+//! original's.
 
 use super::mesh_builder::{
     MeshBuilder, about_x, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright,
@@ -17,7 +17,7 @@ const UNIT: f64 = 118.0;
 /// Half the side of the cushion, in inner radii of the shank.
 const CUSHION: f64 = 2.6;
 
-/// The triangles of the scene; the same bytes at every call and on every machine.
+/// Generates the triangles of the scene. Every call gives the same bytes on every machine.
 pub fn triangles() -> Vec<Triangle> {
     let mut scene = MeshBuilder::default();
     let lean = about_z(0.09) * about_x(0.045) * about_y(-0.03);
@@ -27,7 +27,7 @@ pub fn triangles() -> Vec<Triangle> {
     for (x, y, size, turns) in
         [(2.1, -1.6, 0.22, 0.02), (0.4, -0.9, 0.17, 0.11), (-0.7, 1.0, 0.26, 0.07)]
     {
-        // Loose stones lie on their pavilion: girdle and culet touch the cushion.
+        // Loose stones rest on their pavilion: girdle and culet touch the cushion.
         let tilted = about_z(turns * 5.0) * about_y(0.39) * about_z(turns);
         scene.place(
             &brilliant(),
@@ -71,7 +71,7 @@ fn ring() -> MeshBuilder {
     let head = 1.62;
     ring.place(&stone, &placed(about_z(0.013) * 0.52, DVec3::Z * head));
 
-    // The setting: two gallery rails, a halo plate, six prongs bent over the girdle.
+    // The setting has two gallery rails, a halo plate, and six prongs bent over the girdle.
     for (radius, z, thickness) in [(0.3, 1.22, 0.035), (0.46, 1.47, 0.04)] {
         ring.place(&torus(radius, thickness, 40, 7), &upright(0.0, 0.0, 0.0, z));
     }
@@ -97,10 +97,9 @@ fn ring() -> MeshBuilder {
     // Halo stones in a circle, then pavé rows over both shoulders, beads between neighbours.
     let bead = bead();
     for k in 0..24 {
-        let at = |turns: f64, z: f64| upright(turns, 0.0, 0.0, 0.0) * upright(0.0, 0.65, 0.0, z);
-        ring.place(&stone, &(at(fraction(k, 24), 1.58) * small(0.076)));
+        ring.place(&stone, &(on_halo(fraction(k, 24), 1.58) * small(0.076)));
         for (shift, radial) in [(0.5, 0.075), (0.5, -0.075)] {
-            let between = at((k as f64 + shift) / 24.0, 1.55);
+            let between = on_halo((k as f64 + shift) / 24.0, 1.55);
             ring.place(&bead, &(between * upright(0.0, radial, 0.0, 0.0) * small(0.024)));
         }
     }
@@ -111,10 +110,6 @@ fn ring() -> MeshBuilder {
             let i = k % 17;
             let away = half * (0.082 + 0.0105 * i as f64 + 0.002 * row);
             let size = 0.042 - 0.0009 * i as f64;
-            let seat = |away: f64, across: f64| {
-                placed(about_y(away), DVec3::ZERO)
-                    * placed(DMat3::IDENTITY, DVec3::new(0.0, across, surface(away, across)))
-            };
             let lean = placed(about_x(-0.035 * row), DVec3::ZERO);
             ring.place(&stone, &(seat(away, 0.105 * row) * lean * small(size)));
             for (along, across) in [(-0.0053, 0.052), (0.0053, -0.052)] {
@@ -123,6 +118,17 @@ fn ring() -> MeshBuilder {
         }
     }
     ring
+}
+
+/// Returns the placement on the circle of the halo, `turns` around the stone.
+fn on_halo(turns: f64, z: f64) -> DAffine3 {
+    upright(turns, 0.0, 0.0, 0.0) * upright(0.0, 0.65, 0.0, z)
+}
+
+/// Returns the placement on the outer surface of the shank.
+fn seat(away: f64, across: f64) -> DAffine3 {
+    placed(about_y(away), DVec3::ZERO)
+        * placed(DMat3::IDENTITY, DVec3::new(0.0, across, surface(away, across)))
 }
 
 /// Half the width of the shank, `away` turns from the head.
@@ -143,7 +149,7 @@ fn shank(mesh: &mut MeshBuilder) {
     let dome = 9;
     let steps = 72;
     mesh.grid(dome + 2, steps, |i, j| {
-        // A cubic spacing of the steps: most of them near the head, where the shoulders are.
+        // The cubic spacing puts most of the steps near the head, where the shoulders are.
         let s = 2.0 * fraction(j, steps) - 1.0;
         let away = 0.5 * s * (0.45 + 0.55 * s * s);
         let width = half_width(away);
@@ -159,7 +165,7 @@ fn shank(mesh: &mut MeshBuilder) {
     });
 }
 
-/// The placement that shrinks a part to `size`.
+/// Returns the placement that shrinks a part to `size`.
 fn small(size: f64) -> DAffine3 {
     DAffine3::from_scale(DVec3::splat(size))
 }
@@ -186,14 +192,10 @@ fn torus(radius: f64, thickness: f64, segments: usize, sides: usize) -> MeshBuil
 fn chain(links: usize) -> MeshBuilder {
     let mut chain = MeshBuilder::default();
     let link = torus(0.06, 0.016, 12, 6);
-    let at = |t: f64| {
-        let spot = on_circle(1.75 + 0.22 * cos_sin(2.5 * t).0, 0.55 + 0.8 * t, 0.0);
-        spot.with_z(padding(spot.x, spot.y) + 0.05)
-    };
     for k in 0..links {
-        let before = at(fraction(k, links));
-        let here = at(fraction(2 * k + 1, 2 * links));
-        let after = at(fraction(k + 1, links));
+        let before = on_wave(fraction(k, links));
+        let here = on_wave(fraction(2 * k + 1, 2 * links));
+        let after = on_wave(fraction(k + 1, links));
         let along = (after - before).normalize();
         let across = DVec3::Z.cross(along).normalize();
         let heading = DMat3::from_cols(along, across, along.cross(across));
@@ -202,6 +204,12 @@ fn chain(links: usize) -> MeshBuilder {
         chain.place(&link, &placed(heading * about_x(roll) * stretch, here));
     }
     chain
+}
+
+/// Returns a point of the chain, `t` from its start to its end in 0..=1.
+fn on_wave(t: f64) -> DVec3 {
+    let point = on_circle(1.75 + 0.22 * cos_sin(2.5 * t).0, 0.55 + 0.8 * t, 0.0);
+    point.with_z(padding(point.x, point.y) + 0.05)
 }
 
 /// A padded top over a plain box.

@@ -3,8 +3,8 @@
 //! Twin columns with base, leaved capital and abacus carry moulded round arches; behind them groin
 //! vaults with ribs; outside, walls of a few large polygons. Shafts, ribs and tiles are long and
 //! thin. Nothing is irregular, but the walks differ in length, columns stand turned, and the gate,
-//! the well and the garden lie oblique. World units are chosen so that the greedy MF tree costs
-//! about 1.8e9, as the original's did.
+//! the well and the garden are oblique. World units are chosen so that the greedy MF tree costs
+//! about 1.8e9, like the original's.
 
 use super::mesh_builder::{
     MeshBuilder, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright,
@@ -24,10 +24,10 @@ const SPRING: f64 = 3.0;
 /// Height of wall plate and eaves, metres.
 const EAVES: f64 = 5.4;
 
-/// The triangles of the scene; the same bytes at every call and on every machine.
+/// Generates the triangles of the scene. Every call gives the same bytes on every machine.
 pub fn triangles() -> Vec<Triangle> {
     let mut cloister = MeshBuilder::default();
-    // Court sides in bays: long walks along x, short ones along y.
+    // The court's sides in bays: the long walks run along x, the short ones along y.
     let long = 9;
     let short = 7;
     let half = DVec3::new(long as f64, short as f64, 0.0) * (0.5 * BAY);
@@ -71,9 +71,6 @@ impl Parts {
 /// One column on z = 0, 2.3 m high.
 fn column() -> MeshBuilder {
     let mut column = MeshBuilder::default();
-    let square = |mesh: &mut MeshBuilder, half: f64, low: f64, high: f64| {
-        mesh.cuboid(DVec3::new(-half, -half, low), DVec3::new(half, half, high));
-    };
     square(&mut column, 0.17, 0.0, 0.12);
     // Attic base: torus, scotia, torus; then one long quad per side of the shaft, a necking, and
     // the bell.
@@ -110,6 +107,11 @@ fn column() -> MeshBuilder {
     column
 }
 
+/// Adds a square plate of this half width around the z axis.
+fn square(mesh: &mut MeshBuilder, half: f64, low: f64, high: f64) {
+    mesh.cuboid(DVec3::new(-half, -half, low), DVec3::new(half, half, high));
+}
+
 /// The arch over one bay with its moulding on both faces; springs at z = 0, centred on x = 0.
 fn arcade_arch() -> MeshBuilder {
     let mut arch = MeshBuilder::default();
@@ -133,12 +135,11 @@ fn arcade_arch() -> MeshBuilder {
 fn vault() -> MeshBuilder {
     let mut vault = MeshBuilder::default();
     let half = 0.5 * BAY;
-    let crown = |t: f64| cos_sin(0.25 * t);
     for k in 0..4 {
         // One web: from the groin (|y| = x) to the wall arch at x = half, courses parallel to y.
         let mut web = MeshBuilder::default();
         web.grid(6, 6, |i, j| {
-            let (c, s) = crown(fraction(j, 6));
+            let (c, s) = cos_sin(0.25 * fraction(j, 6));
             let reach = half * c;
             let y = (2.0 * fraction(i, 6) - 1.0) * reach;
             DVec3::new(reach, y, half * s)
@@ -180,7 +181,7 @@ fn walk(parts: &Parts, bays: usize) -> MeshBuilder {
     );
     for bay in 0..=bays {
         let x = start + BAY * bay as f64;
-        // Bays run on into the corner, where the vault is shared and no arch stands.
+        // Bays continue into the corner, which has a shared vault and no arch.
         let middle = x + 0.5 * BAY;
         walk.place(&parts.vault, &upright(0.0, middle, -0.5 * BAY - 0.1, SPRING));
         if bay < bays {
@@ -192,24 +193,30 @@ fn walk(parts: &Parts, bays: usize) -> MeshBuilder {
         }
         paving(&mut walk, x, bay);
     }
-    let bed = |x: f64, y: f64| DVec3::new(x, y, -0.02);
     let outer = end - back;
-    walk.quad(bed(start, 0.0), bed(end, 0.0), bed(outer, back), bed(-outer, back));
-    // The back wall: three polygons with a doorway between them, closed above by its arch.
+    let bed = [(start, 0.0), (end, 0.0), (outer, back), (-outer, back)];
+    let [a, b, c, d] = bed.map(|(x, y)| DVec3::new(x, y, -0.02));
+    walk.quad(a, b, c, d);
+    // The back wall has three polygons around a doorway, whose arch closes it above.
     let door = start + BAY * (0.5 + (bays / 2) as f64);
-    let upright_quad = |mesh: &mut MeshBuilder, from: f64, to: f64, low: f64, high: f64| {
-        let at = |x: f64, z: f64| DVec3::new(x, back, z);
-        mesh.quad(at(from, low), at(to, low), at(to, high), at(from, high));
-    };
-    upright_quad(&mut walk, -outer, door - 1.0, 0.0, 6.9);
-    upright_quad(&mut walk, door + 1.0, outer, 0.0, 6.9);
-    upright_quad(&mut walk, door - 1.0, door + 1.0, 4.2, 6.9);
+    for (from, to, low, high) in [
+        (-outer, door - 1.0, 0.0, 6.9),
+        (door + 1.0, outer, 0.0, 6.9),
+        (door - 1.0, door + 1.0, 4.2, 6.9),
+    ] {
+        walk.quad(
+            DVec3::new(from, back, low),
+            DVec3::new(to, back, low),
+            DVec3::new(to, back, high),
+            DVec3::new(from, back, high),
+        );
+    }
     let mut doorway = MeshBuilder::default();
     doorway.arch(0.8, 1.0, 1.7, 0.4, 18);
     for x in [-1.0, 0.8] {
         doorway.cuboid(DVec3::new(x, -0.2, -2.5), DVec3::new(x + 0.2, 0.2, 0.0));
     }
-    // The door leaf stands ajar.
+    // The door leaf is ajar.
     let mut leaf = MeshBuilder::default();
     leaf.cuboid(DVec3::ZERO, DVec3::new(1.5, 0.06, 2.4));
     for z in [0.4, 1.2, 2.0] {

@@ -1,9 +1,9 @@
 //! Stand-in for escher: staircases that interlock under three directions of gravity.
 //!
-//! After the print 'Relativity'. Each gravity has its own flights, landings, arcade and balustrades in one room; the
-//! flights differ in length, place and bearing, so that no symmetry of the axes decides a split. Walls and
-//! floors are a few large polygons. World units are chosen so that the greedy MF tree costs about
-//! 4.8e5, as the original's did.
+//! The model is the print 'Relativity'. Each gravity has its own flights, landings, arcade and
+//! balustrades in one room. The flights differ in length, place and bearing, so that no symmetry of the
+//! axes decides a split. Walls and floors are a few large polygons. World units are chosen so that the
+//! greedy MF tree costs about 4.8e5, like the original's.
 
 use super::mesh_builder::{
     MeshBuilder, about_z, circle, cos_sin, fraction, on_circle, placed, upright,
@@ -20,10 +20,10 @@ const RAIL: f64 = 2.6;
 /// Side of the room, in tread depths.
 const ROOM: f64 = 30.0;
 
-/// The triangles of the scene; the same bytes at every call and on every machine.
+/// Generates the triangles of the scene. Every call gives the same bytes on every machine.
 pub fn triangles() -> Vec<Triangle> {
     let mut room = MeshBuilder::default();
-    // Cyclic changes of the axes: each column set sends 'up' to another axis.
+    // Each cyclic permutation of the axes sends 'up' to a different axis.
     let gravities = [
         DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::Z),
         DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X),
@@ -68,7 +68,7 @@ pub fn triangles() -> Vec<Triangle> {
     room.finish(UNIT, DVec3::ZERO)
 }
 
-/// What distinguishes one gravity's staircases from the other two.
+/// The parameters of one gravity's staircases.
 struct Plan {
     first: usize,
     second: usize,
@@ -85,8 +85,8 @@ fn storey(plan: &Plan) -> MeshBuilder {
     let mut storey = MeshBuilder::default();
     storey.grid(3, 2, |i, j| DVec3::new(fraction(i, 3), fraction(j, 2), 0.0) * ROOM);
 
-    // First flight along x to a landing, second along y to a gallery, third down at an angle of its
-    // own.
+    // The first flight leads along x to a landing, the second along y to a gallery, and the third down
+    // at an oblique angle.
     let width = plan.width;
     let deep = plan.width + 1.0;
     let low = plan.first as f64 * RISE;
@@ -104,7 +104,7 @@ fn storey(plan: &Plan) -> MeshBuilder {
     let bearing = 0.5 + plan.oblique;
     let down = high - 8.0 * RISE;
     let (c, s) = cos_sin(bearing);
-    // The descending flight is an ascending one seen from its foot.
+    // The descending flight is an ascending flight that begins at its foot.
     let foot = DVec3::new(turn + 8.0 * c, gallery + 8.0 * s + width, down);
     storey.place(
         &flight(8, width, plan.climbs_beneath),

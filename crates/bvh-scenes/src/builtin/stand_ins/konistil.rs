@@ -1,8 +1,8 @@
 //! Stand-in for konistil: a valley with town and railway, in millimetres on a map grid.
 //!
-//! Coordinates run into the millions, costs to 1e14, beside parts a few tens of units thick: rails,
-//! wires and lattice masts are long and thin; the terrain is one coarse sheet, fine only where the
-//! town stands. Ground, houses and trees are irregular by a small seeded jitter.
+//! Coordinates run into the millions and costs to 1e14, although some parts are only a few tens of
+//! units thick: rails, wires and lattice masts are long and thin. The terrain is one coarse sheet that
+//! is fine only under the town. Ground, houses and trees are irregular by a small seeded jitter.
 
 use super::mesh_builder::{
     MeshBuilder, about_z, circle, cos_sin, fraction, jitter, placed, upright,
@@ -21,7 +21,7 @@ const CELLS: (usize, usize) = (36, 27);
 /// Height of the railway, metres.
 const TRACK: f64 = 78.0;
 
-/// The triangles of the scene; the same bytes at every call and on every machine.
+/// Generates the triangles of the scene. Every call gives the same bytes on every machine.
 pub fn triangles() -> Vec<Triangle> {
     let mut valley = MeshBuilder::default();
     terrain(&mut valley);
@@ -42,7 +42,7 @@ fn ground(x: f64, y: f64) -> f64 {
     for (octave, cell) in [400.0, 130.0, 45.0].into_iter().enumerate() {
         noise += 0.055 * cell * value_noise(octave as u32, x / cell, y / cell);
     }
-    // Level ground around station and town.
+    // The ground around station and town is level.
     let dx = (x - 1500.0) / 700.0;
     let dy = (y - course(x) - 190.0) / 260.0;
     let wild = 1.0 - 0.85 / (1.0 + dx * dx * dx * dx + dy * dy * dy * dy);
@@ -53,13 +53,18 @@ fn ground(x: f64, y: f64) -> f64 {
 fn value_noise(stream: u32, x: f64, y: f64) -> f64 {
     let i = x.floor();
     let j = y.floor();
-    let ease = |t: f64| t * t * (3.0 - 2.0 * t);
     let u = ease(x - i);
     let v = ease(y - j);
-    let at = |a: f64, b: f64| jitter(stream, ((i + a + 64.0) * 512.0 + j + b + 64.0) as usize);
-    let low = at(0.0, 0.0) * (1.0 - u) + at(1.0, 0.0) * u;
-    let high = at(0.0, 1.0) * (1.0 - u) + at(1.0, 1.0) * u;
+    // The offset keeps the index of the jitter positive.
+    let value = |a: f64, b: f64| jitter(stream, ((i + a + 64.0) * 512.0 + j + b + 64.0) as usize);
+    let low = value(0.0, 0.0) * (1.0 - u) + value(1.0, 0.0) * u;
+    let high = value(0.0, 1.0) * (1.0 - u) + value(1.0, 1.0) * u;
     low * (1.0 - v) + high * v
+}
+
+/// Returns the cubic ease of `t` in 0..=1, whose slope is 0 at both ends.
+fn ease(t: f64) -> f64 {
+    t * t * (3.0 - 2.0 * t)
 }
 
 /// The line that valley and railway follow: y in metres at x, oblique to the map and slightly
@@ -242,7 +247,7 @@ fn house(length: f64, width: f64, wall: f64, gable: f64) -> MeshBuilder {
             at(end, 0.0, wall + gable),
             at(end, -y, wall),
         ]);
-        // The roof overhangs on all sides.
+        // The roof overhangs the walls on all sides.
         let eaves = wall - 0.7 * gable / y;
         house.quad(
             at(-x - 0.5, side * (y + 0.7), eaves),
@@ -318,7 +323,7 @@ fn power_line(mesh: &mut MeshBuilder) {
         DVec3::new(x, y, ground(x, y))
     };
     let mast = mast();
-    // The arms stand across the line.
+    // The arms point across the line.
     let along = (foot(1) - foot(0)).with_z(0.0).normalize();
     let across = DMat3::from_cols(DVec3::Z.cross(along), -along, DVec3::Z);
     for k in 0..masts {
@@ -371,10 +376,14 @@ fn mast() -> MeshBuilder {
 /// Firs on the slopes: a pyramid on a thin trunk.
 fn forest(mesh: &mut MeshBuilder) {
     for k in 0..520 {
-        // Low-discrepancy spots (plastic number), left out where town and railway are.
-        let unit = |step: f64| (0.5 + step * k as f64) - (0.5 + step * k as f64).floor();
-        let x = SIZE.0 * unit(0.754_877_666_246_692_8);
-        let y = SIZE.1 * unit(0.569_840_290_998_053_2);
+        // The recurrence of the plastic number spreads the trees evenly.
+        let [u, v] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2].map(|step| {
+            let place = 0.5 + step * k as f64;
+            place - place.floor()
+        });
+        let x = SIZE.0 * u;
+        let y = SIZE.1 * v;
+        // No tree grows on the town and on the railway.
         let aside = y - course(x);
         if (-120.0..420.0).contains(&aside) {
             continue;

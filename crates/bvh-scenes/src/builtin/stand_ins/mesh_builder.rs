@@ -1,4 +1,4 @@
-//! Turns surfaces, swept profiles and placed copies into triangles, for the mesh stand-ins.
+//! Makes triangles from surfaces, swept profiles and placed copies, for the mesh stand-ins.
 //!
 //! All coordinates are f64 until [`MeshBuilder::finish`] rounds each of them to f32 once. Angles are in
 //! turns, so that quarter turns are exact; sine and cosine come from `libm`, so that every machine
@@ -85,15 +85,20 @@ impl MeshBuilder {
 
     /// Adds the 12 triangles of a box parallel to the axes.
     pub fn cuboid(&mut self, min: DVec3, max: DVec3) {
-        let at = |i: usize| {
-            let pick =
-                |bit: usize, low: f64, high: f64| if (i >> bit) & 1 == 0 { low } else { high };
-            DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z))
-        };
+        // The bits of a corner's number choose its side along each axis.
         let sides =
             [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        for [a, b, c, d] in sides {
-            self.quad(at(a), at(b), at(c), at(d));
+        for side in sides {
+            let [a, b, c, d] = side.map(|number| {
+                DVec3::from(
+                    [0, 1, 2].map(
+                        |axis| {
+                            if number >> axis & 1 == 0 { min[axis] } else { max[axis] }
+                        },
+                    ),
+                )
+            });
+            self.quad(a, b, c, d);
         }
     }
 
@@ -132,30 +137,27 @@ impl MeshBuilder {
 
     /// Adds a copy of `part`, moved by `placement`.
     pub fn place(&mut self, part: &MeshBuilder, placement: &DAffine3) {
-        let moved = |corner: DVec3| placement.transform_point3(corner);
-        self.triangles.extend(
-            part.triangles
-                .iter()
-                .map(|triangle| triangle.map(moved)),
-        );
+        for corners in &part.triangles {
+            let moved = corners.map(|corner| placement.transform_point3(corner));
+            self.triangles.push(moved);
+        }
     }
 
-    /// Multiplies by `unit`, adds `origin`, rounds to f32 and drops the triangles without area (a quadrilateral at a
-    /// pole gives one).
+    /// Multiplies by `unit`, adds `origin`, rounds to f32, and drops triangles without area, which
+    /// quadrilaterals at a pole give.
     pub fn finish(self, unit: f64, origin: DVec3) -> Vec<Triangle> {
-        let rounded = |corner: DVec3| (corner * unit + origin).as_vec3();
-        let triangles = self
-            .triangles
+        self.triangles
             .into_iter()
-            .map(|corners| Triangle(corners.map(rounded)));
-        triangles
+            .map(|corners| corners.map(|corner| (corner * unit + origin).as_vec3()))
+            .map(Triangle)
             .filter(|triangle| !triangle.is_degenerate())
             .collect()
     }
 }
 
-/// Cosine and sine of an angle in turns; exact at multiples of a quarter turn.
+/// Returns cosine and sine of an angle in turns, which are exact at multiples of a quarter turn.
 pub fn cos_sin(turns: f64) -> (f64, f64) {
+    // Reduction to the first quarter leaves 0 there, of which both functions are exact.
     let within = turns - turns.floor();
     let quarters = (within * 4.0).floor();
     let rest = (within - quarters * 0.25) * std::f64::consts::TAU;
@@ -233,7 +235,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quarter_turns_are_exact_and_other_angles_lie_on_the_unit_circle() {
+    fn quarter_turns_are_exact_and_other_angles_are_on_the_unit_circle() {
         assert_eq!(
             [0.0, 0.25, 0.5, -0.25].map(cos_sin),
             [(1.0, 0.0), (-0.0, 1.0), (-1.0, -0.0), (0.0, -1.0)]
@@ -244,16 +246,17 @@ mod tests {
         }
     }
 
+    fn volume(mesh: &MeshBuilder) -> f64 {
+        let six: f64 = mesh
+            .triangles
+            .iter()
+            .map(|[a, b, c]| a.cross(*b).dot(*c))
+            .sum();
+        (six / 6.0).abs()
+    }
+
     #[test]
     fn a_cuboid_and_a_closed_sweep_enclose_their_volume() {
-        let volume = |mesh: &MeshBuilder| {
-            let six: f64 = mesh
-                .triangles
-                .iter()
-                .map(|[a, b, c]| a.cross(*b).dot(*c))
-                .sum();
-            (six / 6.0).abs()
-        };
         let mut cuboid = MeshBuilder::default();
         cuboid.cuboid(DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0));
         assert_eq!(volume(&cuboid), 6.0);
@@ -263,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn triangles_without_area_are_left_out() {
+    fn triangles_without_area_are_dropped() {
         let mut cone = MeshBuilder::default();
         cone.revolve(&[(1.0, 0.0), (0.0, 1.0)], 9);
         assert_eq!(cone.triangles.len(), 18);

@@ -18,7 +18,7 @@ const GOLDEN: f64 = 0.381_966_011_250_105_1;
 const SCALES: usize = 122;
 const SUB_SCALES: usize = 6;
 
-/// The triangles of the scene; the same bytes at every call and on every machine.
+/// Generates the triangles of the scene. Every call gives the same bytes on every machine.
 pub fn triangles() -> Vec<Triangle> {
     let mut cone = MeshBuilder::default();
     let core = [0.0, 0.0, 0.25, 0.5, 0.75, 1.0].map(|t| (0.6 * belly(t), 0.97 * t));
@@ -35,7 +35,7 @@ pub fn triangles() -> Vec<Triangle> {
     cone.sweep(&stem, DVec3::Y, &circle(0.035, 8), |k| 1.0 - 0.07 * k as f64);
 
     for i in 0..SCALES {
-        // More scales per height towards the tip, where they are smaller.
+        // Scales are denser towards the tip, where they are smaller.
         let t = libm::pow(fraction(2 * i + 1, 2 * SCALES), 0.9);
         let size = 0.06 + 0.17 * belly(t) / 0.31 + 0.008 * jitter(1, i);
         let opening = 0.13 - 0.09 * t + 0.012 * jitter(2, i);
