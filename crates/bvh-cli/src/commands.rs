@@ -14,6 +14,7 @@ pub fn completions(shell: Shell, command: &mut Command) -> Vec<u8> {
 pub fn manual(command: Command) -> std::io::Result<Vec<u8>> {
     let mut page = Vec::new();
     clap_mangen::Man::new(command.clone()).render(&mut page)?;
+    // A hidden command is not documented anywhere.
     for part in command
         .get_subcommands()
         .filter(|part| !part.is_hide_set())

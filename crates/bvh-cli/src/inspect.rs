@@ -79,6 +79,7 @@ impl Serialize for Facts {
 /// Inspects a file, and prints each fact as a line `name: value`, or all as JSON. Rejects a damaged
 /// file, and a file for a different scene.
 pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
+    // A wrong path is reported before the scene is loaded, which may take long.
     if let Some(nodes) = &args.nodes {
         output_file("--nodes", nodes, &NODES)?;
     }

@@ -47,6 +47,7 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(answer) => return answered(&answer),
     };
+    // Signals are heard before any work begins.
     interrupt::listen("error: interrupted");
     match run(cli.command) {
         Ok(()) => succeeded(),

@@ -17,6 +17,7 @@ pub fn scenes() -> Result<(), Error> {
         table += &line(name, &count.to_string(), "procedural", origin);
     }
     for (name, package) in FETCHED {
+        // The size of a scene is known only after it has been fetched.
         let objects = match fetched_path(name) {
             Some(_) => Scene::load(name)?.boxes.len().to_string(),
             None => "not fetched".into(),

@@ -157,6 +157,7 @@ fn a_missing_folder_is_named_before_the_work() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     said(at, &["bake", "spheres75", "--budget=0s", "--out=tree.bvh"]);
+    // The work would take so long that the test would time out.
     for args in [
         &["bake", "spheres75", "--budget=1h", "--out=no/x.bvh"][..],
         &["render", "spheres7500", "--accel=brute", "--size=10000x10000", "--out=no/x.png"],

@@ -17,6 +17,7 @@ pub struct Jobs {
 impl Jobs {
     /// Limits the program to this number of threads. Call it once.
     pub fn apply(self) -> Result<(), Error> {
+        // By default rayon starts one thread per processor when it is first used.
         let Some(jobs) = self.jobs else { return Ok(()) };
         rayon::ThreadPoolBuilder::new()
             .num_threads(jobs.into())
@@ -94,6 +95,7 @@ pub fn output_folder(flag: &str, path: &Path) -> Result<(), Error> {
     if path.as_os_str().is_empty() {
         return reject(flag, path, "empty", "the path of a folder");
     }
+    // The nearest existing ancestor decides whether the rest of the path can be created.
     match path.ancestors().find(|above| above.exists()) {
         Some(above) if !above.is_dir() => reject(flag, above, "a file", "the path of a folder"),
         _ => Ok(()),

@@ -43,6 +43,7 @@ pub fn succeeded() -> ExitCode {
 pub fn answered(answer: &clap::Error) -> ExitCode {
     const USAGE: u8 = 2;
     let text = answer.render().to_string();
+    // Help and version are results and go to standard output.
     if answer.use_stderr() {
         print_error(text.trim_end());
         return ExitCode::from(USAGE);

@@ -58,7 +58,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         .chain([&top])
         .map(|scene| scene.boxes.len())
         .sum();
-    // The top tree's objects are boxes, which cannot be divided, and it has no wide layout of its own.
+    // The top tree's objects are boxes, which cannot be divided, and no wide layout is made of it.
     let plan_of_top = Plan { references: 1.0, objective: Objective::InternalArea, ..plan.clone() };
     let names = parts
         .meshes

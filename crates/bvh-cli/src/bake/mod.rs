@@ -169,6 +169,7 @@ impl BakeArgs {
 /// Searches until the budget is spent or `interrupted` becomes true, writes the best tree, and prints
 /// its cost. An interrupted bake writes the file as well, and returns [`Error::Stopped`].
 pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+    // Wrong paths are reported before the scene is loaded, which may take long.
     if let Some(from) = &args.from {
         input_file("--from", from)?;
     }

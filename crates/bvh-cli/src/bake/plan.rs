@@ -106,6 +106,7 @@ impl Bake<'_> {
             known: Some(&self.greedy),
             ..Problem::new(&self.scene.boxes)
         };
+        // Gains are relative to the greedy tree, by the cost that the search minimises.
         let base = problem.cost(&self.greedy);
         let watch = Watch::new(self.plan.effort, self.deadline, base, interrupted);
         let outcome = self.outcome(&problem, &watch, interrupted);
