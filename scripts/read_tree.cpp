@@ -1,5 +1,5 @@
-// Prints the facts about a tree file on a little-endian machine. The documentation of bvh_core::file
-// describes the format.
+// Prints the facts about a tree file on a little-endian machine. The documentation of
+// bvh_core::file describes the format.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Prints the facts about a tree file, or its nodes with --nodes. The documentation of bvh_core::file
-describes the format."""
+"""Prints the facts about a tree file, or its nodes with --nodes. The documentation of
+bvh_core::file describes the format."""
 import struct
 import sys
 import zlib

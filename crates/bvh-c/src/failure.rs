@@ -1,5 +1,5 @@
-//! Failures: a function returns a status or null, and keeps a message for the calling thread. Panics become
-//! failures as well.
+//! Failures: a function returns a status or null, and keeps a message for the calling thread.
+//! Panics become failures as well.
 
 use bvh_files::WriteError;
 use bvh_files::tree_file::TreeFileError;
@@ -56,8 +56,8 @@ thread_local! {
     static LAST: RefCell<CString> = RefCell::default();
 }
 
-/// Returns the message of the last failed call of this thread, or an empty string if none has failed. The
-/// string is valid until another call of this thread fails.
+/// Returns the message of the last failed call of this thread, or an empty string if none has
+/// failed. The string is valid until another call of this thread fails.
 #[unsafe(no_mangle)]
 pub extern "C" fn bvh_last_error() -> *const c_char {
     LAST.with_borrow(|message| message.as_ptr())
@@ -65,7 +65,8 @@ pub extern "C" fn bvh_last_error() -> *const c_char {
 
 /// Runs the action, and keeps the message of a failure.
 fn attempt<T>(action: impl FnOnce() -> Result<T, Failure>) -> Result<T, BvhStatus> {
-    // The action is unwind safe: trees are replaced as a whole, so that a panic leaves the old tree.
+    // The action is unwind safe: trees are replaced as a whole, so that a panic leaves the old
+    // tree.
     let result = catch_unwind(AssertUnwindSafe(action)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<&str>().copied();
         let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
@@ -142,8 +143,8 @@ pub(crate) unsafe fn slice<'a, T>(
         return Ok(&[]);
     }
     check(name, first, count)?;
-    // SAFETY: `first` is aligned and points to `count` elements that nobody changes meanwhile, and their
-    // size fits into `isize`.
+    // SAFETY: `first` is aligned and points to `count` elements that nobody changes meanwhile, and
+    // their size fits into `isize`.
     Ok(unsafe { std::slice::from_raw_parts(first, count) })
 }
 
@@ -160,7 +161,8 @@ pub(crate) unsafe fn slice_mut<'a, T>(
         return Ok(&mut []);
     }
     check(name, first, count)?;
-    // SAFETY: `first` is aligned and points to `count` elements that nobody else uses meanwhile, and their
-    // size fits into `isize`. The elements are plain numbers, so that any bytes are valid.
+    // SAFETY: `first` is aligned and points to `count` elements that nobody else uses meanwhile,
+    // and their size fits into `isize`. The elements are plain numbers, so that any bytes are
+    // valid.
     Ok(unsafe { std::slice::from_raw_parts_mut(first, count) })
 }

@@ -1,4 +1,5 @@
-//! Wrong arguments from C are rejected by name, and the results of right ones agree with the Rust crates.
+//! Wrong arguments from C are rejected by name, and the results of right ones agree with the Rust
+//! crates.
 
 use crate::failure::{BvhStatus, bvh_last_error, status};
 use crate::{tracer::*, tree::*};
@@ -16,7 +17,8 @@ fn corners(count: usize) -> Vec<f32> {
 }
 
 fn last_error() -> String {
-    // SAFETY: the message ends with a zero, and no call of this thread fails before the copy is made.
+    // SAFETY: the message ends with a zero, and no call of this thread fails before the copy is
+    // made.
     let message = unsafe { CStr::from_ptr(bvh_last_error()) };
     message.to_str().unwrap().to_owned()
 }
@@ -45,8 +47,8 @@ fn trees_and_hits_equal_the_results_of_the_rust_crates() {
     let mut cost = 0.0;
     let mut hits = vec![BvhHit { t: 0.0, object: 0 }; rays.len()];
     let mut any = vec![9u8; rays.len()];
-    // SAFETY: every pointer comes with its array's length, and the nodes are copied before the tree is
-    // improved.
+    // SAFETY: every pointer comes with its array's length, and the nodes are copied before the tree
+    // is improved.
     unsafe {
         let nodes = std::slice::from_raw_parts(bvh_tree_nodes(tree, &mut count), count).to_vec();
         let ids = std::slice::from_raw_parts(bvh_tree_object_ids(tree, &mut ids), ids);
@@ -93,7 +95,8 @@ fn bytes_as_triangles(corners: &[f32]) -> Vec<Triangle> {
 
 /// Cancels at the thousandth call.
 unsafe extern "C" fn asked_enough(context: *mut c_void) -> u8 {
-    // SAFETY: the context is the test's counter, which outlives the search and is changed atomically.
+    // SAFETY: the context is the test's counter, which outlives the search and is changed
+    // atomically.
     let asked = unsafe { &*context.cast::<AtomicU64>() };
     u8::from(asked.fetch_add(1, Relaxed) >= 1000)
 }
@@ -109,8 +112,8 @@ fn a_search_of_hours_ends_when_the_caller_cancels_it_and_keeps_its_tree() {
     let mut before = 0.0;
     let mut after = 0.0;
     let start = std::time::Instant::now();
-    // SAFETY: the tree is not freed before the last call, no other thread uses it, and any thread may call
-    // the function, which only counts atomically.
+    // SAFETY: the tree is not freed before the last call, no other thread uses it, and any thread
+    // may call the function, which only counts atomically.
     unsafe {
         bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut before);
         let context = (&raw mut asked).cast();
@@ -183,8 +186,8 @@ fn invalid_arguments_are_rejected_by_name() {
     wrong[9 * 3] = f32::NAN;
     let boxes = [0.0f32, 0.0, 0.0, 1.0, 1.0, 1.0];
     let ray = BvhRay { origin: [0.0; 3], t_min: 0.0, direction: [0.0; 3], t_max: 1.0 };
-    // SAFETY: every pointer that a call dereferences comes with its array's length; null, unaligned and
-    // oversized arrays are rejected before.
+    // SAFETY: every pointer that a call dereferences comes with its array's length; null, unaligned
+    // and oversized arrays are rejected before.
     unsafe {
         assert!(bvh_tree_from_triangles(wrong.as_ptr(), 5, 0.0, 1.0).is_null());
         rejected("3");

@@ -7,8 +7,8 @@ use bvh_search::prelude::*;
 /// Triangles in the wide layout. Any number of threads may use a tracer at the same time.
 pub struct BvhTracer(WideBvh);
 
-/// The points `origin` + t * `direction` with `t_min` <= t <= `t_max`. The direction may have any length
-/// except 0; `t_min` is 0 or more; `t_max` may be infinite.
+/// The points `origin` + t * `direction` with `t_min` <= t <= `t_max`. The direction may have any
+/// length except 0; `t_min` is 0 or more; `t_max` may be infinite.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct BvhRay {
@@ -22,8 +22,8 @@ pub struct BvhRay {
     pub t_max: f32,
 }
 
-/// The nearest triangle that a ray hits; of several at the same distance, the triangle with the lowest
-/// index. A ray without a hit has infinity and UINT32_MAX.
+/// The nearest triangle that a ray hits; of several at the same distance, the triangle with the
+/// lowest index. A ray without a hit has infinity and UINT32_MAX.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BvhHit {
@@ -33,8 +33,8 @@ pub struct BvhHit {
     pub object: u32,
 }
 
-/// Creates a tracer of a tree over triangles. The tracer is independent of the tree: the tree may be freed,
-/// and later improvements do not change the tracer.
+/// Creates a tracer of a tree over triangles. The tracer is independent of the tree: the tree may
+/// be freed, and later improvements do not change the tracer.
 ///
 /// `tree` is a tree.
 #[unsafe(no_mangle)]
@@ -51,8 +51,9 @@ pub unsafe extern "C" fn bvh_tracer_new(tree: *const BvhTree) -> *mut BvhTracer 
     })
 }
 
-/// Writes the nearest hits of `count` rays to `hits`. Set `coherent` to 1 if consecutive rays begin close to
-/// each other and have similar directions, and to 0 otherwise. It changes the speed and no answer.
+/// Writes the nearest hits of `count` rays to `hits`. Set `coherent` to 1 if consecutive rays begin
+/// close to each other and have similar directions, and to 0 otherwise. It changes the speed and no
+/// answer.
 ///
 /// `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
 #[unsafe(no_mangle)]
@@ -83,8 +84,8 @@ pub unsafe extern "C" fn bvh_tracer_nearest_hits(
     })
 }
 
-/// Writes to `hits` whether each of `count` rays hits any triangle: 1 or 0. `coherent` has the meaning that
-/// it has in `bvh_tracer_nearest_hits`.
+/// Writes to `hits` whether each of `count` rays hits any triangle: 1 or 0. `coherent` has the
+/// meaning that it has in `bvh_tracer_nearest_hits`.
 ///
 /// `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
 #[unsafe(no_mangle)]
@@ -126,16 +127,16 @@ pub unsafe extern "C" fn bvh_tracer_free(tracer: *mut BvhTracer) {
     }
 }
 
-/// The number of rays that are converted and traced at once: enough to make the cost of a call negligible,
-/// and few enough to stay in the cache.
+/// The number of rays that are converted and traced at once: enough to make the cost of a call
+/// negligible, and few enough to stay in the cache.
 const BATCH: usize = 512;
 
 fn coherence(coherent: i32) -> Coherence {
     if coherent != 0 { Coherence::Coherent } else { Coherence::Incoherent }
 }
 
-/// Passes all rays to `trace`, batch by batch, with the index of each batch's first ray. Passes none if one
-/// of the rays is invalid.
+/// Passes all rays to `trace`, batch by batch, with the index of each batch's first ray. Passes
+/// none if one of the rays is invalid.
 fn in_batches(rays: &[BvhRay], mut trace: impl FnMut(usize, &[Ray])) -> Result<(), Failure> {
     // All rays are checked first, because a failed call must not change `hits`.
     for (index, ray) in rays.iter().enumerate() {

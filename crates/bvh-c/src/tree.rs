@@ -6,21 +6,22 @@ use bvh_search::prelude::*;
 use bvh_search::{Objects, Observer, OwnedTree};
 use std::ffi::{CStr, c_char, c_void};
 
-/// A tree with its objects. Any number of threads may read a tree at the same time. A thread that improves
-/// or frees it must be the only user.
+/// A tree with its objects. Any number of threads may read a tree at the same time. A thread that
+/// improves or frees it must be the only user.
 pub struct BvhTree {
     pub(crate) owned: OwnedTree,
     nodes: Vec<BvhNode>,
 }
 
-/// A binary node of 32 bytes with the layout of tinybvh's `BVH::BVHNode`. Node 0 is the root. If there are
-/// more nodes, node 1 is unused, so that both children of a node share a cache line.
+/// A binary node of 32 bytes with the layout of tinybvh's `BVH::BVHNode`. Node 0 is the root. If
+/// there are more nodes, node 1 is unused, so that both children of a node share a cache line.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BvhNode {
     /// The lower corner of the box.
     pub min: [f32; 3],
-    /// The index of the first of two adjacent children, or the position of the leaf's first object id.
+    /// The index of the first of two adjacent children, or the position of the leaf's first object
+    /// id.
     pub first: u32,
     /// The upper corner of the box.
     pub max: [f32; 3],
@@ -42,8 +43,8 @@ pub enum BvhCost {
     Layout = 3,
 }
 
-/// Searches for the best tree over `count` boxes for about `seconds`, 0 or more. Each box is 6 floats: the
-/// lower corner, then the upper corner.
+/// Searches for the best tree over `count` boxes for about `seconds`, 0 or more. Each box is 6
+/// floats: the lower corner, then the upper corner.
 ///
 /// `boxes` points to 6 * `count` floats.
 #[unsafe(no_mangle)]
@@ -59,9 +60,9 @@ pub unsafe extern "C" fn bvh_tree_from_boxes(
     })
 }
 
-/// Searches for the best tree over `count` triangles for about `seconds`, 0 or more. Each triangle is 9
-/// floats: three corners. With `references` above 1, up to 16, triangles may be divided among leaves, on
-/// average into that many parts each.
+/// Searches for the best tree over `count` triangles for about `seconds`, 0 or more. Each triangle
+/// is 9 floats: three corners. With `references` above 1, up to 16, triangles may be divided among
+/// leaves, on average into that many parts each.
 ///
 /// `corners` points to 9 * `count` floats.
 #[unsafe(no_mangle)]
@@ -81,22 +82,23 @@ pub unsafe extern "C" fn bvh_tree_from_triangles(
     })
 }
 
-/// Improves a tree for about `seconds`, 0 or more. Arrays from `bvh_tree_nodes` and `bvh_tree_object_ids`
-/// become invalid.
+/// Improves a tree for about `seconds`, 0 or more. Arrays from `bvh_tree_nodes` and
+/// `bvh_tree_object_ids` become invalid.
 ///
 /// `tree` is a tree that no other thread uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvh_tree_improve(tree: *mut BvhTree, seconds: f64) -> BvhStatus {
-    // SAFETY: the caller promises that no other thread uses the tree, and there is no function to call.
+    // SAFETY: the caller promises that no other thread uses the tree, and there is no function to
+    // call.
     unsafe { bvh_tree_improve_until(tree, seconds, None, std::ptr::null_mut()) }
 }
 
-/// Improves a tree like `bvh_tree_improve`, and ends soon after `cancelled(context)` returns a number other
-/// than 0. The tree is then the best one so far, and the call succeeds. To cancel a search from its
-/// beginning, create the tree in 0 seconds first.
+/// Improves a tree like `bvh_tree_improve`, and ends soon after `cancelled(context)` returns a
+/// number other than 0. The tree is then the best one so far, and the call succeeds. To cancel a
+/// search from its beginning, create the tree in 0 seconds first.
 ///
-/// `tree` is a tree that no other thread uses; `cancelled` is null, or a function that throws no exception
-/// and that any number of threads may call at the same time until this call returns.
+/// `tree` is a tree that no other thread uses; `cancelled` is null, or a function that throws no
+/// exception and that any number of threads may call at the same time until this call returns.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvh_tree_improve_until(
     tree: *mut BvhTree,
@@ -123,8 +125,8 @@ struct Until {
     context: *mut c_void,
 }
 
-// SAFETY: the context is passed only to the caller's function, which any number of threads may call at the
-// same time.
+// SAFETY: the context is passed only to the caller's function, which any number of threads may call
+// at the same time.
 unsafe impl Sync for Until {}
 
 impl Observer for Until {
@@ -174,8 +176,8 @@ pub unsafe extern "C" fn bvh_tree_cost(
     })
 }
 
-/// Returns the nodes of the tree, and writes their number to `count`. The nodes belong to the tree and are
-/// valid until it is improved or freed.
+/// Returns the nodes of the tree, and writes their number to `count`. The nodes belong to the tree
+/// and are valid until it is improved or freed.
 ///
 /// `tree` is a tree; `count` points to a size.
 #[unsafe(no_mangle)]
@@ -190,8 +192,8 @@ pub unsafe extern "C" fn bvh_tree_nodes(tree: *const BvhTree, count: *mut usize)
     })
 }
 
-/// Returns the object ids, to which leaves refer by position, and writes their number to `count`. The ids
-/// belong to the tree and are valid until it is improved or freed.
+/// Returns the object ids, to which leaves refer by position, and writes their number to `count`.
+/// The ids belong to the tree and are valid until it is improved or freed.
 ///
 /// `tree` is a tree; `count` points to a size.
 #[unsafe(no_mangle)]
@@ -210,7 +212,8 @@ pub unsafe extern "C" fn bvh_tree_object_ids(
     })
 }
 
-/// Loads the tree over these boxes, given as for `bvh_tree_from_boxes`, from the file `path`, in UTF-8.
+/// Loads the tree over these boxes, given as for `bvh_tree_from_boxes`, from the file `path`, in
+/// UTF-8.
 ///
 /// `path` is a string; `boxes` points to 6 * `count` floats.
 #[unsafe(no_mangle)]
@@ -228,8 +231,8 @@ pub unsafe extern "C" fn bvh_tree_load_boxes(
     })
 }
 
-/// Loads the tree over these triangles, given as for `bvh_tree_from_triangles`, from the file `path`, in
-/// UTF-8.
+/// Loads the tree over these triangles, given as for `bvh_tree_from_triangles`, from the file
+/// `path`, in UTF-8.
 ///
 /// `path` is a string; `corners` points to 9 * `count` floats.
 #[unsafe(no_mangle)]
@@ -247,8 +250,8 @@ pub unsafe extern "C" fn bvh_tree_load_triangles(
     })
 }
 
-/// Writes the tree to the file `path`, in UTF-8. An existing file is replaced when the new one is complete;
-/// a failure leaves the old one.
+/// Writes the tree to the file `path`, in UTF-8. An existing file is replaced when the new one is
+/// complete; a failure leaves the old one.
 ///
 /// `tree` is a tree; `path` is a string.
 #[unsafe(no_mangle)]
@@ -321,7 +324,8 @@ unsafe fn boxes_of(first: *const f32, count: usize) -> Result<Objects, Failure> 
 /// # Safety
 /// `first` points to 9 · `count` floats.
 unsafe fn triangles_of(first: *const f32, count: usize) -> Result<Objects, Failure> {
-    // SAFETY: a `Triangle` is `repr(C)` with 9 floats, and `first` points to that many for each triangle.
+    // SAFETY: a `Triangle` is `repr(C)` with 9 floats, and `first` points to that many for each
+    // triangle.
     let triangles = unsafe { slice("corners", first.cast::<Triangle>(), count) }?.to_vec();
     Ok(Objects::Shapes(Primitives::Triangles(triangles)))
 }
@@ -329,7 +333,8 @@ unsafe fn triangles_of(first: *const f32, count: usize) -> Result<Objects, Failu
 /// Returns a path as text.
 ///
 /// # Safety
-/// `path` is null, or a string that ends with a zero and that nobody changes while the result is in use.
+/// `path` is null, or a string that ends with a zero and that nobody changes while the result is in
+/// use.
 unsafe fn text<'a>(path: *const c_char) -> Result<&'a str, Failure> {
     // SAFETY: a pointer that is not null points to a string that ends with a zero.
     let path = unsafe { CStr::from_ptr(given("path", path)?) };

@@ -86,7 +86,8 @@ impl Error {
         move |source| Self::Io { path: path.to_owned(), action, source }
     }
 
-    /// Returns a function for `map_err` on builders and searches that names the scene and the method.
+    /// Returns a function for `map_err` on builders and searches that names the scene and the
+    /// method.
     pub fn search<E: Into<SearchError>>(scene: &str, method: &str) -> impl FnOnce(E) -> Self {
         let scene = scene.to_owned();
         let method = method.to_owned();

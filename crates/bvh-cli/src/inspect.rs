@@ -1,5 +1,5 @@
-//! `bvh inspect` and `bvh verify`: report the origin of a tree file, and the costs and the shape of its
-//! tree.
+//! `bvh inspect` and `bvh verify`: report the origin of a tree file, and the costs and the shape of
+//! its tree.
 
 use crate::scene_files::SceneFiles;
 use crate::{Error, csv};
@@ -27,8 +27,8 @@ pub struct InspectArgs {
     /// The tree file.
     #[arg(value_name = "FILE.bvh")]
     pub file: PathBuf,
-    /// The tree's scene, by name or path of a mesh file. Checks the tree against the scene's objects,
-    /// compares it with the Müller–Fellner tree, and measures the end-point overlap.
+    /// The tree's scene, by name or path of a mesh file. Checks the tree against the scene's
+    /// objects, compares it with the Müller–Fellner tree, and measures the end-point overlap.
     pub scene: Option<String>,
     /// Write the nodes to a CSV file, one row each, in full precision.
     #[arg(long, value_name = "NODES.csv")]

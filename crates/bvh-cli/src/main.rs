@@ -17,8 +17,8 @@ use error::Error;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Bounding volume hierarchies by stochastic search: bake the best tree within a budget, and inspect
-/// it.
+/// Bounding volume hierarchies by stochastic search: bake the best tree within a budget, and
+/// inspect it.
 #[derive(Parser)]
 #[command(name = "bvh", version, arg_required_else_help = true)]
 struct Cli {

@@ -1,5 +1,5 @@
-//! The files of a baked scene of instances, loaded as users load them, give the same answers as the flat
-//! scene.
+//! The files of a baked scene of instances, loaded as users load them, give the same answers as the
+//! flat scene.
 
 mod support;
 
@@ -16,8 +16,8 @@ fn triangle(number: u32) -> Triangle {
     Triangle::from(coordinates.map(|i| (i.wrapping_mul(2_654_435_761) >> 27) as f32))
 }
 
-/// Returns a GLB file of two meshes of triangles and one of points, and the triangles. Nodes turn the
-/// meshes by right angles and mirror them, so that nothing is rounded.
+/// Returns a GLB file of two meshes of triangles and one of points, and the triangles. Nodes turn
+/// the meshes by right angles and mirror them, so that nothing is rounded.
 fn forest() -> (Vec<u8>, [Vec<Triangle>; 2]) {
     let meshes = [0..150, 150..400].map(|range| range.map(triangle).collect::<Vec<_>>());
     let corners: Vec<u8> = bytemuck::cast_slice(&meshes.concat()).to_vec();
@@ -84,7 +84,8 @@ fn a_scene_of_instances_is_baked_mesh_by_mesh_and_answers_like_the_flat_scene() 
 
     let flat = Scene::load(at.join("forest.glb").to_str().unwrap()).unwrap();
     let flat = flat.triangles().unwrap();
-    // The first triangle of each instance in the flat scene, whose nodes place these meshes in order.
+    // The first triangle of each instance in the flat scene, whose nodes place these meshes in
+    // order.
     let first: Vec<usize> = [1, 0, 0, 1, 0]
         .iter()
         .scan(0, |end, &mesh: &usize| Some(std::mem::replace(end, *end + meshes[mesh].len())))

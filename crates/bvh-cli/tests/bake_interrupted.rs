@@ -52,8 +52,8 @@ fn a_bake_that_is_interrupted_early_is_not_behind_plain_reinsertion() {
         "plain.bvh",
     ];
     said(folder.path(), &args);
-    // The time suffices for reinsertion and the trees built before it, also on a busy machine. The heat
-    // of a long search has not paid by then.
+    // The time suffices for reinsertion and the trees built before it, also on a busy machine. The
+    // heat of a long search has not paid by then.
     let plain = cost("plain.bvh");
     let after = Duration::from_secs(1) + 8 * begin.elapsed();
     for more in [
@@ -62,8 +62,8 @@ fn a_bake_that_is_interrupted_early_is_not_behind_plain_reinsertion() {
         &["--budget", "1h", "--references", "1.2"],
     ] {
         interrupted(folder.path(), more, after);
-        // If leaves may be divided, they are part of the measure, and moves with equal gains come in a
-        // different order.
+        // If leaves may be divided, they are part of the measure, and moves with equal gains come
+        // in a different order.
         let most = if more.contains(&"--references") { 1.0001 } else { 1.0 };
         let found = cost("a.bvh");
         assert!(found <= most * plain, "{more:?}: {found} is above {plain}");

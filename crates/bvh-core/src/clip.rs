@@ -180,7 +180,9 @@ mod tests {
             let point = (a * weights[0] + b * weights[1] + c * weights[2]) / sum.max(1e-9);
             // The point is off by rounding errors of the largest coordinate, and a tight part
             // allows for such errors.
-            prop_assert!(!is_inside(point, &region) || is_inside(point, &tight), "{point} in {tight:?}");
+            if is_inside(point, &region) {
+                prop_assert!(is_inside(point, &tight), "{point} in {tight:?}");
+            }
         }
 
         #[test]

@@ -8,19 +8,19 @@ use core::ops::Range;
 
 /// Computes the end-point overlap, EPO = Σ over nodes of C(node) · A((S \ Q(node)) ∩ box(node)) /
 /// A(S). S is the surface of all triangles, Q(node) is the surface of the triangles below the node,
-/// and C is the traversal constant for an inner node, and the intersection constant times the number
-/// of objects for a leaf.
+/// and C is the traversal constant for an inner node, and the intersection constant times the
+/// number of objects for a leaf.
 ///
 /// The result is the expected cost, in the constants' unit, of nodes that a ray enters although it
 /// ends on a surface elsewhere. Together with the surface area heuristic it predicts times better
 /// than the heuristic alone.
 ///
-/// Triangles are clipped against boxes in f64, so that areas are exact except for rounding. Boxes are
-/// closed: a triangle within a face of a box counts. Triangles without area have the overlap 0 by
-/// definition.
+/// Triangles are clipped against boxes in f64, so that areas are exact except for rounding. Boxes
+/// are closed: a triangle within a face of a box counts. Triangles without area have the overlap 0
+/// by definition.
 ///
-/// Takes O(Σ over triangles of the nodes whose boxes they meet) time, which is about n log n on common
-/// scenes and n² at most, and O(n) memory.
+/// Takes O(Σ over triangles of the nodes whose boxes they meet) time, which is about n log n on
+/// common scenes and n² at most, and O(n) memory.
 ///
 /// Source: Aila, Karras & Laine 2013, 'On quality metrics of bounding volume hierarchies', section
 /// 4.2. Differs from the paper: both constants are 1 by default; the paper has 1.2 and 1.
@@ -44,7 +44,8 @@ pub struct EndPointOverlap<'a> {
     tree: &'a Bvh,
     triangles: &'a [Triangle],
     constants: SahConstants,
-    /// For each node, the range of the object ids below it, counted from the first leaf to the last.
+    /// For each node, the range of the object ids below it, counted from the first leaf to the
+    /// last.
     below: Vec<Range<u32>>,
     /// Pairs of an object and one of its positions, sorted.
     positions: Vec<(u32, u32)>,
@@ -178,8 +179,8 @@ impl<'a> EndPointOverlap<'a> {
     }
 }
 
-/// Returns the area of a polygon inside a box. `bounds` is the box around the polygon, and `area` is
-/// its whole area.
+/// Returns the area of a polygon inside a box. `bounds` is the box around the polygon, and `area`
+/// is its whole area.
 fn area_inside(polygon: &Polygon, aabb: &Aabb, bounds: &Aabb, area: f64) -> f64 {
     let mut part = *polygon;
     let mut is_cut = false;
@@ -206,8 +207,8 @@ mod tests {
     use alloc::vec;
     use glam::DVec3;
 
-    /// Returns two right triangles with legs of length 1 in the plane z = 0, the second moved by `x`, and
-    /// a tree with one leaf for each.
+    /// Returns two right triangles with legs of length 1 in the plane z = 0, the second moved by
+    /// `x`, and a tree with one leaf for each.
     fn pair(x: f32) -> (Vec<Triangle>, Bvh) {
         let triangle = |x: f32| Triangle::from([[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x, 1.0, 0.0]]);
         let triangles = vec![triangle(0.0), triangle(x)];

@@ -91,8 +91,8 @@ mod tests {
 
     #[test]
     fn a_cut_without_room_for_its_corners_drops_none() {
-        // Rounding never makes a polygon as concave as this zigzag, which crosses the plane at every
-        // edge but one.
+        // Rounding never makes a polygon as concave as this zigzag, which crosses the plane at
+        // every edge but one.
         let mut zigzag = Polygon { corners: [DVec3::ZERO; 9], len: 9 };
         for (index, corner) in zigzag.corners.iter_mut().enumerate() {
             let height = if index % 2 == 0 { 1.0 } else { -1.0 };

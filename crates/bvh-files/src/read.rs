@@ -27,8 +27,8 @@ pub enum ReadError {
 }
 
 impl ReadError {
-    /// Returns the kind of error that the operating system would report. Bindings choose their exception
-    /// by it.
+    /// Returns the kind of error that the operating system would report. Bindings choose their
+    /// exception by it.
     pub fn kind(&self) -> io::ErrorKind {
         match self {
             Self::NotFound { .. } => io::ErrorKind::NotFound,
@@ -53,8 +53,8 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
     })
 }
 
-/// Returns the bytes of the regular file at `path`. Rejects anything else unread, because a pipe could
-/// block the program and a device might never end.
+/// Returns the bytes of the regular file at `path`. Rejects anything else unread, because a pipe
+/// could block the program and a device might never end.
 pub fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
     regular(path)?;
     std::fs::read(path).map_err(|source| failed(path, source))

@@ -23,8 +23,8 @@ impl WriteError {
     }
 }
 
-/// Replaces the contents of the file at `path` by `bytes`. At any moment the file is the old one or the
-/// complete new one.
+/// Replaces the contents of the file at `path` by `bytes`. At any moment the file is the old one or
+/// the complete new one.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     Reserved::new(path, 0)?.write(bytes)
 }
@@ -52,9 +52,10 @@ fn remove_leftovers(folder: &Path, prefix: &str) {
 
 /// Creates a file that no other writer removes; `create` makes a file with an unused name.
 ///
-/// Between the creation and the lock another writer may mistake the file for a leftover. That writer
-/// removes the file while it holds the lock. After this writer gets the lock, it can therefore rely on
-/// the name: if the name is gone, so is the file; if it exists, no writer will remove it.
+/// Between the creation and the lock another writer may mistake the file for a leftover. That
+/// writer removes the file while it holds the lock. After this writer gets the lock, it can
+/// therefore rely on the name: if the name is gone, so is the file; if it exists, no writer will
+/// remove it.
 fn create_locked(
     mut create: impl FnMut() -> io::Result<NamedTempFile>,
 ) -> io::Result<NamedTempFile> {
@@ -68,12 +69,13 @@ fn create_locked(
     }
 }
 
-/// The number of bytes of a reserved file that are written at a time. The kernel caches large writes in
-/// large pages, which it maps faster than many small ones.
+/// The number of bytes of a reserved file that are written at a time. The kernel caches large
+/// writes in large pages, which it maps faster than many small ones.
 const PIECE: usize = 1 << 21;
 
-/// A file whose space on the disk is reserved before its contents exist. A search of hours thus learns at
-/// its beginning and not at its end that its result cannot be saved. Dropping it leaves no file behind.
+/// A file whose space on the disk is reserved before its contents exist. A search of hours thus
+/// learns at its beginning and not at its end that its result cannot be saved. Dropping it leaves
+/// no file behind.
 #[derive(Debug)]
 pub struct Reserved {
     path: PathBuf,
@@ -117,8 +119,8 @@ impl Reserved {
         Ok(Self { path, unfinished })
     }
 
-    /// Writes the bytes, syncs the file, and renames it. At any moment the file at the path is the old one
-    /// or the complete new one.
+    /// Writes the bytes, syncs the file, and renames it. At any moment the file at the path is the
+    /// old one or the complete new one.
     pub fn write(self, bytes: &[u8]) -> Result<(), WriteError> {
         let Self { path, mut unfinished } = self;
         // The user may have removed the file during hours of search.
@@ -131,8 +133,8 @@ impl Reserved {
         unfinished
             .persist(&path)
             .map_err(|failed| WriteError::of(&path, "replace the file")(failed.error))?;
-        // Syncing the folder makes the new name outlast a loss of power. Where that is impossible, the old
-        // file may come back, complete.
+        // Syncing the folder makes the new name outlast a loss of power. Where that is impossible,
+        // the old file may come back, complete.
         if let Some(folder) = folder.and_then(|folder| File::open(folder).ok()) {
             let _ = folder.sync_all();
         }

@@ -30,8 +30,8 @@ impl TreeFileError {
     }
 }
 
-/// Returns the bytes of the tree file at `path`. If the header is invalid or does not match the file's
-/// length, rejects the file before it reads the rest.
+/// Returns the bytes of the tree file at `path`. If the header is invalid or does not match the
+/// file's length, rejects the file before it reads the rest.
 pub fn read(path: &Path) -> Result<Vec<u8>, TreeFileError> {
     let length = regular(path)?;
     let failed = |source| ReadError::Failed { path: path.to_owned(), source };

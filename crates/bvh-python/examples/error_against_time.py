@@ -1,7 +1,7 @@
 """Draws the error of trees, relative to the best tree found, over the times of their searches.
 
-Run `python error_against_time.py [error.svg]`, or cell by cell in an editor that knows `# %%`. Needs
-matplotlib.
+Run `python error_against_time.py [error.svg]`, or cell by cell in an editor that knows `# %%`.
+Needs matplotlib.
 """
 
 # %% A scene: a tube along a knot, with posts of all heights around it.
@@ -40,8 +40,8 @@ posts = foot + random.uniform(0, 0.1, (4000, 3, 3)) + random.uniform(0, 3, (4000
 triangles = np.concatenate([knots, posts]).astype(np.float32)
 print(f"{len(triangles)} triangles")
 
-# %% A tree for every budget. One search of a second finds a better tree than ten searches of a tenth,
-# so each budget begins again.
+# %% A tree for every budget. One search of a second finds a better tree than ten searches of a
+# tenth, so each budget begins again.
 budgets = [0, 0.03, 0.1, 0.3, 1, 3]
 trees, seconds = [], []
 for budget in budgets:

@@ -1,4 +1,5 @@
-//! Converts and checks numpy arrays. Errors name the argument, the value found and the values accepted.
+//! Converts and checks numpy arrays. Errors name the argument, the value found and the values
+//! accepted.
 
 use bvh_search::bvh_core::Primitives;
 use bvh_search::{Objects, prelude::*};
@@ -13,7 +14,8 @@ pub fn invalid(message: impl Display) -> PyErr {
     PyValueError::new_err(message.to_string())
 }
 
-/// Converts anything that numpy accepts as an array to `float32` in row order, and checks its shape.
+/// Converts anything that numpy accepts as an array to `float32` in row order, and checks its
+/// shape.
 fn floats<'py>(
     name: &str,
     argument: &Bound<'py, PyAny>,

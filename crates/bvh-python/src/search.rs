@@ -26,8 +26,8 @@ impl Observer for Watch {
     }
 }
 
-/// Runs `search` for `seconds`. Returns its result, and the exception that a signal handler has raised
-/// meanwhile.
+/// Runs `search` for `seconds`. Returns its result, and the exception that a signal handler has
+/// raised meanwhile.
 pub fn searched<T: Send>(
     py: Python,
     seconds: f64,
@@ -36,8 +36,8 @@ pub fn searched<T: Send>(
     let limit = Duration::try_from_secs_f64(seconds)
         .map_err(|_| invalid(format!("seconds is {seconds}; accepted: 0 or more, finite")))?;
     let watch = &Watch { deadline: Deadline::after(limit), pressed: AtomicBool::new(false) };
-    // Python runs signal handlers on its main thread only. The calling thread may be the main thread, so a
-    // second thread searches while this one waits for signals.
+    // Python runs signal handlers on its main thread only. The calling thread may be the main
+    // thread, so a second thread searches while this one waits for signals.
     Ok(py.detach(|| {
         thread::scope(|scope| {
             let (sender, receiver) = channel();

@@ -7,8 +7,8 @@ use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-/// The triangles of a tree in a layout for fast traversal. Later improvements of the tree do not change the
-/// tracer.
+/// The triangles of a tree in a layout for fast traversal. Later improvements of the tree do not
+/// change the tracer.
 #[pyclass(frozen, module = "bvh_search")]
 pub struct Tracer {
     wide: WideBvh,
@@ -31,9 +31,9 @@ impl Tracer {
     /// Returns the distances of the nearest hits, in multiples of the directions' lengths, and the
     /// triangles' indices. A ray without a hit has infinity and −1.
     ///
-    /// Origins and directions have the shape `(m, 3)`. `t_min` and `t_max`, by default 0 and infinity, are
-    /// one number or have the shape `(m,)`. Set `coherent` if consecutive rays begin close to each other
-    /// and have similar directions: it changes the speed and no answer.
+    /// Origins and directions have the shape `(m, 3)`. `t_min` and `t_max`, by default 0 and
+    /// infinity, are one number or have the shape `(m,)`. Set `coherent` if consecutive rays begin
+    /// close to each other and have similar directions: it changes the speed and no answer.
     #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = false))]
     fn nearest<'py>(
         &self,

@@ -1,4 +1,5 @@
-//! The class `Tree`: trees over arrays, found, improved, measured, saved, loaded, and copied as nodes.
+//! The class `Tree`: trees over arrays, found, improved, measured, saved, loaded, and copied as
+//! nodes.
 
 use crate::arrays::{boxes, invalid, triangles};
 use crate::search::searched;
@@ -14,12 +15,12 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, TryLockError};
 
-/// A tree with its objects. `from_triangles`, `from_boxes` and `load` create trees; `len` is the number of
-/// objects.
+/// A tree with its objects. `from_triangles`, `from_boxes` and `load` create trees; `len` is the
+/// number of objects.
 #[pyclass(frozen, module = "bvh_search")]
 pub struct Tree {
-    /// The tree. A thread must not call Python while it holds this lock: Python may switch to a second thread,
-    /// which would wait for the lock and never switch back.
+    /// The tree. A thread must not call Python while it holds this lock: Python may switch to a
+    /// second thread, which would wait for the lock and never switch back.
     owned: RwLock<OwnedTree>,
     /// The lock of the thread that improves the tree.
     improving: Mutex<()>,
@@ -41,8 +42,9 @@ impl Tree {
 
 #[pymethods]
 impl Tree {
-    /// Searches for the best tree over triangles, `(n, 3, 3)`, for about `seconds`. With `references` above 1,
-    /// up to 16, triangles may be divided among leaves, on average into that many parts each.
+    /// Searches for the best tree over triangles, `(n, 3, 3)`, for about `seconds`. With
+    /// `references` above 1, up to 16, triangles may be divided among leaves, on average into that
+    /// many parts each.
     #[staticmethod]
     #[pyo3(signature = (triangles, seconds = 1.0, *, references = 1.0))]
     fn from_triangles(triangles: &Bound<PyAny>, seconds: f64, references: f64) -> PyResult<Self> {
@@ -52,8 +54,8 @@ impl Tree {
         found(triangles.py(), "triangles", self::triangles(triangles)?, references, seconds)
     }
 
-    /// Searches for the best tree over boxes, `(n, 2, 3)` or `(n, 6)`, lower corners first, for about
-    /// `seconds`.
+    /// Searches for the best tree over boxes, `(n, 2, 3)` or `(n, 6)`, lower corners first, for
+    /// about `seconds`.
     #[staticmethod]
     #[pyo3(signature = (boxes, seconds = 1.0))]
     fn from_boxes(boxes: &Bound<PyAny>, seconds: f64) -> PyResult<Self> {
@@ -81,15 +83,16 @@ impl Tree {
             .map_err(|error| invalid_argument("path", error))
     }
 
-    /// Writes the tree to a file. An existing file is replaced when the new one is complete; a failure leaves
-    /// the old one.
+    /// Writes the tree to a file. An existing file is replaced when the new one is complete; a
+    /// failure leaves the old one.
     fn save(&self, path: PathBuf) -> PyResult<()> {
         let bytes = self.owned().save().map_err(invalid)?;
         bvh_files::write(&path, &bytes).map_err(write_error)
     }
 
-    /// Improves the tree for about `seconds`. Ctrl-C ends the search early, and the tree keeps its gains. Until
-    /// the call returns, other threads see the old tree, and a second `improve` raises a `RuntimeError`.
+    /// Improves the tree for about `seconds`. Ctrl-C ends the search early, and the tree keeps its
+    /// gains. Until the call returns, other threads see the old tree, and a second `improve` raises
+    /// a `RuntimeError`.
     #[pyo3(signature = (seconds = 1.0))]
     fn improve(&self, py: Python, seconds: f64) -> PyResult<()> {
         // Waiting for the lock here would block the interpreter and with it the other thread.
@@ -109,8 +112,8 @@ impl Tree {
         raised
     }
 
-    /// Returns a cost of the tree: `internal_area`, which searches minimise, `goldsmith_salmon`, `sah` with both
-    /// constants 1, or `layout`, the cost of a `Tracer`.
+    /// Returns a cost of the tree: `internal_area`, which searches minimise, `goldsmith_salmon`,
+    /// `sah` with both constants 1, or `layout`, the cost of a `Tracer`.
     #[pyo3(signature = (kind = "internal_area"))]
     fn cost(&self, kind: &str) -> PyResult<f64> {
         let objective = match kind {
@@ -126,9 +129,9 @@ impl Tree {
         Ok(self.owned().cost(objective))
     }
 
-    /// Returns the nodes, the root first, as an array with the fields `min`, `first`, `max` and `count`. An
-    /// inner node has the `count` 0, and its two children begin at `first`. The objects of a leaf are
-    /// `object_ids()[first:first + count]`.
+    /// Returns the nodes, the root first, as an array with the fields `min`, `first`, `max` and
+    /// `count`. An inner node has the `count` 0, and its two children begin at `first`. The objects
+    /// of a leaf are `object_ids()[first:first + count]`.
     fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         // numpy views the words as records, so that no field is converted.
         let words: Vec<u32> = bytemuck::cast_slice(&self.owned().tree().to_first_count()).to_vec();
@@ -183,7 +186,8 @@ fn invalid_argument(name: &str, error: impl Display) -> PyErr {
     invalid(format!("{name}: {error}"))
 }
 
-/// Converts a failure to read into an `OSError` of its kind, or into a `ValueError` about the contents.
+/// Converts a failure to read into an `OSError` of its kind, or into a `ValueError` about the
+/// contents.
 fn read_error(error: TreeFileError) -> PyErr {
     match error {
         TreeFileError::Invalid { source, .. } => invalid_argument("path", source),

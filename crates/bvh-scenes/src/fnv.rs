@@ -1,7 +1,7 @@
 //! The FNV-1a hash, which derives seeds, scene checksums and picture checksums in results.
 
-/// Returns the 64-bit FNV-1a hash (Fowler, Noll & Vo) of `bytes`, which is the same on every machine
-/// and in every version.
+/// Returns the 64-bit FNV-1a hash (Fowler, Noll & Vo) of `bytes`, which is the same on every
+/// machine and in every version.
 pub fn fnv1a(bytes: impl IntoIterator<Item = u8>) -> u64 {
     // The offset basis and the prime are part of the algorithm's definition.
     bytes

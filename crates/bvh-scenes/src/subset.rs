@@ -96,8 +96,8 @@ fn range(word: &str) -> Option<(u32, u32)> {
     Some((low.parse().ok()?, high.parse().ok()?))
 }
 
-/// Replaces every `A..B` after a colon of `name` by A, A + 1, …, B. One line of a spec can thus name
-/// many subsets of a scene.
+/// Replaces every `A..B` after a colon of `name` by A, A + 1, …, B. One line of a spec can thus
+/// name many subsets of a scene.
 pub fn expand(name: &str) -> Vec<String> {
     let mut names = vec![String::new()];
     for (index, word) in name.split(':').enumerate() {

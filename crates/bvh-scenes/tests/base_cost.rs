@@ -5,8 +5,8 @@ use bvh_core::{Aabb, Bvh, cost};
 use bvh_scenes::Scene;
 use bvh_scenes::builtin::stand_ins::STAND_INS;
 
-/// Returns the sum of inner half areas. Computes every node's box from the objects below it, and reads no
-/// box of the tree.
+/// Returns the sum of inner half areas. Computes every node's box from the objects below it, and
+/// reads no box of the tree.
 fn from_objects(tree: &Bvh, boxes: &[Aabb]) -> f64 {
     let mut total = 0.0;
     let mut below = vec![Aabb::EMPTY; tree.nodes.len()];

@@ -8,8 +8,8 @@ use std::path::Path;
 /// The limit on the program's threads.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
 pub struct Jobs {
-    /// Number of threads; the default is one per processor. It changes only times, and the results of
-    /// budgets of time.
+    /// Number of threads; the default is one per processor. It changes only times, and the results
+    /// of budgets of time.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
 }
@@ -41,8 +41,8 @@ pub struct FileKind {
     pub extension: &'static str,
 }
 
-/// Checks the path of a file to write: a new file, or a file of the same kind, which is replaced. Rejects
-/// folders, devices and files of other kinds, such as the command's own input.
+/// Checks the path of a file to write: a new file, or a file of the same kind, which is replaced.
+/// Rejects folders, devices and files of other kinds, such as the command's own input.
 pub fn output_file(flag: &str, path: &Path, kind: &FileKind) -> Result<(), Error> {
     let accepted = "the path of a file to write";
     if path.as_os_str().is_empty() {
@@ -89,8 +89,8 @@ fn folder_of(path: &Path) -> &Path {
         .unwrap_or(Path::new("."))
 }
 
-/// Checks the path of a folder to write into: an existing folder, or one that can be created because no
-/// part of its path is a file.
+/// Checks the path of a folder to write into: an existing folder, or one that can be created
+/// because no part of its path is a file.
 pub fn output_folder(flag: &str, path: &Path) -> Result<(), Error> {
     if path.as_os_str().is_empty() {
         return reject(flag, path, "empty", "the path of a folder");

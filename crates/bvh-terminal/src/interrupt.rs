@@ -14,8 +14,8 @@ static HELD: AtomicBool = AtomicBool::new(false);
 /// The exit code after a signal.
 const CODE: u8 = 130;
 
-/// The time that a command has to end in order. The end by force after that time damages no file and
-/// loses no finished run.
+/// The time that a command has to end in order. The end by force after that time damages no file
+/// and loses no finished run.
 const GRACE: Duration = Duration::from_millis(800);
 
 /// Begins to listen to signals. Prints `message` if the program is ended by force.
@@ -43,7 +43,8 @@ pub fn holds() -> bool {
     HELD.load(Relaxed)
 }
 
-/// Forbids the end by force after the first signal, because the command saves its result at the end.
+/// Forbids the end by force after the first signal, because the command saves its result at the
+/// end.
 pub fn hold() {
     HELD.store(true, Relaxed);
 }

@@ -1,5 +1,5 @@
-//! The interface of the programs to their users: arguments of several commands, lines for the terminal,
-//! signals, and files that are replaced as a whole.
+//! The interface of the programs to their users: arguments of several commands, lines for the
+//! terminal, signals, and files that are replaced as a whole.
 
 pub mod arguments;
 mod error;

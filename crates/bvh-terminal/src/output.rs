@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 /// True after a failed write to standard output.
 pub static STDOUT_FAILED: AtomicBool = AtomicBool::new(false);
 
-/// Prints text to standard output, and ends the line. A reader that closes the pipe early, like `head`,
-/// causes no error, because the results are in files.
+/// Prints text to standard output, and ends the line. A reader that closes the pipe early, like
+/// `head`, causes no error, because the results are in files.
 pub fn print_line(text: &str) {
     print_bytes(format!("{}\n", plain(text.trim_end())).as_bytes());
 }
@@ -39,7 +39,8 @@ pub fn succeeded() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// Prints the parser's answer to the arguments: help, version, or their fault. Returns the exit code.
+/// Prints the parser's answer to the arguments: help, version, or their fault. Returns the exit
+/// code.
 pub fn answered(answer: &clap::Error) -> ExitCode {
     const USAGE: u8 = 2;
     let text = answer.render().to_string();
@@ -52,8 +53,8 @@ pub fn answered(answer: &clap::Error) -> ExitCode {
     succeeded()
 }
 
-/// Escapes control characters except ends of lines. Names of files and keys of specs come from the user
-/// and must not control the terminal.
+/// Escapes control characters except ends of lines. Names of files and keys of specs come from the
+/// user and must not control the terminal.
 fn plain(text: &str) -> Cow<'_, str> {
     if !text.contains(is_command) {
         return text.into();

@@ -28,8 +28,8 @@ const INSTANCES: &str = "instances.csv";
 /// The columns of [`INSTANCES`], which docs/TREE_FILES.md describes.
 const COLUMNS: &str = "node,mesh,xx,xy,xz,yx,yy,yz,zx,zy,zz,tx,ty,tz";
 
-/// Searches for one tree after the other until the budget is spent or `interrupted` becomes true, and
-/// writes each tree as soon as its search ends. An interrupted bake still writes all files.
+/// Searches for one tree after the other until the budget is spent or `interrupted` becomes true,
+/// and writes each tree as soon as its search ends. An interrupted bake still writes all files.
 pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     new_folder(&args.out)?;
     args.jobs.apply()?;

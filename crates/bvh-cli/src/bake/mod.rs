@@ -166,8 +166,8 @@ impl BakeArgs {
     }
 }
 
-/// Searches until the budget is spent or `interrupted` becomes true, writes the best tree, and prints
-/// its cost. An interrupted bake writes the file as well, and returns [`Error::Stopped`].
+/// Searches until the budget is spent or `interrupted` becomes true, writes the best tree, and
+/// prints its cost. An interrupted bake writes the file as well, and returns [`Error::Stopped`].
 pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     // Wrong paths are reported before the scene is loaded, which may take long.
     if let Some(from) = &args.from {
@@ -238,8 +238,8 @@ fn summary(plan: &Plan, scene: &Scene, bake: &Bake, baked: &Baked) -> String {
             "no object is divided, because that does not pay here".into()
         });
     }
-    // A method that plans its time completes its plan just before the time is over, and then could have
-    // used more.
+    // A method that plans its time completes its plan just before the time is over, and then could
+    // have used more.
     let in_time =
         matches!(plan.effort, Effort::Time(limit) if *seconds >= 0.5 * limit.as_secs_f64());
     let why = match outcome.stop {

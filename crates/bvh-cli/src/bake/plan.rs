@@ -130,7 +130,8 @@ impl Bake<'_> {
             Effort::Time(_) => Budget::UNLIMITED,
             Effort::Work(work) => Budget { max_work: Some(work), ..Budget::UNLIMITED },
         };
-        // With little work `best` may end above a tree that it builds on its way; that tree is kept.
+        // With little work `best` may end above a tree that it builds on its way; that tree is
+        // kept.
         let fallback = match (*effort, method) {
             (Effort::Work(work), Method::Best(_)) => {
                 best::fallback(problem, work, &Interrupted(interrupted))?

@@ -12,8 +12,8 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 /// takes a few tenths of a second.
 const BUILT_AT_ONCE: usize = 200_000;
 
-/// Builds the greedy tree, the reference for the costs of all other trees. If the build is interrupted,
-/// a bake that has already written trees continues with the tree of a faster builder.
+/// Builds the greedy tree, the reference for the costs of all other trees. If the build is
+/// interrupted, a bake that has already written trees continues with the tree of a faster builder.
 pub fn greedy(method: &str, scene: &Scene, interrupted: &AtomicBool) -> Result<Bvh, Error> {
     let is_interrupted = || scene.boxes.len() > BUILT_AT_ONCE && interrupted.load(Relaxed);
     let config = muller_fellner::Config::default();
@@ -41,8 +41,8 @@ pub enum Division<'a> {
 }
 
 impl<'a> Division<'a> {
-    /// Decides whether leaves may have up to `most_references` in total. The search continues `from` a
-    /// tree, if there is one.
+    /// Decides whether leaves may have up to `most_references` in total. The search continues
+    /// `from` a tree, if there is one.
     pub fn decide(
         most_references: usize,
         scene: &'a Scene,

@@ -24,8 +24,8 @@ pub struct Watch<'a> {
     /// The cost that gains are relative to.
     base: f64,
     last: Mutex<Option<Event>>,
-    /// The number of moves so far. Events are rare while the search is hot, so that their numbers would
-    /// be out of date.
+    /// The number of moves so far. Events are rare while the search is hot, so that their numbers
+    /// would be out of date.
     moves: AtomicU64,
     /// The work so far.
     work: AtomicU64,

@@ -1,5 +1,5 @@
-//! Sphere scenes for ray tracing: the 75 spheres of the second source document, and larger scenes with
-//! the same density.
+//! Sphere scenes for ray tracing: the 75 spheres of the second source document, and larger scenes
+//! with the same density.
 //!
 //! Centres follow Roberts' (2018) additive recurrence on the plastic-number generalization of the
 //! golden ratio, which keeps any number of points evenly apart without a grid. Differs from the
@@ -9,13 +9,14 @@ use super::stand_ins::jitter;
 use bvh_core::Sphere;
 use glam::DVec3;
 
-/// Half the size of the box of the centres, which is centred at the origin and has about the ratio 16:9
-/// along the z axis.
+/// Half the size of the box of the centres, which is centred at the origin and has about the ratio
+/// 16:9 along the z axis.
 const HALF_SIZE: DVec3 = DVec3::new(8.0, 4.5, 5.0);
 
-/// Generates `count` spheres whose centres fill the box |x| <= 8, |y| <= 4.5, |z| <= 5 at every count.
-/// Radii vary by a factor of 4 and shrink with the cube root of `count`, so that the total volume stays
-/// the same; few spheres touch. Every call gives the same bytes on every machine. O(count).
+/// Generates `count` spheres whose centres fill the box |x| <= 8, |y| <= 4.5, |z| <= 5 at every
+/// count. Radii vary by a factor of 4 and shrink with the cube root of `count`, so that the total
+/// volume stays the same; few spheres touch. Every call gives the same bytes on every machine.
+/// O(count).
 pub fn spheres(count: usize) -> Vec<Sphere> {
     // The steps are 1/g, 1/g², 1/g³ for the real root g of g⁴ = g + 1.
     let steps =

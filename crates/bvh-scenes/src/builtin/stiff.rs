@@ -1,8 +1,8 @@
-//! The stiff and extreme scenes. Each is a function of the number of objects, with the identifier of
-//! its case.
+//! The stiff and extreme scenes. Each is a function of the number of objects, with the identifier
+//! of its case.
 //!
-//! All scenes consist of triangles, so that rays can be traced; a scene of boxes has in each box the
-//! triangle over its diagonal. The same number gives the same scene on every machine.
+//! All scenes consist of triangles, so that rays can be traced; a scene of boxes has in each box
+//! the triangle over its diagonal. The same number gives the same scene on every machine.
 
 use bvh_core::{Aabb, Triangle};
 use bvh_search::Stream;
@@ -10,11 +10,12 @@ use glam::Vec3;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 
-/// Generates a scene with this number of triangles, or with about this number if that is impossible.
+/// Generates a scene with this number of triangles, or with about this number if that is
+/// impossible.
 pub type Generator = fn(usize) -> Vec<Triangle>;
 
-/// Every stiff scene by the identifier of the case that builds and traces it. Several cases may have the
-/// same scene. Cases that are not listed test rays, errors, files or threads.
+/// Every stiff scene by the identifier of the case that builds and traces it. Several cases may
+/// have the same scene. Cases that are not listed test rays, errors, files or threads.
 pub const STIFF: [(&str, Generator); 31] = [
     ("S01", uniform),
     ("S02", uniform),
@@ -160,8 +161,8 @@ pub fn facets(n: usize) -> Vec<Triangle> {
     })
 }
 
-/// S12 to S16: the surface of the cube from -1 to 1: six faces of equal squares with two triangles each,
-/// and at least 12 triangles.
+/// S12 to S16: the surface of the cube from -1 to 1: six faces of equal squares with two triangles
+/// each, and at least 12 triangles.
 pub fn closed_box(n: usize) -> Vec<Triangle> {
     let cells = (n / 12).isqrt().max(1);
     let mut triangles = Vec::new();
@@ -247,8 +248,8 @@ pub fn sorted(n: usize) -> Vec<Triangle> {
 /// Triangles of the stadium.
 pub const STADIUM: usize = 48;
 
-/// S27: a ball of small triangles on the floor of a box that is a million times larger. The triangles of
-/// the box come first.
+/// S27: a ball of small triangles on the floor of a box that is a million times larger. The
+/// triangles of the box come first.
 pub fn teapot_in_a_stadium(n: usize) -> Vec<Triangle> {
     let mut triangles = closed_box(STADIUM);
     // The ball is at the origin, where it keeps its detail, and not at the middle of the floor.
@@ -303,8 +304,8 @@ pub fn two_densities(n: usize) -> Vec<Triangle> {
     })
 }
 
-/// S32: every second box is the reflection of the previous box in the origin. No two boxes have the same
-/// centre along any axis.
+/// S32: every second box is the reflection of the previous box in the origin. No two boxes have the
+/// same centre along any axis.
 pub fn symmetric(n: usize) -> Vec<Triangle> {
     let half = uniform(n.div_ceil(2));
     let all = half

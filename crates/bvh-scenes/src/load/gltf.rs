@@ -237,7 +237,8 @@ impl<'a> Loader<'a> {
         Fault::new(self.path, Place::Element(place), message)
     }
 
-    /// Follows the default scene, or the first one, from its roots. Rejects a node with two parents.
+    /// Follows the default scene, or the first one, from its roots. Rejects a node with two
+    /// parents.
     fn places(&self) -> Result<Vec<Placed>, Fault> {
         let scene = match self.root.scene {
             Some(index) => Some(

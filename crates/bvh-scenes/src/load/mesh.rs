@@ -13,7 +13,8 @@ pub const MOST_TRIANGLES: usize = 100_000_000;
 pub struct Mesh {
     /// The triangles in world units with finite corners, in the order of the file across its
     /// objects and groups. A face of n ≥ 3 vertices becomes the n − 2 triangles of the fan around
-    /// its first vertex. The fan is exact for convex faces; for a concave face it can reach outside.
+    /// its first vertex. The fan is exact for convex faces; for a concave face it can reach
+    /// outside.
     pub triangles: Vec<Triangle>,
     /// The number of vertices that are a corner of no triangle. They must be finite.
     pub unused_vertices: usize,

@@ -84,8 +84,8 @@ pub fn load_with(path: &Path, outside: OutsideFiles) -> Result<Mesh, MeshError> 
     parse_with(&read(path)?, path, outside)
 }
 
-/// Reads the bytes of a mesh file. `path` names the file in errors, and a glTF file's references are
-/// relative to its folder.
+/// Reads the bytes of a mesh file. `path` names the file in errors, and a glTF file's references
+/// are relative to its folder.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
     parse_with(bytes, path, OutsideFiles::Rejected)
 }

@@ -75,8 +75,8 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     let mut vertices = Vec::new();
     let mut faces = Vec::new();
     for element in header.elements.values() {
-        // Every element has at least a byte or a line. Without this check a header of one line could
-        // ask for any amount of memory.
+        // Every element has at least a byte or a line. Without this check a header of one line
+        // could ask for any amount of memory.
         if element.properties.is_empty() || element.count > bytes.len() {
             let found = format!(
                 "{} of {} properties in a file of {} bytes",

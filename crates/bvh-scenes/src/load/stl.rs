@@ -1,7 +1,7 @@
 //! Triangles from STL files, text or binary.
 //!
-//! This module does not use `stl_io` 0.11, because `stl_io` stops after the first of several solids,
-//! mistakes `solid` without a name for a binary file, and names no line.
+//! This module does not use `stl_io` 0.11, because `stl_io` stops after the first of several
+//! solids, mistakes `solid` without a name for a binary file, and names no line.
 
 use super::mesh::{Fault, Mesh, Place};
 use bvh_core::Triangle;

@@ -49,8 +49,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Creates the camera of a picture of this size in pixels. If the eye is the point in the middle
-    /// of the picture, the camera looks along −z.
+    /// Creates the camera of a picture of this size in pixels. If the eye is the point in the
+    /// middle of the picture, the camera looks along −z.
     pub fn new(view: &View, up: DVec3, width: u32, height: u32) -> Self {
         let forward = (view.at - view.from)
             .try_normalize()
@@ -63,8 +63,8 @@ impl Camera {
         Self { origin: view.from, corner, steps }
     }
 
-    /// Returns the unit direction through a point of the picture, given in pixels from its upper left
-    /// corner.
+    /// Returns the unit direction through a point of the picture, given in pixels from its upper
+    /// left corner.
     pub fn direction(&self, x: f64, y: f64) -> DVec3 {
         (self.corner + self.steps[0] * x + self.steps[1] * y).normalize()
     }

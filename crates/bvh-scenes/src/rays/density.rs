@@ -3,8 +3,8 @@
 use super::segments::TracedRay;
 use bvh_core::{Bvh, DensityError, RayDensity, Segment};
 
-/// The default number of primary rays that train a tree; without a camera, the number of rays of each
-/// family.
+/// The default number of primary rays that train a tree; without a camera, the number of rays of
+/// each family.
 pub const TRAINED: u32 = 100_000;
 
 /// The share of area in a box's measure. Without it a box that no sampled ray enters would be free.

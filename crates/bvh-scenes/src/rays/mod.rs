@@ -1,5 +1,5 @@
-//! The rays of measurements and of renderers, their segments up to the hit, and the density of these
-//! segments.
+//! The rays of measurements and of renderers, their segments up to the hit, and the density of
+//! these segments.
 
 mod camera;
 mod density;

@@ -31,8 +31,8 @@ pub fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> 
     let (origin, direction) = match family {
         Family::Inside => (inside, on_sphere(rng)),
         Family::Lines => {
-            // A uniform point on the surface and an inward direction with cosine density make a line
-            // that is uniform among all lines through the box.
+            // A uniform point on the surface and an inward direction with cosine density make a
+            // line that is uniform among all lines through the box.
             let areas = [size.y * size.z, size.z * size.x, size.x * size.y];
             let pick = rng.random::<f64>() * areas.iter().sum::<f64>();
             let axis =
@@ -53,8 +53,8 @@ pub fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> 
     Ray::half_line(origin, direction.as_vec3()).ok()
 }
 
-/// Returns a uniform point on the unit sphere: the direction of a uniform point in the unit ball, which
-/// needs no function that differs between machines.
+/// Returns a uniform point on the unit sphere: the direction of a uniform point in the unit ball,
+/// which needs no function that differs between machines.
 pub(super) fn on_sphere(rng: &mut Stream) -> DVec3 {
     loop {
         let unit = DVec3::from_array(rng.random());
@@ -79,13 +79,13 @@ pub(super) fn on_sphere(rng: &mut Stream) -> DVec3 {
 pub enum Kind {
     /// Rays with uniform origins in the root's box and uniform directions; nearest hit.
     Incoherent,
-    /// Rays from a pinhole camera with an angle of view of 60 degrees, pixels in Morton order; nearest
-    /// hit.
+    /// Rays from a pinhole camera with an angle of view of 60 degrees, pixels in Morton order;
+    /// nearest hit.
     Primary,
     /// Rays from the hits of the primary rays, in their order, in random directions; nearest hit.
     Bounce,
-    /// Rays from the hits of the primary rays, in their order, to a light below the middle of the box's
-    /// upper side; any hit.
+    /// Rays from the hits of the primary rays, in their order, to a light below the middle of the
+    /// box's upper side; any hit.
     Shadow,
 }
 
@@ -95,8 +95,8 @@ impl Kind {
         if self == Self::Shadow { Query::Any } else { Query::Nearest }
     }
 
-    /// Returns whether `count` rays of this kind cover squares of 16 × 16 pixels completely, one square
-    /// after the other, each in Morton order.
+    /// Returns whether `count` rays of this kind cover squares of 16 × 16 pixels completely, one
+    /// square after the other, each in Morton order.
     pub fn is_in_squares(self, count: u32) -> bool {
         let side = picture_side(count);
         self == Self::Primary && side.is_multiple_of(16) && side * side == count
@@ -121,8 +121,8 @@ impl Kind {
     }
 }
 
-/// The camera of a scene's primary rays, in fractions of the root's box: 0 is the lower corner and 1 the
-/// upper corner.
+/// The camera of a scene's primary rays, in fractions of the root's box: 0 is the lower corner and
+/// 1 the upper corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -143,8 +143,8 @@ impl Default for Viewpoint {
     }
 }
 
-/// Returns `count` rays of a kind through `tree`, which must be valid over the scene. Bounce and shadow
-/// rays need a primary hit; without one the result is empty.
+/// Returns `count` rays of a kind through `tree`, which must be valid over the scene. Bounce and
+/// shadow rays need a primary hit; without one the result is empty.
 pub fn rays(
     kind: Kind,
     count: u32,
@@ -210,7 +210,8 @@ fn hit_points(rays: &[Ray], scene: &Scene, tree: &Bvh, fraction: f32) -> Vec<Vec
 
 /// Returns rays through the centres of the pixels of a square picture, in Morton order.
 ///
-/// Packet tracers need consecutive rays to be close to each other in both directions of the picture:
+/// Packet tracers need consecutive rays to be close to each other in both directions of the
+/// picture:
 ///
 /// ```text
 ///  0  1 │  4  5
@@ -232,16 +233,16 @@ fn primary_rays(count: u32, root: &Aabb, viewpoint: &Viewpoint) -> Vec<Ray> {
     rays
 }
 
-/// Returns the side of the smallest square picture with at least `count` pixels. Its last rows may be
-/// incomplete.
+/// Returns the side of the smallest square picture with at least `count` pixels. Its last rows may
+/// be incomplete.
 fn picture_side(count: u32) -> u32 {
     (1..=count)
         .find(|side| side.saturating_mul(*side) >= count)
         .unwrap_or(count)
 }
 
-/// Returns the column and the row of the first `count` pixels of a square picture, counted row by row,
-/// in Morton order.
+/// Returns the column and the row of the first `count` pixels of a square picture, counted row by
+/// row, in Morton order.
 fn pixels(side: u32, count: u32) -> impl Iterator<Item = [u32; 2]> {
     // Morton codes fill a square whose side is a power of two; the pixels outside the picture go.
     let codes = u64::from(side.next_power_of_two()).pow(2);

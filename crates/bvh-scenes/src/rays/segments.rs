@@ -13,8 +13,8 @@ use rand::{RngExt, SeedableRng};
 use std::ops::Bound::Excluded;
 
 config! {
-    /// The rays of a renderer: the contents of the file of `bake --rays FILE.toml`. All coordinates are
-    /// in world units.
+    /// The rays of a renderer: the contents of the file of `bake --rays FILE.toml`. All coordinates
+    /// are in world units.
     pub struct RenderedRays {
         /// The poses of the camera on its path, at least one. The camera moves in straight lines.
         cameras: Vec<Pose>;
@@ -67,8 +67,8 @@ impl RenderedRays {
         check_count("count", self.count, 1 + self.bounces as usize + self.lights.len())
     }
 
-    /// Returns the camera at a position on its path, 0 at the first pose and 1 at the last. Its picture
-    /// is one unit high.
+    /// Returns the camera at a position on its path, 0 at the first pose and 1 at the last. Its
+    /// picture is one unit high.
     fn camera(&self, position: f64, up: DVec3) -> Camera {
         let last = self.cameras.len() - 1;
         let place = position * last as f64;
@@ -88,7 +88,8 @@ impl RenderedRays {
 /// The largest number of rays that [`of_anything`] makes per unit of its count.
 pub const OF_ANYTHING: usize = 6;
 
-/// Rejects a count if that many rays, each leading to `rays` in total, exceed the limit of a density.
+/// Rejects a count if that many rays, each leading to `rays` in total, exceed the limit of a
+/// density.
 pub fn check_count(key: &str, count: u32, rays: usize) -> Option<OutOfRange> {
     let most = RayDensity::MOST_SEGMENTS / rays;
     if count as usize <= most {
@@ -103,14 +104,14 @@ pub struct TracedRay {
     pub kind: Kind,
     /// The ray, which begins at a surface or a camera.
     pub ray: Ray,
-    /// The segment up to the nearest hit. A shadow ray has its full length, because any object on its
-    /// way may end its traversal.
+    /// The segment up to the nearest hit. A shadow ray has its full length, because any object on
+    /// its way may end its traversal.
     pub segment: Segment,
 }
 
-/// Returns the rays of a renderer through `scene`: primary rays through random points of the pictures,
-/// `bounces` reflections in random directions, and shadow rays from primary hits to every light. `tree`
-/// is any valid tree over the scene.
+/// Returns the rays of a renderer through `scene`: primary rays through random points of the
+/// pictures, `bounces` reflections in random directions, and shadow rays from primary hits to every
+/// light. `tree` is any valid tree over the scene.
 pub fn of_renderer(config: &RenderedRays, scene: &Scene, tree: &Bvh) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, config.seed);
     let up = scene.up();
@@ -135,8 +136,9 @@ pub fn of_renderer(config: &RenderedRays, scene: &Scene, tree: &Bvh) -> Vec<Trac
     tracing.rays
 }
 
-/// Returns rays that need no camera: `count` rays from random points in the scene, `count` rays through
-/// it from outside, and from each hit one ray in a random direction and one to a random point.
+/// Returns rays that need no camera: `count` rays from random points in the scene, `count` rays
+/// through it from outside, and from each hit one ray in a random direction and one to a random
+/// point.
 pub fn of_anything(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, seed);
     let Some(root) = tree.root_aabb() else { return Vec::new() };
@@ -182,8 +184,8 @@ impl<'a> Tracing<'a> {
         Self { accelerator, bounds, rng: Stream::seed_from_u64(seed), rays: Vec::new() }
     }
 
-    /// Keeps a ray that needs its nearest hit. Returns a point just before the hit, where further rays
-    /// may begin.
+    /// Keeps a ray that needs its nearest hit. Returns a point just before the hit, where further
+    /// rays may begin.
     fn nearest(&mut self, kind: Kind, origin: Vec3, direction: DVec3) -> Option<Vec3> {
         let ray = Ray::half_line(origin, direction.as_vec3()).ok()?;
         let hit = self.accelerator.nearest_hit(&ray);

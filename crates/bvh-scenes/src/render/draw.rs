@@ -1,5 +1,5 @@
-//! Draws a picture of a scene from a view. Tiles are drawn in parallel, and the picture has the same
-//! bytes for any number of threads.
+//! Draws a picture of a scene from a view. Tiles are drawn in parallel, and the picture has the
+//! same bytes for any number of threads.
 
 use super::film::Film;
 use super::framing;
@@ -53,8 +53,8 @@ pub fn tiles(options: &Options) -> u64 {
     u64::from(options.width.div_ceil(TILE)) * u64::from(options.height.div_ceil(TILE))
 }
 
-/// Draws the scene on all threads of the current rayon pool. Calls `tile_done` after every tile; once
-/// it returns false, abandons the picture and returns `None`.
+/// Draws the scene on all threads of the current rayon pool. Calls `tile_done` after every tile;
+/// once it returns false, abandons the picture and returns `None`.
 pub fn render(
     scene: &Scene,
     accelerator: &Accelerator,

@@ -2,8 +2,8 @@
 
 use bvh_core::TestCounts;
 
-/// A picture, or a tile that one thread has drawn, with its numbers of rays and tests. Rows run from
-/// the top, and pixels from the left.
+/// A picture, or a tile that one thread has drawn, with its numbers of rays and tests. Rows run
+/// from the top, and pixels from the left.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Film {
     /// The number of pixels per row.

@@ -5,13 +5,13 @@ use crate::rays::{View, frame};
 use bvh_core::{Aabb, Primitives};
 use glam::DVec3;
 
-/// Views of scenes that should be seen from inside: the name, the eye, the point in the middle of the
-/// picture, and the angle.
+/// Views of scenes that should be seen from inside: the name, the eye, the point in the middle of
+/// the picture, and the angle.
 const INSIDE: [(&str, [f64; 3], [f64; 3], f64); 1] =
     [("sponza", [-11.3, 1.9, -0.9], [3.0, 4.4, 0.5], 62.0)];
 
-/// Returns a view of a scene: the view in [`INSIDE`], or otherwise a view from outside, from above and
-/// a little from the side, whose distance just fits the whole box.
+/// Returns a view of a scene: the view in [`INSIDE`], or otherwise a view from outside, from above
+/// and a little from the side, whose distance just fits the whole box.
 pub fn automatic(scene: &Scene, bounds: &Aabb, aspect: f64) -> View {
     if let Some((_, from, at, fov)) = INSIDE.iter().find(|view| view.0 == scene.name) {
         let view = View { from: (*from).into(), at: (*at).into(), fov: *fov };
@@ -30,8 +30,8 @@ pub fn automatic(scene: &Scene, bounds: &Aabb, aspect: f64) -> View {
     framing(bounds, up.cross(front) * side + up * height + front, up, aspect, View::FOV)
 }
 
-/// Returns the view of a box from the direction `towards_eye`, at the smallest distance that shows the
-/// whole box with a small border. An empty box and a single point are seen from one unit away.
+/// Returns the view of a box from the direction `towards_eye`, at the smallest distance that shows
+/// the whole box with a small border. An empty box and a single point are seen from one unit away.
 fn framing(bounds: &Aabb, towards_eye: DVec3, up: DVec3, aspect: f64, fov: f64) -> View {
     let (center, half) = match bounds.check() {
         Ok(()) => (bounds.doubled_centroid() * 0.5, bounds.extent() * 0.5),

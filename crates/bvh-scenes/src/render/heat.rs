@@ -3,8 +3,8 @@
 use super::film::Film;
 use super::key::{self, BadFont};
 
-/// Every sixteenth colour of matplotlib's 'inferno' (van der Walt & Smith 2015; CC0), whose brightness
-/// increases evenly to the eye.
+/// Every sixteenth colour of matplotlib's 'inferno' (van der Walt & Smith 2015; CC0), whose
+/// brightness increases evenly to the eye.
 const INFERNO: [[u8; 3]; 17] = [
     [0, 0, 4],
     [11, 7, 36],
@@ -25,8 +25,8 @@ const INFERNO: [[u8; 3]; 17] = [
     [252, 255, 164],
 ];
 
-/// The distribution of a heat map's values: tests per ray through a pixel, with the tests of the rays
-/// that follow.
+/// The distribution of a heat map's values: tests per ray through a pixel, with the tests of the
+/// rays that follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// The smallest value.
@@ -40,7 +40,8 @@ pub struct Range {
     pub max: f64,
 }
 
-/// Returns the distribution of tests over the pixels of a film with this many rays through each pixel.
+/// Returns the distribution of tests over the pixels of a film with this many rays through each
+/// pixel.
 pub fn range(film: &Film, rays_per_pixel: u32) -> Range {
     let mut sorted = film.tests.clone();
     sorted.sort_unstable();

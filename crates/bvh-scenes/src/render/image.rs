@@ -5,8 +5,8 @@ use glam::DVec3;
 /// The exposure that makes a white surface in the automatic light just darker than white.
 const EXPOSURE: f64 = 0.66;
 
-/// Maps linear light of any strength to 0..1 like film: overexposed light loses its colour but not its
-/// shape.
+/// Maps linear light of any strength to 0..1 like film: overexposed light loses its colour but not
+/// its shape.
 ///
 /// Source: Narkowicz 2015, 'ACES filmic tone mapping curve'.
 pub fn expose(light: DVec3) -> DVec3 {

@@ -1,5 +1,5 @@
-//! Computes the light that reaches a pixel with rays through the pixel, to the lights, and along mirror
-//! reflections.
+//! Computes the light that reaches a pixel with rays through the pixel, to the lights, and along
+//! mirror reflections.
 
 use super::film::Film;
 use super::image;
@@ -25,8 +25,8 @@ impl Light {
         Self { position, colour: colour.into(), reach }
     }
 
-    /// Returns white lights at these positions. They do not fade with distance, and together they are as
-    /// bright as the automatic lights.
+    /// Returns white lights at these positions. They do not fade with distance, and together they
+    /// are as bright as the automatic lights.
     pub fn white(positions: &[DVec3]) -> Vec<Self> {
         let colour = DVec3::splat(1.3 / positions.len().max(1) as f64);
         positions
@@ -47,9 +47,9 @@ impl Light {
     }
 }
 
-/// Returns lights that suit a view. A scene seen from outside has a warm light at the upper left and a
-/// weak cool light at the right. A scene seen from inside has a sun overhead, sunlight reflected by the
-/// floor, and a weak lamp near the eye.
+/// Returns lights that suit a view. A scene seen from outside has a warm light at the upper left
+/// and a weak cool light at the right. A scene seen from inside has a sun overhead, sunlight
+/// reflected by the floor, and a weak lamp near the eye.
 pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     if bounds.check().is_err() {
         return vec![];
@@ -61,8 +61,8 @@ pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     if view.is_inside(bounds) {
         let sun = center + up * (4.0 * radius) + right * (0.85 * radius) + forward * (0.6 * radius);
         let lamp = view.from + up * (0.05 * radius) - right * (0.04 * radius);
-        // The renderer has no diffuse reflection. This light replaces the sunlight that the floor would
-        // reflect to walls and vaults.
+        // The renderer has no diffuse reflection. This light replaces the sunlight that the floor
+        // would reflect to walls and vaults.
         let floor = view.at - up * (0.15 * radius) + right * (0.05 * radius);
         return vec![
             Light::new(sun, [2.0, 1.72, 1.3], f64::INFINITY),
@@ -153,8 +153,8 @@ impl<'a> World<'a> {
         tile
     }
 
-    /// Returns the light from `direction`. A loop follows reflections, because each surface has only
-    /// one.
+    /// Returns the light from `direction`. A loop follows reflections, because each surface has
+    /// only one.
     fn radiance(&self, mut origin: DVec3, mut direction: DVec3, tally: &mut Tally) -> DVec3 {
         let mut light = DVec3::ZERO;
         let mut weight = 1.0;
@@ -201,10 +201,11 @@ impl<'a> World<'a> {
         hit.map(|hit| Surface::of_object(self.accelerator.objects(), &hit, origin, direction))
     }
 
-    /// Returns a point just in front of the surface, from which a ray does not meet the surface again.
+    /// Returns a point just in front of the surface, from which a ray does not meet the surface
+    /// again.
     fn lifted(&self, surface: &Surface, seen_from: DVec3) -> DVec3 {
-        // Rounding moves a hit by a few units in the last place of the largest coordinate involved, and
-        // 64 units are a safe multiple.
+        // Rounding moves a hit by a few units in the last place of the largest coordinate involved,
+        // and 64 units are a safe multiple.
         let size = surface
             .point
             .abs()

@@ -45,8 +45,8 @@ pub enum StructureError {
     File(#[from] TreeFileError),
 }
 
-/// Builds the structure that `--accel` names over the scene. Trees are built by greedy Müller–Fellner
-/// division.
+/// Builds the structure that `--accel` names over the scene. Trees are built by greedy
+/// Müller–Fellner division.
 pub fn by_name(name: &str, scene: &Scene) -> Result<Structure<'static>, StructureError> {
     match name {
         "brute" => Ok(Structure::Brute),

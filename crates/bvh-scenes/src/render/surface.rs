@@ -58,8 +58,8 @@ impl Surface {
     }
 }
 
-/// The plane below the scene. No acceleration structure contains it, because one division intersects
-/// it.
+/// The plane below the scene. No acceleration structure contains it, because one division
+/// intersects it.
 #[derive(Clone, Debug)]
 pub struct Ground {
     up: DVec3,

@@ -1,5 +1,5 @@
-//! Finds the objects on a ray through one interface over every acceleration structure, with and without
-//! counting tests.
+//! Finds the objects on a ray through one interface over every acceleration structure, with and
+//! without counting tests.
 
 use super::kd_tree::KdTree;
 use bvh_core::{
@@ -34,8 +34,8 @@ pub enum Structure<'a> {
     KdTree(KdTree),
     /// A hierarchy.
     Tree(Cow<'a, Bvh>),
-    /// A hierarchy of triangles in the wide layout, traced with the best instructions of this machine,
-    /// which count no tests.
+    /// A hierarchy of triangles in the wide layout, traced with the best instructions of this
+    /// machine, which count no tests.
     Wide(WideBvh),
     /// A hierarchy of triangles in the wide layout, traced with portable code.
     WidePortable(WideBvh),
@@ -81,8 +81,8 @@ pub struct Accelerator<'a> {
 }
 
 impl<'a> Accelerator<'a> {
-    /// Combines objects with a structure, which must have been built over these objects. Otherwise rays
-    /// may panic or return wrong answers.
+    /// Combines objects with a structure, which must have been built over these objects. Otherwise
+    /// rays may panic or return wrong answers.
     pub fn new(objects: &'a Primitives, structure: Structure<'a>) -> Self {
         Self { objects, structure }
     }
@@ -97,8 +97,8 @@ impl<'a> Accelerator<'a> {
         self.objects
     }
 
-    /// Returns the nearest object in the ray's range; of several at the same distance, the object with
-    /// the lowest id.
+    /// Returns the nearest object in the ray's range; of several at the same distance, the object
+    /// with the lowest id.
     #[inline]
     pub fn nearest_hit(&self, ray: &Ray) -> Option<Hit> {
         match &self.structure {
@@ -116,8 +116,8 @@ impl<'a> Accelerator<'a> {
         }
     }
 
-    // The methods below are not generic, so that they are compiled and optimised in this crate even if
-    // the callers are not optimised.
+    // The methods below are not generic, so that they are compiled and optimised in this crate even
+    // if the callers are not optimised.
 
     fn nearest_hit_uncounted(&self, ray: &Ray) -> Option<Hit> {
         self.find(ray, &mut ())
@@ -136,7 +136,8 @@ impl<'a> Accelerator<'a> {
         }
     }
 
-    /// Answers as [`any_hit`](Self::any_hit) does and counts the tests, except in [`Structure::Wide`].
+    /// Answers as [`any_hit`](Self::any_hit) does and counts the tests, except in
+    /// [`Structure::Wide`].
     pub fn any_hit_counted(&self, ray: &Ray, counts: &mut TestCounts) -> bool {
         match &self.structure {
             Structure::Wide(wide) => wide.any_hit(ray),
@@ -144,9 +145,9 @@ impl<'a> Accelerator<'a> {
         }
     }
 
-    /// Answers `query` and counts the tests. Returns whether the ray hits. The wide layouts use portable
-    /// code here, so that the counts are the same on every machine; for [`Query::All`] they test every
-    /// object.
+    /// Answers `query` and counts the tests. Returns whether the ray hits. The wide layouts use
+    /// portable code here, so that the counts are the same on every machine; for [`Query::All`]
+    /// they test every object.
     pub fn count(&self, query: Query, ray: &Ray, counts: &mut TestCounts) -> bool {
         match query {
             Query::All => self.visit(ray, false, counts),
@@ -185,8 +186,8 @@ impl<'a> Accelerator<'a> {
         }
     }
 
-    /// Tests the objects on the ray, up to the first hit or all of them. Returns whether there was a
-    /// hit.
+    /// Tests the objects on the ray, up to the first hit or all of them. Returns whether there was
+    /// a hit.
     #[inline(always)]
     fn visit(&self, ray: &Ray, ends_at_hit: bool, counter: &mut impl Counter) -> bool {
         let mut found = false;

@@ -40,8 +40,9 @@ fn flags(folder: &Path, command: &str) -> Vec<(String, Option<String>)> {
     flags
 }
 
-/// Gives every flag of the commands invalid values, together with the arguments that the command needs.
-/// Asserts that the message names the flag and that no file is written. Returns the number of flags.
+/// Gives every flag of the commands invalid values, together with the arguments that the command
+/// needs. Asserts that the message names the flag and that no file is written. Returns the number
+/// of flags.
 pub fn wrong_flags(at: &Path, commands: &[(&str, &[&str])]) -> usize {
     fs::create_dir(at.join("folder")).unwrap();
     fs::write(at.join("file"), "").unwrap();

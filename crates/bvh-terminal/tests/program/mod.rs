@@ -1,5 +1,5 @@
-//! A program as a child process, and the files that it leaves. `PROGRAM` in the parent module is its
-//! path.
+//! A program as a child process, and the files that it leaves. `PROGRAM` in the parent module is
+//! its path.
 #![allow(dead_code)] // each test file uses some of it
 
 mod flags;
@@ -51,8 +51,8 @@ pub fn run(folder: &Path, args: &[&str]) -> Output {
     program(folder, args).output().unwrap()
 }
 
-/// Runs the program where no file may be larger than `blocks` blocks of 512 bytes. Larger writes fail as
-/// they do on a full disk.
+/// Runs the program where no file may be larger than `blocks` blocks of 512 bytes. Larger writes
+/// fail as they do on a full disk.
 pub fn run_on_a_small_disk(folder: &Path, args: &str, blocks: u32) -> Output {
     // Without the trap the signal would kill the program before the write fails.
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec '{PROGRAM}' {args}");
@@ -129,7 +129,8 @@ pub fn send(signal: &str, to: &Child) {
     assert!(status.unwrap().success());
 }
 
-/// Returns a glTF scene of one triangle, whose corners, [`outside_buffer`], are in the file at `uri`.
+/// Returns a glTF scene of one triangle, whose corners, [`outside_buffer`], are in the file at
+/// `uri`.
 pub fn outside_scene(uri: &str) -> String {
     format!(
         r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0}}],

@@ -78,8 +78,8 @@ pub fn blocks_in(language: &str) -> Vec<Block> {
     blocks
 }
 
-/// Splits shell text into the words of its commands, without comments, leading variables, and the parts
-/// after a pipe.
+/// Splits shell text into the words of its commands, without comments, leading variables, and the
+/// parts after a pipe.
 pub fn commands(text: &str, place: &str) -> Vec<Vec<String>> {
     let mut commands = Vec::new();
     for line in text.replace("\\\n", " ").lines() {
@@ -130,10 +130,11 @@ impl Called {
         }
     }
 
-    /// Asserts that the program accepts the arguments of all commands in blocks. Returns the number of
-    /// commands.
+    /// Asserts that the program accepts the arguments of all commands in blocks. Returns the number
+    /// of commands.
     pub fn reads_blocks(&self) -> usize {
-        // In an empty folder valid commands end soon, because the files that they name do not exist.
+        // In an empty folder valid commands end soon, because the files that they name do not
+        // exist.
         let empty = tempfile::tempdir().unwrap();
         let mut read = 0;
         for block in blocks_in("sh") {
@@ -147,8 +148,8 @@ impl Called {
         read
     }
 
-    /// Asserts that the program has the commands and flags that sentences name. Returns the number of
-    /// commands.
+    /// Asserts that the program has the commands and flags that sentences name. Returns the number
+    /// of commands.
     pub fn knows_sentences(&self) -> usize {
         let mut read = 0;
         for page in pages() {

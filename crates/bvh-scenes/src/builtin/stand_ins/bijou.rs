@@ -1,9 +1,9 @@
 //! Stand-in for bijou: a ring with a brilliant-cut stone, shoulders of small stones, and a chain.
 //!
-//! Every stone of any size is a complete standard brilliant (table, stars, bezels, girdle, pavilion).
-//! The shank, prongs and beads are smooth, and the cushion has a few large polygons. The ring leans
-//! against the axes. World units are chosen so that the greedy MF tree costs about 1.7e7, like the
-//! original's.
+//! Every stone of any size is a complete standard brilliant (table, stars, bezels, girdle,
+//! pavilion). The shank, prongs and beads are smooth, and the cushion has a few large polygons. The
+//! ring leans against the axes. World units are chosen so that the greedy MF tree costs about
+//! 1.7e7, like the original's.
 
 use super::mesh_builder::{
     MeshBuilder, about_x, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright,

@@ -1,9 +1,9 @@
 //! Stand-in for escher: staircases that interlock under three directions of gravity.
 //!
 //! The model is the print 'Relativity'. Each gravity has its own flights, landings, arcade and
-//! balustrades in one room. The flights differ in length, place and bearing, so that no symmetry of the
-//! axes decides a split. Walls and floors are a few large polygons. World units are chosen so that the
-//! greedy MF tree costs about 4.8e5, like the original's.
+//! balustrades in one room. The flights differ in length, place and bearing, so that no symmetry of
+//! the axes decides a split. Walls and floors are a few large polygons. World units are chosen so
+//! that the greedy MF tree costs about 4.8e5, like the original's.
 
 use super::mesh_builder::{
     MeshBuilder, about_z, circle, cos_sin, fraction, on_circle, placed, upright,
@@ -85,8 +85,8 @@ fn storey(plan: &Plan) -> MeshBuilder {
     let mut storey = MeshBuilder::default();
     storey.grid(3, 2, |i, j| DVec3::new(fraction(i, 3), fraction(j, 2), 0.0) * ROOM);
 
-    // The first flight leads along x to a landing, the second along y to a gallery, and the third down
-    // at an oblique angle.
+    // The first flight leads along x to a landing, the second along y to a gallery, and the third
+    // down at an oblique angle.
     let width = plan.width;
     let deep = plan.width + 1.0;
     let low = plan.first as f64 * RISE;

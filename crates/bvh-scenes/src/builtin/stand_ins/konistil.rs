@@ -1,8 +1,9 @@
 //! Stand-in for konistil: a valley with town and railway, in millimetres on a map grid.
 //!
 //! Coordinates run into the millions and costs to 1e14, although some parts are only a few tens of
-//! units thick: rails, wires and lattice masts are long and thin. The terrain is one coarse sheet that
-//! is fine only under the town. Ground, houses and trees are irregular by a small seeded jitter.
+//! units thick: rails, wires and lattice masts are long and thin. The terrain is one coarse sheet
+//! that is fine only under the town. Ground, houses and trees are irregular by a small seeded
+//! jitter.
 
 use super::mesh_builder::{
     MeshBuilder, about_z, circle, cos_sin, fraction, jitter, placed, upright,

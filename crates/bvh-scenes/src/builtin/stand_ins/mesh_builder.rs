@@ -1,8 +1,8 @@
 //! Makes triangles from surfaces, swept profiles and placed copies, for the mesh stand-ins.
 //!
-//! All coordinates are f64 until [`MeshBuilder::finish`] rounds each of them to f32 once. Angles are in
-//! turns, so that quarter turns are exact; sine and cosine come from `libm`, so that every machine
-//! gets the same bytes.
+//! All coordinates are f64 until [`MeshBuilder::finish`] rounds each of them to f32 once. Angles
+//! are in turns, so that quarter turns are exact; sine and cosine come from `libm`, so that every
+//! machine gets the same bytes.
 
 use bvh_core::Triangle;
 use glam::{DAffine3, DMat3, DVec3};

@@ -1,8 +1,8 @@
 //! Procedural stand-ins for the five scenes of the paper.
 //!
-//! The originals are no longer distributed. The stand-ins have the originals' sizes and character, but
-//! different triangles: compare ratios to the greedy tree's cost, never absolute costs. Every generator
-//! is deterministic to the bit on every machine.
+//! The originals are no longer distributed. The stand-ins have the originals' sizes and character,
+//! but different triangles: compare ratios to the greedy tree's cost, never absolute costs. Every
+//! generator is deterministic to the bit on every machine.
 
 mod bijou;
 mod cloister;

@@ -55,8 +55,9 @@ impl<'a> Geometry<'a> {
     ///
     /// # Errors
     ///
-    /// The first fault in the order of the file. An index above the number of vertices is found only
-    /// at the end of the file, because a face may come before its vertices, and is reported last.
+    /// The first fault in the order of the file. An index above the number of vertices is found
+    /// only at the end of the file, because a face may come before its vertices, and is reported
+    /// last.
     pub fn finish(&mut self) -> Result<(), ObjError> {
         while self.add_statement() {}
         let (index, line) = self.highest;

@@ -24,8 +24,8 @@ use geometry::Geometry;
 use glam::Vec3;
 use std::path::Path;
 
-/// Reads the bytes of an OBJ file; `path` only names it in errors. Any bytes give a mesh or an error.
-/// O(bytes).
+/// Reads the bytes of an OBJ file; `path` only names it in errors. Any bytes give a mesh or an
+/// error. O(bytes).
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, ObjError> {
     let mut geometry = Geometry::new(bytes, path);
     let options = tobj::LoadOptions {

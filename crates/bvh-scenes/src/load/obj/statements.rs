@@ -9,8 +9,8 @@ pub enum Keyword {
     Face,
 }
 
-/// The largest number of vertices of one face. The fan of a larger face would need a hundred bytes of
-/// memory for every two bytes of the file.
+/// The largest number of vertices of one face. The fan of a larger face would need a hundred bytes
+/// of memory for every two bytes of the file.
 pub const MOST_CORNERS: usize = 1 << 16;
 
 /// Keywords of the format that are ignored (Wavefront, "Object Files", version 3.0).
@@ -41,8 +41,8 @@ impl<'a> Statements<'a> {
         Self { rest, lines: 0, ignoring: false, unknown: None }
     }
 
-    /// Returns the next `v` or `f` statement and the number of its first line. Replaces the contents
-    /// of `words` by the words after the keyword, at most `most` of them.
+    /// Returns the next `v` or `f` statement and the number of its first line. Replaces the
+    /// contents of `words` by the words after the keyword, at most `most` of them.
     pub fn next(&mut self, words: &mut Vec<&'a [u8]>, most: usize) -> Option<(Keyword, usize)> {
         loop {
             let (code, mut continued) = self.line()?;

@@ -1,8 +1,8 @@
 //! A KD-tree by the surface area heuristic: a baseline for comparison with bounding volume
 //! hierarchies.
 //!
-//! Wald & Havran 2006, 'On building fast kd-trees for ray tracing, and on doing that in O(N log N)',
-//! section 4.3.
+//! Wald & Havran 2006, 'On building fast kd-trees for ray tracing, and on doing that in O(N log
+//! N)', section 4.3.
 //!
 //! Differs from the paper: objects are boxes, whose perfect split is the box clipped to the cell.
 //! Events are therefore never regenerated or merged: events outside a cell are no candidates, and
@@ -16,7 +16,8 @@ use bvh_config::{Check, above};
 use bvh_core::Aabb;
 
 bvh_config::config! {
-    /// The constants of the surface area heuristic, in any unit of time. The defaults are the paper's.
+    /// The constants of the surface area heuristic, in any unit of time. The defaults are the
+    /// paper's.
     pub struct Config {
         /// The time to step through a cell.
         traversal: f64 = 15.0, in above(0.0);
@@ -27,8 +28,8 @@ bvh_config::config! {
     }
 }
 
-/// A tree of cells that fill the root's box without overlap. Every leaf that an object's box overlaps
-/// names the object.
+/// A tree of cells that fill the root's box without overlap. Every leaf that an object's box
+/// overlaps names the object.
 #[derive(Clone, Debug)]
 pub struct KdTree {
     /// The box around all objects.
@@ -42,8 +43,8 @@ pub struct KdTree {
 
 #[derive(Clone, Copy, Debug)]
 enum Cell {
-    /// A cell that a plane splits. The child below the plane is at index `below`, and the child above it
-    /// is at the next index.
+    /// A cell that a plane splits. The child below the plane is at index `below`, and the child
+    /// above it is at the next index.
     Inner { axis: u8, position: f32, below: u32 },
     /// A leaf with a range of [`KdTree::objects`].
     Leaf { first: u32, count: u32 },
@@ -69,8 +70,9 @@ impl KdTree {
     }
 }
 
-/// The start or the end of an object's box along an axis. At equal positions ends come first and starts
-/// last: a box that ends at a plane is not above the plane, and a box that starts there is not below.
+/// The start or the end of an object's box along an axis. At equal positions ends come first and
+/// starts last: a box that ends at a plane is not above the plane, and a box that starts there is
+/// not below.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Event {
     position: f32,
@@ -117,8 +119,8 @@ impl Config {
     /// The limit on references per object. Wald & Havran report 2 to 6 for meshes.
     const MAX_REFERENCES: usize = 16;
 
-    /// Builds a tree over `boxes`; `boxes[i]` bounds object `i`. No boxes give the tree without cells.
-    /// O(n log n).
+    /// Builds a tree over `boxes`; `boxes[i]` bounds object `i`. No boxes give the tree without
+    /// cells. O(n log n).
     ///
     /// The tree is at most 8 + 1.3 log₂ n deep and has at most 16 references per object.
     pub fn build(&self, boxes: &[Aabb]) -> Result<KdTree, BuildError> {
@@ -203,8 +205,8 @@ impl Config {
             let high = frame.bounds.max[axis];
             let u = extent[(axis + 1) % 3];
             let v = extent[(axis + 2) % 3];
-            // The probability that a line through the cell meets the part of this length, or the part's
-            // share of the length if the cell has no area.
+            // The probability that a line through the cell meets the part of this length, or the
+            // part's share of the length if the cell has no area.
             let chance = |length: f64| {
                 if area > 0.0 { (u * v + length * (u + v)) / area } else { length / extent[axis] }
             };

@@ -1,22 +1,22 @@
 //! Traversal of a KD-tree, with the same answers as a test of every object.
 //!
-//! A ray's interval in a cell is computed by the operations of [`Slabs`] and is only ever cut by split
-//! planes. If an object's box is on one side of a plane, its interval is therefore within the interval
-//! of that side. A box on both sides is referenced from both, and the two intervals overlap. Hence the
-//! traversal skips no cell that contains a hit. A hit outside the current cell counts as well, and
-//! cells that begin behind the hit are skipped.
+//! A ray's interval in a cell is computed by the operations of [`Slabs`] and is only ever cut by
+//! split planes. If an object's box is on one side of a plane, its interval is therefore within the
+//! interval of that side. A box on both sides is referenced from both, and the two intervals
+//! overlap. Hence the traversal skips no cell that contains a hit. A hit outside the current cell
+//! counts as well, and cells that begin behind the hit are skipped.
 
 use super::{Cell, KdTree};
 use bvh_core::{Counter, Hit, Ray, Slabs};
 use std::ops::ControlFlow;
 
 impl KdTree {
-    /// Returns the nearest object that `ray` hits in its range; of several at the same distance, the
-    /// object with the lowest id. Accepts the same `test` as [`bvh_core::nearest_hit_by`] and gives the
-    /// same answer, bit for bit.
+    /// Returns the nearest object that `ray` hits in its range; of several at the same distance,
+    /// the object with the lowest id. Accepts the same `test` as [`bvh_core::nearest_hit_by`] and
+    /// gives the same answer, bit for bit.
     ///
-    /// `counter` counts the root's box and every visited split plane as one box each. It counts every
-    /// test of an object, which may happen once in each cell that the object overlaps.
+    /// `counter` counts the root's box and every visited split plane as one box each. It counts
+    /// every test of an object, which may happen once in each cell that the object overlaps.
     #[inline]
     pub fn nearest_hit(
         &self,
@@ -67,8 +67,8 @@ impl KdTree {
         found
     }
 
-    /// Calls `leaf` with the objects of every leaf that the ray may hit, from near to far, until `leaf`
-    /// breaks. `leaf` may lower the distance beyond which cells are skipped.
+    /// Calls `leaf` with the objects of every leaf that the ray may hit, from near to far, until
+    /// `leaf` breaks. `leaf` may lower the distance beyond which cells are skipped.
     #[inline(always)]
     fn walk<C: Counter>(
         &self,
@@ -147,8 +147,8 @@ mod tests {
     use glam::Vec3;
     use proptest::prelude::*;
 
-    /// Makes boxes between points of a small grid: many are flat, identical or nested, and many faces
-    /// coincide.
+    /// Makes boxes between points of a small grid: many are flat, identical or nested, and many
+    /// faces coincide.
     fn boxes() -> impl Strategy<Value = Vec<Aabb>> {
         let corners = prop::array::uniform2(prop::array::uniform3(-3i8..4));
         let b = corners.prop_map(|corners| {
