@@ -14,7 +14,7 @@ mod support;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
-use support::query::{pivot, rows};
+use support::query::answer;
 use support::{assert_current, experiments, top};
 
 /// The beginning of a table's comment.
@@ -39,10 +39,8 @@ fn renewed(text: &str) -> String {
             .split_whitespace()
             .collect();
         let query = words.join(" ");
-        let fields: Vec<&str> = query.split(" | ").collect();
-        let [file, conditions, axes, what, format] = fields[..] else { panic!("{query}") };
         out.push_str(&rest[..open]);
-        out.push_str(&format!("\n{}\n", pivot(&rows(file, conditions), axes, what, format)));
+        out.push_str(&answer(&query));
         rest = &rest[close..];
     }
     out + rest

@@ -7,7 +7,7 @@ mod support;
 
 use std::fs;
 use std::ops::Range;
-use support::query::value;
+use support::query::answer;
 use support::{assert_current, top};
 
 /// A piece of prose: its text with a name in braces for every number, and a query for every name.
@@ -165,7 +165,7 @@ fn the_prose_shows_the_committed_numbers() {
             .unwrap_or_else(|| panic!("{page} lacks: {text}"));
         let mut made = shown.clone();
         for (place, name) in places.into_iter().zip(&pattern.names).rev() {
-            let value = value(query(name));
+            let value = answer(query(name));
             if !reads_alike(&shown[place.clone()], &value) {
                 made.replace_range(place, &value);
             }

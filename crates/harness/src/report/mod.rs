@@ -24,6 +24,7 @@ pub mod pictures;
 mod prelude;
 mod profile;
 mod progress;
+pub mod query;
 mod ray_cost;
 pub mod ray_tests;
 mod ray_time;
