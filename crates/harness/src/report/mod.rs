@@ -9,7 +9,6 @@ pub mod config;
 mod correlation;
 pub mod data;
 pub mod distribution;
-mod ecdf;
 mod estimator;
 pub mod gaps;
 pub mod generations;
@@ -22,7 +21,6 @@ mod pareto;
 pub mod peers;
 pub mod pictures;
 mod prelude;
-mod profile;
 mod progress;
 pub mod query;
 mod ray_cost;
@@ -131,10 +129,6 @@ reports! {
     "gaps" => Gaps(gaps::Config: methods, optimum) by gaps::Config::write => [gaps::Gaps, gaps::Tightness];
     /// Run-time distributions.
     "run_times" => RunTimes(config::Targets: methods) by run_times::write => [run_times::Step, run_times::Fit];
-    /// The aggregate distribution of run times over scenes and targets.
-    "ecdf" => Ecdf(config::Targets: methods) by ecdf::write => [ecdf::Step];
-    /// Performance profiles.
-    "profile" => Profile(config::Targets: methods) by profile::write => [profile::Row];
     /// Time and work until targets are reached, one row per method, scene and target.
     "time_to_target" => TimeToTarget(config::Targets: methods) by time_to_target::write => [time_to_target::Reached];
     /// Medians, quartiles and primal integrals.
@@ -185,11 +179,8 @@ impl Report {
 
     /// Whether the report measures gaps.
     pub fn needs_references(&self) -> bool {
-        use Report::{Anytime, Ecdf, Numbers, Profile, RunTimes, TimeToTarget};
-        matches!(
-            self,
-            Anytime(_) | RunTimes(_) | Ecdf(_) | Profile(_) | Numbers(_) | TimeToTarget(_)
-        )
+        use Report::{Anytime, Numbers, RunTimes, TimeToTarget};
+        matches!(self, Anytime(_) | RunTimes(_) | Numbers(_) | TimeToTarget(_))
     }
 }
 

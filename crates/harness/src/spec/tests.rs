@@ -57,9 +57,9 @@ const WRONG_REPORTS: &[(&str, &str, &[&str])] = &[
     ("ray_tests", "tolerance = -0.1", &["reports[0].tolerance is -0.1", "0 to 1"]),
     ("ray_tests", "paper = { e = [1, 2] }", &["reports[0].paper.e is a list of 2", "up to 1"]),
     ("times", "paper = { e = [0.0] }", &["reports[0].paper.e[0] is 0", "above 0"]),
-    ("ecdf", "targets = []", &["reports[0].targets is empty", "one or more"]),
+    ("run_times", "targets = []", &["reports[0].targets is empty", "one or more"]),
     (
-        "ecdf",
+        "run_times",
         "targets = [{ of = 'base', percent = -100 }]",
         &["targets[0].percent is -100", "above -100"],
     ),
@@ -314,7 +314,7 @@ judge = { count = 0 }, for_rays = 'camera' },
     { method = 'best', label = 'd', references = 99.0, keep = ['nothing'] },
 ]
 [[reports]]
-kind = 'ecdf'
+kind = 'time_to_target'
 titel = 't'
 methods = ['a', 'b', 'e']
 targets = [{ of = 'bse', percent = 'x' }, { of = 'base', percent = -100 }]
