@@ -72,7 +72,8 @@ impl Ray {
 
     /// Makes a ray like [`new`](Self::new), without the checks, for callers who know that they
     /// would pass: a finite origin, a direction whose largest component is between 2⁻¹⁰⁰ and 2¹⁰⁰,
-    /// `0 <= t_min`, and no NaN. Otherwise answers may be wrong, but nothing is undefined.
+    /// `0 <= t_min`, and no NaN. Otherwise answers may be wrong, but nothing is undefined. A `t_min`
+    /// below 0 counts as 0.
     #[inline]
     pub fn assume_valid(
         origin: impl Into<Vec3>,
@@ -88,8 +89,10 @@ impl Ray {
         let sizes = inverse.abs();
         let least = sizes.x.min(sizes.y).min(sizes.z);
         // Adding 0 turns −0 into +0, so no kernel returns a distance of −0.
+        // A range that began below 0 would have entries below 0, and kernels sort entries by
+        // their bits.
         Self {
-            origin: origin.extend(t_min + 0.0),
+            origin: origin.extend(t_min.max(0.0) + 0.0),
             direction: direction.extend(t_max.min(f32::MAX) + 0.0),
             inverse: inverse.with_w(least),
         }

@@ -4,8 +4,8 @@
 mod support;
 
 use bvh_core::{
-    Coherence, Hit, Kernel, Ray, RefitError, Shear, Triangle, WideBvh, collapse_leaves,
-    cost::SahConstants,
+    Coherence, Distances, Hit, Kernel, Ray, RayComponents, RefitError, Shear, Triangle, WideBvh,
+    collapse_leaves, cost::SahConstants,
 };
 use glam::Vec3;
 use support::{
@@ -211,6 +211,89 @@ fn a_range_that_ends_at_either_zero_has_the_same_bits_from_every_kernel() {
     let rays: Vec<Ray> = (0..64).map(ray).collect();
     let hits = check("sheets that rays begin in", &triangles, &layouts, &rays);
     assert!(hits > 40, "{hits} of 64");
+}
+
+/// The answers to rays by component, all of whose ranges begin and end at the given distances.
+fn by_component(
+    wide: &WideBvh,
+    rays: &[Ray],
+    range: [f32; 2],
+    coherence: Coherence,
+) -> Vec<(u32, u32)> {
+    let components = |vector: fn(&Ray) -> Vec3| {
+        [0, 1, 2].map(|axis| -> Vec<f32> { rays.iter().map(|ray| vector(ray)[axis]).collect() })
+    };
+    let origins = components(Ray::origin);
+    let directions = components(Ray::direction);
+    let components = RayComponents::assume_valid(
+        origins.each_ref().map(Vec::as_slice),
+        directions.each_ref().map(Vec::as_slice),
+        Distances::All(range[0]),
+        Distances::All(range[1]),
+    );
+    let mut distances = vec![0.0; rays.len()];
+    let mut objects = vec![0; rays.len()];
+    wide.nearest_hits_by_component(&components, &mut distances, &mut objects, coherence);
+    let distance_bits = distances.into_iter().map(f32::to_bits);
+    distance_bits.zip(objects).collect()
+}
+
+/// The answers to a batch of rays.
+fn of_batch(wide: &WideBvh, rays: &[Ray], coherence: Coherence) -> Vec<(u32, u32)> {
+    let mut hits = vec![Hit::MISS; rays.len()];
+    wide.nearest_hits(rays, &mut hits, coherence);
+    hits.iter()
+        .map(|hit| (hit.t.to_bits(), hit.object))
+        .collect()
+}
+
+#[test]
+fn ranges_by_component_end_at_either_zero_with_the_same_bits() {
+    let sheet = |x: f32| {
+        Triangle([Vec3::new(x, -1.0, 0.0), Vec3::new(x + 1.0, -1.0, 0.0), Vec3::new(x, 3.0, 0.0)])
+    };
+    let triangles: Vec<Triangle> = (0..20).map(|x| sheet(x as f32)).collect();
+    let rays: Vec<Ray> = (0..64)
+        .map(|i| {
+            let side = [1.0, -1.0][i % 2];
+            Ray::new([0.3 * i as f32, 0.0, 0.0], [0.0, 0.0, side], 0.0, 0.0).unwrap()
+        })
+        .collect();
+    for (kernel, wide) in layouts(&triangles, &mut Random(5)) {
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let answers = by_component(&wide, &rays, [-0.0, -0.0], coherence);
+            assert_eq!(answers, of_batch(&wide, &rays, coherence), "{kernel:?}, {coherence:?}");
+        }
+    }
+}
+
+#[test]
+fn ranges_that_begin_below_zero_are_answered_as_from_zero() {
+    let mut random = Random(6);
+    let triangles = soup(200, &mut random);
+    let valid = rays(&triangles, 500, &mut random);
+    let invalid: Vec<Ray> = valid
+        .iter()
+        .map(|ray| Ray::assume_valid(ray.origin(), ray.direction(), -1e30, f32::INFINITY))
+        .collect();
+    let valid: Vec<Ray> = valid
+        .iter()
+        .map(|ray| Ray::half_line(ray.origin(), ray.direction()).unwrap())
+        .collect();
+    for (kernel, wide) in layouts(&triangles, &mut random) {
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let expected = of_batch(&wide, &valid, coherence);
+            let range = [-1e30, f32::INFINITY];
+            let separate = by_component(&wide, &valid, range, coherence);
+            assert_eq!(separate, expected, "{kernel:?}, {coherence:?}, by component");
+            let together = of_batch(&wide, &invalid, coherence);
+            assert_eq!(together, expected, "{kernel:?}, {coherence:?}");
+        }
+        for (ray, invalid) in valid.iter().zip(&invalid) {
+            let answer = bits(wide.nearest_hit(invalid));
+            assert_eq!(answer, bits(wide.nearest_hit(ray)), "{kernel:?}");
+        }
+    }
 }
 
 #[test]

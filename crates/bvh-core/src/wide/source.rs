@@ -89,6 +89,7 @@ impl Source for &RayComponents<'_> {
                 Distances::Each(distances) => component(distances),
             };
             let direction = [component(dx), component(dy), component(dz)];
+            let zero = L::splat(0.0);
             let one = L::splat(1.0);
             let most = L::splat(f32::MAX);
             let least = L::splat(f32::MIN);
@@ -98,8 +99,8 @@ impl Source for &RayComponents<'_> {
                 origin: [component(ox), component(oy), component(oz)],
                 direction,
                 inverse: [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])],
-                t_min: distance(t_min) + L::splat(0.0),
-                t_max: distance(t_max).min(most),
+                t_min: distance(t_min).max(zero) + zero,
+                t_max: distance(t_max).min(most) + zero,
             }
         }
     }
