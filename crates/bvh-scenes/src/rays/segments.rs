@@ -217,14 +217,60 @@ impl<'a> Tracing<'a> {
         let reach = (self.bounds.min - ray.origin())
             .abs()
             .max((self.bounds.max - ray.origin()).abs());
-        2.0 * reach.length() / ray.direction().length()
+        let (reach, reach_unit) = scaled_length(reach);
+        let (step, step_unit) = scaled_length(ray.direction());
+        2.0 * reach / step * (reach_unit / step_unit)
     }
+}
+
+/// Returns the length of a vector in multiples of a power of two, and that power.
+///
+/// The power is near the vector's largest component, so that no square overflows or vanishes.
+fn scaled_length(vector: Vec3) -> (f32, f32) {
+    let largest = vector.abs().max_element();
+    let exponent_bits = largest.to_bits() & f32::INFINITY.to_bits();
+    let unit = f32::from_bits(exponent_bits).max(f32::MIN_POSITIVE);
+    ((vector / unit).length(), unit)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::SceneKind;
+    use bvh_build::{Builder, muller_fellner};
     use bvh_config::Check;
+    use bvh_core::{Primitives, Triangle};
+
+    /// Returns the segments of rays through four triangles whose corners are multiples of `unit`.
+    fn segments_at_scale(unit: f32) -> Vec<[[f32; 3]; 2]> {
+        let corners = [[0.0, 0.0, 0.0], [3.0, 0.0, 1.0], [0.0, 2.0, 0.0], [1.0, 1.0, 4.0]];
+        let corners = corners.map(|corner| Vec3::from(corner) * unit);
+        let triangles: Vec<Triangle> = (0..4)
+            .map(|skipped| Triangle([1, 2, 3].map(|step| corners[(skipped + step) % 4])))
+            .collect();
+        let scene = Scene::new("tetrahedron", SceneKind::File, Primitives::Triangles(triangles));
+        let tree = muller_fellner::Config::default()
+            .build(&scene.primitives.boxes())
+            .unwrap();
+        of_anything(50, &scene, &tree, 1)
+            .iter()
+            .filter(|traced| traced.kind != Kind::Shadow)
+            .map(|traced| [traced.segment.from, traced.segment.to])
+            .collect()
+    }
+
+    #[test]
+    fn rays_that_miss_are_as_long_in_scenes_of_any_scale() {
+        let segments = segments_at_scale(1.0);
+        for exponent in [-100, -70, 70, 100] {
+            let unit = 2f32.powi(exponent);
+            let expected: Vec<_> = segments
+                .iter()
+                .map(|ends| ends.map(|end| end.map(|coordinate| coordinate * unit)))
+                .collect();
+            assert_eq!(segments_at_scale(unit), expected, "2^{exponent}");
+        }
+    }
 
     #[test]
     fn more_rays_than_a_density_counts_are_rejected_before_they_are_traced() {
