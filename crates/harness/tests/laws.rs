@@ -64,9 +64,9 @@ fn insertion_and_exact() -> Vec<Method> {
 fn with_axes(boxes: &[Aabb], to: [usize; 3]) -> Vec<Aabb> {
     let mut turned = boxes.to_vec();
     for (aabb, turned) in boxes.iter().zip(&mut turned) {
-        for axis in 0..3 {
-            turned.min[to[axis]] = aabb.min[axis];
-            turned.max[to[axis]] = aabb.max[axis];
+        for (from, to) in to.into_iter().enumerate() {
+            turned.min[to] = aabb.min[from];
+            turned.max[to] = aabb.max[from];
         }
     }
     turned
