@@ -160,7 +160,8 @@ impl Called {
             let begins = format!("{} ", self.name);
             let inline_code = outside.split('`').skip(1).step_by(2);
             for code in inline_code.filter(|code| code.starts_with(&begins)) {
-                for command in commands(code, &place) {
+                // A command may be wrapped like the sentence around it.
+                for command in commands(&code.replace('\n', " "), &place) {
                     let Some(mut arguments) = self.arguments(&command) else { continue };
                     arguments.push("--help");
                     let answer = run(Path::new("."), &arguments);
