@@ -15,11 +15,10 @@
 use super::answer::Answers;
 use super::instructions::{Instructions, Pending};
 use super::kernel::STACK;
-use super::lanes::{Lanes, Mask};
+use super::lanes::Lanes;
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
 use super::prepared::{Prepared, Ready};
-use super::ray_lanes::RayLanes;
 use super::source::Source;
 use super::triangles::TriangleBlock;
 use crate::triangle::AXES;
@@ -264,7 +263,7 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
                     .nodes
                     .as_ptr()
                     .add(traversal.child.index());
-                let (entry, mask) = boxes::<K::Boxes>(node, &traversal.ray, traversal.t);
+                let (entry, mask) = boxes::<K>(node, &traversal.ray, traversal.t);
                 if A::ANY {
                     K::compress_pending(node, mask, traversal.top);
                 } else {
@@ -350,7 +349,7 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
 
 /// The eight boxes of a node: the distances at which the ray enters them, and a bit for each box entered before `t_max`.
 #[inline(always)]
-unsafe fn boxes<L: Lanes>(node: &WideNode, ray: &Prepared, t_max: f32) -> (L, u32) {
+unsafe fn boxes<K: Instructions>(node: &WideNode, ray: &Prepared, t_max: f32) -> (K::Boxes, u32) {
     // SAFETY: the caller's promises; loads are of whole, aligned planes, which the ray names.
     unsafe {
         let distance = |plane: u32, scale: f32, shift: f32| {
@@ -360,16 +359,16 @@ unsafe fn boxes<L: Lanes>(node: &WideNode, ray: &Prepared, t_max: f32) -> (L, u3
                 .cast::<u8>()
                 .add(plane as usize)
                 .cast();
-            L::load(plane).mul_add(L::splat(scale), L::splat(shift))
+            K::Boxes::load(plane).mul_add(K::Boxes::splat(scale), K::Boxes::splat(shift))
         };
         let near = |axis: usize| distance(ray.near[axis], ray.scale[axis], ray.near_shift[axis]);
         let far = |axis: usize| distance(ray.far[axis], ray.scale[axis], ray.far_shift[axis]);
         let entry = near(0)
             .max(near(1))
-            .max(near(2).max(L::splat(ray.t_min)));
+            .max(near(2).max(K::Boxes::splat(ray.t_min)));
         // Of a NaN and a number the second: unused lanes stay NaN.
-        let exit = L::splat(t_max).min(far(0).min(far(1)).min(far(2)));
-        (entry, entry.le(RayLanes::beyond(exit)).bits())
+        let exit = K::Boxes::splat(t_max).min(far(0).min(far(1)).min(far(2)));
+        (entry, K::entered(entry, exit))
     }
 }
 

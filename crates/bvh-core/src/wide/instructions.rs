@@ -25,6 +25,9 @@ pub(crate) trait Instructions {
     /// Rays in flight.
     const FLIGHT: usize;
 
+    /// A bit per child whose entry is at most its exit.
+    unsafe fn entered(entry: Self::Boxes, exit: Self::Boxes) -> u32;
+
     /// Writes the keys of the entered children, the nearest last: the bits of the entry, of which the last three are the
     /// inverted lane. Entries are not negative, so that keys are ordered as they are, and distinct.
     unsafe fn sort_keys(entry: Self::Boxes, mask: u32, to: *mut u32);

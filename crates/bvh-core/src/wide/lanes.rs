@@ -22,7 +22,7 @@ pub(crate) trait Lanes:
     /// A set of lanes.
     type Mask: Mask;
     /// As many numbers of f64.
-    type Double: DoubleLanes<Mask = Self::Mask>;
+    type Double: DoubleLanes;
 
     /// The same number in all lanes.
     ///
@@ -83,6 +83,9 @@ pub(crate) trait Lanes:
 
     /// The numbers of f64 rounded to f32.
     fn single(double: Self::Double) -> Self;
+
+    /// The same set of lanes.
+    fn narrow(mask: <Self::Double as DoubleLanes>::Mask) -> Self::Mask;
 
     /// Four lanes from each of `N / 4` places.
     ///
@@ -146,7 +149,7 @@ pub(crate) trait DoubleLanes:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     /// A set of lanes.
-    type Mask;
+    type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
 
     /// The same number in all lanes.
     ///
@@ -159,6 +162,9 @@ pub(crate) trait DoubleLanes:
 
     /// The greater, as [`Lanes::max`].
     fn max(self, other: Self) -> Self;
+
+    /// `self · factor − term`, rounded once.
+    fn mul_sub(self, factor: Self, term: Self) -> Self;
 
     /// Where `self < other`.
     fn lt(self, other: Self) -> Self::Mask;

@@ -11,7 +11,7 @@ use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
 use super::pairs::Pairs;
-use super::ray_lanes::{FAR, RayBounds, RayLanes, UNDERFLOW};
+use super::ray_lanes::{RayBounds, RayLanes};
 use super::triangles::TriangleBlock;
 use core::mem::MaybeUninit;
 
@@ -274,7 +274,7 @@ impl<K: Instructions> Packet<K> {
                 // Of a NaN and a number the second: unused lanes stay NaN.
                 exit = exit.min(far);
             }
-            (entry, entry.le(RayLanes::beyond(exit)).bits())
+            (entry, K::entered(entry, exit))
         }
     }
 
@@ -318,7 +318,7 @@ impl<K: Instructions> Packet<K> {
                 entry = entry.max(near);
                 exit = exit.min(far);
             }
-            entry.le(RayLanes::beyond(exit)).bits()
+            entry.le(exit).bits()
         }
     }
 
@@ -381,7 +381,7 @@ impl<K: Instructions> Packet<K> {
 /// The greatest key of a child that a ray may enter before `farthest`.
 #[inline(always)]
 fn key_of(farthest: f32) -> u32 {
-    (farthest * FAR + UNDERFLOW).to_bits() | 7
+    farthest.to_bits() | 7
 }
 
 impl<L: Lanes> Culling<L> {

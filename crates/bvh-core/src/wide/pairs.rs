@@ -94,16 +94,17 @@ impl<L: Lanes> Pairs<L> {
         let cx = cx.double();
         let cy = cy.double();
         let cz = cz.double();
-        // Products of two f32 are exact in f64.
-        let u = cx * by - cy * bx;
-        let v = ax * cy - ay * cx;
-        let w = bx * ay - by * ax;
+        // Products of two f32 are exact in f64: fused or not, the difference is the same.
+        let u = cx.mul_sub(by, cy * bx);
+        let v = ax.mul_sub(cy, ay * cx);
+        let w = bx.mul_sub(ay, by * ax);
         // SAFETY: values exist.
         let zero = unsafe { L::Double::splat(0.0) };
         let outside = u.min(v).min(w).lt(zero) & zero.lt(u.max(v).max(w));
         let determinant = u + v + w;
         let t = (u * az + v * bz + w * cz) / (determinant * self.depth.double());
         let after = self.t_min.double().le(t);
-        (after.and_not(outside | determinant.eq(zero)), L::single(t))
+        let excluded = L::narrow(outside | determinant.eq(zero));
+        (L::narrow(after).and_not(excluded), L::single(t))
     }
 }

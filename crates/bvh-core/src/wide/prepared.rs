@@ -77,7 +77,7 @@ impl<L: Lanes> Ready<L> {
             entry = entry.max(near.mul_add(self.scale[axis], self.near_shift[axis]));
             exit = exit.min(far.mul_add(self.scale[axis], self.far_shift[axis]));
         }
-        entry.le(RayLanes::beyond(exit)).bits()
+        entry.le(exit).bits()
     }
 
     /// The rays that run backwards along an axis.

@@ -6,26 +6,43 @@ use crate::Slabs;
 use crate::ray::pow2;
 use crate::triangle::AXES;
 
-// Why the box tests of packets and of rays in flight are conservative. Names are those of the proof of `BoxRay`: u = 2^-24, S the
-// largest size of a coordinate, o the origin, i the reciprocal of the direction, s the same clamped, i > 0; the other sign
-// mirrors every step. The distance to a near plane p is `(p - M) * s - o * s`, to a far plane `(p + M) * s - o * s`, with the margin
-// M = 16uS; packets take the largest S of their rays, and rays in flight add M to the origin instead of the plane.
+// # The box test
 //
-// 1. Shift. The sum with M is off by at most uS, the product o * s by uS * s, and so is the other product where it is not fused. The
-//    margin is left with at least 13uS, of which `Slabs` takes 10uS.
-// 2. Scale. The last operation rounds once: a near distance is too far by a factor of at most 1 + u, a far one too near by 1 - u, and
-//    `Slabs` multiplies its exit by 1 + 8u. One factor FAR = 1 + 24u on the exit covers all of it, on the nearest hit so far, too, since
-//    that is the least of the far distances.
-// 3. Underflow. Errors of subnormal numbers are below 2^-146 together; UNDERFLOW = 2^-125 covers them at both ends.
-// 4. Clamp and overflow are those of `BoxRay`: rays outside its bounds are left to the portable kernel.
+// Every kernel computes the distances to the planes of a box as `plane · scale + shift`, and visits
+// a box whose greatest near distance is at most its least far distance. The test decides which boxes
+// are visited, never an answer. It must be *conservative*: whenever the interval that `Slabs`
+// computes for a triangle's own box has a distance `t <= t_max`, every box around the triangle
+// passes.
 //
-// Interval arithmetic takes the least and the greatest product over all origins and all scales of a packet, by the same operations:
-// rounding is monotone, so that it is not beyond any ray's own distance by more than the steps above allow.
-
-/// What an exit is multiplied by before an entry is compared with it.
-pub(crate) const FAR: f32 = 1.0 + 24.0 * (f32::EPSILON / 2.0);
-/// What is added to it then.
-pub(crate) const UNDERFLOW: f32 = 2.0 * f32::MIN_POSITIVE;
+// Names, for one axis: u = 2⁻²⁴; o, d and i are the origin, the direction and its reciprocal; D is
+// the largest component of the direction; S is the largest component of the origin plus the largest
+// coordinate of the scene. Take i > 0, since the other sign mirrors every step. `Slabs` has a margin
+// m of at most 10uS + 2⁻¹²⁶. With L = o + m and U = o − m, rounded, it computes for a lower plane
+// p > L at least (p − L) · i · (1 − 2u) − 2⁻¹⁴⁹, for another lower plane nothing positive, and for
+// an upper plane at most (p − U) · i · (1 + 12u) + 2⁻¹⁴⁸. The test here uses the margin M = 32uS,
+// and computes (p − L') · s and (p − U') · s with L' = o + M, U' = o − M and a scale s.
+//
+// 1. *Shift.* M is added to the origin or to the plane, which rounds by at most uS, and the product
+//    of origin and scale rounds by at most uS · s. With the rounding of L, all of these move a plane
+//    by less than 4uS. Hence L' and L differ by at least (32 − 10 − 4)uS = 18uS, and so do U' and U.
+// 2. *Relative errors.* The factors of `Slabs` and the last rounding here amount to 3u on a near
+//    distance and 13u on a far one. No plane is farther from the origin than S. So these factors
+//    move no plane by more than 14uS, and 4uS of the margin remain.
+// 3. *Underflow.* Errors of subnormal numbers are below 2⁻¹⁴⁶ together. Rays with S / D < 2⁻¹²⁰ are
+//    left to the portable kernel; for all others the remaining margin is at least
+//    4uS / D = 2⁻¹⁴² in distance.
+// 4. *Clamp.* Where |d| is far smaller than D, i · o could overflow. Hence |s| is i clamped to
+//    K = 2²⁴ / D. Near distances only become nearer. A far plane p that `Slabs` has in front of the
+//    origin has p ≥ U, and then (p − U') · K ≥ 4uS · K = 4S / D, which no distance exceeds that
+//    `Slabs` accepts on the axis of D.
+// 5. *Overflow.* Rays with S ≥ 2⁶⁰, S · K ≥ 2¹²⁰ or S < 2⁻⁹⁰ are left to the portable kernel.
+//
+// `Slabs` moves a hit's distance into the interval of the triangle's box. Hence a near distance is at
+// most the distance of any accepted hit, and needs no margin compared with the nearest hit so far.
+//
+// Interval arithmetic takes the least and the greatest product over all origins and all scales of a
+// packet by the same operations, with the largest S. Rounding is monotone: the bounds are not beyond
+// the distances of any ray of the packet by more than the steps above allow.
 
 /// As many rays as there are lanes. Vectors of three are by axis.
 #[derive(Clone, Copy)]
@@ -39,13 +56,7 @@ pub(crate) struct RayLanes<L> {
 
 impl<L: Lanes> RayLanes<L> {
     /// By how much boxes grow, in multiples of the largest size of a coordinate.
-    pub(crate) const MARGIN: f32 = 2.0 * Slabs::MARGIN;
-    /// What an entry is compared with.
-    #[inline(always)]
-    pub(crate) fn beyond(exit: L) -> L {
-        // SAFETY: a value exists.
-        unsafe { exit.mul_add(L::splat(FAR), L::splat(UNDERFLOW)) }
-    }
+    pub(crate) const MARGIN: f32 = 4.0 * Slabs::MARGIN;
 
     /// A bit per axis along which the first ray runs backwards.
     #[inline(always)]
@@ -72,7 +83,7 @@ impl<L: Lanes> RayLanes<L> {
         (x.lt(y).and_not(third), third)
     }
 
-    /// The rays within the bounds of `BoxRay`, the largest size of a coordinate for each, and the
+    /// The rays within the bounds of the proof above, the largest size of a coordinate for each, and the
     /// reciprocals of the directions made so small that nothing overflows.
     #[inline(always)]
     pub(crate) fn bounded(&self, largest: f32) -> (L::Mask, L, [L; 3]) {
@@ -82,9 +93,11 @@ impl<L: Lanes> RayLanes<L> {
             let limit = x.abs().min(y.abs()).min(z.abs()) * L::splat(pow2(24));
             let [ox, oy, oz] = self.origin;
             let size = ox.abs().max(oy.abs()).max(oz.abs()) + L::splat(largest);
+            let most_shift = size * limit;
             let in_range = size.lt(L::splat(pow2(60)))
                 & L::splat(pow2(-90)).le(size)
-                & (size * limit).lt(L::splat(pow2(120)));
+                & most_shift.lt(L::splat(pow2(120)))
+                & L::splat(pow2(-96)).le(most_shift);
             let least = L::splat(0.0) - limit;
             let scale = [x.max(least).min(limit), y.max(least).min(limit), z.max(least).min(limit)];
             (in_range, size, scale)

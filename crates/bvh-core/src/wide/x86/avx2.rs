@@ -5,6 +5,7 @@ use super::one_ray::{any, nearest};
 use super::sort;
 use crate::wide::answer::Answers;
 use crate::wide::instructions::{Instructions, Pending, last_pending};
+use crate::wide::lanes::{Lanes as _, Mask as _};
 use crate::wide::layout::WideBvh;
 use crate::wide::node::{Child, WideNode};
 use crate::wide::source::Source;
@@ -75,6 +76,11 @@ impl Instructions for Avx2 {
     type Rays = F32x8;
     const PACKET: usize = 64;
     const FLIGHT: usize = 24;
+
+    #[inline(always)]
+    unsafe fn entered(entry: F32x8, exit: F32x8) -> u32 {
+        entry.le(exit).bits()
+    }
 
     #[inline(always)]
     unsafe fn sort_keys(entry: F32x8, mask: u32, to: *mut u32) {

@@ -58,6 +58,12 @@ impl Instructions for Avx512 {
     const FLIGHT: usize = 24;
 
     #[inline(always)]
+    unsafe fn entered(F32x8(entry): F32x8, F32x8(exit): F32x8) -> u32 {
+        // SAFETY: the caller has AVX-512 VL.
+        u32::from(unsafe { _mm256_cmp_ps_mask::<_CMP_LE_OQ>(entry, exit) })
+    }
+
+    #[inline(always)]
     unsafe fn sort_keys(entry: F32x8, mask: u32, to: *mut u32) {
         // SAFETY: the caller's promises.
         unsafe {

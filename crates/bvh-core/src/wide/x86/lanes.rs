@@ -115,11 +115,9 @@ pub(crate) struct Mask4(__m128);
 #[derive(Clone, Copy)]
 pub(crate) struct Mask8(__m256);
 
-/// Sets of lanes, a bit each.
+/// A set of lanes of f64, likewise.
 #[derive(Clone, Copy)]
-pub(crate) struct Bits8(u8);
-#[derive(Clone, Copy)]
-pub(crate) struct Bits16(pub(crate) u16);
+pub(crate) struct WideMask4(__m256d);
 
 /// Numbers of f64.
 #[derive(Clone, Copy)]
@@ -139,6 +137,7 @@ operators!(F32x16: Add add _mm512_add_ps, Sub sub _mm512_sub_ps, Mul mul _mm512_
     BitAnd bitand _mm512_and_ps, BitOr bitor _mm512_or_ps, BitXor bitxor _mm512_xor_ps);
 operators!(F64x4: Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_mul_pd, Div div _mm256_div_pd);
 operators!(F64x8: Add add _mm512_add_pd, Sub sub _mm512_sub_pd, Mul mul _mm512_mul_pd, Div div _mm512_div_pd);
+operators!(WideMask4: BitAnd bitand _mm256_and_pd, BitOr bitor _mm256_or_pd);
 operators!(Mask4: BitAnd bitand _mm_and_ps, BitOr bitor _mm_or_ps);
 operators!(Mask8: BitAnd bitand _mm256_and_ps, BitOr bitor _mm256_or_ps);
 
@@ -183,6 +182,14 @@ impl Lanes for F32x4 {
     #[inline(always)]
     fn single(double: F64x4) -> Self {
         unsafe { Self(_mm256_cvtpd_ps(double.0)) }
+    }
+    #[inline(always)]
+    fn narrow(mask: WideMask4) -> Mask4 {
+        unsafe {
+            let mask = _mm256_castpd_ps(mask.0);
+            let high = _mm256_extractf128_ps::<1>(mask);
+            Mask4(_mm_shuffle_ps::<0b10_00_10_00>(_mm256_castps256_ps128(mask), high))
+        }
     }
 }
 
@@ -232,11 +239,15 @@ impl Lanes for F32x8 {
     fn single(Two(low, high): Two<F64x4>) -> Self {
         unsafe { Self(_mm256_setr_m128(_mm256_cvtpd_ps(low.0), _mm256_cvtpd_ps(high.0))) }
     }
+    #[inline(always)]
+    fn narrow(Two(low, high): Two<WideMask4>) -> Mask8 {
+        unsafe { Mask8(_mm256_setr_m128(F32x4::narrow(low).0, F32x4::narrow(high).0)) }
+    }
 }
 
 impl Lanes for F32x16 {
     const N: usize = 16;
-    type Mask = Bits16;
+    type Mask = u16;
     type Double = Two<F64x8>;
     memory!(_mm512_set1_ps _mm512_load_ps _mm512_loadu_ps _mm512_storeu_ps);
     #[inline(always)]
@@ -261,9 +272,9 @@ impl Lanes for F32x16 {
         min(a, b) -> Self = Self(_mm512_min_ps(a.0, b.0));
         max(a, b) -> Self = Self(_mm512_max_ps(a.0, b.0));
         mul_add(a, b, c) -> Self = Self(_mm512_fmadd_ps(a.0, b.0, c.0));
-        lt(a, b) -> Bits16 = Bits16(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a.0, b.0));
-        le(a, b) -> Bits16 = Bits16(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a.0, b.0));
-        eq(a, b) -> Bits16 = Bits16(_mm512_cmp_ps_mask::<_CMP_EQ_OQ>(a.0, b.0));
+        lt(a, b) -> u16 = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a.0, b.0);
+        le(a, b) -> u16 = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a.0, b.0);
+        eq(a, b) -> u16 = _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(a.0, b.0);
         signs(a) -> u32 = u32::from(_mm512_movepi32_mask(_mm512_castps_si512(a.0)));
         greatest(a) -> f32 =
             F32x8(_mm256_max_ps(_mm512_castps512_ps256(a.0), _mm512_extractf32x8_ps::<1>(a.0))).greatest();
@@ -271,12 +282,12 @@ impl Lanes for F32x16 {
             F64x8(_mm512_cvtps_pd(_mm512_castps512_ps256(a.0))),
             F64x8(_mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(a.0))),
         );
-        below(a, b) -> Bits16 =
-            Bits16(_mm512_cmplt_epu32_mask(_mm512_castps_si512(a.0), _mm512_castps_si512(b.0)));
+        below(a, b) -> u16 =
+            _mm512_cmplt_epu32_mask(_mm512_castps_si512(a.0), _mm512_castps_si512(b.0));
     }
     #[inline(always)]
-    fn select(mask: Bits16, yes: Self, no: Self) -> Self {
-        unsafe { Self(_mm512_mask_mov_ps(no.0, mask.0, yes.0)) }
+    fn select(mask: u16, yes: Self, no: Self) -> Self {
+        unsafe { Self(_mm512_mask_mov_ps(no.0, mask, yes.0)) }
     }
     #[inline(always)]
     fn single(Two(low, high): Two<F64x8>) -> Self {
@@ -285,10 +296,14 @@ impl Lanes for F32x16 {
             Self(_mm512_insertf32x8::<1>(low, _mm512_cvtpd_ps(high.0)))
         }
     }
+    #[inline(always)]
+    fn narrow(Two(low, high): Two<u8>) -> u16 {
+        u16::from_le_bytes([low, high])
+    }
 }
 
 impl DoubleLanes for F64x4 {
-    type Mask = Mask4;
+    type Mask = WideMask4;
     #[inline(always)]
     unsafe fn splat(x: f64) -> Self {
         unsafe { Self(_mm256_set1_pd(x)) }
@@ -296,26 +311,15 @@ impl DoubleLanes for F64x4 {
     functions! {
         min(a, b) -> Self = Self(_mm256_min_pd(a.0, b.0));
         max(a, b) -> Self = Self(_mm256_max_pd(a.0, b.0));
-        lt(a, b) -> Mask4 = narrow(_mm256_cmp_pd::<_CMP_LT_OQ>(a.0, b.0));
-        le(a, b) -> Mask4 = narrow(_mm256_cmp_pd::<_CMP_LE_OQ>(a.0, b.0));
-        eq(a, b) -> Mask4 = narrow(_mm256_cmp_pd::<_CMP_EQ_OQ>(a.0, b.0));
-    }
-}
-
-/// A half of every lane.
-#[inline(always)]
-unsafe fn narrow(mask: __m256d) -> Mask4 {
-    unsafe {
-        let mask = _mm256_castpd_ps(mask);
-        Mask4(_mm_shuffle_ps::<0b10_00_10_00>(
-            _mm256_castps256_ps128(mask),
-            _mm256_extractf128_ps::<1>(mask),
-        ))
+        mul_sub(a, b, c) -> Self = Self(_mm256_fmsub_pd(a.0, b.0, c.0));
+        lt(a, b) -> WideMask4 = WideMask4(_mm256_cmp_pd::<_CMP_LT_OQ>(a.0, b.0));
+        le(a, b) -> WideMask4 = WideMask4(_mm256_cmp_pd::<_CMP_LE_OQ>(a.0, b.0));
+        eq(a, b) -> WideMask4 = WideMask4(_mm256_cmp_pd::<_CMP_EQ_OQ>(a.0, b.0));
     }
 }
 
 impl DoubleLanes for F64x8 {
-    type Mask = Bits8;
+    type Mask = u8;
     #[inline(always)]
     unsafe fn splat(x: f64) -> Self {
         unsafe { Self(_mm512_set1_pd(x)) }
@@ -323,31 +327,10 @@ impl DoubleLanes for F64x8 {
     functions! {
         min(a, b) -> Self = Self(_mm512_min_pd(a.0, b.0));
         max(a, b) -> Self = Self(_mm512_max_pd(a.0, b.0));
-        lt(a, b) -> Bits8 = Bits8(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a.0, b.0));
-        le(a, b) -> Bits8 = Bits8(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(a.0, b.0));
-        eq(a, b) -> Bits8 = Bits8(_mm512_cmp_pd_mask::<_CMP_EQ_OQ>(a.0, b.0));
-    }
-}
-
-/// Sets of lanes that two halves make up.
-pub(crate) trait Join {
-    type Joined;
-    fn join(self, high: Self) -> Self::Joined;
-}
-
-impl Join for Mask4 {
-    type Joined = Mask8;
-    #[inline(always)]
-    fn join(self, high: Self) -> Mask8 {
-        unsafe { Mask8(_mm256_setr_m128(self.0, high.0)) }
-    }
-}
-
-impl Join for Bits8 {
-    type Joined = Bits16;
-    #[inline(always)]
-    fn join(self, high: Self) -> Bits16 {
-        Bits16(u16::from(self.0) | u16::from(high.0) << 8)
+        mul_sub(a, b, c) -> Self = Self(_mm512_fmsub_pd(a.0, b.0, c.0));
+        lt(a, b) -> u8 = _mm512_cmp_pd_mask::<_CMP_LT_OQ>(a.0, b.0);
+        le(a, b) -> u8 = _mm512_cmp_pd_mask::<_CMP_LE_OQ>(a.0, b.0);
+        eq(a, b) -> u8 = _mm512_cmp_pd_mask::<_CMP_EQ_OQ>(a.0, b.0);
     }
 }
 
@@ -364,10 +347,10 @@ macro_rules! of_halves {
     )*};
 }
 
-of_halves!(Add add, Sub sub, Mul mul, Div div);
+of_halves!(Add add, Sub sub, Mul mul, Div div, BitAnd bitand, BitOr bitor);
 
-impl<T: DoubleLanes<Mask: Join>> DoubleLanes for Two<T> {
-    type Mask = <T::Mask as Join>::Joined;
+impl<T: DoubleLanes> DoubleLanes for Two<T> {
+    type Mask = Two<T::Mask>;
     #[inline(always)]
     unsafe fn splat(x: f64) -> Self {
         unsafe { Self(T::splat(x), T::splat(x)) }
@@ -375,9 +358,10 @@ impl<T: DoubleLanes<Mask: Join>> DoubleLanes for Two<T> {
     functions! {
         min(a, b) -> Self = Self(a.0.min(b.0), a.1.min(b.1));
         max(a, b) -> Self = Self(a.0.max(b.0), a.1.max(b.1));
-        lt(a, b) -> Self::Mask = a.0.lt(b.0).join(a.1.lt(b.1));
-        le(a, b) -> Self::Mask = a.0.le(b.0).join(a.1.le(b.1));
-        eq(a, b) -> Self::Mask = a.0.eq(b.0).join(a.1.eq(b.1));
+        mul_sub(a, b, c) -> Self = Self(a.0.mul_sub(b.0, c.0), a.1.mul_sub(b.1, c.1));
+        lt(a, b) -> Self::Mask = Two(a.0.lt(b.0), a.1.lt(b.1));
+        le(a, b) -> Self::Mask = Two(a.0.le(b.0), a.1.le(b.1));
+        eq(a, b) -> Self::Mask = Two(a.0.eq(b.0), a.1.eq(b.1));
     }
 }
 
@@ -419,33 +403,17 @@ impl Mask for Mask8 {
     }
 }
 
-impl Mask for Bits16 {
+impl Mask for u16 {
     #[inline(always)]
     fn bits(self) -> u32 {
-        u32::from(self.0)
+        u32::from(self)
     }
     #[inline(always)]
     unsafe fn from_bits(bits: u32) -> Self {
-        Self(bits as u16)
+        bits as Self
     }
     #[inline(always)]
     fn and_not(self, other: Self) -> Self {
-        Self(self.0 & !other.0)
-    }
-}
-
-impl BitAnd for Bits16 {
-    type Output = Self;
-    #[inline(always)]
-    fn bitand(self, other: Self) -> Self {
-        Self(self.0 & other.0)
-    }
-}
-
-impl BitOr for Bits16 {
-    type Output = Self;
-    #[inline(always)]
-    fn bitor(self, other: Self) -> Self {
-        Self(self.0 | other.0)
+        self & !other
     }
 }
