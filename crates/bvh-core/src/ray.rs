@@ -138,11 +138,10 @@ impl Ray {
         self.inverse.truncate()
     }
 
-    /// The least absolute value of the reciprocals of the direction's components.
-    #[cfg(all(feature = "std", target_arch = "x86_64"))]
+    /// Returns the origin, the direction and the reciprocals, with the fourth lanes of the fields.
     #[inline]
-    pub(crate) fn least_inverse(&self) -> f32 {
-        self.inverse.w
+    pub(crate) fn vectors(&self) -> [Vec4; 3] {
+        [self.origin, self.direction, self.inverse]
     }
 
     /// The smallest distance of a hit, 0 or more.

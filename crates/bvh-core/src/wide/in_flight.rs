@@ -265,7 +265,7 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
                     .add(traversal.child.index());
                 let (entry, mask) = boxes::<K>(node, &traversal.ray, traversal.t);
                 if A::ANY {
-                    K::compress_pending(node, mask, traversal.top);
+                    K::compress(node, mask, traversal.top);
                 } else {
                     K::sort(node, entry, mask, traversal.top);
                 }

@@ -18,6 +18,8 @@ pub(crate) type Pending = u64;
 pub(crate) trait Instructions {
     /// As many numbers as a node has children.
     type Boxes: Lanes;
+    /// As many numbers as a block has triangles.
+    type Block: Lanes;
     /// The widest register: one ray per lane.
     type Rays: Lanes;
     /// Rays of a packet.
@@ -38,11 +40,8 @@ pub(crate) trait Instructions {
     /// The nearest of two or more entered children; all are written to `to`, the nearest last.
     unsafe fn sort(node: &WideNode, entry: Self::Boxes, mask: u32, to: *mut Pending) -> Child;
 
-    /// Writes the entered children in the order of their lanes.
-    unsafe fn compress(node: &WideNode, mask: u32, to: *mut Child);
-
-    /// As [`compress`](Self::compress), with entries of 0.
-    unsafe fn compress_pending(node: &WideNode, mask: u32, to: *mut Pending);
+    /// Writes the entered children in the order of their lanes, with entries of 0.
+    unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending);
 
     /// Has a line of memory fetched, which may be anywhere.
     unsafe fn prefetch(line: *const u8);

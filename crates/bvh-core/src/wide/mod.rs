@@ -6,6 +6,7 @@
 mod answer;
 mod batch;
 mod batches;
+mod box_ray;
 mod build;
 mod in_flight;
 mod instructions;
@@ -13,6 +14,7 @@ mod kernel;
 mod lanes;
 mod layout;
 mod node;
+mod one_ray;
 mod packet;
 mod pairs;
 mod portable;
@@ -100,36 +102,30 @@ impl WideBvh {
     }
 
     /// The nearest triangle that `ray` meets in its range; of several at the same distance the one of the lowest id.
-    #[inline]
     pub fn nearest_hit(&self, ray: &Ray) -> Option<Hit> {
-        #[cfg(all(feature = "std", target_arch = "x86_64"))]
-        if self.kernel != Kernel::Portable {
-            // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
-            let (t, object) = unsafe {
-                match self.kernel {
-                    Kernel::Avx512 => x86::avx512::nearest_hit(self, ray),
-                    _ => x86::avx2::nearest_hit(self, ray),
-                }
-            };
-            return (object != u32::MAX).then_some(Hit { t, object });
-        }
-        self.nearest_hit_counted(ray, &mut ())
+        self.one_ray::<false>(ray, |_| true)
     }
 
     /// Whether `ray` meets any triangle in its range.
-    #[inline]
     pub fn any_hit(&self, ray: &Ray) -> bool {
+        self.one_ray::<true>(ray, |_| true).is_some()
+    }
+
+    /// The nearest hit, or with `ANY` the first one found, of those that `accept` accepts.
+    #[inline]
+    fn one_ray<const ANY: bool>(&self, ray: &Ray, accept: impl FnMut(Hit) -> bool) -> Option<Hit> {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
         if self.kernel != Kernel::Portable {
             // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
-            return unsafe {
+            let hit = unsafe {
                 match self.kernel {
-                    Kernel::Avx512 => x86::avx512::any_hit(self, ray),
-                    _ => x86::avx2::any_hit(self, ray),
+                    Kernel::Avx512 => x86::avx512::one_ray::<ANY>(self, ray, accept),
+                    _ => x86::avx2::one_ray::<ANY>(self, ray, accept),
                 }
             };
+            return (!hit.is_miss()).then_some(hit);
         }
-        self.any_hit_counted(ray, &mut ())
+        walk::<ANY>(self, ray, &mut (), accept)
     }
 
     /// The same layout traced by another kernel; `None` if this processor cannot run it. Layouts of trees far deeper
@@ -159,8 +155,8 @@ impl WideBvh {
         walk::<true>(self, ray, counter, |_| true).is_some()
     }
 
-    /// [`nearest_hit`](Self::nearest_hit) of the hits that `accept` does not pass over, by [`Kernel::Portable`]. `accept` sees hits in no
-    /// order, and no more than it takes to know the answer: all of them if it accepts none.
+    /// [`nearest_hit`](Self::nearest_hit) of the hits that `accept` accepts, for example where a texture is opaque. `accept` sees
+    /// hits in no order, and no more than it takes to know the answer: all of them if it accepts none.
     ///
     /// ```
     /// # use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};
@@ -178,13 +174,23 @@ impl WideBvh {
     /// assert_eq!(all.len(), 2);
     /// # Ok::<(), bvh_core::InvalidBvh>(())
     /// ```
-    pub fn nearest_hit_where(&self, ray: &Ray, accept: impl FnMut(Hit) -> bool) -> Option<Hit> {
-        walk::<false>(self, ray, &mut (), accept)
+    pub fn nearest_hit_where(&self, ray: &Ray, mut accept: impl FnMut(Hit) -> bool) -> Option<Hit> {
+        self.nearest_accepted(ray, &mut accept)
     }
 
-    /// [`any_hit`](Self::any_hit) of the hits that `accept` does not pass over, likewise: for shadows of what is cut out.
-    pub fn any_hit_where(&self, ray: &Ray, accept: impl FnMut(Hit) -> bool) -> bool {
-        walk::<true>(self, ray, &mut (), accept).is_some()
+    /// [`any_hit`](Self::any_hit) of the hits that `accept` accepts, for example for shadows of what is cut out.
+    pub fn any_hit_where(&self, ray: &Ray, mut accept: impl FnMut(Hit) -> bool) -> bool {
+        self.any_accepted(ray, &mut accept)
+    }
+
+    // Not generic over the filter: a generic kernel would be compiled, perhaps without optimisation, by
+    // every crate that calls it.
+    fn nearest_accepted(&self, ray: &Ray, accept: &mut dyn FnMut(Hit) -> bool) -> Option<Hit> {
+        self.one_ray::<false>(ray, accept)
+    }
+
+    fn any_accepted(&self, ray: &Ray, accept: &mut dyn FnMut(Hit) -> bool) -> bool {
+        self.one_ray::<true>(ray, accept).is_some()
     }
 
     /// Bytes of memory that nodes and triangles take.

@@ -1,5 +1,6 @@
 //! Rays made ready for rays in flight: what the tests of boxes and triangles need of one, together in memory.
 
+use super::box_ray::MARGIN;
 use super::lanes::{Lanes, Mask};
 use super::pairs::Pairs;
 use super::ray_lanes::RayLanes;
@@ -51,7 +52,7 @@ impl<L: Lanes> Ready<L> {
         unsafe {
             let zero = L::splat(0.0);
             let sign = L::splat(-0.0);
-            let margin = size * L::splat(RayLanes::<L>::MARGIN);
+            let margin = size * L::splat(MARGIN);
             let mut near_shift = [zero; 3];
             let mut far_shift = [zero; 3];
             for axis in 0..3 {

@@ -1,48 +1,9 @@
 //! Rays side by side, a ray per lane, from any order in memory.
 
+use super::box_ray::{CLAMP, MARGIN, SHIFTS, SIZES};
 use super::lanes::{Lanes, Mask};
 use super::pairs::Pairs;
-use crate::Slabs;
-use crate::ray::pow2;
 use crate::triangle::AXES;
-
-// # The box test
-//
-// Every kernel computes the distances to the planes of a box as `plane · scale + shift`, and visits
-// a box whose greatest near distance is at most its least far distance. The test decides which boxes
-// are visited, never an answer. It must be *conservative*: whenever the interval that `Slabs`
-// computes for a triangle's own box has a distance `t <= t_max`, every box around the triangle
-// passes.
-//
-// Names, for one axis: u = 2⁻²⁴; o, d and i are the origin, the direction and its reciprocal; D is
-// the largest component of the direction; S is the largest component of the origin plus the largest
-// coordinate of the scene. Take i > 0, since the other sign mirrors every step. `Slabs` has a margin
-// m of at most 10uS + 2⁻¹²⁶. With L = o + m and U = o − m, rounded, it computes for a lower plane
-// p > L at least (p − L) · i · (1 − 2u) − 2⁻¹⁴⁹, for another lower plane nothing positive, and for
-// an upper plane at most (p − U) · i · (1 + 12u) + 2⁻¹⁴⁸. The test here uses the margin M = 32uS,
-// and computes (p − L') · s and (p − U') · s with L' = o + M, U' = o − M and a scale s.
-//
-// 1. *Shift.* M is added to the origin or to the plane, which rounds by at most uS, and the product
-//    of origin and scale rounds by at most uS · s. With the rounding of L, all of these move a plane
-//    by less than 4uS. Hence L' and L differ by at least (32 − 10 − 4)uS = 18uS, and so do U' and U.
-// 2. *Relative errors.* The factors of `Slabs` and the last rounding here amount to 3u on a near
-//    distance and 13u on a far one. No plane is farther from the origin than S. So these factors
-//    move no plane by more than 14uS, and 4uS of the margin remain.
-// 3. *Underflow.* Errors of subnormal numbers are below 2⁻¹⁴⁶ together. Rays with S / D < 2⁻¹²⁰ are
-//    left to the portable kernel; for all others the remaining margin is at least
-//    4uS / D = 2⁻¹⁴² in distance.
-// 4. *Clamp.* Where |d| is far smaller than D, i · o could overflow. Hence |s| is i clamped to
-//    K = 2²⁴ / D. Near distances only become nearer. A far plane p that `Slabs` has in front of the
-//    origin has p ≥ U, and then (p − U') · K ≥ 4uS · K = 4S / D, which no distance exceeds that
-//    `Slabs` accepts on the axis of D.
-// 5. *Overflow.* Rays with S ≥ 2⁶⁰, S · K ≥ 2¹²⁰ or S < 2⁻⁹⁰ are left to the portable kernel.
-//
-// `Slabs` moves a hit's distance into the interval of the triangle's box. Hence a near distance is at
-// most the distance of any accepted hit, and needs no margin compared with the nearest hit so far.
-//
-// Interval arithmetic takes the least and the greatest product over all origins and all scales of a
-// packet by the same operations, with the largest S. Rounding is monotone: the bounds are not beyond
-// the distances of any ray of the packet by more than the steps above allow.
 
 /// As many rays as there are lanes. Vectors of three are by axis.
 #[derive(Clone, Copy)]
@@ -55,9 +16,6 @@ pub(crate) struct RayLanes<L> {
 }
 
 impl<L: Lanes> RayLanes<L> {
-    /// By how much boxes grow, in multiples of the largest size of a coordinate.
-    pub(crate) const MARGIN: f32 = 4.0 * Slabs::MARGIN;
-
     /// A bit per axis along which the first ray runs backwards.
     #[inline(always)]
     pub(crate) fn octant(&self) -> u32 {
@@ -83,21 +41,21 @@ impl<L: Lanes> RayLanes<L> {
         (x.lt(y).and_not(third), third)
     }
 
-    /// The rays within the bounds of the proof above, the largest size of a coordinate for each, and the
+    /// The rays within the bounds of [`box_ray`](super::box_ray), the largest size of a coordinate for each, and the
     /// reciprocals of the directions made so small that nothing overflows.
     #[inline(always)]
     pub(crate) fn bounded(&self, largest: f32) -> (L::Mask, L, [L; 3]) {
         // SAFETY: values exist.
         unsafe {
             let [x, y, z] = self.inverse;
-            let limit = x.abs().min(y.abs()).min(z.abs()) * L::splat(pow2(24));
+            let limit = x.abs().min(y.abs()).min(z.abs()) * L::splat(CLAMP);
             let [ox, oy, oz] = self.origin;
             let size = ox.abs().max(oy.abs()).max(oz.abs()) + L::splat(largest);
-            let most_shift = size * limit;
-            let in_range = size.lt(L::splat(pow2(60)))
-                & L::splat(pow2(-90)).le(size)
-                & most_shift.lt(L::splat(pow2(120)))
-                & L::splat(pow2(-96)).le(most_shift);
+            let shift = size * limit;
+            let in_range = size.lt(L::splat(SIZES.end))
+                & L::splat(SIZES.start).le(size)
+                & shift.lt(L::splat(SHIFTS.end))
+                & L::splat(SHIFTS.start).le(shift);
             let least = L::splat(0.0) - limit;
             let scale = [x.max(least).min(limit), y.max(least).min(limit), z.max(least).min(limit)];
             (in_range, size, scale)
@@ -205,7 +163,7 @@ impl<L: Lanes> RayBounds<L> {
                 .max(self.lowest[axis].abs())
                 .max(self.highest[axis].abs());
         }
-        (size.greatest() + largest) * RayLanes::<L>::MARGIN
+        (size.greatest() + largest) * MARGIN
     }
 }
 

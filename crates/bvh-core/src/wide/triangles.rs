@@ -114,6 +114,26 @@ impl TriangleBlock {
         candidates
     }
 
+    /// The corners of all four triangles along these axes.
+    ///
+    /// # Safety
+    /// The processor has the instructions; axes are below 3, and `L` has four lanes.
+    #[inline(always)]
+    pub(crate) unsafe fn corners_along<L: Lanes>(&self, axes: [usize; 3]) -> [[L; 3]; 3] {
+        const { assert!(L::N == Self::LANES) };
+        // SAFETY: there are three axes of four aligned lanes for every corner.
+        unsafe {
+            let lanes = self.corners.as_ptr().cast::<f32>();
+            let mut corners = [[L::splat(0.0); 3]; 3];
+            for (corner, coordinates) in corners.iter_mut().enumerate() {
+                for (coordinate, axis) in coordinates.iter_mut().zip(axes) {
+                    *coordinate = L::load(lanes.add((3 * corner + axis) * Self::LANES));
+                }
+            }
+            corners
+        }
+    }
+
     /// The corners of the triangle in a lane along these axes, each coordinate in all lanes.
     ///
     /// # Safety

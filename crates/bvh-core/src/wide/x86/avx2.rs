@@ -1,7 +1,6 @@
 //! The AVX2 kernel: eight boxes at once with fused multiply-add, entered children sorted without a branch.
 
-use super::lanes::F32x8;
-use super::one_ray::{any, nearest};
+use super::lanes::{F32x4, F32x8};
 use super::sort;
 use crate::wide::answer::Answers;
 use crate::wide::instructions::{Instructions, Pending, last_pending};
@@ -9,48 +8,12 @@ use crate::wide::lanes::{Lanes as _, Mask as _};
 use crate::wide::layout::WideBvh;
 use crate::wide::node::{Child, WideNode};
 use crate::wide::source::Source;
-use crate::wide::{batch, in_flight};
-use crate::{Coherence, Ray};
 use core::arch::x86_64::*;
 use core::ops::Range;
 
 pub(crate) struct Avx2;
 
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-pub(crate) unsafe fn nearest_hit(wide: &WideBvh, ray: &Ray) -> (f32, u32) {
-    // SAFETY: the caller's promises.
-    unsafe { nearest::<Avx2>(wide, ray) }
-}
-
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-pub(crate) unsafe fn any_hit(wide: &WideBvh, ray: &Ray) -> bool {
-    // SAFETY: the caller's promises.
-    unsafe { any::<Avx2>(wide, ray) }
-}
-
-/// As [`batch::trace`].
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-pub(crate) unsafe fn trace<A: Answers>(
-    wide: &WideBvh,
-    rays: impl Source,
-    answers: &mut A,
-    coherence: Coherence,
-) {
-    // SAFETY: the caller's promises.
-    unsafe { batch::trace::<Avx2, A>(wide, rays, answers, coherence) }
-}
-
-/// As [`in_flight::trace`].
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-unsafe fn in_flight<A: Answers>(
-    wide: &WideBvh,
-    rays: impl Source,
-    answers: &mut A,
-    numbers: Range<usize>,
-) {
-    // SAFETY: the caller's promises.
-    unsafe { in_flight::trace::<Avx2, A>(wide, rays, answers, numbers) }
-}
+super::entry_points!(Avx2, "avx2,fma,bmi1,bmi2,popcnt,lzcnt");
 
 /// The lanes of each mask, the lowest first: what compresses eight lanes by one permutation.
 static LANES_OF: [[u8; 8]; 256] = {
@@ -73,6 +36,7 @@ static LANES_OF: [[u8; 8]; 256] = {
 
 impl Instructions for Avx2 {
     type Boxes = F32x8;
+    type Block = F32x4;
     type Rays = F32x8;
     const PACKET: usize = 64;
     const FLIGHT: usize = 24;
@@ -112,7 +76,7 @@ impl Instructions for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn compress_pending(node: &WideNode, mask: u32, to: *mut Pending) {
+    unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending) {
         // SAFETY: the caller's promises.
         unsafe {
             let children = compress(_mm256_load_si256(node.children.as_ptr().cast()), mask);
@@ -198,18 +162,6 @@ impl Instructions for Avx2 {
             _mm256_storeu_si256(to, _mm256_permute2x128_si256::<0x20>(low, high));
             _mm256_storeu_si256(to.add(1), _mm256_permute2x128_si256::<0x31>(low, high));
             nearest
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn compress(node: &WideNode, mask: u32, stack: *mut Child) {
-        // SAFETY: the caller's promises; the stack has room for eight entries.
-        unsafe {
-            let order = _mm256_cvtepu8_epi32(_mm_loadl_epi64(
-                LANES_OF[mask as usize & 255].as_ptr().cast(),
-            ));
-            let children = _mm256_load_si256(node.children.as_ptr().cast());
-            _mm256_storeu_si256(stack.cast(), _mm256_permutevar8x32_epi32(children, order));
         }
     }
 }

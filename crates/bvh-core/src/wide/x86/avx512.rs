@@ -1,58 +1,22 @@
 //! The AVX-512 kernel: eight boxes at once, entered children compressed into place.
 
-use super::lanes::{F32x8, F32x16};
-use super::one_ray::{any, nearest};
+use super::lanes::{F32x4, F32x8, F32x16};
 use super::sort;
 use crate::wide::answer::Answers;
 use crate::wide::instructions::{Instructions, Pending, last_pending};
 use crate::wide::layout::WideBvh;
 use crate::wide::node::{Child, WideNode};
 use crate::wide::source::Source;
-use crate::wide::{batch, in_flight};
-use crate::{Coherence, Ray};
 use core::arch::x86_64::*;
 use core::ops::Range;
 
 pub(crate) struct Avx512;
 
-#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-pub(crate) unsafe fn nearest_hit(wide: &WideBvh, ray: &Ray) -> (f32, u32) {
-    // SAFETY: the caller's promises.
-    unsafe { nearest::<Avx512>(wide, ray) }
-}
-
-#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-pub(crate) unsafe fn any_hit(wide: &WideBvh, ray: &Ray) -> bool {
-    // SAFETY: the caller's promises.
-    unsafe { any::<Avx512>(wide, ray) }
-}
-
-/// As [`batch::trace`].
-#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-pub(crate) unsafe fn trace<A: Answers>(
-    wide: &WideBvh,
-    rays: impl Source,
-    answers: &mut A,
-    coherence: Coherence,
-) {
-    // SAFETY: the caller's promises.
-    unsafe { batch::trace::<Avx512, A>(wide, rays, answers, coherence) }
-}
-
-/// As [`in_flight::trace`].
-#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-unsafe fn in_flight<A: Answers>(
-    wide: &WideBvh,
-    rays: impl Source,
-    answers: &mut A,
-    numbers: Range<usize>,
-) {
-    // SAFETY: the caller's promises.
-    unsafe { in_flight::trace::<Avx512, A>(wide, rays, answers, numbers) }
-}
+super::entry_points!(Avx512, "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt");
 
 impl Instructions for Avx512 {
     type Boxes = F32x8;
+    type Block = F32x4;
     type Rays = F32x16;
     const PACKET: usize = 64;
     const FLIGHT: usize = 24;
@@ -101,7 +65,7 @@ impl Instructions for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn compress_pending(node: &WideNode, mask: u32, to: *mut Pending) {
+    unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending) {
         // SAFETY: the caller's promises.
         unsafe {
             let children = _mm256_load_si256(node.children.as_ptr().cast());
@@ -193,15 +157,6 @@ impl Instructions for Avx512 {
                 }
             }
             nearest
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn compress(node: &WideNode, mask: u32, stack: *mut Child) {
-        // SAFETY: the caller's promises; the stack has room for eight entries.
-        unsafe {
-            let children = _mm256_load_si256(node.children.as_ptr().cast());
-            _mm256_storeu_si256(stack.cast(), _mm256_maskz_compress_epi32(mask as u8, children));
         }
     }
 }

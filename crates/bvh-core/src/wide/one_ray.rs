@@ -1,0 +1,184 @@
+//! The traversal of one ray in vector registers.
+
+use super::box_ray::BoxRay;
+use super::instructions::{Instructions, Pending};
+use super::kernel::STACK;
+use super::lanes::{Lanes, Mask};
+use super::layout::WideBvh;
+use super::node::Child;
+use super::pairs::Pairs;
+use super::portable::walk;
+use super::triangles::TriangleBlock;
+use crate::{Hit, Ray, Shear};
+use core::hint::black_box;
+use core::mem::MaybeUninit;
+
+/// Aligns the frame of the function that holds it. Otherwise the compiler keeps vectors of 32 bytes at
+/// odd multiples of 16, depending on where its caller's frame ends, and then every other vector crosses
+/// a line of the cache. That costs a ray which misses everything 5 of 14 ns.
+#[repr(align(64))]
+struct Aligned<T>(T);
+
+/// Returns the nearest hit, or with `ANY` the first one found, among those that `accept` accepts;
+/// without any the object is `u32::MAX`.
+///
+/// # Safety
+/// The processor has the instructions of `K`, and the caller is compiled with them; the references of
+/// `wide` are sound and its `stack_need` is at most [`STACK`].
+#[inline(always)]
+pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
+    wide: &WideBvh,
+    ray: &Ray,
+    mut accept: impl FnMut(Hit) -> bool,
+) -> Hit {
+    let mut nearest = Hit { t: ray.t_max(), object: u32::MAX };
+    // SAFETY: the processor has the instructions; references are sound, and the stack has room for
+    // `stack_need` children and one register more.
+    unsafe {
+        let (Some(root), Some(box_ray)) = (wide.root, BoxRay::new(ray, wide.largest)) else {
+            return portable::<ANY>(wide, ray, &mut accept);
+        };
+        let nodes = wide.nodes.as_ptr();
+        let blocks = wide.blocks.as_ptr();
+        let mut stack = MaybeUninit::<Aligned<[Pending; STACK + 8]>>::uninit();
+        let base = stack.as_mut_ptr().cast::<Pending>();
+        let mut top = base;
+        let mut leaf_ray = MaybeUninit::<LeafRay<K::Block>>::uninit();
+        let mut is_prepared = false;
+        let mut child = root;
+        loop {
+            while child.is_node() {
+                let node = &*nodes.add(child.index());
+                let (entry, mask) = box_ray.enter::<K>(node, nearest.t);
+                let others = mask & mask.wrapping_sub(1);
+                if others == 0 {
+                    if mask == 0 {
+                        break;
+                    }
+                    child = *node
+                        .children
+                        .get_unchecked(mask.trailing_zeros() as usize);
+                    continue;
+                }
+                if ANY {
+                    let last = mask.ilog2();
+                    child = *node.children.get_unchecked(last as usize);
+                    let mut others = mask ^ 1 << last;
+                    while others != 0 {
+                        let other = *node
+                            .children
+                            .get_unchecked(others.trailing_zeros() as usize);
+                        top.write(u64::from(other.bits()));
+                        top = top.add(1);
+                        others &= others - 1;
+                    }
+                    continue;
+                }
+                child = K::sort(node, entry, mask, top);
+                top = top.add(mask.count_ones() as usize - 1);
+            }
+            if !child.is_node() {
+                if !is_prepared {
+                    leaf_ray.write(LeafRay::new(ray));
+                    is_prepared = true;
+                }
+                let leaf_ray = leaf_ray.assume_init_ref();
+                let mut block = blocks.add(child.index());
+                loop {
+                    if leaf_ray.visit(&*block, &mut nearest, &mut accept) && ANY {
+                        return nearest;
+                    }
+                    if (*block).is_last() {
+                        break;
+                    }
+                    block = block.add(1);
+                }
+            }
+            child = loop {
+                if top == base {
+                    return nearest;
+                }
+                top = top.sub(1);
+                let pending = *top;
+                if ANY || (pending >> 32) as u32 <= nearest.t.to_bits() | 7 {
+                    break Child::from_bits(pending as u32);
+                }
+            };
+        }
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn portable<const ANY: bool>(
+    wide: &WideBvh,
+    ray: &Ray,
+    accept: &mut impl FnMut(Hit) -> bool,
+) -> Hit {
+    walk::<ANY>(wide, ray, &mut (), accept).unwrap_or(Hit::MISS)
+}
+
+/// A ray in all lanes, as triangles are tested with it.
+struct LeafRay<L> {
+    pairs: Pairs<L>,
+    axes: [usize; 3],
+}
+
+impl<L: Lanes> LeafRay<L> {
+    #[inline(always)]
+    unsafe fn new(ray: &Ray) -> Self {
+        // Most rays in the open meet no leaf: without this the compiler does a part of this work for all.
+        let ray = black_box(ray);
+        let shear = Shear::new(ray);
+        let inverse = ray.inverse_direction().to_array();
+        let [x, y, z] = shear.axes;
+        let [ox, oy, oz] = shear.origin;
+        // SAFETY: the caller's promise: the processor has the instructions.
+        unsafe {
+            let pairs = Pairs {
+                origin: [L::splat(ox), L::splat(oy), L::splat(oz)],
+                inverse: [L::splat(inverse[x]), L::splat(inverse[y]), L::splat(inverse[z])],
+                slope: [L::splat(shear.slope[0]), L::splat(shear.slope[1])],
+                depth: L::splat(shear.depth as f32),
+                t_min: L::splat(ray.t_min()),
+            };
+            Self { pairs, axes: shear.axes }
+        }
+    }
+
+    /// Tests the triangles of a block. Returns whether one of them is the new nearest hit.
+    #[inline(always)]
+    unsafe fn visit(
+        &self,
+        block: &TriangleBlock,
+        nearest: &mut Hit,
+        accept: &mut impl FnMut(Hit) -> bool,
+    ) -> bool {
+        // SAFETY: the caller's promise: the processor has the instructions; axes are below 3.
+        unsafe {
+            let corners = block.corners_along::<L>(self.axes);
+            if self.pairs.candidates(&corners) == 0 {
+                return false;
+            }
+            let (inside, t) = self.pairs.decide(&corners, L::splat(nearest.t));
+            let mut hits = inside.bits();
+            if hits == 0 {
+                return false;
+            }
+            let mut distances = [0.0; TriangleBlock::LANES];
+            t.store(distances.as_mut_ptr());
+            let mut is_nearer = false;
+            while hits != 0 {
+                let lane = hits.trailing_zeros() as usize & 3;
+                hits &= hits - 1;
+                let hit = Hit { t: distances[lane], object: block.id(lane) };
+                // An unused lane repeats a triangle, which a filter may have rejected.
+                if !hit.is_miss() && hit.precedes(nearest) && accept(hit) {
+                    *nearest = hit;
+                    is_nearer = true;
+                }
+            }
+            is_nearer
+        }
+    }
+}
