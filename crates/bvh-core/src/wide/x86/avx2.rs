@@ -1,6 +1,6 @@
 //! The AVX2 kernel: eight boxes at once with fused multiply-add, entered children sorted without a branch.
 
-use super::lanes::{F32x4, F32x8};
+use super::lanes::{F32x4, F32x8, Mask8};
 use super::sort;
 use crate::wide::answer::Answers;
 use crate::wide::instructions::{Instructions, Pending, last_pending};
@@ -40,6 +40,7 @@ impl Instructions for Avx2 {
     type Rays = F32x8;
     const PACKET: usize = 64;
     const FLIGHT: usize = 24;
+    super::common_instructions!();
 
     #[inline(always)]
     unsafe fn entered(entry: F32x8, exit: F32x8) -> u32 {
@@ -49,30 +50,16 @@ impl Instructions for Avx2 {
     #[inline(always)]
     unsafe fn sort_keys(entry: F32x8, mask: u32, to: *mut u32) {
         // SAFETY: the caller's promises.
-        unsafe { sort::descending(compress(sort::keys(entry.0), mask), mask.count_ones(), to) }
+        unsafe {
+            let sorted = sort::descending(compress(sort::keys(entry.0), mask), mask.count_ones());
+            _mm256_storeu_si256(to.cast(), sorted);
+        }
     }
 
     #[inline(always)]
     unsafe fn compress_keys(entry: F32x8, mask: u32, to: *mut u32) {
         // SAFETY: the caller's promises.
         unsafe { _mm256_storeu_si256(to.cast(), compress(sort::keys(entry.0), mask)) }
-    }
-
-    #[inline(always)]
-    unsafe fn prefetch(line: *const u8) {
-        // SAFETY: a prefetch may name any address.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(line.cast()) }
-    }
-
-    #[inline(always)]
-    unsafe fn in_flight<A: Answers>(
-        wide: &WideBvh,
-        rays: impl Source,
-        answers: &mut A,
-        numbers: Range<usize>,
-    ) {
-        // SAFETY: the caller's promises.
-        unsafe { in_flight(wide, rays, answers, numbers) }
     }
 
     #[inline(always)]
@@ -107,60 +94,15 @@ impl Instructions for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn sort(node: &WideNode, F32x8(entry): F32x8, mask: u32, stack: *mut Pending) -> Child {
-        const TURNS: [[i32; 8]; 7] = {
-            let mut turns = [[0; 8]; 7];
-            let mut i = 0;
-            while i < 56 {
-                turns[i / 8][i % 8] = (i / 8 + 1 + i % 8) as i32 & 7;
-                i += 1;
-            }
-            turns
-        };
-        // SAFETY: the caller's promises; the stack has room for eight entries.
+    unsafe fn sort(node: &WideNode, F32x8(entry): F32x8, mask: u32, to: *mut Pending) -> Child {
+        // SAFETY: this instruction set includes AVX2; there is room for eight.
         unsafe {
-            // The inverted lane in the last three bits makes keys distinct and prefers the higher of two lanes; lanes that
-            // are not entered get negative keys.
-            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-            let inverted = _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0);
-            let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-            let entered =
-                _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(mask as i32), bits), bits);
-            let cut = _mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(entry));
-            let cut = _mm256_blendv_epi8(_mm256_set1_epi32(-8), cut, entered);
-            let keys = _mm256_or_si256(cut, inverted);
-
+            let keys = sort::keys(entry);
+            let entered = _mm256_castps_si256(Mask8::from_bits(mask).0);
+            let others = _mm256_set1_epi32(-1);
             // The nearest child first: the rest of the work is not on the way to it.
-            let least =
-                _mm_min_epu32(_mm256_castsi256_si128(keys), _mm256_extracti128_si256::<1>(keys));
-            let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0x4e>(least));
-            let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0xb1>(least));
-            let nearest = *node
-                .children
-                .get_unchecked((!_mm_cvtsi128_si32(least) & 7) as usize);
-
-            // A child's place is the number of keys greater than its own.
-            let mut places = _mm256_setzero_si256();
-            for turn in &TURNS {
-                let turned =
-                    _mm256_permutevar8x32_epi32(keys, _mm256_loadu_si256(turn.as_ptr().cast()));
-                places = _mm256_sub_epi32(places, _mm256_cmpgt_epi32(turned, keys));
-            }
-            // The inverse of that permutation, four bits per place, first gathered in all lanes and then shared out.
-            let order = _mm256_sllv_epi32(lanes, _mm256_slli_epi32::<2>(places));
-            let order = _mm256_or_si256(order, _mm256_permute2x128_si256::<1>(order, order));
-            let order = _mm256_or_si256(order, _mm256_shuffle_epi32::<0x4e>(order));
-            let order = _mm256_or_si256(order, _mm256_shuffle_epi32::<0xb1>(order));
-            let order = _mm256_srlv_epi32(order, _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
-
-            let entries = _mm256_permutevar8x32_epi32(_mm256_castps_si256(entry), order);
-            let children = _mm256_load_si256(node.children.as_ptr().cast());
-            let children = _mm256_permutevar8x32_epi32(children, order);
-            let low = _mm256_unpacklo_epi32(children, entries);
-            let high = _mm256_unpackhi_epi32(children, entries);
-            let to = stack.cast::<__m256i>();
-            _mm256_storeu_si256(to, _mm256_permute2x128_si256::<0x20>(low, high));
-            _mm256_storeu_si256(to.add(1), _mm256_permute2x128_si256::<0x31>(low, high));
+            let nearest = sort::nearest(node, _mm256_blendv_epi8(others, keys, entered));
+            sort::write(node, compress(keys, mask), mask.count_ones(), to);
             nearest
         }
     }

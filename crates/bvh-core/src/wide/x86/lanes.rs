@@ -113,7 +113,7 @@ pub(crate) struct F32x16(pub(crate) __m512);
 #[derive(Clone, Copy)]
 pub(crate) struct Mask4(__m128);
 #[derive(Clone, Copy)]
-pub(crate) struct Mask8(__m256);
+pub(crate) struct Mask8(pub(crate) __m256);
 
 /// A set of lanes of f64, likewise.
 #[derive(Clone, Copy)]

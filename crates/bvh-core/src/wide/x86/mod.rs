@@ -48,3 +48,26 @@ macro_rules! entry_points {
     };
 }
 use entry_points;
+
+/// What all instruction sets of x86-64 have in common.
+macro_rules! common_instructions {
+    () => {
+        #[inline(always)]
+        unsafe fn prefetch(line: *const u8) {
+            // SAFETY: a prefetch may name any address.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(line.cast()) }
+        }
+
+        #[inline(always)]
+        unsafe fn in_flight<A: Answers>(
+            wide: &WideBvh,
+            rays: impl Source,
+            answers: &mut A,
+            numbers: Range<usize>,
+        ) {
+            // SAFETY: the processor has the instructions, and there is an answer for every ray.
+            unsafe { in_flight(wide, rays, answers, numbers) }
+        }
+    };
+}
+use common_instructions;

@@ -1,27 +1,30 @@
 //! Keys of a node's children, and their order.
 
+use crate::wide::instructions::Pending;
+use crate::wide::node::{Child, WideNode};
 use core::arch::x86_64::*;
 
-/// The bits of the entries, of which the last three are the inverted lane: of equal ones the higher lane is nearer.
+/// Returns the bits of the entries with the inverted lane in the last three: of equal entries the
+/// higher lane is nearer.
 ///
 /// # Safety
 /// The caller has AVX2.
 #[inline(always)]
 pub(super) unsafe fn keys(entry: __m256) -> __m256i {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller has AVX2.
     unsafe {
         let cut = _mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(entry));
         _mm256_or_si256(cut, _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0))
     }
 }
 
-/// Writes the first `count` keys in descending order; the others are 0.
+/// Returns the first `count` keys in descending order, if all others are 0.
 ///
 /// # Safety
-/// The caller has AVX2; `to` has room for eight.
+/// The caller has AVX2.
 #[inline(always)]
-pub(super) unsafe fn descending(keys: __m256i, count: u32, to: *mut u32) {
-    // SAFETY: the caller's promises.
+pub(super) unsafe fn descending(keys: __m256i, count: u32) -> __m256i {
+    // SAFETY: the caller has AVX2.
     unsafe {
         if count <= 4 {
             // Three stages of two comparisons.
@@ -32,7 +35,7 @@ pub(super) unsafe fn descending(keys: __m256i, count: u32, to: *mut u32) {
             let x = _mm_blend_epi32::<0b1100>(_mm_max_epu32(x, s), _mm_min_epu32(x, s));
             let s = _mm_shuffle_epi32::<0b11_01_10_00>(x);
             let x = _mm_blend_epi32::<0b0100>(_mm_max_epu32(x, s), _mm_min_epu32(x, s));
-            return _mm_storeu_si128(to.cast(), x);
+            return _mm256_castsi128_si256(x);
         }
         // Bitonic: pairs, fours, then eight.
         let x = keys;
@@ -47,7 +50,44 @@ pub(super) unsafe fn descending(keys: __m256i, count: u32, to: *mut u32) {
         let s = _mm256_shuffle_epi32::<0b01_00_11_10>(x);
         let x = _mm256_blend_epi32::<0b1100_1100>(_mm256_max_epu32(x, s), _mm256_min_epu32(x, s));
         let s = _mm256_shuffle_epi32::<0b10_11_00_01>(x);
-        let x = _mm256_blend_epi32::<0b1010_1010>(_mm256_max_epu32(x, s), _mm256_min_epu32(x, s));
-        _mm256_storeu_si256(to.cast(), x);
+        _mm256_blend_epi32::<0b1010_1010>(_mm256_max_epu32(x, s), _mm256_min_epu32(x, s))
+    }
+}
+
+/// Writes the `count` children that have these keys, the nearest last. All other keys are 0.
+///
+/// # Safety
+/// The caller has AVX2; `to` has room for eight.
+#[inline(always)]
+pub(super) unsafe fn write(node: &WideNode, keys: __m256i, count: u32, to: *mut Pending) {
+    // SAFETY: the caller has AVX2, and there is room for eight.
+    unsafe {
+        let sorted = descending(keys, count);
+        let order = _mm256_andnot_si256(sorted, _mm256_set1_epi32(7));
+        let children = _mm256_load_si256(node.children.as_ptr().cast());
+        let children = _mm256_permutevar8x32_epi32(children, order);
+        let low = _mm256_unpacklo_epi32(children, sorted);
+        let high = _mm256_unpackhi_epi32(children, sorted);
+        let to = to.cast::<__m256i>();
+        _mm256_storeu_si256(to, _mm256_permute2x128_si256::<0x20>(low, high));
+        _mm256_storeu_si256(to.add(1), _mm256_permute2x128_si256::<0x31>(low, high));
+    }
+}
+
+/// Returns the child of the least key.
+///
+/// # Safety
+/// The caller has AVX2.
+#[inline(always)]
+pub(super) unsafe fn nearest(node: &WideNode, keys: __m256i) -> Child {
+    // SAFETY: the caller has AVX2; a lane is below eight.
+    unsafe {
+        let least =
+            _mm_min_epu32(_mm256_castsi256_si128(keys), _mm256_extracti128_si256::<1>(keys));
+        let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0x4e>(least));
+        let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0xb1>(least));
+        *node
+            .children
+            .get_unchecked((!_mm_cvtsi128_si32(least) & 7) as usize)
     }
 }
