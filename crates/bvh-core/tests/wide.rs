@@ -248,6 +248,22 @@ fn of_batch(wide: &WideBvh, rays: &[Ray], coherence: Coherence) -> Vec<(u32, u32
 }
 
 #[test]
+fn batches_miss_a_scene_in_which_no_triangle_has_an_area() {
+    let line = Triangle::from([[-1.0; 3], [0.0; 3], [1.0; 3]]);
+    let ray = Ray::half_line([0.0, 0.0, 5.0], [0.01, 0.01, -1.0]).unwrap();
+    for (kernel, wide) in layouts(&[line, line], &mut Random(7)) {
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let mut hits = vec![Hit { t: 1.0, object: 0 }; 100];
+            let mut any = vec![true; 100];
+            wide.nearest_hits(&[ray; 100], &mut hits, coherence);
+            wide.any_hits(&[ray; 100], &mut any, coherence);
+            let is_miss = hits.iter().all(Hit::is_miss) && !any.contains(&true);
+            assert!(is_miss, "{kernel:?}, {coherence:?}");
+        }
+    }
+}
+
+#[test]
 fn ranges_by_component_end_at_either_zero_with_the_same_bits() {
     let sheet = |x: f32| {
         Triangle([Vec3::new(x, -1.0, 0.0), Vec3::new(x + 1.0, -1.0, 0.0), Vec3::new(x, 3.0, 0.0)])

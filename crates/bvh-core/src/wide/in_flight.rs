@@ -50,6 +50,13 @@ pub(crate) unsafe fn trace<K: Instructions, A: Answers>(
     numbers: Range<usize>,
 ) {
     const { assert!(K::FLIGHT <= FLIGHT && K::Rays::N <= RAYS) };
+    // No triangle has an area. The flight below expects that every ray visits something.
+    if wide.root.is_none() {
+        for number in numbers {
+            answers.write(number, f32::INFINITY, u32::MAX);
+        }
+        return;
+    }
     // SAFETY: the caller's promises.
     unsafe {
         let mut traversals = MaybeUninit::<[Traversal; FLIGHT]>::uninit();
