@@ -10,7 +10,7 @@ use glam::DVec3;
 const INSIDE: [(&str, [f64; 3], [f64; 3], f64); 1] =
     [("sponza", [-11.3, 1.9, -0.9], [3.0, 4.4, 0.5], 62.0)];
 
-/// Returns a view of a scene: the view in [`INSIDE`], or otherwise a view from outside, from above
+/// Returns a view of a scene: the view in `INSIDE`, or otherwise a view from outside, from above
 /// and a little from the side, whose distance just fits the whole box.
 pub fn automatic(scene: &Scene, bounds: &Aabb, aspect: f64) -> View {
     if let Some((_, from, at, fov)) = INSIDE.iter().find(|view| view.0 == scene.name) {
