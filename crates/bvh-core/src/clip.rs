@@ -100,10 +100,10 @@ fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
     for axis in 0..3 {
         // Planes that miss the triangle cut nothing off.
         if full.min[axis] < region.min[axis] {
-            polygon = cut(&polygon, Plane { axis, position: low[axis], side: 1.0 });
+            cut(&mut polygon, Plane { axis, position: low[axis], side: 1.0 });
         }
         if full.max[axis] > region.max[axis] {
-            polygon = cut(&polygon, Plane { axis, position: high[axis], side: -1.0 });
+            cut(&mut polygon, Plane { axis, position: high[axis], side: -1.0 });
         }
     }
     let kept = polygon.corners();
@@ -127,11 +127,11 @@ fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
 
 /// Cuts a polygon, and puts the new corners exactly on the plane.
 #[inline]
-fn cut(polygon: &Polygon, plane: Plane) -> Polygon {
+fn cut(polygon: &mut Polygon, plane: Plane) {
     polygon.cut(plane, |mut corner| {
         corner[plane.axis] = plane.position;
         corner
-    })
+    });
 }
 
 #[cfg(test)]

@@ -182,22 +182,24 @@ impl<'a> EndPointOverlap<'a> {
 /// Returns the area of a polygon inside a box. `bounds` is the box around the polygon, and `area`
 /// is its whole area.
 fn area_inside(polygon: &Polygon, aabb: &Aabb, bounds: &Aabb, area: f64) -> f64 {
+    let below = bounds.min.cmplt(aabb.min);
+    let above = bounds.max.cmpgt(aabb.max);
+    if !(below | above).any() {
+        return area;
+    }
     let mut part = *polygon;
-    let mut is_cut = false;
     for axis in 0..3 {
         // Planes that do not cut the polygon are skipped, which changes no bit.
-        if bounds.min[axis] < aabb.min[axis] {
+        if below.test(axis) {
             let position = f64::from(aabb.min[axis]);
-            part = part.cut(Plane { axis, position, side: 1.0 }, |corner| corner);
-            is_cut = true;
+            part.cut(Plane { axis, position, side: 1.0 }, |corner| corner);
         }
-        if bounds.max[axis] > aabb.max[axis] {
+        if above.test(axis) {
             let position = f64::from(aabb.max[axis]);
-            part = part.cut(Plane { axis, position, side: -1.0 }, |corner| corner);
-            is_cut = true;
+            part.cut(Plane { axis, position, side: -1.0 }, |corner| corner);
         }
     }
-    if is_cut { part.area() } else { area }
+    part.area()
 }
 
 #[cfg(test)]

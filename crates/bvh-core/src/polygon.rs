@@ -49,39 +49,40 @@ impl Polygon {
         libm::sqrt(doubled.length_squared()) / 2.0
     }
 
-    /// Returns the part on the kept side of a plane. `crossing` receives each new corner, and may
-    /// correct its rounding errors.
+    /// Keeps the part on one side of a plane. `crossing` receives each new corner, and may correct
+    /// its rounding errors.
     ///
     /// Rounding can make a polygon slightly concave, and a plane could then add more corners than
-    /// there is room for. The result is in that case the polygon without this cut: too large by
-    /// rounding errors, but never too small.
+    /// there is room for. The polygon stays uncut in that case: too large by rounding errors, but
+    /// never too small.
     #[inline(always)]
-    pub fn cut(&self, plane: Plane, crossing: impl Fn(DVec3) -> DVec3) -> Self {
-        let mut kept = Self { corners: [DVec3::ZERO; 9], len: 0 };
-        for (index, &from) in self.corners().iter().enumerate() {
-            let next = if index + 1 == self.len { 0 } else { index + 1 };
-            let to = self.corners[next];
+    pub fn cut(&mut self, plane: Plane, crossing: impl Fn(DVec3) -> DVec3) {
+        let whole = *self;
+        let mut kept = 0;
+        let mut add = |corner: DVec3| {
+            if let Some(place) = self.corners.get_mut(kept) {
+                *place = corner;
+            }
+            kept += 1;
+        };
+        for (index, &from) in whole.corners().iter().enumerate() {
+            let next = if index + 1 == whole.len { 0 } else { index + 1 };
+            let to = whole.corners[next];
             let before = plane.height(from);
             let after = plane.height(to);
-            if before >= 0.0 && !kept.add(from) {
-                return *self;
+            if before >= 0.0 {
+                add(from);
             }
             // A corner in the plane is kept above, and would be its own crossing.
-            let crosses = (before < 0.0) != (after < 0.0) && before != 0.0 && after != 0.0;
-            if crosses && !kept.add(crossing(from + (to - from) * (before / (before - after)))) {
-                return *self;
+            if (before < 0.0) != (after < 0.0) && before != 0.0 && after != 0.0 {
+                add(crossing(from + (to - from) * (before / (before - after))));
             }
         }
-        kept
-    }
-
-    /// Adds a corner. Returns false if there is no room.
-    #[inline(always)]
-    fn add(&mut self, corner: DVec3) -> bool {
-        let Some(place) = self.corners.get_mut(self.len) else { return false };
-        *place = corner;
-        self.len += 1;
-        true
+        if kept <= self.corners.len() {
+            self.len = kept;
+        } else {
+            *self = whole;
+        }
     }
 }
 
@@ -98,18 +99,25 @@ mod tests {
             let height = if index % 2 == 0 { 1.0 } else { -1.0 };
             *corner = DVec3::new(index as f64, height, 0.0);
         }
-        let plane = Plane { axis: 1, position: 0.0, side: 1.0 };
-        assert_eq!(zigzag.cut(plane, |corner| corner).corners(), zigzag.corners());
+        let mut polygon = zigzag;
+        polygon.cut(Plane { axis: 1, position: 0.0, side: 1.0 }, |corner| corner);
+        assert_eq!(polygon.corners(), zigzag.corners());
     }
 
     #[test]
     fn a_corner_in_the_plane_is_kept_once() {
-        let triangle = Polygon::new([DVec3::ZERO, DVec3::X, DVec3::Y]);
-        let upper = Plane { axis: 0, position: 0.0, side: 1.0 };
-        let lower = Plane { side: -1.0, ..upper };
-        assert_eq!(triangle.cut(upper, |corner| corner).corners(), triangle.corners());
-        assert_eq!(triangle.cut(lower, |corner| corner).corners(), [DVec3::ZERO, DVec3::Y]);
-        let middle = Plane { position: 0.25, ..upper };
-        assert_eq!(triangle.cut(middle, |corner| corner).area(), 0.28125);
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        for (position, side, expected) in [
+            (0.0, 1.0, &corners[..]),
+            (0.0, -1.0, &[DVec3::ZERO, DVec3::Y]),
+            (1.0, 1.0, &[DVec3::X]),
+        ] {
+            let mut polygon = Polygon::new(corners);
+            polygon.cut(Plane { axis: 0, position, side }, |corner| corner);
+            assert_eq!(polygon.corners(), expected);
+        }
+        let mut polygon = Polygon::new(corners);
+        polygon.cut(Plane { axis: 0, position: 0.25, side: 1.0 }, |corner| corner);
+        assert_eq!(polygon.area(), 0.28125);
     }
 }
