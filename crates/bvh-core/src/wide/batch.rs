@@ -1,12 +1,12 @@
 //! Batches of rays: packets where the rays are coherent, and else many rays in flight.
 
 use super::answer::Answers;
+use super::coherence::Coherence;
 use super::instructions::Instructions;
 use super::lanes::Lanes;
 use super::layout::WideBvh;
 use super::packet::Packet;
 use super::source::Source;
-use crate::Coherence;
 use core::ops::Range;
 
 /// So many rays between packets are traced together.

@@ -1,24 +1,12 @@
 //! Batches of rays: one after the other in memory, or by component.
 
 use super::answer::Answers;
+use super::coherence::Coherence;
 use super::layout::WideBvh;
 use super::source::Source;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 use super::{kernel::Kernel, x86};
 use crate::{Hit, Ray, RayComponents};
-
-/// What a caller expects of the rays of a batch. A hint: the answers are the same. [`Kernel::Portable`](crate::Kernel::Portable) traces one ray after
-/// the other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Coherence {
-    /// Consecutive rays begin close to each other and run the same way, as those through neighbouring pixels or from
-    /// neighbouring points to a light. They are traced in packets of 64 where they do, and else as
-    /// incoherent ones.
-    Coherent,
-    /// Consecutive rays have little in common. Two dozen are on their way at a time, a step of each in turn, which hides
-    /// what one alone would wait for: from a hundred rays on it pays.
-    Incoherent,
-}
 
 impl WideBvh {
     /// [`nearest_hit`](Self::nearest_hit) of every ray, into as many `hits`; [`Hit::MISS`] for a ray that meets nothing.

@@ -36,7 +36,6 @@
 //! packet by the same operations, with the largest S. Rounding is monotone: the bounds are not beyond
 //! the distances of any ray of the packet by more than the steps above allow.
 
-use super::instructions::Instructions;
 use super::lanes::Lanes;
 use super::node::WideNode;
 use crate::ray::pow2;
@@ -133,17 +132,13 @@ impl<L: Lanes> BoxRay<L> {
         }
     }
 
-    /// Returns the distances at which the ray enters the eight boxes of a node, and a bit for each
-    /// box that it enters before `t_max`.
+    /// Returns the distances at which the ray enters and leaves the eight boxes of a node, the latter
+    /// at most `t_max`.
     ///
     /// # Safety
-    /// The caller is compiled with the instructions of `K`.
+    /// The processor has the instructions.
     #[inline(always)]
-    pub(crate) unsafe fn enter<K: Instructions<Boxes = L>>(
-        &self,
-        node: &WideNode,
-        t_max: f32,
-    ) -> (L, u32) {
+    pub(crate) unsafe fn intervals(&self, node: &WideNode, t_max: f32) -> (L, L) {
         // SAFETY: `near` and `far` name aligned planes of the node, of as many lanes as `L`.
         unsafe {
             let planes = node.planes.as_ptr().cast::<u8>();
@@ -158,7 +153,7 @@ impl<L: Lanes> BoxRay<L> {
             let entry = near[0].max(near[1]).max(near[2].max(self.t_min));
             // Of a NaN and a number the second: unused lanes stay NaN.
             let exit = L::splat(t_max).min(far[0].min(far[1]).min(far[2]));
-            (entry, K::entered(entry, exit))
+            (entry, exit)
         }
     }
 }

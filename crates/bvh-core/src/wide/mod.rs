@@ -8,6 +8,7 @@ mod batch;
 mod batches;
 mod box_ray;
 mod build;
+mod coherence;
 mod in_flight;
 mod instructions;
 mod kernel;
@@ -26,8 +27,8 @@ mod triangles;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod x86;
 
-pub use batches::Coherence;
 pub(crate) use build::{BLOCK_COST, NODE_COST, areas, children, decide};
+pub use coherence::Coherence;
 pub use kernel::Kernel;
 pub use layout::WideBvh;
 pub use refit::RefitError;

@@ -49,7 +49,8 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
         loop {
             while child.is_node() {
                 let node = &*nodes.add(child.index());
-                let (entry, mask) = box_ray.enter::<K>(node, nearest.t);
+                let (entry, exit) = box_ray.intervals(node, nearest.t);
+                let mask = K::entered(entry, exit);
                 let others = mask & mask.wrapping_sub(1);
                 if others == 0 {
                     if mask == 0 {
