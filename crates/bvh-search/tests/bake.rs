@@ -73,10 +73,19 @@ fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
         let deadline = || Deadline::after(Duration::from_millis(50));
         let mut owned = OwnedTree::find(objects.clone(), references, &deadline()).unwrap();
         let first = cost::total_area(owned.tree());
-        owned.improve(&deadline()).unwrap();
-        assert!(cost::total_area(owned.tree()) <= first * (1.0 + 1e-12));
-        let divided = owned.tree().prim_ids.len() > boxes.len();
-        assert_eq!(divided, references > 1.0 && owned.triangles().is_some());
+        let may_divide = references > 1.0 && owned.triangles().is_some();
+        let mut time = Duration::from_millis(50);
+        let divides = loop {
+            owned.improve(&Deadline::after(time)).unwrap();
+            assert!(cost::total_area(owned.tree()) <= first * (1.0 + 1e-12));
+            let divides = owned.tree().prim_ids.len() > boxes.len();
+            // A busy or an emulated processor may need more than a moment before it divides any.
+            if divides == may_divide || time > Duration::from_secs(30) {
+                break divides;
+            }
+            time *= 2;
+        };
+        assert_eq!(divides, may_divide);
         let mut loaded = OwnedTree::load(objects, &owned.save().unwrap()).unwrap();
         assert_eq!((loaded.tree(), loaded.objects()), (owned.tree(), boxes.len()));
         loaded.improve(&deadline()).unwrap();
