@@ -3,10 +3,15 @@
 use super::answer::Answers;
 use super::coherence::Coherence;
 use super::layout::WideBvh;
+#[cfg(any(
+    all(target_arch = "aarch64", target_feature = "neon"),
+    all(target_arch = "wasm32", target_feature = "simd128")
+))]
+use super::simd128;
 use super::source::Source;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
-use super::{kernel::Kernel, x86};
-use crate::{Hit, Ray, RayComponents};
+use super::x86;
+use crate::{Hit, Kernel, Ray, RayComponents};
 
 impl WideBvh {
     /// [`nearest_hit`](Self::nearest_hit) of every ray, into as many `hits`; [`Hit::MISS`] for a ray that meets nothing.
@@ -69,6 +74,14 @@ impl WideBvh {
                     _ => x86::avx2::trace(self, rays, answers, coherence),
                 }
             };
+        }
+        #[cfg(any(
+            all(target_arch = "aarch64", target_feature = "neon"),
+            all(target_arch = "wasm32", target_feature = "simd128")
+        ))]
+        if self.kernel == Kernel::Simd128 {
+            // SAFETY: the target has the instructions; `choose` saw that `stack_need` is small enough.
+            return unsafe { simd128::trace(self, rays, answers, coherence) };
         }
         let _ = coherence;
         for number in 0..rays.len() {

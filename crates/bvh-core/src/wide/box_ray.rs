@@ -27,6 +27,8 @@
 //!    K = 2²⁴ / D. Near distances only become nearer. A far plane p that `Slabs` has in front of the
 //!    origin has p ≥ U, and then (p − U') · K ≥ 4uS · K = 4S / D, which no distance exceeds that
 //!    `Slabs` accepts on the axis of D.
+//!    Where no instruction fuses, the product of plane and scale rounds by another uS · s. Then 3uS of
+//!    the margin remain, which suffices here and in step 3.
 //! 5. *Overflow.* Rays with S ≥ 2⁶⁰, S · K ≥ 2¹²⁰ or S < 2⁻⁹⁰ are left to the portable kernel.
 //!
 //! `Slabs` moves a hit's distance into the interval of the triangle's box. Hence a near distance is at

@@ -9,11 +9,13 @@ pub enum Kernel {
     Avx2,
     /// x86-64 with AVX-512 F, VL, DQ and BW. Needs the feature `std`, too.
     Avx512,
+    /// Registers of 128 bits: NEON on 64-bit ARM, and WebAssembly compiled with SIMD128.
+    Simd128,
 }
 
 impl Kernel {
     /// All kernels, the fastest first.
-    pub const ALL: [Self; 3] = [Self::Avx512, Self::Avx2, Self::Portable];
+    pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Simd128, Self::Portable];
 
     /// Whether this processor can run the kernel.
     pub fn is_available(self) -> bool {
@@ -23,6 +25,11 @@ impl Kernel {
             Self::Avx2 => has_avx2(),
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Self::Avx512 => has_avx512(),
+            #[cfg(any(
+                all(target_arch = "aarch64", target_feature = "neon"),
+                all(target_arch = "wasm32", target_feature = "simd128")
+            ))]
+            Self::Simd128 => true,
             #[allow(unreachable_patterns)]
             _ => false,
         }

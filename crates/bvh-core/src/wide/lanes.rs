@@ -54,7 +54,8 @@ pub(crate) trait Lanes:
     /// The greater; of two zeros, or a NaN and a number, `other`.
     fn max(self, other: Self) -> Self;
 
-    /// `self · factor + term`, rounded once.
+    /// `self · factor + term`, rounded once, or twice where no instruction fuses them. Only tests of
+    /// boxes use it, whose margin covers both.
     fn mul_add(self, factor: Self, term: Self) -> Self;
 
     /// Where `self < other`; not where either is NaN.
@@ -163,7 +164,7 @@ pub(crate) trait DoubleLanes:
     /// The greater, as [`Lanes::max`].
     fn max(self, other: Self) -> Self;
 
-    /// `self · factor − term`, rounded once.
+    /// `self · factor − term` where the product is exact, so that it is the same fused or not.
     fn mul_sub(self, factor: Self, term: Self) -> Self;
 
     /// Where `self < other`.

@@ -22,6 +22,11 @@ mod portable;
 mod prepared;
 mod ray_lanes;
 mod refit;
+#[cfg(any(
+    all(target_arch = "aarch64", target_feature = "neon"),
+    all(target_arch = "wasm32", target_feature = "simd128")
+))]
+mod simd128;
 mod source;
 mod triangles;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
@@ -124,6 +129,15 @@ impl WideBvh {
                     _ => x86::avx2::one_ray::<ANY>(self, ray, accept),
                 }
             };
+            return (!hit.is_miss()).then_some(hit);
+        }
+        #[cfg(any(
+            all(target_arch = "aarch64", target_feature = "neon"),
+            all(target_arch = "wasm32", target_feature = "simd128")
+        ))]
+        if self.kernel == Kernel::Simd128 {
+            // SAFETY: the target has the instructions; `choose` saw that `stack_need` is small enough.
+            let hit = unsafe { simd128::one_ray::<ANY>(self, ray, accept) };
             return (!hit.is_miss()).then_some(hit);
         }
         walk::<ANY>(self, ray, &mut (), accept)

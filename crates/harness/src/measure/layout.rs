@@ -71,6 +71,7 @@ fn instructions_of(kernel: Kernel) -> &'static str {
     match kernel {
         Kernel::Avx512 => "AVX-512",
         Kernel::Avx2 => "AVX2",
+        Kernel::Simd128 => "128 bits",
         Kernel::Portable => COMPILED,
     }
 }

@@ -1,0 +1,141 @@
+//! The kernel in registers of 128 bits, two for eight numbers: NEON on 64-bit ARM, and SIMD128 in WebAssembly.
+
+mod lanes;
+#[cfg_attr(target_arch = "aarch64", path = "neon.rs")]
+#[cfg_attr(target_arch = "wasm32", path = "wasm.rs")]
+mod registers;
+
+use super::answer::Answers;
+use super::instructions::{Instructions, Pending, last_pending};
+use super::lanes::{Lanes, Mask};
+use super::layout::WideBvh;
+use super::node::{Child, WideNode};
+use super::source::Source;
+use super::{batch, in_flight, one_ray};
+use crate::{Coherence, Hit, Ray};
+use core::cmp::Reverse;
+use core::ops::Range;
+use lanes::Singles;
+
+pub(crate) struct Simd128;
+
+/// [`one_ray::trace`].
+pub(crate) unsafe fn one_ray<const ANY: bool>(
+    wide: &WideBvh,
+    ray: &Ray,
+    accept: impl FnMut(Hit) -> bool,
+) -> Hit {
+    // SAFETY: the target has the instructions; the rest is the caller's promise.
+    unsafe { one_ray::trace::<Simd128, ANY>(wide, ray, accept) }
+}
+
+/// [`batch::trace`].
+pub(crate) unsafe fn trace<A: Answers>(
+    wide: &WideBvh,
+    rays: impl Source,
+    answers: &mut A,
+    coherence: Coherence,
+) {
+    // SAFETY: the caller's promises.
+    unsafe { batch::trace::<Simd128, A>(wide, rays, answers, coherence) }
+}
+
+/// The entered lanes, the lowest first.
+#[inline(always)]
+fn lanes_of(mask: u32) -> impl Iterator<Item = usize> {
+    (0..8).filter(move |lane| mask >> lane & 1 != 0)
+}
+
+impl Instructions for Simd128 {
+    type Boxes = Singles<2>;
+    type Block = Singles<1>;
+    type Rays = Singles<2>;
+    const PACKET: usize = 64;
+    const FLIGHT: usize = 24;
+
+    #[inline(always)]
+    unsafe fn entered(entry: Singles<2>, exit: Singles<2>) -> u32 {
+        entry.le(exit).bits()
+    }
+
+    #[inline(always)]
+    unsafe fn sort_keys(entry: Singles<2>, mask: u32, to: *mut u32) {
+        // SAFETY: the caller's promises; as many keys are written as there are bits.
+        unsafe {
+            Self::compress_keys(entry, mask, to);
+            let keys = core::slice::from_raw_parts_mut(to, mask.count_ones() as usize);
+            keys.sort_unstable_by_key(|&key| Reverse(key));
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn compress_keys(entry: Singles<2>, mask: u32, to: *mut u32) {
+        let mut entries = [0.0; 8];
+        // SAFETY: there is room for eight, and for a key per bit.
+        unsafe {
+            entry.store(entries.as_mut_ptr());
+            for (i, lane) in lanes_of(mask).enumerate() {
+                *to.add(i) = entries[lane].to_bits() & !7 | (7 - lane as u32);
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn sort(node: &WideNode, entry: Singles<2>, mask: u32, to: *mut Pending) -> Child {
+        let mut keys = [0; 8];
+        let mut nearest = Child::node(0);
+        // SAFETY: the caller's promises; there is room for a key per bit.
+        unsafe {
+            Self::sort_keys(entry, mask, keys.as_mut_ptr());
+            for (i, &key) in keys
+                .iter()
+                .enumerate()
+                .take(mask.count_ones() as usize)
+            {
+                nearest = node.children[(!key & 7) as usize];
+                *to.add(i) = u64::from(key) << 32 | u64::from(nearest.bits());
+            }
+        }
+        nearest
+    }
+
+    #[inline(always)]
+    unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending) {
+        for (i, lane) in lanes_of(mask).enumerate() {
+            // SAFETY: the caller's promise: there is room for a child per bit.
+            unsafe { *to.add(i) = u64::from(node.children[lane].bits()) };
+        }
+    }
+
+    /// Does nothing: neither target has a stable instruction for it.
+    #[inline(always)]
+    unsafe fn prefetch(_: *const u8) {}
+
+    #[inline(never)]
+    unsafe fn in_flight<A: Answers>(
+        wide: &WideBvh,
+        rays: impl Source,
+        answers: &mut A,
+        numbers: Range<usize>,
+    ) {
+        // SAFETY: the caller's promises.
+        unsafe { in_flight::trace::<Self, A>(wide, rays, answers, numbers) }
+    }
+
+    #[inline(always)]
+    unsafe fn drop_farther(base: *mut Pending, top: *mut Pending, nearest: f32) -> *mut Pending {
+        let last = last_pending(nearest);
+        let mut from = base;
+        let mut to = base;
+        // SAFETY: the stack is between its ends.
+        unsafe {
+            while from < top {
+                let pending = *from;
+                *to = pending;
+                to = to.add(usize::from(pending <= last));
+                from = from.add(1);
+            }
+        }
+        to
+    }
+}
