@@ -99,13 +99,13 @@ pub(crate) enum Verdict {
 /// the coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Line {
-    origin: [f64; 3],
-    direction: [f64; 3],
-    axes: [usize; 3],
+    pub(crate) origin: [f64; 3],
+    pub(crate) direction: [f64; 3],
+    pub(crate) axes: [usize; 3],
 }
 
 /// The factor of error bounds, 64ε in f64.
-const ERROR: f64 = 1.0 / (1_u64 << 47) as f64;
+pub(crate) const ERROR: f64 = 1.0 / (1_u64 << 47) as f64;
 
 impl Line {
     /// Prepares a ray.
@@ -188,6 +188,29 @@ impl Line {
         }
         Verdict::Unsure
     }
+
+    /// Returns the rounded distance at which the ray crosses the triangle at or in front of the origin,
+    /// by the rule of [`Triangle::crossing`](crate::Triangle::crossing). `self` is the line of `ray`.
+    #[inline(always)]
+    pub(crate) fn crossing(&self, ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
+        match self.filter(triangle) {
+            Verdict::Miss => None,
+            Verdict::Hit(t) => Some(t),
+            Verdict::Unsure => crossing(ray, triangle),
+        }
+    }
+}
+
+/// Returns the rounded distance of [`Line::crossing`] by exact arithmetic. Does not allocate.
+#[cold]
+#[inline(never)]
+fn crossing(ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
+    let volumes = Volumes::new(ray, triangle)?;
+    let [u, v, w] = volumes.sides(triangle);
+    let is_crossed = u != 0 && u == v && v == w;
+    is_crossed
+        .then(|| round_quotient(&volumes.along_normal(), &volumes.determinant()))
+        .flatten()
 }
 
 /// Returns the rounded distance at which the ray's line crosses the triangle at or in front of the
@@ -248,6 +271,29 @@ impl Volumes {
     fn edges(&self) -> [Expansion<96>; 3] {
         let [a, b, c] = &self.corners;
         [(c, b), (a, c), (b, a)].map(|(p, q)| self.along_direction(&cross(p, q)))
+    }
+
+    /// Returns the sides of the edges on which the ray is, never 0 for an edge that is not parallel to it: the
+    /// signs of `u`, `v` and `w` after the origin has moved by (ε, ε², ε³) with an infinitely small ε > 0.
+    fn sides(&self, &[a, b, c]: &[Vec3; 3]) -> [i32; 3] {
+        let [u, v, w] = self.edges().map(|edge| edge.sign());
+        [(u, c, b), (v, a, c), (w, b, a)].map(|(side, from, to)| {
+            if side != 0 {
+                return side;
+            }
+            let edge = difference(to, from);
+            let direction = self.direction.to_array().map(f64::from);
+            [(1, 2), (2, 0), (0, 1)]
+                .into_iter()
+                .map(|(i, j)| {
+                    let mut component: Expansion<8> = Expansion::ZERO;
+                    component.add_scaled(&edge[j], direction[i]);
+                    component.add_scaled(&edge[i], -direction[j]);
+                    component.sign()
+                })
+                .find(|&sign| sign != 0)
+                .unwrap_or(0)
+        })
     }
 
     /// Returns `d · n`, which is −(u + v + w).

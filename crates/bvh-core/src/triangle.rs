@@ -170,6 +170,26 @@ impl Triangle {
         (ray.t_min() <= t && t <= t_max).then_some(t)
     }
 
+    /// Returns the distance at which the ray crosses the triangle, in real arithmetic, if that distance is
+    /// in the ray's range. The same as [`hit_exactly`](Self::hit_exactly), but of the triangles that
+    /// meet in an edge or a corner, the ray crosses only those that it would cross if its origin were moved
+    /// by (ε, ε², ε³) with an infinitely small ε > 0. The line of a ray crosses a closed mesh an even
+    /// number of times.
+    ///
+    /// Source: Edelsbrunner & Mücke 1990, 'Simulation of simplicity'.
+    ///
+    /// ```
+    /// use bvh_core::{Ray, Triangle};
+    /// let [a, b, c, d] = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]];
+    /// let diagonal = Ray::half_line([0.5, 0.5, 0.0], [0.0, 0.0, 1.0]).unwrap();
+    /// assert_eq!(Triangle::from([a, b, c]).crossing(&diagonal), Some(1.0));
+    /// assert_eq!(Triangle::from([a, c, d]).crossing(&diagonal), None);
+    /// ```
+    pub fn crossing(&self, ray: &Ray) -> Option<f32> {
+        let t = Line::new(ray).crossing(ray, &self.0)?;
+        (ray.t_min() <= t && t <= ray.t_max()).then_some(t)
+    }
+
     /// Returns the distance at which the ray hits the triangle if that distance is in the ray's
     /// range and at most `t_max`.
     ///

@@ -124,7 +124,12 @@ fn check(
     assert_eq!(bits(found), bits(expected), "{case}, {ray:?}");
     let found = any_hit_by(tree, ray, |id| test(id, ray.t_max()).is_some(), &mut ());
     assert_eq!(found, expected.is_some(), "{case}, {ray:?}");
+    let crossings = triangles
+        .iter()
+        .filter(|triangle| triangle.crossing(ray).is_some())
+        .count();
     for wide in kernels {
+        assert_eq!(wide.all_hits(ray).len(), crossings, "{case}, {ray:?}");
         assert_eq!(bits(wide.nearest_hit(ray)), bits(expected), "{case}, {ray:?}");
         assert_eq!(wide.any_hit(ray), expected.is_some(), "{case}, {ray:?}");
     }

@@ -3,14 +3,8 @@
 use super::answer::Answers;
 use super::coherence::Coherence;
 use super::layout::WideBvh;
-#[cfg(any(
-    all(target_arch = "aarch64", target_feature = "neon"),
-    all(target_arch = "wasm32", target_feature = "simd128")
-))]
-use super::simd128;
 use super::source::Source;
-#[cfg(all(feature = "std", target_arch = "x86_64"))]
-use super::x86;
+use super::vector;
 use crate::{Hit, Kernel, Ray, RayComponents};
 
 impl WideBvh {
@@ -65,25 +59,10 @@ impl WideBvh {
 
     #[inline]
     fn trace<A: Answers>(&self, rays: impl Source, answers: &mut A, coherence: Coherence) {
-        #[cfg(all(feature = "std", target_arch = "x86_64"))]
         if self.kernel != Kernel::Portable {
             // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
-            return unsafe {
-                match self.kernel {
-                    Kernel::Avx512 => x86::avx512::trace(self, rays, answers, coherence),
-                    _ => x86::avx2::trace(self, rays, answers, coherence),
-                }
-            };
+            return unsafe { vector::trace(self, rays, answers, coherence) };
         }
-        #[cfg(any(
-            all(target_arch = "aarch64", target_feature = "neon"),
-            all(target_arch = "wasm32", target_feature = "simd128")
-        ))]
-        if self.kernel == Kernel::Simd128 {
-            // SAFETY: the target has the instructions; `choose` saw that `stack_need` is small enough.
-            return unsafe { simd128::trace(self, rays, answers, coherence) };
-        }
-        let _ = coherence;
         for number in 0..rays.len() {
             answers.alone(number, self, &rays.ray(number));
         }

@@ -55,7 +55,22 @@ pub(crate) trait Instructions {
     );
 
     /// Takes what begins behind `nearest` from a stack that is aligned to 64 bytes; its new end.
-    unsafe fn drop_farther(base: *mut Pending, top: *mut Pending, nearest: f32) -> *mut Pending;
+    #[inline(always)]
+    unsafe fn drop_farther(base: *mut Pending, top: *mut Pending, nearest: f32) -> *mut Pending {
+        let last = last_pending(nearest);
+        let mut from = base;
+        let mut to = base;
+        // SAFETY: the stack is between its ends.
+        unsafe {
+            while from < top {
+                let pending = *from;
+                *to = pending;
+                to = to.add(usize::from(pending <= last));
+                from = from.add(1);
+            }
+        }
+        to
+    }
 }
 
 /// What is behind a hit at this distance is greater.

@@ -3,6 +3,7 @@
 // Of the vector kernels, which not every machine has.
 #![cfg_attr(not(all(feature = "std", target_arch = "x86_64")), allow(dead_code))]
 
+mod all_hits;
 mod answer;
 mod batch;
 mod batches;
@@ -22,15 +23,18 @@ mod portable;
 mod prepared;
 mod ray_lanes;
 mod refit;
-#[cfg(any(
-    all(target_arch = "aarch64", target_feature = "neon"),
-    all(target_arch = "wasm32", target_feature = "simd128")
-))]
-mod simd128;
 mod source;
 mod triangles;
-#[cfg(all(feature = "std", target_arch = "x86_64"))]
-mod x86;
+// The kernels of the target, or none.
+#[cfg_attr(all(feature = "std", target_arch = "x86_64"), path = "x86/mod.rs")]
+#[cfg_attr(
+    any(
+        all(target_arch = "aarch64", target_feature = "neon"),
+        all(target_arch = "wasm32", target_feature = "simd128")
+    ),
+    path = "simd128/mod.rs"
+)]
+mod vector;
 
 pub(crate) use build::{BLOCK_COST, NODE_COST, areas, children, decide};
 pub use coherence::Coherence;
@@ -120,27 +124,12 @@ impl WideBvh {
     /// The nearest hit, or with `ANY` the first one found, of those that `accept` accepts.
     #[inline]
     fn one_ray<const ANY: bool>(&self, ray: &Ray, accept: impl FnMut(Hit) -> bool) -> Option<Hit> {
-        #[cfg(all(feature = "std", target_arch = "x86_64"))]
-        if self.kernel != Kernel::Portable {
-            // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
-            let hit = unsafe {
-                match self.kernel {
-                    Kernel::Avx512 => x86::avx512::one_ray::<ANY>(self, ray, accept),
-                    _ => x86::avx2::one_ray::<ANY>(self, ray, accept),
-                }
-            };
-            return (!hit.is_miss()).then_some(hit);
+        if self.kernel == Kernel::Portable {
+            return walk::<ANY>(self, ray, &mut (), accept);
         }
-        #[cfg(any(
-            all(target_arch = "aarch64", target_feature = "neon"),
-            all(target_arch = "wasm32", target_feature = "simd128")
-        ))]
-        if self.kernel == Kernel::Simd128 {
-            // SAFETY: the target has the instructions; `choose` saw that `stack_need` is small enough.
-            let hit = unsafe { simd128::one_ray::<ANY>(self, ray, accept) };
-            return (!hit.is_miss()).then_some(hit);
-        }
-        walk::<ANY>(self, ray, &mut (), accept)
+        // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
+        let hit = unsafe { vector::one_ray::<ANY>(self, ray, accept) };
+        (!hit.is_miss()).then_some(hit)
     }
 
     /// The same layout traced by another kernel; `None` if this processor cannot run it. Layouts of trees far deeper

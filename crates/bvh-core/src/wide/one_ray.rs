@@ -29,22 +29,47 @@ struct Aligned<T>(T);
 pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
     ray: &Ray,
-    mut accept: impl FnMut(Hit) -> bool,
+    accept: impl FnMut(Hit) -> bool,
 ) -> Hit {
+    let mut leaves = FirstHits { ray, leaf_ray: MaybeUninit::uninit(), is_prepared: false, accept };
+    // SAFETY: the caller's promises.
+    match unsafe { traverse::<K, ANY>(wide, ray, &mut leaves) } {
+        Some(hit) => hit,
+        None => portable::<ANY>(wide, ray, &mut leaves.accept),
+    }
+}
+
+/// Tests of the triangles in the leaves that a ray enters.
+pub(crate) trait Leaves<L> {
+    /// Tests the triangles of a block. Returns whether one of them is the new nearest hit.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`, and the caller is compiled with them.
+    unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool;
+}
+
+/// Visits the leaves that the ray enters up to the nearest hit, or with `ANY` up to the first hit that
+/// is found, in no order. Returns `None` for a ray that the portable kernel must trace.
+///
+/// # Safety
+/// As for [`trace`].
+#[inline(always)]
+pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
+    wide: &WideBvh,
+    ray: &Ray,
+    leaves: &mut impl Leaves<K::Block>,
+) -> Option<Hit> {
     let mut nearest = Hit { t: ray.t_max(), object: u32::MAX };
     // SAFETY: the processor has the instructions; references are sound, and the stack has room for
     // `stack_need` children and one register more.
     unsafe {
-        let (Some(root), Some(box_ray)) = (wide.root, BoxRay::new(ray, wide.largest)) else {
-            return portable::<ANY>(wide, ray, &mut accept);
-        };
+        let root = wide.root?;
+        let box_ray = BoxRay::new(ray, wide.largest)?;
         let nodes = wide.nodes.as_ptr();
         let blocks = wide.blocks.as_ptr();
         let mut stack = MaybeUninit::<Aligned<[Pending; STACK + 8]>>::uninit();
         let base = stack.as_mut_ptr().cast::<Pending>();
         let mut top = base;
-        let mut leaf_ray = MaybeUninit::<LeafRay<K::Block>>::uninit();
-        let mut is_prepared = false;
         let mut child = root;
         loop {
             while child.is_node() {
@@ -79,15 +104,10 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
                 top = top.add(mask.count_ones() as usize - 1);
             }
             if !child.is_node() {
-                if !is_prepared {
-                    leaf_ray.write(LeafRay::new(ray));
-                    is_prepared = true;
-                }
-                let leaf_ray = leaf_ray.assume_init_ref();
                 let mut block = blocks.add(child.index());
                 loop {
-                    if leaf_ray.visit(&*block, &mut nearest, &mut accept) && ANY {
-                        return nearest;
+                    if leaves.visit(&*block, &mut nearest) && ANY {
+                        return Some(nearest);
                     }
                     if (*block).is_last() {
                         break;
@@ -97,7 +117,7 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
             }
             child = loop {
                 if top == base {
-                    return nearest;
+                    return Some(nearest);
                 }
                 top = top.sub(1);
                 let pending = *top;
@@ -117,6 +137,30 @@ fn portable<const ANY: bool>(
     accept: &mut impl FnMut(Hit) -> bool,
 ) -> Hit {
     walk::<ANY>(wide, ray, &mut (), accept).unwrap_or(Hit::MISS)
+}
+
+/// Keeps the nearest hit among those that `accept` accepts.
+struct FirstHits<'r, L, A> {
+    ray: &'r Ray,
+    leaf_ray: MaybeUninit<LeafRay<L>>,
+    is_prepared: bool,
+    accept: A,
+}
+
+impl<L: Lanes, A: FnMut(Hit) -> bool> Leaves<L> for FirstHits<'_, L, A> {
+    #[inline(always)]
+    unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool {
+        // SAFETY: the caller's promise; the ray is prepared before its use.
+        unsafe {
+            if !self.is_prepared {
+                self.leaf_ray.write(LeafRay::new(self.ray));
+                self.is_prepared = true;
+            }
+            self.leaf_ray
+                .assume_init_ref()
+                .visit(block, nearest, &mut self.accept)
+        }
+    }
 }
 
 /// A ray in all lanes, as triangles are tested with it.

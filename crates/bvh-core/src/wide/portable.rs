@@ -94,44 +94,59 @@ pub(crate) fn walk<const ANY: bool>(
     counter: &mut impl Counter,
     mut accept: impl FnMut(Hit) -> bool,
 ) -> Option<Hit> {
-    let mut child = wide.root?;
     let shear = Shear::new(ray);
+    let visit = |block: &TriangleBlock, nearest: &mut Hit| {
+        let mut is_nearer = false;
+        let mut lanes = block.candidates(&shear);
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            if let Some((object, triangle)) = block.triangle(lane)
+                && let Some(t) = triangle.decide(&shear, nearest.t)
+            {
+                let hit = Hit { t, object };
+                if hit.precedes(nearest) && accept(hit) {
+                    *nearest = hit;
+                    is_nearer = true;
+                    if ANY {
+                        break;
+                    }
+                }
+            }
+        }
+        is_nearer
+    };
+    let nearest = traverse::<ANY>(wide, ray, counter, visit);
+    (!nearest.is_miss()).then_some(nearest)
+}
+
+/// Visits the leaves that the ray enters up to the nearest hit, or with `ANY` up to the first hit that
+/// is found, in no order. `visit` tests a block, and returns whether the nearest hit is a new one.
+#[inline(always)]
+pub(crate) fn traverse<const ANY: bool>(
+    wide: &WideBvh,
+    ray: &Ray,
+    counter: &mut impl Counter,
+    mut visit: impl FnMut(&TriangleBlock, &mut Hit) -> bool,
+) -> Hit {
+    let mut nearest = Hit { t: ray.t_max(), object: u32::MAX };
+    let Some(mut child) = wide.root else { return nearest };
     let wide_ray = WideRay::new(ray, &wide.bounds);
-    let mut nearest: Option<Hit> = None;
-    let mut t_max = ray.t_max();
     let mut stack = Stack::<Pending, 32>::new(Pending { entry: 0.0, child: Child::node(0) });
     loop {
         if child.is_node() {
             counter.boxes(WideNode::LANES);
-            if let Some((nearest, others)) =
-                wide_ray.enter::<ANY>(&wide.nodes[child.index()], t_max, stack.room())
-            {
+            let node = &wide.nodes[child.index()];
+            if let Some((first, others)) = wide_ray.enter::<ANY>(node, nearest.t, stack.room()) {
                 stack.grow(others);
-                child = nearest;
+                child = first;
                 continue;
             }
         } else {
             for block in &wide.blocks[child.index()..] {
                 (0..TriangleBlock::LANES).for_each(|_| counter.object());
-                let mut lanes = block.candidates(&shear);
-                while lanes != 0 {
-                    let lane = lanes.trailing_zeros() as usize;
-                    lanes &= lanes - 1;
-                    if let Some((object, triangle)) = block.triangle(lane)
-                        && let Some(t) = triangle.decide(&shear, t_max)
-                    {
-                        let hit = Hit { t, object };
-                        if !accept(hit) {
-                            continue;
-                        }
-                        if ANY {
-                            return Some(hit);
-                        }
-                        if nearest.is_none_or(|nearest| hit.precedes(&nearest)) {
-                            nearest = Some(hit);
-                            t_max = t;
-                        }
-                    }
+                if visit(block, &mut nearest) && ANY {
+                    return nearest;
                 }
                 if block.is_last() {
                     break;
@@ -140,7 +155,7 @@ pub(crate) fn walk<const ANY: bool>(
         }
         child = loop {
             let Some(pending) = stack.pop() else { return nearest };
-            if pending.entry <= t_max {
+            if pending.entry <= nearest.t {
                 break pending.child;
             }
         };

@@ -5,22 +5,28 @@ mod lanes;
 #[cfg_attr(target_arch = "wasm32", path = "wasm.rs")]
 mod registers;
 
+use super::all_hits::AllHits;
 use super::answer::Answers;
-use super::instructions::{Instructions, Pending, last_pending};
+use super::instructions::{Instructions, Pending};
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
 use super::source::Source;
 use super::{batch, in_flight, one_ray};
-use crate::{Coherence, Hit, Ray};
+use crate::{Coherence, Hit, Kernel, Ray};
 use core::cmp::Reverse;
 use core::ops::Range;
 use lanes::Singles;
 
 pub(crate) struct Simd128;
 
+/// Returns whether a kernel is the target's own.
+pub(super) fn has(kernel: Kernel) -> bool {
+    kernel == Kernel::Simd128
+}
+
 /// [`one_ray::trace`].
-pub(crate) unsafe fn one_ray<const ANY: bool>(
+pub(super) unsafe fn one_ray<const ANY: bool>(
     wide: &WideBvh,
     ray: &Ray,
     accept: impl FnMut(Hit) -> bool,
@@ -29,8 +35,14 @@ pub(crate) unsafe fn one_ray<const ANY: bool>(
     unsafe { one_ray::trace::<Simd128, ANY>(wide, ray, accept) }
 }
 
+/// [`one_ray::traverse`] for all hits. Returns whether it could trace the ray.
+pub(super) unsafe fn all_hits(wide: &WideBvh, ray: &Ray, leaves: &mut AllHits) -> bool {
+    // SAFETY: the target has the instructions; the rest is the caller's promise.
+    unsafe { one_ray::traverse::<Simd128, true>(wide, ray, leaves) }.is_some()
+}
+
 /// [`batch::trace`].
-pub(crate) unsafe fn trace<A: Answers>(
+pub(super) unsafe fn trace<A: Answers>(
     wide: &WideBvh,
     rays: impl Source,
     answers: &mut A,
@@ -120,22 +132,5 @@ impl Instructions for Simd128 {
     ) {
         // SAFETY: the caller's promises.
         unsafe { in_flight::trace::<Self, A>(wide, rays, answers, numbers) }
-    }
-
-    #[inline(always)]
-    unsafe fn drop_farther(base: *mut Pending, top: *mut Pending, nearest: f32) -> *mut Pending {
-        let last = last_pending(nearest);
-        let mut from = base;
-        let mut to = base;
-        // SAFETY: the stack is between its ends.
-        unsafe {
-            while from < top {
-                let pending = *from;
-                *to = pending;
-                to = to.add(usize::from(pending <= last));
-                from = from.add(1);
-            }
-        }
-        to
     }
 }

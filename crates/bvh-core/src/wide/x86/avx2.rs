@@ -3,7 +3,7 @@
 use super::lanes::{F32x4, F32x8, Mask8};
 use super::sort;
 use crate::wide::answer::Answers;
-use crate::wide::instructions::{Instructions, Pending, last_pending};
+use crate::wide::instructions::{Instructions, Pending};
 use crate::wide::lanes::{Lanes as _, Mask as _};
 use crate::wide::layout::WideBvh;
 use crate::wide::node::{Child, WideNode};
@@ -73,23 +73,6 @@ impl Instructions for Avx2 {
                 to.add(1),
                 _mm256_cvtepu32_epi64(_mm256_extracti128_si256::<1>(children)),
             );
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn drop_farther(base: *mut Pending, top: *mut Pending, nearest: f32) -> *mut Pending {
-        // SAFETY: the stack is between its ends.
-        unsafe {
-            let last = last_pending(nearest);
-            let mut from = base;
-            let mut to = base;
-            while from < top {
-                let pending = *from;
-                *to = pending;
-                to = to.add(usize::from(pending <= last));
-                from = from.add(1);
-            }
-            to
         }
     }
 

@@ -1,9 +1,97 @@
 //! The instruction sets of x86-64.
 
-pub(super) mod avx2;
-pub(super) mod avx512;
+mod avx2;
+mod avx512;
 mod lanes;
 mod sort;
+
+use super::all_hits::AllHits;
+use super::answer::Answers;
+use super::layout::WideBvh;
+use super::source::Source;
+use crate::{Coherence, Hit, Kernel, Ray};
+
+/// Returns whether this processor can run a kernel.
+pub(super) fn has(kernel: Kernel) -> bool {
+    match kernel {
+        Kernel::Avx2 => has_avx2(),
+        Kernel::Avx512 => has_avx512(),
+        _ => false,
+    }
+}
+
+/// Whether the processor has what the AVX2 kernel is compiled for.
+fn has_avx2() -> bool {
+    is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("fma")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+        && is_x86_feature_detected!("popcnt")
+        && is_x86_feature_detected!("lzcnt")
+}
+
+/// Whether the processor has what the AVX-512 kernel is compiled for.
+fn has_avx512() -> bool {
+    has_avx2()
+        && is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512vl")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512bw")
+}
+
+/// Runs [`one_ray::trace`](super::one_ray::trace) by the layout's kernel.
+///
+/// # Safety
+/// The layout has a vector kernel, which the processor can run; its references are sound and its
+/// `stack_need` is at most [`STACK`](super::kernel::STACK).
+#[inline(always)]
+pub(super) unsafe fn one_ray<const ANY: bool>(
+    wide: &WideBvh,
+    ray: &Ray,
+    accept: impl FnMut(Hit) -> bool,
+) -> Hit {
+    // SAFETY: the caller's promises.
+    unsafe {
+        match wide.kernel {
+            Kernel::Avx512 => avx512::one_ray::<ANY>(wide, ray, accept),
+            _ => avx2::one_ray::<ANY>(wide, ray, accept),
+        }
+    }
+}
+
+/// Finds all hits by the layout's kernel. Returns whether it could trace the ray.
+///
+/// # Safety
+/// As for [`one_ray`].
+pub(super) unsafe fn all_hits(wide: &WideBvh, ray: &Ray, leaves: &mut AllHits) -> bool {
+    // SAFETY: the caller's promises.
+    unsafe {
+        match wide.kernel {
+            Kernel::Avx512 => avx512::all_hits(wide, ray, leaves),
+            _ => avx2::all_hits(wide, ray, leaves),
+        }
+    }
+}
+
+/// Runs [`batch::trace`](super::batch::trace) by the layout's kernel.
+///
+/// # Safety
+/// As for [`one_ray`], and there is an answer for every ray.
+#[inline(always)]
+pub(super) unsafe fn trace<A: Answers>(
+    wide: &WideBvh,
+    rays: impl Source,
+    answers: &mut A,
+    coherence: Coherence,
+) {
+    // SAFETY: the caller's promises.
+    unsafe {
+        match wide.kernel {
+            Kernel::Avx512 => avx512::trace(wide, rays, answers, coherence),
+            _ => avx2::trace(wide, rays, answers, coherence),
+        }
+    }
+}
 
 /// Compiles the kernels with the instructions of one processor. The functions are unsafe for the
 /// reasons of those that they call, and because the processor must have the instructions.
@@ -18,6 +106,18 @@ macro_rules! entry_points {
         ) -> crate::Hit {
             // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
             unsafe { crate::wide::one_ray::trace::<$instructions, ANY>(wide, ray, accept) }
+        }
+
+        /// [`one_ray::traverse`](crate::wide::one_ray::traverse) for all hits.
+        #[target_feature(enable = $features)]
+        pub(crate) unsafe fn all_hits(
+            wide: &WideBvh,
+            ray: &crate::Ray,
+            leaves: &mut crate::wide::all_hits::AllHits,
+        ) -> bool {
+            // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
+            unsafe { crate::wide::one_ray::traverse::<$instructions, true>(wide, ray, leaves) }
+                .is_some()
         }
 
         /// [`batch::trace`](crate::wide::batch::trace).

@@ -1,0 +1,230 @@
+//! All hits of a ray, each crossing of a surface once, and whether points are inside a closed mesh.
+//!
+//! # Rule
+//!
+//! The hits are the crossings of [`Triangle::crossing`](crate::Triangle::crossing), in real
+//! arithmetic. A ray through an edge or a corner meets several closed triangles there; the rule
+//! counts it as if its origin were moved by (ε, ε², ε³) with an infinitely small ε > 0 (a *symbolic
+//! perturbation*). With `o` the origin, `d` the direction and `P`, `Q` the ends of an edge relative
+//! to `o`, the side of the edge on which the moved line is follows from the sign of
+//!
+//! ```text
+//!   d · ((P − e) × (Q − e)) = d · (P × Q) + e · (d × (Q − P)),      e = (ε, ε², ε³)
+//! ```
+//!
+//! which is the first nonzero number among `d · (P × Q)` and the components of `d × (Q − P)`. The
+//! ray crosses the triangle if the signs of its three edges are equal and not zero.
+//!
+//! # Proof that the parity is right
+//!
+//! There is an ε₀ > 0 such that, for every ε below it, all signs of a finite mesh are the signs of
+//! the moved line. Such a line meets no corner and no edge: it is on one side of every edge or, if
+//! `d × (Q − P) = 0`, parallel to it and to its triangles. Therefore it crosses the *interior* of
+//! exactly the triangles that the rule accepts. A line that meets no edge crosses a closed mesh, where
+//! an even number of triangles shares every edge, an even number of times. A half line crosses the
+//! mesh an odd number of times if and only if it begins inside, and so does the ray: if the origin is
+//! not on the surface, every distance has the sign of the moved line's distance. A triangle without
+//! area is never crossed and changes no parity, so T-junctions that such triangles close are closed.
+//!
+//! Neighbours compute the same sign for a common edge, negated if their corners run in the same
+//! direction of rotation: swapping `P` and `Q` negates all four numbers.
+//!
+//! # Sources
+//!
+//! Edelsbrunner & Mücke 1990, 'Simulation of simplicity'. Differs from the paper: only the ray's origin
+//! is perturbed, so three terms suffice. [`exact`](crate::exact) has the filter in f64 and its bounds;
+//! no rounding decides an answer.
+
+use super::lanes::{DoubleLanes, Lanes, Mask};
+use super::layout::WideBvh;
+use super::one_ray::Leaves;
+use super::portable;
+use super::triangles::TriangleBlock;
+use super::vector;
+use crate::exact::{self, Line};
+use crate::{Hit, Kernel, Ray};
+use alloc::vec::Vec;
+use glam::Vec3;
+
+impl WideBvh {
+    /// Returns the hits of the ray in its range, each crossing of a surface once, the nearest first;
+    /// among hits at the same distance the lowest id first.
+    ///
+    /// Through an edge or a corner, the ray hits only the triangles that it would hit if its origin
+    /// were moved by (ε, ε², ε³) with an infinitely small ε > 0. The number of hits of a line with a
+    /// closed mesh is therefore even, and a half line that begins inside has an odd number. All
+    /// kernels give the hits of [`Triangle::crossing`](crate::Triangle::crossing), bit by bit.
+    ///
+    /// [`nearest_hit`](Self::nearest_hit) rounds corners relative to the ray, and distances and hits at
+    /// a border may therefore differ from it in the last digits.
+    ///
+    /// ```
+    /// # use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};
+    /// // A square of two triangles, and a ray through its diagonal.
+    /// let [a, b, c, d] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let square = [[a, b, c], [a, c, d]].map(Triangle::from);
+    /// let leaf = Node::leaf(Aabb::from([a, c]), 0, 2);
+    /// let wide = WideBvh::new(&Bvh { nodes: vec![leaf], prim_ids: vec![0, 1] }, &square)?;
+    /// let ray = Ray::half_line([0.5, 0.5, 3.0], [0.0, 0.0, -1.0]).unwrap();
+    /// assert_eq!(wide.all_hits(&ray), [Hit { t: 3.0, object: 0 }]);
+    /// # Ok::<(), bvh_core::InvalidBvh>(())
+    /// ```
+    pub fn all_hits(&self, ray: &Ray) -> Vec<Hit> {
+        let mut hits = Vec::new();
+        self.append_hits(ray, &mut hits);
+        hits
+    }
+
+    /// Appends [all hits](Self::all_hits) of every ray to `hits`, ray after ray, and writes the number of
+    /// hits of each ray.
+    ///
+    /// # Panics
+    /// Panics if `rays` and `counts` are not equally many.
+    pub fn all_hits_of(&self, rays: &[Ray], hits: &mut Vec<Hit>, counts: &mut [u32]) {
+        assert_eq!(rays.len(), counts.len(), "a count for every ray");
+        for (ray, count) in rays.iter().zip(counts) {
+            let first = hits.len();
+            self.append_hits(ray, hits);
+            *count = (hits.len() - first) as u32;
+        }
+    }
+
+    /// Writes the number of [all hits](Self::all_hits) of every ray.
+    ///
+    /// # Panics
+    /// Panics if `rays` and `counts` are not equally many.
+    pub fn count_hits(&self, rays: &[Ray], counts: &mut [u32]) {
+        assert_eq!(rays.len(), counts.len(), "a count for every ray");
+        let mut hits = Vec::new();
+        for (ray, count) in rays.iter().zip(counts) {
+            hits.clear();
+            self.append_hits(ray, &mut hits);
+            *count = hits.len() as u32;
+        }
+    }
+
+    /// Writes whether every point is inside the mesh: whether the half line from the point along +x
+    /// has an odd number of [hits](Self::all_hits). The answer is exact for closed meshes. A point on the
+    /// surface counts as inside or outside, and of two solids with a common face and opposite sides
+    /// of it one contains the point. A point that is not finite is outside.
+    ///
+    /// # Panics
+    /// Panics if `points` and `inside` are not equally many.
+    pub fn contains(&self, points: &[Vec3], inside: &mut [bool]) {
+        assert_eq!(points.len(), inside.len(), "an answer for every point");
+        let mut hits = Vec::new();
+        for (&point, inside) in points.iter().zip(inside) {
+            hits.clear();
+            // A point outside the box is outside the mesh. NaN fails every comparison.
+            if (self.bounds.min.cmple(point) & point.cmple(self.bounds.max)).all() {
+                let ray = Ray::assume_valid(point, Vec3::X, 0.0, f32::MAX);
+                self.append_hits(&ray, &mut hits);
+            }
+            *inside = hits.len() % 2 == 1;
+        }
+    }
+
+    /// Appends the hits of a ray.
+    fn append_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
+        let first = hits.len();
+        let mut leaves = AllHits { ray, line: Line::new(ray), hits };
+        // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
+        let is_traced =
+            self.kernel != Kernel::Portable && unsafe { vector::all_hits(self, ray, &mut leaves) };
+        if !is_traced {
+            portable::traverse::<true>(self, ray, &mut (), |block, _| {
+                leaves.test(block, (1 << block.len()) - 1);
+                false
+            });
+        }
+        hits[first..].sort_unstable_by(|a, b| {
+            let by_distance = a.t.total_cmp(&b.t);
+            by_distance.then(a.object.cmp(&b.object))
+        });
+        // A divided triangle is in several leaves, every time at the same distance.
+        let mut kept = first;
+        for i in first..hits.len() {
+            if i == first || hits[i] != hits[i - 1] {
+                hits[kept] = hits[i];
+                kept += 1;
+            }
+        }
+        hits.truncate(kept);
+    }
+}
+
+/// Collects all hits of a ray.
+pub(crate) struct AllHits<'a> {
+    ray: &'a Ray,
+    line: Line,
+    hits: &'a mut Vec<Hit>,
+}
+
+impl AllHits<'_> {
+    /// Tests the triangles of these lanes.
+    #[inline(always)]
+    fn test(&mut self, block: &TriangleBlock, mut lanes: u32) {
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize & 3;
+            lanes &= lanes - 1;
+            if let Some((object, triangle)) = block.triangle(lane)
+                && let Some(t) = self.line.crossing(self.ray, &triangle.0)
+                && self.ray.t_min() <= t
+                && t <= self.ray.t_max()
+            {
+                self.hits.push(Hit { t, object });
+            }
+        }
+    }
+}
+
+impl<L: Lanes> Leaves<L> for AllHits<'_> {
+    #[inline(always)]
+    unsafe fn visit(&mut self, block: &TriangleBlock, _: &mut Hit) -> bool {
+        // SAFETY: the caller's promise; axes are below 3.
+        let candidates = unsafe { candidates::<L>(&self.line, block) };
+        self.test(block, candidates);
+        false
+    }
+}
+
+/// Returns a bit per triangle of the block that the line may meet: the first test of
+/// [`Line::filter`] for four triangles at once, by the same operations.
+///
+/// # Safety
+/// The processor has the instructions of `L`, and the caller is compiled with them.
+#[inline(always)]
+unsafe fn candidates<L: Lanes>(line: &Line, block: &TriangleBlock) -> u32 {
+    // SAFETY: the caller's promise; axes are below 3.
+    unsafe {
+        let zero = L::Double::splat(0.0);
+        let [ox, oy, oz] = line.origin.map(|x| L::Double::splat(x));
+        let [dx, dy, dz] = line.direction.map(|x| L::Double::splat(x));
+        let size = |x: L::Double| x.max(zero - x);
+        let mut reach = zero;
+        let mut spread = zero;
+        let mut sheared = [[zero; 2]; 3];
+        for (corner, sheared) in block
+            .corners_along::<L>(line.axes)
+            .iter()
+            .zip(&mut sheared)
+        {
+            let x = corner[0].double() - ox;
+            let y = corner[1].double() - oy;
+            let z = corner[2].double() - oz;
+            *sheared = [x * dz - dx * z, y * dz - dy * z];
+            reach = size(x).max(size(y)).max(size(z).max(reach));
+            spread = size(sheared[0]).max(size(sheared[1])).max(spread);
+        }
+        let [[ax, ay], [bx, by], [cx, cy]] = sheared;
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        let error = reach * L::Double::splat(line.direction[2].abs() * exact::ERROR);
+        let edge_error = error * (spread + error);
+        let least = u.min(v).min(w);
+        let most = u.max(v).max(w);
+        let outside = least.lt(zero - edge_error) & edge_error.lt(most);
+        !L::narrow(outside).bits() & 15
+    }
+}

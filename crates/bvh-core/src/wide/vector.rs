@@ -1,0 +1,29 @@
+//! A target without vector kernels.
+
+use super::all_hits::AllHits;
+use super::answer::Answers;
+use super::layout::WideBvh;
+use super::source::Source;
+use crate::{Coherence, Hit, Kernel, Ray};
+
+/// Returns whether this processor can run a kernel other than the portable one: no.
+pub(super) fn has(_: Kernel) -> bool {
+    false
+}
+
+/// Is never called.
+pub(super) unsafe fn one_ray<const ANY: bool>(
+    _: &WideBvh,
+    _: &Ray,
+    _: impl FnMut(Hit) -> bool,
+) -> Hit {
+    Hit::MISS
+}
+
+/// Is never called.
+pub(super) unsafe fn all_hits(_: &WideBvh, _: &Ray, _: &mut AllHits) -> bool {
+    false
+}
+
+/// Is never called.
+pub(super) unsafe fn trace<A: Answers>(_: &WideBvh, _: impl Source, _: &mut A, _: Coherence) {}
