@@ -53,6 +53,6 @@ pub use traverse::{
 };
 pub use triangle::{Shear, Triangle};
 pub use validate::{InvalidBvh, validate, validate_references};
-pub use wide::{Coherence, Kernel, RefitError, WideBvh};
+pub use wide::{Closest, Coherence, Kernel, RefitError, WideBvh};
 
 pub use glam;

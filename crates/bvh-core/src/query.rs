@@ -13,9 +13,10 @@
 //! | the object nearest to a point | [`nearest`] | about O(log n) for objects that are spread out |
 //! | the k objects nearest to a point | [`k_nearest`] | about O(k + log n) for such objects |
 //!
-//! All queries use the tree. The [wide layout](crate::WideBvh) can only answer rays, because it
-//! omits triangles without area: rays cannot hit them, but they may be in regions and near points.
-//! Its [`nearest_hit_where`](crate::WideBvh::nearest_hit_where) filters the hits of rays.
+//! All queries use the tree. The [wide layout](crate::WideBvh) is faster, but omits triangles without
+//! area. Its [`all_hits`](crate::WideBvh::all_hits) counts each crossing of a surface once, although
+//! triangles share edges; [`closest_points`](crate::WideBvh::closest_points) and
+//! [`contains`](crate::WideBvh::contains) answer batches of points.
 //!
 //! ```
 //! use bvh_core::{Aabb, Bvh, Node, Triangle, query};

@@ -87,24 +87,27 @@ impl Triangle {
     ///
     /// Source: Ericson 2005, *Real-Time Collision Detection*, section 5.1.5.
     pub fn closest_point(&self, point: impl Into<Vec3>) -> DVec3 {
-        let [a, b, c] = self.0.map(Vec3::as_dvec3);
-        let p = point.into().as_dvec3();
+        let point = point.into().as_dvec3();
+        point + self.offset_from(point)
+    }
+
+    /// Returns the vector from `point` to the nearest point of the triangle. Triangles with a common edge
+    /// or corner compute the same bits for a nearest point on it.
+    pub(crate) fn offset_from(&self, point: DVec3) -> DVec3 {
+        let [a, b, c] = self.0.map(|corner| corner.as_dvec3() - point);
         let normal = (b - a).cross(c - a);
-        let inside = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from)) >= 0.0;
-        if normal != DVec3::ZERO && inside(a, b) && inside(b, c) && inside(c, a) {
-            return p - normal * (normal.dot(p - a) / normal.length_squared());
+        let is_inside = |from: DVec3, to: DVec3| normal.dot(from.cross(to)) > 0.0;
+        if is_inside(a, b) && is_inside(b, c) && is_inside(c, a) {
+            return normal * (normal.dot(a) / normal.length_squared());
         }
-        let on_edge = |from: DVec3, to: DVec3| {
-            let edge = to - from;
-            let length = edge.length_squared();
-            let along =
-                if length > 0.0 { ((p - from).dot(edge) / length).clamp(0.0, 1.0) } else { 0.0 };
-            from + edge * along
-        };
-        let edges = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
-        let nearer =
-            |x: DVec3, y: DVec3| if y.distance_squared(p) < x.distance_squared(p) { y } else { x };
-        nearer(nearer(edges[0], edges[1]), edges[2])
+        let mut nearest = nearest_of_edge(a, b);
+        for (from, to) in [(b, c), (c, a)] {
+            let offset = nearest_of_edge(from, to);
+            if offset.length_squared() < nearest.length_squared() {
+                nearest = offset;
+            }
+        }
+        nearest
     }
 
     /// Returns the weights of the three corners at the point where the ray's line meets the
@@ -244,6 +247,22 @@ impl Triangle {
         }
         // The rounding of the shear can give collinear corners an area.
         clip_to_box(&shear.ray, &self.aabb(), t as f32, t_max).filter(|_| !self.is_degenerate())
+    }
+}
+
+/// Returns the point of a segment nearest to zero, the same bits for both directions of the segment.
+fn nearest_of_edge(from: DVec3, to: DVec3) -> DVec3 {
+    let is_ordered = from.to_array() <= to.to_array();
+    let (from, to) = if is_ordered { (from, to) } else { (to, from) };
+    let edge = to - from;
+    let along = -from.dot(edge);
+    let length_squared = edge.length_squared();
+    if along <= 0.0 {
+        from
+    } else if along >= length_squared {
+        to
+    } else {
+        from + edge * (along / length_squared)
     }
 }
 

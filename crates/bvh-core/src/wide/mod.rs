@@ -9,6 +9,7 @@ mod batch;
 mod batches;
 mod box_ray;
 mod build;
+mod closest;
 mod coherence;
 mod in_flight;
 mod instructions;
@@ -37,6 +38,7 @@ mod triangles;
 mod vector;
 
 pub(crate) use build::{BLOCK_COST, NODE_COST, areas, children, decide};
+pub use closest::Closest;
 pub use coherence::Coherence;
 pub use kernel::Kernel;
 pub use layout::WideBvh;

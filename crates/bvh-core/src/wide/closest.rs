@@ -1,0 +1,153 @@
+//! The points of the triangles closest to given points, and signed distances.
+
+use super::layout::WideBvh;
+use super::node::{Child, WideNode};
+use crate::query::Near;
+use alloc::vec::Vec;
+use glam::{DVec3, Vec3};
+
+/// The point of a mesh that is closest to a given point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Closest {
+    /// The triangle that contains it; of several the one of the lowest id.
+    pub object: u32,
+    /// The closest point.
+    pub point: DVec3,
+    /// Its distance from the given point, 0 or more.
+    pub distance: f64,
+}
+
+/// A child that is visited later, and a lower bound of the squared distances of its triangles.
+#[derive(Clone, Copy)]
+struct Pending {
+    bound: f64,
+    child: Child,
+}
+
+impl WideBvh {
+    /// Returns the closest point of the triangles, in f64; among triangles at the same distance the
+    /// lowest id wins. Returns `None` for a point that is not finite, and if no triangle has an area:
+    /// the layout omits triangles without area.
+    ///
+    /// The answer is the answer of [`Triangle::closest_point`](crate::Triangle::closest_point) for every
+    /// triangle. About O(log n) for a point near triangles that are spread out.
+    ///
+    /// ```
+    /// # use bvh_core::{Aabb, Bvh, Node, Triangle, WideBvh};
+    /// let triangle = Triangle::from([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    /// # let leaf = Node::leaf(triangle.aabb(), 0, 1);
+    /// # let tree = Bvh { nodes: vec![leaf], prim_ids: vec![0] };
+    /// let wide = WideBvh::new(&tree, &[triangle])?;
+    /// let closest = wide.closest_point([0.25, 0.25, 3.0]).unwrap();
+    /// assert_eq!((closest.object, closest.distance), (0, 3.0));
+    /// assert_eq!(closest.point.to_array(), [0.25, 0.25, 0.0]);
+    /// # Ok::<(), bvh_core::InvalidBvh>(())
+    /// ```
+    pub fn closest_point(&self, point: impl Into<Vec3>) -> Option<Closest> {
+        self.closest(point.into(), &mut Vec::new())
+    }
+
+    /// Writes the [closest point](Self::closest_point) of every point.
+    ///
+    /// # Panics
+    /// Panics if `points` and `closest` are not equally many.
+    pub fn closest_points(&self, points: &[Vec3], closest: &mut [Option<Closest>]) {
+        assert_eq!(points.len(), closest.len(), "an answer for every point");
+        let mut stack = Vec::new();
+        for (&point, closest) in points.iter().zip(closest) {
+            *closest = self.closest(point, &mut stack);
+        }
+    }
+
+    /// Writes the distance of every point from the [closest point](Self::closest_point), negative if the
+    /// mesh [contains](Self::contains) the point: the sign follows from parity, and is right for
+    /// closed meshes. Infinite where there is no closest point.
+    ///
+    /// # Panics
+    /// Panics if `points` and `distances` are not equally many.
+    pub fn signed_distances(&self, points: &[Vec3], distances: &mut [f64]) {
+        assert_eq!(points.len(), distances.len(), "a distance for every point");
+        let mut inside = alloc::vec![false; points.len()];
+        self.contains(points, &mut inside);
+        let mut stack = Vec::new();
+        for ((&point, inside), distance) in points.iter().zip(inside).zip(distances) {
+            let closest = self.closest(point, &mut stack);
+            let size = closest.map_or(f64::INFINITY, |closest| closest.distance);
+            *distance = if inside { -size } else { size };
+        }
+    }
+
+    fn closest(&self, point: Vec3, stack: &mut Vec<Pending>) -> Option<Closest> {
+        let mut child = self.root.filter(|_| point.is_finite())?;
+        let target = point.as_dvec3();
+        let mut nearest = Near { object: u32::MAX, distance_squared: f64::INFINITY };
+        let mut closest = DVec3::ZERO;
+        stack.clear();
+        loop {
+            if child.is_node() {
+                let node = &self.nodes[child.index()];
+                let bounds = bounds(node, point);
+                let first = stack.len();
+                for (lane, &bound) in bounds.iter().enumerate() {
+                    // False for unused lanes, which are NaN.
+                    if bound <= nearest.distance_squared {
+                        let mut at = stack.len();
+                        stack.push(Pending { bound, child: node.children[lane] });
+                        // Insertion, the nearest child last.
+                        while at > first && stack[at - 1].bound < bound {
+                            stack.swap(at - 1, at);
+                            at -= 1;
+                        }
+                    }
+                }
+            } else {
+                for (object, triangle) in self
+                    .leaf(child)
+                    .iter()
+                    .flat_map(|block| block.triangles())
+                {
+                    let offset = triangle.offset_from(target);
+                    let near = Near { object, distance_squared: offset.length_squared() };
+                    if near < nearest {
+                        nearest = near;
+                        closest = target + offset;
+                    }
+                }
+            }
+            child = loop {
+                let Some(pending) = stack.pop() else {
+                    return Some(Closest {
+                        object: nearest.object,
+                        point: closest,
+                        distance: libm::sqrt(nearest.distance_squared),
+                    });
+                };
+                if pending.bound <= nearest.distance_squared {
+                    break pending.child;
+                }
+            };
+        }
+    }
+}
+
+/// Returns lower bounds of the squared distances of a point from the boxes of a node; NaN for unused
+/// lanes.
+#[inline(always)]
+fn bounds(node: &WideNode, point: Vec3) -> [f64; WideNode::LANES] {
+    /// Covers the rounding of the differences in f32, and all rounding in f64.
+    const ROUNDING: f64 = 1.0 - 1.0 / (1 << 21) as f64;
+    let mut bounds = [0.0; WideNode::LANES];
+    for axis in 0..3 {
+        let lower = &node.planes[axis];
+        let upper = &node.planes[axis + 3];
+        for lane in 0..WideNode::LANES {
+            let below = lower[lane] - point[axis];
+            let above = point[axis] - upper[lane];
+            // Comparisons that keep NaN.
+            let outside = if below > above { below } else { above };
+            let outside = f64::from(if outside < 0.0 { 0.0 } else { outside });
+            bounds[lane] += outside * outside;
+        }
+    }
+    bounds.map(|bound| bound * ROUNDING)
+}
