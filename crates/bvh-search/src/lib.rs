@@ -16,6 +16,7 @@ mod orders;
 mod owned;
 mod parallel;
 pub mod prelude;
+mod rays;
 #[cfg(feature = "serde")]
 mod registry;
 mod run;
@@ -35,7 +36,10 @@ pub use local::initial::Start;
 pub use local::reinsertion;
 pub use optimize::optimize;
 pub use orders::{genetic, random_orders};
-pub use owned::{Improvement, Objects, OwnedTree};
+pub use owned::{Improvement, Objects, Options, OwnedTree};
+pub use rays::FindError;
+#[cfg(feature = "std")]
+pub use rays::bake_for_rays;
 #[cfg(feature = "serde")]
 pub use registry::Method;
 pub use run::{

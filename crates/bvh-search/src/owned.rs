@@ -1,10 +1,11 @@
 //! A tree that owns its objects, for callers that cannot lend them: the bindings to other
 //! languages.
 
+use crate::rays::{FindError, density};
 use crate::{Budget, Observer, Outcome, Problem, SearchError, Splits, best, optimize, solve};
-use bvh_core::cost::Objective;
+use bvh_core::cost::{Measure, Objective};
 use bvh_core::file::{self, FileError, Origin};
-use bvh_core::{Aabb, Bvh, Primitives, Triangle};
+use bvh_core::{Aabb, Bvh, InvalidBvh, Primitives, RayDensity, Segment, Triangle, WideBvh};
 
 /// The objects of a tree.
 #[derive(Clone, Debug)]
@@ -13,6 +14,25 @@ pub enum Objects {
     Boxes(Vec<Aabb>),
     /// Objects of a known shape, which can be divided among leaves.
     Shapes(Primitives),
+}
+
+/// The choices of a search for an [`OwnedTree`].
+#[derive(Clone, Copy, Debug)]
+pub struct Options<'a> {
+    /// The average number of parts into which shapes may be divided among leaves; 1 keeps them whole.
+    pub references: f64,
+    /// The seed of the random numbers.
+    pub seed: u64,
+    /// The limits of the search besides its observer.
+    pub budget: Budget,
+    /// The rays that the tree is for, sampled as by [`bake_for_rays`](crate::bake_for_rays); random lines if empty.
+    pub rays: &'a [Segment],
+}
+
+impl Default for Options<'_> {
+    fn default() -> Self {
+        Self { references: 1.0, seed: 1, budget: Budget::UNLIMITED, rays: &[] }
+    }
 }
 
 /// A better tree over the objects of an [`OwnedTree`], from [`OwnedTree::improvement`].
@@ -29,6 +49,9 @@ pub struct OwnedTree {
     most: usize,
     /// The work of all searches so far.
     work: u64,
+    seed: u64,
+    /// The density of the rays that the tree is for.
+    density: Option<RayDensity>,
 }
 
 impl OwnedTree {
@@ -40,10 +63,58 @@ impl OwnedTree {
         observer: &dyn Observer,
     ) -> Result<Self, SearchError> {
         let mut owned = Self::bare(objects, references);
-        let outcome =
-            solve(&best::Config::default(), &owned.problem(), 1, Budget::UNLIMITED, observer)?;
-        owned.take(outcome);
+        owned.search(Budget::UNLIMITED, observer)?;
         Ok(owned)
+    }
+
+    /// Searches as [`find`](Self::find) does, with these options.
+    pub fn find_with(
+        objects: Objects,
+        options: &Options,
+        observer: &dyn Observer,
+    ) -> Result<Self, FindError> {
+        let mut owned = Self::bare(objects, options.references);
+        owned.seed = options.seed;
+        if !options.rays.is_empty() {
+            owned.density = Some(density(&owned.boxes, options.rays)?);
+        }
+        owned.search(options.budget, observer)?;
+        Ok(owned)
+    }
+
+    fn search(&mut self, budget: Budget, observer: &dyn Observer) -> Result<(), SearchError> {
+        let config = best::Config::default();
+        let outcome = solve(&config, &self.problem(), self.seed, budget, observer)?;
+        self.take(outcome);
+        Ok(())
+    }
+
+    /// Moves the tree to the same objects at other places: every box becomes tight again, and the nodes
+    /// remain. The growth of a [cost](Self::cost) tells when a search is worth its time. O(n).
+    ///
+    /// # Errors
+    /// Returns the first object that has no valid box; the tree is then unchanged.
+    ///
+    /// # Panics
+    /// Panics if the number of objects differs.
+    pub fn refit(&mut self, objects: Objects) -> Result<(), bvh_core::InvalidBox> {
+        let (boxes, shapes) = boxes_of(objects);
+        assert_eq!(boxes.len(), self.boxes.len(), "the same number of objects");
+        bvh_core::check_boxes(&boxes)?;
+        self.tree.refit(&boxes);
+        self.boxes = boxes;
+        self.shapes = shapes;
+        Ok(())
+    }
+
+    /// Returns the layout of the tree that traces rays, for the rays of its search if there are any;
+    /// `None` for objects that are not triangles.
+    pub fn layout(&self) -> Option<Result<WideBvh, InvalidBvh>> {
+        let triangles = self.triangles()?;
+        Some(match &self.density {
+            Some(density) => WideBvh::for_rays(&self.tree, triangles, &density.visits(&self.tree)),
+            None => WideBvh::new(&self.tree, triangles),
+        })
     }
 
     /// Reads a tree over these objects from `bytes`. Later searches may use as many references as
@@ -67,9 +138,17 @@ impl OwnedTree {
     /// Searches as [`improve`](Self::improve) does without changing the tree, so that other threads
     /// can read it meanwhile. Pass the result to [`apply`](Self::apply).
     pub fn improvement(&self, observer: &dyn Observer) -> Result<Improvement, SearchError> {
+        self.improvement_within(Budget::UNLIMITED, observer)
+    }
+
+    /// Searches as [`improvement`](Self::improvement) does, within a budget.
+    pub fn improvement_within(
+        &self,
+        budget: Budget,
+        observer: &dyn Observer,
+    ) -> Result<Improvement, SearchError> {
         let config = best::Config::default();
-        optimize(&self.tree, &self.problem(), &config, 1, Budget::UNLIMITED, observer)
-            .map(Improvement)
+        optimize(&self.tree, &self.problem(), &config, self.seed, budget, observer).map(Improvement)
     }
 
     /// Replaces the tree by an improvement of this very tree.
@@ -79,7 +158,8 @@ impl OwnedTree {
 
     /// Returns the tree as a file, which [`load`](Self::load) and the program `bvh` read.
     pub fn save(&self) -> Result<Vec<u8>, FileError> {
-        let origin = Origin { method: "best", seed: 1, work: self.work, ..Origin::default() };
+        let origin =
+            Origin { method: "best", seed: self.seed, work: self.work, ..Origin::default() };
         match &self.shapes {
             // The validation of divided objects needs their shapes.
             Some(shapes) => file::save_references(&self.tree, &self.boxes, shapes, &origin),
@@ -102,6 +182,11 @@ impl OwnedTree {
         self.boxes.len()
     }
 
+    /// The boxes of the objects.
+    pub fn boxes(&self) -> &[Aabb] {
+        &self.boxes
+    }
+
     /// The objects, if they are triangles.
     pub fn triangles(&self) -> Option<&[Triangle]> {
         match &self.shapes {
@@ -112,23 +197,34 @@ impl OwnedTree {
 
     /// Builds the value without a tree.
     fn bare(objects: Objects, references: f64) -> Self {
-        let (boxes, shapes) = match objects {
-            Objects::Boxes(boxes) => (boxes, None),
-            Objects::Shapes(shapes) => (shapes.boxes(), Some(shapes)),
-        };
+        let (boxes, shapes) = boxes_of(objects);
         let most = (references * boxes.len() as f64) as usize;
-        Self { tree: Bvh::default(), boxes, shapes, most, work: 0 }
+        Self { tree: Bvh::default(), boxes, shapes, most, work: 0, seed: 1, density: None }
     }
 
     /// The problem that every search solves.
     fn problem(&self) -> Problem<'_> {
         let shapes = self.shapes.as_ref();
         let splits = shapes.and_then(|shapes| Splits::at_most(self.most, &self.boxes, shapes));
-        Problem { splits, ..Problem::new(&self.boxes) }
+        let mut problem = Problem { splits, ..Problem::new(&self.boxes) };
+        if let Some(density) = &self.density {
+            // The cost of the layout saves more tests of rays than the sum of visits does.
+            problem.objective = Objective::Layout;
+            problem.measure = Some(density as &dyn Measure);
+        }
+        problem
     }
 
     fn take(&mut self, outcome: Outcome) {
         self.tree = outcome.tree;
         self.work = self.work.saturating_add(outcome.work);
+    }
+}
+
+/// Returns the boxes of objects, and their shapes if they have any.
+fn boxes_of(objects: Objects) -> (Vec<Aabb>, Option<Primitives>) {
+    match objects {
+        Objects::Boxes(boxes) => (boxes, None),
+        Objects::Shapes(shapes) => (shapes.boxes(), Some(shapes)),
     }
 }

@@ -1,7 +1,7 @@
 //! The everyday calls keep their time limit, use all of it, and end with good trees.
 
 use bvh_search::bvh_core::Primitives;
-use bvh_search::{Objects, OwnedTree, prelude::*};
+use bvh_search::{Objects, Options, OwnedTree, prelude::*};
 use std::time::Instant;
 
 fn scene() -> Vec<Aabb> {
@@ -91,4 +91,41 @@ fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
         loaded.improve(&deadline()).unwrap();
         assert!(cost::total_area(loaded.tree()) <= first * (1.0 + 1e-12));
     }
+}
+
+#[test]
+fn a_tree_with_its_objects_follows_a_seed_a_budget_recorded_rays_and_moved_objects() {
+    let at = |x: f32, z: f32| [[x, 0.0, z], [x + 1.5, 0.2, z], [x, 1.0, z + 0.1]];
+    let triangles: Vec<Triangle> = (0..400u16)
+        .map(|i| Triangle::from(at(f32::from(i % 20), f32::from(i / 20))))
+        .collect();
+    let shapes =
+        |triangles: &[Triangle]| Objects::Shapes(Primitives::Triangles(triangles.to_vec()));
+    let rays: Vec<Segment> = (0..300u16)
+        .map(|i| Segment { from: [0.0, 0.5, -5.0], to: [f32::from(i % 5), 0.3, f32::from(i % 7)] })
+        .collect();
+    let find = |seed: u64, rays: &[Segment]| {
+        let budget = Budget { max_evaluations: Some(2000), ..Budget::UNLIMITED };
+        let options = Options { seed, budget, rays, ..Options::default() };
+        OwnedTree::find_with(shapes(&triangles), &options, &()).unwrap()
+    };
+    assert_eq!(find(1, &[]).tree(), find(1, &[]).tree());
+    assert_eq!(find(2, &rays).tree(), find(2, &rays).tree());
+    assert_ne!(find(2, &rays).tree(), find(2, &[]).tree());
+    let bad = [Segment { from: [f32::NAN; 3], to: [0.0; 3] }];
+    let options = Options { rays: &bad, ..Options::default() };
+    let error = OwnedTree::find_with(shapes(&triangles), &options, &()).unwrap_err();
+    assert_eq!(error.to_string(), "rays: segment 0 has a coordinate that is not finite");
+
+    let mut owned = find(1, &rays);
+    let moved: Vec<Triangle> = triangles
+        .iter()
+        .map(|triangle| Triangle(triangle.0.map(|corner| corner * 2.0 + Vec3::Y)))
+        .collect();
+    owned.refit(shapes(&moved)).unwrap();
+    validate(owned.tree(), &boxes(&moved)).unwrap();
+    let ray = Ray::half_line([0.5, 1.5, -5.0], [0.0, 0.0, 1.0]).unwrap();
+    let hit = owned.layout().unwrap().unwrap().nearest_hit(&ray);
+    assert_eq!(hit, nearest_hit(owned.tree(), &moved, &ray));
+    assert!(hit.is_some());
 }
