@@ -1,6 +1,7 @@
 //! `bvh inspect` and `bvh verify`: report the origin of a tree file, and the costs and the shape of
 //! its tree.
 
+use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use crate::{Error, csv};
 use bvh_build::{Builder, muller_fellner};
@@ -30,6 +31,11 @@ pub struct InspectArgs {
     /// The tree's scene, by name or path of a mesh file. Checks the tree against the scene's
     /// objects, compares it with the Müller–Fellner tree, and measures the end-point overlap.
     pub scene: Option<String>,
+    /// Measure the expected tests of rays in the wide layout of the tree: `default` for rays that
+    /// need no camera, or a file that describes the rays of a renderer. No bake trains on the same
+    /// default rays.
+    #[arg(long, value_name = "default|FILE.toml", requires = "scene")]
+    pub rays: Option<String>,
     /// Write the nodes to a CSV file, one row each, in full precision.
     #[arg(long, value_name = "NODES.csv")]
     pub nodes: Option<PathBuf>,
@@ -83,12 +89,16 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     if let Some(nodes) = &args.nodes {
         output_file("--nodes", nodes, &NODES)?;
     }
+    let rays = args.rays.as_deref().map(Rays::read).transpose()?;
     let scene = args
         .scene
         .as_deref()
         .map(|name| args.files.load(name))
         .transpose()?;
-    let (tree, facts) = examine(&args.file, scene.as_ref())?;
+    let (tree, mut facts) = examine(&args.file, scene.as_ref())?;
+    if let (Some(rays), Some(scene)) = (rays, &scene) {
+        facts.add("expected tests of a ray", rays.expected_tests(&tree, scene)?);
+    }
     if let Some(path) = &args.nodes {
         write_nodes(&tree, path)?;
     }

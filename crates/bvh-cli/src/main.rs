@@ -5,7 +5,9 @@ mod commands;
 mod csv;
 mod error;
 mod inspect;
+mod rays;
 mod render;
+mod report;
 mod scene_files;
 mod scenes;
 
@@ -32,6 +34,7 @@ enum Command {
     Inspect(inspect::InspectArgs),
     Verify(inspect::VerifyArgs),
     Render(render::RenderArgs),
+    Report(report::ReportArgs),
     /// List the built-in scenes, their sizes, and the originals that they replace.
     Scenes,
     /// Print the file with which a shell completes arguments.
@@ -65,6 +68,7 @@ fn run(command: Command) -> Result<(), Error> {
         Command::Inspect(args) => inspect::inspect(&args),
         Command::Verify(args) => inspect::verify(&args),
         Command::Render(args) => render::render(&args, &INTERRUPTED),
+        Command::Report(args) => report::report(&args, &INTERRUPTED),
         Command::Scenes => scenes::scenes(),
         Command::Completions { shell } => {
             print_bytes(&commands::completions(shell, &mut Cli::command()));

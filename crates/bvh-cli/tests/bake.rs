@@ -350,3 +350,64 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_reject_damage() {
     let tried: Vec<&str> = readers.iter().map(|reader| reader.0).collect();
     eprintln!("readers tried: {tried:?}; the other programs are not installed");
 }
+
+#[test]
+fn a_bake_without_flags_chooses_says_why_and_writes_the_same_bytes_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let bytes = ["1", "2"].map(|jobs| {
+        let out = format!("{jobs}.bvh");
+        let said = said(at, &["bake", "escher:400", "--out", &out, "--jobs", jobs]);
+        for choice in ["budget: 3 Mwork, 8000 nodes per object", "cost: ", "rays: ", "references: "]
+        {
+            assert_eq!(said.matches(choice).count(), 1, "{choice}: {said}");
+        }
+        fs::read(at.join(out)).unwrap()
+    });
+    assert!(bytes[0] == bytes[1]);
+}
+
+#[test]
+fn a_given_choice_is_kept_and_not_tried() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (flags, kept) in [
+        (&["--cost", "area"][..], "cost: "),
+        (&["--rays", "default"], "rays: "),
+        (&["--references", "1"], "references: "),
+    ] {
+        let bake = ["bake", "escher:200", "--out", "a.bvh"];
+        let said = said(at, &[&bake[..], flags].concat());
+        assert!(said.contains("budget: ") && !said.contains(kept), "{flags:?}: {said}");
+    }
+    // Spheres have no wide layout, and other methods than `best` offer no choices.
+    for flags in [&["spheres75"][..], &["escher:200", "--method", "reinsertion"]] {
+        let said = said(at, &[&["bake", "--out", "a.bvh"][..], flags].concat());
+        assert!(said.contains("budget: ") && !said.contains("references: "), "{flags:?}: {said}");
+    }
+}
+
+#[test]
+fn a_bake_without_a_name_writes_a_new_file_named_after_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let bake = ["bake", "escher:50", "--budget=0s"];
+    said(at, &bake);
+    assert_eq!(names(at), ["escher-50.bvh"]);
+    refused(at, &bake, 2, &["escher-50.bvh exists", "--out"]);
+}
+
+#[test]
+fn an_inspection_with_rays_measures_their_expected_tests() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let measured = |method: &str| {
+        let bake = ["bake", "escher", "--budget=2Mwork", "--out=a.bvh", "--method", method];
+        said(at, &bake);
+        let facts = facts(&said(at, &["inspect", "a.bvh", "escher", "--rays", "default"]));
+        number(&facts, "expected tests of a ray")
+    };
+    let searched = measured("best");
+    assert!(0.0 < searched && searched < measured("muller_fellner"), "{searched}");
+    refused(at, &["inspect", "a.bvh", "--rays", "default"], 2, &["--rays", "SCENE"]);
+}

@@ -206,6 +206,7 @@ fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
             ("inspect", &["good.bvh", "spheres75"]),
             ("verify", &["good.bvh", "spheres75"]),
             ("render", &["spheres75", "--out=x.png", "--size=8x8"]),
+            ("report", &["good.bvh", "spheres75"]),
             ("scenes", &[]),
             ("completions", &["bash"]),
             ("man", &[]),
@@ -228,6 +229,7 @@ fn every_command_reads_buffers_outside_the_folder_of_a_scene_only_with_permissio
         &["inspect", "x.bvh", "scene.gltf"],
         &["verify", "x.bvh", "scene.gltf"],
         &["render", "scene.gltf", "--size=8x8", "--out=x.png"],
+        &["report", "x.bvh", "scene.gltf"],
     ] {
         refused(at, command, 2, &["buffers[0]", "outside the scene's folder", "--outside-files"]);
         said(at, &[command, &["--outside-files"]].concat());

@@ -1,9 +1,10 @@
 //! `bvh bake --instances`: writes a tree for every mesh of a glTF file, and one tree over the
 //! instances that its nodes place, into a folder.
 
-use super::BakeArgs;
+use super::effort::Effort;
 use super::plan::Plan;
 use super::watch::gain;
+use super::{BakeArgs, decide};
 use crate::Error;
 use crate::csv;
 use bvh_build::{Builder, median_cut};
@@ -31,7 +32,8 @@ const COLUMNS: &str = "node,mesh,xx,xy,xz,yx,yy,yz,zx,zy,zz,tx,ty,tz";
 /// Searches for one tree after the other until the budget is spent or `interrupted` becomes true,
 /// and writes each tree as soon as its search ends. An interrupted bake still writes all files.
 pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
-    new_folder(&args.out)?;
+    let out = args.out()?;
+    new_folder(&out)?;
     args.jobs.apply()?;
     let plan = args.plan()?;
     let path = Path::new(&args.scene);
@@ -50,14 +52,21 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let instances = instances(&parts);
     let top = top(&stem, &scenes, &instances, &parts)?;
     // Everything that can be invalid has been checked, so that a fault leaves no folder behind.
-    fs::create_dir_all(&args.out).map_err(Error::io(&args.out, "create the folder"))?;
-    files::write(&args.out.join(INSTANCES), table(&instances, &parts).as_bytes())?;
+    fs::create_dir_all(&out).map_err(Error::io(&out, "create the folder"))?;
+    files::write(&out.join(INSTANCES), table(&instances, &parts).as_bytes())?;
 
     let objects: usize = scenes
         .iter()
         .chain([&top])
         .map(|scene| scene.boxes.len())
         .sum();
+    let plan = match args.budget {
+        Some(_) => plan,
+        None => {
+            print_line(&decide::reason_of_work(objects));
+            Plan { effort: Effort::Work(decide::work(objects)), ..plan }
+        }
+    };
     // The top tree's objects are boxes, which cannot be divided, and no wide layout is made of it.
     let plan_of_top = Plan { references: 1.0, objective: Objective::InternalArea, ..plan.clone() };
     let names = parts
@@ -73,13 +82,13 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         // Every tree gets a share of the budget in proportion to its number of objects.
         let part = scene.boxes.len() as f64 / objects as f64;
         let plan = Plan { effort: plan.effort.share(part), ..plan.clone() };
-        bake_part(&plan, scene, &args.out.join(name), interrupted)?;
+        bake_part(&plan, scene, &out.join(name), interrupted)?;
     }
     if interrupted.load(Relaxed) {
-        return Err(Error::StoppedInstances { path: args.out.clone() });
+        return Err(Error::StoppedInstances { path: out });
     }
     let places = instances.len();
-    let path = args.out.join(INSTANCES);
+    let path = out.join(INSTANCES);
     print_line(&format!("{}: {places} instances of {} meshes", path.display(), scenes.len()));
     Ok(())
 }

@@ -1,13 +1,14 @@
 //! `bvh bake`: searches for the best tree of a scene within a budget, and writes it to a file.
 
+mod decide;
 mod effort;
 pub mod instances;
 mod plan;
-mod rays;
 mod starts;
 mod watch;
 
 use crate::Error;
+use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use bvh_core::cost::Objective;
 use bvh_core::file::Header;
@@ -19,9 +20,9 @@ use bvh_terminal::arguments::{FileKind, Jobs, input_file, output_file};
 use bvh_terminal::files::Reserved;
 use bvh_terminal::output::{print_error, print_line};
 use clap::Args;
+use decide::{Choices, Open, decide};
 use effort::Effort;
 use plan::{Bake, Baked, Plan, Start};
-use rays::Rays;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use watch::gain;
@@ -32,13 +33,15 @@ pub struct BakeArgs {
     /// Name of a scene, or path of a mesh file.
     pub scene: String,
     /// How long to search: a time (`10s`, `1m 30s`), or work (`50Mwork`: 50 million nodes visited),
-    /// which gives the same bytes on every machine.
+    /// which gives the same bytes on every machine. Without it, the bake ends when more work would
+    /// hardly pay; it also chooses --rays, --cost and --references where they are not given, and
+    /// prints the reasons.
     #[arg(long, value_name = "TIME|WORK")]
-    pub budget: Effort,
+    pub budget: Option<Effort>,
     /// The file to write. It replaces an existing file when it is complete. With --instances, a new
-    /// or empty folder.
+    /// or empty folder. Without it, a new file or folder with the scene's name, in this folder.
     #[arg(long, value_name = "FILE.bvh|DIR")]
-    pub out: PathBuf,
+    pub out: Option<PathBuf>,
     /// Bake one tree for every mesh of a glTF file, and one tree over the instances that its nodes
     /// place.
     #[arg(long, conflicts_with_all = ["rays", "from", "explain"])]
@@ -51,14 +54,14 @@ pub struct BakeArgs {
     #[arg(long, value_name = "default|FILE.toml")]
     pub rays: Option<String>,
     /// The cost to minimise: `area`, the internal area, which suits every tracer; or `layout`, the
-    /// tests of nodes and of blocks of triangles in this project's wide layout. The default is
-    /// `layout` with --rays, and `area` otherwise.
+    /// tests of nodes and of blocks of triangles in this project's wide layout. With --budget, the
+    /// default is `layout` with --rays, and `area` otherwise.
     #[arg(long, value_name = "area|layout", value_enum)]
     pub cost: Option<BakeCost>,
     /// Divide objects among leaves where it pays, up to N references per object, 1 to 16. The cost
-    /// then includes the leaves.
-    #[arg(long, value_name = "N", default_value_t = 1.0)]
-    pub references: f64,
+    /// then includes the leaves. With --budget, the default is 1.
+    #[arg(long, value_name = "N")]
+    pub references: Option<f64>,
     /// The method, with its default parameters.
     #[arg(long, value_name = "NAME", default_value = BEST)]
     pub method: String,
@@ -92,7 +95,28 @@ const TREE: FileKind =
 const BEST: &str = "best";
 
 impl BakeArgs {
-    /// Returns the search that the arguments specify.
+    /// Returns the file or folder to write. A name that is not given must be free.
+    fn out(&self) -> Result<PathBuf, Error> {
+        if let Some(out) = &self.out {
+            return Ok(out.clone());
+        }
+        let scene = Path::new(&self.scene);
+        let stem = scene.file_stem().unwrap_or(scene.as_os_str());
+        // The colon of `escher:1000` is no part of a file's name everywhere.
+        let stem = stem.to_string_lossy().replace(':', "-");
+        let extension = if self.instances { "" } else { ".bvh" };
+        let out = PathBuf::from(stem + extension);
+        if out.exists() {
+            return Err(Error::Usage(format!(
+                "{0} exists; accepted: --out {0} to replace it, or the name of a new file",
+                out.display()
+            )));
+        }
+        Ok(out)
+    }
+
+    /// Returns the search that the arguments specify. Without `--budget` it has no work yet, which
+    /// [`Self::decided`] adds.
     fn plan(&self) -> Result<Plan, Error> {
         let rays = self.rays.as_deref().map(Rays::read).transpose()?;
         let method = self.method()?;
@@ -105,13 +129,50 @@ impl BakeArgs {
         };
         Ok(Plan {
             method,
-            effort: self.budget,
+            effort: self.budget.unwrap_or(Effort::Work(0)),
             seed: self.seed,
             objective,
-            references: self.references,
+            references: self.references.unwrap_or(1.0),
             rays,
-            name: self.recorded(),
+            name: self.recorded(self.rays.as_deref()),
         })
+    }
+
+    /// Completes a plan without a budget: adds the work, and makes the choices that the arguments
+    /// leave open. Prints the reasons.
+    fn decided(&self, plan: Plan, scene: &Scene, interrupted: &AtomicBool) -> Result<Plan, Error> {
+        if self.budget.is_some() {
+            return Ok(plan);
+        }
+        let objects = scene.boxes.len();
+        print_line(&decide::reason_of_work(objects));
+        let plan = Plan { effort: Effort::Work(decide::work(objects)), ..plan };
+        // Only `best` offers the choices, and only triangles have a wide layout. A search from an
+        // earlier tree minimises the cost that is given.
+        let has_choices = matches!(plan.method, Method::Best(_)) && scene.triangles().is_ok();
+        if !has_choices || self.from.is_some() {
+            return Ok(plan);
+        }
+        let open = Open {
+            cost: self.cost.is_none() && self.rays.is_none(),
+            rays: self.rays.is_none(),
+            references: self.references.is_none(),
+        };
+        let given = Choices {
+            objective: plan.objective,
+            rays: plan.rays.clone(),
+            references: plan.references,
+        };
+        let (chosen, reasons) = decide(open, given, &plan.method, scene, plan.seed, interrupted)?;
+        for reason in reasons {
+            print_line(&reason);
+        }
+        let Choices { objective, rays, references } = chosen;
+        let name = match (&rays, &self.rays) {
+            (Some(_), None) => self.recorded(Some(Rays::DEFAULT)),
+            _ => plan.name,
+        };
+        Ok(Plan { objective, rays, references, name, ..plan })
     }
 
     /// Returns the named method. If a tree is given, rejects methods that cannot continue from it.
@@ -138,7 +199,7 @@ impl BakeArgs {
 
     /// Rejects numbers of references that are out of range, and methods that would ignore them.
     fn check_references(&self, method: &Method) -> Result<(), Error> {
-        let references = self.references;
+        let references = self.references.unwrap_or(1.0);
         if !(1.0..=16.0).contains(&references) {
             return Err(Error::Usage(format!("--references {references}; accepted: 1 to 16")));
         }
@@ -151,12 +212,12 @@ impl BakeArgs {
         Ok(())
     }
 
-    /// Returns the name that the file records: the method, and the rays if there are any.
-    fn recorded(&self) -> String {
+    /// Returns the name that the file records: the method, and the `rays` if there are any.
+    fn recorded(&self, rays: Option<&str>) -> String {
         const MOST_BYTES: usize = 64;
-        let Some(rays) = &self.rays else { return self.method.clone() };
+        let Some(rays) = rays else { return self.method.clone() };
         let file = Path::new(rays).file_name();
-        let file = file.map_or(rays.clone(), |name| name.to_string_lossy().into_owned());
+        let file = file.map_or(rays.to_owned(), |name| name.to_string_lossy().into_owned());
         let mut name = format!("{} for rays of {file}", self.method).replace('\0', "");
         // Removing characters and not bytes keeps the name valid UTF-8.
         while name.len() > MOST_BYTES {
@@ -173,7 +234,8 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     if let Some(from) = &args.from {
         input_file("--from", from)?;
     }
-    output_file("--out", &args.out, &TREE)?;
+    let out = args.out()?;
+    output_file("--out", &out, &TREE)?;
     let plan = args.plan()?;
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;
@@ -191,8 +253,9 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         }
         None => None,
     };
+    let plan = args.decided(plan, &scene, interrupted)?;
     // Reserving the file first reports a full disk before the search and not after it.
-    let reserved = Reserved::new(&args.out, plan.most_bytes(&scene))?;
+    let reserved = Reserved::new(&out, plan.most_bytes(&scene))?;
     let bake = plan.begin(&scene, start.as_ref(), interrupted)?;
     if args.explain && bake.is_whole() {
         print_line(
@@ -202,13 +265,13 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let baked = bake.search(interrupted)?;
     let bytes = bake
         .file(&baked)
-        .map_err(TreeFileError::of(&args.out))?;
+        .map_err(TreeFileError::of(&out))?;
     reserved.write(&bytes)?;
     if interrupted.load(Relaxed) {
-        return Err(Error::Stopped { path: args.out.clone(), cost: baked.outcome.cost });
+        return Err(Error::Stopped { path: out, cost: baked.outcome.cost });
     }
     print_line(&summary(&plan, &scene, &bake, &baked));
-    print_line(&format!("{}: {} bytes", args.out.display(), bytes.len()));
+    print_line(&format!("{}: {} bytes", out.display(), bytes.len()));
     Ok(())
 }
 

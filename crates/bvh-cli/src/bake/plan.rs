@@ -1,10 +1,10 @@
 //! A bake without its command line: the search, its result, and the tree file.
 
 use super::effort::Effort;
-use super::rays::Rays;
 use super::starts::{Division, greedy};
 use super::watch::{Interrupted, Watch};
 use crate::Error;
+use crate::rays::Rays;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::file::{self, FileError, Header, Origin};
 use bvh_core::{Bvh, Node, RayDensity};

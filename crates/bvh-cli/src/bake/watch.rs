@@ -2,6 +2,7 @@
 
 use super::effort::Effort;
 use bvh_search::{Deadline, Event, Observer};
+use bvh_terminal::output::print_error;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
@@ -54,16 +55,17 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Shows the incumbent, its gain, the rate and the time left, ten times a second.
+    /// Shows the incumbent, its gain, the rate and the time left: in the bar ten times a second, or
+    /// without a terminal as a line every ten seconds.
     fn show(&self) {
-        const REFRESH_MILLISECONDS: u64 = 100;
-        if self.bar.is_hidden() {
-            return;
-        }
+        const BAR_MILLISECONDS: u64 = 100;
+        const LINE_MILLISECONDS: u64 = 10_000;
+        let is_bar = !self.bar.is_hidden();
+        let interval = if is_bar { BAR_MILLISECONDS } else { LINE_MILLISECONDS };
         let elapsed = self.deadline.elapsed();
         let now = elapsed.as_millis() as u64;
         let before = self.shown.load(Relaxed);
-        if now < before + REFRESH_MILLISECONDS {
+        if now < before + interval {
             return;
         }
         // All threads of a search come here; the one that changes the time updates the bar.
@@ -83,15 +85,20 @@ impl<'a> Watch<'a> {
             Effort::Time(_) => self.deadline.fraction(),
             Effort::Work(work) => self.work.load(Relaxed) as f64 / work.max(1) as f64,
         };
-        self.bar
-            .set_position((1000.0 * done.min(1.0)) as u64);
-        self.bar.set_message(format!(
+        let message = format!(
             "{:.6e}, {} MF, {:.2} M moves/s, {:.0} s left",
             event.incumbent,
             gain(event.incumbent, self.base),
             self.moves.load(Relaxed) as f64 / seconds / 1e6,
             (seconds / done.max(1e-9) - seconds).max(0.0)
-        ));
+        );
+        if !is_bar {
+            print_error(&message);
+            return;
+        }
+        self.bar
+            .set_position((1000.0 * done.min(1.0)) as u64);
+        self.bar.set_message(message);
     }
 }
 

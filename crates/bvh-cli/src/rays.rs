@@ -1,7 +1,8 @@
-//! The rays of `bake --rays`, from a renderer or any through the scene, and their density.
+//! The rays of `--rays`, from a renderer or any through the scene, and their density.
 
 use crate::Error;
 use bvh_config::fault;
+use bvh_core::cost::Objective;
 use bvh_core::{Bvh, RayDensity};
 use bvh_scenes::rays::{RenderedRays, TRAINED, density, of_anything, of_renderer};
 use bvh_scenes::{Scene, read_text};
@@ -18,9 +19,15 @@ pub enum Rays {
 }
 
 impl Rays {
+    /// The name of [`Rays::Default`].
+    pub const DEFAULT: &str = "default";
+    /// The seed of rays that judge trees. A bake trains on other rays, unless its `--seed` is this
+    /// number.
+    pub const JUDGING: u64 = u64::MAX;
+
     /// Returns the rays named `default`, or reads the file with this name.
     pub fn read(named: &str) -> Result<Self, Error> {
-        if named == "default" {
+        if named == Self::DEFAULT {
             return Ok(Self::Default);
         }
         let path = Path::new(named);
@@ -38,5 +45,16 @@ impl Rays {
             Self::Rendered(config) => of_renderer(config, scene, tree),
         };
         density(&rays, tree).map_err(|source| Error::Tracing { scene: scene.name.clone(), source })
+    }
+
+    /// Returns the expected number of tests of a ray that enters the scene, in the wide layout of a
+    /// tree. No bake trains on the same default rays.
+    pub fn expected_tests(&self, tree: &Bvh, scene: &Scene) -> Result<f64, Error> {
+        let density = self.density(scene, tree, Self::JUDGING)?;
+        let tests = Objective::Layout.cost_by(tree, &density);
+        let root = tree
+            .root_aabb()
+            .map_or(0.0, |root| density.measure(&root));
+        Ok(if root > 0.0 { tests / root } else { 0.0 })
     }
 }

@@ -1,0 +1,173 @@
+//! `bvh report`: one page about a tree file, compared with the plain tree that a library builds.
+
+mod levels;
+mod page;
+
+use crate::Error;
+use crate::rays::Rays;
+use crate::scene_files::SceneFiles;
+use bvh_build::{Builder, muller_fellner};
+use bvh_core::cost::{self, Objective};
+use bvh_core::{Bvh, validate_references};
+use bvh_scenes::Scene;
+use bvh_scenes::render::{Film, Options, heat, image, render};
+use bvh_scenes::trace::{Accelerator, Structure};
+use bvh_scenes::tree_file::{self, TreeFileError};
+use bvh_terminal::arguments::{FileKind, Jobs, output_file};
+use bvh_terminal::files;
+use bvh_terminal::output::{print_error, print_line};
+use clap::Args;
+use levels::Level;
+use page::{Page, Row};
+use std::borrow::Cow;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+/// Write a page about a tree file: costs by level, overlap, tests of rays as heat, each compared
+/// with the greedy tree of the same scene.
+#[derive(Args, Clone, Debug)]
+pub struct ReportArgs {
+    /// The tree file.
+    #[arg(value_name = "FILE.bvh")]
+    pub file: PathBuf,
+    /// The tree's scene, by name or path of a mesh file.
+    pub scene: String,
+    /// The page, an HTML file without scripts that refers to no other file. The default is the name
+    /// of the tree file with the extension html, which must be free.
+    #[arg(long, value_name = "FILE.html")]
+    pub out: Option<PathBuf>,
+    /// Permits files outside the scene's folder.
+    #[command(flatten)]
+    pub files: SceneFiles,
+    /// Limits the threads.
+    #[command(flatten)]
+    pub jobs: Jobs,
+}
+
+/// The kind of pages.
+const PAGE: FileKind =
+    FileKind { name: "an HTML page", beginning: b"<!DOCTYPE html>", extension: "html" };
+/// The width and the height of the pictures, in pixels.
+const PICTURE: (u32, u32) = (640, 400);
+
+impl ReportArgs {
+    /// Returns the page to write. A name that is not given must be free.
+    fn out(&self) -> Result<PathBuf, Error> {
+        if let Some(out) = &self.out {
+            return Ok(out.clone());
+        }
+        let out = self.file.with_extension("html");
+        if out.exists() {
+            return Err(Error::Usage(format!(
+                "{0} exists; accepted: --out {0} to replace it, or the name of a new file",
+                out.display()
+            )));
+        }
+        Ok(out)
+    }
+}
+
+/// One of the two trees on the page.
+struct Measured {
+    tree: Bvh,
+    levels: Vec<Level>,
+    /// The expected tests of a ray in the wide layout, for triangles.
+    tests: Option<f64>,
+    film: Film,
+}
+
+/// Measures the tree in a file and the greedy tree, draws both, and writes the page.
+pub fn report(args: &ReportArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+    let out = args.out()?;
+    output_file("--out", &out, &PAGE)?;
+    args.jobs.apply()?;
+    let scene = args.files.load(&args.scene)?;
+    if let Some(remark) = &scene.remark {
+        print_error(remark);
+    }
+    let (tree, header) = tree_file::load(&args.file, &scene)?;
+    validate_references(&tree, &scene.boxes, &scene.primitives)
+        .map_err(|fault| TreeFileError::of(&args.file)(fault.into()))?;
+    let greedy = muller_fellner::Config::default()
+        .build(&scene.boxes)
+        .map_err(Error::search(&scene.name, "muller_fellner"))?;
+    let baked = measure(tree, &scene, interrupted)?;
+    let greedy = measure(greedy, &scene, interrupted)?;
+    let title = format!("{} by {}", scene.name, header.method);
+    let page = Page {
+        title: &title,
+        origin: format!(
+            "{} objects, {} references; seed {}, {} nodes visited by the search.",
+            header.objects, header.references, header.seed, header.work
+        ),
+        rows: rows(&baked, &greedy),
+        scene: png(&out, &baked.film, &baked.film.pixels)?,
+        heat: [&baked, &greedy]
+            .into_iter()
+            .map(|measured| heat_map(&out, &measured.film))
+            .collect::<Result<_, Error>>()?,
+        levels: [&baked.levels, &greedy.levels],
+    };
+    files::write(&out, page.html().as_bytes())?;
+    print_line(&format!("{}: {title}", out.display()));
+    Ok(())
+}
+
+/// Measures a tree, and draws the scene with it.
+fn measure(tree: Bvh, scene: &Scene, interrupted: &AtomicBool) -> Result<Measured, Error> {
+    let tests = match scene.triangles() {
+        Ok(_) => Some(Rays::Default.expected_tests(&tree, scene)?),
+        Err(_) => None,
+    };
+    let (width, height) = PICTURE;
+    let options =
+        Options { width, height, samples: 1, depth: 0, view: None, lights: None, ground: false };
+    let accelerator = Accelerator::new(&scene.primitives, Structure::Tree(Cow::Borrowed(&tree)));
+    let film = render(scene, &accelerator, &options, &|| !interrupted.load(Relaxed))
+        .ok_or(Error::Abandoned)?;
+    let levels = levels::of(&tree);
+    Ok(Measured { tree, levels, tests, film })
+}
+
+/// Compares the two trees, one fact each.
+fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {
+    let facts: [(&'static str, fn(&Measured) -> Option<f64>); 7] = [
+        ("Internal area over root area", |of| {
+            Some(cost::over_root_area(&of.tree, cost::internal_area(&of.tree)))
+        }),
+        ("Cost of the wide layout by area", |of| {
+            let cost = Objective::Layout.cost(&of.tree);
+            Some(cost::over_root_area(&of.tree, cost))
+        }),
+        ("Expected tests of a ray from anywhere", |of| of.tests),
+        ("Tests per ray of the picture", |of| {
+            let counts = of.film.counts;
+            Some((counts.boxes + counts.objects) as f64 / of.film.rays.max(1) as f64)
+        }),
+        ("Shared area of siblings over root area", |of| {
+            Some(of.levels.iter().map(|level| level.overlap).sum())
+        }),
+        ("Depth", |of| Some(of.tree.depth() as f64)),
+        ("Nodes", |of| Some(of.tree.nodes.len() as f64)),
+    ];
+    facts
+        .into_iter()
+        .filter_map(|(name, fact)| Some(Row { name, baked: fact(baked)?, greedy: fact(greedy)? }))
+        .collect()
+}
+
+/// Returns the PNG file of a film's heat map, with the key below it.
+fn heat_map(out: &Path, film: &Film) -> Result<Vec<u8>, Error> {
+    let pixels = heat::map(film, 1)
+        .map_err(io::Error::other)
+        .map_err(Error::io(out, "encode the picture"))?;
+    png(out, film, &pixels)
+}
+
+/// Returns a PNG file as wide as the film.
+fn png(out: &Path, film: &Film, pixels: &[[u8; 3]]) -> Result<Vec<u8>, Error> {
+    image::png(film.width, pixels)
+        .map_err(io::Error::other)
+        .map_err(Error::io(out, "encode the picture"))
+}
