@@ -148,6 +148,12 @@ fn every_column_of_every_committed_table_is_on_the_page_of_columns() {
             .unwrap()
             .map(|entry| entry.unwrap().path())
         {
+            // The scripts that write these tables describe them.
+            let is_of_script =
+                path.ends_with("results/choices") || path.ends_with("results/instructions");
+            if is_of_script {
+                continue;
+            }
             if path.is_dir() {
                 folders.push(path);
             } else if path
