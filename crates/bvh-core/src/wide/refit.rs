@@ -85,7 +85,7 @@ impl WideBvh {
     }
 
     /// The blocks of a leaf.
-    pub(super) fn leaf(&self, leaf: Child) -> &[TriangleBlock] {
+    fn leaf(&self, leaf: Child) -> &[TriangleBlock] {
         let blocks = &self.blocks[leaf.index()..];
         let end = blocks
             .iter()
