@@ -6,6 +6,7 @@ mod csv;
 mod error;
 mod inspect;
 mod rays;
+mod recorded;
 mod render;
 mod report;
 mod scene_files;

@@ -1,12 +1,14 @@
-//! The rays of `--rays`, from a renderer or any through the scene, and their density.
+//! The rays of `--rays`, from a file, from a renderer or any through the scene, and their density.
 
-use crate::Error;
+use crate::{Error, recorded};
 use bvh_config::fault;
 use bvh_core::cost::Objective;
-use bvh_core::{Bvh, RayDensity};
+use bvh_core::{Bvh, RayDensity, Segment};
 use bvh_scenes::rays::{RenderedRays, TRAINED, density, of_anything, of_renderer};
 use bvh_scenes::{Scene, read_text};
+use bvh_search::ray_density;
 use bvh_terminal::arguments::input_file;
+use std::fs;
 use std::path::Path;
 
 /// The rays that train a tree.
@@ -16,6 +18,8 @@ pub enum Rays {
     Default,
     /// The rays of a renderer.
     Rendered(RenderedRays),
+    /// The segments of a file.
+    Recorded(Vec<Segment>),
 }
 
 impl Rays {
@@ -32,6 +36,15 @@ impl Rays {
         }
         let path = Path::new(named);
         input_file("--rays", path)?;
+        let extension = path
+            .extension()
+            .and_then(|extension| extension.to_str());
+        if let Some(format @ ("npy" | "csv" | "bin")) = extension {
+            let invalid = |message| Error::Rays { file: path.to_owned(), message };
+            let bytes = fs::read(path).map_err(|error| invalid(error.to_string()))?;
+            let segments = recorded::read(format, &bytes).map_err(invalid)?;
+            return Ok(Self::Recorded(segments));
+        }
         let text = read_text(path)?;
         fault::parse(&text, &path.to_string_lossy())
             .map(Self::Rendered)
@@ -40,11 +53,15 @@ impl Rays {
 
     /// Returns the rays' density in a scene; `tree` is any valid tree over the scene.
     pub fn density(&self, scene: &Scene, tree: &Bvh, seed: u64) -> Result<RayDensity, Error> {
+        let tracing = |source| Error::Tracing { scene: scene.name.clone(), source };
         let rays = match self {
             Self::Default => of_anything(TRAINED, scene, tree, seed),
             Self::Rendered(config) => of_renderer(config, scene, tree),
+            Self::Recorded(segments) => {
+                return ray_density(&scene.boxes, segments).map_err(tracing);
+            }
         };
-        density(&rays, tree).map_err(|source| Error::Tracing { scene: scene.name.clone(), source })
+        density(&rays, tree).map_err(tracing)
     }
 
     /// Returns the expected number of tests of a ray that enters the scene, in the wide layout of a

@@ -37,9 +37,9 @@ pub use local::reinsertion;
 pub use optimize::optimize;
 pub use orders::{genetic, random_orders};
 pub use owned::{Improvement, Objects, Options, OwnedTree};
-pub use rays::FindError;
 #[cfg(feature = "std")]
 pub use rays::bake_for_rays;
+pub use rays::{FindError, ray_density};
 #[cfg(feature = "serde")]
 pub use registry::Method;
 pub use run::{

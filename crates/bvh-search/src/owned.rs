@@ -1,7 +1,7 @@
 //! A tree that owns its objects, for callers that cannot lend them: the bindings to other
 //! languages.
 
-use crate::rays::{FindError, density};
+use crate::rays::{FindError, ray_density};
 use crate::{Budget, Observer, Outcome, Problem, SearchError, Splits, best, optimize, solve};
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::file::{self, FileError, Origin};
@@ -76,7 +76,7 @@ impl OwnedTree {
         let mut owned = Self::bare(objects, options.references);
         owned.seed = options.seed;
         if !options.rays.is_empty() {
-            owned.density = Some(density(&owned.boxes, options.rays)?);
+            owned.density = Some(ray_density(&owned.boxes, options.rays)?);
         }
         owned.search(options.budget, observer)?;
         Ok(owned)

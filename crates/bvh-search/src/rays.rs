@@ -53,7 +53,7 @@ pub fn bake_for_rays(
     time: Duration,
 ) -> Result<(Outcome, RayDensity), FindError> {
     let deadline = Deadline::after(time);
-    let density = density(boxes, segments)?;
+    let density = ray_density(boxes, segments)?;
     let problem = Problem {
         objective: Objective::Layout,
         measure: Some(&density as &dyn Measure),
@@ -64,8 +64,9 @@ pub fn bake_for_rays(
     Ok((outcome, density))
 }
 
-/// Returns the density of segments between surfaces of the boxes. Of too many, every n-th counts.
-pub(crate) fn density(boxes: &[Aabb], segments: &[Segment]) -> Result<RayDensity, DensityError> {
+/// Returns the density of segments between surfaces of the boxes, with a tenth of area. Of more than
+/// [`RayDensity::MOST_SEGMENTS`] segments, every n-th counts.
+pub fn ray_density(boxes: &[Aabb], segments: &[Segment]) -> Result<RayDensity, DensityError> {
     let bounds = boxes
         .iter()
         .fold(Aabb::EMPTY, |bounds, aabb| bounds.union(aabb));

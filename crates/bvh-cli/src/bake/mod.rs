@@ -49,9 +49,10 @@ pub struct BakeArgs {
     /// Seed of the random numbers.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Minimise the cost of rays instead of area: `default` for rays that need no camera, or a file
-    /// that describes the rays of a renderer.
-    #[arg(long, value_name = "default|FILE.toml")]
+    /// Minimise the cost of rays instead of area: `default` for rays that need no camera, a TOML file
+    /// that describes the rays of a renderer, or a file of recorded segments: six numbers each, from the
+    /// origin to the hit, as an array of numpy, lines of CSV, or little-endian `f32`.
+    #[arg(long, value_name = "default|FILE.toml|.npy|.csv|.bin")]
     pub rays: Option<String>,
     /// The cost to minimise: `area`, the internal area, which suits every tracer; or `layout`, the
     /// tests of nodes and of blocks of triangles in this project's wide layout. With --budget, the

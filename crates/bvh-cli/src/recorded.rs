@@ -1,0 +1,143 @@
+//! Files of recorded rays: segments of six numbers each, from the origin to the hit.
+
+use bvh_core::Segment;
+
+/// Reads segments in the format `npy`, `csv` or `bin`. Returns the fault of an invalid file.
+pub fn read(format: &str, bytes: &[u8]) -> Result<Vec<Segment>, String> {
+    let numbers = match format {
+        "npy" => npy(bytes)?,
+        "csv" => csv(bytes)?,
+        _ => floats(bytes)?,
+    };
+    let (segments, rest) = numbers.as_chunks::<6>();
+    if !rest.is_empty() {
+        let count = numbers.len();
+        return Err(format!("there are {count} numbers; accepted: six for each segment"));
+    }
+    let segment = |&[a, b, c, d, e, f]: &[f32; 6]| Segment { from: [a, b, c], to: [d, e, f] };
+    Ok(segments.iter().map(segment).collect())
+}
+
+/// Reads little-endian `f32`.
+fn floats(bytes: &[u8]) -> Result<Vec<f32>, String> {
+    let (numbers, rest) = bytes.as_chunks();
+    if !rest.is_empty() {
+        return Err(format!("there are {} bytes; accepted: a multiple of 24", bytes.len()));
+    }
+    Ok(numbers
+        .iter()
+        .map(|&number| f32::from_le_bytes(number))
+        .collect())
+}
+
+/// Reads lines of six numbers, separated by commas. The first line may be a header.
+fn csv(bytes: &[u8]) -> Result<Vec<f32>, String> {
+    let text = str::from_utf8(bytes).map_err(|_| "the file is not UTF-8".to_owned())?;
+    let mut numbers = Vec::new();
+    for (number, line) in (1..).zip(text.lines()) {
+        let fields: Result<Vec<f32>, _> = line
+            .split(',')
+            .map(|field| field.trim().parse())
+            .collect();
+        match fields {
+            Ok(fields) if fields.len() == 6 => numbers.extend(fields),
+            Err(_) if number == 1 || line.trim().is_empty() => {}
+            _ => return Err(format!("line {number} is {line:?}; accepted: six numbers")),
+        }
+    }
+    Ok(numbers)
+}
+
+/// Reads an array of numpy: `float32` or `float64`, little-endian, in row order.
+fn npy(bytes: &[u8]) -> Result<Vec<f32>, String> {
+    let invalid = || "the file is not an array of numpy".to_owned();
+    let rest = bytes
+        .strip_prefix(b"\x93NUMPY")
+        .ok_or_else(invalid)?;
+    let (&[major, _], rest) = rest
+        .split_first_chunk::<2>()
+        .ok_or_else(invalid)?;
+    let (length, rest) = if major == 1 {
+        let (length, rest) = rest.split_first_chunk().ok_or_else(invalid)?;
+        (usize::from(u16::from_le_bytes(*length)), rest)
+    } else {
+        let (length, rest) = rest.split_first_chunk().ok_or_else(invalid)?;
+        (u32::from_le_bytes(*length) as usize, rest)
+    };
+    let (header, data) = rest
+        .split_at_checked(length)
+        .ok_or_else(invalid)?;
+    let header: String = str::from_utf8(header)
+        .map_err(|_| invalid())?
+        .split_whitespace()
+        .collect();
+    let is_table = header.contains(",6)") || header.contains(",2,3)");
+    if header.contains("'fortran_order':True") || !is_table {
+        return Err(format!("the array is {header}; accepted: (n, 6) or (n, 2, 3) in row order"));
+    }
+    if header.contains("'<f4'") {
+        return floats(data);
+    }
+    if !header.contains("'<f8'") {
+        return Err(format!("the array is {header}; accepted: float32 or float64"));
+    }
+    let (numbers, _) = data.as_chunks();
+    Ok(numbers
+        .iter()
+        .map(|&number| f64::from_le_bytes(number) as f32)
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SEGMENT: Segment = Segment { from: [1.0, 2.0, 3.0], to: [4.0, 5.0, -6.5] };
+
+    /// Returns an array of numpy.
+    fn array(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+        let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let length = (header.len() as u16).to_le_bytes();
+        [&b"\x93NUMPY\x01\x00"[..], &length, header.as_bytes(), data].concat()
+    }
+
+    #[test]
+    fn segments_come_from_all_formats() {
+        let numbers = [1.0, 2.0, 3.0, 4.0, 5.0, -6.5];
+        let single: Vec<u8> = numbers
+            .iter()
+            .flat_map(|&x| (x as f32).to_le_bytes())
+            .collect();
+        let double: Vec<u8> = numbers
+            .iter()
+            .flat_map(|&x: &f64| x.to_le_bytes())
+            .collect();
+        for (format, bytes) in [
+            ("bin", single.clone()),
+            ("csv", b"x,y,z,to x,to y,to z\n1,2,3, 4,5,-6.5\n".to_vec()),
+            ("csv", b"1,2,3,4,5,-6.5".to_vec()),
+            ("npy", array("<f4", "(1, 6)", &single)),
+            ("npy", array("<f8", "(1, 2, 3)", &double)),
+        ] {
+            assert_eq!(read(format, &bytes), Ok(vec![SEGMENT]), "{format}");
+        }
+    }
+
+    #[test]
+    fn faults_are_named() {
+        for (format, bytes, message) in [
+            ("bin", vec![0; 7], "there are 7 bytes; accepted: a multiple of 24"),
+            ("bin", vec![0; 28], "there are 7 numbers; accepted: six for each segment"),
+            ("csv", b"1,2,3,4,5,6\n1,2,3".to_vec(), "line 2 is \"1,2,3\"; accepted: six numbers"),
+            ("npy", b"PK".to_vec(), "the file is not an array of numpy"),
+            (
+                "npy",
+                array("<i8", "(1, 6)", &[0; 48]),
+                "the array is {'descr':'<i8','fortran_order':False,'shape':(1,6),}; \
+                 accepted: float32 or float64",
+            ),
+        ] {
+            assert_eq!(read(format, &bytes).unwrap_err(), message);
+        }
+    }
+}
