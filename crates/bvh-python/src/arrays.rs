@@ -1,13 +1,14 @@
 //! Converts and checks numpy arrays. Errors name the argument, the value found and the values
 //! accepted.
 
-use bvh_search::bvh_core::Primitives;
+use bvh_search::bvh_core::{InvalidRay, Primitives};
 use bvh_search::{Objects, prelude::*};
-use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::fmt::Display;
+use std::ops::Range;
 
 /// Creates the error of an invalid argument.
 pub fn invalid(message: impl Display) -> PyErr {
@@ -22,9 +23,21 @@ fn floats<'py>(
     accepted: &str,
     accepts: impl Fn(&[usize]) -> bool,
 ) -> PyResult<PyReadonlyArrayDyn<'py, f32>> {
+    numbers(name, argument, "float32", accepted, accepts)
+}
+
+/// Converts anything that numpy accepts as an array of real numbers to `dtype`, which is the type `T`,
+/// in row order, and checks its shape.
+fn numbers<'py, T: Element>(
+    name: &str,
+    argument: &Bound<'py, PyAny>,
+    dtype: &str,
+    accepted: &str,
+    accepts: impl Fn(&[usize]) -> bool,
+) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
     let py = argument.py();
     let options = PyDict::new(py);
-    options.set_item("dtype", "float32")?;
+    options.set_item("dtype", dtype)?;
     options.set_item("order", "C")?;
     let numpy = py.import("numpy")?;
     let no_array =
@@ -37,7 +50,7 @@ fn floats<'py>(
     let array = numpy
         .call_method("asarray", (given,), Some(&options))
         .map_err(no_array)?;
-    let array: PyReadonlyArrayDyn<f32> = array.extract()?;
+    let array: PyReadonlyArrayDyn<T> = array.extract()?;
     if accepts(array.shape()) {
         return Ok(array);
     }
@@ -73,6 +86,52 @@ pub fn triangles(argument: &Bound<PyAny>) -> PyResult<Objects> {
     Ok(Objects::Shapes(Primitives::Triangles(triangles.to_vec())))
 }
 
+/// Reads the vertices of a mesh, `(v, 3)`, and its faces, `(n, 3)`.
+pub fn mesh(vertices: &Bound<PyAny>, faces: &Bound<PyAny>) -> PyResult<(Objects, Vec<[u32; 3]>)> {
+    let faces: PyReadonlyArrayDyn<i64> =
+        numbers("faces", faces, "int64", "(n, 3)", |shape| matches!(shape, [_, 3]))?;
+    let mut indices = Vec::with_capacity(faces.shape()[0]);
+    for (face, corners) in faces
+        .as_slice()?
+        .as_chunks::<3>()
+        .0
+        .iter()
+        .enumerate()
+    {
+        let mut index = [0; 3];
+        for (index, &corner) in index.iter_mut().zip(corners) {
+            *index = u32::try_from(corner)
+                .map_err(|_| invalid(format!("faces: face {face} names vertex {corner}")))?;
+        }
+        indices.push(index);
+    }
+    Ok((moved_mesh(vertices, &indices)?, indices))
+}
+
+/// Reads the vertices of a mesh with known faces.
+pub fn moved_mesh(vertices: &Bound<PyAny>, faces: &[[u32; 3]]) -> PyResult<Objects> {
+    let vertices = floats("vertices", vertices, "(v, 3)", |shape| matches!(shape, [_, 3]))?;
+    let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
+    let triangles = Triangle::from_mesh(vertices, faces).map_err(invalid)?;
+    Ok(Objects::Shapes(Primitives::Triangles(triangles)))
+}
+
+/// Reads recorded rays: segments of the shape `(m, 2, 3)`.
+pub fn segments(argument: Option<&Bound<PyAny>>) -> PyResult<Vec<Segment>> {
+    let Some(argument) = argument else { return Ok(vec![]) };
+    let array = floats("rays", argument, "(m, 2, 3)", |shape| matches!(shape, [_, 2, 3]))?;
+    let (segments, _) = array.as_slice()?.as_chunks::<6>();
+    let segment = |&[a, b, c, d, e, f]: &[f32; 6]| Segment { from: [a, b, c], to: [d, e, f] };
+    Ok(segments.iter().map(segment).collect())
+}
+
+/// Reads points, `(m, 3)`.
+pub fn points(argument: &Bound<PyAny>) -> PyResult<Vec<Vec3>> {
+    let array = floats("points", argument, "(m, 3)", |shape| matches!(shape, [_, 3]))?;
+    let points: &[Vec3] = bytemuck::cast_slice(array.as_slice()?);
+    Ok(points.to_vec())
+}
+
 /// Reads boxes with a lower and an upper corner each.
 pub fn boxes(argument: &Bound<PyAny>) -> PyResult<Objects> {
     let array = floats("boxes", argument, "(n, 2, 3) or (n, 6)", |shape| {
@@ -82,35 +141,159 @@ pub fn boxes(argument: &Bound<PyAny>) -> PyResult<Objects> {
     Ok(Objects::Boxes(boxes.to_vec()))
 }
 
-/// Reads rays. `t_min` and `t_max` are one number for all rays or one number per ray.
-pub fn rays(
-    origins: &Bound<PyAny>,
-    directions: &Bound<PyAny>,
-    t_min: Option<&Bound<PyAny>>,
-    t_max: Option<&Bound<PyAny>>,
-) -> PyResult<Vec<Ray>> {
-    let origins = floats("origins", origins, "(m, 3)", |shape| matches!(shape, [_, 3]))?;
-    let rays = origins.shape()[0];
-    let accepted = format!("({rays}, 3), as origins");
-    let directions = floats("directions", directions, &accepted, |shape| shape == [rays, 3])?;
-    let accepted = format!("a number or ({rays},), as origins");
-    let limits = |name, argument: Option<&Bound<PyAny>>, default: f32| -> PyResult<Vec<f32>> {
-        let Some(argument) = argument else { return Ok(vec![default; rays]) };
-        let limit = floats(name, argument, &accepted, |shape| shape.is_empty() || shape == [rays])?;
-        // An array without axes is one number for all rays.
-        match limit.shape() {
-            [] => Ok(vec![limit.as_slice()?[0]; rays]),
-            _ => Ok(limit.as_slice()?.to_vec()),
+/// The origins or directions of rays, in either precision: `float64` is rounded ray by ray, without a
+/// copy of the array.
+enum Vectors<'py> {
+    Single(PyReadonlyArrayDyn<'py, f32>),
+    Double(PyReadonlyArrayDyn<'py, f64>),
+}
+
+impl<'py> Vectors<'py> {
+    fn read(
+        name: &str,
+        argument: &Bound<'py, PyAny>,
+        accepted: &str,
+        accepts: impl Fn(&[usize]) -> bool,
+    ) -> PyResult<Self> {
+        // Not a subclass, such as a masked array.
+        let is_array = argument.get_type().name()? == "ndarray";
+        match argument.extract::<PyReadonlyArrayDyn<f64>>() {
+            Ok(array) if is_array && array.is_c_contiguous() && accepts(array.shape()) => {
+                Ok(Self::Double(array))
+            }
+            _ => floats(name, argument, accepted, accepts).map(Self::Single),
         }
-    };
-    let t_min = limits("t_min", t_min, 0.0)?;
-    let t_max = limits("t_max", t_max, f32::INFINITY)?;
-    let (origins, _) = origins.as_slice()?.as_chunks::<3>();
-    let (directions, _) = directions.as_slice()?.as_chunks::<3>();
-    (0..rays)
-        .map(|index| {
-            Ray::new(origins[index], directions[index], t_min[index], t_max[index])
-                .map_err(|error| invalid(format!("ray {index}: {error}")))
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Self::Single(array) => array.shape()[0],
+            Self::Double(array) => array.shape()[0],
+        }
+    }
+
+    fn slice(&self) -> PyResult<VectorSlice<'_>> {
+        Ok(match self {
+            Self::Single(array) => VectorSlice::Single(array.as_slice()?.as_chunks().0),
+            Self::Double(array) => VectorSlice::Double(array.as_slice()?.as_chunks().0),
         })
-        .collect()
+    }
+}
+
+/// Vectors that threads without Python can read.
+#[derive(Clone, Copy)]
+enum VectorSlice<'a> {
+    Single(&'a [[f32; 3]]),
+    Double(&'a [[f64; 3]]),
+}
+
+impl VectorSlice<'_> {
+    #[inline(always)]
+    fn at(self, index: usize) -> Vec3 {
+        match self {
+            Self::Single(vectors) => Vec3::from(vectors[index]),
+            Self::Double(vectors) => Vec3::from(vectors[index].map(|x| x as f32)),
+        }
+    }
+}
+
+/// The arrays of rays. `t_min` and `t_max` are one number for all rays or one number per ray.
+pub struct RayArrays<'py> {
+    origins: Vectors<'py>,
+    directions: Vectors<'py>,
+    limits: [Vec<f32>; 2],
+    /// Whether an invalid ray hits nothing, instead of being an error.
+    misses: bool,
+}
+
+impl<'py> RayArrays<'py> {
+    /// Reads the arguments of a call. `invalid` is `error` or `miss`.
+    pub fn read(
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        t_min: Option<&Bound<'py, PyAny>>,
+        t_max: Option<&Bound<'py, PyAny>>,
+        invalid: &str,
+    ) -> PyResult<Self> {
+        let misses = match invalid {
+            "error" => false,
+            "miss" => true,
+            _ => {
+                let message = format!("invalid is {invalid:?}; accepted: error, miss");
+                return Err(self::invalid(message));
+            }
+        };
+        let origins = Vectors::read("origins", origins, "(m, 3)", |shape| matches!(shape, [_, 3]))?;
+        let rays = origins.len();
+        let accepted = format!("({rays}, 3), as origins");
+        let directions =
+            Vectors::read("directions", directions, &accepted, |shape| shape == [rays, 3])?;
+        let accepted = format!("a number or ({rays},), as origins");
+        let mut limits = [vec![0.0], vec![f32::INFINITY]];
+        for ((name, argument), limit) in [("t_min", t_min), ("t_max", t_max)]
+            .into_iter()
+            .zip(&mut limits)
+        {
+            if let Some(argument) = argument {
+                // An array without axes is one number for all rays.
+                *limit =
+                    floats(name, argument, &accepted, |shape| shape.is_empty() || shape == [rays])?
+                        .as_slice()?
+                        .to_vec();
+            }
+        }
+        Ok(Self { origins, directions, limits, misses })
+    }
+
+    /// Returns the rays for threads without Python.
+    pub fn source(&self) -> PyResult<RaySource<'_>> {
+        let [t_min, t_max] = self.limits.each_ref().map(Vec::as_slice);
+        Ok(RaySource {
+            origins: self.origins.slice()?,
+            directions: self.directions.slice()?,
+            t_min,
+            t_max,
+            rays: self.origins.len(),
+            misses: self.misses,
+        })
+    }
+}
+
+/// Rays in arrays.
+#[derive(Clone, Copy)]
+pub struct RaySource<'a> {
+    origins: VectorSlice<'a>,
+    directions: VectorSlice<'a>,
+    t_min: &'a [f32],
+    t_max: &'a [f32],
+    pub rays: usize,
+    misses: bool,
+}
+
+impl RaySource<'_> {
+    /// Returns some of the rays, or the number of an invalid one and its fault.
+    pub fn rays(&self, range: Range<usize>) -> Result<Vec<Ray>, (usize, InvalidRay)> {
+        let limit =
+            |limits: &[f32], index: usize| limits[if limits.len() == 1 { 0 } else { index }];
+        range
+            .map(|index| {
+                let ray = Ray::new(
+                    self.origins.at(index),
+                    self.directions.at(index),
+                    limit(self.t_min, index),
+                    limit(self.t_max, index),
+                );
+                match ray {
+                    // An empty range hits nothing.
+                    Err(_) if self.misses => Ok(Ray::assume_valid(Vec3::ZERO, Vec3::X, 1.0, 0.0)),
+                    _ => ray.map_err(|error| (index, error)),
+                }
+            })
+            .collect()
+    }
+}
+
+/// Creates the error of an invalid ray.
+pub fn invalid_ray((index, error): (usize, InvalidRay)) -> PyErr {
+    invalid(format!("ray {index}: {error}"))
 }

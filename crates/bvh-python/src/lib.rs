@@ -7,8 +7,15 @@ mod tree;
 
 /// Better bounding volume hierarchies by stochastic search: find, save, load and trace trees over
 /// numpy arrays.
-#[pyo3::pymodule(name = "bvh_search")]
+#[pyo3::pymodule(name = "_bvh_search")]
 mod module {
     #[pymodule_export]
-    use crate::{tracer::Tracer, tree::Tree};
+    use crate::{
+        tracer::{Tracer, locations},
+        tree::Tree,
+    };
+
+    #[pymodule_export]
+    #[allow(non_upper_case_globals, reason = "Python's name")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
 }

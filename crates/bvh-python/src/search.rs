@@ -1,47 +1,90 @@
 //! Searches that let other Python threads run, and that end with their time or after Ctrl-C.
 
 use crate::arrays::invalid;
+use bvh_search::Event;
 use bvh_search::{Observer, prelude::*};
 use pyo3::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
+use std::time::Instant;
 
 /// The longest time between a press of Ctrl-C and the reaction.
 const NOTICE: Duration = Duration::from_millis(50);
 
+/// The limits of a search, and the function that follows it.
+pub struct Limits {
+    /// The time; 1 second if there is no limit of work either.
+    pub seconds: Option<f64>,
+    /// Nodes created or visited.
+    pub work: Option<u64>,
+    /// Called with the elapsed seconds and the lowest cost so far.
+    pub progress: Option<Py<PyAny>>,
+}
+
 /// Ends a search at its deadline or after Ctrl-C.
 struct Watch {
-    deadline: Deadline,
+    deadline: Option<Deadline>,
     pressed: AtomicBool,
+    /// The bits of the lowest cost so far.
+    cost: AtomicU64,
 }
 
 impl Observer for Watch {
     fn cancelled(&self) -> bool {
-        self.pressed.load(Relaxed) || self.deadline.cancelled()
+        let is_late = self
+            .deadline
+            .as_ref()
+            .is_some_and(Observer::cancelled);
+        self.pressed.load(Relaxed) || is_late
     }
 
     fn progress(&self) -> Option<f64> {
-        self.deadline.progress()
+        self.deadline.as_ref()?.progress()
+    }
+
+    fn event(&self, event: &Event) {
+        self.cost
+            .store(event.incumbent.to_bits(), Relaxed);
     }
 }
 
-/// Runs `search` for `seconds`. Returns its result, and the exception that a signal handler has
-/// raised meanwhile.
+/// Runs `search` within its limits. Returns its result, and the exception that a signal handler or the
+/// function `progress` has raised meanwhile.
 pub fn searched<T: Send>(
     py: Python,
-    seconds: f64,
-    search: impl FnOnce(&dyn Observer) -> T + Send,
+    Limits { seconds, work, progress }: Limits,
+    search: impl FnOnce(Budget, &dyn Observer) -> T + Send,
 ) -> PyResult<(T, PyResult<()>)> {
-    let limit = Duration::try_from_secs_f64(seconds)
-        .map_err(|_| invalid(format!("seconds is {seconds}; accepted: 0 or more, finite")))?;
-    let watch = &Watch { deadline: Deadline::after(limit), pressed: AtomicBool::new(false) };
+    let seconds = if work.is_none() { Some(seconds.unwrap_or(1.0)) } else { seconds };
+    let limit =
+        match seconds {
+            Some(seconds) => Some(Duration::try_from_secs_f64(seconds).map_err(|_| {
+                invalid(format!("seconds is {seconds}; accepted: 0 or more, finite"))
+            })?),
+            None => None,
+        };
+    let budget = Budget { max_work: work, ..Budget::UNLIMITED };
+    let start = Instant::now();
+    let watch = &Watch {
+        deadline: limit.map(Deadline::after),
+        pressed: AtomicBool::new(false),
+        cost: AtomicU64::new(f64::INFINITY.to_bits()),
+    };
+    let react = |py: Python| {
+        py.check_signals()?;
+        if let Some(progress) = &progress {
+            let cost = f64::from_bits(watch.cost.load(Relaxed));
+            progress.call1(py, (start.elapsed().as_secs_f64(), cost))?;
+        }
+        Ok(())
+    };
     // Python runs signal handlers on its main thread only. The calling thread may be the main
     // thread, so a second thread searches while this one waits for signals.
     Ok(py.detach(|| {
         thread::scope(|scope| {
             let (sender, receiver) = channel();
-            scope.spawn(move || sender.send(search(watch)));
+            scope.spawn(move || sender.send(search(budget, watch)));
             let mut raised = Ok(());
             loop {
                 match receiver.recv_timeout(NOTICE) {
@@ -50,7 +93,7 @@ pub fn searched<T: Send>(
                         panic!("the search ended without a tree")
                     }
                     Err(RecvTimeoutError::Timeout) if raised.is_ok() => {
-                        raised = Python::attach(|py| py.check_signals());
+                        raised = Python::attach(react);
                         watch.pressed.store(raised.is_err(), Relaxed);
                     }
                     // The search has been cancelled and is about to end.

@@ -1,40 +1,59 @@
-//! The class `Tracer`: triangles in the wide layout, which answer batches of rays on all threads.
+//! The class `Tracer`: triangles in the wide layout, which answer batches of rays and points on all
+//! threads.
 
-use crate::arrays::{invalid, rays};
+use crate::arrays::{RayArrays, RaySource, invalid, invalid_ray, points};
 use crate::tree::Tree;
+use bvh_search::OwnedTree;
+use bvh_search::bvh_core::InvalidRay;
+use bvh_search::bvh_core::glam::DVec3;
 use bvh_search::prelude::*;
-use numpy::{IntoPyArray, PyArray1};
+use numpy::{
+    IntoPyArray, Ix2, Ix3, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray, PyReadonlyArray1,
+};
 use pyo3::prelude::*;
 use rayon::prelude::*;
+use std::sync::Arc;
 
-/// The triangles of a tree in a layout for fast traversal. Later improvements of the tree do not
-/// change the tracer.
+/// The triangles of a tree in a layout for fast traversal. Later improvements and updates of the tree
+/// do not change the tracer.
+///
+/// Rays have `origins` and `directions` of the shape `(m, 3)`. `t_min` and `t_max`, by default 0 and
+/// infinity, are one number or have the shape `(m,)`. Distances are in multiples of the directions'
+/// lengths. Set `coherent` if consecutive rays begin close to each other and have similar directions:
+/// it changes the speed and no answer. An invalid ray, with a direction that is zero or a number that
+/// is not finite, raises a `ValueError`; with `invalid="miss"` it hits nothing.
+///
+/// >>> import numpy as np
+/// >>> from bvh_search import Tracer, Tree
+/// >>> square = Tree.from_mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+/// >>> tracer = Tracer(square)
 #[pyclass(frozen, module = "bvh_search")]
 pub struct Tracer {
     wide: WideBvh,
+    source: Arc<OwnedTree>,
 }
 
-/// The number of rays that a thread traces at once.
-const BATCH: usize = 4096;
+/// The number of rays or points that a thread answers at once.
+const BATCH: usize = 1024;
 
 #[pymethods]
 impl Tracer {
     #[new]
     fn new(tree: &Tree) -> PyResult<Self> {
-        let owned = tree.owned();
-        let Some(triangles) = owned.triangles() else {
+        let source = tree.owned();
+        let Some(wide) = source.layout() else {
             return Err(invalid("tree is over boxes; accepted: a tree over triangles"));
         };
-        Ok(Self { wide: WideBvh::new(owned.tree(), triangles).map_err(invalid)? })
+        Ok(Self { wide: wide.map_err(invalid)?, source })
     }
 
-    /// Returns the distances of the nearest hits, in multiples of the directions' lengths, and the
-    /// triangles' indices. A ray without a hit has infinity and −1.
+    /// Returns the distances of the nearest hits and the triangles' indices. A ray without a hit has
+    /// infinity and −1.
     ///
-    /// Origins and directions have the shape `(m, 3)`. `t_min` and `t_max`, by default 0 and
-    /// infinity, are one number or have the shape `(m,)`. Set `coherent` if consecutive rays begin
-    /// close to each other and have similar directions: it changes the speed and no answer.
-    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = false))]
+    /// >>> tracer.nearest([[0.25, 0.5, 3], [2, 2, 3]], [[0, 0, -1], [0, 0, -1]])
+    /// (array([ 3., inf], dtype=float32), array([ 1, -1], dtype=int32))
+    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = false, invalid = "error"))]
+    #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn nearest<'py>(
         &self,
         origins: &Bound<'py, PyAny>,
@@ -42,28 +61,45 @@ impl Tracer {
         t_min: Option<&Bound<'py, PyAny>>,
         t_max: Option<&Bound<'py, PyAny>>,
         coherent: bool,
-    ) -> PyResult<Nearest<'py>> {
+        invalid: &str,
+    ) -> PyResult<(Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i32>>)> {
         let py = origins.py();
-        let rays = rays(origins, directions, t_min, t_max)?;
-        let (t, object) = py.detach(|| {
-            let mut hits = vec![Hit::MISS; rays.len()];
-            let batches = rays
-                .par_chunks(BATCH)
-                .zip(hits.par_chunks_mut(BATCH));
-            batches.for_each(|(rays, hits)| {
-                self.wide
-                    .nearest_hits(rays, hits, coherence(coherent))
-            });
-            // The cast turns the id of a miss, `u32::MAX`, into −1.
-            let t: Vec<f32> = hits.iter().map(|hit| hit.t).collect();
-            let object: Vec<i32> = hits.iter().map(|hit| hit.object as i32).collect();
-            (t, object)
-        });
-        Ok((t.into_pyarray(py), object.into_pyarray(py)))
+        let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
+        let source = arrays.source()?;
+        let (t, objects) = py
+            .detach(|| {
+                let mut t = vec![0.0; source.rays];
+                let mut objects = vec![0; source.rays];
+                let parts = t
+                    .par_chunks_mut(BATCH)
+                    .zip(objects.par_chunks_mut(BATCH));
+                parts
+                    .enumerate()
+                    .try_for_each(|(batch, (t, objects))| {
+                        let rays = batch_of(source, batch)?;
+                        let mut hits = [Hit::MISS; BATCH];
+                        let hits = &mut hits[..rays.len()];
+                        self.wide
+                            .nearest_hits(&rays, hits, coherence(coherent));
+                        for ((hit, t), object) in hits.iter().zip(t).zip(objects) {
+                            *t = hit.t;
+                            // The cast turns the id of a miss, `u32::MAX`, into −1.
+                            *object = hit.object as i32;
+                        }
+                        Ok(())
+                    })?;
+                Ok((t, objects))
+            })
+            .map_err(invalid_ray)?;
+        Ok((t.into_pyarray(py), objects.into_pyarray(py)))
     }
 
-    /// Returns whether each ray hits any triangle. Accepts the same arguments as `nearest`.
-    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = false))]
+    /// Returns whether each ray hits any triangle.
+    ///
+    /// >>> tracer.any([[0.25, 0.5, 3], [2, 2, 3]], [[0, 0, -1], [0, 0, -1]])
+    /// array([ True, False])
+    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = false, invalid = "error"))]
+    #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn any<'py>(
         &self,
         origins: &Bound<'py, PyAny>,
@@ -71,27 +107,312 @@ impl Tracer {
         t_min: Option<&Bound<'py, PyAny>>,
         t_max: Option<&Bound<'py, PyAny>>,
         coherent: bool,
+        invalid: &str,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let py = origins.py();
-        let rays = rays(origins, directions, t_min, t_max)?;
-        let hits = py.detach(|| {
-            let mut hits = vec![false; rays.len()];
-            let batches = rays
-                .par_chunks(BATCH)
-                .zip(hits.par_chunks_mut(BATCH));
-            batches.for_each(|(rays, hits)| {
-                self.wide
-                    .any_hits(rays, hits, coherence(coherent))
-            });
-            hits
-        });
+        let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
+        let source = arrays.source()?;
+        let hits = py
+            .detach(|| {
+                answers(source.rays, false, |batch, hits| {
+                    let rays = batch_of(source, batch)?;
+                    self.wide
+                        .any_hits(&rays, hits, coherence(coherent));
+                    Ok(())
+                })
+            })
+            .map_err(invalid_ray)?;
         Ok(hits.into_pyarray(py))
+    }
+
+    /// Returns all hits, ray after ray and the nearest first: distances, triangles, and the indices of
+    /// the rays. Each crossing of the surface counts once, although triangles share edges and corners, so
+    /// the number of hits of a line with a closed mesh is even.
+    ///
+    /// >>> tracer.all([[0.5, 0.5, 3], [2, 2, 3]], [[0, 0, -1], [0, 0, -1]])
+    /// (array([3.], dtype=float32), array([0], dtype=int32), array([0]))
+    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, invalid = "error"))]
+    #[allow(clippy::type_complexity, reason = "three arrays")]
+    fn all<'py>(
+        &self,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        t_min: Option<&Bound<'py, PyAny>>,
+        t_max: Option<&Bound<'py, PyAny>>,
+        invalid: &str,
+    ) -> PyResult<(Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<i64>>)>
+    {
+        let py = origins.py();
+        let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
+        let source = arrays.source()?;
+        let (t, objects, numbers) = py
+            .detach(|| {
+                let batches = (0..source.rays.div_ceil(BATCH)).into_par_iter();
+                let found: Vec<(Vec<Hit>, Vec<u32>)> = batches
+                    .map(|batch| {
+                        let rays = batch_of(source, batch)?;
+                        let mut hits = Vec::with_capacity(2 * rays.len());
+                        let mut counts = vec![0; rays.len()];
+                        self.wide
+                            .all_hits_of(&rays, &mut hits, &mut counts);
+                        Ok((hits, counts))
+                    })
+                    .collect::<Result<_, _>>()?;
+                let hits = found.iter().map(|(hits, _)| hits.len()).sum();
+                let mut t = Vec::with_capacity(hits);
+                let mut objects = Vec::with_capacity(hits);
+                let mut numbers = Vec::with_capacity(hits);
+                let mut number = 0;
+                for (hits, counts) in found {
+                    t.extend(hits.iter().map(|hit| hit.t));
+                    objects.extend(hits.iter().map(|hit| hit.object as i32));
+                    for count in counts {
+                        numbers.extend((0..count).map(|_| number));
+                        number += 1;
+                    }
+                }
+                Ok((t, objects, numbers))
+            })
+            .map_err(invalid_ray)?;
+        Ok((t.into_pyarray(py), objects.into_pyarray(py), numbers.into_pyarray(py)))
+    }
+
+    /// Returns the number of hits of each ray, as `all` counts them.
+    ///
+    /// >>> tracer.counts([[0.5, 0.5, 3], [2, 2, 3]], [[0, 0, -1], [0, 0, -1]])
+    /// array([1, 0], dtype=uint32)
+    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, invalid = "error"))]
+    fn counts<'py>(
+        &self,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        t_min: Option<&Bound<'py, PyAny>>,
+        t_max: Option<&Bound<'py, PyAny>>,
+        invalid: &str,
+    ) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        let py = origins.py();
+        let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
+        let source = arrays.source()?;
+        let counts = py
+            .detach(|| {
+                answers(source.rays, 0, |batch, counts| {
+                    self.wide
+                        .count_hits(&batch_of(source, batch)?, counts);
+                    Ok(())
+                })
+            })
+            .map_err(invalid_ray)?;
+        Ok(counts.into_pyarray(py))
+    }
+
+    /// Returns whether each point, `(m, 3)`, is inside the mesh. The answer is exact for closed meshes; a
+    /// point on the surface may count as either.
+    ///
+    /// >>> tracer.contains([[0.5, 0.5, 1]])
+    /// array([False])
+    fn contains<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let py = points.py();
+        let points = self::points(points)?;
+        let inside = py.detach(|| {
+            of_points(&points, false, |points, inside| self.wide.contains(points, inside))
+        });
+        Ok(inside.into_pyarray(py))
+    }
+
+    /// Returns the closest points of the triangles to each point, `(m, 3)`, in `float64`, with the
+    /// triangles' indices and the distances. Among triangles at the same distance the lowest index wins. A
+    /// point that is not finite has NaN, −1 and infinity. Triangles without area do not count.
+    ///
+    /// >>> tracer.closest([[0.5, 0.25, 2]])
+    /// (array([[0.5 , 0.25, 0.  ]]), array([0], dtype=int32), array([2.]))
+    #[allow(clippy::type_complexity, reason = "three arrays")]
+    fn closest<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<f64>>)>
+    {
+        let py = points.py();
+        let points = self::points(points)?;
+        let (closest, objects, distances) = py.detach(|| {
+            let closest = of_points(&points, None, |points, closest| {
+                self.wide.closest_points(points, closest)
+            });
+            let mut positions = Vec::with_capacity(3 * points.len());
+            let mut objects = Vec::with_capacity(points.len());
+            let mut distances = Vec::with_capacity(points.len());
+            for closest in closest {
+                positions.extend(closest.map_or([f64::NAN; 3], |closest| closest.point.to_array()));
+                objects.push(closest.map_or(-1, |closest| closest.object as i32));
+                distances.push(closest.map_or(f64::INFINITY, |closest| closest.distance));
+            }
+            (positions, objects, distances)
+        });
+        let closest = closest
+            .into_pyarray(py)
+            .reshape([points.len(), 3])?;
+        Ok((closest, objects.into_pyarray(py), distances.into_pyarray(py)))
+    }
+
+    /// Returns the distance of each point, `(m, 3)`, from the triangles, negative for points that the mesh
+    /// contains.
+    ///
+    /// >>> tracer.signed_distance([[0.5, 0.25, 2]])
+    /// array([2.])
+    fn signed_distance<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let py = points.py();
+        let points = self::points(points)?;
+        let distances = py.detach(|| {
+            of_points(&points, 0.0, |points, distances| {
+                self.wide.signed_distances(points, distances);
+            })
+        });
+        Ok(distances.into_pyarray(py))
+    }
+
+    /// Returns the weights `u` and `v` of the second and third corner at hits, and the unit normals of the
+    /// triangles, on the side from which their corners run counterclockwise. `triangle` has one index per
+    /// ray; where it is −1 all numbers are 0.
+    ///
+    /// >>> tracer.surface([[0.5, 0.25, 3]], [[0, 0, -1]], [0])
+    /// (array([0.25]), array([0.25]), array([[0., 0., 1.]], dtype=float32))
+    #[allow(clippy::type_complexity, reason = "three arrays")]
+    fn surface<'py>(
+        &self,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        triangle: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f32>>)>
+    {
+        let py = origins.py();
+        let arrays = RayArrays::read(origins, directions, None, None, "miss")?;
+        let source = arrays.source()?;
+        let indices = py
+            .import("numpy")?
+            .call_method1("ascontiguousarray", (triangle, "int64"))?;
+        let indices: PyReadonlyArray1<i64> = indices.extract()?;
+        let indices = indices.as_slice()?;
+        let triangles = self.source.triangles().unwrap_or(&[]);
+        let is_index = |&index: &i64| (-1..triangles.len() as i64).contains(&index);
+        if indices.len() != source.rays || !indices.iter().all(is_index) {
+            let message =
+                format!("triangle: accepted: an index below {} per ray, or -1", triangles.len());
+            return Err(invalid(message));
+        }
+        let surfaces = py
+            .detach(|| {
+                answers(source.rays, ([0.0; 2], [0.0; 3]), |batch, surfaces| {
+                    let rays = batch_of(source, batch)?;
+                    for ((ray, &index), surface) in rays
+                        .iter()
+                        .zip(&indices[batch * BATCH..])
+                        .zip(surfaces)
+                    {
+                        if let Some(triangle) = triangles.get(index as usize) {
+                            let [_, u, v] = triangle.barycentrics(ray).unwrap_or_default();
+                            *surface = ([u, v], triangle.normal().unwrap_or_default().to_array());
+                        }
+                    }
+                    Ok(())
+                })
+            })
+            .map_err(invalid_ray)?;
+        let u: Vec<f64> = surfaces.iter().map(|([u, _], _)| *u).collect();
+        let v: Vec<f64> = surfaces.iter().map(|([_, v], _)| *v).collect();
+        let normals: Vec<f32> = surfaces
+            .iter()
+            .flat_map(|(_, normal)| *normal)
+            .collect();
+        let normals = normals
+            .into_pyarray(py)
+            .reshape([source.rays, 3])?;
+        Ok((u.into_pyarray(py), v.into_pyarray(py), normals))
+    }
+
+    fn __len__(&self) -> usize {
+        self.source.objects()
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Tree,))> {
+        let class = py.get_type::<Self>().into_any();
+        Ok((class, (Tree::shared(self.source.clone()),)))
     }
 }
 
-/// The distances and the indices of triangles.
-type Nearest<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i32>>);
+/// Returns the rays of a batch.
+fn batch_of(source: RaySource, batch: usize) -> Result<Vec<Ray>, (usize, InvalidRay)> {
+    let first = batch * BATCH;
+    source.rays(first..(first + BATCH).min(source.rays))
+}
+
+/// Returns one answer per ray; `answer` writes the answers of a batch.
+fn answers<T: Clone + Send + Sync>(
+    rays: usize,
+    filler: T,
+    answer: impl Fn(usize, &mut [T]) -> Result<(), (usize, InvalidRay)> + Sync,
+) -> Result<Vec<T>, (usize, InvalidRay)> {
+    let mut answers = vec![filler; rays];
+    answers
+        .par_chunks_mut(BATCH)
+        .enumerate()
+        .try_for_each(|(batch, answers)| answer(batch, answers))?;
+    Ok(answers)
+}
+
+/// Returns one answer per point; `answer` writes the answers of some points.
+fn of_points<T: Clone + Send + Sync>(
+    points: &[Vec3],
+    filler: T,
+    answer: impl Fn(&[Vec3], &mut [T]) + Sync,
+) -> Vec<T> {
+    let mut answers = vec![filler; points.len()];
+    let parts = points
+        .par_chunks(BATCH)
+        .zip(answers.par_chunks_mut(BATCH));
+    parts.for_each(|(points, answers)| answer(points, answers));
+    answers
+}
 
 fn coherence(coherent: bool) -> Coherence {
     if coherent { Coherence::Coherent } else { Coherence::Incoherent }
+}
+
+/// Returns the points, in `float64`, where rays cross the planes of triangles: `t`, the indices of
+/// triangles and the indices of rays are from `Tracer.all`. `triangles` has the shape `(n, 3, 3)`.
+#[pyfunction]
+pub fn locations<'py>(
+    triangles: PyReadonlyArray<'py, f64, Ix3>,
+    origins: PyReadonlyArray<'py, f64, Ix2>,
+    directions: PyReadonlyArray<'py, f64, Ix2>,
+    t: PyReadonlyArray1<'py, f32>,
+    triangle: PyReadonlyArray1<'py, i32>,
+    ray: PyReadonlyArray1<'py, i64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let py = triangles.py();
+    let (corners, _) = triangles.as_slice()?.as_chunks::<9>();
+    let (origins, _) = origins.as_slice()?.as_chunks::<3>();
+    let (directions, _) = directions.as_slice()?.as_chunks::<3>();
+    let triangle = triangle.as_slice()?;
+    let ray = ray.as_slice()?;
+    let t = t.as_slice()?;
+    let mut points = Vec::with_capacity(3 * t.len());
+    for ((&t, &triangle), &ray) in t.iter().zip(triangle).zip(ray) {
+        let missing = || invalid("locations: accepted: hits of these rays and triangles");
+        let &[ax, ay, az, bx, by, bz, cx, cy, cz] = corners
+            .get(triangle as usize)
+            .ok_or_else(missing)?;
+        let a = DVec3::new(ax, ay, az);
+        let normal = (DVec3::new(bx, by, bz) - a).cross(DVec3::new(cx, cy, cz) - a);
+        let origin = DVec3::from(*origins.get(ray as usize).ok_or_else(missing)?);
+        let direction = DVec3::from(*directions.get(ray as usize).ok_or_else(missing)?);
+        let exact = normal.dot(a - origin) / normal.dot(direction);
+        // Next to a plane that is nearly parallel, the distance in f32 is as good.
+        let rounded = f64::from(t);
+        let is_close = (exact - rounded).abs() <= 1e-4 * rounded.abs().max(1e-3);
+        let distance = if is_close { exact } else { rounded };
+        points.extend((origin + direction * distance).to_array());
+    }
+    points.into_pyarray(py).reshape([t.len(), 3])
 }

@@ -1,65 +1,143 @@
 //! The class `Tree`: trees over arrays, found, improved, measured, saved, loaded, and copied as
 //! nodes.
 
-use crate::arrays::{boxes, invalid, triangles};
-use crate::search::searched;
+use crate::arrays::{boxes, invalid, mesh, moved_mesh, segments, triangles};
+use crate::search::{Limits, searched};
 use bvh_files::WriteError;
 use bvh_files::tree_file::{self, TreeFileError};
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
-use bvh_search::{Objects, OwnedTree};
+use bvh_search::bvh_core::{Primitives, Segment};
+use bvh_search::prelude::{Aabb, Triangle, Vec3};
+use bvh_search::{FindError, Objects, Options, OwnedTree};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use std::fmt::Display;
 use std::io;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, TryLockError};
+use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
 
-/// A tree with its objects. `from_triangles`, `from_boxes` and `load` create trees; `len` is the
-/// number of objects.
+/// A tree with its objects. `from_mesh`, `from_triangles`, `from_boxes` and `load` create trees; `len`
+/// is the number of objects. Trees can be copied and pickled.
+///
+/// Searches have these arguments. They end after `seconds`, by default 1, or after `work` nodes
+/// created or visited. With `work` and without `seconds`, the same `seed` gives the same tree on every
+/// machine. `progress(seconds, cost)` is called about twenty times per second with the elapsed time and
+/// the lowest cost so far; if it raises an exception, the search ends. `rays` are recorded rays of the
+/// shape `(m, 2, 3)`, from their origins to their hits: the tree is then for rays like these.
+/// `references` above 1, up to 16, divides triangles among leaves, on average into that many parts
+/// each.
+///
+/// >>> from bvh_search import Tree
+/// >>> square = Tree.from_mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], work=100)
+/// >>> len(square)
+/// 2
 #[pyclass(frozen, module = "bvh_search")]
 pub struct Tree {
     /// The tree. A thread must not call Python while it holds this lock: Python may switch to a
     /// second thread, which would wait for the lock and never switch back.
-    owned: RwLock<OwnedTree>,
+    owned: RwLock<Arc<OwnedTree>>,
+    /// The corners of the triangles of a mesh.
+    faces: Option<Arc<Vec<[u32; 3]>>>,
     /// The lock of the thread that improves the tree.
     improving: Mutex<()>,
 }
 
 impl Tree {
     fn new(owned: OwnedTree) -> Self {
-        Self { owned: RwLock::new(owned), improving: Mutex::new(()) }
+        Self::shared(Arc::new(owned))
+    }
+
+    /// Returns a tree that shares its objects until one of the two changes.
+    pub fn shared(owned: Arc<OwnedTree>) -> Self {
+        Self { owned: RwLock::new(owned), faces: None, improving: Mutex::new(()) }
     }
 
     /// Returns the current tree.
-    pub fn owned(&self) -> RwLockReadGuard<'_, OwnedTree> {
+    pub fn owned(&self) -> Arc<OwnedTree> {
         // A poisoned lock still has a valid tree, because trees are replaced as a whole.
         self.owned
             .read()
             .unwrap_or_else(PoisonError::into_inner)
+            .clone()
+    }
+
+    /// Changes the tree.
+    fn change<T>(&self, change: impl FnOnce(&mut OwnedTree) -> T) -> T {
+        let mut owned = self
+            .owned
+            .write()
+            .unwrap_or_else(PoisonError::into_inner);
+        change(Arc::make_mut(&mut owned))
     }
 }
 
 #[pymethods]
 impl Tree {
-    /// Searches for the best tree over triangles, `(n, 3, 3)`, for about `seconds`. With
-    /// `references` above 1, up to 16, triangles may be divided among leaves, on average into that
-    /// many parts each.
+    /// Searches for the best tree over the triangles of a mesh: vertices, `(v, 3)`, and faces, `(n, 3)`,
+    /// of three vertices each. `update` moves the vertices later.
+    ///
+    /// >>> mesh = Tree.from_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], work=100)
     #[staticmethod]
-    #[pyo3(signature = (triangles, seconds = 1.0, *, references = 1.0))]
-    fn from_triangles(triangles: &Bound<PyAny>, seconds: f64, references: f64) -> PyResult<Self> {
-        if !(1.0..=16.0).contains(&references) {
-            return Err(invalid(format!("references is {references}; accepted: 1 to 16")));
-        }
-        found(triangles.py(), "triangles", self::triangles(triangles)?, references, seconds)
+    #[pyo3(signature = (vertices, faces, seconds = None, *, references = 1.0, seed = 1, work = None, progress = None, rays = None))]
+    #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
+    fn from_mesh(
+        vertices: &Bound<PyAny>,
+        faces: &Bound<PyAny>,
+        seconds: Option<f64>,
+        references: f64,
+        seed: u64,
+        work: Option<u64>,
+        progress: Option<Py<PyAny>>,
+        rays: Option<&Bound<PyAny>>,
+    ) -> PyResult<Self> {
+        let (objects, faces) = mesh(vertices, faces)?;
+        let limits = Limits { seconds, work, progress };
+        let rays = segments(rays)?;
+        let py = vertices.py();
+        let mut tree = found(py, "vertices", objects, references, seed, &rays, limits)?;
+        tree.faces = Some(Arc::new(faces));
+        Ok(tree)
     }
 
-    /// Searches for the best tree over boxes, `(n, 2, 3)` or `(n, 6)`, lower corners first, for
-    /// about `seconds`.
+    /// Searches for the best tree over triangles, `(n, 3, 3)`.
+    ///
+    /// >>> triangle = Tree.from_triangles([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], seconds=0.1)
     #[staticmethod]
-    #[pyo3(signature = (boxes, seconds = 1.0))]
-    fn from_boxes(boxes: &Bound<PyAny>, seconds: f64) -> PyResult<Self> {
-        found(boxes.py(), "boxes", self::boxes(boxes)?, 1.0, seconds)
+    #[pyo3(signature = (triangles, seconds = None, *, references = 1.0, seed = 1, work = None, progress = None, rays = None))]
+    #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
+    fn from_triangles(
+        triangles: &Bound<PyAny>,
+        seconds: Option<f64>,
+        references: f64,
+        seed: u64,
+        work: Option<u64>,
+        progress: Option<Py<PyAny>>,
+        rays: Option<&Bound<PyAny>>,
+    ) -> PyResult<Self> {
+        let objects = self::triangles(triangles)?;
+        let limits = Limits { seconds, work, progress };
+        let rays = segments(rays)?;
+        found(triangles.py(), "triangles", objects, references, seed, &rays, limits)
+    }
+
+    /// Searches for the best tree over boxes, `(n, 2, 3)` or `(n, 6)`, lower corners first.
+    ///
+    /// >>> two = Tree.from_boxes([[0, 0, 0, 1, 1, 1], [2, 0, 0, 3, 1, 1]], work=100)
+    #[staticmethod]
+    #[pyo3(signature = (boxes, seconds = None, *, seed = 1, work = None, progress = None, rays = None))]
+    fn from_boxes(
+        boxes: &Bound<PyAny>,
+        seconds: Option<f64>,
+        seed: u64,
+        work: Option<u64>,
+        progress: Option<Py<PyAny>>,
+        rays: Option<&Bound<PyAny>>,
+    ) -> PyResult<Self> {
+        let limits = Limits { seconds, work, progress };
+        let rays = segments(rays)?;
+        found(boxes.py(), "boxes", self::boxes(boxes)?, 1.0, seed, &rays, limits)
     }
 
     /// Loads the tree in a file. The triangles or boxes must be the ones that it was saved for.
@@ -93,27 +171,58 @@ impl Tree {
     /// Improves the tree for about `seconds`. Ctrl-C ends the search early, and the tree keeps its
     /// gains. Until the call returns, other threads see the old tree, and a second `improve` raises
     /// a `RuntimeError`.
-    #[pyo3(signature = (seconds = 1.0))]
-    fn improve(&self, py: Python, seconds: f64) -> PyResult<()> {
+    ///
+    /// >>> square.improve(work=1000)
+    #[pyo3(signature = (seconds = None, *, work = None, progress = None))]
+    fn improve(
+        &self,
+        py: Python,
+        seconds: Option<f64>,
+        work: Option<u64>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<()> {
         // Waiting for the lock here would block the interpreter and with it the other thread.
         let _improving = match self.improving.try_lock() {
             Ok(guard) => guard,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => return Err(PyRuntimeError::new_err(IMPROVING)),
         };
+        let owned = self.owned();
+        let limits = Limits { seconds, work, progress };
         let (improvement, raised) =
-            searched(py, seconds, |observer| self.owned().improvement(observer))?;
+            searched(py, limits, |budget, observer| owned.improvement_within(budget, observer))?;
+        drop(owned);
         let improvement = improvement.map_err(invalid)?;
         // The gains are applied before a KeyboardInterrupt is raised.
-        self.owned
-            .write()
-            .unwrap_or_else(PoisonError::into_inner)
-            .apply(improvement);
+        self.change(|owned| owned.apply(improvement));
         raised
+    }
+
+    /// Moves the vertices, `(v, 3)`, of a tree from `from_mesh`. The nodes remain and their boxes become
+    /// tight, in milliseconds; `improve` may find better nodes. Tracers of the tree do not change.
+    ///
+    /// >>> mesh.update([[0, 0, 1], [1, 0, 1], [0, 1, 1]])
+    fn update(&self, vertices: &Bound<PyAny>) -> PyResult<()> {
+        let Some(faces) = &self.faces else {
+            return Err(invalid("the tree has no faces; accepted: a tree from Tree.from_mesh"));
+        };
+        let objects = moved_mesh(vertices, faces)?;
+        let _improving = match self.improving.try_lock() {
+            Ok(guard) => guard,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => return Err(PyRuntimeError::new_err(IMPROVING)),
+        };
+        vertices
+            .py()
+            .detach(|| self.change(|owned| owned.refit(objects)))
+            .map_err(|error| invalid_argument("vertices", error))
     }
 
     /// Returns a cost of the tree: `internal_area`, which searches minimise, `goldsmith_salmon`,
     /// `sah` with both constants 1, or `layout`, the cost of a `Tracer`.
+    ///
+    /// >>> square.cost("sah") > 0
+    /// True
     #[pyo3(signature = (kind = "internal_area"))]
     fn cost(&self, kind: &str) -> PyResult<f64> {
         let objective = match kind {
@@ -132,6 +241,9 @@ impl Tree {
     /// Returns the nodes, the root first, as an array with the fields `min`, `first`, `max` and
     /// `count`. An inner node has the `count` 0, and its two children begin at `first`. The objects
     /// of a leaf are `object_ids()[first:first + count]`.
+    ///
+    /// >>> square.nodes()["max"][0]
+    /// array([1., 1., 0.], dtype=float32)
     fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         // numpy views the words as records, so that no field is converted.
         let words: Vec<u32> = bytemuck::cast_slice(&self.owned().tree().to_first_count()).to_vec();
@@ -147,9 +259,58 @@ impl Tree {
     }
 
     /// Returns the object ids, to which leaves refer by position.
+    ///
+    /// >>> sorted(square.object_ids().tolist())
+    /// [0, 1]
     fn object_ids<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
         let ids = self.owned().tree().prim_ids.clone();
         ids.into_pyarray(py)
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, State<'py>)> {
+        let owned = self.owned();
+        let bytes = |numbers: &[u8]| PyBytes::new(py, numbers);
+        let tree = owned.save().map_err(invalid)?;
+        let faces = self
+            .faces
+            .as_ref()
+            .map(|faces| bytes(bytemuck::cast_slice(faces)));
+        let (shape, objects) = match owned.triangles() {
+            Some(triangles) => ("triangles", bytes(bytemuck::cast_slice(triangles))),
+            None => ("boxes", bytes(bytemuck::cast_slice(owned.boxes()))),
+        };
+        let restore = py.get_type::<Self>().getattr("_restore")?;
+        Ok((restore, (shape, objects, bytes(&tree), faces)))
+    }
+
+    /// Makes the tree of a pickle.
+    #[staticmethod]
+    fn _restore(shape: &str, objects: &[u8], tree: &[u8], faces: Option<&[u8]>) -> PyResult<Self> {
+        let floats: Vec<[f32; 3]> = numbers(objects)?;
+        let corners: &[Vec3] = bytemuck::cast_slice(&floats);
+        let objects = match shape {
+            "triangles" => {
+                let (triangles, _) = corners.as_chunks();
+                Objects::Shapes(Primitives::Triangles(
+                    triangles.iter().copied().map(Triangle).collect(),
+                ))
+            }
+            _ => {
+                let (boxes, _) = corners.as_chunks();
+                Objects::Boxes(
+                    boxes
+                        .iter()
+                        .map(|&[min, max]| Aabb { min, max })
+                        .collect(),
+                )
+            }
+        };
+        let mut restored = Self::new(OwnedTree::load(objects, tree).map_err(invalid)?);
+        restored.faces = match faces {
+            Some(faces) => Some(Arc::new(numbers(faces)?)),
+            None => None,
+        };
+        Ok(restored)
     }
 
     fn __len__(&self) -> usize {
@@ -166,19 +327,39 @@ impl Tree {
 const IMPROVING: &str =
     "another thread is improving this tree; accepted: `improve` when its call has returned";
 
+/// The arguments that restore a tree: the kind of objects, the objects, the file and the faces.
+type State<'py> =
+    (&'static str, Bound<'py, PyBytes>, Bound<'py, PyBytes>, Option<Bound<'py, PyBytes>>);
+
+/// Reads numbers of a pickle, whose bytes may begin anywhere.
+fn numbers<T: bytemuck::AnyBitPattern>(bytes: &[u8]) -> PyResult<Vec<T>> {
+    bytes
+        .chunks(size_of::<T>())
+        .map(|bytes| bytemuck::try_pod_read_unaligned(bytes).map_err(invalid))
+        .collect()
+}
+
 fn found(
     py: Python,
     name: &str,
     objects: Objects,
     references: f64,
-    seconds: f64,
+    seed: u64,
+    rays: &[Segment],
+    limits: Limits,
 ) -> PyResult<Tree> {
-    let (found, raised) =
-        searched(py, seconds, |observer| OwnedTree::find(objects, references, observer))?;
+    if !(1.0..=16.0).contains(&references) {
+        return Err(invalid(format!("references is {references}; accepted: 1 to 16")));
+    }
+    let (found, raised) = searched(py, limits, |budget, observer| {
+        let options = Options { references, seed, budget, rays };
+        OwnedTree::find_with(objects, &options, observer)
+    })?;
     raised?;
-    found
-        .map(Tree::new)
-        .map_err(|error| invalid_argument(name, error))
+    found.map(Tree::new).map_err(|error| match error {
+        FindError::Rays(_) => invalid(error),
+        FindError::Search(_) => invalid_argument(name, error),
+    })
 }
 
 /// Creates the error of an argument with this name.

@@ -1,0 +1,150 @@
+"""A scene with the method names of Open3D's `RaycastingScene`."""
+
+import numpy as np
+
+from ._bvh_search import Tracer, Tree
+
+__all__ = ["RaycastingScene"]
+
+
+class RaycastingScene:
+    """Triangle meshes that answer rays and points, with the method names of
+    `open3d.t.geometry.RaycastingScene`.
+
+    Rays have the shape `(..., 6)`: origin, then direction. Points have the shape `(..., 3)`. Answers
+    are numpy arrays of the same leading shape. Geometries are numbered in the order of `add_triangles`.
+    The tree is found at the first query, in about `seconds`.
+
+    >>> from bvh_search import RaycastingScene
+    >>> scene = RaycastingScene(seconds=0.1)
+    >>> scene.add_triangles([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    0
+    >>> scene.cast_rays([[0.25, 0.25, 2, 0, 0, -1]])["t_hit"]
+    array([2.], dtype=float32)
+    """
+
+    INVALID_ID = 0xFFFFFFFF
+
+    def __init__(self, seconds=1.0):
+        self._seconds = seconds
+        self._triangles = []
+        self._made = None
+
+    def add_triangles(self, vertex_positions, triangle_indices=None):
+        """Adds a mesh and returns its geometry id. Accepts vertices and indices, or anything with
+        `vertices` and `faces`, such as a mesh of trimesh."""
+        if triangle_indices is None:
+            mesh = vertex_positions
+            vertex_positions, triangle_indices = mesh.vertices, mesh.faces
+        vertices = np.asarray(vertex_positions, dtype=np.float32)
+        triangles = vertices[np.asarray(triangle_indices, dtype=np.int64)]
+        self._triangles.append(triangles.reshape((-1, 3, 3)))
+        self._made = None
+        return len(self._triangles) - 1
+
+    def _scene(self):
+        if self._made is None:
+            triangles = np.concatenate([np.empty((0, 3, 3), np.float32), *self._triangles])
+            tracer = Tracer(Tree.from_triangles(triangles, self._seconds))
+            first = np.cumsum([0] + [len(part) for part in self._triangles])
+            self._made = tracer, first
+        return self._made
+
+    @staticmethod
+    def _split(rays):
+        rays = np.asarray(rays, dtype=np.float32)
+        flat = rays.reshape((-1, 6))
+        return rays.shape[:-1], flat[:, :3], flat[:, 3:]
+
+    def _ids(self, triangle, first):
+        """Returns the geometry ids and the primitive ids of triangles."""
+        geometry = np.searchsorted(first, triangle, side="right") - 1
+        hit = triangle >= 0
+        primitive = np.where(hit, triangle - first[np.where(hit, geometry, 0)], self.INVALID_ID)
+        geometry = np.where(hit, geometry, self.INVALID_ID)
+        return geometry.astype(np.uint32), primitive.astype(np.uint32)
+
+    def cast_rays(self, rays):
+        """Returns the nearest hits: `t_hit`, `geometry_ids`, `primitive_ids`, `primitive_uvs` and
+        `primitive_normals`."""
+        tracer, first = self._scene()
+        shape, origins, directions = self._split(rays)
+        t, triangle = tracer.nearest(origins, directions, coherent=True, invalid="miss")
+        u, v, normals = tracer.surface(origins, directions, triangle)
+        geometry, primitive = self._ids(triangle, first)
+        return {
+            "t_hit": t.reshape(shape),
+            "geometry_ids": geometry.reshape(shape),
+            "primitive_ids": primitive.reshape(shape),
+            "primitive_uvs": np.stack([u, v], axis=-1).astype(np.float32).reshape((*shape, 2)),
+            "primitive_normals": normals.reshape((*shape, 3)),
+        }
+
+    def test_occlusions(self, rays, tnear=0.0, tfar=np.inf):
+        """Returns whether each ray hits anything between `tnear` and `tfar`."""
+        shape, origins, directions = self._split(rays)
+        tracer, _ = self._scene()
+        hits = tracer.any(origins, directions, tnear, tfar, coherent=True, invalid="miss")
+        return hits.reshape(shape)
+
+    def count_intersections(self, rays):
+        """Returns the number of crossings of the surface by each ray."""
+        shape, origins, directions = self._split(rays)
+        counts = self._scene()[0].counts(origins, directions, invalid="miss")
+        return counts.astype(np.int32).reshape(shape)
+
+    def list_intersections(self, rays):
+        """Returns all crossings of the surface, ray after ray: `ray_splits`, `ray_ids`, `t_hit`,
+        `geometry_ids`, `primitive_ids` and `primitive_uvs`."""
+        tracer, first = self._scene()
+        _, origins, directions = self._split(rays)
+        t, triangle, ray = tracer.all(origins, directions, invalid="miss")
+        u, v, _ = tracer.surface(origins[ray], directions[ray], triangle)
+        geometry, primitive = self._ids(triangle, first)
+        return {
+            "ray_splits": np.searchsorted(ray, np.arange(len(origins) + 1)),
+            "ray_ids": ray,
+            "t_hit": t,
+            "geometry_ids": geometry,
+            "primitive_ids": primitive,
+            "primitive_uvs": np.stack([u, v], axis=-1).astype(np.float32),
+        }
+
+    @staticmethod
+    def _points(query_points):
+        points = np.asarray(query_points, dtype=np.float32)
+        return points.shape[:-1], points.reshape((-1, 3))
+
+    def compute_closest_points(self, query_points):
+        """Returns the closest points of the surface: `points`, `geometry_ids`, `primitive_ids`,
+        `primitive_uvs` and `primitive_normals`."""
+        tracer, first = self._scene()
+        shape, points = self._points(query_points)
+        closest, triangle, _ = tracer.closest(points)
+        geometry, primitive = self._ids(triangle, first)
+        # The weights and normals of a hit there, along any direction.
+        normals = tracer.surface(closest, np.ones_like(closest), triangle)[2]
+        u, v, _ = tracer.surface(closest, normals, triangle)
+        return {
+            "points": closest.astype(np.float32).reshape((*shape, 3)),
+            "geometry_ids": geometry.reshape(shape),
+            "primitive_ids": primitive.reshape(shape),
+            "primitive_uvs": np.stack([u, v], axis=-1).astype(np.float32).reshape((*shape, 2)),
+            "primitive_normals": normals.reshape((*shape, 3)),
+        }
+
+    def compute_distance(self, query_points):
+        """Returns the distances of points from the surface."""
+        shape, points = self._points(query_points)
+        return self._scene()[0].closest(points)[2].astype(np.float32).reshape(shape)
+
+    def compute_signed_distance(self, query_points):
+        """Returns the distances of points from the surface, negative inside; the sign follows from the
+        parity of crossings."""
+        shape, points = self._points(query_points)
+        return self._scene()[0].signed_distance(points).astype(np.float32).reshape(shape)
+
+    def compute_occupancy(self, query_points):
+        """Returns 1 for points inside the surface and 0 for others."""
+        shape, points = self._points(query_points)
+        return self._scene()[0].contains(points).astype(np.float32).reshape(shape)

@@ -1,0 +1,64 @@
+"""Compares the ray queries of trimesh with its own engine in Python."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+trimesh = pytest.importorskip("trimesh")
+
+from bvh_search.trimesh import RayMeshIntersector  # noqa: E402
+
+RANDOM = np.random.default_rng(12)
+
+
+def meshes():
+    far = trimesh.creation.icosphere(subdivisions=2)
+    far.apply_translation([1e6, -2e6, 5e5])
+    return [trimesh.creation.box(), trimesh.creation.icosphere(subdivisions=3), trimesh.creation.torus(2, 0.5), far]
+
+
+def rays_of(mesh, count=300):
+    origins = mesh.bounds.mean(axis=0) + RANDOM.normal(size=(count, 3)) * mesh.extents.max()
+    targets = mesh.bounds.mean(axis=0) + RANDOM.uniform(-0.6, 0.6, (count, 3)) * mesh.extents
+    return origins, targets - origins
+
+
+@pytest.mark.parametrize("mesh", meshes())
+def test_answers_are_those_of_the_python_engine(mesh):
+    pytest.importorskip("rtree")
+    from trimesh.ray.ray_triangle import RayMeshIntersector as Python
+
+    ours, python = RayMeshIntersector(mesh), Python(mesh)
+    origins, directions = rays_of(mesh)
+    first = ours.intersects_first(origins, directions)
+    np.testing.assert_array_equal(first, python.intersects_first(origins, directions))
+    np.testing.assert_array_equal(ours.intersects_any(origins, directions), first >= 0)
+    locations, index_ray, index_tri = ours.intersects_location(origins, directions)
+    order = np.lexsort((index_tri, index_ray))
+    theirs, their_ray, their_tri = python.intersects_location(origins, directions)
+    their_order = np.lexsort((their_tri, their_ray))
+    np.testing.assert_array_equal(index_ray[order], their_ray[their_order])
+    np.testing.assert_array_equal(index_tri[order], their_tri[their_order])
+    np.testing.assert_allclose(locations[order], theirs[their_order], rtol=1e-9, atol=1e-6 * mesh.scale)
+    points = mesh.bounds.mean(axis=0) + RANDOM.uniform(-0.6, 0.6, (300, 3)) * mesh.extents
+    np.testing.assert_array_equal(ours.contains_points(points), python.contains_points(points))
+    index_tri, index_ray = ours.intersects_id(origins, directions, multiple_hits=False)
+    np.testing.assert_array_equal(index_tri, first[index_ray])
+    index_tri, index_ray = ours.intersects_id(origins, directions, max_hits=1)
+    np.testing.assert_array_equal(index_ray, np.nonzero(first >= 0)[0])
+
+
+def test_an_engine_follows_its_mesh_and_is_copied():
+    mesh = trimesh.creation.box()
+    mesh.ray = RayMeshIntersector(mesh)
+    above, down = [[0.1, 0.2, 5]], [[0, 0, -1]]
+    assert mesh.ray.intersects_location(above, down, multiple_hits=False)[0].tolist() == [[0.1, 0.2, 0.5]]
+    mesh.apply_scale(2)
+    assert mesh.ray.intersects_location(above, down, multiple_hits=False)[0].tolist() == [[0.1, 0.2, 1]]
+    assert mesh.contains([[0, 0, 0.9]]).tolist() == [True]
+    for twin in (copy.copy(mesh.ray), copy.deepcopy(mesh.ray), pickle.loads(pickle.dumps(mesh.ray))):
+        assert twin.intersects_any(above, down).tolist() == [True]
+    assert mesh.ray.intersects_first([[0, 0, 5]] * 2, [[0, 0, 0], [np.nan, 0, 1]]).tolist() == [-1, -1]
+    assert mesh.ray.intersects_first(np.empty((0, 3)), np.empty((0, 3))).shape == (0,)
