@@ -10,10 +10,8 @@
 //         origin, t_min, direction (a unit vector), t_max
 //   out:  f64 seconds for each part, then f32 for each ray: the distance of its hit, or infinity; for any hit 0 or infinity
 //
-// and so on until the input ends. `ray_peers "tinybvh tree splits"` answers the mesh with f64 seconds, u32 nodes,
-// u32 references, the nodes of 32 bytes each and the triangle of every reference as u32. The rays of a picture go from one
-// point through its pixels, which are in Morton order from the upper left corner in right-handed coordinates. Only
-// tinybvh's packets make use of it.
+// and so on until the input ends. The rays of a picture go from one point through its pixels, which are in Morton order
+// from the upper left corner in right-handed coordinates. Only tinybvh's packets make use of it.
 
 #define TINYBVH_IMPLEMENTATION
 #include "tiny_bvh.h"
@@ -377,28 +375,9 @@ int serve(const Mode &mode) {
     return 0;
 }
 
-/// Hands out tinybvh's tree with spatial splits, for its cost.
-int split_tree() {
-    std::vector<uint32_t> triangles(1);
-    if (!read(triangles)) return 1;
-    std::vector<float> corners(9 * size_t(triangles[0]));
-    if (!read(corners)) return 1;
-    std::vector<tinybvh::bvhvec4> vertices = padded(corners);
-    tinybvh::BVH tree;
-    double start = now();
-    tree.BuildHQ(vertices.data(), triangles[0]);
-    write(std::vector<double>{now() - start});
-    write(std::vector<uint32_t>{tree.usedNodes, tree.idxCount});
-    static_assert(sizeof(*tree.bvhNode) == 32);
-    fwrite(tree.bvhNode, sizeof(*tree.bvhNode), tree.usedNodes, stdout);
-    fwrite(tree.primIdx, sizeof(*tree.primIdx), tree.idxCount, stdout);
-    return fflush(stdout);
-}
-
 } // namespace
 
 int main(int argc, char **argv) {
-    if (argc > 1 && !strcmp(argv[1], "tinybvh tree splits")) return split_tree();
     if (argc < 2) {
         ssize_t embree = rtcGetDeviceProperty(rtcNewDevice(EMBREE_CONFIG), 0);
         for (const Mode &mode : MODES) {

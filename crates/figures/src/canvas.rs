@@ -19,7 +19,7 @@ pub(super) const STEPS: f64 = 4.0;
 /// plotters' SVG backend divides font sizes by this.
 pub(super) const FONT_SIZE: f64 = 1.24;
 
-/// What can be drawn. The layout comes first, because the size of the sheet follows from it.
+/// A drawing. It computes its layout first, because the size of the sheet follows from it.
 pub trait Picture {
     /// Says what is shown, for readers who cannot see it.
     fn title(&self) -> &str;
@@ -35,7 +35,7 @@ pub trait Layout {
     fn draw<B: DrawingBackend>(&self, sheet: &Sheet<B>) -> Result<(), Fault<B>>;
 }
 
-/// What plotters refused.
+/// An error of plotters.
 pub type Fault<B> = DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>;
 
 /// How a text lies with respect to its point; always centred across the line.

@@ -135,7 +135,7 @@ impl<'a> Plan<'a> {
         fonts: &Fonts,
     ) -> Self {
         let room = whole - 2.0 * BORDER;
-        // What stands beside the plots leaves their width, and that decides on what stands below them.
+        // Labels next to the plots determine the width left for them, and with it the lines below.
         let mut plots: Vec<Plot> = panels
             .iter()
             .map(|panel| Plot::new(panel, height, fonts))

@@ -1,4 +1,4 @@
-//! What a figure is: panels, axes and layers of data series, in data units and without any layout.
+//! The parts of a figure: panels, axes and layers of data series, in data units, without layout.
 
 use thiserror::Error;
 
@@ -48,7 +48,7 @@ pub struct Panel {
     pub layers: Vec<Layer>,
 }
 
-/// What is measured along one side of a panel, and which part of it is shown.
+/// The quantity along one side of a panel, and the part of it that is shown.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Axis {
     /// Name and unit, such as `time (s)`. A power of ten common to all ticks is appended to it.
@@ -110,11 +110,11 @@ impl Axis {
 pub struct Layer {
     /// The series, or what the legend calls the reference line. An empty name has no legend entry.
     pub name: String,
-    /// What is drawn.
+    /// The marks.
     pub marks: Marks,
 }
 
-/// What a layer draws. Coordinates are data units; points an axis cannot show (non-finite, or not
+/// The marks of a layer. Coordinates are data units; points an axis cannot show (non-finite, or not
 /// positive on a logarithmic axis) are skipped and interrupt a line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Marks {
@@ -184,7 +184,7 @@ pub struct HeatMap {
     pub title: String,
     /// Printed under the title; wrapped.
     pub caption: String,
-    /// What the rows are, such as `case`; may be empty.
+    /// The kind of the rows, such as `case`; may be empty.
     pub row_label: String,
     /// One name per row, from the top.
     pub rows: Vec<String>,
@@ -192,7 +192,7 @@ pub struct HeatMap {
     pub columns: Vec<String>,
     /// `rows.len() * columns.len()` cells, row by row.
     pub cells: Vec<Cell>,
-    /// What the colours mean, from best to worst; at most five.
+    /// The meanings of the colours, from best to worst; at most five.
     pub classes: Vec<String>,
 }
 

@@ -76,9 +76,6 @@ bvh_config::config! { serde;
         /// Limits of the method's runs; the lower of this and the experiment's limit applies.
         /// Default none.
         budget: Option<Budget>;
-        /// Seconds that each run of the method may take; the lower of this and the experiment's
-        /// `max_seconds` applies. Default none.
-        max_seconds: Option<f64>, in 0.001..=1e6;
         /// Steps that the method's runs perform although the scene does not need them, to measure
         /// the savings of skipping them. Default none.
         #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -49,9 +49,9 @@ pub enum Error {
     /// Rays cannot be traced through this scene.
     #[error("scene {scene}, tracing: {message}")]
     Tracing { scene: String, message: String },
-    /// A step that was skipped as unnecessary has changed a cost: a defect of the method.
-    #[error("scene {scene}: {message}; please report this")]
-    Ablation { scene: String, message: String },
+    /// A query of a report that the rows of a file cannot answer, or whose answer is not accepted.
+    #[error("{}: {message}", .path.display())]
+    Query { path: PathBuf, message: String },
     /// A method returned something that is not a tree over the scene: a defect of the method.
     #[error(
         "scene {scene}, method {method} returned an invalid tree: {source}; please report this"

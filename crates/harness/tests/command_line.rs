@@ -6,7 +6,7 @@ mod support;
 use std::fs;
 use std::path::Path;
 use support::{
-    begin, ended, folder_with, names, refused, reproducible, rows, run, said, send, text, wait_for,
+    begin, ended, folder_with, refused, reproducible, rows, run, said, send, text, wait_for,
 };
 
 const SPEC: &str = "
@@ -378,41 +378,23 @@ fn a_mistyped_command_is_answered_with_the_one_that_is_meant() {
 }
 
 #[test]
-fn runs_that_the_clock_ends_leave_rows_among_the_timings_alone_and_checks_do_not_compare_them() {
-    let spec = "question = 'How low in a moment?'\nscenes = ['escher']\nsequential = true\nmax_seconds = 0.05\n\
-                methods = [{ method = 'best', references = 1.2 }]\ntinybvh = 'nowhere/ray_peers'\n";
-    let folder = folder_with("clock.toml", spec);
-    let first = said(folder.path(), &["clock.toml"]);
-    assert!(
-        first.contains("collapsed_sah") && first.contains("Without tinybvh: nowhere/ray_peers"),
-        "{first}"
-    );
-    let results = folder.path().join("results/clock");
-    let mut names = names(&results);
-    names.retain(|name| !name.starts_with('.'));
-    let timings = ["timing_report.txt", "timing_runs.csv", "timing_runs.svg"];
-    assert_eq!(names, [&["provenance.toml", "resolved.toml"][..], &timings].concat());
-    let runs = results.join("timing_runs.csv");
-    let seconds: f64 = rows(&runs)[0]["seconds"].parse().unwrap();
-    // The bounds are wide for busy machines; without the limit, `best` takes hours.
-    assert!((0.05..20.0).contains(&seconds), "{seconds}");
-
-    // Different costs are no difference between time-limited runs, but a different spec is.
-    fs::write(
-        &runs,
-        fs::read_to_string(&runs)
-            .unwrap()
-            .replace('1', "2"),
-    )
-    .unwrap();
-    let check = said(folder.path(), &["--check", "clock.toml"]);
-    assert!(check.contains("cannot be compared"), "{check}");
-    fs::write(folder.path().join("clock.toml"), spec.replace("1.2", "1.3")).unwrap();
-    let check = run(folder.path(), &["--check", "clock.toml"]);
-    assert_eq!(check.status.code(), Some(1));
-    assert!(
-        text(&check.stdout).contains("references is 1.3, committed 1.2"),
-        "{}",
-        text(&check.stdout)
-    );
+fn a_redraw_that_fails_leaves_finished_results() {
+    let spec = "question = 'q'\nscenes = ['spheres75']\nmethods = [{ method = 'median_cut' }]\n";
+    let report = "[[reports]]\nkind = 'query'\nfile = 'x'\nrows = 'runs.csv'\nby = ['scene']\n\
+                  columns = [{ name = 'a', value = 'only COLUMN' }]\n";
+    let folder = folder_with("plain.toml", spec);
+    let path = folder.path();
+    said(path, &["plain.toml"]);
+    let resolved = path.join("results/plain/resolved.toml");
+    let before = fs::read(&resolved).unwrap();
+    fs::write(path.join("plain.toml"), format!("{spec}{report}")).unwrap();
+    let parts = ["results/plain/runs.csv", "no column \"COLUMN\"", "cost_over_base"];
+    refused(path, &["plain.toml", "--redraw"], 1, &parts);
+    assert!(!path.join("results/plain/.partial").exists());
+    assert!(fs::read(&resolved).unwrap() == before);
+    let report = report.replace("COLUMN", "objects");
+    fs::write(path.join("plain.toml"), format!("{spec}{report}")).unwrap();
+    said(path, &["plain.toml", "--redraw"]);
+    let table = fs::read_to_string(path.join("results/plain/x.csv")).unwrap();
+    assert_eq!(table, "scene,a\nspheres75,75\n");
 }

@@ -297,7 +297,7 @@ fn every_case_holds_with_the_visits_of_rays_instead_of_area() {
         validate(&outcome.tree, &boxes).unwrap();
         assert!(outcome.cost <= problem.cost(&start), "{}: a worse tree", case.id);
         assert_reported(case.id, outcome.cost, problem.cost(&outcome.tree));
-        // What is saved can be loaded, and every ray has its right answer in the layout for these
+        // A saved tree can be loaded, and every ray has its right answer in the layout for these
         // rays.
         let visits = density.visits(&outcome.tree);
         let bytes = file::save(

@@ -10,7 +10,7 @@ use alloc::{vec, vec::Vec};
 
 /// Expected time of visiting a wide node: the unit.
 pub(crate) const NODE_COST: f32 = 1.0;
-/// Expected time of testing a block. Half of it and twice of it make no rays faster: `experiments/block_cost.toml`.
+/// Expected time of testing a block. Rays were no faster with half of it or twice as much.
 pub(crate) const BLOCK_COST: f32 = 1.0;
 
 /// How a subtree becomes children of a wide node.

@@ -18,6 +18,7 @@ pub fn page() -> String {
          Every column of every CSV file that the harness writes; generated from the declarations of\n\
          the rows by `UPDATE_DOCS=1 cargo test -p harness --test docs`. Files whose names begin with\n\
          `timing` hold numbers that differ from run to run. An empty cell means that the number does\n\
-         not exist. FILE is a placeholder for a name that the spec chooses.\n{sections}"
+         not exist. FILE is a placeholder for a name that the spec chooses. The columns of a report of the\n\
+         kind `query` are in its spec.\n{sections}"
     )
 }

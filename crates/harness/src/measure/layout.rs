@@ -26,10 +26,6 @@ pub enum Layout {
     WideBatches,
     /// A second copy of `WideBatches`; its times differ from the first copy's only by noise.
     WideBatchesAgain,
-    /// `WideBatches`, laid out as if a block of triangles took half the time of a node.
-    WideCheapBlocks,
-    /// `WideBatches`, laid out as if a block of triangles took twice the time of a node.
-    WideDearBlocks,
     /// [`WideBvh`] with portable code.
     WidePortable,
 }
@@ -89,8 +85,6 @@ impl Layout {
             Self::WideAgain => "wide, again",
             Self::WideBatches => "wide, batches",
             Self::WideBatchesAgain => "wide, batches, again",
-            Self::WideCheapBlocks => "wide, cheap blocks",
-            Self::WideDearBlocks => "wide, dear blocks",
             Self::WidePortable => "wide, portable",
         }
     }
@@ -98,11 +92,6 @@ impl Layout {
     /// Returns true if the vector kernels trace the layout.
     fn has_kernels(self) -> bool {
         !matches!(self, Self::Binary | Self::BinaryLeaves | Self::WidePortable)
-    }
-
-    /// Returns true if the layout is always made for random lines, whatever rays the tree is for.
-    pub fn is_for_lines(self) -> bool {
-        matches!(self, Self::WideCheapBlocks | Self::WideDearBlocks)
     }
 }
 
@@ -168,8 +157,6 @@ fn own_contender<'a>(
     let start = Instant::now();
     let wide = match layout {
         Layout::Binary | Layout::BinaryLeaves => None,
-        Layout::WideCheapBlocks => Some(WideBvh::with_block_cost(tree, triangles, 0.5)),
-        Layout::WideDearBlocks => Some(WideBvh::with_block_cost(tree, triangles, 2.0)),
         _ => Some(widened(tree, triangles, visits)),
     };
     let tracer = match wide {

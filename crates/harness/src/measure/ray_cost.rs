@@ -1,11 +1,9 @@
 //! Trees for the rays that will be traced: the density of the rays that a tree is trained on, and
 //! the tests of other rays, of the same kind or of another camera, in it.
 
-use super::contender::timed;
-use crate::statistics::minimum;
 use bvh_build::{Builder, muller_fellner};
 use bvh_config::{OutOfRange, config};
-use bvh_core::{Bvh, Hit, Ray, RayDensity, TestCounts, WideBvh};
+use bvh_core::{Bvh, Ray, RayDensity, TestCounts, WideBvh};
 use bvh_scenes::Scene;
 use bvh_scenes::rays::{
     Family, Kind, OF_ANYTHING, Pose, RenderedRays, TRAINED, TracedRay, Viewpoint, check_count,
@@ -49,8 +47,6 @@ config! {
         count: u32 = 50_000, in 0..=10_000_000;
         /// Primary rays that trees are trained on; without a camera, rays of each family.
         trained: u32 = TRAINED, in 1..;
-        /// Rounds of timed rays; with 0, tests are only counted.
-        rounds: u32 = 3;
         /// Cameras by scene; scenes without an entry are seen from outside.
         cameras: BTreeMap<String, Cameras>;
         /// Rays whose visits cost every tree, which is then also tested singly, for reports of
@@ -220,37 +216,6 @@ impl TestRays {
             counts.objects as f64 / (WideBvh::OBJECTS_OF_BLOCK as f64 * rays),
         ]
     }
-
-    /// Returns the million rays per second through each of the layouts, in interleaved rounds. Each
-    /// part of the rays counts with its fastest round.
-    pub fn speeds(&self, layouts: &[&WideBvh], rounds: u32) -> Vec<f64> {
-        let mut hits: Vec<Option<Hit>> = vec![None; self.rays.len()];
-        let mut turns: Vec<Vec<Vec<f64>>> = vec![Vec::new(); layouts.len()];
-        for _ in 0..rounds {
-            for (wide, turns) in layouts.iter().zip(&mut turns) {
-                turns.push(if self.kind == Kind::Shadow {
-                    timed(&self.rays, &mut hits, |ray| {
-                        wide.any_hit(ray)
-                            .then_some(super::answers::SOME_HIT)
-                    })
-                } else {
-                    timed(&self.rays, &mut hits, |ray| wide.nearest_hit(ray))
-                });
-            }
-        }
-        let seconds = turns.iter().map(|turns| fastest_seconds(turns));
-        seconds
-            .map(|seconds| self.rays.len() as f64 / seconds / 1e6)
-            .collect()
-    }
-}
-
-/// Sums the shortest time of each part. `turns` holds the seconds of each part for each round.
-fn fastest_seconds(turns: &[Vec<f64>]) -> f64 {
-    let parts = turns.first().map_or(0, Vec::len);
-    (0..parts)
-        .filter_map(|part| minimum(turns.iter().map(|turn| turn[part])))
-        .sum()
 }
 
 #[cfg(test)]
@@ -283,7 +248,5 @@ mod tests {
                 .sum::<f64>()
         });
         assert!(trained_tests < plain_tests, "{trained_tests} {plain_tests}");
-        let speeds = test_rays[0].speeds(&[&plain, &trained], 2);
-        assert!(speeds.iter().all(|speed| *speed > 0.0), "{speeds:?}");
     }
 }

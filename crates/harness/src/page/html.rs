@@ -1,4 +1,5 @@
-//! The page as HTML: one file that needs neither scripts nor others, but leads to the files that it was made from.
+//! The page as HTML: one file that needs neither scripts nor others, but leads to the files that it
+//! was made from.
 
 use super::{Drawing, Link, Section, Verdict};
 use crate::report::output::Output;
@@ -211,8 +212,8 @@ fn drawing(svg: &str) -> &str {
     svg.find("<svg").map_or("", |start| &svg[start..])
 }
 
-/// A table in a box of its own, which scrolls where the page would become too wide or the table too long. The first cell of
-/// a row names it.
+/// A table in a box of its own, which scrolls where the page would become too wide or the table too
+/// long. The first cell of a row names it.
 fn table(explanation: &str, table: &Table) -> String {
     let cells = |row: &Row| {
         row.cell_iter()

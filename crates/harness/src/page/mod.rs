@@ -19,25 +19,26 @@ use std::path::{Component, Path, PathBuf};
 struct Section {
     name: String,
     question: String,
-    /// What its rows come to.
+    /// The verdict on its rows.
     verdict: Verdict,
     stand_ins: bool,
     /// Whether it reproduces something of the paper's.
     of_paper: bool,
-    /// What the reports make of the rows.
+    /// The outputs of its reports.
     outputs: Vec<Output>,
     /// The figures in the folder, those of the first report first.
     figures: Vec<Drawing>,
     /// The first figure's first panel, small; of a figure without panels nothing.
     miniature: Option<String>,
-    /// Spec, resolved spec and provenance: what it is called, and where it is as seen from the page.
+    /// Spec, resolved spec and provenance: what it is called, and where it is as seen from the
+    /// page.
     specs: Vec<Link>,
     /// The rows.
     tables: Vec<Link>,
     provenance: Provenance,
 }
 
-/// What an experiment comes to, by a rule that the page states.
+/// The conclusion of an experiment, by a rule that the page states.
 enum Verdict {
     Paper(Outcome, String),
     Reading(String),
@@ -57,8 +58,8 @@ struct Link {
     to: String,
 }
 
-/// Writes a page of all finished experiments in `results` to `out`, without quick variants and the repetitions that lie
-/// beside others. Returns the number of experiments.
+/// Writes a page of all finished experiments in `results` to `out`, without quick variants and the
+/// repetitions that lie beside others. Returns the number of experiments.
 pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
     let mut names = files::names(results)?;
     names.retain(|name| results.join(name).join("resolved.toml").is_file());
@@ -76,13 +77,14 @@ pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
             results.display()
         )));
     }
-    // What the paper has comes first.
+    // The paper's experiments come first.
     sections.sort_by(|a, b| (!a.of_paper, &a.name).cmp(&(!b.of_paper, &b.name)));
     files::write(out, html::page(&sections).as_bytes())?;
     Ok(sections.len())
 }
 
-/// Reads what an experiment has written, and makes its reports again, which read CSV files only. Runs nothing.
+/// Reads what an experiment has written, and makes its reports again, which read CSV files only.
+/// Runs nothing.
 fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
     let folder = results.join(name);
     let Resolved { experiment, scenes } = read_toml(&folder.join("resolved.toml"))?;
@@ -149,7 +151,8 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
     })
 }
 
-/// Returns the verdict and the answers where numbers are next to the paper's, otherwise the first report's reading of its own.
+/// Returns the verdict and the answers where numbers are next to the paper's, otherwise the first
+/// report's reading of its own.
 fn verdict(outputs: &[Output]) -> Verdict {
     let compared = outputs
         .iter()

@@ -6,11 +6,10 @@
 //! alternate in one run.
 
 use crate::measure::contender::{Batch, Contender, PART, Tracer};
-use bvh_core::{Bvh, FirstCountNode, Hit, Triangle};
+use bvh_core::{Hit, Triangle};
 use bvh_scenes::Scene;
 use bvh_scenes::trace::Query;
 use std::cell::RefCell;
-use std::error::Error;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
@@ -91,43 +90,6 @@ pub fn contenders(
         contenders.push((mode.library, contender));
     }
     Ok(contenders)
-}
-
-/// Returns tinybvh's tree with spatial splits over the scene's triangles, with its leaves and
-/// boxes, and the seconds of its build.
-///
-/// # Errors
-///
-/// If the program cannot be started or its output is malformed.
-pub fn split_tree(program: &Path, scene: &Scene) -> Result<(Bvh, f64), String> {
-    let triangles = scene
-        .triangles()
-        .map_err(|error| error.to_string())?;
-    read_split_tree(program, triangles).map_err(|error| {
-        let program = program.display();
-        format!("{program} \"{SPLIT_TREE}\": {error}; scripts/ray-peers/build makes it again")
-    })
-}
-
-/// The argument for a tree. It is not a mode, because it traces nothing.
-const SPLIT_TREE: &str = "tinybvh tree splits";
-
-fn read_split_tree(program: &Path, triangles: &[Triangle]) -> Result<(Bvh, f64), Box<dyn Error>> {
-    let (mut process, seconds) = Process::start(program, SPLIT_TREE, triangles)?;
-    let (nodes, ids) = read_nodes(&mut process.answers)?;
-    Ok((Bvh::from_first_count(&nodes, &ids)?, seconds))
-}
-
-/// Reads the number of nodes, the number of references, the nodes and the references of a tree.
-fn read_nodes(reader: &mut impl Read) -> io::Result<(Vec<FirstCountNode>, Vec<u32>)> {
-    let mut counts = [0u32; 2];
-    reader.read_exact(bytemuck::cast_slice_mut(&mut counts))?;
-    let [node_count, id_count] = counts.map(|count| count as usize);
-    let mut nodes = vec![FirstCountNode::default(); node_count];
-    let mut ids = vec![0u32; id_count];
-    reader.read_exact(bytemuck::cast_slice_mut(&mut nodes))?;
-    reader.read_exact(bytemuck::cast_slice_mut(&mut ids))?;
-    Ok((nodes, ids))
 }
 
 /// The program in one mode, with one scene.
@@ -255,27 +217,6 @@ mod tests {
         let hit = |t| Some(Hit { t, object: 0 });
         assert_eq!(hits, [hit(2.5), None, hit(0.0)]);
         assert!(answer(&mut &received[1..], &mut hits).is_err(), "an answer that is cut short");
-    }
-
-    #[test]
-    fn a_tree_is_read_from_its_nodes_and_a_truncated_one_is_rejected() {
-        let aabb = bvh_core::Aabb::from([[0.0; 3], [1.0; 3]]);
-        let nodes = vec![
-            bvh_core::Node::inner(aabb, 1, 2),
-            bvh_core::Node::leaf(aabb, 0, 2),
-            bvh_core::Node::leaf(aabb, 2, 1),
-        ];
-        let tree = Bvh { nodes, prim_ids: vec![1, 0, 1] };
-        let nodes = tree.to_first_count_aligned();
-        let ids = &tree.prim_ids;
-        let mut sent = [nodes.len() as u32, ids.len() as u32]
-            .map(u32::to_le_bytes)
-            .concat();
-        sent.extend_from_slice(bytemuck::cast_slice(&nodes));
-        sent.extend_from_slice(bytemuck::cast_slice(ids));
-        let (nodes, ids) = read_nodes(&mut &sent[..]).unwrap();
-        assert_eq!(Bvh::from_first_count(&nodes, &ids), Ok(tree));
-        assert!(read_nodes(&mut &sent[..sent.len() - 1]).is_err());
     }
 
     #[test]

@@ -1,17 +1,18 @@
-//! Error against run time: the gap of the incumbent to the exact optimum or the best known cost, along all three axes.
+//! Error against run time: the gap of the incumbent to the exact optimum or the best known cost,
+//! along all three axes.
 
+use super::config::check_file;
 use super::data::ratio;
-use super::metric::Metric;
 use super::output::text_table;
 use super::prelude::*;
-use super::progress::{ProgressAxis, Series, series};
+use super::progress::{ProgressAxis, Series, WORST, series};
 use crate::statistics::{median, quartiles, range};
 use bvh_config::{OutOfRange, above};
 
 bvh_config::config! { serde;
     /// Error against run time.
     pub struct Config {
-        /// What it belongs to.
+        /// The section or topic that it belongs to.
         source: String;
         /// Heading.
         title: String;
@@ -27,8 +28,9 @@ bvh_config::config! { serde;
     check Self::check_names;
 }
 
-/// One corner of a curve, which is flat up to the next, or its end, as written to `timing_FILE.csv`, `FILE_evaluations.csv` and
-/// `FILE_work.csv`, where FILE is `anytime` unless the report says otherwise.
+/// One corner of a curve, which is flat up to the next, or its end, as written to
+/// `timing_FILE.csv`, `FILE_evaluations.csv` and `FILE_work.csv`, where FILE is `anytime` unless
+/// the report says otherwise.
 #[derive(Clone, Copy, Serialize, JsonSchema)]
 pub(super) struct Point<'a> {
     scene: &'a str,
@@ -65,7 +67,12 @@ impl Config {
                     layers.extend(draw(method, &own));
                     points.extend(own);
                 }
-                panels.push(panel(rows.shown(scene), axis.axis(), Metric::Gap.axis(), layers));
+                panels.push(panel(
+                    rows.shown(scene),
+                    axis.axis(),
+                    Axis::log("gap to the best known"),
+                    layers,
+                ));
             }
             output.add_figure(axis.file(&self.file), caption, self.panels_per_row, panels);
             axis.add_csv(&mut output, &self.file, &corners(&points))?;
@@ -80,12 +87,7 @@ impl Config {
         let falls = falls.then(|| {
             OutOfRange::new("at_seconds", format!("{:?}", self.at_seconds), "ascending numbers")
         });
-        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        let is_odd = self.file.is_empty() || !self.file.chars().all(plain);
-        let is_odd = is_odd.then(|| {
-            OutOfRange::new("file", format!("{:?}", self.file), "letters, digits, - and _")
-        });
-        falls.into_iter().chain(is_odd)
+        falls.into_iter().chain(check_file(&self.file))
     }
 
     /// Which methods end lowest, on how many scenes, and how far below the greedy tree.
@@ -153,7 +155,8 @@ fn percent(ratio: f64) -> String {
     format!("{:+.2} %", 100.0 * (ratio - 1.0))
 }
 
-/// What the incumbents of all runs cost then, the worst where a run has none yet: so their median never rises.
+/// Returns the costs of the incumbents of all runs at `at`, the worst cost where a run has none
+/// yet, so that their median never rises.
 fn incumbents(runs: &[Series], at: f64) -> Vec<f64> {
     let incumbent = |run: &Series| {
         run.iter()
@@ -162,11 +165,12 @@ fn incumbents(runs: &[Series], at: f64) -> Vec<f64> {
             .map(|point| point.1)
     };
     runs.iter()
-        .map(|run| incumbent(run).unwrap_or(Metric::WORST))
+        .map(|run| incumbent(run).unwrap_or(WORST))
         .collect()
 }
 
-/// Median and quartiles of the gap from the first x at which every run has an incumbent to the last event.
+/// Median and quartiles of the gap from the first x at which every run has an incumbent to the last
+/// event.
 fn curve<'a>(scene: &'a str, method: &'a str, runs: &[Series], reference: f64) -> Vec<Point<'a>> {
     let first = runs
         .iter()

@@ -1,4 +1,5 @@
-//! What the runs of a method did about a problem, a scene with a target: what reports on run time are made from.
+//! The attempts of a method's runs at a problem, a scene with a target. Reports on run time are
+//! made from them.
 
 use super::config::Targets;
 use super::data::Rows;
@@ -10,7 +11,7 @@ use crate::statistics::sorted;
 pub struct Attempt<'a> {
     pub scene: &'a str,
     pub target: &'a Target,
-    /// What the target costs on the scene.
+    /// The target as a cost on the scene.
     pub cost: f64,
     pub method: &'a str,
     pub runs: usize,
@@ -46,8 +47,8 @@ pub fn attempts<'a>(config: &'a Targets, rows: &'a Rows, axis: ProgressAxis) -> 
     attempts
 }
 
-/// The empirical distribution function that rises to each `(x, fraction)`, from 0 at the first to `end`. Empty if it
-/// never rises.
+/// The empirical distribution function that rises to each `(x, fraction)`, from 0 at the first to
+/// `end`. Empty if it never rises.
 pub fn staircase(rises: Vec<(f64, f64)>, end: f64) -> Vec<(f64, f64)> {
     let (Some(&(first, _)), Some(&(last, fraction))) = (rises.first(), rises.last()) else {
         return rises;

@@ -1,9 +1,9 @@
-//! How well costs predict the tests that rays take, over the trees that one method builds of one scene. Trees of different methods are
-//! never pooled: a rank over binary and n-ary trees mostly tells the one kind from the other (Simpson 1951).
+//! How well costs predict the tests that rays take, over the trees that one method builds of one
+//! scene. Trees of different methods are never pooled: a rank over binary and n-ary trees mostly
+//! tells the one kind from the other (Simpson 1951).
 
 use super::config::first;
 use super::data::distinct;
-use super::metric::Metric;
 use super::paper::{PaperRow, Verdict, ratios};
 use super::prelude::*;
 use crate::rows::{RunRow, RunTestRow, VisitRow};
@@ -13,13 +13,15 @@ use bvh_config::above;
 bvh_config::config! { serde;
     /// Costs against tests per ray.
     pub struct Config {
-        /// What it belongs to, such as a section of the paper.
+        /// The section or topic that it belongs to.
         source: String;
         /// Heading.
         title: String;
-        /// Labels of the methods, the paper's own case first: the trees of each are compared among themselves.
+        /// Labels of the methods, the paper's own case first: the trees of each are compared among
+        /// themselves.
         methods: Vec<String>, in OneOrMore;
-        /// The words in which the paper describes the correlation over the trees of the first method.
+        /// The words in which the paper describes the correlation over the trees of the first
+        /// method.
         #[serde(skip_serializing_if = "Option::is_none")]
         paper_says: Option<String>;
         /// Pearson's correlation from which on these words hold.
@@ -51,6 +53,9 @@ pub(super) struct Correlation<'a> {
 /// The kind of rays that the paper sends: they start inside and end at any hit.
 const OF_PAPER: (&str, &str) = ("inside", "any");
 
+/// The cost that the paper compares with tests, as in `runs.csv`.
+const OF_AREA: &str = "goldsmith_salmon";
+
 /// A tree, and the tests per ray of one kind in it.
 type Tree<'a> = (&'a RunRow, f64);
 
@@ -59,8 +64,11 @@ type Cost<'a> = (String, Box<dyn Fn(&RunRow) -> Option<f64> + 'a>);
 
 /// The costs by area, and the one by the density of each kind of rays.
 fn costs(rows: &Rows) -> Vec<Cost<'_>> {
-    let of_area = Metric::COSTS
-        .map(|cost| -> Cost { (cost.column().into(), Box::new(move |run| cost.of_run(run))) });
+    let of_area: [Cost; 3] = [
+        (OF_AREA.into(), Box::new(|run| Some(run.goldsmith_salmon))),
+        ("cost_over_root_area".into(), Box::new(|run| Some(run.cost_over_root_area))),
+        ("sah".into(), Box::new(|run| Some(run.sah))),
+    ];
     let of_rays = |rays| -> Cost {
         let own = move |run: &RunRow, row: &VisitRow| {
             (&row.scene, &row.method, row.repetition) == (&run.scene, &run.method, run.repetition)
@@ -136,12 +144,13 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
 }
 
 impl Config {
-    /// The paper's words next to the correlation of its cost and its rays over the trees of its case, scene by scene.
+    /// The paper's words next to the correlation of its cost and its rays over the trees of its
+    /// case, scene by scene.
     fn compare(&self, rows: &Rows, correlations: &[Correlation]) -> Vec<PaperRow> {
         let Some(says) = &self.paper_says else { return Vec::new() };
         let is_of_paper = |row: &&Correlation| {
             row.method == first(&self.methods)
-                && row.cost == Metric::GoldsmithSalmon.column()
+                && row.cost == OF_AREA
                 && (row.family, row.query) == OF_PAPER
         };
         let compare = |row: &Correlation| {
@@ -153,7 +162,7 @@ impl Config {
             } else if high < self.paper_from {
                 Verdict::Differs
             } else {
-                Verdict::CannotBeTold
+                Verdict::Inconclusive
             };
             let quantity = "Pearson's correlation of cost and tests per ray over insertion orders";
             let compared =
@@ -173,7 +182,8 @@ impl Config {
     }
 }
 
-/// The method's trees through which rays of the kind were sent: random ones through the binary tree, others through its wide layout.
+/// The method's trees through which rays of the kind were sent: random ones through the binary
+/// tree, others through its wide layout.
 fn trees<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) -> Vec<Tree<'a>> {
     let random = rows
         .rays_of(scene, method, kind)
@@ -241,8 +251,8 @@ fn draw(
         Layer::new(*method, Marks::Points(points.collect()))
     };
     let rank = rank.map_or_else(String::new, |rank| format!(", ρ = {rank:.3}"));
-    let x = Metric::GoldsmithSalmon.axis();
-    let y = Metric::BoxesPerRay.axis();
+    let x = Axis::linear("Goldsmith–Salmon cost");
+    let y = Axis::linear("box tests per ray");
     panel(format!("{scene}: {family}, {query}{rank}"), x, y, methods.iter().map(points).collect())
 }
 
@@ -270,7 +280,8 @@ mod tests {
     use crate::report::data::run;
     use crate::rows::RayRow;
 
-    /// Rows of two methods, whose costs predict nothing within either, though the second is dearer and takes more tests.
+    /// Rows of two methods, whose costs predict nothing within either, though the second is dearer
+    /// and takes more tests.
     fn two_families() -> Rows {
         let mut rows = Rows::default();
         for (method, level) in [("orders", 1.0), ("splits", 100.0)] {
@@ -334,7 +345,7 @@ mod tests {
             ..Config::default()
         };
         let [row] = &config_output(&config).paper[..] else { panic!("one scene, one row") };
-        assert_eq!((row.ours.as_str(), row.verdict), ("0.00", Verdict::CannotBeTold));
+        assert_eq!((row.ours.as_str(), row.verdict), ("0.00", Verdict::Inconclusive));
     }
 
     fn config_output(config: &Config) -> Output {

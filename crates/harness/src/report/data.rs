@@ -1,19 +1,18 @@
 //! An experiment's rows as its CSV files hold them, and the selections of them that reports share.
 
 use crate::Error;
-use crate::measure::layout::{is_repeat, is_single};
 use crate::rows::{
-    self, BoundRow, ClockRow, HistoryRow, RayRow, ReferenceRow, RenderRow, RenderTimeRow, Row,
-    RunRow, RunTestRow, TestRow, TestTimeRow, TimingRow, TraceRow, TraceTimeRow, TrialRow,
-    VisitRow,
+    self, BoundRow, ClockRow, HistoryRow, RayRow, ReferenceRow, Row, RunRow, RunTestRow, TestRow,
+    TimingRow, TrialRow, VisitRow,
 };
-use crate::statistics::{median, minimum};
 use bvh_scenes::SceneKind;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// An experiment's rows.
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
+    /// The experiment's folder, for reports that read further files.
+    pub folder: PathBuf,
     /// Of `runs.csv`.
     pub runs: Vec<RunRow>,
     /// Of `history.csv`; none if no report reads them.
@@ -26,22 +25,13 @@ pub struct Rows {
     pub rays: Vec<RayRow>,
     /// Of `bounds.csv`; none if bounds were not asked for.
     pub bounds: Vec<BoundRow>,
-    /// Of `timing_history.csv`; none if no report needs them, otherwise one for every row of `history`, in its order.
+    /// Of `timing_history.csv`; none if no report needs them, otherwise one for every row of
+    /// `history`, in its order.
     pub clock: Vec<ClockRow>,
     /// Of `references.csv`, under the experiment's objective; none if no report needs them.
     pub references: Vec<ReferenceRow>,
-    /// Of `renders.csv`; none if pictures were not asked for.
-    pub renders: Vec<RenderRow>,
-    /// Of `timing_renders.csv`, likewise.
-    pub render_times: Vec<RenderTimeRow>,
-    /// Of `traversal.csv`; none if rays were not traced.
-    pub traces: Vec<TraceRow>,
-    /// Of `timing_traversal.csv`, likewise.
-    pub trace_times: Vec<TraceTimeRow>,
     /// Of `tests.csv`; none if no rays judge the trees.
     pub tests: Vec<TestRow>,
-    /// Of `timing_tests.csv`, likewise.
-    pub test_times: Vec<TestTimeRow>,
     /// Of `run_tests.csv`; none if trees were not tested one by one.
     pub run_tests: Vec<RunTestRow>,
     /// Of `visits.csv`, likewise.
@@ -52,6 +42,7 @@ impl Rows {
     /// Reads the CSV files in an experiment's folder. Only `runs.csv` has to be there.
     pub fn read(folder: &Path) -> Result<Self, Error> {
         Ok(Self {
+            folder: folder.to_owned(),
             runs: rows::read(&folder.join(RunRow::FILE))?,
             history: rows::read_if_any(folder)?,
             trials: rows::read_if_any(folder)?,
@@ -60,12 +51,7 @@ impl Rows {
             bounds: rows::read_if_any(folder)?,
             clock: rows::read_if_any(folder)?,
             references: rows::read_if_any(folder)?,
-            renders: rows::read_if_any(folder)?,
-            render_times: rows::read_if_any(folder)?,
-            traces: rows::read_if_any(folder)?,
-            trace_times: rows::read_if_any(folder)?,
             tests: rows::read_if_any(folder)?,
-            test_times: rows::read_if_any(folder)?,
             run_tests: rows::read_if_any(folder)?,
             visits: rows::read_if_any(folder)?,
         })
@@ -111,7 +97,7 @@ impl Rows {
             .map_or(f64::NAN, |run| run.base_cost)
     }
 
-    /// What gaps on the scene are measured from.
+    /// Returns the reference that gaps on the scene are measured from.
     pub fn reference(&self, scene: &str) -> Option<&ReferenceRow> {
         self.references
             .iter()
@@ -139,11 +125,6 @@ impl Rows {
             .iter()
             .filter(|row| row.scene == scene && row.method == method);
         own.map(|row| row.seconds).collect()
-    }
-
-    /// The seconds of the method's fastest repetition.
-    pub fn build_seconds(&self, scene: &str, method: &str) -> Option<f64> {
-        minimum(self.seconds_of(scene, method))
     }
 
     /// The trials of one method on one scene, one list per repetition.
@@ -197,37 +178,6 @@ impl Rows {
         };
         self.rays.iter().filter(own).collect()
     }
-
-    /// The layouts that rays were traced through.
-    pub fn layouts(&self) -> Vec<&str> {
-        distinct(self.traces.iter().map(|row| row.layout.as_str()))
-    }
-
-    /// The kinds of rays that were traced.
-    pub fn traced_kinds(&self) -> Vec<&str> {
-        distinct(self.traces.iter().map(|row| row.rays.as_str()))
-    }
-
-    /// Nanoseconds per ray.
-    pub fn ns_per_ray(&self, scene: &str, method: &str, layout: &str, rays: &str) -> Option<f64> {
-        let own = self.trace_times.iter().find(|row| {
-            row.scene == scene && row.method == method && row.layout == layout && row.rays == rays
-        });
-        own.filter(|row| row.count > 0)
-            .map(|row| 1e9 * row.seconds / row.count as f64)
-    }
-
-    /// The method's layout that is fastest for these rays by single calls, with its nanoseconds per ray. Libraries without
-    /// batches can be compared so.
-    pub fn fastest_layout(&self, scene: &str, method: &str, rays: &str) -> Option<(&str, f64)> {
-        let layouts = self
-            .layouts()
-            .into_iter()
-            .filter(|layout| is_single(layout) && !is_repeat(layout));
-        let timed = layouts
-            .filter_map(|layout| Some((layout, self.ns_per_ray(scene, method, layout, rays)?)));
-        timed.min_by(|a, b| a.1.total_cmp(&b.1))
-    }
 }
 
 /// A run on the scene `s` with nothing of note.
@@ -244,19 +194,6 @@ pub(super) fn run(method: &str, repetition: u32, evaluations: u64, work: u64) ->
 /// A ratio of costs; 1 when the denominator is 0, as in `runs.csv`.
 pub fn ratio(cost: f64, base: f64) -> f64 {
     if base > 0.0 { cost / base } else { 1.0 }
-}
-
-/// The row whose value is the median, the lower of two.
-pub(super) fn middle<R>(rows: Vec<&R>, value: impl Fn(&R) -> f64) -> Option<&R> {
-    let median = median(
-        &rows
-            .iter()
-            .map(|row| value(row))
-            .collect::<Vec<_>>(),
-    )?;
-    let distance = |row: &R| (value(row) - median).abs();
-    rows.into_iter()
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// The distinct items, in the order in which they first occur.

@@ -9,7 +9,7 @@ use bvh_scenes::SceneKind;
 bvh_config::config! { serde;
     /// The distribution of costs over trials.
     pub struct Config {
-        /// What it belongs to, such as a section of the paper.
+        /// The section or topic that it belongs to.
         source: String;
         /// Heading.
         title: String;
@@ -109,7 +109,8 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
 }
 
 impl Config {
-    /// Whether the majority of trials is where the paper finds it, on every stand-in for a scene of the paper: one statement, one row.
+    /// Whether the majority of trials is where the paper finds it, on every stand-in for a scene of
+    /// the paper: one statement, one row.
     fn majority(&self, rows: &Rows, method: &str) -> Option<PaperRow> {
         let within = self.paper_majority_within?;
         let fraction = |scene: &str| {

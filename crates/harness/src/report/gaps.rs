@@ -1,4 +1,5 @@
-//! How far from the exact optimum every method ends on small scenes, and how tight the lower bound is there.
+//! How far from the exact optimum every method ends on small scenes, and how tight the lower bound
+//! is there.
 
 use super::prelude::*;
 use crate::statistics::{median, quantile};
@@ -20,7 +21,8 @@ bvh_config::config! { serde;
 /// A gap below this is rounding: the method has found the optimum.
 const SOLVED: f64 = 1e-12;
 
-/// One method on all scenes of one kind and size, as written to `gaps.csv`; gap = (cost − optimum) / optimum.
+/// One method on all scenes of one kind and size, as written to `gaps.csv`; gap = (cost − optimum)
+/// / optimum.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Gaps<'a> {
     method: &'a str,
@@ -38,7 +40,8 @@ pub(super) struct Gaps<'a> {
     maximum_gap: f64,
 }
 
-/// The lower bound over the optimum, on all scenes of one kind and size, as written to `tightness.csv`.
+/// The lower bound over the optimum, on all scenes of one kind and size, as written to
+/// `tightness.csv`.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Tightness {
     /// `random` or `cluster`.
@@ -54,8 +57,8 @@ pub(super) struct Tightness {
     maximum_bound_over_optimum: f64,
 }
 
-/// The gaps of all runs by method, kind of part and number of objects, and the bounds over the optimum of all scenes by
-/// the latter two.
+/// The gaps of all runs by method, kind of part and number of objects, and the bounds over the
+/// optimum of all scenes by the latter two.
 struct Found<'a> {
     gaps: BTreeMap<(&'a str, &'static str, usize), Vec<f64>>,
     bounds: BTreeMap<(&'static str, usize), Vec<f64>>,
@@ -180,7 +183,8 @@ impl Config {
         parts.into_iter().flat_map(both).collect()
     }
 
-    /// What every method reaches over all scenes, and how tight the lower bound is.
+    /// Returns a sentence on the runs that end at the optimum, and on the tightness of the lower
+    /// bound.
     fn reading(&self, found: &Found) -> String {
         let gaps_of = |method: &str| -> Vec<f64> {
             let own = found

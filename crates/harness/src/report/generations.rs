@@ -1,4 +1,5 @@
-//! The paper's Figures 2 to 4: cost against generation, the median run and the range of all, with random picking.
+//! The paper's Figures 2 to 4: cost against generation, the median run and the range of all, with
+//! random picking.
 
 use super::paper::{PaperRow, Verdict, ratios};
 use super::prelude::*;
@@ -23,7 +24,7 @@ bvh_config::config! { serde;
         /// The paper's final cost over that of the average order.
         #[serde(skip_serializing_if = "Option::is_none")]
         paper_gain: Option<f64>, in above(0.0);
-        /// What the paper says of the gain in place of a number.
+        /// The paper's words on the gain, where it gives no number.
         #[serde(skip_serializing_if = "Option::is_none")]
         paper_says: Option<String>;
         /// Why ours differs, where it does.
@@ -167,7 +168,7 @@ impl Config {
             });
         let says = self.paper_says.as_ref().map(|says| {
             let ours = format!("{:.3}", end.median / end.average);
-            row(GAIN).compare(says, ours, Verdict::CannotBeTold, "the paper gives no number")
+            row(GAIN).compare(says, ours, Verdict::Inconclusive, "the paper gives no number")
         });
         let interval = (end.low / end.average, end.high / end.average);
         let gain = self.paper_gain.map(|paper| {

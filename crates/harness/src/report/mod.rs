@@ -1,41 +1,32 @@
-//! What is made from an experiment's CSV files: tables, figures, and the paper's numbers beside ours.
+//! Reports made from an experiment's CSV files: tables, figures, and the paper's numbers next to
+//! ours.
 //!
 //! A kind of report is one file and one line in [`Report`]. Reports read CSV files only.
 
 pub mod anytime;
 mod attempt;
-pub mod clocked;
 pub mod config;
 mod correlation;
 pub mod data;
 pub mod distribution;
-mod estimator;
 pub mod gaps;
 pub mod generations;
-mod metric;
 pub mod numbers;
-pub mod omissions;
 pub mod output;
 pub mod paper;
-mod pareto;
-pub mod peers;
-pub mod pictures;
 mod prelude;
 mod progress;
 pub mod query;
+mod query_figure;
+pub mod query_report;
 mod ray_cost;
-pub mod ray_tests;
-mod ray_time;
 mod run_times;
 mod sides;
 pub mod significance;
 pub mod table;
 pub mod target;
 mod time_to_target;
-pub mod times;
-mod traversal;
 pub mod trials;
-pub mod variations;
 
 use crate::Error;
 use crate::rows::columns::Columns;
@@ -51,13 +42,14 @@ use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Declares the kinds of reports: name in specs (in snake case), configuration and its keys that name methods, the function
-/// that makes it, and the rows of its CSV files.
+/// Declares the kinds of reports: name in specs (in snake case), configuration and its keys that
+/// name methods, the function that makes it, and the rows of its CSV files.
 macro_rules! reports {
     ($($(#[$doc:meta])* $name:literal => $kind:ident($config:ty: $($label:ident),*) by $write:path => [$($row:ty),*];)*) => {
         /// One report of a spec.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
         #[serde(tag = "kind")]
+        #[allow(clippy::large_enum_variant, reason = "a spec has few reports")]
         pub enum Report {
             $($(#[$doc])* #[serde(rename = $name)] $kind($config),)*
         }
@@ -74,8 +66,9 @@ macro_rules! reports {
             /// The names of all kinds.
             pub const NAMES: &[&str] = &[$($name),*];
 
-            /// Reads the configuration of a report of the kind `name`; `None` if there is none of this name. Unlike
-            /// deserialising a whole report, hands `config` on unbuffered, so that its errors know their place.
+            /// Reads the configuration of a report of the kind `name`; `None` if there is none of
+            /// this name. Unlike deserialising a whole report, hands `config` on unbuffered, so
+            /// that its errors know their place.
             pub fn read<'de, D: Deserializer<'de>>(name: &str, config: D) -> Result<Option<Self>, D::Error> {
                 match name {
                     $($name => <$config>::deserialize(config).map(|config| Some(Self::$kind(config))),)*
@@ -85,7 +78,7 @@ macro_rules! reports {
 
             /// The columns of the CSV files that reports make.
             pub fn columns() -> Vec<Columns> {
-                vec![$($(Columns::of::<$row>()),*),*, Columns::of::<PaperRow>(), Columns::of::<Answer>()]
+                vec![$($(Columns::of::<$row>(),)*)* Columns::of::<PaperRow>(), Columns::of::<Answer>()]
             }
 
             /// The labels of the methods that the report names, each with its key.
@@ -109,18 +102,10 @@ reports! {
     "table" => Table(table::Config: columns) by table::Config::write => [table::Cell];
     /// Cost against number of trials.
     "trials" => Trials(trials::Config: methods) by trials::Config::write => [trials::Point];
-    /// Times of runs against each other.
-    "times" => Times(times::Config: methods, again) by times::Config::write => [times::Ratio];
     /// Cost against generation.
     "generations" => Generations(generations::Config: method, baseline) by generations::Config::write => [generations::Generation];
     /// The distribution of costs over trials.
     "distribution" => Distribution(distribution::Config: methods) by distribution::write => [distribution::Summary];
-    /// Final costs of variations of one method over those of the method itself.
-    "variations" => Variations(variations::Config: methods) by variations::Config::write => [variations::Variation];
-    /// Tests per random ray, methods by scenes.
-    "ray_tests" => RayTests(ray_tests::Config: methods) by ray_tests::Config::write => [ray_tests::Measured];
-    /// The error of the ray estimator against the number of rays, for the first repetition.
-    "estimator" => Estimator(config::Methods: methods) by estimator::write => [estimator::Point];
     /// Costs against tests per ray over the trees of each method; every repetition is one tree.
     "correlation" => Correlation(correlation::Config: methods) by correlation::write => [correlation::Correlation];
     /// Error against run time and against work.
@@ -135,21 +120,11 @@ reports! {
     "numbers" => Numbers(numbers::Config: methods) by numbers::Config::write => [numbers::Numbers, numbers::Timing];
     /// Whether methods really differ.
     "significance" => Significance(significance::Config: against, method) by significance::Config::write => [significance::Row];
-    /// One picture by brute force, KD-tree and trees.
-    "pictures" => Pictures(pictures::Config: methods) by pictures::Config::write => [pictures::Tests, pictures::Times];
     /// Tests of rays in trees that are trained on rays.
     "ray_cost" => RayCost(ray_cost::Config: base, pairs) by ray_cost::Config::write
-        => [ray_cost::Compared, ray_cost::Paired, ray_cost::Speed];
-    /// Tests of rays against the time in which trees are made.
-    "ray_time" => RayTime(ray_time::Config: base, series) by ray_time::Config::write => [ray_time::Point];
-    /// Cost against build time and against time per ray.
-    "pareto" => Pareto(config::Methods: methods) by pareto::write => [pareto::Point];
-    /// Other libraries beside ours.
-    "peers" => Peers(peers::Config: methods, ours) by peers::Config::write => [peers::Comparison];
-    /// Speed of rays by tree, layout and kind of rays, and how well the cost predicts it.
-    "traversal" => Traversal(config::Methods: methods) by traversal::write => [traversal::Rank, traversal::Speed];
-    /// What leaving something out saves.
-    "omissions" => Omissions(omissions::Config: pairs) by omissions::Config::write => [omissions::Compared, omissions::Times];
+        => [ray_cost::Compared, ray_cost::Paired];
+    /// Rows of one CSV file, selected, grouped, aggregated and drawn.
+    "query" => Query(query_report::Config: pairs) by query_report::Config::write => [];
 }
 
 impl Report {
@@ -158,7 +133,8 @@ impl Report {
         self.needs_references()
     }
 
-    /// The labels of the methods whose single trials the report reads; `history.csv` suffices for all others.
+    /// The labels of the methods whose single trials the report reads; `history.csv` suffices for
+    /// all others.
     pub fn trial_methods(&self) -> Vec<&str> {
         match self {
             Self::Trials(config) => config
@@ -187,7 +163,8 @@ impl Report {
 /// The file that keeps what the reports printed. Its tables may have seconds, as its name says.
 pub const TEXT_FILE: &str = "timing_report.txt";
 
-/// Makes all reports from the CSV files in a folder, the paper's numbers beside ours last. Writes nothing.
+/// Makes all reports from the CSV files in a folder, the paper's numbers beside ours last. Writes
+/// nothing.
 pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> {
     let rows = Rows::read(folder)?;
     let mut outputs = reports
@@ -220,8 +197,8 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
     Ok(outputs)
 }
 
-/// Writes what reports have made into the store's folder. Returns the text for the terminal, which [`TEXT_FILE`] keeps.
-/// Figures are written only if they are `drawn`.
+/// Writes what reports have made into the store's folder. Returns the text for the terminal, which
+/// [`TEXT_FILE`] keeps. Figures are written only if they are `drawn`.
 pub fn write_all(outputs: &[Output], store: &Store, drawn: bool) -> Result<String, Error> {
     for output in outputs {
         for (name, bytes) in &output.csv {
@@ -238,7 +215,7 @@ pub fn write_all(outputs: &[Output], store: &Store, drawn: bool) -> Result<Strin
     Ok(text)
 }
 
-/// What there is to say without a report: what every method came to.
+/// Returns the table of final costs, for experiments without reports.
 fn final_costs(rows: &Rows) -> Result<Output, Error> {
     #[derive(serde::Serialize)]
     struct Row<'a> {
@@ -284,8 +261,8 @@ fn series(figure: &Figure) -> BTreeSet<String> {
         .collect()
 }
 
-/// The looks of an experiment's methods, the same in all its figures. If there are more methods than colours, those that share
-/// no figure may share a look.
+/// The looks of an experiment's methods, the same in all its figures. If there are more methods
+/// than colours, those that share no figure may share a look.
 fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, Look)> {
     let mut slots: Vec<usize> = Vec::new();
     for (index, method) in methods.iter().enumerate() {
@@ -322,8 +299,8 @@ fn answers(outputs: &[Output]) -> Vec<Answer> {
     answers
 }
 
-/// The comparisons of all reports of an experiment with the paper. A number of the paper that several of ours are
-/// compared with is one number.
+/// The comparisons of all reports of an experiment with the paper. A number of the paper that
+/// several of ours are compared with is one number.
 fn beside_paper(rows: &[PaperRow], answers: &[Answer]) -> Result<Output, Error> {
     let numbers = rows
         .iter()

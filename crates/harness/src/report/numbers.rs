@@ -1,5 +1,5 @@
-//! The numbers behind the figures: medians and quartiles of costs and gaps, primal integrals, and the lower bound
-//! beside them.
+//! The numbers behind the figures: medians and quartiles of costs and gaps, primal integrals, and
+//! the lower bound beside them.
 
 use super::data::ratio;
 use super::prelude::*;
@@ -31,7 +31,7 @@ pub(super) struct Numbers<'a> {
     cost_over_base_quartile_3: f64,
     /// `exact optimum` or `best known`.
     reference: &'static str,
-    /// What gaps are measured from.
+    /// The cost that gaps are measured from.
     reference_cost: f64,
     /// The method that found it; its own gaps are too small if it did so in this very experiment.
     reference_method: String,
@@ -46,7 +46,8 @@ pub(super) struct Numbers<'a> {
     lower_bound_over_reference: Option<f64>,
     /// Median cost over the lower bound, minus 1: no tree is farther from the optimum.
     proven_gap_median: Option<f64>,
-    /// The mean gap over the evaluations of the longest run of any method on the scene, the median over runs.
+    /// The mean gap over the evaluations of the longest run of any method on the scene, the median
+    /// over runs.
     primal_integral_evaluations: f64,
     /// Likewise over work.
     primal_integral_work: f64,
@@ -163,7 +164,7 @@ impl Config {
     }
 }
 
-/// What a method's runs on a scene cost. `integrals` are over evaluations and over work.
+/// Returns the costs of a method's runs on a scene. `integrals` are over evaluations and over work.
 fn of_costs<'a>(
     rows: &Rows,
     scene: &'a str,

@@ -1,6 +1,8 @@
-//! What a report makes: CSV files, figures, comparisons with the paper, and text for the terminal.
+//! The output of a report: CSV files, figures, comparisons with the paper, and text for the
+//! terminal.
 
 use super::paper::{Outcome, PaperRow};
+use super::query::Row;
 use crate::Error;
 use crate::rows::store::Store;
 use crate::rows::to_bytes;
@@ -9,9 +11,10 @@ use comfy_table::{Table, presets};
 use figures::{Axis, Figure, Layer, Look, Panel};
 use serde::Serialize;
 use std::collections::BTreeSet;
+use std::io;
 use std::path::Path;
 
-/// What a report makes.
+/// The output of a report.
 #[derive(Clone, Debug, Default)]
 pub struct Output {
     /// Source and title of the report; the title of its figures and the first line of its text.
@@ -24,10 +27,10 @@ pub struct Output {
     pub paper: Vec<PaperRow>,
     /// The sentence that reads the result, made from its numbers; empty if the tables say it all.
     pub reading: String,
-    /// The sentence that answers next to the paper, chosen by a rule from the numbers; only where there is something of the paper's to
-    /// compare with.
+    /// The sentence that answers next to the paper, chosen by a rule from the numbers; only where
+    /// there is something of the paper's to compare with.
     pub answer: Option<String>,
-    /// What the paper's numbers beside ours come to; only where they are compared.
+    /// The verdict on all of the paper's numbers; only where they are compared.
     pub outcome: Option<Outcome>,
     /// The tables, each under a line that explains it.
     pub tables: Vec<(String, Table)>,
@@ -89,17 +92,27 @@ impl Output {
         self.tables.push((explanation.into(), table));
     }
 
-    /// Adds a table of some columns of a CSV file's rows, numbers with four digits. `columns` are their names with blanks
-    /// between them.
+    /// Adds a table of some columns of a CSV file's rows, numbers with four digits. `columns` are
+    /// their names with blanks between them.
     pub fn show(
         &mut self,
         explanation: &str,
         rows: &[impl Serialize],
         columns: &str,
     ) -> Result<(), Error> {
+        let bytes = to_bytes(rows, Path::new("table"))?;
+        self.show_csv(explanation, &bytes, columns)
+    }
+
+    /// Adds a table of some columns of a CSV file.
+    pub fn show_csv(
+        &mut self,
+        explanation: &str,
+        bytes: &[u8],
+        columns: &str,
+    ) -> Result<(), Error> {
         let path = Path::new("table");
-        let bytes = to_bytes(rows, path)?;
-        let mut reader = csv::Reader::from_reader(bytes.as_slice());
+        let mut reader = csv::Reader::from_reader(bytes);
         let header = reader
             .headers()
             .map_err(Error::csv(path))?
@@ -130,6 +143,27 @@ impl Output {
     }
 }
 
+/// Returns the bytes of a CSV file with these columns of some rows.
+pub fn table_bytes(columns: &[String], rows: &[Row]) -> Result<Vec<u8>, Error> {
+    let path = Path::new("table");
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer
+        .write_record(columns)
+        .map_err(Error::csv(path))?;
+    for row in rows {
+        let cells = columns
+            .iter()
+            .map(|column| row.get(column).map_or("", String::as_str));
+        writer
+            .write_record(cells)
+            .map_err(Error::csv(path))?;
+    }
+    writer.into_inner().map_err(|error| {
+        let source = io::Error::other(error.to_string());
+        Error::Io { path: path.to_owned(), action: "write", source }
+    })
+}
+
 /// A number with four digits, and any other text, or a whole number, as it is.
 fn four_digits(text: &str) -> String {
     let number = if text.contains('.') { text.parse::<f64>().ok() } else { None };
@@ -158,7 +192,7 @@ pub fn panel(title: impl Into<String>, x: Axis, y: Axis, layers: Vec<Layer>) -> 
     Panel { title: title.into(), x, y, layers }
 }
 
-/// What `say` has to say of each item, separated by commas.
+/// Returns the texts that `say` gives for the items, separated by commas.
 pub fn each<T>(items: impl IntoIterator<Item = T>, say: impl FnMut(T) -> Option<String>) -> String {
     items
         .into_iter()
@@ -167,8 +201,8 @@ pub fn each<T>(items: impl IntoIterator<Item = T>, say: impl FnMut(T) -> Option<
         .join(", ")
 }
 
-/// From where to where the values of the rows of each name go, to so many decimals: `a 0.91 to 1.20, b 1.02 to 1.10`.
-/// Names without values are left out.
+/// From where to where the values of the rows of each name go, to so many decimals: `a 0.91 to
+/// 1.20, b 1.02 to 1.10`. Names without values are left out.
 pub fn spans<'n, R>(
     names: impl IntoIterator<Item = &'n str>,
     rows: &[R],
@@ -186,8 +220,8 @@ pub fn spans<'n, R>(
     })
 }
 
-/// For how many of `total` cases something holds, by name: `‘a’, ‘b’ for all 7 scenes; ‘c’ for 3 of 7 scenes; ‘d’ for
-/// none`.
+/// For how many of `total` cases something holds, by name: `‘a’, ‘b’ for all 7 scenes; ‘c’ for 3 of
+/// 7 scenes; ‘d’ for none`.
 pub fn tally<'a>(
     counts: impl IntoIterator<Item = (&'a str, usize)>,
     total: usize,

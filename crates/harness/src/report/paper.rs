@@ -4,17 +4,17 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// One row of `paper.csv`: something that the paper says beside ours. Absolute costs are not compared, as the scenes are
-/// not the paper's.
+/// One row of `paper.csv`: something that the paper says beside ours. Absolute costs are not
+/// compared, as the scenes are not the paper's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PaperRow {
     /// Where the paper has it.
     pub source: String,
     /// Scene, ours a stand-in.
     pub scene: String,
-    /// What is compared.
+    /// The quantity that is compared.
     pub quantity: String,
-    /// What the paper says; empty if it says nothing and the row only adds to the others.
+    /// The paper's number or words; empty if it has none and the row only adds to the others.
     pub paper: String,
     /// Ours.
     pub ours: String,
@@ -22,8 +22,8 @@ pub struct PaperRow {
     pub paper_over_base: Option<f64>,
     /// Ours likewise.
     pub ours_over_base: Option<f64>,
-    /// Between which values ours lies in nine of ten repetitions, or in all where they are few; empty where ours is one
-    /// number without chance.
+    /// Between which values ours lies in nine of ten repetitions, or in all where they are few;
+    /// empty where ours is one number without chance.
     pub ours_low: Option<f64>,
     /// The upper end.
     pub ours_high: Option<f64>,
@@ -35,7 +35,8 @@ pub struct PaperRow {
     pub reason: String,
 }
 
-/// One row of `answer.csv`: the sentence that a report answers with, chosen by a rule from its numbers.
+/// One row of `answer.csv`: the sentence that a report answers with, chosen by a rule from its
+/// numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Answer {
     /// Where the paper has it.
@@ -80,8 +81,9 @@ impl PaperRow {
         Self { paper: paper.into(), ours: ours.into(), verdict, rule: rule.into(), ..self }
     }
 
-    /// The same row with a ratio to base of the paper's and ours, which lies in an interval where it depends on chance.
-    /// They agree if the whole interval is within `tolerance` of the paper's, relatively, and on the same side of 1.
+    /// The same row with a ratio to base of the paper's and ours, which lies in an interval where
+    /// it depends on chance. They agree if the whole interval is within `tolerance` of the paper's,
+    /// relatively, and on the same side of 1.
     #[must_use]
     pub fn compare_ratios(
         self,
@@ -98,7 +100,7 @@ impl PaperRow {
         let row = self.compare(
             format!("{paper:.4}"),
             format!("{ours:.4}"),
-            if same { verdicts[0] } else { Verdict::CannotBeTold },
+            if same { verdicts[0] } else { Verdict::Inconclusive },
             format!("within {} % of the paper's, and on the same side of 1", 100.0 * tolerance),
         );
         let (ours_low, ours_high) = interval.unzip();
@@ -112,7 +114,8 @@ impl PaperRow {
     }
 }
 
-/// Returns a sentence for each quantity that is compared: ours, the paper's and the verdict, scene by scene. `None` if nothing is.
+/// Returns a sentence for each quantity that is compared: ours, the paper's and the verdict, scene
+/// by scene. `None` if nothing is.
 pub fn ratios(rows: &[PaperRow]) -> Option<String> {
     let compared: Vec<&PaperRow> = rows
         .iter()
@@ -163,8 +166,8 @@ pub enum Verdict {
     #[serde(rename = "differs")]
     Differs,
     /// Another repetition may have led to another verdict, or the paper has no number.
-    #[serde(rename = "cannot be told")]
-    CannotBeTold,
+    #[serde(rename = "inconclusive")]
+    Inconclusive,
     /// The paper does not speak of it.
     #[serde(rename = "not in the paper")]
     NotInPaper,
@@ -180,13 +183,13 @@ impl Verdict {
             Self::DiffersHigher => "differs, higher",
             Self::DiffersLower => "differs, lower",
             Self::Differs => "differs",
-            Self::CannotBeTold => "cannot be told",
+            Self::Inconclusive => "inconclusive",
             Self::NotInPaper => "not in the paper",
         }
     }
 
-    /// How our ratio to base compares with the paper's: whether it is within `tolerance` of it, and on the same side of
-    /// the base.
+    /// How our ratio to base compares with the paper's: whether it is within `tolerance` of it, and
+    /// on the same side of the base.
     fn of_ratios(paper: f64, ours: f64, tolerance: f64) -> Self {
         // The paper prints four digits: closer to the base than this is on neither side.
         let side =
@@ -207,14 +210,14 @@ impl Verdict {
     }
 }
 
-/// What comparisons with the paper come to: so many of each kind.
+/// The number of comparisons with the paper of each kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outcome {
     agree: usize,
     /// Not the paper's number, but on its side of the base.
     same_side: usize,
     differ: usize,
-    untold: usize,
+    inconclusive: usize,
 }
 
 impl Outcome {
@@ -228,14 +231,14 @@ impl Outcome {
         let compared = count(|verdict| verdict != Verdict::NotInPaper);
         let agree = count(|verdict| verdict == Verdict::Agrees);
         let same_side = count(Verdict::is_same_direction);
-        let untold = count(|verdict| verdict == Verdict::CannotBeTold);
-        Self { agree, same_side, untold, differ: compared - agree - same_side - untold }
+        let inconclusive = count(|verdict| verdict == Verdict::Inconclusive);
+        Self { agree, same_side, inconclusive, differ: compared - agree - same_side - inconclusive }
     }
 
     /// The verdict on all of them together: what all that can be told have in common.
     pub fn name(&self) -> &'static str {
         match (self.agree, self.same_side, self.differ) {
-            (0, 0, 0) => "cannot be told",
+            (0, 0, 0) => "inconclusive",
             (_, 0, 0) => "agrees",
             (_, _, 0) => "same direction",
             (0, 0, _) => "differs",
@@ -246,12 +249,12 @@ impl Outcome {
 
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { agree, same_side, differ, untold } = *self;
+        let Self { agree, same_side, differ, inconclusive } = *self;
         let kinds = [
             ("agree", agree),
             ("same side of the base only", same_side),
             ("differ", differ),
-            ("cannot be told", untold),
+            ("inconclusive", inconclusive),
         ];
         let some = kinds.iter().filter(|(_, count)| *count > 0);
         let some: Vec<String> = some
@@ -260,7 +263,7 @@ impl fmt::Display for Outcome {
         write!(
             f,
             "Comparisons with the paper: {} ({}).",
-            agree + same_side + differ + untold,
+            agree + same_side + differ + inconclusive,
             some.join("; ")
         )
     }
@@ -289,23 +292,23 @@ mod tests {
     #[test]
     fn the_verdict_on_all_is_what_those_that_can_be_told_have_in_common() {
         use Verdict::{
-            Agrees, CannotBeTold, Differs, DiffersLower, NotInPaper, SameDirectionLower,
+            Agrees, Differs, DiffersLower, Inconclusive, NotInPaper, SameDirectionLower,
         };
         let of = |verdicts: &[Verdict]| {
             let row = |&verdict: &Verdict| PaperRow { verdict, ..PaperRow::new("", "", "", "") };
             Outcome::of(&verdicts.iter().map(row).collect::<Vec<_>>()).name()
         };
-        assert_eq!(of(&[Agrees, CannotBeTold, NotInPaper]), "agrees");
+        assert_eq!(of(&[Agrees, Inconclusive, NotInPaper]), "agrees");
         assert_eq!(of(&[Agrees, SameDirectionLower]), "same direction");
-        assert_eq!(of(&[Differs, DiffersLower, CannotBeTold]), "differs");
+        assert_eq!(of(&[Differs, DiffersLower, Inconclusive]), "differs");
         assert_eq!(of(&[Differs, SameDirectionLower]), "in part");
-        assert_eq!(of(&[CannotBeTold, NotInPaper]), "cannot be told");
+        assert_eq!(of(&[Inconclusive, NotInPaper]), "inconclusive");
     }
 
     #[test]
     fn what_another_repetition_could_turn_round_cannot_be_told() {
         assert_eq!(verdict(0.99, 0.995, Some((0.992, 0.998))), Verdict::Agrees);
-        assert_eq!(verdict(0.99, 0.999, Some((0.996, 1.004))), Verdict::CannotBeTold);
+        assert_eq!(verdict(0.99, 0.999, Some((0.996, 1.004))), Verdict::Inconclusive);
         assert_eq!(verdict(1.1, 1.3, Some((1.2, 1.4))), Verdict::SameDirectionHigher);
     }
 }

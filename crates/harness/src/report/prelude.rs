@@ -1,4 +1,4 @@
-//! What every kind of report is made of: an experiment's rows in, tables and figures out.
+//! Items that every kind of report uses: an experiment's rows in, tables and figures out.
 
 pub(crate) use super::config::OneOrMore;
 pub(crate) use super::data::Rows;

@@ -1,14 +1,17 @@
-//! How far runs have come along the three axes of run time: wall seconds, evaluations, and work units.
+//! How far runs have come along the three axes of run time: wall seconds, evaluations, and work
+//! units.
 
 use super::data::Rows;
-use super::metric::Metric;
 use super::output::Output;
 use crate::Error;
 use crate::statistics::median;
 use figures::Axis;
 use serde::Serialize;
 
-/// What run time is measured by. Seconds belong to a machine and go into timing files only.
+/// The value of a run that has none, such as a run without an incumbent: worse than every other.
+pub const WORST: f64 = f64::INFINITY;
+
+/// A measure of run time. Seconds belong to a machine and go into timing files only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProgressAxis {
     /// Wall time.
@@ -23,8 +26,9 @@ impl ProgressAxis {
     /// Every axis.
     pub const ALL: [Self; 3] = [Self::Seconds, Self::Evaluations, Self::Work];
 
-    /// The axes along which these methods can be compared. Where some count whole trees and others single moves, evaluations
-    /// are not among them: a run that builds a tree with every evaluation visits at least as many nodes as there are objects.
+    /// The axes along which these methods can be compared. Where some count whole trees and others
+    /// single moves, evaluations are not among them: a run that builds a tree with every evaluation
+    /// visits at least as many nodes as there are objects.
     pub fn of(rows: &Rows, methods: &[String]) -> Vec<Self> {
         let own = rows
             .runs
@@ -48,7 +52,7 @@ impl ProgressAxis {
         }
     }
 
-    /// What stands along an axis of a figure.
+    /// Returns the label of an axis of a figure.
     pub fn label(self) -> &'static str {
         self.names().1
     }
@@ -66,7 +70,8 @@ impl ProgressAxis {
         }
     }
 
-    /// Adds a CSV file of rows whose column `x` is measured along this axis, and is called after it.
+    /// Adds a CSV file of rows whose column `x` is measured along this axis, and is called after
+    /// it.
     pub fn add_csv(
         self,
         output: &mut Output,
@@ -147,13 +152,15 @@ pub fn reached(run: &Series, cost: f64) -> Option<f64> {
         .map(|(x, _)| *x)
 }
 
-/// When the median run had an incumbent of at most this cost, unsolved runs last; `None` if it never had.
+/// When the median run had an incumbent of at most this cost, unsolved runs last; `None` if it
+/// never had.
 pub fn median_reached(runs: &[Series], cost: f64) -> Option<f64> {
     let times: Vec<f64> = runs
         .iter()
-        .map(|run| reached(run, cost).unwrap_or(Metric::WORST))
+        .map(|run| reached(run, cost).unwrap_or(WORST))
         .collect();
-    // Between a number and infinity there is only infinity, and between two infinities there is NaN.
+    // Between a number and infinity there is only infinity, and between two infinities there is
+    // NaN.
     median(&times).filter(|time| time.is_finite())
 }
 

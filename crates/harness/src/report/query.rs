@@ -1,15 +1,20 @@
 //! Queries of CSV files, in which pages and charts select, group and aggregate rows.
 //!
 //! ```text
-//! CONDITIONS   COLUMN=TEXT, COLUMN!=TEXT or TEXT, …          `*` for all rows; a comma in a text is written `\,`
-//! MEASURE      AGGREGATE COLUMN [LOW, HIGH] (COLUMN)         an interval and a further column, both optional
-//!              AGGREGATE COLUMN / COLUMN                     the quotient of two columns, row by row
-//! AGGREGATE    only (all rows agree), min, max, median, count
-//! FORMAT       DECIMALS [below | above | percent]            percent below one, above one, or of a fraction
+//! CONDITIONS   COLUMN=TEXT, COLUMN!=TEXT or TEXT, …          `*` for all rows; a comma in a text
+//! is written `\,`
+//!              COLUMN=max                                    rows with the greatest number of the column
+//! MEASURE      AGGREGATE VALUE [LOW, HIGH] (COLUMN)          an interval and a further column,
+//! both optional
+//!              spearman VALUE, VALUE                         the rank correlation; pearson likewise
+//! AGGREGATE    only (all rows agree), first, min, max, sum, median, geomean, count VALUE
+//! COLUMN, COLUMN / COLUMN * 1e-6, …             computed row by row, from left to right FORMAT
+//! DECIMALS [below | above | percent]            percent below one, above one, or of a fraction
 //!              text                                          cells as they are; all rows have the same one
 //! ```
 
 use crate::Error;
+use crate::statistics::{geometric_mean, median, pearson, range, spearman};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -17,7 +22,7 @@ use std::path::Path;
 pub type Row = BTreeMap<String, String>;
 
 /// Reasons why a query has no answer.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "each message says what its fields are")]
 pub enum QueryError {
     /// A part of the query that cannot be read.
@@ -32,6 +37,9 @@ pub enum QueryError {
     /// Conditions that no row meets.
     #[error("no row meets {0:?}")]
     NoRow(String),
+    /// A quotient outside its accepted range.
+    #[error("{column} of {group} is {found}; accepted: {accepted}")]
+    NotAccepted { column: String, group: String, found: f64, accepted: String },
 }
 
 /// Stands for a comma within a text while conditions are divided.
@@ -46,11 +54,16 @@ pub fn read(path: &Path) -> Result<Vec<Row>, Error> {
 }
 
 /// Returns the text of a cell.
-fn cell<'r>(row: &'r Row, column: &str) -> Result<&'r String, QueryError> {
+pub fn cell<'r>(row: &'r Row, column: &str) -> Result<&'r String, QueryError> {
     row.get(column).ok_or_else(|| {
         let names: Vec<&str> = row.keys().map(String::as_str).collect();
         QueryError::Column { column: column.into(), accepted: names.join(", ") }
     })
+}
+
+/// Returns the number in a cell, if it holds one.
+pub fn number_in(row: &Row, column: &str) -> Option<f64> {
+    row.get(column)?.parse().ok()
 }
 
 /// A condition on one column.
@@ -76,27 +89,89 @@ impl Condition {
         Ok(Self { column: column.into(), texts, wanted })
     }
 
+    /// Replaces the text `max` by the greatest number of the column, if it holds numbers.
+    fn resolve(&mut self, rows: &[Row]) -> Result<(), QueryError> {
+        if self.texts != ["max"] {
+            return Ok(());
+        }
+        let mut greatest: Option<(f64, &String)> = None;
+        for row in rows {
+            let text = cell(row, &self.column)?;
+            if let Ok(number) = text.parse::<f64>()
+                && greatest.is_none_or(|(most, _)| number > most)
+            {
+                greatest = Some((number, text));
+            }
+        }
+        if let Some((_, text)) = greatest {
+            self.texts = vec![text.clone()];
+        }
+        Ok(())
+    }
+
     fn is_met(&self, row: &Row) -> Result<bool, QueryError> {
         let found = self.texts.contains(cell(row, &self.column)?);
         Ok(found == self.wanted)
     }
 }
 
+/// Conditions on the columns of a row, all of which have to be met.
+pub struct Conditions(Vec<Condition>);
+
+impl Conditions {
+    /// Reads conditions; `*` and an empty text are none.
+    pub fn parse(text: &str) -> Result<Self, QueryError> {
+        let mut conditions = Vec::new();
+        if !["", "*"].contains(&text) {
+            for text in text.replace("\\, ", COMMA).split(", ") {
+                conditions.push(Condition::parse(&text.replace(COMMA, ", "))?);
+            }
+        }
+        Ok(Self(conditions))
+    }
+
+    /// Returns the condition that a column has a text.
+    pub fn equal(column: &str, text: &str) -> Self {
+        let texts = vec![text.to_owned()];
+        Self(vec![Condition { column: column.into(), texts, wanted: true }])
+    }
+
+    /// The columns that the conditions are on.
+    pub fn columns(&self) -> impl Iterator<Item = &str> {
+        self.0
+            .iter()
+            .map(|condition| condition.column.as_str())
+    }
+
+    /// The texts that the conditions name.
+    pub fn texts(&self) -> Vec<&str> {
+        let texts = self
+            .0
+            .iter()
+            .flat_map(|condition| &condition.texts);
+        texts.map(String::as_str).collect()
+    }
+
+    /// Returns true if the row meets all conditions.
+    pub fn are_met(&self, row: &Row) -> Result<bool, QueryError> {
+        for condition in &self.0 {
+            if !condition.is_met(row)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+}
+
 /// Returns the rows that meet all conditions; at least one.
 pub fn select(rows: Vec<Row>, conditions: &str) -> Result<Vec<Row>, QueryError> {
-    let mut parsed = Vec::new();
-    if conditions != "*" {
-        for text in conditions.replace("\\, ", COMMA).split(", ") {
-            parsed.push(Condition::parse(&text.replace(COMMA, ", "))?);
-        }
+    let mut parsed = Conditions::parse(conditions)?;
+    for condition in &mut parsed.0 {
+        condition.resolve(&rows)?;
     }
     let mut selected = Vec::new();
     for row in rows {
-        let mut is_met = true;
-        for condition in &parsed {
-            is_met &= condition.is_met(&row)?;
-        }
-        if is_met {
+        if parsed.are_met(&row)? {
             selected.push(row);
         }
     }
@@ -104,6 +179,24 @@ pub fn select(rows: Vec<Row>, conditions: &str) -> Result<Vec<Row>, QueryError> 
         return Err(QueryError::NoRow(conditions.into()));
     }
     Ok(selected)
+}
+
+/// Returns each row with the columns of every other row that agrees with it in all common columns.
+pub fn join(rows: &[Row], others: &[Row]) -> Vec<Row> {
+    let mut joined = Vec::new();
+    for row in rows {
+        for other in others {
+            let agrees = other
+                .iter()
+                .all(|(column, text)| row.get(column).is_none_or(|own| own == text));
+            if agrees {
+                let mut both = row.clone();
+                both.extend(other.clone());
+                joined.push(both);
+            }
+        }
+    }
+    joined
 }
 
 /// Returns the different values of some columns, in their order in the file.
@@ -132,48 +225,167 @@ pub fn group<'r>(rows: &'r [Row], columns: &[&str], values: &[String]) -> Vec<&'
     rows.iter().filter(is_own).collect()
 }
 
-/// Returns one number of the rows' `AGGREGATE COLUMN`; `None` if no row has one.
-pub fn aggregate(rows: &[&Row], measure: &str) -> Result<Option<f64>, QueryError> {
-    let malformed = || QueryError::Malformed {
-        part: "measure",
-        found: measure.into(),
-        accepted: "only, min, max, median or count, and a column",
-    };
-    let (how, columns) = measure.split_once(' ').ok_or_else(malformed)?;
-    if how == "count" {
-        return Ok(Some(rows.len() as f64));
-    }
-    let mut values = Vec::new();
-    for row in rows {
-        values.extend(number(row, columns)?);
-    }
-    values.sort_by(f64::total_cmp);
-    let [Some(first), Some(last)] = [values.first().copied(), values.last().copied()] else {
-        return Ok(None);
-    };
-    match how {
-        "only" if first == last => Ok(Some(first)),
-        "only" => Err(QueryError::Several {
-            column: columns.into(),
-            values: format!("from {first} to {last}"),
-        }),
-        "min" => Ok(Some(first)),
-        "max" => Ok(Some(last)),
-        "median" => Ok(Some(0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2]))),
-        _ => Err(malformed()),
+/// How the values of some rows become one number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aggregate {
+    /// The value in which all rows agree.
+    Only,
+    /// The value of the first row.
+    First,
+    /// The least value.
+    Min,
+    /// The greatest value.
+    Max,
+    /// The sum.
+    Sum,
+    /// The median.
+    Median,
+    /// The geometric mean.
+    Geomean,
+    /// The number of rows, whatever they hold.
+    Count,
+    /// Pearson's correlation of two values.
+    Pearson,
+    /// Spearman's rank correlation of two values.
+    Spearman,
+}
+
+impl Aggregate {
+    const NAMES: [(&str, Self); 10] = [
+        ("only", Self::Only),
+        ("first", Self::First),
+        ("min", Self::Min),
+        ("max", Self::Max),
+        ("sum", Self::Sum),
+        ("median", Self::Median),
+        ("geomean", Self::Geomean),
+        ("count", Self::Count),
+        ("pearson", Self::Pearson),
+        ("spearman", Self::Spearman),
+    ];
+
+    /// Returns true for correlations, which need two values of every row.
+    fn is_of_pairs(self) -> bool {
+        matches!(self, Self::Pearson | Self::Spearman)
     }
 }
 
-/// Returns a cell's number, or the quotient of two; `None` where a cell holds none.
-fn number(row: &Row, columns: &str) -> Result<Option<f64>, QueryError> {
-    let Some((above, below)) = columns.split_once(" / ") else {
-        return Ok(cell(row, columns)?.parse().ok());
-    };
-    let above: Option<f64> = cell(row, above)?.parse().ok();
-    let below: Option<f64> = cell(row, below)?.parse().ok();
-    Ok(above
-        .zip(below)
-        .map(|(above, below)| above / below))
+/// An aggregate of a value, computed row by row from columns and numbers.
+pub struct Measure<'t> {
+    /// How the values become one.
+    pub how: Aggregate,
+    values: Vec<&'t str>,
+    text: &'t str,
+}
+
+impl<'t> Measure<'t> {
+    /// Reads `AGGREGATE VALUE`.
+    pub fn parse(text: &'t str) -> Result<Self, QueryError> {
+        let malformed = || QueryError::Malformed {
+            part: "measure",
+            found: text.into(),
+            accepted: "only, first, min, max, sum, median, geomean, count, and a column; pearson, \
+                       spearman, and two",
+        };
+        let (name, rest) = text.split_once(' ').ok_or_else(malformed)?;
+        let (_, how) = Aggregate::NAMES
+            .into_iter()
+            .find(|(known, _)| *known == name)
+            .ok_or_else(malformed)?;
+        let values: Vec<&str> =
+            if how.is_of_pairs() { rest.split(", ").collect() } else { vec![rest] };
+        if values.len() != 1 + usize::from(how.is_of_pairs()) {
+            return Err(malformed());
+        }
+        Ok(Self { how, values, text })
+    }
+
+    /// Returns the first value of a row; `None` where a cell holds no number.
+    pub fn of_row(&self, row: &Row) -> Result<Option<f64>, QueryError> {
+        number(row, self.values[0])
+    }
+
+    /// Returns one number of the rows; `None` if no row has one.
+    pub fn of_rows(&self, rows: &[&Row]) -> Result<Option<f64>, QueryError> {
+        if self.how == Aggregate::Count {
+            return Ok(Some(rows.len() as f64));
+        }
+        if self.how.is_of_pairs() {
+            return self.correlation(rows);
+        }
+        let mut values = Vec::new();
+        for row in rows {
+            values.extend(self.of_row(row)?);
+        }
+        self.of_values(&values)
+    }
+
+    /// Returns one number of some values; `None` if there are none.
+    pub fn of_values(&self, values: &[f64]) -> Result<Option<f64>, QueryError> {
+        let Some((least, most)) = range(values.iter().copied()) else { return Ok(None) };
+        Ok(match self.how {
+            Aggregate::Only if least < most => {
+                let values = format!("from {least} to {most}");
+                return Err(QueryError::Several { column: self.values[0].into(), values });
+            }
+            Aggregate::Only | Aggregate::First => values.first().copied(),
+            Aggregate::Min => Some(least),
+            Aggregate::Max => Some(most),
+            Aggregate::Sum => Some(values.iter().sum()),
+            Aggregate::Median => median(values),
+            Aggregate::Geomean => Some(geometric_mean(values)),
+            Aggregate::Count | Aggregate::Pearson | Aggregate::Spearman => {
+                let accepted = "an aggregate of one value of every row";
+                return Err(QueryError::Malformed {
+                    part: "ratio",
+                    found: self.text.into(),
+                    accepted,
+                });
+            }
+        })
+    }
+
+    fn correlation(&self, rows: &[&Row]) -> Result<Option<f64>, QueryError> {
+        let mut pairs = Vec::new();
+        for row in rows {
+            let first = number(row, self.values[0])?;
+            let second = number(row, self.values[1])?;
+            pairs.extend(first.zip(second));
+        }
+        Ok(match self.how {
+            Aggregate::Pearson => pearson(&pairs),
+            _ => spearman(&pairs),
+        })
+    }
+}
+
+/// Returns a value of a row, computed from left to right; `None` where a cell holds no number.
+fn number(row: &Row, value: &str) -> Result<Option<f64>, QueryError> {
+    let mut words = value.split(' ');
+    let mut result = operand(row, words.next().unwrap_or_default())?;
+    while let Some(operator) = words.next() {
+        let other = operand(row, words.next().unwrap_or_default())?;
+        let Some((left, right)) = result.zip(other) else { return Ok(None) };
+        result = Some(match operator {
+            "+" => left + right,
+            "*" => left * right,
+            "/" => left / right,
+            _ => {
+                let found = value.into();
+                let accepted = "columns and numbers with +, * or / between blanks";
+                return Err(QueryError::Malformed { part: "value", found, accepted });
+            }
+        });
+    }
+    Ok(result)
+}
+
+/// Returns the number of a column, or the number itself.
+fn operand(row: &Row, word: &str) -> Result<Option<f64>, QueryError> {
+    match word.parse() {
+        Ok(number) => Ok(Some(number)),
+        Err(_) => Ok(cell(row, word)?.parse().ok()),
+    }
 }
 
 /// Writes a number in a format.
@@ -196,7 +408,7 @@ fn write(value: f64, format: &str) -> Result<String, QueryError> {
 }
 
 /// Returns the one text of a column; `None` if all cells are empty.
-fn only_text(rows: &[&Row], column: &str) -> Result<Option<String>, QueryError> {
+pub fn only_text(rows: &[&Row], column: &str) -> Result<Option<String>, QueryError> {
     let mut texts = BTreeSet::new();
     for row in rows {
         texts.insert(cell(row, column)?.as_str());
@@ -227,7 +439,8 @@ fn one(rows: &[&Row], measure: &str, format: &str) -> Result<Option<String>, Que
     if format == "text" {
         return only_text(rows, measure.strip_prefix("only ").unwrap_or(measure));
     }
-    aggregate(rows, measure)?
+    Measure::parse(measure)?
+        .of_rows(rows)?
         .map(|value| write(value, format))
         .transpose()
 }

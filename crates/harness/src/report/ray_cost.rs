@@ -1,26 +1,29 @@
-//! Tests of rays in trees that are trained on rays, over those in a tree that is searched for by area.
+//! Tests of rays in trees that are trained on rays, over those in a tree that is searched for by
+//! area.
 
 use super::data::distinct;
 use super::prelude::*;
-use crate::rows::{TestRow, TestTimeRow};
+use crate::rows::TestRow;
 use crate::statistics::{geometric_mean, student};
 
 bvh_config::config! { serde;
     /// A comparison of trees by the tests of rays that they were not trained on.
     pub struct Config {
-        /// What it belongs to.
+        /// The section or topic that it belongs to.
         source: String;
         /// Heading.
         title: String;
         /// Label of the method that the others are compared with.
         base: String;
-        /// Pairs of labels: whether trees of the second take more tests than those of the first. Default none.
+        /// Pairs of labels: whether trees of the second take more tests than those of the first.
+        /// Default none.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pairs: Vec<[String; 2]>;
     }
 }
 
-/// A tree's tests over those of the base, as written to `ray_cost.csv`; rows for the geometric mean of all scenes come last.
+/// A tree's tests over those of the base, as written to `ray_cost.csv`; rows for the geometric mean
+/// of all scenes come last.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Compared<'a> {
     scene: &'a str,
@@ -54,11 +57,11 @@ pub(super) struct Paired<'a> {
     low: Option<f64>,
     /// The upper end.
     high: Option<f64>,
-    /// What the interval says:
+    /// The verdict of the interval:
     verdict: Verdict,
 }
 
-/// What an interval says of a ratio of tests.
+/// The verdict of an interval of a ratio of tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 enum Verdict {
@@ -67,8 +70,8 @@ enum Verdict {
     /// It lies above 1.
     More,
     /// It holds 1, or there is none.
-    #[serde(rename = "cannot be told")]
-    CannotBeTold,
+    #[serde(rename = "inconclusive")]
+    Inconclusive,
 }
 
 /// The scene of rows that are geometric means.
@@ -98,10 +101,6 @@ impl Config {
         let columns =
             "scene tree trained_on judged_on camera over_base_low tests_over_base over_base_high";
         output.show(&format!("Tests per ray over those of {}:", self.base), &table, columns)?;
-        let speeds = self.speeds(rows);
-        if !speeds.is_empty() {
-            output.add_csv("timing_ray_cost", &speeds)?;
-        }
         output.reading = reading(&table, &self.base);
         let paired: Vec<Paired> = self
             .pairs
@@ -154,37 +153,6 @@ impl Config {
             layers,
         )
     }
-
-    /// Speeds over those of the base.
-    fn speeds<'a>(&self, rows: &'a Rows) -> Vec<Speed<'a>> {
-        let speed = |row: &'a TestTimeRow| {
-            let same = |of: &&TestTimeRow| {
-                of.scene == row.scene
-                    && of.method == self.base
-                    && (&of.judged_on, &of.camera) == (&row.judged_on, &row.camera)
-            };
-            let base = rows.test_times.iter().find(same)?;
-            Some(Speed {
-                scene: &row.scene,
-                method: &row.method,
-                judged_on: &row.judged_on,
-                camera: &row.camera,
-                speed_over_base: row.million_per_s / base.million_per_s,
-            })
-        };
-        rows.test_times.iter().filter_map(speed).collect()
-    }
-}
-
-/// A tree's rays per second over those of the base, as written to `timing_ray_cost.csv`.
-#[derive(Serialize, JsonSchema)]
-pub(super) struct Speed<'a> {
-    scene: &'a str,
-    method: &'a str,
-    judged_on: &'a str,
-    camera: &'a str,
-    /// Rays per second over the base's.
-    speed_over_base: f64,
 }
 
 fn tree_name(tree: &str, trained_on: &str) -> String {
@@ -231,7 +199,7 @@ fn paired<'a>(rows: &'a Rows, [first, second]: &'a [String; 2]) -> Vec<Paired<'a
         let verdict = match low.zip(high) {
             Some((_, high)) if high < 1.0 => Verdict::Fewer,
             Some((low, _)) if low > 1.0 => Verdict::More,
-            _ => Verdict::CannotBeTold,
+            _ => Verdict::Inconclusive,
         };
         let TestRow { scene, judged_on, camera, .. } = row;
         let method = second.as_str();
@@ -302,7 +270,8 @@ fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
         .collect()
 }
 
-/// With how many kinds of rays each trained tree takes fewer tests than the base, and the least of all.
+/// With how many kinds of rays each trained tree takes fewer tests than the base, and the least of
+/// all.
 fn reading(table: &[Compared], base: &str) -> String {
     let own = || {
         table

@@ -1,7 +1,7 @@
 //! Run-time distributions: how likely a randomised search has reached a target within some time.
 //!
-//! One distribution per target is Hoos & Stützle's qualified run-time distribution (1998); the fit is that of the
-//! time-to-target plots of Aiex, Resende & Ribeiro (2007).
+//! One distribution per target is Hoos & Stützle's qualified run-time distribution (1998); the fit
+//! is that of the time-to-target plots of Aiex, Resende & Ribeiro (2007).
 
 use super::attempt::{Attempt, attempts, staircase};
 use super::config::Targets;
@@ -9,8 +9,8 @@ use super::prelude::*;
 use super::progress::ProgressAxis;
 use crate::statistics::time_to_target::ShiftedExponential;
 
-/// One step of a distribution, as written to `timing_run_times.csv`, `run_times_evaluations.csv` and
-/// `run_times_work.csv`.
+/// One step of a distribution, as written to `timing_run_times.csv`, `run_times_evaluations.csv`
+/// and `run_times_work.csv`.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Step<'a> {
     scene: &'a str,
@@ -33,7 +33,8 @@ pub(super) struct Fit<'a> {
     solved: usize,
     /// Of all runs; empty if fewer than half were solved.
     median: Option<f64>,
-    /// Of the shifted exponential distribution; empty if fewer than three quarters were solved, or all at once.
+    /// Of the shifted exponential distribution; empty if fewer than three quarters were solved, or
+    /// all at once.
     shift: Option<f64>,
     /// The mean time after the shift.
     mean: Option<f64>,

@@ -1,6 +1,7 @@
 //! On which side of the base the costs of something lie, scene by scene.
 
-/// The number of scenes on which a whole interval lies below the base, above it, or on neither side.
+/// The number of scenes on which a whole interval lies below the base, above it, or on neither
+/// side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Sides {
     below: usize,
@@ -23,14 +24,14 @@ impl Sides {
     /// Returns a sentence about `name`.
     pub(super) fn say(self, name: &str) -> String {
         let Self { below, above, scenes } = self;
-        let untold = scenes - below - above;
+        let inconclusive = scenes - below - above;
         if above == scenes {
             return format!("The {name} costs more than greedy on all {scenes} scenes.");
         }
         if below == scenes {
             return format!("The {name} costs less than greedy on all {scenes} scenes.");
         }
-        if untold == scenes {
+        if inconclusive == scenes {
             return format!(
                 "Whether the {name} costs more or less than greedy is inconclusive on all {scenes} scenes."
             );
@@ -42,9 +43,12 @@ impl Sides {
         if above > 0 {
             sides.push(format!("more than greedy on {above}"));
         }
-        let untold =
-            if untold > 0 { format!("; {untold} are inconclusive") } else { String::new() };
-        format!("The {name} costs {} of {scenes} scenes{untold}.", sides.join(" and "))
+        let inconclusive = if inconclusive > 0 {
+            format!("; {inconclusive} are inconclusive")
+        } else {
+            String::new()
+        };
+        format!("The {name} costs {} of {scenes} scenes{inconclusive}.", sides.join(" and "))
     }
 }
 

@@ -1,4 +1,5 @@
-//! Whether one method really differs from others: paired across scenes, and run against run within each.
+//! Whether one method really differs from others: paired across scenes, and run against run within
+//! each.
 
 use super::prelude::*;
 use crate::statistics::median;
@@ -21,7 +22,8 @@ bvh_config::config! { serde;
     }
 }
 
-/// One comparison, as written to `significance.csv`. Holm's correction is over all rows of the same test.
+/// One comparison, as written to `significance.csv`. Holm's correction is over all rows of the same
+/// test.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Row<'a> {
     /// `all` for the comparison across scenes.
@@ -39,12 +41,12 @@ pub(super) struct Row<'a> {
     statistic: f64,
     /// Of the test alone.
     p_value: f64,
-    /// What the corrected p-value would be if every test came out as clearly as its samples allow.
+    /// The corrected p-value if every test came out as clearly as its samples allow.
     least_holm_p_value: f64,
     /// The corrected p-value.
     holm_p_value: f64,
-    /// How likely a run of the method ends below one of the other, ties counting a half; across scenes, its mean over
-    /// them.
+    /// How likely a run of the method ends below one of the other, ties counting a half; across
+    /// scenes, its mean over them.
     a12: f64,
     /// The method's median work over the other's, the median over scenes: budgets may differ.
     work_ratio: Option<f64>,
@@ -77,9 +79,10 @@ enum Difference {
     /// The corrected p-value is not below the level.
     #[serde(rename = "not different")]
     None,
-    /// No result could have been below the level: there are too few samples for so many comparisons.
-    #[serde(rename = "cannot be told")]
-    CannotBeTold,
+    /// No result could have been below the level: there are too few samples for so many
+    /// comparisons.
+    #[serde(rename = "inconclusive")]
+    Inconclusive,
 }
 
 impl Config {
@@ -147,7 +150,8 @@ impl Config {
         (samples > 0).then_some(Row { test: RankTest::Wilcoxon, a12, work_ratio, verdict, ..row })
     }
 
-    /// The test of the runs on one scene; `None` if either method has only one, which says nothing about others.
+    /// The test of the runs on one scene; `None` if either method has only one, which says nothing
+    /// about others.
     fn within<'a>(&'a self, rows: &'a Rows, scene: &'a str, against: &'a str) -> Option<Row<'a>> {
         let [own, other] = [&self.method, against].map(|method| rows.final_ratios(scene, method));
         let test = mann_whitney(&own, &other)?;
@@ -209,7 +213,7 @@ impl Config {
             (row.least_holm_p_value, row.holm_p_value) = (least, found);
             if found >= self.level {
                 let possible = least < self.level;
-                row.verdict = if possible { Difference::None } else { Difference::CannotBeTold };
+                row.verdict = if possible { Difference::None } else { Difference::Inconclusive };
             }
         }
         table
@@ -256,7 +260,7 @@ impl Difference {
             Self::Lower => "lower",
             Self::Higher => "higher",
             Self::None => "not different",
-            Self::CannotBeTold => "not told by so few",
+            Self::Inconclusive => "not told by so few",
         }
     }
 }

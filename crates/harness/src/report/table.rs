@@ -62,9 +62,10 @@ pub(super) struct Cell<'a> {
     cost_over_base: f64,
     /// The expected best of so many trials, from all trials run.
     expected_over_base: Option<f64>,
-    /// The lower of two numbers between which the best of as many fresh trials lies in at least nine of ten repetitions. The pool
-    /// of all trials predicts them, by its order statistics or, below its lowest value, by an exponential tail. For full runs, the
-    /// lowest of the repetitions.
+    /// The lower of two numbers between which the best of as many fresh trials lies in at least
+    /// nine of ten repetitions. The pool of all trials predicts them, by its order statistics or,
+    /// below its lowest value, by an exponential tail. For full runs, the lowest of the
+    /// repetitions.
     low_over_base: Option<f64>,
     /// The higher number.
     high_over_base: Option<f64>,
@@ -197,10 +198,10 @@ impl Config {
         let row = row.compare(
             format!("{paper:.4}"),
             format!("{:.4}, by {}", closest.cost_over_base, closest.column),
-            if close { Verdict::CannotBeTold } else { Verdict::Differs },
+            if close { Verdict::Inconclusive } else { Verdict::Differs },
             format!(
                 "differs if no reading is within {} % of the paper's; the paper prints no formula, so that a reading which is within cannot \
-                 be told from the paper's",
+                 be distinguished from the paper's",
                 100.0 * self.tolerance
             ),
         );
@@ -246,8 +247,8 @@ impl Config {
             .collect()
     }
 
-    /// The sentence that answers for the paper: how many scenes each column is above and below the base on, by whole intervals, or
-    /// how many of the paper's ratios each reading comes close to.
+    /// The sentence that answers for the paper: how many scenes each column is above and below the
+    /// base on, by whole intervals, or how many of the paper's ratios each reading comes close to.
     fn answer(&self, cells: &[Cell]) -> Option<String> {
         cells
             .iter()
@@ -329,7 +330,8 @@ impl Config {
             layers.push(bars(name, column, &|cell| Some(cell.cost_over_base), own.collect()));
         }
         layers.push(Layer::new("greedy", Marks::HLine(1.0)));
-        // Readings of a heuristic that peel off one object at a time would hide all differences between the others.
+        // Readings of a heuristic that peel off one object at a time would hide all differences
+        // between the others.
         let y = Axis::linear("cost / base");
         let y = if is_cut(cells) { y.range(0.9, 1.2 * highest_of_paper(cells)) } else { y };
         panel("", Axis::categories("", rows.all_shown()), y, layers)
@@ -462,7 +464,7 @@ mod tests {
         // A reading that comes close may still not be the paper's.
         assert_eq!(
             (row.ours.as_str(), row.verdict),
-            ("1.9000, by difference", Verdict::CannotBeTold)
+            ("1.9000, by difference", Verdict::Inconclusive)
         );
         assert!(
             near.answer

@@ -9,14 +9,14 @@ bvh_config::config! { serde;
     /// A cost relative to the greedy tree's or to the best known.
     #[derive(Copy)]
     pub struct Target {
-        /// What the percentage is of.
+        /// The cost that the percentage is relative to.
         of: Of;
         /// By how much the target is above it; below it if negative.
         percent: f64, in (Excluded(-100.0), Included(1e6));
     }
 }
 
-/// What a target is relative to.
+/// The cost that a target is relative to.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
 )]

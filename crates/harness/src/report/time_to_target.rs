@@ -1,14 +1,14 @@
-//! Error against run time in one table: seconds and work until every method is within a distance of the best known.
+//! Error against run time in one table: seconds and work until every method is within a distance of
+//! the best known.
 
 use super::attempt::{Attempt, attempts};
 use super::config::Targets;
-use super::metric::Metric;
 use super::prelude::*;
-use super::progress::ProgressAxis;
+use super::progress::{ProgressAxis, WORST};
 use crate::statistics::order_quantile;
 
-/// One method and target on one scene, as written to `timing_to_target.csv`, `to_target_evaluations.csv`
-/// and `to_target_work.csv`.
+/// One method and target on one scene, as written to `timing_to_target.csv`,
+/// `to_target_evaluations.csv` and `to_target_work.csv`.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Reached<'a> {
     scene: &'a str,
@@ -16,7 +16,8 @@ pub(super) struct Reached<'a> {
     method: &'a str,
     runs: usize,
     solved: usize,
-    /// Over all runs, of which those that never reach the target are the last; empty if that is the quantile's.
+    /// Over all runs, of which those that never reach the target are the last; empty if that is the
+    /// quantile's.
     median: Option<f64>,
     /// When nine of ten runs have reached it.
     quantile_90: Option<f64>,
@@ -42,7 +43,7 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
 
 fn reached<'a>(attempt: &Attempt<'a>) -> Reached<'a> {
     let mut times = attempt.solved.clone();
-    times.resize(attempt.runs, Metric::WORST);
+    times.resize(attempt.runs, WORST);
     let at = |q| order_quantile(&times, q).filter(|time| time.is_finite());
     Reached {
         scene: attempt.scene,

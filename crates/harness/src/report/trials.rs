@@ -1,4 +1,5 @@
-//! The paper's Figure 1: cost against number of trials, one run's staircase and the exact expectation.
+//! The paper's Figure 1: cost against number of trials, one run's staircase and the exact
+//! expectation.
 
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
@@ -13,8 +14,8 @@ bvh_config::config! { serde;
         title: String;
         /// Labels of the methods to compare.
         methods: Vec<String>, in OneOrMore;
-        /// Figures end at, and methods are compared at, the best of so many trials. Use fewer than are run: the
-        /// expectation needs a pool to draw from.
+        /// Figures end at, and methods are compared at, the best of so many trials. Use fewer than
+        /// are run: the expectation needs a pool to draw from.
         best_of: usize = 100, in 1..;
         /// The method that the paper found best.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -150,7 +151,7 @@ impl Config {
             .collect()
     }
 
-    /// On how many scenes each method is best, or cannot be told from the best.
+    /// On how many scenes each method is best, or cannot be distinguished from the best.
     fn reading(&self, last: &[&Point]) -> String {
         let scenes: Vec<&[&Point]> = last.chunk_by(|a, b| a.scene == b.scene).collect();
         let is_best = |scene: &[&Point], method: &str| {
@@ -174,7 +175,8 @@ impl Config {
         )
     }
 
-    /// The methods that no other is below, by the expected best of as many trials as are compared, the lowest first.
+    /// The methods that no other is below, by the expected best of as many trials as are compared,
+    /// the lowest first.
     fn best<'p, 'a>(&self, curves: &'p [Vec<Point<'a>>]) -> Vec<&'p Point<'a>> {
         let mut ranking: Vec<&Point> = curves
             .iter()
@@ -195,14 +197,15 @@ impl Config {
         (!best.is_empty()).then(|| (in_words(&best), scene))
     }
 
-    /// Compares the best methods with the paper's. Where there are several, which of them is best cannot be told.
+    /// Compares the best methods with the paper's. Where there are several, it is inconclusive
+    /// which is best.
     fn compare(&self, scene: &str, curves: &[Vec<Point>], output: &mut Output) {
         let best = self.best(curves);
         let Some(least) = best.first() else { return };
         let Some(paper) = &self.paper_best else { return };
         let verdict = match (best.iter().any(|point| point.method == paper), best.len()) {
             (true, 1) => Verdict::Agrees,
-            (true, _) => Verdict::CannotBeTold,
+            (true, _) => Verdict::Inconclusive,
             (false, _) => Verdict::Differs,
         };
         let quantity = format!("best of the compared, by the expected best of {}", self.best_of);
@@ -225,8 +228,8 @@ fn in_words(best: &[&Point]) -> String {
         .join(" or ")
 }
 
-/// The sentence that answers for the paper: the best methods by scene, whether the paper's is one of them, and whether any is below
-/// the base.
+/// The sentence that answers for the paper: the best methods by scene, whether the paper's is one
+/// of them, and whether any is below the base.
 fn answer(lists: &[(String, &str)], last: &[&Point], paper: &str) -> String {
     let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
     for (best, scene) in lists {
@@ -305,8 +308,8 @@ mod tests {
         assert_eq!(verdict("other", worse), ("one".into(), Verdict::Differs));
         // Less on average by one lucky repetition.
         let lucky = [[0.8, 1.1, 1.2], [1.02, 1.1, 1.2], [1.01, 1.1, 1.2], [1.02, 1.1, 1.2]];
-        assert_eq!(verdict("one", lucky), ("other or one".into(), Verdict::CannotBeTold));
-        assert_eq!(verdict("other", lucky), ("other or one".into(), Verdict::CannotBeTold));
+        assert_eq!(verdict("one", lucky), ("other or one".into(), Verdict::Inconclusive));
+        assert_eq!(verdict("other", lucky), ("other or one".into(), Verdict::Inconclusive));
     }
 
     #[test]

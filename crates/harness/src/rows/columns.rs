@@ -1,5 +1,5 @@
-//! What a CSV file is: rows of a type, whose fields are the columns, and whose documentation names the files and describes the
-//! columns. From it alone the page of all columns is made, docs/COLUMNS.md.
+//! CSV files as rows of a type. The fields of the type are the columns; its documentation names the
+//! files and describes the columns. From it alone the page of all columns is made, docs/COLUMNS.md.
 
 use crate::Error;
 use schemars::JsonSchema;
@@ -150,7 +150,8 @@ impl Columns {
         Self { about: text(&schema, "description"), columns }
     }
 
-    /// Returns the names of the files that hold such rows: all that the documentation names before it says what they hold.
+    /// Returns the names of the files that hold such rows: all that the documentation names before
+    /// it says what they hold.
     pub fn files(&self) -> impl Iterator<Item = &str> {
         let names = self
             .about

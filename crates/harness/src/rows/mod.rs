@@ -1,6 +1,7 @@
 //! The rows of the CSV files: flat, units in the names, full precision.
 //!
-//! Columns that many files have are described in [`mod@columns`], and the page of all columns is made from both.
+//! Columns that many files have are described in [`mod@columns`], and the page of all columns is
+//! made from both.
 #![allow(missing_docs, reason = "columns whose names say it all, and those above")]
 
 pub mod columns;
@@ -49,7 +50,8 @@ rows! {
         stop: bvh_search::StopReason,
         /// The objective's value for the best tree found.
         cost: f64,
-        /// The objective's value for the greedy Müller–Fellner tree of the scene, the base of ratios.
+        /// The objective's value for the greedy Müller–Fellner tree of the scene, the base of
+        /// ratios.
         base_cost: f64,
         /// `cost` divided by `base_cost`; 1 when that is 0.
         cost_over_base: f64,
@@ -64,8 +66,8 @@ rows! {
         depth: usize,
     }
 
-    /// One row of `history.csv`: the first event of a run, an improvement, or the last event. The file is there if a report
-    /// reads it or the spec has no reports.
+    /// One row of `history.csv`: the first event of a run, an improvement, or the last event. The
+    /// file is there if a report reads it or the spec has no reports.
     HistoryRow in "history.csv" {
         scene: String,
         method: String,
@@ -78,7 +80,8 @@ rows! {
         incumbent: f64,
     }
 
-    /// One row of `trial_costs.csv`: one trial or generation of a run, of methods whose trials a report reads.
+    /// One row of `trial_costs.csv`: one trial or generation of a run, of methods whose trials a
+    /// report reads.
     TrialRow in "trial_costs.csv" {
         scene: String,
         method: String,
@@ -98,34 +101,6 @@ rows! {
         threads: usize,
         /// Wall time of the whole run.
         seconds: f64,
-    }
-
-    /// One row of `timing_runs.csv`: what a run found that the clock ended.
-    ClockedRow in "timing_runs.csv" {
-        scene: String,
-        method: String,
-        seed: u64,
-        repetition: u32,
-        threads: usize,
-        /// Wall time of the whole run.
-        seconds: f64,
-        evaluations: u64,
-        work: u64,
-        /// As in `runs.csv`.
-        cost: f64,
-        cost_over_base: f64,
-        references_per_object: f64,
-        collapsed_sah: f64,
-    }
-
-    /// One row of `timing_third_party_trees.csv`: a third-party tree next to such runs.
-    ClockedPeerRow in "timing_third_party_trees.csv" {
-        scene: String,
-        method: String,
-        /// Wall time of its build, on one thread.
-        seconds: f64,
-        references_per_object: f64,
-        collapsed_sah: f64,
     }
 
     /// One row of `timing_history.csv`: the time of the event in the same row of `history.csv`.
@@ -149,7 +124,7 @@ rows! {
         repetition: u32,
         /// Where the rays come from.
         family: String,
-        /// What they ask.
+        /// The question that they ask.
         query: String,
         /// Number of rays.
         rays: u64,
@@ -166,7 +141,8 @@ rows! {
         objects_standard_error: f64,
     }
 
-    /// One row of `timing_rays.csv`, of a comparison with other libraries: the speed of rays of one kind.
+    /// One row of `timing_rays.csv`, of a comparison with other libraries: the speed of rays of one
+    /// kind.
     PeerRayRow in "timing_rays.csv" {
         /// Name of the scene, or that the row is a mean over all scenes.
         scene: String,
@@ -184,7 +160,7 @@ rows! {
         rays: String,
         /// Million rays per second on one thread, each part of the rays by its fastest turn.
         million_per_s: f64,
-        /// What tree and layout took to build; in the mean over scenes, their mean.
+        /// Wall time of building tree and layout; in the mean over scenes, their mean.
         build_seconds: f64,
         /// Rays that this contender answers otherwise than brute force.
         disagreements: u64,
@@ -219,7 +195,8 @@ rows! {
     }
 
     #[derive(Default)]
-    /// One row of `traversal.csv`: what rays of one kind found and took in one layout of a run's tree.
+    /// One row of `traversal.csv`: what rays of one kind found and took in one layout of a run's
+    /// tree.
     TraceRow in "traversal.csv" {
         scene: String,
         method: String,
@@ -232,14 +209,16 @@ rows! {
         missed_hits: u64,
         false_hits: u64,
         other_hits: u64,
-        /// Mean number of tests against boxes, the root's included where it is tested; 8 for every wide node.
+        /// Mean number of tests against boxes, the root's included where it is tested; 8 for every
+        /// wide node.
         boxes_per_ray: Option<f64>,
         /// Mean number of tests against objects; 4 for every block of triangles.
         objects_per_ray: Option<f64>,
     }
 
     #[derive(Default)]
-    /// One row of `timing_traversal.csv`: the time of rays of one kind in one layout of a run's tree, on one thread.
+    /// One row of `timing_traversal.csv`: the time of rays of one kind in one layout of a run's
+    /// tree, on one thread.
     TraceTimeRow in "timing_traversal.csv" {
         scene: String,
         method: String,
@@ -248,15 +227,16 @@ rows! {
         count: u64,
         /// Turns that were timed.
         rounds: u32,
-        /// What it took to make the layout from the tree; for other libraries with the tree.
+        /// Wall time of making the layout from the tree; for other libraries, with the tree.
         preparation_seconds: f64,
-        /// What all rays took: the sum over small parts of them of each part's fastest turn.
+        /// Wall time of all rays: the sum over small parts of them of each part's fastest turn.
         seconds: f64,
         /// The same with each part's median turn.
         median_seconds: f64,
     }
 
-    /// One row of `tests.csv`: the tests of rays that a tree was not trained on, in the wide layout.
+    /// One row of `tests.csv`: the tests of rays that a tree was not trained on, in the wide
+    /// layout.
     TestRow in "tests.csv" {
         scene: String,
         method: String,
@@ -266,7 +246,8 @@ rows! {
         trained_on: String,
         /// Kind of the rays.
         judged_on: String,
-        /// Whether they come from the training's path of cameras: `same`, `other`, or `none` without a camera.
+        /// Whether they come from the training's path of cameras: `same`, `other`, or `none`
+        /// without a camera.
         camera: String,
         /// Mean number of nodes tested per ray, eight boxes each: over all rays and repetitions.
         node_tests: f64,
@@ -280,26 +261,29 @@ rows! {
         rays: u64,
     }
 
-    /// One row of `timing_ratios.csv`: the speed of rays of one kind in one of our modes, over the fastest mode of other
-    /// libraries on the same scene; after the scenes the geometric mean over them.
+    /// One row of `timing_ratios.csv`: the speed of rays of one kind in one of our modes, over the
+    /// fastest mode of other libraries on the same scene; after the scenes the geometric mean over
+    /// them.
     RayRatioRow in "timing_ratios.csv" {
         scene: String,
         /// The processor that was measured, and the instruction set that all are held to.
         processor: String,
         /// Our mode.
         mode: String,
-        /// The modes compared with: `any mode`, `single calls`, those of `whole triangles`, or Embree's `robust` ones.
+        /// The modes compared with: `any mode`, `single calls`, those of `whole triangles`, or
+        /// Embree's `robust` ones.
         against: String,
         /// The fastest of them on this scene; empty for means.
         fastest: String,
         rays: String,
-        /// Our speed over the fastest of theirs, to six decimals like all ratios here; more than 1 is faster.
+        /// Our speed over the fastest of theirs, to six decimals like all ratios here; more than 1
+        /// is faster.
         ratio: f64,
         /// The least ratio of one turn.
         least_turn: f64,
         /// The greatest ratio of one turn.
         greatest_turn: f64,
-        /// What tree and layout took to build; in the mean over scenes, their mean.
+        /// Wall time of building tree and layout; in the mean over scenes, their mean.
         build_seconds: f64,
         /// The scene that lifts the mean most; empty for scenes.
         carried_by: String,
@@ -307,17 +291,8 @@ rows! {
         ratio_without: Option<f64>,
     }
 
-    /// One row of `timing_tests.csv`: the speed of the same rays in the tree of the first run, on one thread.
-    TestTimeRow in "timing_tests.csv" {
-        scene: String,
-        method: String,
-        judged_on: String,
-        camera: String,
-        /// Million rays per second, each part of the rays by its fastest turn; trees take turns.
-        million_per_s: f64,
-    }
-
-    /// One row of `visits.csv`: the cost of a run's tree for one kind of rays, others than those that are tested.
+    /// One row of `visits.csv`: the cost of a run's tree for one kind of rays, others than those
+    /// that are tested.
     VisitRow in "visits.csv" {
         scene: String,
         method: String,
@@ -338,7 +313,8 @@ rows! {
         tests: f64,
     }
 
-    /// One row of `layouts.csv`: the size and the cost of a method's trees and of the wide layouts that rays are traced through.
+    /// One row of `layouts.csv`: the size and the cost of a method's trees and of the wide layouts
+    /// that rays are traced through.
     LayoutRow in "layouts.csv" {
         scene: String,
         method: String,
@@ -348,7 +324,8 @@ rows! {
         /// Of the wide layout.
         bytes_per_object: f64,
         collapsed_sah: f64,
-        /// Nodes and blocks of triangles that a random line through the root's box is expected to visit.
+        /// Nodes and blocks of triangles that a random line through the root's box is expected to
+        /// visit.
         layout_over_root: f64,
     }
 
@@ -379,11 +356,12 @@ rows! {
         internal_area: f64,
         /// The greatest proven lower bound known of `internal_area`.
         lower_bound: Option<f64>,
-        /// What made the tree.
+        /// The command that made the tree.
         command: String,
     }
 
-    /// One row of `best_known.csv` and `references.csv`: what gaps are measured from. Trees are binary, with one object per leaf.
+    /// One row of `best_known.csv` and `references.csv`: what gaps are measured from. Trees are
+    /// binary, with one object per leaf.
     ReferenceRow in "references.csv" {
         scene: String,
         objects: usize,

@@ -1,9 +1,10 @@
-//! The folder of one experiment's results: one writer at a time, finished runs kept one by one, files replaced whole.
+//! The folder of one experiment's results: one writer at a time, finished runs kept one by one,
+//! files replaced whole.
 //!
-//! Until all runs are finished, each finished one is a folder `.partial/NNNNNN/` with its own rows. The folder is written
-//! under another name, synced, and renamed, so that every finished run survives a crash, a full disk or `kill -9`. At
-//! the end the rows of all runs are joined in the order of the spec, so that their bytes do not depend on the order in
-//! which runs finish.
+//! Until all runs are finished, each finished one is a folder `.partial/NNNNNN/` with its own rows.
+//! The folder is written under another name, synced, and renamed, so that every finished run
+//! survives a crash, a full disk or `kill -9`. At the end the rows of all runs are joined in the
+//! order of the spec, so that their bytes do not depend on the order in which runs finish.
 
 use super::lock::lock_folder;
 use super::{Row, read_if_any, to_bytes};
@@ -14,7 +15,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-/// The file in which a kept run lists its other files, one a line: name, number of bytes and checksum.
+/// The file in which a kept run lists its other files, one a line: name, number of bytes and
+/// checksum.
 const CONTENTS: &str = "contents.txt";
 
 /// The rows of one finished run: one CSV file for every kind of rows that it has.
@@ -57,7 +59,7 @@ impl FinishedRun {
         }
     }
 
-    /// What [`CONTENTS`] has to say.
+    /// Returns the text of the file [`CONTENTS`].
     fn contents(&self) -> String {
         let line = |(name, bytes): (&String, &Vec<u8>)| {
             format!("{name} {} {:016x}\n", bytes.len(), fnv1a(bytes.iter().copied()))
@@ -78,7 +80,7 @@ impl FinishedRun {
     }
 }
 
-/// What happens to the results that are there already.
+/// The treatment of results that exist already.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Existing {
     /// They stay. A repetition of the same runs goes beside them; other runs are refused.
@@ -90,7 +92,7 @@ pub enum Existing {
     Replace,
 }
 
-/// What `.partial/` is called while it is removed.
+/// The name of `.partial/` while it is removed.
 const REMOVED: &str = ".removed";
 
 /// An experiment's folder, locked until dropped.
@@ -102,8 +104,9 @@ pub struct Store {
 }
 
 impl Store {
-    /// Creates and locks `folder`. If the finished runs of an interrupted experiment are there, `existing` decides whether
-    /// they are resumed, which takes the same resolved spec, discarded, or the reason to refuse.
+    /// Creates and locks `folder`. If the finished runs of an interrupted experiment are there,
+    /// `existing` decides whether they are resumed, which takes the same resolved spec, discarded,
+    /// or the reason to refuse.
     pub fn open(folder: &Path, resolved: &str, existing: Existing) -> Result<Self, Error> {
         let (folder, partial) = (folder.to_owned(), folder.join(".partial"));
         fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
@@ -174,7 +177,8 @@ impl Store {
         fs::rename(&unfinished, &part).map_err(Error::io(&part, "rename the folder"))
     }
 
-    /// The rows of one kind that run `index`, which has been kept, left; none if it left no such rows.
+    /// The rows of one kind that run `index`, which has been kept, left; none if it left no such
+    /// rows.
     pub fn rows<R: Row>(&self, index: usize) -> Result<Vec<R>, Error> {
         read_if_any(&self.part(index))
     }
@@ -225,9 +229,11 @@ impl Store {
         Ok(files::write(&self.partial.join("provenance.toml"), provenance.as_bytes())?)
     }
 
-    /// Removes what only an interrupted experiment needs. The lock file stays: removing it would race.
+    /// Removes what only an interrupted experiment needs. The lock file stays: removing it would
+    /// race.
     pub fn finish(self) -> Result<(), Error> {
-        // Renamed first, so that an interrupted removal leaves nothing that looks like finished runs.
+        // Renamed first, so that an interrupted removal leaves nothing that looks like finished
+        // runs.
         let removed = self.folder.join(REMOVED);
         fs::rename(&self.partial, &removed)
             .map_err(Error::io(&self.partial, "rename the folder"))?;

@@ -21,8 +21,8 @@ struct Rows {
 
 /// Lists the differences between the folders `fresh` and `committed`, one line each.
 ///
-/// The rows of `skipped_scenes` are not compared. If any scene was skipped, neither are figures, nor
-/// the rows of files without a column `scene`, which summarise all scenes.
+/// The rows of `skipped_scenes` are not compared. If any scene was skipped, neither are figures,
+/// nor the rows of files without a column `scene`, which summarise all scenes.
 pub fn compare(
     fresh: &Path,
     committed: &Path,

@@ -1,6 +1,5 @@
 //! Executes an experiment: opens its folder, performs its measurements and makes its reports.
 
-use super::clocked::ClockedPeers;
 use super::finish::{Summary, conclude};
 use super::job::Job;
 use super::measurement::{Measurement, Trees, Work};
@@ -73,9 +72,6 @@ fn measurements(experiment: &Experiment) -> Vec<Box<dyn Measurement + Sync + '_>
     if let Some(config) = experiment.judges() {
         measurements.push(Box::new(Judging(config)));
     }
-    if let Some(program) = &experiment.tinybvh {
-        measurements.push(Box::new(ClockedPeers(program)));
-    }
     measurements
 }
 
@@ -108,7 +104,6 @@ fn run(
     remarks.dedup();
     let mut work = Work {
         experiment,
-        scenes: &scenes,
         jobs: &jobs,
         assigned,
         store: &store,

@@ -1,8 +1,8 @@
 //! From finished runs to results: joins their rows, updates the references and makes the reports.
 
 use crate::Error;
+use crate::report;
 use crate::report::output::Output;
-use crate::report::{self, clocked};
 use crate::rows::store::{self, Existing, Store};
 use crate::run::provenance::Provenance;
 use crate::run::reference::{self, BestKnown};
@@ -63,9 +63,9 @@ fn report(
     provenance: &Provenance,
     store: &Store,
 ) -> Result<String, Error> {
-    store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
     reference::update(resolved, best_known, &provenance.revision, store)?;
     let made = outputs(&resolved.experiment, store.folder())?;
+    store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
     // Only the rows of quick variants are ever read, so they need no figures.
     report::write_all(&made, store, !resolved.experiment.quick)
 }
@@ -74,7 +74,6 @@ fn report(
 pub fn outputs(experiment: &Experiment, folder: &Path) -> Result<Vec<Output>, Error> {
     match &experiment.suite {
         Some(measure) => Ok(vec![measure.output(folder)?]),
-        None if experiment.is_by_the_clock() => Ok(vec![clocked::output(folder)?]),
         None => report::outputs(&experiment.reports, folder),
     }
 }
@@ -117,7 +116,9 @@ pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     // The rows are still the output of the program that ran, so its provenance is kept.
     let path = folder.join("provenance.toml");
     let provenance: Provenance = toml::from_str(&read_text(&path)?).map_err(Error::toml(&path))?;
-    let text = report(&resolved, BestKnown::Improve(out), &provenance, &store)?;
+    let made = report(&resolved, BestKnown::Improve(out), &provenance, &store);
+    // A failing report leaves finished results, not an interrupted experiment.
     store.finish()?;
+    let text = made?;
     Ok(Summary { text, skipped_scenes: vec![], remarks: vec![], folder, previous: None })
 }

@@ -6,7 +6,6 @@ use crate::Error;
 use crate::rows::store::Store;
 use crate::spec::Experiment;
 use bvh_core::Bvh;
-use bvh_scenes::Scene;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
@@ -27,7 +26,6 @@ pub(crate) trait Measurement {
 /// A running experiment, with everything that its measurements share.
 pub(crate) struct Work<'a> {
     pub experiment: &'a Experiment,
-    pub scenes: &'a [Scene],
     /// All runs of the experiment.
     pub jobs: &'a [Job<'a>],
     /// The indices of the runs of this shard: all runs, unless the experiment is split.

@@ -2,7 +2,6 @@
 
 pub mod archive;
 pub mod check;
-mod clocked;
 pub mod execute;
 pub mod finish;
 mod job;

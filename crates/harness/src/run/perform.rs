@@ -13,13 +13,13 @@ use bvh_core::cost::{Measure, Objective};
 use bvh_core::{Bvh, validate_references};
 use bvh_scenes::Scene;
 use bvh_search::{
-    Budget, Deadline, Event, Judge, Method, Observer, Outcome, Problem, SearchError, Splits,
-    StopReason, exact, lower_bound, solve,
+    Budget, Event, Judge, Method, Observer, Outcome, Problem, SearchError, Splits, StopReason,
+    exact, lower_bound, solve,
 };
 use indicatif::ProgressBar;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Computes a lower bound of the scene's internal area: the exact optimum if gaps are measured from
 /// it, otherwise the bound that the experiment requests, if any.
@@ -47,15 +47,7 @@ pub(crate) fn perform(
     }
     let Job { scene, labelled, .. } = *job;
     let seed = job.seed(experiment);
-    let limit = experiment
-        .max_seconds_of(labelled)
-        .map(Duration::from_secs_f64);
-    let stopwatch = Stopwatch {
-        watch,
-        start: Instant::now(),
-        deadline: limit.map(Deadline::after),
-        events: Mutex::default(),
-    };
+    let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
     let result = solve_or_build(experiment, job, seed, &stopwatch);
     // Cancelling kills the external program, which is not an error.
     if watch.cancelled() {
@@ -71,11 +63,6 @@ pub(crate) fn perform(
     let solved = Solved { experiment, job, seed, outcome: &outcome, seconds };
     let run = solved.run_row();
     let mut finished = FinishedRun::default();
-    // The rows of a time-limited run differ from run to run, so they go to a timing file.
-    if experiment.is_by_the_clock() {
-        finished.add(&[solved.clocked_row(run)])?;
-        return Ok(Some((finished, outcome.tree)));
-    }
     let bounds = if job.first_of_scene { bound(experiment, scene, watch)? } else { None };
     let (renders, render_times) = match &experiment.render {
         Some(config) => config.measure(scene, &outcome.tree, &run, seconds, job.first_of_scene)?,
@@ -198,11 +185,10 @@ impl Observer for Watch<'_> {
     }
 }
 
-/// Records the times of a run's events, and ends the run at its deadline, if it has one.
+/// Records the times of a run's events.
 struct Stopwatch<'a> {
     watch: &'a Watch<'a>,
     start: Instant,
-    deadline: Option<Deadline>,
     events: Mutex<Vec<f64>>,
 }
 
@@ -231,12 +217,5 @@ impl Observer for Stopwatch<'_> {
 
     fn cancelled(&self) -> bool {
         self.watch.cancelled()
-            || self
-                .deadline
-                .is_some_and(|deadline| deadline.has_passed())
-    }
-
-    fn progress(&self) -> Option<f64> {
-        self.deadline.map(|deadline| deadline.fraction())
     }
 }

@@ -6,7 +6,7 @@ use crate::Error;
 use crate::measure::layout::{collapsed_sah, widened};
 use crate::measure::ray_cost::{Config, TestRays, TrainedOn, test_rays};
 use crate::rows::store::Store;
-use crate::rows::{LayoutRow, RunTestRow, TestRow, TestTimeRow, VisitRow};
+use crate::rows::{LayoutRow, RunTestRow, TestRow, VisitRow};
 use crate::spec::Experiment;
 use bvh_core::cost::{self, Objective};
 use bvh_core::{Bvh, WideBvh};
@@ -47,7 +47,6 @@ type Run<'a> = (&'a Job<'a>, &'a Bvh);
 #[derive(Default)]
 struct Rows {
     tests: Vec<TestRow>,
-    times: Vec<TestTimeRow>,
     layouts: Vec<LayoutRow>,
     visits: Vec<VisitRow>,
     run_tests: Vec<RunTestRow>,
@@ -61,14 +60,11 @@ impl Rows {
             store.write_rows(&self.visits)?;
             store.write_rows(&self.run_tests)?;
         }
-        if !self.times.is_empty() {
-            store.write_rows(&self.times)?;
-        }
         Ok(())
     }
 
-    /// Counts the tests of the same rays in the trees of all runs on a scene, and times the rays in
-    /// the trees of first runs. Each tree is laid out for the rays that it was trained on.
+    /// Counts the tests of the same rays in the trees of all runs on a scene. Each tree is laid out
+    /// for the rays that it was trained on.
     fn judge_scene(&mut self, config: &Config, work: &Work, runs: &[Run]) -> Result<(), Error> {
         let experiment = work.experiment;
         let repetitions = experiment.repetitions as usize;
@@ -82,16 +78,13 @@ impl Rows {
         let layouts_of_methods = layouts.chunks(repetitions);
         self.layouts.extend(
             runs.chunks(repetitions)
-                .zip(layouts_of_methods.clone())
+                .zip(layouts_of_methods)
                 .map(|(runs, layouts)| layout_row(runs, layouts)),
         );
         for &trained_on in &config.costs {
             self.visits
                 .extend(visit_rows(experiment, config, trained_on, runs)?);
         }
-        let first_layouts: Vec<&WideBvh> = layouts_of_methods
-            .map(|layouts| &layouts[0])
-            .collect();
         let seed = experiment.seed_of(&scene.name, "rays that judge trees", 0);
         for rays in test_rays(config, scene, first_tree, seed) {
             if work.watch.cancelled() {
@@ -113,21 +106,6 @@ impl Rows {
                     .zip(tests.chunks(repetitions))
                     .map(|(runs, tests)| test_row(runs[0].0, &rays, tests)),
             );
-            if config.rounds > 0 {
-                let speeds = rays.speeds(&first_layouts, config.rounds);
-                self.times
-                    .extend(
-                        runs.chunks(repetitions)
-                            .zip(speeds)
-                            .map(|(runs, million_per_s)| TestTimeRow {
-                                scene: scene.name.clone(),
-                                method: runs[0].0.labelled.label.clone(),
-                                judged_on: rays.kind.name().into(),
-                                camera: rays.camera.into(),
-                                million_per_s,
-                            }),
-                    );
-            }
         }
         Ok(())
     }

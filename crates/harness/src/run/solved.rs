@@ -2,8 +2,7 @@
 
 use super::job::Job;
 use crate::measure::empirical_cost;
-use crate::measure::layout::collapsed_sah;
-use crate::rows::{ClockRow, ClockedRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow};
+use crate::rows::{ClockRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow};
 use crate::spec::Experiment;
 use bvh_core::cost::{self, SahConstants};
 use bvh_scenes::rays::Family;
@@ -90,24 +89,6 @@ impl Solved<'_> {
         TimingRow { scene, method, seed: self.seed, repetition, threads, seconds: self.seconds }
     }
 
-    pub fn clocked_row(&self, run: RunRow) -> ClockedRow {
-        let tree = &self.outcome.tree;
-        ClockedRow {
-            scene: run.scene,
-            method: run.method,
-            seed: run.seed,
-            repetition: run.repetition,
-            threads: rayon::current_num_threads(),
-            seconds: self.seconds,
-            evaluations: run.evaluations,
-            work: run.work,
-            cost: run.cost,
-            cost_over_base: run.cost_over_base,
-            references_per_object: tree.prim_ids.len() as f64 / run.objects as f64,
-            collapsed_sah: collapsed_sah(tree),
-        }
-    }
-
     /// Returns the time of every row of the history, if a report needs it; `event_seconds` are the
     /// times of all events.
     pub fn clock_rows(&self, event_seconds: &[f64]) -> Vec<ClockRow> {
@@ -157,8 +138,8 @@ impl Solved<'_> {
     }
 }
 
-/// Returns the events that `history.csv` keeps, each with its index: the first, every improvement, and
-/// the last.
+/// Returns the events that `history.csv` keeps, each with its index: the first, every improvement,
+/// and the last.
 fn milestones(history: &[Event]) -> impl Iterator<Item = (usize, &Event)> {
     history
         .iter()

@@ -20,7 +20,6 @@ impl Measurement for Suite<'_> {
                 config
                     .execute(&experiment.scenes, &experiment.methods, store, &|| watch.cancelled())
             }
-            Measure::Precision(config) => config.execute(store),
         }
     }
 }

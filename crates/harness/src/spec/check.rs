@@ -87,9 +87,7 @@ impl Experiment {
 
     fn check_method(&self, labelled: &Labelled) -> Vec<Fault> {
         let Labelled { method, options, .. } = labelled;
-        let EntryOptions {
-            budget, max_seconds, keep, judge, for_rays, objective, references, ..
-        } = options;
+        let EntryOptions { budget, keep, judge, for_rays, objective, references, .. } = options;
         let is_ours = matches!(method, Contestant::Ours(_));
         let is_best = matches!(method, Contestant::Ours(Method::Best(_)));
         let judged = Labelled::JUDGED;
@@ -98,7 +96,6 @@ impl Experiment {
         let sized = "with a method of ours except median_cut, which compares no box sizes";
         let restricted_keys = [
             ("budget", budget.is_some(), is_ours, ours),
-            ("max_seconds", max_seconds.is_some(), is_ours, ours),
             ("keep", !keep.is_empty(), is_ours, ours),
             ("objective", objective.is_some(), is_ours, ours),
             ("for_rays", for_rays.is_some(), is_ours && method.name() != "median_cut", sized),
@@ -115,14 +112,6 @@ impl Experiment {
         if for_rays.is_some() && is_ours && self.ray_cost.is_none() {
             let accepted = "with the experiment's `ray_cost`";
             faults.push(Fault::new("for_rays", "set without `ray_cost`", accepted));
-        }
-        let mut layouts = self
-            .tracing
-            .iter()
-            .flat_map(|tracing| &tracing.layouts);
-        if for_rays.is_some() && layouts.any(|layout| layout.is_for_lines()) {
-            let found = "set together with `tracing.layouts` that have another cost of blocks";
-            faults.push(Fault::new("for_rays", found, "with other layouts, which can be for rays"));
         }
         faults.extend(self.check_library(method));
         faults
@@ -154,8 +143,8 @@ impl Experiment {
             "missing for best, which would spend {work} nodes of work per object: hours on a large \
              scene"
         );
-        let accepted = "`budget = { max_work = 300_000_000 }`, some seconds on one thread, or \
-                        `max_seconds = 10`, here or for all methods, or another `work_per_object`";
+        let accepted = "`budget = { max_work = 300_000_000 }`, some seconds on one thread, here or \
+                        for all methods, or another `work_per_object`";
         indices
             .iter()
             .zip(&self.methods)
@@ -171,44 +160,7 @@ impl Experiment {
         let Contestant::Ours(Method::Best(config)) = &labelled.method else { return false };
         config.work_per_object == best::Config::default().work_per_object
             && self.budget_of(labelled) == Budget::UNLIMITED
-            && self.max_seconds_of(labelled).is_none()
             && self.suite.is_none()
-    }
-
-    /// Finds outputs that a time-limited run cannot produce: everything that must be reproducible.
-    pub(super) fn check_clock(&self) -> Vec<Fault> {
-        if !self.is_by_the_clock() {
-            let found = "set without `max_seconds`";
-            let accepted = "with a budget in seconds, to cost its trees for comparison";
-            let fault = Fault::new("tinybvh", found, accepted);
-            return self
-                .tinybvh
-                .iter()
-                .map(|_| fault.clone())
-                .collect();
-        }
-        let accepted = "none, or a budget of `max_work`: time-limited runs have rows only in \
-                        timing_runs.csv";
-        let repeatable = [
-            ("suite", self.suite.is_some()),
-            ("lower_bound", self.lower_bound.is_some()),
-            ("rays", !self.rays.is_empty()),
-            ("render", self.render.is_some()),
-            ("tracing", self.tracing.is_some()),
-            ("ray_cost", self.ray_cost.is_some()),
-            ("reports", !self.reports.is_empty()),
-        ];
-        let mut faults: Vec<Fault> = repeatable
-            .iter()
-            .filter(|(_, is_set)| *is_set)
-            .map(|(key, _)| Fault::new(key, "set together with `max_seconds`", accepted))
-            .collect();
-        if !self.sequential {
-            let found = "false together with `max_seconds`";
-            let accepted = "true: parallel runs slow each other down";
-            faults.push(Fault::new("sequential", found, accepted));
-        }
-        faults
     }
 
     /// Finds labels in reports that no method has. `indices` are the reports' places in the spec.
@@ -233,7 +185,7 @@ impl Experiment {
 
 /// Returns true if a key that limits the runs of `entry` has a fault.
 fn has_faulty_limit(entry: &str, faults: &[Fault]) -> bool {
-    ["budget", "max_seconds", "work_per_object"]
+    ["budget", "work_per_object"]
         .iter()
         .flat_map(|key| [(*key).to_owned(), format!("{entry}.{key}")])
         .any(|key| {

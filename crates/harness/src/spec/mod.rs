@@ -68,13 +68,6 @@ config! {
         objective: Objective;
         /// Limits of every run; by default none.
         budget: Budget = Budget::UNLIMITED;
-        /// Seconds that every run of a method of ours may take, in addition to its `budget`. Such
-        /// rows differ from run to run: they are in `timing_runs.csv` instead of `runs.csv`, with
-        /// the trees' costs after the best collapse of leaves. Default none.
-        max_seconds: Option<f64>, in 0.001..=1e6;
-        /// The program of `scripts/ray-peers` that builds tinybvh's trees with spatial splits, to
-        /// cost them for comparison with time-limited runs; ignored if it does not exist.
-        tinybvh: Option<PathBuf>;
         /// Effort of a lower bound of every scene's internal area; by default no bound is computed.
         lower_bound: Option<u32>;
         /// The methods, at least one; with `suite`, none for every method of the registry.
@@ -173,24 +166,6 @@ impl Experiment {
             max_evaluations: max_evaluations.into_iter().flatten().min(),
             max_work: max_work.into_iter().flatten().min(),
         }
-    }
-
-    /// The seconds that a method's runs may take.
-    pub fn max_seconds_of(&self, labelled: &Labelled) -> Option<f64> {
-        // Nothing can end a library's build, and an external program has its own timeout.
-        let is_ours = matches!(labelled.method, Contestant::Ours(_));
-        let common = self.max_seconds.filter(|_| is_ours);
-        [common, labelled.options.max_seconds]
-            .into_iter()
-            .flatten()
-            .reduce(f64::min)
-    }
-
-    /// Returns true if the clock ends some runs. Only `timing*.csv` may then hold their rows.
-    pub fn is_by_the_clock(&self) -> bool {
-        self.methods
-            .iter()
-            .any(|labelled| self.max_seconds_of(labelled).is_some())
     }
 
     /// The seed of one run, of 32 bits, which every spreadsheet represents exactly.

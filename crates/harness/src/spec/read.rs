@@ -117,7 +117,6 @@ impl Experiment {
         together.extend(experiment.check_methods(&method_indices));
         together.extend(experiment.check_ends(&method_indices, &faults));
         together.extend(experiment.check_reports(&labels, &report_indices));
-        together.extend(experiment.check_clock());
         faults.extend(together);
         if faults.is_empty() { Ok(experiment) } else { Err(faults) }
     }

@@ -12,7 +12,6 @@ pub mod exact_area;
 pub mod examine;
 pub mod kernels;
 mod peers;
-pub mod precision;
 pub mod promise;
 pub mod stability;
 mod table;
@@ -35,21 +34,18 @@ pub use table::{CASES, by_id};
 pub enum Measure {
     /// Every case with every method.
     Stability(stability::Config),
-    /// Areas in f32 and f64 compared with exact areas.
-    Precision(precision::Config),
 }
 
 impl Measure {
     /// The columns of the CSV files that measurements write.
     pub fn columns() -> Vec<Columns> {
-        [stability::columns(), precision::columns()].concat()
+        stability::columns()
     }
 
     /// Makes tables and figures from the CSV files in the folder.
     pub fn output(&self, folder: &Path) -> Result<Output, Error> {
         match self {
             Self::Stability(_) => stability::output(folder),
-            Self::Precision(_) => precision::output(folder),
         }
     }
 }
@@ -58,7 +54,6 @@ impl bvh_config::Check for Measure {
     fn faults(&self) -> Vec<OutOfRange> {
         match self {
             Self::Stability(config) => Nested.faults("stability", config),
-            Self::Precision(config) => Nested.faults("precision", config),
         }
     }
 }
