@@ -1,7 +1,5 @@
 //! The implementations of the wide layout's traversal, and which of them this processor can run.
 
-use super::vector;
-
 /// An implementation of the traversal of a [`WideBvh`](crate::WideBvh). All give the same answers, bit by bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kernel {
@@ -18,19 +16,6 @@ pub enum Kernel {
 impl Kernel {
     /// All kernels, the fastest first.
     pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Simd128, Self::Portable];
-
-    /// Whether this processor can run the kernel.
-    pub fn is_available(self) -> bool {
-        self == Self::Portable || vector::has(self)
-    }
-
-    /// The fastest kernel that this processor can run.
-    pub fn best() -> Self {
-        Self::ALL
-            .into_iter()
-            .find(|kernel| kernel.is_available())
-            .unwrap_or(Self::Portable)
-    }
 }
 
 /// Entries of the stack of a vector kernel's traversal; layouts that could need more are left to the portable kernel.

@@ -5,12 +5,14 @@
 
 mod all_hits;
 mod answer;
+mod available;
 mod batch;
 mod batches;
 mod box_ray;
 mod build;
 mod closest;
 mod coherence;
+mod crossed_leaves;
 mod in_flight;
 mod instructions;
 mod kernel;

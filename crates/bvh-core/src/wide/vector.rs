@@ -1,7 +1,7 @@
 //! A target without vector kernels.
 
-use super::all_hits::AllHits;
 use super::answer::Answers;
+use super::crossed_leaves::AllHits;
 use super::layout::WideBvh;
 use super::source::Source;
 use crate::{Coherence, Hit, Kernel, Ray};

@@ -5,8 +5,8 @@ mod lanes;
 #[cfg_attr(target_arch = "wasm32", path = "wasm.rs")]
 mod registers;
 
-use super::all_hits::AllHits;
 use super::answer::Answers;
+use super::crossed_leaves::AllHits;
 use super::instructions::{Instructions, Pending};
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;

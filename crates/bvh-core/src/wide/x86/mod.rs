@@ -5,8 +5,8 @@ mod avx512;
 mod lanes;
 mod sort;
 
-use super::all_hits::AllHits;
 use super::answer::Answers;
+use super::crossed_leaves::AllHits;
 use super::layout::WideBvh;
 use super::source::Source;
 use crate::{Coherence, Hit, Kernel, Ray};
@@ -113,7 +113,7 @@ macro_rules! entry_points {
         pub(crate) unsafe fn all_hits(
             wide: &WideBvh,
             ray: &crate::Ray,
-            leaves: &mut crate::wide::all_hits::AllHits,
+            leaves: &mut crate::wide::crossed_leaves::AllHits,
         ) -> bool {
             // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
             unsafe { crate::wide::one_ray::traverse::<$instructions, true>(wide, ray, leaves) }
