@@ -73,6 +73,33 @@ typedef struct {
     uint32_t object;
 } BvhHit;
 
+// A hit with the surface there. Without a hit, `t` is infinity, `object` is UINT32_MAX, and all other
+// numbers are 0.
+typedef struct {
+    // The distance, in multiples of the direction's length.
+    float t;
+    // The index of the triangle.
+    uint32_t object;
+    // The weight of the triangle's second corner.
+    float u;
+    // The weight of the triangle's third corner.
+    float v;
+    // The unit vector perpendicular to the triangle, on the side from which its corners run
+    // counterclockwise.
+    float normal[3];
+} BvhSurfaceHit;
+
+// The point of the triangles that is closest to a given point. Without one, `distance` is infinity,
+// `object` is UINT32_MAX, and the point is NaN.
+typedef struct {
+    // The closest point.
+    double point[3];
+    // Its distance from the given point.
+    double distance;
+    // The index of the triangle; of several at the same distance, the lowest.
+    uint32_t object;
+} BvhClosest;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -93,6 +120,12 @@ BvhTree *bvh_tree_from_boxes(const float *boxes, size_t count, double seconds);
 //
 // `corners` points to 9 * `count` floats.
 BvhTree *bvh_tree_from_triangles(const float *corners, size_t count, double seconds, double references);
+
+// Searches like `bvh_tree_from_triangles` for the best tree for recorded rays. Each of `ray_count`
+// rays is 6 floats: its origin, then its hit or a point outside the scene.
+//
+// `corners` points to 9 * `count` floats, and `rays` to 6 * `ray_count` floats.
+BvhTree *bvh_tree_for_rays(const float *corners, size_t count, double seconds, double references, const float *rays, size_t ray_count);
 
 // Improves a tree for about `seconds`, 0 or more. Arrays from `bvh_tree_nodes` and
 // `bvh_tree_object_ids` become invalid.
@@ -166,6 +199,33 @@ BvhStatus bvh_tracer_nearest_hits(const BvhTracer *tracer, const BvhRay *rays, s
 //
 // `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
 BvhStatus bvh_tracer_any_hits(const BvhTracer *tracer, const BvhRay *rays, size_t count, int32_t coherent, uint8_t *hits);
+
+// Writes the nearest hits of `count` rays with the surfaces there to `hits`. `coherent` has the meaning
+// that it has in `bvh_tracer_nearest_hits`.
+//
+// `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
+BvhStatus bvh_tracer_surface_hits(const BvhTracer *tracer, const BvhRay *rays, size_t count, int32_t coherent, BvhSurfaceHit *hits);
+
+// Writes all hits of `count` rays to `hits`, ray after ray and the nearest first, the number of each
+// ray's hits to `counts`, and the number of all hits to `total`. Each crossing of the surface counts
+// once, although triangles share edges and corners. Only the first `capacity` hits are written; if
+// `total` is greater, call again with room for them.
+//
+// `tracer` is a tracer; `rays` and `counts` point to `count` elements each, `hits` points to `capacity`
+// elements, and `total` points to a size.
+BvhStatus bvh_tracer_all_hits(const BvhTracer *tracer, const BvhRay *rays, size_t count, BvhHit *hits, size_t capacity, uint32_t *counts, size_t *total);
+
+// Writes the closest points of the triangles to `count` points, 3 floats each. Triangles without area do
+// not count.
+//
+// `tracer` is a tracer; `points` points to 3 * `count` floats, and `closest` to `count` elements.
+BvhStatus bvh_tracer_closest_points(const BvhTracer *tracer, const float *points, size_t count, BvhClosest *closest);
+
+// Writes to `inside` whether each of `count` points, 3 floats each, is inside the mesh: 1 or 0. The
+// answer is exact for closed meshes; a point on the surface may count as either.
+//
+// `tracer` is a tracer; `points` points to 3 * `count` floats, and `inside` to `count` bytes.
+BvhStatus bvh_tracer_contains(const BvhTracer *tracer, const float *points, size_t count, uint8_t *inside);
 
 // Frees a tracer. Ignores null.
 //

@@ -84,6 +84,87 @@ fn trees_and_hits_equal_the_results_of_the_rust_crates() {
     }
 }
 
+#[test]
+fn surfaces_all_hits_closest_points_and_insides_equal_the_results_of_the_rust_crates() {
+    let corners = corners(40);
+    let triangles = bytes_as_triangles(&corners);
+    let segments: Vec<f32> = (0..60)
+        .flat_map(|i| [i as f32 * 0.5, 0.2, -1.0, i as f32 * 0.5, 0.2, 30.0])
+        .collect();
+    let rays: Vec<BvhRay> = (0..1500)
+        .map(|i| BvhRay {
+            origin: [i as f32 * 0.03, 0.2, -1.0],
+            t_min: 0.0,
+            direction: [0.1, 0.0, 1.0],
+            t_max: f32::INFINITY,
+        })
+        .collect();
+    let none = BvhSurfaceHit { t: 0.0, object: 0, u: 0.0, v: 0.0, normal: [0.0; 3] };
+    let mut surfaces = vec![none; rays.len()];
+    let mut hits = vec![BvhHit { t: 0.0, object: 0 }; 9000];
+    let mut counts = vec![9; rays.len()];
+    let mut total = 0;
+    let points: Vec<f32> = rays.iter().flat_map(|ray| ray.origin).collect();
+    let far = BvhClosest { point: [0.0; 3], distance: 0.0, object: 0 };
+    let mut closest = vec![far; rays.len()];
+    let mut inside = vec![9u8; rays.len()];
+    // SAFETY: every pointer comes with its array's length.
+    unsafe {
+        let tree = bvh_tree_for_rays(corners.as_ptr(), 40, 0.02, 1.0, segments.as_ptr(), 60);
+        let tracer = bvh_tracer_new(tree);
+        let count = rays.len();
+        let status =
+            bvh_tracer_surface_hits(tracer, rays.as_ptr(), count, 0, surfaces.as_mut_ptr());
+        assert_eq!(status, BvhStatus::Ok);
+        let status =
+            bvh_tracer_closest_points(tracer, points.as_ptr(), count, closest.as_mut_ptr());
+        assert_eq!(status, BvhStatus::Ok);
+        let status = bvh_tracer_contains(tracer, points.as_ptr(), count, inside.as_mut_ptr());
+        assert_eq!(status, BvhStatus::Ok);
+        // Without room for all hits, their number is written nevertheless.
+        for capacity in [10, 9000] {
+            let status = bvh_tracer_all_hits(
+                tracer,
+                rays.as_ptr(),
+                count,
+                hits.as_mut_ptr(),
+                capacity,
+                counts.as_mut_ptr(),
+                &mut total,
+            );
+            assert_eq!(status, BvhStatus::Ok);
+        }
+        bvh_tracer_free(tracer);
+        bvh_tree_free(tree);
+    }
+    let mut first = 0;
+    for (index, ray) in rays.iter().enumerate() {
+        let ray = Ray::half_line(ray.origin, ray.direction).unwrap();
+        let crossed = triangles
+            .iter()
+            .filter(|triangle| triangle.crossing(&ray).is_some())
+            .count();
+        assert_eq!(counts[index] as usize, crossed);
+        let nearest = &hits[first..first + crossed];
+        assert!(nearest.is_sorted_by(|a, b| a.t <= b.t));
+        first += crossed;
+        let surface = surfaces[index];
+        if let Some(triangle) = triangles.get(surface.object as usize) {
+            let [a, b, c] = triangle.0;
+            let point = a + surface.u * (b - a) + surface.v * (c - a);
+            assert!(point.distance(ray.at(surface.t)) < 1e-4);
+            assert_eq!(Some(Vec3::from(surface.normal)), triangle.normal());
+        } else {
+            assert_eq!(surface, BvhSurfaceHit { t: f32::INFINITY, object: u32::MAX, ..none });
+        }
+        let found = triangles[closest[index].object as usize].closest_point(ray.origin());
+        assert_eq!(closest[index].point, found.to_array());
+        assert_eq!(inside[index], 0);
+    }
+    assert_eq!(total, first);
+    assert!(total > 100);
+}
+
 fn bytes_as_triangles(corners: &[f32]) -> Vec<Triangle> {
     let (points, _) = corners.as_chunks::<3>();
     let (triangles, _) = points.as_chunks::<3>();

@@ -1,11 +1,14 @@
-//! Tracers: triangles in the wide layout, which answer batches of rays.
+//! Tracers: triangles in the wide layout, which answer batches of rays and points.
 
 use crate::failure::{BvhStatus, Failure, given, made, slice, slice_mut, status};
 use crate::tree::BvhTree;
 use bvh_search::prelude::*;
 
 /// Triangles in the wide layout. Any number of threads may use a tracer at the same time.
-pub struct BvhTracer(WideBvh);
+pub struct BvhTracer {
+    wide: WideBvh,
+    triangles: Vec<Triangle>,
+}
 
 /// The points `origin` + t * `direction` with `t_min` <= t <= `t_max`. The direction may have any
 /// length except 0; `t_min` is 0 or more; `t_max` may be infinite.
@@ -33,6 +36,37 @@ pub struct BvhHit {
     pub object: u32,
 }
 
+/// A hit with the surface there. Without a hit, `t` is infinity, `object` is UINT32_MAX, and all other
+/// numbers are 0.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BvhSurfaceHit {
+    /// The distance, in multiples of the direction's length.
+    pub t: f32,
+    /// The index of the triangle.
+    pub object: u32,
+    /// The weight of the triangle's second corner.
+    pub u: f32,
+    /// The weight of the triangle's third corner.
+    pub v: f32,
+    /// The unit vector perpendicular to the triangle, on the side from which its corners run
+    /// counterclockwise.
+    pub normal: [f32; 3],
+}
+
+/// The point of the triangles that is closest to a given point. Without one, `distance` is infinity,
+/// `object` is UINT32_MAX, and the point is NaN.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BvhClosest {
+    /// The closest point.
+    pub point: [f64; 3],
+    /// Its distance from the given point.
+    pub distance: f64,
+    /// The index of the triangle; of several at the same distance, the lowest.
+    pub object: u32,
+}
+
 /// Creates a tracer of a tree over triangles. The tracer is independent of the tree: the tree may
 /// be freed, and later improvements do not change the tracer.
 ///
@@ -42,12 +76,11 @@ pub unsafe extern "C" fn bvh_tracer_new(tree: *const BvhTree) -> *mut BvhTracer 
     made(|| {
         // SAFETY: the caller keeps the tree alive and unchanged during the call.
         let owned = &unsafe { given("tree", tree) }?.owned;
-        let Some(triangles) = owned.triangles() else {
+        let (Some(triangles), Some(wide)) = (owned.triangles(), owned.layout()) else {
             return Err(Failure::invalid("tree is over boxes; accepted: a tree over triangles"));
         };
-        WideBvh::new(owned.tree(), triangles)
-            .map(BvhTracer)
-            .map_err(Failure::invalid)
+        let wide = wide.map_err(Failure::invalid)?;
+        Ok(BvhTracer { wide, triangles: triangles.to_vec() })
     })
 }
 
@@ -75,7 +108,7 @@ pub unsafe extern "C" fn bvh_tracer_nearest_hits(
         in_batches(rays, |start, rays| {
             let found = &mut found[..rays.len()];
             tracer
-                .0
+                .wide
                 .nearest_hits(rays, found, coherence(coherent));
             for (to, &Hit { t, object }) in hits[start..].iter_mut().zip(&*found) {
                 *to = BvhHit { t, object };
@@ -107,12 +140,168 @@ pub unsafe extern "C" fn bvh_tracer_any_hits(
         in_batches(rays, |start, rays| {
             let found = &mut found[..rays.len()];
             tracer
-                .0
+                .wide
                 .any_hits(rays, found, coherence(coherent));
             for (to, &hit) in hits[start..].iter_mut().zip(&*found) {
                 *to = u8::from(hit);
             }
         })
+    })
+}
+
+/// Writes the nearest hits of `count` rays with the surfaces there to `hits`. `coherent` has the meaning
+/// that it has in `bvh_tracer_nearest_hits`.
+///
+/// `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvh_tracer_surface_hits(
+    tracer: *const BvhTracer,
+    rays: *const BvhRay,
+    count: usize,
+    coherent: i32,
+    hits: *mut BvhSurfaceHit,
+) -> BvhStatus {
+    status(|| {
+        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
+        let tracer = unsafe { given("tracer", tracer) }?;
+        // SAFETY: `rays` points to `count` elements that nobody changes during the call.
+        let rays = unsafe { slice("rays", rays, count) }?;
+        // SAFETY: `hits` points to `count` elements that nobody else uses during the call.
+        let hits = unsafe { slice_mut("hits", hits, count) }?;
+        let mut found = [Hit::MISS; BATCH];
+        in_batches(rays, |start, rays| {
+            let found = &mut found[..rays.len()];
+            tracer
+                .wide
+                .nearest_hits(rays, found, coherence(coherent));
+            for ((to, ray), &Hit { t, object }) in hits[start..].iter_mut().zip(rays).zip(&*found) {
+                let triangle = tracer.triangles.get(object as usize);
+                let weights = triangle.and_then(|triangle| triangle.barycentrics(ray));
+                let normal = triangle.and_then(Triangle::normal);
+                let [_, u, v] = weights
+                    .unwrap_or_default()
+                    .map(|weight| weight as f32);
+                *to = BvhSurfaceHit {
+                    t,
+                    object,
+                    u,
+                    v,
+                    normal: normal.unwrap_or_default().to_array(),
+                };
+            }
+        })
+    })
+}
+
+/// Writes all hits of `count` rays to `hits`, ray after ray and the nearest first, the number of each
+/// ray's hits to `counts`, and the number of all hits to `total`. Each crossing of the surface counts
+/// once, although triangles share edges and corners. Only the first `capacity` hits are written; if
+/// `total` is greater, call again with room for them.
+///
+/// `tracer` is a tracer; `rays` and `counts` point to `count` elements each, `hits` points to `capacity`
+/// elements, and `total` points to a size.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvh_tracer_all_hits(
+    tracer: *const BvhTracer,
+    rays: *const BvhRay,
+    count: usize,
+    hits: *mut BvhHit,
+    capacity: usize,
+    counts: *mut u32,
+    total: *mut usize,
+) -> BvhStatus {
+    status(|| {
+        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
+        let tracer = unsafe { given("tracer", tracer) }?;
+        // SAFETY: `rays` points to `count` elements that nobody changes during the call.
+        let rays = unsafe { slice("rays", rays, count) }?;
+        // SAFETY: `hits` points to `capacity` elements that nobody else uses during the call.
+        let hits = unsafe { slice_mut("hits", hits, capacity) }?;
+        // SAFETY: `counts` points to `count` elements that nobody else uses during the call.
+        let counts = unsafe { slice_mut("counts", counts, count) }?;
+        // SAFETY: `total` points to a size that nobody else uses during the call.
+        let total = unsafe { slice_mut("total", total, 1) }?;
+        let mut found = Vec::new();
+        let mut written = 0;
+        in_batches(rays, |start, rays| {
+            found.clear();
+            let counts = &mut counts[start..start + rays.len()];
+            tracer.wide.all_hits_of(rays, &mut found, counts);
+            let room = hits.get_mut(written..).unwrap_or_default();
+            for (to, &Hit { t, object }) in room.iter_mut().zip(&found) {
+                *to = BvhHit { t, object };
+            }
+            written += found.len();
+        })?;
+        total[0] = written;
+        Ok(())
+    })
+}
+
+/// Writes the closest points of the triangles to `count` points, 3 floats each. Triangles without area do
+/// not count.
+///
+/// `tracer` is a tracer; `points` points to 3 * `count` floats, and `closest` to `count` elements.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvh_tracer_closest_points(
+    tracer: *const BvhTracer,
+    points: *const f32,
+    count: usize,
+    closest: *mut BvhClosest,
+) -> BvhStatus {
+    status(|| {
+        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
+        let tracer = unsafe { given("tracer", tracer) }?;
+        // SAFETY: `points` points to 3 floats for each of `count` points.
+        let points = unsafe { slice("points", points.cast::<Vec3>(), count) }?;
+        // SAFETY: `closest` points to `count` elements that nobody else uses during the call.
+        let closest = unsafe { slice_mut("closest", closest, count) }?;
+        let mut found = [None; BATCH];
+        for (points, closest) in points
+            .chunks(BATCH)
+            .zip(closest.chunks_mut(BATCH))
+        {
+            let found = &mut found[..points.len()];
+            tracer.wide.closest_points(points, found);
+            for (to, closest) in closest.iter_mut().zip(&*found) {
+                *to = BvhClosest {
+                    point: closest.map_or([f64::NAN; 3], |closest| closest.point.to_array()),
+                    distance: closest.map_or(f64::INFINITY, |closest| closest.distance),
+                    object: closest.map_or(u32::MAX, |closest| closest.object),
+                };
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Writes to `inside` whether each of `count` points, 3 floats each, is inside the mesh: 1 or 0. The
+/// answer is exact for closed meshes; a point on the surface may count as either.
+///
+/// `tracer` is a tracer; `points` points to 3 * `count` floats, and `inside` to `count` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvh_tracer_contains(
+    tracer: *const BvhTracer,
+    points: *const f32,
+    count: usize,
+    inside: *mut u8,
+) -> BvhStatus {
+    status(|| {
+        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
+        let tracer = unsafe { given("tracer", tracer) }?;
+        // SAFETY: `points` points to 3 floats for each of `count` points.
+        let points = unsafe { slice("points", points.cast::<Vec3>(), count) }?;
+        // SAFETY: `inside` points to `count` bytes that nobody else uses during the call.
+        let inside = unsafe { slice_mut("inside", inside, count) }?;
+        let mut found = [false; BATCH];
+        for (points, inside) in points.chunks(BATCH).zip(inside.chunks_mut(BATCH)) {
+            let found = &mut found[..points.len()];
+            tracer.wide.contains(points, found);
+            for (to, &is_inside) in inside.iter_mut().zip(&*found) {
+                *to = u8::from(is_inside);
+            }
+        }
+        Ok(())
     })
 }
 

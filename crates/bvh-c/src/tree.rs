@@ -3,7 +3,7 @@
 use crate::failure::{BvhStatus, Failure, array, given, given_mut, made, slice, status};
 use bvh_search::bvh_core::{FirstCountNode, Primitives, cost::Objective, cost::SahConstants};
 use bvh_search::prelude::*;
-use bvh_search::{Objects, Observer, OwnedTree};
+use bvh_search::{Objects, Observer, Options, OwnedTree};
 use std::ffi::{CStr, c_char, c_void};
 
 /// A tree with its objects. Any number of threads may read a tree at the same time. A thread that
@@ -73,12 +73,40 @@ pub unsafe extern "C" fn bvh_tree_from_triangles(
     references: f64,
 ) -> *mut BvhTree {
     made(|| {
-        if !(1.0..=16.0).contains(&references) {
-            return Err(Failure::invalid(format!("references is {references}; accepted: 1 to 16")));
-        }
+        check_references(references)?;
         // SAFETY: `corners` points to 9 floats for each of `count` triangles.
         let triangles = unsafe { triangles_of(corners, count) }?;
         found(triangles, references, seconds)
+    })
+}
+
+/// Searches like `bvh_tree_from_triangles` for the best tree for recorded rays. Each of `ray_count`
+/// rays is 6 floats: its origin, then its hit or a point outside the scene.
+///
+/// `corners` points to 9 * `count` floats, and `rays` to 6 * `ray_count` floats.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvh_tree_for_rays(
+    corners: *const f32,
+    count: usize,
+    seconds: f64,
+    references: f64,
+    rays: *const f32,
+    ray_count: usize,
+) -> *mut BvhTree {
+    made(|| {
+        // SAFETY: `corners` points to 9 floats for each of `count` triangles.
+        let triangles = unsafe { triangles_of(corners, count) }?;
+        // SAFETY: `rays` points to 6 floats for each of `ray_count` rays.
+        let rays = unsafe { slice("rays", rays.cast::<[[f32; 3]; 2]>(), ray_count) }?;
+        let rays: Vec<Segment> = rays
+            .iter()
+            .map(|&[from, to]| Segment { from, to })
+            .collect();
+        check_references(references)?;
+        let options = Options { references, rays: &rays, ..Options::default() };
+        OwnedTree::find_with(triangles, &options, &deadline(seconds)?)
+            .map(whole)
+            .map_err(Failure::invalid)
     })
 }
 
@@ -287,6 +315,13 @@ fn nodes(owned: &OwnedTree) -> Vec<BvhNode> {
         .into_iter()
         .map(|FirstCountNode { min, first, max, count }| BvhNode { min, first, max, count })
         .collect()
+}
+
+fn check_references(references: f64) -> Result<(), Failure> {
+    if (1.0..=16.0).contains(&references) {
+        return Ok(());
+    }
+    Err(Failure::invalid(format!("references is {references}; accepted: 1 to 16")))
 }
 
 fn found(objects: Objects, references: f64, seconds: f64) -> Result<BvhTree, Failure> {
